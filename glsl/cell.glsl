@@ -12,15 +12,15 @@
 // only in the fourth face, the cap: x + y <= 2 (A), x <= 1 (B), x + z <= 2 (C). 3 classes x 48 frames are the 144
 // shapes of docs/architecture.md. Faces are numbered 0: z >= 0, 1: x >= y, 2: y >= z, 3: the cap.
 //
-// Shape word, 16 bits: 0-2 sign of frame axes x, y, z; 3-4, 5-6, 7-8 cube axis behind frame axis x, y, z;
-// 9-10 class; 11-14 exponent; 15, of records, that the cell gives off light.
+// Shape word: 0-2 sign of frame axes x, y, z; 3-4, 5-6, 7-8 cube axis behind frame axis x, y, z; 9-10 class; 11 and up
+// exponent, at most 17.
 #ifndef CM_CELL_GLSL
 #define CM_CELL_GLSL
 
 #define CM_NONE 0xffffffffu
 
 CM_FN uint cm_shape_class(uint shape) { return (shape >> 9) & 3u; }
-CM_FN uint cm_shape_exponent(uint shape) { return (shape >> 11) & 15u; }
+CM_FN uint cm_shape_exponent(uint shape) { return shape >> 11; }
 // 2^exponent and 2^-exponent, exactly.
 CM_FN float cm_shape_unit(uint shape) { return uintBitsToFloat((127u + cm_shape_exponent(shape)) << 23); }
 CM_FN float cm_shape_inverse_unit(uint shape) { return uintBitsToFloat((127u - cm_shape_exponent(shape)) << 23); }
@@ -137,13 +137,44 @@ CM_FN void cm_root_cell(uint root, uint exponent, CM_OUT(vec3) v0, CM_OUT(uint) 
 }
 
 // The record, 32 bytes: links (4 neighbours across faces 0 to 3, CM_NONE outside) and
-// data: x = v0.x | v0.y << 16, y = v0.z | shape << 16 | CM_RECORD_EMITS if it gives off light (glsl/channels.glsl), z = half2(density at the centroid, gradient x),
+// data: x, y = v0 and shape, and CM_RECORD_EMITS in y if it gives off light (glsl/channels.glsl), z = half2(density at the centroid, gradient x),
 // w = half2(gradient y, z); gradient along the frame's axes per unit, density relative to the volume's maximum.
+#define CM_RECORD_EMITS 0x80000000u
+// Of cubes up to 2^15: x = v0.x | v0.y << 16, y = v0.z | shape << 16.
 CM_FN vec3 cm_record_v0(uvec4 data) {
   return vec3(float(data.x & 0xffffu), float(data.x >> 16), float(data.y & 0xffffu));
 }
-#define CM_RECORD_EMITS 0x80000000u
-CM_FN uint cm_record_shape(uvec4 data) { return data.y >> 16; }
+CM_FN uint cm_record_shape(uvec4 data) { return (data.y >> 16) & 0x7fffu; }
+
+// Of wider ones, up to 2^18, instead of v0 the corner at (1,1,1) of the frame: within the cube, and an odd multiple of
+// the cell's unit along each axis, so that it has the exponent, too. x = corner.x | corner.y << 18, y = corner.y >> 14 |
+// corner.z << 4 | frame << 22 | class << 29; of the frame the signs and the axes behind x and y.
+CM_FN bool cm_is_wide(uint root_exponent) { return root_exponent > 14u; }
+CM_FN uint cm_wide_shape(uvec4 data) {
+  uint frame = (data.y >> 22) & 0x7fu;
+  uint axis_z = 3u - ((frame >> 3) & 3u) - (frame >> 5);
+  return frame | (axis_z << 7) | (((data.y >> 29) & 3u) << 9) | (uint(findLSB(int(data.x & 0x3ffffu))) << 11);
+}
+CM_FN vec3 cm_wide_v0(uvec4 data) {
+  vec3 corner = vec3(float(data.x & 0x3ffffu), float((data.x >> 18) | ((data.y & 15u) << 14)),
+                     float((data.y >> 4) & 0x3ffffu));
+  uint shape = cm_wide_shape(data);
+  float unit = cm_shape_unit(shape);
+  return corner - cm_from_frame(vec3(unit, unit, unit), shape);
+}
+
+// Of either.
+CM_FN vec3 cm_record_v0(uvec4 data, bool wide) { return wide ? cm_wide_v0(data) : cm_record_v0(data); }
+CM_FN uint cm_record_shape(uvec4 data, bool wide) { return wide ? cm_wide_shape(data) : cm_record_shape(data); }
+// The x and y of a record's data.
+CM_FN uvec2 cm_record_place(vec3 v0, uint shape, bool wide) {
+  if (!wide) return uvec2(uint(v0.x) | (uint(v0.y) << 16), uint(v0.z) | (shape << 16));
+  float unit = cm_shape_unit(shape);
+  vec3 corner = v0 + cm_from_frame(vec3(unit, unit, unit), shape);
+  uint y = uint(corner.y);
+  return uvec2(uint(corner.x) | (y << 18),
+               (y >> 14) | (uint(corner.z) << 4) | ((shape & 0x7fu) << 22) | (cm_shape_class(shape) << 29));
+}
 
 // A ray and a cell's v0 in the cell's frame, not scaled.
 struct CmFrame {

@@ -16,9 +16,7 @@ layout(local_size_x = 64) in;
 #include "grid_places.glsl"
 #include "grid_leaves.glsl"
 
-uvec2 cm_where(vec3 v0, uint shape) {
-  return uvec2(uint(v0.x) | (uint(v0.y) << 16), uint(v0.z) | (shape << 16));
-}
+uvec2 cm_where(vec3 v0, uint shape) { return cm_record_place(v0, shape, cm_cube_is_wide()); }
 
 #if CM_STAGE == 0
 
@@ -60,16 +58,15 @@ void main() {
   uint cell_class = cm_shape_class(shape);
   vec3 v0 = cm_v0_of(cell.where);
   for (uint side = 0u; side < 2u; ++side) {
-    uvec2 where = cm_where(side == 0u ? v0 : cm_cell_vertex(v0, shape, 1u), cm_child_shape(shape, side));
+    vec3 child_v0 = side == 0u ? v0 : cm_cell_vertex(v0, shape, 1u);
     uvec4 own = uvec4(CM_NONE, CM_NONE, CM_NONE, cell.child + 1u - side);
     for (uint k = 0u; k < 2u; ++k) {
       uvec2 faces = cm_half_face(cell_class, side, k);
       uint other = cm_link(links, faces.y);
       if (other == CM_NONE) continue;
       // The neighbour is of the same diamond and splits too: its child at the same end of the edge.
-      CmTreeCell neighbour = cm_cells[other];
-      bool same = neighbour.where.x == where.x && (neighbour.where.y & 0xffffu) == (where.y & 0xffffu);
-      own = cm_with_link(own, faces.x, neighbour.child + (same ? 0u : 1u));
+      bool same = cm_v0_of(cm_cells[other].where) == child_v0;
+      own = cm_with_link(own, faces.x, cm_cells[other].child + (same ? 0u : 1u));
     }
     uvec2 faces = cm_whole_face(cell_class, side);
     uint whole = cm_link(links, faces.y);
@@ -82,7 +79,7 @@ void main() {
     CmTreeCell child;
     child.child = 0u;
     child.leaves = 1u;
-    child.where = where;
+    child.where = cm_where(child_v0, cm_child_shape(shape, side));
     cm_cells[cell.child + side] = child;
   }
 }

@@ -12,8 +12,9 @@ layout(std430, binding = CM_STORAGE_GRID_CELLS) buffer CmCells { CmTreeCell cm_c
 layout(location = 0) uniform uint cm_first;
 layout(location = 1) uniform uint cm_end;
 
-vec3 cm_v0_of(uvec2 where) { return cm_record_v0(uvec4(where, 0u, 0u)); }
-uint cm_shape_of(uvec2 where) { return where.y >> 16; }
+bool cm_cube_is_wide() { return cm_is_wide(cm_log2_size - 1u); }
+vec3 cm_v0_of(uvec2 where) { return cm_record_v0(uvec4(where, 0u, 0u), cm_cube_is_wide()); }
+uint cm_shape_of(uvec2 where) { return cm_record_shape(uvec4(where, 0u, 0u), cm_cube_is_wide()); }
 
 // The nearest half, of two as near the larger: drivers round as they like.
 uint cm_half(float value) {

@@ -2,7 +2,7 @@
 #ifndef CM_GRID_STATE_GLSL
 #define CM_GRID_STATE_GLSL
 
-#define CM_SPLIT_LEVELS 43u    // of the largest cube that there can be
+#define CM_SPLIT_LEVELS 52u    // of the largest cube that there can be
 #define CM_PRIORITIES 65536u
 
 struct CmGridState {

@@ -63,8 +63,9 @@ CmFaces cm_faces(uvec3 cell, vec3 p) {
   CmFaces faces;
 #if CM_MARCH == 0
   uvec4 data = cm_record(cell.x, 1u);
-  vec3 v0 = cm_record_v0(data);
-  uint shape = cm_record_shape(data);
+  bool wide = cm_grid_is_wide();
+  vec3 v0 = cm_record_v0(data, wide);
+  uint shape = cm_record_shape(data, wide);
   uint cell_class = cm_shape_class(shape);
   float unit = cm_shape_unit(shape);
   vec3 normal[4] = vec3[4](vec3(0, 0, 1), vec3(1, -1, 0), vec3(0, 1, -1),

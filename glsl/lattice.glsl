@@ -38,13 +38,17 @@ CM_FN ivec3 cm_block_corner(uvec2 block) {
 }
 CM_FN uint cm_block_scale(uvec2 block) { return block.y >> 16; }
 
-// Of a cube of the octree whose cells split, three words: its corner, its log2 size, how many levels of its own cells
-// have priorities, and where these begin.
+// Of a cube of the octree whose cells split, three words: its corner, in bricks, its log2 size, how many levels of its
+// own cells have priorities, and where these begin.
 CM_FN ivec3 cm_node_corner(uvec3 node) {
-  return ivec3(int(node.x & 0xffffu), int(node.x >> 16), int(node.y & 0xffffu));
+  return ivec3(int(node.x & 0xffffu), int(node.x >> 16), int(node.y & 0xffffu)) * 8;
 }
-CM_FN uint cm_node_size(uvec3 node) { return (node.y >> 16) & 15u; }
-CM_FN uint cm_node_levels(uvec3 node) { return node.y >> 20; }
+CM_FN uint cm_node_size(uvec3 node) { return (node.y >> 16) & 31u; }
+CM_FN uint cm_node_levels(uvec3 node) { return node.y >> 21; }
+CM_FN uvec2 cm_node_words(ivec3 corner, uint log2_size, uint levels) {
+  uvec3 brick = uvec3(corner >> ivec3(3));
+  return uvec2(brick.x | (brick.y << 16), brick.z | (log2_size << 16) | (levels << 21));
+}
 
 // Of a vertex that is an odd multiple of 2^octave in `odd` of its coordinates: how many cells split there, in a cube of
 // 2^log2_size voxels.

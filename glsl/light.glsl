@@ -156,11 +156,12 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   }
   uvec4 record = cm_glow_word(2u * i + 1u);
   uvec4 place = uvec4(entry.z, entry.w, 0u, 0u);
-  uint shape = cm_record_shape(place);
+  bool wide = cm_is_wide(CM_GRID.root_exponent);
+  uint shape = cm_record_shape(place, wide);
   uint cell_class = cm_shape_class(shape);
   vec3 point = cm_cell_point(cell_class, vec3(u.x, u.y, cm_random(p.random, p.stream)));
   // Not from `here`, which is a little above a surface: flights through the medium start at p.o as well.
-  vec3 to_v0 = cm_record_v0(place) - cm_in_volume_point(p.o);
+  vec3 to_v0 = cm_record_v0(place, wide) - cm_in_volume_point(p.o);
   vec3 way = cm_out_of_volume(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
   float length_2 = max(dot(way, way), 1e-24f);
   vec3 mean = cm_emission_mean(record);

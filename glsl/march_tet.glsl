@@ -13,6 +13,12 @@
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
+// Kernels that may meet no grid of a cube wider than 2^15 know but one kind of record.
+#ifndef CM_WIDE
+#define CM_WIDE 0
+#endif
+CM_FN bool cm_grid_is_wide() { return CM_WIDE != 0 && cm_is_wide(CM_GRID.root_exponent); }
+
 // Point location: descends the bisection, O(level).
 CM_FN uvec3 cm_march_enter(vec3 p) {
   float half_size = uintBitsToFloat((127u + CM_GRID.root_exponent) << 23);
@@ -58,8 +64,9 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
                          CM_OUT(float) r_1, CM_OUT(uvec3) next) {
   uvec4 links = cm_record(cell.x, 0u);
   uvec4 data = cm_record(cell.x, 1u);
-  uint shape = cm_record_shape(data);
-  CmFrame frame = cm_cell_frame(cm_record_v0(data), shape, o, d);
+  bool wide = cm_grid_is_wide();
+  uint shape = cm_record_shape(data, wide);
+  CmFrame frame = cm_cell_frame(cm_record_v0(data, wide), shape, o, d);
   float t_exit;
   uint face;
   cm_cell_exit(frame, shape, t_exit, face);
@@ -87,8 +94,9 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   e.slope = 0.0f;
   e.distance = 0.0f;
   if ((data.y & CM_RECORD_EMITS) != 0u) {
-    uint shape = cm_record_shape(data);
-    e = cm_cell_emission(cm_emission_record(cell.x), cm_cell_frame(cm_record_v0(data), shape, o, d), shape);
+    bool wide = cm_grid_is_wide();
+    uint shape = cm_record_shape(data, wide);
+    e = cm_cell_emission(cm_emission_record(cell.x), cm_cell_frame(cm_record_v0(data, wide), shape, o, d), shape);
   }
   return e;
 }

@@ -5,8 +5,11 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "base/error.hpp"
+#include "grid/cell.hpp"
 
 namespace cumulet::grid {
+
+bool Cube::wide() const { return core::cm_is_wide(static_cast<std::uint32_t>(log2_size - 1)); }
 
 Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max) {
   const double determinant = glm::determinant(glm::dmat3(volume.index_to_world));

@@ -15,11 +15,13 @@ struct Cube {
   int log2_size = 4;     ///< edge length is 2^log2_size voxels, 4 (the first cells hold a brick) to max_log2_size
   glm::dmat4 to_world{1.0};
 
-  static constexpr int max_log2_size = 15;  // a record keeps vertex coordinates in 16 bits
+  static constexpr int max_log2_size = 18;  // what a cell's record holds: glsl/cell.glsl
   [[nodiscard]] int size() const { return 1 << log2_size; }
+  /// Whether its cells have the records of wide cubes (glsl/cell.glsl).
+  [[nodiscard]] bool wide() const;
 };
 
-/// Over these bounds of the volume's lattice, inclusive. Throws Error(unsupported) if they are wider than 2^15 voxels.
+/// Over these bounds of the volume's lattice, inclusive. Throws Error(unsupported) if they are wider than 2^18 voxels.
 Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max);
 inline Cube fit_cube(const volume::ScalarVolume& volume) {
   return fit_cube(volume, volume.bounds_min, volume.bounds_max);

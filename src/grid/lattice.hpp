@@ -61,7 +61,7 @@ struct Lattice {
   /// By scale, the coarsest first; the first is none, the second the one that all others are found from.
   std::vector<glm::uvec2> blocks;
   /// Blocks of a scale: from `first` of it up to that of the scale below, of scale 0 to the end.
-  std::array<std::uint32_t, 6> first{};
+  std::array<std::uint32_t, Cube::max_log2_size / 3 + 1> first{};
   /// CM_BLOCK_POINTS for each block of scale 1 and up, and for the first.
   std::vector<LatticePlace> places;
   std::vector<CoarseCells> coarse;  ///< the first is of none

@@ -124,9 +124,7 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
       find(evaluations, cube, log2_size, floor, *sums, *found);
       const unsigned levels = levels_of(*found);
       if (levels == 0) continue;
-      const auto word = [](int n) { return static_cast<std::uint32_t>(n); };
-      pieces[p].nodes.emplace_back(word(cube.corner.x) | (word(cube.corner.y) << 16U),
-                                   word(cube.corner.z) | (word(cube.log2_size) << 16U) | (levels << 20U),
+      pieces[p].nodes.emplace_back(core::cm_node_words(cube.corner, static_cast<std::uint32_t>(cube.log2_size), levels),
                                    static_cast<std::uint32_t>(pieces[p].values.size()));
       pieces[p].values.insert(pieces[p].values.end(), found->begin(), found->begin() + points_of_levels[levels]);
     }

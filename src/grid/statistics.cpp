@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "base/error.hpp"
@@ -399,29 +400,64 @@ void Statistics::compute_moments(Progress* progress) {
   }
 }
 
-void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume, Progress* progress) {
-  // Columns of voxels that meet any density, as 8 x 8 bits for a column of bricks, for each axis.
-  std::array<std::unordered_map<std::uint64_t, std::uint64_t>, 3> columns;
-  const auto mark = [&](const ivec3& brick, const std::array<std::uint64_t, 3>& masks) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (masks[axis] == 0) continue;
-      const auto key =
-          (std::uint64_t(std::uint32_t(brick[(axis + 1) % 3])) << 32U) | std::uint32_t(brick[(axis + 2) % 3]);
-      columns[axis][key] |= masks[axis];
+namespace {
+
+// Columns of voxels along an axis that meet any density. Memory as there are bricks and cubes of one value, however
+// large these are.
+class Shadow {
+ public:
+  Shadow(int axis, int log2_size) : axis_(axis), squares_(static_cast<std::size_t>(log2_size) + 1) {}
+  // columns: 8 x 8 bits.
+  void add_brick(const ivec3& corner, std::uint64_t columns) {
+    if (columns != 0) bricks_[key(corner, 3)] |= columns;
+  }
+  void add_cube(const ivec3& corner, int log2_size) {
+    squares_[static_cast<std::size_t>(log2_size)].insert(key(corner, log2_size));
+  }
+  [[nodiscard]] std::uint64_t voxels() const {
+    std::uint64_t all = 0;
+    for (const auto& [at, columns] : bricks_) {
+      if (!covered(at, 3, 3)) all += static_cast<std::uint64_t>(std::popcount(columns));
     }
-  };
+    for (std::size_t size = 0; size < squares_.size(); ++size) {
+      for (const std::uint64_t at : squares_[size]) {
+        if (!covered(at, size, size + 1)) all += std::uint64_t{1} << (2 * size);
+      }
+    }
+    return all;
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t key(const ivec3& corner, int log2_size) const {
+    return (std::uint64_t(std::uint32_t(corner[(axis_ + 1) % 3] >> log2_size)) << 32U) |
+           std::uint32_t(corner[(axis_ + 2) % 3] >> log2_size);
+  }
+  // The square of 2^size there, by one of 2^from or more.
+  [[nodiscard]] bool covered(std::uint64_t at, std::size_t size, std::size_t from) const {
+    for (std::size_t larger = from; larger < squares_.size(); ++larger) {
+      if (squares_[larger].empty()) continue;
+      const std::size_t up = larger - size;
+      const std::uint64_t above = ((at >> 32U >> up) << 32U) | ((at & 0xffffffffU) >> up);
+      if (squares_[larger].contains(above)) return true;
+    }
+    return false;
+  }
+
+  int axis_;
+  std::unordered_map<std::uint64_t, std::uint64_t> bricks_;
+  std::vector<std::unordered_set<std::uint64_t>> squares_;  // by log2 of their side
+};
+
+}  // namespace
+
+void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume, Progress* progress) {
   struct Projection {
     double sum = 0.0;
     std::array<std::uint64_t, 3> masks{};
   };
   const auto& bricks = by_size_[3];
   std::vector<Projection> projections(bricks.size());
-  const auto bricks_along = [](const Node& node) {
-    return node.is_uniform() && node.uniform > 0.0F ? (1 << node.log2_size) / 8 : 0;
-  };
-  std::uint64_t total = 2 * bricks.size();
-  for (const Node& node : nodes_) total += static_cast<std::uint64_t>(bricks_along(node)) * bricks_along(node);
-  ProgressPart part(progress, 0.1, 0.3, total);
+  ProgressPart part(progress, 0.1, 0.3, 2 * bricks.size() + nodes_.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 64), [&](const auto& range) {
     volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -438,33 +474,26 @@ void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume, 
     }
     part.add(range.size());
   });
+  std::array<Shadow, 3> shadows{Shadow(0, cube_.log2_size), Shadow(1, cube_.log2_size), Shadow(2, cube_.log2_size)};
   double mass = 0.0;
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     mass += projections[i].sum;
-    mark(nodes_[bricks[i]].corner / 8, projections[i].masks);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      shadows[axis].add_brick(nodes_[bricks[i]].corner, projections[i].masks[axis]);
     if (i % 1024 == 1023) part.add(1024);
   }
-  constexpr std::uint64_t full = ~std::uint64_t{0};
-  for (const Node& node : nodes_) {
-    const int side = bricks_along(node);
-    if (side == 0) continue;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (i % 1024 == 1023) part.add(1024);
+    const Node& node = nodes_[i];
+    if (!node.is_uniform() || !(node.uniform > 0.0F)) continue;
     mass += node.uniform * std::pow(double(1 << node.log2_size), 3.0);
-    for (int a = 0; a < side; ++a) {
-      part.add(static_cast<std::uint64_t>(side));
-      for (int b = 0; b < side; ++b) {
-        const ivec3 base = node.corner / 8;
-        mark(base + ivec3(0, a, b), {full, 0, 0});
-        mark(base + ivec3(b, 0, a), {0, full, 0});
-        mark(base + ivec3(a, b, 0), {0, 0, full});
-      }
-    }
+    for (Shadow& shadow : shadows) shadow.add_cube(node.corner, node.log2_size);
   }
   double sum = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::uint64_t hit = 0;
-    for (const auto& [key, mask] : columns[axis]) hit += static_cast<std::uint64_t>(std::popcount(mask));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::uint64_t hit = shadows[axis].voxels();
     if (hit == 0) return;
-    sum += mass * glm::length(dvec3(volume.index_to_world[axis])) / static_cast<double>(hit);
+    sum += mass * glm::length(dvec3(volume.index_to_world[static_cast<int>(axis)])) / static_cast<double>(hit);
   }
   mean_optical_depth_ = sum / 3.0;
 }

@@ -26,12 +26,6 @@ using glm::ivec3;
 using glm::vec3;
 using glm::vec4;
 
-vec3 v0_of(const std::array<std::uint16_t, 3>& v) { return {v[0], v[1], v[2]}; }
-
-std::array<std::uint16_t, 3> pack_v0(const vec3& v) {
-  return {static_cast<std::uint16_t>(v.x), static_cast<std::uint16_t>(v.y), static_cast<std::uint16_t>(v.z)};
-}
-
 std::uint32_t pack_emission_gradient(const vec3& gradient) {
   std::uint32_t word = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -42,6 +36,21 @@ std::uint32_t pack_emission_gradient(const vec3& gradient) {
 }
 
 }  // namespace
+
+GridBuilder::Vertex::Vertex(const vec3& at) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto whole = static_cast<std::uint32_t>(at[static_cast<int>(axis)]);
+    low[axis] = static_cast<std::uint16_t>(whole);
+    high = static_cast<std::uint16_t>(high | ((whole >> 16U) << (5 * axis)));
+  }
+}
+
+GridBuilder::Vertex::operator vec3() const {
+  const auto whole = [&](std::size_t axis) {
+    return static_cast<float>(low[axis] | (((std::uint32_t{high} >> (5 * axis)) & 31U) << 16U));
+  };
+  return {whole(0), whole(1), whole(2)};
+}
 
 GridBuilder::GridBuilder(const Statistics& statistics, const DiamondSet& diamonds)
     : statistics_(&statistics), diamonds_(&diamonds) {}
@@ -73,7 +82,7 @@ void GridBuilder::make_roots() {
   for (unsigned root = 0; root < 24; ++root) {
     nodes_[root] = {.links = roots[root].links,
                     .child = 0,
-                    .v0 = pack_v0(roots[root].v0),
+                    .v0 = Vertex(roots[root].v0),
                     .shape = static_cast<std::uint16_t>(roots[root].shape),
                     .heap = 0,
                     .permutation = 0};
@@ -108,7 +117,7 @@ std::uint32_t GridBuilder::mark_splits(std::uint32_t first, std::uint32_t last) 
     node.child = 0;
     if (cell_class == 1 && core::cm_shape_exponent(node.shape) == 0) continue;  // a sixth of a voxel
     const vec3 middle =
-        v0_of(node.v0) +
+        vec3(node.v0) +
         core::cm_from_frame(core::cm_frame_midpoint(cell_class) * core::cm_shape_unit(node.shape), node.shape);
     if (cursor.is_split(ivec3(middle))) {
       node.child = 1;
@@ -125,12 +134,12 @@ void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
   const std::uint32_t shape = core::cm_child_shape(node.shape, side);
   child.child = 0;
   child.shape = static_cast<std::uint16_t>(shape);
-  child.v0 = side == 0 ? node.v0 : pack_v0(core::cm_cell_vertex(v0_of(node.v0), node.shape, 1));
-  child.heap = static_cast<std::uint16_t>(node.heap == 0 ? 0 : 2 * node.heap + side);
+  child.v0 = side == 0 ? node.v0 : Vertex(core::cm_cell_vertex(vec3(node.v0), node.shape, 1));
+  child.heap = node.heap == 0 ? 0 : (2U * node.heap + side) & 0xfffU;
   child.permutation = node.permutation;
   if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 3) {
     child.heap = 1;
-    child.permutation = static_cast<std::uint16_t>(permutation_of(shape));
+    child.permutation = permutation_of(shape) & 15U;
   }
   child.links[3] = node.child + 1 - side;
   for (unsigned k = 0; k < 2; ++k) {
@@ -196,11 +205,11 @@ std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
   const Node& node = nodes_[from];
   std::uint32_t other = node.links[face];
   while (other != CM_NONE && nodes_[other].child != 0) {
-    const vec3 end = v0_of(nodes_[other].v0);
+    const vec3 end = vec3(nodes_[other].v0);
     bool has_end = false;
     for (std::uint32_t i = 0; i < 4; ++i) {
       if (i == core::cm_opposite(core::cm_shape_class(node.shape), face)) continue;
-      has_end = has_end || core::cm_cell_vertex(v0_of(node.v0), node.shape, i) == end;
+      has_end = has_end || core::cm_cell_vertex(vec3(node.v0), node.shape, i) == end;
     }
     other = nodes_[other].child + (has_end ? 0 : 1);
   }
@@ -273,7 +282,7 @@ class GridBuilder::LeafMoments {
  public:
   explicit LeafMoments(const Statistics& statistics) : statistics_(&statistics) {}
   Moments operator()(const Node& node, const vec3& centroid) {
-    const vec3 v0 = v0_of(node.v0);
+    const vec3 v0 = vec3(node.v0);
     if (node.heap == 0) return statistics_->moments(v0, node.shape);
     const Statistics::Node& holder = statistics_->node_at(ivec3(centroid));
     if (holder.is_uniform()) return uniform_moments(v0, node.shape, holder.uniform);
@@ -389,7 +398,7 @@ class GridBuilder::LeafVelocity {
   glm::uvec2 operator()(const Node& node, const vec3& centroid) {
     std::array<double, 4> sums{};
     if (node.heap == 0) {
-      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = fields_[i]->moments(v0_of(node.v0), node.shape).mass;
+      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = fields_[i]->moments(vec3(node.v0), node.shape).mass;
     } else {
       look_up(ivec3(centroid) & ~(volume::brick_size - 1));
       const BrickTree& tree = brick_tree(kuhn_frame(corner_, volume::brick_size, node.permutation));
@@ -508,8 +517,9 @@ CellRecord GridBuilder::record(std::uint32_t index, const vec4& fit, bool emits)
     const std::uint32_t other = resolve(index, face);
     record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
   }
-  record.data.x = node.v0[0] | (std::uint32_t{node.v0[1]} << 16U);
-  record.data.y = node.v0[2] | (std::uint32_t{node.shape} << 16U) | (emits ? CM_RECORD_EMITS : 0U);
+  const glm::uvec2 place = core::cm_record_place(vec3(node.v0), node.shape, statistics_->cube().wide());
+  record.data.x = place.x;
+  record.data.y = place.y | (emits ? CM_RECORD_EMITS : 0U);
   const glm::uvec2 packed = pack_fit(fit);
   record.data.z = packed.x;
   record.data.w = packed.y;
@@ -544,7 +554,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
-      const vec3 v0 = v0_of(node.v0);
+      const vec3 v0 = vec3(node.v0);
       const std::uint32_t shape = node.shape;
       const std::uint32_t cell_class = core::cm_shape_class(shape);
       const float unit = core::cm_shape_unit(shape);

@@ -108,13 +108,22 @@ class GridBuilder {
   }
 
  private:
+  // A vertex: 16 bits of each coordinate, and 5 more of each in one word.
+  struct Vertex {
+    std::array<std::uint16_t, 3> low{};
+    std::uint16_t high = 0;
+    Vertex() = default;
+    explicit Vertex(const glm::vec3& at);
+    explicit operator glm::vec3() const;
+    bool operator==(const Vertex&) const = default;
+  };
   struct Node {
     std::array<std::uint32_t, 4> links;
     std::uint32_t child;  // 0: a leaf
-    std::array<std::uint16_t, 3> v0;
+    Vertex v0;
     std::uint16_t shape;
-    std::uint16_t heap;         // place in the brick's tree, 0 above bricks
-    std::uint16_t permutation;  // of that tree
+    std::uint16_t heap : 12;        // place in the brick's tree, 0 above bricks
+    std::uint16_t permutation : 4;  // of that tree
   };
   static_assert(sizeof(Node) == 32);
 

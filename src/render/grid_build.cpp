@@ -459,9 +459,9 @@ void GridBuild::plan_cells() {
     std::array<TreeCell, 24> cells{};
     std::array<glm::uvec4, 24> links{};
     const std::array<grid::RootCell, 24> roots = grid::root_cells(data_->lattice().cube.log2_size);
+    const bool wide = data_->lattice().cube.wide();
     for (std::size_t i = 0; i < roots.size(); ++i) {
-      const glm::uvec3 v0(roots[i].v0);
-      cells[i] = {0, 1, {v0.x | (v0.y << 16U), v0.z | (roots[i].shape << 16U)}};
+      cells[i] = {0, 1, core::cm_record_place(roots[i].v0, roots[i].shape, wide)};
       links[i] = {roots[i].links[0], roots[i].links[1], roots[i].links[2], roots[i].links[3]};
     }
     gl_->NamedBufferSubData(tree_cells_.name(), 0, sizeof cells, cells.data());

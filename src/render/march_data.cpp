@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "gl/bindings.hpp"
+#include "grid/cell.hpp"
 
 namespace cumulet::render {
 
@@ -563,7 +564,8 @@ void MarchUpload::plan_brick() {
 std::vector<std::string> MarchData::defines(bool several, bool motion) const {
   // One, two or as many as there can be: fewer programs.
   std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
-  if (pages > 2 || (several && march_ == March::tet)) pages = max_pages;
+  const auto is_wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
+  if (pages > 2 || (march_ == March::tet && (several || std::ranges::any_of(parts_, is_wide)))) pages = max_pages;
   std::vector<std::string> defines{"CM_MARCH " + std::to_string(static_cast<int>(march_)),
                                    std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
                                    "CM_PAGES " + std::to_string(pages)};

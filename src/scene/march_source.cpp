@@ -1,9 +1,13 @@
 #include "scene/march_source.hpp"
 
+#include <algorithm>
 #include <array>
 #include <glm/gtc/packing.hpp>
+#include <string>
 #include <unordered_map>
 #include <utility>
+
+#include "base/error.hpp"
 
 namespace cumulet::scene {
 
@@ -50,10 +54,25 @@ void add_brick(MarchSource& source, const grid::Statistics::Node& node, const fl
   }
 }
 
+// The march has a voxel's place in 16 bits an axis, and a table of all bricks of the box.
+void require_table(const ivec3& end, const ivec3& bricks) {
+  constexpr int most_voxels = 1 << 16;
+  constexpr std::int64_t most_bricks = std::int64_t{1} << 28U;
+  if (const int widest = std::max({end.x, end.y, end.z}); widest > most_voxels) {
+    throw Error(ErrorCode::unsupported, "the brick march over " + std::to_string(widest) + " voxels: the limit is " +
+                                            std::to_string(most_voxels));
+  }
+  if (const std::int64_t all = std::int64_t{bricks.x} * bricks.y * bricks.z; all > most_bricks) {
+    throw Error(ErrorCode::unsupported, "the brick march over a box of " + std::to_string(all) +
+                                            " bricks: the limit is " + std::to_string(most_bricks));
+  }
+}
+
 void pack_bricks(MarchSource& source) {
   const grid::Statistics& statistics = *source.statistics;
   const ivec3 first = source.box_low >> 3;
   source.brick_count = ((source.box_low + source.box_size + 7) >> 3) - first;
+  require_table(source.box_low + source.box_size, source.brick_count);
   constexpr std::uint32_t empty = 0xfffffffeU;
   std::unordered_map<float, std::uint32_t> uniform_slots;
   std::uint32_t count = 0;

@@ -26,6 +26,7 @@
 #include "support/gl_state.hpp"
 #include "support/view_cameras.hpp"
 #include "support/volumes.hpp"
+#include "support/wide_volumes.hpp"
 
 namespace {
 
@@ -183,6 +184,32 @@ TEST_P(GridBuilds, AreTheProcessorsForEveryVolumeAndTwoHundredCameras) {
   EXPECT_LT(static_cast<double>(rounding.others), 0.03 * static_cast<double>(rounding.coefficients));
   RecordProperty("rounded_otherwise", std::to_string(rounding.others));
   RecordProperty("coefficients", std::to_string(rounding.coefficients));
+}
+
+// In cubes so wide that cells have other records, too.
+TEST_P(GridBuilds, AreTheProcessorsHoweverWide) {
+  const gl::StateGuard guard(*gl_);
+  test::Cameras cameras(3);
+  Rounding rounding;
+  const auto cloud = test::noise_volume({40, 36, 33}, glm::ivec3(0), 6);
+  for (const glm::ivec3& by : {glm::ivec3(60'000, 800, 0), glm::ivec3(72, 262'000, 100'000)}) {
+    const Reference reference(test::clouds_apart(cloud, by));
+    grid::RefineSettings settings;
+    settings.threshold = 0.05;
+    const auto data = upload(reference.lattice(settings), reference.statistics);
+    for (int i = 0; i < 4; ++i) {
+      if (i == 1) settings.max_cells = 5000;
+      if (i > 1) settings.camera = cameras.about(reference.statistics->cube());
+      const grid::TetGrid expected = reference.grid(settings);
+      ASSERT_TRUE(expected.cube.wide());
+      const render::BuiltGrid built = build(data, settings);
+      ASSERT_NO_FATAL_FAILURE(expect_same(expected, built, read(built), rounding)) << by.x << ", camera " << i;
+      if (i == 0) {
+        EXPECT_GT(built.count, 20'000U);
+      }
+    }
+  }
+  EXPECT_LT(static_cast<double>(rounding.others), 0.03 * static_cast<double>(rounding.coefficients));
 }
 
 // The least-squares fit of a cell's sixths of voxels in double precision, nowhere negative: mean, then gradient.

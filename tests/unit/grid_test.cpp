@@ -7,12 +7,14 @@
 #include <random>
 #include <set>
 
+#include "base/error.hpp"
 #include "grid/cell.hpp"
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
 #include "grid/transmittance.hpp"
 #include "support/volumes.hpp"
+#include "support/wide_volumes.hpp"
 
 namespace {
 
@@ -37,9 +39,9 @@ Built build(const volume::ScalarVolume& volume, const grid::RefineSettings& sett
   return built;
 }
 
-std::array<vec3, 4> vertices_of(const grid::CellRecord& cell) {
-  const vec3 v0 = core::cm_record_v0(cell.data);
-  const std::uint32_t shape = core::cm_record_shape(cell.data);
+std::array<vec3, 4> vertices_of(const grid::CellRecord& cell, bool wide = false) {
+  const vec3 v0 = core::cm_record_v0(cell.data, wide);
+  const std::uint32_t shape = core::cm_record_shape(cell.data, wide);
   return {v0, core::cm_cell_vertex(v0, shape, 1), core::cm_cell_vertex(v0, shape, 2),
           core::cm_cell_vertex(v0, shape, 3)};
 }
@@ -51,9 +53,9 @@ double volume_of(const std::array<vec3, 4>& v) {
 constexpr std::array<std::array<unsigned, 4>, 3> opposite{{{3, 1, 2, 0}, {1, 3, 2, 0}, {3, 2, 1, 0}}};
 
 using Face = std::array<std::array<float, 3>, 3>;
-Face face_of(const grid::CellRecord& cell, unsigned face) {
-  const auto v = vertices_of(cell);
-  const unsigned skip = opposite[core::cm_shape_class(core::cm_record_shape(cell.data))][face];
+Face face_of(const grid::CellRecord& cell, unsigned face, bool wide) {
+  const auto v = vertices_of(cell, wide);
+  const unsigned skip = opposite[core::cm_shape_class(core::cm_record_shape(cell.data, wide))][face];
   Face f{};
   unsigned n = 0;
   for (unsigned i = 0; i < 4; ++i) {
@@ -68,13 +70,14 @@ void expect_conforming(const grid::TetGrid& grid) {
   double volume = 0.0;
   std::size_t wrong = 0;
   const auto size = static_cast<float>(grid.cube.size());
+  const bool wide = grid.cube.wide();
   for (std::uint32_t c = 0; c < grid.cells.size(); ++c) {
     const grid::CellRecord& cell = grid.cells[c];
-    const auto v = vertices_of(cell);
+    const auto v = vertices_of(cell, wide);
     volume += volume_of(v);
     for (unsigned face = 0; face < 4; ++face) {
       const std::uint32_t other = cell.links[static_cast<int>(face)];
-      const Face mine = face_of(cell, face);
+      const Face mine = face_of(cell, face, wide);
       if (other == CM_NONE) {
         bool on_boundary = false;
         for (unsigned axis = 0; axis < 3; ++axis) {
@@ -90,8 +93,8 @@ void expect_conforming(const grid::TetGrid& grid) {
       }
       bool matched = false;
       for (unsigned back = 0; back < 4; ++back) {
-        matched = matched ||
-                  (grid.cells[other].links[static_cast<int>(back)] == c && face_of(grid.cells[other], back) == mine);
+        matched = matched || (grid.cells[other].links[static_cast<int>(back)] == c &&
+                              face_of(grid.cells[other], back, wide) == mine);
       }
       wrong += matched ? 0 : 1;
     }
@@ -269,6 +272,93 @@ TEST(Statistics, GrowWithTheActiveNodesNotWithTheBox) {
   EXPECT_EQ(
       glm::unpackHalf2x16(built.grid.cells[grid::locate(built.grid, vec3(30007.3F, 30007.4F, 30007.6F))].data.z).x,
       1.0F);
+}
+
+// The records of every cell that bisection comes to, whatever the cube: from the roots down to sixths of voxels.
+TEST(WideRecords, HoldEveryCell) {
+  test::Random random(5);
+  for (const int log2_size : {15, 16, 17, 18}) {
+    const bool wide = log2_size > 15;
+    std::set<std::uint32_t> shapes;
+    for (int i = 0; i < 4000; ++i) {
+      vec3 v0;
+      std::uint32_t shape = 0;
+      core::cm_root_cell(random() % 24, static_cast<std::uint32_t>(log2_size - 1), v0, shape);
+      while (true) {
+        const glm::uvec2 place = core::cm_record_place(v0, shape, wide);
+        const glm::uvec4 data(place.x, place.y | (random() % 2 == 0 ? CM_RECORD_EMITS : 0U), random(), random());
+        ASSERT_EQ(place.y & CM_RECORD_EMITS, 0U);
+        ASSERT_EQ(core::cm_record_v0(data, wide), v0) << log2_size << ' ' << shape;
+        ASSERT_EQ(core::cm_record_shape(data, wide), shape) << log2_size;
+        shapes.insert(shape);
+        if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 0) break;
+        const std::uint32_t side = random() % 2;
+        if (side == 1) v0 = core::cm_cell_vertex(v0, shape, 1);
+        shape = core::cm_child_shape(shape, side);
+      }
+    }
+    EXPECT_GT(shapes.size(), 48U * static_cast<std::size_t>(3 * log2_size - 3)) << "but for the roots' exponent all";
+  }
+}
+
+// A cloud far out in a wide box has the cells that it has by itself, voxel by voxel.
+TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
+  const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
+  grid::RefineSettings settings;
+  settings.threshold = -1.0;
+  settings.cells = grid::CellKind::constant;
+  const Built near = build(cloud, settings);
+  for (const ivec3& by : {ivec3(32768, 0, 32768), ivec3(65536, 65536, 65536), ivec3(196608, 131072, 0)}) {
+    SCOPED_TRACE(by.x);
+    const Built far = build(test::clouds_apart(cloud, by), settings);
+    const bool wide = far.grid.cube.wide();
+    ASSERT_TRUE(wide);
+    expect_conforming(far.grid);
+    EXPECT_EQ(far.grid.content_max, near.grid.content_max + vec3(by));
+    EXPECT_LT(far.statistics->bytes(), 3 * near.statistics->bytes()) << "as there are voxels, not as the box is";
+    test::Random random(9);
+    std::size_t dense = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const vec3 p = vec3(random() % 30, random() % 28, random() % 25) + vec3(0.3F, 0.45F, 0.62F);
+      const glm::uvec4& a = near.grid.cells[grid::locate(near.grid, p)].data;
+      for (const vec3& shift : {vec3(0.0F), vec3(by)}) {
+        const glm::uvec4& b = far.grid.cells[grid::locate(far.grid, p + shift)].data;
+        ASSERT_EQ(glm::unpackHalf2x16(b.z).x, glm::unpackHalf2x16(a.z).x);
+        if (a.z == 0) continue;
+        ++dense;
+        ASSERT_EQ(core::cm_record_v0(b, wide), core::cm_record_v0(a) + shift);
+        ASSERT_EQ(core::cm_record_shape(b, wide), core::cm_record_shape(a));
+      }
+    }
+    EXPECT_GT(dense, 10000U);
+  }
+}
+
+TEST(Statistics, WideTilesAreSummedWhole) {
+  volume::ScalarVolume tile;
+  tile.name = "density";
+  tile.bounds_max = {(1 << 17) - 1, (1 << 18) - 1, (1 << 16) - 1};
+  tile.tiles.push_back({tile.bounds_min, tile.bounds_max, 0.5F});
+  tile.max_value = 0.5F;
+  const grid::Statistics statistics(tile, grid::fit_cube(tile));
+  EXPECT_DOUBLE_EQ(statistics.mean_optical_depth(), 0.5 * ((1 << 17) + (1 << 18) + (1 << 16)) / 3.0);
+  EXPECT_LT(statistics.bytes(), 100'000U);
+}
+
+TEST(Cube, TheWidestIsRefusedInALine) {
+  volume::ScalarVolume bar;
+  bar.name = "bar";
+  bar.bounds_min = {1'000'000, -1'000'000, 64};
+  bar.bounds_max = bar.bounds_min + ivec3((1 << 18) - 1, 0, 0);
+  EXPECT_EQ(grid::fit_cube(bar).log2_size, 18);
+  ++bar.bounds_max.x;
+  try {
+    grid::fit_cube(bar);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+    EXPECT_STREQ(error.what(), "grid 'bar' is 262145 voxels wide; the limit is 262144");
+  }
 }
 
 TEST(LinearFit, RecoversALinearFieldAndStaysNonNegative) {

@@ -237,9 +237,9 @@ TEST(DenseVolume, RefusesWhatIsWrong) {
   EXPECT_HAS(matrix(5, 0.0), "singular");
   EXPECT_HAS(matrix(12, std::numeric_limits<double>::quiet_NaN()), "not finite");
   // Longer than a control cube.
-  Dense bar(40000, 1, 1);
-  bar.at(0, 0, 0) = bar.at(39999, 0, 0) = 1.0F;
-  EXPECT_HAS(refused(CUMULET_ERROR_UNSUPPORTED, bar.call()), "40000 voxels wide");
+  Dense bar(300000, 1, 1);
+  bar.at(0, 0, 0) = bar.at(299999, 0, 0) = 1.0F;
+  EXPECT_HAS(refused(CUMULET_ERROR_UNSUPPORTED, bar.call()), "300000 voxels wide; the limit is 262144");
 }
 
 TEST(DenseVolume, TakesDefaults) {
