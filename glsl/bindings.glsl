@@ -34,6 +34,8 @@ const int CM_UNIT_BACKGROUND = 5;
 const int CM_UNIT_BACKGROUND_BEFORE = 6;
 // host_depth.comp:
 const int CM_UNIT_DEPTH_SOURCE = 0;
+// pack_bricks.comp:
+const int CM_UNIT_HOST_VOXELS = 0;
 // denoise_*.comp:
 const int CM_UNIT_DENOISE_COLOUR = 0;
 const int CM_UNIT_DENOISE_ALBEDO = 1;
@@ -77,6 +79,10 @@ const int CM_STORAGE_MATTES = 0;         // cryptomatte.comp
 const int CM_STORAGE_ERRORS = 1;         // noise.comp
 const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
 const int CM_STORAGE_SIGN = 0;           // sign.comp
+const int CM_STORAGE_PACKED_PLACES = 0;  // pack_bricks.comp
+const int CM_STORAGE_PACKED_VALUES = 1;
+const int CM_STORAGE_PACKED_CHOICE = 2;
+const int CM_STORAGE_HOST_VOXELS = 3;
 const int CM_STORAGE_DENOISE_BINS = 0;   // denoise_*.comp
 const int CM_STORAGE_DENOISE_CHANNELS = 1;
 const int CM_STORAGE_DENOISE_WEIGHTS = 2;

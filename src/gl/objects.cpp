@@ -96,9 +96,19 @@ void Fence::order() const {
 }
 
 ReadBack::ReadBack(const FunctionsPtr& gl, std::size_t bytes, const char* what) {
-  constexpr GLbitfield access = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
   const std::vector<std::byte> zeros(bytes);
-  buffer_ = make_buffer(gl, bytes, zeros.data(), access, what);
+  map(gl, bytes, zeros.data(), what);
+}
+
+ReadBack ReadBack::unfilled(const FunctionsPtr& gl, std::size_t bytes, const char* what) {
+  ReadBack made;
+  made.map(gl, bytes, nullptr, what);
+  return made;
+}
+
+void ReadBack::map(const FunctionsPtr& gl, std::size_t bytes, const void* values, const char* what) {
+  constexpr GLbitfield access = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  buffer_ = make_buffer(gl, bytes, values, access, what);
   data_ =
       static_cast<const std::byte*>(gl->MapNamedBufferRange(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), access));
   check(*gl, what);

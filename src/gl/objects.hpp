@@ -96,12 +96,17 @@ class Fence {
 class ReadBack {
  public:
   ReadBack() = default;
+  /// Of zeros at first.
   ReadBack(const FunctionsPtr& gl, std::size_t bytes, const char* what);
+  /// Of whatever is there: for large ones, of which only what was written is read.
+  static ReadBack unfilled(const FunctionsPtr& gl, std::size_t bytes, const char* what);
   [[nodiscard]] GLuint name() const { return buffer_.name(); }
   [[nodiscard]] const std::byte* data() const { return data_; }
   explicit operator bool() const { return data_ != nullptr; }
 
  private:
+  void map(const FunctionsPtr& gl, std::size_t bytes, const void* values, const char* what);
+
   Object buffer_;
   const std::byte* data_ = nullptr;
 };

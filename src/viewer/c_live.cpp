@@ -6,16 +6,19 @@
 #include "base/callback_scope.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
+#include "viewer/c_viewer.hpp"
 #include "viewer/live.hpp"
 
 namespace {
 
 using namespace cumulet::c_abi;
+namespace render = cumulet::render;
 using cumulet::viewer::Live;
 using cumulet::volume::Channel;
 using cumulet::volume::MemoryField;
 
 static_assert(static_cast<unsigned>(Channel::velocity_z) == CUMULET_CHANNEL_VELOCITY_Z);
+static_assert(static_cast<unsigned>(render::VoxelFormat::bytes) == CUMULET_VOXEL_FORMAT_R8);
 
 // A host's memory, given back in the end.
 class HostMemory {
@@ -60,6 +63,41 @@ HandedState state_of(const cumulet_state_desc* desc) {
 
 void require_no_release(const HandedState& state) {
   require(state.desc.release == nullptr, "cumulet_state_desc.release is for cumulet_live_set alone");
+}
+
+render::GlVoxels gl_voxels_of(const cumulet_gl_field& field, const std::string& what) {
+  const cumulet_gl_field f = read_desc(&field, "cumulet_gl_field");
+  if (number(f.channel) > CUMULET_CHANNEL_VELOCITY_Z) refuse(what + ": its channel is unknown");
+  if ((f.texture == 0) == (f.buffer == 0)) refuse(what + ": it has not one of texture and buffer");
+  if (f.component > 3) refuse(what + ": its component is not from 0 to 3");
+  if (number(f.format) > CUMULET_VOXEL_FORMAT_R8) refuse(what + ": its format is unknown");
+  render::GlVoxels voxels{static_cast<Channel>(number(f.channel)), {}, matrix_or_identity(f.index_to_world)};
+  if (f.texture != 0) {
+    voxels.source = render::VoxelTexture{f.texture, static_cast<int>(f.component)};
+  } else {
+    voxels.source = render::VoxelBuffer{.name = f.buffer,
+                                        .format = static_cast<render::VoxelFormat>(number(f.format)),
+                                        .offset = f.offset,
+                                        .strides = {f.strides[0], f.strides[1], f.strides[2]},
+                                        .size = {f.size[0], f.size[1], f.size[2]}};
+  }
+  return voxels;
+}
+
+render::GlState gl_state_of(const cumulet_gl_state_desc* desc) {
+  const cumulet_gl_state_desc d = read_desc(desc, "cumulet_gl_state_desc");
+  render::GlState state;
+  state.name = name_or(d.name, "state");
+  for_each_desc(d.fields, d.field_count, "cumulet_gl_field", state.name + ": field",
+                [&](const cumulet_gl_field& field, const std::string& what) {
+                  state.fields.push_back(gl_voxels_of(field, what));
+                });
+  const auto boxes = array_of(d.changed, d.changed_count, 1, state.name + ": changed boxes");
+  if (d.changed != nullptr) state.changed.emplace();
+  for (const cumulet_voxel_box& b : boxes)
+    state.changed->push_back({{b.min[0], b.min[1], b.min[2]}, {b.max[0], b.max[1], b.max[2]}});
+  state.wait = static_cast<GLsync>(d.wait);
+  return state;
 }
 
 std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
@@ -126,6 +164,13 @@ cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc*
                  .tiles = {}};
     }
     l.update(state.fields, state.name);
+  });
+}
+
+cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live, const cumulet_gl_state_desc* desc) {
+  return guarded(viewer, [&](cumulet::viewer::Viewer& v) {
+    require(live != nullptr, "the live volume is NULL");
+    v.set_live_gl(live->asset, gl_state_of(desc));
   });
 }
 

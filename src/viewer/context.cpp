@@ -29,7 +29,8 @@ Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
       upload_timer_(functions_),
       host_depth_timer_(functions_),
       display_timer_(functions_),
-      host_depth_(functions_, programs_) {
+      host_depth_(functions_, programs_),
+      transfers_(functions_, programs_, limits_) {
   strings_ = {gl::string_of(*functions_, GL_VENDOR), gl::string_of(*functions_, GL_RENDERER),
               gl::string_of(*functions_, GL_VERSION)};
   gl::check(*functions_, "reading the context's limits");
@@ -431,7 +432,7 @@ std::uint64_t Context::bytes() const {
   std::uint64_t maps = 0;
   for (const auto& [slot, map] : maps_) maps += map.bytes();
   return scene_.data_bytes() + scene_.other_bytes() + maps + progressive_.bytes() + empty_.bytes() +
-         compositor_.bytes() + (target_ ? target_.of().bytes() : 0) +
+         compositor_.bytes() + transfers_.bytes() + (target_ ? target_.of().bytes() : 0) +
          depth_size.x * depth_size.y * host_depth_.layers() * 4;
 }
 

@@ -22,6 +22,7 @@
 #include "render/progressive.hpp"
 #include "render/rehearsal.hpp"
 #include "render/transmittance_map.hpp"
+#include "render/voxel_transfers.hpp"
 #include "viewer/frame.hpp"
 #include "viewer/settings.hpp"
 
@@ -65,6 +66,7 @@ class Context {
   [[nodiscard]] const GlStrings& strings() const { return strings_; }
   [[nodiscard]] const render::GpuScene& scene() const { return scene_; }
   [[nodiscard]] render::Progressive& progressive() { return progressive_; }
+  [[nodiscard]] render::VoxelTransfers& transfers() { return transfers_; }
   /// Before anything else, once.
   void find_out_dispatches();
 
@@ -219,6 +221,7 @@ class Context {
   render::PassTimer host_depth_timer_;
   render::PassTimer display_timer_;
   render::HostDepth host_depth_;
+  render::VoxelTransfers transfers_;
   Revision<render::HostDepth> host_depth_revision_;
   std::optional<std::pair<std::uint64_t, std::string>> told_;  // the last failure of OpenGL's, and at which settings
   std::optional<DrawnAs> drawn_;                               // last; nothing where that was older than what there was

@@ -12,6 +12,8 @@ namespace {
 
 using volume::MemoryField;
 
+constexpr const char* no_state = "there is no state to update";
+
 [[noreturn]] void refuse(const std::string& name, const std::string& cause) {
   throw Error(ErrorCode::invalid_argument, one_line(name + ": " + cause));
 }
@@ -33,23 +35,34 @@ std::vector<MemoryField> Live::Whole::view() const {
 void Live::set(const std::vector<MemoryField>& fields, std::string name, const MakeLease& lease) {
   volume::check_fields(fields, name);
   const bool copies = !lease;
-  Next next;
-  next.whole.emplace();
+  Whole whole;
   if (copies) {
     std::vector<volume::FieldCopy> made;
     made.reserve(fields.size());
     for (const MemoryField& field : fields) made.push_back(volume::FieldCopy::of(field, name));
-    next.whole->fields = std::move(made);
+    whole.fields = std::move(made);
   } else {
-    next.whole->fields = fields;
+    whole.fields = fields;
   }
-  next.whole->name = std::move(name);
+  whole.name = std::move(name);
   std::vector<Handed> handed;
   for (const MemoryField& field : fields) {
     const bool dense = std::holds_alternative<volume::DenseVoxels>(field.voxels);
     const Takes takes = !copies || has_tiles(field) ? Takes::nothing : dense ? Takes::zeros : Takes::bricks;
     handed.push_back({field.channel, takes});
   }
+  hand_over(std::move(whole), std::move(handed), lease);
+}
+
+void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
+  std::vector<Handed> handed;
+  for (const volume::FieldCopy& field : fields) handed.push_back({field.channel, Takes::zeros});
+  hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr);
+}
+
+void Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease) {
+  Next next;
+  next.whole = std::move(whole);
   // Last of what may fail: who is refused keeps the memory.
   if (lease) next.whole->lease = lease();
   {
@@ -61,36 +74,61 @@ void Live::set(const std::vector<MemoryField>& fields, std::string name, const M
   listeners_.tell();
 }
 
+std::vector<Live::Handed> Live::handed() {
+  const std::scoped_lock lock(mutex_);
+  return handed_;
+}
+
+const Live::Handed& Live::updatable(const std::vector<Handed>& handed, volume::Channel channel,
+                                    const std::string& name) {
+  const auto there = std::ranges::find(handed, channel, &Handed::channel);
+  if (there == handed.end()) refuse(name, std::string("there is no ") + name_of(channel) + " to update");
+  if (there->takes == Takes::nothing)
+    refuse(name, std::string(name_of(channel)) + " takes no bricks: it was handed over with tiles, or with a release");
+  return *there;
+}
+
+void Live::require_updatable(const std::vector<volume::Channel>& channels,
+                             const std::optional<std::vector<volume::Channel>>& comes, const std::string& name) {
+  std::vector<Handed> handed;
+  if (comes) {
+    for (const volume::Channel channel : *comes) handed.push_back({channel, Takes::zeros});
+  } else {
+    handed = this->handed();
+  }
+  if (handed.empty()) refuse(name, no_state);
+  for (const volume::Channel channel : channels) updatable(handed, channel, name);
+}
+
 void Live::update(const std::vector<MemoryField>& fields, const std::string& name) {
   for (const MemoryField& field : fields) {
     if (!std::holds_alternative<volume::SparseVoxels>(field.voxels))
       refuse(name, std::string(name_of(field.channel)) + " is dense: an update has bricks");
-    if (std::ranges::count(fields, field.channel, &MemoryField::channel) > 1)
-      refuse(name, std::string("has ") + name_of(field.channel) + " twice");
   }
-  volume::check_voxels(fields, name);
-  std::vector<Handed> handed;
-  {
-    const std::scoped_lock lock(mutex_);
-    handed = handed_;
-  }
-  if (handed.empty()) refuse(name, "there is no state to update");
+  volume::check_update(fields, name);
+  const std::vector<Handed> handed = this->handed();
+  if (handed.empty()) refuse(name, no_state);
   volume::Changes changes;
   for (const MemoryField& field : fields) {
-    const auto there = std::ranges::find(handed, field.channel, &Handed::channel);
-    if (there == handed.end()) refuse(name, std::string("there is no ") + name_of(field.channel) + " to update");
-    if (there->takes == Takes::nothing) {
-      refuse(name, std::string(name_of(field.channel)) +
-                       " takes no bricks: it was handed over with tiles, or with a release");
-    }
+    const Handed& there = updatable(handed, field.channel, name);
     volume::require_finite(field, name);
     const auto& sparse = std::get<volume::SparseVoxels>(field.voxels);
-    changes.fields.push_back({field.channel, volume::BrickCopy(sparse, there->takes == Takes::zeros)});
+    changes.fields.push_back({field.channel, volume::BrickCopy(sparse, there.takes == Takes::zeros)});
   }
+  hand_over(std::move(changes), handed, name);
+}
+
+void Live::update(volume::Changes changes, const std::string& name) {
+  const std::vector<Handed> handed = this->handed();
+  if (handed.empty()) refuse(name, no_state);
+  for (const volume::Changes::Bricks& field : changes.fields) updatable(handed, field.channel, name);
+  hand_over(std::move(changes), handed, name);
+}
+
+void Live::hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name) {
   {
     const std::scoped_lock lock(mutex_);
-    const auto same = [](const Handed& a, const Handed& b) { return a.channel == b.channel && a.takes == b.takes; };
-    if (!std::ranges::equal(handed, handed_, same)) refuse(name, "another state came between");
+    if (handed != handed_) refuse(name, "another state came between");
     next_.changes.put(std::move(changes));
     ++newest_;
   }

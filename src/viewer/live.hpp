@@ -37,6 +37,15 @@ class Live {
   /// take none.
   void update(const std::vector<volume::MemoryField>& fields, const std::string& name);
 
+  /// The same of copies whose fields were checked, and whose voxels are finite; those of bricks take bricks as dense
+  /// fields do.
+  void set(std::vector<volume::FieldCopy> fields, std::string name);
+  void update(volume::Changes changes, const std::string& name);
+  /// Throws where update() would, of these channels. comes: those of the whole state that will have been handed over by
+  /// then; none: the last one.
+  void require_updatable(const std::vector<volume::Channel>& channels,
+                         const std::optional<std::vector<volume::Channel>>& comes, const std::string& name);
+
   /// How many states were handed over; the newest has this number.
   [[nodiscard]] std::uint64_t newest() const { return newest_; }
   struct State {
@@ -72,7 +81,13 @@ class Live {
   struct Handed {
     volume::Channel channel;
     Takes takes;
+    bool operator==(const Handed&) const = default;
   };
+  [[nodiscard]] std::vector<Handed> handed();
+  static const Handed& updatable(const std::vector<Handed>& handed, volume::Channel channel, const std::string& name);
+  void hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease);
+  // Of what was handed over last when they were made.
+  void hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name);
   // old: what it held before.
   void take_next(std::optional<Whole>& old);
   void refuse_base(std::optional<Whole>& old);

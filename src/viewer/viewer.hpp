@@ -93,6 +93,8 @@ class Viewer {
   std::optional<Error> frame_failure(const Instance& instance, std::uint32_t frame);
   /// Shows, in place of the volume, the newest state of it; null: none, and of one before nothing.
   void set_live(std::shared_ptr<Live> live);
+  /// [GL] The next state of this, whoever shows it, from voxels in GL; of what changed, on top of the last.
+  void set_live_gl(const std::shared_ptr<Live>& live, const render::GlState& state);
   struct LiveStatus {
     std::uint64_t handed = 0;       ///< the newest state's number; 0: none
     std::uint64_t ready = 0;        ///< of the one that was taken last
@@ -269,6 +271,8 @@ class Viewer {
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.
   void prepare(const Frame& frame);
+  // Takes voxels from GL that are there.
+  static void follow_transfers(Context& g, double budget_ms);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.

@@ -219,6 +219,11 @@ FrameResult Viewer::render(const Frame& frame) {
     // Asking the driver may take some of the budget: who wakes its threads may lose a core to them.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
+    if (g.transfers().busy()) {
+      attempt("cumulet: live voxels", [&] { follow_transfers(g, frame.budget_ms); });
+    } else {
+      follow_transfers(g, 0.0);
+    }
     attempt("cumulet: upload", [&] {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
@@ -239,7 +244,7 @@ FrameResult Viewer::render(const Frame& frame) {
     }
     if (watched_) note_drawn(g, *watched_);
     for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
-    if (something_waits()) {
+    if (something_waits() || g.transfers().busy()) {
       result.more = true;
       result.converged = false;
     }
@@ -261,12 +266,53 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   with_gl([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
+    follow_transfers(g, frame.budget_ms);
     prepare(frame);
     g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
     follow_upload(g);
     result = g.warm_up(shot(), frame, all, busy(), deadline);
   });
   return result;
+}
+
+// ---- states in GL ----
+
+void Viewer::set_live_gl(const std::shared_ptr<Live>& live, const render::GlState& state) {
+  std::vector<volume::MemoryField> fields;  // what of them can be checked without voxels
+  std::vector<volume::Channel> channels;
+  for (const render::GlVoxels& field : state.fields) {
+    fields.push_back({field.channel, volume::SparseVoxels{.brick_origins = {},
+                                                          .brick_values = {},
+                                                          .brick_active = {},
+                                                          .tiles = {},
+                                                          .index_to_world = field.index_to_world}});
+    channels.push_back(field.channel);
+  }
+  render::VoxelTransfers::Arrive arrive;
+  if (!state.changed) {
+    volume::check_fields(fields, state.name);
+    arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
+  } else {
+    volume::check_update(fields, state.name);
+    arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) {
+      volume::Changes changes;
+      for (volume::FieldCopy& copy : copies)
+        changes.fields.push_back({copy.channel, std::get<volume::BrickCopy>(std::move(copy.voxels))});
+      live->update(std::move(changes), name);
+    };
+  }
+  with_gl([&](Context& g) {
+    if (state.changed) live->require_updatable(channels, g.transfers().channels_of(live.get()), state.name);
+    g.transfers().begin(state, live.get(), std::move(arrive));
+  });
+  notify();
+}
+
+void Viewer::follow_transfers(Context& g, double budget_ms) {
+  // They share a frame with all else.
+  constexpr double part = 0.5;
+  constexpr double least_ms = 2.0;
+  g.transfers().follow(deadline_after(std::max(part * budget_ms, least_ms)));
 }
 
 // ---- for the host's own drawing ----

@@ -54,8 +54,8 @@ struct MemoryField {
 /// others, and for spans and sizes that do not agree, Error(file) for transforms, bricks and tiles; name begins the
 /// line.
 void check_fields(std::span<const MemoryField> fields, const std::string& name);
-/// Of each field's voxels alone.
-void check_voxels(std::span<const MemoryField> fields, const std::string& name);
+/// The same of what changes some fields of a state: others need not be there.
+void check_update(std::span<const MemoryField> fields, const std::string& name);
 /// Throws Error(file) for a value that is not finite, with the field and the voxel. O(values), in parallel.
 void require_finite(const MemoryField& field, const std::string& name);
 

@@ -316,37 +316,11 @@ std::optional<std::size_t> first_not_finite(std::span<const float> values) {
   return first < values.size() ? std::optional(first.load()) : std::nullopt;
 }
 
-}  // namespace
-
-bool detail::all_finite(std::span<const float> values) {
-  // In whole numbers, without a branch: it vectorizes.
-  constexpr std::uint32_t exponent = 0x7f800000U;
-  std::uint32_t bad = 0;
-  for (const float value : values) bad |= (std::bit_cast<std::uint32_t>(value) & exponent) == exponent ? 1U : 0U;
-  return bad == 0;
-}
-
-const char* name_of(Channel channel) {
-  constexpr std::array<const char*, channel_count> names = {"density",    "temperature", "flame",      "red",
-                                                            "green",      "blue",        "anisotropy", "velocity_x",
-                                                            "velocity_y", "velocity_z"};
-  return names.at(static_cast<std::size_t>(channel));
-}
-
-void check_fields(std::span<const MemoryField> fields, const std::string& name) {
-  std::array<int, channel_count> count{};
-  for (const MemoryField& field : fields) ++count.at(static_cast<std::size_t>(field.channel));
-  const auto there = [&](Channel channel) { return count.at(static_cast<std::size_t>(channel)); };
+void refuse_twice(std::span<const MemoryField> fields, const std::string& name) {
   for (const MemoryField& field : fields) {
-    if (there(field.channel) > 1) refuse(name, std::string("has ") + name_of(field.channel) + " twice");
+    if (std::ranges::count(fields, field.channel, &MemoryField::channel) > 1)
+      refuse(name, std::string("has ") + name_of(field.channel) + " twice");
   }
-  const int colours = there(Channel::red) + there(Channel::green) + there(Channel::blue);
-  const int velocities = there(Channel::velocity_x) + there(Channel::velocity_y) + there(Channel::velocity_z);
-  if (colours % 3 != 0) refuse(name, "has some of red, green and blue, not all");
-  if (velocities % 3 != 0) refuse(name, "has some of velocity_x, velocity_y and velocity_z, not all");
-  if (there(Channel::density) + there(Channel::temperature) + there(Channel::flame) == 0)
-    refuse(name, "has neither density nor temperature nor flame");
-  check_voxels(fields, name);
 }
 
 void check_voxels(std::span<const MemoryField> fields, const std::string& name) {
@@ -367,6 +341,42 @@ void check_voxels(std::span<const MemoryField> fields, const std::string& name) 
       }
     });
   }
+}
+
+}  // namespace
+
+bool detail::all_finite(std::span<const float> values) {
+  // In whole numbers, without a branch: it vectorizes.
+  constexpr std::uint32_t exponent = 0x7f800000U;
+  std::uint32_t bad = 0;
+  for (const float value : values) bad |= (std::bit_cast<std::uint32_t>(value) & exponent) == exponent ? 1U : 0U;
+  return bad == 0;
+}
+
+const char* name_of(Channel channel) {
+  constexpr std::array<const char*, channel_count> names = {"density",    "temperature", "flame",      "red",
+                                                            "green",      "blue",        "anisotropy", "velocity_x",
+                                                            "velocity_y", "velocity_z"};
+  return names.at(static_cast<std::size_t>(channel));
+}
+
+void check_fields(std::span<const MemoryField> fields, const std::string& name) {
+  refuse_twice(fields, name);
+  std::array<int, channel_count> count{};
+  for (const MemoryField& field : fields) ++count.at(static_cast<std::size_t>(field.channel));
+  const auto there = [&](Channel channel) { return count.at(static_cast<std::size_t>(channel)); };
+  const int colours = there(Channel::red) + there(Channel::green) + there(Channel::blue);
+  const int velocities = there(Channel::velocity_x) + there(Channel::velocity_y) + there(Channel::velocity_z);
+  if (colours % 3 != 0) refuse(name, "has some of red, green and blue, not all");
+  if (velocities % 3 != 0) refuse(name, "has some of velocity_x, velocity_y and velocity_z, not all");
+  if (there(Channel::density) + there(Channel::temperature) + there(Channel::flame) == 0)
+    refuse(name, "has neither density nor temperature nor flame");
+  check_voxels(fields, name);
+}
+
+void check_update(std::span<const MemoryField> fields, const std::string& name) {
+  refuse_twice(fields, name);
+  check_voxels(fields, name);
 }
 
 void require_finite(const MemoryField& field, const std::string& name) {

@@ -73,6 +73,20 @@ BrickCopy::BrickCopy(const DenseCopy& dense) : index_to_world_(dense.index_to_wo
   leaves.sweep(take, nullptr, {});
 }
 
+void BrickCopy::reserve(std::size_t count) {
+  origins_.reserve(3 * count);
+  values_.reserve(brick_voxels * count);
+  active_.reserve(brick_size * count);
+}
+
+bool BrickCopy::add(const glm::ivec3& origin, std::span<const float, brick_voxels> values) {
+  for (int axis = 0; axis < 3; ++axis) origins_.push_back(origin[axis]);
+  values_.insert(values_.end(), values.begin(), values.end());
+  const ActiveMask mask = not_zero(values);
+  active_.insert(active_.end(), mask.begin(), mask.end());
+  return all_finite(values);
+}
+
 SparseVoxels BrickCopy::view() const { return {origins_, values_, active_, tiles_, background_, index_to_world_}; }
 
 std::size_t BrickCopy::Hash::operator()(const glm::ivec3& origin) const {

@@ -42,6 +42,12 @@ class BrickCopy {
   explicit BrickCopy(const SparseVoxels& voxels, bool zeros = false);
   /// Of voxels that are not 0.
   explicit BrickCopy(const DenseCopy& dense);
+  /// Of none yet.
+  explicit BrickCopy(const glm::dmat4& index_to_world) : index_to_world_(index_to_world) {}
+
+  void reserve(std::size_t count);
+  /// One more, at a place where none is: active are those of its voxels that are not 0. Returns whether all are finite.
+  bool add(const glm::ivec3& origin, std::span<const float, brick_voxels> values);
 
   /// What it reads from stays here.
   [[nodiscard]] SparseVoxels view() const;

@@ -1,5 +1,6 @@
 // How long it takes from a state's hand-over to its picture, and where that goes: of a plume in a dense array of so
-// many voxels a side, which is copied or held, of its bricks, and of a tenth of its bricks. A picture is there when a
+// many voxels a side, which is copied or held, of its bricks, of a tenth of its bricks, and of textures: handed over as
+// they are, or read back by the host through a pixel buffer and held. A picture is there when a
 // frame draws it, coarse where the budget makes it so. By hand:
 //
 //     cumulet-bench-live [SIDE [STATES]]...
@@ -14,6 +15,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "c_viewer.hpp"
@@ -73,6 +75,64 @@ double least(const std::vector<Spent>& spent, double Spent::*part) {
   return (*std::ranges::min_element(spent, {}, part)).*part;
 }
 
+// A simulation's texture, the states that it takes in turn, and a pixel buffer of the host's.
+class Textures {
+ public:
+  Textures(const GladGLContext& gl, int side, GLenum format, const std::vector<float> (&values)[2])
+      : gl_(gl), side_(side) {
+    gl_.CreateTextures(GL_TEXTURE_3D, 3, names_);
+    for (const GLuint name : names_) gl_.TextureStorage3D(name, 1, format, side, side, side);
+    for (int i = 0; i < 2; ++i)
+      gl_.TextureSubImage3D(names_[1 + i], 0, 0, 0, 0, side, side, side, GL_RED, GL_FLOAT, values[i].data());
+    constexpr GLbitfield mapped = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    const auto bytes = static_cast<GLsizeiptr>(values[0].size() * sizeof(float));
+    gl_.CreateBuffers(1, &buffer_);
+    gl_.NamedBufferStorage(buffer_, bytes, nullptr, mapped | GL_CLIENT_STORAGE_BIT);
+    read_ = static_cast<const float*>(gl_.MapNamedBufferRange(buffer_, 0, bytes, mapped));
+  }
+  Textures(const Textures&) = delete;
+  Textures& operator=(const Textures&) = delete;
+  ~Textures() {
+    gl_.DeleteTextures(3, names_);
+    gl_.DeleteBuffers(1, &buffer_);
+  }
+  void step(int i) const {
+    gl_.CopyImageSubData(names_[1 + i % 2], GL_TEXTURE_3D, 0, 0, 0, 0, names_[0], GL_TEXTURE_3D, 0, 0, 0, 0, side_,
+                         side_, side_);
+  }
+  [[nodiscard]] GLsync read_back() const {
+    gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, buffer_);
+    gl_.GetTextureImage(names_[0], 0, GL_RED, GL_FLOAT, 4 * side_ * side_ * side_, nullptr);
+    gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    const GLsync read = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl_.Flush();
+    return read;
+  }
+  void describe(cumulet_dense_desc& dense) const {
+    dense.values = read_;
+    dense.value_count = static_cast<std::uint64_t>(side_) * static_cast<std::uint64_t>(side_ * side_);
+    for (int& s : dense.size) s = side_;
+    std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), dense.index_to_world);
+  }
+  [[nodiscard]] cumulet_gl_field field() const {
+    auto field = make_desc<cumulet_gl_field>();
+    field.texture = names_[0];
+    std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), field.index_to_world);
+    return field;
+  }
+  // About the middle of the height.
+  [[nodiscard]] cumulet_voxel_box tenth() const {
+    return {{0, side_ / 2 - side_ / 20, 0}, {side_ - 1, side_ / 2 + side_ / 20, side_ - 1}};
+  }
+
+ private:
+  const GladGLContext& gl_;
+  int side_;
+  GLuint names_[3]{};
+  GLuint buffer_ = 0;
+  const float* read_ = nullptr;
+};
+
 class Bench {
  public:
   explicit Bench(double density_scale)
@@ -103,15 +163,23 @@ class Bench {
   }
 
   Spent show(const State& state, decltype(cumulet_live_set)* how, bool held) {
+    return show([&] { hand_over(state, how, held); });
+  }
+  // hand_over: how a state comes, or begins to; meanwhile: what the host does between frames.
+  Spent show(
+      const std::function<void()>& hand_over, const std::function<void()>& meanwhile = [] {}) {
+    auto before = make_desc<cumulet_live_info>();
+    must(viewer_.get(), cumulet_get_live_info(viewer_.get(), &before));
     const auto begun = Clock::now();
-    hand_over(state, how, held);
+    hand_over();
     Spent spent;
     spent.copy = milliseconds_since(begun);
     auto info = make_desc<cumulet_live_info>();
     for (;;) {
+      meanwhile();
       must(viewer_.get(), cumulet_render(viewer_.get(), &frame_, nullptr));
       must(viewer_.get(), cumulet_get_live_info(viewer_.get(), &info));
-      if (info.drawn_state == info.handed_state) break;
+      if (info.handed_state > before.handed_state && info.drawn_state == info.handed_state) break;
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     spent.all = milliseconds_since(begun);
@@ -128,6 +196,45 @@ class Bench {
     return spent;
   }
   [[nodiscard]] std::uint64_t cells() const { return cells_; }
+
+  // Of a texture, to which voxels are copied on the device first, as a simulation's step would write them.
+  Spent show(const Textures& textures, int i, bool changed) {
+    textures.step(i);
+    return show([&] {
+      const cumulet_gl_field field = textures.field();
+      auto desc = make_desc<cumulet_gl_state_desc>();
+      desc.fields = &field;
+      desc.field_count = 1;
+      const cumulet_voxel_box box = textures.tenth();
+      if (changed) {
+        desc.changed = &box;
+        desc.changed_count = 1;
+      }
+      must(viewer_.get(), cumulet_live_set_gl(viewer_.get(), live_.get(), &desc));
+    });
+  }
+  // The way of a host that reads back itself, and waits for nothing.
+  Spent show_read_back(const Textures& textures, int i) {
+    textures.step(i);
+    GLsync read = nullptr;
+    const auto begin = [&] { read = textures.read_back(); };
+    const auto look = [&] {
+      if (read == nullptr || gl_.ClientWaitSync(read, 0, 0) == GL_TIMEOUT_EXPIRED) return;
+      gl_.DeleteSync(std::exchange(read, nullptr));
+      auto dense = make_desc<cumulet_dense_desc>();
+      textures.describe(dense);
+      auto field = make_desc<cumulet_field>();
+      field.dense = &dense;
+      auto desc = make_desc<cumulet_state_desc>();
+      desc.fields = &field;
+      desc.field_count = 1;
+      desc.release = [](void*) {};
+      char error[256];
+      if (cumulet_live_set(live_.get(), &desc, error, sizeof error) != CUMULET_OK) throw std::runtime_error(error);
+    };
+    return show(begin, look);
+  }
+  [[nodiscard]] const GladGLContext& gl() const { return gl_; }
 
  private:
   void hand_over(const State& state, decltype(cumulet_live_set)* how, bool held) {
@@ -159,14 +266,17 @@ void measure(int side, int count) {
   };
   const auto dense = [&](int i) { return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, values[i])); };
   Bench bench(3.0);
-  const auto row = [&](const char* what, const State(&states)[2], decltype(cumulet_live_set)* how, bool held) {
+  const auto rows = [&](const char* what, const std::function<Spent(int)>& show) {
     std::vector<Spent> spent;
-    for (int i = 0; i < count; ++i) spent.push_back(bench.show(states[i % 2], how, held));
+    for (int i = 0; i < count; ++i) spent.push_back(show(i));
     std::printf("| %d^3 | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %llu |\n", side, what,
                 least(spent, &Spent::copy), least(spent, &Spent::read), least(spent, &Spent::statistics),
                 least(spent, &Spent::refine), least(spent, &Spent::records), least(spent, &Spent::upload),
                 least(spent, &Spent::rest), least(spent, &Spent::all), static_cast<unsigned long long>(bench.cells()));
     std::fflush(stdout);
+  };
+  const auto row = [&](const char* what, const State(&states)[2], decltype(cumulet_live_set)* how, bool held) {
+    rows(what, [&](int i) { return bench.show(states[i % 2], how, held); });
   };
   {
     const State states[] = {dense(0), dense(1)};
@@ -182,6 +292,12 @@ void measure(int side, int count) {
   std::erase_if(tenth, [&](const Sides& origin) { return std::abs(origin[1] - side / 2) > side / 20; });
   const State parts[] = {sparse(values[1], tenth), sparse(values[0], tenth)};
   row("a tenth of the bricks", parts, cumulet_live_update, false);
+  const Textures floats(bench.gl(), side, GL_R32F, values);
+  rows("in GL, R32F, read back by the host", [&](int i) { return bench.show_read_back(floats, i); });
+  rows("in GL, R32F", [&](int i) { return bench.show(floats, i, false); });
+  const Textures halves(bench.gl(), side, GL_R16F, values);
+  rows("in GL, R16F", [&](int i) { return bench.show(halves, i, false); });
+  rows("in GL, R16F, a tenth of it", [&](int i) { return bench.show(halves, i, true); });
 }
 
 }  // namespace

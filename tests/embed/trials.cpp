@@ -368,6 +368,7 @@ void Caller::call_all() {
   cumulet_live* new_live = nullptr;
   const auto live = make_desc<cumulet_live_desc>();
   const auto state = make_desc<cumulet_state_desc>();
+  const auto gl_state = make_desc<cumulet_gl_state_desc>();
   auto live_info = make_desc<cumulet_live_info>();
   const auto limits = make_desc<cumulet_limits_desc>();
   cumulet_model* new_model = nullptr;
@@ -495,6 +496,7 @@ void Caller::call_all() {
     CALL(cumulet_set_sequence, v, nullptr);
     CALL(cumulet_set_live, v, nullptr);
     CALL(cumulet_get_live_info, v, &live_info);
+    CALL(cumulet_live_set_gl, v, new_live, &gl_state);
     CALL(cumulet_set_limits, v, &limits);
     CALL(cumulet_get_sequence_info, v, &sequence_info, nullptr, 0);
     CALL(cumulet_get_sequence_frame, v, 0, nullptr, 0);

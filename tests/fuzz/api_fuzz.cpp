@@ -410,8 +410,34 @@ class Program {
       static_cast<void>(state.release());  // now the library's, or gone
   }
 
+  /// Of names that are none of the context's but by chance: the library's own among them.
+  void set_live_gl() {
+    std::array<cumulet_gl_field, 2> fields{described<cumulet_gl_field>(), described<cumulet_gl_field>()};
+    if (data_.ConsumeBool()) {
+      for (cumulet_gl_field& field : fields) {
+        field.struct_size = sizeof field;
+        field.texture = data_.ConsumeBool() ? data_.ConsumeIntegralInRange<std::uint32_t>(0, 40) : 0;
+        field.buffer = field.texture == 0 ? data_.ConsumeIntegralInRange<std::uint32_t>(0, 40) : 0;
+        for (std::int32_t& side : field.size) side = data_.ConsumeIntegralInRange(-1, 20);
+      }
+    }
+    std::array<cumulet_voxel_box, 2> boxes{};
+    for (cumulet_voxel_box& box : boxes) {
+      for (std::int32_t& at : box.min) at = data_.ConsumeIntegral<std::int32_t>();
+      for (std::int32_t& at : box.max) at = data_.ConsumeIntegral<std::int32_t>();
+    }
+    auto desc = described<cumulet_gl_state_desc>();
+    desc.fields = fields.data();
+    desc.field_count = data_.ConsumeIntegralInRange<std::uint64_t>(0, fields.size());
+    desc.changed = data_.ConsumeBool() ? boxes.data() : nullptr;
+    desc.changed_count = desc.changed != nullptr ? data_.ConsumeIntegralInRange<std::uint64_t>(0, boxes.size()) : 0;
+    desc.wait = nullptr;
+    desc.name = data_.ConsumeBool() ? "a state\nof lines" : nullptr;
+    told(cumulet_live_set_gl(viewer_.get(), live_.get(), &desc));
+  }
+
   void change_live() {
-    switch (data_.ConsumeIntegralInRange(0, 9)) {
+    switch (data_.ConsumeIntegralInRange(0, 10)) {
       case 0:
       case 1:
       case 2:
@@ -441,6 +467,8 @@ class Program {
         if (volume != nullptr) volume_.reset(volume);
         return;
       }
+      case 9:
+        return set_live_gl();
       default: {
         const auto desc = described<cumulet_live_desc>();
         cumulet_live* live = nullptr;

@@ -1,5 +1,5 @@
-// A live simulation: smoke that the mouse stirs, computed in the host's own context, handed over step by step and path
-// traced as it moves.
+// A live simulation: smoke that the mouse stirs, computed in the host's own context, handed over step by step in the
+// texture in which it is, and path traced as it moves.
 //
 //     cumulet-embed-smoke [--voxels N] [--record FILE]
 //     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N]
@@ -18,7 +18,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -56,7 +55,6 @@ layout(binding = 0) uniform sampler3D velocity;
 layout(binding = 1) uniform sampler3D other;
 layout(binding = 0, rgba32f) uniform writeonly image3D to_velocity;
 layout(binding = 1, r32f) uniform writeonly image3D to_number;
-layout(binding = 0, std430) writeonly buffer State { float state[]; };
 layout(location = 0) uniform float dt;
 layout(location = 1) uniform vec3 stirred;
 layout(location = 2) uniform vec3 push;
@@ -116,7 +114,6 @@ void main() {
   float smoke = texture(other, from()).x * (1.0 - fade * dt) + 3.0 * dt * source();
   if (smoke < 1e-3) smoke = 0.0;
   imageStore(to_number, cell, vec4(smoke));
-  state[(cell.z * n + cell.y) * n + cell.x] = smoke;
 }
 #endif
 )";
@@ -151,9 +148,7 @@ class Solver {
     Point at{};    ///< in parts of the cube
     Point push{};  ///< voxels a second
   };
-  /// Into this buffer, n^3 floats.
-  void step(float dt, const Stir& stir, GLuint state) {
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, state);
+  void step(float dt, const Stir& stir) {
     for (const GLuint program : programs_) {
       glProgramUniform1f(program, 0, dt);
       glProgramUniform3f(program, 1, float(stir.at[0]), float(stir.at[1]), float(stir.at[2]));
@@ -171,6 +166,8 @@ class Solver {
     run(4, velocity_[0], smoke_[0], 0, smoke_[1]);
     std::swap(smoke_[0], smoke_[1]);
   }
+  /// After the last step: a 3D texture of floats.
+  [[nodiscard]] GLuint smoke() const { return smoke_[0]; }
 
  private:
   using Pair = std::array<GLuint, 2>;
@@ -202,65 +199,6 @@ class Solver {
   Pair velocity_{}, divergence_{}, pressure_{}, smoke_{};
 };
 
-// ---- buffers that the device writes, and the library reads where they are ----
-
-struct Buffer {
-  GLuint name = 0;
-  const float* values = nullptr;
-  GLsync written = nullptr;           // under way
-  std::atomic<bool> is_held = false;  // by the library
-};
-
-/// Nothing waits: the device writes into one while the library reads another, and which one that still is it tells from
-/// whatever thread.
-class Ring {
- public:
-  explicit Ring(int voxels) : count_(std::size_t(voxels) * std::size_t(voxels) * std::size_t(voxels)) {
-    constexpr GLbitfield mapped = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-    const auto bytes = static_cast<GLsizeiptr>(count_ * sizeof(float));
-    for (Buffer& buffer : buffers_) {
-      glCreateBuffers(1, &buffer.name);
-      glNamedBufferStorage(buffer.name, bytes, nullptr, mapped | GL_CLIENT_STORAGE_BIT);
-      buffer.values = static_cast<const float*>(glMapNamedBufferRange(buffer.name, 0, bytes, mapped));
-      if (buffer.values == nullptr) fail("a buffer cannot be mapped");
-    }
-  }
-  Ring(const Ring&) = delete;
-  Ring& operator=(const Ring&) = delete;
-  /// Once the library holds none any more.
-  ~Ring() {
-    for (Buffer& buffer : buffers_) glDeleteBuffers(1, &buffer.name);
-  }
-
-  Buffer* free() {
-    auto* const found = std::ranges::find_if(
-        buffers_, [](const Buffer& buffer) { return buffer.written == nullptr && !buffer.is_held; });
-    return found == buffers_.end() ? nullptr : &*found;
-  }
-  void begin(Buffer& buffer) {
-    glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
-    buffer.written = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
-    under_way_.push_back(&buffer);
-  }
-  /// The oldest that is under way, if it is written by now.
-  Buffer* written(bool wait) {
-    if (under_way_.empty()) return nullptr;
-    Buffer& buffer = *under_way_.front();
-    constexpr GLuint64 second = 1'000'000'000;
-    const GLenum state = glClientWaitSync(buffer.written, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? 10 * second : 0);
-    if (state == GL_TIMEOUT_EXPIRED) return nullptr;
-    glDeleteSync(std::exchange(buffer.written, nullptr));
-    under_way_.erase(under_way_.begin());
-    return &buffer;
-  }
-  [[nodiscard]] std::size_t count() const { return count_; }
-
- private:
-  std::size_t count_;
-  std::array<Buffer, 4> buffers_;  // written, waiting, read, and one to begin with
-  std::vector<Buffer*> under_way_;
-};
-
 // ---- the host ----
 
 struct Mouse {
@@ -272,10 +210,7 @@ struct Mouse {
 class Host {
  public:
   Host(const cumulet::GetProc& get_proc, int voxels, bool test)
-      : voxels_(voxels),
-        solver_(voxels),
-        ring_(voxels),
-        viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
+      : voxels_(voxels), solver_(voxels), viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
     must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
                             .sun_elevation_degrees = 50.0F,
                             .sun_irradiance = {3.0F, 2.8F, 2.5F},
@@ -291,23 +226,28 @@ class Host {
 
   [[nodiscard]] cumulet::Viewer& viewer() { return viewer_; }
 
-  /// A step of the simulation, if there is room for it, and over with what is written by now.
-  void advance(const Mouse& mouse, double aspect, bool wait) {
-    if (Buffer* buffer = ring_.free()) {
-      solver_.step(1.0F / 30.0F, stir(mouse, aspect), buffer->name);
-      ring_.begin(*buffer);
-    }
-    while (Buffer* buffer = ring_.written(wait)) hand_over(*buffer);
+  /// A step of the simulation, handed over: what the next one does to its textures is no matter.
+  void advance(const Mouse& mouse, double aspect) {
+    solver_.step(1.0F / 30.0F, stir(mouse, aspect));
+    const double voxel = 2.0 / voxels_;
+    const double first = -1.0 + 0.5 * voxel;
+    const cumulet::GlField smoke{
+        .channel = cumulet::Channel::density,
+        .texture = solver_.smoke(),
+        .index_to_world = {voxel, 0, 0, 0, 0, voxel, 0, 0, 0, 0, voxel, 0, first, first, first, 1}};
+    must(viewer_.live_set_gl(live_, {.fields = {&smoke, 1}, .name = "smoke"}));
   }
 
-  /// Where the smoke of the newest state is, in the picture: 0 to 1, from its top left.
+  /// Where the smoke of the last step is, in the picture: 0 to 1, from its top left.
   [[nodiscard]] std::array<double, 2> middle_of_smoke(double aspect) {
+    const auto n = static_cast<std::size_t>(voxels_);
+    std::vector<float> values(n * n * n);
+    glGetTextureImage(solver_.smoke(), 0, GL_RED, GL_FLOAT, GLsizei(values.size() * sizeof(float)), values.data());
     double mass = 0.0;
     Point sum{};
-    for (std::size_t i = 0; i < ring_.count(); ++i) {
-      const double value = newest_[i];
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double value = values[i];
       mass += value;
-      const auto n = static_cast<std::size_t>(voxels_);
       const std::array<std::size_t, 3> p{i % n, i / n % n, i / n / n};
       for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += value * (2.0 * (double(p[axis]) + 0.5) / voxels_ - 1.0);
     }
@@ -350,26 +290,8 @@ class Host {
     return stir;
   }
 
-  void hand_over(Buffer& buffer) {
-    newest_ = buffer.values;
-    buffer.is_held = true;
-    const double voxel = 2.0 / voxels_;
-    const double first = -1.0 + 0.5 * voxel;
-    const cumulet::Field smoke(
-        cumulet::Channel::density,
-        cumulet::DenseDesc{.values = {buffer.values, ring_.count()},
-                           .size = {voxels_, voxels_, voxels_},
-                           .index_to_world = {voxel, 0, 0, 0, 0, voxel, 0, 0, 0, 0, voxel, 0, first, first, first, 1}});
-    must(live_.set({.fields = {&smoke, 1},
-                    .name = "smoke",
-                    .release = [](void* user) { static_cast<Buffer*>(user)->is_held = false; },
-                    .release_user = &buffer}));
-  }
-
   int voxels_;
   Solver solver_;
-  Ring ring_;  // before those that may hold its buffers
-  const float* newest_ = nullptr;
   std::optional<Mouse> mouse_;  // of the last frame, while it stirs
   cumulet::Live live_;
   cumulet::Viewer viewer_;
@@ -441,13 +363,17 @@ void play(const std::string& record, const std::string& folder, int voxels) {
   };
   for (int i = 0; i < frames; ++i) {
     for (; next < moves.size() && moves[next].frame <= i; ++next) mouse = moves[next].mouse;
-    host.advance(mouse, 1.0, true);
+    host.advance(mouse, 1.0);
     must(viewer.render(frame));
     follow();
   }
-  for (int more = 0; follow().drawn_state != follow().handed_state; ++more) {
+  // Until nothing is on its way, and the newest is drawn.
+  const auto rests = [&] {
+    return must(viewer.render(frame)).has(cumulet::RenderFlags::converged) &&
+           follow().drawn_state == follow().handed_state;
+  };
+  for (int more = 0; !rests(); ++more) {
     if (more == 1000) fail("the newest state is never drawn");
-    must(viewer.render(frame));
   }
   const auto info = follow();
   std::printf("%d frames, %llu states, %llu drawn\n", frames, static_cast<unsigned long long>(info.handed_state),
@@ -534,7 +460,7 @@ void run(GLFWwindow* window, Host& host, const std::string& record) {
     if (file && (mouse.x != last.x || mouse.y != last.y || mouse.stirs != last.stirs))
       file << i << ' ' << mouse.x << ' ' << mouse.y << ' ' << mouse.stirs << '\n';
     last = mouse;
-    host.advance(mouse, height > 0 ? double(width) / height : 1.0, false);
+    host.advance(mouse, height > 0 ? double(width) / height : 1.0);
     must(host.viewer().render(
         {.budget_ms = 12.0, .width = static_cast<std::uint32_t>(width), .height = static_cast<std::uint32_t>(height)}));
     glfwSwapBuffers(window);

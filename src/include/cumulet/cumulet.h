@@ -59,11 +59,11 @@
  *       - GL_FRAMEBUFFER_SRGB
  *
  *     and the contents of the frame's own target. It never touches: queries, transform feedback, sync objects of the
- *     host, the debug callback and its filters, or any other object. Do not call it inside transform feedback,
- *     conditional rendering or a query of the host's. With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored:
- *     afterwards the state listed above is undefined. Objects get labels and passes are debug groups (KHR_debug), up to
- *     two on top of the host's own. glGetError is clean after every call; errors that were pending before
- *     are dropped.
+ *     host (but to wait for, on the device, the one in cumulet_gl_state_desc), the debug callback and its filters, or
+ *     any other object. Do not call it inside transform feedback, conditional rendering or a query of the host's. With
+ *     CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is undefined.
+ *     Objects get labels and passes are debug groups (KHR_debug), up to two on top of the host's own. glGetError is
+ *     clean after every call; errors that were pending before are dropped.
  *
  * Ownership
  *     Handles belong to the caller that got them and end with the function named beside the type; what a handle refers
@@ -616,6 +616,8 @@ CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* 
  * None of them waits for a build: a call copies what it is given and returns (or does not copy, see
  * cumulet_state_desc.release). A state that nobody began to build when the next one comes is not built: there is one
  * under way and one that waits, however fast they come. In numbers: states count from 1 on, updates among them.
+ *
+ * Voxels that a simulation has in textures or buffers of OpenGL: cumulet_live_set_gl, a call of a viewer's, below.
  */
 
 typedef struct cumulet_live_desc {
@@ -938,6 +940,87 @@ typedef struct cumulet_live_info {
   uint64_t ready_count;  /* how many were taken up since the live volume was set */
   uint64_t drawn_count;  /* how many of these have been drawn */
 } cumulet_live_info;
+
+/* What a voxel is in a buffer: numbers one behind another in GL's formats of these names. R16 and R8 are 0 to 1. */
+typedef enum cumulet_voxel_format {
+  CUMULET_VOXEL_FORMAT_R32F = 0,
+  CUMULET_VOXEL_FORMAT_R16F = 1,
+  CUMULET_VOXEL_FORMAT_R16 = 2,
+  CUMULET_VOXEL_FORMAT_R8 = 3
+} cumulet_voxel_format;
+
+/* One channel's voxels in a GL object of the host's: in a texture, or in a buffer. */
+typedef struct cumulet_gl_field {
+  size_t struct_size; /* of all fields of an array the same: the distance between them */
+  cumulet_channel channel;
+  /*
+   * A GL_TEXTURE_3D, of which level 0 is read as a shader fetches it (floats, or what is normalised; no whole numbers,
+   * base level 0): texel (x, y, z) is the voxel. component: 0 to 3, r to a, so that one texture may have three fields.
+   */
+  uint32_t texture;
+  uint32_t component;
+  /*
+   * Or, where texture is 0, a buffer. offset: bytes to voxel 0. strides: bytes from voxel to voxel along x, y and z;
+   * all 0: x fastest, then y, then z, without gaps. All are multiples of a number's bytes, and of a buffer of R16F, R16
+   * or R8 the words of four bytes that hold the voxels lie in it.
+   */
+  uint32_t buffer;
+  cumulet_voxel_format format; /* of a buffer, as the next three */
+  uint64_t offset;
+  uint64_t strides[3];
+  int32_t size[3];
+  double index_to_world[16]; /* as in cumulet_dense_desc */
+} cumulet_gl_field;
+
+/* Voxels that changed; both ends are inclusive. */
+typedef struct cumulet_voxel_box {
+  int32_t min[3];
+  int32_t max[3];
+} cumulet_voxel_box;
+
+/* A state as cumulet_state_desc has it, in GL. */
+typedef struct cumulet_gl_state_desc {
+  size_t struct_size;
+  const cumulet_gl_field* fields;
+  uint64_t field_count;
+  /*
+   * NULL, and none: the whole of the next state. Else the next state is the last one handed over but for these boxes:
+   * of each field, whose texture or buffer is still that of the whole, all bricks of 8^3 voxels (the first begins at
+   * voxel 0) that a box touches are taken. What of a box lies outside of a field is left out.
+   */
+  const cumulet_voxel_box* changed;
+  uint64_t changed_count;
+  void* wait;       /* a GLsync that the device waits for before it reads, or NULL; it stays the host's */
+  const char* name; /* for messages; NULL: "state" */
+} cumulet_gl_state_desc;
+
+/*
+ * [GL] As cumulet_live_set, or cumulet_live_update of bricks, of voxels that lie in GL: they never pass through the
+ * host's memory. The viewer need not show the live volume: its context does the work, for all viewers that show it.
+ *
+ * The call queues a copy on the device and returns: commands that the host gives afterwards may overwrite or delete its
+ * objects. What shaders wrote before in the same context is seen without a glMemoryBarrier; for another context's there
+ * is wait. Only bricks that are not empty are copied back to main memory, in the texture's own precision, so that a
+ * sparse plume costs what it has. That is found done by a later cumulet_render of this viewer (or cumulet_warm_up),
+ * none of which waits: only then is it a state, counted by cumulet_live_info, and built. Until then cumulet_render has
+ * CUMULET_RENDER_MORE. cumulet_wait does not wait for it. The first of a kind (texture or buffer, whole or boxes)
+ * compiles a small program, if cumulet_warm_up did not.
+ *
+ * States become so in the order in which they were handed over by one viewer; memory's (cumulet_live_set) or another
+ * viewer's when they are handed over, whatever is on its way. However fast they come the newest whole state wins and
+ * none starves: the oldest that is on its way arrives, and of those behind it the newest; boxes on top of one that was
+ * left out are part of a newer whole. Two whole states on their way take as much GL memory as twice their voxels.
+ *
+ * It is the same, bit for bit, as the same numbers by cumulet_live_set in a dense array: of a normalised format k / 255
+ * or k / 65535. Refused in one line, with all else as it was, is what cumulet_live_set refuses, and a name that is no
+ * such texture or buffer of the context's group, has no size, lacks the component, or whose layers of bricks are larger
+ * than the driver's storage blocks (CUMULET_ERROR_UNSUPPORTED). A number that is not finite is found when it arrives:
+ * the cumulet_render that finds it draws what there was, and is CUMULET_ERROR_FILE with the line, once; so is what no
+ * longer fits the state that is there. What is on its way when the viewer is detached, or its context is lost, never
+ * arrives: the state before stays, and boxes on top of it would miss it, so that a whole state is next.
+ */
+CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
+                                               const cumulet_gl_state_desc* desc);
 
 /* Of the viewer's live volume; CUMULET_ERROR_INVALID_ARGUMENT if it shows none. */
 CUMULET_API cumulet_status cumulet_get_live_info(cumulet_viewer* viewer, cumulet_live_info* info);

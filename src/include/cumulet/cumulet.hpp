@@ -730,6 +730,42 @@ struct StateDesc {
   void* release_user = nullptr;
 };
 
+/// One channel's voxels in the host's OpenGL: a component of a texture, or, where that is 0, numbers in a buffer.
+struct GlField {
+  Channel channel = Channel::density;
+  std::uint32_t texture = 0;
+  std::uint32_t component = 0;
+  std::uint32_t buffer = 0;
+  VoxelFormat format = VoxelFormat::r32f;
+  std::uint64_t offset = 0;
+  std::array<std::uint64_t, 3> strides{};
+  std::array<int, 3> size{};
+  Matrix index_to_world{};
+
+  operator cumulet_gl_field() const noexcept {
+    cumulet_gl_field c{.struct_size = sizeof(cumulet_gl_field),
+                       .channel = static_cast<cumulet_channel>(channel),
+                       .texture = texture,
+                       .component = component,
+                       .buffer = buffer,
+                       .format = static_cast<cumulet_voxel_format>(format),
+                       .offset = offset,
+                       .strides = {strides[0], strides[1], strides[2]},
+                       .size = {size[0], size[1], size[2]},
+                       .index_to_world = {}};
+    std::copy(index_to_world.begin(), index_to_world.end(), c.index_to_world);
+    return c;
+  }
+};
+
+/// A simulation's state there. changed: boxes of voxels (both ends inclusive) that differ from the last; none: all.
+struct GlStateDesc {
+  std::span<const GlField> fields{};
+  std::optional<std::span<const cumulet_voxel_box>> changed{};
+  void* wait = nullptr;  ///< a GLsync
+  const char* name = nullptr;
+};
+
 namespace detail {
 
 /// Calls with C's descriptor of it.
@@ -1287,6 +1323,23 @@ class Viewer {
   /// An empty one: shows none.
   [[nodiscard]] Result<> set_live(const Live& live) noexcept {
     return result(cumulet_set_live(handle(), live.handle()));
+  }
+  /// [GL] The next state of a live volume, from voxels in OpenGL.
+  [[nodiscard]] Result<> live_set_gl(const Live& live, const GlStateDesc& desc) noexcept {
+    constexpr std::size_t most = CUMULET_CHANNEL_VELOCITY_Z + 2;
+    constexpr cumulet_voxel_box none{};
+    std::array<cumulet_gl_field, most> fields{};
+    const std::size_t count = std::min(desc.fields.size(), most);
+    for (std::size_t i = 0; i < count; ++i) fields[i] = desc.fields[i];
+    const bool some = desc.changed && !desc.changed->empty();
+    const cumulet_gl_state_desc c{.struct_size = sizeof c,
+                                  .fields = fields.data(),
+                                  .field_count = count,
+                                  .changed = some ? desc.changed->data() : (desc.changed ? &none : nullptr),
+                                  .changed_count = some ? desc.changed->size() : 0,
+                                  .wait = desc.wait,
+                                  .name = desc.name};
+    return result(cumulet_live_set_gl(handle(), live.handle(), &c));
   }
   [[nodiscard]] Result<LiveInfo> get_live_info() noexcept {
     auto c = detail::sized<cumulet_live_info>();

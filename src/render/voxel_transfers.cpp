@@ -1,0 +1,514 @@
+#include "render/voxel_transfers.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cstring>
+#include <utility>
+
+#include "base/error.hpp"
+#include "base/one_line.hpp"
+#include "gl/bindings.hpp"
+
+namespace cumulet::render {
+
+namespace {
+
+using volume::brick_size;
+using volume::brick_voxels;
+
+constexpr int longest_side = 1 << 20;  // as of all volumes
+constexpr std::uint64_t most_bricks = std::uint64_t{1} << 27U;
+constexpr const char* what_step = "copying a host's voxels";
+
+[[noreturn]] void refuse(ErrorCode code, const std::string& what, const std::string& cause) {
+  throw Error(code, one_line(what + ", " + cause));
+}
+[[noreturn]] void refuse(const std::string& what, const std::string& cause) {
+  refuse(ErrorCode::invalid_argument, what, cause);
+}
+
+std::string text(glm::ivec3 v) { return std::to_string(v.x) + "x" + std::to_string(v.y) + "x" + std::to_string(v.z); }
+
+std::size_t bytes_of(VoxelFormat format) {
+  return format == VoxelFormat::floats ? 4 : format == VoxelFormat::bytes ? 1 : 2;
+}
+std::size_t brick_bytes(VoxelFormat format) { return brick_voxels * bytes_of(format); }
+
+glm::ivec3 bricks_of(glm::ivec3 size) { return (size - 1) / brick_size + 1; }
+
+/// The format whose bits hold what is fetched.
+VoxelFormat format_of(GLint internal) {
+  switch (internal) {
+    case GL_R8:
+    case GL_RG8:
+    case GL_RGB8:
+    case GL_RGBA8:
+      return VoxelFormat::bytes;
+    case GL_R16:
+    case GL_RG16:
+    case GL_RGB16:
+    case GL_RGBA16:
+      return VoxelFormat::shorts;
+    case GL_R16F:
+    case GL_RG16F:
+    case GL_RGB16F:
+    case GL_RGBA16F:
+      return VoxelFormat::halves;
+    default:
+      return VoxelFormat::floats;
+  }
+}
+
+/// By whole numbers: a host may have set its threads to flush small floats to 0.
+float float_of(std::uint16_t half) {
+  constexpr std::uint32_t rebias = 112U << 23U;
+  constexpr float least = std::bit_cast<float>(113U << 23U);  // the least half that is normal
+  const std::uint32_t bits = std::uint32_t{half} << 13U & 0x0fffe000U;
+  const float small = std::bit_cast<float>(bits + rebias + (1U << 23U)) - least;
+  const std::uint32_t normal = bits + rebias + (bits >= 0x7c00U << 13U ? rebias : 0U);
+  const std::uint32_t magnitude = bits < 0x400U << 13U ? std::bit_cast<std::uint32_t>(small) : normal;
+  return std::bit_cast<float>(magnitude | (std::uint32_t{half} & 0x8000U) << 16U);
+}
+
+template <class Number, class Convert>
+void convert(const std::byte* from, std::span<float, brick_voxels> to, Convert&& number) {
+  std::array<Number, brick_voxels> numbers;
+  std::memcpy(numbers.data(), from, sizeof numbers);
+  std::ranges::transform(numbers, to.begin(), number);
+}
+
+void unpack(VoxelFormat format, const std::byte* from, std::span<float, brick_voxels> to) {
+  switch (format) {
+    case VoxelFormat::floats:
+      std::memcpy(to.data(), from, to.size_bytes());
+      break;
+    case VoxelFormat::halves:
+      convert<std::uint16_t>(from, to, float_of);
+      break;
+    case VoxelFormat::shorts:
+      convert<std::uint16_t>(from, to, [](std::uint16_t v) { return static_cast<float>(v) / 65535.0F; });
+      break;
+    case VoxelFormat::bytes:
+      convert<std::uint8_t>(from, to, [](std::uint8_t v) { return static_cast<float>(v) / 255.0F; });
+      break;
+  }
+}
+
+/// The bricks that boxes touch.
+std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec3 size) {
+  const glm::ivec3 bricks = bricks_of(size);
+  std::vector<bool> any(std::size_t(bricks.x) * std::size_t(bricks.y) * std::size_t(bricks.z));
+  for (const VoxelBox& box : boxes) {
+    const glm::ivec3 low = glm::max(box.min, 0) / brick_size;
+    const glm::ivec3 high = glm::min(box.max, size - 1);
+    if (glm::any(glm::lessThan(high, glm::max(box.min, 0)))) continue;
+    for (int z = low.z; z <= high.z / brick_size; ++z) {
+      for (int y = low.y; y <= high.y / brick_size; ++y) {
+        const std::size_t row = (std::size_t(z) * std::size_t(bricks.y) + std::size_t(y)) * std::size_t(bricks.x);
+        std::fill(any.begin() + std::ptrdiff_t(row) + low.x,
+                  any.begin() + std::ptrdiff_t(row) + high.x / brick_size + 1, true);
+      }
+    }
+  }
+  std::vector<std::uint32_t> found;
+  for (std::size_t i = 0; i < any.size(); ++i) {
+    if (any[i]) found.push_back(static_cast<std::uint32_t>(i));
+  }
+  return found;
+}
+
+std::uint32_t word_at(const std::byte* data, std::size_t i) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, data + i * sizeof word, sizeof word);
+  return word;
+}
+
+}  // namespace
+
+VoxelTransfers::VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits)
+    : gl_(std::move(gl)), programs_(std::move(programs)) {
+  constexpr std::int64_t most = std::int64_t{1} << 31U;  // whose words are counted in 32 bits
+  most_bytes_ = static_cast<std::uint64_t>(std::min(limits.storage_block_bytes, most));
+  GLint alignment = 0;
+  gl_->GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
+  alignment_ = static_cast<std::uint64_t>(std::max(alignment, 4));
+}
+
+// ---- what a host names ----
+
+VoxelTransfers::Source VoxelTransfers::open_texture(const VoxelTexture& texture, const std::string& what) const {
+  const auto& gl = *gl_;
+  const std::string name = what + ": texture " + std::to_string(texture.name);
+  // The target by way of a binding, as HostDepth asks for it.
+  GLint bound = 0;
+  if (gl.IsTexture(texture.name) != GL_FALSE) {
+    gl.ActiveTexture(GL_TEXTURE0 + core::CM_UNIT_HOST_VOXELS);
+    gl.BindTexture(GL_TEXTURE_3D, 0);
+    gl.BindTextureUnit(core::CM_UNIT_HOST_VOXELS, texture.name);
+    gl.GetIntegerv(GL_TEXTURE_BINDING_3D, &bound);
+  }
+  if (bound == 0) refuse(name, "is no GL_TEXTURE_3D of this context's group");
+  const auto level = [&](GLenum parameter) {
+    GLint value = 0;
+    gl.GetTextureLevelParameteriv(texture.name, 0, parameter, &value);
+    return value;
+  };
+  Source source;
+  source.texture = texture.name;
+  source.component = texture.component;
+  source.size = {level(GL_TEXTURE_WIDTH), level(GL_TEXTURE_HEIGHT), level(GL_TEXTURE_DEPTH)};
+  if (glm::any(glm::lessThanEqual(source.size, glm::ivec3(0)))) refuse(name, "has no level 0");
+  GLint base = 0;
+  gl.GetTextureParameteriv(texture.name, GL_TEXTURE_BASE_LEVEL, &base);
+  if (base != 0) refuse(name, "has a base level that is not 0");
+  constexpr std::array<std::array<GLenum, 2>, 4> components{{{GL_TEXTURE_RED_SIZE, GL_TEXTURE_RED_TYPE},
+                                                             {GL_TEXTURE_GREEN_SIZE, GL_TEXTURE_GREEN_TYPE},
+                                                             {GL_TEXTURE_BLUE_SIZE, GL_TEXTURE_BLUE_TYPE},
+                                                             {GL_TEXTURE_ALPHA_SIZE, GL_TEXTURE_ALPHA_TYPE}}};
+  const auto& [bits, type] = components.at(static_cast<std::size_t>(texture.component));
+  if (level(bits) == 0) refuse(name, "has no component " + std::to_string(texture.component));
+  const auto kind = static_cast<GLenum>(level(type));
+  if (kind != GL_FLOAT && kind != GL_UNSIGNED_NORMALIZED && kind != GL_SIGNED_NORMALIZED)
+    refuse(name, "is of whole numbers");
+  source.format = format_of(level(GL_TEXTURE_INTERNAL_FORMAT));
+  return source;
+}
+
+VoxelTransfers::Source VoxelTransfers::open_buffer(const VoxelBuffer& buffer, const std::string& what) const {
+  const auto& gl = *gl_;
+  const std::string name = what + ": buffer " + std::to_string(buffer.name);
+  if (gl.IsBuffer(buffer.name) == GL_FALSE) refuse(name, "is none of this context's group");
+  if (glm::any(glm::lessThanEqual(buffer.size, glm::ivec3(0))) ||
+      glm::any(glm::greaterThan(buffer.size, glm::ivec3(longest_side))))
+    refuse(name, "has voxels of size " + text(buffer.size));
+  GLint64 bytes = 0;
+  GLint mapped = 0;
+  GLint access = 0;
+  gl.GetNamedBufferParameteri64v(buffer.name, GL_BUFFER_SIZE, &bytes);
+  gl.GetNamedBufferParameteriv(buffer.name, GL_BUFFER_MAPPED, &mapped);
+  gl.GetNamedBufferParameteriv(buffer.name, GL_BUFFER_ACCESS_FLAGS, &access);
+  if (mapped != 0 && (static_cast<GLbitfield>(access) & GL_MAP_PERSISTENT_BIT) == 0) refuse(name, "is mapped");
+  Source source;
+  source.buffer = buffer.name;
+  source.size = buffer.size;
+  source.format = buffer.format;
+  source.offset = buffer.offset;
+  const std::uint64_t number = bytes_of(buffer.format);
+  source.strides = {buffer.strides[0], buffer.strides[1], buffer.strides[2]};
+  const glm::u64vec3 size(buffer.size);
+  if (source.strides == glm::u64vec3(0)) {
+    source.strides = number * glm::u64vec3(1, size.x, size.x * size.y);
+  }
+  const auto there = static_cast<std::uint64_t>(bytes);
+  if (source.offset % number != 0 || source.strides % number != glm::u64vec3(0))
+    refuse(name, "has an offset or strides that are no multiples of a number's " + std::to_string(number) + " bytes");
+  // Those that overlap would be more than there is.
+  const bool more = size.x * size.y > there || size.x * size.y * size.z > there / number;
+  const bool beyond = more || source.offset > there || glm::any(glm::greaterThan(source.strides, glm::u64vec3(there)));
+  if (beyond || range_of(source, {0, bricks_of(source.size).z}).y > there)
+    refuse(name, "has " + std::to_string(there) + " bytes, and does not hold the words of its voxels");
+  return source;
+}
+
+VoxelTransfers::Source VoxelTransfers::open(const GlVoxels& field, const std::string& what) const {
+  const auto* texture = std::get_if<VoxelTexture>(&field.source);
+  Source source =
+      texture != nullptr ? open_texture(*texture, what) : open_buffer(std::get<VoxelBuffer>(field.source), what);
+  const glm::u64vec3 bricks(bricks_of(source.size));
+  if (bricks.x * bricks.y * bricks.z > most_bricks)
+    refuse(ErrorCode::unsupported, what, "its size of " + text(source.size) + " is more than 2^36 voxels");
+  return source;
+}
+
+glm::u64vec2 VoxelTransfers::range_of(const Source& source, glm::ivec2 layers) const {
+  const glm::u64vec3 last(source.size.x - 1, source.size.y - 1, std::min(brick_size * layers.y, source.size.z) - 1);
+  const auto first = static_cast<std::uint64_t>(brick_size * layers.x);
+  const std::uint64_t begin = source.offset + first * source.strides.z;
+  const std::uint64_t end = source.offset + last.x * source.strides.x + last.y * source.strides.y +
+                            last.z * source.strides.z + bytes_of(source.format);
+  return {begin / alignment_ * alignment_, (end + 3) / 4 * 4};
+}
+
+// ---- the device's part ----
+
+void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vector<std::uint32_t>* chosen,
+                          const std::string& what) const {
+  const Source& source = transfer.sources[field];
+  const glm::ivec3 bricks = bricks_of(source.size);
+  const std::uint64_t layer = std::uint64_t(bricks.x) * std::uint64_t(bricks.y);
+  const auto fits = [&](std::uint64_t count, glm::ivec2 layers) {
+    if (count * brick_bytes(source.format) > most_bytes_) return false;
+    if (source.buffer == 0) return true;
+    const glm::u64vec2 range = range_of(source, layers);
+    return range.y - range.x <= most_bytes_;
+  };
+  // How many bricks lie before this layer.
+  const auto before = [&](int z) {
+    const std::uint64_t brick = layer * std::uint64_t(z);
+    if (chosen == nullptr) return brick;
+    return std::uint64_t(std::ranges::lower_bound(*chosen, brick) - chosen->begin());
+  };
+  for (int z = 0; z < bricks.z;) {
+    const std::uint64_t first = before(z);
+    int end = z + 1;
+    if (!fits(before(end) - first, {z, end})) {
+      refuse(ErrorCode::unsupported, what,
+             "a layer of bricks of it takes more than the driver's storage blocks of " + std::to_string(most_bytes_) +
+                 " bytes");
+    }
+    while (end < bricks.z && fits(before(end + 1) - first, {z, end + 1})) ++end;
+    const std::uint64_t count = before(end) - first;
+    if (count > 0) {
+      Piece& piece = transfer.pieces.emplace_back();
+      piece.field = field;
+      piece.first = static_cast<std::uint32_t>(first);
+      piece.count = static_cast<std::uint32_t>(count);
+      piece.layers = {z, end};
+    }
+    z = end;
+  }
+}
+
+VoxelTransfers::Room VoxelTransfers::take_room(std::size_t bricks, std::size_t bytes) {
+  constexpr std::size_t small = std::size_t{1} << 20U;
+  const auto found = std::ranges::find_if(spare_, [&](const Room& room) {
+    return room.bricks >= bricks && room.bytes >= bytes && room.bytes <= 2 * bytes + small;
+  });
+  if (found != spare_.end()) {
+    Room room = std::move(*found);
+    spare_.erase(found);
+    return room;
+  }
+  Room room;
+  room.places = gl::make_buffer(gl_, places_bytes(bricks), nullptr, 0, "creating the places of a host's bricks");
+  room.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating a copy of a host's bricks");
+  room.places_back =
+      gl::ReadBack::unfilled(gl_, places_bytes(bricks), "creating the places of a host's bricks in memory");
+  room.bricks = bricks;
+  room.bytes = bytes;
+  return room;
+}
+
+void VoxelTransfers::make_room_back(Room& room, std::size_t bytes) const {
+  if (room.back_bytes >= bytes) return;
+  room.values_back = gl::ReadBack::unfilled(gl_, bytes, "creating a host's bricks in memory");
+  room.back_bytes = bytes;
+}
+
+void VoxelTransfers::pack(const Transfer& transfer, const Piece& piece, GLuint chosen) {
+  const auto& gl = *gl_;
+  const Source& source = transfer.sources[piece.field];
+  const gl::Program& program = programs_->get(
+      {"pack_bricks.comp",
+       {source.buffer != 0 ? "CM_BUFFER 1" : "CM_BUFFER 0", chosen != 0 ? "CM_CHOSEN 1" : "CM_CHOSEN 0"}});
+  const GLuint name = program.name();
+  gl.ProgramUniform3i(name, 0, source.size.x, source.size.y, source.size.z);
+  gl.ProgramUniform2ui(name, 1, piece.first, piece.count);
+  gl.ProgramUniform1i(name, 2, static_cast<GLint>(source.format));
+  if (source.buffer != 0) {
+    const glm::u64vec2 range = range_of(source, piece.layers);
+    const std::uint64_t number = bytes_of(source.format);
+    // Modulo 2^32: voxel 0 may lie before the range, what is read of it does not.
+    const std::uint64_t first =
+        source.offset < range.x ? 0 - (range.x - source.offset) / number : (source.offset - range.x) / number;
+    const glm::uvec3 strides(source.strides / number);
+    gl.ProgramUniform4ui(name, 3, strides.x, strides.y, strides.z, static_cast<std::uint32_t>(first));
+    gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_HOST_VOXELS, source.buffer,
+                       static_cast<GLintptr>(range.x), static_cast<GLsizeiptr>(range.y - range.x));
+  } else {
+    if (!sampler_) sampler_ = gl::make_sampler(gl_);
+    gl.ProgramUniform1i(name, 3, source.component);
+    gl.BindTextureUnit(core::CM_UNIT_HOST_VOXELS, source.texture);
+    gl.BindSampler(core::CM_UNIT_HOST_VOXELS, sampler_.name());
+  }
+  gl.ClearNamedBufferSubData(piece.room.places.name(), GL_R32UI, 0, 2 * sizeof(std::uint32_t), GL_RED_INTEGER,
+                             GL_UNSIGNED_INT, nullptr);
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_PLACES, piece.room.places.name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_VALUES, piece.room.values.name());
+  if (chosen != 0) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_CHOICE, chosen);
+  program.use(gl);
+  constexpr std::uint32_t most_groups = 65535;
+  const std::uint32_t across = std::min(piece.count, most_groups);
+  gl.DispatchCompute(across, (piece.count + across - 1) / across, 1);
+  if (source.buffer == 0) gl.BindSampler(core::CM_UNIT_HOST_VOXELS, 0);
+}
+
+gl::Fence VoxelTransfers::fence() const { return gl_->dispatches_in_call ? gl::Fence() : gl::Fence(gl_); }
+
+void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arrive) {
+  const auto& gl = *gl_;
+  const gl::DebugGroup group(gl, "cumulet: live voxels");
+  if (state.wait != nullptr && gl.IsSync(state.wait) == GL_FALSE)
+    throw Error(ErrorCode::invalid_argument, one_line(state.name + ": what is to be waited for is no sync object"));
+  Transfer transfer;
+  transfer.whose = whose;
+  transfer.whole = !state.changed;
+  transfer.name = state.name;
+  transfer.arrive = std::move(arrive);
+  std::vector<gl::Object> choices(state.fields.size());
+  for (std::size_t i = 0; i < state.fields.size(); ++i) {
+    const GlVoxels& field = state.fields[i];
+    const std::string what = state.name + ": " + name_of(field.channel);
+    transfer.sources.push_back(open(field, what));
+    transfer.fields.push_back({field.channel, volume::BrickCopy(field.index_to_world)});
+    if (transfer.whole) {
+      plan(transfer, i, nullptr, what);
+      continue;
+    }
+    const std::vector<std::uint32_t> chosen = touched(*state.changed, transfer.sources.back().size);
+    plan(transfer, i, &chosen, what);
+    if (chosen.empty()) continue;
+    choices[i] = gl::make_buffer(gl_, chosen.size() * sizeof(std::uint32_t), chosen.data(), 0,
+                                 "creating the list of a host's bricks");
+  }
+  for (Piece& piece : transfer.pieces) {
+    const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
+    piece.room = take_room(piece.count, piece.count * each);
+    // A plume grows little from state to state.
+    const std::size_t expected = piece.room.expected + piece.room.expected / 4;
+    piece.copied = std::min<std::size_t>(expected, piece.count);
+    make_room_back(piece.room, piece.copied * each);
+  }
+  if (state.wait != nullptr) gl.WaitSync(state.wait, 0, GL_TIMEOUT_IGNORED);
+  gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  for (const Piece& piece : transfer.pieces) pack(transfer, piece, choices[piece.field].name());
+  gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  for (const Piece& piece : transfer.pieces) {
+    const Room& room = piece.room;
+    gl.CopyNamedBufferSubData(room.places.name(), room.places_back.name(), 0, 0,
+                              static_cast<GLsizeiptr>(places_bytes(piece.count)));
+    const std::size_t bytes = piece.copied * brick_bytes(transfer.sources[piece.field].format);
+    if (bytes > 0)
+      gl.CopyNamedBufferSubData(room.values.name(), room.values_back.name(), 0, 0, static_cast<GLsizeiptr>(bytes));
+  }
+  transfer.fence = fence();
+  gl::check(gl, what_step);
+  if (transfer.whole) {
+    // Those that nobody will want, but for the first: it arrives however fast they come.
+    const auto of_one = [&](const Transfer& other) { return other.whose == whose; };
+    auto other = std::ranges::find_if(transfers_, of_one);
+    if (other != transfers_.end()) ++other;
+    while ((other = std::find_if(other, transfers_.end(), of_one)) != transfers_.end()) {
+      other->fence.order();  // another context of the group may have begun it
+      recycle(*other);
+      other = transfers_.erase(other);
+    }
+  }
+  transfers_.push_back(std::move(transfer));
+}
+
+// ---- main memory's part ----
+
+std::optional<std::vector<volume::Channel>> VoxelTransfers::channels_of(const void* whose) const {
+  const auto found = std::find_if(transfers_.rbegin(), transfers_.rend(),
+                                  [&](const Transfer& t) { return t.whose == whose && t.whole; });
+  if (found == transfers_.rend()) return std::nullopt;
+  std::vector<volume::Channel> channels;
+  for (const volume::FieldCopy& field : found->fields) channels.push_back(field.channel);
+  return channels;
+}
+
+void VoxelTransfers::copy_rest(Transfer& transfer) const {
+  bool copies = false;
+  for (Piece& piece : transfer.pieces) {
+    Room& room = piece.room;
+    const std::size_t filled = word_at(room.places_back.data(), 0);
+    room.expected = filled;
+    if (filled > piece.count) throw Error(ErrorCode::gl, one_line(transfer.name + ": the driver packed no bricks"));
+    if (filled <= piece.copied) continue;
+    const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
+    if (room.back_bytes < filled * each) {
+      make_room_back(room, std::min<std::size_t>(filled + filled / 4, piece.count) * each);
+      piece.copied = 0;
+    }
+    const auto from = static_cast<GLintptr>(piece.copied * each);
+    gl_->CopyNamedBufferSubData(room.values.name(), room.values_back.name(), from, from,
+                                static_cast<GLsizeiptr>(filled * each) - from);
+    copies = true;
+  }
+  if (copies) transfer.fence = fence();
+  gl::check(*gl_, what_step);
+}
+
+bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
+  if (!transfer.fence.passed()) return false;
+  if (!transfer.counted) {
+    copy_rest(transfer);
+    transfer.counted = true;
+    if (!transfer.fence.passed()) return false;
+  }
+  constexpr int at_a_time = 256;
+  int bricks_since = 0;
+  std::array<float, brick_voxels> values{};
+  for (Piece& piece : transfer.pieces) {
+    const Source& source = transfer.sources[piece.field];
+    const glm::ivec3 bricks = bricks_of(source.size);
+    auto& copy = std::get<volume::BrickCopy>(transfer.fields[piece.field].voxels);
+    const std::byte* places = piece.room.places_back.data();
+    const std::size_t filled = word_at(places, 0);
+    const std::size_t all = filled + word_at(places, 1);
+    if (piece.taken == 0) copy.reserve(copy.count() + all);
+    for (; piece.taken < all; ++piece.taken) {
+      if (bricks_since++ == at_a_time) {
+        bricks_since = 0;
+        if (std::chrono::steady_clock::now() > deadline) return false;
+      }
+      const bool empty = piece.taken >= filled;
+      const std::size_t place = empty ? piece.count - 1 - (piece.taken - filled) : piece.taken;
+      const auto brick = static_cast<int>(word_at(places, 2 + place));
+      if (empty) {
+        values.fill(0.0F);
+      } else {
+        unpack(source.format, piece.room.values_back.data() + piece.taken * brick_bytes(source.format), values);
+      }
+      const glm::ivec3 origin(brick % bricks.x, brick / bricks.x % bricks.y, brick / bricks.x / bricks.y);
+      if (!copy.add(brick_size * origin, values)) transfer.finite = false;
+    }
+  }
+  return true;
+}
+
+void VoxelTransfers::recycle(Transfer& transfer) {
+  for (Piece& piece : transfer.pieces) spare_.push_back(std::move(piece.room));
+  // As many as two states use, one under way and one that waits.
+  while (spare_.size() > 2 * transfer.pieces.size()) spare_.pop_front();
+}
+
+void VoxelTransfers::follow(Deadline deadline) {
+  constexpr int long_time = 300;
+  if (transfers_.empty()) {
+    if (++idle_ == long_time) spare_.clear();
+    return;
+  }
+  idle_ = 0;
+  while (!transfers_.empty()) {
+    Transfer& first = transfers_.front();
+    try {
+      if (!take(first, deadline)) return;
+    } catch (...) {
+      transfers_.pop_front();
+      throw;
+    }
+    Transfer done = std::move(first);
+    transfers_.pop_front();
+    recycle(done);
+    if (!done.finite) {
+      for (const volume::FieldCopy& field : done.fields) volume::require_finite(field.view(), done.name);
+    }
+    done.arrive(std::move(done.fields));
+    if (std::chrono::steady_clock::now() > deadline) return;
+  }
+}
+
+std::uint64_t VoxelTransfers::bytes() const {
+  std::uint64_t sum = 0;
+  for (const Room& room : spare_) sum += room.all_bytes();
+  for (const Transfer& transfer : transfers_) {
+    for (const Piece& piece : transfer.pieces) sum += piece.room.all_bytes();
+  }
+  return sum;
+}
+
+}  // namespace cumulet::render

@@ -1,0 +1,157 @@
+#pragma once
+
+// Voxels that a host has in GL, on their way to main memory.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "gl/programs.hpp"
+#include "render/upload.hpp"
+#include "volume/state.hpp"
+
+namespace cumulet::render {
+
+/// As glsl/pack_bricks.comp: floats, halves, and whole numbers that stand for 0 to 1.
+enum class VoxelFormat { floats = 0, halves = 1, shorts = 2, bytes = 3 };
+
+/// One component of a GL_TEXTURE_3D.
+struct VoxelTexture {
+  GLuint name = 0;
+  int component = 0;
+};
+
+/// Numbers in a buffer.
+struct VoxelBuffer {
+  GLuint name = 0;
+  VoxelFormat format = VoxelFormat::floats;
+  std::uint64_t offset = 0;                   ///< bytes to voxel 0
+  std::array<std::uint64_t, 3> strides = {};  ///< bytes along x, y and z; zeros: without gaps, x fastest
+  glm::ivec3 size{0};
+};
+
+struct GlVoxels {
+  volume::Channel channel;
+  std::variant<VoxelTexture, VoxelBuffer> source;
+  glm::dmat4 index_to_world{1.0};
+};
+
+/// Both ends inclusive.
+struct VoxelBox {
+  glm::ivec3 min{0};
+  glm::ivec3 max{0};
+};
+
+struct GlState {
+  std::string name;  ///< begins every message
+  std::vector<GlVoxels> fields;
+  std::optional<std::vector<VoxelBox>> changed;  ///< none: all of it
+  GLsync wait = nullptr;                         ///< that the device waits for first
+};
+
+/// Copies bricks that are not empty on the device at once, and takes them to main memory when they are there. Never
+/// waits. All calls but those that tell need the context current and a StateGuard around.
+class VoxelTransfers {
+ public:
+  VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits);
+
+  /// Given the fields, whose copies are bricks; of those that changed the empty ones, too, as zeros.
+  using Arrive = std::function<void(std::vector<volume::FieldCopy> fields)>;
+  /// whose: of one the oldest whole state that is on its way arrives, and of those behind it the newest. Fields'
+  /// channels and transforms are checked. Throws Error(invalid_argument) for what is no such object, Error(unsupported)
+  /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
+  void begin(const GlState& state, const void* whose, Arrive arrive);
+  /// Of whose newest whole state that is on its way; none: there is none.
+  [[nodiscard]] std::optional<std::vector<volume::Channel>> channels_of(const void* whose) const;
+  /// Whether any is on its way.
+  [[nodiscard]] bool busy() const { return !transfers_.empty(); }
+  /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
+  /// finite: that state is dropped, and the next call goes on.
+  void follow(Deadline deadline);
+  /// In GL.
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  // An object of the host's, looked at.
+  struct Source {
+    GLuint texture = 0;
+    int component = 0;
+    GLuint buffer = 0;
+    std::uint64_t offset = 0;
+    glm::u64vec3 strides{0};
+    glm::ivec3 size{0};
+    VoxelFormat format = VoxelFormat::floats;
+  };
+  // Where so many bricks go, empty ones among them.
+  struct Room {
+    std::size_t bricks = 0;
+    std::size_t bytes = 0;  // of values
+    std::size_t back_bytes = 0;
+    gl::Object places;
+    gl::Object values;
+    gl::ReadBack places_back;
+    gl::ReadBack values_back;
+    std::size_t expected = 0;  // as many were filled last
+
+    [[nodiscard]] std::uint64_t all_bytes() const { return 2 * places_bytes(bricks) + bytes + back_bytes; }
+  };
+  static std::size_t places_bytes(std::size_t bricks) { return (2 + bricks) * sizeof(std::uint32_t); }
+  // Layers of bricks of a field's, which one dispatch packs.
+  struct Piece {
+    std::size_t field = 0;
+    std::uint32_t first = 0;  // brick, or of those that were chosen
+    std::uint32_t count = 0;
+    glm::ivec2 layers{0};  // from, to
+    Room room;
+    std::size_t copied = 0;  // bricks that were copied back before their number was known
+    std::size_t taken = 0;   // filled and emptied ones
+  };
+  struct Transfer {
+    const void* whose = nullptr;
+    bool whole = true;
+    std::string name;
+    std::vector<Source> sources;
+    std::vector<Piece> pieces;
+    std::vector<volume::FieldCopy> fields;
+    bool finite = true;
+    Arrive arrive;
+    gl::Fence fence;
+    bool counted = false;  // what is filled is known, and was copied
+  };
+
+  [[nodiscard]] Source open(const GlVoxels& field, const std::string& what) const;
+  [[nodiscard]] Source open_texture(const VoxelTexture& texture, const std::string& what) const;
+  [[nodiscard]] Source open_buffer(const VoxelBuffer& buffer, const std::string& what) const;
+  // Of a buffer the bytes of these layers of bricks: from, to.
+  [[nodiscard]] glm::u64vec2 range_of(const Source& source, glm::ivec2 layers) const;
+  // chosen: null: all bricks.
+  void plan(Transfer& transfer, std::size_t field, const std::vector<std::uint32_t>* chosen,
+            const std::string& what) const;
+  [[nodiscard]] Room take_room(std::size_t bricks, std::size_t bytes);
+  void make_room_back(Room& room, std::size_t bytes) const;
+  void pack(const Transfer& transfer, const Piece& piece, GLuint chosen);
+  [[nodiscard]] gl::Fence fence() const;
+  // Returns whether all of it was taken.
+  bool take(Transfer& transfer, Deadline deadline);
+  // What the driver had not copied by guess.
+  void copy_rest(Transfer& transfer) const;
+  void recycle(Transfer& transfer);
+
+  gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
+  std::uint64_t most_bytes_;
+  std::uint64_t alignment_;
+  gl::Object sampler_;
+  std::deque<Transfer> transfers_;  // in the order in which they were begun
+  std::deque<Room> spare_;
+  int idle_ = 0;  // calls of follow() since there was any
+};
+
+}  // namespace cumulet::render

@@ -1,0 +1,866 @@
+// States that lie in a host's textures and buffers: to the last bit what the same numbers are from memory.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <glm/gtc/packing.hpp>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gl/state_guard.hpp"
+#include "render/voxel_transfers.hpp"
+#include "support/c_playback.hpp"
+#include "support/fake_gl.hpp"
+#include "support/gl_state.hpp"
+#include "support/simulated.hpp"
+#include "support/volumes.hpp"
+#include "viewer/c_handles.hpp"
+
+namespace {
+
+using namespace cumulet;
+using test::at;
+using test::difference;
+using test::LiveRef;
+using test::make_desc;
+using test::make_live;
+using test::Sides;
+using test::simulated;
+using test::State;
+using test::ViewerPtr;
+using test::VolumeRef;
+using Picture = std::vector<std::uint8_t>;
+
+constexpr Sides small = {24, 24, 24};
+constexpr Sides odd = {23, 31, 17};
+
+/// A number as a format keeps it: its bits, and what they stand for.
+struct Kept {
+  std::vector<std::byte> bits;
+  float value = 0.0F;
+};
+template <class Number>
+Kept kept(Number number, float value) {
+  Kept k{std::vector<std::byte>(sizeof number), value};
+  std::memcpy(k.bits.data(), &number, sizeof number);
+  return k;
+}
+Kept keep(cumulet_voxel_format format, float v) {
+  const float unit = std::clamp(v, 0.0F, 1.0F);
+  switch (format) {
+    case CUMULET_VOXEL_FORMAT_R16F: {
+      const std::uint16_t half = glm::packHalf1x16(v);
+      return kept(half, glm::unpackHalf1x16(half));
+    }
+    case CUMULET_VOXEL_FORMAT_R16: {
+      const auto code = static_cast<std::uint16_t>(std::lround(unit * 65535.0F));
+      return kept(code, static_cast<float>(code / 65535.0));
+    }
+    case CUMULET_VOXEL_FORMAT_R8: {
+      const auto code = static_cast<std::uint8_t>(std::lround(unit * 255.0F));
+      return kept(code, static_cast<float>(code / 255.0));
+    }
+    default:
+      return kept(v, v);
+  }
+}
+
+/// An array in a format, and what is in it.
+struct Array {
+  std::vector<std::byte> bytes;
+  std::vector<float> values;
+  Array(cumulet_voxel_format format, const std::vector<float>& from) {
+    for (const float v : from) {
+      const Kept k = keep(format, v);
+      bytes.insert(bytes.end(), k.bits.begin(), k.bits.end());
+      values.push_back(k.value);
+    }
+  }
+};
+
+struct Type {
+  cumulet_voxel_format format;
+  GLenum internal;
+  GLenum type;
+};
+constexpr auto types = std::to_array<Type>({{CUMULET_VOXEL_FORMAT_R32F, GL_R32F, GL_FLOAT},
+                                            {CUMULET_VOXEL_FORMAT_R16F, GL_R16F, GL_HALF_FLOAT},
+                                            {CUMULET_VOXEL_FORMAT_R16, GL_R16, GL_UNSIGNED_SHORT},
+                                            {CUMULET_VOXEL_FORMAT_R8, GL_R8, GL_UNSIGNED_BYTE}});
+
+/// A host's objects; all of a context's functions.
+class Objects {
+ public:
+  explicit Objects(const GladGLContext& gl) : gl_(gl) {}
+  Objects(const Objects&) = delete;
+  Objects& operator=(const Objects&) = delete;
+  ~Objects() {
+    for (const GLuint name : textures_) gl_.DeleteTextures(1, &name);
+    for (const GLuint name : buffers_) gl_.DeleteBuffers(1, &name);
+  }
+  GLuint texture(const Sides& size, GLenum internal, GLenum format, GLenum type, const void* pixels) {
+    GLuint name = 0;
+    gl_.CreateTextures(GL_TEXTURE_3D, 1, &name);
+    textures_.push_back(name);
+    gl_.TextureStorage3D(name, 1, internal, size[0], size[1], size[2]);
+    put(name, size, format, type, pixels);
+    return name;
+  }
+  GLuint texture(const Sides& size, const Type& type, const Array& array) {
+    return texture(size, type.internal, GL_RED, type.type, array.bytes.data());
+  }
+  void put(GLuint name, const Sides& size, GLenum format, GLenum type, const void* pixels) const {
+    GLint alignment = 0;
+    gl_.GetIntegerv(GL_UNPACK_ALIGNMENT, &alignment);
+    gl_.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    gl_.TextureSubImage3D(name, 0, 0, 0, 0, size[0], size[1], size[2], format, type, pixels);
+    gl_.PixelStorei(GL_UNPACK_ALIGNMENT, alignment);
+  }
+  GLuint buffer(const std::vector<std::byte>& bytes) {
+    GLuint name = 0;
+    gl_.CreateBuffers(1, &name);
+    buffers_.push_back(name);
+    gl_.NamedBufferData(name, static_cast<GLsizeiptr>((bytes.size() + 3) / 4 * 4), nullptr, GL_DYNAMIC_COPY);
+    gl_.NamedBufferSubData(name, 0, static_cast<GLsizeiptr>(bytes.size()), bytes.data());
+    return name;
+  }
+
+ private:
+  const GladGLContext& gl_;
+  std::vector<GLuint> textures_, buffers_;
+};
+
+cumulet_gl_field field_at(cumulet_channel channel, const Sides& size) {
+  auto field = make_desc<cumulet_gl_field>();
+  field.channel = channel;
+  const auto place = test::simulated_place(size);
+  std::copy(place.begin(), place.end(), field.index_to_world);
+  return field;
+}
+cumulet_gl_field in_texture(cumulet_channel channel, const Sides& size, GLuint name, std::uint32_t component = 0) {
+  cumulet_gl_field field = field_at(channel, size);
+  field.texture = name;
+  field.component = component;
+  return field;
+}
+cumulet_gl_field in_buffer(cumulet_channel channel, const Sides& size, GLuint name, cumulet_voxel_format format) {
+  cumulet_gl_field field = field_at(channel, size);
+  field.buffer = name;
+  field.format = format;
+  std::copy(size.begin(), size.end(), field.size);
+  return field;
+}
+
+cumulet_gl_state_desc state_of(const std::vector<cumulet_gl_field>& fields) {
+  auto desc = make_desc<cumulet_gl_state_desc>();
+  desc.fields = fields.data();
+  desc.field_count = fields.size();
+  desc.name = "smoke";
+  return desc;
+}
+
+VolumeRef newest(const LiveRef& live) {
+  std::array<char, 256> error{};
+  cumulet_volume* out = nullptr;
+  EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_OK) << error.data();
+  return VolumeRef(out);
+}
+
+VolumeRef alone(const State& state) {
+  std::array<char, 256> error{};
+  cumulet_volume* out = nullptr;
+  const cumulet_state_desc desc = state.desc();
+  EXPECT_EQ(cumulet_volume_from_state(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
+  return VolumeRef(out);
+}
+
+void expect_same(const VolumeRef& a, const VolumeRef& b) {
+  ASSERT_NE(a, nullptr);
+  ASSERT_NE(b, nullptr);
+  const auto& left = a->asset->frame();
+  const auto& right = b->asset->frame();
+  test::expect_same_voxels(left.density, right.density);
+  const auto others = left.beside_density();
+  ASSERT_EQ(others.size(), right.beside_density().size());
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    SCOPED_TRACE(others[i]->name);
+    test::expect_same_voxels(*others[i], *right.beside_density()[i]);
+    EXPECT_EQ(others[i]->index_to_world, right.beside_density()[i]->index_to_world);
+  }
+}
+
+State dense(const Sides& size, const std::vector<float>& values) {
+  return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, values));
+}
+
+/// A host whose viewer goes through a FakeGl, and shows nothing yet.
+class LiveGl : public testing::Test {
+ protected:
+  ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
+    return test::make_viewer({.get_proc = test::FakeGl::get_proc, .user = &fake_, .samples = 2, .build = build});
+  }
+  void hand_over(const std::vector<cumulet_gl_field>& fields) {
+    const cumulet_gl_state_desc desc = state_of(fields);
+    ASSERT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+  }
+  void hand_over(const std::vector<cumulet_gl_field>& fields, const std::vector<cumulet_voxel_box>& changed) {
+    cumulet_gl_state_desc desc = state_of(fields);
+    desc.changed = changed.data();
+    desc.changed_count = changed.size();
+    ASSERT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+  }
+  std::string refusal(const cumulet_gl_state_desc& desc, cumulet_status status) {
+    EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), status);
+    return cumulet_last_error(v_);
+  }
+  std::uint64_t handed() {
+    auto info = make_desc<cumulet_live_info>();
+    EXPECT_EQ(cumulet_get_live_info(v_, &info), CUMULET_OK) << cumulet_last_error(v_);
+    return info.handed_state;
+  }
+  // Frames until so many states came of what is on its way, and some more. Returns how many did.
+  std::uint64_t arrive(std::uint64_t count = 1) {
+    const std::uint64_t before = handed();
+    cumulet_frame_desc frame = target_.frame();
+    frame.target = CUMULET_TARGET_NONE;
+    frame.budget_ms = 5.0;
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    for (int more = 0; more < 3 && std::chrono::steady_clock::now() < until;) {
+      EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
+      if (handed() >= before + count) ++more;
+    }
+    return handed() - before;
+  }
+  Picture picture() { return test::drawn_once(v_, target_); }
+
+  headless::Context context_ = headless::Context::create(headless::Backend::automatic);
+  test::FakeGl fake_{headless::Context::get_proc, &context_};
+  const GladGLContext& gl_ = fake_.real();
+  test::HostTarget target_{gl_, 32, 32};
+  Objects objects_{gl_};
+  LiveRef live_ = make_live();
+  ViewerPtr viewer_ = make();
+  cumulet_viewer* v_ = viewer_.get();
+
+  void SetUp() override { ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK); }
+};
+
+TEST_F(LiveGl, EveryFormatIsWhatItIsInMemory) {
+  int step = 0;
+  for (const Type& type : types) {
+    for (const Sides& size : {odd, small}) {
+      SCOPED_TRACE(type.format);
+      const Array array(type.format, simulated(CUMULET_CHANNEL_DENSITY, size, ++step));
+      const VolumeRef expected = alone(dense(size, array.values));
+      hand_over({in_texture(CUMULET_CHANNEL_DENSITY, size, objects_.texture(size, type, array))});
+      EXPECT_EQ(arrive(), 1U);
+      expect_same(newest(live_), expected);
+      hand_over({in_buffer(CUMULET_CHANNEL_DENSITY, size, objects_.buffer(array.bytes), type.format)});
+      EXPECT_EQ(arrive(), 1U);
+      expect_same(newest(live_), expected);
+      if (size == odd && type.format == CUMULET_VOXEL_FORMAT_R16F) {
+        EXPECT_EQ(difference(picture(), test::picture_of(make().get(), expected.get(), target_)), "");
+      }
+    }
+  }
+  // What GL alone can say what it is: as its own read-back has it.
+  const auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 3);
+  const GLuint signs = objects_.texture(odd, GL_R16_SNORM, GL_RED, GL_FLOAT, values.data());
+  std::vector<float> read(values.size());
+  gl_.GetTextureImage(signs, 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(4 * read.size()), read.data());
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, signs)});
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, read)));
+}
+
+// Every half there is, signs, denormals and zeros of both signs among them; and of floats those that flushing would
+// change.
+TEST_F(LiveGl, BitsStayWhatTheyAre) {
+  constexpr Sides size = {64, 32, 31};
+  std::vector<float> halves;
+  std::vector<std::uint16_t> bits;
+  for (std::uint32_t h = 0; h < 65536 && halves.size() < std::size_t{64} * 32 * 31; ++h) {
+    const bool finite = (h & 0x7c00U) != 0x7c00U;
+    bits.push_back(static_cast<std::uint16_t>(finite ? h : 0x3c00U));
+    halves.push_back(glm::unpackHalf1x16(bits.back()));
+  }
+  std::vector<float> floats;
+  for (std::size_t i = 0; i < halves.size(); ++i) {
+    const auto word = static_cast<std::uint32_t>(i * 2654435761U);
+    float value = 0.0F;
+    std::memcpy(&value, &word, sizeof value);
+    // Velocities may be negative.
+    floats.push_back(i % 5 != 0 ? std::numeric_limits<float>::denorm_min() * static_cast<float>(i % 7)
+                                : (std::abs(value) < 1e15F ? value : 1.0F));
+  }
+  const auto ones = std::vector<float>(halves.size(), 1.0F);
+  State state = dense(size, ones);
+  state.dense(CUMULET_CHANNEL_VELOCITY_X, size, halves);
+  state.dense(CUMULET_CHANNEL_VELOCITY_Y, size, floats);
+  state.dense(CUMULET_CHANNEL_VELOCITY_Z, size, halves);
+  const VolumeRef expected = alone(state);
+  std::vector<std::byte> raw(bits.size() * 2);
+  std::memcpy(raw.data(), bits.data(), raw.size());
+  std::vector<std::byte> raw_floats(floats.size() * 4);
+  std::memcpy(raw_floats.data(), floats.data(), raw_floats.size());
+  const Array one(CUMULET_VOXEL_FORMAT_R8, ones);
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, size, objects_.texture(size, types[3], one)),
+             in_texture(CUMULET_CHANNEL_VELOCITY_X, size,
+                        objects_.texture(size, GL_R16F, GL_RED, GL_HALF_FLOAT, bits.data())),
+             in_buffer(CUMULET_CHANNEL_VELOCITY_Y, size, objects_.buffer(raw_floats), CUMULET_VOXEL_FORMAT_R32F),
+             in_buffer(CUMULET_CHANNEL_VELOCITY_Z, size, objects_.buffer(raw), CUMULET_VOXEL_FORMAT_R16F)});
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), expected);
+}
+
+// All channels, of which three colours and three velocities lie in one texture each.
+TEST_F(LiveGl, ComponentsAreFields) {
+  State state = dense(odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  const Array density(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  std::vector<cumulet_gl_field> fields{
+      in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], density))};
+  for (const cumulet_channel first : {CUMULET_CHANNEL_RED, CUMULET_CHANNEL_VELOCITY_X}) {
+    std::vector<float> texels(4 * density.values.size(), 0.25F);
+    for (int c = 0; c < 3; ++c) {
+      const auto channel = static_cast<cumulet_channel>(first + c);
+      auto values = simulated(channel, odd, 1);
+      for (std::size_t i = 0; i < values.size(); ++i) texels[4 * i + static_cast<std::size_t>(c)] = values[i];
+      state.dense(channel, odd, std::move(values));
+    }
+    const GLuint name = objects_.texture(odd, GL_RGBA32F, GL_RGBA, GL_FLOAT, texels.data());
+    for (std::uint32_t c = 0; c < 3; ++c)
+      fields.push_back(in_texture(static_cast<cumulet_channel>(first + int(c)), odd, name, c));
+  }
+  hand_over(fields);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(state));
+}
+
+// z fastest, with gaps, not from the beginning; and voxels of three numbers each.
+TEST_F(LiveGl, BuffersHaveStrides) {
+  for (const Type& type : types) {
+    SCOPED_TRACE(type.format);
+    const Array array(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 2));
+    const std::size_t number = array.bytes.size() / array.values.size();
+    const std::array<std::uint64_t, 3> strides{number * 3 * 19 * 31, number * 3 * 19, number * 3};
+    constexpr std::uint64_t offset = 268;
+    std::vector<std::byte> bytes(offset + strides[0] * 23 + 8, std::byte{0x3c});
+    for (std::uint64_t i = 0; i < array.values.size(); ++i) {
+      const std::uint64_t to = offset + strides[0] * (i % 23) + strides[1] * (i / 23 % 31) + strides[2] * (i / 23 / 31);
+      std::memcpy(&bytes[to], &array.bytes[i * number], number);
+    }
+    cumulet_gl_field field = in_buffer(CUMULET_CHANNEL_DENSITY, odd, objects_.buffer(bytes), type.format);
+    field.offset = offset;
+    std::copy(strides.begin(), strides.end(), field.strides);
+    hand_over({field});
+    EXPECT_EQ(arrive(), 1U);
+    expect_same(newest(live_), alone(dense(odd, array.values)));
+  }
+}
+
+// Boxes of what changed, read between them or not, on top of states from GL and from memory, and boxes that are too
+// large, overlap, or lie outside.
+TEST_F(LiveGl, BoxesAreTheWhole) {
+  for (const bool from_memory : {false, true}) {
+    for (const bool read : {false, true}) {
+      const Type& type = types[read ? 1 : 0];
+      Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+      std::uint64_t on_their_way = 0;
+      const GLuint name = objects_.texture(odd, type, before);
+      const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
+      if (from_memory) {
+        const State whole = dense(odd, before.values);
+        const cumulet_state_desc desc = whole.desc();
+        ASSERT_EQ(cumulet_live_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
+      } else {
+        hand_over(fields);  // boxes follow while it is on its way
+        ++on_their_way;
+      }
+      for (int step = 1; step < 5; ++step) {
+        if (read) {
+          if (on_their_way > 0) {
+            EXPECT_EQ(arrive(std::exchange(on_their_way, 0)), 1U);
+          }
+          newest(live_);
+        }
+        const Array now(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, step));
+        objects_.put(name, odd, GL_RED, type.type, now.bytes.data());
+        std::vector<cumulet_voxel_box> boxes{{{-9, 40, 0}, {-2, 99, 16}}, {{5, 5, 5}, {4, 9, 9}}};
+        for (const Sides& b : State::bricks(odd, now.values, before.values)) {
+          boxes.push_back({{b[0], b[1], b[2]}, {b[0] + 7, b[1] + 7, b[2] + 7}});
+          // A voxel is enough.
+          if (b[0] % 16 == 0) boxes.back() = {{b[0] + 3, b[1], b[2]}, {b[0] + 3, b[1], b[2]}};
+          if (b[1] % 16 == 0) boxes.push_back({{b[0] - 100, b[1] + 1, b[2]}, {b[0], b[1] + 1, b[2] + 1}});
+        }
+        hand_over(fields, boxes);
+        ++on_their_way;
+        before = now;
+      }
+      EXPECT_EQ(arrive(on_their_way), on_their_way);
+      expect_same(newest(live_), alone(dense(odd, before.values)));
+      // No box at all is a state, too.
+      const std::uint64_t number = handed();
+      hand_over(fields, {{{99, 99, 99}, {120, 120, 120}}});
+      EXPECT_EQ(arrive(), 1U);
+      EXPECT_EQ(handed(), number + 1);
+      expect_same(newest(live_), alone(dense(odd, before.values)));
+    }
+  }
+}
+
+// Memory's bricks on top of GL's state.
+TEST_F(LiveGl, TakesBricksFromMemory) {
+  const Array before(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const auto now = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], before))});
+  arrive();
+  State changes;
+  changes.sparse(CUMULET_CHANNEL_DENSITY, odd, now, State::bricks(odd, now, before.values));
+  changes.last_sparse().brick_active = nullptr;
+  const cumulet_state_desc desc = changes.desc();
+  ASSERT_EQ(cumulet_live_update(live_.get(), &desc, nullptr, 0), CUMULET_OK);
+  expect_same(newest(live_), alone(dense(odd, now)));
+}
+
+// What the host does with its texture after the call is no matter, to delete it among it; nor that others were deleted.
+TEST_F(LiveGl, IsCopiedAtOnce) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  const Array other(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 2));
+  GLuint name = 0;
+  gl_.CreateTextures(GL_TEXTURE_3D, 1, &name);
+  gl_.TextureStorage3D(name, 1, GL_R16F, odd[0], odd[1], odd[2]);
+  objects_.put(name, odd, GL_RED, GL_HALF_FLOAT, array.bytes.data());
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, name)});
+  objects_.put(name, odd, GL_RED, GL_HALF_FLOAT, other.bytes.data());
+  gl_.DeleteTextures(1, &name);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, array.values)));
+}
+
+// However fast they come: the oldest on its way, and the newest.
+TEST_F(LiveGl, TheNewestWinsAndNoneStarves) {
+  std::vector<Array> arrays;
+  std::vector<GLuint> names;
+  for (int step = 0; step < 6; ++step) {
+    arrays.emplace_back(CUMULET_VOXEL_FORMAT_R32F,
+                        simulated(CUMULET_CHANNEL_DENSITY, step % 2 == 0 ? odd : small, step));
+    names.push_back(objects_.texture(step % 2 == 0 ? odd : small, types[0], arrays.back()));
+  }
+  const LiveRef other = make_live();  // none of its states is lost to those
+  const auto fields = std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, names[2])};
+  const cumulet_gl_state_desc desc = state_of(fields);
+  ASSERT_EQ(cumulet_live_set_gl(v_, other.get(), &desc), CUMULET_OK);
+  std::vector<std::uint64_t> bytes;
+  for (int round = 0; round < 6; ++round) {
+    for (std::size_t step = 0; step < 6; ++step)
+      hand_over({in_texture(CUMULET_CHANNEL_DENSITY, step % 2 == 0 ? odd : small, names[step])});
+    auto stats = make_desc<cumulet_stats>();
+    ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+    bytes.push_back(stats.gl_bytes);
+    EXPECT_EQ(arrive(2), 2U);
+    expect_same(newest(live_), alone(dense(small, arrays[5].values)));
+    picture();  // what else is in GL is the same in each round
+  }
+  expect_same(newest(other), alone(dense(odd, arrays[2].values)));
+  EXPECT_EQ(bytes[5], bytes[3]) << "memory grows with states";
+  // While they come between frames all the time, pictures follow.
+  cumulet_frame_desc frame = target_.frame();
+  auto info = make_desc<cumulet_live_info>();
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  for (int i = 0; info.drawn_count < 3 && std::chrono::steady_clock::now() < until; ++i) {
+    hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, names[2 * (std::size_t(i) % 3)])});
+    ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+    ASSERT_EQ(cumulet_get_live_info(v_, &info), CUMULET_OK);
+  }
+  EXPECT_GE(info.drawn_count, 3U);
+}
+
+TEST_F(LiveGl, IsRefusedInOneLine) {
+  const Array array(CUMULET_VOXEL_FORMAT_R8, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const GLuint good = objects_.texture(odd, types[3], array);
+  const GLuint bytes = objects_.buffer(array.bytes);
+  const auto refused = [&](cumulet_gl_field field, const std::string& cause,
+                           cumulet_status status = CUMULET_ERROR_INVALID_ARGUMENT) {
+    const std::vector<cumulet_gl_field> fields{field};
+    EXPECT_EQ(refusal(state_of(fields), status), cause);
+  };
+  const auto named = [](const char* kind, GLuint name) { return "smoke: density: " + (kind + std::to_string(name)); };
+  const cumulet_gl_field texture = in_texture(CUMULET_CHANNEL_DENSITY, odd, good);
+  const cumulet_gl_field buffer = in_buffer(CUMULET_CHANNEL_DENSITY, odd, bytes, CUMULET_VOXEL_FORMAT_R8);
+  const auto changed = [](cumulet_gl_field field, const auto& change) {
+    change(field);
+    return field;
+  };
+
+  refused(changed(texture, [](auto& f) { f.texture = 0; }), "smoke: field 0: it has not one of texture and buffer");
+  refused(changed(texture, [](auto& f) { f.buffer = 7; }), "smoke: field 0: it has not one of texture and buffer");
+  refused(changed(texture, [](auto& f) { f.component = 4; }), "smoke: field 0: its component is not from 0 to 3");
+  refused(changed(texture, [](auto& f) { f.component = 1; }), named("texture ", good) + ", has no component 1");
+  refused(changed(texture, [](auto& f) { f.index_to_world[3] = 1.0; }), "smoke: density: its transform is not affine",
+          CUMULET_ERROR_FILE);
+  const int none_such = 77;
+  refused(changed(texture, [&](auto& f) { std::memcpy(&f.channel, &none_such, sizeof none_such); }),
+          "smoke: field 0: its channel is unknown");
+  refused(changed(buffer, [&](auto& f) { std::memcpy(&f.format, &none_such, sizeof none_such); }),
+          "smoke: field 0: its format is unknown");
+  refused(changed(texture, [](auto& f) { f.channel = CUMULET_CHANNEL_RED; }),
+          "smoke: has some of red, green and blue, not all");
+  refused(changed(texture, [](auto& f) { f.texture = 4711; }),
+          named("texture ", 4711) + ", is no GL_TEXTURE_3D of this context's group");
+
+  const auto odd_texture = [&](GLenum target, const std::string& cause, const std::function<void(GLuint)>& fill) {
+    GLuint name = 0;
+    gl_.CreateTextures(target, 1, &name);
+    fill(name);
+    refused(in_texture(CUMULET_CHANNEL_DENSITY, odd, name), named("texture ", name) + ", " + cause);
+    gl_.DeleteTextures(1, &name);
+  };
+  odd_texture(GL_TEXTURE_2D, "is no GL_TEXTURE_3D of this context's group",
+              [&](GLuint name) { gl_.TextureStorage2D(name, 1, GL_R32F, 8, 8); });
+  odd_texture(GL_TEXTURE_3D, "has no level 0", [](GLuint) {});
+  odd_texture(GL_TEXTURE_3D, "is of whole numbers",
+              [&](GLuint name) { gl_.TextureStorage3D(name, 1, GL_R16UI, 8, 8, 8); });
+  odd_texture(GL_TEXTURE_3D, "has a base level that is not 0", [&](GLuint name) {
+    gl_.TextureStorage3D(name, 2, GL_R16F, 8, 8, 8);
+    gl_.TextureParameteri(name, GL_TEXTURE_BASE_LEVEL, 1);
+  });
+
+  refused(changed(buffer, [](auto& f) { f.buffer = 4711; }),
+          named("buffer ", 4711) + ", is none of this context's group");
+  refused(changed(buffer, [](auto& f) { f.size[1] = 0; }), named("buffer ", bytes) + ", has voxels of size 23x0x17");
+  refused(changed(buffer, [](auto& f) { f.size[1] = 1 << 30; }),
+          named("buffer ", bytes) + ", has voxels of size 23x1073741824x17");
+  const std::string too_small =
+      named("buffer ", bytes) + ", has 12124 bytes, and does not hold the words of its voxels";
+  refused(changed(buffer, [](auto& f) { f.size[2] = 18; }), too_small);
+  refused(changed(buffer, [](auto& f) { f.offset = 4; }), too_small);
+  refused(changed(buffer, [](auto& f) { f.offset = ~std::uint64_t{0} - 3; }), too_small);
+  refused(changed(buffer, [](auto& f) { f.strides[2] = ~std::uint64_t{0} - 3; }), too_small);
+  refused(changed(buffer,
+                  [](auto& f) {
+                    f.format = CUMULET_VOXEL_FORMAT_R16;
+                    f.size[2] = 8;
+                    f.offset = 1;
+                  }),
+          named("buffer ", bytes) + ", has an offset or strides that are no multiples of a number's 2 bytes");
+  ASSERT_NE(gl_.MapNamedBuffer(bytes, GL_READ_ONLY), nullptr);
+  refused(buffer, named("buffer ", bytes) + ", is mapped");
+  gl_.UnmapNamedBuffer(bytes);
+
+  const std::vector<cumulet_gl_field> twice{texture, buffer};
+  EXPECT_EQ(refusal(state_of(twice), CUMULET_ERROR_INVALID_ARGUMENT), "smoke: has density twice");
+  const std::vector<cumulet_gl_field> fine{texture};
+  cumulet_gl_state_desc desc = state_of(fine);
+  int word = 0;
+  desc.wait = &word;
+  EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: what is to be waited for is no sync object");
+  desc.wait = nullptr;
+  const cumulet_voxel_box box{{0, 0, 0}, {7, 7, 7}};
+  desc.changed = &box;
+  desc.changed_count = 1;
+  EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
+  desc.changed = nullptr;
+  EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: changed boxes are NULL");
+  EXPECT_EQ(cumulet_live_set_gl(v_, nullptr, &desc), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(handed(), 0U);
+
+  // Nothing of this is in the way of what is right; of boxes, the state's channels.
+  hand_over(fine);
+  std::vector<cumulet_gl_field> flame{texture};
+  flame[0].channel = CUMULET_CHANNEL_FLAME;
+  cumulet_gl_state_desc update = state_of(flame);
+  update.changed = &box;
+  update.changed_count = 1;
+  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
+  // A fence is waited for by the device.
+  desc = state_of(fine);
+  const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  desc.wait = fence;
+  ASSERT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+  EXPECT_EQ(fake_.calls("WaitSync"), 1U);
+  gl_.DeleteSync(fence);
+  EXPECT_EQ(arrive(), 1U);
+  // Without the context, or one at all.
+  ASSERT_EQ(cumulet_detach(v_), CUMULET_OK);
+  EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_ERROR_DETACHED);
+}
+
+TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
+  const Array good(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], good))});
+  arrive();
+  const Picture before = picture();
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                          -std::numeric_limits<float>::infinity()}) {
+    for (const std::size_t type : {0, 1}) {
+      for (const bool boxes : {false, true}) {
+        auto values = good.values;
+        values[State::at({3, 20, 11}, odd)] = bad;
+        const Array array(types.at(type).format, values);
+        const std::vector fields{
+            in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types.at(type), array))};
+        if (boxes) {
+          hand_over(fields, {{{0, 16, 8}, {7, 23, 15}}});
+        } else {
+          hand_over(fields);
+        }
+        const cumulet_frame_desc frame = target_.frame();
+        target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+        cumulet_status status = CUMULET_OK;
+        for (int i = 0; i < 100 && status == CUMULET_OK; ++i) {
+          target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+          status = cumulet_render(v_, &frame, nullptr);
+        }
+        EXPECT_EQ(status, CUMULET_ERROR_FILE);
+        EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: its voxel (3, 20, 11) is not finite");
+        EXPECT_EQ(difference(target_.pixels(), before), "");
+        EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << "told once";
+        EXPECT_EQ(handed(), 1U);
+      }
+    }
+  }
+  const Array next(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], next))});
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, next.values)));
+}
+
+// What is on its way when the context goes never arrives; what was there stays, and the next arrives in the new one.
+TEST_F(LiveGl, EndsWithItsContext) {
+  const Array first(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Array second(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], first))};
+  const std::vector others{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], second))};
+  hand_over(fields);
+  arrive();
+  const auto alive = fake_.alive();
+  hand_over(others);
+  ASSERT_EQ(cumulet_detach(v_), CUMULET_OK);
+  EXPECT_EQ(fake_.alive().count("Sync"), 0U);
+  EXPECT_EQ(handed(), 1U);
+  expect_same(newest(live_), alone(dense(odd, first.values)));
+  ASSERT_EQ(cumulet_attach(v_, test::FakeGl::get_proc, &fake_), CUMULET_OK);
+  hand_over(others);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, second.values)));
+  hand_over(fields);
+  ASSERT_EQ(cumulet_context_lost(v_), CUMULET_OK);
+  EXPECT_EQ(handed(), 2U);
+  expect_same(newest(live_), alone(dense(odd, second.values)));
+  ASSERT_EQ(cumulet_attach(v_, test::FakeGl::get_proc, &fake_), CUMULET_OK);
+  hand_over(fields);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), test::picture_of(make().get(), alone(dense(odd, first.values)).get(), target_)), "");
+  EXPECT_EQ(test::FakeGl::strays(), 0U);
+  EXPECT_FALSE(alive.empty());
+}
+
+// Lost in the midst of it, at each call.
+TEST_F(LiveGl, TheContextIsLostInTheCall) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const GLuint name = objects_.texture(odd, types[1], array);
+  for (const std::int64_t call : {1, 4, 9, 17, 26, 37, 48}) {
+    test::FakeGl fake(headless::Context::get_proc, &context_);
+    const ViewerPtr viewer = test::make_viewer({.get_proc = test::FakeGl::get_proc, .user = &fake, .samples = 2});
+    const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
+    const cumulet_gl_state_desc desc = state_of(fields);
+    ASSERT_EQ(cumulet_live_set_gl(viewer.get(), live_.get(), &desc), CUMULET_OK) << cumulet_last_error(viewer.get());
+    fake.lose_context(call);
+    cumulet_status status = cumulet_live_set_gl(viewer.get(), live_.get(), &desc);
+    if (!fake.lost()) continue;
+    if (status == CUMULET_OK) status = cumulet_live_set_gl(viewer.get(), live_.get(), &desc);
+    EXPECT_TRUE(status == CUMULET_ERROR_CONTEXT_LOST || status == CUMULET_ERROR_DETACHED ||
+                status == CUMULET_ERROR_INVALID_ARGUMENT)
+        << call << ": " << cumulet_last_error(viewer.get());
+  }
+  fake_.make_current();
+}
+
+TEST_F(LiveGl, WithoutMemoryNothingIsLost) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array))};
+  hand_over(fields);
+  const Array large(CUMULET_VOXEL_FORMAT_R32F, std::vector<float>(96 * 96 * 96, 1.0F));
+  const std::vector larger{
+      in_texture(CUMULET_CHANNEL_DENSITY, {96, 96, 96}, objects_.texture({96, 96, 96}, types[0], large))};
+  const cumulet_gl_state_desc desc = state_of(larger);
+  fake_.fail_storage(true);
+  EXPECT_EQ(refusal(desc, CUMULET_ERROR_OUT_OF_MEMORY).rfind("the GL driver is out of memory: creating ", 0), 0U)
+      << cumulet_last_error(v_);
+  fake_.fail_storage(false);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, array.values)));
+  // Nor where it lacks when the state is found.
+  hand_over(larger);
+  fake_.fail_storage(true);
+  cumulet_frame_desc frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_OUT_OF_MEMORY);
+  fake_.fail_storage(false);
+  hand_over(larger);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense({96, 96, 96}, large.values)));
+}
+
+TEST_F(LiveGl, NoCallWaitsForTheDevice) {
+  const auto waits = [&] {
+    std::uint64_t sum = 0;
+    for (const char* name : {"Finish", "GetNamedBufferSubData", "GetBufferSubData", "ReadPixels", "GetTextureImage",
+                             "GetTexImage", "GetTextureSubImage", "MapBuffer", "MapNamedBuffer"})
+      sum += fake_.calls(name);
+    return sum;
+  };
+  const std::uint64_t before = waits();
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array))};
+  for (int i = 0; i < 3; ++i) {
+    hand_over(fields);
+    arrive();
+    hand_over(fields, {{{0, 0, 0}, {9, 9, 9}}});
+    arrive();
+  }
+  EXPECT_EQ(waits(), before);
+  EXPECT_EQ(fake_.uploaded() > 0, true);
+}
+
+// A sparse plume costs what it has: of what is empty nothing comes back.
+TEST_F(LiveGl, CopiesBackWhatItHas) {
+  constexpr Sides wide = {96, 96, 96};
+  std::vector<float> values(96 * 96 * 96);
+  values[State::at({50, 40, 30}, wide)] = 1.0F;
+  const Array array(CUMULET_VOXEL_FORMAT_R32F, values);
+  const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, wide, objects_.texture(wide, types[0], array))};
+  auto stats = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+  const std::uint64_t before = stats.gl_bytes;
+  hand_over(fields);
+  ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+  const std::uint64_t copy = stats.gl_bytes - before;
+  EXPECT_GE(copy, std::uint64_t{4} * 96 * 96 * 96);
+  EXPECT_LT(copy, std::uint64_t{4} * 96 * 96 * 96 + 32768);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(wide, values)));
+}
+
+// Grids that GL builds are of these states, too.
+TEST_F(LiveGl, TheGridIsGlsToo) {
+  viewer_ = make(CUMULET_BUILD_GPU);
+  v_ = viewer_.get();
+  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array))});
+  EXPECT_EQ(arrive(), 1U);
+  const ViewerPtr single = make(CUMULET_BUILD_GPU);
+  EXPECT_EQ(difference(picture(), test::picture_of(single.get(), alone(dense(odd, array.values)).get(), target_)), "");
+}
+
+/// What needs no viewer.
+class Transfers : public test::GlTest {
+ protected:
+  void SetUp() override {
+    GlTest::SetUp();
+    if (IsSkipped()) return;
+    gl::find_out_dispatches(gl_, *programs_);
+  }
+  std::vector<volume::FieldCopy> transfer(render::VoxelTransfers& transfers, const render::GlState& state) {
+    std::optional<std::vector<volume::FieldCopy>> found;
+    const gl::StateGuard guard(*gl_);
+    transfers.begin(state, this, [&](std::vector<volume::FieldCopy> fields) { found = std::move(fields); });
+    for (int i = 0; !found && i < 100000; ++i) transfers.follow(render::Deadline::max());
+    return std::move(found).value();
+  }
+};
+
+// Layer by layer, where the driver's storage blocks are small, of textures and of buffers, whole and boxes.
+TEST_P(Transfers, SmallStorageBlocksAreEnough) {
+  constexpr Sides size = {20, 17, 61};
+  const auto values = simulated(CUMULET_CHANNEL_DENSITY, size, 1);
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, values);
+  Objects objects(*gl_);
+  gl::Limits limits = gl::query_limits(*gl_);
+  const auto voxels_of = [&](bool texture) {
+    render::GlVoxels voxels{volume::Channel::density, {}, glm::dmat4(1.0)};
+    if (texture) {
+      voxels.source = render::VoxelTexture{objects.texture(size, types[1], array), 0};
+    } else {
+      voxels.source = render::VoxelBuffer{.name = objects.buffer(array.bytes),
+                                          .format = render::VoxelFormat::halves,
+                                          .size = {size[0], size[1], size[2]}};
+    }
+    return voxels;
+  };
+  for (const bool texture : {true, false}) {
+    for (const bool boxes : {true, false}) {
+      render::GlState state{"smoke", {voxels_of(texture)}, std::nullopt, nullptr};
+      if (boxes) state.changed = {{{0, 0, 0}, {19, 16, 60}}};
+      limits.storage_block_bytes = std::int64_t{1} << 27U;
+      render::VoxelTransfers at_once(gl_, programs_, limits);
+      // Three layers of 3x3 bricks: 27 kB.
+      limits.storage_block_bytes = 28000;
+      render::VoxelTransfers in_pieces(gl_, programs_, limits);
+      const volume::MemoryField whole{volume::Channel::density, volume::DenseVoxels{array.values, {20, 17, 61}}};
+      const auto expected = volume::import_fields(std::vector{whole}, "smoke", {});
+      for (render::VoxelTransfers* transfers : {&at_once, &in_pieces}) {
+        const auto fields = transfer(*transfers, state);
+        ASSERT_EQ(fields.size(), 1U);
+        const auto found = volume::import_fields(std::vector{fields[0].view()}, "smoke", {});
+        test::expect_same_voxels(found.density, expected.density);
+        EXPECT_GT(transfers->bytes(), 0U);
+      }
+      // A layer alone is too much.
+      limits.storage_block_bytes = 4096;
+      render::VoxelTransfers refusing(gl_, programs_, limits);
+      const gl::StateGuard guard(*gl_);
+      EXPECT_THROW(refusing.begin(state, this, nullptr), Error);
+      EXPECT_FALSE(refusing.busy());
+    }
+  }
+}
+
+TEST_P(Transfers, LeaveTheHostsStateAsItWas) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  Objects objects(*gl_);
+  const GLuint texture = objects.texture(odd, types[1], array);
+  const GLuint buffer = objects.buffer(array.bytes);
+  const ViewerPtr viewer = test::make_viewer({.get_proc = headless::Context::get_proc, .user = context_.get()});
+  const LiveRef live = make_live();
+  test::ScramblingHost host(gl_);
+  const test::HostTarget target(*gl_, 16, 16);
+  cumulet_frame_desc frame = target.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
+  const auto kept = [&](std::uint32_t seed, const std::function<cumulet_status()>& call) {
+    host.scramble(seed);
+    const auto before = test::read_gl_state(*gl_);
+    EXPECT_EQ(call(), CUMULET_OK) << cumulet_last_error(viewer.get());
+    EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+    EXPECT_EQ(test::state_differences(before, test::read_gl_state(*gl_)), "") << seed;
+  };
+  for (std::uint32_t seed = 0; seed < 12; ++seed) {
+    const std::vector fields{seed % 2 == 0
+                                 ? in_texture(CUMULET_CHANNEL_DENSITY, odd, texture)
+                                 : in_buffer(CUMULET_CHANNEL_DENSITY, odd, buffer, CUMULET_VOXEL_FORMAT_R16F)};
+    cumulet_gl_state_desc desc = state_of(fields);
+    if (seed % 4 > 1) {
+      desc.changed = &box;
+      desc.changed_count = 1;
+    }
+    kept(2 * seed, [&] { return cumulet_live_set_gl(viewer.get(), live.get(), &desc); });
+    kept(2 * seed + 1, [&] { return cumulet_render(viewer.get(), &frame, nullptr); });
+  }
+  expect_same(newest(live), alone(dense(odd, array.values)));
+}
+
+CUMULET_ON_BACKENDS(Transfers);
+
+}  // namespace
