@@ -7,7 +7,8 @@
 //   surface z     view depth of that surface at the pixel's centre, infinity where there is none
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
 //   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
-//                 it the nearest surface, none behind the ground; mean
+//                 it the nearest surface, none behind the ground; and what that surface's matte part sends on of the sun,
+//                 with its shadows, whose share is beside it; mean
 //   velocity      of the volume where it scatters light for the first time, world units a second; mean, 0 where nothing
 //                 scatters
 //   motion        from where it is seen to where it was a frame ago, pixels, y up: of what is solid (the ground too), or
@@ -115,6 +116,34 @@ vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
 
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
+#if CM_SURFACES
+// What a surface's matte part sends towards the eye of the sun's light. u: for a point of the sun.
+vec3 cm_sunlit(CmHit hit, CmSurfacePoint point, vec3 w, vec2 u) {
+  vec3 across;
+  vec3 along;
+  cm_frame(cm.lights.sun_direction, across, along);
+  vec2 apart = sqrt(2.0 * cm.lights.sun_spread) * cm_on_disc(u);
+  vec3 to_sun = normalize(cm.lights.sun_direction + apart.x * across + apart.y * along);
+  float cosine = dot(point.material.matte_normal, to_sun);
+  float share = cosine > 0.0 && !point.unlit ? 0.318309886 * cosine * cm_terminator(point.material, to_sun) : 0.0;
+  vec3 light = share * cm.lights.sun_irradiance * cm_matte_albedo(point.material, dot(point.material.normal, -w));
+  if (light == vec3(0.0)) return light;
+  vec3 shift;
+  vec3 from = cm_surface_origin(hit.triangle, hit.barycentrics, point.behind, point.lifted, to_sun, shift);
+  CmHit met;
+  cm_hit_camera = false;
+  if (cm_trace_models(from, to_sun, 0.0, 3.0e38, true, met)) return vec3(0.0);
+  float used = 0.0;
+  CmWalk walk = cm_walk(cm_to_cube_point(from), cm_to_cube(to_sun), 3.0e38);
+  float t_1, e_0, e_1;
+  for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e_0, e_1); ++j) {
+    used += cm_depth_of(e_0, e_1, t_1 - walk.t, t_1 - walk.t);
+    cm_walk_on(walk, t_1);
+  }
+  return exp(-used) * light;
+}
+#endif
+
 void main() {
   uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
@@ -129,6 +158,7 @@ void main() {
   float scattered = 0.0;
   vec2 covered = vec2(0.0);  // by surfaces, by the ground
   vec3 emission = vec3(0.0);
+  vec3 sunlit = vec3(0.0);
 #if CM_VELOCITY
   vec3 velocity = vec3(0.0);  // sums
   vec2 volume_motion = vec2(0.0);
@@ -144,6 +174,7 @@ void main() {
     float surface_t = ray.end;
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
+    vec3 of_sun = vec3(0.0);
     CmHit hit;
     if (cm_trace_models(cm_from_cube_point(o), w, 0.0, surface_t, false, hit)) {
       surface_t = hit.t;
@@ -152,6 +183,7 @@ void main() {
       albedo += point.material.base_color;
       covered.x += 1.0;
       of_surface = point.emission;
+      of_sun = cm_sunlit(hit, point, w, fract(0.5 + float(i) * vec2(0.8191725134, 0.6710436067)));
 #if CM_VELOCITY
       if (i == 0) motion = cm_backward_surface(hit, point.position);
 #endif
@@ -204,7 +236,10 @@ void main() {
 #if CM_SURFACES
     // Where another draws the surfaces beneath, their light is none of the picture's.
     bool drawn_here = cm.layers.count == 0u || cm.layers.coloured != 0u;
-    if (drawn_here && surface_t <= ground_t) emission += exp(-used) * of_surface;
+    if (drawn_here && surface_t <= ground_t) {
+      emission += exp(-used) * of_surface;
+      sunlit += exp(-used) * of_sun;
+    }
 #endif
   }
   imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));
@@ -213,7 +248,9 @@ void main() {
   imageStore(cm_velocity, ivec2(pixel), vec4(scattered > 0.0 ? velocity / scattered : vec3(0.0), 0.0));
   imageStore(cm_motion, ivec2(pixel), vec4(motion, scattered > 0.0 ? volume_motion / scattered : vec2(0.0)));
 #endif
-  imageStore(cm_emission_out, ivec2(pixel), vec4(share * emission, 0.0));
+  vec3 known = emission + sunlit;
+  float of_sun = known == vec3(0.0) ? 0.0 : cm_luminance(sunlit) / cm_luminance(known);
+  imageStore(cm_emission_out, ivec2(pixel), vec4(share * known, of_sun));
   imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));
   imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
   imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z, share * covered.y, 0.0, 0.0));
