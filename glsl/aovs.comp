@@ -7,7 +7,8 @@
 //   surface z     view depth of that surface at the pixel's centre, infinity where there is none
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
 //   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
-//                 it the nearest surface, none behind the ground; mean
+//                 it the nearest surface, none behind the ground; and the sun's light that they scatter to the eye, whose
+//                 share is beside it: of the surface's matte part, with shadows, and about that of the volume; mean
 //   velocity      of the volume where it scatters light for the first time, world units a second; mean, 0 where nothing
 //                 scatters
 //   motion        from where it is seen to where it was a frame ago, pixels, y up: of what is solid (the ground too), or
@@ -27,6 +28,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "parameters.glsl"
 #include "cell.glsl"
 #include "random.glsl"
+#include "luminance.glsl"
+#include "frame.glsl"
 #include "phase.glsl"
 #include "buffers.glsl"
 #include "march.glsl"
@@ -114,6 +117,47 @@ vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
 #endif
 
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
+#define CM_OCTAVES 4u
+
+// A direction to a point of the sun.
+vec3 cm_to_sun(vec2 u) {
+  vec3 across;
+  vec3 along;
+  cm_frame(cm.lights.sun_direction, across, along);
+  vec2 apart = sqrt(2.0 * cm.lights.sun_spread) * cm_on_disc(u);
+  return normalize(cm.lights.sun_direction + apart.x * across + apart.y * along);
+}
+
+// The optical depth from a point (world) to what is far away along d, 1e30 behind a surface or the ground.
+float cm_depth_to_far(vec3 from, vec3 d) {
+  vec3 o = cm_to_cube_point(from);
+  if (cm_ground_distance(o, cm_to_cube(d)) < CM_NO_GROUND) return 1e30;
+#if CM_SURFACES
+  CmHit met;
+  cm_hit_camera = false;
+  if (cm_trace_models(from, d, 0.0, 3.0e38, true, met)) return 1e30;
+#endif
+  float used = 0.0;
+  CmWalk walk = cm_walk(o, cm_to_cube(d), 3.0e38);
+  float t_1, e_0, e_1;
+  for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e_0, e_1); ++j) {
+    used += cm_depth_of(e_0, e_1, t_1 - walk.t, t_1 - walk.t);
+    cm_walk_on(walk, t_1);
+  }
+  return used;
+}
+
+// Of light through so much of a medium, about what it scatters by that cosine, by many events as well: each doubling of
+// their number halves what is left, its optical depth and its mean cosine (Wrenninge, Kulla and Lundqvist, "Oz: The Great
+// and Volumetric", SIGGRAPH Talks 2013).
+float cm_scattered_by_many(float g, float cosine, float depth) {
+  uint most = cm.integrator.max_bounces == 0u ? CM_OCTAVES : min(CM_OCTAVES, cm.integrator.max_bounces);
+  float sum = 0.0;
+  float part = 1.0;
+  for (uint n = 0u; n < most; ++n, part *= 0.5)
+    sum += part * cm_henyey_greenstein(part * g, cosine) * exp(-part * depth);
+  return sum;
+}
 
 void main() {
   uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
@@ -129,6 +173,7 @@ void main() {
   float scattered = 0.0;
   vec2 covered = vec2(0.0);  // by surfaces, by the ground
   vec3 emission = vec3(0.0);
+  vec3 sunlit = vec3(0.0);
 #if CM_VELOCITY
   vec3 velocity = vec3(0.0);  // sums
   vec2 volume_motion = vec2(0.0);
@@ -142,8 +187,13 @@ void main() {
     vec3 d = ray.d;
     float t_per_z = ray.t_per_z;
     float surface_t = ray.end;
+    vec3 to_sun = cm_to_sun(fract(0.5 + float(i) * vec2(0.8191725134, 0.6710436067)));
+    vec3 sun_from[2];  // of a surface, of the medium
+    vec2 scatters = vec2(0.0);  // this ray's chances, and sum of depths
+    vec4 medium = vec4(0.0);    // its albedo and mean cosine, sums
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
+    vec3 of_sun = vec3(0.0);
     CmHit hit;
     if (cm_trace_models(cm_from_cube_point(o), w, 0.0, surface_t, false, hit)) {
       surface_t = hit.t;
@@ -152,6 +202,13 @@ void main() {
       albedo += point.material.base_color;
       covered.x += 1.0;
       of_surface = point.emission;
+      float cosine = dot(point.material.matte_normal, to_sun);
+      if (cosine > 0.0 && !point.unlit) {
+        of_sun = 0.318309886 * cosine * cm_terminator(point.material, to_sun) * cm.lights.sun_irradiance *
+                 cm_matte_albedo(point.material, dot(point.material.normal, -w));
+        vec3 shift;
+        sun_from[0] = cm_surface_origin(hit.triangle, hit.barycentrics, point.behind, point.lifted, to_sun, shift);
+      }
 #if CM_VELOCITY
       if (i == 0) motion = cm_backward_surface(hit, point.position);
 #endif
@@ -189,9 +246,11 @@ void main() {
       float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
       emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
 #endif
-      if (t < solid_t) emission += clear * chance * cm_walk_source(walk);
-      scattered_z += clear * chance * (t + within_part * min(span, walk.t_end - t)) / t_per_z;
-      scattered += clear * chance;
+      if (t < solid_t) {
+        emission += clear * chance * cm_walk_source(walk);
+        medium += clear * chance * cm_walk_scatters(walk);
+      }
+      scatters += clear * chance * vec2(1.0, (t + within_part * min(span, walk.t_end - t)) / t_per_z);
 #if CM_VELOCITY
       velocity += clear * chance * cm_walk_velocity(walk, t_1);
       vec3 middle = o + (t + within_part * min(span, walk.t_end - t)) * d;
@@ -204,8 +263,24 @@ void main() {
 #if CM_SURFACES
     // Where another draws the surfaces beneath, their light is none of the picture's.
     bool drawn_here = cm.layers.count == 0u || cm.layers.coloured != 0u;
-    if (drawn_here && surface_t <= ground_t) emission += exp(-used) * of_surface;
+    of_sun *= exp(-used);
+    if (drawn_here && surface_t <= ground_t) {
+      emission += exp(-used) * of_surface;
+    } else {
+      of_sun = vec3(0.0);
+    }
+#else
+    vec3 of_sun = vec3(0.0);
 #endif
+    scattered += scatters.x;
+    scattered_z += scatters.y;
+    if (scatters.x > 0.0) sun_from[1] = cm_from_cube_point(o + (scatters.y / scatters.x * t_per_z) * d);
+    vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
+    for (int k = 0; k < 2; ++k) {
+      if (light[k] == vec3(0.0)) continue;
+      float depth = cm_depth_to_far(sun_from[k], to_sun);
+      sunlit += light[k] * (k == 0 ? exp(-depth) : cm_scattered_by_many(medium.a / scatters.x, dot(w, to_sun), depth));
+    }
   }
   imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));
   imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
@@ -213,7 +288,9 @@ void main() {
   imageStore(cm_velocity, ivec2(pixel), vec4(scattered > 0.0 ? velocity / scattered : vec3(0.0), 0.0));
   imageStore(cm_motion, ivec2(pixel), vec4(motion, scattered > 0.0 ? volume_motion / scattered : vec2(0.0)));
 #endif
-  imageStore(cm_emission_out, ivec2(pixel), vec4(share * emission, 0.0));
+  vec3 known = emission + sunlit;
+  float of_sun = known == vec3(0.0) ? 0.0 : cm_luminance(sunlit) / cm_luminance(known);
+  imageStore(cm_emission_out, ivec2(pixel), vec4(share * known, of_sun));
   imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));
   imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
   imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z, share * covered.y, 0.0, 0.0));

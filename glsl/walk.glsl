@@ -178,6 +178,25 @@ vec3 cm_walk_source(inout CmWalk walk) {
 #endif
 }
 
+// Likewise: their albedo, and the mean cosine that they scatter by.
+vec4 cm_walk_scatters(inout CmWalk walk) {
+  vec4 scatters = vec4(0.0);
+  float sum = 0.0;
+  for (int k = 0; k < walk.count; ++k) {
+    cm_stand_at(walk.front[k]);
+    float extinction = walk.front[k].e_0 + walk.front[k].e_1;
+    vec3 albedo = CM_MEDIUM.holdout != 0u ? vec3(0.0) : CM_MEDIUM.albedo;
+    vec4 here = vec4(albedo, mix(CM_MEDIUM.anisotropy, CM_MEDIUM.second_anisotropy, CM_MEDIUM.second_share));
+#if CM_CHANNELS
+    if (CM_MEDIUM.coloured != 0u) here.rgb *= cm_march_colour(walk.front[k].cell.xy);
+    if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy);
+#endif
+    scatters += extinction * here;
+    sum += extinction;
+  }
+  return sum > 0.0 ? scatters / sum : vec4(0.0);
+}
+
 #if CM_VELOCITY
 // Of the part up to t_1: the mean velocity of what scatters, world units a second.
 vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {

@@ -87,8 +87,8 @@ float cm_alike(CmGuides here, CmGuides there, vec4 slopes, vec2 offset) {
 // A surface's albedo, as far as it is seen: what its light is divided by, to be smooth where only its colour is not.
 // covered: the share of the pixel that surfaces cover. What samples and facts differ by of light that is given off has
 // nothing to do with an albedo, which may be black.
-vec3 cm_tint(vec3 albedo, float covered, float transmittance, vec3 emission) {
-  return clamp(1.0 + transmittance * (albedo - covered) + emission, 0.05, 1.0);
+vec3 cm_tint(vec3 albedo, float covered, float transmittance, vec4 known) {
+  return clamp(1.0 + transmittance * (albedo - covered) + (1.0 - known.a) * known.rgb, 0.05, 1.0);
 }
 
 // The part of a pixel that neither surfaces, the ground nor the volume cover.

@@ -37,8 +37,9 @@ void main() {
   guides.volume_z = volume.x;
   float covered = cm_surfaces * through.y;
   // What is known without noise is not filtered: it comes back at the end.
-  vec3 emission = texelFetch(cm_emission, texel, 0).rgb;
-  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, guides.transmittance, emission);
+  vec4 known_light = texelFetch(cm_emission, texel, 0);
+  vec3 emission = known_light.rgb;
+  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, guides.transmittance, known_light);
   float open = cm_open(covered, volume.y, guides.transmittance);
   vec3 lit = mean.front.rgb - emission;
   vec3 front = lit / tint;
@@ -54,7 +55,7 @@ void main() {
   float known = cm_luminance(emission);
   float of_front = square - (part > 0.0 ? behind * behind / part : 0.0);
   float own = max(of_front - known * (2.0 * apart + known), apart * apart);
-  float scale = apart != 0.0 ? clamp(luminance / apart, 1.0, 20.0) : 1.0;
+  float scale = apart != 0.0 ? clamp(cm_luminance(abs(front)) / cm_luminance(abs(lit)), 1.0, 20.0) : 1.0;
   float moment = samples > 0.0 ? scale * scale * own : luminance * luminance;
   if (!guides.finite) {
     front = vec3(0.0);

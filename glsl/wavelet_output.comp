@@ -27,13 +27,13 @@ void main() {
     float open = texelFetch(cm_spread, texel, 0).x;
     vec2 through = texelFetch(cm_transmittance, texel, 0).xy;
     float covered = cm_surfaces * through.y;
-    vec3 emission = texelFetch(cm_emission, texel, 0).rgb;
-    vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, through.x, emission);
+    vec4 known = texelFetch(cm_emission, texel, 0);
+    vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, through.x, known);
     float own = cm_open(covered, texelFetch(cm_volume_z, texel, 0).y, through.x);
     // Where only its own samples count, these are what they are.
     float part = clamp(front.a + own - open, 0.0, 1.0);
     vec3 lit = tint * front.rgb * (cm_cover(own) / cm_cover(open));
-    mean.front = vec4(max(vec3(0.0), lit + emission), 1.0 - part);
+    mean.front = vec4(max(vec3(0.0), lit + known.rgb), 1.0 - part);
     mean.background = part * imageLoad(cm_behind, texel).rgb;
   } else {
     mean = cm_mean(texel);

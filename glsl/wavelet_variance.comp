@@ -90,6 +90,7 @@ void main() {
   CmBrightest about = cm_brightest(texel, here, slopes);
   float own_samples = spread.z;
   vec4 front = vec4(0.0);   // and cover, of all samples, for their means
+  vec3 either = vec3(0.0);  // of either sign
   float square = 0.0;
   float open = 0.0;
   float count = 0.0;
@@ -112,6 +113,7 @@ void main() {
       float luminance = cm_luminance(colour.rgb);
       float samples = weight * other.z;
       front += samples * vec4(colour.rgb, cover);
+      either += samples * abs(colour.rgb);
       open += samples * colour.a;
       square += samples * other.y;
       count += samples;
@@ -127,7 +129,7 @@ void main() {
     float sample_variance =
         degrees >= CM_ENOUGH ? cover * deviation / freedom : max(0.0, cover * square / front.a - mean * mean);
     // As of a channel, where colours differ by all of them.
-    vec3 colour = front.rgb / count;
+    vec3 colour = either / count;
     float luminance = cm_luminance(colour);
     float channels = dot(colour, colour) / 3.0;
     // At most as of light that is all blue: what is left of emission has either sign.

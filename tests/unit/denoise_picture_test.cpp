@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -245,6 +246,73 @@ TEST_F(DenoisedPicture, TheGroundIsNoHole) {
     ASSERT_EQ(raw[i + 3], 1.0F) << i;
     EXPECT_NEAR(filtered[i + 3], 1.0F, 1e-5F) << i;
   }
+}
+
+// The sun in the zenith over a floor, and a card of side 8 between: of one sample a pixel the shadow has its edges.
+TEST_F(DenoisedPicture, ShadowsOfTheSunStaySharp) {
+  auto light = make_desc<cumulet_light_desc>();
+  light.sun_elevation_degrees = 90.0F;
+  std::ranges::fill(light.sun_irradiance, 3.0F);
+  std::ranges::fill(light.sky_radiance, 0.3F);
+  ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+  const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
+  const auto level = [](float half, float y) {
+    return std::array<float, 12>{-half, y, -half, -half, y, half, half, y, half, half, y, -half};
+  };
+  const std::array corners{level(40.0F, 0.0F), level(4.0F, 8.0F)};
+  std::array cards{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
+  for (std::size_t i = 0; i < cards.size(); ++i) {
+    cards.at(i).positions = corners.at(i).data();
+    cards.at(i).vertex_count = 4;
+    cards.at(i).indices = indices.data();
+    cards.at(i).index_count = indices.size();
+    cards.at(i).double_sided = 1;
+    std::fill_n(cards.at(i).base_color, 4, 1.0F);
+    std::fill_n(cards.at(i).base_color, 3, 0.5F);
+  }
+  const cumulet::test::SurfacesRef surfaces = cumulet::test::make_surfaces(cards);
+  ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces.get()), CUMULET_OK);
+  constexpr double height = 6.0;  // of the eye, and how far it is from the middle
+  constexpr double away = 14.0;
+  constexpr double fovy = 40.0;
+  cumulet_camera* camera = nullptr;
+  ASSERT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
+  const cumulet::test::CameraRef owner(camera);
+  auto stand = make_desc<cumulet_camera_desc>();
+  stand.eye[1] = height;
+  stand.eye[2] = away;
+  stand.fovy_degrees = fovy;
+  ASSERT_EQ(cumulet_camera_set(camera, &stand), CUMULET_OK);
+  sample(1);
+  auto frame = target_.frame();
+  frame.budget_ms = 1000.0;
+  cumulet::test::converge(viewer_.get(), frame);
+  const auto desc = make_desc<cumulet_denoise_desc>();
+  std::vector<float> filtered(floats);
+  ASSERT_EQ(cumulet_read_denoised(viewer_.get(), &desc, filtered.data(), filtered.size()), CUMULET_OK) << error();
+  const double length = std::hypot(height, away);
+  const double half = std::tan(fovy * std::numbers::pi / 360.0);
+  int near_edge = 0;
+  int wrong = 0;
+  for (int row = 0; row < side; ++row) {
+    for (int column = 0; column < side; ++column) {
+      const double right = half * (2.0 * (column + 0.5) / side - 1.0);
+      const double up = half * (1.0 - 2.0 * (row + 0.5) / side);
+      const double down = (height - up * away) / length;
+      if (down <= 0.1) continue;
+      const double t = height / down;
+      const double x = t * right;
+      const double z = away - t * (away + up * height) / length;
+      const double inside = 4.0 - std::max(std::abs(x), std::abs(z));
+      if (std::abs(inside) < 1.0 || std::abs(inside) > 3.0) continue;
+      // The sun's part is 0.48, the sky's at most 0.15.
+      const float value = filtered[4 * static_cast<std::size_t>(row * side + column)];
+      wrong += (value > 0.3F) == (inside > 0.0) ? 1 : 0;
+      ++near_edge;
+    }
+  }
+  EXPECT_GT(near_edge, 100);
+  EXPECT_LT(wrong, near_edge / 100);
 }
 
 // ---- Frames of a camera that moves ----

@@ -43,9 +43,12 @@ struct Pixel {
   glm::vec3 albedo{0.0F};
   float z = infinite;        // of that surface, or where the volume is half opaque
   glm::vec3 emission{0.0F};  // seen straight, in every sample
+  glm::vec3 sunlit{0.0F};    // the part of front that is known to be the sun's
 };
 
 using Scene = std::function<Pixel(int x, int y)>;
+
+float luminance_of(const glm::vec3& colour) { return static_cast<float>(cumulet::luminance(glm::dvec3(colour))); }
 
 // A pixel's side at depth 1.
 constexpr float pixel_at_1 = 0.01F;
@@ -94,7 +97,9 @@ class Samples {
       transmittance_.emplace_back(surface ? 1.0F : 1.0F - pixel.cover, surface ? pixel.cover : 0.0F);
       surface_z_.push_back(surface ? pixel.z : infinite);
       volume_z_.emplace_back(surface ? infinite : pixel.z, 0.0F);
-      emission_.emplace_back(pixel.emission, 0.0F);
+      const glm::vec3 known = pixel.emission + pixel.cover * pixel.sunlit;
+      emission_.emplace_back(
+          known, known == pixel.emission ? 0.0F : 1.0F - luminance_of(pixel.emission) / luminance_of(known));
       truth_.emplace_back(pixel.cover * pixel.front + pixel.emission, pixel.cover);
     }
   }
@@ -313,6 +318,25 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
         << i % 48 << ", " << i / 48;
   }
   EXPECT_LT(error_of(clean, samples.truth()), 0.3 * error_of(samples.raw(), samples.truth()));
+}
+
+// A shadow on a plane, in which a sample tells little: its edge is where the sun's light is known to end.
+TEST_P(Wavelets, AShadowThatIsKnownHasItsEdge) {
+  const auto scene = [](bool known) {
+    return [known](int x, int) {
+      const glm::vec3 sun(x < 16 ? 0.8F : 0.0F);
+      return Pixel{.front = glm::vec3(0.1F) + sun,
+                   .spread = 0.95F,
+                   .normal = {0.0F, 0.0F, 1.0F},
+                   .albedo = glm::vec3(0.5F),
+                   .z = 4.0F,
+                   .sunlit = known ? sun : glm::vec3(0.0F)};
+    };
+  };
+  const Samples samples(gl_, {32, 32}, 1, scene(true));
+  const double error = error_of(samples.filtered(programs_), samples.truth());
+  const double unknown = error_of(Samples(gl_, {32, 32}, 1, scene(false)).filtered(programs_), samples.truth());
+  EXPECT_LT(error, 0.5 * unknown);
 }
 
 // Flames without smoke: they cover nothing, and end in clear air.
