@@ -18,7 +18,7 @@
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
 // volume's depth the share that the ground covers.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_VELOCITY=1
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -75,9 +75,6 @@ uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(CM_GRID.first_gl
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
 layout(binding = CM_UNIT_CELLS) uniform usamplerBuffer cm_cells[CM_PAGES];
 layout(binding = CM_UNIT_TREE) uniform usamplerBuffer cm_tree_words;
-#if CM_PAGES > 2
-#define CM_WIDE 1  // render::MarchData::defines
-#endif
 
 uvec4 cm_record(uint cell, uint part) {
 #if CM_PAGES == 1

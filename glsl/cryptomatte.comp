@@ -5,7 +5,7 @@
 // ground. Of a fixed set of rays, cm.dispatch.samples of them; the shares along each are exact, of at most as many volumes
 // at one place as walk.glsl takes. A slice has two ids, as a float's bits, and a share each, the largest share first; 0
 // where there are no more. What has no id, as holes have none, hides what is behind it and is nobody's.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_MOTION=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -13,7 +13,7 @@
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
-// Kernels that may meet no grid of a cube wider than 2^15 know but one kind of record.
+// With CM_WIDE grids may be of cubes wider than 2^15; all other kernels know but one kind of record.
 #ifndef CM_WIDE
 #define CM_WIDE 0
 #endif

@@ -4,7 +4,7 @@
 // noise, in closed form from cell to cell. Parallel rays are those of an orthographic view from the light; those of a
 // point are by octahedra (octahedron.glsl), whose folds texels lie on, so that what is filtered across one is of the same
 // rays.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

@@ -246,7 +246,8 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
 std::vector<ProgramKey> all_programs() {
   // They would be half of all and more.
   const auto rare = [](const ShaderMacro& macro) {
-    return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT" || macro.name == "CM_MOTION";
+    return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT" || macro.name == "CM_MOTION" ||
+           macro.name == "CM_WIDE";
   };
   std::vector<ProgramKey> all;
   for (const Shader& shader : shaders()) {

@@ -565,12 +565,14 @@ std::vector<std::string> MarchData::defines(bool several, bool motion) const {
   // One, two or as many as there can be: fewer programs.
   std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
   const auto is_wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
-  if (pages > 2 || (march_ == March::tet && (several || std::ranges::any_of(parts_, is_wide)))) pages = max_pages;
+  const bool wide = march_ == March::tet && std::ranges::any_of(parts_, is_wide);
+  if (pages > 2 || wide || (several && march_ == March::tet)) pages = max_pages;
   std::vector<std::string> defines{"CM_MARCH " + std::to_string(static_cast<int>(march_)),
                                    std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
                                    "CM_PAGES " + std::to_string(pages)};
   if (several) defines.emplace_back("CM_INSTANCES 1");
   if (motion) defines.emplace_back("CM_MOTION 1");
+  if (wide) defines.emplace_back("CM_WIDE 1");
   return defines;
 }
 

@@ -334,6 +334,46 @@ TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
   }
 }
 
+// What rays that start far out meet there is what those meet that start nearby: differences of what is large are exact.
+TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
+  const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
+  grid::RefineSettings settings;
+  settings.threshold = -1.0;
+  settings.cells = grid::CellKind::constant;
+  const Built near = build(cloud, settings);
+  const ivec3 by(229376, 196608, 131072);
+  const Built far = build(test::clouds_apart(cloud, by), settings);
+  const auto depth_of = [](const grid::TetGrid& grid, const vec3& o, const vec3& d) {
+    const bool wide = grid.cube.wide();
+    double depth = 0.0;
+    float t = 0.0F;
+    for (std::uint32_t cell = grid::locate(grid, o), steps = 0; cell != CM_NONE && steps < 4000; ++steps) {
+      const glm::uvec4& data = grid.cells[cell].data;
+      const std::uint32_t shape = core::cm_record_shape(data, wide);
+      float t_exit = 0.0F;
+      std::uint32_t face = 0;
+      core::cm_cell_exit(core::cm_cell_frame(core::cm_record_v0(data, wide), shape, o, d), shape, t_exit, face);
+      const float t_next = std::max(t, t_exit);
+      depth += double(t_next - t) * glm::unpackHalf2x16(data.z).x;
+      t = t_next;
+      cell = core::cm_link(grid.cells[cell].links, face);
+    }
+    return depth;
+  };
+  test::Random random(4);
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  double sum = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    // On what floats have out there, and in no cell's face.
+    const vec3 o = vec3(random() % 30, random() % 28, random() % 25) + vec3(21.0F, 29.0F, 39.0F) / 64.0F;
+    const vec3 d(uniform(random), uniform(random), uniform(random));
+    const double depth = depth_of(near.grid, o, d);
+    ASSERT_NEAR(depth_of(far.grid, o + vec3(by), d), depth, 1e-5 * (1.0 + depth));
+    sum += depth;
+  }
+  EXPECT_GT(sum, 20000.0);
+}
+
 TEST(Statistics, WideTilesAreSummedWhole) {
   volume::ScalarVolume tile;
   tile.name = "density";
