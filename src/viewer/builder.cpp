@@ -175,11 +175,27 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   return built;
 }
 
-VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
-  volume::VolumeFrame frame = volume::import_frame(path, grids, log, progress);
-  const auto place = [&](volume::ScalarVolume& field) { field.index_to_world = to_world * field.index_to_world; };
-  place(frame.density);
-  for (volume::ScalarVolume* field : frame.beside_density()) place(*field);
+namespace {
+
+void place(volume::VolumeFrame& frame, const glm::dmat4& to_world) {
+  for (volume::ScalarVolume* field : frame.fields()) field->index_to_world = to_world * field->index_to_world;
+}
+
+}  // namespace
+
+VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const { return read(log, progress, {}); }
+
+VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
+                                const std::function<void(volume::StandIn)>& take_stand_in) const {
+  const auto take = [&](volume::StandIn made) {
+    place(made.frame, to_world);
+    if (made.extent) made.extent->index_to_world = to_world * made.extent->index_to_world;
+    take_stand_in(std::move(made));
+  };
+  volume::VolumeFrame frame = take_stand_in
+                                  ? volume::import_frame(path, grids, log, progress, {take, least_stand_in_bricks})
+                                  : volume::import_frame(path, grids, log, progress);
+  place(frame, to_world);
   try {
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);
   } catch (const Error& e) {
@@ -188,14 +204,22 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
   }
 }
 
-void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings) {
-  const auto load = std::make_shared<Load>(Load{std::move(settings)});
+void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings,
+                   std::optional<BuildSettings> stand_in) {
+  const auto load = std::make_shared<Load>(Load{std::move(settings), std::move(stand_in)});
   const std::scoped_lock lock(mutex_);
   load_ = load;
+  stand_in_.reset();
   worker_.replace({file.path, Progress::Stage::loading,
                    [this, file, load](Progress& progress) {
                      Stopwatch watch;
-                     LoadedVolume loaded{file.read(log_, &progress), {}};
+                     std::function<void(volume::StandIn)> take_stand_in;
+                     if (load->stand_in) {
+                       take_stand_in = [&](volume::StandIn made) {
+                         build_stand_in(file, std::move(made), *load, progress);
+                       };
+                     }
+                     LoadedVolume loaded{file.read(log_, &progress, take_stand_in), {}};
                      if (file.suggested_density_scale)
                        loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
                      const double seconds = watch.lap();
@@ -212,6 +236,49 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
                      build_of(loaded.volume, *load->settings, seconds, progress);
                    },
                    true});
+  cancel_stand_in();
+}
+
+void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const Load& load, const Progress& loading) {
+  const auto progress = std::make_shared<Progress>();
+  BuildSettings settings;
+  {
+    const std::scoped_lock lock(mutex_);
+    loading.check();
+    settings = load.settings ? *load.settings : *load.stand_in;
+    stand_in_load_ = progress;
+  }
+  settings.on = BuildOn::cpu;
+  settings.refine.camera.reset();
+  StandIn stand_in;
+  try {
+    const auto volume = std::make_shared<const VolumeAsset>(std::move(made.frame), progress.get());
+    if (volume->empty()) return;
+    if (file.suggested_density_scale) stand_in.density_scale = volume->coarse().suggest_density_scale();
+    if (stand_in.density_scale) settings.refine.density_scale = *stand_in.density_scale;
+    VolumeFacts facts = *volume->facts();
+    if (made.extent) {
+      facts.low = made.extent->low;
+      facts.high = made.extent->high;
+      facts.index_to_world = made.extent->index_to_world;
+    }
+    stand_in.facts = std::make_shared<const VolumeFacts>(std::move(facts));
+    stand_in.source = build_grid({}, volume, settings, *progress, *allowance_).source;
+  } catch (...) {
+    // It is not worth a message: what is wrong is wrong with the whole as well.
+    loading.check();
+    return;
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    loading.check();
+    stand_in_ = std::move(stand_in);
+  }
+  notify_();
+}
+
+void Builder::cancel_stand_in() {
+  if (const auto progress = stand_in_load_.lock()) progress->cancel();
 }
 
 void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before) {
@@ -227,24 +294,32 @@ void Builder::cancel() {
   {
     const std::scoped_lock lock(mutex_);
     load_.reset();  // what it stops soon takes no other settings
+    stand_in_.reset();
   }
   worker_.cancel();
+  const std::scoped_lock lock(mutex_);
+  cancel_stand_in();
 }
 
 void Builder::cancel_loads() {
   {
     const std::scoped_lock lock(mutex_);
     load_.reset();
+    stand_in_.reset();
   }
   worker_.cancel_loads();
+  const std::scoped_lock lock(mutex_);
+  cancel_stand_in();
 }
 
 void Builder::forget() {
   const std::scoped_lock lock(mutex_);
   load_.reset();
   worker_.drop();
+  cancel_stand_in();
   loaded_.reset();
   built_.reset();
+  stand_in_.reset();
 }
 
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
@@ -263,6 +338,11 @@ std::optional<LoadedVolume> Builder::take_loaded() {
 std::optional<Built> Builder::take_built() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(built_, std::nullopt);
+}
+
+std::optional<StandIn> Builder::take_stand_in() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(stand_in_, std::nullopt);
 }
 
 bool Builder::busy() const {

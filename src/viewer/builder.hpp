@@ -16,6 +16,7 @@
 #include "scene/march_source.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
+#include "volume/stand_in.hpp"
 
 namespace cumulet::viewer {
 
@@ -25,9 +26,14 @@ struct VolumeFile {
   volume::GridNames grids;
   glm::dmat4 to_world{1.0};              ///< affine, from the file's own world space
   bool suggested_density_scale = false;  ///< the medium gets the one that is suggested for it
+  /// Below which a file has no stand-in; tests have other ones.
+  std::uint64_t least_stand_in_bricks = volume::worth_a_stand_in;
 
   /// Throws what import_frame and VolumeAsset throw.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
+  /// take_stand_in: as import_frame has it, of what stands there.
+  [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress,
+                                    const std::function<void(volume::StandIn)>& take_stand_in) const;
 };
 
 /// What came of it.
@@ -81,6 +87,13 @@ struct Built {
   [[nodiscard]] bool serves(const BuildSettings& wanted) const;
 };
 
+/// What is shown of a large file until it is read and built.
+struct StandIn {
+  VolumeFactsPtr facts;  ///< bounds are the whole's
+  scene::MarchSourcePtr source;
+  std::optional<double> density_scale;  ///< that is suggested for it, where the medium is to get one
+};
+
 /// Of a grid whose refinement ended at so many cells: max_cells, or what memory takes of these.
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 
@@ -102,11 +115,13 @@ class Builder {
   /// notify: called on the worker after a job ended.
   Builder(Log log, std::function<void()> notify, Trace trace = {},
           const AllowancePtr& allowance = std::make_shared<const Allowance>())
-      : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
+      : log_(std::move(log)), notify_(notify), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
 
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()
-  /// does: another file is another subject, and files may take minutes.
-  void load(const VolumeFile& file, std::optional<BuildSettings> settings);
+  /// does: another file is another subject, and files may take minutes. stand_in: how one is built, as long as settings
+  /// are not known, until a large file is there; null: there is none.
+  void load(const VolumeFile& file, std::optional<BuildSettings> settings,
+            std::optional<BuildSettings> stand_in = std::nullopt);
   /// Builds of this volume, after what is under way. before: as build_grid() has it.
   void build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before = nullptr);
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
@@ -123,6 +138,8 @@ class Builder {
   std::optional<LoadedVolume> take_loaded();
   /// The newest result, once.
   std::optional<Built> take_built();
+  /// The stand-in of a load under way, once.
+  std::optional<StandIn> take_stand_in();
 
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
@@ -134,15 +151,22 @@ class Builder {
   // What a load will build: open until the file is read.
   struct Load {
     std::optional<BuildSettings> settings;
+    std::optional<BuildSettings> stand_in;
     bool open = true;
   };
+  void build_stand_in(const VolumeFile& file, volume::StandIn made, const Load& load, const Progress& loading);
+  // It has a progress of its own: the load's tells how much of the whole is read. mutex_ is held.
+  void cancel_stand_in();
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress,
                 const scene::GridPlanPtr& before = nullptr);
 
   Log log_;
+  std::function<void()> notify_;
   AllowancePtr allowance_;
   mutable std::mutex mutex_;
-  std::weak_ptr<Load> load_;  // held by its job
+  std::weak_ptr<Load> load_;               // held by its job
+  std::weak_ptr<Progress> stand_in_load_;  // of the stand-in that is being built
+  std::optional<StandIn> stand_in_;
   std::optional<LoadedVolume> loaded_;
   std::optional<Built> built_;
   Worker worker_;  // last: its thread uses all of the above

@@ -165,8 +165,10 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
     wishes_due_ = true;
+    drop_stand_in();
     if (built_.volume == volume_) take_suggestion();
   }
+  follow_stand_in();
   follow_sequence();
   follow_live();
   follow_watching();
@@ -183,6 +185,25 @@ void Viewer::sync() {
     if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
     surround();
   }
+}
+
+void Viewer::follow_stand_in() {
+  // A sequence, or a live volume, goes on until the volume is there; and what is read back without previews is of what
+  // is asked for alone.
+  if (auto made = builder_.take_stand_in(); made && sampling_.preview && !followed_ && !watched_) {
+    stand_in_ = std::move(made);
+    show_medium();
+  }
+  if (!stand_in_ || builder_.busy()) return;
+  // The volume is there, and the next frame asks for its grid; or there is none to come.
+  const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !builder_.status().failure;
+  if (!waits) drop_stand_in();
+}
+
+void Viewer::drop_stand_in() {
+  if (!stand_in_) return;
+  stand_in_.reset();
+  show_medium();
 }
 
 void Viewer::take_suggestion() {
@@ -202,6 +223,7 @@ void Viewer::take_volume(VolumeAssetPtr volume) {
 bool Viewer::begin_anew(bool shows, bool showed) {
   if (!shows && !showed) return false;
   builder_.forget();
+  drop_stand_in();
   sync();
   leave_sequence();
   if (!shows) {
@@ -475,7 +497,8 @@ void Viewer::load_volume(const VolumeFile& file) {
   sync();
   const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
-  builder_.load(file, settings_at_once());
+  drop_stand_in();
+  builder_.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
   // A sequence, or a live volume, goes on until the volume is there.
   if (followed_ || watched_) {
     suggested_density_scale_ = suggested;
@@ -491,6 +514,7 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
     builder_.cancel();
   }
   builder_.take_loaded();  // what was read, and not shown yet, never is
+  drop_stand_in();
   sync();
   leave_sequence();
   take_volume(std::move(volume));
@@ -1156,7 +1180,13 @@ bool Viewer::other_opacity() const {
   return !suits(grid_.build, wanted);
 }
 
-void Viewer::show_medium() { shown_medium_.set(shown_medium(medium_)); }
+Medium Viewer::seen_medium() const {
+  Medium medium = medium_;
+  if (stand_in_ && stand_in_->density_scale) medium.density_scale = *stand_in_->density_scale / stretch();
+  return medium;
+}
+
+void Viewer::show_medium() { shown_medium_.set(shown_medium(seen_medium())); }
 
 void Viewer::set_light(const Light& light) {
   light_ = light;
@@ -1239,6 +1269,7 @@ void Viewer::set_sampling(const Sampling& sampling) {
   sync();
   const bool other_shutter = sampling_.shutter_seconds != sampling.shutter_seconds;
   sampling_ = sampling;
+  if (!sampling_.preview) drop_stand_in();
   if (other_shutter) {
     poses_due_ = true;
     const bool loads = surface_builder_.configure_load(while_open(surface_settings_.choice, nullptr));
@@ -1309,7 +1340,7 @@ Bounds Viewer::bounds_of(const VolumeFacts& volume) const {
 
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
-  if (facts_ && !facts_->empty) box = bounds_of(*facts_);
+  if (const VolumeFactsPtr& facts = seen_facts(); facts && !facts->empty) box = bounds_of(*facts);
   const auto add = [&](const Bounds& other) { box = box ? both(*box, other) : other; };
   for (const Shown& shown : shown_) {
     if (shown.is_there() && !shown.facts()->empty) add(shown.facts()->bounds(shown.settings.to_world));
@@ -1361,7 +1392,8 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     reach.resize(normals.size(), std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
   };
-  const std::size_t count = (facts_ ? places_.size() : 0) + shown_.size();
+  const VolumeFactsPtr& own = seen_facts();
+  const std::size_t count = (own ? places_.size() : 0) + shown_.size();
   const auto add_volume = [&](const VolumeFacts& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
     const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
@@ -1379,7 +1411,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   };
   std::size_t vertices = 0;
   for (const scene::Place& place : places_) {
-    if (facts_) add_volume(*facts_, place.to_world, medium_);
+    if (own) add_volume(*own, place.to_world, seen_medium());
   }
   for (const Shown& shown : shown_) {
     if (shown.is_there()) add_volume(*shown.facts(), shown.settings.to_world, shown.settings.medium);
@@ -1444,10 +1476,11 @@ bool Viewer::shows_instances() const {
 void Viewer::show_volumes() {
   std::vector<scene::Volume> volumes;
   // What surfaces alone are in stands aside.
-  if (built_.source && (facts_ || !shows_instances())) {
+  const scene::MarchSourcePtr& source = stand_in_ ? stand_in_->source : built_.source;
+  if (source && (seen_facts() || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
     for (const scene::Place& place : places_)
-      volumes.push_back({0, built_.source, shown_medium_, {place.to_world, while_open(place.ends)}, frame});
+      volumes.push_back({0, source, shown_medium_, {place.to_world, while_open(place.ends)}, frame});
     for (std::size_t i = 0; i < std::min(volumes.size(), previous_places_.size()); ++i)
       volumes[i].previous = previous_places_[i];
   }

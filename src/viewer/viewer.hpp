@@ -235,6 +235,11 @@ class Viewer {
   // Those of instances, and their live volumes.
   void wish_for_sequences();
   void follow_played();
+  // The stand-in of a load under way, which goes with it.
+  void follow_stand_in();
+  void drop_stand_in();
+  // Of what is shown of the volume: of its stand-in, as long as there is one.
+  [[nodiscard]] const VolumeFactsPtr& seen_facts() const { return stand_in_ ? stand_in_->facts : facts_; }
   // Those of a sequence, and of a live volume: neither is shown any more.
   void leave_sequence();
   // Takes states that are ready; unseen: though those before were not seen yet.
@@ -258,6 +263,8 @@ class Viewer {
   [[nodiscard]] double density_scale_to_come() const;
   // Whether grids are fitted to what is hidden, and more of it is now, or less.
   [[nodiscard]] bool other_opacity() const;
+  // As it is seen: until the volume is there with the density scale that is suggested for its stand-in.
+  [[nodiscard]] Medium seen_medium() const;
   // What pictures to come know of it.
   void show_medium();
   [[nodiscard]] scene::Emission field_emission() const;
@@ -502,6 +509,7 @@ class Viewer {
   VolumeFactsPtr facts_;                            // of it, or of the sequence
   VolumeAssetPtr empty_volume_;                     // where there are surfaces alone
   std::optional<std::string> remarked_anisotropy_;  // the grid, as long as it is not shown
+  std::optional<StandIn> stand_in_;                 // in its place, and of what was shown before, while it is loaded
   Built built_;                                     // newest, and what is uploaded again in a new context
   scene::Snapshot scene_;                           // as it is now: of it snapshots are made
   scene::SnapshotPtr snapshot_;                     // the newest

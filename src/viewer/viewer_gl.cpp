@@ -93,7 +93,7 @@ void Viewer::prepare(const Frame& frame) {
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
   const bool others = std::ranges::any_of(shown_, &Shown::is_there);
   const bool watches = watched_ || !watching_.empty();  // what its states are of may not be known yet
-  const bool scene = facts_ || shows_models() || others || watches;
+  const bool scene = seen_facts() || shows_models() || others || watches;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
   if (!facts_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
@@ -114,7 +114,7 @@ void Viewer::prepare(const Frame& frame) {
 
   last_view_ = std::exchange(traced_view_, view_);
   const bool places_rest = !std::exchange(places_changed_, false);
-  if ((facts_ || others || watches) && built_for_another()) {
+  if ((seen_facts() || others || watches) && built_for_another()) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     // What GL builds follows a camera in motion, one grid after another, each of which is seen.
     const bool follows =
@@ -352,7 +352,7 @@ std::uint64_t Viewer::tag_of(std::uint64_t id) const {
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
   const auto of_tagged = [&](MatteObject object) {
     // What surfaces alone are in is nothing.
-    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !facts_) return 0U;
+    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !seen_facts()) return 0U;
     object.tag = tag_of(object.id);
     return id_of(object);
   };

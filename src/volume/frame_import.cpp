@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "volume/bricks.hpp"
+#include "volume/coarse_reader.hpp"
 #include "volume/frame.hpp"
 #include "volume/resample.hpp"
+#include "volume/stand_in.hpp"
 
 namespace cumulet::volume {
 
@@ -524,6 +526,43 @@ VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& nam
                          Progress* progress) {
   return naming(file.string(),
                 [&] { return FrameImport(file.string(), log, progress).run(*open(file, progress), names); });
+}
+
+namespace {
+
+// None where anything fails: that is told of the whole, if it fails there, too.
+std::optional<StandIn> stand_in_of(CoarseReader& coarse, const std::string& file, GridNames names,
+                                   const Progress* progress) {
+  try {
+    names.colour = names.anisotropy = names.velocity = no_grid;
+    const Log silent;
+    StandIn made{.frame = FrameImport(file, silent, nullptr).run(coarse, names), .extent = {}};
+    made.extent = coarse.extent(made.frame);
+    return made;
+  } catch (...) {
+    check(progress);
+    return std::nullopt;
+  }
+}
+
+// Less than a brick takes of any file: its mask, twice.
+constexpr std::uint64_t least_bytes_a_brick = 128;
+
+}  // namespace
+
+VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log, Progress* progress,
+                         const StandInWish& stand_in) {
+  return naming(file.string(), [&] {
+    const std::unique_ptr<Reader> reader = open(file, progress);
+    FrameImport import(file.string(), log, progress);
+    std::error_code unknown;
+    const bool is_large = std::filesystem::file_size(file, unknown) / least_bytes_a_brick >= stand_in.least_bricks;
+    if (!is_large || unknown || !reader->streams()) return import.run(*reader, names);
+    CoarseReader coarse(*reader, stand_in.least_bricks, progress);
+    if (auto made = stand_in_of(coarse, file.string(), names, progress)) stand_in.take(std::move(*made));
+    CoarseReader::Rest rest(coarse);
+    return import.run(rest, names);
+  });
 }
 
 VolumeFrame import_fields(std::span<const MemoryField> fields, const std::string& name, const Log& log,

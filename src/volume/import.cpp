@@ -241,12 +241,14 @@ Box box_of_active(const ActiveMask& mask, glm::ivec3 origin) {
 
 }  // namespace
 
-bool detail::HeldLeaves::sweep(const Visit& visit, Progress* progress, Portion portion) const {
+bool detail::HeldLeaves::sweep_chosen(const Choice& chosen, const Visit& visit, Progress* progress,
+                                      Portion portion) const {
   ProgressPart part(progress, portion.from, portion.to, count());
   std::atomic<bool> wanted = true;
   const auto visit_some = [&](const tbb::blocked_range<std::size_t>& range) {
     std::array<float, brick_voxels> room;
     for (std::size_t i = range.begin(); i != range.end() && wanted; ++i) {
+      if (chosen && !chosen(i)) continue;
       values(i, room.data());
       if (!visit(i, room)) wanted = false;
     }
@@ -655,12 +657,12 @@ class OneSign final : public LeafSource {
   [[nodiscard]] std::size_t count() const override { return leaves_->count(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return leaves_->origin(leaf); }
   [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return leaves_->active(leaf); }
-  bool sweep(const Visit& visit, Progress* progress, Portion portion) const override {
+  bool sweep_chosen(const Choice& chosen, const Visit& visit, Progress* progress, Portion portion) const override {
     const auto signed_visit = [&](std::size_t leaf, std::span<float, brick_voxels> values) {
       std::ranges::transform(values, values.begin(), std::ref(*this));
       return visit(leaf, values);
     };
-    return leaves_->sweep(signed_visit, progress, portion);
+    return leaves_->sweep_chosen(chosen, signed_visit, progress, portion);
   }
 
  private:

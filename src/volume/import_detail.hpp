@@ -75,6 +75,8 @@ class LeafSource {
  public:
   /// Of a leaf, all 512 values, active or not, z fastest; it may change them. False: no more are wanted.
   using Visit = std::function<bool(std::size_t leaf, std::span<float, brick_voxels> values)>;
+  /// Which of them are looked at; empty: all.
+  using Choice = std::function<bool(std::size_t leaf)>;
 
   LeafSource() = default;
   LeafSource(const LeafSource&) = delete;
@@ -87,7 +89,11 @@ class LeafSource {
   [[nodiscard]] virtual ActiveMask active(std::size_t leaf) const = 0;
   /// Visits every leaf once, in any order and on many threads at a time; one sweep at a time. Returns whether all were
   /// wanted.
-  virtual bool sweep(const Visit& visit, Progress* progress, Portion portion) const = 0;
+  bool sweep(const Visit& visit, Progress* progress, Portion portion) const {
+    return sweep_chosen({}, visit, progress, portion);
+  }
+  /// The same of those that are chosen, as any thread may ask; the others are passed over.
+  virtual bool sweep_chosen(const Choice& chosen, const Visit& visit, Progress* progress, Portion portion) const = 0;
 };
 
 /// Those whose values are all in memory, if only their library's own.
@@ -95,7 +101,7 @@ class HeldLeaves : public LeafSource {
  public:
   /// Safe to call from many threads.
   virtual void values(std::size_t leaf, float* out) const = 0;
-  bool sweep(const Visit& visit, Progress* progress, Portion portion) const override;
+  bool sweep_chosen(const Choice& chosen, const Visit& visit, Progress* progress, Portion portion) const override;
 };
 
 /// One grid as a file or a host has it.
@@ -124,6 +130,8 @@ class Reader {
   [[nodiscard]] virtual double opened() const { return 0.0; }
   /// What read() takes of a grid's import.
   [[nodiscard]] virtual double reading() const = 0;
+  /// Whether the values of what read() gives stay in the file until they are swept, which can pass over some of them.
+  [[nodiscard]] virtual bool streams() const { return false; }
   /// Reads the tree of the grid at this place of grids(), whose values are not none; they may be read from the file as
   /// they are swept, which the reader has to outlive. log_prefix begins every warning.
   virtual SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) = 0;

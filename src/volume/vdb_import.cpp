@@ -111,6 +111,9 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
 
   [[nodiscard]] double opened() const override { return inputHasGridOffsets() ? 0.0 : 0.35; }
   [[nodiscard]] double reading() const override { return 0.1; }
+  [[nodiscard]] bool streams() const override {
+    return fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
+  }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& /*log*/, const std::string& /*log_prefix*/) override {
     const openvdb::GridBase::Ptr grid = read_topology(index, portion);

@@ -159,11 +159,11 @@ class OwningTree final : public TreeT {
       }
     });
   }
-  /// Calls take(place in leaves, leaf with its values) for each of these, all that there are, on many threads at a time
-  /// until one returns false. Returns whether none did.
+  /// Calls take(place in leaves, leaf with its values) for each that is chosen of these, all that there are, on many
+  /// threads at a time until one returns false. Returns whether none did.
   template <class Take>
-  bool sweep(const VdbStream& stream, const std::vector<const LeafT*>& leaves, Portion portion,
-             const Take& take) const {
+  bool sweep(const VdbStream& stream, const std::vector<const LeafT*>& leaves, const LeafSource::Choice& chosen,
+             Portion portion, const Take& take) const {
     if (!buffers_) return true;
     stream.file.seekg(buffers_->position);
     stream.file.begin(portion.from, portion.to,
@@ -172,13 +172,13 @@ class OwningTree final : public TreeT {
     if (!is_indexed()) {
       with_settings(stream, [&] {
         for (std::size_t i = 0; i < leaves.size() && wanted; ++i)
-          read(stream.file, *leaves[i], [&](const LeafT& leaf) { wanted = take(i, leaf); });
+          read(stream.file, *leaves[i], [&](const LeafT& leaf) { wanted = (chosen && !chosen(i)) || take(i, leaf); });
       });
       return wanted;
     }
     // One thread reads what is packed, run by run; all unpack.
     struct Run {
-      std::size_t first, last;
+      std::vector<std::size_t> leaves;
       std::vector<char> bytes;
     };
     using RunPtr = std::shared_ptr<Run>;
@@ -186,13 +186,21 @@ class OwningTree final : public TreeT {
     constexpr std::size_t most_leaves = 256;
     std::size_t leaves_a_run = 4;
     std::size_t next = 0;
+    std::vector<char> head;
     const auto take_run = [&](tbb::flow_control& flow) -> RunPtr {
       if (next == leaves.size() || !wanted) {
         flow.stop();
         return nullptr;
       }
-      const auto run = std::make_shared<Run>(Run{next, std::min(next + leaves_a_run, leaves.size()), {}});
-      for (; next != run->last; ++next) copy(stream.file, *leaves[next], run->bytes);
+      const auto run = std::make_shared<Run>();
+      for (; next != leaves.size() && run->leaves.size() != leaves_a_run; ++next) {
+        if (chosen && !chosen(next)) {
+          pass_over(stream.file, *leaves[next], head);
+        } else {
+          copy(stream.file, *leaves[next], run->bytes);
+          run->leaves.push_back(next);
+        }
+      }
       leaves_a_run = std::min(2 * leaves_a_run, most_leaves);
       return run;
     };
@@ -201,7 +209,8 @@ class OwningTree final : public TreeT {
       auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
       settings->transferTo(in);
       openvdb::io::setStreamMetadataPtr(in, settings, /*transfer=*/false);
-      for (std::size_t i = run->first; i != run->last && wanted; ++i) {
+      for (const std::size_t i : run->leaves) {
+        if (!wanted) break;
         read(in, *leaves[i], [&](const LeafT& leaf) {
           if (!take(i, leaf)) wanted = false;
         });
@@ -247,6 +256,17 @@ class OwningTree final : public TreeT {
 
   /// Appends what LeafNode::readBuffers reads of a leaf, packed as it is.
   void copy(std::istream& in, const LeafT& leaf, std::vector<char>& to) const {
+    if (const auto bytes = copy_head(in, leaf, to)) copy_compressed(in, to, *bytes, buffers_->settings.compression());
+  }
+  /// Takes the stream past that. head: room for what comes before its values.
+  void pass_over(std::istream& in, const LeafT& leaf, std::vector<char>& head) const {
+    head.clear();
+    if (const auto bytes = copy_head(in, leaf, head))
+      read_compressed(in, nullptr, *bytes, buffers_->settings.compression());
+  }
+  /// Appends what comes before its values. Returns how many bytes these are once they are unpacked; none: the file has
+  /// nothing of them.
+  std::optional<std::size_t> copy_head(std::istream& in, const LeafT& leaf, std::vector<char>& to) const {
     using namespace openvdb::io;
     using Half = RealToHalf<ValueT>;
     copy_bytes(in, to, leaf.getValueMask().memUsage());
@@ -261,8 +281,8 @@ class OwningTree final : public TreeT {
     const bool active_alone = (compression & COMPRESS_ACTIVE_MASK) != 0 && inactive != NO_MASK_AND_ALL_VALS;
     const std::size_t count = active_alone ? leaf.onVoxelCount() : LeafT::SIZE;
     const bool halves = buffers_->from_half && Half::isReal;
-    if (halves && count == 0) return;
-    copy_compressed(in, to, count * (halves ? sizeof(typename Half::HalfT) : sizeof(ValueT)), compression);
+    if (halves && count == 0) return std::nullopt;
+    return count * (halves ? sizeof(typename Half::HalfT) : sizeof(ValueT));
   }
 
   std::optional<Buffers> buffers_;
@@ -309,8 +329,8 @@ class StreamedLeaves final : public LeafSource {
   [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return to_glm(leaves_[leaf]->origin()); }
   [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return active_of(*leaves_[leaf]); }
-  bool sweep(const Visit& visit, Progress* /*progress*/, Portion portion) const override {
-    return tree_->sweep(stream_, leaves_, portion, [&](std::size_t i, const LeafT& leaf) {
+  bool sweep_chosen(const Choice& chosen, const Visit& visit, Progress* /*progress*/, Portion portion) const override {
+    return tree_->sweep(stream_, leaves_, chosen, portion, [&](std::size_t i, const LeafT& leaf) {
       std::array<float, brick_voxels> values;
       std::transform(leaf.buffer().data(), leaf.buffer().data() + brick_voxels, values.begin(), pick_);
       return visit(i, values);

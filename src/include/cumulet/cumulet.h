@@ -832,6 +832,16 @@ CUMULET_API cumulet_status cumulet_environment_get_pixels(const cumulet_environm
  * Begins to read a file as cumulet_volume_open does, on the viewer's worker, and then to build its grid; replaces a
  * load or build under way, though never two in a row, so that of a stream of files at least every second is shown.
  * Returns at once; the volume shown before stays until the new one is ready, for good if that fails.
+ *
+ * Of a .vdb file of some 25 million voxels and more (50,000 bricks of 8^3), while previews are on
+ * (cumulet_sampling_desc) and no sequence or live volume is shown, a stand-in is shown first, in place of what was
+ * there: density, temperature and flame in voxels of 4^3, of a sixteenth of the bricks, after about a twentieth of the
+ * time. Its bounds are the whole's, so that cameras that are fitted to it stay, and so is where there is anything; it
+ * has no colour of its own, anisotropy or velocity. Until the whole is there CUMULET_RENDER_LOADING is set and
+ * CUMULET_RENDER_CONVERGED is not; cumulet_get_progress tells of the file, cumulet_get_volume and cumulet_get_stats of
+ * what there was before, cumulet_get_bounds, pictures and what is read back of them of the stand-in. A density scale
+ * that is suggested is the stand-in's own until then. It goes where the load fails or is cancelled, and what was shown
+ * before is shown again. Where previews are off when the load begins there is none; turned off, it goes.
  */
 CUMULET_API cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name);
 /* The same of cumulet_volume_open_file. */
