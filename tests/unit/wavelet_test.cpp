@@ -320,15 +320,17 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
   EXPECT_LT(error_of(clean, samples.truth()), 0.3 * error_of(samples.raw(), samples.truth()));
 }
 
-// A shadow on a plane, in which a sample tells little: its edge is where the sun's light is known to end.
+// A shadow on a plane with stripes, in which a sample tells little: its edge is where the sun's light is known to end,
+// and what is left of the light is as far from even as the colours are.
 TEST_P(Wavelets, AShadowThatIsKnownHasItsEdge) {
   const auto scene = [](bool known) {
-    return [known](int x, int) {
-      const glm::vec3 sun(x < 16 ? 0.8F : 0.0F);
-      return Pixel{.front = glm::vec3(0.1F) + sun,
+    return [known](int x, int y) {
+      const glm::vec3 albedo(x / 2 % 2 == 0 ? 0.2F : 0.8F);
+      const glm::vec3 sun = y < 16 ? albedo : glm::vec3(0.0F);
+      return Pixel{.front = 0.2F * albedo + sun,
                    .spread = 0.95F,
                    .normal = {0.0F, 0.0F, 1.0F},
-                   .albedo = glm::vec3(0.5F),
+                   .albedo = albedo,
                    .z = 4.0F,
                    .sunlit = known ? sun : glm::vec3(0.0F)};
     };
