@@ -633,7 +633,7 @@ TEST_F(OpenVdbVolume, FilesOpenAndFail) {
   EXPECT_HAS(refused(CUMULET_ERROR_INVALID_ARGUMENT, opening(nullptr, nullptr)), "path is NULL");
   EXPECT_EQ(cumulet_volume_open(file.c_str(), "density[1]", nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
   // A control cube does not hold it; the message names the file all the same.
-  other->tree().setValue(Coord(50000, 0, 0), 1.0F);
+  other->tree().setValue(Coord(500000, 0, 0), 1.0F);
   const std::string wide = write({other});
   const std::string line = refused(CUMULET_ERROR_UNSUPPORTED, opening(wide.c_str(), nullptr));
   EXPECT_EQ(line.rfind(wide + ": ", 0), 0U) << line;

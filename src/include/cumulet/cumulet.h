@@ -1931,9 +1931,9 @@ typedef enum cumulet_warm_up_scope {
   CUMULET_WARM_UP_SCENE = 0, /* the programs that frames of the present scene with the present settings need */
   CUMULET_WARM_UP_ALL = 1    /* these, and all others of the library are compiled (not used: a driver that compiles more
                                 in the first use does so then), but for rare ones: for grids beyond the driver's limit
-                                of a texture buffer, sets of maps that the scene's materials do not have, groups of
-                                lights, holdouts and motion blur. One that does not build is told once all others are
-                                there */
+                                of a texture buffer, or of volumes of more than 32,768 voxels a side, sets of maps that
+                                the scene's materials do not have, groups of lights, holdouts and motion blur. One that
+                                does not build is told once all others are there */
 } cumulet_warm_up_scope;
 
 typedef struct cumulet_warm_up_result {
