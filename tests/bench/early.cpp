@@ -3,8 +3,8 @@
 //     cumulet-bench-early [--without] FILE.vdb [OUT_FOLDER]
 //
 // Seconds by the clock, and of the process' processors, from cumulet_load_volume_file to the end of the frame that has
-// something of it; the host rests in between. With a folder it traces what it sees meanwhile, and early.png and
-// whole.png are of as many samples. --without: previews are off, so that there is no stand-in.
+// something of it; the host rests in between. With a folder it traces what it sees meanwhile, and early.png,
+// as far as it came, and whole.png are what it saw. --without: previews are off, so that there is no stand-in.
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -25,8 +25,8 @@ using cumulet::bench::must;
 using cumulet::headless::Context;
 using cumulet::test::make_desc;
 
-constexpr std::uint32_t size = 512;
-constexpr std::uint32_t samples = 16;
+constexpr std::uint32_t size = 256;
+constexpr std::uint32_t samples = 8;
 
 /// Since the last was made.
 class Watch {
@@ -66,8 +66,12 @@ class Bench {
     if (early) {
       watch.print("stand-in");
       if (!folder.empty()) {
-        while (is_loading() && frame_progress_ < 1.0) frame();
-        if (is_loading()) write(folder + "/early.png");
+        // As far as it comes.
+        write(folder + "/early.png");
+        while (is_loading() && frame_progress_ < 1.0) {
+          frame();
+          if (is_loading()) write(folder + "/early.png");
+        }
       }
     }
     must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
@@ -88,6 +92,8 @@ class Bench {
     auto result = make_desc<cumulet_frame_result>();
     must(viewer_.get(), cumulet_render(viewer_.get(), &desc, &result));
     frame_progress_ = result.progress;
+    width_ = result.width;
+    height_ = result.height;
     return result;
   }
   [[nodiscard]] bool is_loading() const {
@@ -96,14 +102,16 @@ class Bench {
     return progress.stage != CUMULET_STAGE_IDLE && progress.stage != CUMULET_STAGE_UPLOADING;
   }
   void write(const std::string& file) {
-    std::vector<std::uint8_t> rgba(std::size_t{4} * size * size);
+    std::vector<std::uint8_t> rgba(std::size_t{4} * width_ * height_);
     must(viewer_.get(), cumulet_read_display(viewer_.get(), rgba.data(), rgba.size()));
-    cumulet::image::write_png(file, size, size, rgba);
+    cumulet::image::write_png(file, width_, height_, rgba);
   }
 
   Context context_ = Context::create(cumulet::headless::Backend::automatic);
   cumulet::test::ViewerPtr viewer_ = cumulet::bench::make_viewer(context_);
   double frame_progress_ = 0.0;
+  std::uint32_t width_ = 0;  // of the picture: less than the frame's in a preview
+  std::uint32_t height_ = 0;
 };
 
 }  // namespace
