@@ -198,11 +198,12 @@ bool Viewer::something_waits() const {
 
 namespace {
 
-// Whether it was built for more memory than there is by now.
+// Whether it was built for more memory than there is by now, which still does for one.
 bool can_be_coarser(const Built& built, const Allowance& allowance) {
   constexpr std::uint64_t fewest = 24;
-  return built.source && built.source->march == scene::March::tet &&
-         std::max(cells_allowed(built, allowance), fewest) < cells_granted(built);
+  if (!built.source || built.source->march != scene::March::tet) return false;
+  const std::uint64_t allowed = cells_allowed(built, allowance);
+  return allowed >= fewest && allowed < cells_granted(built);
 }
 
 }  // namespace
