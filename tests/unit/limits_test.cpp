@@ -255,36 +255,6 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
   for (const std::string& line : lines) EXPECT_EQ(line.find("on the CPU"), std::string::npos) << line;
 }
 
-// A smaller cap cuts the cells that are there, without being asked and without an error; a larger one refines them
-// again.
-TEST_F(Limits, CellsFollowTheCap) {
-  const VolumeRef ball = make_ball(56);
-  for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
-    SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
-    const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
-    split_to_the_voxel(viewer, build);
-    picture_of(viewer.get(), ball.get(), target_);
-    const cumulet_stats all = stats_of(viewer);
-    ASSERT_EQ(all.limited, 0);
-    auto whole = target_.frame();
-    whole.target = CUMULET_TARGET_NONE;
-    const auto settle = [&] {
-      for (int i = 0; i < 3; ++i) converge(viewer.get(), whole);
-      return stats_of(viewer);
-    };
-    const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
-    limit(viewer, 0, room);
-    const cumulet_stats cut = settle();
-    EXPECT_LE(cut.gl_bytes, room);
-    EXPECT_LT(cut.cells, all.cells);
-    EXPECT_GT(cut.cells, all.cells / 10);
-    EXPECT_EQ(cut.limited, 1);
-    EXPECT_EQ(settle().cells, cut.cells) << "once";
-    limit(viewer, 0, 0);
-    EXPECT_EQ(settle().cells, all.cells);
-  }
-}
-
 TEST_F(Limits, GlMemoryIsKept) {
   const VolumeRef small = make_ball(12);
   const VolumeRef large = make_ball(96);
