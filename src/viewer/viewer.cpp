@@ -13,7 +13,6 @@
 #include "base/one_line.hpp"
 #include "scene/model_table.hpp"
 #include "scene/space.hpp"
-#include "viewer/cell_budget.hpp"
 
 namespace cumulet::viewer {
 
@@ -939,15 +938,9 @@ void Viewer::share_gl() {
 }
 
 void Viewer::set_limits(const Limits& limits) {
-  const auto allowed = [&] {
-    const bool cut = volume_ && built_.source && built_.source->march == scene::March::tet && built_.limited;
-    return cut ? cells_allowed(built_, *allowance_) : 0;
-  };
-  const std::uint64_t before = allowed();
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
   share_gl();
-  if (allowed() > before && !followed_ && !watched_) request_build();
   if (followed_) followed_->wish_due = true;
   for (const PlayedPtr& played : played_) played->followed.wish_due = true;
   touch();

@@ -11,7 +11,6 @@
 #include "denoise/tza.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
-#include "viewer/cell_budget.hpp"
 #include "viewer/viewer.hpp"
 
 namespace cumulet::viewer {
@@ -196,23 +195,11 @@ bool Viewer::something_waits() const {
          std::ranges::any_of(watching_, waits);
 }
 
-namespace {
-
-// Whether it was built for more memory than there is by now.
-bool can_be_coarser(const Built& built, const Allowance& allowance) {
-  constexpr std::uint64_t fewest = 24;
-  return built.source && built.source->march == scene::March::tet &&
-         std::max(cells_allowed(built, allowance), fewest) < cells_granted(built);
-}
-
-}  // namespace
-
 FrameResult Viewer::render(const Frame& frame) {
   const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   std::optional<Error> failure;
-  bool too_large = false;
   // Before anything new is seen, so that what comes later is told again.
   update_pending_ = false;
   with_gl([&](Context& g) {
@@ -241,7 +228,6 @@ FrameResult Viewer::render(const Frame& frame) {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
     });
-    const bool refused = failure && failure->code() == ErrorCode::out_of_memory;
     note_rendered();
     follow_upload(g);
     const Shot shot = this->shot();
@@ -251,9 +237,6 @@ FrameResult Viewer::render(const Frame& frame) {
     g.tell(shot, frame, result);
     gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
     share_gl();
-    too_large = can_be_coarser(built_, *allowance_) && volume_ && !followed_ && !watched_ && !builder_.busy() &&
-                (refused || (g.bytes() > most_gl_bytes_ && !g.scene().uploading_volumes()));
-    if (too_large && refused) failure.reset();
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
     if (busy()) {
       result.loading = true;
@@ -273,11 +256,6 @@ FrameResult Viewer::render(const Frame& frame) {
     result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
-  if (too_large) {
-    request_build();
-    result.more = true;
-    result.converged = false;
-  }
   if (failure) throw Error(*failure);
   return result;
 }
