@@ -195,18 +195,6 @@ TEST(Cancel, Statistics) {
   });
 }
 
-TEST(Cancel, StatisticsOfHugeTiles) {
-  // Few nodes, but millions of columns of bricks.
-  volume::ScalarVolume volume;
-  volume.bounds_min = glm::ivec3(0);
-  volume.bounds_max = glm::ivec3(4095);
-  volume.background = 0.5F;
-  volume.max_value = 1.0F;
-  volume.tiles.push_back({glm::ivec3(0), glm::ivec3(2047), 1.0F});
-  expect_cancels(
-      [&](Progress& progress) { const grid::Statistics statistics(volume, grid::fit_cube(volume), &progress); });
-}
-
 TEST(Cancel, DiamondsAndBisection) {
   for (const double threshold : {0.001, 0.05}) {  // ended by max_cells and not
     grid::RefineSettings settings = built().settings;
