@@ -129,6 +129,8 @@ const std::array fields{
     CM_FIELD(dispatch, view),
     CM_FIELD(dispatch, picks),
     CM_FIELD(dispatch, rows),
+    CM_FIELD(dispatch, lanes),
+    CM_FIELD(dispatch, places),
     CM_FIELD(shutter, open.eye),
     CM_FIELD(shutter, open.orthographic),
     CM_FIELD(shutter, open.forward),
