@@ -64,7 +64,7 @@ VoxelFormat format_of(GLint internal) {
 /// By whole numbers: a host may have set its threads to flush small floats to 0.
 float float_of(std::uint16_t half) {
   constexpr std::uint32_t rebias = 112U << 23U;
-  constexpr float least = std::bit_cast<float>(113U << 23U);  // the least half that is normal
+  constexpr auto least = std::bit_cast<float>(113U << 23U);  // the least half that is normal
   const std::uint32_t bits = std::uint32_t{half} << 13U & 0x0fffe000U;
   const float small = std::bit_cast<float>(bits + rebias + (1U << 23U)) - least;
   const std::uint32_t normal = bits + rebias + (bits >= 0x7c00U << 13U ? rebias : 0U);
@@ -224,7 +224,7 @@ VoxelTransfers::Source VoxelTransfers::open(const GlVoxels& field, const std::st
 
 glm::u64vec2 VoxelTransfers::range_of(const Source& source, glm::ivec2 layers) const {
   const glm::u64vec3 last(source.size.x - 1, source.size.y - 1, std::min(brick_size * layers.y, source.size.z) - 1);
-  const auto first = static_cast<std::uint64_t>(brick_size * layers.x);
+  const std::uint64_t first = std::uint64_t{brick_size} * static_cast<std::uint64_t>(layers.x);
   const std::uint64_t begin = source.offset + first * source.strides.z;
   const std::uint64_t end = source.offset + last.x * source.strides.x + last.y * source.strides.y +
                             last.z * source.strides.z + bytes_of(source.format);

@@ -56,6 +56,7 @@ void Live::set(const std::vector<MemoryField>& fields, std::string name, const M
 
 void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
   std::vector<Handed> handed;
+  handed.reserve(fields.size());
   for (const volume::FieldCopy& field : fields) handed.push_back({field.channel, Takes::zeros});
   hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr);
 }

@@ -128,7 +128,8 @@ class CoarseLeaves final : public HeldLeaves {
         const glm::ivec3 corner(i >> 2, (i >> 1) & 1, i & 1);
         const glm::vec3 weight = glm::mix(1.0F - part, part, glm::vec3(corner));
         const glm::ivec3 brick = low + corner;
-        const std::optional<float> mean = means_[static_cast<std::size_t>((brick.x * 3 + brick.y) * 3 + brick.z)];
+        const int place = (brick.x * 3 + brick.y) * 3 + brick.z;
+        const std::optional<float> mean = means_[static_cast<std::size_t>(place)];
         if (!mean) continue;
         sum += weight.x * weight.y * weight.z * *mean;
         weights += weight.x * weight.y * weight.z;
