@@ -209,7 +209,6 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
   const auto load = std::make_shared<Load>(Load{std::move(settings), std::move(stand_in)});
   const std::scoped_lock lock(mutex_);
   load_ = load;
-  stand_in_.reset();
   worker_.replace({file.path, Progress::Stage::loading,
                    [this, file, load](Progress& progress) {
                      Stopwatch watch;
@@ -236,7 +235,7 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
                      build_of(loaded.volume, *load->settings, seconds, progress);
                    },
                    true});
-  cancel_stand_in();
+  drop_stand_in();
 }
 
 void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const Load& load, const Progress& loading) {
@@ -277,8 +276,9 @@ void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const
   notify_();
 }
 
-void Builder::cancel_stand_in() {
+void Builder::drop_stand_in() {
   if (const auto progress = stand_in_load_.lock()) progress->cancel();
+  stand_in_.reset();
 }
 
 void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before) {
@@ -291,35 +291,31 @@ void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene:
 }
 
 void Builder::cancel() {
-  {
-    const std::scoped_lock lock(mutex_);
-    load_.reset();  // what it stops soon takes no other settings
-    stand_in_.reset();
-  }
-  worker_.cancel();
-  const std::scoped_lock lock(mutex_);
-  cancel_stand_in();
+  stop([this] { worker_.cancel(); });
 }
 
 void Builder::cancel_loads() {
+  stop([this] { worker_.cancel_loads(); });
+}
+
+void Builder::stop(const std::function<void()>& jobs) {
   {
     const std::scoped_lock lock(mutex_);
-    load_.reset();
-    stand_in_.reset();
+    load_.reset();  // what it stops soon takes no other settings
   }
-  worker_.cancel_loads();
+  jobs();
+  // Last: what is cancelled makes no other.
   const std::scoped_lock lock(mutex_);
-  cancel_stand_in();
+  drop_stand_in();
 }
 
 void Builder::forget() {
   const std::scoped_lock lock(mutex_);
   load_.reset();
   worker_.drop();
-  cancel_stand_in();
+  drop_stand_in();
   loaded_.reset();
   built_.reset();
-  stand_in_.reset();
 }
 
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {

@@ -155,8 +155,11 @@ class Builder {
     bool open = true;
   };
   void build_stand_in(const VolumeFile& file, volume::StandIn made, const Load& load, const Progress& loading);
-  // It has a progress of its own: the load's tells how much of the whole is read. mutex_ is held.
-  void cancel_stand_in();
+  // jobs: cancels those that are to be.
+  void stop(const std::function<void()>& jobs);
+  // Also that which is being built, whose progress is its own: the load's tells how much of the whole is read. mutex_
+  // is held.
+  void drop_stand_in();
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress,
                 const scene::GridPlanPtr& before = nullptr);
 
