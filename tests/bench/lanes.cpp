@@ -10,9 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <queue>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -207,21 +205,4 @@ void measure(core::Recording& recording, const std::filesystem::path& file, cons
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    bench::RecordingOptions options;
-    for (int i = 1; i < argc; ++i) {
-      if (!bench::take_option(options, argc, argv, i))
-        throw std::invalid_argument(std::string(argv[i]) + " is no option here");
-    }
-    headless::Context context = headless::Context::create(headless::Backend::automatic);
-    for (const std::filesystem::path& file : options.files) {
-      bench::with_recording(context, file, options,
-                            [&](core::Recording& recording) { measure(recording, file, options); });
-    }
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "cumulet-bench-lanes: %s\n", error.what());
-    return 1;
-  }
-  return 0;
-}
+int main(int argc, char** argv) { return bench::record_files(argc, argv, "cumulet-bench-lanes", measure); }

@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
-#include <exception>
 #include <filesystem>
 #include <headless.hpp>
 #include <numeric>
@@ -387,21 +386,4 @@ void measure(core::Recording& recording, const std::filesystem::path& file, cons
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  try {
-    Options options;
-    for (int i = 1; i < argc; ++i) {
-      if (!bench::take_option(options, argc, argv, i))
-        throw std::invalid_argument(std::string(argv[i]) + " is no option here");
-    }
-    headless::Context context = headless::Context::create(headless::Backend::automatic);
-    for (const std::filesystem::path& file : options.files) {
-      bench::with_recording(context, file, options,
-                            [&](core::Recording& recording) { measure(recording, file, options); });
-    }
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "cumulet-bench-locality: %s\n", error.what());
-    return 1;
-  }
-  return 0;
-}
+int main(int argc, char** argv) { return bench::record_files(argc, argv, "cumulet-bench-locality", measure); }

@@ -2,6 +2,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <cstdio>
+#include <exception>
 #include <stdexcept>
 #include <string>
 
@@ -11,29 +13,34 @@
 
 namespace cumulet::bench {
 
-bool take_option(RecordingOptions& options, int argc, char** argv, int& i) {
-  const std::string flag = argv[i];
-  const auto value = [&] {
-    if (i + 1 >= argc) throw std::invalid_argument(flag + " needs a value");
-    return std::string(argv[++i]);
-  };
-  if (flag == "--threshold")
-    options.threshold = std::stod(value());
-  else if (flag == "--optical-depth")
-    options.optical_depth = std::stod(value());
-  else if (flag == "--size")
-    options.size = static_cast<std::uint32_t>(std::stoul(value()));
-  else if (flag == "--samples")
-    options.samples = static_cast<std::uint32_t>(std::stoul(value()));
-  else if (!flag.starts_with("--"))
-    options.files.emplace_back(flag);
-  else
-    return false;
-  return true;
+namespace {
+
+RecordingOptions recording_options(int argc, char** argv) {
+  RecordingOptions options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string flag = argv[i];
+    const auto value = [&] {
+      if (i + 1 >= argc) throw std::invalid_argument(flag + " needs a value");
+      return std::string(argv[++i]);
+    };
+    if (flag == "--threshold")
+      options.threshold = std::stod(value());
+    else if (flag == "--optical-depth")
+      options.optical_depth = std::stod(value());
+    else if (flag == "--size")
+      options.size = static_cast<std::uint32_t>(std::stoul(value()));
+    else if (flag == "--samples")
+      options.samples = static_cast<std::uint32_t>(std::stoul(value()));
+    else if (!flag.starts_with("--"))
+      options.files.emplace_back(flag);
+    else
+      throw std::invalid_argument(flag + " is no option here");
+  }
+  return options;
 }
 
-void with_recording(headless::Context& context, const std::filesystem::path& file, const RecordingOptions& options,
-                    const std::function<void(core::Recording&)>& use) {
+void record(headless::Context& context, const std::filesystem::path& file, const RecordingOptions& options,
+            const UseRecording& use) {
   Input input;
   input.file = file;
   input.grid = "density";
@@ -69,7 +76,21 @@ void with_recording(headless::Context& context, const std::filesystem::path& fil
   recording.cm = still.viewer().trace_parameters();
   recording.cm.dispatch.samples = options.samples;
   recording.grid = &grid;
-  use(recording);
+  use(recording, file, options);
+}
+
+}  // namespace
+
+int record_files(int argc, char** argv, const char* program, const UseRecording& use) {
+  try {
+    const RecordingOptions options = recording_options(argc, argv);
+    headless::Context context = headless::Context::create(headless::Backend::automatic);
+    for (const std::filesystem::path& file : options.files) record(context, file, options, use);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", program, error.what());
+    return 1;
+  }
+  return 0;
 }
 
 }  // namespace cumulet::bench

@@ -58,11 +58,11 @@ struct RecordingOptions {
   std::vector<std::filesystem::path> files;
 };
 
-/// Takes argv[i] and its value where it is one of these.
-bool take_option(RecordingOptions& options, int argc, char** argv, int& i);
+/// What records paths of a file's grid.
+using UseRecording =
+    std::function<void(core::Recording&, const std::filesystem::path& file, const RecordingOptions& options)>;
 
-/// Calls use with what records paths of a file's grid. Throws std::runtime_error.
-void with_recording(headless::Context& context, const std::filesystem::path& file, const RecordingOptions& options,
-                    const std::function<void(core::Recording&)>& use);
+/// The whole of a program that does this for each file of its arguments: its exit status.
+int record_files(int argc, char** argv, const char* program, const UseRecording& use);
 
 }  // namespace cumulet::bench

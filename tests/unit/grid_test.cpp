@@ -28,6 +28,14 @@ struct Built {
   grid::TetGrid grid;
 };
 
+// Of cells that are as fine as what differs, and constant.
+grid::RefineSettings voxel_by_voxel() {
+  grid::RefineSettings settings;
+  settings.threshold = -1.0;
+  settings.cells = grid::CellKind::constant;
+  return settings;
+}
+
 Built build(const volume::ScalarVolume& volume, const grid::RefineSettings& settings) {
   Built built;
   built.statistics = std::make_unique<grid::Statistics>(volume, grid::fit_cube(volume));
@@ -263,10 +271,7 @@ TEST(Statistics, GrowWithTheActiveNodesNotWithTheBox) {
   ASSERT_EQ(cube.log2_size, 15);
   const grid::Statistics statistics(volume, cube);
   EXPECT_LT(statistics.nodes().size(), 2U * 8U * 13U);
-  grid::RefineSettings settings;
-  settings.threshold = -1.0;
-  settings.cells = grid::CellKind::constant;
-  const Built built = build(volume, settings);
+  const Built built = build(volume, voxel_by_voxel());
   expect_conforming(built.grid);
   EXPECT_LT(built.grid.cells.size(), 8000U);
   EXPECT_EQ(
@@ -304,9 +309,7 @@ TEST(WideRecords, HoldEveryCell) {
 // A cloud far out in a wide box has the cells that it has by itself, voxel by voxel.
 TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
-  grid::RefineSettings settings;
-  settings.threshold = -1.0;
-  settings.cells = grid::CellKind::constant;
+  const grid::RefineSettings settings = voxel_by_voxel();
   const Built near = build(cloud, settings);
   for (const ivec3& by : {ivec3(32768, 0, 32768), ivec3(65536, 65536, 65536), ivec3(196608, 131072, 0)}) {
     SCOPED_TRACE(by.x);
@@ -337,9 +340,7 @@ TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
 // What rays that start far out meet there is what those meet that start nearby: differences of what is large are exact.
 TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
-  grid::RefineSettings settings;
-  settings.threshold = -1.0;
-  settings.cells = grid::CellKind::constant;
+  const grid::RefineSettings settings = voxel_by_voxel();
   const Built near = build(cloud, settings);
   const ivec3 by(229376, 196608, 131072);
   const Built far = build(test::clouds_apart(cloud, by), settings);
@@ -522,10 +523,7 @@ TEST(Grid, ConformsForASingleVoxelAnywhere) {
     if (p.x >= 60 || p.y >= 60 || p.z >= 60) continue;
     values[hot] = 1.0F;
     volume.max_value = 1.0F;
-    grid::RefineSettings settings;
-    settings.threshold = -1.0;
-    settings.cells = grid::CellKind::constant;
-    const Built built = build(volume, settings);
+    const Built built = build(volume, voxel_by_voxel());
     expect_conforming(built.grid);
     // The voxel itself is resolved, exactly.
     const std::uint32_t cell = grid::locate(built.grid, vec3(p) + vec3(0.4F, 0.5F, 0.6F));
@@ -536,9 +534,7 @@ TEST(Grid, ConformsForASingleVoxelAnywhere) {
 
 TEST(Grid, FullyRefinedConstantCellsAreTheVoxels) {
   const auto volume = test::noise_volume({20, 30, 25}, ivec3(4, -9, 0), 2);
-  grid::RefineSettings settings;
-  settings.threshold = -1.0;
-  settings.cells = grid::CellKind::constant;
+  grid::RefineSettings settings = voxel_by_voxel();
   settings.max_cells = 100'000'000;
   const Built built = build(volume, settings);
   test::Random random(5);

@@ -19,6 +19,7 @@
 #include "support/c_playback.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
+#include "support/live_volumes.hpp"
 #include "support/simulated.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
@@ -26,11 +27,13 @@
 namespace {
 
 using namespace cumulet;
+using test::alone;
 using test::at;
 using test::difference;
 using test::LiveRef;
 using test::make_desc;
 using test::make_live;
+using test::newest;
 using test::Sides;
 using test::simulated;
 using test::State;
@@ -164,21 +167,6 @@ cumulet_gl_state_desc state_of(const std::vector<cumulet_gl_field>& fields) {
   desc.field_count = fields.size();
   desc.name = "smoke";
   return desc;
-}
-
-VolumeRef newest(const LiveRef& live) {
-  std::array<char, 256> error{};
-  cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_OK) << error.data();
-  return VolumeRef(out);
-}
-
-VolumeRef alone(const State& state) {
-  std::array<char, 256> error{};
-  cumulet_volume* out = nullptr;
-  const cumulet_state_desc desc = state.desc();
-  EXPECT_EQ(cumulet_volume_from_state(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
-  return VolumeRef(out);
 }
 
 void expect_same(const VolumeRef& a, const VolumeRef& b) {

@@ -13,12 +13,14 @@
 #include <vector>
 
 #include "support/c_playback.hpp"
+#include "support/live_volumes.hpp"
 #include "support/simulated.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
 
 namespace {
 
+using cumulet::test::alone;
 using cumulet::test::at;
 using cumulet::test::CameraRef;
 using cumulet::test::difference;
@@ -28,6 +30,7 @@ using cumulet::test::LiveRef;
 using cumulet::test::make_ball;
 using cumulet::test::make_desc;
 using cumulet::test::make_live;
+using cumulet::test::newest;
 using cumulet::test::picture_of;
 using cumulet::test::Sides;
 using cumulet::test::simulated;
@@ -66,21 +69,6 @@ State fire(const Sides& size, int step) {
 }
 
 State smoke(const Sides& size, int step) { return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, step)); }
-
-VolumeRef alone(const State& state) {
-  std::array<char, 256> error{};
-  cumulet_volume* out = nullptr;
-  const cumulet_state_desc desc = state.desc();
-  EXPECT_EQ(cumulet_volume_from_state(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
-  return VolumeRef(out);
-}
-
-VolumeRef newest(const LiveRef& live) {
-  std::array<char, 256> error{};
-  cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_OK) << error.data();
-  return VolumeRef(out);
-}
 
 void expect_same(const VolumeRef& a, const VolumeRef& b) {
   const auto& left = a->asset->frame();
