@@ -51,6 +51,8 @@ install_packages() {
     { tail -n 20 "$log" >&2; die "apt-get could not install ${missing[*]} (all of it: $log)"; }
 }
 
+build_within=() # a command that bounds how long it takes
+
 # build PRESET [TARGET...]: configured each time, since packages may have come; ninja shows its own progress.
 build() {
   local preset=$1
@@ -61,6 +63,6 @@ build() {
   cmake --preset "$preset" >"$folder/configure.log" 2>&1 ||
     { tail -n 30 "$folder/configure.log" >&2; echo "configuring failed (all of it: $folder/configure.log)" >&2; return 1; }
   say "building $folder with $jobs jobs"
-  cmake --build "$folder" --parallel "$jobs" ${1:+--target "$@"} || return 1
+  "${build_within[@]}" cmake --build "$folder" --parallel "$jobs" ${1:+--target "$@"} || return
   say "built $folder in $(elapsed "$since")"
 }

@@ -5,25 +5,37 @@
 # --quick: the release build's tests alone, without those labelled slow. --long: everything, clang-tidy with the static
 # analyzer, then the tests of threads under ThreadSanitizer, the soak, most behind OSMesa's door, all drivers' pictures
 # and a minute of each fuzzer (an hour and a half more).
+# --minutes N: of what comes after the release build's tests nothing begins later than that; what did not is counted as
+# skipped. For machines that end the script, and lose its findings, after a time.
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
 tier=all
-for argument in "$@"; do
-  case $argument in
+minutes=1000000
+while [ $# -gt 0 ]; do
+  case $1 in
     --quick) tier=quick ;;
     --long) tier=long ;;
+    --minutes)
+      [[ ${2:-} =~ ^[0-9]{1,6}$ ]] || { echo "tests/run.sh: --minutes needs a whole number" >&2; exit 2; }
+      minutes=$2
+      shift
+      ;;
     -h | --help)
-      echo "usage: tests/run.sh [--quick | --long]"
-      echo "  --quick: the release build's tests, but for slow ones; --long: soak, analyzer, ThreadSanitizer and fuzzers, too"
+      echo "usage: tests/run.sh [--quick | --long] [--minutes N]"
+      echo "  --quick: the release build's tests, but for slow ones; --long: soak, analyzer, ThreadSanitizer and fuzzers, too;"
+      echo "  --minutes: of what follows the release build's tests nothing begins later, and the rest counts as skipped"
       exit 0
       ;;
     *)
-      echo "tests/run.sh: unknown argument '$argument'; there are --quick and --long" >&2
+      echo "tests/run.sh: unknown argument '$1'; there are --quick, --long and --minutes" >&2
       exit 2
       ;;
   esac
+  shift
 done
+# In seconds; below one there is none.
+time_left() { echo $((60 * minutes - SECONDS + script_started)); }
 
 launcher=() # of ctest
 passed=0 failed=0 skipped=0
@@ -35,6 +47,11 @@ failures=() # said again at the end, where those who see the end of a long log a
 fail() { # WHAT: counts as one test
   count 0 1 0
   failures+=("$1")
+}
+
+left_out() { # WHAT: for want of time; counts as one test that was skipped
+  count 0 0 1
+  say "left out for time: $1"
 }
 
 # What tests that were killed leave behind goes with this folder.
@@ -123,6 +140,7 @@ script_check() {
 # shellcheck disable=SC2317 # called by xargs
 tidy_one() { # STAMP SOURCE
   local log
+  [ "$(date +%s)" -lt "$tidy_until" ] || { : >"$1.left"; echo "  left    $2"; return; }
   # A tenth of the analyzer's default budget a function, where it runs.
   if log=$(clang-tidy --quiet -p build/release --checks="$tidy_checks" --extra-arg=-Wno-unknown-warning-option \
     --extra-arg=-Xclang --extra-arg=-analyzer-config --extra-arg=-Xclang --extra-arg=max-nodes=22500 "$2" 2>&1); then
@@ -164,16 +182,25 @@ tidy() {
     [ -e "$key" ] || todo+=("$key" "$source")
   done
   say "clang-tidy: $((${#todo[@]} / 2)) of $files files have changed"
+  rm -f "$stamps"/*.left
+  tidy_until=$(($(date +%s) + $(time_left)))
+  export tidy_until
   if [ "${#todo[@]}" -gt 0 ]; then
     printf '%s\0' "${todo[@]}" | xargs -0 -n 2 -P "$jobs" bash -c 'tidy_one "$@"' tidy || true
   fi
-  local good=0
+  local good=0 left=0
   for source in "${sources[@]}"; do
     key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
-    if [ -e "$key" ]; then good=$((good + 1)); else failures+=("clang-tidy: $source"); fi
+    if [ -e "$key" ]; then
+      good=$((good + 1))
+    elif [ -e "$key.left" ]; then
+      left=$((left + 1))
+    else
+      failures+=("clang-tidy: $source")
+    fi
   done
-  count "$good" $((files - good)) 0
-  say "clang-tidy: $((files - good)) of $files failed, in $(elapsed "$since")"
+  count "$good" $((files - good - left)) "$left"
+  say "clang-tidy: $((files - good - left)) of $files failed, $left left out for time, in $(elapsed "$since")"
 }
 
 # No display and no session: what a test finds must not depend on them.
@@ -196,6 +223,33 @@ build_and_test() {
   fi
 }
 
+# Under sanitizers, some programs at a time, as long as there is time.
+sanitized_tests() {
+  local folder=build/sanitize/tests/unit group=8 names=() first status=0 some
+  if [ "$(time_left)" -lt 1 ]; then
+    left_out "sanitize: nothing was built"
+    return
+  fi
+  build_within=(timeout "$(time_left)")
+  build sanitize cumulet_sanitized_tests || status=$?
+  build_within=()
+  case $status in
+    0) ;;
+    124) left_out "sanitize: not all was built"; return ;;
+    *) fail "sanitize: did not build"; return ;;
+  esac
+  mapfile -t names < <(ctest --test-dir "$folder" --show-only --label-exclude long | sed -n 's/^ *Test *#[0-9]*: //p')
+  [ "${#names[@]}" -gt 0 ] || { fail "sanitize: found no tests"; return; }
+  for ((first = 0; first < ${#names[@]}; first += group)); do
+    if [ "$(time_left)" -lt 1 ]; then
+      left_out "sanitize: ${names[*]:first}"
+      return
+    fi
+    printf -v some '%s|' "${names[@]:first:group}"
+    run_ctest "sanitize_$first" "$folder" --tests-regex "^(${some%|})\$"
+  done
+}
+
 if [ "$tier" = quick ]; then
   build_and_test release "" . --label-exclude 'slow|long'
   finish
@@ -210,7 +264,7 @@ export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_
 export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
 if [ "$tier" = all ]; then
-  build_and_test sanitize cumulet_sanitized_tests tests/unit --label-exclude long
+  sanitized_tests
 else
   build_and_test sanitize tests/unit/all tests/unit
   run_ctest release-long build/release --label-regex long

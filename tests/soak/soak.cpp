@@ -21,10 +21,10 @@
 #include <string>
 #include <vector>
 
+#include "support/fake_gl.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
 #include "unit/support/c_host.hpp"
-#include "unit/support/fake_gl.hpp"
 
 namespace {
 
