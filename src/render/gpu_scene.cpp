@@ -429,6 +429,21 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
         if (!build_grids(of, wanted.most_bytes, deadline)) break;
         auto work =
             std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels, &grids_.built());
+        const auto fits_beside = [&](std::uint64_t held) {
+          held -= std::min(heap_.free_bytes(), work->bytes());
+          return work->bytes() <= wanted.most_bytes - std::min(wanted.most_bytes, held);
+        };
+        // Lattices serve views to come alone.
+        if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.most_bytes, deadline);
+        // Cells that were made for more memory would keep out those made for less.
+        if (data_ && of.front()->march == scene::March::tet && !fits_beside(data_bytes() + other_bytes()) &&
+            fits_beside(other_bytes())) {
+          work.reset();
+          data_.clear();
+          data_of_.clear();
+          data_revision_.advance();
+          continue;
+        }
         require_room(work->bytes(), wanted.most_bytes);
         upload_->work = std::move(work);
       }

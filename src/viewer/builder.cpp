@@ -5,7 +5,7 @@
 
 #include "base/apart.hpp"
 #include "grid/tet_grid.hpp"
-#include "render/grid_build.hpp"
+#include "viewer/cell_budget.hpp"
 #include "viewer/stopwatch.hpp"
 #include "volume/advection.hpp"
 
@@ -49,22 +49,6 @@ bool Built::serves(const BuildSettings& wanted) const {
 
 namespace {
 
-// With its node of the tree, and what glows of it.
-std::uint64_t bytes_a_cell(const grid::Channels& channels) {
-  std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
-  using grid::Channel;
-  using render::channel_bytes;
-  if (channels.emission) bytes += channel_bytes(Channel::emission, 1) + sizeof(scene::GlowingCell);
-  if (channels.scattering) bytes += channel_bytes(Channel::colour, 1);
-  if (channels.forward) bytes += channel_bytes(Channel::anisotropy, 1);
-  if (channels.momentum) bytes += channel_bytes(Channel::velocity, 1);
-  if (channels.ends) bytes += sizeof(glm::uvec2);
-  return bytes;
-}
-
-// A grid's tables, of whatever size it is.
-constexpr std::uint64_t tables = 4096;
-
 // What it is while the shutter is open; null where nothing moves.
 VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& progress) {
   try {
@@ -73,27 +57,6 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
     if (error.code() == ErrorCode::cancelled) throw;
     throw Error(error.code(), volume->name() + ", while the shutter is open: " + error.what());
   }
-}
-
-std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held, const Allowance& allowance) {
-  const std::uint64_t most = allowance.memory_bytes();
-  return (most - std::min(most, held + tables)) / bytes_a_cell(channels);
-}
-
-std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance& allowance) {
-  // What was there stays until all cells have come, and pictures may grow meanwhile.
-  const std::uint64_t most = allowance.gl_bytes() / 5 * 2;
-  return (most - std::min(most, tables)) / bytes_a_cell(channels);
-}
-
-// Of a plan, where GL builds the cells: beside them there are the lattice, what it builds of, the grid before, a copy,
-// and what is left of the heap's pages.
-std::uint64_t planned_cells_that_fit_gl(const grid::Channels& channels, const grid::Lattice& lattice,
-                                        const Allowance& allowance) {
-  const std::uint64_t most = allowance.gl_bytes();
-  const std::uint64_t held = lattice.device_bytes() + tables;
-  return (most - std::min(most, held)) /
-         (4 * bytes_a_cell(channels) + render::building_bytes_a_cell(channels.emission != nullptr));
 }
 
 }  // namespace
@@ -134,17 +97,25 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   }
   if (settings.on == BuildOn::gpu && moving)
     log.info(volume->name() + ": it moves while the shutter is open, so its grid is built on the CPU");
+  const Carried carried = Carried::of(channels);
+  const std::uint64_t max_cells = settings.refine.max_cells;
+  grid::LatticePtr lattice;
+  std::optional<std::uint64_t> planned;
   if (settings.on == BuildOn::gpu && !moving) {
-    const grid::LatticePtr lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
+    lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
+    planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), allowance);
+    if (!planned)
+      log.info(volume->name() + ": its grid is built on the CPU: the lattice of " +
+               std::to_string(lattice->device_bytes()) + " bytes leaves too little of the GL memory that is allowed, " +
+               std::to_string(allowance.gl_bytes()) + " bytes");
+  }
+  if (planned) {
     std::vector<std::uint8_t> levels =
         before && before->lattice == lattice
             ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
-    const std::uint64_t most =
-        std::min({settings.refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance),
-                  planned_cells_that_fit_gl(channels, *lattice, allowance)});
     scene::MarchSource source =
-        scene::make_planned_source({lattice, std::move(levels), most}, voxels, statistics, channels);
+        scene::make_planned_source({lattice, std::move(levels), *planned}, voxels, statistics, channels);
     source.optical_depth = statistics->mean_optical_depth();
     built.source = std::make_shared<const scene::MarchSource>(std::move(source));
     allowance.require(built.bytes(), volume->name());
@@ -152,8 +123,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     return built;
   }
   grid::RefineSettings refine = settings.refine;
-  refine.max_cells = std::min(
-      {refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance), cells_that_fit_gl(channels, allowance)});
+  refine.max_cells = cells_that_fit(max_cells, carried, volume->bytes(), allowance);
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
@@ -166,7 +136,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.cells = grid->cells.size();
   built.levels = grid->levels;
   built.limited = grid->limited;
-  if (grid->limited) log_limited(log, refine.max_cells, settings.refine.max_cells);
+  if (grid->limited) log_limited(log, refine.max_cells, max_cells);
   scene::MarchSource source =
       scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress);
   source.optical_depth = statistics->mean_optical_depth();

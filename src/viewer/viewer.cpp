@@ -13,6 +13,7 @@
 #include "base/one_line.hpp"
 #include "scene/model_table.hpp"
 #include "scene/space.hpp"
+#include "viewer/cell_budget.hpp"
 
 namespace cumulet::viewer {
 
@@ -938,9 +939,19 @@ void Viewer::share_gl() {
 }
 
 void Viewer::set_limits(const Limits& limits) {
+  const bool has_cells = volume_ && built_.source && built_.source->march == scene::March::tet;
+  const auto allowed = [&] { return has_cells ? cells_allowed(built_, *allowance_) : 0; };
+  const std::uint64_t before = allowed();
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
   share_gl();
+  // Asked for here alone, not in frames: how many cells are allowed follows what the pictures of each frame leave.
+  const std::uint64_t now = allowed();
+  if (now != before && now >= fewest_cells && !followed_ && !watched_) {
+    const std::uint64_t granted = cells_granted(built_);
+    const bool wants_more = built_.limited || built_.source->plan;
+    if (builder_.busy() || now < granted || (now > granted && wants_more)) request_build();
+  }
   if (followed_) followed_->wish_due = true;
   for (const PlayedPtr& played : played_) played->followed.wish_due = true;
   touch();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -253,6 +254,85 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
     EXPECT_EQ(stats_of(viewer).cells, all.cells);
   }
   for (const std::string& line : lines) EXPECT_EQ(line.find("on the CPU"), std::string::npos) << line;
+}
+
+// A smaller cap cuts the cells that are there, without being asked and without an error; a larger one refines them
+// again.
+TEST_F(Limits, CellsFollowTheCap) {
+  const VolumeRef ball = make_ball(56);
+  for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
+    SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
+    const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
+    split_to_the_voxel(viewer, build);
+    picture_of(viewer.get(), ball.get(), target_);
+    const cumulet_stats all = stats_of(viewer);
+    ASSERT_EQ(all.limited, 0);
+    auto whole = target_.frame();
+    whole.target = CUMULET_TARGET_NONE;
+    const auto settle = [&] {
+      for (int i = 0; i < 3; ++i) converge(viewer.get(), whole);
+      return stats_of(viewer);
+    };
+    const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
+    limit(viewer, 0, room);
+    const cumulet_stats cut = settle();
+    EXPECT_LE(cut.gl_bytes, room);
+    EXPECT_LT(cut.cells, all.cells);
+    EXPECT_GT(cut.cells, all.cells / 10);
+    EXPECT_EQ(cut.limited, 1);
+    EXPECT_EQ(settle().cells, cut.cells) << "once";
+    limit(viewer, 0, 0);
+    EXPECT_EQ(settle().cells, all.cells);
+  }
+}
+
+// Where the lattice that GL builds of would leave little, the CPU's cells come instead, which need none.
+TEST_F(Limits, NoLatticeTakesTheCellsRoom) {
+  const VolumeRef ball = make_ball(56);
+  std::vector<std::string> lines;
+  const auto keep = [](void* user, cumulet_log_level /*level*/, const char* line) {
+    static_cast<std::vector<std::string>*>(user)->emplace_back(line);
+  };
+  const auto cells_under = [&](cumulet_build build, std::uint64_t room) {
+    const ViewerPtr viewer =
+        make_viewer({.get_proc = Context::get_proc, .user = &context_, .log = keep, .log_user = &lines, .samples = 1});
+    split_to_the_voxel(viewer, build);
+    limit(viewer, 0, room);
+    picture_of(viewer.get(), ball.get(), target_);
+    return stats_of(viewer);
+  };
+  const cumulet_stats all = cells_under(CUMULET_BUILD_CPU, 0);
+  lines.clear();
+  for (const std::uint64_t part : {2, 8, 32}) {
+    SCOPED_TRACE(part);
+    const std::uint64_t room = all.gl_bytes - all.cell_bytes + all.cell_bytes / part;
+    const std::uint64_t by_cpu = cells_under(CUMULET_BUILD_CPU, room).cells;
+    EXPECT_GT(by_cpu, 24U);
+    EXPECT_GE(cells_under(CUMULET_BUILD_GPU, room).cells, by_cpu / 5);
+  }
+  EXPECT_TRUE(std::ranges::any_of(
+      lines, [](const std::string& line) { return line.find("its grid is built on the CPU") != std::string::npos; }));
+}
+
+// One that was lowered and raised again before any cells were cut; one in which no cells fit.
+TEST_F(Limits, CellsOutliveACapThatPasses) {
+  const VolumeRef ball = make_ball(56);
+  const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
+  split_to_the_voxel(viewer, CUMULET_BUILD_CPU);
+  picture_of(viewer.get(), ball.get(), target_);
+  const cumulet_stats all = stats_of(viewer);
+  auto whole = target_.frame();
+  whole.target = CUMULET_TARGET_NONE;
+  for (const double seconds : {0.0, 0.001, 0.01, -1.0}) {
+    limit(viewer, 0, all.gl_bytes - all.cell_bytes / 8);
+    cumulet_wait(viewer.get(), seconds);
+    limit(viewer, 0, 0);
+    converge(viewer.get(), whole);
+    EXPECT_EQ(stats_of(viewer).cells, all.cells) << "raised after " << seconds << " s";
+  }
+  limit(viewer, 0, 1);
+  converge(viewer.get(), whole);
+  EXPECT_EQ(stats_of(viewer).cells, all.cells);
 }
 
 TEST_F(Limits, GlMemoryIsKept) {

@@ -1169,15 +1169,15 @@ typedef struct cumulet_limits_desc {
    */
   uint64_t memory_bytes;
   /*
-   * GL memory. Cells, not instances', are as coarse as two fifths of what the rest leaves take (cumulet_stats.limited);
-   * the rest is what there was in the last frame, so pictures of a first one are not foreseen. Voxels are as they are.
-   * A volume that would yet bring gl_bytes above it, beside the one before, is not uploaded, and that one stays:
-   * cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and pictures count, and are not refused.
+   * GL memory. Cells, not instances', are as coarse as two fifths of what the last frame's rest leaves take
+   * (cumulet_stats.limited); those before them go first where both do not fit. Voxels are as they are: a volume that
+   * would bring gl_bytes above it, beside the one before, is not uploaded, and that one stays: cumulet_render tells
+   * CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and pictures count, and are not refused.
    */
   uint64_t gl_bytes;
 } cumulet_limits_desc;
 
-/* Holds for what is begun from now on; what is there stays. */
+/* Holds for what is begun from now on; but the cells of a volume that is no sequence's nor live are then cut anew. */
 CUMULET_API cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_desc* desc);
 
 /* ---- Settings --------------------------------------------------------------------------------------------------- */

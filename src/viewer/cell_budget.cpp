@@ -1,0 +1,81 @@
+#include "viewer/cell_budget.hpp"
+
+#include <algorithm>
+
+#include "grid/tet_grid.hpp"
+#include "render/grid_build.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+// With its node of the tree, and what glows of it.
+std::uint64_t bytes_a_cell(const Carried& carried) {
+  std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
+  using grid::Channel;
+  using render::channel_bytes;
+  if (carried.emission) bytes += channel_bytes(Channel::emission, 1) + sizeof(scene::GlowingCell);
+  if (carried.colour) bytes += channel_bytes(Channel::colour, 1);
+  if (carried.anisotropy) bytes += channel_bytes(Channel::anisotropy, 1);
+  if (carried.velocity) bytes += channel_bytes(Channel::velocity, 1);
+  if (carried.change) bytes += sizeof(glm::uvec2);
+  return bytes;
+}
+
+// A grid's tables, of whatever size it is.
+constexpr std::uint64_t tables = 4096;
+
+std::uint64_t left_of(std::uint64_t most, std::uint64_t held) { return most - std::min(most, held); }
+
+std::uint64_t fit_in_memory(const Carried& carried, std::uint64_t held, const Allowance& allowance) {
+  return left_of(allowance.memory_bytes(), held + tables) / bytes_a_cell(carried);
+}
+
+std::uint64_t fit_in_gl(const Carried& carried, const Allowance& allowance) {
+  // What was there stays until all cells have come, and pictures may grow meanwhile.
+  return left_of(allowance.gl_bytes() / 5 * 2, tables) / bytes_a_cell(carried);
+}
+
+}  // namespace
+
+Carried Carried::of(const grid::Channels& channels) {
+  return {channels.emission != nullptr, channels.scattering != nullptr, channels.forward != nullptr,
+          channels.momentum != nullptr, channels.ends != nullptr};
+}
+
+Carried Carried::of(const scene::MarchSource& source) {
+  return {source.emits(), source.coloured(), source.anisotropic(), source.moves(), source.changes()};
+}
+
+std::uint64_t cells_that_fit(std::uint64_t max_cells, const Carried& carried, std::uint64_t held,
+                             const Allowance& allowance) {
+  return std::min({max_cells, fit_in_memory(carried, held, allowance), fit_in_gl(carried, allowance)});
+}
+
+std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, const Carried& carried,
+                                                    const grid::Lattice& lattice, std::uint64_t held,
+                                                    const Allowance& allowance) {
+  // Beside the cells there are the lattice, what it builds of, the grid before, a copy, and what is left of the heap's
+  // pages.
+  const std::uint64_t in_gl = left_of(allowance.gl_bytes(), lattice.device_bytes() + tables) /
+                              (4 * bytes_a_cell(carried) + render::building_bytes_a_cell(carried.emission));
+  // Beside a small lattice it is two fifths of what the CPU's may have, and more.
+  if (in_gl < std::min(max_cells, fit_in_gl(carried, allowance) / 4)) return std::nullopt;
+  return std::min({max_cells, fit_in_memory(carried, held, allowance), in_gl});
+}
+
+std::uint64_t cells_allowed(const Built& built, const Allowance& allowance) {
+  const scene::MarchSource& source = *built.source;
+  const Carried carried = Carried::of(source);
+  const std::uint64_t max_cells = built.settings.refine.max_cells;
+  const std::uint64_t held = built.volume ? built.volume->bytes() : 0;
+  const auto planned =
+      source.plan ? planned_cells_that_fit(max_cells, carried, *source.plan->lattice, held, allowance) : std::nullopt;
+  return planned ? *planned : cells_that_fit(max_cells, carried, held, allowance);
+}
+
+std::uint64_t cells_granted(const Built& built) {
+  return built.source->plan ? built.source->plan->max_cells : built.cells;
+}
+
+}  // namespace cumulet::viewer
