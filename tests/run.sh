@@ -257,7 +257,6 @@ fi
 build_and_test release "" . --label-exclude long
 check "clang-format" format_check
 check "shellcheck" script_check
-tidy
 # Leaks inside the software GL driver and TBB are theirs. GCC 12 takes what lies before a block of dynamic TLS for a
 # header of glibc 2.19 and now and then crashes at exit on what it reads there: such blocks are found from the heap too.
 export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
@@ -277,4 +276,6 @@ else
   launcher=()
   build_and_test fuzz cumulet_fuzzers tests/fuzz
 fi
+# Last, where time may not do for all.
+tidy
 finish
