@@ -225,7 +225,7 @@ build_and_test() {
 
 # Under sanitizers, some programs at a time, as long as there is time.
 sanitized_tests() {
-  local folder=build/sanitize/tests/unit group=8 names=() first status=0 some
+  local folder=build/sanitize/tests/unit group=16 names=() first status=0 some
   if [ "$(time_left)" -lt 1 ]; then
     left_out "sanitize: nothing was built"
     return
