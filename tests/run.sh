@@ -157,29 +157,39 @@ tidy_checks=
 export tidy_checks
 
 # clang-tidy of src/ and demo/, but for the files that include OpenVDB (a minute each and more). Each file is a check;
-# one that passed is not looked at again until it, a header or the rules change.
+# one that passed is not looked at again until it, a header of its own or the rules change: what passed is kept where
+# ccache keeps what it has, for other clones as well.
 tidy() {
-  local stamps=build/tidy since=$SECONDS sources=() source common key todo=() files
+  local stamps=${XDG_CACHE_HOME:-${HOME:-$root/build}/.cache}/cumulet/tidy since=$SECONDS
+  local rules source includes sources=() keys=() todo=() files
   mkdir -p "$stamps"
+  find "$stamps" -type f -mtime +30 -delete
   say "clang-tidy"
-  # What ninja knows of the includes of every object file: those without OpenVDB.
-  mapfile -t sources < <(ninja -C build/release -t deps | awk -v root="$root/" '
+  rules=$({ cat .clang-tidy; echo "$tidy_checks"; clang-tidy --version; } | sha256sum)
+  # What ninja knows of the includes of every object file: of those without OpenVDB, a source and all of ours.
+  while read -r -a includes; do
+    source=${includes[0]}
+    sources+=("$source")
+    keys+=("$stamps/$({ echo "$rules $source"; cat "${includes[@]}"; } | sha256sum | cut -c1-32)")
+  done < <(ninja -C build/release -t deps | awk -v root="$root/" '
     /^[^ ].*: #deps/ { flush(); next }
-    /^    / { file = $1; if (!first) first = file; if (file ~ /\/openvdb\/openvdb\.h$|\/openvdb\/.*\.h$/) vdb = 1 }
+    /^    / {
+      file = $1
+      if (file ~ /\/openvdb\/openvdb\.h$|\/openvdb\/.*\.h$/) vdb = 1
+      if (file !~ /^\//) file = root "build/release/" file
+      while (sub("/[^/.][^/]*/[.][.]/", "/", file)) {}
+      if (index(file, root) == 1) ours = ours " " substr(file, length(root) + 1)
+    }
     END { flush() }
     function flush() {
-      sub("^../../", root, first)
-      if (first && !vdb && index(first, root) == 1) print substr(first, length(root) + 1)
-      first = ""; vdb = 0
-    }' | grep -E '^(src|demo)/.*\.cpp$' | LC_ALL=C sort -u || true)
+      if (ours && !vdb) print substr(ours, 2)
+      ours = ""; vdb = 0
+    }' | grep -E '^(src|demo)/[^ ]*\.cpp( |$)' | LC_ALL=C sort -u -k 1,1 || true)
   files=${#sources[@]}
   [ "$files" -gt 0 ] || { say "clang-tidy: found no files"; fail "clang-tidy: found no files"; return; }
-
-  common=$({ cat .clang-tidy; echo "$tidy_checks"; clang-tidy --version; find src demo glsl -name '*.h' -o -name '*.hpp' -o -name '*.glsl' |
-    LC_ALL=C sort | xargs cat; } | sha256sum)
-  for source in "${sources[@]}"; do
-    key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
-    [ -e "$key" ] || todo+=("$key" "$source")
+  local i
+  for ((i = 0; i < files; ++i)); do
+    [ -e "${keys[i]}" ] || todo+=("${keys[i]}" "${sources[i]}")
   done
   say "clang-tidy: $((${#todo[@]} / 2)) of $files files have changed"
   rm -f "$stamps"/*.left
@@ -189,14 +199,13 @@ tidy() {
     printf '%s\0' "${todo[@]}" | xargs -0 -n 2 -P "$jobs" bash -c 'tidy_one "$@"' tidy || true
   fi
   local good=0 left=0
-  for source in "${sources[@]}"; do
-    key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
-    if [ -e "$key" ]; then
+  for ((i = 0; i < files; ++i)); do
+    if [ -e "${keys[i]}" ]; then
       good=$((good + 1))
-    elif [ -e "$key.left" ]; then
+    elif [ -e "${keys[i]}.left" ]; then
       left=$((left + 1))
     else
-      failures+=("clang-tidy: $source")
+      failures+=("clang-tidy: ${sources[i]}")
     fi
   done
   count "$good" $((files - good - left)) "$left"

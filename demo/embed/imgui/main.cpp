@@ -265,7 +265,7 @@ cumulet::Viewer make_viewer(cumulet::Background background, bool test) {
                          .sun_elevation_degrees = 40.0F,
                          .sun_irradiance = {2.6F, 2.5F, 2.3F},
                          .sky_radiance = {0.2F, 0.3F, 0.5F}}));
-  must(viewer.set_sampling({.samples = test ? 4U : 0U}));
+  must(viewer.set_sampling({.samples = test ? 2U : 0U}));
   must(viewer.set_display({.background = background}));
   return viewer;
 }
