@@ -435,9 +435,11 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
         };
         // Lattices serve views to come alone.
         if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.most_bytes, deadline);
-        // Cells that were made for more memory would keep out those made for less.
+        // Cells that were made for more memory would keep out those made for less. Where some of them stay the rest is
+        // not worth it: they would have to be made again.
+        const auto stays = [&](const scene::MarchSourcePtr& source) { return data_->grid(*source) != nullptr; };
         if (data_ && of.front()->march == scene::March::tet && !fits_beside(data_bytes() + other_bytes()) &&
-            fits_beside(other_bytes())) {
+            fits_beside(other_bytes()) && std::ranges::none_of(of, stays)) {
           work.reset();
           data_.clear();
           data_of_.clear();

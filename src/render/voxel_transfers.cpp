@@ -5,6 +5,7 @@
 #include <bit>
 #include <chrono>
 #include <cstring>
+#include <exception>
 #include <utility>
 
 #include "base/error.hpp"
@@ -337,7 +338,7 @@ void VoxelTransfers::pack(const Transfer& transfer, const Piece& piece, GLuint c
 
 gl::Fence VoxelTransfers::fence() const { return gl_->dispatches_in_call ? gl::Fence() : gl::Fence(gl_); }
 
-void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arrive) {
+void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arrive, Refuse refuse) {
   const auto& gl = *gl_;
   const gl::DebugGroup group(gl, "cumulet: live voxels");
   if (state.wait != nullptr && gl.IsSync(state.wait) == GL_FALSE)
@@ -347,6 +348,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arriv
   transfer.whole = !state.changed;
   transfer.name = state.name;
   transfer.arrive = std::move(arrive);
+  transfer.refuse = std::move(refuse);
   std::vector<gl::Object> choices(state.fields.size());
   for (std::size_t i = 0; i < state.fields.size(); ++i) {
     const GlVoxels& field = state.fields[i];
@@ -374,7 +376,9 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arriv
   if (state.wait != nullptr) gl.WaitSync(state.wait, 0, GL_TIMEOUT_IGNORED);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) pack(transfer, piece, choices[piece.field].name());
-  gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  // The images: what the host stores there next waits for what was read here.
+  gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
+                             GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) {
     const Room& room = piece.room;
     gl.CopyNamedBufferSubData(room.places.name(), room.places_back.name(), 0, 0,
@@ -472,32 +476,60 @@ bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
 
 void VoxelTransfers::recycle(Transfer& transfer) {
   for (Piece& piece : transfer.pieces) spare_.push_back(std::move(piece.room));
+  most_pieces_ = std::max(most_pieces_, transfer.pieces.size());
   // As many as two states use, one under way and one that waits.
-  while (spare_.size() > 2 * transfer.pieces.size()) spare_.pop_front();
+  while (spare_.size() > 2 * most_pieces_) spare_.pop_front();
+}
+
+void VoxelTransfers::refuse_on_top(const Transfer& whole) {
+  for (auto other = transfers_.begin(); other != transfers_.end();) {
+    if (other->whose != whole.whose) {
+      ++other;
+      continue;
+    }
+    if (other->whole) break;
+    other->fence.order();  // another context of the group may have begun it
+    recycle(*other);
+    other = transfers_.erase(other);
+  }
+  whole.refuse();
 }
 
 void VoxelTransfers::follow(Deadline deadline) {
   constexpr int long_time = 300;
   if (transfers_.empty()) {
-    if (++idle_ == long_time) spare_.clear();
+    if (++idle_ == long_time) {
+      spare_.clear();
+      most_pieces_ = 0;
+    }
     return;
   }
   idle_ = 0;
   while (!transfers_.empty()) {
     Transfer& first = transfers_.front();
+    std::exception_ptr failure;
     try {
       if (!take(first, deadline)) return;
+      if (!first.finite) {
+        for (const volume::FieldCopy& field : first.fields) volume::require_finite(field.view(), first.name);
+      }
     } catch (...) {
-      transfers_.pop_front();
-      throw;
+      failure = std::current_exception();
     }
     Transfer done = std::move(first);
     transfers_.pop_front();
     recycle(done);
-    if (!done.finite) {
-      for (const volume::FieldCopy& field : done.fields) volume::require_finite(field.view(), done.name);
+    if (!failure) {
+      try {
+        done.arrive(std::move(done.fields));
+      } catch (...) {
+        failure = std::current_exception();
+      }
     }
-    done.arrive(std::move(done.fields));
+    if (failure) {
+      if (done.whole) refuse_on_top(done);
+      std::rethrow_exception(failure);
+    }
     if (std::chrono::steady_clock::now() > deadline) return;
   }
 }

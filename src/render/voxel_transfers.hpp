@@ -64,16 +64,18 @@ class VoxelTransfers {
 
   /// Given the fields, whose copies are bricks; of those that changed the empty ones, too, as zeros.
   using Arrive = std::function<void(std::vector<volume::FieldCopy> fields)>;
+  /// A whole state does not arrive: something is wrong with it. Those on top of it that were on their way are gone.
+  using Refuse = std::function<void()>;
   /// whose: of one the oldest whole state that is on its way arrives, and of those behind it the newest. Fields'
   /// channels and transforms are checked. Throws Error(invalid_argument) for what is no such object, Error(unsupported)
   /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
-  void begin(const GlState& state, const void* whose, Arrive arrive);
+  void begin(const GlState& state, const void* whose, Arrive arrive, Refuse refuse);
   /// Of whose newest whole state that is on its way; none: there is none.
   [[nodiscard]] std::optional<std::vector<volume::Channel>> channels_of(const void* whose) const;
   /// Whether any is on its way.
   [[nodiscard]] bool busy() const { return !transfers_.empty(); }
   /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
-  /// finite: that state is dropped, and the next call goes on.
+  /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
   void follow(Deadline deadline);
   /// In GL.
   [[nodiscard]] std::uint64_t bytes() const;
@@ -122,6 +124,7 @@ class VoxelTransfers {
     std::vector<volume::FieldCopy> fields;
     bool finite = true;
     Arrive arrive;
+    Refuse refuse;
     gl::Fence fence;
     bool counted = false;  // what is filled is known, and was copied
   };
@@ -143,6 +146,7 @@ class VoxelTransfers {
   // What the driver had not copied by guess.
   void copy_rest(Transfer& transfer) const;
   void recycle(Transfer& transfer);
+  void refuse_on_top(const Transfer& whole);
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
@@ -151,7 +155,8 @@ class VoxelTransfers {
   gl::Object sampler_;
   std::deque<Transfer> transfers_;  // in the order in which they were begun
   std::deque<Room> spare_;
-  int idle_ = 0;  // calls of follow() since there was any
+  std::size_t most_pieces_ = 0;  // of a state, lately
+  int idle_ = 0;                 // calls of follow() since there was any
 };
 
 }  // namespace cumulet::render

@@ -181,45 +181,53 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
   load_ = load;
   worker_.replace({file.path, Progress::Stage::loading,
                    [this, file, load](Progress& progress) {
-                     Stopwatch watch;
-                     std::function<void(volume::StandIn)> take_stand_in;
-                     if (load->stand_in) {
-                       take_stand_in = [&](volume::StandIn made) {
-                         build_stand_in(file, std::move(made), *load, progress);
-                       };
+                     try {
+                       read(file, load, progress);
+                     } catch (...) {
+                       const std::scoped_lock failing(mutex_);
+                       if (stand_in_ && stand_in_->load.lock() == load) stand_in_.reset();
+                       throw;
                      }
-                     LoadedVolume loaded{file.read(log_, &progress, take_stand_in), {}};
-                     if (file.suggested_density_scale)
-                       loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
-                     const double seconds = watch.lap();
-                     allowance_->require(loaded.volume->bytes(), file.path);
-                     {
-                       const std::scoped_lock handing(mutex_);
-                       progress.check();
-                       loaded_ = loaded;
-                       load->open = false;
-                     }
-                     // Closed: nobody else changes it now.
-                     if (!load->settings) return;
-                     if (loaded.density_scale) load->settings->refine.density_scale = *loaded.density_scale;
-                     build_of(loaded.volume, *load->settings, seconds, progress);
                    },
                    true});
   drop_stand_in();
 }
 
-void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const Load& load, const Progress& loading) {
+void Builder::read(const VolumeFile& file, const std::shared_ptr<Load>& load, Progress& progress) {
+  Stopwatch watch;
+  std::function<void(volume::StandIn)> take_stand_in;
+  if (load->stand_in)
+    take_stand_in = [&](volume::StandIn made) { build_stand_in(file, std::move(made), load, progress); };
+  LoadedVolume loaded{file.read(log_, &progress, take_stand_in), {}};
+  if (file.suggested_density_scale) loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
+  const double seconds = watch.lap();
+  allowance_->require(loaded.volume->bytes(), file.path);
+  {
+    const std::scoped_lock handing(mutex_);
+    progress.check();
+    loaded_ = loaded;
+    load->open = false;
+  }
+  // Closed: nobody else changes it now.
+  if (!load->settings) return;
+  if (loaded.density_scale) load->settings->refine.density_scale = *loaded.density_scale;
+  build_of(loaded.volume, *load->settings, seconds, progress);
+}
+
+void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const std::shared_ptr<const Load>& load,
+                             const Progress& loading) {
   const auto progress = std::make_shared<Progress>();
   BuildSettings settings;
   {
     const std::scoped_lock lock(mutex_);
     loading.check();
-    settings = load.settings ? *load.settings : *load.stand_in;
+    settings = load->settings ? *load->settings : *load->stand_in;
     stand_in_load_ = progress;
   }
   settings.on = BuildOn::cpu;
   settings.refine.camera.reset();
   StandIn stand_in;
+  stand_in.load = load;
   try {
     const auto volume = std::make_shared<const VolumeAsset>(std::move(made.frame), progress.get());
     if (volume->empty()) return;
@@ -288,6 +296,12 @@ void Builder::forget() {
   built_.reset();
 }
 
+bool Builder::loads() const {
+  const std::scoped_lock lock(mutex_);
+  const auto load = load_.lock();
+  return load && load->open;
+}
+
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
   const std::scoped_lock lock(mutex_);
   const auto load = load_.lock();
@@ -313,7 +327,10 @@ std::optional<StandIn> Builder::take_stand_in() {
 
 bool Builder::busy() const {
   // In this order: what a job leaves is there before it ends.
-  if (worker_.busy()) return true;
+  return worker_.busy() || has_result();
+}
+
+bool Builder::has_result() const {
   const std::scoped_lock lock(mutex_);
   return loaded_ || built_;
 }
@@ -325,6 +342,7 @@ void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settin
   const std::scoped_lock lock(mutex_);
   progress.check();
   built_ = std::move(built);
+  stand_in_.reset();  // that nobody has seen yet
 }
 
 }  // namespace cumulet::viewer

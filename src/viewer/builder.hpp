@@ -92,6 +92,7 @@ struct StandIn {
   VolumeFactsPtr facts;  ///< bounds are the whole's
   scene::MarchSourcePtr source;
   std::optional<double> density_scale;  ///< that is suggested for it, where the medium is to get one
+  std::weak_ptr<const void> load;       ///< expires with the load's job
 };
 
 /// Of a grid whose refinement ended at so many cells: max_cells, or what memory takes of these.
@@ -127,6 +128,8 @@ class Builder {
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();
+  /// Whether a file is being read, or waits to be.
+  [[nodiscard]] bool loads() const;
   /// Loads alone: another volume is there.
   void cancel_loads();
   /// Ends all, and nothing is known of it: neither what was read, nor how it ended.
@@ -143,6 +146,8 @@ class Builder {
 
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
+  /// Whether there is such a result.
+  [[nodiscard]] bool has_result() const;
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Until idle, at most until then. Returns whether it is.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
@@ -154,7 +159,9 @@ class Builder {
     std::optional<BuildSettings> stand_in;
     bool open = true;
   };
-  void build_stand_in(const VolumeFile& file, volume::StandIn made, const Load& load, const Progress& loading);
+  void read(const VolumeFile& file, const std::shared_ptr<Load>& load, Progress& progress);
+  void build_stand_in(const VolumeFile& file, volume::StandIn made, const std::shared_ptr<const Load>& load,
+                      const Progress& loading);
   // jobs: cancels those that are to be.
   void stop(const std::function<void()>& jobs);
   // Also that which is being built, whose progress is its own: the load's tells how much of the whole is read. mutex_

@@ -136,6 +136,11 @@ void Live::hand_over(volume::Changes changes, const std::vector<Handed>& handed,
   listeners_.tell();
 }
 
+void Live::refuse_updates() {
+  const std::scoped_lock lock(mutex_);
+  handed_.clear();
+}
+
 void Live::take_next(std::optional<Whole>& old) {
   Next next;
   {

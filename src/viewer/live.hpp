@@ -46,6 +46,9 @@ class Live {
   void require_updatable(const std::vector<volume::Channel>& channels,
                          const std::optional<std::vector<volume::Channel>>& comes, const std::string& name);
 
+  /// A whole state that was announced was refused: none is updated until another is handed over.
+  void refuse_updates();
+
   /// How many states were handed over; the newest has this number.
   [[nodiscard]] std::uint64_t newest() const { return newest_; }
   struct State {

@@ -166,9 +166,12 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
     wishes_due_ = true;
-    drop_stand_in();
-    if (built_.volume == volume_) take_suggestion();
+    if (built_.volume == volume_) {  // else the volume before, of which a grid was asked for
+      drop_stand_in();
+      take_suggestion();
+    }
   }
+  fit_cells();
   follow_stand_in();
   follow_sequence();
   follow_live();
@@ -195,7 +198,8 @@ void Viewer::follow_stand_in() {
     stand_in_ = std::move(made);
     show_medium();
   }
-  if (!stand_in_ || builder_.busy()) return;
+  // In this order: what a job leaves is there before it ends.
+  if (!stand_in_ || !stand_in_->load.expired() || builder_.has_result()) return;
   // The volume is there, and the next frame asks for its grid; or there is none to come.
   const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !builder_.status().failure;
   if (!waits) drop_stand_in();
@@ -939,22 +943,27 @@ void Viewer::share_gl() {
 }
 
 void Viewer::set_limits(const Limits& limits) {
-  const bool has_cells = volume_ && built_.source && built_.source->march == scene::March::tet;
-  const auto allowed = [&] { return has_cells ? cells_allowed(built_, *allowance_) : 0; };
-  const std::uint64_t before = allowed();
+  // Asked for here alone, not in frames: how many cells are allowed follows what the pictures of each frame leave.
+  cells_due_ = cells_due_ || limits.gl_bytes != most_gl_bytes_ || limits.memory_bytes != allowance_->memory_bytes();
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
   share_gl();
-  // Asked for here alone, not in frames: how many cells are allowed follows what the pictures of each frame leave.
-  const std::uint64_t now = allowed();
-  if (now != before && now >= fewest_cells && !followed_ && !watched_) {
-    const std::uint64_t granted = cells_granted(built_);
-    const bool wants_more = built_.limited || built_.source->plan;
-    if (builder_.busy() || now < granted || (now > granted && wants_more)) request_build();
-  }
+  sync();
   if (followed_) followed_->wish_due = true;
   for (const PlayedPtr& played : played_) played->followed.wish_due = true;
   touch();
+}
+
+void Viewer::fit_cells() {
+  // What is under way was begun under other limits, perhaps, or another volume comes.
+  if (!cells_due_ || builder_.busy()) return;
+  cells_due_ = false;
+  const bool has_cells = volume_ && built_.source && built_.source->march == scene::March::tet;
+  if (!has_cells || followed_ || watched_) return;
+  const std::uint64_t allowed = cells_allowed(built_, *allowance_);
+  const std::uint64_t granted = cells_granted(built_);
+  const bool wants_more = built_.limited || built_.source->plan;
+  if (allowed >= fewest_cells && (allowed < granted || (allowed > granted && wants_more))) request_build();
 }
 
 void Viewer::cancel() {

@@ -94,7 +94,7 @@ class Viewer {
   /// Shows, in place of the volume, the newest state of it; null: none, and of one before nothing.
   void set_live(std::shared_ptr<Live> live);
   /// [GL] The next state of this, whoever shows it, from voxels in GL; of what changed, on top of the last.
-  void set_live_gl(const std::shared_ptr<Live>& live, const render::GlState& state);
+  void set_live_gl(std::shared_ptr<Live> live, const render::GlState& state);
   struct LiveStatus {
     std::uint64_t handed = 0;       ///< the newest state's number; 0: none
     std::uint64_t ready = 0;        ///< of the one that was taken last
@@ -237,6 +237,8 @@ class Viewer {
   void follow_played();
   // The stand-in of a load under way, which goes with it.
   void follow_stand_in();
+  // Asks for cells that limits allow, where those that are shown are more, or fewer than there could be.
+  void fit_cells();
   void drop_stand_in();
   // Of what is shown of the volume: of its stand-in, as long as there is one.
   [[nodiscard]] const VolumeFactsPtr& seen_facts() const { return stand_in_ ? stand_in_->facts : facts_; }
@@ -559,6 +561,7 @@ class Viewer {
 
   std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
   std::uint64_t most_gl_bytes_ = Allowance::no_limit;
+  bool cells_due_ = false;               // limits are others, and the grid's cells may have to be
   std::uint64_t gl_beside_volumes_ = 0;  // by the last frame
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above

@@ -114,7 +114,10 @@ void Viewer::prepare(const Frame& frame) {
 
   last_view_ = std::exchange(traced_view_, view_);
   const bool places_rest = !std::exchange(places_changed_, false);
-  if ((seen_facts() || others || watches) && built_for_another()) {
+  // A grid of the volume before would take the place of a file that waits to be read.
+  const bool another_comes = builder_.loads();
+  const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
+  if ((seen_facts() || others || watches) && built_for_another() && !waits) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     // What GL builds follows a camera in motion, one grid after another, each of which is seen.
     const bool follows =
@@ -129,7 +132,7 @@ void Viewer::prepare(const Frame& frame) {
         followed_->settings = settings_for_view();
         followed_->wish_due = true;
         follow_sequence();
-      } else if (volume_) {
+      } else if (volume_ && !another_comes) {
         builder_.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
       }
       wishes_due_ = true;
@@ -209,7 +212,8 @@ FrameResult Viewer::render(const Frame& frame) {
       const Trace::Span span(trace_, name);
       try {
         part();
-      } catch (const Error& error) {
+      } catch (...) {
+        const Error error = caught(name);
         if (error.code() == ErrorCode::context_lost) throw;
         gl::check_reset(*g.functions());
         if (!failure) failure = error;
@@ -238,7 +242,7 @@ FrameResult Viewer::render(const Frame& frame) {
     gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
     share_gl();
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    if (busy()) {
+    if (busy() || stand_in_) {
       result.loading = true;
       result.converged = false;
     }
@@ -253,7 +257,7 @@ FrameResult Viewer::render(const Frame& frame) {
                     std::ranges::any_of(played_, [&](const PlayedPtr& p) { return failed(p->shelf.status()); }) ||
                     std::ranges::any_of(watching_, [&](const WatchingPtr& w) { return failed(w->builder.status()); }) ||
                     failed(lives_.status()) || failed(poses_.status());
-    result.more = result.more || navigation_.moving() || built_for_another();
+    result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
   if (failure) throw Error(*failure);
@@ -277,7 +281,8 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
 
 // ---- states in GL ----
 
-void Viewer::set_live_gl(const std::shared_ptr<Live>& live, const render::GlState& state) {
+// live: a copy, for the log callback may release the host's last handle.
+void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
   std::vector<volume::MemoryField> fields;  // what of them can be checked without voxels
   std::vector<volume::Channel> channels;
   for (const render::GlVoxels& field : state.fields) {
@@ -303,7 +308,7 @@ void Viewer::set_live_gl(const std::shared_ptr<Live>& live, const render::GlStat
   }
   with_gl([&](Context& g) {
     if (state.changed) live->require_updatable(channels, g.transfers().channels_of(live.get()), state.name);
-    g.transfers().begin(state, live.get(), std::move(arrive));
+    g.transfers().begin(state, live.get(), std::move(arrive), [live] { live->refuse_updates(); });
   });
   notify();
 }

@@ -310,6 +310,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   }
 
   openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor, Portion portion) {
+    stream_.clear();  // a stand-in may have failed
+    stream_.hold(false);
     stream_.seekg(descriptor.getGridPos());
     // An instance holds no tree. Without offsets a grid's end is unknown, and the file's the best guess.
     if (!descriptor.isInstance()) {

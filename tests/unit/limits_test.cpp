@@ -286,6 +286,35 @@ TEST_F(Limits, CellsFollowTheCap) {
   }
 }
 
+// Also of a first grid, which was begun before there was a cap.
+TEST_F(Limits, CellsUnderWayFollowTheCap) {
+  const VolumeRef ball = make_ball(56);
+  auto frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  const auto begin = [&] {
+    ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
+    split_to_the_voxel(viewer, CUMULET_BUILD_CPU);
+    EXPECT_EQ(cumulet_set_volume(viewer.get(), ball.get()), CUMULET_OK);
+    return viewer;
+  };
+  const ViewerPtr free = begin();
+  converge(free.get(), frame);
+  const cumulet_stats all = stats_of(free);
+  const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
+  const ViewerPtr viewer = begin();
+  limit(viewer, 0, room);
+  auto result = make_desc<cumulet_frame_result>();
+  int refused = 0;  // what was built before may come first
+  for (int i = 0; i < 100000 && (result.flags & CUMULET_RENDER_CONVERGED) == 0; ++i) {
+    if (cumulet_render(viewer.get(), &frame, &result) == CUMULET_ERROR_OUT_OF_MEMORY) ++refused;
+    ASSERT_LE(refused, 1) << cumulet_last_error(viewer.get());
+  }
+  const cumulet_stats cut = stats_of(viewer);
+  EXPECT_LE(cut.gl_bytes, room);
+  EXPECT_LT(cut.cells, all.cells);
+  EXPECT_GT(cut.cells, all.cells / 10);
+}
+
 // Where the lattice that GL builds of would leave little, the CPU's cells come instead, which need none.
 TEST_F(Limits, NoLatticeTakesTheCellsRoom) {
   const VolumeRef ball = make_ball(56);

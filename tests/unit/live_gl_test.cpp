@@ -586,8 +586,10 @@ TEST_F(LiveGl, IsRefusedInOneLine) {
 
 TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
   const Array good(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
-  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], good))});
+  const std::vector good_fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], good))};
+  hand_over(good_fields);
   arrive();
+  std::uint64_t states = 1;
   const Picture before = picture();
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
                           -std::numeric_limits<float>::infinity()}) {
@@ -599,6 +601,8 @@ TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
         const std::vector fields{
             in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types.at(type), array))};
         if (boxes) {
+          hand_over(good_fields);
+          states += arrive();
           hand_over(fields, {{{0, 16, 8}, {7, 23, 15}}});
         } else {
           hand_over(fields);
@@ -614,13 +618,48 @@ TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
         EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: its voxel (3, 20, 11) is not finite");
         EXPECT_EQ(difference(target_.pixels(), before), "");
         EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << "told once";
-        EXPECT_EQ(handed(), 1U);
+        EXPECT_EQ(handed(), states);
       }
     }
   }
   const Array next(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
   hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], next))});
   EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, next.values)));
+}
+
+// Boxes that came after a whole state which is refused were of that, and those before it of one that is no longer
+// known.
+TEST_F(LiveGl, BoxesOnARefusedStateGoWithIt) {
+  const Array good(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Array next(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  auto bad = next;
+  bad.values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::quiet_NaN();
+  const auto field = [&](const Array& array) {
+    return in_texture(CUMULET_CHANNEL_DENSITY, odd,
+                      objects_.texture(odd, types[0], Array(CUMULET_VOXEL_FORMAT_R32F, array.values)));
+  };
+  hand_over({field(good)});
+  arrive();
+  hand_over({field(bad)});
+  hand_over({field(next)}, {{{0, 0, 0}, {7, 7, 7}}});
+  const cumulet_frame_desc frame = target_.frame();
+  cumulet_status status = CUMULET_OK;
+  for (int i = 0; i < 100 && status == CUMULET_OK; ++i) status = cumulet_render(v_, &frame, nullptr);
+  EXPECT_EQ(status, CUMULET_ERROR_FILE);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
+  EXPECT_EQ(handed(), 1U);
+  expect_same(newest(live_), alone(dense(odd, good.values)));
+  const std::vector fields{field(next)};
+  const cumulet_voxel_box box{{0, 0, 0}, {7, 7, 7}};
+  cumulet_gl_state_desc update = state_of(fields);
+  update.changed = &box;
+  update.changed_count = 1;
+  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
+  hand_over(fields);
+  hand_over(fields, {box});
+  arrive();
+  EXPECT_EQ(handed(), 3U);
   expect_same(newest(live_), alone(dense(odd, next.values)));
 }
 
@@ -764,7 +803,8 @@ class Transfers : public test::GlTest {
   std::vector<volume::FieldCopy> transfer(render::VoxelTransfers& transfers, const render::GlState& state) {
     std::optional<std::vector<volume::FieldCopy>> found;
     const gl::StateGuard guard(*gl_);
-    transfers.begin(state, this, [&](std::vector<volume::FieldCopy> fields) { found = std::move(fields); });
+    transfers.begin(
+        state, this, [&](std::vector<volume::FieldCopy> fields) { found = std::move(fields); }, [] {});
     for (int i = 0; !found && i < 100000; ++i) transfers.follow(render::Deadline::max());
     return std::move(found).value();
   }
@@ -810,7 +850,7 @@ TEST_P(Transfers, SmallStorageBlocksAreEnough) {
       limits.storage_block_bytes = 4096;
       render::VoxelTransfers refusing(gl_, programs_, limits);
       const gl::StateGuard guard(*gl_);
-      EXPECT_THROW(refusing.begin(state, this, nullptr), Error);
+      EXPECT_THROW(refusing.begin(state, this, nullptr, nullptr), Error);
       EXPECT_FALSE(refusing.busy());
     }
   }

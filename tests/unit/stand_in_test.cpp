@@ -207,27 +207,39 @@ TEST_F(StandIns, TheWholeIsAsItIsWithout) {
 }
 
 TEST_F(StandIns, WhatIsWrongIsToldOfTheWhole) {
-  write(file(), {ball("density", 0, 33, everywhere(1.0F))});
+  write(file(), {ball("density", 0, 33, everywhere(1.0F)), ball("temperature", 0, 33, everywhere(2.0F))});
   volume::GridNames missing;
   missing.temperature = "nowhere";
-  const auto refusal = [&](bool with) {
+  const auto refusal = [&](bool with, const volume::GridNames& names) {
     return test::refusal(file(), [&] {
       if (with) {
-        import(1, missing);
+        import(1, names);
       } else {
-        static_cast<void>(volume::import_frame(file(), missing, Log()));
+        static_cast<void>(volume::import_frame(file(), names, Log()));
       }
     });
   };
-  EXPECT_EQ(refusal(true), refusal(false));
-  // Values that no codec takes: of a leaf in the middle of the file.
+  EXPECT_EQ(refusal(true, missing), refusal(false, missing));
+  // It ends within the temperature.
+  const volume::GridNames any;
+  const auto whole_size = std::filesystem::file_size(file());
+  for (const double at : {0.95, 0.75, 0.55}) {
+    std::filesystem::resize_file(file(), static_cast<std::uintmax_t>(at * double(whole_size)));
+    EXPECT_NE(refusal(false, any), "");
+    EXPECT_EQ(refusal(true, any), refusal(false, any)) << at;
+  }
+  write(file(), {ball("density", 0, 33, everywhere(1.0F)), ball("temperature", 0, 33, everywhere(2.0F))});
+  // Values that no codec takes: of the density, which comes first, or of the temperature.
   const auto size = std::filesystem::file_size(file());
-  std::fstream damaged(file(), std::ios::in | std::ios::out | std::ios::binary);
-  damaged.seekp(static_cast<std::streamoff>(size / 2));
-  const std::vector<char> noise(size / 4, '\x7f');
-  damaged.write(noise.data(), static_cast<std::streamsize>(noise.size()));
-  damaged.close();
-  EXPECT_NE(test::refusal(file(), [&] { import(); }), "");
+  for (const double at : {0.9, 0.25}) {
+    std::fstream damaged(file(), std::ios::in | std::ios::out | std::ios::binary);
+    damaged.seekp(static_cast<std::streamoff>(at * double(size)));
+    const std::vector<char> noise(size / 20, '\x7f');
+    damaged.write(noise.data(), static_cast<std::streamsize>(noise.size()));
+    damaged.close();
+    EXPECT_NE(refusal(false, any), "");
+    EXPECT_EQ(refusal(true, any), refusal(false, any)) << at;
+  }
 }
 
 /// A viewer whose loads stand still once they have read the density, which has a negative voxel: until it is let go on.

@@ -242,6 +242,7 @@ class Host {
   [[nodiscard]] std::array<double, 2> middle_of_smoke(double aspect) {
     const auto n = static_cast<std::size_t>(voxels_);
     std::vector<float> values(n * n * n);
+    glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);
     glGetTextureImage(solver_.smoke(), 0, GL_RED, GL_FLOAT, GLsizei(values.size() * sizeof(float)), values.data());
     double mass = 0.0;
     Point sum{};

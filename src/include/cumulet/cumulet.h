@@ -1019,15 +1019,18 @@ typedef struct cumulet_gl_state_desc {
  * States become so in the order in which they were handed over by one viewer; memory's (cumulet_live_set) or another
  * viewer's when they are handed over, whatever is on its way. However fast they come the newest whole state wins and
  * none starves: the oldest that is on its way arrives, and of those behind it the newest; boxes on top of one that was
- * left out are part of a newer whole. Two whole states on their way take as much GL memory as twice their voxels.
+ * left out are part of a newer whole. Two whole states on their way take as much GL memory as twice their voxels, which
+ * cumulet_limits_desc.gl_bytes does not bound; cells get what these leave of it.
  *
  * It is the same, bit for bit, as the same numbers by cumulet_live_set in a dense array: of a normalised format k / 255
  * or k / 65535. Refused in one line, with all else as it was, is what cumulet_live_set refuses, and a name that is no
  * such texture or buffer of the context's group, has no size, lacks the component, or whose layers of bricks are larger
  * than the driver's storage blocks (CUMULET_ERROR_UNSUPPORTED). A number that is not finite is found when it arrives:
  * the cumulet_render that finds it draws what there was, and is CUMULET_ERROR_FILE with the line, once; so is what no
- * longer fits the state that is there. What is on its way when the viewer is detached, or its context is lost, never
- * arrives: the state before stays, and boxes on top of it would miss it, so that a whole state is next.
+ * longer fits the state that is there. Of a whole state that is so refused boxes on top of it are left out with it, and
+ * refused from then on, until another whole one is handed over; boxes that are refused are missing, no more. What is on
+ * its way when the viewer is detached, or its context is lost, never arrives: the state before stays, and boxes on top
+ * of it would miss it, so that a whole state is next.
  */
 CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
                                                const cumulet_gl_state_desc* desc);
