@@ -8,7 +8,8 @@
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
 //   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
 //                 it the nearest surface, none behind the ground; and the sun's light that they scatter to the eye, whose
-//                 share is beside it: of the surface's matte part, with shadows, and about that of the volume; mean
+//                 share is beside it: of the surface's matte part, with shadows, and about that of the volume, neither
+//                 where light may come through glass; of holdouts nothing; mean
 //   velocity      of the volume where it scatters light for the first time, world units a second; mean, 0 where nothing
 //                 scatters
 //   motion        from where it is seen to where it was a frame ago, pixels, y up: of what is solid (the ground too), or
@@ -138,7 +139,7 @@ float cm_depth_to_far(vec3 from, vec3 d) {
   if (cm_trace_models(from, d, 0.0, 3.0e38, true, met)) return 1e30;
 #endif
   float used = 0.0;
-  CmWalk walk = cm_walk(o, cm_to_cube(d), 3.0e38);
+  CmWalk walk = cm_walk(o, cm_to_cube(d), 3.0e38, false);
   float t_1, e_0, e_1;
   for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e_0, e_1); ++j) {
     used += cm_depth_of(e_0, e_1, t_1 - walk.t, t_1 - walk.t);
@@ -190,7 +191,8 @@ void main() {
     vec3 to_sun = cm_to_sun(fract(0.5 + float(i) * vec2(0.8191725134, 0.6710436067)));
     vec3 sun_from[2];  // of a surface, of the medium
     vec2 scatters = vec2(0.0);  // this ray's chances, and sum of depths
-    vec4 medium = vec4(0.0);    // its albedo and mean cosine, sums
+    vec4 medium = vec4(0.0);    // its albedo and mean cosine, sums; of what is before all that is solid
+    vec2 before = vec2(0.0);    // likewise, of that
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
     vec3 of_sun = vec3(0.0);
@@ -201,9 +203,10 @@ void main() {
       normal += point.material.normal;
       albedo += point.material.base_color;
       covered.x += 1.0;
-      of_surface = point.emission;
+      bool is_hole = (cm_models[cm_model_of(hit.triangle)].flags & CM_MODEL_HOLDOUT) != 0u;
+      if (!is_hole) of_surface = point.emission;
       float cosine = dot(point.material.matte_normal, to_sun);
-      if (cosine > 0.0 && !point.unlit) {
+      if (cosine > 0.0 && !point.unlit && !is_hole && cm.surfaces.rich == 0u) {
         of_sun = 0.318309886 * cosine * cm_terminator(point.material, to_sun) * cm.lights.sun_irradiance *
                  cm_matte_albedo(point.material, dot(point.material.normal, -w));
         vec3 shift;
@@ -226,7 +229,7 @@ void main() {
 #endif
     float used = 0.0;
     float clear = 1.0;
-    CmWalk walk = cm_walk(o, d, surface_t);
+    CmWalk walk = cm_walk(o, d, surface_t, true);
     // Beyond e^-40 nothing is left to know.
     for (int j = 0; j < 100000 && used < 40.0; ++j) {
       float t_1, e_0, e_1;
@@ -246,11 +249,13 @@ void main() {
       float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
       emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
 #endif
+      vec2 scatters_here = clear * chance * vec2(1.0, (t + within_part * min(span, walk.t_end - t)) / t_per_z);
+      scatters += scatters_here;
       if (t < solid_t) {
         emission += clear * chance * cm_walk_source(walk);
         medium += clear * chance * cm_walk_scatters(walk);
+        before += scatters_here;
       }
-      scatters += clear * chance * vec2(1.0, (t + within_part * min(span, walk.t_end - t)) / t_per_z);
 #if CM_VELOCITY
       velocity += clear * chance * cm_walk_velocity(walk, t_1);
       vec3 middle = o + (t + within_part * min(span, walk.t_end - t)) * d;
@@ -274,12 +279,15 @@ void main() {
 #endif
     scattered += scatters.x;
     scattered_z += scatters.y;
-    if (scatters.x > 0.0) sun_from[1] = cm_from_cube_point(o + (scatters.y / scatters.x * t_per_z) * d);
+    if (before.x > 0.0) sun_from[1] = cm_from_cube_point(o + (before.y / before.x * t_per_z) * d);
     vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
+#if CM_SURFACES
+    if (cm.surfaces.rich != 0u) light[1] = vec3(0.0);
+#endif
     for (int k = 0; k < 2; ++k) {
       if (light[k] == vec3(0.0)) continue;
       float depth = cm_depth_to_far(sun_from[k], to_sun);
-      sunlit += light[k] * (k == 0 ? exp(-depth) : cm_scattered_by_many(medium.a / scatters.x, dot(w, to_sun), depth));
+      sunlit += light[k] * (k == 0 ? exp(-depth) : cm_scattered_by_many(medium.a / before.x, dot(w, to_sun), depth));
     }
   }
   imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));

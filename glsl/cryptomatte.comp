@@ -100,7 +100,7 @@ void main() {
     }
     float used = 0.0;
     float clear = share;
-    CmWalk walk = cm_walk(ray.o, ray.d, solid_t);
+    CmWalk walk = cm_walk(ray.o, ray.d, solid_t, true);
     // Beyond e^-40 nothing is left to know.
     for (int j = 0; j < 100000 && used < 40.0; ++j) {
       float t_1, e_0, e_1;

@@ -163,7 +163,7 @@ void main() {
 #endif
   // Width of a pixel in world space, over t where perspective.
   float footprint = 2.0 * length(cm.view.up) / float(cm.view.size.y);
-  CmWalk walk = cm_walk(o, d, surface_t);
+  CmWalk walk = cm_walk(o, d, surface_t, true);
   bool hit = walk.entry < 3.0e38;
   if (view == CM_VIEW_CELLS) {
     vec3 f = abs(cm_to_cube(cm.view.forward));

@@ -4,11 +4,6 @@
 #ifndef CM_WALK_GLSL
 #define CM_WALK_GLSL
 
-// Which instances a ray comes to: what cameras see, if the includer does not say otherwise.
-#ifndef CM_WALK_FLAGS
-#define CM_WALK_FLAGS CM_INSTANCE_SEEN
-#endif
-
 // That a ray may be in at once. With more of them at one place those that it enters last are taken up when others end.
 #if CM_INSTANCES
 #define CM_MOST_FRONTS 4
@@ -32,6 +27,7 @@ struct CmWalk {
   vec3 d;
   float t;  // where the part begins
   float t_end;
+  bool of_camera;  // it comes to what cameras see, else to all
   int count;
   CmFront front[CM_MOST_FRONTS];
   float entry;   // where it enters the volume that comes next, 3e38: none does
@@ -65,14 +61,16 @@ float cm_front_extinction(CmFront front, float t) {
 // The volume that comes next.
 void cm_walk_seek(inout CmWalk walk) {
 #if CM_INSTANCES
-  if (!cm_next_instance(walk.o, walk.d, walk.t_end, CM_WALK_FLAGS, walk.entry, walk.volume)) walk.entry = 3.0e38;
+  uint flags = walk.of_camera ? CM_INSTANCE_SEEN : 0u;
+  if (!cm_next_instance(walk.o, walk.d, walk.t_end, flags, walk.entry, walk.volume)) walk.entry = 3.0e38;
 #else
   walk.entry = 3.0e38;
 #endif
 }
 
-CmWalk cm_walk(vec3 o, vec3 d, float t_end) {
+CmWalk cm_walk(vec3 o, vec3 d, float t_end, bool of_camera) {
   CmWalk walk;
+  walk.of_camera = of_camera;
   walk.o = o;
   walk.d = d;
   walk.t = 0.0;
