@@ -6,6 +6,8 @@
 #define CM_BLOCK_LANES 1024u
 #define CM_MOST_BLOCKS 256u
 #define CM_BEGINS 0x80000000u  // with a block's number: a tile begins
+#define CM_TURN 16             // likewise, from this bit on: which of these lists it reads; it makes the next
+#define CM_TURNS 3u
 #define CM_SQUARE_EDGE 8u
 #define CM_SQUARE_PIXELS 64u
 #define CM_MOST_SQUARES 16384u  // of a tile

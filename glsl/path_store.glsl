@@ -13,6 +13,8 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
                                       // that they finished in this dispatch
   uint cm_next_place;                 // that no lane has had
   uint cm_squares[CM_MOST_SQUARES];   // the list of those that are sampled: CM_SQUARE_ROWS
+  uint cm_rank_counts[CM_TURNS * CM_MOST_BLOCKS];  // by turns, of each block: its lanes that have a path
+  uint cm_ranks[];                    // by turns: lanes of all blocks, of each those first that have a path
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
@@ -137,11 +139,25 @@ void cm_store_path(CmPath p, uint lane) {
 
 // A kernel that has a row of work groups for each block of the dispatch: its lane, which there may not be; and whether a
 // tile begins, so that no lane has a path.
-uint cm_block_lane() {
-  uint block = cm_blocks[gl_WorkGroupID.y].x & ~CM_BEGINS;
-  return block * CM_BLOCK_LANES + gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex;
-}
+uint cm_block() { return bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, 0, CM_TURN); }
+uint cm_place_in_block() { return gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex; }
+uint cm_block_lane() { return cm_block() * CM_BLOCK_LANES + cm_place_in_block(); }
 bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
 uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
+
+// The same with closed ranks: where many lanes are done those that are not share vectors. Turn by turn a dispatch reads
+// the list that the block's last one has made, makes the next, and empties the one after that.
+uint cm_turn(uint ahead) { return (bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, CM_TURN, 2) + ahead) % CM_TURNS; }
+uint cm_ranked_lane() {
+  if (cm_place_in_block() == 0u) cm_rank_counts[cm_turn(2u) * CM_MOST_BLOCKS + cm_block()] = 0u;
+  if (cm_block_begins()) return cm_block_lane();
+  if (cm_place_in_block() >= cm_rank_counts[cm_turn(0u) * CM_MOST_BLOCKS + cm_block()]) return cm_lanes();
+  return cm_ranks[cm_turn(0u) * cm_lanes() + cm_block_lane()];
+}
+// It goes on in the next dispatch.
+void cm_join_ranks(uint lane) {
+  uint rank = atomicAdd(cm_rank_counts[cm_turn(1u) * CM_MOST_BLOCKS + cm_block()], 1u);
+  cm_ranks[cm_turn(1u) * cm_lanes() + cm_block() * CM_BLOCK_LANES + rank] = lane;
+}
 
 #endif

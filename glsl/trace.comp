@@ -37,7 +37,7 @@ void cm_forget_triangles(inout CmPath p) {
 }
 
 void main() {
-  uint lane = cm_block_lane();
+  uint lane = cm_ranked_lane();
   if (lane >= cm_lanes()) return;
 #if CM_GROUPS
   cm_group_lane = lane;
@@ -49,7 +49,6 @@ void main() {
   } else {
     p = cm_load_path(lane);
     cm_load_visit(p, lane);
-    if (p.stage == CM_STAGE_DONE) return;
     samples = cm_pixel_samples(cm_pixel_of(p.place));
   }
   cm_forget_triangles(p);
@@ -58,7 +57,10 @@ void main() {
   cm_store_path(p, lane);
   cm_store_visit(p, lane);
   uint block = cm_block_of(lane);
-  if (p.stage != CM_STAGE_DONE) atomicAdd(cm_blocks[block].y, 1u);
+  if (p.stage != CM_STAGE_DONE) {
+    cm_join_ranks(lane);
+    atomicAdd(cm_blocks[block].y, 1u);
+  }
   if (p.stage != CM_STAGE_DONE && samples == 0u) atomicAdd(cm_blocks[block].z, 1u);
   if (run.finished != 0u) atomicAdd(cm_blocks[block].w, run.finished);
   if (run.marches != 0u) atomicAdd(cm_total.x, (run.marches + CM_EVENTS - 1u) / CM_EVENTS);

@@ -34,19 +34,17 @@ constexpr std::uint32_t first_rounds = 4;  // while nothing is known of what the
 std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std::uint32_t under_way, bool free,
                                     Dispatched& what) {
   std::optional<double> round_ms;
-  double all_lanes = 0.0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::size_t index = (from + i) % blocks.size();
     const Block& block = blocks[index];
     if (block.unfinished == 0 || block.under_way != under_way) continue;
     const double lanes = what.lanes + block.unfinished;
-    const double slots = std::min(lanes, (all_lanes + block.lanes) / lanes_a_slot);
+    const double slots = what.slots + std::ceil(block.unfinished / lanes_a_slot);
     const auto ms = what.cost->most(slots, free);
     if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > what.aim_ms)) break;
     what.blocks.push_back(static_cast<std::uint32_t>(index));
     what.lanes = lanes;
     what.slots = slots;
-    all_lanes += block.lanes;
     round_ms = ms;
   }
   return round_ms;

@@ -51,11 +51,11 @@ class Reserve {
 
 /// Some of the lanes that sample a tile's pixels in one pass.
 struct Block {
-  std::uint32_t lanes = 0;
-  std::uint32_t unfinished = 0;  // have a pixel, as far as is known: no fewer have
+  std::uint32_t unfinished = 0;  // have a pixel, as far as is known: no more have
   std::uint32_t empty = 0;       // of those: one without a sample
   std::uint32_t under_way = 0;   // dispatches
   bool begins = true;
+  std::uint32_t turn = 0;  // CM_TURN of glsl/path_blocks.glsl
 };
 using Blocks = std::vector<Block>;
 

@@ -30,19 +30,29 @@ constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MOST_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // a lane
 
-// cm_next_place and cm_squares, behind cm_total and cm_blocks.
+// cm_next_place and what follows it, behind cm_total and cm_blocks.
 constexpr std::size_t next_place_at = (1 + CM_MOST_BLOCKS) * sizeof(glm::uvec4);
 constexpr std::size_t squares_at = next_place_at + sizeof(std::uint32_t);
-constexpr std::size_t blocks_bytes = squares_at + CM_MOST_SQUARES * sizeof(std::uint32_t);
+constexpr std::size_t rank_counts_at = squares_at + CM_MOST_SQUARES * sizeof(std::uint32_t);
+constexpr std::size_t rank_counts_bytes = std::size_t{CM_TURNS} * CM_MOST_BLOCKS * sizeof(std::uint32_t);
+constexpr std::size_t blocks_bytes(std::size_t lanes) {
+  return rank_counts_at + rank_counts_bytes + CM_TURNS * lanes * sizeof(std::uint32_t);
+}
 
 }  // namespace
 
-void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
-  if (!blocks_) {
-    blocks_ = gl::make_buffer(gl_, blocks_bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
+bool PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
+  bool kept = true;
+  if (!blocks_ || lanes > ranked_lanes_) {
+    kept = false;
+    blocks_ = {};
+    ranked_lanes_ = 0;
+    blocks_ = gl::make_buffer(gl_, blocks_bytes(lanes), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
+    ranked_lanes_ = lanes;
   }
   const std::size_t path_bytes = lanes * lane_bytes(visits, within, groups);
   if (path_bytes > path_bytes_) {
+    kept = false;
     paths_ = {};
     path_bytes_ = 0;
     paths_ = gl::make_buffer(gl_, path_bytes, nullptr, 0, "creating the path buffer");
@@ -55,6 +65,7 @@ void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool with
                               "creating the queues of paths");
     queues_lanes_ = lanes;
   }
+  return kept;
 }
 
 void PathKernels::bind() const {
@@ -70,6 +81,8 @@ void PathKernels::set_counters(std::span<const glm::uvec4> words) const {
 void PathKernels::set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const {
   gl_->NamedBufferSubData(blocks_.name(), next_place_at, sizeof lanes, &lanes);
   gl_->NamedBufferSubData(blocks_.name(), squares_at, static_cast<GLsizeiptr>(squares.size_bytes()), squares.data());
+  gl_->ClearNamedBufferSubData(blocks_.name(), GL_R32UI, rank_counts_at, rank_counts_bytes, GL_RED_INTEGER,
+                               GL_UNSIGNED_INT, nullptr);
 }
 
 void PathKernels::run_one(std::uint32_t lanes, std::size_t blocks) const {
@@ -104,7 +117,8 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t lanes,
 std::uint32_t PathKernels::most_rounds() { return CM_MOST_ROUNDS; }
 
 std::uint64_t PathKernels::bytes() const {
-  return path_bytes_ + (queues_ ? heads_bytes + queues_lanes_ * queue_bytes : 0);
+  return path_bytes_ + (blocks_ ? blocks_bytes(ranked_lanes_) : 0) +
+         (queues_ ? heads_bytes + queues_lanes_ * queue_bytes : 0);
 }
 
 }  // namespace cumulet::render

@@ -31,15 +31,15 @@ class PathKernels {
 
   /// Makes room for so many paths, with queues if they are to be run by stages, with what paths among several
   /// volumes keep of their visits, with what they keep of the glass that they are within, and with sums of so many
-  /// groups of lights. Throws on a GL error.
-  void reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
+  /// groups of lights. Returns whether paths that were under way still are. Throws on a GL error.
+  bool reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
   /// Binds all that reserve made.
   void bind() const;
   /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
   [[nodiscard]] GLuint counters() const { return blocks_.name(); }
   void set_counters(std::span<const glm::uvec4> words) const;
   /// The list of a tile's squares that are sampled (CM_SQUARE_ROWS of glsl/path_blocks.glsl); no place of theirs is
-  /// taken but those that so many lanes begin with.
+  /// taken but those that so many lanes begin with. All blocks begin, with their first turn.
   void set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const;
   /// One kernel over so many blocks of so many lanes; its program is in use.
   void run_one(std::uint32_t lanes, std::size_t blocks) const;
@@ -56,6 +56,7 @@ class PathKernels {
   gl::Object queues_;
   std::size_t queues_lanes_ = 0;
   gl::Object blocks_;
+  std::size_t ranked_lanes_ = 0;
 };
 
 }  // namespace cumulet::render

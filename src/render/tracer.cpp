@@ -31,6 +31,7 @@ static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_
 static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
 static_assert(CM_MOST_SQUARES <= 1U << CM_SQUARE_ROWS);
 constexpr double hasty_rest = 0.03;  // of a tile's pixels
+static_assert(lanes_in_call > hasty_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
 constexpr std::uint32_t most_rounds = 65536;
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t most_samples = 1U << 31U;
@@ -217,7 +218,7 @@ void Picture::begin_tile() {
                             : std::accumulate(pixels.begin() + static_cast<std::ptrdiff_t>(first),
                                               pixels.begin() + static_cast<std::ptrdiff_t>(end), 0U);
     // Not known of a pass that begins with holes until its blocks tell.
-    blocks_->push_back({lanes, lanes, holes_ ? lanes : 0, 0, true});
+    blocks_->push_back({.unfinished = lanes, .empty = holes_ ? lanes : 0});
   }
 }
 
@@ -576,7 +577,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   const bool stages = picture.traced_ > 0;
   const std::uint32_t most_lanes = gl_->dispatches_in_call ? lanes_in_call : (stages ? lanes_of_stages : lanes_at_once);
   const std::uint32_t lanes = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, most_lanes);
-  if (shaded) kernels_.reserve(lanes, stages, picture.several_, picture.rich_, picture.light_groups_);
+  if (shaded && !kernels_.reserve(lanes, stages, picture.several_, picture.rich_, picture.light_groups_))
+    paths_of_.reset();
   find_programs(picture, data, obstacles);
   picture.parameters_ = assemble(parameters, obstacles);
   picture.parameters_.integrator.groups = picture.light_groups_;
@@ -823,11 +825,14 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   const std::size_t step = far_step(count);
   for (std::size_t i = 0; i < count; ++i) dealt[i] = what.blocks[i * step % count];
   what.blocks = std::move(dealt);
+  std::uint32_t lanes_a_block = 0;
   std::vector<glm::uvec4> words(1 + picture.blocks_->size(), glm::uvec4(0U));
   for (std::size_t i = 0; i < count; ++i) {
     Block& block = (*picture.blocks_)[what.blocks[i]];
-    words[1 + i].x = what.blocks[i] | (block.begins ? PathKernels::begins_tile : 0U);
+    words[1 + i].x = what.blocks[i] | block.turn << CM_TURN | (block.begins ? PathKernels::begins_tile : 0U);
+    lanes_a_block = std::max(lanes_a_block, block.begins ? block_lanes : block.unfinished);
     block.begins = false;
+    block.turn = (block.turn + 1) % CM_TURNS;
     ++block.under_way;
   }
   picture.revision_ = ++revision_;
@@ -843,7 +848,7 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   if (stages) {
     kernels_.run_stages(*stages, picture.lanes_, count, what.rounds);
   } else {
-    kernels_.run_one(picture.lanes_, count);
+    kernels_.run_one(std::min(picture.lanes_, lanes_a_block), count);
   }
   flights_.end(std::move(what), kernels_.counters(), words.size());
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |

@@ -114,7 +114,6 @@ class MadeDevice {
       for (std::uint32_t lane = 0; lane < a_block; ++lane)
         lanes_[i].push_back({i < rows ? Lane::sky : i == rows && lane % 2 == 0 ? Lane::rim : Lane::cloud, i, 0});
     }
-    for (render::Block& block : blocks) block.lanes = a_block;
   }
 
   render::Blocks blocks;
