@@ -15,7 +15,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "march.glsl"
 #include "ray.glsl"
 #include "octahedron.glsl"
-// Who is hidden from cameras has its shadow.
 #include "walk.glsl"
 
 layout(r16f, binding = CM_IMAGE_TRANSMITTANCE_MAP) uniform writeonly image3D cm_map;
@@ -35,6 +34,7 @@ void main() {
   float step_t = (cm_range.y - cm_range.x) / float(slices - 1);
   int slice = 0;
   float used = 0.0;
+  // Who is hidden from cameras has its shadow.
   CmWalk walk = cm_walk(o, cm_to_cube(w), cm_range.y, false);
   for (int i = 0; i < 100000 && slice < slices; ++i) {
     float t_1, e_0, e_1;

@@ -43,12 +43,14 @@ constexpr std::size_t blocks_bytes(std::size_t lanes) {
 
 bool PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
   bool kept = true;
-  if (!blocks_ || lanes > ranked_lanes_) {
+  const std::size_t ranked_lanes = stages ? 0 : lanes;  // stages have queues
+  if (!blocks_ || ranked_lanes > ranked_lanes_) {
     kept = false;
     blocks_ = {};
     ranked_lanes_ = 0;
-    blocks_ = gl::make_buffer(gl_, blocks_bytes(lanes), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
-    ranked_lanes_ = lanes;
+    blocks_ =
+        gl::make_buffer(gl_, blocks_bytes(ranked_lanes), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
+    ranked_lanes_ = ranked_lanes;
   }
   const std::size_t path_bytes = lanes * lane_bytes(visits, within, groups);
   if (path_bytes > path_bytes_) {

@@ -394,11 +394,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arriv
     const auto of_one = [&](const Transfer& other) { return other.whose == whose; };
     auto other = std::ranges::find_if(transfers_, of_one);
     if (other != transfers_.end()) ++other;
-    while ((other = std::find_if(other, transfers_.end(), of_one)) != transfers_.end()) {
-      other->fence.order();  // another context of the group may have begun it
-      recycle(*other);
-      other = transfers_.erase(other);
-    }
+    while ((other = std::find_if(other, transfers_.end(), of_one)) != transfers_.end()) other = drop(other);
   }
   transfers_.push_back(std::move(transfer));
 }
@@ -481,6 +477,12 @@ void VoxelTransfers::recycle(Transfer& transfer) {
   while (spare_.size() > 2 * most_pieces_) spare_.pop_front();
 }
 
+VoxelTransfers::Transfers::iterator VoxelTransfers::drop(Transfers::iterator transfer) {
+  transfer->fence.order();  // another context of the group may have begun it
+  recycle(*transfer);
+  return transfers_.erase(transfer);
+}
+
 void VoxelTransfers::refuse_on_top(const Transfer& whole) {
   for (auto other = transfers_.begin(); other != transfers_.end();) {
     if (other->whose != whole.whose) {
@@ -488,9 +490,7 @@ void VoxelTransfers::refuse_on_top(const Transfer& whole) {
       continue;
     }
     if (other->whole) break;
-    other->fence.order();  // another context of the group may have begun it
-    recycle(*other);
-    other = transfers_.erase(other);
+    other = drop(other);
   }
   whole.refuse();
 }
@@ -513,19 +513,13 @@ void VoxelTransfers::follow(Deadline deadline) {
       if (!first.finite) {
         for (const volume::FieldCopy& field : first.fields) volume::require_finite(field.view(), first.name);
       }
+      first.arrive(std::move(first.fields));
     } catch (...) {
       failure = std::current_exception();
     }
     Transfer done = std::move(first);
     transfers_.pop_front();
     recycle(done);
-    if (!failure) {
-      try {
-        done.arrive(std::move(done.fields));
-      } catch (...) {
-        failure = std::current_exception();
-      }
-    }
     if (failure) {
       if (done.whole) refuse_on_top(done);
       std::rethrow_exception(failure);

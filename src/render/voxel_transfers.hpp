@@ -146,6 +146,10 @@ class VoxelTransfers {
   // What the driver had not copied by guess.
   void copy_rest(Transfer& transfer) const;
   void recycle(Transfer& transfer);
+  using Transfers = std::deque<Transfer>;
+  // Nobody waits for it any more. Returns the one after it.
+  Transfers::iterator drop(Transfers::iterator transfer);
+  // Those that came after a whole one, which is refused.
   void refuse_on_top(const Transfer& whole);
 
   gl::FunctionsPtr gl_;
@@ -153,7 +157,7 @@ class VoxelTransfers {
   std::uint64_t most_bytes_;
   std::uint64_t alignment_;
   gl::Object sampler_;
-  std::deque<Transfer> transfers_;  // in the order in which they were begun
+  Transfers transfers_;  // in the order in which they were begun
   std::deque<Room> spare_;
   std::size_t most_pieces_ = 0;  // of a state, lately
   int idle_ = 0;                 // calls of follow() since there was any

@@ -17,11 +17,12 @@ constexpr std::uint32_t height = 139;
 
 class Lanes : public CViewerTest {
  protected:
-  Lanes() : CViewerTest(width, height, 3) {}
+  Lanes() : CViewerTest(width, height) {}
 
   /// With so much time a frame; frames: how many it took.
   std::vector<float> picture(double budget_ms, bool surfaces, int& frames) {
-    SetUp();
+    viewer_ = make_viewer({.get_proc = cumulet::headless::Context::get_proc, .user = context_.get(), .samples = 3});
+    v_ = viewer_.get();
     auto frame = undrawn();
     frame.budget_ms = budget_ms;
     EXPECT_EQ(cumulet_set_volume(v_, ball_.get()), CUMULET_OK);

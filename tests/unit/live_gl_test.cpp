@@ -628,16 +628,15 @@ TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
   expect_same(newest(live_), alone(dense(odd, next.values)));
 }
 
-// Boxes that came after a whole state which is refused were of that, and those before it of one that is no longer
-// known.
+// They were on top of that, not of the state before.
 TEST_F(LiveGl, BoxesOnARefusedStateGoWithIt) {
   const Array good(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array next(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
-  auto bad = next;
-  bad.values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::quiet_NaN();
+  auto values = next.values;
+  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::quiet_NaN();
+  const Array bad(CUMULET_VOXEL_FORMAT_R32F, values);
   const auto field = [&](const Array& array) {
-    return in_texture(CUMULET_CHANNEL_DENSITY, odd,
-                      objects_.texture(odd, types[0], Array(CUMULET_VOXEL_FORMAT_R32F, array.values)));
+    return in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], array));
   };
   hand_over({field(good)});
   arrive();

@@ -207,7 +207,11 @@ TEST_F(StandIns, TheWholeIsAsItIsWithout) {
 }
 
 TEST_F(StandIns, WhatIsWrongIsToldOfTheWhole) {
-  write(file(), {ball("density", 0, 33, everywhere(1.0F)), ball("temperature", 0, 33, everywhere(2.0F))});
+  const auto write_both = [&] {
+    write(file(), {ball("density", 0, 33, everywhere(1.0F)), ball("temperature", 0, 33, everywhere(2.0F))});
+    return std::filesystem::file_size(file());
+  };
+  const auto size = write_both();
   volume::GridNames missing;
   missing.temperature = "nowhere";
   const auto refusal = [&](bool with, const volume::GridNames& names) {
@@ -222,15 +226,13 @@ TEST_F(StandIns, WhatIsWrongIsToldOfTheWhole) {
   EXPECT_EQ(refusal(true, missing), refusal(false, missing));
   // It ends within the temperature.
   const volume::GridNames any;
-  const auto whole_size = std::filesystem::file_size(file());
   for (const double at : {0.95, 0.75, 0.55}) {
-    std::filesystem::resize_file(file(), static_cast<std::uintmax_t>(at * double(whole_size)));
+    std::filesystem::resize_file(file(), static_cast<std::uintmax_t>(at * double(size)));
     EXPECT_NE(refusal(false, any), "");
     EXPECT_EQ(refusal(true, any), refusal(false, any)) << at;
   }
-  write(file(), {ball("density", 0, 33, everywhere(1.0F)), ball("temperature", 0, 33, everywhere(2.0F))});
+  write_both();
   // Values that no codec takes: of the density, which comes first, or of the temperature.
-  const auto size = std::filesystem::file_size(file());
   for (const double at : {0.9, 0.25}) {
     std::fstream damaged(file(), std::ios::in | std::ios::out | std::ios::binary);
     damaged.seekp(static_cast<std::streamoff>(at * double(size)));
