@@ -477,7 +477,7 @@ void VoxelTransfers::recycle(Transfer& transfer) {
   while (spare_.size() > 2 * most_pieces_) spare_.pop_front();
 }
 
-VoxelTransfers::Transfers::iterator VoxelTransfers::drop(Transfers::iterator transfer) {
+VoxelTransfers::Transfers::iterator VoxelTransfers::drop(const Transfers::iterator& transfer) {
   transfer->fence.order();  // another context of the group may have begun it
   recycle(*transfer);
   return transfers_.erase(transfer);

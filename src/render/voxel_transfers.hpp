@@ -148,7 +148,7 @@ class VoxelTransfers {
   void recycle(Transfer& transfer);
   using Transfers = std::deque<Transfer>;
   // Nobody waits for it any more. Returns the one after it.
-  Transfers::iterator drop(Transfers::iterator transfer);
+  Transfers::iterator drop(const Transfers::iterator& transfer);
   // Those that came after a whole one, which is refused.
   void refuse_on_top(const Transfer& whole);
 
