@@ -6,7 +6,6 @@
 // Files made for it, of the size N: fog:N, N^3 voxels; picture:N, N^2 pixels of a PNG; mesh:N, draco:N, meshopt:N, 2
 // N^2 triangles.
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -23,6 +22,7 @@
 #include "base/milliseconds.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
+#include "support/openvdb.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/surface_builder.hpp"
 

@@ -8,7 +8,6 @@
 // shaders while one waits, of the first view alone, and of no view. All with the same random numbers, twice: the
 // product of two independent differences to the voxels is, but for chance, the square of what is wrong with a grid, the
 // difference of the two pictures its noise. Time is the process's, of all cores.
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <array>
@@ -227,7 +226,6 @@ void run(const FlightOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  openvdb::initialize();
   FlightOptions options;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];

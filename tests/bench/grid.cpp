@@ -7,7 +7,6 @@
 // it, 1280 x 720; refits are of as many small steps on it, in calls of a budget, of which the longest are told. Seconds
 // of GL are until a fence after all passes has passed, on whatever driver there is; on Mesa's llvmpipe they are of the
 // same cores. Bytes are what passes read and write at least, each word once a pass that needs it.
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -234,7 +233,6 @@ void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings, c
 }  // namespace
 
 int main(int argc, char** argv) try {
-  openvdb::initialize();
   grid::RefineSettings settings;
   settings.criterion = grid::Criterion::transmittance;
   settings.threshold = 0.15;

@@ -1,7 +1,5 @@
 #include "recording.hpp"
 
-#include <openvdb/openvdb.h>
-
 #include <cstdio>
 #include <exception>
 #include <stdexcept>

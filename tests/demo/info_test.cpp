@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
-#include <openvdb/openvdb.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include <string>
 
 #include "support/folder.hpp"
+#include "support/openvdb.hpp"
 
 namespace {
 

@@ -5,7 +5,6 @@
 // of a kind can be set beside what was held after the last. One viewer stays, and ends each day with the same picture.
 
 #include <malloc.h>
-#include <openvdb/openvdb.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -24,6 +23,7 @@
 #include "support/fake_gl.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
+#include "support/openvdb.hpp"
 #include "unit/support/c_host.hpp"
 
 namespace {

@@ -3,7 +3,6 @@
 #include "volume/advection.hpp"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <tbb/global_control.h>
 
 #include <cmath>

@@ -7,7 +7,6 @@
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
 
 #include <atomic>
 #include <chrono>
@@ -27,6 +26,7 @@
 #include "support/c_host.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
+#include "support/openvdb.hpp"
 #include "support/radiance.hpp"
 #include "support/volumes.hpp"
 #include "surface/gltf_import.hpp"

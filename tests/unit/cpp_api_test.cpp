@@ -1,6 +1,5 @@
 // cumulet.hpp: that it passes everything through, and nothing gets lost between owners.
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -16,6 +15,7 @@
 #include "cumulet/cumulet.hpp"
 #include "headless.hpp"
 #include "support/folder.hpp"
+#include "support/openvdb.hpp"
 #include "support/osmesa_leaks.hpp"
 
 namespace {

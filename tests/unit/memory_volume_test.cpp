@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "support/folder.hpp"
+#include "support/openvdb.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
 

@@ -1,7 +1,6 @@
 // What a host must be able to rely on when things go wrong: memory, the context, files, sizes and moments.
 #include <gtest/gtest.h>
 #include <malloc.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/LevelSetUtil.h>
 
@@ -15,6 +14,7 @@
 #include "support/c_host.hpp"
 #include "support/fake_gl.hpp"
 #include "support/folder.hpp"
+#include "support/openvdb.hpp"
 
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\nleak:libgallium\nleak:swrast_dri\n"; }

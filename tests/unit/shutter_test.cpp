@@ -1,7 +1,6 @@
 // Motion blur: against closed forms, and against means of many pictures of what stands still.
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <array>
 #include <cmath>

@@ -2,7 +2,6 @@
 // still.
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,6 @@
 // Values that are read from a file leaf by leaf, against OpenVDB's own trees: of files with more leaves than a run has.
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 #include <limits>

@@ -1,7 +1,6 @@
 // How volumes move: what cells have of it, against sums over voxels, and what pixels have, against closed forms.
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>

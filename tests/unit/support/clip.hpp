@@ -1,7 +1,5 @@
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cmath>
 #include <filesystem>
 #include <fstream>

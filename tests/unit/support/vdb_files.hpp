@@ -3,7 +3,6 @@
 // For tests that write VDB files and read them back.
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <filesystem>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "support/openvdb.hpp"
 
 #define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 

@@ -1,0 +1,3 @@
+#include "support/openvdb.hpp"
+
+CUMULET_OPENVDB_GRIDS()
