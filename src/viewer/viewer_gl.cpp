@@ -137,7 +137,8 @@ void Viewer::prepare(const Frame& frame) {
       }
       wishes_due_ = true;
       follow_instances();
-      built_for_ = build_view();
+      // One that waits for a file that is read is asked for again, should it not be read.
+      built_for_ = volume_ && another_comes ? std::nullopt : std::optional(build_view());
       built_in_motion_ = !rests;
     }
   }
@@ -203,6 +204,7 @@ FrameResult Viewer::render(const Frame& frame) {
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   std::optional<Error> failure;
+  std::vector<std::string> others;  // whatever failed besides
   // Before anything new is seen, so that what comes later is told again.
   update_pending_ = false;
   with_gl([&](Context& g) {
@@ -216,7 +218,11 @@ FrameResult Viewer::render(const Frame& frame) {
         const Error error = caught(name);
         if (error.code() == ErrorCode::context_lost) throw;
         gl::check_reset(*g.functions());
-        if (!failure) failure = error;
+        if (failure) {
+          others.emplace_back(error.what());
+        } else {
+          failure = error;
+        }
         gl::clear_errors(*g.functions());
       }
     };
@@ -260,8 +266,9 @@ FrameResult Viewer::render(const Frame& frame) {
     result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
-  if (failure) throw Error(*failure);
-  return result;
+  if (!failure) return result;
+  for (const std::string& other : others) log_.warning(other);
+  throw Error(*failure);
 }
 
 WarmUp Viewer::warm_up(const Frame& frame, bool all) {

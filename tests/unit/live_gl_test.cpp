@@ -628,6 +628,33 @@ TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
   expect_same(newest(live_), alone(dense(odd, next.values)));
 }
 
+TEST_F(LiveGl, WhatElseFailsInItsFrameIsToldToTheLog) {
+  std::vector<std::string> warnings;
+  viewer_ = test::make_viewer({.get_proc = test::FakeGl::get_proc,
+                               .user = &fake_,
+                               .log =
+                                   [](void* all, cumulet_log_level level, const char* text) {
+                                     if (level == CUMULET_LOG_WARNING)
+                                       static_cast<std::vector<std::string>*>(all)->emplace_back(text);
+                                   },
+                               .log_user = &warnings,
+                               .samples = 2});
+  v_ = viewer_.get();
+  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 0);
+  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::quiet_NaN();
+  const Array bad(CUMULET_VOXEL_FORMAT_R32F, values);
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], bad))});
+  cumulet_frame_desc frame = target_.frame();
+  frame.framebuffer = 4711;
+  const std::string no_framebuffer = "the target, 4711, is no framebuffer of the current context";
+  cumulet_status status = CUMULET_ERROR_GL;
+  for (int i = 0; i < 100 && status != CUMULET_ERROR_FILE; ++i) status = cumulet_render(v_, &frame, nullptr);
+  EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: its voxel (3, 20, 11) is not finite");
+  EXPECT_EQ(warnings, std::vector{no_framebuffer});
+  viewer_.reset();
+}
+
 // They were on top of that, not of the state before.
 TEST_F(LiveGl, BoxesOnARefusedStateGoWithIt) {
   const Array good(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));

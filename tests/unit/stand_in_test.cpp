@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <fstream>
 #include <functional>
+#include <glm/gtc/matrix_transform.hpp>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/vdb_files.hpp"
+#include "viewer/instance.hpp"
 #include "volume/bricks.hpp"
 #include "volume/stand_in.hpp"
 
@@ -390,6 +392,34 @@ TEST_P(StandInViewer, WhatWasThereBeforeComesBack) {
   go_on();
   EXPECT_THROW(viewer_->wait(-1.0), Error);
   EXPECT_EQ(viewer_->bounds().max, before.max);
+}
+
+TEST_P(StandInViewer, ACameraThatMovedMeanwhileIsBuiltFor) {
+  volume::ScalarVolume small;
+  small.bounds_max = glm::ivec3(7);
+  small.background = small.max_value = 1.0F;
+  small.active_voxels = 512;
+  const auto before = std::make_shared<const viewer::VolumeAsset>(std::move(small));
+  viewer::GridSettings grid;
+  grid.camera_adaptive = true;
+  viewer_->set_grid(grid);
+  viewer_->set_volume(before);
+  // Its grid is built for views while the file is read.
+  viewer_->add_instance(std::make_shared<viewer::Instance>(
+      viewer::InstanceSettings{.volume = before, .to_world = glm::translate(glm::dmat4(1.0), glm::dvec3(20.0))}));
+  finished();
+  load();
+  wait_for_stand();
+  viewer::CameraPose pose;
+  pose.eye = {40.0, 30.0, 90.0};
+  pose.target = {10.0, 4.0, 4.0};
+  viewer_->camera()->set(pose);
+  for (int i = 0; i < 4; ++i) render();
+  viewer_->cancel();
+  go_on();
+  EXPECT_THROW(viewer_->wait(-1.0), Error);
+  for (int i = 0; i < 3; ++i) render();
+  EXPECT_NO_THROW(viewer_->wait(-1.0));
 }
 
 TEST_P(StandInViewer, WaitsForItsViewWhereGridsDependOnIt) {
