@@ -39,7 +39,8 @@ CM_FN float cm_passing_density(vec3 o, vec3 w, vec3 to_light, float distance) {
   float across = max(length(cross(w, to_light)), 1e-4f) * distance;
   vec2 line = cm_box_line(o, cm_to_cube(w));
   float angle = cm_angle_of(across, min(line.x, 0.0f) - along, max(line.y, 0.0f) - along);
-  return across / max(angle * distance * distance, 1e-30f);
+  // Where a line only touches the box it is without bounds, and its square would be no number.
+  return min(across / max(angle * distance * distance, 1e-30f), 1e18f);
 }
 
 // The share of what a look from there brings that counts, where the extinction is that: by the power heuristic.

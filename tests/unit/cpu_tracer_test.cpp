@@ -120,6 +120,19 @@ std::shared_ptr<StillScene> room_with_emitters() {
   return scene;
 }
 
+// One in thirty million did so, of a lamp in smoke: its pixel was no number.
+TEST(PassedLine, HasAShareWhereItOnlyTouchesTheBox) {
+  core::CpuTetPassing twin;
+  twin.cm.space.to_cube_x = {1.0F, 0.0F, 0.0F};
+  twin.cm.space.to_cube_y = {0.0F, 1.0F, 0.0F};
+  twin.cm.space.to_cube_z = {0.0F, 0.0F, 1.0F};
+  twin.cm.space.box_max = vec3(8.0F);
+  twin.cm.lights.lamp_chance = 0.5F;
+  const vec3 along_an_edge = glm::normalize(vec3(1.0F, -1.0F, 0.0F));
+  const float density = twin.cm_passing_density({8.0F, 8.0F, 4.0F}, along_an_edge, {0.0F, 0.0F, 1.0F}, 2.0F);
+  EXPECT_EQ(twin.cm_passing_share(density, 3.0F), 1.0F);
+}
+
 // A chance of 0 times a density that is no number would be none.
 TEST(GlowingBox, HasADensityFromAnywhere) {
   core::CpuTetSurfaces twin;

@@ -94,6 +94,19 @@ struct CpuSurfaceData {
   static float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, vec4& colour) { return 3.0e38F; }
 };
 
+#undef CM_EQUIANGULAR
+#define CM_EQUIANGULAR 1
+#undef CM_LAMPS
+#define CM_LAMPS 1
+struct CpuTetPassing : CpuTetData {
+  static CmLamp cm_lamp(uint) { return {}; }
+#include "support/traced.inc"
+};
+#undef CM_EQUIANGULAR
+#define CM_EQUIANGULAR 0
+#undef CM_LAMPS
+#define CM_LAMPS CM_SURFACES
+
 #undef CM_SURFACES
 #define CM_SURFACES 1
 struct CpuTetSurfaces : CpuTetData, CpuSurfaceData {
