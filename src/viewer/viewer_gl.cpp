@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
@@ -18,6 +20,26 @@ namespace cumulet::viewer {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// Of a frame's parts.
+struct Failures {
+  std::optional<Error> first;
+  std::vector<std::string> others;
+
+  void add(const Error& error) {
+    if (first) {
+      others.emplace_back(error.what());
+    } else {
+      first = error;
+    }
+  }
+  // Throws the first, if there is one; the log has the others.
+  void tell(const Log& log) const {
+    if (!first) return;
+    for (const std::string& other : others) log.warning(other);
+    throw Error(*first);
+  }
+};
 
 bool failed(const Worker::Status& status) { return status.failure && status.failure->code() != ErrorCode::cancelled; }
 
@@ -203,8 +225,7 @@ FrameResult Viewer::render(const Frame& frame) {
   const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
-  std::optional<Error> failure;
-  std::vector<std::string> others;  // whatever failed besides
+  Failures failures;
   // Before anything new is seen, so that what comes later is told again.
   update_pending_ = false;
   with_gl([&](Context& g) {
@@ -218,11 +239,7 @@ FrameResult Viewer::render(const Frame& frame) {
         const Error error = caught(name);
         if (error.code() == ErrorCode::context_lost) throw;
         gl::check_reset(*g.functions());
-        if (failure) {
-          others.emplace_back(error.what());
-        } else {
-          failure = error;
-        }
+        failures.add(error);
         gl::clear_errors(*g.functions());
       }
     };
@@ -264,11 +281,10 @@ FrameResult Viewer::render(const Frame& frame) {
                     std::ranges::any_of(watching_, [&](const WatchingPtr& w) { return failed(w->builder.status()); }) ||
                     failed(lives_.status()) || failed(poses_.status());
     result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
-    if (failure && !g.is_news(shot, *failure)) failure.reset();
+    if (failures.first && !g.is_news(shot, *failures.first)) failures = {};
   });
-  if (!failure) return result;
-  for (const std::string& other : others) log_.warning(other);
-  throw Error(*failure);
+  failures.tell(log_);
+  return result;
 }
 
 WarmUp Viewer::warm_up(const Frame& frame, bool all) {
