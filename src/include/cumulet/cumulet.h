@@ -1917,7 +1917,7 @@ typedef struct cumulet_frame_result {
 
 /*
  * [GL] One frame: takes up what the worker has made, uploads and traces for about budget_ms in bounded dispatches, and
- * draws the newest picture. result may be NULL. Fails, once, when something cannot be made (GL memory, a limit), still
+ * draws the newest picture. result may be NULL. Fails, once, by what cannot be made first (more go to the log), still
  * having drawn what there was before; later frames go on with that until a setting changes.
  *
  * It waits for no result of the device: what a dispatch did is learnt later, at most three of them are under way when
