@@ -470,7 +470,8 @@ BuildSettings Viewer::settings_for_view() const {
 }
 
 bool Viewer::built_for_another() const {
-  return grid_.camera_adaptive && view_ && (built_in_motion_ || built_for_ != build_view());
+  const bool own_is_due = own_left_out_ && !builder_.loads();
+  return grid_.camera_adaptive && view_ && (built_in_motion_ || own_is_due || built_for_ != build_view());
 }
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {

@@ -547,6 +547,7 @@ class Viewer {
   [[nodiscard]] BuildView build_view() const { return {*view_, frame_size_, places_}; }
   std::optional<BuildView> built_for_;  // camera-adaptive: what the grid was last asked for
   bool built_in_motion_ = false;        // for that, with cells that were there before
+  bool own_left_out_ = false;           // of that the viewer's own volume: a file was read that may take its place
   render::Totals totals_;
 
   [[nodiscard]] Followed& followed();

@@ -159,8 +159,8 @@ void Viewer::prepare(const Frame& frame) {
       }
       wishes_due_ = true;
       follow_instances();
-      // One that waits for a file that is read is asked for again, should it not be read.
-      built_for_ = volume_ && another_comes ? std::nullopt : std::optional(build_view());
+      built_for_ = build_view();
+      own_left_out_ = volume_ && another_comes;
       built_in_motion_ = !rests;
     }
   }
