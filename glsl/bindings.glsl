@@ -128,6 +128,7 @@ const int CM_IMAGE_DENOISED = 0;    // denoise_convolution.comp
 const int CM_IMAGE_GUIDE_COLOUR = 0;  // denoise_guides.comp
 const int CM_IMAGE_GUIDE_ALBEDO = 1;
 const int CM_IMAGE_GUIDE_NORMAL = 2;
+const int CM_IMAGE_GUIDE_MISSING = 3;
 const int CM_IMAGE_WAVELET_FRONT = 2;  // wavelet_*.comp, beside resolve.comp's
 const int CM_IMAGE_WAVELET_SPREAD = 3;
 const int CM_IMAGE_WAVELET_GUIDES = 4;

@@ -30,6 +30,12 @@ uint cm_pack(vec2 v) {
   return packHalf2x16(uintBitsToFloat(bits));
 }
 
+// Of the light that facts have (aovs.comp) what they have exactly: all but the sun's from a medium, which is about right.
+vec3 cm_exact_light(vec4 known, float transmittance) {
+  vec3 exact = known.rgb * (1.0 - known.a * (1.0 - transmittance));
+  return cm_is_finite(exact) ? exact : vec3(0.0);
+}
+
 // What the network sees of a radiance: none of what is no radiance.
 vec3 cm_radiance(vec3 v) { return cm_is_finite(v) ? max(v, vec3(0.0)) : vec3(0.0); }
 

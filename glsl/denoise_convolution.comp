@@ -35,9 +35,9 @@ layout(location = 10) uniform uint cm_blocks_1;
 layout(std430, binding = CM_STORAGE_DENOISE_BINS) readonly buffer CmBins { float cm_exposure; };
 layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
 layout(rgba32f, binding = CM_IMAGE_DENOISED) uniform writeonly image2D cm_denoised;
-layout(location = 11) uniform uvec2 cm_begin;       // of the tile in the picture
-layout(location = 12) uniform uvec2 cm_keep_begin;  // of what the tile is right about
-layout(location = 13) uniform uvec2 cm_keep_end;
+layout(location = 11) uniform ivec2 cm_begin;       // of the tile in the picture
+layout(location = 12) uniform ivec2 cm_keep_begin;  // of what the tile is right about
+layout(location = 13) uniform ivec2 cm_keep_end;
 #endif
 
 shared uint cm_pixels[4][CM_SIDE * CM_SIDE];  // two channels each
@@ -64,12 +64,12 @@ uvec4 cm_block(vec4 lower, vec4 upper) {
 #if CM_RESULT == 2
 // What is not finite, before or after, is left as it was.
 void cm_keep(uvec2 p, vec3 encoded) {
-  uvec2 texel = cm_begin + p;
+  ivec2 texel = cm_begin + ivec2(p);
   if (any(lessThan(texel, cm_keep_begin)) || any(greaterThanEqual(texel, cm_keep_end))) return;
-  vec4 before = texelFetch(cm_colour, ivec2(texel), 0);
+  vec4 before = texelFetch(cm_colour, texel, 0);
   vec3 after = vec3(cm_pu_inverse(encoded.r), cm_pu_inverse(encoded.g), cm_pu_inverse(encoded.b)) / cm_exposure;
   bool better = cm_is_finite(before.rgb) && cm_is_finite(after);
-  imageStore(cm_denoised, ivec2(texel), better ? vec4(after, before.a) : before);
+  imageStore(cm_denoised, texel, better ? vec4(after, before.a) : before);
 }
 #endif
 

@@ -1,22 +1,54 @@
 #version 450
 // What a denoiser is told of a picture: its means, and what is known of pixels without light. A volume hides what is
 // behind it from these guides as it does from the eye: else geometry that nobody sees would print through clouds. What
-// it has instead is its own albedo, so that its outline is a guide as well.
+// it has instead is its own albedo, so that its outline is a guide as well, times how bright it is by light that is
+// known, against what is about it, so that its billows are.
 // CM_BACKGROUND 0: what is in front of the background; 1: all radiance.
-// variants: CM_BACKGROUND=0,1
+// CM_KNOWN 1: less the light that is known without noise. What is left has either sign, which no network takes: in one
+// picture what is left, in another what is missing.
+// variants: CM_BACKGROUND=0,1 CM_KNOWN=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
+#include "denoise.glsl"
 layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
 layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // already means
 layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;    // of surfaces, as the two that follow
 layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
 layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;  // in front of them
+layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
 layout(rgba32f, binding = CM_IMAGE_GUIDE_COLOUR) uniform writeonly image2D cm_colour_out;
 layout(rgba32f, binding = CM_IMAGE_GUIDE_ALBEDO) uniform writeonly image2D cm_albedo_out;
 layout(rgba32f, binding = CM_IMAGE_GUIDE_NORMAL) uniform writeonly image2D cm_normal_out;
+#if CM_KNOWN
+layout(rgba32f, binding = CM_IMAGE_GUIDE_MISSING) uniform writeonly image2D cm_missing_out;
+#endif
 layout(location = 0) uniform vec3 cm_medium_albedo;
 layout(location = 1) uniform ivec2 cm_first;  // pixel of the picture
+
+// What is about a pixel, as far as billows are wide: so many steps to each side, so many pixels long.
+#define CM_STEPS 4
+#define CM_STEP 3
+
+vec3 cm_known_light(ivec2 texel) {
+  vec3 known = texelFetch(cm_emission, texel, 0).rgb;
+  return cm_is_finite(known) ? known : vec3(0.0);
+}
+
+// How bright what is here is by that: 0 where it has none, a half where it has as much as what is about it.
+vec3 cm_relief(ivec2 texel) {
+  ivec2 end = cm_first + imageSize(cm_colour_out) - 1;
+  vec4 about = vec4(0.0);
+  for (int y = -CM_STEPS; y <= CM_STEPS; ++y) {
+    for (int x = -CM_STEPS; x <= CM_STEPS; ++x) {
+      float weight = exp(-0.125 * float(x * x + y * y));
+      about += weight * vec4(cm_known_light(clamp(texel + CM_STEP * ivec2(x, y), cm_first, end)), 1.0);
+    }
+  }
+  if (about.rgb == vec3(0.0)) return vec3(1.0);
+  vec3 known = cm_known_light(texel);
+  return known / max(known + about.rgb / about.a, vec3(1e-30));
+}
 
 void main() {
   ivec2 at = ivec2(gl_GlobalInvocationID.xy);
@@ -27,7 +59,14 @@ void main() {
   colour.rgb += texelFetch(cm_background, texel, 0).rgb;
 #endif
   float transmittance = texelFetch(cm_transmittance, texel, 0).x;
-  vec3 albedo = mix(cm_medium_albedo, texelFetch(cm_albedo, texel, 0).rgb, transmittance);
+#if CM_KNOWN
+  vec3 left = colour.rgb - cm_exact_light(texelFetch(cm_emission, texel, 0), transmittance);
+  bool finite = cm_is_finite(left);
+  if (finite) colour.rgb = max(left, vec3(0.0));
+  imageStore(cm_missing_out, at, vec4(finite ? max(-left, vec3(0.0)) : vec3(0.0), 0.0));
+#endif
+  vec3 medium = transmittance < 1.0 ? cm_medium_albedo * cm_relief(texel) : cm_medium_albedo;
+  vec3 albedo = mix(medium, texelFetch(cm_albedo, texel, 0).rgb, transmittance);
   imageStore(cm_colour_out, at, colour);
   imageStore(cm_albedo_out, at, vec4(albedo, 0.0));
   imageStore(cm_normal_out, at, vec4(transmittance * texelFetch(cm_normal, texel, 0).xyz, 0.0));

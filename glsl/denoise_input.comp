@@ -1,5 +1,6 @@
 #version 450
-// What a network sees of a picture: colour exposed and encoded, albedo, and normals from 0 to 1; zeros beyond it.
+// What a network sees of a picture: colour exposed and encoded, albedo, and normals from 0 to 1; beyond it what is within,
+// mirrored, as its outermost pixels would be taken for an edge of what is seen.
 // CM_GUIDES 0: colour alone.
 // variants: CM_GUIDES=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -16,27 +17,31 @@ layout(std430, binding = CM_STORAGE_DENOISE_CHANNELS) writeonly buffer CmChannel
 layout(location = 0) uniform uint cm_first;   // work group of all
 layout(location = 1) uniform uint cm_width;   // of the tile
 layout(location = 2) uniform uint cm_height;
-layout(location = 3) uniform uvec2 cm_begin;  // of the tile in the picture
+layout(location = 3) uniform ivec2 cm_begin;  // of the tile in the picture
 layout(location = 4) uniform uint cm_to;
+
+ivec2 cm_mirrored(ivec2 texel, ivec2 size) {
+  ivec2 low = mix(texel, -1 - texel, lessThan(texel, ivec2(0)));
+  ivec2 high = mix(low, 2 * size - 1 - low, greaterThanEqual(low, size));
+  return clamp(high, ivec2(0), size - 1);
+}
 
 void main() {
   uint group = cm_first + gl_WorkGroupID.x;
   uint groups_x = cm_width / 8u;
   uvec2 p = uvec2(group % groups_x, group / groups_x) * 8u + gl_LocalInvocationID.xy;
-  ivec2 texel = ivec2(cm_begin + p);
-  vec3 colour = vec3(0.0);
+  ivec2 texel = cm_mirrored(cm_begin + ivec2(p), textureSize(cm_colour, 0));
+  vec3 exposed = min(cm_exposure * cm_radiance(texelFetch(cm_colour, texel, 0).rgb), vec3(3e38));
+  vec3 colour = vec3(cm_pu(exposed.r), cm_pu(exposed.g), cm_pu(exposed.b));
+#if CM_GUIDES
+  vec3 a = texelFetch(cm_albedo, texel, 0).rgb;
+  vec3 n = texelFetch(cm_normal, texel, 0).rgb;
+  vec3 albedo = cm_is_finite(a) ? clamp(a, 0.0, 1.0) : vec3(0.0);
+  vec3 normal = 0.5 + 0.5 * (cm_is_finite(n) ? clamp(n, -1.0, 1.0) : vec3(0.0));
+#else
   vec3 albedo = vec3(0.0);
   vec3 normal = vec3(0.0);
-  if (all(lessThan(texel, textureSize(cm_colour, 0)))) {
-    vec3 exposed = min(cm_exposure * cm_radiance(texelFetch(cm_colour, texel, 0).rgb), vec3(3e38));
-    colour = vec3(cm_pu(exposed.r), cm_pu(exposed.g), cm_pu(exposed.b));
-#if CM_GUIDES
-    vec3 a = texelFetch(cm_albedo, texel, 0).rgb;
-    vec3 n = texelFetch(cm_normal, texel, 0).rgb;
-    albedo = cm_is_finite(a) ? clamp(a, 0.0, 1.0) : vec3(0.0);
-    normal = 0.5 + 0.5 * (cm_is_finite(n) ? clamp(n, -1.0, 1.0) : vec3(0.0));
 #endif
-  }
   uint at = cm_to + p.y * cm_width + p.x;
   cm_channels[at] = uvec4(cm_pack(colour.rg), cm_pack(vec2(colour.b, albedo.r)), cm_pack(albedo.gb),
                           cm_pack(normal.rg));

@@ -26,6 +26,9 @@ std::uint32_t quads_of(std::size_t convolution) {
   return convolution + 1 == Network::convolution_count ? 1 : group_channels / quad_channels;
 }
 
+/// Of a place in the picture with its rim.
+glm::ivec2 in_picture(glm::uvec2 place) { return glm::ivec2(place) - static_cast<int>(rim); }
+
 std::uint32_t groups_of(const Network& network, std::size_t convolution) {
   return divided_up(network.convolutions.at(convolution).outputs, quads_of(convolution) * quad_channels);
 }
@@ -126,7 +129,7 @@ void Denoiser::begin(const Pictures& pictures) {
   const std::uint64_t room =
       std::min<std::uint64_t>(most_bytes_ - std::min(most_bytes_, other_bytes),
                               static_cast<std::uint64_t>(gl::query_limits(*gl_).storage_block_bytes));
-  tiles_ = tiles_of(pictures.size, static_cast<std::uint64_t>(static_cast<double>(room) / pixel_bytes));
+  tiles_ = tiles_of(pictures.size + 2 * rim, static_cast<std::uint64_t>(static_cast<double>(room) / pixel_bytes));
   glm::uvec2 largest(0U);
   for (const Tile& tile : tiles_) largest = glm::max(largest, tile.size);
   memory_ = memory_of(*network_, largest);
@@ -201,7 +204,8 @@ void Denoiser::bind() const {
 void Denoiser::set_input(GLuint program, const Tile& tile) const {
   gl_->ProgramUniform1ui(program, 1, tile.size.x);
   gl_->ProgramUniform1ui(program, 2, tile.size.y);
-  gl_->ProgramUniform2ui(program, 3, tile.begin.x, tile.begin.y);
+  const glm::ivec2 begin = in_picture(tile.begin);
+  gl_->ProgramUniform2i(program, 3, begin.x, begin.y);
   gl_->ProgramUniform1ui(program, 4, memory_.input);
 }
 
@@ -219,9 +223,12 @@ void Denoiser::set_convolution(GLuint program, const Tile& tile, std::size_t ind
   gl.ProgramUniform1ui(program, 6, place(first));
   gl.ProgramUniform1ui(program, 7, blocks_of(*network_, first));
   if (index + 1 == Network::convolution_count) {
-    gl.ProgramUniform2ui(program, 11, tile.begin.x, tile.begin.y);
-    gl.ProgramUniform2ui(program, 12, tile.keep_begin.x, tile.keep_begin.y);
-    gl.ProgramUniform2ui(program, 13, tile.keep_end.x, tile.keep_end.y);
+    const glm::ivec2 begin = in_picture(tile.begin);
+    const glm::ivec2 keep_begin = glm::max(in_picture(tile.keep_begin), 0);
+    const glm::ivec2 keep_end = glm::min(in_picture(tile.keep_end), glm::ivec2(pictures_.size));
+    gl.ProgramUniform2i(program, 11, begin.x, begin.y);
+    gl.ProgramUniform2i(program, 12, keep_begin.x, keep_begin.y);
+    gl.ProgramUniform2i(program, 13, keep_end.x, keep_end.y);
   } else {
     gl.ProgramUniform1ui(program, 5, memory_.results.at(index));
   }

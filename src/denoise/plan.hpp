@@ -19,16 +19,21 @@ constexpr std::uint32_t divided_up(std::uint32_t value, std::uint32_t by) { retu
 std::uint32_t input_blocks(const Network& network);
 std::uint32_t result_blocks(const Convolution& convolution);
 
-/// A part of a picture that is denoised by itself, in pixels of the picture.
+/// Pixels around a picture that a network sees as well: its own, mirrored, so that its outermost ones are as good as
+/// others.
+inline constexpr std::uint32_t rim = 16;
+
+/// A part of a picture that is denoised by itself, in pixels of the picture with its rim.
 struct Tile {
   glm::uvec2 begin{0U};
-  glm::uvec2 size{0U};  ///< multiples of Network::alignment; may go beyond the picture
-  /// Where it is what denoising all at once gives. Of all tiles together: the picture.
+  glm::uvec2 size{0U};  ///< multiples of Network::alignment; may go beyond the picture and its rim
+  /// Where it is what denoising all at once gives. Of all tiles together: the picture with its rim.
   glm::uvec2 keep_begin{0U};
   glm::uvec2 keep_end{0U};
 };
 
-/// Tiles of at most so many pixels each, as far as 64 of them in each direction and what these depend on fit.
+/// Tiles of a picture with its rim, of at most so many pixels each, as far as 64 of them in each direction and what
+/// these depend on fit.
 std::vector<Tile> tiles_of(glm::uvec2 picture, std::uint64_t most_pixels);
 
 /// Where a tile's channels are while it is denoised: what is needed no more makes room for what comes.

@@ -312,6 +312,9 @@ gl::Object Context::by_network(const Shot& shot, const render::Picture& picture,
   denoising.network = network;
   denoising.with_background = shot.display.shown(false).shows_background();
   if (!volumes.empty()) denoising.medium_albedo = (*volumes.front().medium).albedo;
+  denoising.known_light = !shot.scene->models.empty() || std::ranges::any_of(volumes, [](const scene::Volume& volume) {
+    return volume.source->emits() || (*volume.medium).emission != glm::vec3(0.0F);
+  });
   denoising.most_bytes = most_denoiser_bytes;
   return render::denoised(functions_, programs_, picture, denoising);
 }

@@ -59,10 +59,10 @@ class DenoiseReference {
                                                 const std::vector<glm::vec4>& albedo,
                                                 const std::vector<glm::vec4>& normal, glm::ivec2 size) const {
     const double exposed = exposure(colour, size);
-    Channels input((size.x + 15) / 16 * 16, (size.y + 15) / 16 * 16, albedo.empty() ? 3 : 9);
-    for (int y = 0; y < size.y; ++y) {
-      for (int x = 0; x < size.x; ++x) {
-        const auto i = static_cast<std::size_t>(y * size.x + x);
+    Channels input((size.x + 2 * rim + 15) / 16 * 16, (size.y + 2 * rim + 15) / 16 * 16, albedo.empty() ? 3 : 9);
+    for (int y = 0; y < input.height; ++y) {
+      for (int x = 0; x < input.width; ++x) {
+        const auto i = static_cast<std::size_t>(mirrored(y - rim, size.y) * size.x + mirrored(x - rim, size.x));
         for (int c = 0; c < 3; ++c) {
           input.at(c, y, x) = encode(exposed * sane(colour[i])[c]);
           if (albedo.empty()) continue;
@@ -76,7 +76,7 @@ class DenoiseReference {
     for (int y = 0; y < size.y; ++y) {
       for (int x = 0; x < size.x; ++x) {
         glm::dvec3 pixel;
-        for (int c = 0; c < 3; ++c) pixel[c] = decode(output.at(c, y, x)) / exposed;
+        for (int c = 0; c < 3; ++c) pixel[c] = decode(output.at(c, y + rim, x + rim)) / exposed;
         result.push_back(pixel);
       }
     }
@@ -84,6 +84,13 @@ class DenoiseReference {
   }
 
  private:
+  static constexpr int rim = 16;  // of the picture, mirrored, around it
+  static int mirrored(int i, int count) {
+    if (i < 0) i = -1 - i;
+    if (i >= count) i = 2 * count - 1 - i;
+    return std::clamp(i, 0, count - 1);
+  }
+
   struct Channels {
     Channels(int w, int h, int n) : width(w), height(h), count(n), values(static_cast<std::size_t>(w * h * n)) {}
     double& at(int c, int y, int x) { return values[static_cast<std::size_t>((c * height + y) * width + x)]; }

@@ -107,4 +107,26 @@ inline denoise::TensorArchive random_archive(const NetworkWidths& widths, std::u
   return archive;
 }
 
+/// A network all of whose weights are 0.
+inline denoise::TensorArchive dark_archive(const NetworkWidths& widths, std::uint32_t inputs) {
+  denoise::TensorArchive archive = random_archive(widths, inputs);
+  for (auto& [name, tensor] : archive) tensor.values.assign(tensor.values.size(), 0.0F);
+  return archive;
+}
+
+/// A network that hands on what colours it sees.
+inline denoise::TensorArchive clear_archive(const NetworkWidths& widths, std::uint32_t inputs) {
+  denoise::TensorArchive archive = dark_archive(widths, inputs);
+  const auto hand_on = [&](const char* name, std::uint32_t first) {
+    denoise::Tensor& weights = archive.at(name);
+    constexpr std::uint32_t middle = 4;  // of 3 x 3
+    for (std::uint32_t c = 0; c < 3; ++c)
+      weights.values.at(9 * (std::size_t{c} * weights.shape[1] + first + c) + middle) = 1.0F;
+  };
+  hand_on("dec_conv1a.weight", widths[12]);
+  hand_on("dec_conv1b.weight", 0);
+  hand_on("dec_conv0.weight", 0);
+  return archive;
+}
+
 }  // namespace cumulet::test

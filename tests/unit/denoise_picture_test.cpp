@@ -45,7 +45,11 @@ class DenoisedPicture : public testing::Test {
     std::ranges::fill(light.sky_radiance, 0.3F);
     EXPECT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
     sample(4);
-    const auto bytes = cumulet::test::tza_file(cumulet::test::random_archive(cumulet::test::small_widths, 9));
+    write_network(cumulet::test::random_archive(cumulet::test::small_widths, 9));
+  }
+
+  void write_network(const cumulet::denoise::TensorArchive& archive) const {
+    const auto bytes = cumulet::test::tza_file(archive);
     std::ofstream(file_, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
@@ -248,71 +252,109 @@ TEST_F(DenoisedPicture, TheGroundIsNoHole) {
   }
 }
 
-// The sun in the zenith over a floor, and a lath between: of one sample a pixel its shadow, three of them wide, is
-// there.
-TEST_F(DenoisedPicture, ShadowsOfTheSunStaySharp) {
-  auto light = make_desc<cumulet_light_desc>();
-  light.sun_elevation_degrees = 90.0F;
-  std::ranges::fill(light.sun_irradiance, 3.0F);
-  std::ranges::fill(light.sky_radiance, 0.3F);
-  ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
-  const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
-  const auto level = [](float half, float y) {
-    return std::array<float, 12>{-half, y, -40.0F, -half, y, 40.0F, half, y, 40.0F, half, y, -40.0F};
-  };
-  const std::array corners{level(40.0F, 0.0F), level(0.4F, 8.0F)};
-  std::array cards{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
-  for (std::size_t i = 0; i < cards.size(); ++i) {
-    cards.at(i).positions = corners.at(i).data();
-    cards.at(i).vertex_count = 4;
-    cards.at(i).indices = indices.data();
-    cards.at(i).index_count = indices.size();
-    cards.at(i).double_sided = 1;
-    std::fill_n(cards.at(i).base_color, 4, 1.0F);
-    std::fill_n(cards.at(i).base_color, 3, 0.5F);
+// The sun in the zenith over a floor, and a lath between, whose shadow is three pixels wide.
+class LathPicture : public DenoisedPicture {
+ protected:
+  // One sample a pixel.
+  void render(float sky) const {
+    auto light = make_desc<cumulet_light_desc>();
+    light.sun_elevation_degrees = 90.0F;
+    std::ranges::fill(light.sun_irradiance, 3.0F);
+    std::ranges::fill(light.sky_radiance, sky);
+    ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
+    const auto level = [](float half, float y) {
+      return std::array<float, 12>{-half, y, -40.0F, -half, y, 40.0F, half, y, 40.0F, half, y, -40.0F};
+    };
+    const std::array corners{level(40.0F, 0.0F), level(0.4F, 8.0F)};
+    std::array cards{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
+    for (std::size_t i = 0; i < cards.size(); ++i) {
+      cards.at(i).positions = corners.at(i).data();
+      cards.at(i).vertex_count = 4;
+      cards.at(i).indices = indices.data();
+      cards.at(i).index_count = indices.size();
+      cards.at(i).double_sided = 1;
+      std::fill_n(cards.at(i).base_color, 4, 1.0F);
+      std::fill_n(cards.at(i).base_color, 3, 0.5F);
+    }
+    const cumulet::test::SurfacesRef surfaces = cumulet::test::make_surfaces(cards);
+    ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces.get()), CUMULET_OK);
+    cumulet_camera* camera = nullptr;
+    ASSERT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
+    const cumulet::test::CameraRef owner(camera);
+    auto stand = make_desc<cumulet_camera_desc>();
+    stand.eye[1] = height;
+    stand.eye[2] = away;
+    stand.fovy_degrees = fovy;
+    ASSERT_EQ(cumulet_camera_set(camera, &stand), CUMULET_OK);
+    sample(1);
+    auto frame = target_.frame();
+    frame.budget_ms = 1000.0;
+    cumulet::test::converge(viewer_.get(), frame);
   }
-  const cumulet::test::SurfacesRef surfaces = cumulet::test::make_surfaces(cards);
-  ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces.get()), CUMULET_OK);
-  constexpr double height = 6.0;  // of the eye, and how far it is from the middle
-  constexpr double away = 14.0;
-  constexpr double fovy = 40.0;
-  cumulet_camera* camera = nullptr;
-  ASSERT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
-  const cumulet::test::CameraRef owner(camera);
-  auto stand = make_desc<cumulet_camera_desc>();
-  stand.eye[1] = height;
-  stand.eye[2] = away;
-  stand.fovy_degrees = fovy;
-  ASSERT_EQ(cumulet_camera_set(camera, &stand), CUMULET_OK);
-  sample(1);
-  auto frame = target_.frame();
-  frame.budget_ms = 1000.0;
-  cumulet::test::converge(viewer_.get(), frame);
+
+  // Calls visit(red, shadowed) for the floor about the shadow, but not at its edges. Returns how many pixels that is.
+  template <class Visit>
+  static int for_each_near_shadow(const std::vector<float>& picture, Visit&& visit) {
+    const double length = std::hypot(height, away);
+    const double half = std::tan(fovy * std::numbers::pi / 360.0);
+    int count = 0;
+    for (int row = 0; row < side; ++row) {
+      for (int column = 0; column < side; ++column) {
+        const double right = half * (2.0 * (column + 0.5) / side - 1.0);
+        const double up = half * (1.0 - 2.0 * (row + 0.5) / side);
+        const double down = (height - up * away) / length;
+        if (down <= 0.1) continue;
+        const double inside = 0.4 - std::abs(height / down * right);
+        if (std::abs(inside) < 0.2 || inside < -1.2) continue;
+        visit(picture[4 * static_cast<std::size_t>(row * side + column)], inside > 0.0);
+        ++count;
+      }
+    }
+    return count;
+  }
+
+  static constexpr double height = 6.0;  // of the eye, and how far it is from the middle
+  static constexpr double away = 14.0;
+  static constexpr double fovy = 40.0;
+};
+
+TEST_F(LathPicture, ShadowsOfTheSunStaySharp) {
+  ASSERT_NO_FATAL_FAILURE(render(0.3F));
   const auto desc = make_desc<cumulet_denoise_desc>();
   std::vector<float> filtered(floats);
   ASSERT_EQ(cumulet_read_denoised(viewer_.get(), &desc, filtered.data(), filtered.size()), CUMULET_OK) << error();
-  const double length = std::hypot(height, away);
-  const double half = std::tan(fovy * std::numbers::pi / 360.0);
-  int near_edge = 0;
   int wrong = 0;
-  for (int row = 0; row < side; ++row) {
-    for (int column = 0; column < side; ++column) {
-      const double right = half * (2.0 * (column + 0.5) / side - 1.0);
-      const double up = half * (1.0 - 2.0 * (row + 0.5) / side);
-      const double down = (height - up * away) / length;
-      if (down <= 0.1) continue;
-      const double t = height / down;
-      const double x = t * right;
-      const double inside = 0.4 - std::abs(x);
-      if (std::abs(inside) < 0.2 || inside < -1.2) continue;
-      // The sun's part is 0.48, the sky's at most 0.15.
-      const float value = filtered[4 * static_cast<std::size_t>(row * side + column)];
-      wrong += (value > 0.3F) == (inside > 0.0) ? 1 : 0;
-      ++near_edge;
-    }
-  }
+  // The sun's part is 0.48, the sky's at most 0.15.
+  const int near_edge =
+      for_each_near_shadow(filtered, [&](float value, bool shadowed) { wrong += (value > 0.3F) == shadowed ? 1 : 0; });
   EXPECT_GT(near_edge, 100);
   EXPECT_LT(wrong, near_edge / 50);
+}
+
+TEST_F(LathPicture, ANetworkThatLeavesNothingLeavesWhatIsKnown) {
+  ASSERT_NO_FATAL_FAILURE(render(0.3F));
+  write_network(cumulet::test::dark_archive(cumulet::test::small_widths, 9));
+  std::vector<float> denoised(floats);
+  ASSERT_EQ(denoise(file_, denoised), CUMULET_OK) << error();
+  // An irradiance of 3 on a grey of 0.5, of which the glossy part of 0.04 at least is not known.
+  int wrong = 0;
+  const int near_edge = for_each_near_shadow(denoised, [&](float value, bool shadowed) {
+    const double known = shadowed ? 0.0 : 0.96 * 3.0 * 0.5 / std::numbers::pi;
+    wrong += std::abs(value - known) > 0.015 ? 1 : 0;
+  });
+  EXPECT_GT(near_edge, 100);
+  EXPECT_LT(wrong, near_edge / 50);
+}
+
+// At edges samples are brighter than what is known and darker.
+TEST_F(LathPicture, ANetworkThatLeavesAllLeavesThePicture) {
+  ASSERT_NO_FATAL_FAILURE(render(0.3F));
+  write_network(cumulet::test::clear_archive(cumulet::test::small_widths, 9));
+  const std::vector<float> raw = linear();
+  std::vector<float> denoised(floats);
+  ASSERT_EQ(denoise(file_, denoised), CUMULET_OK) << error();
+  for (std::size_t i = 0; i < floats; ++i) EXPECT_NEAR(denoised[i], raw[i], 0.01 * raw[i] + 1e-3) << i;
 }
 
 // ---- Frames of a camera that moves ----

@@ -2077,11 +2077,13 @@ typedef struct cumulet_denoise_desc {
 /*
  * [GL] cumulet_read_linear's picture so far with its noise taken away by a network that has learned what pictures look
  * like: an estimate, not the mean of samples, and without any promise on its error. Alpha, and what of the picture is
- * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory and 64 bytes a pixel for the
- * time of the call; waits for it, some 90 seconds a megapixel on software drivers, and for their compiler.
- * Without a network: by the filter, alpha as well, with 128 bytes a pixel, a second or two a megapixel on software
- * drivers. CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views
- * and for a preview over surfaces that are not traced, and as cumulet_read_aov.
+ * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory and 80 bytes a pixel for the
+ * time of the call; waits for it, 20 to 90 seconds a megapixel on software drivers, and for their compiler; for twice
+ * as long where the scene has surfaces or media that give off light: what is known of their light without noise is kept
+ * from the network, which sees what is left and what is missing. Without a network: by the filter, alpha as well, with
+ * 128 bytes a pixel, a second or two a megapixel on software drivers. CUMULET_ERROR_FILE for a file that is missing or
+ * no such network, CUMULET_ERROR_UNSUPPORTED for debug views and for a preview over surfaces that are not traced, and
+ * as cumulet_read_aov.
  */
 CUMULET_API cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
                                                  size_t count);
