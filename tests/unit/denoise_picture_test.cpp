@@ -255,30 +255,37 @@ TEST_F(DenoisedPicture, TheGroundIsNoHole) {
 // The sun in the zenith over a floor, and a lath between, whose shadow is three pixels wide.
 class LathPicture : public DenoisedPicture {
  protected:
-  // One sample a pixel.
-  void render(float sky) const {
+  static cumulet::test::SurfacesRef level(float half, float y) {
+    const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
+    const std::array<float, 12> corners{-half, y, -40.0F, -half, y, 40.0F, half, y, 40.0F, half, y, -40.0F};
+    auto card = make_desc<cumulet_mesh_desc>();
+    card.positions = corners.data();
+    card.vertex_count = 4;
+    card.indices = indices.data();
+    card.index_count = indices.size();
+    card.double_sided = 1;
+    std::fill_n(card.base_color, 4, 1.0F);
+    std::fill_n(card.base_color, 3, 0.5F);
+    return cumulet::test::make_surfaces({&card, 1});
+  }
+
+  // One sample a pixel. floor, lath: what there is to say of them beside what they are.
+  void render(cumulet_surface_settings_desc floor = make_desc<cumulet_surface_settings_desc>(),
+              cumulet_model_desc lath = make_desc<cumulet_model_desc>()) const {
     auto light = make_desc<cumulet_light_desc>();
     light.sun_elevation_degrees = 90.0F;
     std::ranges::fill(light.sun_irradiance, 3.0F);
-    std::ranges::fill(light.sky_radiance, sky);
+    std::ranges::fill(light.sky_radiance, 0.3F);
     ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
-    const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
-    const auto level = [](float half, float y) {
-      return std::array<float, 12>{-half, y, -40.0F, -half, y, 40.0F, half, y, 40.0F, half, y, -40.0F};
-    };
-    const std::array corners{level(40.0F, 0.0F), level(0.4F, 8.0F)};
-    std::array cards{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
-    for (std::size_t i = 0; i < cards.size(); ++i) {
-      cards.at(i).positions = corners.at(i).data();
-      cards.at(i).vertex_count = 4;
-      cards.at(i).indices = indices.data();
-      cards.at(i).index_count = indices.size();
-      cards.at(i).double_sided = 1;
-      std::fill_n(cards.at(i).base_color, 4, 1.0F);
-      std::fill_n(cards.at(i).base_color, 3, 0.5F);
-    }
-    const cumulet::test::SurfacesRef surfaces = cumulet::test::make_surfaces(cards);
-    ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces.get()), CUMULET_OK);
+    const cumulet::test::SurfacesRef ground = level(40.0F, 0.0F);
+    ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), ground.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_surface_settings(viewer_.get(), &floor), CUMULET_OK);
+    const cumulet::test::SurfacesRef above = level(0.4F, 8.0F);
+    lath.surfaces = above.get();
+    cumulet_model* model = nullptr;
+    ASSERT_EQ(cumulet_model_create(&lath, &model, nullptr, 0), CUMULET_OK);
+    EXPECT_EQ(cumulet_add_model(viewer_.get(), model), CUMULET_OK);
+    cumulet_model_release(model);
     cumulet_camera* camera = nullptr;
     ASSERT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
     const cumulet::test::CameraRef owner(camera);
@@ -291,6 +298,25 @@ class LathPicture : public DenoisedPicture {
     auto frame = target_.frame();
     frame.budget_ms = 1000.0;
     cumulet::test::converge(viewer_.get(), frame);
+  }
+
+  // What is known: a network that leaves nothing of the rest shows it.
+  [[nodiscard]] std::vector<float> known() const {
+    write_network(cumulet::test::dark_archive(cumulet::test::small_widths, 9));
+    std::vector<float> rgba(floats);
+    EXPECT_EQ(denoise(file_, rgba), CUMULET_OK) << error();
+    return rgba;
+  }
+
+  // Of the floor by the sun: an irradiance of 3 on a grey of 0.5, of which the glossy part of 0.04 at least is not
+  // known.
+  static constexpr double sunlit = 0.96 * 3.0 * 0.5 / std::numbers::pi;
+  static void expect_known(const std::vector<float>& rgba, double lit) {
+    int wrong = 0;
+    const int near_edge = for_each_near_shadow(
+        rgba, [&](float value, bool shadowed) { wrong += std::abs(value - (shadowed ? 0.0 : lit)) > 0.015 ? 1 : 0; });
+    EXPECT_GT(near_edge, 100);
+    EXPECT_LT(wrong, near_edge / 50);
   }
 
   // Calls visit(red, shadowed) for the floor about the shadow, but not at its edges. Returns how many pixels that is.
@@ -320,7 +346,7 @@ class LathPicture : public DenoisedPicture {
 };
 
 TEST_F(LathPicture, ShadowsOfTheSunStaySharp) {
-  ASSERT_NO_FATAL_FAILURE(render(0.3F));
+  ASSERT_NO_FATAL_FAILURE(render());
   const auto desc = make_desc<cumulet_denoise_desc>();
   std::vector<float> filtered(floats);
   ASSERT_EQ(cumulet_read_denoised(viewer_.get(), &desc, filtered.data(), filtered.size()), CUMULET_OK) << error();
@@ -333,23 +359,27 @@ TEST_F(LathPicture, ShadowsOfTheSunStaySharp) {
 }
 
 TEST_F(LathPicture, ANetworkThatLeavesNothingLeavesWhatIsKnown) {
-  ASSERT_NO_FATAL_FAILURE(render(0.3F));
-  write_network(cumulet::test::dark_archive(cumulet::test::small_widths, 9));
-  std::vector<float> denoised(floats);
-  ASSERT_EQ(denoise(file_, denoised), CUMULET_OK) << error();
-  // An irradiance of 3 on a grey of 0.5, of which the glossy part of 0.04 at least is not known.
-  int wrong = 0;
-  const int near_edge = for_each_near_shadow(denoised, [&](float value, bool shadowed) {
-    const double known = shadowed ? 0.0 : 0.96 * 3.0 * 0.5 / std::numbers::pi;
-    wrong += std::abs(value - known) > 0.015 ? 1 : 0;
-  });
-  EXPECT_GT(near_edge, 100);
-  EXPECT_LT(wrong, near_edge / 50);
+  ASSERT_NO_FATAL_FAILURE(render());
+  expect_known(known(), sunlit);
+}
+
+TEST_F(LathPicture, ShadowsOfWhatCamerasDoNotSeeAreKnown) {
+  auto lath = make_desc<cumulet_model_desc>();
+  lath.shadow_only = 1;
+  ASSERT_NO_FATAL_FAILURE(render(make_desc<cumulet_surface_settings_desc>(), lath));
+  expect_known(known(), sunlit);
+}
+
+TEST_F(LathPicture, OfHoldoutsNoLightIsKnown) {
+  auto floor = make_desc<cumulet_surface_settings_desc>();
+  floor.holdout = 1;
+  ASSERT_NO_FATAL_FAILURE(render(floor));
+  expect_known(known(), 0.0);
 }
 
 // At edges samples are brighter than what is known and darker.
 TEST_F(LathPicture, ANetworkThatLeavesAllLeavesThePicture) {
-  ASSERT_NO_FATAL_FAILURE(render(0.3F));
+  ASSERT_NO_FATAL_FAILURE(render());
   write_network(cumulet::test::clear_archive(cumulet::test::small_widths, 9));
   const std::vector<float> raw = linear();
   std::vector<float> denoised(floats);
