@@ -160,6 +160,10 @@ float cm_scattered_by_many(float g, float cosine, float depth) {
   return sum;
 }
 
+// Where in a medium a ray asks for the sun, in standard deviations from the mean depth at which it scatters: as depths are
+// spread that fall exponentially, so that shadows are as soft in it as they are.
+float cm_deviation_of_ray(int i) { return -log(1.0 - fract(0.5 + float(i) * 0.6180339887)) - 1.0; }
+
 void main() {
   uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
@@ -192,7 +196,7 @@ void main() {
     vec3 sun_from[2];  // of a surface, of the medium
     vec2 scatters = vec2(0.0);  // this ray's chances, and sum of depths
     vec4 medium = vec4(0.0);    // its albedo and mean cosine, sums; of what is before all that is solid
-    vec2 before = vec2(0.0);    // likewise, of that
+    vec3 before = vec3(0.0);    // likewise, of that, and of squared depths
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
     vec3 of_sun = vec3(0.0);
@@ -254,7 +258,7 @@ void main() {
       if (t < solid_t) {
         emission += clear * chance * cm_walk_source(walk);
         medium += clear * chance * cm_walk_scatters(walk);
-        before += scatters_here;
+        before += vec3(scatters_here, scatters_here.y * scatters_here.y / max(scatters_here.x, 1e-30));
       }
 #if CM_VELOCITY
       velocity += clear * chance * cm_walk_velocity(walk, t_1);
@@ -279,7 +283,11 @@ void main() {
 #endif
     scattered += scatters.x;
     scattered_z += scatters.y;
-    if (before.x > 0.0) sun_from[1] = cm_from_cube_point(o + (before.y / before.x * t_per_z) * d);
+    if (before.x > 0.0) {
+      vec2 moments = before.yz / before.x;
+      float place = moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
+      sun_from[1] = cm_from_cube_point(o + (min(place * t_per_z, solid_t)) * d);
+    }
     vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
 #if CM_SURFACES
     if (cm.surfaces.rich != 0u) light[1] = vec3(0.0);

@@ -26,33 +26,28 @@ layout(rgba32f, binding = CM_IMAGE_GUIDE_MISSING) uniform writeonly image2D cm_m
 layout(location = 0) uniform vec3 cm_medium_albedo;
 layout(location = 1) uniform ivec2 cm_first;  // pixel of the picture
 
-// What is known: given off, and of the sun's.
-vec3 cm_known_light(ivec2 texel, vec2 parts) {
-  vec4 known = texelFetch(cm_emission, texel, 0);
-  vec3 light = known.rgb * mix(parts.x, parts.y, known.a);
-  return cm_is_finite(light) ? light : vec3(0.0);
+vec3 cm_known_light(ivec2 texel) {
+  vec3 known = texelFetch(cm_emission, texel, 0).rgb;
+  return cm_is_finite(known) ? known : vec3(0.0);
 }
 
-// Its mean about a pixel, by so many steps to each side, so many pixels long, with that deviation in steps.
-vec3 cm_mean_light(ivec2 texel, vec2 parts, int steps, int stride, float deviation) {
+// What is about a pixel, as far as billows are wide: so many steps to each side, so many pixels long.
+#define CM_STEPS 4
+#define CM_STEP 3
+
+// How bright what is here is by light that is known: 0 where it has none, a half where it has as much as what is about it.
+vec3 cm_relief(ivec2 texel) {
   ivec2 end = cm_first + imageSize(cm_colour_out) - 1;
-  vec4 sum = vec4(0.0);
-  for (int y = -steps; y <= steps; ++y) {
-    for (int x = -steps; x <= steps; ++x) {
-      float weight = exp(-0.5 / (deviation * deviation) * float(x * x + y * y));
-      sum += weight * vec4(cm_known_light(clamp(texel + stride * ivec2(x, y), cm_first, end), parts), 1.0);
+  vec4 about = vec4(0.0);
+  for (int y = -CM_STEPS; y <= CM_STEPS; ++y) {
+    for (int x = -CM_STEPS; x <= CM_STEPS; ++x) {
+      float weight = exp(-0.125 * float(x * x + y * y));
+      about += weight * vec4(cm_known_light(clamp(texel + CM_STEP * ivec2(x, y), cm_first, end)), 1.0);
     }
   }
-  return sum.rgb / sum.a;
-}
-
-// How bright what is here is by that: 0 where it has none, a half where it has as much as what is about it, as far as
-// billows are wide. Shadows of surfaces have dotted edges in what is known of a medium, which no guide may have.
-vec3 cm_relief(ivec2 texel) {
-  vec3 about = cm_mean_light(texel, vec2(1.0), 4, 3, 2.0);
-  if (about == vec3(0.0)) return vec3(1.0);
-  vec3 here = cm_known_light(texel, vec2(1.0, 0.0)) + cm_mean_light(texel, vec2(0.0, 1.0), 1, 1, 0.85);
-  return here / max(here + about, vec3(1e-30));
+  if (about.rgb == vec3(0.0)) return vec3(1.0);
+  vec3 here = cm_known_light(texel);
+  return here / max(here + about.rgb / about.a, vec3(1e-30));
 }
 
 void main() {
