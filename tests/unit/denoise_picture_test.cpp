@@ -387,6 +387,35 @@ TEST_F(LathPicture, ANetworkThatLeavesAllLeavesThePicture) {
   for (std::size_t i = 0; i < floats; ++i) EXPECT_NEAR(denoised[i], raw[i], 0.01 * raw[i] + 1e-3) << i;
 }
 
+// A shadow across a medium that light goes deep into. Measured: 0.19, and 0.27 where each ray asks for the sun at the
+// mean place at which it scatters.
+TEST_F(LathPicture, ShadowsAreSoftInAMedium) {
+  auto light = make_desc<cumulet_light_desc>();
+  light.sun_elevation_degrees = 90.0F;
+  std::ranges::fill(light.sun_irradiance, 3.0F);
+  std::fill_n(light.sky_radiance, 3, 1e-3F);
+  ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+  const cumulet::test::SurfacesRef roof = level(3.0F, 40.0F);
+  ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), roof.get()), CUMULET_OK);
+  auto medium = make_desc<cumulet_medium_desc>();
+  medium.density_scale = 0.6;
+  ASSERT_EQ(cumulet_set_medium(viewer_.get(), &medium), CUMULET_OK);
+  sample(1);
+  static_cast<void>(picture());
+  const auto desc = make_desc<cumulet_denoise_desc>();
+  std::vector<float> filtered(floats);
+  ASSERT_EQ(cumulet_read_denoised(viewer_.get(), &desc, filtered.data(), filtered.size()), CUMULET_OK) << error();
+  sample(1024);
+  const std::vector<float> many = picture();
+  double square = 0.0;
+  double all = 0.0;
+  for (std::size_t i = 0; i < floats; i += 4) {
+    square += std::pow(double(filtered[i]) - double(many[i]), 2.0);
+    all += std::pow(double(many[i]), 2.0);
+  }
+  EXPECT_LT(std::sqrt(square / all), 0.23);
+}
+
 // ---- Frames of a camera that moves ----
 
 // Squared and relative, of colours.
