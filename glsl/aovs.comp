@@ -196,7 +196,8 @@ void main() {
     vec3 sun_from[2];  // of a surface, of the medium
     vec2 scatters = vec2(0.0);  // this ray's chances, and sum of depths
     vec4 medium = vec4(0.0);    // its albedo and mean cosine, sums; of what is before all that is solid
-    vec3 before = vec3(0.0);    // likewise, of that, and of squared depths
+    vec3 before = vec3(0.0);    // likewise, of that, and of squared depths; from the first such depth on
+    float first_z = 0.0;
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
     vec3 of_sun = vec3(0.0);
@@ -258,7 +259,11 @@ void main() {
       if (t < solid_t) {
         emission += clear * chance * cm_walk_source(walk);
         medium += clear * chance * cm_walk_scatters(walk);
-        before += vec3(scatters_here, scatters_here.y * scatters_here.y / max(scatters_here.x, 1e-30));
+        if (scatters_here.x > 0.0) {
+          float z = scatters_here.y / scatters_here.x;
+          if (before.x == 0.0) first_z = z;
+          before += scatters_here.x * vec3(1.0, z - first_z, (z - first_z) * (z - first_z));
+        }
       }
 #if CM_VELOCITY
       velocity += clear * chance * cm_walk_velocity(walk, t_1);
@@ -285,8 +290,8 @@ void main() {
     scattered_z += scatters.y;
     if (before.x > 0.0) {
       vec2 moments = before.yz / before.x;
-      float place = moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
-      sun_from[1] = cm_from_cube_point(o + (min(place * t_per_z, solid_t)) * d);
+      float place = first_z + moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
+      sun_from[1] = cm_from_cube_point(o + min(place * t_per_z, solid_t) * d);
     }
     vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
 #if CM_SURFACES

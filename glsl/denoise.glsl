@@ -31,6 +31,7 @@ uint cm_pack(vec2 v) {
 }
 
 // Of the light that facts have (aovs.comp) what they have exactly: all but the sun's from a medium, which is about right.
+// Of a pixel that shows both, surface and medium, the sun's counts by the transmittance.
 vec3 cm_exact_light(vec4 known, float transmittance) {
   vec3 exact = known.rgb * (1.0 - known.a * (1.0 - transmittance));
   return cm_is_finite(exact) ? exact : vec3(0.0);
