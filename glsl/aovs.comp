@@ -248,27 +248,24 @@ void main() {
       used += depth;
       // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
       float chance = 1.0 - exp(-depth);
-      float within_part = cm_middle_of_part(depth, chance);
+      float middle = t + cm_middle_of_part(depth, chance) * min(span, walk.t_end - t);
 #if CM_CHANNELS
       // As if it were dimmed evenly within this part.
       float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
       emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
 #endif
-      vec2 scatters_here = clear * chance * vec2(1.0, (t + within_part * min(span, walk.t_end - t)) / t_per_z);
-      scatters += scatters_here;
+      float z = middle / t_per_z;
+      scatters += clear * chance * vec2(1.0, z);
       if (t < solid_t) {
         emission += clear * chance * cm_walk_source(walk);
         medium += clear * chance * cm_walk_scatters(walk);
-        if (scatters_here.x > 0.0) {
-          float z = scatters_here.y / scatters_here.x;
-          if (before.x == 0.0) first_z = z;
-          before += scatters_here.x * vec3(1.0, z - first_z, (z - first_z) * (z - first_z));
-        }
+        if (before.x == 0.0) first_z = z;
+        float beyond = z - first_z;
+        before += clear * chance * vec3(1.0, beyond, beyond * beyond);
       }
 #if CM_VELOCITY
       velocity += clear * chance * cm_walk_velocity(walk, t_1);
-      vec3 middle = o + (t + within_part * min(span, walk.t_end - t)) * d;
-      volume_motion += clear * chance * cm_walk_backward(walk, t_1, middle);
+      volume_motion += clear * chance * cm_walk_backward(walk, t_1, o + middle * d);
 #endif
       clear -= clear * chance;
       cm_walk_on(walk, t_1);

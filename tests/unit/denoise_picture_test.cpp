@@ -256,27 +256,24 @@ TEST_F(DenoisedPicture, TheGroundIsNoHole) {
 class LathPicture : public DenoisedPicture {
  protected:
   static cumulet::test::SurfacesRef level(float half, float y) {
-    const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
-    const std::array<float, 12> corners{-half, y, -40.0F, -half, y, 40.0F, half, y, 40.0F, half, y, -40.0F};
     auto card = make_desc<cumulet_mesh_desc>();
-    card.positions = corners.data();
-    card.vertex_count = 4;
-    card.indices = indices.data();
-    card.index_count = indices.size();
-    card.double_sided = 1;
     std::fill_n(card.base_color, 4, 1.0F);
     std::fill_n(card.base_color, 3, 0.5F);
-    return cumulet::test::make_surfaces({&card, 1});
+    return cumulet::test::make_quad({-half, y, -40.0F, -half, y, 40.0F, half, y, 40.0F, half, y, -40.0F}, card);
+  }
+
+  void shine(float sky) const {
+    auto light = make_desc<cumulet_light_desc>();
+    light.sun_elevation_degrees = 90.0F;
+    std::ranges::fill(light.sun_irradiance, 3.0F);
+    std::ranges::fill(light.sky_radiance, sky);
+    ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
   }
 
   // One sample a pixel. floor, lath: what there is to say of them beside what they are.
   void render(cumulet_surface_settings_desc floor = make_desc<cumulet_surface_settings_desc>(),
               cumulet_model_desc lath = make_desc<cumulet_model_desc>()) const {
-    auto light = make_desc<cumulet_light_desc>();
-    light.sun_elevation_degrees = 90.0F;
-    std::ranges::fill(light.sun_irradiance, 3.0F);
-    std::ranges::fill(light.sky_radiance, 0.3F);
-    ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    ASSERT_NO_FATAL_FAILURE(shine(0.3F));
     const cumulet::test::SurfacesRef ground = level(40.0F, 0.0F);
     ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), ground.get()), CUMULET_OK);
     ASSERT_EQ(cumulet_set_surface_settings(viewer_.get(), &floor), CUMULET_OK);
@@ -390,11 +387,7 @@ TEST_F(LathPicture, ANetworkThatLeavesAllLeavesThePicture) {
 // A shadow across a medium that light goes deep into. Measured: 0.19, and 0.27 where each ray asks for the sun at the
 // mean place at which it scatters.
 TEST_F(LathPicture, ShadowsAreSoftInAMedium) {
-  auto light = make_desc<cumulet_light_desc>();
-  light.sun_elevation_degrees = 90.0F;
-  std::ranges::fill(light.sun_irradiance, 3.0F);
-  std::fill_n(light.sky_radiance, 3, 1e-3F);
-  ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+  ASSERT_NO_FATAL_FAILURE(shine(1e-3F));
   const cumulet::test::SurfacesRef roof = level(3.0F, 40.0F);
   ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), roof.get()), CUMULET_OK);
   auto medium = make_desc<cumulet_medium_desc>();
@@ -438,15 +431,8 @@ class MovingPicture : public DenoisedPicture {
  protected:
   MovingPicture() {
     // A card that stands in the cloud, and shows beside it.
-    const std::array<float, 12> corners{-4.0F, -9.0F, 3.0F, 13.0F, -9.0F, 3.0F, 13.0F, 2.0F, 6.0F, -4.0F, 2.0F, 6.0F};
-    const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
-    auto card = make_desc<cumulet_mesh_desc>();
-    card.positions = corners.data();
-    card.vertex_count = 4;
-    card.indices = indices.data();
-    card.index_count = indices.size();
-    card.double_sided = 1;
-    surfaces_ = cumulet::test::make_surfaces({&card, 1});
+    surfaces_ =
+        cumulet::test::make_quad({-4.0F, -9.0F, 3.0F, 13.0F, -9.0F, 3.0F, 13.0F, 2.0F, 6.0F, -4.0F, 2.0F, 6.0F});
     EXPECT_EQ(cumulet_set_volume(viewer_.get(), volume_.get()), CUMULET_OK);
     EXPECT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces_.get()), CUMULET_OK);
   }

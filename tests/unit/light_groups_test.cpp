@@ -171,18 +171,11 @@ CUMULET_ON_BACKENDS(LightGroups);
 
 // A pane that shines, and the same dark.
 SurfacesRef make_pane(float emission) {
-  const std::array<float, 12> corners{-9.0F, -9.0F, -9.0F, 9.0F, -9.0F, -9.0F, 9.0F, 9.0F, -9.0F, -9.0F, 9.0F, -9.0F};
-  const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
   auto mesh = make_desc<cumulet_mesh_desc>();
-  mesh.positions = corners.data();
-  mesh.vertex_count = 4;
-  mesh.indices = indices.data();
-  mesh.index_count = indices.size();
-  mesh.double_sided = 1;
   for (float& value : mesh.base_color) value = 0.6F;
   mesh.base_color[3] = 1.0F;
   mesh.emission[0] = mesh.emission[1] = emission;
-  return make_surfaces({&mesh, 1});
+  return make_quad({-9.0F, -9.0F, -9.0F, 9.0F, -9.0F, -9.0F, 9.0F, 9.0F, -9.0F, -9.0F, 9.0F, -9.0F}, mesh);
 }
 
 TEST_P(LightGroups, AreEachAsAloneInAVolume) { expect_each_alone("volume"); }

@@ -134,6 +134,19 @@ inline SurfacesRef make_surfaces(std::span<const cumulet_mesh_desc> meshes) {
   return SurfacesRef(out);
 }
 
+/// Two triangles with these corners, in their order, which show from both sides. card: what else there is to say of
+/// them.
+inline SurfacesRef make_quad(const std::array<float, 12>& corners,
+                             cumulet_mesh_desc card = make_desc<cumulet_mesh_desc>()) {
+  const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
+  card.positions = corners.data();
+  card.vertex_count = 4;
+  card.indices = indices.data();
+  card.index_count = indices.size();
+  card.double_sided = 1;
+  return make_surfaces({&card, 1});
+}
+
 /// Two panes across a ball of make_ball: an opaque one that reaches so far, and one that covers half.
 inline SurfacesRef make_panes(float reach) {
   const std::array<float, 9> opaque{-reach, -reach, 0.0F, reach, -reach, 0.0F, 0.0F, reach + 1.0F, 1.0F};
