@@ -1,6 +1,7 @@
 #version 450
 // What is known of a pixel without light, as AOVs: no noise but that of BLEND surfaces' chance, and anti-aliased by a
-// fixed set of rays, cm.dispatch.samples of them.
+// fixed set of rays, cm.dispatch.samples of them; rays_before of them earlier dispatches have looked along. A pixel whose
+// rays are alike goes on with rays_least of them alone.
 //   normal        mean shading normal of the nearest surface (world space, towards the eye), 0 where there is none
 //   albedo        mean base colour of the nearest surface, likewise; both as if there were no volume
 //   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
@@ -18,7 +19,8 @@
 // and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
-// volume's depth the share that the ground covers.
+// volume's depth the share that the ground covers. Behind the first of these two: how many rays all that is of, and the
+// mean square of what they are compared by.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_VELOCITY=1
@@ -43,15 +45,15 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "ground.glsl"
 #include "fact_ray.glsl"
 
-layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;
-layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform writeonly image2D cm_albedo;
-layout(rg32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_transmittance;
+layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform image2D cm_normal;
+layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform image2D cm_albedo;
+layout(rgba32f, binding = CM_IMAGE_TRANSMITTANCE) uniform image2D cm_transmittance;
 layout(r32f, binding = CM_IMAGE_SURFACE_Z) uniform writeonly image2D cm_surface_depth;
-layout(rg32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
-layout(rgba32f, binding = CM_IMAGE_EMISSION) uniform writeonly image2D cm_emission_out;
+layout(rg32f, binding = CM_IMAGE_VOLUME_Z) uniform image2D cm_volume_z;
+layout(rgba32f, binding = CM_IMAGE_EMISSION) uniform image2D cm_emission_out;
 #if CM_VELOCITY
-layout(rgba32f, binding = CM_IMAGE_VELOCITY) uniform writeonly image2D cm_velocity;
-layout(rgba32f, binding = CM_IMAGE_MOTION) uniform writeonly image2D cm_motion;
+layout(rgba32f, binding = CM_IMAGE_VELOCITY) uniform image2D cm_velocity;
+layout(rgba32f, binding = CM_IMAGE_MOTION) uniform image2D cm_motion;
 
 #include "motion.glsl"
 layout(std140, binding = CM_STORAGE_MOTION) readonly buffer CmMotions {
@@ -103,7 +105,7 @@ vec2 cm_backward_surface(CmHit hit, vec3 p) {
 vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
   vec2 motion = vec2(0.0);
   float sum = 0.0;
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     CmFront front = walk.front[k];
     cm_stand_at(front);
     float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
@@ -164,6 +166,18 @@ float cm_scattered_by_many(float g, float cosine, float depth) {
 // spread that fall exponentially, so that shadows are as soft in it as they are.
 float cm_deviation_of_ray(int i) { return -log(1.0 - fract(0.5 + float(i) * 0.6180339887)) - 1.0; }
 
+// By what rays are compared: light that is known, in parts of what far light there is, colour and transmittance. Linear.
+float cm_seen_along(vec3 known, vec3 albedo, float transmittance) {
+  float far = cm_luminance(cm.lights.sun_irradiance) * 0.318309886 + cm_luminance(cm.lights.sky_radiance);
+  return cm_luminance(known) / max(far, 1e-6) + cm_luminance(albedo) + transmittance;
+}
+
+// Whether the mean of so many is known to a hundredth, but for what no eye sees.
+bool cm_is_settled(float seen, float square, float transmittance, float rays) {
+  float least = 0.01 * (seen - transmittance + 0.05);
+  return square - seen * seen <= rays * least * least;
+}
+
 void main() {
   uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
@@ -184,8 +198,15 @@ void main() {
   vec2 volume_motion = vec2(0.0);
   vec2 motion = vec2(0.0);
 #endif
-  float share = 1.0 / float(cm.dispatch.samples);
-  for (int i = 0; i < int(cm.dispatch.samples); ++i) {
+  ivec2 texel = ivec2(pixel);
+  if (cm.dispatch.rays_before >= cm.dispatch.rays_least) {
+    vec4 through = imageLoad(cm_transmittance, texel);
+    float seen = cm_seen_along(imageLoad(cm_emission_out, texel).rgb, imageLoad(cm_albedo, texel).rgb, through.x);
+    if (cm_is_settled(seen, through.w, through.x, through.z)) return;
+  }
+  float seen_before = 0.0;
+  float squares = 0.0;
+  for (int i = int(cm.dispatch.rays_before); i < int(cm.dispatch.samples); ++i) {
     CmFactRay ray = cm_fact_ray(pixel, i);
     vec3 o = ray.o;
     vec3 w = ray.w;
@@ -299,17 +320,54 @@ void main() {
       float depth = cm_depth_to_far(sun_from[k], to_sun);
       sunlit += light[k] * (k == 0 ? exp(-depth) : cm_scattered_by_many(medium.a / before.x, dot(w, to_sun), depth));
     }
+    float seen = cm_seen_along(emission + sunlit, albedo, transmittance);
+    squares += (seen - seen_before) * (seen - seen_before);
+    seen_before = seen;
   }
-  imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));
-  imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
-#if CM_VELOCITY
-  imageStore(cm_velocity, ivec2(pixel), vec4(scattered > 0.0 ? velocity / scattered : vec3(0.0), 0.0));
-  imageStore(cm_motion, ivec2(pixel), vec4(motion, scattered > 0.0 ? volume_motion / scattered : vec2(0.0)));
-#endif
+  // What was found along the rays before is means, of which sums are made again. Of a ray the chances that it scatters
+  // are what its transmittance leaves.
+  float rays = float(cm.dispatch.samples - cm.dispatch.rays_before);
   vec3 known = emission + sunlit;
-  float of_sun = known == vec3(0.0) ? 0.0 : cm_luminance(sunlit) / cm_luminance(known);
-  imageStore(cm_emission_out, ivec2(pixel), vec4(share * known, of_sun));
-  imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));
-  imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
-  imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z, share * covered.y, 0.0, 0.0));
+  float of_sun = known == vec3(0.0) ? 0.0 : cm_luminance(sunlit);
+  if (cm.dispatch.rays_before > 0u) {
+    vec4 through_before = imageLoad(cm_transmittance, texel);
+    vec4 albedo_before = imageLoad(cm_albedo, texel);
+    vec4 light_before = imageLoad(cm_emission_out, texel);
+    float before = through_before.z;
+    rays += before;
+    vec4 normal_before = imageLoad(cm_normal, texel);
+    vec2 volume_before = imageLoad(cm_volume_z, texel).xy;
+    float chances = before * (1.0 - through_before.x);
+    normal += before * normal_before.xyz;
+    solid_z = normal_before.w;
+    albedo += before * albedo_before.rgb;
+    if (albedo_before.a < CM_INFINITE) {
+      scattered_z += chances * albedo_before.a;
+      scattered += chances;
+    }
+    transmittance += before * through_before.x;
+    squares += before * through_before.w;
+    covered += before * vec2(through_before.y, volume_before.y);
+    volume_z = volume_before.x;
+    known += before * light_before.rgb;
+    of_sun += before * light_before.a * cm_luminance(light_before.rgb);
+#if CM_VELOCITY
+    vec4 motion_before = imageLoad(cm_motion, texel);
+    velocity += chances * imageLoad(cm_velocity, texel).xyz;
+    volume_motion += chances * motion_before.zw;
+    motion = motion_before.xy;
+#endif
+  } else {
+    imageStore(cm_surface_depth, texel, vec4(surface_z));
+  }
+  float share = 1.0 / rays;
+  imageStore(cm_normal, texel, vec4(share * normal, solid_z));
+  imageStore(cm_albedo, texel, vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
+  imageStore(cm_transmittance, texel, vec4(share * vec2(transmittance, covered.x), rays, share * squares));
+  imageStore(cm_volume_z, texel, vec4(volume_z, share * covered.y, 0.0, 0.0));
+  imageStore(cm_emission_out, texel, vec4(share * known, of_sun == 0.0 ? 0.0 : of_sun / cm_luminance(known)));
+#if CM_VELOCITY
+  imageStore(cm_velocity, texel, vec4(scattered > 0.0 ? velocity / scattered : vec3(0.0), 0.0));
+  imageStore(cm_motion, texel, vec4(motion, scattered > 0.0 ? volume_motion / scattered : vec2(0.0)));
+#endif
 }

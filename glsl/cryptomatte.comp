@@ -2,9 +2,10 @@
 // Whose a pixel is, as Cryptomatte has it (Friedman and Jones, "Fully automatic ID mattes with support for motion blur and
 // transparency", SIGGRAPH 2015 posters; specification 1.2): the ids of what is seen in it, and of each the share of the
 // pixel at which camera rays end there, by their first scattering or absorption in a volume, or at a surface or the
-// ground. Of a fixed set of rays, cm.dispatch.samples of them; the shares along each are exact, of at most as many volumes
-// at one place as walk.glsl takes. A slice has two ids, as a float's bits, and a share each, the largest share first; 0
-// where there are no more. What has no id, as holes have none, hides what is behind it and is nobody's.
+// ground. Of a fixed set of rays, cm.dispatch.samples of them, rays_before of which earlier dispatches have looked along;
+// the shares along each are exact, of at most as many volumes at one place as walk.glsl takes. A slice has two ids, as a
+// float's bits, and a share each, the largest share first; behind a share of 0 nothing is written. Texels are of the tile.
+// What has no id, as holes have none, hides what is behind it and is nobody's.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -26,7 +27,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "ground.glsl"
 #include "fact_ray.glsl"
 
-layout(rgba32f, binding = CM_IMAGE_MATTES) uniform writeonly image2DArray cm_mattes;
+layout(rgba32f, binding = CM_IMAGE_MATTES) uniform image2DArray cm_mattes;
 
 // Ids, 0 for none: the ground's, one for each volume, and one for each record of models.
 layout(std430, binding = CM_STORAGE_MATTES) readonly buffer CmMatteIds { uint cm_matte_ids[]; };
@@ -81,8 +82,19 @@ void main() {
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
   uvec2 pixel = cm.dispatch.tile_corner + local;
   uint first_model = CM_MATTE_OF_VOLUMES + max(cm.space.volumes, 1u);
-  float share = 1.0 / float(cm.dispatch.samples);
-  for (int i = 0; i < int(cm.dispatch.samples); ++i) {
+  const int slices = int(CM_MOST_MATTES / 2u);
+  float before = float(cm.dispatch.rays_before);
+  bool more = before > 0.0;
+  for (int slice = 0; slice < slices && more; ++slice) {
+    vec4 pairs = imageLoad(cm_mattes, ivec3(ivec2(local), slice));
+    more = pairs.w > 0.0;
+    cm_matte_id[2 * slice] = floatBitsToUint(pairs.x);
+    cm_matte_share[2 * slice] = before * pairs.y;
+    cm_matte_id[2 * slice + 1] = floatBitsToUint(pairs.z);
+    cm_matte_share[2 * slice + 1] = before * pairs.w;
+    cm_matte_count += more ? 2u : pairs.y > 0.0 ? 1u : 0u;
+  }
+  for (int i = int(cm.dispatch.rays_before); i < int(cm.dispatch.samples); ++i) {
     CmFactRay ray = cm_fact_ray(pixel, i);
     float solid_t = ray.end;
     uint solid = 0u;  // the host's has no id
@@ -99,7 +111,7 @@ void main() {
       solid = cm_matte_ids[0];
     }
     float used = 0.0;
-    float clear = share;
+    float clear = 1.0;
     CmWalk walk = cm_walk(ray.o, ray.d, solid_t, true);
     // Beyond e^-40 nothing is left to know.
     for (int j = 0; j < 100000 && used < 40.0; ++j) {
@@ -113,20 +125,23 @@ void main() {
       // Each volume has its share of the extinction there, which is linear.
       float middle = walk.t + cm_middle_of_part(depth, chance) * min(span, way);
       float extinction = 0.0;
-      for (int k = 0; k < walk.count; ++k) extinction += cm_front_extinction(walk.front[k], middle);
+      for (int k = 0; CM_IS_FRONT(k, walk); ++k) extinction += cm_front_extinction(walk.front[k], middle);
       float rare = extinction > 0.0 ? clear * chance / extinction : 0.0;
-      for (int k = 0; k < walk.count; ++k) {
+      for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
         cm_add_to_matte(cm_matte_ids[CM_MATTE_OF_VOLUMES + walk.front[k].volume],
                         rare * cm_front_extinction(walk.front[k], middle));
       }
       clear -= clear * chance;
       cm_walk_on(walk, t_1);
     }
-    cm_add_to_matte(solid, share * exp(-used));
+    cm_add_to_matte(solid, exp(-used));
   }
-  int slices = imageSize(cm_mattes).z;
-  for (int slice = 0; slice < slices; ++slice) {
+  float share = 1.0 / float(cm.dispatch.samples);
+  more = true;
+  for (int slice = 0; slice < slices && more; ++slice) {
     vec2 first = cm_take_largest_matte();
-    imageStore(cm_mattes, ivec3(ivec2(pixel), slice), vec4(first, cm_take_largest_matte()));
+    vec2 second = cm_take_largest_matte();
+    imageStore(cm_mattes, ivec3(ivec2(local), slice), vec4(first.x, share * first.y, second.x, share * second.y));
+    more = second.y > 0.0;
   }
 }

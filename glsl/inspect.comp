@@ -195,7 +195,7 @@ void main() {
         float line = 0.0;
         float level = 0.0;
         float size = max(footprint * (cm.view.orthographic != 0u ? 1.0 : t), 1e-20);
-        for (int k = 0; k < walk.count; ++k) {
+        for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
           CmFront front = walk.front[k];
           if (front.t_0 != t || !(front.e_0 > 0.0 || front.e_1 > 0.0)) continue;
           cm_stand_at(front);

@@ -230,12 +230,14 @@ CM_BLOCK(CmDispatch) {
   CM_ALIGN(8) uvec2 tile_corner;  // pixels
   CM_ALIGN(8) uvec2 tile_size;
   uint rounds;   // that a lane of trace.comp runs at most
-  uint samples;  // that a pixel shall have
+  uint samples;  // that a pixel shall have; of rays without chance those that it shall have been looked along
   uint view;     // of inspect.comp
   uint picks;    // 1: inspect.comp looks at one pixel, the tile's, and tells of it at (0, 0)
   CM_ALIGN(8) uvec2 rows;  // of the tile, for kernels that run by rows: the first, and the one after the last
   uint lanes;    // that there are for paths
   uint places;   // pixels that they take, those of the tile's list of squares: glsl/path_places.glsl
+  uint rays_before;  // of rays without chance those that it has been looked along: glsl/aovs.comp
+  uint rays_least;   // and those that it shall be looked along however alike they are
   CM_EQUALITY(CmDispatch)
 };
 

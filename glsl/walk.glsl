@@ -7,8 +7,10 @@
 // That a ray may be in at once. With more of them at one place those that it enters last are taken up when others end.
 #if CM_INSTANCES
 #define CM_MOST_FRONTS 4
+#define CM_IS_FRONT(k, walk) (k < walk.count)
 #else
 #define CM_MOST_FRONTS 1
+#define CM_IS_FRONT(k, walk) (k < 1 && k < walk.count)  // no loop
 #endif
 
 // A volume that the ray is in: its cell, from t_0 to t_1, with the extinctions there.
@@ -107,8 +109,8 @@ bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1
   }
   if (walk.count == 0 || walk.t >= walk.t_end) return false;
   if (walk.count < CM_MOST_FRONTS) t_1 = walk.entry;
-  for (int k = 0; k < walk.count; ++k) t_1 = min(t_1, walk.front[k].t_1);
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) t_1 = min(t_1, walk.front[k].t_1);
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     e_0 += walk.t == walk.front[k].t_0 ? walk.front[k].e_0 : cm_front_extinction(walk.front[k], walk.t);
     e_1 += cm_front_extinction(walk.front[k], t_1);
   }
@@ -119,7 +121,7 @@ bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1
 void cm_walk_on(inout CmWalk walk, float t_1) {
   walk.t = t_1;
   int kept = 0;
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     CmFront front = walk.front[k];
     bool leaves = front.t_1 <= t_1;
     if (leaves && front.next.x == CM_NONE) continue;
@@ -151,7 +153,7 @@ bool cm_walk_to(inout CmWalk walk, float t) {
 uint cm_walk_densest(inout CmWalk walk, float t) {
   uint densest = walk.front[0].volume;
   float most = -1.0;
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     float extinction = cm_front_extinction(walk.front[k], t);
     if (extinction > most) densest = walk.front[k].volume;
     most = max(most, extinction);
@@ -164,7 +166,7 @@ vec3 cm_walk_source(inout CmWalk walk) {
 #if CM_INSTANCES
   vec3 source = vec3(0.0);
   float sum = 0.0;
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     cm_stand_at(walk.front[k]);
     float extinction = walk.front[k].e_0 + walk.front[k].e_1;
     source += extinction * CM_MEDIUM.source;
@@ -180,7 +182,7 @@ vec3 cm_walk_source(inout CmWalk walk) {
 vec4 cm_walk_scatters(inout CmWalk walk) {
   vec4 scatters = vec4(0.0);
   float sum = 0.0;
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     cm_stand_at(walk.front[k]);
     float extinction = walk.front[k].e_0 + walk.front[k].e_1;
     vec3 albedo = CM_MEDIUM.holdout != 0u ? vec3(0.0) : CM_MEDIUM.albedo;
@@ -200,7 +202,7 @@ vec4 cm_walk_scatters(inout CmWalk walk) {
 vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
   vec3 velocity = vec3(0.0);
   float sum = 0.0;
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     CmFront front = walk.front[k];
     cm_stand_at(front);
     float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
@@ -216,7 +218,7 @@ vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
 // What their cells give off from the part's beginning to t_1.
 vec3 cm_walk_emitted(inout CmWalk walk, float t_1) {
   vec3 emitted = vec3(0.0);
-  for (int k = 0; k < walk.count; ++k) {
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     CmFront front = walk.front[k];
     cm_stand_at(front);
     CmEmission emission =

@@ -37,7 +37,7 @@ inline constexpr FilmLayer depth{"depth", GL_R32F, 4};
 inline constexpr FilmLayer normal{"normal", GL_RGBA32F, 16};
 inline constexpr FilmLayer albedo{"albedo", GL_RGBA32F, 16};
 /// Of the volume; the share of a pixel that surfaces cover.
-inline constexpr FilmLayer transmittance{"transmittance", GL_RG32F, 8};
+inline constexpr FilmLayer transmittance{"transmittance", GL_RGBA32F, 16};
 inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
 /// Of half opacity; the share of a pixel that the ground covers.
 inline constexpr FilmLayer volume_z{"volume z", GL_RG32F, 8};
@@ -47,8 +47,6 @@ inline constexpr FilmLayer velocity{"velocity", GL_RGBA32F, 16};
 inline constexpr FilmLayer motion{"motion", GL_RGBA32F, 16};
 /// As radiance, of so many groups of lights; then of what cameras see of the sky and of the sun.
 constexpr FilmLayer light_groups(unsigned count) { return {"light groups", GL_RGBA32F, 16 * (count + 2), count + 2}; }
-/// Ids and shares, of glsl/cryptomatte.comp; two ranks a slice.
-constexpr FilmLayer mattes(unsigned slices) { return {"mattes", GL_RGBA32F, 16 * slices, slices}; }
 }  // namespace film_layers
 
 /// What passes leave for each other, of one picture. Layers are there from the first pass that writes them on.

@@ -22,7 +22,7 @@ constexpr double most_layer_bytes = 256e6;
 // Frames that the first answer to a change may take.
 constexpr double answer_frames = 2.0;
 // A pixel, for a filter: more would take longer than samples that say as much.
-constexpr std::uint32_t guide_rays = 4;
+constexpr std::uint32_t first_guide_rays = 4;
 using State = Schedule::State;
 using Clock = std::chrono::steady_clock;
 
@@ -187,17 +187,26 @@ bool Progressive::needs_depth() const {
          shown_->data == wish_.content.data && shown_->instances == wish_.content.instances;
 }
 
+std::uint32_t Progressive::guide_rays(const Work& work) const {
+  const Picture& picture = *work.picture;
+  const std::uint64_t pixels = std::max<std::uint64_t>(picture.box().area(), 1);
+  // They take less time than samples so.
+  const bool rough = work.divisor > finest_ || !picture.has_facts();
+  const std::uint64_t more = rough ? 0 : 2 * (picture.samples() / pixels);
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guide_rays + more, most_fact_rays));
+}
+
 bool Progressive::needs_guides(const Work& work) const {
   return wish_.guides && wish_.content.view == View::shaded && work.data == wish_.content.data &&
          work.instances == wish_.content.instances && no_guides_for_ != work.picture->size() &&
-         !work.picture->has_facts();
+         (!work.picture->has_facts() || work.picture->rays_of_facts() < guide_rays(work));
 }
 
 void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
   if (!needs_guides(*working_)) return;
   try {
     if (!tracer_.able_to_find(*working_->picture, data, obstacles)) return;
-    tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays);
+    tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays(*working_));
   } catch (const Error& error) {
     // Nor where a driver does not build their program.
     if (error.code() != ErrorCode::out_of_memory && error.code() != ErrorCode::gl) throw;

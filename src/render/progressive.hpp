@@ -158,6 +158,8 @@ class Progressive {
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;
+  // Rays that guides are of by now: the more samples a picture has, the more can be lost by guides that are rough.
+  [[nodiscard]] std::uint32_t guide_rays(const Work& work) const;
   [[nodiscard]] bool needs_guides(const Work& work) const;
   // Finds them, where it is time: before samples, so that the first are filtered as soon as they are shown.
   void find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline);

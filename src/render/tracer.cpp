@@ -32,7 +32,14 @@ static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
 static_assert(CM_MOST_SQUARES <= 1U << CM_SQUARE_ROWS);
 constexpr double hasty_rest = 0.03;  // of a tile's pixels
 static_assert(lanes_in_call > hasty_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
-constexpr std::uint32_t most_rounds = 65536;
+// A shader of llvmpipe's ends its loops where it has gone around them 65,535 times, all of them together, and says
+// nothing. So these bound what one dispatch does: each round goes around some hundred times, and each ray some thousand
+// times, for mattes more often than for facts.
+constexpr std::uint32_t most_rounds = 256;
+constexpr std::uint32_t facts_rays_at_once = 2;
+constexpr std::uint32_t matte_rays_at_once = 1;
+constexpr int matte_slices = 16;  // cryptomatte.comp's
+static_assert(fact_rays % facts_rays_at_once == 0);
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t most_samples = 1U << 31U;
 constexpr double nearly_done = 0.99;
@@ -739,7 +746,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
     picture.revision_ = ++revision_;
-    picture.done_ = picture.complete_ = inspect(picture, parameters, program, picture.view_row_, deadline);
+    picture.done_ = picture.complete_ = inspect(picture.box_, parameters, program.cost, picture.view_row_, deadline);
     picture.holes_ = !picture.done_;
     *picture.samples_ = std::uint64_t{picture.box_.size.x} * std::min(picture.view_row_, picture.box_.size.y);
     return picture.done_;
@@ -857,22 +864,37 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   gl::check(*gl_, "tracing");
 }
 
-bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program,
+bool Tracer::inspect(const PixelBox& box, const core::CmParameters& parameters, const std::shared_ptr<RoundCost>& cost,
                      std::uint32_t& row, Deadline deadline) {
   core::CmParameters p = parameters;
-  const glm::uvec2 size = picture.box_.size;
-  p.dispatch.tile_corner = picture.box_.first;
+  const glm::uvec2 size = box.size;
+  p.dispatch.tile_corner = box.first;
   p.dispatch.tile_size = size;
   const auto send = [&](glm::uvec2 rows) {
     p.dispatch.rows = rows;
     gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
     gl_->DispatchCompute((size.x + 7) / 8, (rows.y - rows.x + 7) / 8, 1);
   };
-  send_rows(flights_, program.cost, size, row, deadline, send, [&] { collect(); });
+  send_rows(flights_, cost, size, row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
                                GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   gl::check(*gl_, "looking at the pixels");
   return row >= size.y;
+}
+
+bool Tracer::look_along_rays(const PixelBox& box, core::CmParameters parameters, const Program& program,
+                             std::uint32_t at_once, std::uint32_t& rays, std::uint32_t wanted, std::uint32_t& row,
+                             Deadline deadline) {
+  while (rays < wanted) {
+    parameters.dispatch.rays_before = rays;
+    parameters.dispatch.samples = rays + at_once;
+    const auto& cost = rays < parameters.dispatch.rays_least ? program.cost : program.settled_cost;
+    if (!inspect(box, parameters, cost, row, deadline)) return false;
+    rays += at_once;
+    row = 0;
+    if (rays < wanted && Clock::now() >= deadline) return false;
+  }
+  return true;
 }
 
 void Tracer::empty_around(const Picture& picture, std::span<const FilmLayer> layers) const {
@@ -899,7 +921,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
     describe(obstacles, parameters);
     parameters.dispatch.view = view_depth;
     if (picture.depth_row_ == 0) empty_around(picture, std::array{film_layers::depth});
-    return inspect(picture, parameters, program, picture.depth_row_, until);
+    return inspect(picture.box_, parameters, program.cost, picture.depth_row_, until);
   };
   return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
 }
@@ -915,38 +937,42 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
   using namespace film_layers;
   // A reading that failed may have left more to find.
   if (obstacles.motion == nullptr && !picture.film_.has(motion)) picture.facts_ = PixelFacts::guides;
-  if (picture.facts_rays_ < rays || picture.facts_ < facts) {
-    picture.facts_rays_ = std::max(picture.facts_rays_, rays);
-    picture.facts_ = std::max(picture.facts_, facts);
-    picture.facts_row_ = 0;
-  } else if (picture.facts_row_ >= picture.box_.size.y && picture.film_.has(normal)) {
-    return true;
+  if (picture.facts_ < facts) {
+    picture.facts_ = facts;
+    picture.facts_row_ = picture.facts_rays_ = 0;
   }
+  if (picture.facts_rays_ >= rays && picture.film_.has(normal)) return true;
+  // Of motion, which is told once, no more rays than were looked along then.
+  const PixelFacts found = obstacles.motion != nullptr ? picture.facts_ : PixelFacts::guides;
   std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
-  if (picture.facts_ == PixelFacts::all) written.insert(written.end(), {velocity, motion});
+  if (found == PixelFacts::all) written.insert(written.end(), {velocity, motion});
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
     flights_.order();
-    const Program& program = facts_program(picture, data, obstacles, picture.facts_);
+    const Program& program = facts_program(picture, data, obstacles, found);
     program.object->use(*gl_);
     bind(data, obstacles);
-    film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_WRITE_ONLY);
-    film.bind(*gl_, core::CM_IMAGE_ALBEDO, albedo, GL_WRITE_ONLY);
-    film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_READ_WRITE);
+    film.bind(*gl_, core::CM_IMAGE_ALBEDO, albedo, GL_READ_WRITE);
+    film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
-    film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
-    film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_WRITE_ONLY);
-    if (picture.facts_ == PixelFacts::all) {
-      film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_WRITE_ONLY);
-      film.bind(*gl_, core::CM_IMAGE_MOTION, motion, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_READ_WRITE);
+    film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_READ_WRITE);
+    if (found == PixelFacts::all) {
+      film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_READ_WRITE);
+      film.bind(*gl_, core::CM_IMAGE_MOTION, motion, GL_READ_WRITE);
       upload_motion(*obstacles.motion);
       gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MOTION, motion_.name());
     }
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
-    parameters.dispatch.samples = picture.facts_rays_;
-    if (picture.facts_row_ == 0) empty_around(picture, written);
-    return inspect(picture, parameters, program, picture.facts_row_, until);
+    if (picture.facts_row_ == 0 && picture.facts_rays_ == 0) empty_around(picture, written);
+    parameters.dispatch.rays_least = fact_rays;
+    const std::uint32_t before = picture.facts_rays_;
+    const bool done = look_along_rays(picture.box_, parameters, program, facts_rays_at_once, picture.facts_rays_, rays,
+                                      picture.facts_row_, until);
+    if (picture.facts_rays_ != before) picture.revision_ = ++revision_;
+    return done;
   };
   return run(gl_, picture.film_, {"cumulet: facts", {}, written, work}, deadline);
 }
@@ -977,9 +1003,9 @@ void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) co
   gl::check(*gl_, "reading what is known of pixels");
 }
 
-void Tracer::read_mattes(Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
+void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
                          std::uint32_t ranks, float* values) {
-  const FilmLayer layer = film_layers::mattes((ranks + 1) / 2);
+  const gl::DebugGroup group(*gl_, "cumulet: mattes");
   std::vector<std::uint32_t> table{ids.ground};
   table.insert(table.end(), ids.volumes.begin(), ids.volumes.end());
   if (obstacles.scene != nullptr) {
@@ -987,32 +1013,48 @@ void Tracer::read_mattes(Picture& picture, const MarchData& data, const Obstacle
   }
   const gl::Object buffer =
       gl::make_buffer(gl_, table.size() * sizeof(std::uint32_t), table.data(), 0, "creating the table of mattes");
-  std::uint32_t row = 0;
-  const auto work = [&](const Film& film, Deadline until) {
-    make_shared_objects();
-    flights_.order();
-    const Program& program = matte_program(picture, data, obstacles);
+  make_shared_objects();
+  flights_.order();
+  const Program& program = matte_program(picture, data, obstacles);
+  core::CmParameters parameters = picture.parameters_;
+  describe(obstacles, parameters);
+  parameters.dispatch.rays_least = matte_rays;
+  std::fill_n(values, std::size_t{2} * ranks * picture.size_.x * picture.size_.y, 0.0F);
+  const PixelBox& box = picture.box_;
+  if (box.area() == 0) return;
+  // Of each pixel there are more than are asked for, so it is a few rows at a time.
+  constexpr std::uint32_t rows_at_once = 64;
+  const glm::uvec2 size(box.size.x, std::min(box.size.y, rows_at_once));
+  const gl::Object mattes =
+      gl::make_texture_2d_array(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y), matte_slices,
+                                "creating the texture of mattes");
+  const std::size_t slices = (ranks + 1) / 2;
+  std::vector<glm::vec2> pairs(size.x * size.y * 2 * slices);
+  for (std::uint32_t from = 0; from < box.size.y; from += size.y) {
+    const PixelBox part{box.first + glm::uvec2(0, from), glm::uvec2(size.x, std::min(size.y, box.size.y - from))};
+    std::uint32_t row = 0;
+    std::uint32_t rays = 0;
     program.object->use(*gl_);
     bind(data, obstacles);
-    film.bind(*gl_, core::CM_IMAGE_MATTES, layer, GL_WRITE_ONLY);
+    gl_->BindImageTexture(core::CM_IMAGE_MATTES, mattes.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA32F);
     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MATTES, buffer.name());
-    core::CmParameters parameters = picture.parameters_;
-    describe(obstacles, parameters);
-    parameters.dispatch.samples = matte_rays;
-    if (row == 0) empty_around(picture, std::array{layer});
-    return inspect(picture, parameters, program, row, until);
-  };
-  while (!run(gl_, picture.film_, {"cumulet: mattes", {}, {layer}, work}, deadline_after(1000.0))) {
-  }
-  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
-  std::vector<glm::vec2> pairs(pixels * 2 * layer.slices);
-  gl_->GetTextureImage(picture.film_.texture(layer), 0, GL_RGBA, GL_FLOAT,
-                       static_cast<GLsizei>(pairs.size() * sizeof(glm::vec2)), pairs.data());
-  gl::check(*gl_, "reading mattes");
-  picture.film_.drop(layer);
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    for (std::uint32_t rank = 0; rank < ranks; ++rank, values += 2)
-      std::memcpy(values, &pairs[(rank / 2 * pixels + pixel) * 2 + rank % 2], sizeof(glm::vec2));
+    while (!look_along_rays(part, parameters, program, matte_rays_at_once, rays, matte_rays, row,
+                            deadline_after(1000.0))) {
+    }
+    gl_->GetTextureSubImage(mattes.name(), 0, 0, 0, 0, static_cast<GLsizei>(size.x), static_cast<GLsizei>(size.y),
+                            static_cast<GLsizei>(slices), GL_RGBA, GL_FLOAT,
+                            static_cast<GLsizei>(pairs.size() * sizeof(glm::vec2)), pairs.data());
+    gl::check(*gl_, "reading mattes");
+    for (std::uint32_t y = 0; y < part.size.y; ++y) {
+      for (std::uint32_t x = 0; x < part.size.x; ++x) {
+        const std::size_t pixel = std::size_t{part.first.y + y} * picture.size_.x + part.first.x + x;
+        for (std::uint32_t rank = 0; rank < ranks; ++rank) {
+          const glm::vec2& pair = pairs[((rank / 2 * size.y + y) * size.x + x) * 2 + rank % 2];
+          if (!(pair.y > 0.0F)) break;
+          std::memcpy(values + 2 * (pixel * ranks + rank), &pair, sizeof pair);
+        }
+      }
+    }
   }
 }
 

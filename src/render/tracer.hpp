@@ -98,8 +98,10 @@ constexpr std::size_t channels_of(PixelFact fact) {
 /// Those of a pixel that are found together: what a filter asks for, or velocity and motion as well.
 enum class PixelFacts { guides, all };
 
-/// Rays a pixel that facts are means of, where they are read; a filter does with few.
+/// Rays a pixel that facts are means of, where they are read; a filter begins with few. Where they are not alike, as
+/// triangles and shadows are finer than pixels, a filter gains by more, up to so many.
 constexpr std::uint32_t fact_rays = 16;
+constexpr std::uint32_t most_fact_rays = 64;
 
 /// Rays a pixel that mattes are found by, and most ranks that there are.
 constexpr std::uint32_t matte_rays = 64;
@@ -160,6 +162,8 @@ class Picture {
   [[nodiscard]] std::uint32_t light_groups() const { return light_groups_; }
   /// Whether facts are there that a filter can do with (Tracer::find_facts).
   [[nodiscard]] bool has_facts() const;
+  /// Rays a pixel that they are means of, where these are not alike.
+  [[nodiscard]] std::uint32_t rays_of_facts() const { return facts_rays_; }
   /// Asks for this many samples, if that is more, and of a picture with a noise target for this noise: goes on where it
   /// was.
   void extend(std::uint32_t samples, std::optional<double> noise_target);
@@ -247,7 +251,7 @@ class Picture {
   // Rows that the depth and facts passes have come to.
   std::uint32_t depth_row_ = 0;
   std::uint32_t facts_row_ = 0;
-  std::uint32_t facts_rays_ = 0;  // those that are there or under way are of
+  std::uint32_t facts_rays_ = 0;  // that facts are of, and those of rows before that one of some more
   PixelFacts facts_ = PixelFacts::guides;
 };
 
@@ -304,9 +308,10 @@ class Tracer {
   /// Standard error of each pixel's luminance, with the background's; infinite where it has fewer than two samples.
   void read_error(const Picture& picture, float* errors) const;
   /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
-  /// whether they are there, of at least so many rays a pixel. Goes on in the next call.
+  /// whether they are there, of at least so many rays a pixel, beyond fact_rays where they are not alike. Goes on in
+  /// the next call.
   bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                  std::uint32_t rays = fact_rays, PixelFacts facts = PixelFacts::guides);
+                  std::uint32_t rays, PixelFacts facts = PixelFacts::guides);
   /// As able(), for find_facts() of guides.
   bool able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   /// A fact a pixel (PixelFact), each channels_of(fact) floats, once find_facts has found them.
@@ -314,7 +319,7 @@ class Tracer {
   /// width * height * ranks pairs of floats, an id as a float's bits and the share of the pixel that it has, the
   /// largest first: glsl/cryptomatte.comp. Found anew in each call. ranks: 1 to most_matte_ranks; data and obstacles
   /// being those that the picture was made of.
-  void read_mattes(Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
+  void read_mattes(const Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
                    std::uint32_t ranks, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
   /// What this context does from now on comes after what is under way, whichever made that. Waits for nothing.
@@ -347,6 +352,7 @@ class Tracer {
   struct Program {
     const gl::Program* object = nullptr;
     std::shared_ptr<RoundCost> cost = std::make_shared<RoundCost>();
+    std::shared_ptr<RoundCost> settled_cost = std::make_shared<RoundCost>();  // where most pixels have done with it
   };
   // stages: what paths among triangles are run by; without them the program in use is the one kernel.
   void dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
@@ -381,8 +387,12 @@ class Tracer {
                                PixelFacts facts);
   const Program& matte_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   // One of inspect.comp, aovs.comp or cryptomatte.comp over rows from `row` on, until done or about the deadline.
-  bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
-               Deadline deadline);
+  bool inspect(const PixelBox& box, const core::CmParameters& parameters, const std::shared_ptr<RoundCost>& cost,
+               std::uint32_t& row, Deadline deadline);
+  // The same of a kernel that looks along rays, so many in a dispatch, until as many are as are wanted.
+  bool look_along_rays(const PixelBox& box, core::CmParameters parameters, const Program& program,
+                       std::uint32_t at_once, std::uint32_t& rays, std::uint32_t wanted, std::uint32_t& row,
+                       Deadline deadline);
   void make_shared_objects();
   void upload_motion(const scene::MotionTable& motion);
   // What a pass by rows will write is 0 where it does not come to.

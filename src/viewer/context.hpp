@@ -187,7 +187,8 @@ class Context {
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
   // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
-  void find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts);
+  void find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts,
+                  std::uint32_t rays = render::fact_rays);
   // As readable(), and throws where it is a debug view.
   render::Picture& readable_shaded();
   // Throws where what is shown is not what the picture is of any more, or where not this as well.

@@ -54,6 +54,12 @@ std::optional<render::PixelFact> fact_of(Aov aov) {
   return std::nullopt;
 }
 
+// Of few samples more would take longer than more samples, and say less.
+std::uint32_t rays_to_denoise(const render::Picture& picture) {
+  const std::uint64_t samples = picture.samples() / std::max<std::uint64_t>(picture.box().area(), 1);
+  return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(2 * samples, render::fact_rays, render::most_fact_rays));
+}
+
 // How many floats a picture of four channels has. Throws Error(invalid_argument) where there is no room for them.
 std::size_t require_room(const render::Picture& picture, const float* rgba, std::size_t count) {
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 4;
@@ -261,7 +267,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
   progressive_.tracer().read_mattes(picture, *scene_.data(), met, ids, ranks, values);
 }
 
-void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts) {
+void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts, std::uint32_t rays) {
   // Motion is told from now on.
   const bool of_now = facts != render::PixelFacts::all || progressive_.newest_is_seen_as(*shot.scene);
   require_present(of_now);
@@ -272,8 +278,7 @@ void Context::find_facts(const Shot& shot, render::Picture& picture, render::Pix
     met.motion = &motion;
   }
   compositor_.begin_denoising_anew();
-  while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0), render::fact_rays,
-                                           facts)) {
+  while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0), rays, facts)) {
   }
 }
 
@@ -288,7 +293,7 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
     throw Error(ErrorCode::unsupported, "only shaded pictures whose surfaces are traced can be denoised");
   }
   require_room(picture, rgba, count);
-  find_facts(shot, picture, render::PixelFacts::guides);
+  find_facts(shot, picture, render::PixelFacts::guides, rays_to_denoise(picture));
   const render::Display display = shot.display.shown(false);
   const gl::Object denoised =
       network != nullptr ? by_network(shot, picture, network) : filtered(picture, display.shows_background());

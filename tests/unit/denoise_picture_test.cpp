@@ -74,6 +74,20 @@ class DenoisedPicture : public testing::Test {
     return rgba;
   }
 
+  // As it is displayed, in the rows of what is drawn.
+  [[nodiscard]] std::vector<std::uint8_t> shown() const {
+    std::vector<std::uint8_t> rgba(floats);
+    EXPECT_EQ(cumulet_read_display(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
+    for (std::size_t row = 0; row < side / 2; ++row)
+      std::swap_ranges(&rgba[row * side * 4], &rgba[row * side * 4] + side * 4, &rgba[(side - 1 - row) * side * 4]);
+    return rgba;
+  }
+  static double off_by(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
+    double off = 0.0;
+    for (std::size_t i = 0; i < floats; ++i) off += std::abs(double(a[i]) - double(b[i])) / double(floats);
+    return off;
+  }
+
   cumulet_status denoise(const std::string& file, std::vector<float>& rgba) const {
     auto desc = make_desc<cumulet_denoise_desc>();
     desc.network = file.c_str();
@@ -150,19 +164,21 @@ TEST_F(DenoisedPicture, FramesAreFilteredWhereThatIsSetAndWhatIsReadIsNot) {
   EXPECT_NE(filtered, raw);
   EXPECT_EQ(linear(), values);
   // The same that is read back, but for the rays that facts are of.
-  std::vector<std::uint8_t> shown(floats);
-  ASSERT_EQ(cumulet_read_display(viewer_.get(), shown.data(), shown.size()), CUMULET_OK);
-  double off = 0.0;
-  for (std::size_t i = 0; i < floats; ++i) {
-    const std::size_t row = i / (side * 4);
-    const std::size_t turned = (side - 1 - row) * (side * 4) + i % (side * 4);
-    off += std::abs(double(shown[i]) - double(filtered[turned])) / double(floats);
-  }
-  EXPECT_LT(off, 4.0);
+  EXPECT_LT(off_by(shown(), filtered), 4.0);
   display.denoise = CUMULET_DENOISE_OFF;
   ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
   cumulet::test::converge(viewer_.get(), frame);
   EXPECT_EQ(target_.pixels(), raw);
+}
+
+// The more samples there are, the more rays are facts of.
+TEST_F(DenoisedPicture, OfManySamplesWhatIsDrawnIsWhatIsRead) {
+  auto display = make_desc<cumulet_display_desc>();
+  display.denoise = CUMULET_DENOISE_FAST;
+  ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
+  sample(64);
+  const std::vector<std::uint8_t> drawn = cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
+  EXPECT_EQ(off_by(drawn, shown()), 0.0);
 }
 
 // Hosts may work in frames that draw nothing, and draw in others, without a budget, what there is.

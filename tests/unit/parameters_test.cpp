@@ -131,6 +131,8 @@ const std::array fields{
     CM_FIELD(dispatch, rows),
     CM_FIELD(dispatch, lanes),
     CM_FIELD(dispatch, places),
+    CM_FIELD(dispatch, rays_before),
+    CM_FIELD(dispatch, rays_least),
     CM_FIELD(shutter, open.eye),
     CM_FIELD(shutter, open.orthographic),
     CM_FIELD(shutter, open.forward),

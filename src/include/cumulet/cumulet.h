@@ -1458,10 +1458,11 @@ typedef struct cumulet_display_desc {
    * to what they are without. Each view has random numbers of its own then, beside the seed: what is read back is as
    * right, not the same. cumulet_read_linear and cumulet_read_aov are not filtered,
    * and cumulet_read_denoised knows no other frames. It takes at most four tenths of a frame's budget (in the long run
-   * a fifth), 256 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
-   * of the same scene and camera, else this as it is; those that draw nothing go on with it, too, and say by
-   * CUMULET_RENDER_UNDRAWN when there is another. Without memory for it, or for other frames, they are drawn without,
-   * which CUMULET_ERROR_OUT_OF_MEMORY says once. Debug views are not filtered.
+   * a fifth), 270 bytes a pixel of GL memory and unlit rays: four a pixel at first, two more a sample, and beyond
+   * sixteen up to 64 where they are not alike. Until it is done frames draw the last picture of the same scene and
+   * camera, else this as it is; those that draw nothing go on with it, too, and say by CUMULET_RENDER_UNDRAWN when
+   * there is another. Without memory for it, or for other frames, they are drawn without, which
+   * CUMULET_ERROR_OUT_OF_MEMORY says once. Debug views are not filtered.
    */
   cumulet_denoise denoise;
 } cumulet_display_desc;
@@ -2081,9 +2082,10 @@ typedef struct cumulet_denoise_desc {
  * time of the call; waits for it, 20 to 90 seconds a megapixel on software drivers, and for their compiler; for twice
  * as long where the scene has surfaces or media that give off light: what is known of their light without noise is kept
  * from the network, which sees what is left and what is missing. Without a network: by the filter, alpha as well, with
- * 128 bytes a pixel, a second or two a megapixel on software drivers. CUMULET_ERROR_FILE for a file that is missing or
- * no such network, CUMULET_ERROR_UNSUPPORTED for debug views and for a preview over surfaces that are not traced, and
- * as cumulet_read_aov.
+ * 128 bytes a pixel, a second or two a megapixel on software drivers. Either way rays find that first, of which three
+ * take about as long as a sample: 16 a pixel, and up to two a sample, 64 at most, where they are not alike.
+ * CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views and for a
+ * preview over surfaces that are not traced, and as cumulet_read_aov.
  */
 CUMULET_API cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
                                                  size_t count);
@@ -2125,8 +2127,9 @@ typedef enum cumulet_aov {
 /*
  * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
  * number of floats at values. Transmittance, depths, normal, albedo, velocity and motion are found when first asked
- * for, by 16 rays a pixel (the depths by the one through its middle), without noise but where surfaces cover or
- * transmit a part of the light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for
+ * for, by 16 rays a pixel (the depths by the one through its middle; of a picture that was denoised by more where these
+ * are not alike), without noise but where surfaces cover or transmit a part of the light, which is a chance; asking
+ * again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for
  * debug views, and for a picture that is still of the volume before.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
@@ -2170,8 +2173,8 @@ typedef const char* (*cumulet_object_name_fn)(void* user, cumulet_object_kind ki
  *
  * Found anew in each call, by 64 rays a pixel at fixed places, spread over lens and shutter too, along which volumes'
  * coverages are exact (of at most four at one place): without noise, but where surfaces cover in part. It does not
- * depend on the picture's samples. 8 bytes a pixel and rank of GL's memory for the time of the call, rounded up to even
- * ranks. count is the number of floats at values. CUMULET_ERROR_INVALID_ARGUMENT as cumulet_read_aov.
+ * depend on the picture's samples. It takes 16 KB of GL's memory a column of pixels for the time of the call. count is
+ * the number of floats at values. CUMULET_ERROR_INVALID_ARGUMENT as cumulet_read_aov.
  */
 CUMULET_API cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_name_fn name, void* user,
                                                     uint32_t ranks, float* values, size_t count);
