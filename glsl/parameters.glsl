@@ -236,7 +236,7 @@ CM_BLOCK(CmDispatch) {
   CM_ALIGN(8) uvec2 rows;  // of the tile, for kernels that run by rows: the first, and the one after the last
   uint lanes;    // that there are for paths
   uint places;   // pixels that they take, those of the tile's list of squares: glsl/path_places.glsl
-  uint rays_before;  // of rays without chance those that it has been looked along: glsl/aovs.comp
+  uint rays_before;  // of rays without chance those that it has been looked along: glsl/aovs.comp, cryptomatte.comp
   uint rays_least;   // and those that it shall be looked along however alike they are
   CM_EQUALITY(CmDispatch)
 };

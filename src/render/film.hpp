@@ -36,7 +36,7 @@ inline constexpr FilmLayer volume{"volume", GL_RGBA32F, 16};
 inline constexpr FilmLayer depth{"depth", GL_R32F, 4};
 inline constexpr FilmLayer normal{"normal", GL_RGBA32F, 16};
 inline constexpr FilmLayer albedo{"albedo", GL_RGBA32F, 16};
-/// Of the volume; the share of a pixel that surfaces cover.
+/// Of the volume; the share of a pixel that surfaces cover; how many rays facts are of, and how they spread.
 inline constexpr FilmLayer transmittance{"transmittance", GL_RGBA32F, 16};
 inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
 /// Of half opacity; the share of a pixel that the ground covers.

@@ -189,10 +189,9 @@ bool Progressive::needs_depth() const {
 
 std::uint32_t Progressive::guide_rays(const Work& work) const {
   const Picture& picture = *work.picture;
-  const std::uint64_t pixels = std::max<std::uint64_t>(picture.box().area(), 1);
   // They take less time than samples so.
   const bool rough = work.divisor > finest_ || !picture.has_facts();
-  const std::uint64_t more = rough ? 0 : 2 * (picture.samples() / pixels);
+  const std::uint64_t more = rough ? 0 : 2 * picture.samples_a_pixel();
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guide_rays + more, most_fact_rays));
 }
 

@@ -930,6 +930,8 @@ bool Tracer::able_to_find(const Picture& picture, const MarchData& data, const O
   return asked([&] { facts_program(picture, data, obstacles, PixelFacts::guides); });
 }
 
+std::uint64_t Picture::samples_a_pixel() const { return samples() / std::max<std::uint64_t>(box_.area(), 1); }
+
 bool Picture::has_facts() const { return film_.has(film_layers::normal); }
 
 bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,

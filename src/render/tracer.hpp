@@ -154,6 +154,8 @@ class Picture {
   [[nodiscard]] double progress() const;
   /// Camera paths that are known to be finished.
   [[nodiscard]] std::uint64_t samples() const { return samples_ ? *samples_ : 0; }
+  /// Their mean, rounded down.
+  [[nodiscard]] std::uint64_t samples_a_pixel() const;
   /// The surface pass that camera rays ended at. Not where layered is no.
   [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }

@@ -56,8 +56,8 @@ std::optional<render::PixelFact> fact_of(Aov aov) {
 
 // Of few samples more would take longer than more samples, and say less.
 std::uint32_t rays_to_denoise(const render::Picture& picture) {
-  const std::uint64_t samples = picture.samples() / std::max<std::uint64_t>(picture.box().area(), 1);
-  return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(2 * samples, render::fact_rays, render::most_fact_rays));
+  return static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>(2 * picture.samples_a_pixel(), render::fact_rays, render::most_fact_rays));
 }
 
 // How many floats a picture of four channels has. Throws Error(invalid_argument) where there is no room for them.

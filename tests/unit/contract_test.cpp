@@ -614,13 +614,9 @@ TEST_F(Contract, Contract12FlippedAndInARectangle) {
   auto frame = target_.frame();
   frame.flip_y = 1;
   converge(v_, frame);
-  Picture upside_down;
-  for (int y = side; y-- > 0;) {
-    const auto row = picture.begin() + y * side * 4;
-    upside_down.insert(upside_down.end(), row, row + side * 4);
-  }
-  EXPECT_EQ(difference(target_.pixels(), upside_down), "");
-  EXPECT_NE(difference(picture, upside_down), "");
+  const Picture turned = cumulet::test::upside_down(picture, side);
+  EXPECT_EQ(difference(target_.pixels(), turned), "");
+  EXPECT_NE(difference(picture, turned), "");
 
   const HostTarget larger(gl_, side + 20, side + 10);
   larger.clear({1.0F, 0.0F, 1.0F, 1.0F});

@@ -82,9 +82,7 @@ VolumeRef make_block() {
   for (int& edge : desc.size) edge = 8;
   for (int i = 0; i < 4; ++i) desc.index_to_world[i * 5] = 1.0;
   for (int i = 0; i < 3; ++i) desc.index_to_world[12 + i] = -3.5;
-  cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_volume_from_dense(&desc, &out, nullptr, 0), CUMULET_OK);
-  return VolumeRef(out);
+  return make_dense(desc);
 }
 
 // A pixel is a unit, the middle between the pixels 7 and 8, and +x is to the right.
@@ -100,10 +98,7 @@ class Cryptomatte : public CViewerTest {
     auto stand = make_desc<cumulet_camera_desc>();
     stand.eye[2] = 50.0;
     stand.orthographic_height = height;
-    cumulet_camera* camera = nullptr;
-    ASSERT_EQ(cumulet_camera_create(&stand, &camera), CUMULET_OK);
-    const CameraRef owner(camera);
-    ASSERT_EQ(cumulet_set_camera(v_, camera), CUMULET_OK);
+    cumulet::test::look(v_, stand);
   }
   ModelRef add_model(cumulet_surfaces* surfaces, std::uint64_t tag, cumulet_model_desc desc = {}) {
     desc.struct_size = sizeof desc;
@@ -247,10 +242,7 @@ TEST_P(Cryptomatte, AddsUpToAlpha) {
   auto stand = make_desc<cumulet_camera_desc>();
   stand.eye[1] = 3.0;
   stand.eye[2] = 40.0;
-  cumulet_camera* camera = nullptr;
-  ASSERT_EQ(cumulet_camera_create(&stand, &camera), CUMULET_OK);
-  const CameraRef owner(camera);
-  ASSERT_EQ(cumulet_set_camera(v_, camera), CUMULET_OK);
+  cumulet::test::look(v_, stand);
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.samples = 128;
   sampling.preview = CUMULET_PREVIEW_OFF;

@@ -79,9 +79,7 @@ class DenoisedPicture : public testing::Test {
   [[nodiscard]] std::vector<std::uint8_t> shown() const {
     std::vector<std::uint8_t> rgba(floats);
     EXPECT_EQ(cumulet_read_display(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
-    for (std::size_t row = 0; row < side / 2; ++row)
-      std::swap_ranges(&rgba[row * side * 4], &rgba[row * side * 4] + side * 4, &rgba[(side - 1 - row) * side * 4]);
-    return rgba;
+    return cumulet::test::upside_down(rgba, side);
   }
   static double off_by(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
     double off = 0.0;
@@ -398,15 +396,9 @@ TEST_F(LathPicture, WhereThereIsGlassNoLightOfTheSunIsKnown) {
   model.add("materials", {{"extensions", {{"KHR_materials_transmission", {{"transmissionFactor", 1.0}}}}}});
   const int corners = model.vec3({-0.4F, 8.0F, -40.0F, -0.4F, 8.0F, 40.0F, 0.4F, 8.0F, 40.0F});
   model.show({{"attributes", {{"POSITION", corners}}}, {"material", 0}});
-  const cumulet::test::Bytes file = model.gltf();
-  cumulet_surfaces* surfaces = nullptr;
-  std::array<char, 256> why{};
-  ASSERT_EQ(cumulet_surfaces_from_memory(file.data(), file.size(), nullptr, nullptr, &surfaces, why.data(), why.size()),
-            CUMULET_OK)
-      << why.data();
-  const cumulet::test::SurfacesRef glass(surfaces);
+  const cumulet::test::SurfacesRef glass = cumulet::test::read_surfaces(model.gltf());
   auto lath = make_desc<cumulet_model_desc>();
-  lath.surfaces = surfaces;
+  lath.surfaces = glass.get();
   ASSERT_NO_FATAL_FAILURE(render(make_desc<cumulet_surface_settings_desc>(), lath));
   expect_known(known(), 0.0);
 }

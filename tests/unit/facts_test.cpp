@@ -32,9 +32,7 @@ VolumeRef make_column(int length) {
   for (int i = 0; i < 4; ++i) desc.index_to_world[i * 5] = 1.0;
   desc.index_to_world[12] = desc.index_to_world[13] = 0.5 - 0.5 * width;
   desc.index_to_world[14] = 0.5 - length;
-  cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_volume_from_dense(&desc, &out, nullptr, 0), CUMULET_OK);
-  return VolumeRef(out);
+  return make_dense(desc);
 }
 
 // A pixel is a unit; looking down z at the origin.
@@ -47,10 +45,7 @@ class Facts : public CViewerTest {
     auto stand = make_desc<cumulet_camera_desc>();
     stand.eye[2] = 5.0;
     stand.orthographic_height = side;
-    cumulet_camera* camera = nullptr;
-    ASSERT_EQ(cumulet_camera_create(&stand, &camera), CUMULET_OK);
-    const CameraRef owner(camera);
-    ASSERT_EQ(cumulet_set_camera(v_, camera), CUMULET_OK);
+    look(v_, stand);
   }
 };
 CUMULET_ON_BACKENDS(Facts);

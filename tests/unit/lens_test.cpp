@@ -49,11 +49,7 @@ VolumeRef make_speck(double z, double edge) {
   for (int i = 0; i < 3; ++i) desc.index_to_world[i * 5] = edge;
   desc.index_to_world[15] = 1.0;
   desc.index_to_world[14] = z;
-  cumulet_volume* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return VolumeRef(out);
+  return cumulet::test::make_dense(desc);
 }
 
 class Lens : public testing::Test {

@@ -359,13 +359,7 @@ SurfacesRef make_animated() {
   };
   model.add("animations", {{"samplers", {sampler({0, 0, 0, 2, 0, 0}), sampler({1, 1, 1, 1, 2, 1})}},
                            {"channels", {channel(0, "translation"), channel(1, "scale")}}});
-  const Bytes bytes = model.glb();
-  cumulet_surfaces* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_surfaces_from_memory(bytes.data(), bytes.size(), nullptr, "wall", &out, error.data(), error.size()) !=
-      CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return SurfacesRef(out);
+  return read_surfaces(model.glb());
 }
 
 TEST_P(Motion, OfWhatDeformsIsOfItsVertices) {

@@ -593,14 +593,11 @@ class PlayedInstances : public CSequence {
   }
   // However large each frame is.
   static void see_all(cumulet_viewer* viewer) {
-    cumulet_camera* camera = nullptr;
     auto desc = make_desc<cumulet_camera_desc>();
     desc.eye[0] = 10.0;
     desc.eye[2] = 90.0;
     desc.target[0] = 10.0;
-    EXPECT_EQ(cumulet_camera_create(&desc, &camera), CUMULET_OK);
-    const CameraRef owner(camera);
-    EXPECT_EQ(cumulet_set_camera(viewer, camera), CUMULET_OK);
+    cumulet::test::look(viewer, desc);
   }
   static cumulet_sequence_info instance_info(cumulet_viewer* viewer, cumulet_instance* instance) {
     auto info = make_desc<cumulet_sequence_info>();

@@ -74,6 +74,15 @@ inline std::array<double, 16> at(double x, double y, double z) {
   return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
 }
 
+/// Throws std::runtime_error.
+inline VolumeRef make_dense(const cumulet_dense_desc& desc) {
+  cumulet_volume* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return VolumeRef(out);
+}
+
 /// A lumpy ball of size^3 voxels centred on the origin, as a dense array.
 inline VolumeRef make_ball(int size, float density = 0.4F) {
   std::vector<float> values;
@@ -96,11 +105,7 @@ inline VolumeRef make_ball(int size, float density = 0.4F) {
   for (int i = 0; i < 4; ++i) desc.index_to_world[i * 5] = 1.0;
   for (int i = 0; i < 3; ++i) desc.index_to_world[12 + i] = -middle;
   desc.name = "ball";
-  cumulet_volume* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return VolumeRef(out);
+  return make_dense(desc);
 }
 
 /// Bright on one side, of another colour on each: turned, it lights otherwise. Throws std::runtime_error.
@@ -120,6 +125,16 @@ inline EnvironmentRef make_environment(std::uint32_t width, std::uint32_t height
   if (cumulet_environment_from_pixels(&desc, &out, error.data(), error.size()) != CUMULET_OK)
     throw std::runtime_error(error.data());
   return EnvironmentRef(out);
+}
+
+/// Of a file's bytes. Throws std::runtime_error.
+inline SurfacesRef read_surfaces(const std::vector<std::uint8_t>& file) {
+  cumulet_surfaces* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_surfaces_from_memory(file.data(), file.size(), nullptr, nullptr, &out, error.data(), error.size()) !=
+      CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return SurfacesRef(out);
 }
 
 /// Throws std::runtime_error.
@@ -259,6 +274,24 @@ inline ViewerPtr make_plain_viewer(const cumulet_create_desc& desc) {
   return ViewerPtr(out);
 }
 
+/// From there, by a camera of its own. Throws std::runtime_error.
+inline void look(cumulet_viewer* viewer, const cumulet_camera_desc& stand) {
+  cumulet_camera* camera = nullptr;
+  if (cumulet_camera_create(&stand, &camera) != CUMULET_OK) throw std::runtime_error("no camera");
+  const CameraRef owner(camera);
+  if (cumulet_set_camera(viewer, camera) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+}
+
+/// A picture of so many pixels a row, of four bytes each, with its last row first.
+inline std::vector<std::uint8_t> upside_down(const std::vector<std::uint8_t>& rgba, std::size_t width) {
+  std::vector<std::uint8_t> turned;
+  for (auto row = rgba.end(); row != rgba.begin();) {
+    row -= static_cast<std::ptrdiff_t>(4 * width);
+    turned.insert(turned.end(), row, row + static_cast<std::ptrdiff_t>(4 * width));
+  }
+  return turned;
+}
+
 /// A viewer with light, a camera before make_ball, few samples a pixel and no preview. Throws std::runtime_error.
 inline ViewerPtr make_viewer(const ViewerOptions& options) {
   auto create = make_desc<cumulet_create_desc>();
@@ -283,14 +316,12 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   auto stand = make_desc<cumulet_camera_desc>();
   stand.eye[1] = 6.0;
   stand.eye[2] = 32.0;
-  cumulet_camera* camera = nullptr;
-  if (cumulet_camera_create(&stand, &camera) != CUMULET_OK) throw std::runtime_error("no camera");
-  const CameraRef owner(camera);
   auto grid = make_desc<cumulet_grid_desc>();
   grid.build = options.build;
   if (cumulet_set_light(out, &light) != CUMULET_OK || cumulet_set_sampling(out, &sampling) != CUMULET_OK ||
-      cumulet_set_grid(out, &grid) != CUMULET_OK || cumulet_set_camera(out, camera) != CUMULET_OK)
+      cumulet_set_grid(out, &grid) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(out));
+  look(out, stand);
   return viewer;
 }
 
