@@ -64,6 +64,8 @@ const int CM_UNIFORM_SURFACE_VIEW = 0;
 const int CM_UNIFORM_MATERIAL = 1;
 const int CM_UNIFORM_BRICK_POINTS = 0;  // grid_lattice.comp
 const int CM_UNIFORM_CELL_PARTS = 0;    // grid_cells.comp
+const int CM_UNIFORM_BRICK_TREE = 0;    // summarize_bricks.comp, own_priorities.comp
+const int CM_UNIFORM_POINT_PLACES = 1;  // own_priorities.comp
 
 // Storage buffers.
 const int CM_STORAGE_PATHS = 0;
@@ -83,6 +85,13 @@ const int CM_STORAGE_PACKED_PLACES = 0;  // pack_bricks.comp
 const int CM_STORAGE_PACKED_VALUES = 1;
 const int CM_STORAGE_PACKED_CHOICE = 2;
 const int CM_STORAGE_HOST_VOXELS = 3;
+const int CM_STORAGE_BRICKS_KEPT = 2;  // summarize_bricks.comp
+const int CM_STORAGE_BRICK_SUMMARIES = 3;
+const int CM_STORAGE_BRICKS_FROM = 0;  // copy_bricks.comp
+const int CM_STORAGE_BRICKS_TO = 1;
+const int CM_STORAGE_BRICKS_MOVED = 2;
+const int CM_STORAGE_BRICKS_TO_RATE = 2;  // own_priorities.comp
+const int CM_STORAGE_BRICKS_LIT = 3;
 const int CM_STORAGE_DENOISE_BINS = 0;   // denoise_*.comp
 const int CM_STORAGE_DENOISE_CHANNELS = 1;
 const int CM_STORAGE_DENOISE_WEIGHTS = 2;

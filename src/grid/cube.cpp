@@ -19,7 +19,9 @@ Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, 
   Cube cube;
   std::int64_t extent = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    cube.origin[axis] = bounds_min[axis] & ~(volume::brick_size - 1);
+    // Which octant of a cube a brick is has to be known where it is summed up (glsl/summarize_bricks.comp).
+    const int step = volume.on_device ? 2 * volume::brick_size : volume::brick_size;
+    cube.origin[axis] = bounds_min[axis] & ~(step - 1);
     extent = std::max<std::int64_t>(extent, std::int64_t{bounds_max[axis]} - cube.origin[axis] + 1);
   }
   while ((std::int64_t{1} << cube.log2_size) < extent) ++cube.log2_size;

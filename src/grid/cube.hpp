@@ -21,7 +21,8 @@ struct Cube {
   [[nodiscard]] bool wide() const;
 };
 
-/// Over these bounds of the volume's lattice, inclusive. Throws Error(unsupported) if they are wider than 2^18 voxels.
+/// Over these bounds of the volume's lattice, inclusive; of one on a device aligned to two bricks. Throws
+/// Error(unsupported) if they are wider than 2^18 voxels.
 Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max);
 inline Cube fit_cube(const volume::ScalarVolume& volume) {
   return fit_cube(volume, volume.bounds_min, volume.bounds_max);

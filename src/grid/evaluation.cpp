@@ -1,5 +1,7 @@
 #include "grid/evaluation.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -60,6 +62,11 @@ float Measure::bound(float min, float max, float edge_squared, float lit) const 
   return 0.25F * (max - min) * (max - min) * edge_squared * scale_ * seen_squared(lit);
 }
 
+float Measure::bound_of_steepest(float variance, float left, float lit) const {
+  if (criterion_ == Criterion::range_mean) return std::numeric_limits<float>::infinity();
+  return (cells_ == CellKind::constant ? variance : left) * scale_ * seen_squared(lit);
+}
+
 float Measure::squared(std::uint32_t cell_class, float mean, float variance, const vec3& covariance, float min,
                        float max, float edge_squared, float lit, float floor) const {
   if (min >= max) return 0.0F;
@@ -95,6 +102,40 @@ Evaluation::Evaluation(const Statistics& statistics, const Weights& weights, con
       }
     }
   }
+}
+
+unsigned Evaluation::levels_at_most(const Statistics::Node& brick, float floor) const {
+  const volume::BrickSummary& summary = *statistics_->summary(brick);
+  const float* blocks = lit(brick);
+  const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
+  const auto all = static_cast<int>(splitting_levels(statistics_->cube().log2_size));
+  auto levels =
+      static_cast<unsigned>(std::clamp(all - kuhn_level(statistics_->cube().log2_size, 3), 0, int{CM_BRICK_LEVELS}));
+  const auto upper_half = [](std::uint32_t bits) { return std::bit_cast<float>(bits << 16U); };
+  while (levels > 0) {
+    const std::uint32_t steepest = summary.steepest[levels - 1];
+    if (measure_.bound_of_steepest(upper_half(steepest >> 16U), upper_half(steepest & 0xffffU), most) > floor) break;
+    --levels;
+  }
+  return levels;
+}
+
+std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world) {
+  const EdgeLengths length(to_world);
+  std::array<float, CM_BRICK_EDGES> squared{};
+  for (int octant = 0; octant < 8; ++octant) {
+    const ivec3 corner = 8 * ivec3(octant & 1, (octant >> 1) & 1, octant >> 2);
+    for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+      const BrickTree& tree = brick_tree(kuhn_frame(corner, 8, permutation));
+      for (unsigned heap = 1; heap < 512; ++heap) {
+        const double edge = length(tree.shape[heap]);
+        const vec3 along = core::cm_cell_vertex(vec3(0.0F), tree.shape[heap], 1);
+        const auto level = static_cast<unsigned>(std::bit_width(heap)) - 1U;
+        squared[CM_LEVEL_EDGES * level + core::cm_edge_of(along)] = static_cast<float>(edge * edge);
+      }
+    }
+  }
+  return squared;
 }
 
 Evaluations::Evaluations(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "grid/cell.hpp"
+#include "grid/priorities.hpp"
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
 #include "grid/transmittance.hpp"
@@ -62,6 +63,12 @@ class Measure {
   /// No cell of a region whose values lie in [min, max] exceeds this: a variance is at most a quarter of the range
   /// squared. lit: the most of the region.
   [[nodiscard]] float bound(float min, float max, float edge_squared, float lit) const;
+  /// The same of what the largest variances of a level's cells are, times the squares of their edges: `left` of those
+  /// that a linear fit leaves.
+  [[nodiscard]] float bound_of_steepest(float variance, float left, float lit) const;
+  [[nodiscard]] OwnMeasure numbers(float floor) const {
+    return {scale_, own_hiding_, floor, cells_ == CellKind::linear, criterion_ == Criterion::range_mean};
+  }
   /// covariance: of position and density in the frame, per unit. No more than floor: the exact value does not matter.
   [[nodiscard]] float squared(std::uint32_t cell_class, float mean, float variance, const glm::vec3& covariance,
                               float min, float max, float edge_squared, float lit, float floor) const;
@@ -85,6 +92,14 @@ class Evaluation {
              const RefineSettings& settings);
 
   [[nodiscard]] const Statistics& statistics() const { return *statistics_; }
+
+  /// Of a brick that is known by its summary, how many levels of its cells may split at the most.
+  [[nodiscard]] unsigned levels_at_most(const Statistics::Node& brick, float floor) const;
+  /// What part of the light gets to each of its blocks; null where nothing is hidden.
+  [[nodiscard]] const float* lit(const Statistics::Node& brick) const {
+    return transmittance_ != nullptr ? transmittance_->blocks(brick.corner) : nullptr;
+  }
+  [[nodiscard]] OwnMeasure measure(float floor) const { return measure_.numbers(floor); }
 
   /// Calls visit(vertex, squared) for every cell whose criterion is above the floor, of one node that is not uniform:
   /// inside a brick all, of a larger one a Kuhn tetrahedron's first three levels, of the whole cube the roots. Only of
@@ -124,6 +139,9 @@ class Evaluation {
   std::array<std::array<float, 512>, 48> edge_squared_{};  // of a brick tree's nodes
   std::array<float, 9> longest_{};                         // of a level of those
 };
+
+/// The squares of lengths of a brick's refinement edges, CM_LEVEL_EDGES a level (glsl/brick_summary.glsl).
+std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world);
 
 /// Those of all that a grid's cells are split for: of density, and of its channels.
 class Evaluations {

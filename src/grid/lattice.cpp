@@ -100,7 +100,7 @@ std::uint64_t Lattice::device_bytes() const {
   std::uint64_t values = std::uint64_t{bricks} * volume::brick_voxels * (halves ? 2 : 4);
   for (const LatticeChannel& channel : channels)
     values += (channel.even_bricks.size() + channel.bricks.size()) * volume::brick_voxels * channel.numbers * 4;
-  return bytes() + values + std::uint64_t{blocks.size()} * CM_BLOCK_POINTS * 4;
+  return bytes() + values + 2 * own.to_rate.values + std::uint64_t{blocks.size()} * CM_BLOCK_POINTS * 4;
 }
 
 void Lattice::find_blocks(const Statistics& statistics, const std::vector<ChannelFields>& beside, Progress* progress) {

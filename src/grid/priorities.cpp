@@ -96,9 +96,17 @@ void find(const Evaluations& evaluations, const CubeKey& cube, int log2_size, fl
   }
 }
 
+constexpr std::uint64_t most_values = std::uint64_t{1} << 32U;
+[[noreturn]] void refuse_values(std::size_t bricks) {
+  throw Error(ErrorCode::unsupported,
+              "priorities of " + std::to_string(bricks) + " bricks: the limit is 2^32 of them; raise the threshold");
+}
+
 }  // namespace
 
 const BrickPoints& brick_points() { return points().points; }
+
+const std::array<std::uint16_t, 729>& places_of_brick_points() { return points().index; }
 
 OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                              Progress* progress)
@@ -106,6 +114,7 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
   const Evaluations evaluations(statistics, channels, settings, progress);
   const double threshold = std::max(settings.threshold, 0.0);
   const auto floor = static_cast<float>(threshold * threshold);
+  const bool on_device = statistics.on_device() != nullptr;
   const std::vector<CubeKey> cubes = cubes_of(evaluations, log2_size, progress);
   // Found piece by piece, then put one after another.
   constexpr std::size_t piece = 64;
@@ -121,6 +130,7 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
     const std::size_t end = std::min(cubes.size(), (p + 1) * piece);
     for (std::size_t i = p * piece; i < end; ++i) {
       const CubeKey& cube = cubes[i];
+      if (on_device && cube.log2_size == 3) continue;
       find(evaluations, cube, log2_size, floor, *sums, *found);
       const unsigned levels = levels_of(*found);
       if (levels == 0) continue;
@@ -136,10 +146,8 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
     all_nodes += p.nodes.size();
     all_values += p.values.size();
   }
-  if (all_values >= (std::uint64_t{1} << 32U)) {
-    throw Error(ErrorCode::unsupported, "priorities of " + std::to_string(all_nodes) +
-                                            " bricks: the limit is 2^32 of them; raise the threshold");
-  }
+  if (all_values >= most_values) refuse_values(all_nodes);
+  if (on_device) values.reserve(all_values + 1);
   nodes.reserve(all_nodes);
   values.reserve(all_values);
   for (Piece& p : pieces) {
@@ -147,6 +155,29 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
     for (const Node& node : p.nodes) nodes.emplace_back(node.x, node.y, node.z + std::uint32_t(values.size()));
     values.insert(values.end(), p.values.begin(), p.values.end());
     p = {};
+  }
+  if (on_device) plan_to_rate(*evaluations.begin(), floor);
+}
+
+void OwnPriorities::plan_to_rate(const Evaluation& evaluation, float floor) {
+  const Statistics& statistics = evaluation.statistics();
+  // Two share a word, but not those of two nodes.
+  if (values.size() % 2 != 0) values.push_back(0);
+  to_rate.first_node = nodes.size();
+  to_rate.measure = evaluation.measure(floor);
+  to_rate.edges_squared = brick_edges(statistics.cube().to_world);
+  const std::vector<std::uint32_t>& bricks = statistics.nodes_of_size(3);
+  for (std::uint32_t i = 0; i < bricks.size(); ++i) {
+    const Statistics::Node& brick = statistics.nodes()[bricks[i]];
+    const unsigned levels = evaluation.levels_at_most(brick, floor);
+    if (levels == 0) continue;
+    const std::size_t first = all_values();
+    if (first >= most_values) refuse_values(nodes.size());
+    nodes.emplace_back(core::cm_node_words(brick.corner, 3, levels), static_cast<std::uint32_t>(first));
+    to_rate.values += (points_of_levels[levels] + 1) / 2 * 2;
+    to_rate.bricks.push_back(i);
+    if (const float* lit = evaluation.lit(brick))
+      to_rate.lit.insert(to_rate.lit.end(), lit, lit + Transmittance::blocks_a_brick);
   }
 }
 

@@ -23,6 +23,30 @@ inline constexpr std::array<unsigned, brick_levels + 1> points_of_levels{CM_POIN
 using BrickPoints = std::array<glm::u8vec3, CM_BRICK_POINTS>;
 const BrickPoints& brick_points();
 
+/// Of a brick's 9^3 points, x first, which of brick_points() each is.
+const std::array<std::uint16_t, 729>& places_of_brick_points();
+
+/// Numbers of a criterion of density, as shaders are told them.
+struct OwnMeasure {
+  float scale = 0.0F;
+  float own_hiding = 0.0F;
+  float floor = 0.0F;  ///< no more is nothing
+  bool linear = false;
+  bool range_mean = false;
+};
+
+/// Bricks whose values are in GL, and so are to be the priorities that their cells give (glsl/own_priorities.comp).
+struct BricksToRate {
+  std::size_t first_node = 0;         ///< theirs are the last ones
+  std::vector<std::uint32_t> bricks;  ///< of each node: which of nodes_of_size(3)
+  std::vector<float> lit;             ///< what part of the light gets to its blocks, 64 each; empty: all of it
+  std::size_t values = 0;             ///< of all, from the end of those that are known on
+  OwnMeasure measure;
+  std::array<float, CM_BRICK_EDGES> edges_squared{};
+
+  [[nodiscard]] std::uint64_t bytes() const { return (bricks.size() + lit.size()) * 4; }
+};
+
 /// What does not depend on the view of which splits are worth it: of each cube of the octree in which any is, the
 /// priorities that its own cells give the vertices that they split at, 16 bits each, as far down as there are any. A
 /// view says how many levels of each cube count. 2 bytes a point of 9^3 a brick at most.
@@ -37,7 +61,8 @@ struct OwnPriorities {
 
   int log2_size;
   std::vector<Node> nodes;
-  std::vector<std::uint16_t> values;
+  std::vector<std::uint16_t> values;  ///< but those of
+  BricksToRate to_rate;
 
   /// Of each node, how many levels of its cells may split and have priorities: 0 to brick_levels. O(nodes).
   [[nodiscard]] std::vector<std::uint8_t> levels(const ViewLevels& view, const Progress* progress = nullptr) const;
@@ -45,10 +70,17 @@ struct OwnPriorities {
   [[nodiscard]] std::vector<std::uint8_t> levels(const Cube& cube, const RefineSettings& settings,
                                                  std::span<const std::uint8_t> before,
                                                  const Progress* progress = nullptr) const;
-  /// Calls visit(vertex, priority) for what a node's cells of that many levels give.
+  /// Calls visit(vertex, priority) for what a node's cells of that many levels give; of one to be rated for what they
+  /// might, at 1.
   template <class Visit>
   void for_each(const Node& node, unsigned levels, Visit&& visit) const;
-  [[nodiscard]] std::uint64_t bytes() const { return nodes.size() * sizeof(Node) + values.size() * 2; }
+  [[nodiscard]] std::uint64_t bytes() const {
+    return nodes.size() * sizeof(Node) + values.size() * 2 + to_rate.bytes();
+  }
+  [[nodiscard]] std::size_t all_values() const { return values.size() + to_rate.values; }
+
+ private:
+  void plan_to_rate(const class Evaluation& evaluation, float floor);
 };
 
 template <class Visit>
@@ -56,8 +88,13 @@ void OwnPriorities::for_each(const Node& node, unsigned levels, Visit&& visit) c
   const BrickPoints& points = brick_points();
   const glm::ivec3 corner = core::cm_node_corner(node);
   const int finer = static_cast<int>(core::cm_node_size(node)) - 3;
+  const bool known = node.z < values.size();
   for (unsigned i = 0; i < points_of_levels[levels]; ++i) {
-    if (values[node.z + i] != 0) visit(corner + (glm::ivec3(points[i]) << finer), values[node.z + i]);
+    if (!known) {
+      visit(corner + (glm::ivec3(points[i]) << finer), std::uint16_t{1});
+    } else if (values[node.z + i] != 0) {
+      visit(corner + (glm::ivec3(points[i]) << finer), values[node.z + i]);
+    }
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
@@ -148,9 +149,13 @@ const BrickTree& brick_tree(std::uint32_t frame) {
 }
 
 float BrickSums::reference_of(const float* values) {
-  double sum = 0.0;
-  for (unsigned i = 0; i < volume::brick_voxels; ++i) sum += values[i];
-  return static_cast<float>(sum / volume::brick_voxels);
+  // As glsl/brick_sums.glsl adds them up.
+  std::array<float, 128> sums{};
+  for (std::size_t row = 0; row < 64; ++row) {
+    for (std::size_t z = 0; z < 8; ++z) sums[64 + row] += values[8 * row + z];
+  }
+  for (std::size_t i = 63; i >= 1; --i) sums[i] = sums[2 * i] + sums[2 * i + 1];
+  return sums[1] / static_cast<float>(volume::brick_voxels);
 }
 
 void BrickSums::compute(const float* values, float of_brick, const BrickTree& tree) {
@@ -177,20 +182,40 @@ void BrickSums::compute(const float* values, float of_brick, const BrickTree& tr
   }
 }
 
-Moments BrickSums::moments(unsigned h, const ivec3& corner, const BrickTree& tree) const {
-  const double leaves = 512.0 / std::bit_floor(h);
+namespace {
+
+// Of sums over so many leaves, relative to the reference; centroid: from the brick's low corner.
+Moments moments_of_sums(double leaves, float reference, float mass, float square, const vec3& first,
+                        const vec3& centroid, const ivec3& corner) {
   constexpr double leaf_volume = 1.0 / 6.0;
   Moments m;
   m.volume = leaves * leaf_volume;
-  m.mass = (mass[h] + leaves * reference) * leaf_volume;
+  m.mass = (mass + leaves * reference) * leaf_volume;
   // square: sum (f' + r)^2 = sum f'^2 + 2 r sum f' + n r^2
-  m.square =
-      (square[h] + 2.0 * reference * mass[h] + leaves * reference * static_cast<double>(reference)) * leaf_volume;
-  m.min = min[h];
-  m.max = max[h];
+  m.square = (square + 2.0 * reference * mass + leaves * reference * static_cast<double>(reference)) * leaf_volume;
+  m.first = dvec3(first) * leaf_volume + dvec3(centroid) * (m.volume * reference) + dvec3(corner) * m.mass;
+  return m;
+}
+
+}  // namespace
+
+Moments BrickSums::moments(unsigned h, const ivec3& corner, const BrickTree& tree) const {
   const vec3 centroid = h < 512 ? tree.node_centroid[h]
                                 : vec3(tree.centroid[0][h - 512], tree.centroid[1][h - 512], tree.centroid[2][h - 512]);
-  m.first = dvec3(x[h], y[h], z[h]) * leaf_volume + dvec3(centroid) * (m.volume * reference) + dvec3(corner) * m.mass;
+  Moments m =
+      moments_of_sums(512.0 / std::bit_floor(h), reference, mass[h], square[h], {x[h], y[h], z[h]}, centroid, corner);
+  m.min = min[h];
+  m.max = max[h];
+  return m;
+}
+
+Moments moments_of(const volume::BrickSummary& summary, std::uint32_t permutation, const ivec3& corner,
+                   const BrickTree& tree) {
+  const float* sums = summary.cells + std::size_t{7} * permutation;
+  Moments m = moments_of_sums(512.0, summary.reference, sums[0], sums[1], {sums[2], sums[3], sums[4]},
+                              tree.node_centroid[1], corner);
+  m.min = sums[5];
+  m.max = sums[6];
   return m;
 }
 
@@ -205,7 +230,10 @@ Moments uniform_moments(const vec3& v0, std::uint32_t shape, float value) {
 }
 
 Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube, Progress* progress)
-    : cube_(cube), by_size_(static_cast<std::size_t>(cube.log2_size) + 1), brick_values_(&volume.brick_values) {
+    : cube_(cube),
+      by_size_(static_cast<std::size_t>(cube.log2_size) + 1),
+      brick_values_(&volume.brick_values),
+      on_device_(volume.on_device) {
   build_topology(volume, progress);
   compute_mean_optical_depth(volume, progress);
   compute_moments(progress);
@@ -218,6 +246,7 @@ const float* Statistics::values(const Node& node, volume::BrickValues::Brick& ro
 }
 
 bool Statistics::values_are_halves() const {
+  if (on_device_) return on_device_->are_halves();
   return brick_values_->are_halves() &&
          std::ranges::all_of(extra_values_, [](float value) { return volume::exact_half(value).has_value(); });
 }
@@ -369,6 +398,13 @@ void Statistics::compute_moments(Progress* progress) {
     volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Node& node = nodes_[bricks[i]];
+      if (const volume::BrickSummary* known = summary(node)) {
+        for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+          moments_[node.moments + permutation] =
+              moments_of(*known, permutation, node.corner, brick_tree(kuhn_frame(node.corner, 8, permutation)));
+        }
+        continue;
+      }
       const float* brick = values(node, room);
       const float reference = BrickSums::reference_of(brick);
       for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
@@ -461,8 +497,14 @@ void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume, 
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 64), [&](const auto& range) {
     volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const float* data = values(nodes_[bricks[i]], room);
       Projection& p = projections[i];
+      if (const volume::BrickSummary* known = summary(nodes_[bricks[i]])) {
+        p.sum = std::accumulate(std::begin(known->blocks), std::end(known->blocks), 0.0);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          p.masks[axis] = known->shadows[2 * axis] | std::uint64_t{known->shadows[2 * axis + 1]} << 32U;
+        continue;
+      }
+      const float* data = values(nodes_[bricks[i]], room);
       for (unsigned v = 0; v < volume::brick_voxels; ++v) {
         if (!(data[v] > 0.0F)) continue;
         p.sum += data[v];

@@ -70,6 +70,9 @@ struct BrickSums {
   /// Moments of heap node h of a brick whose low corner is at corner.
   [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner, const BrickTree& tree) const;
 };
+/// Of the whole tetrahedron, of a brick that is known by its summary.
+Moments moments_of(const volume::BrickSummary& summary, std::uint32_t permutation, const glm::ivec3& corner,
+                   const BrickTree& tree);
 
 /// The volume's octree down to bricks, with exact moments of the six Kuhn tetrahedra of every cube.
 ///
@@ -92,8 +95,14 @@ class Statistics {
 
   [[nodiscard]] const Cube& cube() const { return cube_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  /// The 512 values of a brick node, which may be in `room`.
+  /// The 512 values of a brick node, which may be in `room`. Not of one with a summary.
   const float* values(const Node& node, volume::BrickValues::Brick& room) const;
+  /// Of a brick node whose values are in GL what is known of it; else null.
+  [[nodiscard]] const volume::BrickSummary* summary(const Node& node) const {
+    return on_device_ && node.values >= 0 ? &on_device_->summaries[static_cast<std::size_t>(node.values)] : nullptr;
+  }
+  /// Null: they are in main memory.
+  [[nodiscard]] const volume::DeviceBricksPtr& on_device() const { return on_device_; }
   /// Whether halves are exactly what all values of bricks are.
   [[nodiscard]] bool values_are_halves() const;
   /// Exact moments of any cell no smaller than a brick's Kuhn tetrahedron, or in a uniform part.
@@ -125,6 +134,7 @@ class Statistics {
   std::vector<std::vector<std::uint32_t>> by_size_;
   std::vector<Moments> moments_;
   const volume::BrickValues* brick_values_;
+  volume::DeviceBricksPtr on_device_;
   std::vector<float> extra_values_;  // payloads made here: where a tile or the background ends inside a brick
   double mean_optical_depth_ = 0.0;
 };

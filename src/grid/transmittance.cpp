@@ -62,8 +62,13 @@ void Transmittance::sum_blocks(const Progress* progress) {
     check(progress);
     volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const float* values = statistics_->values(statistics_->nodes()[bricks[i]], room);
+      const Statistics::Node& brick = statistics_->nodes()[bricks[i]];
       float* sums = sums_.data() + i * blocks_a_brick;
+      if (const volume::BrickSummary* known = statistics_->summary(brick)) {
+        std::ranges::copy(known->blocks, sums);
+        continue;
+      }
+      const float* values = statistics_->values(brick, room);
       for (unsigned v = 0; v < volume::brick_voxels; ++v) sums[block_of_voxel(v)] += values[v];
     }
   });

@@ -22,12 +22,13 @@ namespace cumulet::render {
 /// calls that change it need the context current and a StateGuard around.
 class GpuScene {
  public:
-  GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits)
+  /// memories: where volumes' bricks are that are in GL.
+  GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits, DeviceMemoriesPtr memories)
       : gl_(std::move(gl)),
         programs_(std::move(programs)),
         limits_(limits),
         heap_(gl_, {.largest_page = static_cast<std::size_t>(limits.texture_buffer_texels) * 16}),
-        grids_(gl_, programs_, limits),
+        grids_(gl_, programs_, limits, std::move(memories)),
         surface_pass_(gl_) {}
 
   struct Wanted {

@@ -82,10 +82,13 @@ gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {"CM_STAGE " + 
 
 }  // namespace
 
-LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, const gl::Limits& limits, grid::LatticePtr lattice,
-                             std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels)
+LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
+                             grid::LatticePtr lattice, std::shared_ptr<const grid::Statistics> statistics,
+                             grid::Channels channels, DeviceMemoriesPtr memories)
     : gl_(gl),
+      programs_(std::move(programs)),
       limits_(limits),
+      memories_(std::move(memories)),
       statistics_(std::move(statistics)),
       channels_(std::move(channels)),
       fields_(grid::fields_of(*statistics_, channels_)),
@@ -103,11 +106,20 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, const gl::Limits& limit
     plan_buffer(buffer, from.size() * sizeof(T), from.data(), what);
   };
   plan(data_->nodes_, l.own.nodes, "creating the lattice's nodes");
-  plan(data_->own_, l.own.values, "creating the splits' own priorities");
+  plan_buffer(data_->own_, l.own.all_values() * 2, nullptr, "creating the splits' own priorities");
+  upload_.add_bytes(
+      [this] {
+        return Upload::Place{data_->own_.name(), 0};
+      },
+      l.own.values.data(), l.own.values.size() * 2);
   plan(data_->blocks_, l.blocks, "creating the lattice's blocks");
   plan(data_->places_, l.places, "creating the lattice's places");
   plan(data_->coarse_, l.coarse, "creating the coefficients of coarse cells");
   plan_bricks();
+  if (statistics_->on_device()) {
+    plan_device_bricks();
+    plan_priorities();
+  }
   plan_channels();
   plan_buffer(data_->priorities_, l.blocks.size() * CM_BLOCK_POINTS * 4, nullptr, "creating the priorities");
   plan_buffer(data_->bins_, std::uint64_t{CM_PRIORITIES} * 4, nullptr, "creating the priorities' histogram");
@@ -128,9 +140,8 @@ void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const v
   upload_.add_bytes(place, from, bytes);
 }
 
-void LatticeUpload::plan_values(gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill,
-                                const char* what) {
-  plan_buffer(buffer, bricks * brick_bytes, nullptr, what);
+void LatticeUpload::plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes,
+                                const FillBrick& fill) {
   const auto put = [this, &buffer, brick_bytes, fill](std::size_t first, std::size_t bytes) {
     std::vector<std::byte> piece(bytes);
     for (std::size_t at = 0; at < bytes; at += brick_bytes) fill((first + at) / brick_bytes, &piece[at]);
@@ -160,7 +171,99 @@ void LatticeUpload::plan_bricks() {
       std::memcpy(to, values, brick_bytes);
     }
   };
-  plan_values(data_->bricks_, l.bricks, brick_bytes, fill, "creating the values of bricks");
+  plan_buffer(data_->bricks_, std::uint64_t{l.bricks} * brick_bytes, nullptr, "creating the values of bricks");
+  plan_values(data_->bricks_, statistics_->on_device() ? l.even_bricks.size() : l.bricks, brick_bytes, fill);
+}
+
+void LatticeUpload::plan_dispatches(const gl::ProgramKey& key, std::uint32_t items, std::uint32_t a_step,
+                                    const DispatchItems& dispatch) {
+  for (std::uint32_t first = 0; first < items; first += a_step) {
+    upload_.add_until([this, key, dispatch, first, end = std::min(items, first + a_step)] {
+      const gl::Program& program = programs_->ask(key);
+      if (!program.usable()) return false;
+      dispatch(program, first, end);
+      return true;
+    });
+  }
+}
+
+void LatticeUpload::plan_device_bricks() {
+  const grid::Lattice& l = *data_->lattice_;
+  const volume::DeviceBricks& bricks = *statistics_->on_device();
+  const std::vector<std::uint32_t>& nodes = statistics_->nodes_of_size(3);
+  scratch_.moved.resize(bricks.memories.size());
+  std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
+  for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+    const auto& place = bricks.places[static_cast<std::size_t>(statistics_->nodes()[nodes[i]].values)];
+    moves[place.memory].emplace_back(place.brick, i);
+  }
+  constexpr std::uint32_t a_step = 4096;
+  for (std::size_t m = 0; m < moves.size(); ++m) {
+    const volume::DeviceMemory& memory = *bricks.memories[m];
+    const gl::Object* from = memories_ ? memories_->find(memory) : nullptr;
+    if (from == nullptr) throw Error(ErrorCode::unsupported, "the volume's voxels are in another context");
+    const auto count = static_cast<std::uint32_t>(moves[m].size());
+    upload_.add([this, m, list = std::move(moves[m])] {
+      scratch_.moved[m] = gl::make_buffer(gl_, list.size() * sizeof(MovedBrick), list.data(), 0,
+                                          "creating the list of a volume's bricks");
+    });
+    const BrickCopies copies{
+        from, memory.halves, &data_->bricks_, l.halves, std::uint32_t(l.even_bricks.size()), &scratch_.moved[m]};
+    plan_dispatches(copies.program(), count, a_step,
+                    [this, copies](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
+                      copies.dispatch(*gl_, program, first, end);
+                    });
+  }
+  upload_.add([this] {
+    scratch_.moved.clear();
+    gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
+  });
+}
+
+void LatticeUpload::plan_priorities() {
+  const grid::Lattice& l = *data_->lattice_;
+  const grid::BricksToRate& rated = l.own.to_rate;
+  if (rated.bricks.empty()) return;
+  upload_.add([this, &rated] {
+    const auto make = [this](const auto& from, const char* what) {
+      return gl::make_buffer(gl_, std::max<std::size_t>(from.size() * sizeof from[0], 4),
+                             from.empty() ? nullptr : from.data(), 0, what);
+    };
+    scratch_.to_rate = make(rated.bricks, "creating the list of bricks to rate");
+    scratch_.lit = make(rated.lit, "creating the light of bricks");
+    scratch_.tree = make_brick_tree(gl_, rated.edges_squared);
+    std::array<std::uint32_t, 732> places{};
+    std::ranges::copy(grid::places_of_brick_points(), places.begin());
+    scratch_.points = make(places, "creating the places of a brick's points");
+  });
+  const gl::ProgramKey key{"own_priorities.comp", {l.halves ? "CM_HALVES 1" : "CM_HALVES 0"}};
+  // Where a processor computes them, little enough that a frame can stop between two.
+  const std::uint32_t a_step = gl_->dispatches_in_call ? 64 : 4096;
+  plan_dispatches(key, static_cast<std::uint32_t>(rated.bricks.size()), a_step,
+                  [this, &l, &rated](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
+                    const GLuint name = program.name();
+                    const grid::OwnMeasure& measure = rated.measure;
+                    gl_->ProgramUniform2ui(name, 0, first, end);
+                    gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(rated.first_node));
+                    gl_->ProgramUniform3f(name, 2, measure.scale, measure.own_hiding, measure.floor);
+                    gl_->ProgramUniform2i(name, 3, rated.lit.empty() ? 0 : 1, measure.linear ? 1 : 0);
+                    gl_->ProgramUniform1i(name, 4, measure.range_mean ? 1 : 0);
+                    gl_->ProgramUniform1i(name, 5, static_cast<GLint>(l.even_bricks.size()));
+                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_NODES, data_->nodes_.name());
+                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_OWN, data_->own_.name());
+                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_BRICKS, data_->bricks_.name());
+                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO_RATE,
+                                        scratch_.to_rate.name());
+                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_LIT, scratch_.lit.name());
+                    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, scratch_.tree.name());
+                    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_POINT_PLACES, scratch_.points.name());
+                    program.use(*gl_);
+                    dispatch_groups(*gl_, end - first);
+                  });
+  upload_.add([this] {
+    scratch_ = {};
+    gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
+  });
 }
 
 void LatticeUpload::plan_channels() {
@@ -181,8 +284,10 @@ void LatticeUpload::plan_channels() {
       }
       std::memcpy(to, numbers.data(), numbers.size() * sizeof(float));
     };
-    plan_values(data.bricks, channel.even_bricks.size() + channel.bricks.size(),
-                volume::brick_voxels * channel.numbers * sizeof(float), fill, "creating a channel's values of bricks");
+    const std::size_t bricks = channel.even_bricks.size() + channel.bricks.size();
+    const std::size_t brick_bytes = volume::brick_voxels * channel.numbers * sizeof(float);
+    plan_buffer(data.bricks, bricks * brick_bytes, nullptr, "creating a channel's values of bricks");
+    plan_values(data.bricks, bricks, brick_bytes, fill);
   }
 }
 
@@ -665,6 +770,13 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_b
       // What there is no room for leaves it to the cells.
       if (error.code() == ErrorCode::out_of_memory)
         std::erase_if(lattices_, [&](const auto& data) { return &data->lattice() == source->plan->lattice.get(); });
+      if (const volume::DeviceBricksPtr& in_gl = source->statistics->on_device()) {
+        if (in_gl->gone())
+          throw Error(ErrorCode::unsupported,
+                      "the volume's voxels went with the context that they were in; hand over the next state");
+        if (in_gl->wanted) in_gl->wanted->ask();
+        throw Error(error.code(), std::string(error.what()) + "; its voxels are brought to main memory");
+      }
       on_cpu_ = std::make_unique<CpuGridBuild>(source, error.what());
     }
   }
@@ -676,7 +788,8 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_b
 }
 
 void GridBuilds::begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes) {
-  upload_ = std::make_unique<LatticeUpload>(gl_, limits_, source.plan->lattice, source.statistics, source.channels);
+  upload_ = std::make_unique<LatticeUpload>(gl_, programs_, limits_, source.plan->lattice, source.statistics,
+                                            source.channels, memories_);
   const std::uint64_t needs = bytes();
   if (needs <= most_bytes) return;
   throw Error(ErrorCode::out_of_memory, "the lattice needs " + std::to_string(needs) + " bytes of GL memory; " +

@@ -20,6 +20,7 @@
 #include "gl/objects.hpp"
 #include "gl/programs.hpp"
 #include "grid/lattice.hpp"
+#include "render/device_memories.hpp"
 #include "render/upload.hpp"
 #include "scene/glow.hpp"
 #include "scene/march_source.hpp"
@@ -58,8 +59,11 @@ class LatticeUpload {
  public:
   /// statistics, channels: that the lattice was made of; all are held until the last step is made. Throws
   /// Error(unsupported) that names the limit that does not suffice; allocates nothing yet.
-  LatticeUpload(const gl::FunctionsPtr& gl, const gl::Limits& limits, grid::LatticePtr lattice,
-                std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels = {});
+  /// Of bricks that are in GL the values are copied there, and their priorities found. Throws Error(unsupported) where
+  /// memories has them not.
+  LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
+                grid::LatticePtr lattice, std::shared_ptr<const grid::Statistics> statistics,
+                grid::Channels channels = {}, DeviceMemoriesPtr memories = nullptr);
   LatticeUpload(const LatticeUpload&) = delete;
   LatticeUpload& operator=(const LatticeUpload&) = delete;
   /// As Upload has them.
@@ -74,14 +78,28 @@ class LatticeUpload {
  private:
   void plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what);
   void plan_bricks();
+  void plan_device_bricks();
+  void plan_priorities();
   void plan_channels();
+  // A step for each piece of these items, once the driver has the program.
+  using DispatchItems = std::function<void(const gl::Program& program, std::uint32_t first, std::uint32_t end)>;
+  void plan_dispatches(const gl::ProgramKey& key, std::uint32_t items, std::uint32_t a_step,
+                       const DispatchItems& dispatch);
   // Bricks of whole values, which fill puts where it is told, one after another.
   using FillBrick = std::function<void(std::size_t brick, std::byte* to)>;
-  void plan_values(gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill,
-                   const char* what);
+  void plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill);
+
+  // What steps make for others.
+  struct Scratch {
+    std::vector<gl::Object> moved;  // by memory
+    gl::Object to_rate, lit, tree, points;
+  };
 
   gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
   gl::Limits limits_;
+  DeviceMemoriesPtr memories_;
+  Scratch scratch_;
   std::shared_ptr<const grid::Statistics> statistics_;
   grid::Channels channels_;
   std::vector<grid::ChannelFields> fields_;
@@ -249,8 +267,9 @@ using BuiltGrids = std::map<scene::MarchSourcePtr, BuiltGrid>;
 class GridBuilds {
  public:
   using Sources = std::vector<scene::MarchSourcePtr>;
-  GridBuilds(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits)
-      : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits) {}
+  /// memories: where volumes' bricks are that are in GL.
+  GridBuilds(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, DeviceMemoriesPtr memories)
+      : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits), memories_(std::move(memories)) {}
 
   /// Those of sources, until about the deadline. Returns whether all are there. kept: whose lattices stay, these among
   /// them; others go. most_bytes: of GL memory that lattices and what is built may take. Throws Error(gl), and what the
@@ -277,6 +296,7 @@ class GridBuilds {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
+  DeviceMemoriesPtr memories_;
   std::vector<LatticeDataPtr> lattices_;
   std::unique_ptr<LatticeUpload> upload_;
   struct UnderWay {

@@ -11,6 +11,7 @@
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 #include "gl/bindings.hpp"
+#include "grid/evaluation.hpp"
 
 namespace cumulet::render {
 
@@ -36,6 +37,8 @@ std::size_t bytes_of(VoxelFormat format) {
   return format == VoxelFormat::floats ? 4 : format == VoxelFormat::bytes ? 1 : 2;
 }
 std::size_t brick_bytes(VoxelFormat format) { return brick_voxels * bytes_of(format); }
+/// Of one that stays in GL.
+std::size_t kept_bytes(VoxelFormat format) { return brick_voxels * (format == VoxelFormat::halves ? 2U : 4U); }
 
 glm::ivec3 bricks_of(glm::ivec3 size) { return (size - 1) / brick_size + 1; }
 
@@ -120,6 +123,17 @@ std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec
   return found;
 }
 
+void require_finite(const volume::DeviceBricks& bricks, const std::string& name) {
+  const auto bad = std::ranges::find_if(bricks.summaries, [](const volume::BrickSummary& summary) {
+    return (summary.voxels & CM_BRICK_NOT_FINITE) != 0;
+  });
+  if (bad == bricks.summaries.end()) return;
+  const glm::ivec3 origin = bricks.origins[static_cast<std::size_t>(bad - bricks.summaries.begin())];
+  throw Error(ErrorCode::file,
+              one_line(name + ": density: a voxel of the 8x8x8 from (" + std::to_string(origin.x) + ", " +
+                       std::to_string(origin.y) + ", " + std::to_string(origin.z) + ") on is not finite"));
+}
+
 std::uint32_t word_at(const std::byte* data, std::size_t i) {
   std::uint32_t word = 0;
   std::memcpy(&word, data + i * sizeof word, sizeof word);
@@ -128,8 +142,9 @@ std::uint32_t word_at(const std::byte* data, std::size_t i) {
 
 }  // namespace
 
-VoxelTransfers::VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits)
-    : gl_(std::move(gl)), programs_(std::move(programs)) {
+VoxelTransfers::VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits,
+                               DeviceMemoriesPtr memories)
+    : gl_(std::move(gl)), programs_(std::move(programs)), memories_(std::move(memories)) {
   constexpr std::int64_t most = std::int64_t{1} << 31U;  // whose words are counted in 32 bits
   most_bytes_ = static_cast<std::uint64_t>(std::min(limits.storage_block_bytes, most));
   GLint alignment = 0;
@@ -239,8 +254,9 @@ void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vect
   const Source& source = transfer.sources[field];
   const glm::ivec3 bricks = bricks_of(source.size);
   const std::uint64_t layer = std::uint64_t(bricks.x) * std::uint64_t(bricks.y);
+  const std::size_t each = std::max(brick_bytes(source.format), transfer.stays_in_gl() ? kept_bytes(source.format) : 0);
   const auto fits = [&](std::uint64_t count, glm::ivec2 layers) {
-    if (count * brick_bytes(source.format) > most_bytes_) return false;
+    if (count * each > most_bytes_) return false;
     if (source.buffer == 0) return true;
     const glm::u64vec2 range = range_of(source, layers);
     return range.y - range.x <= most_bytes_;
@@ -338,7 +354,7 @@ void VoxelTransfers::pack(const Transfer& transfer, const Piece& piece, GLuint c
 
 gl::Fence VoxelTransfers::fence() const { return gl_->dispatches_in_call ? gl::Fence() : gl::Fence(gl_); }
 
-void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arrive, Refuse refuse) {
+void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse) {
   const auto& gl = *gl_;
   const gl::DebugGroup group(gl, "cumulet: live voxels");
   if (state.wait != nullptr && gl.IsSync(state.wait) == GL_FALSE)
@@ -347,7 +363,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arriv
   transfer.whose = whose;
   transfer.whole = !state.changed;
   transfer.name = state.name;
-  transfer.arrive = std::move(arrive);
+  transfer.arrival = std::move(arrival);
   transfer.refuse = std::move(refuse);
   std::vector<gl::Object> choices(state.fields.size());
   for (std::size_t i = 0; i < state.fields.size(); ++i) {
@@ -368,6 +384,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arriv
   for (Piece& piece : transfer.pieces) {
     const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
     piece.room = take_room(piece.count, piece.count * each);
+    if (transfer.stays_in_gl()) continue;
     // A plume grows little from state to state.
     const std::size_t expected = piece.room.expected + piece.room.expected / 4;
     piece.copied = std::min<std::size_t>(expected, piece.count);
@@ -401,13 +418,144 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrive arriv
 
 // ---- main memory's part ----
 
-std::optional<std::vector<volume::Channel>> VoxelTransfers::channels_of(const void* whose) const {
+std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* whose) const {
   const auto found = std::find_if(transfers_.rbegin(), transfers_.rend(),
                                   [&](const Transfer& t) { return t.whose == whose && t.whole; });
-  if (found == transfers_.rend()) return std::nullopt;
-  std::vector<volume::Channel> channels;
-  for (const volume::FieldCopy& field : found->fields) channels.push_back(field.channel);
-  return channels;
+  if (found == transfers_.rend()) {
+    if (std::ranges::find(returns_, whose, &Return::whose) == returns_.end()) return std::nullopt;
+    return Announced{{volume::Channel::density}, false};
+  }
+  Announced announced{{}, found->stays_in_gl()};
+  for (const volume::FieldCopy& field : found->fields) announced.channels.push_back(field.channel);
+  return announced;
+}
+
+bool VoxelTransfers::busy_with(const void* whose) const {
+  return std::ranges::find(transfers_, whose, &Transfer::whose) != transfers_.end() ||
+         std::ranges::find(returns_, whose, &Return::whose) != returns_.end();
+}
+
+void VoxelTransfers::bring_back(volume::DeviceBricksPtr bricks, const glm::dmat4& index_to_world, const void* whose,
+                                Arrive arrive) {
+  Return back{whose, std::move(bricks), index_to_world, {}, std::move(arrive), {}};
+  for (const volume::DeviceMemoryPtr& memory : back.bricks->memories) {
+    const gl::Object* buffer = memories_->find(*memory);
+    if (buffer == nullptr) throw Error(ErrorCode::internal, "voxels in GL that are in no memory");
+    const std::size_t bytes = memory->bricks * brick_voxels * (memory->halves ? 2 : 4);
+    back.memories.push_back(gl::ReadBack::unfilled(gl_, bytes, "creating a host's bricks in memory"));
+    gl_->CopyNamedBufferSubData(buffer->name(), back.memories.back().name(), 0, 0, static_cast<GLsizeiptr>(bytes));
+  }
+  back.fence = fence();
+  gl::check(*gl_, what_step);
+  returns_.push_back(std::move(back));
+}
+
+bool VoxelTransfers::take(Return& back) {
+  if (!back.fence.passed()) return false;
+  const volume::DeviceBricks& bricks = *back.bricks;
+  volume::BrickCopy copy(back.index_to_world);
+  copy.reserve(bricks.origins.size());
+  std::array<float, brick_voxels> values{};
+  for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
+    const volume::DeviceBricks::Place& place = bricks.places[i];
+    const VoxelFormat format = bricks.memories[place.memory]->halves ? VoxelFormat::halves : VoxelFormat::floats;
+    unpack(format, back.memories[place.memory].data() + place.brick * brick_bytes(format), values);
+    copy.add(bricks.origins[i], values);
+  }
+  std::vector<volume::FieldCopy> fields;
+  fields.push_back({volume::Channel::density, std::move(copy)});
+  back.arrive(std::move(fields));
+  return true;
+}
+
+void VoxelTransfers::begin_summaries(Transfer& transfer) {
+  transfer.brick_tree =
+      make_brick_tree(gl_, grid::brick_edges(std::get<volume::BrickCopy>(transfer.fields[0].voxels).index_to_world()));
+  for (Piece& piece : transfer.pieces) {
+    Room& room = piece.room;
+    piece.filled = word_at(room.places_back.data(), 0);
+    if (piece.filled > piece.count)
+      throw Error(ErrorCode::gl, one_line(transfer.name + ": the driver packed no bricks"));
+    if (piece.filled == 0) continue;
+    if (room.summed < piece.filled) {
+      const std::size_t with_more = std::min<std::size_t>(piece.filled + piece.filled / 4, piece.count);
+      const std::size_t bytes = with_more * sizeof(volume::BrickSummary);
+      room.summaries = gl::make_buffer(gl_, bytes, nullptr, 0, "creating what is known of a host's bricks");
+      room.summaries_back = gl::ReadBack::unfilled(gl_, bytes, "creating what is known of a host's bricks in memory");
+      room.summed = with_more;
+    }
+    piece.kept = memories_->make(piece.filled, transfer.sources[piece.field].format == VoxelFormat::halves);
+  }
+}
+
+void VoxelTransfers::summarize(const Transfer& transfer, const Piece& piece, std::uint32_t first,
+                               std::uint32_t end) const {
+  const auto& gl = *gl_;
+  const Source& source = transfer.sources[piece.field];
+  const gl::Program& program =
+      programs_->get({"summarize_bricks.comp", {"CM_FORMAT " + std::to_string(static_cast<int>(source.format))}});
+  const glm::uvec3 bricks(bricks_of(source.size));
+  gl.ProgramUniform2ui(program.name(), 0, first, end);
+  gl.ProgramUniform3ui(program.name(), 1, bricks.x, bricks.y, bricks.z);
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_PLACES, piece.room.places.name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_VALUES, piece.room.values.name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_KEPT, memories_->find(*piece.kept)->name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICK_SUMMARIES, piece.room.summaries.name());
+  gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, transfer.brick_tree.name());
+  program.use(gl);
+  dispatch_groups(gl, end - first);
+}
+
+bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
+  const auto& gl = *gl_;
+  if (!transfer.brick_tree) begin_summaries(transfer);
+  // Where a processor computes them, what a call takes is known when it returns.
+  constexpr std::uint32_t few = 64;
+  for (Piece& piece : transfer.pieces) {
+    while (piece.summarized < piece.filled) {
+      const std::uint32_t left = piece.filled - piece.summarized;
+      const std::uint32_t end = piece.summarized + (gl.dispatches_in_call ? std::min(left, few) : left);
+      summarize(transfer, piece, piece.summarized, end);
+      piece.summarized = end;
+      if (std::chrono::steady_clock::now() > deadline) return false;
+    }
+  }
+  gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  for (const Piece& piece : transfer.pieces) {
+    const std::size_t bytes = piece.filled * sizeof(volume::BrickSummary);
+    if (bytes > 0)
+      gl.CopyNamedBufferSubData(piece.room.summaries.name(), piece.room.summaries_back.name(), 0, 0,
+                                static_cast<GLsizeiptr>(bytes));
+  }
+  transfer.brick_tree = {};
+  transfer.fence = fence();
+  gl::check(gl, what_step);
+  return true;
+}
+
+volume::DeviceBricks VoxelTransfers::take_bricks(const Transfer& transfer) {
+  volume::DeviceBricks made;
+  for (const Piece& piece : transfer.pieces) {
+    const glm::ivec3 bricks = bricks_of(transfer.sources[piece.field].size);
+    const std::byte* places = piece.room.places_back.data();
+    const std::size_t filled = word_at(places, 0);
+    const std::size_t all = filled + word_at(places, 1);
+    if (piece.kept) made.memories.push_back(piece.kept);
+    for (std::size_t i = 0; i < all; ++i) {
+      const bool empty = i >= filled;
+      const auto brick = static_cast<int>(word_at(places, 2 + (empty ? piece.count - 1 - (i - filled) : i)));
+      made.origins.push_back(brick_size *
+                             glm::ivec3(brick % bricks.x, brick / bricks.x % bricks.y, brick / bricks.x / bricks.y));
+      volume::BrickSummary& summary = made.summaries.emplace_back();
+      if (empty) {
+        made.places.emplace_back();
+        continue;
+      }
+      std::memcpy(&summary, piece.room.summaries_back.data() + i * sizeof summary, sizeof summary);
+      made.places.push_back({static_cast<std::uint32_t>(made.memories.size() - 1), static_cast<std::uint32_t>(i)});
+    }
+  }
+  return made;
 }
 
 void VoxelTransfers::copy_rest(Transfer& transfer) const {
@@ -435,10 +583,15 @@ void VoxelTransfers::copy_rest(Transfer& transfer) const {
 bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
   if (!transfer.fence.passed()) return false;
   if (!transfer.counted) {
-    copy_rest(transfer);
+    if (transfer.stays_in_gl()) {
+      if (!summarize(transfer, deadline)) return false;
+    } else {
+      copy_rest(transfer);
+    }
     transfer.counted = true;
     if (!transfer.fence.passed()) return false;
   }
+  if (transfer.stays_in_gl()) return true;
   constexpr int at_a_time = 256;
   int bricks_since = 0;
   std::array<float, brick_voxels> values{};
@@ -497,6 +650,11 @@ void VoxelTransfers::refuse_on_top(const Transfer& whole) {
 
 void VoxelTransfers::follow(Deadline deadline) {
   constexpr int long_time = 300;
+  memories_->collect();
+  while (!returns_.empty()) {
+    if (!take(returns_.front())) return;
+    returns_.pop_front();
+  }
   if (transfers_.empty()) {
     if (++idle_ == long_time) {
       spare_.clear();
@@ -510,10 +668,16 @@ void VoxelTransfers::follow(Deadline deadline) {
     std::exception_ptr failure;
     try {
       if (!take(first, deadline)) return;
-      if (!first.finite) {
-        for (const volume::FieldCopy& field : first.fields) volume::require_finite(field.view(), first.name);
+      if (first.stays_in_gl()) {
+        volume::DeviceBricks bricks = take_bricks(first);
+        require_finite(bricks, first.name);
+        std::get<StayInGl>(first.arrival)(std::move(bricks));
+      } else {
+        if (!first.finite) {
+          for (const volume::FieldCopy& field : first.fields) volume::require_finite(field.view(), first.name);
+        }
+        std::get<Arrive>(first.arrival)(std::move(first.fields));
       }
-      first.arrive(std::move(first.fields));
     } catch (...) {
       failure = std::current_exception();
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Voxels that a host has in GL, on their way to main memory.
+// Voxels that a host has in GL, on their way to main memory, or to where they stay in GL.
 
 #include <array>
 #include <cstddef>
@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "render/device_memories.hpp"
 #include "render/upload.hpp"
 #include "volume/state.hpp"
 
@@ -60,20 +61,33 @@ struct GlState {
 /// waits. All calls but those that tell need the context current and a StateGuard around.
 class VoxelTransfers {
  public:
-  VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits);
+  /// memories: where those go that stay in GL.
+  VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, DeviceMemoriesPtr memories);
 
   /// Given the fields, whose copies are bricks; of those that changed the empty ones, too, as zeros.
   using Arrive = std::function<void(std::vector<volume::FieldCopy> fields)>;
+  /// Given the one field, whose bricks stay in GL; of those that changed the empty ones, too. Not tidy.
+  using StayInGl = std::function<void(volume::DeviceBricks bricks)>;
+  using Arrival = std::variant<Arrive, StayInGl>;
   /// A whole state does not arrive: something is wrong with it. Those on top of it that were on their way are gone.
   using Refuse = std::function<void()>;
   /// whose: of one the oldest whole state that is on its way arrives, and of those behind it the newest. Fields'
   /// channels and transforms are checked. Throws Error(invalid_argument) for what is no such object, Error(unsupported)
   /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
-  void begin(const GlState& state, const void* whose, Arrive arrive, Refuse refuse);
-  /// Of whose newest whole state that is on its way; none: there is none.
-  [[nodiscard]] std::optional<std::vector<volume::Channel>> channels_of(const void* whose) const;
+  void begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse);
+  /// Density that stays in GL comes to main memory after all, before all that is begun from now on. whose: of whom
+  /// nothing is on its way.
+  void bring_back(volume::DeviceBricksPtr bricks, const glm::dmat4& index_to_world, const void* whose, Arrive arrive);
+  /// Of whose newest whole state that is on its way.
+  struct Announced {
+    std::vector<volume::Channel> channels;
+    bool stays_in_gl = false;
+  };
+  /// None: there is none.
+  [[nodiscard]] std::optional<Announced> announced(const void* whose) const;
   /// Whether any is on its way.
-  [[nodiscard]] bool busy() const { return !transfers_.empty(); }
+  [[nodiscard]] bool busy() const { return !transfers_.empty() || !returns_.empty(); }
+  [[nodiscard]] bool busy_with(const void* whose) const;
   /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
   /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
   void follow(Deadline deadline);
@@ -101,8 +115,13 @@ class VoxelTransfers {
     gl::ReadBack places_back;
     gl::ReadBack values_back;
     std::size_t expected = 0;  // as many were filled last
+    std::size_t summed = 0;    // bricks that there is room for below
+    gl::Object summaries;
+    gl::ReadBack summaries_back;
 
-    [[nodiscard]] std::uint64_t all_bytes() const { return 2 * places_bytes(bricks) + bytes + back_bytes; }
+    [[nodiscard]] std::uint64_t all_bytes() const {
+      return 2 * places_bytes(bricks) + bytes + back_bytes + 2 * summed * sizeof(volume::BrickSummary);
+    }
   };
   static std::size_t places_bytes(std::size_t bricks) { return (2 + bricks) * sizeof(std::uint32_t); }
   // Layers of bricks of a field's, which one dispatch packs.
@@ -112,8 +131,11 @@ class VoxelTransfers {
     std::uint32_t count = 0;
     glm::ivec2 layers{0};  // from, to
     Room room;
-    std::size_t copied = 0;  // bricks that were copied back before their number was known
-    std::size_t taken = 0;   // filled and emptied ones
+    std::size_t copied = 0;        // bricks that were copied back before their number was known
+    std::size_t taken = 0;         // filled and emptied ones
+    volume::DeviceMemoryPtr kept;  // that stay in GL; null: there are none
+    std::uint32_t filled = 0;      // of those
+    std::uint32_t summarized = 0;  // of those
   };
   struct Transfer {
     const void* whose = nullptr;
@@ -123,10 +145,22 @@ class VoxelTransfers {
     std::vector<Piece> pieces;
     std::vector<volume::FieldCopy> fields;
     bool finite = true;
-    Arrive arrive;
+    Arrival arrival;
     Refuse refuse;
     gl::Fence fence;
-    bool counted = false;  // what is filled is known, and was copied
+    bool counted = false;   // what is filled is known, and was copied
+    gl::Object brick_tree;  // while it is summarized
+
+    [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
+  };
+  // What stayed in GL, on its way back.
+  struct Return {
+    const void* whose = nullptr;
+    volume::DeviceBricksPtr bricks;
+    glm::dmat4 index_to_world{1.0};
+    std::vector<gl::ReadBack> memories;
+    Arrive arrive;
+    gl::Fence fence;
   };
 
   [[nodiscard]] Source open(const GlVoxels& field, const std::string& what) const;
@@ -143,8 +177,15 @@ class VoxelTransfers {
   [[nodiscard]] gl::Fence fence() const;
   // Returns whether all of it was taken.
   bool take(Transfer& transfer, Deadline deadline);
+  // Returns whether it was taken.
+  bool take(Return& back);
   // What the driver had not copied by guess.
   void copy_rest(Transfer& transfer) const;
+  // Of what stays in GL: values where they stay, and what main memory is to know of them. Returns whether all is sent.
+  bool summarize(Transfer& transfer, Deadline deadline);
+  void begin_summaries(Transfer& transfer);
+  void summarize(const Transfer& transfer, const Piece& piece, std::uint32_t first, std::uint32_t end) const;
+  static volume::DeviceBricks take_bricks(const Transfer& transfer);
   void recycle(Transfer& transfer);
   using Transfers = std::deque<Transfer>;
   // Nobody waits for it any more. Returns the one after it.
@@ -154,10 +195,12 @@ class VoxelTransfers {
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
+  DeviceMemoriesPtr memories_;
   std::uint64_t most_bytes_;
   std::uint64_t alignment_;
   gl::Object sampler_;
   Transfers transfers_;  // in the order in which they were begun
+  std::deque<Return> returns_;
   std::deque<Room> spare_;
   std::size_t most_pieces_ = 0;  // of a state, lately
   int idle_ = 0;                 // calls of follow() since there was any

@@ -61,6 +61,15 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
 
 }  // namespace
 
+namespace {
+
+// Of voxels in main memory, whatever can be known of them without.
+bool needs_values(const BuildSettings& settings) {
+  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty();
+}
+
+}  // namespace
+
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
   log.info((most < max_cells ? "the memory that is allowed, of " + std::to_string(most) + " cells,"
                              : "max_cells (" + std::to_string(max_cells) + ")") +
@@ -70,6 +79,11 @@ void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
 Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress,
                  const Allowance& allowance, const scene::GridPlanPtr& before) {
   Built built;
+  const volume::DeviceBricksPtr& in_gl = volume->volume().on_device;
+  if (in_gl && needs_values(settings)) {
+    in_gl->wanted->ask();
+    return built;
+  }
   built.volume = volume;
   built.settings = settings;
   built.active_voxels = volume->volume().active_voxels;
@@ -104,6 +118,10 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   if (settings.on == BuildOn::gpu && !moving) {
     lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), allowance);
+    if (!planned && in_gl) {
+      in_gl->wanted->ask();
+      return {};
+    }
     if (!planned)
       log.info(volume->name() + ": its grid is built on the CPU: the lattice of " +
                std::to_string(lattice->device_bytes()) + " bytes leaves too little of the GL memory that is allowed, " +

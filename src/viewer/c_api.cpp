@@ -342,7 +342,8 @@ cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) 
   return guarded(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
-    *out = viewer->volume.of(v.volume());
+    const auto volume = v.volume();
+    if (!volume || !volume->volume().on_device) *out = viewer->volume.of(volume);
   });
 }
 

@@ -106,9 +106,11 @@ std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
   require(std::ranges::all_of(d.bounds_min, moderate) && std::ranges::all_of(d.bounds_max, moderate),
           "cumulet_live_desc's bounds are not within +-1e15");
   const cumulet::viewer::Bounds bounds{to_dvec3(d.bounds_min), to_dvec3(d.bounds_max)};
-  if (bounds.min == glm::dvec3(0.0) && bounds.max == glm::dvec3(0.0)) return std::make_shared<Live>(std::nullopt);
+  const bool stays = d.stays_in_gl != 0;
+  if (bounds.min == glm::dvec3(0.0) && bounds.max == glm::dvec3(0.0))
+    return std::make_shared<Live>(std::nullopt, stays);
   require(glm::all(glm::lessThan(bounds.min, bounds.max)), "cumulet_live_desc.bounds_min is not below bounds_max");
-  return std::make_shared<Live>(bounds);
+  return std::make_shared<Live>(bounds, stays);
 }
 
 // As on(), for calls that tell why.
@@ -181,6 +183,12 @@ cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out,
     cumulet::Progress progress;
     Live::State state = l.read(progress);
     if (!state.volume) return;
+    if (const auto& in_gl = state.volume->volume().on_device) {
+      in_gl->wanted->ask();
+      throw cumulet::Error(
+          cumulet::ErrorCode::unsupported,
+          state.volume->name() + ": its voxels are in GL; they are brought to main memory from now on");
+    }
     auto handle = std::make_unique<cumulet_volume>();
     handle->asset = std::move(state.volume);
     *out = handle.release();

@@ -23,14 +23,15 @@ Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
       group_(functions_),
       programs_(programs.of_current(*functions_)),
       limits_(gl::query_limits(*functions_)),
-      scene_(functions_, programs_, limits_),
+      memories_(std::make_shared<render::DeviceMemories>(functions_)),
+      scene_(functions_, programs_, limits_, memories_),
       progressive_(functions_, programs_),
       compositor_(functions_, programs_),
       upload_timer_(functions_),
       host_depth_timer_(functions_),
       display_timer_(functions_),
       host_depth_(functions_, programs_),
-      transfers_(functions_, programs_, limits_) {
+      transfers_(functions_, programs_, limits_, memories_) {
   strings_ = {gl::string_of(*functions_, GL_VENDOR), gl::string_of(*functions_, GL_RENDERER),
               gl::string_of(*functions_, GL_VERSION)};
   gl::check(*functions_, "reading the context's limits");
@@ -432,7 +433,7 @@ std::uint64_t Context::bytes() const {
   std::uint64_t maps = 0;
   for (const auto& [slot, map] : maps_) maps += map.bytes();
   return scene_.data_bytes() + scene_.other_bytes() + maps + progressive_.bytes() + empty_.bytes() +
-         compositor_.bytes() + transfers_.bytes() + (target_ ? target_.of().bytes() : 0) +
+         compositor_.bytes() + transfers_.bytes() + memories_->bytes() + (target_ ? target_.of().bytes() : 0) +
          depth_size.x * depth_size.y * host_depth_.layers() * 4;
 }
 

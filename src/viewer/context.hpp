@@ -67,6 +67,7 @@ class Context {
   [[nodiscard]] const render::GpuScene& scene() const { return scene_; }
   [[nodiscard]] render::Progressive& progressive() { return progressive_; }
   [[nodiscard]] render::VoxelTransfers& transfers() { return transfers_; }
+  [[nodiscard]] render::DeviceMemories& memories() { return *memories_; }
   /// Before anything else, once.
   void find_out_dispatches();
 
@@ -214,6 +215,7 @@ class Context {
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
   GlStrings strings_;
+  render::DeviceMemoriesPtr memories_;
   render::GpuScene scene_;
   render::Progressive progressive_;
   render::Compositor compositor_;

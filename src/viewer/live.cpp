@@ -25,6 +25,7 @@ bool has_tiles(const MemoryField& field) {
 
 }  // namespace
 
+// Not of what is in GL.
 std::vector<MemoryField> Live::Whole::view() const {
   if (const auto* held = std::get_if<std::vector<MemoryField>>(&fields)) return *held;
   std::vector<MemoryField> views;
@@ -61,21 +62,62 @@ void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
   hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr);
 }
 
-void Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease) {
+void Live::set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name) {
+  bricks.tidy();
+  hand_over_in_gl(std::move(bricks), index_to_world, std::move(name), nullptr);
+}
+
+void Live::update(const volume::DeviceBricks& bricks, const std::string& name) {
+  const std::optional<InGl> before = in_gl();
+  if (!before) refuse(name, "the state before it is not in GL");
+  hand_over_in_gl(before->bricks->with(bricks), before->index_to_world, name, before->bricks.get());
+}
+
+void Live::hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name,
+                           const volume::DeviceBricks* on_top_of) {
+  bricks.wanted = values_wanted_;
+  InGl state{std::make_shared<const volume::DeviceBricks>(std::move(bricks)), index_to_world, name};
+  hand_over({std::move(state), std::move(name), nullptr}, {{volume::Channel::density, Takes::bricks_in_gl}}, nullptr,
+            on_top_of);
+}
+
+void Live::move_in_gl(const volume::DeviceBricksPtr& from, volume::DeviceBricksPtr to) {
+  const std::scoped_lock lock(mutex_);
+  if (!in_gl_ || in_gl_->bricks != from) return;
+  if (to) {
+    in_gl_->bricks = std::move(to);
+  } else {
+    in_gl_.reset();
+    handed_.clear();
+  }
+}
+
+std::optional<Live::InGl> Live::in_gl() const {
+  const std::scoped_lock lock(mutex_);
+  return in_gl_;
+}
+
+void Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
+                     const volume::DeviceBricks* on_top_of) {
   Next next;
+  std::optional<InGl> state;
+  if (const auto* there = std::get_if<InGl>(&whole.fields)) state = *there;
   next.whole = std::move(whole);
   // Last of what may fail: who is refused keeps the memory.
   if (lease) next.whole->lease = lease();
   {
     const std::scoped_lock lock(mutex_);
+    if (on_top_of != nullptr && (!in_gl_ || in_gl_->bricks.get() != on_top_of))
+      refuse(next.whole->name, "another state came between");
     std::swap(next_, next);  // what nobody read ends after the lock
     std::swap(handed_, handed);
+    std::swap(in_gl_, state);
     ++newest_;
   }
   listeners_.tell();
 }
 
-std::vector<Live::Handed> Live::handed() {
+std::vector<Live::Handed> Live::handed() const {
   const std::scoped_lock lock(mutex_);
   return handed_;
 }
@@ -102,6 +144,7 @@ void Live::require_updatable(const std::vector<volume::Channel>& channels,
 }
 
 void Live::update(const std::vector<MemoryField>& fields, const std::string& name) {
+  if (in_gl()) refuse(name, "density is in GL, and takes what changes from there alone");
   for (const MemoryField& field : fields) {
     if (!std::holds_alternative<volume::SparseVoxels>(field.voxels))
       refuse(name, std::string(name_of(field.channel)) + " is dense: an update has bricks");
@@ -139,6 +182,7 @@ void Live::hand_over(volume::Changes changes, const std::vector<Handed>& handed,
 void Live::refuse_updates() {
   const std::scoped_lock lock(mutex_);
   handed_.clear();
+  in_gl_.reset();
 }
 
 void Live::take_next(std::optional<Whole>& old) {
@@ -151,6 +195,7 @@ void Live::take_next(std::optional<Whole>& old) {
   if (next.whole) old = std::exchange(base_, std::move(next.whole));
   if (!base_) return;
   auto* copies = std::get_if<std::vector<volume::FieldCopy>>(&base_->fields);
+  if (copies == nullptr) return;  // it takes none
   for (const volume::Changes::Bricks& change : next.changes.fields) {
     const auto field = std::ranges::find(*copies, change.channel, &volume::FieldCopy::channel);
     field->put(change.bricks);
@@ -165,7 +210,18 @@ void Live::refuse_base(std::optional<Whole>& old) {
   if (next_.whole) return;
   std::swap(next_, next);
   handed_.clear();
+  in_gl_.reset();
   base_number_ = newest_;
+}
+
+volume::VolumeFrame Live::read_base(Progress& progress) const {
+  if (const auto* there = std::get_if<InGl>(&base_->fields))
+    return {.density = volume::volume_on_device(there->bricks, base_->name, there->index_to_world)};
+  const std::vector<MemoryField> fields = base_->view();
+  if (base_->lease) {
+    for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
+  }
+  return volume::import_fields(fields, base_->name, {}, &progress);
 }
 
 Live::State Live::read(Progress& progress) {
@@ -177,12 +233,7 @@ Live::State Live::read(Progress& progress) {
   try {
     if (newest_ != base_number_) take_next(before);
     if (!base_ || base_number_ == state_.number) return state_;
-    const std::vector<MemoryField> fields = base_->view();
-    if (base_->lease) {
-      for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
-    }
-    state_.volume =
-        std::make_shared<const VolumeAsset>(volume::import_fields(fields, base_->name, {}, &progress), &progress);
+    state_.volume = std::make_shared<const VolumeAsset>(read_base(progress), &progress);
     state_.number = base_number_;
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) refuse_base(after);

@@ -27,7 +27,9 @@ using MakeLease = std::function<Lease()>;
 /// are safe from any thread. Those of a host wait for no reading.
 class Live {
  public:
-  explicit Live(const std::optional<Bounds>& bounds) : bounds_(bounds) {}
+  /// stays_in_gl: density that a host has there does, as long as nobody needs its voxels in main memory.
+  explicit Live(const std::optional<Bounds>& bounds, bool stays_in_gl = false)
+      : bounds_(bounds), values_wanted_(stays_in_gl ? std::make_shared<volume::ValuesWanted>() : nullptr) {}
 
   /// The whole of the next state. lease: called where nothing can fail any more, and voxels are read where they are
   /// until it goes; null: they are copied. Throws what check_fields does, and of voxels that are copied what
@@ -41,6 +43,22 @@ class Live {
   /// fields do.
   void set(std::vector<volume::FieldCopy> fields, std::string name);
   void update(volume::Changes changes, const std::string& name);
+  /// The same of density in GL; not tidy.
+  void set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name);
+  void update(const volume::DeviceBricks& bricks, const std::string& name);
+  /// Whether density that is handed over by way of GL is to stay there; false once anyone needed its voxels.
+  [[nodiscard]] bool stays_in_gl() const { return values_wanted_ && !values_wanted_->asked(); }
+  /// Of the state that was handed over last, which is in GL; null: it is not.
+  struct InGl {
+    volume::DeviceBricksPtr bricks;
+    glm::dmat4 index_to_world{1.0};
+    std::string name;
+  };
+  [[nodiscard]] std::optional<InGl> in_gl() const;
+  /// If that is still the newest, what comes is on top of the same elsewhere; null: its memory is gone, and none is
+  /// updated until a whole state is handed over.
+  void move_in_gl(const volume::DeviceBricksPtr& from, volume::DeviceBricksPtr to);
+
   /// Throws where update() would, of these channels. comes: those of the whole state that will have been handed over by
   /// then; none: the last one.
   void require_updatable(const std::vector<volume::Channel>& channels,
@@ -67,9 +85,9 @@ class Live {
   }
 
  private:
-  // Voxels of a whole state: copies, or as long as the lease holds the host's.
+  // Voxels of a whole state: copies, or as long as the lease holds the host's; or in GL.
   struct Whole {
-    std::variant<std::vector<volume::FieldCopy>, std::vector<volume::MemoryField>> fields;
+    std::variant<std::vector<volume::FieldCopy>, std::vector<volume::MemoryField>, InGl> fields;
     std::string name;
     Lease lease;
     [[nodiscard]] std::vector<volume::MemoryField> view() const;
@@ -80,24 +98,32 @@ class Live {
     volume::Changes changes;  // on top of that, or of what was read
   };
   // What bricks may be put into: of the state that was handed over last.
-  enum class Takes { zeros, bricks, nothing };
+  enum class Takes { zeros, bricks, nothing, bricks_in_gl };
   struct Handed {
     volume::Channel channel;
     Takes takes;
     bool operator==(const Handed&) const = default;
   };
-  [[nodiscard]] std::vector<Handed> handed();
+  [[nodiscard]] std::vector<Handed> handed() const;
   static const Handed& updatable(const std::vector<Handed>& handed, volume::Channel channel, const std::string& name);
-  void hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease);
+  // on_top_of: it follows this; null: whatever there is.
+  void hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
+                 const volume::DeviceBricks* on_top_of = nullptr);
+  void hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name,
+                       const volume::DeviceBricks* on_top_of);
   // Of what was handed over last when they were made.
   void hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name);
+  // reading_ is held.
+  [[nodiscard]] volume::VolumeFrame read_base(Progress& progress) const;
   // old: what it held before.
   void take_next(std::optional<Whole>& old);
   void refuse_base(std::optional<Whole>& old);
 
   std::optional<Bounds> bounds_;
+  volume::ValuesWantedPtr values_wanted_;  // null: what a host has in GL comes to main memory
+  std::optional<InGl> in_gl_;              // of the newest, under mutex_
   std::atomic<std::uint64_t> newest_ = 0;
-  std::mutex mutex_;  // of these two, held for moments
+  mutable std::mutex mutex_;  // of these, held for moments
   Next next_;
   std::vector<Handed> handed_;
   std::mutex reading_;         // of all below, held while a state is read

@@ -105,6 +105,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
       const Live::State state = live->read(progress);
       const double load_seconds = watch.lap();
       if (!state.volume) return;
+      // Else it needs voxels, which another state brings.
       ready = {build_grid(log_, state.volume, begun.settings, progress, *allowance_), state.number};
       ready.built.seconds.load = load_seconds;
     });

@@ -281,7 +281,9 @@ class Viewer {
   // What a frame needs before anything is uploaded.
   void prepare(const Frame& frame);
   // Takes voxels from GL that are there.
-  static void follow_transfers(Context& g, double budget_ms);
+  void follow_transfers(Context& g, double budget_ms);
+  // Of live volumes whose density is in GL: what is scattered is gathered, what is needed in main memory brought there.
+  void tend_voxels_in_gl(Context& g);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
@@ -556,7 +558,8 @@ class Viewer {
   [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
   std::optional<Followed> followed_;  // that is shown in place of a volume
   [[nodiscard]] Watched& watched();
-  std::optional<Watched> watched_;  // a live volume that is
+  std::optional<Watched> watched_;                // a live volume that is
+  std::vector<std::weak_ptr<Live>> lives_in_gl_;  // whose voxels this context may have
   std::uint64_t last_followed_ = 0;
   std::uint64_t last_taken_ = 0;
 

@@ -246,7 +246,7 @@ FrameResult Viewer::render(const Frame& frame) {
     // Asking the driver may take some of the budget: who wakes its threads may lose a core to them.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
-    if (g.transfers().busy()) {
+    if (g.transfers().busy() || !lives_in_gl_.empty()) {
       attempt("cumulet: live voxels", [&] { follow_transfers(g, frame.budget_ms); });
     } else {
       follow_transfers(g, 0.0);
@@ -316,12 +316,26 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
                                                           .index_to_world = field.index_to_world}});
     channels.push_back(field.channel);
   }
+  const bool density_alone = channels == std::vector{volume::Channel::density};
+  // Which way a state comes that is the last one but for some boxes, the last one says.
+  const auto comes_to_memory = [&](Context& g) {
+    if (!density_alone || !live->stays_in_gl()) return true;
+    if (!state.changed) return false;
+    const auto announced = g.transfers().announced(live.get());
+    return announced ? !announced->stays_in_gl : !live->in_gl();
+  };
   render::VoxelTransfers::Arrive arrive;
+  render::VoxelTransfers::StayInGl stay;
   if (!state.changed) {
     volume::check_fields(fields, state.name);
+    if (density_alone)
+      stay = [live, name = state.name, to_world = fields[0]](volume::DeviceBricks bricks) {
+        live->set(std::move(bricks), std::get<volume::SparseVoxels>(to_world.voxels).index_to_world, name);
+      };
     arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
   } else {
     volume::check_update(fields, state.name);
+    stay = [live, name = state.name](const volume::DeviceBricks& bricks) { live->update(bricks, name); };
     arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) {
       volume::Changes changes;
       for (volume::FieldCopy& copy : copies)
@@ -330,13 +344,42 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
     };
   }
   with_gl([&](Context& g) {
-    if (state.changed) live->require_updatable(channels, g.transfers().channels_of(live.get()), state.name);
-    g.transfers().begin(state, live.get(), std::move(arrive), [live] { live->refuse_updates(); });
+    if (state.changed) {
+      const auto announced = g.transfers().announced(live.get());
+      live->require_updatable(channels, announced ? std::optional(announced->channels) : std::nullopt, state.name);
+    }
+    const bool to_memory = comes_to_memory(g);
+    render::VoxelTransfers::Arrival arrival = std::move(arrive);
+    if (!to_memory) arrival = std::move(stay);
+    g.transfers().begin(state, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
+    if (!to_memory && std::ranges::none_of(lives_in_gl_, [&](const auto& l) { return l.lock() == live; }))
+      lives_in_gl_.push_back(live);
   });
   notify();
 }
 
+void Viewer::tend_voxels_in_gl(Context& g) {
+  std::erase_if(lives_in_gl_, [](const auto& live) { return live.expired(); });
+  for (const std::weak_ptr<Live>& held : lives_in_gl_) {
+    const std::shared_ptr<Live> live = held.lock();
+    const std::optional<Live::InGl> state = live ? live->in_gl() : std::nullopt;
+    if (!state) continue;
+    if (!g.memories().has(*state->bricks)) {
+      live->move_in_gl(state->bricks, nullptr);
+      continue;
+    }
+    if (state->bricks->scattered())
+      live->move_in_gl(state->bricks, std::make_shared<const volume::DeviceBricks>(
+                                          g.memories().gather(*g.programs(), *state->bricks)));
+    if (live->stays_in_gl() || g.transfers().busy_with(live.get())) continue;
+    g.transfers().bring_back(
+        state->bricks, state->index_to_world, live.get(),
+        [live, name = state->name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); });
+  }
+}
+
 void Viewer::follow_transfers(Context& g, double budget_ms) {
+  tend_voxels_in_gl(g);
   // They share a frame with all else.
   constexpr double part = 0.5;
   constexpr double least_ms = 2.0;

@@ -69,7 +69,9 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
                                   [](const glm::ivec3& origin, int x) { return origin.x < x; });
     for (; first != origins.end() && first->x <= x1; ++first) {
       const glm::ivec3 origin = *first;
-      const float* values = volume.brick_values.brick(static_cast<std::size_t>(first - origins.begin()), room);
+      const auto brick = static_cast<std::size_t>(first - origins.begin());
+      if (volume.on_device) volume.on_device->fill_means(brick, room);
+      const float* values = volume.on_device ? room.data() : volume.brick_values.brick(brick, room);
       const glm::ivec3 from = glm::max(origin, glm::ivec3(x0, low.y, low.z));
       const glm::ivec3 to =
           glm::min(origin + (brick_size - 1), glm::ivec3(x1, volume.bounds_max.y, volume.bounds_max.z));

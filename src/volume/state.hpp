@@ -54,6 +54,7 @@ class BrickCopy {
   /// Bricks of the other take the place of those here, or are added. O(bricks of the other), the first time of all.
   void put(const BrickCopy& other);
   [[nodiscard]] std::size_t count() const { return origins_.size() / 3; }
+  [[nodiscard]] const glm::dmat4& index_to_world() const { return index_to_world_; }
 
  private:
   struct Hash {

@@ -10,6 +10,7 @@
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "volume/brick_values.hpp"
+#include "volume/device_bricks.hpp"
 
 namespace cumulet::volume {
 
@@ -38,6 +39,8 @@ struct ScalarVolume {
   /// 512 a brick, z fastest: index ((x & 7) * 8 + (y & 7)) * 8 + (z & 7), OpenVDB's leaf order. Voxels outside bounds
   /// hold zero.
   BrickValues brick_values;
+  /// Where the values of all bricks are in GL instead: the same bricks; brick_values is empty.
+  DeviceBricksPtr on_device;
   /// Disjoint, not overlapping any brick, clipped to bounds; only tiles whose value differs from
   /// the background.
   std::vector<Tile> tiles;
@@ -49,9 +52,13 @@ struct ScalarVolume {
   [[nodiscard]] bool empty() const { return active_voxels == 0; }
   /// Main memory, but for some hundreds.
   [[nodiscard]] std::uint64_t bytes() const {
-    return brick_origins.size() * sizeof(glm::ivec3) + brick_values.bytes() + tiles.size() * sizeof(Tile);
+    return brick_origins.size() * sizeof(glm::ivec3) + brick_values.bytes() + tiles.size() * sizeof(Tile) +
+           (on_device ? on_device->bytes() : 0);
   }
 };
+
+/// The volume of bricks that are in GL. bricks: tidy.
+ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const glm::dmat4& index_to_world);
 
 /// An entry of a file's metadata, as text.
 struct Metadata {

@@ -97,7 +97,7 @@ class Gpu {
                 const grid::Channels& channels) {
     const gl::StateGuard guard(*gl_);
     const auto start = Clock::now();
-    render::LatticeUpload work(gl_, limits_, lattice, statistics, channels);
+    render::LatticeUpload work(gl_, programs_, limits_, lattice, statistics, channels);
     while (!work.advance(Deadline::max())) {
     }
     gl::Fence(gl_).wait();

@@ -135,7 +135,7 @@ class Textures {
 
 class Bench {
  public:
-  explicit Bench(double density_scale)
+  explicit Bench(double density_scale, cumulet_build build = CUMULET_BUILD_CPU, bool stays_in_gl = false)
       : gl_(cumulet::test::load_gl(Context::get_proc, &context_)), target_(gl_, 640, 360) {
     viewer_ = cumulet::bench::make_viewer(context_);
     auto medium = make_desc<cumulet_medium_desc>();
@@ -144,7 +144,11 @@ class Bench {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = 1;  // so that nothing else is under way when the next comes
     must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
+    auto grid = make_desc<cumulet_grid_desc>();
+    grid.build = build;
+    must(viewer_.get(), cumulet_set_grid(viewer_.get(), &grid));
     auto desc = make_desc<cumulet_live_desc>();
+    desc.stays_in_gl = stays_in_gl ? 1 : 0;
     for (double& x : desc.bounds_min) x = -8.0;
     for (double& x : desc.bounds_max) x = 8.0;
     live_ = cumulet::test::make_live(desc);
@@ -266,15 +270,16 @@ void measure(int side, int count) {
   };
   const auto dense = [&](int i) { return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, values[i])); };
   Bench bench(3.0);
-  const auto rows = [&](const char* what, const std::function<Spent(int)>& show) {
+  const auto rows_of = [&](const Bench& with, const char* what, const std::function<Spent(int)>& show) {
     std::vector<Spent> spent;
     for (int i = 0; i < count; ++i) spent.push_back(show(i));
     std::printf("| %d^3 | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %llu |\n", side, what,
                 least(spent, &Spent::copy), least(spent, &Spent::read), least(spent, &Spent::statistics),
                 least(spent, &Spent::refine), least(spent, &Spent::records), least(spent, &Spent::upload),
-                least(spent, &Spent::rest), least(spent, &Spent::all), static_cast<unsigned long long>(bench.cells()));
+                least(spent, &Spent::rest), least(spent, &Spent::all), static_cast<unsigned long long>(with.cells()));
     std::fflush(stdout);
   };
+  const auto rows = [&](const char* what, const std::function<Spent(int)>& show) { rows_of(bench, what, show); };
   const auto row = [&](const char* what, const State(&states)[2], decltype(cumulet_live_set)* how, bool held) {
     rows(what, [&](int i) { return bench.show(states[i % 2], how, held); });
   };
@@ -298,6 +303,15 @@ void measure(int side, int count) {
   const Textures halves(bench.gl(), side, GL_R16F, values);
   rows("in GL, R16F", [&](int i) { return bench.show(halves, i, false); });
   rows("in GL, R16F, a tenth of it", [&](int i) { return bench.show(halves, i, true); });
+  for (const bool stays : {false, true}) {
+    Bench built_there(3.0, CUMULET_BUILD_GPU, stays);
+    built_there.warm_up(states[0]);
+    const Textures there(built_there.gl(), side, GL_R16F, values);
+    const auto name = [&](const char* what) { return std::string(what) + (stays ? ", stays there" : ", built there"); };
+    rows_of(built_there, name("in GL, R16F").c_str(), [&](int i) { return built_there.show(there, i, false); });
+    rows_of(built_there, name("in GL, R16F, a tenth of it").c_str(),
+            [&](int i) { return built_there.show(there, i, true); });
+  }
 }
 
 }  // namespace

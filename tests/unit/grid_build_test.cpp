@@ -51,7 +51,7 @@ class GridBuilds : public test::GlTest {
   [[nodiscard]] render::LatticeDataPtr upload(const grid::LatticePtr& lattice,
                                               const std::shared_ptr<const grid::Statistics>& statistics,
                                               const grid::Channels& channels = {}) const {
-    render::LatticeUpload work(gl_, limits_, lattice, statistics, channels);
+    render::LatticeUpload work(gl_, programs_, limits_, lattice, statistics, channels);
     while (!work.advance(Deadline::max())) {
     }
     return work.take();
@@ -580,7 +580,7 @@ TEST_P(GridBuilds, WhatGlHasNoRoomForTheCpuBuilds) {
     SCOPED_TRACE(c.why);
     gl::Limits limits = limits_;
     limits.storage_block_bytes = c.block;
-    render::GridBuilds builds(gl_, programs_, limits);
+    render::GridBuilds builds(gl_, programs_, limits, nullptr);
     wait_for(builds, plan.source, c.most);
     ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(builds.built().at(plan.source), plan.expected, c.why));
     EXPECT_LE(builds.bytes(), held) << "nothing but a lattice is left";
@@ -588,7 +588,7 @@ TEST_P(GridBuilds, WhatGlHasNoRoomForTheCpuBuilds) {
     builds.clear();
     builds.advance({plan.source}, {plan.source}, c.most, Deadline::max());
   }
-  render::GridBuilds builds(gl_, programs_, limits_);
+  render::GridBuilds builds(gl_, programs_, limits_, nullptr);
   wait_for(builds, plan.source);
   EXPECT_FALSE(builds.built().at(plan.source).grid);
 }
@@ -604,7 +604,7 @@ TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
   for (std::int64_t n = 0; n < 1000; ++n) {
     SCOPED_TRACE(n);
     {
-      render::GridBuilds builds(functions, programs_, limits_);
+      render::GridBuilds builds(functions, programs_, limits_, nullptr);
       fake.fail_allocation(n);
       wait_for(builds, plan.source);
       fake.fail_allocation(-1);
@@ -633,7 +633,7 @@ TEST_P(GridBuilds, RefitsDoNotGrow) {
   const char* wanted = std::getenv("CUMULET_REFITS");
   const int refits = wanted == nullptr ? 100 : std::atoi(wanted);
   test::Cameras cameras(17);
-  render::GridBuilds builds(functions, programs_, limits_);
+  render::GridBuilds builds(functions, programs_, limits_, nullptr);
   std::map<std::string, std::size_t> alive;
   std::uint64_t bytes = 0;
   for (int i = 0; i < refits; ++i) {
@@ -658,7 +658,7 @@ TEST_P(GridBuilds, SayWhichLimitDoesNotSuffice) {
   gl::Limits small = limits_;
   small.storage_block_bytes = 4096;
   try {
-    const render::LatticeUpload work(gl_, small, lattice, reference.statistics);
+    const render::LatticeUpload work(gl_, programs_, small, lattice, reference.statistics);
     FAIL() << "uploaded";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::unsupported);

@@ -819,6 +819,267 @@ TEST_F(LiveGl, TheGridIsGlsToo) {
   EXPECT_EQ(difference(picture(), test::picture_of(single.get(), alone(dense(odd, array.values)).get(), target_)), "");
 }
 
+/// Of a live volume whose density stays in GL, and a viewer that builds there.
+class LiveInGl : public LiveGl {
+ protected:
+  void SetUp() override {
+    auto desc = make_desc<cumulet_live_desc>();
+    desc.stays_in_gl = 1;
+    live_ = make_live(desc);
+    viewer_ = make(CUMULET_BUILD_GPU);
+    v_ = viewer_.get();
+    ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  }
+  // Of the same numbers in main memory, by a viewer of its own.
+  Picture reference(const std::vector<float>& values) {
+    const ViewerPtr other = make(CUMULET_BUILD_GPU);
+    return test::picture_of(other.get(), alone(dense(odd, values)).get(), target_);
+  }
+  void hand_over_density(const Array& array, const Type& type) {
+    hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, type, array))});
+  }
+  std::string get_volume(cumulet_status status) {
+    std::array<char, 256> error{};
+    cumulet_volume* volume = nullptr;
+    EXPECT_EQ(cumulet_live_get_volume(live_.get(), &volume, error.data(), error.size()), status);
+    EXPECT_EQ(volume, nullptr);
+    return error.data();
+  }
+  [[nodiscard]] bool shows_voxels() const {
+    cumulet_volume* volume = nullptr;
+    EXPECT_EQ(cumulet_get_volume(v_, &volume), CUMULET_OK);
+    const VolumeRef kept(volume);
+    return volume != nullptr;
+  }
+};
+
+TEST_F(LiveInGl, EveryFormatIsTheSamePicture) {
+  int step = 0;
+  for (const Type& type : types) {
+    SCOPED_TRACE(type.format);
+    const Array array(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, ++step));
+    hand_over_density(array, type);
+    EXPECT_EQ(arrive(), 1U);
+    const Picture expected = reference(array.values);
+    EXPECT_EQ(difference(picture(), expected), "");
+    EXPECT_FALSE(shows_voxels());
+    hand_over({in_buffer(CUMULET_CHANNEL_DENSITY, odd, objects_.buffer(array.bytes), type.format)});
+    EXPECT_EQ(arrive(), 1U);
+    EXPECT_EQ(difference(picture(), expected), "");
+    EXPECT_FALSE(shows_voxels());
+  }
+}
+
+// Boxes, some of which empty bricks, built between them or not; in other precision, too. What was replaced goes.
+TEST_F(LiveInGl, BoxesAreTheWhole) {
+  const auto memory = [&] {
+    auto stats = make_desc<cumulet_stats>();
+    EXPECT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+    return stats.gl_bytes;
+  };
+  const Type& type = types[1];
+  Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const GLuint name = objects_.texture(odd, type, before);
+  const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
+  hand_over(fields);
+  std::uint64_t on_their_way = 1;
+  std::uint64_t most = 0;
+  for (int step = 1; step <= 60; ++step) {
+    const Array now(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, step));
+    objects_.put(name, odd, GL_RED, type.type, now.bytes.data());
+    std::vector<cumulet_voxel_box> boxes;
+    for (const Sides& b : State::bricks(odd, now.values, before.values))
+      boxes.push_back({{b[0] + 3, b[1], b[2]}, {b[0] + 3, b[1], b[2]}});
+    hand_over(fields, boxes);
+    before = now;
+    ++on_their_way;
+    if (step % 4 != 0) continue;
+    EXPECT_EQ(arrive(on_their_way), on_their_way);
+    on_their_way = 0;
+    if (step % 20 == 0) {
+      EXPECT_EQ(difference(picture(), reference(now.values)), "");
+    }
+    if (step == 20) most = memory();
+  }
+  EXPECT_FALSE(shows_voxels());
+  EXPECT_LE(memory(), most + most / 4);
+}
+
+// Whoever cannot do without voxels gets them, of the state that is there and of all that come.
+TEST_F(LiveInGl, ComesToMemoryWhereItIsNeeded) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  const Picture expected = reference(array.values);
+  struct Need {
+    const char* name;
+    std::function<void()> make;
+  };
+  const std::vector<Need> needs{
+      {"its voxels", [&] { get_volume(CUMULET_ERROR_UNSUPPORTED); }},
+      {"a build of the processor's",
+       [&] {
+         auto grid = make_desc<cumulet_grid_desc>();
+         grid.build = CUMULET_BUILD_CPU;
+         EXPECT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
+       }},
+  };
+  for (const Need& need : needs) {
+    SCOPED_TRACE(need.name);
+    SetUp();
+    hand_over_density(array, types[1]);
+    EXPECT_EQ(arrive(), 1U);
+    picture();
+    EXPECT_FALSE(shows_voxels());
+    need.make();
+    EXPECT_EQ(arrive(), 1U);  // the same once more
+    expect_same(newest(live_), alone(dense(odd, array.values)));
+    EXPECT_EQ(difference(picture(), expected), "");
+    EXPECT_TRUE(shows_voxels());
+    const Array next(CUMULET_VOXEL_FORMAT_R8, simulated(CUMULET_CHANNEL_DENSITY, odd, 2));
+    hand_over_density(next, types[3]);
+    EXPECT_EQ(arrive(), 1U);
+    expect_same(newest(live_), alone(dense(odd, next.values)));
+  }
+}
+
+// All that is refused of states in GL, and what is there stays.
+TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
+  const Array good(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  hand_over_density(good, types[1]);
+  arrive();
+  const Picture before = picture();
+  auto values = good.values;
+  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
+  for (const std::size_t type : {0, 1}) {
+    hand_over_density(Array(types.at(type).format, values), types.at(type));
+    const cumulet_frame_desc frame = target_.frame();
+    cumulet_status status = CUMULET_OK;
+    for (int i = 0; i < 100 && status == CUMULET_OK; ++i) {
+      target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+      status = cumulet_render(v_, &frame, nullptr);
+    }
+    EXPECT_EQ(status, CUMULET_ERROR_FILE);
+    EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
+    EXPECT_EQ(difference(target_.pixels(), before), "");
+    EXPECT_EQ(handed(), 1U);
+    // Boxes on top of it have no state.
+    const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], good))};
+    cumulet_gl_state_desc boxes = state_of(fields);
+    const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
+    boxes.changed = &box;
+    boxes.changed_count = 1;
+    EXPECT_EQ(refusal(boxes, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
+  }
+  hand_over_density(good, types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  State changes;
+  changes.sparse(CUMULET_CHANNEL_DENSITY, odd, good.values, {{0, 0, 0}});
+  const cumulet_state_desc desc = changes.desc();
+  std::array<char, 256> error{};
+  EXPECT_EQ(cumulet_live_update(live_.get(), &desc, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "smoke: density is in GL, and takes what changes from there alone");
+  EXPECT_EQ(difference(picture(), before), "");
+}
+
+// Of nothing at all, which is a state, too; of more than density, which comes to main memory; and what comes there by
+// itself.
+TEST_F(LiveInGl, GoesAlongWithOtherStates) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Array nothing(CUMULET_VOXEL_FORMAT_R16F, std::vector<float>(array.values.size(), 0.0F));
+  const Array hot(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_TEMPERATURE, odd, 0));
+  const Picture expected = reference(array.values);
+  hand_over_density(array, types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), expected), "");
+  hand_over_density(nothing, types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_NE(difference(picture(), expected), "");
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array)),
+             in_texture(CUMULET_CHANNEL_TEMPERATURE, odd, objects_.texture(odd, types[1], hot))});
+  EXPECT_EQ(arrive(), 1U);
+  State both = dense(odd, array.values);
+  both.dense(CUMULET_CHANNEL_TEMPERATURE, odd, hot.values);
+  expect_same(newest(live_), alone(both));
+  hand_over_density(array, types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), expected), "");
+  EXPECT_FALSE(shows_voxels());
+  const State whole = dense(odd, array.values);
+  const cumulet_state_desc desc = whole.desc();
+  ASSERT_EQ(cumulet_live_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
+  EXPECT_EQ(difference(picture(), expected), "");
+  EXPECT_TRUE(shows_voxels());
+}
+
+// Another context cannot see the voxels; it gets them by way of main memory.
+TEST_F(LiveInGl, IsShownInOtherContexts) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Picture expected = reference(array.values);
+  hand_over_density(array, types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), expected), "");
+  headless::Context other = headless::Context::create(headless::Backend::automatic);
+  const GladGLContext gl = test::load_gl(headless::Context::get_proc, &other);
+  ViewerPtr viewer = test::make_viewer(
+      {.get_proc = headless::Context::get_proc, .user = &other, .samples = 2, .build = CUMULET_BUILD_GPU});
+  std::optional<test::HostTarget> target(std::in_place, gl, 32, 32);
+  ASSERT_EQ(cumulet_set_live(viewer.get(), live_.get()), CUMULET_OK);
+  const cumulet_frame_desc frame = target->frame();
+  cumulet_status status = CUMULET_OK;
+  for (int i = 0; i < 1000 && status == CUMULET_OK; ++i) {
+    ASSERT_EQ(cumulet_wait(viewer.get(), 10.0), CUMULET_OK);
+    status = cumulet_render(viewer.get(), &frame, nullptr);
+  }
+  EXPECT_EQ(status, CUMULET_ERROR_UNSUPPORTED);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()),
+               "the volume's voxels are in another context; its voxels are brought to main memory");
+  context_.make_current();
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), expected), "");
+  other.make_current();
+  EXPECT_EQ(difference(test::drawn_once(viewer.get(), *target), expected), "");
+  viewer.reset();
+  target.reset();
+  context_.make_current();
+}
+
+TEST_F(LiveInGl, EndsWithItsContext) {
+  const Array first(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Array second(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  for (const bool lost : {false, true}) {
+    SCOPED_TRACE(lost);
+    hand_over_density(first, types[1]);
+    EXPECT_EQ(arrive(), 1U);
+    picture();
+    ASSERT_EQ(lost ? cumulet_context_lost(v_) : cumulet_detach(v_), CUMULET_OK);
+    ASSERT_EQ(cumulet_attach(v_, test::FakeGl::get_proc, &fake_), CUMULET_OK);
+    const cumulet_frame_desc frame = target_.frame();
+    cumulet_status status = CUMULET_OK;
+    for (int i = 0; i < 100 && status == CUMULET_OK; ++i) status = cumulet_render(v_, &frame, nullptr);
+    EXPECT_EQ(status, CUMULET_ERROR_UNSUPPORTED);
+    EXPECT_STREQ(cumulet_last_error(v_),
+                 "the volume's voxels went with the context that they were in; hand over the next state");
+    hand_over_density(second, types[1]);
+    EXPECT_EQ(arrive(), 1U);
+    EXPECT_EQ(difference(picture(), reference(second.values)), "");
+    EXPECT_FALSE(shows_voxels());
+  }
+  EXPECT_EQ(test::FakeGl::strays(), 0U);
+}
+
+TEST_F(LiveInGl, WithoutMemoryNothingIsLost) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Picture expected = reference(array.values);
+  hand_over_density(array, types[1]);
+  fake_.fail_storage(true);
+  cumulet_frame_desc frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_OUT_OF_MEMORY);
+  fake_.fail_storage(false);
+  hand_over_density(array, types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), expected), "");
+}
+
 /// What needs no viewer.
 class Transfers : public test::GlTest {
  protected:
@@ -844,6 +1105,7 @@ TEST_P(Transfers, SmallStorageBlocksAreEnough) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, values);
   Objects objects(*gl_);
   gl::Limits limits = gl::query_limits(*gl_);
+  const auto memories = std::make_shared<render::DeviceMemories>(gl_);
   const auto voxels_of = [&](bool texture) {
     render::GlVoxels voxels{volume::Channel::density, {}, glm::dmat4(1.0)};
     if (texture) {
@@ -860,10 +1122,10 @@ TEST_P(Transfers, SmallStorageBlocksAreEnough) {
       render::GlState state{"smoke", {voxels_of(texture)}, std::nullopt, nullptr};
       if (boxes) state.changed = {{{0, 0, 0}, {19, 16, 60}}};
       limits.storage_block_bytes = std::int64_t{1} << 27U;
-      render::VoxelTransfers at_once(gl_, programs_, limits);
+      render::VoxelTransfers at_once(gl_, programs_, limits, memories);
       // Three layers of 3x3 bricks: 27 kB.
       limits.storage_block_bytes = 28000;
-      render::VoxelTransfers in_pieces(gl_, programs_, limits);
+      render::VoxelTransfers in_pieces(gl_, programs_, limits, memories);
       const volume::MemoryField whole{volume::Channel::density, volume::DenseVoxels{array.values, {20, 17, 61}}};
       const auto expected = volume::import_fields(std::vector{whole}, "smoke", {});
       for (render::VoxelTransfers* transfers : {&at_once, &in_pieces}) {
@@ -875,9 +1137,9 @@ TEST_P(Transfers, SmallStorageBlocksAreEnough) {
       }
       // A layer alone is too much.
       limits.storage_block_bytes = 4096;
-      render::VoxelTransfers refusing(gl_, programs_, limits);
+      render::VoxelTransfers refusing(gl_, programs_, limits, memories);
       const gl::StateGuard guard(*gl_);
-      EXPECT_THROW(refusing.begin(state, this, nullptr, nullptr), Error);
+      EXPECT_THROW(refusing.begin(state, this, render::VoxelTransfers::Arrive(), nullptr), Error);
       EXPECT_FALSE(refusing.busy());
     }
   }

@@ -721,7 +721,8 @@ TEST(LiveOpenVdb, IsTheVolume) {
   }
   density->fill(openvdb::CoordBBox(Coord(32), Coord(47)), 0.5F);
   density->setName("smoke");
-  const auto desc = cumulet_live_desc{.struct_size = sizeof(cumulet_live_desc), .bounds_min = {}, .bounds_max = {}};
+  const auto desc =
+      cumulet_live_desc{.struct_size = sizeof(cumulet_live_desc), .bounds_min = {}, .bounds_max = {}, .stays_in_gl = 0};
   cumulet_live* live = nullptr;
   ASSERT_EQ(cumulet_live_create(&desc, &live, nullptr, 0), CUMULET_OK);
   const std::unique_ptr<cumulet_live, decltype(&cumulet_live_release)> owner(live, cumulet_live_release);

@@ -1,9 +1,10 @@
 // A live simulation: smoke that the mouse stirs, computed in the host's own context, handed over step by step in the
 // texture in which it is, and path traced as it moves.
 //
-//     cumulet-embed-smoke [--voxels N] [--record FILE]
-//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N]
+//     cumulet-embed-smoke [--voxels N] [--build cpu|gpu] [--record FILE]
+//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N] [--build cpu|gpu]
 //
+// --build gpu: the smoke stays on the GPU, where its grids are made.
 // Left button stirs, the others move the camera, as does the wheel; Escape quits. --record writes what the mouse does,
 // a line a change: frame, x, y (0 to 1, from the top left), pressed. --test plays that without a window, checks that
 // pictures follow the smoke and that no state starves, and writes OUT_DIR/smoke.ppm.
@@ -209,7 +210,7 @@ struct Mouse {
 
 class Host {
  public:
-  Host(const cumulet::GetProc& get_proc, int voxels, bool test)
+  Host(const cumulet::GetProc& get_proc, int voxels, cumulet::Build build, bool test)
       : voxels_(voxels), solver_(voxels), viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
     must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
                             .sun_elevation_degrees = 50.0F,
@@ -220,7 +221,10 @@ class Host {
     must(viewer_.set_display({.denoise = cumulet::Denoise::fast}));
     must(viewer_.set_sampling({.samples = test ? 8U : 64U}));
     // The box is known, so that neither the camera nor the ground jumps as the smoke rises.
-    live_ = must(cumulet::Live::create({.bounds_min = {-1.0, -1.0, -1.0}, .bounds_max = {1.0, 1.0, 1.0}}));
+    live_ = must(cumulet::Live::create({.bounds_min = {-1.0, -1.0, -1.0},
+                                        .bounds_max = {1.0, 1.0, 1.0},
+                                        .stays_in_gl = build == cumulet::Build::gpu}));
+    must(viewer_.set_grid({.build = build}));
     must(viewer_.set_live(live_));
   }
 
@@ -343,11 +347,11 @@ void write_ppm(const std::string& path, const std::vector<std::uint8_t>& rgba, s
 }
 
 /// Each frame: a step, its state, and a picture within a budget. What may not happen ends it.
-void play(const std::string& record, const std::string& folder, int voxels) {
+void play(const std::string& record, const std::string& folder, int voxels, cumulet::Build build) {
   make_headless_context();
   const std::vector<Moved> moves = read_mouse(record);
   constexpr std::uint32_t width = 240, height = 240;
-  Host host([](const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }, voxels, true);
+  Host host([](const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }, voxels, build, true);
   cumulet::Viewer& viewer = host.viewer();
   const cumulet::FrameDesc frame{
       .budget_ms = 30.0, .target = cumulet::Target::texture, .width = width, .height = height};
@@ -474,16 +478,21 @@ void run(GLFWwindow* window, Host& host, const std::string& record) {
 int main(int argc, char** argv) {
   std::string record, mouse, folder;
   int voxels = 64;
+  std::string built = "cpu";
   for (int i = 1; i + 1 < argc; i += 2) {
     if (std::strcmp(argv[i], "--record") == 0) record = argv[i + 1];
     if (std::strcmp(argv[i], "--mouse") == 0) mouse = argv[i + 1];
     if (std::strcmp(argv[i], "--test") == 0) folder = argv[i + 1];
     if (std::strcmp(argv[i], "--voxels") == 0) voxels = std::atoi(argv[i + 1]);
+    if (std::strcmp(argv[i], "--build") == 0) built = argv[i + 1];
   }
-  if (argc % 2 == 0 || folder.empty() != mouse.empty() || voxels < 8 || voxels > 256)
-    fail("usage: cumulet-embed-smoke [--voxels 8..256] [--record FILE | --mouse FILE --test OUT_DIR]");
+  const auto build = built == "gpu" ? cumulet::Build::gpu : cumulet::Build::cpu;
+  if (argc % 2 == 0 || (built != "cpu" && built != "gpu") || folder.empty() != mouse.empty() || voxels < 8 ||
+      voxels > 256)
+    fail(
+        "usage: cumulet-embed-smoke [--voxels 8..256] [--build cpu|gpu] [--record FILE | --mouse FILE --test OUT_DIR]");
   if (!folder.empty()) {
-    play(mouse, folder, voxels);
+    play(mouse, folder, voxels, build);
     return 0;
   }
   if (glfwInit() == GLFW_FALSE) fail("GLFW finds no display");
@@ -494,7 +503,7 @@ int main(int argc, char** argv) {
   if (window == nullptr) fail("no window with OpenGL 4.5");
   glfwMakeContextCurrent(window);
   {
-    Host host(glfwGetProcAddress, voxels, false);
+    Host host(glfwGetProcAddress, voxels, build, false);
     run(window, host, record);
   }
   glfwDestroyWindow(window);

@@ -628,6 +628,11 @@ typedef struct cumulet_live_desc {
    */
   double bounds_min[3];
   double bounds_max[3];
+  /*
+   * 1: density that cumulet_live_set_gl is given stays in GL, where its grid is made; only what is known of each 8^3
+   * voxels comes to main memory, half a kilobyte. 0: its voxels do. See there.
+   */
+  int32_t stays_in_gl;
 } cumulet_live_desc;
 
 CUMULET_API cumulet_status cumulet_live_create(const cumulet_live_desc* desc, cumulet_live** out, char* error,
@@ -661,7 +666,8 @@ CUMULET_API cumulet_status cumulet_live_update(cumulet_live* live, const cumulet
 /*
  * The newest state as a volume, retained for the caller, who releases it: for what is told of volumes, and for
  * instances. *out is NULL before the first state. Reads the state if nobody did yet, which takes as long as
- * cumulet_volume_from_state.
+ * cumulet_volume_from_state. CUMULET_ERROR_UNSUPPORTED where its voxels are in GL (cumulet_live_desc.stays_in_gl):
+ * these are brought, and a later call has them.
  */
 CUMULET_API cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out, char* error,
                                                    size_t error_size);
@@ -1031,6 +1037,15 @@ typedef struct cumulet_gl_state_desc {
  * refused from then on, until another whole one is handed over; boxes that are refused are missing, no more. What is on
  * its way when the viewer is detached, or its context is lost, never arrives: the state before stays, and boxes on top
  * of it would miss it, so that a whole state is next.
+ *
+ * With cumulet_live_desc.stays_in_gl density alone, without other channels, stays in this viewer's context: priorities
+ * of splits, and values of cells, are found there. Its grid is that of the same numbers in main memory but for
+ * roundings of priorities; its control cube begins at a multiple of 16 voxels. Boxes copy their bricks alone; now and
+ * then, when much has been replaced, all. Who cannot do without the voxels ends that for the live volume, for good:
+ * another march or a build on the CPU, a density ramp, another viewer or context that shows it, more GL memory than is
+ * allowed, cumulet_live_get_volume. Then this viewer's next cumulet_render brings the voxels of the newest state to
+ * main memory, as one more state, and those of the next ones come there at once. cumulet_get_volume gives NULL of a
+ * state in GL, and cumulet_live_update is refused on top of one.
  */
 CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
                                                const cumulet_gl_state_desc* desc);

@@ -1,0 +1,91 @@
+#version 450
+// Priorities that a brick's own cells give the vertices that they split at, as grid::OwnPriorities has them, where main
+// memory has no values of it: a group a brick.
+// variants: CM_HALVES=0,1
+layout(local_size_x = 64) in;
+
+#include "bindings.glsl"
+#include "shared.glsl"
+#include "cell.glsl"
+#include "cell_fit.glsl"
+#include "brick_summary.glsl"
+#include "lattice.glsl"
+
+layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };  // three words each
+layout(std430, binding = CM_STORAGE_GRID_OWN) writeonly buffer CmOwn { uint cm_own[]; };       // two values each
+layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint cm_bricks[]; };
+layout(std430, binding = CM_STORAGE_BRICKS_TO_RATE) readonly buffer CmToRate { uint cm_to_rate[]; };
+layout(std430, binding = CM_STORAGE_BRICKS_LIT) readonly buffer CmBricksLit { float cm_bricks_lit[]; };
+layout(location = 0) uniform uvec2 cm_range;       // of those to rate: the first, and the end
+layout(location = 1) uniform uint cm_first_node;   // of those to rate
+layout(location = 2) uniform vec3 cm_measure;      // as grid::Measure: scale, own hiding, the floor
+layout(location = 3) uniform bvec2 cm_kinds;       // whether light counts, whether cells are linear
+layout(location = 4) uniform bool cm_by_range;     // the criterion is range over mean
+layout(location = 5) uniform int cm_first_value;   // of the bricks' own in the buffer of values: a brick
+
+#include "brick_sums.glsl"
+
+shared uint cm_found[CM_BRICK_POINTS];
+shared uint cm_points;  // that have a place
+
+const uint cm_points_of_levels[10] = uint[10](CM_POINTS_OF_LEVELS);
+
+layout(std140, binding = CM_UNIFORM_POINT_PLACES) uniform CmPointPlaces {
+  uvec4 cm_point_places[183];  // of 9^3 points, four a uvec4: where brick_points() has it
+};
+
+float cm_squared(CmCell cell, CmSums sums, float edge_squared) {
+  if (cm_by_range) {
+    precise float ratio = (sums.high - sums.low) / cell.mean;
+    return ratio * ratio;
+  }
+  precise float own = 1.0 + cm_measure.y * cell.mean * sqrt(edge_squared);
+  precise float seen = cm_kinds.x ? sums.lit * sums.lit * sums.lit * sums.lit : 1.0;
+  precise float weight = edge_squared * cm_measure.x * seen / (own * own);
+  precise float value = cell.variance * weight;
+  if (value <= cm_measure.z || !cm_kinds.y) return value;
+  float explained = cm_fit_linear(cell.cell_class, cell.covariance, cell.mean).explained;
+  precise float left = max(0.0, cell.variance - explained) * weight;
+  return left;
+}
+
+void cm_visit(uint level, uint heap, uint frame, CmSums sums) {
+  if (sums.low >= sums.high) return;
+  CmCell cell = cm_cell_of(level, heap, frame, sums);
+  float squared = cm_squared(cell, sums, cm_edge_squared(level, cell.edge));
+  if (!(squared > cm_measure.z)) return;
+  uvec3 p = uvec3(cell.midpoint + 0.5);
+  uint at = (p.x * 9u + p.y) * 9u + p.z;
+  uint place = cm_point_places[at >> 2u][at & 3u];
+  if (place < cm_points) atomicMax(cm_found[place], max(floatBitsToUint(squared) >> 16, 1u));
+}
+
+void main() {
+  uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  uint i = min(cm_range.x + work, cm_range.y - 1u);
+  uint t = gl_LocalInvocationIndex;
+  uint n = 3u * (cm_first_node + i);
+  uvec3 node = uvec3(cm_nodes[n], cm_nodes[n + 1u], cm_nodes[n + 2u]);
+  uint brick = uint(cm_first_value) + cm_to_rate[i];
+  for (uint k = t; k < CM_BRICK_POINTS; k += 64u) cm_found[k] = 0u;
+  if (t == 0u) cm_points = cm_points_of_levels[cm_node_levels(node)];
+  for (uint z = 0u; z < 8u; ++z) {
+    uint v = 512u * brick + 8u * t + z;
+#if CM_HALVES
+    cm_values[8u * t + z] = unpackHalf2x16(cm_bricks[v / 2u] >> (16u * (v & 1u))).x;
+#else
+    cm_values[8u * t + z] = uintBitsToFloat(cm_bricks[v]);
+#endif
+  }
+  cm_lit[t] = cm_kinds.x ? cm_bricks_lit[64u * i + t] : 1.0;
+  barrier();
+  cm_find_reference();
+  uvec3 odd = uvec3(cm_node_corner(node) >> 3) & 1u;
+  for (uint permutation = 0u; permutation < 6u; ++permutation) cm_sum_tree(cm_kuhn_frame(odd, permutation));
+  barrier();
+  // Its first value has an even place.
+  for (uint k = t; k < (cm_points + 1u) / 2u; k += 64u) {
+    uint high = 2u * k + 1u < cm_points ? cm_found[2u * k + 1u] : 0u;
+    cm_own[node.z / 2u + k] = cm_found[2u * k] | (high << 16);
+  }
+}

@@ -1,0 +1,112 @@
+#include "render/device_memories.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "gl/bindings.hpp"
+#include "grid/cell.hpp"
+#include "grid/statistics.hpp"
+#include "volume/brick_values.hpp"
+
+namespace cumulet::render {
+
+DeviceMemories::~DeviceMemories() {
+  for (const Kept& kept : kept_) {
+    if (const volume::DeviceMemoryPtr memory = kept.held.lock()) memory->gone = true;
+  }
+}
+
+volume::DeviceMemoryPtr DeviceMemories::make(std::size_t bricks, bool halves) {
+  const std::uint64_t bytes = std::uint64_t{bricks} * volume::brick_voxels * (halves ? 2 : 4);
+  auto memory = std::make_shared<const volume::DeviceMemory>(bricks, halves);
+  kept_.push_back({memory, memory.get(), gl::make_buffer(gl_, bytes, nullptr, 0, "creating a host's bricks"), bytes});
+  return memory;
+}
+
+const gl::Object* DeviceMemories::find(const volume::DeviceMemory& memory) const {
+  const auto found = std::ranges::find(kept_, &memory, &Kept::address);
+  return found == kept_.end() ? nullptr : &found->buffer;
+}
+
+bool DeviceMemories::has(const volume::DeviceBricks& bricks) const {
+  return std::ranges::all_of(bricks.memories, [&](const auto& memory) { return find(*memory) != nullptr; });
+}
+
+volume::DeviceBricks DeviceMemories::gather(gl::Programs& programs, const volume::DeviceBricks& bricks) {
+  volume::DeviceBricks made = bricks;
+  const volume::DeviceMemoryPtr memory = make(std::max<std::size_t>(bricks.origins.size(), 1), bricks.are_halves());
+  std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
+  for (std::uint32_t i = 0; i < bricks.places.size(); ++i) {
+    moves[bricks.places[i].memory].emplace_back(bricks.places[i].brick, i);
+    made.places[i] = {0, i};
+  }
+  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
+  for (std::size_t m = 0; m < moves.size(); ++m) {
+    if (moves[m].empty()) continue;
+    const gl::Object moved = gl::make_buffer(gl_, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
+                                             "creating the list of a volume's bricks");
+    const volume::DeviceMemory& from = *bricks.memories[m];
+    const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &moved};
+    copies.dispatch(*gl_, programs.get(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
+  }
+  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  made.memories = {memory};
+  return made;
+}
+
+void DeviceMemories::collect() {
+  std::erase_if(kept_, [](const Kept& kept) { return kept.held.expired(); });
+}
+
+std::uint64_t DeviceMemories::bytes() const {
+  std::uint64_t sum = 0;
+  for (const Kept& kept : kept_) sum += kept.bytes;
+  return sum;
+}
+
+gl::Object make_brick_tree(const gl::FunctionsPtr& gl, const std::array<float, CM_BRICK_EDGES>& edges_squared) {
+  struct Words {
+    std::array<std::uint32_t, 1024> cells{};
+    std::array<float, 56> edges{};
+  };
+  Words words;
+  const grid::BrickTree& tree = grid::brick_tree(grid::kuhn_frame(glm::ivec3(0), 8, 0));
+  const auto centroid = [](const glm::vec3& at) {
+    const glm::uvec3 quarters(4.0F * at);
+    return quarters.x | (quarters.y << 6U) | (quarters.z << 12U);
+  };
+  for (std::size_t i = 1; i < 512; ++i) {
+    const std::uint32_t shape = tree.shape[i];
+    words.cells[i] = centroid(tree.node_centroid[i]) | ((shape & 0x1ffU) << 18U) |
+                     (core::cm_shape_class(shape) << 27U) | (core::cm_shape_exponent(shape) << 29U);
+  }
+  for (std::size_t i = 0; i < 512; ++i)
+    words.cells[512 + i] = centroid({tree.centroid[0][i], tree.centroid[1][i], tree.centroid[2][i]});
+  std::ranges::copy(edges_squared, words.edges.begin());
+  return gl::make_buffer(gl, sizeof words, &words, 0, "creating the tree of a brick's cells");
+}
+
+gl::ProgramKey BrickCopies::program() const {
+  return {"copy_bricks.comp",
+          {std::string("CM_FROM_HALVES ") + (from_halves ? "1" : "0"),
+           std::string("CM_TO_HALVES ") + (to_halves ? "1" : "0")}};
+}
+
+void BrickCopies::dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first,
+                           std::uint32_t end) const {
+  gl.ProgramUniform2ui(program.name(), 0, first, end);
+  gl.ProgramUniform1ui(program.name(), 1, to_first);
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_FROM, from->name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO, to->name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_MOVED, moved->name());
+  program.use(gl);
+  dispatch_groups(gl, end - first);
+}
+
+void dispatch_groups(const gl::Functions& gl, std::uint32_t groups) {
+  constexpr std::uint32_t most = 65535;
+  const std::uint32_t across = std::min(groups, most);
+  gl.DispatchCompute(across, (groups + across - 1) / across, 1);
+}
+
+}  // namespace cumulet::render

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "gl/objects.hpp"
+#include "gl/programs.hpp"
+#include "volume/device_bricks.hpp"
+
+namespace cumulet::render {
+
+/// Bricks in GL that volumes of any thread hold. All calls but those that tell need the context current.
+class DeviceMemories {
+ public:
+  explicit DeviceMemories(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  DeviceMemories(const DeviceMemories&) = delete;
+  DeviceMemories& operator=(const DeviceMemories&) = delete;
+  /// Who holds any is told that it is gone.
+  ~DeviceMemories();
+
+  /// Throws what GL's allocations throw.
+  [[nodiscard]] volume::DeviceMemoryPtr make(std::size_t bricks, bool halves);
+  /// Null: it is of another context.
+  [[nodiscard]] const gl::Object* find(const volume::DeviceMemory& memory) const;
+  [[nodiscard]] bool has(const volume::DeviceBricks& bricks) const;
+  /// The same in one memory, copied; all need to be here. Throws what GL's allocations throw, and Error(gl).
+  [[nodiscard]] volume::DeviceBricks gather(gl::Programs& programs, const volume::DeviceBricks& bricks);
+  /// Those go that nobody holds any more.
+  void collect();
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  struct Kept {
+    std::weak_ptr<const volume::DeviceMemory> held;
+    const volume::DeviceMemory* address = nullptr;
+    gl::Object buffer;
+    std::uint64_t bytes = 0;
+  };
+  gl::FunctionsPtr gl_;
+  std::vector<Kept> kept_;
+};
+using DeviceMemoriesPtr = std::shared_ptr<DeviceMemories>;
+
+/// What kernels know of a brick's cells, for CM_UNIFORM_BRICK_TREE. Throws what GL's allocations throw.
+[[nodiscard]] gl::Object make_brick_tree(const gl::FunctionsPtr& gl,
+                                         const std::array<float, CM_BRICK_EDGES>& edges_squared);
+
+/// Of a brick that is copied: which of its memory, and where to.
+using MovedBrick = glm::uvec2;
+/// Copies of bricks that a buffer of MovedBrick names.
+struct BrickCopies {
+  const gl::Object* from = nullptr;
+  bool from_halves = false;
+  const gl::Object* to = nullptr;
+  bool to_halves = false;
+  std::uint32_t to_first = 0;  ///< brick of `to` that places count from
+  const gl::Object* moved = nullptr;
+
+  [[nodiscard]] gl::ProgramKey program() const;
+  /// Of these that are moved; with that program, which is usable.
+  void dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first, std::uint32_t end) const;
+};
+
+/// So many groups, of kernels that count them along x, then along y.
+void dispatch_groups(const gl::Functions& gl, std::uint32_t groups);
+
+}  // namespace cumulet::render

@@ -1,0 +1,248 @@
+// Density that stays in GL: what is known of it, and the grids that are made of it there.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <numeric>
+#include <optional>
+
+#include "base/error.hpp"
+#include "gl/state_guard.hpp"
+#include "grid/tet_grid.hpp"
+#include "grid/transmittance.hpp"
+#include "render/grid_build.hpp"
+#include "render/voxel_transfers.hpp"
+#include "support/gl_state.hpp"
+#include "support/simulated.hpp"
+#include "support/view_cameras.hpp"
+#include "volume/frame.hpp"
+#include "volume/optical_depth.hpp"
+
+namespace {
+
+using namespace cumulet;
+using render::Deadline;
+using test::Sides;
+using test::simulated;
+
+constexpr Sides odd = {52, 44, 37};
+
+struct Field {
+  std::shared_ptr<const volume::ScalarVolume> volume;
+  std::shared_ptr<const grid::Statistics> statistics;
+  // cube: none: the volume's own.
+  explicit Field(volume::ScalarVolume v, const std::optional<grid::Cube>& cube = std::nullopt)
+      : volume(std::make_shared<const volume::ScalarVolume>(std::move(v))),
+        statistics(std::make_shared<const grid::Statistics>(*volume, cube ? *cube : grid::fit_cube(*volume))) {}
+  [[nodiscard]] grid::LatticePtr lattice(const grid::RefineSettings& settings) const {
+    return std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
+  }
+  [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
+    const grid::DiamondSet diamonds(*statistics, settings);
+    grid::GridBuilder builder(*statistics, diamonds);
+    builder.bisect();
+    return builder.records(settings.cells, volume->max_value);
+  }
+};
+
+struct Cells {
+  std::vector<grid::CellRecord> cells;
+  bool limited = false;
+};
+
+class StaysInGl : public test::GlTest {
+ protected:
+  void SetUp() override {
+    GlTest::SetUp();
+    if (IsSkipped()) return;
+    gl::find_out_dispatches(gl_, *programs_);
+    limits_ = gl::query_limits(*gl_);
+    memories_ = std::make_shared<render::DeviceMemories>(gl_);
+    transfers_ = std::make_unique<render::VoxelTransfers>(gl_, programs_, limits_, memories_);
+  }
+  void TearDown() override {
+    for (const GLuint name : buffers_) gl_->DeleteBuffers(1, &name);
+    transfers_.reset();
+    memories_.reset();
+    GlTest::TearDown();
+  }
+  GLuint buffer(const std::vector<float>& values) {
+    GLuint name = 0;
+    gl_->CreateBuffers(1, &name);
+    buffers_.push_back(name);
+    gl_->NamedBufferData(name, static_cast<GLsizeiptr>(values.size() * 4), values.data(), GL_DYNAMIC_COPY);
+    return name;
+  }
+  // values: as floats, or as halves, which they then are.
+  volume::DeviceBricks bring(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
+                             bool halves = false, std::optional<std::vector<render::VoxelBox>> changed = {}) {
+    std::vector<float> words = values;
+    if (halves) {
+      words.resize((values.size() + 1) / 2);
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        const std::uint16_t half = glm::packHalf1x16(values[i]);
+        std::memcpy(reinterpret_cast<char*>(words.data()) + 2 * i, &half, 2);
+      }
+    }
+    const render::VoxelBuffer source{.name = buffer(words),
+                                     .format = halves ? render::VoxelFormat::halves : render::VoxelFormat::floats,
+                                     .size = {size[0], size[1], size[2]}};
+    const render::GlState state{"smoke", {{volume::Channel::density, source, to_world}}, std::move(changed), nullptr};
+    std::optional<volume::DeviceBricks> found;
+    const gl::StateGuard guard(*gl_);
+    transfers_->begin(
+        state, this, [&](volume::DeviceBricks bricks) { found = std::move(bricks); }, [] {});
+    for (int i = 0; !found && i < 100000; ++i) transfers_->follow(Deadline::max());
+    return std::move(found).value();
+  }
+  static Field field_of(volume::DeviceBricks bricks, const glm::dmat4& to_world) {
+    bricks.tidy();
+    return Field(
+        volume::volume_on_device(std::make_shared<const volume::DeviceBricks>(std::move(bricks)), "smoke", to_world));
+  }
+  // In the same cube as that.
+  static Field in_memory(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
+                         const Field& in_gl) {
+    const volume::MemoryField field{volume::Channel::density,
+                                    volume::DenseVoxels{values, {size[0], size[1], size[2]}, to_world}};
+    return Field(volume::import_fields(std::vector{field}, "smoke", {}).density, in_gl.statistics->cube());
+  }
+  Cells build(const Field& field, const grid::RefineSettings& settings) {
+    const gl::StateGuard guard(*gl_);
+    const grid::LatticePtr lattice = field.lattice(settings);
+    render::LatticeUpload upload(gl_, programs_, limits_, lattice, field.statistics, {}, memories_);
+    while (!upload.advance(Deadline::max())) {
+    }
+    render::GridBuild work(gl_, programs_, limits_, upload.take(),
+                           lattice->own.levels(grid::ViewLevels(lattice->cube, settings)), settings.max_cells);
+    while (!work.advance(Deadline::max())) {
+    }
+    const render::BuiltGrid built = work.take();
+    Cells read{std::vector<grid::CellRecord>(built.count), built.limited};
+    gl_->GetNamedBufferSubData(built.cells.name(), 0, static_cast<GLsizeiptr>(read.cells.size() * 32),
+                               read.cells.data());
+    return read;
+  }
+
+  gl::Limits limits_;
+  render::DeviceMemoriesPtr memories_;
+  std::unique_ptr<render::VoxelTransfers> transfers_;
+  std::vector<GLuint> buffers_;
+};
+CUMULET_ON_BACKENDS(StaysInGl);
+
+std::vector<float> as_halves(std::vector<float> values) {
+  for (float& value : values) value = glm::unpackHalf1x16(glm::packHalf1x16(value));
+  return values;
+}
+
+// Anisotropic, turned.
+glm::dmat4 place() {
+  glm::dmat4 m(1.0);
+  m[0] = {0.5, 0.1, 0.0, 0.0};
+  m[1] = {-0.1, 0.4, 0.05, 0.0};
+  m[2] = {0.0, 0.02, 0.7, 0.0};
+  m[3] = {3.0, -2.0, 1.0, 1.0};
+  return m;
+}
+
+// scale: of what adds up to them.
+void expect_near(double a, double b, double scale) { EXPECT_NEAR(a, b, 1e-6 * scale); }
+
+// What main memory is told is what it would find itself.
+TEST_P(StaysInGl, StatisticsAreThoseOfTheVoxels) {
+  for (const bool halves : {false, true}) {
+    auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+    if (halves) values = as_halves(values);
+    const Field known = field_of(bring(values, odd, place(), halves), place());
+    const Field reference = in_memory(values, odd, place(), known);
+    EXPECT_EQ(known.volume->brick_origins, reference.volume->brick_origins);
+    EXPECT_EQ(known.volume->active_voxels, reference.volume->active_voxels);
+    EXPECT_EQ(known.volume->bounds_min, reference.volume->bounds_min);
+    EXPECT_EQ(known.volume->bounds_max, reference.volume->bounds_max);
+    EXPECT_EQ(known.volume->max_value, reference.volume->max_value);
+    EXPECT_EQ(known.statistics->values_are_halves(), halves);
+    const double depth = reference.statistics->mean_optical_depth();
+    EXPECT_NEAR(known.statistics->mean_optical_depth(), depth, 1e-6 * depth);
+    ASSERT_EQ(known.statistics->cube().log2_size, reference.statistics->cube().log2_size);
+    ASSERT_EQ(known.statistics->nodes().size(), reference.statistics->nodes().size());
+    for (std::size_t i = 0; i < known.statistics->nodes().size(); ++i) {
+      const auto& a = known.statistics->nodes()[i];
+      const auto& b = reference.statistics->nodes()[i];
+      ASSERT_EQ(a.corner, b.corner);
+      ASSERT_EQ(a.is_uniform(), b.is_uniform());
+      if (a.is_uniform()) continue;
+      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+        const grid::Moments& x = known.statistics->kuhn(a, permutation);
+        const grid::Moments& y = reference.statistics->kuhn(b, permutation);
+        EXPECT_EQ(x.min, y.min);
+        EXPECT_EQ(x.max, y.max);
+        const double whole = y.volume * y.max;
+        expect_near(x.mass, y.mass, whole);
+        expect_near(x.square, y.square, whole);
+        for (int axis = 0; axis < 3; ++axis) expect_near(x.first[axis], y.first[axis], whole);
+      }
+    }
+    const grid::Transmittance ours(*known.statistics, 0.7);
+    const grid::Transmittance theirs(*reference.statistics, 0.7);
+    for (const std::uint32_t n : known.statistics->nodes_of_size(3)) {
+      const glm::ivec3 corner = known.statistics->nodes()[n].corner;
+      for (int i = 0; i < grid::Transmittance::blocks_a_brick; ++i)
+        ASSERT_NEAR(ours.blocks(corner)[i], theirs.blocks(corner)[i], 1e-6);
+    }
+    const auto scale = volume::CoarseVolume(*known.volume).suggest_density_scale();
+    const auto expected = volume::CoarseVolume(*reference.volume).suggest_density_scale();
+    ASSERT_TRUE(scale && expected);
+    EXPECT_NEAR(*scale, *expected, 0.05 * *expected);
+  }
+}
+
+void expect_same_cells(const Cells& found, const grid::TetGrid& expected) {
+  EXPECT_EQ(found.limited, expected.limited);
+  ASSERT_EQ(found.cells.size(), expected.cells.size());
+  std::size_t others = 0;
+  for (std::size_t i = 0; i < found.cells.size(); ++i) {
+    if (found.cells[i].links != expected.cells[i].links || found.cells[i].data.x != expected.cells[i].data.x ||
+        found.cells[i].data.y != expected.cells[i].data.y)
+      ++others;
+    ASSERT_NEAR(glm::unpackHalf2x16(found.cells[i].data.z).x, glm::unpackHalf2x16(expected.cells[i].data.z).x, 1e-3);
+  }
+  EXPECT_EQ(others, 0U);
+}
+
+TEST_P(StaysInGl, GridsAreThoseOfTheVoxels) {
+  test::Cameras cameras(3);
+  std::size_t brick_cells = 0;
+  for (const bool halves : {false, true}) {
+    auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
+    if (halves) values = as_halves(values);
+    const Field known = field_of(bring(values, odd, place(), halves), place());
+    const Field reference = in_memory(values, odd, place(), known);
+    for (const auto criterion :
+         {grid::Criterion::transmittance, grid::Criterion::deviation, grid::Criterion::range_mean}) {
+      for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
+        SCOPED_TRACE(testing::Message() << halves << " " << static_cast<int>(criterion) << " "
+                                        << static_cast<int>(cells));
+        grid::RefineSettings settings;
+        settings.criterion = criterion;
+        settings.cells = cells;
+        settings.density_scale = 3.0;
+        settings.threshold = criterion == grid::Criterion::range_mean ? 0.8 : 0.02;
+        expect_same_cells(build(known, settings), reference.grid(settings));
+        settings.camera = cameras.about(reference.statistics->cube());
+        expect_same_cells(build(known, settings), reference.grid(settings));
+        settings.camera.reset();
+        for (const std::uint64_t most : {1000U, 3000U, 7000U}) {
+          settings.max_cells = most;
+          const Cells limited = build(known, settings);
+          EXPECT_TRUE(limited.limited);
+          expect_same_cells(limited, reference.grid(settings));
+        }
+        brick_cells += known.lattice(settings)->own.to_rate.bricks.size();
+      }
+    }
+  }
+  EXPECT_GT(brick_cells, 100U);
+}
+
+}  // namespace
