@@ -132,12 +132,15 @@ void cm_sum_tree(uint frame) {
 // Once the values are there, for all.
 void cm_find_reference() {
   uint t = gl_LocalInvocationIndex;
-  float row = 0.0;
+  precise float row = 0.0;
   for (uint z = 0u; z < 8u; ++z) row += cm_values[8u * t + z];
   cm_halves[64u + t].mass = row;
   barrier();
   for (uint level = 32u; level >= 1u; level /= 2u) {
-    if (t < level) cm_halves[level + t].mass = cm_halves[2u * (level + t)].mass + cm_halves[2u * (level + t) + 1u].mass;
+    if (t < level) {
+      precise float both = cm_halves[2u * (level + t)].mass + cm_halves[2u * (level + t) + 1u].mass;
+      cm_halves[level + t].mass = both;
+    }
     barrier();
   }
   if (t == 0u) cm_reference = cm_halves[1].mass / 512.0;

@@ -124,7 +124,7 @@ void main() {
   cm_look_at(t, slot);
   barrier();
   cm_find_reference();
-  float block = 0.0;
+  precise float block = 0.0;
   uvec3 low = 2u * uvec3(t / 16u, t / 4u % 4u, t % 4u);
   for (uint i = 0u; i < 8u; ++i)
     block += cm_values[(low.x + (i >> 2u)) * 64u + (low.y + ((i >> 1u) & 1u)) * 8u + low.z + (i & 1u)];

@@ -27,7 +27,7 @@ unsigned place_of(const ivec3& point) { return static_cast<unsigned>((point.x * 
 
 struct Points {
   BrickPoints points;
-  std::array<std::uint16_t, 729> index{};  // by place_of
+  PlacesOfBrickPoints index{};  // by place_of
   Points() {
     unsigned count = 0;
     for (unsigned level = 0; level < brick_levels; ++level) {
@@ -106,7 +106,7 @@ constexpr std::uint64_t most_values = std::uint64_t{1} << 32U;
 
 const BrickPoints& brick_points() { return points().points; }
 
-const std::array<std::uint16_t, 729>& places_of_brick_points() { return points().index; }
+const PlacesOfBrickPoints& places_of_brick_points() { return points().index; }
 
 OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                              Progress* progress)

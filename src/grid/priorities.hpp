@@ -24,7 +24,8 @@ using BrickPoints = std::array<glm::u8vec3, CM_BRICK_POINTS>;
 const BrickPoints& brick_points();
 
 /// Of a brick's 9^3 points, x first, which of brick_points() each is.
-const std::array<std::uint16_t, 729>& places_of_brick_points();
+using PlacesOfBrickPoints = std::array<std::uint16_t, 9 * 9 * 9>;
+const PlacesOfBrickPoints& places_of_brick_points();
 
 /// Numbers of a criterion of density, as shaders are told them.
 struct OwnMeasure {

@@ -99,7 +99,7 @@ class Statistics {
   const float* values(const Node& node, volume::BrickValues::Brick& room) const;
   /// Of a brick node whose values are in GL what is known of it; else null.
   [[nodiscard]] const volume::BrickSummary* summary(const Node& node) const {
-    return on_device_ && node.values >= 0 ? &on_device_->summaries[static_cast<std::size_t>(node.values)] : nullptr;
+    return on_device_ && node.values >= 0 ? &on_device_->summary(static_cast<std::size_t>(node.values)) : nullptr;
   }
   /// Null: they are in main memory.
   [[nodiscard]] const volume::DeviceBricksPtr& on_device() const { return on_device_; }

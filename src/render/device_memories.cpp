@@ -1,6 +1,7 @@
 #include "render/device_memories.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <string>
 
 #include "gl/bindings.hpp"
@@ -16,10 +17,10 @@ DeviceMemories::~DeviceMemories() {
   }
 }
 
-volume::DeviceMemoryPtr DeviceMemories::make(std::size_t bricks, bool halves) {
-  const std::uint64_t bytes = std::uint64_t{bricks} * volume::brick_voxels * (halves ? 2 : 4);
-  auto memory = std::make_shared<const volume::DeviceMemory>(bricks, halves);
-  kept_.push_back({memory, memory.get(), gl::make_buffer(gl_, bytes, nullptr, 0, "creating a host's bricks"), bytes});
+std::shared_ptr<volume::DeviceMemory> DeviceMemories::make(std::size_t bricks, bool halves) {
+  auto memory = std::make_shared<volume::DeviceMemory>(bricks, halves);
+  kept_.push_back({memory, memory.get(), gl::make_buffer(gl_, memory->bytes(), nullptr, 0, "creating a host's bricks"),
+                   memory->bytes()});
   return memory;
 }
 
@@ -32,26 +33,44 @@ bool DeviceMemories::has(const volume::DeviceBricks& bricks) const {
   return std::ranges::all_of(bricks.memories, [&](const auto& memory) { return find(*memory) != nullptr; });
 }
 
-volume::DeviceBricks DeviceMemories::gather(gl::Programs& programs, const volume::DeviceBricks& bricks) {
-  volume::DeviceBricks made = bricks;
-  const volume::DeviceMemoryPtr memory = make(std::max<std::size_t>(bricks.origins.size(), 1), bricks.are_halves());
-  std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
-  for (std::uint32_t i = 0; i < bricks.places.size(); ++i) {
-    moves[bricks.places[i].memory].emplace_back(bricks.places[i].brick, i);
-    made.places[i] = {0, i};
+volume::DeviceBricksPtr DeviceMemories::gather(gl::Programs& programs, const volume::DeviceBricks& bricks) {
+  const bool halves = bricks.are_halves();
+  const std::uint64_t bytes = bricks.origins.size() * volume::brick_voxels * (halves ? 2U : 4U);
+  if (bytes > most_bytes_) return nullptr;
+  for (const bool from : {false, true}) {
+    if (!programs.ask(BrickCopies{.from_halves = from, .to_halves = halves}.program()).usable()) return nullptr;
+  }
+  const std::shared_ptr<volume::DeviceMemory> memory = make(std::max<std::size_t>(bricks.origins.size(), 1), halves);
+  auto made = std::make_shared<volume::DeviceBricks>(bricks);
+  std::vector<std::uint32_t> order(bricks.places.size());
+  std::iota(order.begin(), order.end(), 0U);
+  for (const std::uint32_t i : order) {
+    made->places[i] = {0, i};
+    memory->summaries[i] = bricks.summary(i);
   }
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
+  const std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
   for (std::size_t m = 0; m < moves.size(); ++m) {
     if (moves[m].empty()) continue;
     const gl::Object moved = gl::make_buffer(gl_, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
                                              "creating the list of a volume's bricks");
     const volume::DeviceMemory& from = *bricks.memories[m];
     const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &moved};
-    copies.dispatch(*gl_, programs.get(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
+    copies.dispatch(*gl_, programs.ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
   }
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  made.memories = {memory};
+  made->memories = {memory};
   return made;
+}
+
+std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks,
+                                              std::span<const std::uint32_t> order) {
+  std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    const volume::DeviceBricks::Place& place = bricks.places[order[i]];
+    moves[place.memory].emplace_back(place.brick, i);
+  }
+  return moves;
 }
 
 void DeviceMemories::collect() {

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <list>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -17,19 +19,21 @@ namespace cumulet::render {
 /// Bricks in GL that volumes of any thread hold. All calls but those that tell need the context current.
 class DeviceMemories {
  public:
-  explicit DeviceMemories(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  /// most_bytes: of one: what a storage block may have.
+  DeviceMemories(gl::FunctionsPtr gl, std::uint64_t most_bytes) : gl_(std::move(gl)), most_bytes_(most_bytes) {}
   DeviceMemories(const DeviceMemories&) = delete;
   DeviceMemories& operator=(const DeviceMemories&) = delete;
   /// Who holds any is told that it is gone.
   ~DeviceMemories();
 
   /// Throws what GL's allocations throw.
-  [[nodiscard]] volume::DeviceMemoryPtr make(std::size_t bricks, bool halves);
-  /// Null: it is of another context.
+  [[nodiscard]] std::shared_ptr<volume::DeviceMemory> make(std::size_t bricks, bool halves);
+  /// Null: it is of another context. It stays where it is as long as the memory is held.
   [[nodiscard]] const gl::Object* find(const volume::DeviceMemory& memory) const;
   [[nodiscard]] bool has(const volume::DeviceBricks& bricks) const;
-  /// The same in one memory, copied; all need to be here. Throws what GL's allocations throw, and Error(gl).
-  [[nodiscard]] volume::DeviceBricks gather(gl::Programs& programs, const volume::DeviceBricks& bricks);
+  /// The same in one memory, copied, all being here; null: that would be too large, or the driver still compiles.
+  /// Throws what GL's allocations throw, and Error(gl).
+  [[nodiscard]] volume::DeviceBricksPtr gather(gl::Programs& programs, const volume::DeviceBricks& bricks);
   /// Those go that nobody holds any more.
   void collect();
   [[nodiscard]] std::uint64_t bytes() const;
@@ -42,7 +46,8 @@ class DeviceMemories {
     std::uint64_t bytes = 0;
   };
   gl::FunctionsPtr gl_;
-  std::vector<Kept> kept_;
+  std::uint64_t most_bytes_;
+  std::list<Kept> kept_;
 };
 using DeviceMemoriesPtr = std::shared_ptr<DeviceMemories>;
 
@@ -52,6 +57,9 @@ using DeviceMemoriesPtr = std::shared_ptr<DeviceMemories>;
 
 /// Of a brick that is copied: which of its memory, and where to.
 using MovedBrick = glm::uvec2;
+/// Of each of its memories what is moved where, for these bricks of it, in their order.
+[[nodiscard]] std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks,
+                                                            std::span<const std::uint32_t> order);
 /// Copies of bricks that a buffer of MovedBrick names.
 struct BrickCopies {
   const gl::Object* from = nullptr;

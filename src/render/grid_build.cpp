@@ -192,11 +192,11 @@ void LatticeUpload::plan_device_bricks() {
   const volume::DeviceBricks& bricks = *statistics_->on_device();
   const std::vector<std::uint32_t>& nodes = statistics_->nodes_of_size(3);
   scratch_.moved.resize(bricks.memories.size());
-  std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
-  for (std::uint32_t i = 0; i < nodes.size(); ++i) {
-    const auto& place = bricks.places[static_cast<std::size_t>(statistics_->nodes()[nodes[i]].values)];
-    moves[place.memory].emplace_back(place.brick, i);
-  }
+  std::vector<std::uint32_t> order(nodes.size());
+  std::ranges::transform(nodes, order.begin(), [&](std::uint32_t node) {
+    return static_cast<std::uint32_t>(statistics_->nodes()[node].values);
+  });
+  std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
   constexpr std::uint32_t a_step = 4096;
   for (std::size_t m = 0; m < moves.size(); ++m) {
     const volume::DeviceMemory& memory = *bricks.memories[m];
@@ -232,7 +232,7 @@ void LatticeUpload::plan_priorities() {
     scratch_.to_rate = make(rated.bricks, "creating the list of bricks to rate");
     scratch_.lit = make(rated.lit, "creating the light of bricks");
     scratch_.tree = make_brick_tree(gl_, rated.edges_squared);
-    std::array<std::uint32_t, 732> places{};
+    std::array<std::uint32_t, (std::tuple_size_v<grid::PlacesOfBrickPoints> + 3) / 4 * 4> places{};
     std::ranges::copy(grid::places_of_brick_points(), places.begin());
     scratch_.points = make(places, "creating the places of a brick's points");
   });
@@ -758,7 +758,39 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint6
   }
 }
 
+namespace {
+
+// Where there are no voxels of it.
+BuiltGrid nothing_of(const scene::MarchSource& source) {
+  volume::ScalarVolume none;
+  none.index_to_world = source.volume->index_to_world;
+  none.bounds_max = none.bounds_min;
+  const grid::Statistics statistics(none, source.cube);
+  const grid::DiamondSet diamonds(statistics, grid::RefineSettings{});
+  grid::GridBuilder builder(statistics, diamonds);
+  builder.bisect();
+  BuiltGrid made;
+  made.grid = std::make_shared<const grid::TetGrid>(builder.records(source.plan->lattice->cells, 0.0F));
+  made.count = static_cast<std::uint32_t>(made.grid->cells.size());
+  made.levels = made.grid->levels;
+  return made;
+}
+
+}  // namespace
+
 bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
+  const volume::DeviceBricksPtr& in_gl = source->statistics->on_device();
+  if (in_gl && (memories_ == nullptr || !memories_->has(*in_gl))) {
+    // Others of the scene are shown meanwhile.
+    BuiltGrid& made = built_.emplace(source, nothing_of(*source)).first->second;
+    try {
+      in_gl->ask_for_values();
+      made.why_not = "nothing of it, for its voxels are in another context; they are brought to main memory";
+    } catch (const Error& error) {
+      made.why_not = std::string("nothing of it: ") + error.what();
+    }
+    return true;
+  }
   if (!on_cpu_ || on_cpu_->of() != source) {
     on_cpu_.reset();
     try {
@@ -770,11 +802,8 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_b
       // What there is no room for leaves it to the cells.
       if (error.code() == ErrorCode::out_of_memory)
         std::erase_if(lattices_, [&](const auto& data) { return &data->lattice() == source->plan->lattice.get(); });
-      if (const volume::DeviceBricksPtr& in_gl = source->statistics->on_device()) {
-        if (in_gl->gone())
-          throw Error(ErrorCode::unsupported,
-                      "the volume's voxels went with the context that they were in; hand over the next state");
-        if (in_gl->wanted) in_gl->wanted->ask();
+      if (in_gl) {
+        in_gl->ask_for_values();
         throw Error(error.code(), std::string(error.what()) + "; its voxels are brought to main memory");
       }
       on_cpu_ = std::make_unique<CpuGridBuild>(source, error.what());

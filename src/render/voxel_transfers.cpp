@@ -100,6 +100,15 @@ void unpack(VoxelFormat format, const std::byte* from, std::span<float, brick_vo
   }
 }
 
+// Of what is on its way, whose copies are bricks.
+const glm::dmat4& index_to_world_of(const volume::FieldCopy& field) {
+  return std::get<volume::BrickCopy>(field.voxels).index_to_world();
+}
+
+gl::ProgramKey summary_program(VoxelFormat format) {
+  return {"summarize_bricks.comp", {"CM_FORMAT " + std::to_string(static_cast<int>(format))}};
+}
+
 /// The bricks that boxes touch.
 std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec3 size) {
   const glm::ivec3 bricks = bricks_of(size);
@@ -124,11 +133,10 @@ std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec
 }
 
 void require_finite(const volume::DeviceBricks& bricks, const std::string& name) {
-  const auto bad = std::ranges::find_if(bricks.summaries, [](const volume::BrickSummary& summary) {
-    return (summary.voxels & CM_BRICK_NOT_FINITE) != 0;
-  });
-  if (bad == bricks.summaries.end()) return;
-  const glm::ivec3 origin = bricks.origins[static_cast<std::size_t>(bad - bricks.summaries.begin())];
+  std::size_t bad = 0;
+  while (bad < bricks.origins.size() && (bricks.summary(bad).voxels & CM_BRICK_NOT_FINITE) == 0) ++bad;
+  if (bad == bricks.origins.size()) return;
+  const glm::ivec3 origin = bricks.origins[bad];
   throw Error(ErrorCode::file,
               one_line(name + ": density: a voxel of the 8x8x8 from (" + std::to_string(origin.x) + ", " +
                        std::to_string(origin.y) + ", " + std::to_string(origin.z) + ") on is not finite"));
@@ -390,6 +398,8 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
     piece.copied = std::min<std::size_t>(expected, piece.count);
     make_room_back(piece.room, piece.copied * each);
   }
+  // The driver may be at it while bricks are packed.
+  if (transfer.stays_in_gl()) programs_->ask(summary_program(transfer.sources[0].format));
   if (state.wait != nullptr) gl.WaitSync(state.wait, 0, GL_TIMEOUT_IGNORED);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) pack(transfer, piece, choices[piece.field].name());
@@ -421,56 +431,60 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
 std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* whose) const {
   const auto found = std::find_if(transfers_.rbegin(), transfers_.rend(),
                                   [&](const Transfer& t) { return t.whose == whose && t.whole; });
-  if (found == transfers_.rend()) {
-    if (std::ranges::find(returns_, whose, &Return::whose) == returns_.end()) return std::nullopt;
-    return Announced{{volume::Channel::density}, false};
-  }
-  Announced announced{{}, found->stays_in_gl()};
+  if (found == transfers_.rend()) return std::nullopt;
+  Announced announced{{}, found->stays_in_gl(), index_to_world_of(found->fields[0])};
   for (const volume::FieldCopy& field : found->fields) announced.channels.push_back(field.channel);
   return announced;
 }
 
-bool VoxelTransfers::busy_with(const void* whose) const {
-  return std::ranges::find(transfers_, whose, &Transfer::whose) != transfers_.end() ||
-         std::ranges::find(returns_, whose, &Return::whose) != returns_.end();
+void VoxelTransfers::bring_back(const void* whose, std::string name, std::function<std::optional<InGl>()> find,
+                                Arrive arrive, Refuse refuse) {
+  Transfer transfer;
+  transfer.whose = whose;
+  transfer.name = std::move(name);
+  transfer.fields.push_back({volume::Channel::density, volume::BrickCopy(glm::dmat4(1.0))});
+  transfer.arrival = std::move(arrive);
+  transfer.refuse = std::move(refuse);
+  transfer.back = Return{std::move(find), nullptr, {}, 0};
+  transfers_.push_back(std::move(transfer));
 }
 
-void VoxelTransfers::bring_back(volume::DeviceBricksPtr bricks, const glm::dmat4& index_to_world, const void* whose,
-                                Arrive arrive) {
-  Return back{whose, std::move(bricks), index_to_world, {}, std::move(arrive), {}};
-  for (const volume::DeviceMemoryPtr& memory : back.bricks->memories) {
-    const gl::Object* buffer = memories_->find(*memory);
-    if (buffer == nullptr) throw Error(ErrorCode::internal, "voxels in GL that are in no memory");
-    const std::size_t bytes = memory->bricks * brick_voxels * (memory->halves ? 2 : 4);
-    back.memories.push_back(gl::ReadBack::unfilled(gl_, bytes, "creating a host's bricks in memory"));
-    gl_->CopyNamedBufferSubData(buffer->name(), back.memories.back().name(), 0, 0, static_cast<GLsizeiptr>(bytes));
+bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
+  Return& back = *transfer.back;
+  auto& copy = std::get<volume::BrickCopy>(transfer.fields[0].voxels);
+  if (!back.bricks) {
+    const std::optional<InGl> there = back.find();
+    if (!there || !memories_->has(*there->bricks)) {
+      transfer.arrival = Arrive([](const auto& /*fields*/) {});
+      return true;
+    }
+    for (const volume::DeviceMemoryPtr& memory : there->bricks->memories) {
+      back.memories.push_back(gl::ReadBack::unfilled(gl_, memory->bytes(), "creating a host's bricks in memory"));
+      gl_->CopyNamedBufferSubData(memories_->find(*memory)->name(), back.memories.back().name(), 0, 0,
+                                  static_cast<GLsizeiptr>(memory->bytes()));
+    }
+    transfer.fence = fence();
+    gl::check(*gl_, what_step);
+    back.bricks = there->bricks;
+    copy = volume::BrickCopy(there->index_to_world);
+    copy.reserve(back.bricks->origins.size());
   }
-  back.fence = fence();
-  gl::check(*gl_, what_step);
-  returns_.push_back(std::move(back));
-}
-
-bool VoxelTransfers::take(Return& back) {
-  if (!back.fence.passed()) return false;
+  if (!transfer.fence.passed()) return false;
   const volume::DeviceBricks& bricks = *back.bricks;
-  volume::BrickCopy copy(back.index_to_world);
-  copy.reserve(bricks.origins.size());
+  constexpr std::size_t at_a_time = 256;
   std::array<float, brick_voxels> values{};
-  for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
-    const volume::DeviceBricks::Place& place = bricks.places[i];
+  while (back.taken < bricks.origins.size()) {
+    const volume::DeviceBricks::Place& place = bricks.places[back.taken];
     const VoxelFormat format = bricks.memories[place.memory]->halves ? VoxelFormat::halves : VoxelFormat::floats;
     unpack(format, back.memories[place.memory].data() + place.brick * brick_bytes(format), values);
-    copy.add(bricks.origins[i], values);
+    copy.add(bricks.origins[back.taken], values);
+    if (++back.taken % at_a_time == 0 && std::chrono::steady_clock::now() > deadline) return false;
   }
-  std::vector<volume::FieldCopy> fields;
-  fields.push_back({volume::Channel::density, std::move(copy)});
-  back.arrive(std::move(fields));
   return true;
 }
 
 void VoxelTransfers::begin_summaries(Transfer& transfer) {
-  transfer.brick_tree =
-      make_brick_tree(gl_, grid::brick_edges(std::get<volume::BrickCopy>(transfer.fields[0].voxels).index_to_world()));
+  transfer.brick_tree = make_brick_tree(gl_, grid::brick_edges(index_to_world_of(transfer.fields[0])));
   for (Piece& piece : transfer.pieces) {
     Room& room = piece.room;
     piece.filled = word_at(room.places_back.data(), 0);
@@ -492,8 +506,7 @@ void VoxelTransfers::summarize(const Transfer& transfer, const Piece& piece, std
                                std::uint32_t end) const {
   const auto& gl = *gl_;
   const Source& source = transfer.sources[piece.field];
-  const gl::Program& program =
-      programs_->get({"summarize_bricks.comp", {"CM_FORMAT " + std::to_string(static_cast<int>(source.format))}});
+  const gl::Program& program = programs_->ask(summary_program(source.format));
   const glm::uvec3 bricks(bricks_of(source.size));
   gl.ProgramUniform2ui(program.name(), 0, first, end);
   gl.ProgramUniform3ui(program.name(), 1, bricks.x, bricks.y, bricks.z);
@@ -508,13 +521,14 @@ void VoxelTransfers::summarize(const Transfer& transfer, const Piece& piece, std
 
 bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
   const auto& gl = *gl_;
+  if (!programs_->ask(summary_program(transfer.sources[0].format)).usable()) return false;
   if (!transfer.brick_tree) begin_summaries(transfer);
   // Where a processor computes them, what a call takes is known when it returns.
-  constexpr std::uint32_t few = 64;
+  const std::uint32_t a_step = gl.dispatches_in_call ? 64 : 4096;
   for (Piece& piece : transfer.pieces) {
     while (piece.summarized < piece.filled) {
       const std::uint32_t left = piece.filled - piece.summarized;
-      const std::uint32_t end = piece.summarized + (gl.dispatches_in_call ? std::min(left, few) : left);
+      const std::uint32_t end = piece.summarized + std::min(left, a_step);
       summarize(transfer, piece, piece.summarized, end);
       piece.summarized = end;
       if (std::chrono::steady_clock::now() > deadline) return false;
@@ -533,25 +547,27 @@ bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
   return true;
 }
 
-volume::DeviceBricks VoxelTransfers::take_bricks(const Transfer& transfer) {
+volume::DeviceBricks VoxelTransfers::take_bricks(Transfer& transfer) {
   volume::DeviceBricks made;
-  for (const Piece& piece : transfer.pieces) {
+  for (Piece& piece : transfer.pieces) {
     const glm::ivec3 bricks = bricks_of(transfer.sources[piece.field].size);
     const std::byte* places = piece.room.places_back.data();
-    const std::size_t filled = word_at(places, 0);
-    const std::size_t all = filled + word_at(places, 1);
-    if (piece.kept) made.memories.push_back(piece.kept);
+    const std::size_t all = piece.filled + word_at(places, 1);
+    if (piece.kept) {
+      std::memcpy(piece.kept->summaries.data(), piece.room.summaries_back.data(),
+                  piece.filled * sizeof(volume::BrickSummary));
+      made.memories.push_back(piece.kept);
+    }
     for (std::size_t i = 0; i < all; ++i) {
-      const bool empty = i >= filled;
-      const auto brick = static_cast<int>(word_at(places, 2 + (empty ? piece.count - 1 - (i - filled) : i)));
-      made.origins.push_back(brick_size *
-                             glm::ivec3(brick % bricks.x, brick / bricks.x % bricks.y, brick / bricks.x / bricks.y));
-      volume::BrickSummary& summary = made.summaries.emplace_back();
+      const bool empty = i >= piece.filled;
+      const auto brick = static_cast<int>(word_at(places, 2 + (empty ? piece.count - 1 - (i - piece.filled) : i)));
+      const glm::ivec3 origin =
+          brick_size * glm::ivec3(brick % bricks.x, brick / bricks.x % bricks.y, brick / bricks.x / bricks.y);
       if (empty) {
-        made.places.emplace_back();
+        made.emptied.push_back(origin);
         continue;
       }
-      std::memcpy(&summary, piece.room.summaries_back.data() + i * sizeof summary, sizeof summary);
+      made.origins.push_back(origin);
       made.places.push_back({static_cast<std::uint32_t>(made.memories.size() - 1), static_cast<std::uint32_t>(i)});
     }
   }
@@ -581,6 +597,7 @@ void VoxelTransfers::copy_rest(Transfer& transfer) const {
 }
 
 bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
+  if (transfer.back) return take_back(transfer, deadline);
   if (!transfer.fence.passed()) return false;
   if (!transfer.counted) {
     if (transfer.stays_in_gl()) {
@@ -651,10 +668,6 @@ void VoxelTransfers::refuse_on_top(const Transfer& whole) {
 void VoxelTransfers::follow(Deadline deadline) {
   constexpr int long_time = 300;
   memories_->collect();
-  while (!returns_.empty()) {
-    if (!take(returns_.front())) return;
-    returns_.pop_front();
-  }
   if (transfers_.empty()) {
     if (++idle_ == long_time) {
       spare_.clear();
@@ -697,6 +710,8 @@ std::uint64_t VoxelTransfers::bytes() const {
   for (const Room& room : spare_) sum += room.all_bytes();
   for (const Transfer& transfer : transfers_) {
     for (const Piece& piece : transfer.pieces) sum += piece.room.all_bytes();
+    if (!transfer.back || !transfer.back->bricks) continue;
+    for (const volume::DeviceMemoryPtr& memory : transfer.back->bricks->memories) sum += memory->bytes();
   }
   return sum;
 }

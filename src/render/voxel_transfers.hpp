@@ -75,19 +75,25 @@ class VoxelTransfers {
   /// channels and transforms are checked. Throws Error(invalid_argument) for what is no such object, Error(unsupported)
   /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
   void begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse);
-  /// Density that stays in GL comes to main memory after all, before all that is begun from now on. whose: of whom
-  /// nothing is on its way.
-  void bring_back(volume::DeviceBricksPtr bricks, const glm::dmat4& index_to_world, const void* whose, Arrive arrive);
+  /// Density that is in GL, its bricks being here.
+  struct InGl {
+    volume::DeviceBricksPtr bricks;
+    glm::dmat4 index_to_world{1.0};
+  };
+  /// What stays in GL comes to main memory after all: as a whole state, after those that are on their way, of what find
+  /// gives by then; none: it does not come.
+  void bring_back(const void* whose, std::string name, std::function<std::optional<InGl>()> find, Arrive arrive,
+                  Refuse refuse);
   /// Of whose newest whole state that is on its way.
   struct Announced {
     std::vector<volume::Channel> channels;
     bool stays_in_gl = false;
+    glm::dmat4 index_to_world{1.0};  ///< of the first of them
   };
   /// None: there is none.
   [[nodiscard]] std::optional<Announced> announced(const void* whose) const;
   /// Whether any is on its way.
-  [[nodiscard]] bool busy() const { return !transfers_.empty() || !returns_.empty(); }
-  [[nodiscard]] bool busy_with(const void* whose) const;
+  [[nodiscard]] bool busy() const { return !transfers_.empty(); }
   /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
   /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
   void follow(Deadline deadline);
@@ -131,11 +137,18 @@ class VoxelTransfers {
     std::uint32_t count = 0;
     glm::ivec2 layers{0};  // from, to
     Room room;
-    std::size_t copied = 0;        // bricks that were copied back before their number was known
-    std::size_t taken = 0;         // filled and emptied ones
-    volume::DeviceMemoryPtr kept;  // that stay in GL; null: there are none
-    std::uint32_t filled = 0;      // of those
-    std::uint32_t summarized = 0;  // of those
+    std::size_t copied = 0;                      // bricks that were copied back before their number was known
+    std::size_t taken = 0;                       // filled and emptied ones
+    std::shared_ptr<volume::DeviceMemory> kept;  // that stay in GL; null: there are none
+    std::uint32_t filled = 0;                    // of those
+    std::uint32_t summarized = 0;                // of those
+  };
+  // What stayed in GL, on its way back.
+  struct Return {
+    std::function<std::optional<InGl>()> find;
+    volume::DeviceBricksPtr bricks;  // once it is known
+    std::vector<gl::ReadBack> memories;
+    std::size_t taken = 0;
   };
   struct Transfer {
     const void* whose = nullptr;
@@ -150,17 +163,9 @@ class VoxelTransfers {
     gl::Fence fence;
     bool counted = false;   // what is filled is known, and was copied
     gl::Object brick_tree;  // while it is summarized
+    std::optional<Return> back;
 
     [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
-  };
-  // What stayed in GL, on its way back.
-  struct Return {
-    const void* whose = nullptr;
-    volume::DeviceBricksPtr bricks;
-    glm::dmat4 index_to_world{1.0};
-    std::vector<gl::ReadBack> memories;
-    Arrive arrive;
-    gl::Fence fence;
   };
 
   [[nodiscard]] Source open(const GlVoxels& field, const std::string& what) const;
@@ -177,15 +182,15 @@ class VoxelTransfers {
   [[nodiscard]] gl::Fence fence() const;
   // Returns whether all of it was taken.
   bool take(Transfer& transfer, Deadline deadline);
-  // Returns whether it was taken.
-  bool take(Return& back);
+  // Of what was in GL.
+  bool take_back(Transfer& transfer, Deadline deadline);
   // What the driver had not copied by guess.
   void copy_rest(Transfer& transfer) const;
   // Of what stays in GL: values where they stay, and what main memory is to know of them. Returns whether all is sent.
   bool summarize(Transfer& transfer, Deadline deadline);
   void begin_summaries(Transfer& transfer);
   void summarize(const Transfer& transfer, const Piece& piece, std::uint32_t first, std::uint32_t end) const;
-  static volume::DeviceBricks take_bricks(const Transfer& transfer);
+  static volume::DeviceBricks take_bricks(Transfer& transfer);
   void recycle(Transfer& transfer);
   using Transfers = std::deque<Transfer>;
   // Nobody waits for it any more. Returns the one after it.
@@ -200,7 +205,6 @@ class VoxelTransfers {
   std::uint64_t alignment_;
   gl::Object sampler_;
   Transfers transfers_;  // in the order in which they were begun
-  std::deque<Return> returns_;
   std::deque<Room> spare_;
   std::size_t most_pieces_ = 0;  // of a state, lately
   int idle_ = 0;                 // calls of follow() since there was any

@@ -49,6 +49,11 @@ bool Built::serves(const BuildSettings& wanted) const {
 
 namespace {
 
+// Of voxels in main memory, whatever can be known of them without.
+bool needs_values(const BuildSettings& settings) {
+  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty();
+}
+
 // What it is while the shutter is open; null where nothing moves.
 VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& progress) {
   try {
@@ -57,15 +62,6 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
     if (error.code() == ErrorCode::cancelled) throw;
     throw Error(error.code(), volume->name() + ", while the shutter is open: " + error.what());
   }
-}
-
-}  // namespace
-
-namespace {
-
-// Of voxels in main memory, whatever can be known of them without.
-bool needs_values(const BuildSettings& settings) {
-  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty();
 }
 
 }  // namespace
@@ -81,7 +77,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   Built built;
   const volume::DeviceBricksPtr& in_gl = volume->volume().on_device;
   if (in_gl && needs_values(settings)) {
-    in_gl->wanted->ask();
+    in_gl->ask_for_values();
     return built;
   }
   built.volume = volume;
@@ -119,7 +115,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), allowance);
     if (!planned && in_gl) {
-      in_gl->wanted->ask();
+      in_gl->ask_for_values();
       return {};
     }
     if (!planned)

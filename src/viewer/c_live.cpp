@@ -184,7 +184,7 @@ cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out,
     Live::State state = l.read(progress);
     if (!state.volume) return;
     if (const auto& in_gl = state.volume->volume().on_device) {
-      in_gl->wanted->ask();
+      in_gl->ask_for_values();
       throw cumulet::Error(
           cumulet::ErrorCode::unsupported,
           state.volume->name() + ": its voxels are in GL; they are brought to main memory from now on");

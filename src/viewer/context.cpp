@@ -23,7 +23,7 @@ Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
       group_(functions_),
       programs_(programs.of_current(*functions_)),
       limits_(gl::query_limits(*functions_)),
-      memories_(std::make_shared<render::DeviceMemories>(functions_)),
+      memories_(std::make_shared<render::DeviceMemories>(functions_, limits_.storage_block_bytes)),
       scene_(functions_, programs_, limits_, memories_),
       progressive_(functions_, programs_),
       compositor_(functions_, programs_),

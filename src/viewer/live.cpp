@@ -69,6 +69,7 @@ void Live::set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, st
 
 void Live::update(const volume::DeviceBricks& bricks, const std::string& name) {
   const std::optional<InGl> before = in_gl();
+  if (handed().empty()) refuse(name, no_state);
   if (!before) refuse(name, "the state before it is not in GL");
   hand_over_in_gl(before->bricks->with(bricks), before->index_to_world, name, before->bricks.get());
 }
@@ -77,8 +78,16 @@ void Live::hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_
                            const volume::DeviceBricks* on_top_of) {
   bricks.wanted = values_wanted_;
   InGl state{std::make_shared<const volume::DeviceBricks>(std::move(bricks)), index_to_world, name};
-  hand_over({std::move(state), std::move(name), nullptr}, {{volume::Channel::density, Takes::bricks_in_gl}}, nullptr,
-            on_top_of);
+  const std::string called = name;
+  if (!hand_over({std::move(state), std::move(name), nullptr}, {{volume::Channel::density, Takes::bricks_in_gl}},
+                 nullptr, on_top_of))
+    refuse(called, "another state came between");
+}
+
+void Live::set_if_newest(const volume::DeviceBricksPtr& in_gl, std::vector<volume::FieldCopy> fields,
+                         std::string name) {
+  hand_over({std::move(fields), std::move(name), nullptr}, {{volume::Channel::density, Takes::zeros}}, nullptr,
+            in_gl.get());
 }
 
 void Live::move_in_gl(const volume::DeviceBricksPtr& from, volume::DeviceBricksPtr to) {
@@ -97,7 +106,7 @@ std::optional<Live::InGl> Live::in_gl() const {
   return in_gl_;
 }
 
-void Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
+bool Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
                      const volume::DeviceBricks* on_top_of) {
   Next next;
   std::optional<InGl> state;
@@ -107,14 +116,14 @@ void Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& l
   if (lease) next.whole->lease = lease();
   {
     const std::scoped_lock lock(mutex_);
-    if (on_top_of != nullptr && (!in_gl_ || in_gl_->bricks.get() != on_top_of))
-      refuse(next.whole->name, "another state came between");
+    if (on_top_of != nullptr && (!in_gl_ || in_gl_->bricks.get() != on_top_of)) return false;
     std::swap(next_, next);  // what nobody read ends after the lock
     std::swap(handed_, handed);
     std::swap(in_gl_, state);
     ++newest_;
   }
   listeners_.tell();
+  return true;
 }
 
 std::vector<Live::Handed> Live::handed() const {
@@ -131,6 +140,14 @@ const Live::Handed& Live::updatable(const std::vector<Handed>& handed, volume::C
   return *there;
 }
 
+const Live::Handed& Live::updatable_from_memory(const std::vector<Handed>& handed, volume::Channel channel,
+                                                const std::string& name) {
+  const Handed& there = updatable(handed, channel, name);
+  if (there.takes == Takes::bricks_in_gl)
+    refuse(name, std::string(name_of(channel)) + " is in GL, and takes what changes from there alone");
+  return there;
+}
+
 void Live::require_updatable(const std::vector<volume::Channel>& channels,
                              const std::optional<std::vector<volume::Channel>>& comes, const std::string& name) {
   std::vector<Handed> handed;
@@ -144,7 +161,6 @@ void Live::require_updatable(const std::vector<volume::Channel>& channels,
 }
 
 void Live::update(const std::vector<MemoryField>& fields, const std::string& name) {
-  if (in_gl()) refuse(name, "density is in GL, and takes what changes from there alone");
   for (const MemoryField& field : fields) {
     if (!std::holds_alternative<volume::SparseVoxels>(field.voxels))
       refuse(name, std::string(name_of(field.channel)) + " is dense: an update has bricks");
@@ -154,7 +170,7 @@ void Live::update(const std::vector<MemoryField>& fields, const std::string& nam
   if (handed.empty()) refuse(name, no_state);
   volume::Changes changes;
   for (const MemoryField& field : fields) {
-    const Handed& there = updatable(handed, field.channel, name);
+    const Handed& there = updatable_from_memory(handed, field.channel, name);
     volume::require_finite(field, name);
     const auto& sparse = std::get<volume::SparseVoxels>(field.voxels);
     changes.fields.push_back({field.channel, volume::BrickCopy(sparse, there.takes == Takes::zeros)});
@@ -165,7 +181,7 @@ void Live::update(const std::vector<MemoryField>& fields, const std::string& nam
 void Live::update(volume::Changes changes, const std::string& name) {
   const std::vector<Handed> handed = this->handed();
   if (handed.empty()) refuse(name, no_state);
-  for (const volume::Changes::Bricks& field : changes.fields) updatable(handed, field.channel, name);
+  for (const volume::Changes::Bricks& field : changes.fields) updatable_from_memory(handed, field.channel, name);
   hand_over(std::move(changes), handed, name);
 }
 
@@ -182,7 +198,6 @@ void Live::hand_over(volume::Changes changes, const std::vector<Handed>& handed,
 void Live::refuse_updates() {
   const std::scoped_lock lock(mutex_);
   handed_.clear();
-  in_gl_.reset();
 }
 
 void Live::take_next(std::optional<Whole>& old) {
@@ -195,7 +210,7 @@ void Live::take_next(std::optional<Whole>& old) {
   if (next.whole) old = std::exchange(base_, std::move(next.whole));
   if (!base_) return;
   auto* copies = std::get_if<std::vector<volume::FieldCopy>>(&base_->fields);
-  if (copies == nullptr) return;  // it takes none
+  if (copies == nullptr) return;  // in GL, or held: none are handed over on top of that
   for (const volume::Changes::Bricks& change : next.changes.fields) {
     const auto field = std::ranges::find(*copies, change.channel, &volume::FieldCopy::channel);
     field->put(change.bricks);

@@ -45,7 +45,11 @@ class Live {
   void update(volume::Changes changes, const std::string& name);
   /// The same of density in GL; not tidy.
   void set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name);
+  /// Voxels of what was in GL, if that is still the newest.
+  void set_if_newest(const volume::DeviceBricksPtr& in_gl, std::vector<volume::FieldCopy> fields, std::string name);
   void update(const volume::DeviceBricks& bricks, const std::string& name);
+  /// Of those who need voxels; null: none has to be asked for.
+  [[nodiscard]] const volume::ValuesWantedPtr& values_wanted() const { return values_wanted_; }
   /// Whether density that is handed over by way of GL is to stay there; false once anyone needed its voxels.
   [[nodiscard]] bool stays_in_gl() const { return values_wanted_ && !values_wanted_->asked(); }
   /// Of the state that was handed over last, which is in GL; null: it is not.
@@ -106,8 +110,10 @@ class Live {
   };
   [[nodiscard]] std::vector<Handed> handed() const;
   static const Handed& updatable(const std::vector<Handed>& handed, volume::Channel channel, const std::string& name);
-  // on_top_of: it follows this; null: whatever there is.
-  void hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
+  static const Handed& updatable_from_memory(const std::vector<Handed>& handed, volume::Channel channel,
+                                             const std::string& name);
+  // on_top_of: it follows this; null: whatever there is. Returns whether it does.
+  bool hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
                  const volume::DeviceBricks* on_top_of = nullptr);
   void hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name,
                        const volume::DeviceBricks* on_top_of);

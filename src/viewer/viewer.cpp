@@ -128,7 +128,8 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 
 Viewer::~Viewer() {
   watched_.reset();  // what states tell is of the builder, which ends before
-  cancel();          // all at once: where threads are few, jobs wait for each other
+  lives_in_gl_.clear();
+  cancel();  // all at once: where threads are few, jobs wait for each other
   // Without a context nothing can be deleted, and in a stranger's the names are of other objects.
   if (gl_ && !gl_->group().is_current()) context_lost();
 }

@@ -281,9 +281,10 @@ class Viewer {
   // What a frame needs before anything is uploaded.
   void prepare(const Frame& frame);
   // Takes voxels from GL that are there.
-  void follow_transfers(Context& g, double budget_ms);
+  static void follow_transfers(Context& g, double budget_ms);
   // Of live volumes whose density is in GL: what is scattered is gathered, what is needed in main memory brought there.
   void tend_voxels_in_gl(Context& g);
+  static void bring_back(Context& g, const std::shared_ptr<Live>& live);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
@@ -558,8 +559,15 @@ class Viewer {
   [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
   std::optional<Followed> followed_;  // that is shown in place of a volume
   [[nodiscard]] Watched& watched();
-  std::optional<Watched> watched_;                // a live volume that is
-  std::vector<std::weak_ptr<Live>> lives_in_gl_;  // whose voxels this context may have
+  std::optional<Watched> watched_;  // a live volume that is
+  // Whose voxels this context may have.
+  struct InGl {
+    std::weak_ptr<Live> live;
+    std::shared_ptr<void> listener;  // to who needs voxels
+    // Of these it was tried, or is: what fails is not tried again.
+    std::weak_ptr<const volume::DeviceBricks> gathered, brought;
+  };
+  std::vector<InGl> lives_in_gl_;
   std::uint64_t last_followed_ = 0;
   std::uint64_t last_taken_ = 0;
 

@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
+#include "base/one_line.hpp"
 #include "denoise/tza.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
@@ -246,7 +247,8 @@ FrameResult Viewer::render(const Frame& frame) {
     // Asking the driver may take some of the budget: who wakes its threads may lose a core to them.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
-    if (g.transfers().busy() || !lives_in_gl_.empty()) {
+    if (!lives_in_gl_.empty()) attempt("cumulet: voxels in GL", [&] { tend_voxels_in_gl(g); });
+    if (g.transfers().busy()) {
       attempt("cumulet: live voxels", [&] { follow_transfers(g, frame.budget_ms); });
     } else {
       follow_transfers(g, 0.0);
@@ -293,6 +295,7 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   with_gl([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
+    tend_voxels_in_gl(g);
     follow_transfers(g, frame.budget_ms);
     prepare(frame);
     g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
@@ -317,12 +320,20 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
     channels.push_back(field.channel);
   }
   const bool density_alone = channels == std::vector{volume::Channel::density};
-  // Which way a state comes that is the last one but for some boxes, the last one says.
-  const auto comes_to_memory = [&](Context& g) {
-    if (!density_alone || !live->stays_in_gl()) return true;
-    if (!state.changed) return false;
+  // Where it stands; none: it does not stay in GL.
+  const auto place_in_gl = [&](Context& g) -> std::optional<glm::dmat4> {
+    if (!density_alone) return std::nullopt;
+    if (!state.changed) return live->stays_in_gl() ? std::optional(state.fields[0].index_to_world) : std::nullopt;
+    // Boxes go where the rest is.
     const auto announced = g.transfers().announced(live.get());
-    return announced ? !announced->stays_in_gl : !live->in_gl();
+    const std::optional<Live::InGl> rest = live->in_gl();
+    if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
+    if (!announced && !g.memories().has(*rest->bricks))
+      throw Error(ErrorCode::invalid_argument,
+                  one_line(state.name + ": the rest of it is in another viewer's context"));
+    if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
+    bring_back(g, live);
+    return std::nullopt;
   };
   render::VoxelTransfers::Arrive arrive;
   render::VoxelTransfers::StayInGl stay;
@@ -348,38 +359,57 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
       const auto announced = g.transfers().announced(live.get());
       live->require_updatable(channels, announced ? std::optional(announced->channels) : std::nullopt, state.name);
     }
-    const bool to_memory = comes_to_memory(g);
+    const std::optional<glm::dmat4> place = place_in_gl(g);
+    render::GlState placed = state;
+    if (place) placed.fields[0].index_to_world = *place;
     render::VoxelTransfers::Arrival arrival = std::move(arrive);
-    if (!to_memory) arrival = std::move(stay);
-    g.transfers().begin(state, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
-    if (!to_memory && std::ranges::none_of(lives_in_gl_, [&](const auto& l) { return l.lock() == live; }))
-      lives_in_gl_.push_back(live);
+    if (place) arrival = std::move(stay);
+    g.transfers().begin(placed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
+    if (place && std::ranges::none_of(lives_in_gl_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; }))
+      lives_in_gl_.push_back({live, live->values_wanted()->listen([this] { notify(); }), {}, {}});
   });
   notify();
 }
 
+void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live) {
+  using Transfers = render::VoxelTransfers;
+  const auto found = std::make_shared<Live::InGl>();
+  g.transfers().bring_back(
+      live.get(), "state",
+      [live, found]() -> std::optional<Transfers::InGl> {
+        const std::optional<Live::InGl> state = live->in_gl();
+        if (!state) return std::nullopt;
+        *found = *state;
+        return Transfers::InGl{state->bricks, state->index_to_world};
+      },
+      [live, found](std::vector<volume::FieldCopy> copies) {
+        live->set_if_newest(found->bricks, std::move(copies), found->name);
+      },
+      [live] { live->refuse_updates(); });
+}
+
 void Viewer::tend_voxels_in_gl(Context& g) {
-  std::erase_if(lives_in_gl_, [](const auto& live) { return live.expired(); });
-  for (const std::weak_ptr<Live>& held : lives_in_gl_) {
-    const std::shared_ptr<Live> live = held.lock();
+  std::erase_if(lives_in_gl_, [](const InGl& in_gl) { return in_gl.live.expired(); });
+  for (InGl& in_gl : lives_in_gl_) {
+    const std::shared_ptr<Live> live = in_gl.live.lock();
     const std::optional<Live::InGl> state = live ? live->in_gl() : std::nullopt;
     if (!state) continue;
-    if (!g.memories().has(*state->bricks)) {
-      live->move_in_gl(state->bricks, nullptr);
-      continue;
+    if (state->bricks->gone()) live->move_in_gl(state->bricks, nullptr);
+    if (!g.memories().has(*state->bricks)) continue;
+    const auto announced = g.transfers().announced(live.get());
+    if (!live->stays_in_gl() && (!announced || announced->stays_in_gl) && in_gl.brought.lock() != state->bricks) {
+      in_gl.brought = state->bricks;
+      bring_back(g, live);
     }
-    if (state->bricks->scattered())
-      live->move_in_gl(state->bricks, std::make_shared<const volume::DeviceBricks>(
-                                          g.memories().gather(*g.programs(), *state->bricks)));
-    if (live->stays_in_gl() || g.transfers().busy_with(live.get())) continue;
-    g.transfers().bring_back(
-        state->bricks, state->index_to_world, live.get(),
-        [live, name = state->name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); });
+    if (live->stays_in_gl() && state->bricks->scattered() && in_gl.gathered.lock() != state->bricks) {
+      in_gl.gathered = state->bricks;
+      if (auto gathered = g.memories().gather(*g.programs(), *state->bricks))
+        live->move_in_gl(state->bricks, std::move(gathered));
+    }
   }
 }
 
 void Viewer::follow_transfers(Context& g, double budget_ms) {
-  tend_voxels_in_gl(g);
   // They share a frame with all else.
   constexpr double part = 0.5;
   constexpr double least_ms = 2.0;

@@ -3,31 +3,13 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <utility>
 
+#include "base/error.hpp"
 #include "volume/bricks.hpp"
 #include "volume/volume.hpp"
 
 namespace cumulet::volume {
-
-namespace {
-
-// By places in order, each once.
-DeviceBricks chosen(const DeviceBricks& of, const std::vector<std::size_t>& order) {
-  DeviceBricks made;
-  made.memories = of.memories;
-  made.wanted = of.wanted;
-  made.origins.reserve(order.size());
-  made.places.reserve(order.size());
-  made.summaries.reserve(order.size());
-  for (const std::size_t i : order) {
-    made.origins.push_back(of.origins[i]);
-    made.places.push_back(of.places[i]);
-    made.summaries.push_back(of.summaries[i]);
-  }
-  return made;
-}
-
-}  // namespace
 
 bool DeviceBricks::are_halves() const {
   return std::ranges::all_of(memories, [](const DeviceMemoryPtr& memory) { return memory->halves; });
@@ -37,16 +19,29 @@ bool DeviceBricks::gone() const {
   return std::ranges::any_of(memories, [](const DeviceMemoryPtr& memory) { return memory->gone.load(); });
 }
 
+void DeviceBricks::ask_for_values() const {
+  if (gone())
+    throw Error(ErrorCode::unsupported,
+                "the volume's voxels went with the context that they were in; hand over the next state");
+  if (wanted) wanted->ask();
+}
+
 bool DeviceBricks::scattered() const {
   constexpr std::size_t most_memories = 16;
   constexpr std::size_t few = 1024;
   std::size_t held = 0;
-  for (const DeviceMemoryPtr& memory : memories) held += memory->bricks;
+  for (const DeviceMemoryPtr& memory : memories) held += memory->bricks();
   return memories.size() > most_memories || held > 2 * origins.size() + few;
 }
 
-void DeviceBricks::fill_means(std::size_t brick, std::array<float, 512>& values) const {
-  const BrickSummary& s = summaries[brick];
+std::uint64_t DeviceBricks::bytes() const {
+  std::uint64_t bytes = origins.size() * (sizeof(glm::ivec3) + sizeof(Place));
+  for (const DeviceMemoryPtr& memory : memories) bytes += memory->bricks() * sizeof(BrickSummary);
+  return bytes;
+}
+
+void DeviceBricks::fill_means(std::size_t brick, BrickValues::Brick& values) const {
+  const BrickSummary& s = summary(brick);
   for (std::size_t v = 0; v < values.size(); ++v)
     values[v] = s.blocks[(v / 128) * 16 + (v / 16) % 4 * 4 + (v / 2) % 4] / 8.0F;
 }
@@ -54,35 +49,42 @@ void DeviceBricks::fill_means(std::size_t brick, std::array<float, 512>& values)
 void DeviceBricks::tidy() {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < origins.size(); ++i) {
-    if (summaries[i].voxels != 0) order.push_back(i);
+    if (summary(i).voxels != 0) order.push_back(i);
   }
   std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return lexicographic(origins[a], origins[b]); });
-  DeviceBricks made = chosen(*this, order);
+  DeviceBricks made;
+  made.wanted = wanted;
   constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> kept(memories.size(), none);
-  made.memories.clear();
-  for (Place& place : made.places) {
-    if (kept[place.memory] == none) {
-      kept[place.memory] = static_cast<std::uint32_t>(made.memories.size());
+  for (const std::size_t i : order) {
+    Place place = places[i];
+    std::uint32_t& memory = kept[place.memory];
+    if (memory == none) {
+      memory = static_cast<std::uint32_t>(made.memories.size());
       made.memories.push_back(memories[place.memory]);
     }
-    place.memory = kept[place.memory];
+    place.memory = memory;
+    made.origins.push_back(origins[i]);
+    made.places.push_back(place);
   }
   *this = std::move(made);
 }
 
 DeviceBricks DeviceBricks::with(const DeviceBricks& other) const {
   std::vector<glm::ivec3> replaced = other.origins;
+  replaced.insert(replaced.end(), other.emptied.begin(), other.emptied.end());
   std::ranges::sort(replaced, lexicographic);
-  std::vector<std::size_t> order;
+  DeviceBricks made;
+  made.wanted = wanted;
+  made.memories = memories;
   for (std::size_t i = 0; i < origins.size(); ++i) {
-    if (!std::ranges::binary_search(replaced, origins[i], lexicographic)) order.push_back(i);
+    if (std::ranges::binary_search(replaced, origins[i], lexicographic)) continue;
+    made.origins.push_back(origins[i]);
+    made.places.push_back(places[i]);
   }
-  DeviceBricks made = chosen(*this, order);
   const auto first = static_cast<std::uint32_t>(made.memories.size());
   made.memories.insert(made.memories.end(), other.memories.begin(), other.memories.end());
   made.origins.insert(made.origins.end(), other.origins.begin(), other.origins.end());
-  made.summaries.insert(made.summaries.end(), other.summaries.begin(), other.summaries.end());
   for (const Place& place : other.places) made.places.push_back({first + place.memory, place.brick});
   made.tidy();
   return made;
@@ -98,7 +100,7 @@ ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const gl
     volume.bounds_max = glm::ivec3(std::numeric_limits<int>::min());
   }
   for (std::size_t i = 0; i < bricks->origins.size(); ++i) {
-    const BrickSummary& s = bricks->summaries[i];
+    const BrickSummary& s = bricks->summary(i);
     const auto corner = [&](unsigned from) {
       return bricks->origins[i] +
              glm::ivec3((s.box >> from) & 7U, (s.box >> (from + 3)) & 7U, (s.box >> (from + 6)) & 7U);

@@ -6,11 +6,14 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <vector>
 
+#include "base/listeners.hpp"
 #include "base/shared_code.hpp"
+#include "volume/brick_values.hpp"
 
 namespace cumulet::core {
 #include "brick_summary.glsl"
@@ -24,21 +27,32 @@ static_assert(sizeof(BrickSummary) == 4 * CM_BRICK_SUMMARY_WORDS);
 /// Memory of a device's in which bricks are, 512 values each: as long as anyone holds this they stay. Who has the
 /// device's context knows it by its address.
 struct DeviceMemory {
-  std::size_t bricks = 0;
+  std::vector<BrickSummary> summaries;    ///< of its bricks
   bool halves = false;                    ///< half floats, else floats
   mutable std::atomic<bool> gone{false};  ///< with its context: nobody has it any more
-  DeviceMemory(std::size_t count, bool are_halves) : bricks(count), halves(are_halves) {}
+
+  DeviceMemory(std::size_t bricks, bool are_halves) : summaries(bricks), halves(are_halves) {}
+  [[nodiscard]] std::size_t bricks() const { return summaries.size(); }
+  /// On the device.
+  [[nodiscard]] std::size_t bytes() const { return bricks() * brick_voxels * (halves ? 2 : 4); }
 };
 using DeviceMemoryPtr = std::shared_ptr<const DeviceMemory>;
 
-/// Whether somebody cannot do without the values in main memory, of all states of a volume.
+/// Whether somebody cannot do without the values in main memory, of all states of a volume. Any thread.
 class ValuesWanted {
  public:
-  void ask() { asked_ = true; }
+  void ask() {
+    if (!asked_.exchange(true)) listeners_.tell();
+  }
   [[nodiscard]] bool asked() const { return asked_; }
+  /// Listeners::listen() to the first who asks.
+  [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> asked) {
+    return listeners_.listen(std::move(asked));
+  }
 
  private:
   std::atomic<bool> asked_ = false;
+  Listeners listeners_;
 };
 using ValuesWantedPtr = std::shared_ptr<ValuesWanted>;
 
@@ -52,24 +66,27 @@ struct DeviceBricks {
   std::vector<DeviceMemoryPtr> memories;
   std::vector<glm::ivec3> origins;
   std::vector<Place> places;
-  std::vector<BrickSummary> summaries;
-  ValuesWantedPtr wanted;  ///< who needs values asks there; whoever has the volume brings another state of it
+  std::vector<glm::ivec3> emptied;  ///< of what changes another field, where nothing is any more
+  ValuesWantedPtr wanted;           ///< who needs values asks there; whoever has the volume brings another state of it
 
+  [[nodiscard]] const BrickSummary& summary(std::size_t brick) const {
+    return memories[places[brick].memory]->summaries[places[brick].brick];
+  }
   /// Whether halves are what all values are.
   [[nodiscard]] bool are_halves() const;
   /// Whether any of it went with its context.
   [[nodiscard]] bool gone() const;
+  /// Throws Error(unsupported) if they are gone.
+  void ask_for_values() const;
   /// Whether memories hold much that is replaced by now: so much that all of it had better be copied anew.
   [[nodiscard]] bool scattered() const;
   /// Main memory.
-  [[nodiscard]] std::uint64_t bytes() const {
-    return origins.size() * (sizeof(glm::ivec3) + sizeof(Place) + sizeof(BrickSummary));
-  }
+  [[nodiscard]] std::uint64_t bytes() const;
   /// Of a brick its values, as far as they are known here: of 2^3 voxels each the mean.
-  void fill_means(std::size_t brick, std::array<float, 512>& values) const;
+  void fill_means(std::size_t brick, BrickValues::Brick& values) const;
   /// In the order that it is to have; without bricks that are empty, and memories that none is in.
   void tidy();
-  /// The same but for what stands in the other's places: there are the other's bricks, the empty ones among them.
+  /// The same with the other's bricks in their places, and without those that it empties. Tidy.
   [[nodiscard]] DeviceBricks with(const DeviceBricks& other) const;
 };
 using DeviceBricksPtr = std::shared_ptr<const DeviceBricks>;

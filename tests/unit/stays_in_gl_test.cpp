@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <functional>
 #include <numeric>
 #include <optional>
 
@@ -57,7 +58,7 @@ class StaysInGl : public test::GlTest {
     if (IsSkipped()) return;
     gl::find_out_dispatches(gl_, *programs_);
     limits_ = gl::query_limits(*gl_);
-    memories_ = std::make_shared<render::DeviceMemories>(gl_);
+    memories_ = std::make_shared<render::DeviceMemories>(gl_, limits_.storage_block_bytes);
     transfers_ = std::make_unique<render::VoxelTransfers>(gl_, programs_, limits_, memories_);
   }
   void TearDown() override {
@@ -107,11 +108,13 @@ class StaysInGl : public test::GlTest {
                                     volume::DenseVoxels{values, {size[0], size[1], size[2]}, to_world}};
     return Field(volume::import_fields(std::vector{field}, "smoke", {}).density, in_gl.statistics->cube());
   }
-  Cells build(const Field& field, const grid::RefineSettings& settings) {
+  // between: after each step of the upload.
+  Cells build(const Field& field, const grid::RefineSettings& settings, const std::function<void()>& between = {}) {
     const gl::StateGuard guard(*gl_);
     const grid::LatticePtr lattice = field.lattice(settings);
     render::LatticeUpload upload(gl_, programs_, limits_, lattice, field.statistics, {}, memories_);
-    while (!upload.advance(Deadline::max())) {
+    while (!upload.advance(between ? Deadline::min() : Deadline::max())) {
+      if (between) between();
     }
     render::GridBuild work(gl_, programs_, limits_, upload.take(),
                            lattice->own.levels(grid::ViewLevels(lattice->cube, settings)), settings.max_cells);
@@ -243,6 +246,62 @@ TEST_P(StaysInGl, GridsAreThoseOfTheVoxels) {
     }
   }
   EXPECT_GT(brick_cells, 100U);
+}
+
+// Other states come and go while one is uploaded.
+TEST_P(StaysInGl, AnUploadTakesManyFrames) {
+  const auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+  const auto others = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
+  std::optional<volume::DeviceBricks> before = bring(others, odd, place());
+  const Field known = field_of(bring(values, odd, place()), place());
+  grid::RefineSettings settings;
+  settings.threshold = 0.05;
+  int steps = 0;
+  const Cells found = build(known, settings, [&] {
+    ++steps;
+    before = bring(others, odd, place());
+  });
+  EXPECT_GT(steps, 10);
+  expect_same_cells(found, in_memory(values, odd, place(), known).grid(settings));
+  const std::uint64_t bytes = memories_->bytes();
+  before.reset();
+  transfers_->follow(Deadline::max());
+  EXPECT_LT(memories_->bytes(), bytes);
+}
+
+// What is scattered over memories is gathered, and the same.
+TEST_P(StaysInGl, ScatteredBricksAreGathered) {
+  const auto old = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+  auto values = as_halves(old);
+  volume::DeviceBricks all = bring(values, odd, place(), true);
+  all.tidy();
+  for (int step = 2; step < 6; ++step) {
+    const auto next = simulated(CUMULET_CHANNEL_DENSITY, odd, step);
+    const render::VoxelBox box{{8 * step, 0, 0}, {8 * step + 7, odd[1], odd[2]}};
+    for (int z = 0; z < odd[2]; ++z) {
+      for (int y = 0; y < odd[1]; ++y) {
+        for (int x = box.min.x; x <= box.max.x; ++x)
+          values[test::State::at({x, y, z}, odd)] = next[test::State::at({x, y, z}, odd)];
+      }
+    }
+    all = all.with(bring(values, odd, place(), false, std::vector{box}));
+  }
+  EXPECT_EQ(all.memories.size(), 5U);
+  EXPECT_FALSE(all.are_halves());
+  const gl::StateGuard guard(*gl_);
+  volume::DeviceBricksPtr gathered;
+  for (int i = 0; gathered == nullptr && i < 1000; ++i) gathered = memories_->gather(*programs_, all);
+  ASSERT_NE(gathered, nullptr);
+  EXPECT_EQ(gathered->memories.size(), 1U);
+  EXPECT_EQ(gathered->origins, all.origins);
+  grid::RefineSettings settings;
+  settings.threshold = 0.05;
+  const Field known = field_of(*gathered, place());
+  const grid::TetGrid expected = in_memory(values, odd, place(), known).grid(settings);
+  expect_same_cells(build(known, settings), expected);
+  expect_same_cells(build(field_of(all, place()), settings), expected);
+  render::DeviceMemories small(gl_, 1000);
+  EXPECT_EQ(small.gather(*programs_, all), nullptr) << "larger than a storage block";
 }
 
 }  // namespace

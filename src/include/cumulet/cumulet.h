@@ -1040,12 +1040,13 @@ typedef struct cumulet_gl_state_desc {
  *
  * With cumulet_live_desc.stays_in_gl density alone, without other channels, stays in this viewer's context: priorities
  * of splits, and values of cells, are found there. Its grid is that of the same numbers in main memory but for
- * roundings of priorities; its control cube begins at a multiple of 16 voxels. Boxes copy their bricks alone; now and
- * then, when much has been replaced, all. Who cannot do without the voxels ends that for the live volume, for good:
- * another march or a build on the CPU, a density ramp, another viewer or context that shows it, more GL memory than is
- * allowed, cumulet_live_get_volume. Then this viewer's next cumulet_render brings the voxels of the newest state to
- * main memory, as one more state, and those of the next ones come there at once. cumulet_get_volume gives NULL of a
- * state in GL, and cumulet_live_update is refused on top of one.
+ * roundings of priorities; its control cube begins at a multiple of 16 voxels. Boxes come by the same viewer, and take
+ * their bricks alone. Of what is not finite the line names its 8^3 voxels. Who cannot do without the voxels ends that
+ * for the live volume, for good: another march or a build on the CPU, a density ramp, another viewer or context that
+ * shows it, more GL memory than is allowed, cumulet_live_get_volume. Then this viewer's next cumulet_render brings the
+ * voxels of the newest state to main memory, as one more state, and those of the next ones come there at once.
+ * cumulet_get_volume gives NULL of a state in GL, and cumulet_live_update is refused on top of one. With the viewer's
+ * context the state is gone, and nothing of it is shown in another until the next one comes, which the log says.
  */
 CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
                                                const cumulet_gl_state_desc* desc);
