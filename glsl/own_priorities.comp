@@ -1,7 +1,8 @@
 #version 450
 // Priorities that a brick's own cells give the vertices that they split at, as grid::OwnPriorities has them, where main
 // memory has no values of it: a group a brick.
-// variants: CM_HALVES=0,1
+// CM_CRITERION: as grid::Criterion. A variant, for zink of Mesa 22.3 keeps what uniforms alone decided once.
+// variants: CM_HALVES=0,1 CM_CRITERION=0,1,2
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -19,9 +20,8 @@ layout(std430, binding = CM_STORAGE_BRICKS_LIT) readonly buffer CmBricksLit { fl
 layout(location = 0) uniform uvec2 cm_range;       // of those to rate: the first, and the end
 layout(location = 1) uniform uint cm_first_node;   // of those to rate
 layout(location = 2) uniform vec3 cm_measure;      // as grid::Measure: scale, own hiding, the floor
-layout(location = 3) uniform bvec2 cm_kinds;       // whether light counts, whether cells are linear
-layout(location = 4) uniform bool cm_by_range;     // the criterion is range over mean
-layout(location = 5) uniform int cm_first_value;   // of the bricks' own in the buffer of values: a brick
+layout(location = 3) uniform bool cm_linear;       // cells are
+layout(location = 4) uniform int cm_first_value;   // of the bricks' own in the buffer of values: a brick
 
 #include "brick_sums.glsl"
 
@@ -35,18 +35,19 @@ layout(std140, binding = CM_UNIFORM_POINT_PLACES) uniform CmPointPlaces {
 };
 
 float cm_squared(CmCell cell, CmSums sums, float edge_squared) {
-  if (cm_by_range) {
-    precise float ratio = (sums.high - sums.low) / cell.mean;
-    return ratio * ratio;
-  }
+#if CM_CRITERION == 1
+  precise float ratio = (sums.high - sums.low) / cell.mean;
+  return ratio * ratio;
+#else
   precise float own = 1.0 + cm_measure.y * cell.mean * sqrt(edge_squared);
-  precise float seen = cm_kinds.x ? sums.lit * sums.lit * sums.lit * sums.lit : 1.0;
+  precise float seen = sums.lit * sums.lit * sums.lit * sums.lit;
   precise float weight = edge_squared * cm_measure.x * seen / (own * own);
   precise float value = cell.variance * weight;
-  if (value <= cm_measure.z || !cm_kinds.y) return value;
+  if (value <= cm_measure.z || !cm_linear) return value;
   float explained = cm_fit_linear(cell.cell_class, cell.covariance, cell.mean).explained;
   precise float left = max(0.0, cell.variance - explained) * weight;
   return left;
+#endif
 }
 
 void cm_visit(uint level, uint heap, uint frame, CmSums sums) {
@@ -77,7 +78,11 @@ void main() {
     cm_values[8u * t + z] = uintBitsToFloat(cm_bricks[v]);
 #endif
   }
-  cm_lit[t] = cm_kinds.x ? cm_bricks_lit[64u * i + t] : 1.0;
+#if CM_CRITERION == 2
+  cm_lit[t] = cm_bricks_lit[64u * i + t];
+#else
+  cm_lit[t] = 1.0;
+#endif
   barrier();
   cm_find_reference();
   uvec3 odd = uvec3(cm_node_corner(node) >> 3) & 1u;

@@ -33,7 +33,7 @@ struct OwnMeasure {
   float own_hiding = 0.0F;
   float floor = 0.0F;  ///< no more is nothing
   bool linear = false;
-  bool range_mean = false;
+  Criterion criterion = Criterion::transmittance;
 };
 
 /// Bricks whose values are in GL, and so are to be the priorities that their cells give (glsl/own_priorities.comp).

@@ -236,7 +236,9 @@ void LatticeUpload::plan_priorities() {
     std::ranges::copy(grid::places_of_brick_points(), places.begin());
     scratch_.points = make(places, "creating the places of a brick's points");
   });
-  const gl::ProgramKey key{"own_priorities.comp", {l.halves ? "CM_HALVES 1" : "CM_HALVES 0"}};
+  const gl::ProgramKey key{"own_priorities.comp",
+                           {l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
+                            "CM_CRITERION " + std::to_string(static_cast<int>(rated.measure.criterion))}};
   // Where a processor computes them, little enough that a frame can stop between two.
   const std::uint32_t a_step = gl_->dispatches_in_call ? 64 : 4096;
   plan_dispatches(key, static_cast<std::uint32_t>(rated.bricks.size()), a_step,
@@ -246,9 +248,8 @@ void LatticeUpload::plan_priorities() {
                     gl_->ProgramUniform2ui(name, 0, first, end);
                     gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(rated.first_node));
                     gl_->ProgramUniform3f(name, 2, measure.scale, measure.own_hiding, measure.floor);
-                    gl_->ProgramUniform2i(name, 3, rated.lit.empty() ? 0 : 1, measure.linear ? 1 : 0);
-                    gl_->ProgramUniform1i(name, 4, measure.range_mean ? 1 : 0);
-                    gl_->ProgramUniform1i(name, 5, static_cast<GLint>(l.even_bricks.size()));
+                    gl_->ProgramUniform1i(name, 3, measure.linear ? 1 : 0);
+                    gl_->ProgramUniform1i(name, 4, static_cast<GLint>(l.even_bricks.size()));
                     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_NODES, data_->nodes_.name());
                     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_OWN, data_->own_.name());
                     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_BRICKS, data_->bricks_.name());
