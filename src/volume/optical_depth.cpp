@@ -37,6 +37,90 @@ glm::dvec3 direction_of(int i) {
 /// Voxels that two inclusive ranges share.
 int shared(int a0, int a1, int b0, int b1) { return std::max(0, std::min(a1, b1) - std::max(a0, b0) + 1); }
 
+/// A slab of coarse cells, across x.
+class Slab {
+ public:
+  Slab(const ScalarVolume& volume, int slab, int block, const glm::ivec3& size)
+      : low_(volume.bounds_min),
+        x0_(low_.x + slab * block),
+        x1_(std::min(x0_ + block - 1, volume.bounds_max.x)),
+        block_(block),
+        cells_a_row_(static_cast<std::size_t>(size.y)),
+        sums_(cells_a_row_ * static_cast<std::size_t>(size.z)),
+        covered_(sums_.size()) {
+    add_bricks(volume);
+    for (const Tile& tile : volume.tiles) {
+      for_cells(tile.min, tile.max, [&](std::size_t cell, double voxels) {
+        sums_[cell] += voxels * tile.value;
+        covered_[cell] += voxels;
+      });
+    }
+    if (!(volume.background > 0.0F)) return;
+    for_cells(volume.bounds_min, volume.bounds_max, [&](std::size_t cell, double voxels) {
+      sums_[cell] += std::max(0.0, voxels - covered_[cell]) * volume.background;
+    });
+  }
+  /// Of all voxels of a cell.
+  [[nodiscard]] double sum(int j, int k) const { return sums_[cell(j, k)]; }
+
+ private:
+  [[nodiscard]] std::size_t cell(int j, int k) const {
+    return static_cast<std::size_t>(k) * cells_a_row_ + static_cast<std::size_t>(j);
+  }
+
+  void add_bricks(const ScalarVolume& volume) {
+    const auto& origins = volume.brick_origins;
+    BrickValues::Brick room;
+    auto first = std::lower_bound(origins.begin(), origins.end(), x0_ - (brick_size - 1),
+                                  [](const glm::ivec3& origin, int x) { return origin.x < x; });
+    for (; first != origins.end() && first->x <= x1_; ++first) {
+      const auto brick = static_cast<std::size_t>(first - origins.begin());
+      if (volume.on_device) volume.on_device->fill_means(brick, room);
+      const float* values = volume.on_device ? room.data() : volume.brick_values.brick(brick, room);
+      add(*first, values, volume.bounds_max);
+    }
+  }
+
+  void add(const glm::ivec3& origin, const float* values, const glm::ivec3& high) {
+    const glm::ivec3 from = glm::max(origin, glm::ivec3(x0_, low_.y, low_.z));
+    const glm::ivec3 to = glm::min(origin + (brick_size - 1), glm::ivec3(x1_, high.y, high.z));
+    std::array<std::size_t, brick_size> columns;  // of z
+    for (int z = from.z; z <= to.z; ++z) columns[static_cast<std::size_t>(z & 7)] = cell(0, (z - low_.z) / block_);
+    for (int x = from.x; x <= to.x; ++x) {
+      for (int y = from.y; y <= to.y; ++y) {
+        const std::size_t row = cell((y - low_.y) / block_, 0);
+        for (int z = from.z; z <= to.z; ++z) {
+          const std::size_t at = row + columns[static_cast<std::size_t>(z & 7)];
+          sums_[at] += values[((x & 7) * brick_size + (y & 7)) * brick_size + (z & 7)];
+          covered_[at] += 1.0;
+        }
+      }
+    }
+  }
+
+  template <class Each>
+  void for_cells(const glm::ivec3& min, const glm::ivec3& max, Each&& each) const {
+    const int wide = shared(min.x, max.x, x0_, x1_);
+    if (wide == 0) return;
+    for (int j = (min.y - low_.y) / block_; j <= (max.y - low_.y) / block_; ++j) {
+      const int y0 = low_.y + j * block_;
+      const double area = double(wide) * shared(min.y, max.y, y0, y0 + block_ - 1);
+      for (int k = (min.z - low_.z) / block_; k <= (max.z - low_.z) / block_; ++k) {
+        const int z0 = low_.z + k * block_;
+        each(cell(j, k), area * shared(min.z, max.z, z0, z0 + block_ - 1));
+      }
+    }
+  }
+
+  glm::ivec3 low_;
+  int x0_;
+  int x1_;
+  int block_;
+  std::size_t cells_a_row_;
+  std::vector<double> sums_;
+  std::vector<double> covered_;  // voxels of bricks and tiles
+};
+
 }  // namespace
 
 CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress) {
@@ -51,73 +135,12 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
               glm::scale(glm::dmat4(1.0), glm::dvec3(block));
 
   // A slab of cells by one thread: the order of every sum is the volume's own.
-  const auto& origins = volume.brick_origins;
   const double whole = double(block) * block * block;
-  const std::size_t in_slab = static_cast<std::size_t>(size_.y) * static_cast<std::size_t>(size_.z);
-  tbb::parallel_for(0, size_.x, [&](int slab) {
+  tbb::parallel_for(0, size_.x, [&](int x) {
     check(progress);
-    const int x0 = low.x + slab * block;
-    const int x1 = std::min(x0 + block - 1, volume.bounds_max.x);
-    std::vector<double> sums(in_slab);
-    std::vector<double> covered(in_slab);
-    BrickValues::Brick room;
-    const auto at = [&](int y, int z) {
-      return static_cast<std::size_t>((z - low.z) / block) * static_cast<std::size_t>(size_.y) +
-             static_cast<std::size_t>((y - low.y) / block);
-    };
-    auto first = std::lower_bound(origins.begin(), origins.end(), x0 - (brick_size - 1),
-                                  [](const glm::ivec3& origin, int x) { return origin.x < x; });
-    for (; first != origins.end() && first->x <= x1; ++first) {
-      const glm::ivec3 origin = *first;
-      const auto brick = static_cast<std::size_t>(first - origins.begin());
-      if (volume.on_device) volume.on_device->fill_means(brick, room);
-      const float* values = volume.on_device ? room.data() : volume.brick_values.brick(brick, room);
-      const glm::ivec3 from = glm::max(origin, glm::ivec3(x0, low.y, low.z));
-      const glm::ivec3 to =
-          glm::min(origin + (brick_size - 1), glm::ivec3(x1, volume.bounds_max.y, volume.bounds_max.z));
-      std::array<std::size_t, brick_size> columns;  // of z
-      for (int z = from.z; z <= to.z; ++z) columns[static_cast<std::size_t>(z & 7)] = at(low.y, z);
-      for (int x = from.x; x <= to.x; ++x) {
-        for (int y = from.y; y <= to.y; ++y) {
-          const std::size_t row = at(y, low.z);
-          for (int z = from.z; z <= to.z; ++z) {
-            const std::size_t cell = row + columns[static_cast<std::size_t>(z & 7)];
-            sums[cell] += values[((x & 7) * brick_size + (y & 7)) * brick_size + (z & 7)];
-            covered[cell] += 1.0;
-          }
-        }
-      }
-    }
-    const auto for_cells = [&](const glm::ivec3& min, const glm::ivec3& max, auto&& f) {
-      const int wide = shared(min.x, max.x, x0, x1);
-      if (wide == 0) return;
-      for (int j = (min.y - low.y) / block; j <= (max.y - low.y) / block; ++j) {
-        const int y0 = low.y + j * block;
-        const double area = double(wide) * shared(min.y, max.y, y0, y0 + block - 1);
-        for (int k = (min.z - low.z) / block; k <= (max.z - low.z) / block; ++k) {
-          const int z0 = low.z + k * block;
-          f(static_cast<std::size_t>(k) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(j),
-            area * shared(min.z, max.z, z0, z0 + block - 1));
-        }
-      }
-    };
-    for (const Tile& tile : volume.tiles) {
-      for_cells(tile.min, tile.max, [&](std::size_t cell, double voxels) {
-        sums[cell] += voxels * tile.value;
-        covered[cell] += voxels;
-      });
-    }
-    if (volume.background > 0.0F) {
-      for_cells(volume.bounds_min, volume.bounds_max, [&](std::size_t cell, double voxels) {
-        sums[cell] += std::max(0.0, voxels - covered[cell]) * volume.background;
-      });
-    }
+    const Slab slab(volume, x, block, size_);
     for (int k = 0; k < size_.z; ++k) {
-      for (int j = 0; j < size_.y; ++j) {
-        const std::size_t cell =
-            static_cast<std::size_t>(k) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(j);
-        means_[index({slab, j, k})] = static_cast<float>(sums[cell] / whole);
-      }
+      for (int j = 0; j < size_.y; ++j) means_[index({x, j, k})] = static_cast<float>(slab.sum(j, k) / whole);
     }
   });
 }
