@@ -110,7 +110,7 @@ unsigned Evaluation::levels_at_most(const Statistics::Node& brick, float floor) 
   const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
   const auto all = static_cast<int>(splitting_levels(statistics_->cube().log2_size));
   auto levels =
-      static_cast<unsigned>(std::clamp(all - kuhn_level(statistics_->cube().log2_size, 3), 0, int{CM_BRICK_LEVELS}));
+      static_cast<unsigned>(std::clamp(all - kuhn_level(statistics_->cube().log2_size, 3), 0, int{brick_levels}));
   const auto upper_half = [](std::uint32_t bits) { return std::bit_cast<float>(bits << 16U); };
   while (levels > 0) {
     const std::uint32_t steepest = summary.steepest[levels - 1];
@@ -126,12 +126,13 @@ std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world) {
   for (int octant = 0; octant < 8; ++octant) {
     const ivec3 corner = 8 * ivec3(octant & 1, (octant >> 1) & 1, octant >> 2);
     for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-      const BrickTree& tree = brick_tree(kuhn_frame(corner, 8, permutation));
-      for (unsigned heap = 1; heap < 512; ++heap) {
-        const double edge = length(tree.shape[heap]);
-        const vec3 along = core::cm_cell_vertex(vec3(0.0F), tree.shape[heap], 1);
-        const auto level = static_cast<unsigned>(std::bit_width(heap)) - 1U;
+      // Whatever edge a cell has, a first child has in another of these.
+      std::uint32_t shape = brick_tree(kuhn_frame(corner, 8, permutation)).shape[1];
+      for (unsigned level = 0; level < CM_BRICK_LEVELS; ++level) {
+        const double edge = length(shape);
+        const vec3 along = core::cm_cell_vertex(vec3(0.0F), shape, 1);
         squared[CM_LEVEL_EDGES * level + core::cm_edge_of(along)] = static_cast<float>(edge * edge);
+        shape = core::cm_child_shape(shape, 0);
       }
     }
   }

@@ -16,7 +16,7 @@ namespace cumulet::grid {
 
 /// Levels of cells inside a brick that may split, its Kuhn tetrahedra the first. Of cells of larger cubes the first
 /// three are the cube's own.
-inline constexpr unsigned brick_levels = 9;
+inline constexpr unsigned brick_levels = CM_BRICK_LEVELS;
 /// How many points of a brick's 9^3 the cells of its first levels split at.
 inline constexpr std::array<unsigned, brick_levels + 1> points_of_levels{CM_POINTS_OF_LEVELS};
 /// Those points, level by level; of a larger cube they are larger by as much.

@@ -28,7 +28,6 @@ std::size_t block_at(int axis, int along, int u, int v) {
 }
 
 // Of a voxel of a brick.
-unsigned block_of_voxel(unsigned v) { return ((v / 128) * 4 + (v / 16) % 4) * 4 + (v / 2) % 4; }
 
 }  // namespace
 
@@ -69,7 +68,7 @@ void Transmittance::sum_blocks(const Progress* progress) {
         continue;
       }
       const float* values = statistics_->values(brick, room);
-      for (unsigned v = 0; v < volume::brick_voxels; ++v) sums[block_of_voxel(v)] += values[v];
+      for (unsigned v = 0; v < volume::brick_voxels; ++v) sums[volume::block_of_voxel(v)] += values[v];
     }
   });
 }
@@ -147,7 +146,7 @@ void Transmittance::fill_pyramid() {
 }
 
 void BrickTransmittance::compute(const float* blocks, const BrickTree& tree) {
-  for (unsigned i = 0; i < 512; ++i) most[512 + i] = blocks[block_of_voxel(tree.voxel[i])];
+  for (unsigned i = 0; i < 512; ++i) most[512 + i] = blocks[volume::block_of_voxel(tree.voxel[i])];
   for (unsigned h = 511; h >= 1; --h) most[h] = std::max(most[2 * h], most[2 * h + 1]);
 }
 

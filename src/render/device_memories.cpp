@@ -35,7 +35,7 @@ bool DeviceMemories::has(const volume::DeviceBricks& bricks) const {
 
 volume::DeviceBricksPtr DeviceMemories::gather(gl::Programs& programs, const volume::DeviceBricks& bricks) {
   const bool halves = bricks.are_halves();
-  const std::uint64_t bytes = bricks.origins.size() * volume::brick_voxels * (halves ? 2U : 4U);
+  const std::uint64_t bytes = volume::DeviceMemory::bytes_of(bricks.origins.size(), halves);
   if (bytes > most_bytes_) return nullptr;
   for (const bool from : {false, true}) {
     if (!programs.ask(BrickCopies{.from_halves = from, .to_halves = halves}.program()).usable()) return nullptr;

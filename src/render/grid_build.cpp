@@ -107,11 +107,7 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   };
   plan(data_->nodes_, l.own.nodes, "creating the lattice's nodes");
   plan_buffer(data_->own_, l.own.all_values() * 2, nullptr, "creating the splits' own priorities");
-  upload_.add_bytes(
-      [this] {
-        return Upload::Place{data_->own_.name(), 0};
-      },
-      l.own.values.data(), l.own.values.size() * 2);
+  plan_bytes(data_->own_, l.own.values.size() * 2, l.own.values.data());
   plan(data_->blocks_, l.blocks, "creating the lattice's blocks");
   plan(data_->places_, l.places, "creating the lattice's places");
   plan(data_->coarse_, l.coarse, "creating the coefficients of coarse cells");
@@ -135,9 +131,11 @@ void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const v
   data_->bytes_ += whole;
   upload_.add(
       [this, &buffer, whole, what] { buffer = gl::make_buffer(gl_, whole, nullptr, GL_DYNAMIC_STORAGE_BIT, what); });
-  if (from == nullptr) return;
-  const auto place = [&buffer] { return Upload::Place{buffer.name(), 0}; };
-  upload_.add_bytes(place, from, bytes);
+  if (from != nullptr) plan_bytes(buffer, bytes, from);
+}
+
+void LatticeUpload::plan_bytes(const gl::Object& buffer, std::uint64_t bytes, const void* from) {
+  upload_.add_bytes([&buffer] { return Upload::Place{buffer.name(), 0}; }, from, bytes);
 }
 
 void LatticeUpload::plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes,
@@ -761,6 +759,18 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint6
 
 namespace {
 
+// What the CPU made.
+BuiltGrid built_of(grid::TetGrid grid) {
+  BuiltGrid made;
+  made.grid = std::make_shared<const grid::TetGrid>(std::move(grid));
+  made.count = static_cast<std::uint32_t>(made.grid->cells.size());
+  made.levels = made.grid->levels;
+  made.limited = made.grid->limited;
+  made.content_min = made.grid->content_min;
+  made.content_max = made.grid->content_max;
+  return made;
+}
+
 // Where there are no voxels of it.
 BuiltGrid nothing_of(const scene::MarchSource& source) {
   volume::ScalarVolume none;
@@ -770,11 +780,7 @@ BuiltGrid nothing_of(const scene::MarchSource& source) {
   const grid::DiamondSet diamonds(statistics, grid::RefineSettings{});
   grid::GridBuilder builder(statistics, diamonds);
   builder.bisect();
-  BuiltGrid made;
-  made.grid = std::make_shared<const grid::TetGrid>(builder.records(source.plan->lattice->cells, 0.0F));
-  made.count = static_cast<std::uint32_t>(made.grid->cells.size());
-  made.levels = made.grid->levels;
-  return made;
+  return built_of(builder.records(source.plan->lattice->cells, 0.0F));
 }
 
 }  // namespace
@@ -862,15 +868,8 @@ CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
     const grid::DiamondSet diamonds(plan.lattice->own, plan.levels, plan.max_cells, progress.get());
     grid::GridBuilder builder(*of->statistics, diamonds);
     builder.bisect(progress.get());
-    BuiltGrid made;
-    made.grid = std::make_shared<const grid::TetGrid>(
-        builder.records(plan.lattice->cells, of->max_value, of->channels, progress.get()));
+    BuiltGrid made = built_of(builder.records(plan.lattice->cells, of->max_value, of->channels, progress.get()));
     made.glow = scene::glow_table(*made.grid, progress.get());
-    made.count = static_cast<std::uint32_t>(made.grid->cells.size());
-    made.levels = made.grid->levels;
-    made.limited = made.grid->limited;
-    made.content_min = made.grid->content_min;
-    made.content_max = made.grid->content_max;
     return made;
   });
 }

@@ -77,6 +77,7 @@ class LatticeUpload {
 
  private:
   void plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what);
+  void plan_bytes(const gl::Object& buffer, std::uint64_t bytes, const void* from);
   void plan_bricks();
   void plan_device_bricks();
   void plan_priorities();

@@ -38,7 +38,7 @@ std::size_t bytes_of(VoxelFormat format) {
 }
 std::size_t brick_bytes(VoxelFormat format) { return brick_voxels * bytes_of(format); }
 /// Of one that stays in GL.
-std::size_t kept_bytes(VoxelFormat format) { return brick_voxels * (format == VoxelFormat::halves ? 2U : 4U); }
+std::size_t kept_bytes(VoxelFormat format) { return volume::DeviceMemory::bytes_of(1, format == VoxelFormat::halves); }
 
 glm::ivec3 bricks_of(glm::ivec3 size) { return (size - 1) / brick_size + 1; }
 
@@ -142,13 +142,35 @@ void require_finite(const volume::DeviceBricks& bricks, const std::string& name)
                        std::to_string(origin.y) + ", " + std::to_string(origin.z) + ") on is not finite"));
 }
 
-std::uint32_t word_at(const std::byte* data, std::size_t i) {
-  std::uint32_t word = 0;
-  std::memcpy(&word, data + i * sizeof word, sizeof word);
-  return word;
-}
-
 }  // namespace
+
+// Where glsl/pack_bricks.comp says that bricks are: of a piece with room for so many, the filled ones first.
+class VoxelTransfers::PackedPlaces {
+ public:
+  /// Throws Error if there is no room for so many.
+  PackedPlaces(const gl::ReadBack& words, std::uint32_t room, glm::ivec3 size, const std::string& name)
+      : words_(words.data()), room_(room), bricks_(bricks_of(size)), filled_(word(0)) {
+    if (filled_ > room) throw Error(ErrorCode::gl, one_line(name + ": the driver packed no bricks"));
+  }
+  [[nodiscard]] std::uint32_t filled() const { return filled_; }
+  /// With those that are empty.
+  [[nodiscard]] std::size_t all() const { return std::size_t{filled_} + word(1); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t i) const {
+    const auto brick = static_cast<int>(word(2 + (i < filled_ ? i : room_ - 1 - (i - filled_))));
+    return brick_size * glm::ivec3(brick % bricks_.x, brick / bricks_.x % bricks_.y, brick / bricks_.x / bricks_.y);
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t word(std::size_t i) const {
+    std::uint32_t word = 0;
+    std::memcpy(&word, words_ + i * sizeof word, sizeof word);
+    return word;
+  }
+  const std::byte* words_;
+  std::uint32_t room_;
+  glm::ivec3 bricks_;
+  std::uint32_t filled_;
+};
 
 VoxelTransfers::VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits,
                                DeviceMemoriesPtr memories)
@@ -354,9 +376,7 @@ void VoxelTransfers::pack(const Transfer& transfer, const Piece& piece, GLuint c
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_VALUES, piece.room.values.name());
   if (chosen != 0) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_CHOICE, chosen);
   program.use(gl);
-  constexpr std::uint32_t most_groups = 65535;
-  const std::uint32_t across = std::min(piece.count, most_groups);
-  gl.DispatchCompute(across, (piece.count + across - 1) / across, 1);
+  dispatch_groups(gl, piece.count);
   if (source.buffer == 0) gl.BindSampler(core::CM_UNIT_HOST_VOXELS, 0);
 }
 
@@ -483,13 +503,15 @@ bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
   return true;
 }
 
+VoxelTransfers::PackedPlaces VoxelTransfers::places_of(const Transfer& transfer, const Piece& piece) {
+  return {piece.room.places_back, piece.count, transfer.sources[piece.field].size, transfer.name};
+}
+
 void VoxelTransfers::begin_summaries(Transfer& transfer) {
   transfer.brick_tree = make_brick_tree(gl_, grid::brick_edges(index_to_world_of(transfer.fields[0])));
   for (Piece& piece : transfer.pieces) {
     Room& room = piece.room;
-    piece.filled = word_at(room.places_back.data(), 0);
-    if (piece.filled > piece.count)
-      throw Error(ErrorCode::gl, one_line(transfer.name + ": the driver packed no bricks"));
+    piece.filled = places_of(transfer, piece).filled();
     if (piece.filled == 0) continue;
     if (room.summed < piece.filled) {
       const std::size_t with_more = std::min<std::size_t>(piece.filled + piece.filled / 4, piece.count);
@@ -550,26 +572,17 @@ bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
 volume::DeviceBricks VoxelTransfers::take_bricks(Transfer& transfer) {
   volume::DeviceBricks made;
   for (Piece& piece : transfer.pieces) {
-    const glm::ivec3 bricks = bricks_of(transfer.sources[piece.field].size);
-    const std::byte* places = piece.room.places_back.data();
-    const std::size_t all = piece.filled + word_at(places, 1);
+    const PackedPlaces places = places_of(transfer, piece);
     if (piece.kept) {
       std::memcpy(piece.kept->summaries.data(), piece.room.summaries_back.data(),
                   piece.filled * sizeof(volume::BrickSummary));
       made.memories.push_back(piece.kept);
     }
-    for (std::size_t i = 0; i < all; ++i) {
-      const bool empty = i >= piece.filled;
-      const auto brick = static_cast<int>(word_at(places, 2 + (empty ? piece.count - 1 - (i - piece.filled) : i)));
-      const glm::ivec3 origin =
-          brick_size * glm::ivec3(brick % bricks.x, brick / bricks.x % bricks.y, brick / bricks.x / bricks.y);
-      if (empty) {
-        made.emptied.push_back(origin);
-        continue;
-      }
-      made.origins.push_back(origin);
-      made.places.push_back({static_cast<std::uint32_t>(made.memories.size() - 1), static_cast<std::uint32_t>(i)});
+    for (std::uint32_t i = 0; i < places.filled(); ++i) {
+      made.origins.push_back(places.origin(i));
+      made.places.push_back({static_cast<std::uint32_t>(made.memories.size() - 1), i});
     }
+    for (std::size_t i = places.filled(); i < places.all(); ++i) made.emptied.push_back(places.origin(i));
   }
   return made;
 }
@@ -578,9 +591,8 @@ void VoxelTransfers::copy_rest(Transfer& transfer) const {
   bool copies = false;
   for (Piece& piece : transfer.pieces) {
     Room& room = piece.room;
-    const std::size_t filled = word_at(room.places_back.data(), 0);
+    const std::size_t filled = places_of(transfer, piece).filled();
     room.expected = filled;
-    if (filled > piece.count) throw Error(ErrorCode::gl, one_line(transfer.name + ": the driver packed no bricks"));
     if (filled <= piece.copied) continue;
     const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
     if (room.back_bytes < filled * each) {
@@ -614,27 +626,20 @@ bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
   std::array<float, brick_voxels> values{};
   for (Piece& piece : transfer.pieces) {
     const Source& source = transfer.sources[piece.field];
-    const glm::ivec3 bricks = bricks_of(source.size);
     auto& copy = std::get<volume::BrickCopy>(transfer.fields[piece.field].voxels);
-    const std::byte* places = piece.room.places_back.data();
-    const std::size_t filled = word_at(places, 0);
-    const std::size_t all = filled + word_at(places, 1);
-    if (piece.taken == 0) copy.reserve(copy.count() + all);
-    for (; piece.taken < all; ++piece.taken) {
+    const PackedPlaces places = places_of(transfer, piece);
+    if (piece.taken == 0) copy.reserve(copy.count() + places.all());
+    for (; piece.taken < places.all(); ++piece.taken) {
       if (bricks_since++ == at_a_time) {
         bricks_since = 0;
         if (std::chrono::steady_clock::now() > deadline) return false;
       }
-      const bool empty = piece.taken >= filled;
-      const std::size_t place = empty ? piece.count - 1 - (piece.taken - filled) : piece.taken;
-      const auto brick = static_cast<int>(word_at(places, 2 + place));
-      if (empty) {
+      if (piece.taken >= places.filled()) {
         values.fill(0.0F);
       } else {
         unpack(source.format, piece.room.values_back.data() + piece.taken * brick_bytes(source.format), values);
       }
-      const glm::ivec3 origin(brick % bricks.x, brick / bricks.x % bricks.y, brick / bricks.x / bricks.y);
-      if (!copy.add(brick_size * origin, values)) transfer.finite = false;
+      if (!copy.add(places.origin(piece.taken), values)) transfer.finite = false;
     }
   }
   return true;

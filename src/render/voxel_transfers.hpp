@@ -168,6 +168,10 @@ class VoxelTransfers {
     [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
   };
 
+  // Which bricks of it were packed, and where to.
+  class PackedPlaces;
+  static PackedPlaces places_of(const Transfer& transfer, const Piece& piece);
+
   [[nodiscard]] Source open(const GlVoxels& field, const std::string& what) const;
   [[nodiscard]] Source open_texture(const VoxelTexture& texture, const std::string& what) const;
   [[nodiscard]] Source open_buffer(const VoxelBuffer& buffer, const std::string& what) const;

@@ -62,9 +62,9 @@ void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
   hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr);
 }
 
-void Live::set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name) {
+void Live::set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name) {
   bricks.tidy();
-  hand_over_in_gl(std::move(bricks), index_to_world, std::move(name), nullptr);
+  hand_over_in_gl(std::move(bricks), index_to_world, name, nullptr);
 }
 
 void Live::update(const volume::DeviceBricks& bricks, const std::string& name) {
@@ -74,14 +74,13 @@ void Live::update(const volume::DeviceBricks& bricks, const std::string& name) {
   hand_over_in_gl(before->bricks->with(bricks), before->index_to_world, name, before->bricks.get());
 }
 
-void Live::hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name,
+void Live::hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name,
                            const volume::DeviceBricks* on_top_of) {
   bricks.wanted = values_wanted_;
   InGl state{std::make_shared<const volume::DeviceBricks>(std::move(bricks)), index_to_world, name};
-  const std::string called = name;
-  if (!hand_over({std::move(state), std::move(name), nullptr}, {{volume::Channel::density, Takes::bricks_in_gl}},
-                 nullptr, on_top_of))
-    refuse(called, "another state came between");
+  if (!hand_over({std::move(state), name, nullptr}, {{volume::Channel::density, Takes::bricks_in_gl}}, nullptr,
+                 on_top_of))
+    refuse(name, "another state came between");
 }
 
 void Live::set_if_newest(const volume::DeviceBricksPtr& in_gl, std::vector<volume::FieldCopy> fields,

@@ -44,7 +44,7 @@ class Live {
   void set(std::vector<volume::FieldCopy> fields, std::string name);
   void update(volume::Changes changes, const std::string& name);
   /// The same of density in GL; not tidy.
-  void set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name);
+  void set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name);
   /// Voxels of what was in GL, if that is still the newest.
   void set_if_newest(const volume::DeviceBricksPtr& in_gl, std::vector<volume::FieldCopy> fields, std::string name);
   void update(const volume::DeviceBricks& bricks, const std::string& name);
@@ -115,7 +115,7 @@ class Live {
   // on_top_of: it follows this; null: whatever there is. Returns whether it does.
   bool hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
                  const volume::DeviceBricks* on_top_of = nullptr);
-  void hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, std::string name,
+  void hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name,
                        const volume::DeviceBricks* on_top_of);
   // Of what was handed over last when they were made.
   void hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name);

@@ -340,8 +340,8 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
   if (!state.changed) {
     volume::check_fields(fields, state.name);
     if (density_alone)
-      stay = [live, name = state.name, to_world = fields[0]](volume::DeviceBricks bricks) {
-        live->set(std::move(bricks), std::get<volume::SparseVoxels>(to_world.voxels).index_to_world, name);
+      stay = [live, name = state.name, to_world = state.fields[0].index_to_world](volume::DeviceBricks bricks) {
+        live->set(std::move(bricks), to_world, name);
       };
     arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
   } else {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "base/error.hpp"
@@ -42,8 +41,7 @@ std::uint64_t DeviceBricks::bytes() const {
 
 void DeviceBricks::fill_means(std::size_t brick, BrickValues::Brick& values) const {
   const BrickSummary& s = summary(brick);
-  for (std::size_t v = 0; v < values.size(); ++v)
-    values[v] = s.blocks[(v / 128) * 16 + (v / 16) % 4 * 4 + (v / 2) % 4] / 8.0F;
+  for (unsigned v = 0; v < values.size(); ++v) values[v] = s.blocks[block_of_voxel(v)] / 8.0F;
 }
 
 void DeviceBricks::tidy() {

@@ -2,7 +2,6 @@
 
 // Bricks whose values are in GL: what main memory knows of them.
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -34,9 +33,15 @@ struct DeviceMemory {
   DeviceMemory(std::size_t bricks, bool are_halves) : summaries(bricks), halves(are_halves) {}
   [[nodiscard]] std::size_t bricks() const { return summaries.size(); }
   /// On the device.
-  [[nodiscard]] std::size_t bytes() const { return bricks() * brick_voxels * (halves ? 2 : 4); }
+  [[nodiscard]] static std::size_t bytes_of(std::size_t bricks, bool halves) {
+    return bricks * brick_voxels * (halves ? 2 : 4);
+  }
+  [[nodiscard]] std::size_t bytes() const { return bytes_of(bricks(), halves); }
 };
 using DeviceMemoryPtr = std::shared_ptr<const DeviceMemory>;
+
+/// Which of a brick's 64 blocks of 2^3 voxels this voxel is in.
+constexpr unsigned block_of_voxel(unsigned v) { return ((v / 128) * 4 + (v / 16) % 4) * 4 + (v / 2) % 4; }
 
 /// Whether somebody cannot do without the values in main memory, of all states of a volume. Any thread.
 class ValuesWanted {

@@ -24,6 +24,7 @@
 #include "grid/tet_grid.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
+#include "support/grid_reference.hpp"
 #include "support/view_cameras.hpp"
 #include "support/volumes.hpp"
 #include "support/wide_volumes.hpp"
@@ -33,6 +34,7 @@ namespace {
 using namespace cumulet;
 using glm::uvec4;
 using render::Deadline;
+using test::GridReference;
 
 struct Read {
   std::vector<grid::CellRecord> cells;
@@ -92,24 +94,6 @@ class GridBuilds : public test::GlTest {
 };
 CUMULET_ON_BACKENDS(GridBuilds);
 
-struct Reference {
-  std::shared_ptr<const volume::ScalarVolume> volume;
-  std::shared_ptr<const grid::Statistics> statistics;
-
-  explicit Reference(volume::ScalarVolume v)
-      : volume(std::make_shared<const volume::ScalarVolume>(std::move(v))),
-        statistics(std::make_shared<const grid::Statistics>(*volume, grid::fit_cube(*volume))) {}
-  [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
-    const grid::DiamondSet diamonds(*statistics, settings);
-    grid::GridBuilder builder(*statistics, diamonds);
-    builder.bisect();
-    return builder.records(settings.cells, volume->max_value);
-  }
-  [[nodiscard]] grid::LatticePtr lattice(const grid::RefineSettings& settings) const {
-    return std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
-  }
-};
-
 struct Rounding {
   std::size_t coefficients = 0;
   std::size_t others = 0;
@@ -165,7 +149,7 @@ TEST_P(GridBuilds, AreTheProcessorsForEveryVolumeAndTwoHundredCameras) {
   std::size_t limited = 0;
   const std::vector<test::SmallVolume> volumes = test::small_volumes();
   for (const test::SmallVolume& small : volumes) {
-    const Reference reference(small.volume);
+    const GridReference reference(small.volume);
     const auto data = upload(reference.lattice(small.settings), reference.statistics);
     for (std::size_t i = 0; i <= 200 / volumes.size() + 1; ++i) {
       grid::RefineSettings settings = small.settings;
@@ -193,7 +177,7 @@ TEST_P(GridBuilds, AreTheProcessorsHoweverWide) {
   Rounding rounding;
   const auto cloud = test::noise_volume({40, 36, 33}, glm::ivec3(0), 6);
   for (const glm::ivec3& by : {glm::ivec3(60'000, 800, 0), glm::ivec3(72, 262'000, 100'000)}) {
-    const Reference reference(test::clouds_apart(cloud, by));
+    const GridReference reference(test::clouds_apart(cloud, by));
     grid::RefineSettings settings;
     settings.threshold = 0.05;
     const auto data = upload(reference.lattice(settings), reference.statistics);
@@ -438,7 +422,7 @@ TEST_P(GridBuilds, OfFireAloneAreLight) {
 // Half a unit in the last place of a half float, and what floats lose in between.
 TEST_P(GridBuilds, CoefficientsAreLeastSquaresWithinHalfAUnitInTheLastPlace) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({60, 45, 50}, {-3, 2, 5}, 1));
+  const GridReference reference(test::noise_volume({60, 45, 50}, {-3, 2, 5}, 1));
   grid::RefineSettings settings;
   settings.threshold = 0.01;
   const auto data = upload(reference.lattice(settings), reference.statistics);
@@ -464,7 +448,7 @@ TEST_P(GridBuilds, CoefficientsAreLeastSquaresWithinHalfAUnitInTheLastPlace) {
 
 TEST_P(GridBuilds, ConstantCellsHaveNoGradient) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
+  const GridReference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
   grid::RefineSettings settings;
   settings.cells = grid::CellKind::constant;
   const auto data = upload(reference.lattice(settings), reference.statistics);
@@ -486,7 +470,7 @@ TEST_P(GridBuilds, HalvesOfAFileAreTakenAsTheyAre) {
     volume.max_value = std::max(volume.max_value, volume::value_of(halves.back()));
   }
   volume.brick_values = volume::BrickValues(std::move(halves));
-  const Reference reference(std::move(volume));
+  const GridReference reference(std::move(volume));
   const grid::RefineSettings settings;
   const grid::LatticePtr lattice = reference.lattice(settings);
   EXPECT_TRUE(lattice->halves);
@@ -499,7 +483,7 @@ TEST_P(GridBuilds, HalvesOfAFileAreTakenAsTheyAre) {
 // A frame may stop after every dispatch, and another build begin on the same lattice after one that nobody ended.
 TEST_P(GridBuilds, StopAfterEveryStepAndBeginAnew) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
+  const GridReference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
   grid::RefineSettings settings;
   const auto data = upload(reference.lattice(settings), reference.statistics);
   test::Cameras cameras(11);
@@ -527,7 +511,7 @@ TEST_P(GridBuilds, StopAfterEveryStepAndBeginAnew) {
 }
 
 // Of a view, as viewers have it.
-scene::MarchSourcePtr planned(const Reference& reference, const grid::LatticePtr& lattice,
+scene::MarchSourcePtr planned(const GridReference& reference, const grid::LatticePtr& lattice,
                               const grid::RefineSettings& settings) {
   scene::GridPlan plan{lattice, lattice->own.levels(grid::ViewLevels(lattice->cube, settings)), settings.max_cells};
   return std::make_shared<const scene::MarchSource>(
@@ -537,7 +521,7 @@ scene::MarchSourcePtr planned(const Reference& reference, const grid::LatticePtr
 // A volume's plan, and what the CPU makes of it.
 struct Planned {
   explicit Planned(volume::ScalarVolume v) : reference(std::move(v)) {}
-  Reference reference;
+  GridReference reference;
   grid::RefineSettings settings;
   grid::LatticePtr lattice = reference.lattice(settings);
   scene::MarchSourcePtr source = planned(reference, lattice, settings);
@@ -625,7 +609,7 @@ TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
 // A camera on its way: what a grid takes it gives back. CUMULET_REFITS: how many instead of a hundred.
 TEST_P(GridBuilds, RefitsDoNotGrow) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({40, 35, 30}, glm::ivec3(0), 1));
+  const GridReference reference(test::noise_volume({40, 35, 30}, glm::ivec3(0), 1));
   grid::RefineSettings settings;
   const grid::LatticePtr lattice = reference.lattice(settings);
   test::FakeGl fake(headless::Context::get_proc, context_.get());
@@ -652,7 +636,7 @@ TEST_P(GridBuilds, RefitsDoNotGrow) {
 
 TEST_P(GridBuilds, SayWhichLimitDoesNotSuffice) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
+  const GridReference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
   const grid::RefineSettings settings;
   const grid::LatticePtr lattice = reference.lattice(settings);
   gl::Limits small = limits_;

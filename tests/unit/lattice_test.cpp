@@ -6,11 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <set>
 
+#include "grid/evaluation.hpp"
 #include "grid/tet_grid.hpp"
 #include "support/view_cameras.hpp"
 #include "support/volumes.hpp"
@@ -196,6 +198,27 @@ TEST(Lattice, CoarseCellsHaveTheirRecords) {
   }
   EXPECT_EQ(places.size(), std::size_t{CM_COARSE_CELLS});
   EXPECT_EQ(*places.rbegin(), CM_COARSE_CELLS - 1);
+}
+
+TEST(Lattice, EdgesOfBricksAreThoseOfAllTheirCells) {
+  glm::dmat4 sheared(1.0);
+  sheared[0] = {0.5, 0.0, 0.0, 0.0};
+  sheared[1] = {0.3, 1.0, 0.1, 0.0};
+  sheared[2] = {0.0, 0.2, 2.0, 0.0};
+  const std::array<float, CM_BRICK_EDGES> edges = grid::brick_edges(sheared);
+  const grid::EdgeLengths length(sheared);
+  for (int octant = 0; octant < 8; ++octant) {
+    const ivec3 corner = 8 * ivec3(octant & 1, (octant >> 1) & 1, octant >> 2);
+    for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+      const grid::BrickTree& tree = grid::brick_tree(grid::kuhn_frame(corner, 8, permutation));
+      for (unsigned heap = 1; heap < 512; ++heap) {
+        const auto level = static_cast<unsigned>(std::bit_width(heap)) - 1U;
+        const vec3 along = core::cm_cell_vertex(vec3(0.0F), tree.shape[heap], 1);
+        const double edge = length(tree.shape[heap]);
+        ASSERT_EQ(edges[CM_LEVEL_EDGES * level + core::cm_edge_of(along)], static_cast<float>(edge * edge)) << heap;
+      }
+    }
+  }
 }
 
 TEST(Lattice, PartsOfCellsFillThem) {

@@ -227,6 +227,16 @@ class LiveGl : public testing::Test {
     return handed() - before;
   }
   Picture picture() { return test::drawn_once(v_, target_); }
+  // What the first frame that fails says, with the target as it leaves it.
+  cumulet_status frames_until_failure() {
+    const cumulet_frame_desc frame = target_.frame();
+    cumulet_status status = CUMULET_OK;
+    for (int i = 0; i < 100 && status == CUMULET_OK; ++i) {
+      target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+      status = cumulet_render(v_, &frame, nullptr);
+    }
+    return status;
+  }
 
   headless::Context context_ = headless::Context::create(headless::Backend::automatic);
   test::FakeGl fake_{headless::Context::get_proc, &context_};
@@ -608,16 +618,10 @@ TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
         } else {
           hand_over(fields);
         }
-        const cumulet_frame_desc frame = target_.frame();
-        target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
-        cumulet_status status = CUMULET_OK;
-        for (int i = 0; i < 100 && status == CUMULET_OK; ++i) {
-          target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
-          status = cumulet_render(v_, &frame, nullptr);
-        }
-        EXPECT_EQ(status, CUMULET_ERROR_FILE);
+        EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
         EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: its voxel (3, 20, 11) is not finite");
         EXPECT_EQ(difference(target_.pixels(), before), "");
+        const cumulet_frame_desc frame = target_.frame();
         EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << "told once";
         EXPECT_EQ(handed(), states);
       }
@@ -954,13 +958,7 @@ TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
   values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
   for (const std::size_t type : {0, 1}) {
     hand_over_density(Array(types.at(type).format, values), types.at(type));
-    const cumulet_frame_desc frame = target_.frame();
-    cumulet_status status = CUMULET_OK;
-    for (int i = 0; i < 100 && status == CUMULET_OK; ++i) {
-      target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
-      status = cumulet_render(v_, &frame, nullptr);
-    }
-    EXPECT_EQ(status, CUMULET_ERROR_FILE);
+    EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
     EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
     EXPECT_EQ(difference(target_.pixels(), before), "");
     EXPECT_EQ(handed(), 1U);

@@ -15,6 +15,7 @@
 #include "render/grid_build.hpp"
 #include "render/voxel_transfers.hpp"
 #include "support/gl_state.hpp"
+#include "support/grid_reference.hpp"
 #include "support/simulated.hpp"
 #include "support/view_cameras.hpp"
 #include "volume/frame.hpp"
@@ -24,28 +25,11 @@ namespace {
 
 using namespace cumulet;
 using render::Deadline;
+using test::GridReference;
 using test::Sides;
 using test::simulated;
 
 constexpr Sides odd = {52, 44, 37};
-
-struct Field {
-  std::shared_ptr<const volume::ScalarVolume> volume;
-  std::shared_ptr<const grid::Statistics> statistics;
-  // cube: none: the volume's own.
-  explicit Field(volume::ScalarVolume v, const std::optional<grid::Cube>& cube = std::nullopt)
-      : volume(std::make_shared<const volume::ScalarVolume>(std::move(v))),
-        statistics(std::make_shared<const grid::Statistics>(*volume, cube ? *cube : grid::fit_cube(*volume))) {}
-  [[nodiscard]] grid::LatticePtr lattice(const grid::RefineSettings& settings) const {
-    return std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
-  }
-  [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
-    const grid::DiamondSet diamonds(*statistics, settings);
-    grid::GridBuilder builder(*statistics, diamonds);
-    builder.bisect();
-    return builder.records(settings.cells, volume->max_value);
-  }
-};
 
 struct Cells {
   std::vector<grid::CellRecord> cells;
@@ -99,20 +83,21 @@ class StaysInGl : public test::GlTest {
     while (!found && std::chrono::steady_clock::now() < until) transfers_->follow(Deadline::max());
     return std::move(found).value();
   }
-  static Field field_of(volume::DeviceBricks bricks, const glm::dmat4& to_world) {
+  static GridReference field_of(volume::DeviceBricks bricks, const glm::dmat4& to_world) {
     bricks.tidy();
-    return Field(
+    return GridReference(
         volume::volume_on_device(std::make_shared<const volume::DeviceBricks>(std::move(bricks)), "smoke", to_world));
   }
   // In the same cube as that.
-  static Field in_memory(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
-                         const Field& in_gl) {
+  static GridReference in_memory(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
+                                 const GridReference& in_gl) {
     const volume::MemoryField field{volume::Channel::density,
                                     volume::DenseVoxels{values, {size[0], size[1], size[2]}, to_world}};
-    return Field(volume::import_fields(std::vector{field}, "smoke", {}).density, in_gl.statistics->cube());
+    return GridReference(volume::import_fields(std::vector{field}, "smoke", {}).density, in_gl.statistics->cube());
   }
   // between: after each step of the upload.
-  Cells build(const Field& field, const grid::RefineSettings& settings, const std::function<void()>& between = {}) {
+  Cells build(const GridReference& field, const grid::RefineSettings& settings,
+              const std::function<void()>& between = {}) {
     const gl::StateGuard guard(*gl_);
     const grid::LatticePtr lattice = field.lattice(settings);
     render::LatticeUpload upload(gl_, programs_, limits_, lattice, field.statistics, {}, memories_);
@@ -160,8 +145,8 @@ TEST_P(StaysInGl, StatisticsAreThoseOfTheVoxels) {
   for (const bool halves : {false, true}) {
     auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
     if (halves) values = as_halves(values);
-    const Field known = field_of(bring(values, odd, place(), halves), place());
-    const Field reference = in_memory(values, odd, place(), known);
+    const GridReference known = field_of(bring(values, odd, place(), halves), place());
+    const GridReference reference = in_memory(values, odd, place(), known);
     EXPECT_EQ(known.volume->brick_origins, reference.volume->brick_origins);
     EXPECT_EQ(known.volume->active_voxels, reference.volume->active_voxels);
     EXPECT_EQ(known.volume->bounds_min, reference.volume->bounds_min);
@@ -222,8 +207,8 @@ TEST_P(StaysInGl, GridsAreThoseOfTheVoxels) {
   for (const bool halves : {false, true}) {
     auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
     if (halves) values = as_halves(values);
-    const Field known = field_of(bring(values, odd, place(), halves), place());
-    const Field reference = in_memory(values, odd, place(), known);
+    const GridReference known = field_of(bring(values, odd, place(), halves), place());
+    const GridReference reference = in_memory(values, odd, place(), known);
     for (const auto criterion :
          {grid::Criterion::transmittance, grid::Criterion::deviation, grid::Criterion::range_mean}) {
       for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
@@ -256,7 +241,7 @@ TEST_P(StaysInGl, AnUploadTakesManyFrames) {
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
   const auto others = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
   std::optional<volume::DeviceBricks> before = bring(others, odd, place());
-  const Field known = field_of(bring(values, odd, place()), place());
+  const GridReference known = field_of(bring(values, odd, place()), place());
   grid::RefineSettings settings;
   settings.threshold = 0.05;
   int steps = 0;
@@ -300,7 +285,7 @@ TEST_P(StaysInGl, ScatteredBricksAreGathered) {
   EXPECT_EQ(gathered->origins, all.origins);
   grid::RefineSettings settings;
   settings.threshold = 0.05;
-  const Field known = field_of(*gathered, place());
+  const GridReference known = field_of(*gathered, place());
   const grid::TetGrid expected = in_memory(values, odd, place(), known).grid(settings);
   expect_same_cells(build(known, settings), expected);
   expect_same_cells(build(field_of(all, place()), settings), expected);

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "grid/lattice.hpp"
+#include "grid/tet_grid.hpp"
+
+namespace cumulet::test {
+
+/// A volume, its statistics, and what the processor makes of them.
+struct GridReference {
+  std::shared_ptr<const volume::ScalarVolume> volume;
+  std::shared_ptr<const grid::Statistics> statistics;
+
+  /// cube: none: the volume's own.
+  explicit GridReference(volume::ScalarVolume v, const std::optional<grid::Cube>& cube = std::nullopt)
+      : volume(std::make_shared<const volume::ScalarVolume>(std::move(v))),
+        statistics(std::make_shared<const grid::Statistics>(*volume, cube ? *cube : grid::fit_cube(*volume))) {}
+  [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
+    const grid::DiamondSet diamonds(*statistics, settings);
+    grid::GridBuilder builder(*statistics, diamonds);
+    builder.bisect();
+    return builder.records(settings.cells, volume->max_value);
+  }
+  [[nodiscard]] grid::LatticePtr lattice(const grid::RefineSettings& settings) const {
+    return std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
+  }
+};
+
+}  // namespace cumulet::test
