@@ -47,6 +47,13 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   return gl;
 }
 
+std::shared_ptr<const Functions> copy_of(const Functions& gl) {
+  auto copy = std::make_shared<Functions>();
+  static_cast<GladGLContext&>(*copy) = gl;
+  copy->draw_buffers = gl.draw_buffers;
+  return copy;
+}
+
 Limits query_limits(const Functions& gl) {
   Limits limits;
   GLint64 value = 0;

@@ -96,6 +96,8 @@ struct Limits {
 
 /// Loads the table and checks version 4.5 and compute. Throws Error(unsupported) that says what is missing.
 std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user);
+/// The same functions, for what outlives the viewer whose those are, with states of its own.
+std::shared_ptr<const Functions> copy_of(const Functions& gl);
 Limits query_limits(const Functions& gl);
 
 /// Takes all pending GL errors; throws Error(out_of_memory, context_lost or gl) that names the step.

@@ -19,13 +19,6 @@ namespace {
 // KHR_parallel_shader_compile, and ARB's of the same meaning.
 constexpr GLenum completion_status = 0x91B1;
 
-FunctionsPtr copy_of(const Functions& gl) {
-  auto copy = std::make_shared<Functions>();
-  static_cast<GladGLContext&>(*copy) = gl;
-  copy->draw_buffers = gl.draw_buffers;
-  return copy;
-}
-
 std::string text_of(const ProgramKey& key) {
   std::string all = key.name;
   for (const std::string& define : key.defines) all.append(", ").append(define);

@@ -19,21 +19,34 @@ DeviceMemories::~DeviceMemories() {
 
 std::shared_ptr<volume::DeviceMemory> DeviceMemories::make(std::size_t bricks, bool halves) {
   auto memory = std::make_shared<volume::DeviceMemory>(bricks, halves);
-  kept_.push_back({memory, memory.get(), gl::make_buffer(gl_, memory->bytes(), nullptr, 0, "creating a host's bricks"),
-                   memory->bytes()});
+  Kept made{memory,
+            memory.get(),
+            gl::make_buffer(gl_, memory->bytes(), nullptr, 0, "creating a host's bricks"),
+            memory->bytes(),
+            {}};
+  const std::scoped_lock lock(mutex_);
+  kept_.push_back(std::move(made));
   return memory;
 }
 
-const gl::Object* DeviceMemories::find(const volume::DeviceMemory& memory) const {
+const DeviceMemories::Kept* DeviceMemories::kept(const volume::DeviceMemory& memory) const {
   const auto found = std::ranges::find(kept_, &memory, &Kept::address);
-  return found == kept_.end() ? nullptr : &found->buffer;
+  return found == kept_.end() ? nullptr : &*found;
+}
+
+const gl::Object* DeviceMemories::find(const volume::DeviceMemory& memory) const {
+  const Kept* found = kept(memory);
+  if (found == nullptr) return nullptr;
+  found->written.order();
+  return &found->buffer;
 }
 
 bool DeviceMemories::has(const volume::DeviceBricks& bricks) const {
-  return std::ranges::all_of(bricks.memories, [&](const auto& memory) { return find(*memory) != nullptr; });
+  return std::ranges::all_of(bricks.memories, [&](const auto& memory) { return kept(*memory) != nullptr; });
 }
 
-volume::DeviceBricksPtr DeviceMemories::gather(gl::Programs& programs, const volume::DeviceBricks& bricks) {
+volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, gl::Programs& programs,
+                                               const volume::DeviceBricks& bricks) {
   const bool halves = bricks.are_halves();
   const std::uint64_t bytes = volume::DeviceMemory::bytes_of(bricks.origins.size(), halves);
   if (bytes > most_bytes_) return nullptr;
@@ -48,17 +61,18 @@ volume::DeviceBricksPtr DeviceMemories::gather(gl::Programs& programs, const vol
     made->places[i] = {0, i};
     memory->summaries[i] = bricks.summary(i);
   }
-  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
+  gl::memory_barrier(*gl, GL_SHADER_STORAGE_BARRIER_BIT);
   const std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
   for (std::size_t m = 0; m < moves.size(); ++m) {
     if (moves[m].empty()) continue;
-    const gl::Object moved = gl::make_buffer(gl_, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
+    const gl::Object moved = gl::make_buffer(gl, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
                                              "creating the list of a volume's bricks");
     const volume::DeviceMemory& from = *bricks.memories[m];
     const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &moved};
-    copies.dispatch(*gl_, programs.ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
+    copies.dispatch(*gl, programs.ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
   }
-  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  gl::memory_barrier(*gl, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  kept_.back().written = gl::Fence(gl_);
   made->memories = {memory};
   return made;
 }
@@ -74,10 +88,12 @@ std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks
 }
 
 void DeviceMemories::collect() {
+  const std::scoped_lock lock(mutex_);
   std::erase_if(kept_, [](const Kept& kept) { return kept.held.expired(); });
 }
 
 std::uint64_t DeviceMemories::bytes() const {
+  const std::scoped_lock lock(mutex_);
   std::uint64_t sum = 0;
   for (const Kept& kept : kept_) sum += kept.bytes;
   return sum;

@@ -148,7 +148,7 @@ cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumule
       }
       shaders = std::make_shared<cumulet::gl::ShaderFolder>(d.shaders);
     }
-    return std::make_shared<cumulet::gl::ProgramPool>(
+    return std::make_shared<cumulet::viewer::Sharing>(
         kept ? std::make_shared<cumulet::gl::ProgramFiles>(d.folder) : nullptr, std::move(shaders));
   });
 }

@@ -5,13 +5,13 @@
 #include <atomic>
 #include <memory>
 
-#include "gl/programs.hpp"
 #include "light/environment.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/instance.hpp"
 #include "viewer/live.hpp"
 #include "viewer/sequence.hpp"
+#include "viewer/sharing.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
 
@@ -51,7 +51,7 @@ struct cumulet_live {
 };
 
 struct cumulet_programs {
-  std::shared_ptr<cumulet::gl::ProgramPool> asset;
+  std::shared_ptr<cumulet::viewer::Sharing> asset;
   std::atomic<int> references = 1;
 };
 

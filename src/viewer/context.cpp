@@ -18,12 +18,12 @@ constexpr double part_to_filter = 0.4;
 
 }  // namespace
 
-Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
+Context::Context(gl::FunctionsPtr gl, Commons commons)
     : functions_(std::move(gl)),
       group_(functions_),
-      programs_(programs.of_current(*functions_)),
+      programs_(std::move(commons.programs)),
       limits_(gl::query_limits(*functions_)),
-      memories_(std::make_shared<render::DeviceMemories>(functions_, limits_.storage_block_bytes)),
+      memories_(std::move(commons.memories)),
       scene_(functions_, programs_, limits_, memories_),
       progressive_(functions_, programs_),
       compositor_(functions_, programs_),

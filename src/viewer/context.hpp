@@ -25,6 +25,7 @@
 #include "render/voxel_transfers.hpp"
 #include "viewer/frame.hpp"
 #include "viewer/settings.hpp"
+#include "viewer/sharing.hpp"
 
 namespace cumulet::viewer {
 
@@ -57,12 +58,13 @@ struct Shot {
 /// current and a StateGuard around.
 class Context {
  public:
-  /// programs: of all viewers that share them.
-  Context(gl::FunctionsPtr gl, gl::ProgramPool& programs);
+  /// commons: with other viewers.
+  Context(gl::FunctionsPtr gl, Commons commons);
 
   [[nodiscard]] const gl::FunctionsPtr& functions() const { return functions_; }
   [[nodiscard]] const gl::ShareGroup& group() const { return group_; }
   [[nodiscard]] const gl::ProgramsPtr& programs() const { return programs_; }
+  [[nodiscard]] Commons commons() const { return {programs_, memories_}; }
   [[nodiscard]] const GlStrings& strings() const { return strings_; }
   [[nodiscard]] const render::GpuScene& scene() const { return scene_; }
   [[nodiscard]] render::Progressive& progressive() { return progressive_; }

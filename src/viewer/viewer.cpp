@@ -102,13 +102,12 @@ dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
 
 }  // namespace
 
-Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace,
-               std::shared_ptr<gl::ProgramPool> programs)
+Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace, std::shared_ptr<Sharing> sharing)
     : log_(std::move(log)),
       trace_(trace),
       update_(std::move(update)),
       restore_state_(restore_state),
-      programs_(programs ? std::move(programs) : std::make_shared<gl::ProgramPool>()),
+      sharing_(sharing ? std::move(sharing) : std::make_shared<Sharing>()),
       builder_(
           log_, [this] { notify(); }, trace, allowance_),
       surface_builder_(
@@ -282,6 +281,7 @@ Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder) 
     builder.look();
     notify();
   });
+  tend(live);
   watched.live = std::move(live);
   return watched;
 }

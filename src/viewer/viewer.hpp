@@ -56,9 +56,9 @@ class Viewer {
  public:
   using GetProc = void* (*)(void* user, const char* name);
   /// restore_state: [GL] calls leave the GL state as they found it.
-  /// programs: of viewers that share them; null: of its own.
+  /// sharing: of viewers that share programs; null: of its own.
   Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace = {},
-         std::shared_ptr<gl::ProgramPool> programs = nullptr);
+         std::shared_ptr<Sharing> sharing = nullptr);
   ~Viewer();
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
@@ -285,6 +285,8 @@ class Viewer {
   // Of live volumes whose density is in GL: what is scattered is gathered, what is needed in main memory brought there.
   void tend_voxels_in_gl(Context& g);
   static void bring_back(Context& g, const std::shared_ptr<Live>& live);
+  // From now on.
+  void tend(const std::shared_ptr<Live>& live);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
@@ -486,7 +488,7 @@ class Viewer {
   std::atomic<bool> update_pending_ = false;
   bool restore_state_;
   std::atomic<double> upload_progress_ = 1.0;
-  std::shared_ptr<gl::ProgramPool> programs_;
+  std::shared_ptr<Sharing> sharing_;
   std::int64_t page_texels_ = 0;
 
   GridSettings grid_;

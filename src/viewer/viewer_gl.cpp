@@ -55,7 +55,8 @@ void Viewer::attach(GetProc get_proc, void* user) {
   if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is attached to a GL context already");
   auto functions = gl::load_functions(get_proc, user);
   gl::clear_errors(*functions);
-  gl_ = std::make_unique<Context>(std::move(functions), *programs_);
+  Commons commons = sharing_->of_current(*functions);
+  gl_ = std::make_unique<Context>(std::move(functions), std::move(commons));
   notify();
 }
 
@@ -74,10 +75,11 @@ void Viewer::detach() {
 void Viewer::context_lost() {
   if (!gl_) return;
   gl_->functions()->abandoned = true;
-  const gl::ProgramsPtr programs = gl_->programs();
+  const Commons commons = gl_->commons();
   gl_.reset();
   // Others may be attached to another context of the group.
-  if (programs.use_count() == 1) programs->abandon();
+  if (commons.programs.use_count() == 1) commons.programs->abandon();
+  if (commons.memories.use_count() == 1) commons.memories->abandon();
 }
 
 template <class Body>
@@ -329,8 +331,7 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
     const std::optional<Live::InGl> rest = live->in_gl();
     if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
     if (!announced && !g.memories().has(*rest->bricks))
-      throw Error(ErrorCode::invalid_argument,
-                  one_line(state.name + ": the rest of it is in another viewer's context"));
+      throw Error(ErrorCode::invalid_argument, one_line(state.name + ": the rest of it is in another viewer's context"));
     if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
     bring_back(g, live);
     return std::nullopt;
@@ -365,10 +366,15 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
     render::VoxelTransfers::Arrival arrival = std::move(arrive);
     if (place) arrival = std::move(stay);
     g.transfers().begin(placed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
-    if (place && std::ranges::none_of(lives_in_gl_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; }))
-      lives_in_gl_.push_back({live, live->values_wanted()->listen([this] { notify(); }), {}, {}});
+    if (place) tend(live);
   });
   notify();
+}
+
+void Viewer::tend(const std::shared_ptr<Live>& live) {
+  if (live->values_wanted() == nullptr) return;
+  if (std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; })) return;
+  lives_in_gl_.push_back({live, live->values_wanted()->listen([this] { notify(); }), {}, {}});
 }
 
 void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live) {
@@ -403,7 +409,7 @@ void Viewer::tend_voxels_in_gl(Context& g) {
     }
     if (live->stays_in_gl() && state->bricks->scattered() && in_gl.gathered.lock() != state->bricks) {
       in_gl.gathered = state->bricks;
-      if (auto gathered = g.memories().gather(*g.programs(), *state->bricks))
+      if (auto gathered = g.memories().gather(g.functions(), *g.programs(), *state->bricks))
         live->move_in_gl(state->bricks, std::move(gathered));
     }
   }

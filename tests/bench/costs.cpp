@@ -86,7 +86,7 @@ class Rows {
   Rows(headless::Context& context, double density_scale) : context_(context), density_scale_(density_scale) {}
 
   test::Still& add(std::string name, const viewer::VolumeAssetPtr& volume, Burns burns, const viewer::Light& light,
-                   std::shared_ptr<gl::ProgramPool> programs = nullptr) {
+                   std::shared_ptr<viewer::Sharing> programs = nullptr) {
     Row& row = rows_.emplace_back(Row{
         std::move(name), std::make_unique<test::Still>(context_, headless::Context::get_proc, std::move(programs))});
     row.still->viewer().camera()->frame(volume->bounds(), 1.0);

@@ -33,7 +33,7 @@ EditedShaders::EditedShaders(std::span<const Edit> edits, std::span<const std::f
     file.close();
     if (!file) throw std::runtime_error(path.string() + ": cannot be written");
   }
-  programs_ = std::make_shared<gl::ProgramPool>(nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
+  programs_ = std::make_shared<viewer::Sharing>(nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
 }
 
 }  // namespace cumulet::bench

@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
-#include "gl/programs.hpp"
 #include "support/folder.hpp"
+#include "viewer/sharing.hpp"
 
 namespace cumulet::bench {
 
@@ -24,11 +24,11 @@ class EditedShaders {
   /// std::filesystem::filesystem_error.
   explicit EditedShaders(std::span<const Edit> edits, std::span<const std::filesystem::path> files = {});
 
-  [[nodiscard]] std::shared_ptr<gl::ProgramPool> programs() const { return programs_; }
+  [[nodiscard]] std::shared_ptr<viewer::Sharing> programs() const { return programs_; }
 
  private:
   test::Folder folder_;
-  std::shared_ptr<gl::ProgramPool> programs_;
+  std::shared_ptr<viewer::Sharing> programs_;
 };
 
 }  // namespace cumulet::bench

@@ -132,7 +132,7 @@ struct Shown {
 
 class Shows {
  public:
-  Shows(headless::Context& context, const viewer::VolumeAssetPtr& volume, std::shared_ptr<gl::ProgramPool> programs)
+  Shows(headless::Context& context, const viewer::VolumeAssetPtr& volume, std::shared_ptr<viewer::Sharing> programs)
       : still_(context, headless::Context::get_proc, std::move(programs)) {
     still_.set_volume(volume);
     still_.set_camera(pose());

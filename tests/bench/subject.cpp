@@ -41,7 +41,7 @@ viewer::Light bench_light() {
 }
 
 Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
-                 double density_scale, std::shared_ptr<gl::ProgramPool> programs)
+                 double density_scale, std::shared_ptr<viewer::Sharing> programs)
     : kind_(kind),
       size_(options.size),
       albedo_(options.albedo),

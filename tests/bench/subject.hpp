@@ -36,7 +36,7 @@ class Subject {
   /// density_scale: of the shaded picture. programs: others than the library's. The context must be current, now and
   /// until the end.
   Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
-          double density_scale, std::shared_ptr<gl::ProgramPool> programs = nullptr);
+          double density_scale, std::shared_ptr<viewer::Sharing> programs = nullptr);
 
   /// Makes the tetrahedral grid anew; not for dense and brick.
   void refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells);

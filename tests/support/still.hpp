@@ -24,8 +24,8 @@ struct Image {
 class Still {
  public:
   explicit Still(headless::Context& context, viewer::Viewer::GetProc get_proc = headless::Context::get_proc,
-                 std::shared_ptr<gl::ProgramPool> programs = nullptr)
-      : viewer_(std::make_unique<viewer::Viewer>(Log(), nullptr, true, Trace(), std::move(programs))) {
+                 std::shared_ptr<viewer::Sharing> sharing = nullptr)
+      : viewer_(std::make_unique<viewer::Viewer>(Log(), nullptr, true, Trace(), std::move(sharing))) {
     viewer_->attach(get_proc, &context);
   }
 

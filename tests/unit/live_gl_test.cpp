@@ -1094,6 +1094,58 @@ TEST_F(LiveInGl, BoxesComeByTheSameViewer) {
   EXPECT_FALSE(shows_voxels());
 }
 
+// Viewers that share programs have it together, and any of them brings voxels when one is needed.
+TEST_F(LiveInGl, IsSharedWithPrograms) {
+  const Type& type = types[1];
+  const Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  const Array now(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  cumulet_programs* programs = nullptr;
+  const auto programs_desc = make_desc<cumulet_programs_desc>();
+  ASSERT_EQ(cumulet_programs_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
+  const test::ProgramsRef kept(programs);
+  const auto sharing = [&] {
+    ViewerPtr viewer = test::make_viewer({.get_proc = test::FakeGl::get_proc,
+                                          .user = &fake_,
+                                          .samples = 2,
+                                          .programs = programs,
+                                          .build = CUMULET_BUILD_GPU});
+    EXPECT_EQ(cumulet_set_live(viewer.get(), live_.get()), CUMULET_OK);
+    return viewer;
+  };
+  viewer_ = sharing();
+  v_ = viewer_.get();
+  ViewerPtr other = sharing();
+  const GLuint name = objects_.texture(odd, type, before);
+  const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
+  hand_over(fields);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), reference(before.values)), "");
+  EXPECT_EQ(difference(test::drawn_once(other.get(), target_), reference(before.values)), "");
+  // Boxes come by either.
+  objects_.put(name, odd, GL_RED, type.type, now.bytes.data());
+  std::vector<cumulet_voxel_box> boxes;
+  for (const Sides& b : State::bricks(odd, now.values, before.values))
+    boxes.push_back({{b[0], b[1], b[2]}, {b[0] + 7, b[1] + 7, b[2] + 7}});
+  std::swap(viewer_, other);
+  v_ = viewer_.get();
+  hand_over(fields, boxes);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), reference(now.values)), "");
+  EXPECT_EQ(difference(test::drawn_once(other.get(), target_), reference(now.values)), "");
+  EXPECT_EQ(handed(), 2U) << "nobody asked for voxels";
+  // It is the others' when the one goes that brought it, and comes to main memory by them.
+  other.reset();
+  EXPECT_EQ(difference(picture(), reference(now.values)), "");
+  EXPECT_FALSE(shows_voxels());
+  get_volume(CUMULET_ERROR_UNSUPPORTED);
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, now.values)));
+  EXPECT_EQ(difference(picture(), reference(now.values)), "");
+  // With the last of them it goes.
+  ASSERT_EQ(cumulet_context_lost(v_), CUMULET_OK);
+  EXPECT_EQ(test::FakeGl::strays(), 0U);
+}
+
 TEST_F(LiveInGl, EndsWithItsContext) {
   const Array first(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array second(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));

@@ -279,7 +279,8 @@ TEST_P(StaysInGl, ScatteredBricksAreGathered) {
   const gl::StateGuard guard(*gl_);
   volume::DeviceBricksPtr gathered;
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (gathered == nullptr && std::chrono::steady_clock::now() < until) gathered = memories_->gather(*programs_, all);
+  while (gathered == nullptr && std::chrono::steady_clock::now() < until)
+    gathered = memories_->gather(gl_, *programs_, all);
   ASSERT_NE(gathered, nullptr);
   EXPECT_EQ(gathered->memories.size(), 1U);
   EXPECT_EQ(gathered->origins, all.origins);

@@ -198,10 +198,10 @@ typedef struct cumulet_programs_desc {
 /*
  * GL programs, to be shared by viewers (cumulet_create_desc): those that are attached to one context, or to contexts
  * that share objects, compile each program once among them. Programs end with the last viewer that is attached to them,
- * what is in the folder does not. [GL] calls of viewers that share programs wait for each other where they come from
- * several threads at once; callbacks of the one whose turn it is come meanwhile: take no lock in them that is held
- * around a [GL] call. Functions that get_proc gave one of these viewers stay callable until none of them is attached.
- * Any thread; error as in cumulet_create.
+ * what is in the folder does not. They have in common, too, what live volumes keep in GL. [GL] calls of viewers that
+ * share programs wait for each other where they come from several threads at once; callbacks of the one whose turn it
+ * is come meanwhile: take no lock in them that is held around a [GL] call. Functions that get_proc gave one of these
+ * viewers stay callable until none of them is attached. Any thread; error as in cumulet_create.
  */
 CUMULET_API cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumulet_programs** out,
                                                    char* error, size_t error_size);
@@ -1040,13 +1040,15 @@ typedef struct cumulet_gl_state_desc {
  *
  * With cumulet_live_desc.stays_in_gl density alone, without other channels, stays in this viewer's context: priorities
  * of splits, and values of cells, are found there. Its grid is that of the same numbers in main memory but for
- * roundings of priorities; its control cube begins at a multiple of 16 voxels. Boxes come by the same viewer, and take
+ * roundings of priorities; its control cube begins at a multiple of 16 voxels. Viewers that share programs
+ * (cumulet_programs), and whose contexts share objects, have it together; by other viewers boxes do not come. These take
  * their bricks alone. Of what is not finite the line names its 8^3 voxels. Who cannot do without the voxels ends that
- * for the live volume, for good: another march or a build on the CPU, a density ramp, another viewer or context that
- * shows it, more GL memory than is allowed, cumulet_live_get_volume. Then this viewer's next cumulet_render brings the
- * voxels of the newest state to main memory, as one more state, and those of the next ones come there at once.
- * cumulet_get_volume gives NULL of a state in GL, and cumulet_live_update is refused on top of one. With the viewer's
- * context the state is gone, and nothing of it is shown in another until the next one comes, which the log says.
+ * for the live volume, for good: another march or a build on the CPU, a density ramp, a viewer without these programs
+ * that shows it, more GL memory than is allowed, cumulet_live_get_volume. Then the next cumulet_render of a viewer that
+ * has them brings the voxels of the newest state to main memory, as one more state, and those of the next ones come
+ * there at once. cumulet_get_volume gives NULL of a state in GL, and cumulet_live_update is refused on top of one. With
+ * the last of these viewers' contexts the state is gone, and nothing of it is shown in another until the next one comes,
+ * which the log says.
  */
 CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
                                                const cumulet_gl_state_desc* desc);

@@ -1,0 +1,22 @@
+#include "viewer/sharing.hpp"
+
+#include <algorithm>
+
+namespace cumulet::viewer {
+
+Commons Sharing::of_current(const gl::Functions& gl) {
+  const std::scoped_lock lock(mutex_);
+  Commons commons{programs_.of_current(gl), nullptr};
+  std::erase_if(groups_, [](const Group& group) { return group.programs.expired() || group.memories.expired(); });
+  const auto found =
+      std::ranges::find_if(groups_, [&](const Group& group) { return group.programs.lock() == commons.programs; });
+  if (found != groups_.end()) commons.memories = found->memories.lock();
+  if (!commons.memories) {
+    commons.memories = std::make_shared<render::DeviceMemories>(
+        gl::copy_of(gl), static_cast<std::uint64_t>(gl::query_limits(gl).storage_block_bytes));
+    groups_.push_back({commons.programs, commons.memories});
+  }
+  return commons;
+}
+
+}  // namespace cumulet::viewer
