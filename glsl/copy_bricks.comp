@@ -10,6 +10,7 @@ layout(std430, binding = CM_STORAGE_BRICKS_TO) writeonly buffer CmTo { uint cm_t
 layout(std430, binding = CM_STORAGE_BRICKS_MOVED) readonly buffer CmMoved { uvec2 cm_moved[]; };  // from, to
 layout(location = 0) uniform uvec2 cm_range;  // of those moved: the first, and the end
 layout(location = 1) uniform uint cm_to_first;
+layout(location = 2) uniform uvec2 cm_numbers;  // how many floats a voxel has there, and which it is; of halves one
 
 float cm_number(uint i) {
 #if CM_FROM_HALVES
@@ -30,6 +31,7 @@ void main() {
   for (uint w = 0u; w < 4u; ++w)
     cm_to[to / 2u + w] = packHalf2x16(vec2(cm_number(from + 2u * w), cm_number(from + 2u * w + 1u)));
 #else
-  for (uint z = 0u; z < 8u; ++z) cm_to[to + z] = floatBitsToUint(cm_number(from + z));
+  for (uint z = 0u; z < 8u; ++z)
+    cm_to[(to + z) * cm_numbers.x + cm_numbers.y] = floatBitsToUint(cm_number(from + z));
 #endif
 }

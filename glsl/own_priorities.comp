@@ -1,6 +1,6 @@
 #version 450
 // Priorities that a brick's own cells give the vertices that they split at, as grid::OwnPriorities has them, where main
-// memory has no values of it: a group a brick.
+// memory has no values of it: a group a brick. What another field gave there counts as well.
 // CM_CRITERION: as grid::Criterion. A variant, for zink of Mesa 22.3 keeps what uniforms alone decided once.
 // variants: CM_HALVES=0,1 CM_CRITERION=0,1,2
 layout(local_size_x = 64) in;
@@ -13,15 +13,16 @@ layout(local_size_x = 64) in;
 #include "lattice.glsl"
 
 layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };  // three words each
-layout(std430, binding = CM_STORAGE_GRID_OWN) writeonly buffer CmOwn { uint cm_own[]; };       // two values each
+layout(std430, binding = CM_STORAGE_GRID_OWN) buffer CmOwn { uint cm_own[]; };                 // two values each
 layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint cm_bricks[]; };
-layout(std430, binding = CM_STORAGE_BRICKS_TO_RATE) readonly buffer CmToRate { uint cm_to_rate[]; };
+layout(std430, binding = CM_STORAGE_BRICKS_TO_RATE) readonly buffer CmToRate { uvec2 cm_to_rate[]; };  // node, brick
 layout(std430, binding = CM_STORAGE_BRICKS_LIT) readonly buffer CmBricksLit { float cm_bricks_lit[]; };
 layout(location = 0) uniform uvec2 cm_range;       // of those to rate: the first, and the end
 layout(location = 1) uniform uint cm_first_node;   // of those to rate
 layout(location = 2) uniform vec3 cm_measure;      // as grid::Measure: scale, own hiding, the floor
 layout(location = 3) uniform bool cm_linear;       // cells are
-layout(location = 4) uniform int cm_first_value;   // of the bricks' own in the buffer of values: a brick
+layout(location = 4) uniform float cm_back;        // 1: light passes what hides a cell twice, 0: once
+layout(location = 5) uniform uvec2 cm_numbers;     // how many a voxel has in the buffer of values, and which it is
 
 #include "brick_sums.glsl"
 
@@ -40,7 +41,9 @@ float cm_squared(CmCell cell, CmSums sums, float edge_squared) {
   return ratio * ratio;
 #else
   precise float own = 1.0 + cm_measure.y * cell.mean * sqrt(edge_squared);
-  precise float seen = sums.lit * sums.lit * sums.lit * sums.lit;
+  precise float once = sums.lit * sums.lit;
+  precise float twice = once * sums.lit * sums.lit;
+  precise float seen = once * (1.0 - cm_back) + twice * cm_back;
   precise float weight = edge_squared * cm_measure.x * seen / (own * own);
   precise float value = cell.variance * weight;
   if (value <= cm_measure.z || !cm_linear) return value;
@@ -65,13 +68,13 @@ void main() {
   uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
   uint i = min(cm_range.x + work, cm_range.y - 1u);
   uint t = gl_LocalInvocationIndex;
-  uint n = 3u * (cm_first_node + i);
+  uvec2 rate = cm_to_rate[i];
+  uint n = 3u * (cm_first_node + rate.x);
   uvec3 node = uvec3(cm_nodes[n], cm_nodes[n + 1u], cm_nodes[n + 2u]);
-  uint brick = uint(cm_first_value) + cm_to_rate[i];
   for (uint k = t; k < CM_BRICK_POINTS; k += 64u) cm_found[k] = 0u;
   if (t == 0u) cm_points = cm_points_of_levels[cm_node_levels(node)];
   for (uint z = 0u; z < 8u; ++z) {
-    uint v = 512u * brick + 8u * t + z;
+    uint v = (512u * rate.y + 8u * t + z) * cm_numbers.x + cm_numbers.y;
 #if CM_HALVES
     cm_values[8u * t + z] = unpackHalf2x16(cm_bricks[v / 2u] >> (16u * (v & 1u))).x;
 #else
@@ -79,7 +82,7 @@ void main() {
 #endif
   }
 #if CM_CRITERION == 2
-  cm_lit[t] = cm_bricks_lit[64u * i + t];
+  cm_lit[t] = cm_bricks_lit[64u * rate.x + t];
 #else
   cm_lit[t] = 1.0;
 #endif
@@ -91,6 +94,7 @@ void main() {
   // Its first value has an even place.
   for (uint k = t; k < (cm_points + 1u) / 2u; k += 64u) {
     uint high = 2u * k + 1u < cm_points ? cm_found[2u * k + 1u] : 0u;
-    cm_own[node.z / 2u + k] = cm_found[2u * k] | (high << 16);
+    uint there = cm_own[node.z / 2u + k];
+    cm_own[node.z / 2u + k] = max(cm_found[2u * k], there & 0xffffu) | (max(high, there >> 16) << 16);
   }
 }

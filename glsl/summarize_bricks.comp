@@ -1,7 +1,8 @@
 #version 450
 // Of a host's bricks, as pack_bricks.comp has them, the values that volumes keep, and what main memory is to know of them
 // (brick_summary.glsl): a group a brick. What is no number becomes 0, and is told; what is negative becomes 0.
-// variants: CM_FORMAT=0,1,2,3
+// CM_CELLS: 0: of fields that no cell is of, the most, box and voxels alone.
+// variants: CM_FORMAT=0,1,2,3 CM_CELLS=0,1
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -24,13 +25,15 @@ layout(std430, binding = CM_STORAGE_BRICK_SUMMARIES) writeonly buffer CmSummarie
 layout(location = 0) uniform uvec2 cm_range;   // bricks: the first, and the end
 layout(location = 1) uniform uvec3 cm_bricks;  // of the field, along each axis
 
+shared uint cm_box[6];  // low, then 7 less high
+shared uint cm_count;
+shared uint cm_bad;
+
+#if CM_CELLS
 #include "brick_sums.glsl"
 
 shared uint cm_steepest[2 * CM_BRICK_LEVELS];
 shared uint cm_shadows[6];
-shared uint cm_box[6];  // low, then 7 less high
-shared uint cm_count;
-shared uint cm_bad;
 
 vec2 cm_steepest_own[3] = vec2[3](vec2(0.0), vec2(0.0), vec2(0.0));  // of levels 6, 7 and 8, of this invocation
 
@@ -55,6 +58,10 @@ void cm_visit(uint level, uint heap, uint frame, CmSums sums) {
     cm_put_steepest(level, steepest);
   }
 }
+#else
+shared float cm_values[512];  // of the brick
+shared uint cm_most;          // of their bits
+#endif
 
 float cm_number(uint i) {
 #if CM_FORMAT == 0
@@ -90,11 +97,15 @@ void cm_look_at(uint t, uint slot) {
   uint x = t >> 3u;
   uint y = t & 7u;
   atomicAdd(cm_count, uint(bitCount(not_zero)));
+#if CM_CELLS
   atomicOr(cm_shadows[y >> 2u], not_zero << (8u * (y & 3u)));  // along x, bit 8 y + z
   for (uint z = 0u; z < 8u; ++z) {                             // along y, bit 8 z + x
     if (((not_zero >> z) & 1u) != 0u) atomicOr(cm_shadows[2u + (z >> 2u)], 1u << (8u * (z & 3u) + x));
   }
   atomicOr(cm_shadows[4u + (t >> 5u)], 1u << (t & 31u));  // along z, bit 8 x + y
+#else
+  for (uint z = 0u; z < 8u; ++z) atomicMax(cm_most, floatBitsToUint(cm_values[8u * t + z]));
+#endif
   atomicMin(cm_box[0], x);
   atomicMin(cm_box[1], y);
   atomicMin(cm_box[2], uint(findLSB(not_zero)));
@@ -103,26 +114,11 @@ void cm_look_at(uint t, uint slot) {
   atomicMin(cm_box[5], 7u - uint(findMSB(not_zero)));
 }
 
+#if CM_CELLS
 // Of one that is no less.
 uint cm_upper_half(uint bits) { return min((bits >> 16) + ((bits & 0xffffu) != 0u ? 1u : 0u), 0x7f80u); }
 
-void main() {
-  uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  uint slot = min(cm_range.x + work, cm_range.y - 1u);  // the last ones do the last once more
-  uint t = gl_LocalInvocationIndex;
-  if (t < 2u * CM_BRICK_LEVELS) cm_steepest[t] = 0u;
-  if (t < 6u) {
-    cm_shadows[t] = 0u;
-    cm_box[t] = 7u;
-  }
-  if (t == 0u) {
-    cm_count = 0u;
-    cm_bad = 0u;
-  }
-  cm_lit[t] = 1.0;
-  barrier();
-  cm_look_at(t, slot);
-  barrier();
+void cm_put_cells(uint t, uint slot) {
   cm_find_reference();
   precise float block = 0.0;
   uvec3 low = 2u * uvec3(t / 16u, t / 4u % 4u, t % 4u);
@@ -152,8 +148,35 @@ void main() {
         cm_upper_half(cm_steepest[CM_BRICK_LEVELS + t]) | (cm_upper_half(cm_steepest[t]) << 16);
   }
   if (t < 6u) cm_summaries[slot].shadows[t] = cm_shadows[t];
+  if (t == 0u) cm_summaries[slot].reference = cm_reference;
+}
+#endif
+
+void main() {
+  uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  uint slot = min(cm_range.x + work, cm_range.y - 1u);  // the last ones do the last once more
+  uint t = gl_LocalInvocationIndex;
+  if (t < 6u) cm_box[t] = 7u;
   if (t == 0u) {
-    cm_summaries[slot].reference = cm_reference;
+    cm_count = 0u;
+    cm_bad = 0u;
+  }
+#if CM_CELLS
+  if (t < 2u * CM_BRICK_LEVELS) cm_steepest[t] = 0u;
+  if (t < 6u) cm_shadows[t] = 0u;
+  cm_lit[t] = 1.0;
+#else
+  if (t == 0u) cm_most = 0u;
+#endif
+  barrier();
+  cm_look_at(t, slot);
+  barrier();
+#if CM_CELLS
+  cm_put_cells(t, slot);
+#else
+  if (t < 6u) cm_summaries[slot].cells[7u * t + 6u] = uintBitsToFloat(cm_most);
+#endif
+  if (t == 0u) {
     cm_summaries[slot].box = cm_box[0] | (cm_box[1] << 3) | (cm_box[2] << 6) | ((7u - cm_box[3]) << 9) |
                              ((7u - cm_box[4]) << 12) | ((7u - cm_box[5]) << 15);
     cm_summaries[slot].voxels = cm_count | cm_bad;

@@ -67,7 +67,7 @@ class Measure {
   /// that a linear fit leaves.
   [[nodiscard]] float bound_of_steepest(float variance, float left, float lit) const;
   [[nodiscard]] OwnMeasure numbers(float floor) const {
-    return {scale_, own_hiding_, floor, cells_ == CellKind::linear, criterion_};
+    return {scale_, own_hiding_, floor, cells_ == CellKind::linear, there_and_back_, criterion_};
   }
   /// covariance: of position and density in the frame, per unit. No more than floor: the exact value does not matter.
   [[nodiscard]] float squared(std::uint32_t cell_class, float mean, float variance, const glm::vec3& covariance,
@@ -152,6 +152,8 @@ class Evaluations {
               const Progress* progress = nullptr);
   [[nodiscard]] auto begin() const { return all_.begin(); }
   [[nodiscard]] auto end() const { return all_.end(); }
+  /// Null: nothing is hidden.
+  [[nodiscard]] const Transmittance* transmittance() const { return transmittance_.get(); }
 
  private:
   std::unique_ptr<const Transmittance> transmittance_;

@@ -156,28 +156,45 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
     values.insert(values.end(), p.values.begin(), p.values.end());
     p = {};
   }
-  if (on_device) plan_to_rate(*evaluations.begin(), floor);
+  if (!on_device) return;
+  std::vector<ivec3> bricks;
+  for (const CubeKey& cube : cubes) {
+    if (cube.log2_size == 3) bricks.push_back(cube.corner);
+  }
+  plan_to_rate(evaluations, bricks, floor);
 }
 
-void OwnPriorities::plan_to_rate(const Evaluation& evaluation, float floor) {
-  const Statistics& statistics = evaluation.statistics();
+void OwnPriorities::plan_to_rate(const Evaluations& evaluations, const std::vector<ivec3>& bricks, float floor) {
   // Two share a word, but not those of two nodes.
   if (values.size() % 2 != 0) values.push_back(0);
   to_rate.first_node = nodes.size();
-  to_rate.measure = evaluation.measure(floor);
-  to_rate.edges_squared = brick_edges(statistics.cube().to_world);
-  const std::vector<std::uint32_t>& bricks = statistics.nodes_of_size(3);
-  for (std::uint32_t i = 0; i < bricks.size(); ++i) {
-    const Statistics::Node& brick = statistics.nodes()[bricks[i]];
-    const unsigned levels = evaluation.levels_at_most(brick, floor);
-    if (levels == 0) continue;
+  to_rate.edges_squared = brick_edges(evaluations.begin()->statistics().cube().to_world);
+  for (const Evaluation& evaluation : evaluations) to_rate.fields.push_back({evaluation.measure(floor), {}});
+  for (const ivec3& corner : bricks) {
+    const auto number = static_cast<std::uint32_t>(nodes.size() - to_rate.first_node);
+    unsigned most_levels = 0;
+    auto field = to_rate.fields.begin();
+    for (const Evaluation& evaluation : evaluations) {
+      BricksToRate::Field& of = *field++;
+      const Statistics::Node& brick = evaluation.statistics().node_at(corner, 3);
+      if (brick.log2_size != 3 || brick.is_uniform()) continue;
+      const unsigned levels = evaluation.levels_at_most(brick, floor);
+      if (levels == 0) continue;
+      of.nodes.push_back(number);
+      most_levels = std::max(most_levels, levels);
+    }
+    if (most_levels == 0) continue;
     const std::size_t first = all_values();
     if (first >= most_values) refuse_values(nodes.size());
-    nodes.emplace_back(core::cm_node_words(brick.corner, 3, levels), static_cast<std::uint32_t>(first));
-    to_rate.values += (points_of_levels[levels] + 1) / 2 * 2;
-    to_rate.bricks.push_back(i);
-    if (const float* lit = evaluation.lit(brick))
+    nodes.emplace_back(core::cm_node_words(corner, 3, most_levels), static_cast<std::uint32_t>(first));
+    to_rate.values += (points_of_levels[most_levels] + 1) / 2 * 2;
+    const Transmittance* transmittance = evaluations.transmittance();
+    if (transmittance == nullptr) continue;
+    if (const float* lit = transmittance->blocks(corner)) {
       to_rate.lit.insert(to_rate.lit.end(), lit, lit + Transmittance::blocks_a_brick);
+    } else {
+      to_rate.lit.resize(to_rate.lit.size() + Transmittance::blocks_a_brick, 1.0F);
+    }
   }
 }
 

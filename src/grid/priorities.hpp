@@ -33,19 +33,28 @@ struct OwnMeasure {
   float own_hiding = 0.0F;
   float floor = 0.0F;  ///< no more is nothing
   bool linear = false;
+  bool there_and_back = true;  ///< light passes what hides a cell twice
   Criterion criterion = Criterion::transmittance;
 };
 
 /// Bricks whose values are in GL, and so are to be the priorities that their cells give (glsl/own_priorities.comp).
 struct BricksToRate {
-  std::size_t first_node = 0;         ///< theirs are the last ones
-  std::vector<std::uint32_t> bricks;  ///< of each node: which of nodes_of_size(3)
-  std::vector<float> lit;             ///< what part of the light gets to its blocks, 64 each; empty: all of it
-  std::size_t values = 0;             ///< of all, from the end of those that are known on
-  OwnMeasure measure;
+  /// Its nodes, by number from first_node on, have the most of what each gives.
+  struct Field {
+    OwnMeasure measure;
+    std::vector<std::uint32_t> nodes;
+  };
+  std::size_t first_node = 0;  ///< theirs are the last ones
+  std::vector<Field> fields;   ///< density; red, green and blue of emission, if there is any
+  std::vector<float> lit;      ///< of each node what part of the light gets to its blocks, 64 each; empty: all of it
+  std::size_t values = 0;      ///< of all, from the end of those that are known on
   std::array<float, CM_BRICK_EDGES> edges_squared{};
 
-  [[nodiscard]] std::uint64_t bytes() const { return (bricks.size() + lit.size()) * 4; }
+  [[nodiscard]] std::uint64_t bytes() const {
+    std::uint64_t words = lit.size();
+    for (const Field& field : fields) words += field.nodes.size();
+    return 4 * words;
+  }
 };
 
 /// What does not depend on the view of which splits are worth it: of each cube of the octree in which any is, the
@@ -81,7 +90,8 @@ struct OwnPriorities {
   [[nodiscard]] std::size_t all_values() const { return values.size() + to_rate.values; }
 
  private:
-  void plan_to_rate(const class Evaluation& evaluation, float floor);
+  // bricks: corners of those in which any of the fields varies.
+  void plan_to_rate(const class Evaluations& evaluations, const std::vector<glm::ivec3>& bricks, float floor);
 };
 
 template <class Visit>

@@ -22,9 +22,12 @@ class BlackBody {
   BlackBody();
   /// black_body_colour() x black_body_radiance(); above 40,000 K the colour stays. NaN: nothing.
   [[nodiscard]] glm::vec3 emission(float kelvin, float intensity) const;
+  /// From 100 K to 40,000 K, evenly in the temperature's logarithm.
+  using Colours = std::array<glm::vec3, 1024>;
+  [[nodiscard]] const Colours& colours() const { return colours_; }
 
  private:
-  std::array<glm::vec3, 1024> colours_;  // evenly in the temperature's logarithm
+  Colours colours_;
 };
 
 }  // namespace cumulet::light

@@ -1,14 +1,10 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <list>
 #include <memory>
 #include <mutex>
-#include <span>
-#include <utility>
 #include <vector>
 
 #include "gl/objects.hpp"
@@ -43,6 +39,8 @@ class DeviceMemories {
   /// Those go that nobody holds any more.
   void collect();
   [[nodiscard]] std::uint64_t bytes() const;
+  /// Of one of them.
+  [[nodiscard]] std::uint64_t most_bytes() const { return most_bytes_; }
 
  private:
   struct Kept {
@@ -60,31 +58,5 @@ class DeviceMemories {
   std::list<Kept> kept_;
 };
 using DeviceMemoriesPtr = std::shared_ptr<DeviceMemories>;
-
-/// What kernels know of a brick's cells, for CM_UNIFORM_BRICK_TREE. Throws what GL's allocations throw.
-[[nodiscard]] gl::Object make_brick_tree(const gl::FunctionsPtr& gl,
-                                         const std::array<float, CM_BRICK_EDGES>& edges_squared);
-
-/// Of a brick that is copied: which of its memory, and where to.
-using MovedBrick = glm::uvec2;
-/// Of each of its memories what is moved where, for these bricks of it, in their order.
-[[nodiscard]] std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks,
-                                                            std::span<const std::uint32_t> order);
-/// Copies of bricks that a buffer of MovedBrick names.
-struct BrickCopies {
-  const gl::Object* from = nullptr;
-  bool from_halves = false;
-  const gl::Object* to = nullptr;
-  bool to_halves = false;
-  std::uint32_t to_first = 0;  ///< brick of `to` that places count from
-  const gl::Object* moved = nullptr;
-
-  [[nodiscard]] gl::ProgramKey program() const;
-  /// Of these that are moved; with that program, which is usable.
-  void dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first, std::uint32_t end) const;
-};
-
-/// So many groups, of kernels that count them along x, then along y.
-void dispatch_groups(const gl::Functions& gl, std::uint32_t groups);
 
 }  // namespace cumulet::render

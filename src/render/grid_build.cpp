@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <numeric>
 #include <set>
 #include <span>
@@ -17,8 +18,10 @@
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
+#include "render/brick_kernels.hpp"
 #include "render/pace.hpp"
 #include "volume/brick_values.hpp"
+#include "volume/bricks.hpp"
 
 namespace cumulet::render {
 
@@ -112,11 +115,15 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   plan(data_->places_, l.places, "creating the lattice's places");
   plan(data_->coarse_, l.coarse, "creating the coefficients of coarse cells");
   plan_bricks();
+  plan_channels();
   if (statistics_->on_device()) {
     plan_device_bricks();
+    upload_.add([this] {
+      scratch_.moved.clear();
+      gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
+    });
     plan_priorities();
   }
-  plan_channels();
   plan_buffer(data_->priorities_, l.blocks.size() * CM_BLOCK_POINTS * 4, nullptr, "creating the priorities");
   plan_buffer(data_->bins_, std::uint64_t{CM_PRIORITIES} * 4, nullptr, "creating the priorities' histogram");
   plan_buffer(data_->state_, sizeof(core::CmGridState), nullptr, "creating the grid's state");
@@ -173,96 +180,134 @@ void LatticeUpload::plan_bricks() {
   plan_values(data_->bricks_, statistics_->on_device() ? l.even_bricks.size() : l.bricks, brick_bytes, fill);
 }
 
-void LatticeUpload::plan_dispatches(const gl::ProgramKey& key, std::uint32_t items, std::uint32_t a_step,
-                                    const DispatchItems& dispatch) {
-  for (std::uint32_t first = 0; first < items; first += a_step) {
-    upload_.add_until([this, key, dispatch, first, end = std::min(items, first + a_step)] {
-      const gl::Program& program = programs_->ask(key);
-      if (!program.usable()) return false;
-      dispatch(program, first, end);
-      return true;
+void LatticeUpload::plan_moves(const volume::DeviceBricks& bricks, std::span<const std::uint32_t> order,
+                               BrickCopies copies) {
+  std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
+  constexpr std::uint32_t a_step = 4096;
+  for (std::size_t m = 0; m < moves.size(); ++m) {
+    if (moves[m].empty()) continue;
+    const volume::DeviceMemory& memory = *bricks.memories[m];
+    copies.from = memories_ ? memories_->find(memory) : nullptr;
+    if (copies.from == nullptr) throw Error(ErrorCode::unsupported, "the volume's voxels are in another context");
+    copies.from_halves = memory.halves;
+    const auto count = static_cast<std::uint32_t>(moves[m].size());
+    gl::Object& moved = scratch_.moved.emplace_back();
+    copies.moved = &moved;
+    upload_.add([this, &moved, list = std::move(moves[m])] {
+      moved = gl::make_buffer(gl_, list.size() * sizeof(MovedBrick), list.data(), 0,
+                              "creating the list of a volume's bricks");
     });
+    upload_.add_dispatches(programs_, copies.program(), count, a_step,
+                           [this, copies](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
+                             copies.dispatch(*gl_, program, first, end);
+                           });
   }
 }
 
 void LatticeUpload::plan_device_bricks() {
   const grid::Lattice& l = *data_->lattice_;
-  const volume::DeviceBricks& bricks = *statistics_->on_device();
   const std::vector<std::uint32_t>& nodes = statistics_->nodes_of_size(3);
-  scratch_.moved.resize(bricks.memories.size());
   std::vector<std::uint32_t> order(nodes.size());
   std::ranges::transform(nodes, order.begin(), [&](std::uint32_t node) {
     return static_cast<std::uint32_t>(statistics_->nodes()[node].values);
   });
-  std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
-  constexpr std::uint32_t a_step = 4096;
-  for (std::size_t m = 0; m < moves.size(); ++m) {
-    const volume::DeviceMemory& memory = *bricks.memories[m];
-    const gl::Object* from = memories_ ? memories_->find(memory) : nullptr;
-    if (from == nullptr) throw Error(ErrorCode::unsupported, "the volume's voxels are in another context");
-    const auto count = static_cast<std::uint32_t>(moves[m].size());
-    upload_.add([this, m, list = std::move(moves[m])] {
-      scratch_.moved[m] = gl::make_buffer(gl_, list.size() * sizeof(MovedBrick), list.data(), 0,
-                                          "creating the list of a volume's bricks");
-    });
-    const BrickCopies copies{
-        from, memory.halves, &data_->bricks_, l.halves, std::uint32_t(l.even_bricks.size()), &scratch_.moved[m]};
-    plan_dispatches(copies.program(), count, a_step,
-                    [this, copies](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
-                      copies.dispatch(*gl_, program, first, end);
-                    });
+  plan_moves(*statistics_->on_device(), order,
+             {.to = &data_->bricks_, .to_halves = l.halves, .to_first = std::uint32_t(l.even_bricks.size())});
+}
+
+void LatticeUpload::plan_device_bricks(const grid::LatticeChannel& channel, const grid::ChannelFields& fields,
+                                       const gl::Object& to) {
+  const auto numbers = static_cast<std::uint32_t>(channel.numbers);
+  for (std::uint32_t n = 0; n < numbers; ++n) {
+    const volume::DeviceBricks& bricks = *fields.statistics()[n]->on_device();
+    std::vector<std::uint32_t> order;
+    for (const glm::ivec3& corner : channel.bricks) {
+      const auto found =
+          std::ranges::lower_bound(bricks.origins, corner + data_->lattice_->cube.origin, volume::lexicographic);
+      order.push_back(static_cast<std::uint32_t>(found - bricks.origins.begin()));
+    }
+    plan_moves(bricks, order,
+               {.to = &to, .to_first = std::uint32_t(channel.even_bricks.size()), .numbers = {numbers, n}});
   }
-  upload_.add([this] {
-    scratch_.moved.clear();
-    gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
-  });
+}
+
+std::vector<glm::uvec2> LatticeUpload::bricks_to_rate(std::size_t field) const {
+  const grid::Lattice& l = *data_->lattice_;
+  std::map<glm::ivec3, std::uint32_t, decltype(&volume::lexicographic)> of_channel(volume::lexicographic);
+  if (field > 0) {
+    const grid::LatticeChannel& emission = l.channels[0];
+    for (std::uint32_t i = 0; i < emission.bricks.size(); ++i)
+      of_channel[emission.bricks[i]] = static_cast<std::uint32_t>(emission.even_bricks.size()) + i;
+  }
+  std::vector<glm::uvec2> list;
+  for (const std::uint32_t node : l.own.to_rate.fields[field].nodes) {
+    const glm::ivec3 corner = core::cm_node_corner(l.own.nodes[l.own.to_rate.first_node + node]);
+    const std::uint32_t brick =
+        field > 0 ? of_channel.at(corner)
+                  : static_cast<std::uint32_t>(l.even_bricks.size()) + statistics_->node_at(corner).moments / 6;
+    list.emplace_back(node, brick);
+  }
+  return list;
 }
 
 void LatticeUpload::plan_priorities() {
   const grid::Lattice& l = *data_->lattice_;
   const grid::BricksToRate& rated = l.own.to_rate;
-  if (rated.bricks.empty()) return;
-  upload_.add([this, &rated] {
+  if (rated.values == 0) return;
+  scratch_.to_rate.resize(rated.fields.size());
+  upload_.add([this, &l, &rated] {
     const auto make = [this](const auto& from, const char* what) {
       return gl::make_buffer(gl_, std::max<std::size_t>(from.size() * sizeof from[0], 4),
                              from.empty() ? nullptr : from.data(), 0, what);
     };
-    scratch_.to_rate = make(rated.bricks, "creating the list of bricks to rate");
+    for (std::size_t i = 0; i < rated.fields.size(); ++i)
+      scratch_.to_rate[i] = make(bricks_to_rate(i), "creating the list of bricks to rate");
     scratch_.lit = make(rated.lit, "creating the light of bricks");
     scratch_.tree = make_brick_tree(gl_, rated.edges_squared);
     std::array<std::uint32_t, (std::tuple_size_v<grid::PlacesOfBrickPoints> + 3) / 4 * 4> places{};
     std::ranges::copy(grid::places_of_brick_points(), places.begin());
     scratch_.points = make(places, "creating the places of a brick's points");
+    gl_->ClearNamedBufferSubData(data_->own_.name(), GL_R32UI, static_cast<GLintptr>(l.own.values.size() * 2),
+                                 static_cast<GLsizeiptr>(rated.values * 2), GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   });
+  for (std::size_t i = 0; i < rated.fields.size(); ++i) {
+    plan_priorities(i);
+    upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
+  }
+  upload_.add([this] { scratch_ = {}; });
+}
+
+void LatticeUpload::plan_priorities(std::size_t field) {
+  const grid::Lattice& l = *data_->lattice_;
+  const grid::BricksToRate& rated = l.own.to_rate;
+  const grid::OwnMeasure& measure = rated.fields[field].measure;
+  const bool of_density = field == 0;
+  const gl::Object& values = of_density ? data_->bricks_ : data_->channels_[0].bricks;
+  const glm::uvec2 numbers = of_density ? glm::uvec2(1, 0) : glm::uvec2(l.channels[0].numbers, field - 1);
   const gl::ProgramKey key{"own_priorities.comp",
-                           {l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
-                            "CM_CRITERION " + std::to_string(static_cast<int>(rated.measure.criterion))}};
-  // Where a processor computes them, little enough that a frame can stop between two.
-  const std::uint32_t a_step = gl_->dispatches_in_call ? 64 : 4096;
-  plan_dispatches(key, static_cast<std::uint32_t>(rated.bricks.size()), a_step,
-                  [this, &l, &rated](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
-                    const GLuint name = program.name();
-                    const grid::OwnMeasure& measure = rated.measure;
-                    gl_->ProgramUniform2ui(name, 0, first, end);
-                    gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(rated.first_node));
-                    gl_->ProgramUniform3f(name, 2, measure.scale, measure.own_hiding, measure.floor);
-                    gl_->ProgramUniform1i(name, 3, measure.linear ? 1 : 0);
-                    gl_->ProgramUniform1i(name, 4, static_cast<GLint>(l.even_bricks.size()));
-                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_NODES, data_->nodes_.name());
-                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_OWN, data_->own_.name());
-                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_BRICKS, data_->bricks_.name());
-                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO_RATE,
-                                        scratch_.to_rate.name());
-                    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_LIT, scratch_.lit.name());
-                    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, scratch_.tree.name());
-                    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_POINT_PLACES, scratch_.points.name());
-                    program.use(*gl_);
-                    dispatch_groups(*gl_, end - first);
-                  });
-  upload_.add([this] {
-    scratch_ = {};
-    gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
-  });
+                           {of_density && l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
+                            "CM_CRITERION " + std::to_string(static_cast<int>(measure.criterion))}};
+  upload_.add_dispatches(
+      programs_, key, static_cast<std::uint32_t>(rated.fields[field].nodes.size()), bricks_a_step(*gl_),
+      [this, &rated, &measure, &values, numbers, field](const gl::Program& program, std::uint32_t first,
+                                                        std::uint32_t end) {
+        const GLuint name = program.name();
+        gl_->ProgramUniform2ui(name, 0, first, end);
+        gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(rated.first_node));
+        gl_->ProgramUniform3f(name, 2, measure.scale, measure.own_hiding, measure.floor);
+        gl_->ProgramUniform1i(name, 3, measure.linear ? 1 : 0);
+        gl_->ProgramUniform1f(name, 4, measure.there_and_back ? 1.0F : 0.0F);
+        gl_->ProgramUniform2ui(name, 5, numbers.x, numbers.y);
+        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_NODES, data_->nodes_.name());
+        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_OWN, data_->own_.name());
+        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_BRICKS, values.name());
+        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO_RATE, scratch_.to_rate[field].name());
+        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_LIT, scratch_.lit.name());
+        gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, scratch_.tree.name());
+        gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_POINT_PLACES, scratch_.points.name());
+        program.use(*gl_);
+        dispatch_groups(*gl_, end - first);
+      });
 }
 
 void LatticeUpload::plan_channels() {
@@ -286,7 +331,9 @@ void LatticeUpload::plan_channels() {
     const std::size_t bricks = channel.even_bricks.size() + channel.bricks.size();
     const std::size_t brick_bytes = volume::brick_voxels * channel.numbers * sizeof(float);
     plan_buffer(data.bricks, bricks * brick_bytes, nullptr, "creating a channel's values of bricks");
-    plan_values(data.bricks, bricks, brick_bytes, fill);
+    const bool on_device = fields_[i].statistics()[0]->on_device() != nullptr;
+    plan_values(data.bricks, on_device ? channel.even_bricks.size() : bricks, brick_bytes, fill);
+    if (on_device) plan_device_bricks(channel, fields_[i], data.bricks);
   }
 }
 
@@ -785,9 +832,21 @@ BuiltGrid nothing_of(const scene::MarchSource& source) {
 
 }  // namespace
 
+bool GridBuilds::has_bricks_of(const scene::MarchSource& source) const {
+  const auto has = [&](const grid::Statistics& field) {
+    return memories_ != nullptr && memories_->has(*field.on_device());
+  };
+  if (!has(*source.statistics)) return false;
+  const auto& emission = source.channels.emission;
+  for (std::size_t i = 0; emission && i < 3; ++i) {
+    if (!has(emission->component(i))) return false;
+  }
+  return true;
+}
+
 bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
   const volume::DeviceBricksPtr& in_gl = source->statistics->on_device();
-  if (in_gl && (memories_ == nullptr || !memories_->has(*in_gl))) {
+  if (in_gl && !has_bricks_of(*source)) {
     // Others of the scene are shown meanwhile.
     BuiltGrid& made = built_.emplace(source, nothing_of(*source)).first->second;
     try {

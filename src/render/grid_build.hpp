@@ -8,9 +8,11 @@
 #include <glm/glm.hpp>
 #include <initializer_list>
 #include <limits>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +22,7 @@
 #include "gl/objects.hpp"
 #include "gl/programs.hpp"
 #include "grid/lattice.hpp"
+#include "render/brick_kernels.hpp"
 #include "render/device_memories.hpp"
 #include "render/upload.hpp"
 #include "scene/glow.hpp"
@@ -79,21 +82,24 @@ class LatticeUpload {
   void plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what);
   void plan_bytes(const gl::Object& buffer, std::uint64_t bytes, const void* from);
   void plan_bricks();
+  // Of bricks that are in GL, to where copies says; order: which of them.
+  void plan_moves(const volume::DeviceBricks& bricks, std::span<const std::uint32_t> order, BrickCopies copies);
   void plan_device_bricks();
+  void plan_device_bricks(const grid::LatticeChannel& channel, const grid::ChannelFields& fields, const gl::Object& to);
+  // Of each of a field's nodes its number, and which brick of the buffer of values it has.
+  [[nodiscard]] std::vector<glm::uvec2> bricks_to_rate(std::size_t field) const;
   void plan_priorities();
+  void plan_priorities(std::size_t field);
   void plan_channels();
-  // A step for each piece of these items, once the driver has the program.
-  using DispatchItems = std::function<void(const gl::Program& program, std::uint32_t first, std::uint32_t end)>;
-  void plan_dispatches(const gl::ProgramKey& key, std::uint32_t items, std::uint32_t a_step,
-                       const DispatchItems& dispatch);
   // Bricks of whole values, which fill puts where it is told, one after another.
   using FillBrick = std::function<void(std::size_t brick, std::byte* to)>;
   void plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill);
 
   // What steps make for others.
   struct Scratch {
-    std::vector<gl::Object> moved;  // by memory
-    gl::Object to_rate, lit, tree, points;
+    std::list<gl::Object> moved;
+    std::vector<gl::Object> to_rate;  // by field
+    gl::Object lit, tree, points;
   };
 
   gl::FunctionsPtr gl_;
@@ -289,6 +295,8 @@ class GridBuilds {
  private:
   // Returns whether it is there.
   bool build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
+  // Where they are in GL.
+  [[nodiscard]] bool has_bricks_of(const scene::MarchSource& source) const;
   // By GL.
   bool build_there(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
   void begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes);

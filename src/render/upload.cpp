@@ -21,6 +21,18 @@ void Upload::add_bytes(std::function<Place()> to, const void* bytes, std::size_t
   });
 }
 
+void Upload::add_dispatches(const gl::ProgramsPtr& programs, const gl::ProgramKey& key, std::uint32_t items,
+                            std::uint32_t a_step, const DispatchItems& dispatch) {
+  for (std::uint32_t first = 0; first < items; first += a_step) {
+    add_until([programs, key, dispatch, first, end = std::min(items, first + a_step)] {
+      const gl::Program& program = programs->ask(key);
+      if (!program.usable()) return false;
+      dispatch(program, first, end);
+      return true;
+    });
+  }
+}
+
 void Upload::add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba) {
   const std::size_t row = std::size_t{to.size.x} * 4;
   const auto copy = [this, texture = std::move(texture), to, rgba, row](std::size_t first, std::size_t count) {

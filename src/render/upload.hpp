@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gl/objects.hpp"
+#include "gl/programs.hpp"
 
 namespace cumulet::render {
 
@@ -52,6 +53,10 @@ class Upload {
     std::size_t offset = 0;
   };
   void add_bytes(std::function<Place()> to, const void* bytes, std::size_t size);
+  /// A step for each so many of these items, once the driver has the program.
+  using DispatchItems = std::function<void(const gl::Program& program, std::uint32_t first, std::uint32_t end)>;
+  void add_dispatches(const gl::ProgramsPtr& programs, const gl::ProgramKey& key, std::uint32_t items,
+                      std::uint32_t a_step, const DispatchItems& dispatch);
   /// Into an 8-bit RGBA texture, of rows from the top without gaps.
   void add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba);
 

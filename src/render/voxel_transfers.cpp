@@ -105,10 +105,6 @@ const glm::dmat4& index_to_world_of(const volume::FieldCopy& field) {
   return std::get<volume::BrickCopy>(field.voxels).index_to_world();
 }
 
-gl::ProgramKey summary_program(VoxelFormat format) {
-  return {"summarize_bricks.comp", {"CM_FORMAT " + std::to_string(static_cast<int>(format))}};
-}
-
 /// The bricks that boxes touch.
 std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec3 size) {
   const glm::ivec3 bricks = bricks_of(size);
@@ -132,14 +128,14 @@ std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec
   return found;
 }
 
-void require_finite(const volume::DeviceBricks& bricks, const std::string& name) {
+void require_finite(const volume::DeviceBricks& bricks, volume::Channel channel, const std::string& name) {
   std::size_t bad = 0;
   while (bad < bricks.origins.size() && (bricks.summary(bad).voxels & CM_BRICK_NOT_FINITE) == 0) ++bad;
   if (bad == bricks.origins.size()) return;
   const glm::ivec3 origin = bricks.origins[bad];
   throw Error(ErrorCode::file,
-              one_line(name + ": density: a voxel of the 8x8x8 from (" + std::to_string(origin.x) + ", " +
-                       std::to_string(origin.y) + ", " + std::to_string(origin.z) + ") on is not finite"));
+              one_line(name + ": " + name_of(channel) + ": a voxel of the 8x8x8 from (" + std::to_string(origin.x) +
+                       ", " + std::to_string(origin.y) + ", " + std::to_string(origin.z) + ") on is not finite"));
 }
 
 }  // namespace
@@ -419,7 +415,9 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
     make_room_back(piece.room, piece.copied * each);
   }
   // The driver may be at it while bricks are packed.
-  if (transfer.stays_in_gl()) programs_->ask(summary_program(transfer.sources[0].format));
+  if (transfer.stays_in_gl()) {
+    for (const Piece& piece : transfer.pieces) programs_->ask(summaries_of(transfer, piece).program());
+  }
   if (state.wait != nullptr) gl.WaitSync(state.wait, 0, GL_TIMEOUT_IGNORED);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) pack(transfer, piece, choices[piece.field].name());
@@ -438,7 +436,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   gl::check(gl, what_step);
   if (transfer.whole) {
     // Those that nobody will want, but for the first: it arrives however fast they come.
-    const auto of_one = [&](const Transfer& other) { return other.whose == whose; };
+    const auto of_one = [&](const Transfer& other) { return other.whose == whose && !other.finds(); };
     auto other = std::ranges::find_if(transfers_, of_one);
     if (other != transfers_.end()) ++other;
     while ((other = std::find_if(other, transfers_.end(), of_one)) != transfers_.end()) other = drop(other);
@@ -457,50 +455,70 @@ std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* w
   return announced;
 }
 
-void VoxelTransfers::bring_back(const void* whose, std::string name, std::function<std::optional<InGl>()> find,
-                                Arrive arrive, Refuse refuse) {
+void VoxelTransfers::bring_back(const void* whose, const scene::StateInGl& now, Find find, Arrive arrive,
+                                Refuse refuse) {
   Transfer transfer;
   transfer.whose = whose;
-  transfer.name = std::move(name);
-  transfer.fields.push_back({volume::Channel::density, volume::BrickCopy(glm::dmat4(1.0))});
+  transfer.name = now.name;
+  for (const scene::StateInGl::Field& field : now.fields)
+    transfer.fields.push_back({field.channel, volume::BrickCopy(now.index_to_world)});
   transfer.arrival = std::move(arrive);
   transfer.refuse = std::move(refuse);
-  transfer.back = Return{std::move(find), nullptr, {}, 0};
+  transfer.back = Return{.find = std::move(find), .state = {}, .memories = {}};
   transfers_.push_back(std::move(transfer));
 }
 
 bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
   Return& back = *transfer.back;
-  auto& copy = std::get<volume::BrickCopy>(transfer.fields[0].voxels);
-  if (!back.bricks) {
-    const std::optional<InGl> there = back.find();
-    if (!there || !memories_->has(*there->bricks)) {
+  if (!back.state) {
+    const scene::StateInGlPtr there = back.find();
+    const auto has = [&](const volume::DeviceBricks* bricks) { return memories_->has(*bricks); };
+    if (!there || !std::ranges::all_of(std::as_const(*there).all(), has)) {
       transfer.arrival = Arrive([](const auto& /*fields*/) {});
       return true;
     }
-    for (const volume::DeviceMemoryPtr& memory : there->bricks->memories) {
-      back.memories.push_back(gl::ReadBack::unfilled(gl_, memory->bytes(), "creating a host's bricks in memory"));
-      gl_->CopyNamedBufferSubData(memories_->find(*memory)->name(), back.memories.back().name(), 0, 0,
-                                  static_cast<GLsizeiptr>(memory->bytes()));
+    transfer.fields.clear();
+    for (const scene::StateInGl::Field& field : there->fields) {
+      auto& memories = back.memories.emplace_back();
+      for (const volume::DeviceMemoryPtr& memory : field.bricks->memories) {
+        memories.push_back(gl::ReadBack::unfilled(gl_, memory->bytes(), "creating a host's bricks in memory"));
+        gl_->CopyNamedBufferSubData(memories_->find(*memory)->name(), memories.back().name(), 0, 0,
+                                    static_cast<GLsizeiptr>(memory->bytes()));
+      }
+      volume::BrickCopy copy(there->index_to_world);
+      copy.reserve(field.bricks->origins.size());
+      transfer.fields.push_back({field.channel, std::move(copy)});
     }
     transfer.fence = fence();
     gl::check(*gl_, what_step);
-    back.bricks = there->bricks;
-    copy = volume::BrickCopy(there->index_to_world);
-    copy.reserve(back.bricks->origins.size());
+    back.state = there;
   }
   if (!transfer.fence.passed()) return false;
-  const volume::DeviceBricks& bricks = *back.bricks;
   constexpr std::size_t at_a_time = 256;
   std::array<float, brick_voxels> values{};
-  while (back.taken < bricks.origins.size()) {
-    const volume::DeviceBricks::Place& place = bricks.places[back.taken];
-    const VoxelFormat format = bricks.memories[place.memory]->halves ? VoxelFormat::halves : VoxelFormat::floats;
-    unpack(format, back.memories[place.memory].data() + place.brick * brick_bytes(format), values);
-    copy.add(bricks.origins[back.taken], values);
-    if (++back.taken % at_a_time == 0 && std::chrono::steady_clock::now() > deadline) return false;
+  for (; back.field < back.state->fields.size(); ++back.field, back.taken = 0) {
+    const volume::DeviceBricks& bricks = *back.state->fields[back.field].bricks;
+    auto& copy = std::get<volume::BrickCopy>(transfer.fields[back.field].voxels);
+    while (back.taken < bricks.origins.size()) {
+      const volume::DeviceBricks::Place& place = bricks.places[back.taken];
+      const VoxelFormat format = bricks.memories[place.memory]->halves ? VoxelFormat::halves : VoxelFormat::floats;
+      unpack(format, back.memories[back.field][place.memory].data() + place.brick * brick_bytes(format), values);
+      copy.add(bricks.origins[back.taken], values);
+      if (++back.taken % at_a_time == 0 && std::chrono::steady_clock::now() > deadline) return false;
+    }
   }
   return true;
+}
+
+void VoxelTransfers::find_emissions(const void* whose, std::string name, StayInGl stay, Refuse refuse) {
+  Transfer transfer;
+  transfer.whose = whose;
+  transfer.whole = false;
+  transfer.name = std::move(name);
+  transfer.arrival = std::move(stay);
+  transfer.refuse = std::move(refuse);
+  transfer.counted = true;  // nothing is on its way
+  transfers_.push_back(std::move(transfer));
 }
 
 VoxelTransfers::PackedPlaces VoxelTransfers::places_of(const Transfer& transfer, const Piece& piece) {
@@ -524,34 +542,31 @@ void VoxelTransfers::begin_summaries(Transfer& transfer) {
   }
 }
 
-void VoxelTransfers::summarize(const Transfer& transfer, const Piece& piece, std::uint32_t first,
-                               std::uint32_t end) const {
-  const auto& gl = *gl_;
+BrickSummaries VoxelTransfers::summaries_of(const Transfer& transfer, const Piece& piece) const {
   const Source& source = transfer.sources[piece.field];
-  const gl::Program& program = programs_->ask(summary_program(source.format));
-  const glm::uvec3 bricks(bricks_of(source.size));
-  gl.ProgramUniform2ui(program.name(), 0, first, end);
-  gl.ProgramUniform3ui(program.name(), 1, bricks.x, bricks.y, bricks.z);
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_PLACES, piece.room.places.name());
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_VALUES, piece.room.values.name());
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_KEPT, memories_->find(*piece.kept)->name());
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICK_SUMMARIES, piece.room.summaries.name());
-  gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, transfer.brick_tree.name());
-  program.use(gl);
-  dispatch_groups(gl, end - first);
+  return {.format = source.format,
+          .cells = transfer.fields[piece.field].channel == volume::Channel::density,
+          .places = &piece.room.places,
+          .bricks = glm::uvec3(bricks_of(source.size)),
+          .values = &piece.room.values,
+          .kept = piece.kept ? memories_->find(*piece.kept) : nullptr,
+          .summaries = &piece.room.summaries,
+          .tree = &transfer.brick_tree};
 }
 
 bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
   const auto& gl = *gl_;
-  if (!programs_->ask(summary_program(transfer.sources[0].format)).usable()) return false;
+  for (const Piece& piece : transfer.pieces) {
+    if (!programs_->ask(summaries_of(transfer, piece).program()).usable()) return false;
+  }
   if (!transfer.brick_tree) begin_summaries(transfer);
-  // Where a processor computes them, what a call takes is known when it returns.
-  const std::uint32_t a_step = gl.dispatches_in_call ? 64 : 4096;
+  const std::uint32_t a_step = bricks_a_step(gl);
   for (Piece& piece : transfer.pieces) {
+    const BrickSummaries work = summaries_of(transfer, piece);
     while (piece.summarized < piece.filled) {
       const std::uint32_t left = piece.filled - piece.summarized;
       const std::uint32_t end = piece.summarized + std::min(left, a_step);
-      summarize(transfer, piece, piece.summarized, end);
+      work.dispatch(gl, programs_->ask(work.program()), piece.summarized, end);
       piece.summarized = end;
       if (std::chrono::steady_clock::now() > deadline) return false;
     }
@@ -569,22 +584,77 @@ bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
   return true;
 }
 
-volume::DeviceBricks VoxelTransfers::take_bricks(Transfer& transfer) {
-  volume::DeviceBricks made;
+std::vector<scene::StateInGl::Field> VoxelTransfers::take_fields(Transfer& transfer) {
+  std::vector<volume::DeviceBricks> made(transfer.fields.size());
   for (Piece& piece : transfer.pieces) {
+    volume::DeviceBricks& field = made[piece.field];
     const PackedPlaces places = places_of(transfer, piece);
     if (piece.kept) {
       std::memcpy(piece.kept->summaries.data(), piece.room.summaries_back.data(),
                   piece.filled * sizeof(volume::BrickSummary));
-      made.memories.push_back(piece.kept);
+      field.memories.push_back(piece.kept);
     }
     for (std::uint32_t i = 0; i < places.filled(); ++i) {
-      made.origins.push_back(places.origin(i));
-      made.places.push_back({static_cast<std::uint32_t>(made.memories.size() - 1), i});
+      field.origins.push_back(places.origin(i));
+      field.places.push_back({static_cast<std::uint32_t>(field.memories.size() - 1), i});
     }
-    for (std::size_t i = places.filled(); i < places.all(); ++i) made.emptied.push_back(places.origin(i));
+    for (std::size_t i = places.filled(); i < places.all(); ++i) field.emptied.push_back(places.origin(i));
   }
-  return made;
+  std::vector<scene::StateInGl::Field> fields;
+  for (std::size_t i = 0; i < made.size(); ++i) {
+    const volume::Channel channel = transfer.fields[i].channel;
+    require_finite(made[i], channel, transfer.name);
+    made[i].drop_empty();
+    if (transfer.whole) made[i].tidy();
+    made[i].wanted = std::get<StayInGl>(transfer.arrival).values_wanted;
+    fields.push_back({channel, std::make_shared<const volume::DeviceBricks>(std::move(made[i]))});
+  }
+  return fields;
+}
+
+void VoxelTransfers::join(Transfer& transfer) {
+  const StayInGl& stay = std::get<StayInGl>(transfer.arrival);
+  Staying& staying = transfer.staying.emplace();
+  std::vector<scene::StateInGl::Field> fields = take_fields(transfer);
+  // Bricks that may give off other light than before.
+  std::vector<glm::ivec3> changed;
+  for (const scene::StateInGl::Field& field : fields) {
+    if (field.channel == volume::Channel::density) continue;
+    changed.insert(changed.end(), field.bricks->origins.begin(), field.bricks->origins.end());
+    changed.insert(changed.end(), field.bricks->emptied.begin(), field.bricks->emptied.end());
+  }
+  staying.state = stay.join(std::move(fields));
+  if (!staying.state) return;
+  for (scene::Emission& settings : stay.wanted()) {
+    const scene::EmissionInGl* before = staying.state->emission(settings);
+    if (before != nullptr && changed.empty()) {
+      staying.kept.push_back(*before);
+    } else {
+      staying.finding.emplace_back(gl_, programs_, memories_, *staying.state, std::move(settings),
+                                   before != nullptr ? std::optional(changed) : std::nullopt);
+    }
+  }
+}
+
+bool VoxelTransfers::take_in_gl(Transfer& transfer, Deadline deadline) {
+  if (!transfer.counted) {
+    if (!transfer.fence.passed() || !summarize(transfer, deadline)) return false;
+    transfer.counted = true;
+  }
+  if (!transfer.staying) {
+    if (!transfer.fence.passed()) return false;
+    join(transfer);
+  }
+  return std::ranges::all_of(transfer.staying->finding,
+                             [&](BrickEmission& emission) { return emission.advance(deadline); });
+}
+
+scene::StateInGl VoxelTransfers::made(Staying& staying) {
+  scene::StateInGl& state = *staying.state;
+  for (BrickEmission& emission : staying.finding)
+    staying.kept.push_back(emission.take(state.emission(emission.settings())));
+  state.emissions = std::move(staying.kept);
+  return std::move(state);
 }
 
 void VoxelTransfers::copy_rest(Transfer& transfer) const {
@@ -610,17 +680,13 @@ void VoxelTransfers::copy_rest(Transfer& transfer) const {
 
 bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
   if (transfer.back) return take_back(transfer, deadline);
+  if (transfer.stays_in_gl()) return take_in_gl(transfer, deadline);
   if (!transfer.fence.passed()) return false;
   if (!transfer.counted) {
-    if (transfer.stays_in_gl()) {
-      if (!summarize(transfer, deadline)) return false;
-    } else {
-      copy_rest(transfer);
-    }
+    copy_rest(transfer);
     transfer.counted = true;
     if (!transfer.fence.passed()) return false;
   }
-  if (transfer.stays_in_gl()) return true;
   constexpr int at_a_time = 256;
   int bricks_since = 0;
   std::array<float, brick_voxels> values{};
@@ -665,7 +731,8 @@ void VoxelTransfers::refuse_on_top(const Transfer& whole) {
       continue;
     }
     if (other->whole) break;
-    other = drop(other);
+    // What is found is of the state that stays.
+    other = other->finds() ? std::next(other) : drop(other);
   }
   whole.refuse();
 }
@@ -687,9 +754,7 @@ void VoxelTransfers::follow(Deadline deadline) {
     try {
       if (!take(first, deadline)) return;
       if (first.stays_in_gl()) {
-        volume::DeviceBricks bricks = take_bricks(first);
-        require_finite(bricks, first.name);
-        std::get<StayInGl>(first.arrival)(std::move(bricks));
+        if (first.staying->state) std::get<StayInGl>(first.arrival).arrive(made(*first.staying));
       } else {
         if (!first.finite) {
           for (const volume::FieldCopy& field : first.fields) volume::require_finite(field.view(), first.name);
@@ -704,6 +769,7 @@ void VoxelTransfers::follow(Deadline deadline) {
     recycle(done);
     if (failure) {
       if (done.whole) refuse_on_top(done);
+      if (done.finds()) done.refuse();
       std::rethrow_exception(failure);
     }
     if (std::chrono::steady_clock::now() > deadline) return;
@@ -715,8 +781,10 @@ std::uint64_t VoxelTransfers::bytes() const {
   for (const Room& room : spare_) sum += room.all_bytes();
   for (const Transfer& transfer : transfers_) {
     for (const Piece& piece : transfer.pieces) sum += piece.room.all_bytes();
-    if (!transfer.back || !transfer.back->bricks) continue;
-    for (const volume::DeviceMemoryPtr& memory : transfer.back->bricks->memories) sum += memory->bytes();
+    if (!transfer.back || !transfer.back->state) continue;
+    for (const scene::StateInGl::Field& field : transfer.back->state->fields) {
+      for (const volume::DeviceMemoryPtr& memory : field.bricks->memories) sum += memory->bytes();
+    }
   }
   return sum;
 }

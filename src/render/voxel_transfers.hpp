@@ -14,14 +14,14 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "render/brick_emission.hpp"
+#include "render/brick_kernels.hpp"
 #include "render/device_memories.hpp"
 #include "render/upload.hpp"
+#include "scene/state_in_gl.hpp"
 #include "volume/state.hpp"
 
 namespace cumulet::render {
-
-/// As glsl/pack_bricks.comp: floats, halves, and whole numbers that stand for 0 to 1.
-enum class VoxelFormat { floats = 0, halves = 1, shorts = 2, bytes = 3 };
 
 /// One component of a GL_TEXTURE_3D.
 struct VoxelTexture {
@@ -66,8 +66,17 @@ class VoxelTransfers {
 
   /// Given the fields, whose copies are bricks; of those that changed the empty ones, too, as zeros.
   using Arrive = std::function<void(std::vector<volume::FieldCopy> fields)>;
-  /// Given the one field, whose bricks stay in GL; of those that changed the empty ones, too. Not tidy.
-  using StayInGl = std::function<void(volume::DeviceBricks bricks)>;
+  /// Fields stay in GL.
+  struct StayInGl {
+    /// Given those that arrived, in their order: the state that they make, what was found of another that it goes on
+    /// with among it; none: there is none to go on with. Of those that changed bricks are not tidy.
+    std::function<std::optional<scene::StateInGl>(std::vector<scene::StateInGl::Field> fields)> join;
+    /// By which settings it is to be found what that gives off.
+    std::function<std::vector<scene::Emission>()> wanted;
+    /// The same with these, and no others.
+    std::function<void(scene::StateInGl state)> arrive;
+    volume::ValuesWantedPtr values_wanted;  ///< of its bricks
+  };
   using Arrival = std::variant<Arrive, StayInGl>;
   /// A whole state does not arrive: something is wrong with it. Those on top of it that were on their way are gone.
   using Refuse = std::function<void()>;
@@ -75,15 +84,13 @@ class VoxelTransfers {
   /// channels and transforms are checked. Throws Error(invalid_argument) for what is no such object, Error(unsupported)
   /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
   void begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse);
-  /// Density that is in GL, its bricks being here.
-  struct InGl {
-    volume::DeviceBricksPtr bricks;
-    glm::dmat4 index_to_world{1.0};
-  };
   /// What stays in GL comes to main memory after all: as a whole state, after those that are on their way, of what find
-  /// gives by then; none: it does not come.
-  void bring_back(const void* whose, std::string name, std::function<std::optional<InGl>()> find, Arrive arrive,
-                  Refuse refuse);
+  /// gives by then; null: it does not come. now: what it would be now.
+  using Find = std::function<scene::StateInGlPtr()>;
+  void bring_back(const void* whose, const scene::StateInGl& now, Find find, Arrive arrive, Refuse refuse);
+  /// Once those that are on their way are there: what else is wanted is found of the state that stay.join gives for
+  /// none. Refuse: it could not be found.
+  void find_emissions(const void* whose, std::string name, StayInGl stay, Refuse refuse);
   /// Of whose newest whole state that is on its way.
   struct Announced {
     std::vector<volume::Channel> channels;
@@ -145,10 +152,17 @@ class VoxelTransfers {
   };
   // What stayed in GL, on its way back.
   struct Return {
-    std::function<std::optional<InGl>()> find;
-    volume::DeviceBricksPtr bricks;  // once it is known
-    std::vector<gl::ReadBack> memories;
-    std::size_t taken = 0;
+    Find find;
+    scene::StateInGlPtr state;                        // once it is known
+    std::vector<std::vector<gl::ReadBack>> memories;  // of each field
+    std::size_t field = 0;
+    std::size_t taken = 0;  // of that
+  };
+  // A state that stays, while what it gives off is found.
+  struct Staying {
+    std::optional<scene::StateInGl> state;
+    std::vector<scene::EmissionInGl> kept;  // as they are
+    std::deque<BrickEmission> finding;
   };
   struct Transfer {
     const void* whose = nullptr;
@@ -164,8 +178,11 @@ class VoxelTransfers {
     bool counted = false;   // what is filled is known, and was copied
     gl::Object brick_tree;  // while it is summarized
     std::optional<Return> back;
+    std::optional<Staying> staying;  // once its fields are there
 
     [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
+    // Nothing but what a state gives off.
+    [[nodiscard]] bool finds() const { return sources.empty() && !back; }
   };
 
   // Which bricks of it were packed, and where to.
@@ -188,13 +205,19 @@ class VoxelTransfers {
   bool take(Transfer& transfer, Deadline deadline);
   // Of what was in GL.
   bool take_back(Transfer& transfer, Deadline deadline);
+  // Of what stays there.
+  bool take_in_gl(Transfer& transfer, Deadline deadline);
+  void join(Transfer& transfer);
+  // With all that was found.
+  static scene::StateInGl made(Staying& staying);
   // What the driver had not copied by guess.
   void copy_rest(Transfer& transfer) const;
   // Of what stays in GL: values where they stay, and what main memory is to know of them. Returns whether all is sent.
   bool summarize(Transfer& transfer, Deadline deadline);
   void begin_summaries(Transfer& transfer);
   void summarize(const Transfer& transfer, const Piece& piece, std::uint32_t first, std::uint32_t end) const;
-  static volume::DeviceBricks take_bricks(Transfer& transfer);
+  [[nodiscard]] BrickSummaries summaries_of(const Transfer& transfer, const Piece& piece) const;
+  static std::vector<scene::StateInGl::Field> take_fields(Transfer& transfer);
   void recycle(Transfer& transfer);
   using Transfers = std::deque<Transfer>;
   // Nobody waits for it any more. Returns the one after it.

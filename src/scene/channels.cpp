@@ -83,10 +83,17 @@ class BrickSet {
   std::int64_t filled_ = 0;
 };
 
+// Far above all that is seen, and far enough below what floats hold for sums over a volume.
+constexpr double most_radiance = 1e12;
+
+glm::dvec3 flame_colour_of(const Emission& emission) {
+  return glm::dvec3(emission.flame_colour) * emission.flame_strength;
+}
+float intensity_of(const Emission& emission) { return static_cast<float>(std::min(emission.blackbody, most_radiance)); }
+
 class Glow {
  public:
-  explicit Glow(const Emission& emission)
-      : emission_(emission), flame_colour_(glm::dvec3(emission.flame_colour) * emission.flame_strength) {}
+  explicit Glow(const Emission& emission) : emission_(emission), flame_colour_(flame_colour_of(emission)) {}
 
   /// Of what the fields have there.
   [[nodiscard]] vec3 operator()(float temperature_value, float flame_value) const {
@@ -96,16 +103,13 @@ class Glow {
       const double kelvin =
           emission_.temperature_offset + emission_.temperature_scale * static_cast<double>(temperature);
       constexpr double hottest = 1e6;
-      const vec3 body = black_body_.emission(static_cast<float>(std::min(kelvin, hottest)),
-                                             static_cast<float>(std::min(emission_.blackbody, most_radiance)));
+      const vec3 body = black_body_.emission(static_cast<float>(std::min(kelvin, hottest)), intensity_of(emission_));
       light += glm::dvec3(body) * glm::dvec3(emission_.blackbody_tint);
     }
     return {glm::min(light, glm::dvec3(most_radiance))};
   }
 
  private:
-  // Far above all that is seen, and far enough below what floats hold for sums over a volume.
-  static constexpr double most_radiance = 1e12;
   Emission emission_;
   glm::dvec3 flame_colour_;
   light::BlackBody black_body_;
@@ -187,12 +191,33 @@ std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, cons
 
 }  // namespace
 
+core::CmBrickGlow shader_glow(const Emission& emission) {
+  core::CmBrickGlow glow{};
+  const auto put = [](const volume::Ramp& ramp, std::uint32_t& points, glm::vec2* to) {
+    points = static_cast<std::uint32_t>(ramp.points().size());
+    std::ranges::copy(ramp.points(), to);
+  };
+  glow.flame_colour = flame_colour_of(emission);
+  glow.intensity = intensity_of(emission);
+  glow.tint = emission.blackbody_tint;
+  glow.offset = static_cast<float>(emission.temperature_offset);
+  glow.scale = static_cast<float>(emission.temperature_scale);
+  glow.most = static_cast<float>(most_radiance);
+  put(emission.temperature_ramp, glow.temperature_points, glow.temperature_ramp);
+  put(emission.flame_ramp, glow.flame_points, glow.flame_ramp);
+  static_assert(CM_BODY_COLOURS == std::tuple_size_v<light::BlackBody::Colours>);
+  const light::BlackBody body;
+  float* to = glow.colours;
+  for (const vec3& colour : body.colours()) {
+    for (int i = 0; i < 3; ++i) *to++ = colour[i];
+  }
+  return glow;
+}
+
 std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
                                                       const Progress* progress) {
-  const bool burns =
-      frame.flame && !frame.flame->empty() && emission.flame_strength > 0.0 && emission.flame_colour != vec3(0.0F);
-  const bool hot = frame.temperature && !frame.temperature->empty() && emission.blackbody > 0.0 &&
-                   emission.blackbody_tint != vec3(0.0F);
+  const bool burns = frame.flame && !frame.flame->empty() && emission.burns();
+  const bool hot = frame.temperature && !frame.temperature->empty() && emission.is_hot();
   if (!burns && !hot) return std::nullopt;
   BrickSet set("temperature or flame");
   if (burns) set.add(*frame.flame);

@@ -5,9 +5,14 @@
 #include <optional>
 
 #include "base/log.hpp"
+#include "base/shared_code.hpp"
 #include "grid/rgb_field.hpp"
 #include "volume/frame.hpp"
 #include "volume/ramp.hpp"
+
+namespace cumulet::core {
+#include "brick_glow.glsl"
+}  // namespace cumulet::core
 
 namespace cumulet::scene {
 
@@ -22,7 +27,15 @@ struct Emission {
   volume::Ramp temperature_ramp = {};  ///< of the field's values, before offset and scale
   volume::Ramp flame_ramp = {};
   bool operator==(const Emission&) const = default;
+
+  /// Whether flame does, where there is any.
+  [[nodiscard]] bool burns() const { return flame_strength > 0.0 && flame_colour != glm::vec3(0.0F); }
+  /// Whether temperature does.
+  [[nodiscard]] bool is_hot() const { return blackbody > 0.0 && blackbody_tint != glm::vec3(0.0F); }
 };
+
+/// The same for shaders (glsl/emit_bricks.comp).
+core::CmBrickGlow shader_glow(const Emission& emission);
 
 /// Flame x strength x colour + what a black body of the temperature gives off: radiance a world unit of length, linear
 /// Rec. 709, voxel by voxel on the fields' lattice. Nothing if there is no such field, or none of them glows. O(bricks

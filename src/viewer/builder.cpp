@@ -49,11 +49,6 @@ bool Built::serves(const BuildSettings& wanted) const {
 
 namespace {
 
-// Of voxels in main memory, whatever can be known of them without.
-bool needs_values(const BuildSettings& settings) {
-  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty();
-}
-
 // What it is while the shutter is open; null where nothing moves.
 VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& progress) {
   try {
@@ -65,6 +60,10 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
 }
 
 }  // namespace
+
+bool needs_values(const BuildSettings& settings) {
+  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty();
+}
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
   log.info((most < max_cells ? "the memory that is allowed, of " + std::to_string(most) + " cells,"

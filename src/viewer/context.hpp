@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -70,6 +71,10 @@ class Context {
   [[nodiscard]] render::Progressive& progressive() { return progressive_; }
   [[nodiscard]] render::VoxelTransfers& transfers() { return transfers_; }
   [[nodiscard]] render::DeviceMemories& memories() { return *memories_; }
+  /// Whether all of its bricks are here.
+  [[nodiscard]] bool has(const scene::StateInGl& state) const {
+    return std::ranges::all_of(state.all(), [&](const auto* bricks) { return memories_->has(*bricks); });
+  }
   /// Before anything else, once.
   void find_out_dispatches();
 

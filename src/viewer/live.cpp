@@ -62,60 +62,83 @@ void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
   hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr);
 }
 
-void Live::set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name) {
-  bricks.tidy();
-  hand_over_in_gl(std::move(bricks), index_to_world, name, nullptr);
-}
+void Live::set(scene::StateInGl state) { hand_over(std::move(state), std::nullopt); }
 
-void Live::update(const volume::DeviceBricks& bricks, const std::string& name) {
-  const std::optional<InGl> before = in_gl();
+scene::StateInGl Live::with(const std::vector<scene::StateInGl::Field>& changed, const std::string& name) const {
+  const scene::StateInGlPtr before = in_gl().state;
   if (handed().empty()) refuse(name, no_state);
   if (!before) refuse(name, "the state before it is not in GL");
-  hand_over_in_gl(before->bricks->with(bricks), before->index_to_world, name, before->bricks.get());
-}
-
-void Live::hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name,
-                           const volume::DeviceBricks* on_top_of) {
-  bricks.wanted = values_wanted_;
-  InGl state{std::make_shared<const volume::DeviceBricks>(std::move(bricks)), index_to_world, name};
-  if (!hand_over({std::move(state), name, nullptr}, {{volume::Channel::density, Takes::bricks_in_gl}}, nullptr,
-                 on_top_of))
-    refuse(name, "another state came between");
-}
-
-void Live::set_if_newest(const volume::DeviceBricksPtr& in_gl, std::vector<volume::FieldCopy> fields,
-                         std::string name) {
-  hand_over({std::move(fields), std::move(name), nullptr}, {{volume::Channel::density, Takes::zeros}}, nullptr,
-            in_gl.get());
-}
-
-void Live::move_in_gl(const volume::DeviceBricksPtr& from, volume::DeviceBricksPtr to) {
-  const std::scoped_lock lock(mutex_);
-  if (!in_gl_ || in_gl_->bricks != from) return;
-  if (to) {
-    in_gl_->bricks = std::move(to);
-  } else {
-    in_gl_.reset();
-    handed_.clear();
+  scene::StateInGl state = *before;
+  state.name = name;
+  for (const scene::StateInGl::Field& field : changed) {
+    const auto there = std::ranges::find(state.fields, field.channel, &scene::StateInGl::Field::channel);
+    if (there == state.fields.end()) refuse(name, std::string("there is no ") + name_of(field.channel) + " to update");
+    there->bricks = std::make_shared<const volume::DeviceBricks>(there->bricks->with(*field.bricks));
   }
+  return state;
 }
 
-std::optional<Live::InGl> Live::in_gl() const {
+bool Live::set_if_newest(std::uint64_t in_gl, scene::StateInGl state) { return hand_over(std::move(state), in_gl); }
+
+bool Live::hand_over(scene::StateInGl state, std::optional<std::uint64_t> on_top_of) {
+  std::vector<Handed> handed;
+  for (const scene::StateInGl::Field& field : state.fields) handed.push_back({field.channel, Takes::bricks_in_gl});
+  std::string name = state.name;
+  return hand_over({std::make_shared<const scene::StateInGl>(std::move(state)), std::move(name), nullptr},
+                   std::move(handed), nullptr, on_top_of);
+}
+
+bool Live::set_if_newest(std::uint64_t in_gl, std::vector<volume::FieldCopy> fields, std::string name) {
+  std::vector<Handed> handed;
+  for (const volume::FieldCopy& field : fields) handed.push_back({field.channel, Takes::zeros});
+  return hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr, in_gl);
+}
+
+void Live::move_in_gl(const scene::StateInGlPtr& from, scene::StateInGlPtr to) {
+  const std::scoped_lock lock(mutex_);
+  if (in_gl_.state != from) return;
+  in_gl_.state = std::move(to);
+  if (!in_gl_.state) handed_.clear();
+}
+
+Live::InGl Live::in_gl() const {
   const std::scoped_lock lock(mutex_);
   return in_gl_;
 }
 
+Live::Wish Live::want(const scene::Emission& emission) {
+  auto wish = std::make_shared<const scene::Emission>(emission);
+  {
+    const std::scoped_lock lock(mutex_);
+    std::erase_if(wishes_, [](const auto& other) { return other.expired(); });
+    wishes_.push_back(wish);
+  }
+  wish_listeners_.tell();
+  return wish;
+}
+
+std::vector<scene::Emission> Live::wanted() const {
+  std::vector<scene::Emission> wanted;
+  const std::scoped_lock lock(mutex_);
+  for (const auto& held : wishes_) {
+    const Wish wish = held.lock();
+    if (wish && std::ranges::find(wanted, *wish) == wanted.end()) wanted.push_back(*wish);
+  }
+  return wanted;
+}
+
 bool Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
-                     const volume::DeviceBricks* on_top_of) {
+                     std::optional<std::uint64_t> on_top_of) {
   Next next;
-  std::optional<InGl> state;
-  if (const auto* there = std::get_if<InGl>(&whole.fields)) state = *there;
+  InGl state;
+  if (const auto* there = std::get_if<scene::StateInGlPtr>(&whole.fields)) state.state = *there;
   next.whole = std::move(whole);
   // Last of what may fail: who is refused keeps the memory.
   if (lease) next.whole->lease = lease();
   {
     const std::scoped_lock lock(mutex_);
-    if (on_top_of != nullptr && (!in_gl_ || in_gl_->bricks.get() != on_top_of)) return false;
+    if (on_top_of && (!in_gl_.state || in_gl_.number != *on_top_of)) return false;
+    state.number = newest_ + 1;
     std::swap(next_, next);  // what nobody read ends after the lock
     std::swap(handed_, handed);
     std::swap(in_gl_, state);
@@ -224,18 +247,18 @@ void Live::refuse_base(std::optional<Whole>& old) {
   if (next_.whole) return;
   std::swap(next_, next);
   handed_.clear();
-  in_gl_.reset();
+  in_gl_ = {};
   base_number_ = newest_;
 }
 
-volume::VolumeFrame Live::read_base(Progress& progress) const {
-  if (const auto* there = std::get_if<InGl>(&base_->fields))
-    return {.density = volume::volume_on_device(there->bricks, base_->name, there->index_to_world)};
+VolumeAssetPtr Live::read_base(Progress& progress) const {
+  if (const auto* there = std::get_if<scene::StateInGlPtr>(&base_->fields))
+    return std::make_shared<const VolumeAsset>(*there, &progress);
   const std::vector<MemoryField> fields = base_->view();
   if (base_->lease) {
     for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
   }
-  return volume::import_fields(fields, base_->name, {}, &progress);
+  return std::make_shared<const VolumeAsset>(volume::import_fields(fields, base_->name, {}, &progress), &progress);
 }
 
 Live::State Live::read(Progress& progress) {
@@ -247,7 +270,7 @@ Live::State Live::read(Progress& progress) {
   try {
     if (newest_ != base_number_) take_next(before);
     if (!base_ || base_number_ == state_.number) return state_;
-    state_.volume = std::make_shared<const VolumeAsset>(read_base(progress), &progress);
+    state_.volume = read_base(progress);
     state_.number = base_number_;
   } catch (const Error& error) {
     if (error.code() != ErrorCode::cancelled) refuse_base(after);

@@ -43,25 +43,38 @@ class Live {
   /// fields do.
   void set(std::vector<volume::FieldCopy> fields, std::string name);
   void update(volume::Changes changes, const std::string& name);
-  /// The same of density in GL; not tidy.
-  void set(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name);
-  /// Voxels of what was in GL, if that is still the newest.
-  void set_if_newest(const volume::DeviceBricksPtr& in_gl, std::vector<volume::FieldCopy> fields, std::string name);
-  void update(const volume::DeviceBricks& bricks, const std::string& name);
+  /// The same of fields in GL.
+  void set(scene::StateInGl state);
+  /// What the newest is with these bricks in their places, which need not be tidy. Throws as update() does, and where
+  /// the newest is not in GL.
+  [[nodiscard]] scene::StateInGl with(const std::vector<scene::StateInGl::Field>& changed,
+                                      const std::string& name) const;
+  /// What follows the state in GL of this number, if that is still the newest. Returns whether it is.
+  bool set_if_newest(std::uint64_t in_gl, scene::StateInGl state);
+  /// Voxels of it, likewise.
+  bool set_if_newest(std::uint64_t in_gl, std::vector<volume::FieldCopy> fields, std::string name);
   /// Of those who need voxels; null: none has to be asked for.
   [[nodiscard]] const volume::ValuesWantedPtr& values_wanted() const { return values_wanted_; }
-  /// Whether density that is handed over by way of GL is to stay there; false once anyone needed its voxels.
+  /// Whether what is handed over by way of GL is to stay there; false once anyone needed its voxels.
   [[nodiscard]] bool stays_in_gl() const { return values_wanted_ && !values_wanted_->asked(); }
-  /// Of the state that was handed over last, which is in GL; null: it is not.
+  /// The state that was handed over last, which is in GL; null: it is not.
   struct InGl {
-    volume::DeviceBricksPtr bricks;
-    glm::dmat4 index_to_world{1.0};
-    std::string name;
+    scene::StateInGlPtr state;
+    std::uint64_t number = 0;
   };
-  [[nodiscard]] std::optional<InGl> in_gl() const;
+  [[nodiscard]] InGl in_gl() const;
   /// If that is still the newest, what comes is on top of the same elsewhere; null: its memory is gone, and none is
   /// updated until a whole state is handed over.
-  void move_in_gl(const volume::DeviceBricksPtr& from, volume::DeviceBricksPtr to);
+  void move_in_gl(const scene::StateInGlPtr& from, scene::StateInGlPtr to);
+  /// Somebody wants to know what states in GL give off by these settings, for as long as this is held.
+  using Wish = std::shared_ptr<const scene::Emission>;
+  [[nodiscard]] Wish want(const scene::Emission& emission);
+  /// Each once.
+  [[nodiscard]] std::vector<scene::Emission> wanted() const;
+  /// Listeners::listen() to others being wanted.
+  [[nodiscard]] std::shared_ptr<void> listen_to_wishes(std::function<void()> changed) {
+    return wish_listeners_.listen(std::move(changed));
+  }
 
   /// Throws where update() would, of these channels. comes: those of the whole state that will have been handed over by
   /// then; none: the last one.
@@ -91,7 +104,7 @@ class Live {
  private:
   // Voxels of a whole state: copies, or as long as the lease holds the host's; or in GL.
   struct Whole {
-    std::variant<std::vector<volume::FieldCopy>, std::vector<volume::MemoryField>, InGl> fields;
+    std::variant<std::vector<volume::FieldCopy>, std::vector<volume::MemoryField>, scene::StateInGlPtr> fields;
     std::string name;
     Lease lease;
     [[nodiscard]] std::vector<volume::MemoryField> view() const;
@@ -112,22 +125,22 @@ class Live {
   static const Handed& updatable(const std::vector<Handed>& handed, volume::Channel channel, const std::string& name);
   static const Handed& updatable_from_memory(const std::vector<Handed>& handed, volume::Channel channel,
                                              const std::string& name);
-  // on_top_of: it follows this; null: whatever there is. Returns whether it does.
+  // on_top_of: it follows this state in GL; none: whatever there is. Returns whether it does.
   bool hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& lease,
-                 const volume::DeviceBricks* on_top_of = nullptr);
-  void hand_over_in_gl(volume::DeviceBricks bricks, const glm::dmat4& index_to_world, const std::string& name,
-                       const volume::DeviceBricks* on_top_of);
+                 std::optional<std::uint64_t> on_top_of = std::nullopt);
+  bool hand_over(scene::StateInGl state, std::optional<std::uint64_t> on_top_of);
   // Of what was handed over last when they were made.
   void hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name);
   // reading_ is held.
-  [[nodiscard]] volume::VolumeFrame read_base(Progress& progress) const;
+  [[nodiscard]] VolumeAssetPtr read_base(Progress& progress) const;
   // old: what it held before.
   void take_next(std::optional<Whole>& old);
   void refuse_base(std::optional<Whole>& old);
 
   std::optional<Bounds> bounds_;
-  volume::ValuesWantedPtr values_wanted_;  // null: what a host has in GL comes to main memory
-  std::optional<InGl> in_gl_;              // of the newest, under mutex_
+  volume::ValuesWantedPtr values_wanted_;                     // null: what a host has in GL comes to main memory
+  InGl in_gl_;                                                // the newest, under mutex_
+  std::vector<std::weak_ptr<const scene::Emission>> wishes_;  // likewise
   std::atomic<std::uint64_t> newest_ = 0;
   mutable std::mutex mutex_;  // of these, held for moments
   Next next_;
@@ -137,6 +150,7 @@ class Live {
   std::uint64_t base_number_ = 0;
   State state_;
   Listeners listeners_;
+  Listeners wish_listeners_;
 };
 
 }  // namespace cumulet::viewer

@@ -21,6 +21,7 @@ void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings
   begun_.reset();
   old = std::exchange(ready_, std::nullopt);
   std::swap(live_, live);
+  wish_.reset();
   settings_ = std::move(settings);
   begin();
 }
@@ -81,6 +82,23 @@ void LiveBuilder::begin() {
   job_ = job;  // not where there is no thread for it
 }
 
+std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeAsset& state,
+                                                       const BuildSettings& settings) {
+  const scene::StateInGlPtr& in_gl = state.in_gl();
+  if (!in_gl || needs_values(settings)) return settings;
+  const scene::Emission wanted = state.emission_by(settings.emission);
+  if (!in_gl->emits(wanted)) return settings;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (live_.get() == &live && (!wish_ || *wish_ != wanted)) wish_ = live.want(wanted);
+  }
+  if (in_gl->emission(wanted) != nullptr) return settings;
+  if (in_gl->emissions.empty()) return std::nullopt;
+  BuildSettings instead = settings;
+  instead.emission = in_gl->emissions.front().settings;
+  return instead;
+}
+
 bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   std::shared_ptr<Live> live;
   Begun begun;
@@ -105,8 +123,10 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
       const Live::State state = live->read(progress);
       const double load_seconds = watch.lap();
       if (!state.volume) return;
+      const std::optional<BuildSettings> settings = settings_for(*live, *state.volume, begun.settings);
+      if (!settings) return;
       // Else it needs voxels, which another state brings.
-      ready = {build_grid(log_, state.volume, begun.settings, progress, *allowance_), state.number};
+      ready = {build_grid(log_, state.volume, *settings, progress, *allowance_), state.number};
       ready.built.seconds.load = load_seconds;
     });
     progress.check();

@@ -54,6 +54,9 @@ class LiveBuilder {
   // All of these under the lock.
   [[nodiscard]] bool is_due() const;
   void begin();
+  // What a state in GL gives off may have been found by other settings: the same with these, until it is found by those
+  // that are wanted; none: nothing was found yet.
+  std::optional<BuildSettings> settings_for(Live& live, const VolumeAsset& state, const BuildSettings& settings);
   // Returns whether the job is done: no newer state is there in place of one that failed.
   bool build(std::uint64_t job, Progress& progress);
 
@@ -62,6 +65,7 @@ class LiveBuilder {
   mutable std::mutex mutex_;
   std::shared_ptr<Live> live_;
   std::optional<BuildSettings> settings_;
+  Live::Wish wish_;  // of a state in GL
   std::optional<Begun> begun_;
   std::optional<std::uint64_t> job_;  // that is under way, or waits for the worker
   std::uint64_t last_job_ = 0;

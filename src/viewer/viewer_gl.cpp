@@ -275,7 +275,7 @@ FrameResult Viewer::render(const Frame& frame) {
     }
     if (watched_) note_drawn(g, *watched_);
     for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
-    if (something_waits() || g.transfers().busy()) {
+    if (something_waits() || g.transfers().busy() || voxels_in_gl_wait(g)) {
       result.more = true;
       result.converged = false;
     }
@@ -309,6 +309,49 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
 
 // ---- states in GL ----
 
+namespace {
+
+// What may stay in GL, and where it then stands: density and what burns, of one lattice.
+std::optional<glm::dmat4> lattice_in_gl(const render::GlState& state) {
+  bool has_density = false;
+  for (const render::GlVoxels& field : state.fields) {
+    using volume::Channel;
+    if (field.channel != Channel::density && field.channel != Channel::temperature && field.channel != Channel::flame)
+      return std::nullopt;
+    if (field.index_to_world != state.fields[0].index_to_world) return std::nullopt;
+    has_density = has_density || field.channel == Channel::density;
+  }
+  return has_density || state.changed ? std::optional(state.fields[0].index_to_world) : std::nullopt;
+}
+
+// Of a whole state; boxes: on top of what is the newest by then.
+render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
+                                            const glm::dmat4& index_to_world, bool boxes) {
+  const auto below = std::make_shared<std::uint64_t>(0);
+  render::VoxelTransfers::StayInGl stay;
+  stay.values_wanted = live->values_wanted();
+  stay.wanted = [live] { return live->wanted(); };
+  if (boxes) {
+    stay.join = [live, name, below](const auto& fields) {
+      *below = live->in_gl().number;
+      return live->with(fields, name);
+    };
+    stay.arrive = [live, name, below](scene::StateInGl state) {
+      if (!live->set_if_newest(*below, std::move(state)))
+        throw Error(ErrorCode::invalid_argument, one_line(name + ": another state came between"));
+    };
+  } else {
+    stay.join = [name, index_to_world](auto fields) {
+      return scene::StateInGl{
+          .name = name, .fields = std::move(fields), .index_to_world = index_to_world, .emissions = {}};
+    };
+    stay.arrive = [live](scene::StateInGl state) { live->set(std::move(state)); };
+  }
+  return stay;
+}
+
+}  // namespace
+
 // live: a copy, for the log callback may release the host's last handle.
 void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
   std::vector<volume::MemoryField> fields;  // what of them can be checked without voxels
@@ -321,33 +364,28 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
                                                           .index_to_world = field.index_to_world}});
     channels.push_back(field.channel);
   }
-  const bool density_alone = channels == std::vector{volume::Channel::density};
   // Where it stands; none: it does not stay in GL.
   const auto place_in_gl = [&](Context& g) -> std::optional<glm::dmat4> {
-    if (!density_alone) return std::nullopt;
-    if (!state.changed) return live->stays_in_gl() ? std::optional(state.fields[0].index_to_world) : std::nullopt;
+    const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
+    if (!lattice) return std::nullopt;
+    if (!state.changed) return live->stays_in_gl() ? lattice : std::nullopt;
     // Boxes go where the rest is.
     const auto announced = g.transfers().announced(live.get());
-    const std::optional<Live::InGl> rest = live->in_gl();
+    const scene::StateInGlPtr rest = live->in_gl().state;
     if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
-    if (!announced && !g.memories().has(*rest->bricks))
-      throw Error(ErrorCode::invalid_argument, one_line(state.name + ": the rest of it is in another viewer's context"));
+    if (!announced && !g.has(*rest))
+      throw Error(ErrorCode::invalid_argument,
+                  one_line(state.name + ": the rest of it is in another viewer's context"));
     if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
     bring_back(g, live);
     return std::nullopt;
   };
   render::VoxelTransfers::Arrive arrive;
-  render::VoxelTransfers::StayInGl stay;
   if (!state.changed) {
     volume::check_fields(fields, state.name);
-    if (density_alone)
-      stay = [live, name = state.name, to_world = state.fields[0].index_to_world](volume::DeviceBricks bricks) {
-        live->set(std::move(bricks), to_world, name);
-      };
     arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
   } else {
     volume::check_update(fields, state.name);
-    stay = [live, name = state.name](const volume::DeviceBricks& bricks) { live->update(bricks, name); };
     arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) {
       volume::Changes changes;
       for (volume::FieldCopy& copy : copies)
@@ -362,9 +400,11 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
     }
     const std::optional<glm::dmat4> place = place_in_gl(g);
     render::GlState placed = state;
-    if (place) placed.fields[0].index_to_world = *place;
     render::VoxelTransfers::Arrival arrival = std::move(arrive);
-    if (place) arrival = std::move(stay);
+    if (place) {
+      for (render::GlVoxels& field : placed.fields) field.index_to_world = *place;
+      arrival = stay_in_gl(live, state.name, *place, state.changed.has_value());
+    }
     g.transfers().begin(placed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
     if (place) tend(live);
   });
@@ -374,43 +414,99 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
 void Viewer::tend(const std::shared_ptr<Live>& live) {
   if (live->values_wanted() == nullptr) return;
   if (std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; })) return;
-  lives_in_gl_.push_back({live, live->values_wanted()->listen([this] { notify(); }), {}, {}});
+  lives_in_gl_.push_back(
+      {.live = live,
+       .listeners = {live->values_wanted()->listen([this] { notify(); }), live->listen_to_wishes([this] { notify(); })},
+       .gathered = {},
+       .brought = {},
+       .found = {},
+       .found_by = {}});
 }
 
 void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live) {
-  using Transfers = render::VoxelTransfers;
   const auto found = std::make_shared<Live::InGl>();
   g.transfers().bring_back(
-      live.get(), "state",
-      [live, found]() -> std::optional<Transfers::InGl> {
-        const std::optional<Live::InGl> state = live->in_gl();
-        if (!state) return std::nullopt;
-        *found = *state;
-        return Transfers::InGl{state->bricks, state->index_to_world};
+      live.get(), *live->in_gl().state,
+      [live, found] {
+        *found = live->in_gl();
+        return found->state;
       },
       [live, found](std::vector<volume::FieldCopy> copies) {
-        live->set_if_newest(found->bricks, std::move(copies), found->name);
+        live->set_if_newest(found->number, std::move(copies), found->state->name);
       },
       [live] { live->refuse_updates(); });
+}
+
+void Viewer::find_emissions(Context& g, const std::shared_ptr<Live>& live) {
+  const auto found = std::make_shared<Live::InGl>();
+  render::VoxelTransfers::StayInGl stay;
+  stay.join = [live, found](const auto& /*none*/) {
+    *found = live->in_gl();
+    return found->state ? std::optional(*found->state) : std::nullopt;
+  };
+  stay.wanted = [live] { return live->wanted(); };
+  stay.arrive = [live, found](scene::StateInGl state) { live->set_if_newest(found->number, std::move(state)); };
+  // Main memory has other ways.
+  g.transfers().find_emissions(live.get(), "state", std::move(stay), [live] { live->values_wanted()->ask(); });
+}
+
+scene::StateInGlPtr Viewer::gathered(Context& g, const scene::StateInGl& state) {
+  std::optional<scene::StateInGl> made;
+  const auto gather = [&](const std::vector<volume::DeviceBricksPtr*>& all, std::size_t i) {
+    if (auto bricks = g.memories().gather(g.functions(), *g.programs(), **all[i])) *all[i] = std::move(bricks);
+  };
+  const auto all = state.all();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all[i]->scattered()) continue;
+    if (!made) made = state;
+    gather(made->all(), i);
+  }
+  return made ? std::make_shared<const scene::StateInGl>(std::move(*made)) : nullptr;
+}
+
+bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) const {
+  const std::shared_ptr<Live> of = live.lock();
+  if (!of || of->stays_in_gl() || brought.lock() == state) return false;
+  const auto announced = g.transfers().announced(of.get());
+  return !announced || announced->stays_in_gl;
+}
+
+bool Viewer::InGl::needs_emissions(const scene::StateInGlPtr& state) const {
+  const std::shared_ptr<Live> of = live.lock();
+  if (!of || !of->stays_in_gl()) return false;
+  const std::vector<scene::Emission> wanted = of->wanted();
+  const auto is_there = [&](const scene::Emission& settings) { return state->emission(settings) != nullptr; };
+  return !std::ranges::all_of(wanted, is_there) && (found.lock() != state || found_by != wanted);
+}
+
+bool Viewer::voxels_in_gl_wait(Context& g) const {
+  return std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) {
+    const std::shared_ptr<Live> live = in_gl.live.lock();
+    const scene::StateInGlPtr state = live ? live->in_gl().state : nullptr;
+    return state && g.has(*state) && (in_gl.needs_values(g, state) || in_gl.needs_emissions(state));
+  });
 }
 
 void Viewer::tend_voxels_in_gl(Context& g) {
   std::erase_if(lives_in_gl_, [](const InGl& in_gl) { return in_gl.live.expired(); });
   for (InGl& in_gl : lives_in_gl_) {
     const std::shared_ptr<Live> live = in_gl.live.lock();
-    const std::optional<Live::InGl> state = live ? live->in_gl() : std::nullopt;
+    const scene::StateInGlPtr state = live ? live->in_gl().state : nullptr;
     if (!state) continue;
-    if (state->bricks->gone()) live->move_in_gl(state->bricks, nullptr);
-    if (!g.memories().has(*state->bricks)) continue;
-    const auto announced = g.transfers().announced(live.get());
-    if (!live->stays_in_gl() && (!announced || announced->stays_in_gl) && in_gl.brought.lock() != state->bricks) {
-      in_gl.brought = state->bricks;
+    if (state->gone()) live->move_in_gl(state, nullptr);
+    if (!g.has(*state)) continue;
+    if (in_gl.needs_values(g, state)) {
+      in_gl.brought = state;
       bring_back(g, live);
     }
-    if (live->stays_in_gl() && state->bricks->scattered() && in_gl.gathered.lock() != state->bricks) {
-      in_gl.gathered = state->bricks;
-      if (auto gathered = g.memories().gather(g.functions(), *g.programs(), *state->bricks))
-        live->move_in_gl(state->bricks, std::move(gathered));
+    if (in_gl.needs_emissions(state)) {
+      in_gl.found = state;
+      in_gl.found_by = live->wanted();
+      find_emissions(g, live);
+    }
+    if (live->stays_in_gl() && in_gl.gathered.lock() != state) {
+      in_gl.gathered = state;
+      if (scene::StateInGlPtr moved = gathered(g, *state)) live->move_in_gl(state, std::move(moved));
     }
   }
 }

@@ -52,6 +52,11 @@ VolumeAsset::VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, co
   begin(progress);
 }
 
+VolumeAsset::VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress)
+    : in_gl_(std::move(in_gl)), frame_(make_left<const volume::VolumeFrame>(in_gl_->frame())) {
+  begin(progress);
+}
+
 VolumeAsset::Frames VolumeAsset::frames() const { return close_ ? Frames{frame_, close_} : Frames{frame_}; }
 
 void VolumeAsset::begin(const Progress* progress) {
@@ -189,12 +194,17 @@ grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Chan
   return latticed_->lattice;
 }
 
-grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
-                                     bool anisotropic, Progress& progress, const Log& log) const {
+scene::Emission VolumeAsset::emission_by(const scene::Emission& emission) const {
   scene::Emission given = emission;
   // What has a temperature alone would be nothing.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
   if (given.blackbody == 0.0 && alone) given.blackbody = 1.0;
+  return given;
+}
+
+grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
+                                     bool anisotropic, Progress& progress, const Log& log) const {
+  const scene::Emission given = emission_by(emission);
   const auto field = [&]<class Field>(std::type_identity<Field>, auto values) {
     return values ? make_left<const Field>(*std::move(values), cube_, &progress) : nullptr;
   };
@@ -207,7 +217,10 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   if (!glowing_ || glowing_->settings != given) {
     drop(latticed_);  // it holds them
     drop(glowing_);
-    auto glow = scene::emission_of(open, given, &progress);
+    const scene::EmissionInGl* found = in_gl_ ? in_gl_->emission(given) : nullptr;
+    auto glow = found != nullptr ? in_gl_->components(*found)
+                : in_gl_         ? std::nullopt
+                                 : scene::emission_of(open, given, &progress);
     if (close != nullptr)
       glow = scene::mean_of(glow, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
     put(glowing_, Glowing{given, field(colours, std::move(glow))});

@@ -13,6 +13,7 @@
 #include "grid/lattice.hpp"
 #include "grid/statistics.hpp"
 #include "scene/channels.hpp"
+#include "scene/state_in_gl.hpp"
 #include "viewer/bounds.hpp"
 #include "volume/frame.hpp"
 #include "volume/optical_depth.hpp"
@@ -44,6 +45,8 @@ class VolumeAsset {
   explicit VolumeAsset(volume::VolumeFrame frame, const Progress* progress = nullptr);
   /// As it is while the shutter is open, from one frame to the other, of one lattice: its fields are the means of both.
   VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, const Progress* progress = nullptr);
+  /// What is in GL.
+  explicit VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress = nullptr);
   explicit VolumeAsset(volume::ScalarVolume density, const Progress* progress = nullptr)
       : VolumeAsset(volume::VolumeFrame{.density = std::move(density)}, progress) {}
 
@@ -83,8 +86,13 @@ class VolumeAsset {
   /// Throws as density() does.
   [[nodiscard]] grid::LatticePtr lattice(const volume::Ramp& ramp, const grid::Channels& channels,
                                          const grid::RefineSettings& refine, Progress& progress) const;
-  /// What it has beside density; anisotropic: its anisotropy, too. The last that were asked for are kept: another
-  /// threshold or camera asks for the same. log hears of what is left out, when it is made.
+  /// By which settings what burns or is hot gives off light where these are asked for.
+  [[nodiscard]] scene::Emission emission_by(const scene::Emission& emission) const;
+  /// The state that is in GL; null: its voxels are in main memory.
+  [[nodiscard]] const scene::StateInGlPtr& in_gl() const { return in_gl_; }
+  /// What it has beside density; anisotropic: its anisotropy, too. What one that is in GL gives off was found there.
+  /// The last that were asked for are kept: another threshold or camera asks for the same. log hears of what is left
+  /// out, when it is made.
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
                                         bool anisotropic, Progress& progress, const Log& log = {}) const;
 
@@ -104,6 +112,7 @@ class VolumeAsset {
     kept.reset();
   }
 
+  scene::StateInGlPtr in_gl_;
   std::shared_ptr<const volume::VolumeFrame> frame_;
   std::shared_ptr<const volume::VolumeFrame> close_;  // null: there is no shutter
   VolumeFactsPtr facts_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "base/error.hpp"
@@ -44,11 +45,23 @@ void DeviceBricks::fill_means(std::size_t brick, BrickValues::Brick& values) con
   for (unsigned v = 0; v < values.size(); ++v) values[v] = s.blocks[block_of_voxel(v)] / 8.0F;
 }
 
-void DeviceBricks::tidy() {
-  std::vector<std::size_t> order;
+void DeviceBricks::drop_empty() {
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < origins.size(); ++i) {
-    if (summary(i).voxels != 0) order.push_back(i);
+    if (summary(i).voxels == 0) {
+      emptied.push_back(origins[i]);
+      continue;
+    }
+    origins[kept] = origins[i];
+    places[kept++] = places[i];
   }
+  origins.resize(kept);
+  places.resize(kept);
+}
+
+void DeviceBricks::tidy() {
+  std::vector<std::size_t> order(origins.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return lexicographic(origins[a], origins[b]); });
   DeviceBricks made;
   made.wanted = wanted;

@@ -89,7 +89,9 @@ struct DeviceBricks {
   [[nodiscard]] std::uint64_t bytes() const;
   /// Of a brick its values, as far as they are known here: of 2^3 voxels each the mean.
   void fill_means(std::size_t brick, BrickValues::Brick& values) const;
-  /// In the order that it is to have; without bricks that are empty, and memories that none is in.
+  /// Bricks that are empty go to those that are emptied.
+  void drop_empty();
+  /// In the order that it is to have; without memories that no brick is in, and what was emptied.
   void tidy();
   /// The same with the other's bricks in their places, and without those that it empties. Tidy.
   [[nodiscard]] DeviceBricks with(const DeviceBricks& other) const;

@@ -18,6 +18,7 @@ class Ramp {
 
   /// Whether every value stays as it is.
   [[nodiscard]] bool empty() const { return points_.empty(); }
+  [[nodiscard]] const std::vector<glm::vec2>& points() const { return points_; }
   /// value: not negative. O(log points).
   [[nodiscard]] float operator()(float value) const;
   bool operator==(const Ramp&) const = default;

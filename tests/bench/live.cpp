@@ -1,7 +1,7 @@
 // How long it takes from a state's hand-over to its picture, and where that goes: of a plume in a dense array of so
 // many voxels a side, which is copied or held, of its bricks, of a tenth of its bricks, and of textures: handed over as
 // they are, or read back by the host through a pixel buffer and held. A picture is there when a
-// frame draws it, coarse where the budget makes it so. By hand:
+// frame draws it, coarse where the budget makes it so. Fire has a temperature beside its density. By hand:
 //
 //     cumulet-bench-live [SIDE [STATES]]...
 #include <algorithm>
@@ -114,8 +114,9 @@ class Textures {
     for (int& s : dense.size) s = side_;
     std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), dense.index_to_world);
   }
-  [[nodiscard]] cumulet_gl_field field() const {
+  [[nodiscard]] cumulet_gl_field field(cumulet_channel channel) const {
     auto field = make_desc<cumulet_gl_field>();
+    field.channel = channel;
     field.texture = names_[0];
     std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), field.index_to_world);
     return field;
@@ -140,6 +141,7 @@ class Bench {
     viewer_ = cumulet::bench::make_viewer(context_);
     auto medium = make_desc<cumulet_medium_desc>();
     medium.density_scale = density_scale;
+    medium.blackbody = 1.0F;
     must(viewer_.get(), cumulet_set_medium(viewer_.get(), &medium));
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = 1;  // so that nothing else is under way when the next comes
@@ -201,14 +203,16 @@ class Bench {
   }
   [[nodiscard]] std::uint64_t cells() const { return cells_; }
 
-  // Of a texture, to which voxels are copied on the device first, as a simulation's step would write them.
-  Spent show(const Textures& textures, int i, bool changed) {
+  // Of a texture, to which voxels are copied on the device first, as a simulation's step would write them. fire: it is
+  // a temperature as well.
+  Spent show(const Textures& textures, int i, bool changed, bool fire = false) {
     textures.step(i);
     return show([&] {
-      const cumulet_gl_field field = textures.field();
+      const cumulet_gl_field fields[] = {textures.field(CUMULET_CHANNEL_DENSITY),
+                                         textures.field(CUMULET_CHANNEL_TEMPERATURE)};
       auto desc = make_desc<cumulet_gl_state_desc>();
-      desc.fields = &field;
-      desc.field_count = 1;
+      desc.fields = fields;
+      desc.field_count = fire ? 2 : 1;
       const cumulet_voxel_box box = textures.tenth();
       if (changed) {
         desc.changed = &box;
@@ -311,6 +315,11 @@ void measure(int side, int count) {
     rows_of(built_there, name("in GL, R16F").c_str(), [&](int i) { return built_there.show(there, i, false); });
     rows_of(built_there, name("in GL, R16F, a tenth of it").c_str(),
             [&](int i) { return built_there.show(there, i, true); });
+    built_there.show(there, 0, false, true);  // what it gives off is asked for first
+    rows_of(built_there, name("fire in GL, R16F").c_str(),
+            [&](int i) { return built_there.show(there, i, false, true); });
+    rows_of(built_there, name("fire in GL, R16F, a tenth of it").c_str(),
+            [&](int i) { return built_there.show(there, i, true, true); });
   }
 }
 

@@ -986,7 +986,7 @@ TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
 TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array nothing(CUMULET_VOXEL_FORMAT_R16F, std::vector<float>(array.values.size(), 0.0F));
-  const Array hot(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_TEMPERATURE, odd, 0));
+  const Array ahead(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_ANISOTROPY, odd, 0));
   const Picture expected = reference(array.values);
   hand_over_density(array, types[1]);
   EXPECT_EQ(arrive(), 1U);
@@ -995,10 +995,10 @@ TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   EXPECT_EQ(arrive(), 1U);
   EXPECT_NE(difference(picture(), expected), "");
   hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array)),
-             in_texture(CUMULET_CHANNEL_TEMPERATURE, odd, objects_.texture(odd, types[1], hot))});
+             in_texture(CUMULET_CHANNEL_ANISOTROPY, odd, objects_.texture(odd, types[1], ahead))});
   EXPECT_EQ(arrive(), 1U);
   State both = dense(odd, array.values);
-  both.dense(CUMULET_CHANNEL_TEMPERATURE, odd, hot.values);
+  both.dense(CUMULET_CHANNEL_ANISOTROPY, odd, ahead.values);
   expect_same(newest(live_), alone(both));
   hand_over_density(array, types[1]);
   EXPECT_EQ(arrive(), 1U);
@@ -1009,6 +1009,207 @@ TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   ASSERT_EQ(cumulet_live_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
   EXPECT_EQ(difference(picture(), expected), "");
   EXPECT_TRUE(shows_voxels());
+}
+
+// Density, temperature and flame of a step, in halves.
+class FireInGl : public LiveInGl {
+ protected:
+  static constexpr std::array channels{CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_TEMPERATURE, CUMULET_CHANNEL_FLAME};
+  struct Fire {
+    std::vector<Array> arrays;
+    std::vector<GLuint> textures;
+    std::vector<cumulet_gl_field> fields;
+  };
+  Fire fire(int step) {
+    Fire made;
+    for (const cumulet_channel channel : channels) {
+      made.arrays.emplace_back(types[1].format, simulated(channel, odd, step));
+      made.textures.push_back(objects_.texture(odd, types[1], made.arrays.back()));
+      made.fields.push_back(in_texture(channel, odd, made.textures.back()));
+    }
+    return made;
+  }
+  static State in_memory(const Fire& fire) {
+    State state;
+    for (std::size_t i = 0; i < channels.size(); ++i) state.dense(channels[i], odd, fire.arrays[i].values);
+    return state;
+  }
+  static void burn(cumulet_viewer* viewer, float strength, float blackbody = 0.0F) {
+    auto medium = make_desc<cumulet_medium_desc>();
+    medium.flame_strength = strength;
+    medium.blackbody = blackbody;
+    ASSERT_EQ(cumulet_set_medium(viewer, &medium), CUMULET_OK) << cumulet_last_error(viewer);
+  }
+  // By a viewer of its own, of the same in main memory.
+  Picture by_memory(const Fire& fire, float strength, float blackbody = 0.0F) {
+    const ViewerPtr other = make(CUMULET_BUILD_GPU);
+    burn(other.get(), strength, blackbody);
+    return test::picture_of(other.get(), alone(in_memory(fire)).get(), target_);
+  }
+  // By a viewer of its own, in GL.
+  Picture by_gl(const Fire& fire, float strength, float blackbody = 0.0F) {
+    auto desc = make_desc<cumulet_live_desc>();
+    desc.stays_in_gl = 1;
+    const LiveRef live = make_live(desc);
+    const ViewerPtr other = make(CUMULET_BUILD_GPU);
+    burn(other.get(), strength, blackbody);
+    const cumulet_gl_state_desc state = state_of(fire.fields);
+    EXPECT_EQ(cumulet_set_live(other.get(), live.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_live_set_gl(other.get(), live.get(), &state), CUMULET_OK);
+    return settled(other.get());
+  }
+  // Once nothing comes any more.
+  Picture settled(cumulet_viewer* viewer) {
+    cumulet_frame_desc frame = target_.frame();
+    frame.target = CUMULET_TARGET_NONE;
+    for (int quiet = 0; quiet < 5;) {
+      auto result = make_desc<cumulet_frame_result>();
+      EXPECT_EQ(cumulet_wait(viewer, 10.0), CUMULET_OK);
+      if (cumulet_render(viewer, &frame, &result) != CUMULET_OK) {
+        ADD_FAILURE() << cumulet_last_error(viewer);
+        break;
+      }
+      quiet = (result.flags & CUMULET_RENDER_CONVERGED) != 0 ? quiet + 1 : 0;
+    }
+    return test::drawn_once(viewer, target_);
+  }
+  // Of colours found in floats in place of doubles: paths go the same ways but for a few.
+  static void expect_alike(const Picture& a, const Picture& b) {
+    ASSERT_EQ(a.size(), b.size());
+    std::size_t others = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) others += std::abs(int{a[i]} - int{b[i]}) > 1 ? 1U : 0U;
+    EXPECT_LE(others, a.size() / 100);
+  }
+};
+
+TEST_F(FireInGl, IsThatOfMainMemory) {
+  burn(v_, 2.0F, 0.5F);
+  for (const int step : {0, 3}) {
+    const Fire burning = fire(step);
+    hand_over(burning.fields);
+    const Picture found = settled(v_);
+    EXPECT_FALSE(shows_voxels());
+    expect_alike(found, by_memory(burning, 2.0F, 0.5F));
+    EXPECT_EQ(difference(found, by_gl(burning, 2.0F, 0.5F)), "");
+  }
+}
+
+// It is found anew, of voxels that stay.
+TEST_F(FireInGl, FollowsTheMedium) {
+  const Fire burning = fire(1);
+  hand_over(burning.fields);
+  Picture before = settled(v_);
+  EXPECT_EQ(difference(before, by_gl(burning, 1.0F)), "");
+  for (const auto& [strength, blackbody] : {std::pair(5.0F, 0.0F), std::pair(0.5F, 1.0F), std::pair(1.0F, 0.0F)}) {
+    burn(v_, strength, blackbody);
+    const Picture now = settled(v_);
+    EXPECT_NE(difference(now, before), "");
+    EXPECT_EQ(difference(now, by_gl(burning, strength, blackbody)), "");
+    EXPECT_FALSE(shows_voxels());
+    before = now;
+  }
+  // States that follow come with it.
+  const std::uint64_t states = handed();
+  hand_over(fire(2).fields);
+  settled(v_);
+  EXPECT_EQ(handed(), states + 1);
+}
+
+TEST_F(FireInGl, BoxesAreTheWhole) {
+  Fire burning = fire(1);
+  burn(v_, 2.0F, 0.5F);
+  hand_over(burning.fields);
+  settled(v_);
+  for (int step = 2; step < 5; ++step) {
+    Fire next = fire(step);
+    std::vector<cumulet_voxel_box> boxes;
+    for (std::size_t i = 0; i < channels.size(); ++i) {
+      objects_.put(burning.textures[i], odd, GL_RED, types[1].type, next.arrays[i].bytes.data());
+      for (const Sides& b : State::bricks(odd, next.arrays[i].values, burning.arrays[i].values))
+        boxes.push_back({{b[0], b[1], b[2]}, {b[0] + 7, b[1] + 7, b[2] + 7}});
+      burning.arrays[i] = next.arrays[i];
+    }
+    hand_over(burning.fields, boxes);
+    const Picture found = settled(v_);
+    EXPECT_FALSE(shows_voxels());
+    EXPECT_EQ(difference(found, by_gl(next, 2.0F, 0.5F)), "");
+  }
+}
+
+TEST_F(FireInGl, ComesToMemoryWhereItIsNeeded) {
+  const Fire burning = fire(2);
+  burn(v_, 2.0F);
+  hand_over(burning.fields);
+  settled(v_);
+  get_volume(CUMULET_ERROR_UNSUPPORTED);
+  const Picture found = settled(v_);
+  EXPECT_TRUE(shows_voxels());
+  expect_same(newest(live_), alone(in_memory(burning)));
+  EXPECT_EQ(difference(found, by_memory(burning, 2.0F)), "");
+}
+
+// Of viewers that share it each finds what it wants.
+TEST_F(FireInGl, BurnsInEachViewerAsItIsTold) {
+  cumulet_programs* programs = nullptr;
+  const auto programs_desc = make_desc<cumulet_programs_desc>();
+  ASSERT_EQ(cumulet_programs_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
+  const test::ProgramsRef kept(programs);
+  std::array<ViewerPtr, 2> viewers;
+  for (std::size_t i = 0; i < viewers.size(); ++i) {
+    viewers[i] = test::make_viewer({.get_proc = test::FakeGl::get_proc,
+                                    .user = &fake_,
+                                    .samples = 2,
+                                    .programs = programs,
+                                    .build = CUMULET_BUILD_GPU});
+    burn(viewers[i].get(), i == 0 ? 1.0F : 4.0F);
+    ASSERT_EQ(cumulet_set_live(viewers[i].get(), live_.get()), CUMULET_OK);
+  }
+  for (const int step : {1, 2}) {
+    const Fire burning = fire(step);
+    const cumulet_gl_state_desc state = state_of(burning.fields);
+    ASSERT_EQ(cumulet_live_set_gl(viewers[0].get(), live_.get(), &state), CUMULET_OK);
+    settled(viewers[0].get());
+    settled(viewers[1].get());
+    EXPECT_EQ(difference(settled(viewers[0].get()), by_gl(burning, 1.0F)), "");
+    EXPECT_EQ(difference(settled(viewers[1].get()), by_gl(burning, 4.0F)), "");
+  }
+}
+
+// Where there is no memory to find it in, main memory has other ways.
+TEST_F(FireInGl, WithoutMemoryItComesToMainMemory) {
+  const Fire burning = fire(2);
+  burn(v_, 2.0F);
+  hand_over(burning.fields);
+  settled(v_);
+  burn(v_, 3.0F);
+  cumulet_frame_desc frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  fake_.fail_storage(true);
+  cumulet_status status = CUMULET_OK;
+  for (int i = 0; i < 100 && status == CUMULET_OK; ++i) {
+    ASSERT_EQ(cumulet_wait(v_, 10.0), CUMULET_OK);
+    status = cumulet_render(v_, &frame, nullptr);
+  }
+  EXPECT_EQ(status, CUMULET_ERROR_OUT_OF_MEMORY);
+  fake_.fail_storage(false);
+  const Picture found = settled(v_);
+  EXPECT_TRUE(shows_voxels());
+  EXPECT_EQ(difference(found, by_memory(burning, 3.0F)), "");
+}
+
+TEST_F(FireInGl, WhatIsNotFiniteIsRefused) {
+  const Fire good = fire(0);
+  hand_over(good.fields);
+  const Picture before = settled(v_);
+  Fire bad = fire(0);
+  auto values = bad.arrays[1].values;
+  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
+  const Array hot(types[1].format, values);
+  objects_.put(bad.textures[1], odd, GL_RED, types[1].type, hot.bytes.data());
+  hand_over(bad.fields);
+  EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
+  EXPECT_STREQ(cumulet_last_error(v_), "smoke: temperature: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
+  EXPECT_EQ(difference(settled(v_), before), "");
 }
 
 // Another context cannot see the voxels; it gets them by way of main memory.

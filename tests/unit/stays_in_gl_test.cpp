@@ -34,6 +34,7 @@ constexpr Sides odd = {52, 44, 37};
 struct Cells {
   std::vector<grid::CellRecord> cells;
   bool limited = false;
+  std::vector<grid::EmissionRecord> emission;
 };
 
 class StaysInGl : public test::GlTest {
@@ -59,29 +60,56 @@ class StaysInGl : public test::GlTest {
     gl_->NamedBufferData(name, static_cast<GLsizeiptr>(values.size() * 4), values.data(), GL_DYNAMIC_COPY);
     return name;
   }
-  // values: as floats, or as halves, which they then are.
-  volume::DeviceBricks bring(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
-                             bool halves = false, std::optional<std::vector<render::VoxelBox>> changed = {}) {
-    std::vector<float> words = values;
-    if (halves) {
-      words.resize((values.size() + 1) / 2);
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        const std::uint16_t half = glm::packHalf1x16(values[i]);
-        std::memcpy(reinterpret_cast<char*>(words.data()) + 2 * i, &half, 2);
+  // As floats, or as halves, which they then are.
+  struct Values {
+    volume::Channel channel;
+    std::vector<float> values;
+    bool halves = false;
+  };
+  // before: that they are boxes of; none: a whole state. wanted: by which settings it is found what it gives off.
+  scene::StateInGl bring(const std::vector<Values>& fields, const Sides& size, const glm::dmat4& to_world,
+                         const std::vector<scene::Emission>& wanted,
+                         std::optional<std::vector<render::VoxelBox>> changed = {},
+                         const scene::StateInGl* before = nullptr) {
+    render::GlState state{"smoke", {}, std::move(changed), nullptr};
+    for (const Values& field : fields) {
+      std::vector<float> words = field.values;
+      if (field.halves) {
+        words.resize((field.values.size() + 1) / 2);
+        for (std::size_t i = 0; i < field.values.size(); ++i) {
+          const std::uint16_t half = glm::packHalf1x16(field.values[i]);
+          std::memcpy(reinterpret_cast<char*>(words.data()) + 2 * i, &half, 2);
+        }
       }
+      const auto format = field.halves ? render::VoxelFormat::halves : render::VoxelFormat::floats;
+      const render::VoxelBuffer source{.name = buffer(words), .format = format, .size = {size[0], size[1], size[2]}};
+      state.fields.push_back({field.channel, source, to_world});
     }
-    const render::VoxelBuffer source{.name = buffer(words),
-                                     .format = halves ? render::VoxelFormat::halves : render::VoxelFormat::floats,
-                                     .size = {size[0], size[1], size[2]}};
-    const render::GlState state{"smoke", {{volume::Channel::density, source, to_world}}, std::move(changed), nullptr};
-    std::optional<volume::DeviceBricks> found;
+    std::optional<scene::StateInGl> found;
     const gl::StateGuard guard(*gl_);
-    transfers_->begin(
-        state, this, [&](volume::DeviceBricks bricks) { found = std::move(bricks); }, [] {});
+    render::VoxelTransfers::StayInGl stay;
+    stay.join = [&](auto arrived) {
+      if (before == nullptr)
+        return scene::StateInGl{.name = "smoke", .fields = arrived, .index_to_world = to_world, .emissions = {}};
+      scene::StateInGl joined = *before;
+      for (std::size_t i = 0; i < joined.fields.size(); ++i)
+        joined.fields[i].bricks =
+            std::make_shared<const volume::DeviceBricks>(joined.fields[i].bricks->with(*arrived[i].bricks));
+      return joined;
+    };
+    stay.wanted = [&] { return wanted; };
+    stay.arrive = [&](scene::StateInGl arrived) { found = std::move(arrived); };
+    transfers_->begin(state, this, std::move(stay), [] {});
     // The device takes its time.
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!found && std::chrono::steady_clock::now() < until) transfers_->follow(Deadline::max());
     return std::move(found).value();
+  }
+  volume::DeviceBricks bring(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
+                             bool halves = false, std::optional<std::vector<render::VoxelBox>> changed = {}) {
+    return *bring({{volume::Channel::density, values, halves}}, size, to_world, {}, std::move(changed))
+                .fields[0]
+                .bricks;
   }
   static GridReference field_of(volume::DeviceBricks bricks, const glm::dmat4& to_world) {
     bricks.tidy();
@@ -100,7 +128,7 @@ class StaysInGl : public test::GlTest {
               const std::function<void()>& between = {}) {
     const gl::StateGuard guard(*gl_);
     const grid::LatticePtr lattice = field.lattice(settings);
-    render::LatticeUpload upload(gl_, programs_, limits_, lattice, field.statistics, {}, memories_);
+    render::LatticeUpload upload(gl_, programs_, limits_, lattice, field.statistics, field.channels, memories_);
     while (!upload.advance(between ? Deadline::min() : Deadline::max())) {
       if (between) between();
     }
@@ -109,10 +137,33 @@ class StaysInGl : public test::GlTest {
     while (!work.advance(Deadline::max())) {
     }
     const render::BuiltGrid built = work.take();
-    Cells read{std::vector<grid::CellRecord>(built.count), built.limited};
+    Cells read{std::vector<grid::CellRecord>(built.count), built.limited, {}};
     gl_->GetNamedBufferSubData(built.cells.name(), 0, static_cast<GLsizeiptr>(read.cells.size() * 32),
                                read.cells.data());
+    const gl::Object& emission = built.channels[static_cast<std::size_t>(grid::Channel::emission)];
+    if (emission) {
+      read.emission.resize(built.count);
+      gl_->GetNamedBufferSubData(emission.name(), 0,
+                                 static_cast<GLsizeiptr>(read.emission.size() * sizeof(grid::EmissionRecord)),
+                                 read.emission.data());
+    }
     return read;
+  }
+  // The same in main memory.
+  volume::ScalarVolume copied(const volume::ScalarVolume& in_gl) {
+    const volume::DeviceBricks& bricks = *in_gl.on_device;
+    std::vector<float> values;
+    for (const volume::DeviceBricks::Place& place : bricks.places) {
+      const std::size_t first = values.size();
+      values.resize(first + volume::brick_voxels);
+      const volume::DeviceMemory& memory = *bricks.memories[place.memory];
+      EXPECT_FALSE(memory.halves);
+      gl_->GetNamedBufferSubData(memories_->find(memory)->name(), GLintptr{place.brick} * 2048, 2048, &values[first]);
+    }
+    volume::ScalarVolume volume = in_gl;
+    volume.on_device = nullptr;
+    volume.brick_values = std::move(values);
+    return volume;
   }
 
   gl::Limits limits_;
@@ -229,11 +280,162 @@ TEST_P(StaysInGl, GridsAreThoseOfTheVoxels) {
           EXPECT_TRUE(limited.limited);
           expect_same_cells(limited, reference.grid(settings));
         }
-        brick_cells += known.lattice(settings)->own.to_rate.bricks.size();
+        brick_cells += known.lattice(settings)->own.to_rate.fields[0].nodes.size();
       }
     }
   }
   EXPECT_GT(brick_cells, 100U);
+}
+
+// Of what burns: light of flame and of temperature, by ramps or without, where only one of them is, and next to none.
+std::vector<scene::Emission> emissions() {
+  scene::Emission plain{.flame_strength = 3.0, .flame_colour = {1.0F, 0.5F, 0.1F}, .blackbody = 1.0};
+  scene::Emission curved{.flame_strength = 0.5,
+                         .temperature_scale = 700.0,
+                         .temperature_offset = 300.0,
+                         .blackbody = 0.25,
+                         .blackbody_tint = {0.2F, 1.0F, 0.7F},
+                         .temperature_ramp = volume::Ramp({{0.1F, 0.0F}, {0.5F, 2.0F}, {1.2F, 3.0F}}),
+                         .flame_ramp = volume::Ramp({{0.2F, 0.1F}, {0.4F, 0.0F}})};
+  scene::Emission flame_alone{.flame_strength = 1.0, .flame_colour = {0.0F, 1.0F, 0.0F}};
+  scene::Emission heat_alone{.flame_strength = 0.0, .temperature_scale = 4000.0, .blackbody = 1.0};
+  return {plain, curved, flame_alone, heat_alone};
+}
+
+volume::VolumeFrame frame_of(const std::vector<std::pair<volume::Channel, std::vector<float>>>& fields,
+                             const Sides& size) {
+  std::vector<volume::MemoryField> views;
+  for (const auto& [channel, values] : fields)
+    views.push_back({channel, volume::DenseVoxels{values, {size[0], size[1], size[2]}, place()}});
+  return volume::import_fields(views, "smoke", {});
+}
+
+void expect_near(const grid::RgbField::Components& found, const grid::RgbField::Components& expected) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    ASSERT_EQ(found[c].brick_origins, expected[c].brick_origins);
+    EXPECT_EQ(found[c].bounds_min, expected[c].bounds_min);
+    EXPECT_EQ(found[c].bounds_max, expected[c].bounds_max);
+    EXPECT_EQ(found[c].active_voxels, expected[c].active_voxels);
+    EXPECT_NEAR(found[c].max_value, expected[c].max_value, 1e-5F * expected[c].max_value);
+    ASSERT_EQ(found[c].brick_values.size(), expected[c].brick_values.size());
+  }
+  for (std::size_t i = 0; i < expected[0].brick_values.size(); ++i) {
+    const auto at = [i](const grid::RgbField::Components& of) {
+      return glm::vec3(of[0].brick_values[i], of[1].brick_values[i], of[2].brick_values[i]);
+    };
+    ASSERT_LE(glm::length(at(found) - at(expected)), 1e-5F * glm::length(at(expected))) << i;
+  }
+}
+
+TEST_P(StaysInGl, WhatBurnsIsFound) {
+  test::Cameras cameras(4);
+  auto density = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+  // Other sizes than the density's, and elsewhere.
+  const auto flame = as_halves(simulated(CUMULET_CHANNEL_FLAME, odd, 4));
+  const auto temperature = simulated(CUMULET_CHANNEL_TEMPERATURE, odd, 2);
+  const std::vector<scene::Emission> wanted = emissions();
+  const scene::StateInGl state = bring({{volume::Channel::density, density},
+                                        {volume::Channel::temperature, temperature},
+                                        {volume::Channel::flame, flame, true}},
+                                       odd, place(), wanted);
+  ASSERT_EQ(state.emissions.size(), wanted.size());
+  const volume::VolumeFrame in_memory = frame_of({{volume::Channel::density, density},
+                                                  {volume::Channel::temperature, temperature},
+                                                  {volume::Channel::flame, flame}},
+                                                 odd);
+  const volume::VolumeFrame in_gl = state.frame();
+  EXPECT_EQ(in_gl.flame->bounds_min, in_memory.flame->bounds_min);
+  EXPECT_EQ(in_gl.flame->bounds_max, in_memory.flame->bounds_max);
+  EXPECT_EQ(in_gl.temperature->active_voxels, in_memory.temperature->active_voxels);
+  EXPECT_EQ(in_gl.temperature->max_value, in_memory.temperature->max_value);
+  glm::ivec3 low = in_memory.density.bounds_min;
+  glm::ivec3 high = in_memory.density.bounds_max;
+  for (const auto& field : {in_memory.flame, in_memory.temperature}) {
+    low = glm::min(low, field->bounds_min);
+    high = glm::max(high, field->bounds_max);
+  }
+  const grid::Cube cube = grid::fit_cube(in_gl.density, low, high);
+  for (const scene::Emission& settings : wanted) {
+    const auto found = state.components(*state.emission(settings));
+    const auto expected = scene::emission_of(in_memory, settings);
+    ASSERT_TRUE(found && expected);
+    grid::RgbField::Components read;
+    for (std::size_t c = 0; c < 3; ++c) read[c] = copied((*found)[c]);
+    ASSERT_NO_FATAL_FAILURE(expect_near(read, *expected));
+    grid::Channels known_channels;
+    known_channels.emission = std::make_shared<const grid::RgbField>(*found, cube);
+    grid::Channels channels;
+    channels.emission = std::make_shared<const grid::RgbField>(read, cube);
+    const GridReference known(in_gl.density, cube, known_channels);
+    const GridReference reference(in_memory.density, cube, channels);
+    for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
+      grid::RefineSettings refine;
+      refine.cells = cells;
+      refine.density_scale = 3.0;
+      refine.threshold = 0.05;
+      const auto compare = [&] {
+        const Cells made = build(known, refine);
+        const grid::TetGrid same = reference.grid(refine);
+        ASSERT_NO_FATAL_FAILURE(expect_same_cells(made, same));
+        ASSERT_EQ(made.emission.size(), same.emission.size());
+        for (std::size_t i = 0; i < same.emission.size(); ++i) {
+          const glm::vec3 a = made.emission[i].mean;
+          const glm::vec3 b = same.emission[i].mean;
+          ASSERT_LE(glm::length(a - b), 1e-4F * glm::length(b) + 1e-6F) << i;
+        }
+      };
+      ASSERT_NO_FATAL_FAILURE(compare());
+      refine.max_cells = 5000;
+      ASSERT_NO_FATAL_FAILURE(compare());
+      refine.camera = cameras.about(cube);
+      ASSERT_NO_FATAL_FAILURE(compare());
+    }
+  }
+}
+
+// Boxes, some of which put fire out, leave what is found in a whole state.
+TEST_P(StaysInGl, WhatBurnsInBoxesIsFoundThere) {
+  const std::vector<scene::Emission> wanted = emissions();
+  const std::vector<volume::Channel> channels{volume::Channel::density, volume::Channel::temperature,
+                                              volume::Channel::flame};
+  const auto fields_at = [&](int step) {
+    std::vector<Values> fields;
+    for (const volume::Channel channel : channels)
+      fields.push_back({channel, simulated(static_cast<cumulet_channel>(channel), odd, step)});
+    return fields;
+  };
+  std::vector<Values> fields = fields_at(1);
+  std::optional<scene::StateInGl> state = bring(fields, odd, place(), {wanted[0], wanted[1]});
+  for (int step = 2; step < 5; ++step) {
+    const std::vector<Values> next = fields_at(step);
+    const render::VoxelBox box{{8 * step, 0, 0}, {8 * step + 15, odd[1], odd[2]}};
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      for (int z = 0; z < odd[2]; ++z) {
+        for (int y = 0; y < odd[1]; ++y) {
+          for (int x = box.min.x; x <= std::min(box.max.x, odd[0] - 1); ++x) {
+            const std::size_t at = test::State::at({x, y, z}, odd);
+            fields[f].values[at] = step == 3 ? 0.0F : next[f].values[at];
+          }
+        }
+      }
+    }
+    // Others are wanted from the second on.
+    state = bring(fields, odd, place(), {wanted[0], wanted[2]}, std::vector{box}, &*state);
+    ASSERT_EQ(state->emissions.size(), 2U);
+    const scene::StateInGl whole = bring(fields, odd, place(), {wanted[0], wanted[2]});
+    for (const scene::Emission& settings : {wanted[0], wanted[2]}) {
+      const auto found = state->components(*state->emission(settings));
+      const auto expected = whole.components(*whole.emission(settings));
+      ASSERT_TRUE(found && expected);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const volume::ScalarVolume a = copied((*found)[c]);
+        const volume::ScalarVolume b = copied((*expected)[c]);
+        EXPECT_EQ(a.brick_origins, b.brick_origins);
+        ASSERT_EQ(a.brick_values.size(), b.brick_values.size());
+        for (std::size_t i = 0; i < b.brick_values.size(); ++i) ASSERT_EQ(a.brick_values[i], b.brick_values[i]);
+      }
+    }
+  }
 }
 
 // Other states come and go while one is uploaded.
@@ -291,7 +493,7 @@ TEST_P(StaysInGl, ScatteredBricksAreGathered) {
   expect_same_cells(build(known, settings), expected);
   expect_same_cells(build(field_of(all, place()), settings), expected);
   render::DeviceMemories small(gl_, 1000);
-  EXPECT_EQ(small.gather(*programs_, all), nullptr) << "larger than a storage block";
+  EXPECT_EQ(small.gather(gl_, *programs_, all), nullptr) << "larger than a storage block";
 }
 
 }  // namespace

@@ -13,19 +13,22 @@ namespace cumulet::test {
 struct GridReference {
   std::shared_ptr<const volume::ScalarVolume> volume;
   std::shared_ptr<const grid::Statistics> statistics;
+  grid::Channels channels;
 
   /// cube: none: the volume's own.
-  explicit GridReference(volume::ScalarVolume v, const std::optional<grid::Cube>& cube = std::nullopt)
+  explicit GridReference(volume::ScalarVolume v, const std::optional<grid::Cube>& cube = std::nullopt,
+                         grid::Channels beside = {})
       : volume(std::make_shared<const volume::ScalarVolume>(std::move(v))),
-        statistics(std::make_shared<const grid::Statistics>(*volume, cube ? *cube : grid::fit_cube(*volume))) {}
+        statistics(std::make_shared<const grid::Statistics>(*volume, cube ? *cube : grid::fit_cube(*volume))),
+        channels(std::move(beside)) {}
   [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
-    const grid::DiamondSet diamonds(*statistics, settings);
+    const grid::DiamondSet diamonds(*statistics, channels, settings);
     grid::GridBuilder builder(*statistics, diamonds);
     builder.bisect();
-    return builder.records(settings.cells, volume->max_value);
+    return builder.records(settings.cells, volume->max_value, channels);
   }
   [[nodiscard]] grid::LatticePtr lattice(const grid::RefineSettings& settings) const {
-    return std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
+    return std::make_shared<const grid::Lattice>(*statistics, channels, settings, volume->max_value);
   }
 };
 
