@@ -2,20 +2,26 @@
 #ifndef CM_BRICK_GLOW_GLSL
 #define CM_BRICK_GLOW_GLSL
 
-#define CM_RAMP_POINTS 32
+#define CM_RAMP_PARTS 64
 #define CM_BODY_COLOURS 1024
+
+// Of a ramp, from this value on: what it becomes, and how that grows with it.
+struct CmRampPart {
+  float from;
+  float start;
+  float slope;
+};
 
 struct CmBrickGlow {
   vec3 flame_colour;  // times its strength
   float intensity;    // of black body light
   vec3 tint;          // of that
+  float unit;         // of that: a kelvin's radiance, 0: there is none
   float offset;       // kelvin: this and scale times the field's value
   float scale;
   float most;  // radiance
-  uint temperature_points;
-  uint flame_points;
-  vec2 temperature_ramp[CM_RAMP_POINTS];  // value, and what it becomes; so many of them
-  vec2 flame_ramp[CM_RAMP_POINTS];
+  CmRampPart temperature_ramp[CM_RAMP_PARTS];  // of the first one any value, of the last ones none
+  CmRampPart flame_ramp[CM_RAMP_PARTS];
   float colours[3 * CM_BODY_COLOURS];  // of black bodies, evenly in the temperature's logarithm
 };
 

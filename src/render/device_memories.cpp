@@ -11,6 +11,7 @@ DeviceMemories::~DeviceMemories() {
   for (const Kept& kept : kept_) {
     if (const volume::DeviceMemoryPtr memory = kept.held.lock()) memory->gone = true;
   }
+  if (!gl_->abandoned && !programs_->is_current()) abandon();
 }
 
 std::shared_ptr<volume::DeviceMemory> DeviceMemories::make(std::size_t bricks, bool halves) {
@@ -41,13 +42,12 @@ bool DeviceMemories::has(const volume::DeviceBricks& bricks) const {
   return std::ranges::all_of(bricks.memories, [&](const auto& memory) { return kept(*memory) != nullptr; });
 }
 
-volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, gl::Programs& programs,
-                                               const volume::DeviceBricks& bricks) {
+volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, const volume::DeviceBricks& bricks) {
   const bool halves = bricks.are_halves();
   const std::uint64_t bytes = volume::DeviceMemory::bytes_of(bricks.origins.size(), halves);
   if (bytes > most_bytes_) return nullptr;
   for (const bool from : {false, true}) {
-    if (!programs.ask(BrickCopies{.from_halves = from, .to_halves = halves}.program()).usable()) return nullptr;
+    if (!programs_->ask(BrickCopies{.from_halves = from, .to_halves = halves}.program()).usable()) return nullptr;
   }
   const std::shared_ptr<volume::DeviceMemory> memory = make(std::max<std::size_t>(bricks.origins.size(), 1), halves);
   auto made = std::make_shared<volume::DeviceBricks>(bricks);
@@ -65,7 +65,7 @@ volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, gl::P
                                              "creating the list of a volume's bricks");
     const volume::DeviceMemory& from = *bricks.memories[m];
     const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &moved};
-    copies.dispatch(*gl, programs.ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
+    copies.dispatch(*gl, programs_->ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
   }
   gl::memory_barrier(*gl, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   kept_.back().written = gl::Fence(gl_);

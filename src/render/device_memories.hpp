@@ -17,11 +17,12 @@ namespace cumulet::render {
 /// the group current, one thread at a time; those that tell come from any.
 class DeviceMemories {
  public:
-  /// gl: for itself: viewers come and go. most_bytes: of one: what a storage block may have.
-  DeviceMemories(gl::FunctionsPtr gl, std::uint64_t most_bytes) : gl_(std::move(gl)), most_bytes_(most_bytes) {}
+  /// gl: for itself: viewers come and go. programs: of the group. most_bytes: of one: what a storage block may have.
+  DeviceMemories(gl::FunctionsPtr gl, gl::ProgramsPtr programs, std::uint64_t most_bytes)
+      : gl_(std::move(gl)), programs_(std::move(programs)), most_bytes_(most_bytes) {}
   DeviceMemories(const DeviceMemories&) = delete;
   DeviceMemories& operator=(const DeviceMemories&) = delete;
-  /// Who holds any is told that it is gone.
+  /// Who holds any is told that it is gone. Without a context of the group buffers stay behind.
   ~DeviceMemories();
   /// The contexts are gone, and with them the bricks.
   void abandon() const { gl_->abandoned = true; }
@@ -34,8 +35,7 @@ class DeviceMemories {
   [[nodiscard]] bool has(const volume::DeviceBricks& bricks) const;
   /// The same in one memory, copied, all being here; null: that would be too large, or the driver still compiles.
   /// Throws what GL's allocations throw, and Error(gl).
-  [[nodiscard]] volume::DeviceBricksPtr gather(const gl::FunctionsPtr& gl, gl::Programs& programs,
-                                               const volume::DeviceBricks& bricks);
+  [[nodiscard]] volume::DeviceBricksPtr gather(const gl::FunctionsPtr& gl, const volume::DeviceBricks& bricks);
   /// Those go that nobody holds any more.
   void collect();
   [[nodiscard]] std::uint64_t bytes() const;
@@ -53,6 +53,7 @@ class DeviceMemories {
   [[nodiscard]] const Kept* kept(const volume::DeviceMemory& memory) const;
 
   gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
   std::uint64_t most_bytes_;
   mutable std::mutex mutex_;  // of what tells
   std::list<Kept> kept_;

@@ -832,25 +832,23 @@ BuiltGrid nothing_of(const scene::MarchSource& source) {
 
 }  // namespace
 
-bool GridBuilds::has_bricks_of(const scene::MarchSource& source) const {
-  const auto has = [&](const grid::Statistics& field) {
-    return memories_ != nullptr && memories_->has(*field.on_device());
-  };
-  if (!has(*source.statistics)) return false;
+volume::DeviceBricksPtr GridBuilds::not_here(const scene::MarchSource& source) const {
+  std::vector<volume::DeviceBricksPtr> all{source.statistics->on_device()};
   const auto& emission = source.channels.emission;
-  for (std::size_t i = 0; emission && i < 3; ++i) {
-    if (!has(emission->component(i))) return false;
-  }
-  return true;
+  for (std::size_t i = 0; emission && i < 3; ++i) all.push_back(emission->component(i).on_device());
+  const auto found = std::ranges::find_if(all, [&](const volume::DeviceBricksPtr& bricks) {
+    return bricks && (memories_ == nullptr || !memories_->has(*bricks));
+  });
+  return found == all.end() ? nullptr : *found;
 }
 
 bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
   const volume::DeviceBricksPtr& in_gl = source->statistics->on_device();
-  if (in_gl && !has_bricks_of(*source)) {
+  if (const volume::DeviceBricksPtr elsewhere = not_here(*source)) {
     // Others of the scene are shown meanwhile.
     BuiltGrid& made = built_.emplace(source, nothing_of(*source)).first->second;
     try {
-      in_gl->ask_for_values();
+      elsewhere->ask_for_values();
       made.why_not = "nothing of it, for its voxels are in another context; they are brought to main memory";
     } catch (const Error& error) {
       made.why_not = std::string("nothing of it: ") + error.what();

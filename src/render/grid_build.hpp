@@ -295,8 +295,8 @@ class GridBuilds {
  private:
   // Returns whether it is there.
   bool build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
-  // Where they are in GL.
-  [[nodiscard]] bool has_bricks_of(const scene::MarchSource& source) const;
+  // Of bricks in GL such as are in another context, or went with theirs; null: none.
+  [[nodiscard]] volume::DeviceBricksPtr not_here(const scene::MarchSource& source) const;
   // By GL.
   bool build_there(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
   void begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes);

@@ -455,13 +455,13 @@ std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* w
   return announced;
 }
 
-void VoxelTransfers::bring_back(const void* whose, const scene::StateInGl& now, Find find, Arrive arrive,
-                                Refuse refuse) {
+void VoxelTransfers::bring_back(const void* whose, const std::vector<volume::Channel>& channels, Find find,
+                                Arrive arrive, Refuse refuse) {
   Transfer transfer;
   transfer.whose = whose;
-  transfer.name = now.name;
-  for (const scene::StateInGl::Field& field : now.fields)
-    transfer.fields.push_back({field.channel, volume::BrickCopy(now.index_to_world)});
+  transfer.name = "state";
+  for (const volume::Channel channel : channels)
+    transfer.fields.push_back({channel, volume::BrickCopy(glm::dmat4(1.0))});
   transfer.arrival = std::move(arrive);
   transfer.refuse = std::move(refuse);
   transfer.back = Return{.find = std::move(find), .state = {}, .memories = {}};
@@ -510,13 +510,13 @@ bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
   return true;
 }
 
-void VoxelTransfers::find_emissions(const void* whose, std::string name, StayInGl stay, Refuse refuse) {
+void VoxelTransfers::find_emissions(const void* whose, std::string name, StayInGl stay) {
   Transfer transfer;
   transfer.whose = whose;
   transfer.whole = false;
   transfer.name = std::move(name);
   transfer.arrival = std::move(stay);
-  transfer.refuse = std::move(refuse);
+  transfer.refuse = [] {};
   transfer.counted = true;  // nothing is on its way
   transfers_.push_back(std::move(transfer));
 }
@@ -612,20 +612,27 @@ std::vector<scene::StateInGl::Field> VoxelTransfers::take_fields(Transfer& trans
   return fields;
 }
 
-void VoxelTransfers::join(Transfer& transfer) {
+void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Field> fields) {
   const StayInGl& stay = std::get<StayInGl>(transfer.arrival);
   Staying& staying = transfer.staying.emplace();
-  std::vector<scene::StateInGl::Field> fields = take_fields(transfer);
+  staying.fields = std::move(fields);
   // Bricks that may give off other light than before.
   std::vector<glm::ivec3> changed;
-  for (const scene::StateInGl::Field& field : fields) {
+  for (const scene::StateInGl::Field& field : staying.fields) {
     if (field.channel == volume::Channel::density) continue;
     changed.insert(changed.end(), field.bricks->origins.begin(), field.bricks->origins.end());
     changed.insert(changed.end(), field.bricks->emptied.begin(), field.bricks->emptied.end());
   }
-  staying.state = stay.join(std::move(fields));
+  staying.state = stay.join(staying.fields);
   if (!staying.state) return;
+  const auto is_here = [&](const volume::DeviceBricks* bricks) { return memories_->has(*bricks); };
+  if (!std::ranges::all_of(std::as_const(*staying.state).all(), is_here)) {
+    staying.state.reset();
+    if (transfer.finds()) return;
+    refuse(transfer.name, "the rest of it is in another viewer's context");
+  }
   for (scene::Emission& settings : stay.wanted()) {
+    if (!staying.state->emits(settings)) continue;
     const scene::EmissionInGl* before = staying.state->emission(settings);
     if (before != nullptr && changed.empty()) {
       staying.kept.push_back(*before);
@@ -643,10 +650,32 @@ bool VoxelTransfers::take_in_gl(Transfer& transfer, Deadline deadline) {
   }
   if (!transfer.staying) {
     if (!transfer.fence.passed()) return false;
-    join(transfer);
+    join(transfer, take_fields(transfer));
   }
-  return std::ranges::all_of(transfer.staying->finding,
-                             [&](BrickEmission& emission) { return emission.advance(deadline); });
+  Staying& staying = *transfer.staying;
+  try {
+    return std::ranges::all_of(staying.finding, [&](BrickEmission& emission) { return emission.advance(deadline); });
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::context_lost) throw;
+    staying.failure = std::current_exception();
+    staying.finding.clear();
+    return true;
+  }
+}
+
+bool VoxelTransfers::arrive_in_gl(Transfer& transfer) {
+  const StayInGl& stay = std::get<StayInGl>(transfer.arrival);
+  Staying& staying = *transfer.staying;
+  if (staying.failure && stay.values_wanted) stay.values_wanted->ask();
+  // A find that found nothing is no other state.
+  const bool arrives = staying.state && !(transfer.finds() && staying.finding.empty());
+  const std::exception_ptr failure = staying.failure;
+  if (arrives && !stay.arrive(made(staying)) && !transfer.finds()) {
+    join(transfer, std::move(staying.fields));
+    return false;
+  }
+  if (failure) std::rethrow_exception(failure);
+  return true;
 }
 
 scene::StateInGl VoxelTransfers::made(Staying& staying) {
@@ -754,7 +783,7 @@ void VoxelTransfers::follow(Deadline deadline) {
     try {
       if (!take(first, deadline)) return;
       if (first.stays_in_gl()) {
-        if (first.staying->state) std::get<StayInGl>(first.arrival).arrive(made(*first.staying));
+        if (!arrive_in_gl(first)) continue;
       } else {
         if (!first.finite) {
           for (const volume::FieldCopy& field : first.fields) volume::require_finite(field.view(), first.name);
@@ -768,8 +797,8 @@ void VoxelTransfers::follow(Deadline deadline) {
     transfers_.pop_front();
     recycle(done);
     if (failure) {
-      if (done.whole) refuse_on_top(done);
-      if (done.finds()) done.refuse();
+      // What its light alone was not found of is there.
+      if (done.whole && !(done.staying && done.staying->failure)) refuse_on_top(done);
       std::rethrow_exception(failure);
     }
     if (std::chrono::steady_clock::now() > deadline) return;

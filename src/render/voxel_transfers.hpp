@@ -2,10 +2,12 @@
 
 // Voxels that a host has in GL, on their way to main memory, or to where they stay in GL.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <glm/glm.hpp>
 #include <optional>
@@ -70,12 +72,12 @@ class VoxelTransfers {
   struct StayInGl {
     /// Given those that arrived, in their order: the state that they make, what was found of another that it goes on
     /// with among it; none: there is none to go on with. Of those that changed bricks are not tidy.
-    std::function<std::optional<scene::StateInGl>(std::vector<scene::StateInGl::Field> fields)> join;
+    std::function<std::optional<scene::StateInGl>(const std::vector<scene::StateInGl::Field>& fields)> join;
     /// By which settings it is to be found what that gives off.
     std::function<std::vector<scene::Emission>()> wanted;
-    /// The same with these, and no others.
-    std::function<void(scene::StateInGl state)> arrive;
-    volume::ValuesWantedPtr values_wanted;  ///< of its bricks
+    /// The same with these, and no others. False: what it goes on with is another by now; it is joined again.
+    std::function<bool(scene::StateInGl state)> arrive;
+    volume::ValuesWantedPtr values_wanted;  ///< of its bricks; null: nobody asks
   };
   using Arrival = std::variant<Arrive, StayInGl>;
   /// A whole state does not arrive: something is wrong with it. Those on top of it that were on their way are gone.
@@ -85,12 +87,13 @@ class VoxelTransfers {
   /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
   void begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse);
   /// What stays in GL comes to main memory after all: as a whole state, after those that are on their way, of what find
-  /// gives by then; null: it does not come. now: what it would be now.
+  /// gives by then; null: it does not come. channels: what it has.
   using Find = std::function<scene::StateInGlPtr()>;
-  void bring_back(const void* whose, const scene::StateInGl& now, Find find, Arrive arrive, Refuse refuse);
+  void bring_back(const void* whose, const std::vector<volume::Channel>& channels, Find find, Arrive arrive,
+                  Refuse refuse);
   /// Once those that are on their way are there: what else is wanted is found of the state that stay.join gives for
-  /// none. Refuse: it could not be found.
-  void find_emissions(const void* whose, std::string name, StayInGl stay, Refuse refuse);
+  /// none. It does not arrive if that is nothing.
+  void find_emissions(const void* whose, std::string name, StayInGl stay);
   /// Of whose newest whole state that is on its way.
   struct Announced {
     std::vector<volume::Channel> channels;
@@ -101,6 +104,16 @@ class VoxelTransfers {
   [[nodiscard]] std::optional<Announced> announced(const void* whose) const;
   /// Whether any is on its way.
   [[nodiscard]] bool busy() const { return !transfers_.empty(); }
+  /// Whether any of one is.
+  [[nodiscard]] bool busy(const void* whose) const {
+    return std::ranges::any_of(transfers_, [&](const Transfer& transfer) { return transfer.whose == whose; });
+  }
+  /// Whether one goes on with the bricks that a state had.
+  [[nodiscard]] bool goes_on(const void* whose) const {
+    return std::ranges::any_of(transfers_, [&](const Transfer& transfer) {
+      return transfer.whose == whose && transfer.staying && !transfer.whole;
+    });
+  }
   /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
   /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
   void follow(Deadline deadline);
@@ -160,9 +173,11 @@ class VoxelTransfers {
   };
   // A state that stays, while what it gives off is found.
   struct Staying {
+    std::vector<scene::StateInGl::Field> fields;  // that arrived
     std::optional<scene::StateInGl> state;
     std::vector<scene::EmissionInGl> kept;  // as they are
     std::deque<BrickEmission> finding;
+    std::exception_ptr failure;  // of finding; main memory has other ways
   };
   struct Transfer {
     const void* whose = nullptr;
@@ -207,9 +222,11 @@ class VoxelTransfers {
   bool take_back(Transfer& transfer, Deadline deadline);
   // Of what stays there.
   bool take_in_gl(Transfer& transfer, Deadline deadline);
-  void join(Transfer& transfer);
+  void join(Transfer& transfer, std::vector<scene::StateInGl::Field> fields);
   // With all that was found.
   static scene::StateInGl made(Staying& staying);
+  // Returns whether it did, or never will; else it was joined again.
+  bool arrive_in_gl(Transfer& transfer);
   // What the driver had not copied by guess.
   void copy_rest(Transfer& transfer) const;
   // Of what stays in GL: values where they stay, and what main memory is to know of them. Returns whether all is sent.

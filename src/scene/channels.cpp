@@ -193,18 +193,27 @@ std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, cons
 
 core::CmBrickGlow shader_glow(const Emission& emission) {
   core::CmBrickGlow glow{};
-  const auto put = [](const volume::Ramp& ramp, std::uint32_t& points, glm::vec2* to) {
-    points = static_cast<std::uint32_t>(ramp.points().size());
-    std::ranges::copy(ramp.points(), to);
+  const auto put = [](const volume::Ramp& ramp, core::CmRampPart* to) {
+    const std::vector<glm::vec2>& points = ramp.points();
+    constexpr float largest = std::numeric_limits<float>::max();
+    std::fill_n(to, CM_RAMP_PARTS, core::CmRampPart{std::numeric_limits<float>::infinity(), 0.0F, 0.0F});
+    *to++ = points.empty() ? core::CmRampPart{0.0F, 0.0F, 1.0F} : core::CmRampPart{0.0F, points.front().y, 0.0F};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const glm::dvec2 rise =
+          i + 1 < points.size() ? glm::dvec2(points[i + 1]) - glm::dvec2(points[i]) : glm::dvec2(1, 0);
+      *to++ = {points[i].x, points[i].y,
+               static_cast<float>(std::clamp(rise.y / rise.x, -double{largest}, double{largest}))};
+    }
   };
   glow.flame_colour = flame_colour_of(emission);
   glow.intensity = intensity_of(emission);
   glow.tint = emission.blackbody_tint;
+  glow.unit = emission.blackbody > 0.0 ? static_cast<float>(light::black_body_radiance(1000.0, 1.0) / 1e12) : 0.0F;
   glow.offset = static_cast<float>(emission.temperature_offset);
   glow.scale = static_cast<float>(emission.temperature_scale);
   glow.most = static_cast<float>(most_radiance);
-  put(emission.temperature_ramp, glow.temperature_points, glow.temperature_ramp);
-  put(emission.flame_ramp, glow.flame_points, glow.flame_ramp);
+  put(emission.temperature_ramp, glow.temperature_ramp);
+  put(emission.flame_ramp, glow.flame_ramp);
   static_assert(CM_BODY_COLOURS == std::tuple_size_v<light::BlackBody::Colours>);
   const light::BlackBody body;
   float* to = glow.colours;

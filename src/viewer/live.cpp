@@ -138,6 +138,8 @@ bool Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& l
   {
     const std::scoped_lock lock(mutex_);
     if (on_top_of && (!in_gl_.state || in_gl_.number != *on_top_of)) return false;
+    // Updates of a state that was refused still have none to be on top of.
+    if (on_top_of && handed_.empty()) handed.clear();
     state.number = newest_ + 1;
     std::swap(next_, next);  // what nobody read ends after the lock
     std::swap(handed_, handed);

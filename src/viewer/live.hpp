@@ -71,6 +71,9 @@ class Live {
   [[nodiscard]] Wish want(const scene::Emission& emission);
   /// Each once.
   [[nodiscard]] std::vector<scene::Emission> wanted() const;
+  /// Of a state that is on its way to stay in GL, as long as it is.
+  [[nodiscard]] std::shared_ptr<void> flight() const { return flights_; }
+  [[nodiscard]] bool in_flight() const { return flights_.use_count() > 1; }
   /// Listeners::listen() to others being wanted.
   [[nodiscard]] std::shared_ptr<void> listen_to_wishes(std::function<void()> changed) {
     return wish_listeners_.listen(std::move(changed));
@@ -151,6 +154,7 @@ class Live {
   State state_;
   Listeners listeners_;
   Listeners wish_listeners_;
+  std::shared_ptr<void> flights_ = std::make_shared<char>();
 };
 
 }  // namespace cumulet::viewer

@@ -82,16 +82,25 @@ void LiveBuilder::begin() {
   job_ = job;  // not where there is no thread for it
 }
 
+void LiveBuilder::wish(Live& live, const std::optional<scene::Emission>& wanted) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (wanted && wish_ && *wish_ == *wanted) return;
+  }
+  // Whoever listens is told without the lock.
+  Live::Wish wish = wanted ? live.want(*wanted) : nullptr;
+  const std::scoped_lock lock(mutex_);
+  if (live_.get() == &live) std::swap(wish_, wish);
+}
+
 std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeAsset& state,
                                                        const BuildSettings& settings) {
   const scene::StateInGlPtr& in_gl = state.in_gl();
-  if (!in_gl || needs_values(settings)) return settings;
   const scene::Emission wanted = state.emission_by(settings.emission);
-  if (!in_gl->emits(wanted)) return settings;
-  {
-    const std::scoped_lock lock(mutex_);
-    if (live_.get() == &live && (!wish_ || *wish_ != wanted)) wish_ = live.want(wanted);
-  }
+  const bool found_there = in_gl && !needs_values(settings);
+  // Fire may come in another state.
+  wish(live, found_there && (wanted.burns() || wanted.is_hot()) ? std::optional(wanted) : std::nullopt);
+  if (!found_there || !in_gl->emits(wanted) || in_gl->gone()) return settings;
   if (in_gl->emission(wanted) != nullptr) return settings;
   if (in_gl->emissions.empty()) return std::nullopt;
   BuildSettings instead = settings;

@@ -54,6 +54,8 @@ class LiveBuilder {
   // All of these under the lock.
   [[nodiscard]] bool is_due() const;
   void begin();
+  // What is wanted of states in GL from now on; none: nothing.
+  void wish(Live& live, const std::optional<scene::Emission>& wanted);
   // What a state in GL gives off may have been found by other settings: the same with these, until it is found by those
   // that are wanted; none: nothing was found yet.
   std::optional<BuildSettings> settings_for(Live& live, const VolumeAsset& state, const BuildSettings& settings);

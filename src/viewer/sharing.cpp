@@ -13,7 +13,7 @@ Commons Sharing::of_current(const gl::Functions& gl) {
   if (found != groups_.end()) commons.memories = found->memories.lock();
   if (!commons.memories) {
     commons.memories = std::make_shared<render::DeviceMemories>(
-        gl::copy_of(gl), static_cast<std::uint64_t>(gl::query_limits(gl).storage_block_bytes));
+        gl::copy_of(gl), commons.programs, static_cast<std::uint64_t>(gl::query_limits(gl).storage_block_bytes));
     groups_.push_back({commons.programs, commons.memories});
   }
   return commons;

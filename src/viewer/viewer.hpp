@@ -287,7 +287,7 @@ class Viewer {
   void tend_voxels_in_gl(Context& g);
   // Whether there is any such thing to do.
   [[nodiscard]] bool voxels_in_gl_wait(Context& g) const;
-  static void bring_back(Context& g, const std::shared_ptr<Live>& live);
+  static void bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels);
   static void find_emissions(Context& g, const std::shared_ptr<Live>& live);
   // The same with its bricks together; null: they are.
   static scene::StateInGlPtr gathered(Context& g, const scene::StateInGl& state);

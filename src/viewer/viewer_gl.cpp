@@ -78,8 +78,9 @@ void Viewer::context_lost() {
   const Commons commons = gl_->commons();
   gl_.reset();
   // Others may be attached to another context of the group.
-  if (commons.programs.use_count() == 1) commons.programs->abandon();
-  if (commons.memories.use_count() == 1) commons.memories->abandon();
+  if (commons.memories.use_count() > 1) return;
+  commons.programs->abandon();
+  commons.memories->abandon();
 }
 
 template <class Body>
@@ -324,28 +325,33 @@ std::optional<glm::dmat4> lattice_in_gl(const render::GlState& state) {
   return has_density || state.changed ? std::optional(state.fields[0].index_to_world) : std::nullopt;
 }
 
+std::vector<volume::Channel> channels_of(const scene::StateInGl& state) {
+  std::vector<volume::Channel> channels;
+  for (const scene::StateInGl::Field& field : state.fields) channels.push_back(field.channel);
+  return channels;
+}
+
 // Of a whole state; boxes: on top of what is the newest by then.
 render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
                                             const glm::dmat4& index_to_world, bool boxes) {
   const auto below = std::make_shared<std::uint64_t>(0);
   render::VoxelTransfers::StayInGl stay;
   stay.values_wanted = live->values_wanted();
-  stay.wanted = [live] { return live->wanted(); };
+  stay.wanted = [live, flight = live->flight()] { return live->wanted(); };
   if (boxes) {
     stay.join = [live, name, below](const auto& fields) {
       *below = live->in_gl().number;
       return live->with(fields, name);
     };
-    stay.arrive = [live, name, below](scene::StateInGl state) {
-      if (!live->set_if_newest(*below, std::move(state)))
-        throw Error(ErrorCode::invalid_argument, one_line(name + ": another state came between"));
-    };
+    stay.arrive = [live, below](scene::StateInGl state) { return live->set_if_newest(*below, std::move(state)); };
   } else {
-    stay.join = [name, index_to_world](auto fields) {
-      return scene::StateInGl{
-          .name = name, .fields = std::move(fields), .index_to_world = index_to_world, .emissions = {}};
+    stay.join = [name, index_to_world](const auto& fields) {
+      return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .emissions = {}};
     };
-    stay.arrive = [live](scene::StateInGl state) { live->set(std::move(state)); };
+    stay.arrive = [live](scene::StateInGl state) {
+      live->set(std::move(state));
+      return true;
+    };
   }
   return stay;
 }
@@ -377,7 +383,7 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
       throw Error(ErrorCode::invalid_argument,
                   one_line(state.name + ": the rest of it is in another viewer's context"));
     if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
-    bring_back(g, live);
+    bring_back(g, live, announced ? announced->channels : channels_of(*rest));
     return std::nullopt;
   };
   render::VoxelTransfers::Arrive arrive;
@@ -423,10 +429,10 @@ void Viewer::tend(const std::shared_ptr<Live>& live) {
        .found_by = {}});
 }
 
-void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live) {
+void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels) {
   const auto found = std::make_shared<Live::InGl>();
   g.transfers().bring_back(
-      live.get(), *live->in_gl().state,
+      live.get(), channels,
       [live, found] {
         *found = live->in_gl();
         return found->state;
@@ -445,15 +451,15 @@ void Viewer::find_emissions(Context& g, const std::shared_ptr<Live>& live) {
     return found->state ? std::optional(*found->state) : std::nullopt;
   };
   stay.wanted = [live] { return live->wanted(); };
-  stay.arrive = [live, found](scene::StateInGl state) { live->set_if_newest(found->number, std::move(state)); };
-  // Main memory has other ways.
-  g.transfers().find_emissions(live.get(), "state", std::move(stay), [live] { live->values_wanted()->ask(); });
+  stay.arrive = [live, found](scene::StateInGl state) { return live->set_if_newest(found->number, std::move(state)); };
+  stay.values_wanted = live->values_wanted();
+  g.transfers().find_emissions(live.get(), "state", std::move(stay));
 }
 
 scene::StateInGlPtr Viewer::gathered(Context& g, const scene::StateInGl& state) {
   std::optional<scene::StateInGl> made;
   const auto gather = [&](const std::vector<volume::DeviceBricksPtr*>& all, std::size_t i) {
-    if (auto bricks = g.memories().gather(g.functions(), *g.programs(), **all[i])) *all[i] = std::move(bricks);
+    if (auto bricks = g.memories().gather(g.functions(), **all[i])) *all[i] = std::move(bricks);
   };
   const auto all = state.all();
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -467,6 +473,8 @@ scene::StateInGlPtr Viewer::gathered(Context& g, const scene::StateInGl& state) 
 bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) const {
   const std::shared_ptr<Live> of = live.lock();
   if (!of || of->stays_in_gl() || brought.lock() == state) return false;
+  // What another viewer has on its way goes there first.
+  if (of->in_flight() && !g.transfers().busy(of.get())) return false;
   const auto announced = g.transfers().announced(of.get());
   return !announced || announced->stays_in_gl;
 }
@@ -475,7 +483,9 @@ bool Viewer::InGl::needs_emissions(const scene::StateInGlPtr& state) const {
   const std::shared_ptr<Live> of = live.lock();
   if (!of || !of->stays_in_gl()) return false;
   const std::vector<scene::Emission> wanted = of->wanted();
-  const auto is_there = [&](const scene::Emission& settings) { return state->emission(settings) != nullptr; };
+  const auto is_there = [&](const scene::Emission& settings) {
+    return !state->emits(settings) || state->emission(settings) != nullptr;
+  };
   return !std::ranges::all_of(wanted, is_there) && (found.lock() != state || found_by != wanted);
 }
 
@@ -497,16 +507,20 @@ void Viewer::tend_voxels_in_gl(Context& g) {
     if (!g.has(*state)) continue;
     if (in_gl.needs_values(g, state)) {
       in_gl.brought = state;
-      bring_back(g, live);
+      bring_back(g, live, channels_of(*state));
     }
     if (in_gl.needs_emissions(state)) {
       in_gl.found = state;
       in_gl.found_by = live->wanted();
       find_emissions(g, live);
     }
-    if (live->stays_in_gl() && in_gl.gathered.lock() != state) {
+    if (live->stays_in_gl() && in_gl.gathered.lock() != state && !g.transfers().goes_on(live.get())) {
       in_gl.gathered = state;
-      if (scene::StateInGlPtr moved = gathered(g, *state)) live->move_in_gl(state, std::move(moved));
+      if (scene::StateInGlPtr moved = gathered(g, *state)) {
+        live->move_in_gl(state, moved);
+        in_gl.gathered = moved;
+        if (in_gl.found.lock() == state) in_gl.found = moved;
+      }
     }
   }
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -11,6 +13,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -1197,6 +1200,106 @@ TEST_F(FireInGl, WithoutMemoryItComesToMainMemory) {
   EXPECT_EQ(difference(found, by_memory(burning, 3.0F)), "");
 }
 
+// Whichever allocation fails, of a state whose light is wanted, it is told, and the next state is there.
+TEST_F(FireInGl, WhateverIsNotAllocatedNothingIsLost) {
+  const Fire first = fire(1);
+  const Fire second = fire(2);
+  const Picture in_gl = by_gl(second, 2.0F);
+  const Picture in_memory = by_memory(second, 2.0F);
+  cumulet_frame_desc frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  bool failed = true;
+  int failures = 0;
+  int in_main_memory = 0;
+  for (int allocation = 0; failed && !HasFailure(); ++allocation) {
+    SCOPED_TRACE(allocation);
+    auto desc = make_desc<cumulet_live_desc>();
+    desc.stays_in_gl = 1;
+    live_ = make_live(desc);
+    viewer_ = make(CUMULET_BUILD_GPU);
+    v_ = viewer_.get();
+    burn(v_, 2.0F);
+    ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+    hand_over(first.fields);
+    settled(v_);
+    const std::uint64_t before = handed();
+    const cumulet_gl_state_desc state = state_of(second.fields);
+    fake_.fail_allocation(allocation);
+    cumulet_status status = cumulet_live_set_gl(v_, live_.get(), &state);
+    for (int i = 0; i < 1000 && status == CUMULET_OK && handed() == before; ++i)
+      status = cumulet_render(v_, &frame, nullptr);
+    fake_.fail_allocation(-1);
+    failed = status != CUMULET_OK;
+    failures += failed ? 1 : 0;
+    if (failed) {
+      EXPECT_EQ(status, CUMULET_ERROR_OUT_OF_MEMORY) << cumulet_last_error(v_);
+      hand_over(second.fields);
+    }
+    const Picture found = settled(v_);
+    in_main_memory += shows_voxels() ? 1 : 0;
+    EXPECT_EQ(difference(found, shows_voxels() ? in_memory : in_gl), "");
+  }
+  EXPECT_GT(failures, 10);
+  EXPECT_GT(in_main_memory, 3) << "what it gives off was not found";
+}
+
+// Boxes on a state that was refused have none to be on top of, whatever is found of the one before.
+TEST_F(FireInGl, NothingIsOnTopOfWhatIsRefused) {
+  hand_over(fire(0).fields);
+  settled(v_);
+  Fire bad = fire(1);
+  auto values = bad.arrays[0].values;
+  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
+  const Array array(types[1].format, values);
+  objects_.put(bad.textures[0], odd, GL_RED, types[1].type, array.bytes.data());
+  hand_over(bad.fields);
+  EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
+  burn(v_, 4.0F);
+  EXPECT_EQ(difference(settled(v_), by_gl(fire(0), 4.0F)), "");
+  cumulet_gl_state_desc boxes = state_of(bad.fields);
+  const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
+  boxes.changed = &box;
+  boxes.changed_count = 1;
+  EXPECT_EQ(refusal(boxes, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
+}
+
+// A host may do so wherever it is called back.
+TEST_F(FireInGl, IsCancelledInCallbacks) {
+  struct Host {
+    std::atomic<cumulet_viewer*> viewer = nullptr;
+    std::atomic<int> calls = 0;
+  } host;
+  viewer_ = test::make_viewer({.get_proc = test::FakeGl::get_proc,
+                               .user = &fake_,
+                               .update =
+                                   [](void* user) {
+                                     auto& of = *static_cast<Host*>(user);
+                                     // Some of what is under way goes on.
+                                     if (of.viewer != nullptr && ++of.calls % 3 == 0) cumulet_cancel(of.viewer);
+                                   },
+                               .update_user = &host,
+                               .samples = 2,
+                               .build = CUMULET_BUILD_GPU});
+  v_ = viewer_.get();
+  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  host.viewer = v_;
+  cumulet_frame_desc frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  for (int step = 0; step < 6; ++step) {
+    burn(v_, 1.0F + static_cast<float>(step));
+    hand_over(fire(step).fields);
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  host.viewer = nullptr;
+  EXPECT_GT(host.calls, 6);
+  const Fire last = fire(6);
+  hand_over(last.fields);
+  EXPECT_EQ(difference(settled(v_), by_gl(last, 6.0F)), "");
+}
+
 TEST_F(FireInGl, WhatIsNotFiniteIsRefused) {
   const Fire good = fire(0);
   hand_over(good.fields);
@@ -1408,7 +1511,7 @@ TEST_P(Transfers, SmallStorageBlocksAreEnough) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, values);
   Objects objects(*gl_);
   gl::Limits limits = gl::query_limits(*gl_);
-  const auto memories = std::make_shared<render::DeviceMemories>(gl_, limits.storage_block_bytes);
+  const auto memories = std::make_shared<render::DeviceMemories>(gl_, programs_, limits.storage_block_bytes);
   const auto voxels_of = [&](bool texture) {
     render::GlVoxels voxels{volume::Channel::density, {}, glm::dmat4(1.0)};
     if (texture) {

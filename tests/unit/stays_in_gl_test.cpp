@@ -44,7 +44,7 @@ class StaysInGl : public test::GlTest {
     if (IsSkipped()) return;
     gl::find_out_dispatches(gl_, *programs_);
     limits_ = gl::query_limits(*gl_);
-    memories_ = std::make_shared<render::DeviceMemories>(gl_, limits_.storage_block_bytes);
+    memories_ = std::make_shared<render::DeviceMemories>(gl_, programs_, limits_.storage_block_bytes);
     transfers_ = std::make_unique<render::VoxelTransfers>(gl_, programs_, limits_, memories_);
   }
   void TearDown() override {
@@ -98,7 +98,10 @@ class StaysInGl : public test::GlTest {
       return joined;
     };
     stay.wanted = [&] { return wanted; };
-    stay.arrive = [&](scene::StateInGl arrived) { found = std::move(arrived); };
+    stay.arrive = [&](scene::StateInGl arrived) {
+      found = std::move(arrived);
+      return true;
+    };
     transfers_->begin(state, this, std::move(stay), [] {});
     // The device takes its time.
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -481,8 +484,7 @@ TEST_P(StaysInGl, ScatteredBricksAreGathered) {
   const gl::StateGuard guard(*gl_);
   volume::DeviceBricksPtr gathered;
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (gathered == nullptr && std::chrono::steady_clock::now() < until)
-    gathered = memories_->gather(gl_, *programs_, all);
+  while (gathered == nullptr && std::chrono::steady_clock::now() < until) gathered = memories_->gather(gl_, all);
   ASSERT_NE(gathered, nullptr);
   EXPECT_EQ(gathered->memories.size(), 1U);
   EXPECT_EQ(gathered->origins, all.origins);
@@ -492,8 +494,8 @@ TEST_P(StaysInGl, ScatteredBricksAreGathered) {
   const grid::TetGrid expected = in_memory(values, odd, place(), known).grid(settings);
   expect_same_cells(build(known, settings), expected);
   expect_same_cells(build(field_of(all, place()), settings), expected);
-  render::DeviceMemories small(gl_, 1000);
-  EXPECT_EQ(small.gather(gl_, *programs_, all), nullptr) << "larger than a storage block";
+  render::DeviceMemories small(gl_, programs_, 1000);
+  EXPECT_EQ(small.gather(gl_, all), nullptr) << "larger than a storage block";
 }
 
 }  // namespace
