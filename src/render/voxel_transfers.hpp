@@ -108,12 +108,6 @@ class VoxelTransfers {
   [[nodiscard]] bool busy(const void* whose) const {
     return std::ranges::any_of(transfers_, [&](const Transfer& transfer) { return transfer.whose == whose; });
   }
-  /// Whether one goes on with the bricks that a state had.
-  [[nodiscard]] bool goes_on(const void* whose) const {
-    return std::ranges::any_of(transfers_, [&](const Transfer& transfer) {
-      return transfer.whose == whose && transfer.staying && !transfer.whole;
-    });
-  }
   /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
   /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
   void follow(Deadline deadline);

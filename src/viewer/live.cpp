@@ -55,10 +55,15 @@ void Live::set(const std::vector<MemoryField>& fields, std::string name, const M
   hand_over(std::move(whole), std::move(handed), lease);
 }
 
-void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
+std::vector<Live::Handed> Live::handed_as_zeros(const std::vector<volume::FieldCopy>& fields) {
   std::vector<Handed> handed;
   handed.reserve(fields.size());
   for (const volume::FieldCopy& field : fields) handed.push_back({field.channel, Takes::zeros});
+  return handed;
+}
+
+void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
+  std::vector<Handed> handed = handed_as_zeros(fields);
   hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr);
 }
 
@@ -89,8 +94,7 @@ bool Live::hand_over(scene::StateInGl state, std::optional<std::uint64_t> on_top
 }
 
 bool Live::set_if_newest(std::uint64_t in_gl, std::vector<volume::FieldCopy> fields, std::string name) {
-  std::vector<Handed> handed;
-  for (const volume::FieldCopy& field : fields) handed.push_back({field.channel, Takes::zeros});
+  std::vector<Handed> handed = handed_as_zeros(fields);
   return hand_over({std::move(fields), std::move(name), nullptr}, std::move(handed), nullptr, in_gl);
 }
 

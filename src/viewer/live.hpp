@@ -125,6 +125,7 @@ class Live {
     bool operator==(const Handed&) const = default;
   };
   [[nodiscard]] std::vector<Handed> handed() const;
+  static std::vector<Handed> handed_as_zeros(const std::vector<volume::FieldCopy>& fields);
   static const Handed& updatable(const std::vector<Handed>& handed, volume::Channel channel, const std::string& name);
   static const Handed& updatable_from_memory(const std::vector<Handed>& handed, volume::Channel channel,
                                              const std::string& name);

@@ -282,15 +282,17 @@ class Viewer {
   void prepare(const Frame& frame);
   // Takes voxels from GL that are there.
   static void follow_transfers(Context& g, double budget_ms);
-  // Of live volumes that are in GL: what is scattered is gathered, what they give off found, what is needed in main
-  // memory brought there.
+  // Of live volumes that are in GL: what they give off is found, what is needed in main memory brought there.
   void tend_voxels_in_gl(Context& g);
   // Whether there is any such thing to do.
   [[nodiscard]] bool voxels_in_gl_wait(Context& g) const;
   static void bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels);
+  // Where a state of a live volume stands that stays in GL; none: it does not.
+  static std::optional<glm::dmat4> place_in_gl(Context& g, const std::shared_ptr<Live>& live,
+                                               const render::GlState& state);
   static void find_emissions(Context& g, const std::shared_ptr<Live>& live);
-  // The same with its bricks together; null: they are.
-  static scene::StateInGlPtr gathered(Context& g, const scene::StateInGl& state);
+  // Of its newest state bricks that are scattered.
+  static void gather(Context& g, Live& live);
   // From now on.
   void tend(const std::shared_ptr<Live>& live);
   // What status() and stats() tell of it.
@@ -573,7 +575,7 @@ class Viewer {
     std::weak_ptr<Live> live;
     std::array<std::shared_ptr<void>, 2> listeners;  // to who needs voxels, or what is given off
     // Of these it was tried, or is: what fails is not tried again.
-    std::weak_ptr<const scene::StateInGl> gathered, brought, found;
+    std::weak_ptr<const scene::StateInGl> brought, found;
     std::vector<scene::Emission> found_by;
     // Of its newest state, which this context has: in main memory, or what it gives off.
     [[nodiscard]] bool needs_values(Context& g, const scene::StateInGlPtr& state) const;

@@ -331,36 +331,41 @@ std::vector<volume::Channel> channels_of(const scene::StateInGl& state) {
   return channels;
 }
 
-// Of a whole state; boxes: on top of what is the newest by then.
+// A whole state.
 render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
-                                            const glm::dmat4& index_to_world, bool boxes) {
+                                            const glm::dmat4& index_to_world) {
+  render::VoxelTransfers::StayInGl stay;
+  stay.values_wanted = live->values_wanted();
+  stay.wanted = [live, flight = live->flight()] { return live->wanted(); };
+  stay.join = [name, index_to_world](const auto& fields) {
+    return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .emissions = {}};
+  };
+  stay.arrive = [live](scene::StateInGl state) {
+    live->set(std::move(state));
+    return true;
+  };
+  return stay;
+}
+
+// Boxes, on top of what is the newest by then. gather: called before that is looked at.
+render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
+                                            const std::function<void()>& gather) {
   const auto below = std::make_shared<std::uint64_t>(0);
   render::VoxelTransfers::StayInGl stay;
   stay.values_wanted = live->values_wanted();
   stay.wanted = [live, flight = live->flight()] { return live->wanted(); };
-  if (boxes) {
-    stay.join = [live, name, below](const auto& fields) {
-      *below = live->in_gl().number;
-      return live->with(fields, name);
-    };
-    stay.arrive = [live, below](scene::StateInGl state) { return live->set_if_newest(*below, std::move(state)); };
-  } else {
-    stay.join = [name, index_to_world](const auto& fields) {
-      return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .emissions = {}};
-    };
-    stay.arrive = [live](scene::StateInGl state) {
-      live->set(std::move(state));
-      return true;
-    };
-  }
+  stay.join = [live, name, below, gather](const auto& fields) {
+    gather();
+    *below = live->in_gl().number;
+    return live->with(fields, name);
+  };
+  stay.arrive = [live, below](scene::StateInGl state) { return live->set_if_newest(*below, std::move(state)); };
   return stay;
 }
 
-}  // namespace
-
-// live: a copy, for the log callback may release the host's last handle.
-void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
-  std::vector<volume::MemoryField> fields;  // what of them can be checked without voxels
+// What of its fields can be checked without voxels. Returns their channels.
+std::vector<volume::Channel> check(const render::GlState& state) {
+  std::vector<volume::MemoryField> fields;
   std::vector<volume::Channel> channels;
   for (const render::GlVoxels& field : state.fields) {
     fields.push_back({field.channel, volume::SparseVoxels{.brick_origins = {},
@@ -370,49 +375,60 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
                                                           .index_to_world = field.index_to_world}});
     channels.push_back(field.channel);
   }
-  // Where it stands; none: it does not stay in GL.
-  const auto place_in_gl = [&](Context& g) -> std::optional<glm::dmat4> {
-    const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
-    if (!lattice) return std::nullopt;
-    if (!state.changed) return live->stays_in_gl() ? lattice : std::nullopt;
-    // Boxes go where the rest is.
-    const auto announced = g.transfers().announced(live.get());
-    const scene::StateInGlPtr rest = live->in_gl().state;
-    if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
-    if (!announced && !g.has(*rest))
-      throw Error(ErrorCode::invalid_argument,
-                  one_line(state.name + ": the rest of it is in another viewer's context"));
-    if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
-    bring_back(g, live, announced ? announced->channels : channels_of(*rest));
-    return std::nullopt;
-  };
-  render::VoxelTransfers::Arrive arrive;
-  if (!state.changed) {
-    volume::check_fields(fields, state.name);
-    arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
-  } else {
+  if (state.changed) {
     volume::check_update(fields, state.name);
-    arrive = [live, name = state.name](std::vector<volume::FieldCopy> copies) {
-      volume::Changes changes;
-      for (volume::FieldCopy& copy : copies)
-        changes.fields.push_back({copy.channel, std::get<volume::BrickCopy>(std::move(copy.voxels))});
-      live->update(std::move(changes), name);
-    };
+  } else {
+    volume::check_fields(fields, state.name);
   }
+  return channels;
+}
+
+// To main memory.
+render::VoxelTransfers::Arrive arrive(const std::shared_ptr<Live>& live, const std::string& name, bool boxes) {
+  if (!boxes) return [live, name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
+  return [live, name](std::vector<volume::FieldCopy> copies) {
+    volume::Changes changes;
+    for (volume::FieldCopy& copy : copies)
+      changes.fields.push_back({copy.channel, std::get<volume::BrickCopy>(std::move(copy.voxels))});
+    live->update(std::move(changes), name);
+  };
+}
+
+}  // namespace
+
+std::optional<glm::dmat4> Viewer::place_in_gl(Context& g, const std::shared_ptr<Live>& live,
+                                              const render::GlState& state) {
+  const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
+  if (!lattice) return std::nullopt;
+  if (!state.changed) return live->stays_in_gl() ? lattice : std::nullopt;
+  // Boxes go where the rest is.
+  const auto announced = g.transfers().announced(live.get());
+  const scene::StateInGlPtr rest = live->in_gl().state;
+  if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
+  if (!announced && !g.has(*rest))
+    throw Error(ErrorCode::invalid_argument, one_line(state.name + ": the rest of it is in another viewer's context"));
+  if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
+  bring_back(g, live, announced ? announced->channels : channels_of(*rest));
+  return std::nullopt;
+}
+
+// live: a copy, for the log callback may release the host's last handle.
+void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
+  const std::vector<volume::Channel> channels = check(state);
   with_gl([&](Context& g) {
     if (state.changed) {
       const auto announced = g.transfers().announced(live.get());
       live->require_updatable(channels, announced ? std::optional(announced->channels) : std::nullopt, state.name);
     }
-    const std::optional<glm::dmat4> place = place_in_gl(g);
     render::GlState placed = state;
-    render::VoxelTransfers::Arrival arrival = std::move(arrive);
-    if (place) {
+    render::VoxelTransfers::Arrival arrival = arrive(live, state.name, state.changed.has_value());
+    if (const std::optional<glm::dmat4> place = place_in_gl(g, live, state)) {
       for (render::GlVoxels& field : placed.fields) field.index_to_world = *place;
-      arrival = stay_in_gl(live, state.name, *place, state.changed.has_value());
+      arrival = state.changed ? stay_in_gl(live, state.name, [this, live] { gather(gl(), *live); })
+                              : stay_in_gl(live, state.name, *place);
+      tend(live);
     }
     g.transfers().begin(placed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
-    if (place) tend(live);
   });
   notify();
 }
@@ -423,7 +439,6 @@ void Viewer::tend(const std::shared_ptr<Live>& live) {
   lives_in_gl_.push_back(
       {.live = live,
        .listeners = {live->values_wanted()->listen([this] { notify(); }), live->listen_to_wishes([this] { notify(); })},
-       .gathered = {},
        .brought = {},
        .found = {},
        .found_by = {}});
@@ -456,18 +471,19 @@ void Viewer::find_emissions(Context& g, const std::shared_ptr<Live>& live) {
   g.transfers().find_emissions(live.get(), "state", std::move(stay));
 }
 
-scene::StateInGlPtr Viewer::gathered(Context& g, const scene::StateInGl& state) {
-  std::optional<scene::StateInGl> made;
-  const auto gather = [&](const std::vector<volume::DeviceBricksPtr*>& all, std::size_t i) {
-    if (auto bricks = g.memories().gather(g.functions(), **all[i])) *all[i] = std::move(bricks);
-  };
-  const auto all = state.all();
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!all[i]->scattered()) continue;
-    if (!made) made = state;
-    gather(made->all(), i);
+void Viewer::gather(Context& g, Live& live) {
+  const scene::StateInGlPtr state = live.in_gl().state;
+  if (!state || !g.has(*state)) return;
+  scene::StateInGl made = *state;
+  bool moved = false;
+  for (volume::DeviceBricksPtr* bricks : made.all()) {
+    if (!(*bricks)->scattered()) continue;
+    auto gathered = g.memories().gather(g.functions(), **bricks);
+    if (!gathered) continue;
+    *bricks = std::move(gathered);
+    moved = true;
   }
-  return made ? std::make_shared<const scene::StateInGl>(std::move(*made)) : nullptr;
+  if (moved) live.move_in_gl(state, std::make_shared<const scene::StateInGl>(std::move(made)));
 }
 
 bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) const {
@@ -513,14 +529,6 @@ void Viewer::tend_voxels_in_gl(Context& g) {
       in_gl.found = state;
       in_gl.found_by = live->wanted();
       find_emissions(g, live);
-    }
-    if (live->stays_in_gl() && in_gl.gathered.lock() != state && !g.transfers().goes_on(live.get())) {
-      in_gl.gathered = state;
-      if (scene::StateInGlPtr moved = gathered(g, *state)) {
-        live->move_in_gl(state, moved);
-        in_gl.gathered = moved;
-        if (in_gl.found.lock() == state) in_gl.found = moved;
-      }
     }
   }
 }

@@ -1,10 +1,11 @@
 // A live simulation: smoke that the mouse stirs, computed in the host's own context, handed over step by step in the
 // texture in which it is, and path traced as it moves.
 //
-//     cumulet-embed-smoke [--voxels N] [--build cpu|gpu] [--record FILE]
-//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N] [--build cpu|gpu]
+//     cumulet-embed-smoke [--voxels N] [--build cpu|gpu] [--fire on|off] [--record FILE]
+//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N] [--build cpu|gpu] [--fire on|off]
 //
-// --build gpu: the smoke stays on the GPU, where its grids are made.
+// --build gpu: the smoke stays on the GPU, where its grids are made. --fire on: it comes in hot, and glows until it has
+// cooled, in the evening.
 // Left button stirs, the others move the camera, as does the wheel; Escape quits. --record writes what the mouse does,
 // a line a change: frame, x, y (0 to 1, from the top left), pressed. --test plays that without a window, checks that
 // pictures follow the smoke and that no state starves, and writes OUT_DIR/smoke.ppm.
@@ -59,7 +60,8 @@ layout(binding = 1, r32f) uniform writeonly image3D to_number;
 layout(location = 0) uniform float dt;
 layout(location = 1) uniform vec3 stirred;
 layout(location = 2) uniform vec3 push;
-const float fade = 0.25, buoyancy = 26.0, reach = 0.09;
+layout(location = 3) uniform float fade;  // a second
+const float buoyancy = 26.0, reach = 0.09;
 
 ivec3 cell = ivec3(gl_GlobalInvocationID);
 int n = textureSize(velocity, 0).x;
@@ -110,11 +112,11 @@ void main() {
   }
   imageStore(to_velocity, cell, vec4(v, 0.0));
 }
-#else  // smoke moves along, fades, and comes in
+#else  // smoke, and its heat, moves along, fades, and comes in
 void main() {
-  float smoke = texture(other, from()).x * (1.0 - fade * dt) + 3.0 * dt * source();
-  if (smoke < 1e-3) smoke = 0.0;
-  imageStore(to_number, cell, vec4(smoke));
+  float number = texture(other, from()).x * (1.0 - fade * dt) + 3.0 * dt * source();
+  if (number < 1e-3) number = 0.0;
+  imageStore(to_number, cell, vec4(number));
 }
 #endif
 )";
@@ -136,13 +138,13 @@ class Solver {
   explicit Solver(int voxels) : n_(voxels) {
     for (int step = 0; step < 5; ++step) programs_[std::size_t(step)] = program_of(step);
     for (Pair* pair : {&velocity_, &divergence_}) *pair = make(GL_RGBA32F);
-    for (Pair* pair : {&pressure_, &smoke_}) *pair = make(GL_R32F);
+    for (Pair* pair : {&pressure_, &smoke_, &heat_}) *pair = make(GL_R32F);
   }
   Solver(const Solver&) = delete;
   Solver& operator=(const Solver&) = delete;
   ~Solver() {
     for (const GLuint program : programs_) glDeleteProgram(program);
-    for (const Pair& pair : {velocity_, divergence_, pressure_, smoke_}) glDeleteTextures(2, pair.data());
+    for (const Pair& pair : {velocity_, divergence_, pressure_, smoke_, heat_}) glDeleteTextures(2, pair.data());
   }
 
   struct Stir {
@@ -164,11 +166,15 @@ class Solver {
     }
     run(3, velocity_[0], pressure_[0], velocity_[1], 0);
     std::swap(velocity_[0], velocity_[1]);
-    run(4, velocity_[0], smoke_[0], 0, smoke_[1]);
-    std::swap(smoke_[0], smoke_[1]);
+    for (const auto& [numbers, fade] : {std::pair(&smoke_, 0.25F), std::pair(&heat_, 1.2F)}) {
+      glProgramUniform1f(programs_[4], 3, fade);
+      run(4, velocity_[0], (*numbers)[0], 0, (*numbers)[1]);
+      std::swap((*numbers)[0], (*numbers)[1]);
+    }
   }
-  /// After the last step: a 3D texture of floats.
+  /// After the last step: 3D textures of floats.
   [[nodiscard]] GLuint smoke() const { return smoke_[0]; }
+  [[nodiscard]] GLuint heat() const { return heat_[0]; }
 
  private:
   using Pair = std::array<GLuint, 2>;
@@ -197,7 +203,7 @@ class Solver {
 
   int n_;
   std::array<GLuint, 5> programs_{};
-  Pair velocity_{}, divergence_{}, pressure_{}, smoke_{};
+  Pair velocity_{}, divergence_{}, pressure_{}, smoke_{}, heat_{};
 };
 
 // ---- the host ----
@@ -208,23 +214,44 @@ struct Mouse {
   bool stirs = false;
 };
 
+struct Options {
+  int voxels = 64;
+  cumulet::Build build = cumulet::Build::cpu;
+  bool fire = false;
+};
+
 class Host {
  public:
-  Host(const cumulet::GetProc& get_proc, int voxels, cumulet::Build build, bool test)
-      : voxels_(voxels), solver_(voxels), viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
-    must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
-                            .sun_elevation_degrees = 50.0F,
-                            .sun_irradiance = {3.0F, 2.8F, 2.5F},
-                            .sky_radiance = {0.25F, 0.35F, 0.5F}}));
-    must(viewer_.set_medium({.density_scale = 9.0, .coalbedo = {0.03F, 0.03F, 0.03F}}));
+  Host(const cumulet::GetProc& get_proc, const Options& options, bool test)
+      : voxels_(options.voxels),
+        fire_(options.fire),
+        solver_(voxels_),
+        viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
+    if (fire_) {
+      must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
+                              .sun_elevation_degrees = 4.0F,
+                              .sun_irradiance = {0.4F, 0.2F, 0.1F},
+                              .sky_radiance = {0.05F, 0.07F, 0.12F}}));
+      must(viewer_.set_medium({.density_scale = 9.0,
+                               .coalbedo = {0.3F, 0.3F, 0.3F},
+                               .temperature_scale = 3000.0F,
+                               .blackbody = 1.0F,
+                               .blackbody_tint = {12.0F, 12.0F, 12.0F}}));
+    } else {
+      must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
+                              .sun_elevation_degrees = 50.0F,
+                              .sun_irradiance = {3.0F, 2.8F, 2.5F},
+                              .sky_radiance = {0.25F, 0.35F, 0.5F}}));
+      must(viewer_.set_medium({.density_scale = 9.0, .coalbedo = {0.03F, 0.03F, 0.03F}}));
+    }
     must(viewer_.set_ground({.place = cumulet::Ground::below}));
     must(viewer_.set_display({.denoise = cumulet::Denoise::fast}));
     must(viewer_.set_sampling({.samples = test ? 8U : 64U}));
     // The box is known, so that neither the camera nor the ground jumps as the smoke rises.
     live_ = must(cumulet::Live::create({.bounds_min = {-1.0, -1.0, -1.0},
                                         .bounds_max = {1.0, 1.0, 1.0},
-                                        .stays_in_gl = build == cumulet::Build::gpu}));
-    must(viewer_.set_grid({.build = build}));
+                                        .stays_in_gl = options.build == cumulet::Build::gpu}));
+    must(viewer_.set_grid({.build = options.build}));
     must(viewer_.set_live(live_));
   }
 
@@ -239,7 +266,11 @@ class Host {
         .channel = cumulet::Channel::density,
         .texture = solver_.smoke(),
         .index_to_world = {voxel, 0, 0, 0, 0, voxel, 0, 0, 0, 0, voxel, 0, first, first, first, 1}};
-    must(viewer_.live_set_gl(live_, {.fields = {&smoke, 1}, .name = "smoke"}));
+    cumulet::GlField heat = smoke;
+    heat.channel = cumulet::Channel::temperature;
+    heat.texture = solver_.heat();
+    const std::array fields{smoke, heat};
+    must(viewer_.live_set_gl(live_, {.fields = {fields.data(), fire_ ? 2U : 1U}, .name = "smoke"}));
   }
 
   /// Where the smoke of the last step is, in the picture: 0 to 1, from its top left.
@@ -296,6 +327,7 @@ class Host {
   }
 
   int voxels_;
+  bool fire_;
   Solver solver_;
   std::optional<Mouse> mouse_;  // of the last frame, while it stirs
   cumulet::Live live_;
@@ -347,11 +379,11 @@ void write_ppm(const std::string& path, const std::vector<std::uint8_t>& rgba, s
 }
 
 /// Each frame: a step, its state, and a picture within a budget. What may not happen ends it.
-void play(const std::string& record, const std::string& folder, int voxels, cumulet::Build build) {
+void play(const std::string& record, const std::string& folder, const Options& options) {
   make_headless_context();
   const std::vector<Moved> moves = read_mouse(record);
   constexpr std::uint32_t width = 240, height = 240;
-  Host host([](const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }, voxels, build, true);
+  Host host([](const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }, options, true);
   cumulet::Viewer& viewer = host.viewer();
   const cumulet::FrameDesc frame{
       .budget_ms = 30.0, .target = cumulet::Target::texture, .width = width, .height = height};
@@ -405,6 +437,14 @@ void play(const std::string& record, const std::string& folder, int voxels, cumu
   std::printf("smoke at %.3f, %.3f; in the picture at %.3f, %.3f\n", expected[0], expected[1], x / mass, y / mass);
   if (!(std::abs(x / mass - expected[0]) < 0.03 && std::abs(y / mass - expected[1]) < 0.03))
     fail("the picture is not of the newest state");
+  if (options.fire) {
+    const auto by_red = [&](std::size_t a, std::size_t b) { return linear[4 * a] < linear[4 * b]; };
+    std::size_t hottest = 0;
+    for (std::size_t i = 0; i < std::size_t{width} * height; ++i) hottest = std::max(hottest, i, by_red);
+    const float* colour = &linear[4 * hottest];
+    std::printf("hottest %.3f, %.3f, %.3f\n", double{colour[0]}, double{colour[1]}, double{colour[2]});
+    if (!(colour[0] > 1.0F && colour[0] > 3.0F * colour[2])) fail("nothing glows");
+  }
   must(viewer.set_ground({.place = cumulet::Ground::below}));
   while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {
   }
@@ -477,22 +517,26 @@ void run(GLFWwindow* window, Host& host, const std::string& record) {
 
 int main(int argc, char** argv) {
   std::string record, mouse, folder;
-  int voxels = 64;
+  Options options;
   std::string built = "cpu";
+  std::string fire = "off";
   for (int i = 1; i + 1 < argc; i += 2) {
     if (std::strcmp(argv[i], "--record") == 0) record = argv[i + 1];
     if (std::strcmp(argv[i], "--mouse") == 0) mouse = argv[i + 1];
     if (std::strcmp(argv[i], "--test") == 0) folder = argv[i + 1];
-    if (std::strcmp(argv[i], "--voxels") == 0) voxels = std::atoi(argv[i + 1]);
+    if (std::strcmp(argv[i], "--voxels") == 0) options.voxels = std::atoi(argv[i + 1]);
     if (std::strcmp(argv[i], "--build") == 0) built = argv[i + 1];
+    if (std::strcmp(argv[i], "--fire") == 0) fire = argv[i + 1];
   }
-  const auto build = built == "gpu" ? cumulet::Build::gpu : cumulet::Build::cpu;
-  if (argc % 2 == 0 || (built != "cpu" && built != "gpu") || folder.empty() != mouse.empty() || voxels < 8 ||
-      voxels > 256)
+  options.build = built == "gpu" ? cumulet::Build::gpu : cumulet::Build::cpu;
+  options.fire = fire == "on";
+  if (argc % 2 == 0 || (built != "cpu" && built != "gpu") || (fire != "on" && fire != "off") ||
+      folder.empty() != mouse.empty() || options.voxels < 8 || options.voxels > 256)
     fail(
-        "usage: cumulet-embed-smoke [--voxels 8..256] [--build cpu|gpu] [--record FILE | --mouse FILE --test OUT_DIR]");
+        "usage: cumulet-embed-smoke [--voxels 8..256] [--build cpu|gpu] [--fire on|off] [--record FILE | --mouse FILE "
+        "--test OUT_DIR]");
   if (!folder.empty()) {
-    play(mouse, folder, voxels, build);
+    play(mouse, folder, options);
     return 0;
   }
   if (glfwInit() == GLFW_FALSE) fail("GLFW finds no display");
@@ -503,7 +547,7 @@ int main(int argc, char** argv) {
   if (window == nullptr) fail("no window with OpenGL 4.5");
   glfwMakeContextCurrent(window);
   {
-    Host host(glfwGetProcAddress, voxels, build, false);
+    Host host(glfwGetProcAddress, options, false);
     run(window, host, record);
   }
   glfwDestroyWindow(window);
