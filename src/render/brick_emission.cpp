@@ -35,6 +35,7 @@ BrickEmission::BrickEmission(gl::FunctionsPtr gl, gl::ProgramsPtr programs, Devi
       index_to_world_(state.index_to_world),
       temperature_(settings_.is_hot() ? state.field(volume::Channel::temperature) : nullptr),
       flame_(settings_.burns() ? state.field(volume::Channel::flame) : nullptr),
+      values_wanted_(state.fields.front().bricks->wanted),
       upload_(gl_, "finding what bricks give off") {
   const auto sort = [](std::vector<glm::ivec3>& origins) {
     std::ranges::sort(origins, lexicographic);
@@ -55,8 +56,12 @@ BrickEmission::BrickEmission(gl::FunctionsPtr gl, gl::ProgramsPtr programs, Devi
   for (const glm::ivec3& origin : origins_) bricks_ = glm::max(bricks_, origin / volume::brick_size + 1);
   if (origins_.empty()) return;
   upload_.add([this] {
-    const core::CmBrickGlow glow = scene::shader_glow(settings_);
-    glow_ = gl::make_buffer(gl_, sizeof glow, &glow, 0, "creating what bricks give off by");
+    // Of whole vectors, as blocks of shaders are.
+    struct alignas(16) Block {
+      core::CmBrickGlow glow;
+    };
+    const Block block{scene::shader_glow(settings_)};
+    glow_ = gl::make_buffer(gl_, sizeof block, &block, 0, "creating what bricks give off by");
     tree_ = make_brick_tree(gl_, grid::brick_edges(index_to_world_));
   });
   const std::size_t most = std::max<std::size_t>(memories_->most_bytes() / volume::DeviceMemory::bytes_of(1, false), 1);
@@ -176,6 +181,7 @@ scene::EmissionInGl BrickEmission::take(const scene::EmissionInGl* before) {
   }
   scene::EmissionInGl emission{settings_, {}};
   for (std::size_t c = 0; c < 3; ++c) {
+    made[c].wanted = values_wanted_;
     made[c].emptied = changed_;
     if (before != nullptr) {
       made[c] = before->components[c]->with(made[c]);

@@ -60,8 +60,9 @@ class BrickEmission {
   scene::Emission settings_;
   glm::dmat4 index_to_world_;
   volume::DeviceBricksPtr temperature_, flame_;  // null: none that glows
-  std::vector<glm::ivec3> origins_;              // of what glows
-  std::vector<glm::ivec3> changed_;              // and of what does not any more
+  volume::ValuesWantedPtr values_wanted_;
+  std::vector<glm::ivec3> origins_;  // of what glows
+  std::vector<glm::ivec3> changed_;  // and of what does not any more
   glm::ivec3 bricks_{0};
   gl::Object glow_, tree_;
   std::deque<Part> parts_;

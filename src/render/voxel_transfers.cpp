@@ -436,7 +436,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   gl::check(gl, what_step);
   if (transfer.whole) {
     // Those that nobody will want, but for the first: it arrives however fast they come.
-    const auto of_one = [&](const Transfer& other) { return other.whose == whose && !other.finds(); };
+    const auto of_one = [&](const Transfer& other) { return other.whose == whose && !other.finds() && !other.back; };
     auto other = std::ranges::find_if(transfers_, of_one);
     if (other != transfers_.end()) ++other;
     while ((other = std::find_if(other, transfers_.end(), of_one)) != transfers_.end()) other = drop(other);
@@ -486,7 +486,8 @@ bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
                                     static_cast<GLsizeiptr>(memory->bytes()));
       }
       volume::BrickCopy copy(there->index_to_world);
-      copy.reserve(field.bricks->origins.size());
+      copy.reserve(field.bricks->origins.size() + field.bricks->emptied.size());
+      for (const glm::ivec3& origin : field.bricks->emptied) copy.add(origin, std::array<float, brick_voxels>{});
       transfer.fields.push_back({field.channel, std::move(copy)});
     }
     transfer.fence = fence();
@@ -624,7 +625,18 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
     changed.insert(changed.end(), field.bricks->emptied.begin(), field.bricks->emptied.end());
   }
   staying.state = stay.join(staying.fields);
-  if (!staying.state) return;
+  if (!staying.state) {
+    if (!stay.instead) return;
+    // What it goes on with came to main memory.
+    auto state = std::make_shared<scene::StateInGl>();
+    state->name = transfer.name;
+    state->fields = std::move(staying.fields);
+    state->index_to_world = index_to_world_of(transfer.fields[0]);
+    transfer.back = Return{.find = [state] { return state; }, .state = {}, .memories = {}};
+    transfer.arrival = Arrive(stay.instead);
+    transfer.staying.reset();
+    return;
+  }
   const auto is_here = [&](const volume::DeviceBricks* bricks) { return memories_->has(*bricks); };
   if (!std::ranges::all_of(std::as_const(*staying.state).all(), is_here)) {
     staying.state.reset();
@@ -632,6 +644,8 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
     refuse(transfer.name, "the rest of it is in another viewer's context");
   }
   for (scene::Emission& settings : stay.wanted()) {
+    // In main memory it is found by other ways.
+    if (stay.values_wanted && stay.values_wanted->asked()) break;
     if (!staying.state->emits(settings)) continue;
     const scene::EmissionInGl* before = staying.state->emission(settings);
     if (before != nullptr && changed.empty()) {
@@ -651,6 +665,7 @@ bool VoxelTransfers::take_in_gl(Transfer& transfer, Deadline deadline) {
   if (!transfer.staying) {
     if (!transfer.fence.passed()) return false;
     join(transfer, take_fields(transfer));
+    if (transfer.back) return take_back(transfer, deadline);
   }
   Staying& staying = *transfer.staying;
   try {
@@ -669,11 +684,13 @@ bool VoxelTransfers::arrive_in_gl(Transfer& transfer) {
   if (staying.failure && stay.values_wanted) stay.values_wanted->ask();
   // A find that found nothing is no other state.
   const bool arrives = staying.state && !(transfer.finds() && staying.finding.empty());
-  const std::exception_ptr failure = staying.failure;
+  const std::exception_ptr failure = std::exchange(staying.failure, nullptr);
   if (arrives && !stay.arrive(made(staying)) && !transfer.finds()) {
     join(transfer, std::move(staying.fields));
+    if (transfer.staying) transfer.staying->failure = failure;
     return false;
   }
+  staying.failure = failure;
   if (failure) std::rethrow_exception(failure);
   return true;
 }

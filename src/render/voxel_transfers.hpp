@@ -2,7 +2,6 @@
 
 // Voxels that a host has in GL, on their way to main memory, or to where they stay in GL.
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -71,12 +70,14 @@ class VoxelTransfers {
   /// Fields stay in GL.
   struct StayInGl {
     /// Given those that arrived, in their order: the state that they make, what was found of another that it goes on
-    /// with among it; none: there is none to go on with. Of those that changed bricks are not tidy.
+    /// with among it; none: there is none in GL to go on with. Of those that changed bricks are not tidy.
     std::function<std::optional<scene::StateInGl>(const std::vector<scene::StateInGl::Field>& fields)> join;
     /// By which settings it is to be found what that gives off.
     std::function<std::vector<scene::Emission>()> wanted;
     /// The same with these, and no others. False: what it goes on with is another by now; it is joined again.
     std::function<bool(scene::StateInGl state)> arrive;
+    /// What changed comes to main memory, as what it goes on with did; null: nothing does.
+    Arrive instead;
     volume::ValuesWantedPtr values_wanted;  ///< of its bricks; null: nobody asks
   };
   using Arrival = std::variant<Arrive, StayInGl>;
@@ -104,10 +105,6 @@ class VoxelTransfers {
   [[nodiscard]] std::optional<Announced> announced(const void* whose) const;
   /// Whether any is on its way.
   [[nodiscard]] bool busy() const { return !transfers_.empty(); }
-  /// Whether any of one is.
-  [[nodiscard]] bool busy(const void* whose) const {
-    return std::ranges::any_of(transfers_, [&](const Transfer& transfer) { return transfer.whose == whose; });
-  }
   /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
   /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
   void follow(Deadline deadline);

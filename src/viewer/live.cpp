@@ -69,11 +69,10 @@ void Live::set(std::vector<volume::FieldCopy> fields, std::string name) {
 
 void Live::set(scene::StateInGl state) { hand_over(std::move(state), std::nullopt); }
 
-scene::StateInGl Live::with(const std::vector<scene::StateInGl::Field>& changed, const std::string& name) const {
-  const scene::StateInGlPtr before = in_gl().state;
+scene::StateInGl Live::with(const scene::StateInGl& newest, const std::vector<scene::StateInGl::Field>& changed,
+                            const std::string& name) const {
   if (handed().empty()) refuse(name, no_state);
-  if (!before) refuse(name, "the state before it is not in GL");
-  scene::StateInGl state = *before;
+  scene::StateInGl state = newest;
   state.name = name;
   for (const scene::StateInGl::Field& field : changed) {
     const auto there = std::ranges::find(state.fields, field.channel, &scene::StateInGl::Field::channel);

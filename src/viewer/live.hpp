@@ -45,9 +45,10 @@ class Live {
   void update(volume::Changes changes, const std::string& name);
   /// The same of fields in GL.
   void set(scene::StateInGl state);
-  /// What the newest is with these bricks in their places, which need not be tidy. Throws as update() does, and where
-  /// the newest is not in GL.
-  [[nodiscard]] scene::StateInGl with(const std::vector<scene::StateInGl::Field>& changed,
+  /// What the newest, which is in GL, is with these bricks in their places; they need not be tidy. Throws as update()
+  /// does.
+  [[nodiscard]] scene::StateInGl with(const scene::StateInGl& newest,
+                                      const std::vector<scene::StateInGl::Field>& changed,
                                       const std::string& name) const;
   /// What follows the state in GL of this number, if that is still the newest. Returns whether it is.
   bool set_if_newest(std::uint64_t in_gl, scene::StateInGl state);
@@ -71,9 +72,6 @@ class Live {
   [[nodiscard]] Wish want(const scene::Emission& emission);
   /// Each once.
   [[nodiscard]] std::vector<scene::Emission> wanted() const;
-  /// Of a state that is on its way to stay in GL, as long as it is.
-  [[nodiscard]] std::shared_ptr<void> flight() const { return flights_; }
-  [[nodiscard]] bool in_flight() const { return flights_.use_count() > 1; }
   /// Listeners::listen() to others being wanted.
   [[nodiscard]] std::shared_ptr<void> listen_to_wishes(std::function<void()> changed) {
     return wish_listeners_.listen(std::move(changed));
@@ -155,7 +153,6 @@ class Live {
   State state_;
   Listeners listeners_;
   Listeners wish_listeners_;
-  std::shared_ptr<void> flights_ = std::make_shared<char>();
 };
 
 }  // namespace cumulet::viewer

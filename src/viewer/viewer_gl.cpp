@@ -336,7 +336,7 @@ render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, c
                                             const glm::dmat4& index_to_world) {
   render::VoxelTransfers::StayInGl stay;
   stay.values_wanted = live->values_wanted();
-  stay.wanted = [live, flight = live->flight()] { return live->wanted(); };
+  stay.wanted = [live] { return live->wanted(); };
   stay.join = [name, index_to_world](const auto& fields) {
     return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .emissions = {}};
   };
@@ -344,22 +344,6 @@ render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, c
     live->set(std::move(state));
     return true;
   };
-  return stay;
-}
-
-// Boxes, on top of what is the newest by then. gather: called before that is looked at.
-render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
-                                            const std::function<void()>& gather) {
-  const auto below = std::make_shared<std::uint64_t>(0);
-  render::VoxelTransfers::StayInGl stay;
-  stay.values_wanted = live->values_wanted();
-  stay.wanted = [live, flight = live->flight()] { return live->wanted(); };
-  stay.join = [live, name, below, gather](const auto& fields) {
-    gather();
-    *below = live->in_gl().number;
-    return live->with(fields, name);
-  };
-  stay.arrive = [live, below](scene::StateInGl state) { return live->set_if_newest(*below, std::move(state)); };
   return stay;
 }
 
@@ -392,6 +376,25 @@ render::VoxelTransfers::Arrive arrive(const std::shared_ptr<Live>& live, const s
       changes.fields.push_back({copy.channel, std::get<volume::BrickCopy>(std::move(copy.voxels))});
     live->update(std::move(changes), name);
   };
+}
+
+// Boxes, on top of what is the newest by then. gather: called before that is looked at.
+render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
+                                            const std::function<void()>& gather) {
+  const auto below = std::make_shared<std::uint64_t>(0);
+  render::VoxelTransfers::StayInGl stay;
+  stay.values_wanted = live->values_wanted();
+  stay.wanted = [live] { return live->wanted(); };
+  stay.join = [live, name, below, gather](const auto& fields) -> std::optional<scene::StateInGl> {
+    gather();
+    const Live::InGl now = live->in_gl();
+    if (!now.state) return std::nullopt;
+    *below = now.number;
+    return live->with(*now.state, fields, name);
+  };
+  stay.instead = arrive(live, name, true);
+  stay.arrive = [live, below](scene::StateInGl state) { return live->set_if_newest(*below, std::move(state)); };
+  return stay;
 }
 
 }  // namespace
@@ -478,10 +481,16 @@ void Viewer::gather(Context& g, Live& live) {
   bool moved = false;
   for (volume::DeviceBricksPtr* bricks : made.all()) {
     if (!(*bricks)->scattered()) continue;
-    auto gathered = g.memories().gather(g.functions(), **bricks);
-    if (!gathered) continue;
-    *bricks = std::move(gathered);
-    moved = true;
+    try {
+      auto gathered = g.memories().gather(g.functions(), **bricks);
+      if (!gathered) continue;
+      *bricks = std::move(gathered);
+      moved = true;
+    } catch (const Error& error) {
+      // They serve as they are.
+      if (error.code() == ErrorCode::context_lost) throw;
+      gl::clear_errors(*g.functions());
+    }
   }
   if (moved) live.move_in_gl(state, std::make_shared<const scene::StateInGl>(std::move(made)));
 }
@@ -489,8 +498,6 @@ void Viewer::gather(Context& g, Live& live) {
 bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) const {
   const std::shared_ptr<Live> of = live.lock();
   if (!of || of->stays_in_gl() || brought.lock() == state) return false;
-  // What another viewer has on its way goes there first.
-  if (of->in_flight() && !g.transfers().busy(of.get())) return false;
   const auto announced = g.transfers().announced(of.get());
   return !announced || announced->stays_in_gl;
 }

@@ -1450,6 +1450,50 @@ TEST_F(LiveInGl, IsSharedWithPrograms) {
   EXPECT_EQ(test::FakeGl::strays(), 0U);
 }
 
+// Boxes that one viewer has on its way to GL when another brings the rest to main memory go there, too.
+TEST_F(LiveInGl, BoxesFollowWhatAnotherBroughtBack) {
+  const Type& type = types[1];
+  const Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
+  Array now(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  std::fill_n(now.values.begin(), now.values.size() / 2, 0.0F);  // empties bricks, too
+  now = Array(type.format, now.values);
+  cumulet_programs* programs = nullptr;
+  const auto programs_desc = make_desc<cumulet_programs_desc>();
+  ASSERT_EQ(cumulet_programs_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
+  const test::ProgramsRef kept(programs);
+  std::array<ViewerPtr, 2> viewers;
+  for (ViewerPtr& viewer : viewers) {
+    viewer = test::make_viewer({.get_proc = test::FakeGl::get_proc,
+                                .user = &fake_,
+                                .samples = 2,
+                                .programs = programs,
+                                .build = CUMULET_BUILD_GPU});
+    ASSERT_EQ(cumulet_set_live(viewer.get(), live_.get()), CUMULET_OK);
+  }
+  const GLuint name = objects_.texture(odd, type, before);
+  const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
+  viewer_ = std::move(viewers[0]);
+  v_ = viewer_.get();
+  hand_over(fields);
+  EXPECT_EQ(arrive(), 1U);
+  std::vector<cumulet_voxel_box> boxes;
+  for (const Sides& b : State::bricks(odd, now.values, before.values))
+    boxes.push_back({{b[0], b[1], b[2]}, {b[0] + 7, b[1] + 7, b[2] + 7}});
+  objects_.put(name, odd, GL_RED, type.type, now.bytes.data());
+  hand_over(fields, boxes);
+  get_volume(CUMULET_ERROR_UNSUPPORTED);
+  std::swap(viewer_, viewers[1]);
+  v_ = viewer_.get();
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_TRUE(shows_voxels());
+  expect_same(newest(live_), alone(dense(odd, before.values)));
+  std::swap(viewer_, viewers[1]);
+  v_ = viewer_.get();
+  EXPECT_EQ(arrive(), 1U);
+  expect_same(newest(live_), alone(dense(odd, now.values)));
+  EXPECT_EQ(difference(picture(), reference(now.values)), "");
+}
+
 TEST_F(LiveInGl, EndsWithItsContext) {
   const Array first(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array second(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
