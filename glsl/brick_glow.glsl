@@ -2,7 +2,7 @@
 #ifndef CM_BRICK_GLOW_GLSL
 #define CM_BRICK_GLOW_GLSL
 
-#define CM_RAMP_PARTS 64
+#define CM_RAMP_PARTS 64u
 #define CM_BODY_COLOURS 1024
 
 // Of a ramp, from this value on: what it becomes, and how that grows with it.
@@ -20,8 +20,7 @@ struct CmBrickGlow {
   float offset;       // kelvin: this and scale times the field's value
   float scale;
   float most;  // radiance
-  CmRampPart temperature_ramp[CM_RAMP_PARTS];  // of the first one any value, of the last ones none
-  CmRampPart flame_ramp[CM_RAMP_PARTS];
+  CmRampPart ramps[2 * CM_RAMP_PARTS];  // temperature's, then flame's: of the first one any value, of the last ones none
   float colours[3 * CM_BODY_COLOURS];  // of black bodies, evenly in the temperature's logarithm
 };
 

@@ -39,20 +39,13 @@ float cm_flame_at(uint i) {
 #endif
 }
 
-// As volume::Ramp: 0 stays. Found by halves: no branch is the same for all voxels, which zink of Mesa 22.3 would keep.
-float cm_temperature_ramp(float value) {
-  uint part = 0u;
+// As volume::Ramp: 0 stays. first: of its parts. Found by halves: no branch is the same for all voxels, which zink of
+// Mesa 22.3 would keep.
+float cm_ramp(uint first, float value) {
+  uint part = first;
   for (uint step = CM_RAMP_PARTS / 2u; step > 0u; step /= 2u)
-    part += value >= cm_glow.temperature_ramp[part + step].from ? step : 0u;
-  CmRampPart at = cm_glow.temperature_ramp[part];
-  return value > 0.0 ? max(0.0, at.start + at.slope * (value - at.from)) : 0.0;
-}
-
-float cm_flame_ramp(float value) {
-  uint part = 0u;
-  for (uint step = CM_RAMP_PARTS / 2u; step > 0u; step /= 2u)
-    part += value >= cm_glow.flame_ramp[part + step].from ? step : 0u;
-  CmRampPart at = cm_glow.flame_ramp[part];
+    part += value >= cm_glow.ramps[part + step].from ? step : 0u;
+  CmRampPart at = cm_glow.ramps[part];
   return value > 0.0 ? max(0.0, at.start + at.slope * (value - at.from)) : 0.0;
 }
 
@@ -73,8 +66,8 @@ vec3 cm_black_body(float kelvin) {
 }
 
 vec3 cm_emission(float temperature_value, float flame_value) {
-  vec3 light = cm_flame_ramp(flame_value) * cm_glow.flame_colour;
-  float temperature = cm_temperature_ramp(temperature_value);
+  vec3 light = cm_ramp(CM_RAMP_PARTS, flame_value) * cm_glow.flame_colour;
+  float temperature = cm_ramp(0u, temperature_value);
   if (temperature > 0.0) {
     const float hottest = 1e6;
     float kelvin = min(cm_glow.offset + cm_glow.scale * temperature, hottest);

@@ -26,11 +26,12 @@ std::optional<volume::DeviceBricks::Place> place_of(const volume::DeviceBricksPt
 }  // namespace
 
 BrickEmission::BrickEmission(gl::FunctionsPtr gl, gl::ProgramsPtr programs, DeviceMemoriesPtr memories,
-                             const scene::StateInGl& state, scene::Emission settings,
+                             const light::BlackBody& body, const scene::StateInGl& state, scene::Emission settings,
                              const std::optional<std::vector<glm::ivec3>>& changed)
     : gl_(std::move(gl)),
       programs_(std::move(programs)),
       memories_(std::move(memories)),
+      body_(body),
       settings_(std::move(settings)),
       index_to_world_(state.index_to_world),
       temperature_(settings_.is_hot() ? state.field(volume::Channel::temperature) : nullptr),
@@ -60,7 +61,7 @@ BrickEmission::BrickEmission(gl::FunctionsPtr gl, gl::ProgramsPtr programs, Devi
     struct alignas(16) Block {
       core::CmBrickGlow glow;
     };
-    const Block block{scene::shader_glow(settings_)};
+    const Block block{scene::shader_glow(settings_, body_)};
     glow_ = gl::make_buffer(gl_, sizeof block, &block, 0, "creating what bricks give off by");
     tree_ = make_brick_tree(gl_, grid::brick_edges(index_to_world_));
   });

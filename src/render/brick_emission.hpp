@@ -19,9 +19,9 @@ namespace cumulet::render {
 /// context current and a StateGuard around.
 class BrickEmission {
  public:
-  /// changed: bricks that are other than in the state before, however they were changed; none: there was none. The
-  /// memories have the state's. Allocates nothing yet.
-  BrickEmission(gl::FunctionsPtr gl, gl::ProgramsPtr programs, DeviceMemoriesPtr memories,
+  /// body: outlives it. changed: bricks that are other than in the state before, however they were changed; none: there
+  /// was none. The memories have the state's. Allocates nothing yet.
+  BrickEmission(gl::FunctionsPtr gl, gl::ProgramsPtr programs, DeviceMemoriesPtr memories, const light::BlackBody& body,
                 const scene::StateInGl& state, scene::Emission settings,
                 const std::optional<std::vector<glm::ivec3>>& changed);
   BrickEmission(const BrickEmission&) = delete;
@@ -57,6 +57,7 @@ class BrickEmission {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   DeviceMemoriesPtr memories_;
+  const light::BlackBody& body_;
   scene::Emission settings_;
   glm::dmat4 index_to_world_;
   volume::DeviceBricksPtr temperature_, flame_;  // null: none that glows

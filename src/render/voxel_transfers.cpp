@@ -651,7 +651,8 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
     if (before != nullptr && changed.empty()) {
       staying.kept.push_back(*before);
     } else {
-      staying.finding.emplace_back(gl_, programs_, memories_, *staying.state, std::move(settings),
+      if (!body_) body_.emplace();
+      staying.finding.emplace_back(gl_, programs_, memories_, *body_, *staying.state, std::move(settings),
                                    before != nullptr ? std::optional(changed) : std::nullopt);
     }
   }

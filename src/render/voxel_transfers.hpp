@@ -239,7 +239,8 @@ class VoxelTransfers {
   std::uint64_t most_bytes_;
   std::uint64_t alignment_;
   gl::Object sampler_;
-  Transfers transfers_;  // in the order in which they were begun
+  std::optional<light::BlackBody> body_;  // once anything glows; made in a millisecond
+  Transfers transfers_;                   // in the order in which they were begun
   std::deque<Room> spare_;
   std::size_t most_pieces_ = 0;  // of a state, lately
   int idle_ = 0;                 // calls of follow() since there was any

@@ -191,7 +191,7 @@ std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, cons
 
 }  // namespace
 
-core::CmBrickGlow shader_glow(const Emission& emission) {
+core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& body) {
   core::CmBrickGlow glow{};
   const auto put = [](const volume::Ramp& ramp, core::CmRampPart* to) {
     const std::vector<glm::vec2>& points = ramp.points();
@@ -212,10 +212,9 @@ core::CmBrickGlow shader_glow(const Emission& emission) {
   glow.offset = static_cast<float>(emission.temperature_offset);
   glow.scale = static_cast<float>(emission.temperature_scale);
   glow.most = static_cast<float>(most_radiance);
-  put(emission.temperature_ramp, glow.temperature_ramp);
-  put(emission.flame_ramp, glow.flame_ramp);
+  put(emission.temperature_ramp, glow.ramps);
+  put(emission.flame_ramp, glow.ramps + CM_RAMP_PARTS);
   static_assert(CM_BODY_COLOURS == std::tuple_size_v<light::BlackBody::Colours>);
-  const light::BlackBody body;
   float* to = glow.colours;
   for (const vec3& colour : body.colours()) {
     for (int i = 0; i < 3; ++i) *to++ = colour[i];

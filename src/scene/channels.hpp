@@ -7,6 +7,7 @@
 #include "base/log.hpp"
 #include "base/shared_code.hpp"
 #include "grid/rgb_field.hpp"
+#include "light/black_body.hpp"
 #include "volume/frame.hpp"
 #include "volume/ramp.hpp"
 
@@ -35,7 +36,7 @@ struct Emission {
 };
 
 /// The same for shaders (glsl/emit_bricks.comp).
-core::CmBrickGlow shader_glow(const Emission& emission);
+core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& body);
 
 /// Flame x strength x colour + what a black body of the temperature gives off: radiance a world unit of length, linear
 /// Rec. 709, voxel by voxel on the fields' lattice. Nothing if there is no such field, or none of them glows. O(bricks

@@ -331,12 +331,18 @@ std::vector<volume::Channel> channels_of(const scene::StateInGl& state) {
   return channels;
 }
 
-// A whole state.
-render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
-                                            const glm::dmat4& index_to_world) {
+// Of any state, what a live volume tells.
+render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live) {
   render::VoxelTransfers::StayInGl stay;
   stay.values_wanted = live->values_wanted();
   stay.wanted = [live] { return live->wanted(); };
+  return stay;
+}
+
+// A whole state.
+render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
+                                            const glm::dmat4& index_to_world) {
+  render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
   stay.join = [name, index_to_world](const auto& fields) {
     return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .emissions = {}};
   };
@@ -382,9 +388,7 @@ render::VoxelTransfers::Arrive arrive(const std::shared_ptr<Live>& live, const s
 render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
                                             const std::function<void()>& gather) {
   const auto below = std::make_shared<std::uint64_t>(0);
-  render::VoxelTransfers::StayInGl stay;
-  stay.values_wanted = live->values_wanted();
-  stay.wanted = [live] { return live->wanted(); };
+  render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
   stay.join = [live, name, below, gather](const auto& fields) -> std::optional<scene::StateInGl> {
     gather();
     const Live::InGl now = live->in_gl();
@@ -463,14 +467,12 @@ void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live, const std
 
 void Viewer::find_emissions(Context& g, const std::shared_ptr<Live>& live) {
   const auto found = std::make_shared<Live::InGl>();
-  render::VoxelTransfers::StayInGl stay;
+  render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
   stay.join = [live, found](const auto& /*none*/) {
     *found = live->in_gl();
     return found->state ? std::optional(*found->state) : std::nullopt;
   };
-  stay.wanted = [live] { return live->wanted(); };
   stay.arrive = [live, found](scene::StateInGl state) { return live->set_if_newest(found->number, std::move(state)); };
-  stay.values_wanted = live->values_wanted();
   g.transfers().find_emissions(live.get(), "state", std::move(stay));
 }
 

@@ -1032,6 +1032,14 @@ class FireInGl : public LiveInGl {
     }
     return made;
   }
+  // One of its channels has a voxel that is not finite.
+  Fire spoilt(Fire fire, std::size_t channel) {
+    auto values = fire.arrays[channel].values;
+    values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
+    const Array array(types[1].format, values);
+    objects_.put(fire.textures[channel], odd, GL_RED, types[1].type, array.bytes.data());
+    return fire;
+  }
   static State in_memory(const Fire& fire) {
     State state;
     for (std::size_t i = 0; i < channels.size(); ++i) state.dense(channels[i], odd, fire.arrays[i].values);
@@ -1241,18 +1249,14 @@ TEST_F(FireInGl, WhateverIsNotAllocatedNothingIsLost) {
     EXPECT_EQ(difference(found, shows_voxels() ? in_memory : in_gl), "");
   }
   EXPECT_GT(failures, 10);
-  EXPECT_GT(in_main_memory, 0) << "what it gives off was not found";
+  EXPECT_GT(in_main_memory, 3) << "what it gives off was not found";
 }
 
 // Boxes on a state that was refused have none to be on top of, whatever is found of the one before.
 TEST_F(FireInGl, NothingIsOnTopOfWhatIsRefused) {
   hand_over(fire(0).fields);
   settled(v_);
-  Fire bad = fire(1);
-  auto values = bad.arrays[0].values;
-  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
-  const Array array(types[1].format, values);
-  objects_.put(bad.textures[0], odd, GL_RED, types[1].type, array.bytes.data());
+  const Fire bad = spoilt(fire(1), 0);
   hand_over(bad.fields);
   EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
   burn(v_, 4.0F);
@@ -1305,11 +1309,7 @@ TEST_F(FireInGl, WhatIsNotFiniteIsRefused) {
   const Fire good = fire(0);
   hand_over(good.fields);
   const Picture before = settled(v_);
-  Fire bad = fire(0);
-  auto values = bad.arrays[1].values;
-  values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
-  const Array hot(types[1].format, values);
-  objects_.put(bad.textures[1], odd, GL_RED, types[1].type, hot.bytes.data());
+  const Fire bad = spoilt(fire(0), 1);
   hand_over(bad.fields);
   EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
   EXPECT_STREQ(cumulet_last_error(v_), "smoke: temperature: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
