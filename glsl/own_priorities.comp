@@ -22,7 +22,6 @@ layout(location = 1) uniform uint cm_first_node;   // of those to rate
 layout(location = 2) uniform vec3 cm_measure;      // as grid::Measure: scale, own hiding, the floor
 layout(location = 3) uniform bool cm_linear;       // cells are
 layout(location = 4) uniform float cm_back;        // 1: light passes what hides a cell twice, 0: once
-layout(location = 5) uniform uvec2 cm_numbers;     // how many a voxel has in the buffer of values, and which it is
 
 #include "brick_sums.glsl"
 
@@ -74,7 +73,7 @@ void main() {
   for (uint k = t; k < CM_BRICK_POINTS; k += 64u) cm_found[k] = 0u;
   if (t == 0u) cm_points = cm_points_of_levels[cm_node_levels(node)];
   for (uint z = 0u; z < 8u; ++z) {
-    uint v = (512u * rate.y + 8u * t + z) * cm_numbers.x + cm_numbers.y;
+    uint v = 512u * rate.y + 8u * t + z;
 #if CM_HALVES
     cm_values[8u * t + z] = unpackHalf2x16(cm_bricks[v / 2u] >> (16u * (v & 1u))).x;
 #else

@@ -1,8 +1,8 @@
 #version 450
 // Of a host's bricks, as pack_bricks.comp has them, the values that volumes keep, and what main memory is to know of them
 // (brick_summary.glsl): a group a brick. What is no number becomes 0, and is told; what is negative becomes 0.
-// CM_CELLS: 0: of fields that no cell is of, the most, box and voxels alone.
-// variants: CM_FORMAT=0,1,2,3 CM_CELLS=0,1
+// CM_FIELD: 0, 1: of fields that no cell is of, the most, either way, box and voxels alone; 0: what is negative stays.
+// variants: CM_FORMAT=0,1,2,3 CM_FIELD=0,1,2
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -13,6 +13,7 @@ layout(local_size_x = 64) in;
 
 // CM_FORMAT: as render::VoxelFormat.
 #define CM_HALVES (CM_FORMAT == 1)
+#define CM_CELLS (CM_FIELD == 2)
 
 layout(std430, binding = CM_STORAGE_PACKED_PLACES) readonly buffer CmPlaces {
   uint cm_filled;
@@ -83,9 +84,11 @@ void cm_look_at(uint t, uint slot) {
       cm_bad = CM_BRICK_NOT_FINITE;
       value = 0.0;
     }
+#if CM_FIELD > 0
     value = value > 0.0 ? value : 0.0;
+#endif
     cm_values[8u * t + z] = value;
-    if (value > 0.0) not_zero |= 1u << z;
+    if (value != 0.0) not_zero |= 1u << z;
   }
 #if CM_HALVES
   for (uint w = 0u; w < 4u; ++w)
@@ -104,7 +107,7 @@ void cm_look_at(uint t, uint slot) {
   }
   atomicOr(cm_shadows[4u + (t >> 5u)], 1u << (t & 31u));  // along z, bit 8 x + y
 #else
-  for (uint z = 0u; z < 8u; ++z) atomicMax(cm_most, floatBitsToUint(cm_values[8u * t + z]));
+  for (uint z = 0u; z < 8u; ++z) atomicMax(cm_most, floatBitsToUint(abs(cm_values[8u * t + z])));
 #endif
   atomicMin(cm_box[0], x);
   atomicMin(cm_box[1], y);

@@ -139,6 +139,23 @@ std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world) {
   return squared;
 }
 
+std::vector<EvaluatedField> evaluated_fields(const Statistics& density, const Channels& channels) {
+  std::vector<EvaluatedField> fields;
+  if (channels.ends) {
+    // What is between two fields deviates no more than one of them.
+    fields = {{&channels.ends->open.statistics(), {}}, {&channels.ends->close.statistics(), {}}};
+  } else {
+    fields = {{&density, {}}};
+  }
+  for (int i = 0; i < 3; ++i) {
+    const auto component = static_cast<std::size_t>(i);
+    if (channels.emission) fields.push_back({&channels.emission->component(component), i});
+    if (channels.scattering) fields.push_back({&channels.scattering->component(component), {}});
+  }
+  if (channels.forward) fields.push_back({&channels.forward->statistics(), {}});
+  return fields;
+}
+
 Evaluations::Evaluations(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                          const Progress* progress) {
   RefineSettings used = settings;
@@ -147,24 +164,12 @@ Evaluations::Evaluations(const Statistics& statistics, const Channels& channels,
     transmittance_ =
         std::make_unique<const Transmittance>(statistics, hiding(used.density_scale, used.anisotropy), progress);
   }
-  const auto add = [&](const Statistics& field, const Weights& weights) {
-    all_.emplace_back(field, weights, transmittance_.get(), used);
-  };
   const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), used);
-  if (channels.ends) {
-    // What is between two fields deviates no more than one of them.
-    add(channels.ends->open.statistics(), of_density);
-    add(channels.ends->close.statistics(), of_density);
-  } else {
-    add(statistics, of_density);
+  for (const EvaluatedField& of : evaluated_fields(statistics, channels)) {
+    const Weights weights =
+        of.light ? Weights::of_emission(channels.emission->mean_depth(), *of.light, used) : of_density;
+    all_.emplace_back(*of.field, weights, transmittance_.get(), used);
   }
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (channels.emission)
-      add(channels.emission->component(i),
-          Weights::of_emission(channels.emission->mean_depth(), static_cast<int>(i), used));
-    if (channels.scattering) add(channels.scattering->component(i), of_density);
-  }
-  if (channels.forward) add(channels.forward->statistics(), of_density);
 }
 
 }  // namespace cumulet::grid

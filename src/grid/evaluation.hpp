@@ -143,6 +143,14 @@ class Evaluation {
 /// The squares of lengths of a brick's refinement edges, CM_LEVEL_EDGES a level (glsl/brick_summary.glsl).
 std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world);
 
+/// A field that a grid's cells are split for.
+struct EvaluatedField {
+  const Statistics* field;
+  std::optional<int> light;  ///< which component of emission it is; none: it is weighed as density is
+};
+/// All of them: density, and those of its channels, in the order of Evaluations.
+std::vector<EvaluatedField> evaluated_fields(const Statistics& density, const Channels& channels);
+
 /// Those of all that a grid's cells are split for: of density, and of its channels.
 class Evaluations {
  public:

@@ -43,12 +43,11 @@ std::uint32_t bricks_a_step(const gl::Functions& gl) {
   return gl.dispatches_in_call ? 64 : 4096;
 }
 
-std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks,
-                                              std::span<const std::uint32_t> order) {
+std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks, std::span<const MovedBrick> moved) {
   std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) {
-    const volume::DeviceBricks::Place& place = bricks.places[order[i]];
-    moves[place.memory].emplace_back(place.brick, i);
+  for (const MovedBrick& brick : moved) {
+    const volume::DeviceBricks::Place& place = bricks.places[brick.x];
+    moves[place.memory].emplace_back(place.brick, brick.y);
   }
   return moves;
 }
@@ -72,12 +71,14 @@ void BrickCopies::dispatch(const gl::Functions& gl, const gl::Program& program, 
 }
 
 gl::ProgramKey BrickSummaries::program() const {
-  return {"summarize_bricks.comp",
-          {"CM_FORMAT " + std::to_string(static_cast<int>(format)), std::string("CM_CELLS ") + (cells ? "1" : "0")}};
+  return {
+      "summarize_bricks.comp",
+      {"CM_FORMAT " + std::to_string(static_cast<int>(format)), "CM_FIELD " + std::to_string(static_cast<int>(field))}};
 }
 
 void BrickSummaries::dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first,
                               std::uint32_t end) const {
+  const bool cells = field == Field::cells;
   gl.ProgramUniform2ui(program.name(), 0, first, end);
   if (cells) gl.ProgramUniform3ui(program.name(), 1, bricks.x, bricks.y, bricks.z);
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_PLACES, places->name());

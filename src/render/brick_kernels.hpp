@@ -31,9 +31,9 @@ void dispatch_groups(const gl::Functions& gl, std::uint32_t groups);
 
 /// Of a brick that is copied: which of its memory, and where to.
 using MovedBrick = glm::uvec2;
-/// Of each of its memories what is moved where, for these bricks of it, in their order.
+/// The same by the memories that they are in; moved: which of the field, and where to.
 [[nodiscard]] std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks,
-                                                            std::span<const std::uint32_t> order);
+                                                            std::span<const MovedBrick> moved);
 /// Copies of bricks that a buffer of MovedBrick names.
 struct BrickCopies {
   const gl::Object* from = nullptr;
@@ -52,7 +52,12 @@ struct BrickCopies {
 /// Of bricks, as glsl/pack_bricks.comp leaves them, the values that are kept, and what main memory is to know of them.
 struct BrickSummaries {
   VoxelFormat format = VoxelFormat::floats;
-  bool cells = true;  ///< of fields whose cells count; else the most, box and voxels alone
+  enum class Field {
+    as_is,         ///< may be negative; the most, either way, the box and how many voxels are not 0
+    not_negative,  ///< the same
+    cells          ///< the same, and what is known of its cells
+  };
+  Field field = Field::cells;
   const gl::Object* places = nullptr;
   glm::uvec3 bricks{0};  ///< that places count, along each axis
   const gl::Object* values = nullptr;

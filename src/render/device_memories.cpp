@@ -1,7 +1,6 @@
 #include "render/device_memories.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include "render/brick_kernels.hpp"
 
@@ -51,20 +50,20 @@ volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, const
   }
   const std::shared_ptr<volume::DeviceMemory> memory = make(std::max<std::size_t>(bricks.origins.size(), 1), halves);
   auto made = std::make_shared<volume::DeviceBricks>(bricks);
-  std::vector<std::uint32_t> order(bricks.places.size());
-  std::iota(order.begin(), order.end(), 0U);
-  for (const std::uint32_t i : order) {
+  std::vector<MovedBrick> moved;
+  for (std::uint32_t i = 0; i < bricks.places.size(); ++i) {
+    moved.emplace_back(i, i);
     made->places[i] = {0, i};
     memory->summaries[i] = bricks.summary(i);
   }
   gl::memory_barrier(*gl, GL_SHADER_STORAGE_BARRIER_BIT);
-  const std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
+  const std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, moved);
   for (std::size_t m = 0; m < moves.size(); ++m) {
     if (moves[m].empty()) continue;
-    const gl::Object moved = gl::make_buffer(gl, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
-                                             "creating the list of a volume's bricks");
+    const gl::Object list = gl::make_buffer(gl, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
+                                            "creating the list of a volume's bricks");
     const volume::DeviceMemory& from = *bricks.memories[m];
-    const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &moved};
+    const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &list};
     copies.dispatch(*gl, programs_->ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));
   }
   gl::memory_barrier(*gl, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <map>
 #include <numeric>
 #include <set>
 #include <span>
@@ -17,6 +16,7 @@
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
+#include "grid/evaluation.hpp"
 #include "grid/tet_grid.hpp"
 #include "render/brick_kernels.hpp"
 #include "render/pace.hpp"
@@ -96,6 +96,7 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
       channels_(std::move(channels)),
       fields_(grid::fields_of(*statistics_, channels_)),
       data_(std::make_shared<LatticeData>()),
+      moves_(gl_, programs_, memories_),
       upload_(gl, "uploading the lattice") {
   data_->lattice_ = std::move(lattice);
   const grid::Lattice& l = *data_->lattice_;
@@ -118,10 +119,7 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   plan_channels();
   if (statistics_->on_device()) {
     plan_device_bricks();
-    upload_.add([this] {
-      scratch_.moved.clear();
-      gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT);
-    });
+    upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
     plan_priorities();
   }
   plan_buffer(data_->priorities_, l.blocks.size() * CM_BLOCK_POINTS * 4, nullptr, "creating the priorities");
@@ -180,88 +178,49 @@ void LatticeUpload::plan_bricks() {
   plan_values(data_->bricks_, statistics_->on_device() ? l.even_bricks.size() : l.bricks, brick_bytes, fill);
 }
 
-void LatticeUpload::plan_moves(const volume::DeviceBricks& bricks, std::span<const std::uint32_t> order,
-                               BrickCopies copies) {
-  std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, order);
-  constexpr std::uint32_t a_step = 4096;
-  for (std::size_t m = 0; m < moves.size(); ++m) {
-    if (moves[m].empty()) continue;
-    const volume::DeviceMemory& memory = *bricks.memories[m];
-    copies.from = memories_ ? memories_->find(memory) : nullptr;
-    if (copies.from == nullptr) throw Error(ErrorCode::unsupported, "the volume's voxels are in another context");
-    copies.from_halves = memory.halves;
-    const auto count = static_cast<std::uint32_t>(moves[m].size());
-    gl::Object& moved = scratch_.moved.emplace_back();
-    copies.moved = &moved;
-    upload_.add([this, &moved, list = std::move(moves[m])] {
-      moved = gl::make_buffer(gl_, list.size() * sizeof(MovedBrick), list.data(), 0,
-                              "creating the list of a volume's bricks");
-    });
-    upload_.add_dispatches(programs_, copies.program(), count, a_step,
-                           [this, copies](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
-                             copies.dispatch(*gl_, program, first, end);
-                           });
-  }
-}
-
 void LatticeUpload::plan_device_bricks() {
   const grid::Lattice& l = *data_->lattice_;
-  const std::vector<std::uint32_t>& nodes = statistics_->nodes_of_size(3);
-  std::vector<std::uint32_t> order(nodes.size());
-  std::ranges::transform(nodes, order.begin(), [&](std::uint32_t node) {
-    return static_cast<std::uint32_t>(statistics_->nodes()[node].values);
-  });
-  plan_moves(*statistics_->on_device(), order,
-             {.to = &data_->bricks_, .to_halves = l.halves, .to_first = std::uint32_t(l.even_bricks.size())});
+  std::vector<MovedBrick> moved;
+  for (const std::uint32_t node : statistics_->nodes_of_size(3))
+    moved.emplace_back(statistics_->nodes()[node].values, moved.size());
+  moves_.plan(upload_, *statistics_->on_device(), moved,
+              {.to = &data_->bricks_, .to_halves = l.halves, .to_first = std::uint32_t(l.even_bricks.size())});
 }
 
 void LatticeUpload::plan_device_bricks(const grid::LatticeChannel& channel, const grid::ChannelFields& fields,
                                        const gl::Object& to) {
-  const auto numbers = static_cast<std::uint32_t>(channel.numbers);
-  for (std::uint32_t n = 0; n < numbers; ++n) {
-    const volume::DeviceBricks& bricks = *fields.statistics()[n]->on_device();
-    std::vector<std::uint32_t> order;
-    for (const glm::ivec3& corner : channel.bricks) {
-      const auto found =
-          std::ranges::lower_bound(bricks.origins, corner + data_->lattice_->cube.origin, volume::lexicographic);
-      order.push_back(static_cast<std::uint32_t>(found - bricks.origins.begin()));
-    }
-    plan_moves(bricks, order,
-               {.to = &to, .to_first = std::uint32_t(channel.even_bricks.size()), .numbers = {numbers, n}});
-  }
-}
-
-std::vector<glm::uvec2> LatticeUpload::bricks_to_rate(std::size_t field) const {
-  const grid::Lattice& l = *data_->lattice_;
-  std::map<glm::ivec3, std::uint32_t, decltype(&volume::lexicographic)> of_channel(volume::lexicographic);
-  if (field > 0) {
-    const grid::LatticeChannel& emission = l.channels[0];
-    for (std::uint32_t i = 0; i < emission.bricks.size(); ++i)
-      of_channel[emission.bricks[i]] = static_cast<std::uint32_t>(emission.even_bricks.size()) + i;
-  }
-  std::vector<glm::uvec2> list;
-  for (const std::uint32_t node : l.own.to_rate.fields[field].nodes) {
-    const glm::ivec3 corner = core::cm_node_corner(l.own.nodes[l.own.to_rate.first_node + node]);
-    const std::uint32_t brick =
-        field > 0 ? of_channel.at(corner)
-                  : static_cast<std::uint32_t>(l.even_bricks.size()) + statistics_->node_at(corner).moments / 6;
-    list.emplace_back(node, brick);
-  }
-  return list;
+  std::vector<volume::DeviceBricksPtr> bricks;
+  for (const grid::Statistics* field : fields.statistics()) bricks.push_back(field->on_device());
+  std::vector<glm::ivec3> origins;
+  for (const glm::ivec3& corner : channel.bricks) origins.push_back(corner + data_->lattice_->cube.origin);
+  const auto to_first = static_cast<std::uint32_t>(channel.even_bricks.size());
+  const gl::ProgramKey key{"channel_numbers.comp",
+                           {"CM_CHANNEL " + std::to_string(static_cast<int>(fields.channel())),
+                            "CM_FIELDS " + std::to_string(bricks.size())}};
+  moves_.plan_together(upload_, bricks, origins, [&](std::size_t first, std::uint32_t count) {
+    upload_.add_dispatches(programs_, key, count, bricks_a_step(*gl_),
+                           [this, &to, to_first = to_first + static_cast<std::uint32_t>(first)](
+                               const gl::Program& program, std::uint32_t begin, std::uint32_t end) {
+                             gl_->ProgramUniform2ui(program.name(), 0, begin, end);
+                             gl_->ProgramUniform1ui(program.name(), 1, to_first);
+                             gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TOGETHER,
+                                                 moves_.together().name());
+                             gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_NUMBERS, to.name());
+                             program.use(*gl_);
+                             dispatch_groups(*gl_, end - begin);
+                           });
+  });
 }
 
 void LatticeUpload::plan_priorities() {
   const grid::Lattice& l = *data_->lattice_;
   const grid::BricksToRate& rated = l.own.to_rate;
   if (rated.values == 0) return;
-  scratch_.to_rate.resize(rated.fields.size());
   upload_.add([this, &l, &rated] {
     const auto make = [this](const auto& from, const char* what) {
       return gl::make_buffer(gl_, std::max<std::size_t>(from.size() * sizeof from[0], 4),
                              from.empty() ? nullptr : from.data(), 0, what);
     };
-    for (std::size_t i = 0; i < rated.fields.size(); ++i)
-      scratch_.to_rate[i] = make(bricks_to_rate(i), "creating the list of bricks to rate");
     scratch_.lit = make(rated.lit, "creating the light of bricks");
     scratch_.tree = make_brick_tree(gl_, rated.edges_squared);
     std::array<std::uint32_t, (std::tuple_size_v<grid::PlacesOfBrickPoints> + 3) / 4 * 4> places{};
@@ -270,44 +229,66 @@ void LatticeUpload::plan_priorities() {
     gl_->ClearNamedBufferSubData(data_->own_.name(), GL_R32UI, static_cast<GLintptr>(l.own.values.size() * 2),
                                  static_cast<GLsizeiptr>(rated.values * 2), GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   });
-  for (std::size_t i = 0; i < rated.fields.size(); ++i) {
-    plan_priorities(i);
-    upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
-  }
-  upload_.add([this] { scratch_ = {}; });
+  const std::vector<grid::EvaluatedField> fields = grid::evaluated_fields(*statistics_, channels_);
+  for (std::size_t i = 0; i < fields.size(); ++i) plan_priorities(*fields[i].field, rated.fields[i]);
+  upload_.add([this] {
+    scratch_ = {};
+    moves_.drop();
+  });
 }
 
-void LatticeUpload::plan_priorities(std::size_t field) {
+void LatticeUpload::plan_priorities(const grid::Statistics& field, const grid::BricksToRate::Field& rated) {
+  if (rated.nodes.empty()) return;
   const grid::Lattice& l = *data_->lattice_;
-  const grid::BricksToRate& rated = l.own.to_rate;
-  const grid::OwnMeasure& measure = rated.fields[field].measure;
-  const bool of_density = field == 0;
-  const gl::Object& values = of_density ? data_->bricks_ : data_->channels_[0].bricks;
-  const glm::uvec2 numbers = of_density ? glm::uvec2(1, 0) : glm::uvec2(l.channels[0].numbers, field - 1);
+  const bool of_density = &field == statistics_.get();
+  // Of each its number, and which brick of the buffer of values it has.
+  std::vector<glm::uvec2> list;
+  std::vector<MovedBrick> moved;
+  for (const std::uint32_t node : rated.nodes) {
+    const grid::Statistics::Node& brick =
+        field.node_at(core::cm_node_corner(l.own.nodes[l.own.to_rate.first_node + node]));
+    const auto at = static_cast<std::uint32_t>(list.size());
+    list.emplace_back(node, of_density ? static_cast<std::uint32_t>(l.even_bricks.size()) + brick.moments / 6 : at);
+    moved.emplace_back(static_cast<std::uint32_t>(brick.values), at);
+  }
+  upload_.add([this, list = std::move(list)] {
+    scratch_.to_rate =
+        gl::make_buffer(gl_, list.size() * sizeof list[0], list.data(), 0, "creating the list of bricks to rate");
+  });
+  if (!of_density) {
+    const std::uint64_t bytes = moved.size() * volume::brick_voxels * sizeof(float);
+    require_block(limits_, bytes, "the bricks to rate of a field");
+    upload_.add([this, bytes] {
+      scratch_.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the values of bricks to rate");
+    });
+    moves_.plan(upload_, *field.on_device(), moved, {.to = &scratch_.values});
+    upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
+  }
+  const grid::OwnMeasure& measure = rated.measure;
+  const gl::Object& values = of_density ? data_->bricks_ : scratch_.values;
   const gl::ProgramKey key{"own_priorities.comp",
                            {of_density && l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
                             "CM_CRITERION " + std::to_string(static_cast<int>(measure.criterion))}};
   upload_.add_dispatches(
-      programs_, key, static_cast<std::uint32_t>(rated.fields[field].nodes.size()), bricks_a_step(*gl_),
-      [this, &rated, &measure, &values, numbers, field](const gl::Program& program, std::uint32_t first,
-                                                        std::uint32_t end) {
+      programs_, key, static_cast<std::uint32_t>(rated.nodes.size()), bricks_a_step(*gl_),
+      [this, &l, &measure, &values](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
         const GLuint name = program.name();
         gl_->ProgramUniform2ui(name, 0, first, end);
-        gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(rated.first_node));
+        gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(l.own.to_rate.first_node));
         gl_->ProgramUniform3f(name, 2, measure.scale, measure.own_hiding, measure.floor);
         gl_->ProgramUniform1i(name, 3, measure.linear ? 1 : 0);
         gl_->ProgramUniform1f(name, 4, measure.there_and_back ? 1.0F : 0.0F);
-        gl_->ProgramUniform2ui(name, 5, numbers.x, numbers.y);
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_NODES, data_->nodes_.name());
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_OWN, data_->own_.name());
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_BRICKS, values.name());
-        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO_RATE, scratch_.to_rate[field].name());
+        gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO_RATE, scratch_.to_rate.name());
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_LIT, scratch_.lit.name());
         gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, scratch_.tree.name());
         gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_POINT_PLACES, scratch_.points.name());
         program.use(*gl_);
         dispatch_groups(*gl_, end - first);
       });
+  upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
 }
 
 void LatticeUpload::plan_channels() {

@@ -23,6 +23,7 @@
 #include "gl/programs.hpp"
 #include "grid/lattice.hpp"
 #include "render/brick_kernels.hpp"
+#include "render/brick_moves.hpp"
 #include "render/device_memories.hpp"
 #include "render/upload.hpp"
 #include "scene/glow.hpp"
@@ -82,14 +83,10 @@ class LatticeUpload {
   void plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what);
   void plan_bytes(const gl::Object& buffer, std::uint64_t bytes, const void* from);
   void plan_bricks();
-  // Of bricks that are in GL, to where copies says; order: which of them.
-  void plan_moves(const volume::DeviceBricks& bricks, std::span<const std::uint32_t> order, BrickCopies copies);
   void plan_device_bricks();
   void plan_device_bricks(const grid::LatticeChannel& channel, const grid::ChannelFields& fields, const gl::Object& to);
-  // Of each of a field's nodes its number, and which brick of the buffer of values it has.
-  [[nodiscard]] std::vector<glm::uvec2> bricks_to_rate(std::size_t field) const;
   void plan_priorities();
-  void plan_priorities(std::size_t field);
+  void plan_priorities(const grid::Statistics& field, const grid::BricksToRate::Field& rated);
   void plan_channels();
   // Bricks of whole values, which fill puts where it is told, one after another.
   using FillBrick = std::function<void(std::size_t brick, std::byte* to)>;
@@ -97,8 +94,7 @@ class LatticeUpload {
 
   // What steps make for others.
   struct Scratch {
-    std::list<gl::Object> moved;
-    std::vector<gl::Object> to_rate;  // by field
+    gl::Object to_rate, values;  // of one field after another
     gl::Object lit, tree, points;
   };
 
@@ -111,6 +107,7 @@ class LatticeUpload {
   grid::Channels channels_;
   std::vector<grid::ChannelFields> fields_;
   std::shared_ptr<LatticeData> data_;
+  BrickMoves moves_;
   Upload upload_;  // its steps use the above
 };
 

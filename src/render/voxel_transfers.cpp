@@ -40,6 +40,25 @@ std::size_t brick_bytes(VoxelFormat format) { return brick_voxels * bytes_of(for
 /// Of one that stays in GL.
 std::size_t kept_bytes(VoxelFormat format) { return volume::DeviceMemory::bytes_of(1, format == VoxelFormat::halves); }
 
+// Cells are split for density alone.
+BrickSummaries::Field field_of(volume::Channel channel) {
+  using Field = BrickSummaries::Field;
+  if (channel == volume::Channel::density) return Field::cells;
+  return channel >= volume::Channel::anisotropy ? Field::as_is : Field::not_negative;
+}
+
+// Bricks in which that may be other than before, by the fields that changed.
+std::vector<glm::ivec3> changed_for(const scene::Product& product, const std::vector<scene::StateInGl::Field>& fields) {
+  const std::vector<volume::Channel> made_of = scene::fields_of(product);
+  std::vector<glm::ivec3> changed;
+  for (const scene::StateInGl::Field& field : fields) {
+    if (std::ranges::find(made_of, field.channel) == made_of.end()) continue;
+    changed.insert(changed.end(), field.bricks->origins.begin(), field.bricks->origins.end());
+    changed.insert(changed.end(), field.bricks->emptied.begin(), field.bricks->emptied.end());
+  }
+  return changed;
+}
+
 glm::ivec3 bricks_of(glm::ivec3 size) { return (size - 1) / brick_size + 1; }
 
 /// The format whose bits hold what is fetched.
@@ -436,7 +455,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   gl::check(gl, what_step);
   if (transfer.whole) {
     // Those that nobody will want, but for the first: it arrives however fast they come.
-    const auto of_one = [&](const Transfer& other) { return other.whose == whose && !other.finds() && !other.back; };
+    const auto of_one = [&](const Transfer& other) { return other.whose == whose && !other.makes() && !other.back; };
     auto other = std::ranges::find_if(transfers_, of_one);
     if (other != transfers_.end()) ++other;
     while ((other = std::find_if(other, transfers_.end(), of_one)) != transfers_.end()) other = drop(other);
@@ -511,7 +530,7 @@ bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
   return true;
 }
 
-void VoxelTransfers::find_emissions(const void* whose, std::string name, StayInGl stay) {
+void VoxelTransfers::make_products(const void* whose, std::string name, StayInGl stay) {
   Transfer transfer;
   transfer.whose = whose;
   transfer.whole = false;
@@ -546,7 +565,7 @@ void VoxelTransfers::begin_summaries(Transfer& transfer) {
 BrickSummaries VoxelTransfers::summaries_of(const Transfer& transfer, const Piece& piece) const {
   const Source& source = transfer.sources[piece.field];
   return {.format = source.format,
-          .cells = transfer.fields[piece.field].channel == volume::Channel::density,
+          .field = field_of(transfer.fields[piece.field].channel),
           .places = &piece.room.places,
           .bricks = glm::uvec3(bricks_of(source.size)),
           .values = &piece.room.values,
@@ -617,13 +636,6 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
   const StayInGl& stay = std::get<StayInGl>(transfer.arrival);
   Staying& staying = transfer.staying.emplace();
   staying.fields = std::move(fields);
-  // Bricks that may give off other light than before.
-  std::vector<glm::ivec3> changed;
-  for (const scene::StateInGl::Field& field : staying.fields) {
-    if (field.channel == volume::Channel::density) continue;
-    changed.insert(changed.end(), field.bricks->origins.begin(), field.bricks->origins.end());
-    changed.insert(changed.end(), field.bricks->emptied.begin(), field.bricks->emptied.end());
-  }
   staying.state = stay.join(staying.fields);
   if (!staying.state) {
     if (!stay.instead) return;
@@ -640,20 +652,20 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
   const auto is_here = [&](const volume::DeviceBricks* bricks) { return memories_->has(*bricks); };
   if (!std::ranges::all_of(std::as_const(*staying.state).all(), is_here)) {
     staying.state.reset();
-    if (transfer.finds()) return;
+    if (transfer.makes()) return;
     refuse(transfer.name, "the rest of it is in another viewer's context");
   }
-  for (scene::Emission& settings : stay.wanted()) {
-    // In main memory it is found by other ways.
-    if (stay.values_wanted && stay.values_wanted->asked()) break;
-    if (!staying.state->emits(settings)) continue;
-    const scene::EmissionInGl* before = staying.state->emission(settings);
+  // In main memory it is made by other ways.
+  if (stay.values_wanted && stay.values_wanted->asked()) return;
+  for (scene::Product& product : staying.state->wanted(stay.wanted())) {
+    const scene::ProductInGl* before = staying.state->product(product);
+    const std::vector<glm::ivec3> changed = changed_for(product, staying.fields);
     if (before != nullptr && changed.empty()) {
       staying.kept.push_back(*before);
     } else {
       if (!body_) body_.emplace();
-      staying.finding.emplace_back(gl_, programs_, memories_, *body_, *staying.state, std::move(settings),
-                                   before != nullptr ? std::optional(changed) : std::nullopt);
+      staying.making.emplace_back(gl_, programs_, memories_, *body_, *staying.state, std::move(product),
+                                  before != nullptr ? std::optional(changed) : std::nullopt);
     }
   }
 }
@@ -670,11 +682,11 @@ bool VoxelTransfers::take_in_gl(Transfer& transfer, Deadline deadline) {
   }
   Staying& staying = *transfer.staying;
   try {
-    return std::ranges::all_of(staying.finding, [&](BrickEmission& emission) { return emission.advance(deadline); });
+    return std::ranges::all_of(staying.making, [&](BrickProducts& products) { return products.advance(deadline); });
   } catch (const Error& error) {
     if (error.code() == ErrorCode::context_lost) throw;
     staying.failure = std::current_exception();
-    staying.finding.clear();
+    staying.making.clear();
     return true;
   }
 }
@@ -683,10 +695,10 @@ bool VoxelTransfers::arrive_in_gl(Transfer& transfer) {
   const StayInGl& stay = std::get<StayInGl>(transfer.arrival);
   Staying& staying = *transfer.staying;
   if (staying.failure && stay.values_wanted) stay.values_wanted->ask();
-  // A find that found nothing is no other state.
-  const bool arrives = staying.state && !(transfer.finds() && staying.finding.empty());
+  // Where nothing was made it is no other state.
+  const bool arrives = staying.state && !(transfer.makes() && staying.making.empty());
   const std::exception_ptr failure = std::exchange(staying.failure, nullptr);
-  if (arrives && !stay.arrive(made(staying)) && !transfer.finds()) {
+  if (arrives && !stay.arrive(made(staying)) && !transfer.makes()) {
     join(transfer, std::move(staying.fields));
     if (transfer.staying) transfer.staying->failure = failure;
     return false;
@@ -698,9 +710,9 @@ bool VoxelTransfers::arrive_in_gl(Transfer& transfer) {
 
 scene::StateInGl VoxelTransfers::made(Staying& staying) {
   scene::StateInGl& state = *staying.state;
-  for (BrickEmission& emission : staying.finding)
-    staying.kept.push_back(emission.take(state.emission(emission.settings())));
-  state.emissions = std::move(staying.kept);
+  for (BrickProducts& products : staying.making)
+    staying.kept.push_back(products.take(state.product(products.product())));
+  state.products = std::move(staying.kept);
   return std::move(state);
 }
 
@@ -778,8 +790,8 @@ void VoxelTransfers::refuse_on_top(const Transfer& whole) {
       continue;
     }
     if (other->whole) break;
-    // What is found is of the state that stays.
-    other = other->finds() ? std::next(other) : drop(other);
+    // What is made is of the state that stays.
+    other = other->makes() ? std::next(other) : drop(other);
   }
   whole.refuse();
 }
@@ -815,7 +827,7 @@ void VoxelTransfers::follow(Deadline deadline) {
     transfers_.pop_front();
     recycle(done);
     if (failure) {
-      // What its light alone was not found of is there.
+      // That something was not made of it is no fault of the state.
       if (done.whole && !(done.staying && done.staying->failure)) refuse_on_top(done);
       std::rethrow_exception(failure);
     }

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "gl/programs.hpp"
-#include "render/brick_emission.hpp"
 #include "render/brick_kernels.hpp"
+#include "render/brick_products.hpp"
 #include "render/device_memories.hpp"
 #include "render/upload.hpp"
 #include "scene/state_in_gl.hpp"
@@ -69,7 +69,7 @@ class VoxelTransfers {
   using Arrive = std::function<void(std::vector<volume::FieldCopy> fields)>;
   /// Fields stay in GL.
   struct StayInGl {
-    /// Given those that arrived, in their order: the state that they make, what was found of another that it goes on
+    /// Given those that arrived, in their order: the state that they make, what was made of another that it goes on
     /// with among it; none: there is none in GL to go on with. Of those that changed bricks are not tidy.
     std::function<std::optional<scene::StateInGl>(const std::vector<scene::StateInGl::Field>& fields)> join;
     /// By which settings it is to be found what that gives off.
@@ -92,9 +92,9 @@ class VoxelTransfers {
   using Find = std::function<scene::StateInGlPtr()>;
   void bring_back(const void* whose, const std::vector<volume::Channel>& channels, Find find, Arrive arrive,
                   Refuse refuse);
-  /// Once those that are on their way are there: what else is wanted is found of the state that stay.join gives for
+  /// Once those that are on their way are there: what else is wanted is made of the state that stay.join gives for
   /// none. It does not arrive if that is nothing.
-  void find_emissions(const void* whose, std::string name, StayInGl stay);
+  void make_products(const void* whose, std::string name, StayInGl stay);
   /// Of whose newest whole state that is on its way.
   struct Announced {
     std::vector<volume::Channel> channels;
@@ -162,13 +162,13 @@ class VoxelTransfers {
     std::size_t field = 0;
     std::size_t taken = 0;  // of that
   };
-  // A state that stays, while what it gives off is found.
+  // A state that stays, while is made of it what is wanted.
   struct Staying {
     std::vector<scene::StateInGl::Field> fields;  // that arrived
     std::optional<scene::StateInGl> state;
-    std::vector<scene::EmissionInGl> kept;  // as they are
-    std::deque<BrickEmission> finding;
-    std::exception_ptr failure;  // of finding; main memory has other ways
+    std::vector<scene::ProductInGl> kept;  // as they are
+    std::deque<BrickProducts> making;
+    std::exception_ptr failure;  // of that; main memory has other ways
   };
   struct Transfer {
     const void* whose = nullptr;
@@ -187,8 +187,8 @@ class VoxelTransfers {
     std::optional<Staying> staying;  // once its fields are there
 
     [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
-    // Nothing but what a state gives off.
-    [[nodiscard]] bool finds() const { return sources.empty() && !back; }
+    // Nothing but what is made of a state.
+    [[nodiscard]] bool makes() const { return sources.empty() && !back; }
   };
 
   // Which bricks of it were packed, and where to.
@@ -214,7 +214,7 @@ class VoxelTransfers {
   // Of what stays there.
   bool take_in_gl(Transfer& transfer, Deadline deadline);
   void join(Transfer& transfer, std::vector<scene::StateInGl::Field> fields);
-  // With all that was found.
+  // With all that was made of it.
   static scene::StateInGl made(Staying& staying);
   // Returns whether it did, or never will; else it was joined again.
   bool arrive_in_gl(Transfer& transfer);

@@ -35,7 +35,7 @@ struct Emission {
   [[nodiscard]] bool is_hot() const { return blackbody > 0.0 && blackbody_tint != glm::vec3(0.0F); }
 };
 
-/// The same for shaders (glsl/emit_bricks.comp).
+/// The same for shaders (glsl/brick_products.comp).
 core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& body);
 
 /// Flame x strength x colour + what a black body of the temperature gives off: radiance a world unit of length, linear

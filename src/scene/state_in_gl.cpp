@@ -1,73 +1,55 @@
 #include "scene/state_in_gl.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
+#include <type_traits>
+#include <utility>
 
 #include "volume/bricks.hpp"
 
 namespace cumulet::scene {
 
-volume::DeviceBricksPtr StateInGl::field(volume::Channel channel) const {
-  const auto found = std::ranges::find(fields, channel, &Field::channel);
-  return found == fields.end() ? nullptr : found->bricks;
-}
+namespace {
 
-const EmissionInGl* StateInGl::emission(const Emission& settings) const {
-  const auto found = std::ranges::find(emissions, settings, &EmissionInGl::settings);
-  return found == emissions.end() ? nullptr : &*found;
-}
+using volume::Channel;
 
-bool StateInGl::emits(const Emission& settings) const {
-  const auto is_there = [&](volume::Channel channel) {
-    const volume::DeviceBricksPtr bricks = field(channel);
-    return bricks && !bricks->origins.empty();
-  };
-  return (settings.burns() && is_there(volume::Channel::flame)) ||
-         (settings.is_hot() && is_there(volume::Channel::temperature));
-}
+constexpr std::array<Channel, 3> colours{Channel::red, Channel::green, Channel::blue};
+constexpr std::array<Channel, 3> velocities{Channel::velocity_x, Channel::velocity_y, Channel::velocity_z};
 
-std::vector<volume::DeviceBricksPtr*> StateInGl::all() {
-  std::vector<volume::DeviceBricksPtr*> all;
-  for (Field& field : fields) all.push_back(&field.bricks);
-  for (EmissionInGl& emission : emissions) {
-    for (volume::DeviceBricksPtr& component : emission.components) all.push_back(&component);
+struct FieldsOf {
+  std::vector<Channel> operator()(const Emission& settings) const {
+    std::vector<Channel> fields;
+    if (settings.is_hot()) fields.push_back(Channel::temperature);
+    if (settings.burns()) fields.push_back(Channel::flame);
+    return fields;
   }
-  return all;
-}
-
-std::vector<const volume::DeviceBricks*> StateInGl::all() const {
-  std::vector<const volume::DeviceBricks*> all;
-  for (const Field& field : fields) all.push_back(field.bricks.get());
-  for (const EmissionInGl& emission : emissions) {
-    for (const volume::DeviceBricksPtr& component : emission.components) all.push_back(component.get());
+  std::vector<Channel> operator()(const Scattering& /*unused*/) const { return with(colours); }
+  std::vector<Channel> operator()(const Forward& forward) const {
+    std::vector<Channel> fields = forward.coloured ? with(colours) : std::vector{Channel::density};
+    fields.push_back(Channel::anisotropy);
+    return fields;
   }
-  return all;
-}
+  std::vector<Channel> operator()(const Momentum& /*unused*/) const { return with(velocities); }
+  static std::vector<Channel> with(const std::array<Channel, 3>& three) {
+    return {Channel::density, three[0], three[1], three[2]};
+  }
+};
 
-bool StateInGl::gone() const {
-  return std::ranges::any_of(all(), [](const volume::DeviceBricks* bricks) { return bricks->gone(); });
-}
+bool any(const volume::DeviceBricksPtr& bricks) { return bricks && !bricks->origins.empty(); }
 
-volume::VolumeFrame StateInGl::frame() const {
-  const auto volume_of = [&](volume::Channel channel) {
-    const volume::DeviceBricksPtr bricks = field(channel);
-    return bricks ? std::optional(volume::volume_on_device(bricks, name, index_to_world)) : std::nullopt;
-  };
-  volume::VolumeFrame frame;
-  frame.density = *volume_of(volume::Channel::density);
-  frame.temperature = volume_of(volume::Channel::temperature);
-  frame.flame = volume_of(volume::Channel::flame);
-  return frame;
-}
+// Powers of two: what changes a little is in units of the same.
+float unit_above(double fastest) { return static_cast<float>(std::exp2(std::ceil(std::log2(fastest)))); }
 
-std::optional<grid::RgbField::Components> StateInGl::components(const EmissionInGl& emission) const {
-  const std::vector<glm::ivec3>& origins = emission.components[0]->origins;
-  if (origins.empty()) return std::nullopt;
-  grid::RgbField::Components made;
-  for (std::size_t i = 0; i < made.size(); ++i) {
-    volume::ScalarVolume& component = made[i];
-    component = volume::volume_on_device(emission.components[i], "emission", index_to_world);
-    // Whole bricks, as emission_of() has them.
+std::vector<volume::ScalarVolume> volumes_of(const ProductInGl& product, const std::string& name,
+                                             const glm::dmat4& index_to_world) {
+  std::vector<volume::ScalarVolume> made;
+  const std::vector<glm::ivec3>& origins = product.components[0]->origins;
+  for (const volume::DeviceBricksPtr& bricks : product.components) {
+    volume::ScalarVolume& component = made.emplace_back(volume::volume_on_device(bricks, name, index_to_world));
+    // Whole bricks, as those of main memory.
+    if (origins.empty()) continue;
     component.bounds_min = glm::ivec3(std::numeric_limits<int>::max());
     component.bounds_max = glm::ivec3(std::numeric_limits<int>::min());
     for (const glm::ivec3& origin : origins) {
@@ -77,6 +59,143 @@ std::optional<grid::RgbField::Components> StateInGl::components(const EmissionIn
     component.active_voxels = origins.size() * volume::brick_voxels;
   }
   return made;
+}
+
+grid::RgbField::Components three(std::vector<volume::ScalarVolume> volumes) {
+  return {std::move(volumes[0]), std::move(volumes[1]), std::move(volumes[2])};
+}
+
+}  // namespace
+
+std::vector<Channel> fields_of(const Product& product) { return std::visit(FieldsOf(), product); }
+
+volume::DeviceBricksPtr StateInGl::field(Channel channel) const {
+  const auto found = std::ranges::find(fields, channel, &Field::channel);
+  return found == fields.end() ? nullptr : found->bricks;
+}
+
+const ProductInGl* StateInGl::product(const Product& what) const {
+  const auto found = std::ranges::find(products, what, &ProductInGl::what);
+  return found == products.end() ? nullptr : &*found;
+}
+
+StateInGl::Scatters StateInGl::scatters() const {
+  if (!any(field(Channel::density))) return {};
+  return {.coloured = std::ranges::any_of(colours, [&](Channel channel) { return field(channel) != nullptr; }),
+          .anisotropic = field(Channel::anisotropy) != nullptr,
+          .moves = std::ranges::any_of(velocities, [&](Channel channel) { return any(field(channel)); })};
+}
+
+std::vector<Product> StateInGl::wanted(const std::vector<Emission>& settings) const {
+  std::vector<Product> wanted;
+  std::ranges::copy_if(settings, std::back_inserter(wanted), [&](const Emission& light) { return emits(light); });
+  const Scatters how = scatters();
+  if (how.coloured) wanted.emplace_back(Scattering{});
+  if (how.anisotropic) wanted.emplace_back(Forward{how.coloured});
+  if (how.moves) wanted.emplace_back(Momentum{unit_above(fastest_of(frame()))});
+  return wanted;
+}
+
+bool StateInGl::has_wanted(const std::vector<Emission>& settings) const {
+  const auto has = [&]<class Kind>(std::type_identity<Kind>) {
+    return std::ranges::any_of(products,
+                               [](const ProductInGl& product) { return std::holds_alternative<Kind>(product.what); });
+  };
+  const Scatters how = scatters();
+  return (!how.coloured || has(std::type_identity<Scattering>())) &&
+         (!how.anisotropic || has(std::type_identity<Forward>())) &&
+         (!how.moves || has(std::type_identity<Momentum>())) &&
+         std::ranges::all_of(settings, [&](const Emission& light) { return !emits(light) || product(light); });
+}
+
+const Emission* StateInGl::some_emission() const {
+  for (const ProductInGl& product : products) {
+    if (const auto* emission = std::get_if<Emission>(&product.what)) return emission;
+  }
+  return nullptr;
+}
+
+bool StateInGl::emits(const Emission& settings) const {
+  return std::ranges::any_of(fields_of(settings), [&](Channel channel) { return any(field(channel)); });
+}
+
+std::vector<volume::DeviceBricksPtr*> StateInGl::all() {
+  std::vector<volume::DeviceBricksPtr*> all;
+  for (Field& field : fields) all.push_back(&field.bricks);
+  for (ProductInGl& product : products) {
+    for (volume::DeviceBricksPtr& component : product.components) all.push_back(&component);
+  }
+  return all;
+}
+
+std::vector<const volume::DeviceBricks*> StateInGl::all() const {
+  std::vector<const volume::DeviceBricks*> all;
+  for (const Field& field : fields) all.push_back(field.bricks.get());
+  for (const ProductInGl& product : products) {
+    for (const volume::DeviceBricksPtr& component : product.components) all.push_back(component.get());
+  }
+  return all;
+}
+
+bool StateInGl::gone() const {
+  return std::ranges::any_of(all(), [](const volume::DeviceBricks* bricks) { return bricks->gone(); });
+}
+
+volume::VolumeFrame StateInGl::frame() const {
+  const auto volume_of = [&](Channel channel) {
+    const volume::DeviceBricksPtr bricks = field(channel);
+    std::string of = channel == Channel::density ? name : volume::name_of(channel);
+    return bricks ? std::optional(volume::volume_on_device(bricks, std::move(of), index_to_world)) : std::nullopt;
+  };
+  volume::ScalarVolume none;
+  none.index_to_world = index_to_world;
+  none.bounds_max = none.bounds_min;
+  volume::VolumeFrame frame;
+  frame.density = *volume_of(Channel::density);
+  frame.temperature = volume_of(Channel::temperature);
+  frame.flame = volume_of(Channel::flame);
+  if (auto anisotropy = volume_of(Channel::anisotropy)) frame.anisotropy = {std::move(*anisotropy), none};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (auto colour = volume_of(colours[i])) {
+      if (!frame.colour) frame.colour = {none, none, none};
+      (*frame.colour)[i] = std::move(*colour);
+    }
+    if (auto part = volume_of(velocities[i])) {
+      if (!frame.velocity) {
+        frame.velocity = volume::Velocity{{}, volume::Velocity::to_index_of(index_to_world)};
+        frame.velocity->parts.fill(none);
+      }
+      frame.velocity->parts[2 * i] = std::move(*part);
+    }
+  }
+  return frame;
+}
+
+std::optional<grid::RgbField::Components> StateInGl::emission(const Emission& settings) const {
+  const ProductInGl* made = product(settings);
+  if (made == nullptr || !any(made->components[0])) return std::nullopt;
+  return three(volumes_of(*made, "emission", index_to_world));
+}
+
+std::optional<grid::RgbField::Components> StateInGl::scattering() const {
+  const ProductInGl* made = product(Scattering{});
+  if (made == nullptr) return std::nullopt;
+  return three(volumes_of(*made, "scattering", index_to_world));
+}
+
+std::optional<volume::ScalarVolume> StateInGl::forward() const {
+  for (const ProductInGl& made : products) {
+    if (std::holds_alternative<Forward>(made.what)) return std::move(volumes_of(made, "anisotropy", index_to_world)[0]);
+  }
+  return std::nullopt;
+}
+
+std::optional<grid::MomentumField::Values> StateInGl::momentum() const {
+  for (const ProductInGl& made : products) {
+    if (const auto* momentum = std::get_if<Momentum>(&made.what))
+      return grid::MomentumField::Values{three(volumes_of(made, "velocity", index_to_world)), momentum->fastest};
+  }
+  return std::nullopt;
 }
 
 }  // namespace cumulet::scene

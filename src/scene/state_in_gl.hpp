@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "scene/channels.hpp"
@@ -14,14 +15,34 @@
 
 namespace cumulet::scene {
 
-/// What of a volume gives off light by these settings, as emission_of() has it, but in GL and but for roundings.
-struct EmissionInGl {
-  Emission settings;
-  /// Red, green and blue: the same bricks in the same order, none of them black, as floats.
-  std::array<volume::DeviceBricksPtr, 3> components;
+/// What is made of a volume's fields, voxel by voxel, as the functions of these names make it in main memory
+/// (scene/channels.hpp): its light by these settings is an Emission, and there is scattering_of(), ...
+struct Scattering {
+  bool operator==(const Scattering&) const = default;
+};
+/// ... forward_of(), ...
+struct Forward {
+  bool coloured = false;  ///< of what has a colour
+  bool operator==(const Forward&) const = default;
+};
+/// ... and momentum_of().
+struct Momentum {
+  float fastest = 0.0F;  ///< what it is in units of
+  bool operator==(const Momentum&) const = default;
+};
+using Product = std::variant<Emission, Scattering, Forward, Momentum>;
+/// Which fields it is made of. But for light the first is density, of whose bricks it is, and they are in the order
+/// that glsl/brick_products.comp has them in.
+std::vector<volume::Channel> fields_of(const Product& product);
+
+/// The same in GL, but for roundings.
+struct ProductInGl {
+  Product what;
+  /// One or three: the same bricks in the same order, of which none is 0 in all of them, as floats.
+  std::vector<volume::DeviceBricksPtr> components;
 };
 
-/// A volume whose bricks are in GL: density, which may be nothing, and what burns.
+/// A volume whose bricks are in GL: density, which may be nothing, and what is beside it.
 struct StateInGl {
   struct Field {
     volume::Channel channel;
@@ -30,12 +51,18 @@ struct StateInGl {
   std::string name;
   std::vector<Field> fields;  ///< one lattice has them all
   glm::dmat4 index_to_world{1.0};
-  std::vector<EmissionInGl> emissions;  ///< those that were found
+  std::vector<ProductInGl> products;  ///< those that were made
 
   /// Null: it has no such field.
   [[nodiscard]] volume::DeviceBricksPtr field(volume::Channel channel) const;
-  /// Null: it was not found.
-  [[nodiscard]] const EmissionInGl* emission(const Emission& settings) const;
+  /// Null: it was not made.
+  [[nodiscard]] const ProductInGl* product(const Product& what) const;
+  /// All that volumes need of it where its light is wanted by these settings, as far as the fields tell. O(bricks).
+  [[nodiscard]] std::vector<Product> wanted(const std::vector<Emission>& settings) const;
+  /// Whether it has all of that. O(1).
+  [[nodiscard]] bool has_wanted(const std::vector<Emission>& settings) const;
+  /// Light that was found of it, if any was: by which settings.
+  [[nodiscard]] const Emission* some_emission() const;
   /// All that is in GL.
   [[nodiscard]] std::vector<volume::DeviceBricksPtr*> all();
   [[nodiscard]] std::vector<const volume::DeviceBricks*> all() const;
@@ -43,9 +70,22 @@ struct StateInGl {
   [[nodiscard]] bool gone() const;
   /// Whether any of it gives off light by these settings, as far as they tell.
   [[nodiscard]] bool emits(const Emission& settings) const;
-  /// What volumes are made of; their voxels are not in main memory.
+  /// What volumes are made of; their voxels are not in main memory. Of what has a sign there is the magnitude.
   [[nodiscard]] volume::VolumeFrame frame() const;
-  [[nodiscard]] std::optional<grid::RgbField::Components> components(const EmissionInGl& emission) const;
+  // What was made, as channels have it; nothing where it was not.
+  [[nodiscard]] std::optional<grid::RgbField::Components> emission(const Emission& settings) const;
+  [[nodiscard]] std::optional<grid::RgbField::Components> scattering() const;
+  [[nodiscard]] std::optional<volume::ScalarVolume> forward() const;
+  [[nodiscard]] std::optional<grid::MomentumField::Values> momentum() const;
+
+ private:
+  // Of its density, where there is any.
+  struct Scatters {
+    bool coloured = false;
+    bool anisotropic = false;
+    bool moves = false;
+  };
+  [[nodiscard]] Scatters scatters() const;
 };
 using StateInGlPtr = std::shared_ptr<const StateInGl>;
 

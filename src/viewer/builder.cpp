@@ -61,8 +61,9 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
 
 }  // namespace
 
-bool needs_values(const BuildSettings& settings) {
-  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty();
+bool needs_values(const VolumeAsset& volume, const BuildSettings& settings) {
+  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty() ||
+         (settings.shutter_seconds != 0.0 && volume.moves());
 }
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -75,7 +76,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
                  const Allowance& allowance, const scene::GridPlanPtr& before) {
   Built built;
   const volume::DeviceBricksPtr& in_gl = volume->volume().on_device;
-  if (in_gl && needs_values(settings)) {
+  if (in_gl && needs_values(*volume, settings)) {
     in_gl->ask_for_values();
     return built;
   }

@@ -98,8 +98,8 @@ struct StandIn {
 /// Of a grid whose refinement ended at so many cells: max_cells, or what memory takes of these.
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 
-/// Whether nothing can be built by these of voxels that are not in main memory.
-[[nodiscard]] bool needs_values(const BuildSettings& settings);
+/// Whether nothing can be built of it by these while its voxels are not in main memory.
+[[nodiscard]] bool needs_values(const VolumeAsset& volume, const BuildSettings& settings);
 
 /// Of a volume, on this thread. Throws Error(cancelled), and what its parts throw.
 /// What GL builds is planned: the job is done once GL can begin. What moves while the shutter is open is built here,

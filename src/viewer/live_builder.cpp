@@ -97,14 +97,14 @@ std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeA
                                                        const BuildSettings& settings) {
   const scene::StateInGlPtr& in_gl = state.in_gl();
   const scene::Emission wanted = state.emission_by(settings.emission);
-  const bool found_there = in_gl && !needs_values(settings);
+  const bool made_there = in_gl && !needs_values(state, settings);
   // Fire may come in another state.
-  wish(live, found_there && (wanted.burns() || wanted.is_hot()) ? std::optional(wanted) : std::nullopt);
-  if (!found_there || !in_gl->emits(wanted) || in_gl->gone()) return settings;
-  if (in_gl->emission(wanted) != nullptr) return settings;
-  if (in_gl->emissions.empty()) return std::nullopt;
+  wish(live, made_there && (wanted.burns() || wanted.is_hot()) ? std::optional(wanted) : std::nullopt);
+  if (!made_there || in_gl->gone() || in_gl->has_wanted({wanted})) return settings;
+  const scene::Emission* found = in_gl->some_emission();
+  if (found == nullptr || !in_gl->has_wanted({})) return std::nullopt;
   BuildSettings instead = settings;
-  instead.emission = in_gl->emissions.front().settings;
+  instead.emission = *found;
   return instead;
 }
 

@@ -57,7 +57,7 @@ class LiveBuilder {
   // What is wanted of states in GL from now on; none: nothing.
   void wish(Live& live, const std::optional<scene::Emission>& wanted);
   // What a state in GL gives off may have been found by other settings: the same with these, until it is found by those
-  // that are wanted; none: nothing was found yet.
+  // that are wanted; none: something of it was not made yet.
   std::optional<BuildSettings> settings_for(Live& live, const VolumeAsset& state, const BuildSettings& settings);
   // Returns whether the job is done: no newer state is there in place of one that failed.
   bool build(std::uint64_t job, Progress& progress);

@@ -290,7 +290,7 @@ class Viewer {
   // Where a state of a live volume stands that stays in GL; none: it does not.
   static std::optional<glm::dmat4> place_in_gl(Context& g, const std::shared_ptr<Live>& live,
                                                const render::GlState& state);
-  static void find_emissions(Context& g, const std::shared_ptr<Live>& live);
+  static void make_products(Context& g, const std::shared_ptr<Live>& live);
   // Of its newest state bricks that are scattered.
   static void gather(Context& g, Live& live);
   // From now on.
@@ -575,11 +575,11 @@ class Viewer {
     std::weak_ptr<Live> live;
     std::array<std::shared_ptr<void>, 2> listeners;  // to who needs voxels, or what is given off
     // Of these it was tried, or is: what fails is not tried again.
-    std::weak_ptr<const scene::StateInGl> brought, found;
-    std::vector<scene::Emission> found_by;
-    // Of its newest state, which this context has: in main memory, or what it gives off.
+    std::weak_ptr<const scene::StateInGl> brought, made;
+    std::vector<scene::Emission> made_by;
+    // Of its newest state, which this context has: in main memory, or what is made of it.
     [[nodiscard]] bool needs_values(Context& g, const scene::StateInGlPtr& state) const;
-    [[nodiscard]] bool needs_emissions(const scene::StateInGlPtr& state) const;
+    [[nodiscard]] bool needs_products(const scene::StateInGlPtr& state) const;
   };
   std::vector<InGl> lives_in_gl_;
   std::uint64_t last_followed_ = 0;

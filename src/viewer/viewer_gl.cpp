@@ -312,15 +312,12 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
 
 namespace {
 
-// What may stay in GL, and where it then stands: density and what burns, of one lattice.
+// What may stay in GL, and where it then stands: density, and what is beside it, of one lattice.
 std::optional<glm::dmat4> lattice_in_gl(const render::GlState& state) {
   bool has_density = false;
   for (const render::GlVoxels& field : state.fields) {
-    using volume::Channel;
-    if (field.channel != Channel::density && field.channel != Channel::temperature && field.channel != Channel::flame)
-      return std::nullopt;
     if (field.index_to_world != state.fields[0].index_to_world) return std::nullopt;
-    has_density = has_density || field.channel == Channel::density;
+    has_density = has_density || field.channel == volume::Channel::density;
   }
   return has_density || state.changed ? std::optional(state.fields[0].index_to_world) : std::nullopt;
 }
@@ -344,7 +341,7 @@ render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, c
                                             const glm::dmat4& index_to_world) {
   render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
   stay.join = [name, index_to_world](const auto& fields) {
-    return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .emissions = {}};
+    return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .products = {}};
   };
   stay.arrive = [live](scene::StateInGl state) {
     live->set(std::move(state));
@@ -447,8 +444,8 @@ void Viewer::tend(const std::shared_ptr<Live>& live) {
       {.live = live,
        .listeners = {live->values_wanted()->listen([this] { notify(); }), live->listen_to_wishes([this] { notify(); })},
        .brought = {},
-       .found = {},
-       .found_by = {}});
+       .made = {},
+       .made_by = {}});
 }
 
 void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels) {
@@ -465,7 +462,7 @@ void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live, const std
       [live] { live->refuse_updates(); });
 }
 
-void Viewer::find_emissions(Context& g, const std::shared_ptr<Live>& live) {
+void Viewer::make_products(Context& g, const std::shared_ptr<Live>& live) {
   const auto found = std::make_shared<Live::InGl>();
   render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
   stay.join = [live, found](const auto& /*none*/) {
@@ -473,7 +470,7 @@ void Viewer::find_emissions(Context& g, const std::shared_ptr<Live>& live) {
     return found->state ? std::optional(*found->state) : std::nullopt;
   };
   stay.arrive = [live, found](scene::StateInGl state) { return live->set_if_newest(found->number, std::move(state)); };
-  g.transfers().find_emissions(live.get(), "state", std::move(stay));
+  g.transfers().make_products(live.get(), "state", std::move(stay));
 }
 
 void Viewer::gather(Context& g, Live& live) {
@@ -504,21 +501,18 @@ bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) co
   return !announced || announced->stays_in_gl;
 }
 
-bool Viewer::InGl::needs_emissions(const scene::StateInGlPtr& state) const {
+bool Viewer::InGl::needs_products(const scene::StateInGlPtr& state) const {
   const std::shared_ptr<Live> of = live.lock();
   if (!of || !of->stays_in_gl()) return false;
   const std::vector<scene::Emission> wanted = of->wanted();
-  const auto is_there = [&](const scene::Emission& settings) {
-    return !state->emits(settings) || state->emission(settings) != nullptr;
-  };
-  return !std::ranges::all_of(wanted, is_there) && (found.lock() != state || found_by != wanted);
+  return !state->has_wanted(wanted) && (made.lock() != state || made_by != wanted);
 }
 
 bool Viewer::voxels_in_gl_wait(Context& g) const {
   return std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) {
     const std::shared_ptr<Live> live = in_gl.live.lock();
     const scene::StateInGlPtr state = live ? live->in_gl().state : nullptr;
-    return state && g.has(*state) && (in_gl.needs_values(g, state) || in_gl.needs_emissions(state));
+    return state && g.has(*state) && (in_gl.needs_values(g, state) || in_gl.needs_products(state));
   });
 }
 
@@ -534,10 +528,10 @@ void Viewer::tend_voxels_in_gl(Context& g) {
       in_gl.brought = state;
       bring_back(g, live, channels_of(*state));
     }
-    if (in_gl.needs_emissions(state)) {
-      in_gl.found = state;
-      in_gl.found_by = live->wanted();
-      find_emissions(g, live);
+    if (in_gl.needs_products(state)) {
+      in_gl.made = state;
+      in_gl.made_by = live->wanted();
+      make_products(g, live);
     }
   }
 }

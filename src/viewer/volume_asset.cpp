@@ -217,10 +217,7 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   if (!glowing_ || glowing_->settings != given) {
     drop(latticed_);  // it holds them
     drop(glowing_);
-    const scene::EmissionInGl* found = in_gl_ ? in_gl_->emission(given) : nullptr;
-    auto glow = found != nullptr ? in_gl_->components(*found)
-                : in_gl_         ? std::nullopt
-                                 : scene::emission_of(open, given, &progress);
+    auto glow = in_gl_ ? in_gl_->emission(given) : scene::emission_of(open, given, &progress);
     if (close != nullptr)
       glow = scene::mean_of(glow, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
     put(glowing_, Glowing{given, field(colours, std::move(glow))});
@@ -228,9 +225,10 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   if (!weighted_ || weighted_->density_ramp != density_ramp) {
     drop(latticed_);
     drop(weighted_);
-    auto scattering = scene::scattering_of(open, density_ramp, &progress);
-    auto momentum =
-        scene::momentum_of(open, density_ramp, &progress, log, close != nullptr ? scene::fastest_of(*close) : 0.0);
+    auto scattering = in_gl_ ? in_gl_->scattering() : scene::scattering_of(open, density_ramp, &progress);
+    auto momentum = in_gl_ ? in_gl_->momentum()
+                           : scene::momentum_of(open, density_ramp, &progress, log,
+                                                close != nullptr ? scene::fastest_of(*close) : 0.0);
     if (close != nullptr) {
       scattering =
           scene::mean_of(scattering, scene::scattering_of(*close, density_ramp, &progress), "density", &progress);
@@ -240,7 +238,7 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
                             std::nullopt});
   }
   if (anisotropic && !weighted_->forward) {
-    auto forward = scene::forward_of(open, density_ramp, &progress);
+    auto forward = in_gl_ ? in_gl_->forward() : scene::forward_of(open, density_ramp, &progress);
     if (close != nullptr) {
       const auto at_close = scene::forward_of(*close, density_ramp, &progress);
       forward = scene::mean_of(forward ? &*forward : nullptr, at_close ? &*at_close : nullptr, "density", &progress);

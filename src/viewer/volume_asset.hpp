@@ -90,7 +90,7 @@ class VolumeAsset {
   [[nodiscard]] scene::Emission emission_by(const scene::Emission& emission) const;
   /// The state that is in GL; null: its voxels are in main memory.
   [[nodiscard]] const scene::StateInGlPtr& in_gl() const { return in_gl_; }
-  /// What it has beside density; anisotropic: its anisotropy, too. What one that is in GL gives off was found there.
+  /// What it has beside density; anisotropic: its anisotropy, too. Of one that is in GL it was made there.
   /// The last that were asked for are kept: another threshold or camera asks for the same. log hears of what is left
   /// out, when it is made.
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,

@@ -11,6 +11,12 @@
 
 namespace cumulet::volume {
 
+std::optional<std::uint32_t> DeviceBricks::find(const glm::ivec3& origin) const {
+  const auto found = std::ranges::lower_bound(origins, origin, lexicographic);
+  if (found == origins.end() || *found != origin) return std::nullopt;
+  return static_cast<std::uint32_t>(found - origins.begin());
+}
+
 bool DeviceBricks::are_halves() const {
   return std::ranges::all_of(memories, [](const DeviceMemoryPtr& memory) { return memory->halves; });
 }

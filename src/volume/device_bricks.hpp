@@ -8,6 +8,7 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/listeners.hpp"
@@ -77,6 +78,8 @@ struct DeviceBricks {
   [[nodiscard]] const BrickSummary& summary(std::size_t brick) const {
     return memories[places[brick].memory]->summaries[places[brick].brick];
   }
+  /// Which of them begins there; none: it has no such brick.
+  [[nodiscard]] std::optional<std::uint32_t> find(const glm::ivec3& origin) const;
   /// Whether halves are what all values are.
   [[nodiscard]] bool are_halves() const;
   /// Whether any of it went with its context.

@@ -20,6 +20,13 @@ struct Velocity {
   std::array<ScalarVolume, 6> parts;
   /// Voxels a second along the lattice's axes = to_index * (x, y, z).
   glm::dmat3 to_index{1.0};
+
+  /// Of velocities in world units a second along the world's axes.
+  [[nodiscard]] static glm::dmat3 to_index_of(const glm::dmat4& index_to_world) {
+    return glm::inverse(glm::dmat3(index_to_world));
+  }
+  /// No component as given is more: nothing is then faster than fastest_velocity.
+  [[nodiscard]] float most() const;
 };
 
 /// The fields of one file, all on one lattice: each has the same index_to_world, and voxel (i,j,k) of each is the same

@@ -403,12 +403,8 @@ class FrameImport {
 
   // to_index: from the file's world to the lattice, too; and nothing faster than a half float says of it.
   void bring_to_index(Velocity& velocity) const {
-    velocity.to_index = glm::inverse(glm::dmat3(out_.density.index_to_world)) * velocity.to_index;
-    double longest = 0.0;
-    const glm::dmat3 rows = glm::transpose(velocity.to_index);
-    for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, glm::dot(glm::abs(rows[axis]), glm::dvec3(1.0)));
-    const double most = std::min(fastest_velocity / longest, double{std::numeric_limits<float>::max()});
-    const std::uint64_t beyond = clamp_to(static_cast<float>(most), velocity.parts);
+    velocity.to_index = Velocity::to_index_of(out_.density.index_to_world) * velocity.to_index;
+    const std::uint64_t beyond = clamp_to(velocity.most(), velocity.parts);
     if (beyond == 0) return;
     std::ostringstream text;
     text << beyond << " components beyond " << fastest_velocity << " voxels a second clamped to that";
@@ -485,6 +481,13 @@ std::vector<Field*> fields_beside_density(Frame& frame) {
 }
 
 }  // namespace
+
+float Velocity::most() const {
+  double longest = 0.0;
+  const glm::dmat3 rows = glm::transpose(to_index);
+  for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, glm::dot(glm::abs(rows[axis]), glm::dvec3(1.0)));
+  return static_cast<float>(std::min(fastest_velocity / longest, double{std::numeric_limits<float>::max()}));
+}
 
 std::vector<const ScalarVolume*> VolumeFrame::beside_density() const {
   return fields_beside_density<const ScalarVolume>(*this);

@@ -1,7 +1,8 @@
 // How long it takes from a state's hand-over to its picture, and where that goes: of a plume in a dense array of so
 // many voxels a side, which is copied or held, of its bricks, of a tenth of its bricks, and of textures: handed over as
 // they are, or read back by the host through a pixel buffer and held. A picture is there when a
-// frame draws it, coarse where the budget makes it so. Fire has a temperature beside its density. By hand:
+// frame draws it, coarse where the budget makes it so. Fire has a temperature beside its density, and what is coloured
+// and moves has a colour and a velocity. By hand:
 //
 //     cumulet-bench-live [SIDE [STATES]]...
 #include <algorithm>
@@ -203,16 +204,17 @@ class Bench {
   }
   [[nodiscard]] std::uint64_t cells() const { return cells_; }
 
-  // Of a texture, to which voxels are copied on the device first, as a simulation's step would write them. fire: it is
-  // a temperature as well.
-  Spent show(const Textures& textures, int i, bool changed, bool fire = false) {
+  // Of a texture, to which voxels are copied on the device first, as a simulation's step would write them. channels:
+  // all that it is.
+  Spent show(const Textures& textures, int i, bool changed,
+             const std::vector<cumulet_channel>& channels = {CUMULET_CHANNEL_DENSITY}) {
     textures.step(i);
     return show([&] {
-      const cumulet_gl_field fields[] = {textures.field(CUMULET_CHANNEL_DENSITY),
-                                         textures.field(CUMULET_CHANNEL_TEMPERATURE)};
+      std::vector<cumulet_gl_field> fields;
+      for (const cumulet_channel channel : channels) fields.push_back(textures.field(channel));
       auto desc = make_desc<cumulet_gl_state_desc>();
-      desc.fields = fields;
-      desc.field_count = fire ? 2 : 1;
+      desc.fields = fields.data();
+      desc.field_count = fields.size();
       const cumulet_voxel_box box = textures.tenth();
       if (changed) {
         desc.changed = &box;
@@ -312,17 +314,21 @@ void measure(int side, int count) {
     built_there.warm_up(states[0]);
     const Textures there(built_there.gl(), side, GL_R16F, values);
     const auto name = [&](const char* what) { return std::string(what) + (stays ? ", stays there" : ", built there"); };
-    rows_of(built_there, name("in GL, R16F").c_str(), [&](int i) { return built_there.show(there, i, false); });
-    rows_of(built_there, name("in GL, R16F, a tenth of it").c_str(),
-            [&](int i) { return built_there.show(there, i, true); });
-    try {
-      built_there.show(there, 0, false, true);  // what it gives off is asked for first
-      rows_of(built_there, name("fire in GL, R16F").c_str(),
-              [&](int i) { return built_there.show(there, i, false, true); });
-      rows_of(built_there, name("fire in GL, R16F, a tenth of it").c_str(),
-              [&](int i) { return built_there.show(there, i, true, true); });
-    } catch (const std::exception& error) {
-      std::fprintf(stderr, "%s: %s\n", name("fire in GL").c_str(), error.what());  // beyond a driver's limits
+    const std::pair<const char*, std::vector<cumulet_channel>> kinds[] = {
+        {"in GL, R16F", {CUMULET_CHANNEL_DENSITY}},
+        {"fire in GL, R16F", {CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_TEMPERATURE}},
+        {"coloured and moving in GL, R16F",
+         {CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_RED, CUMULET_CHANNEL_GREEN, CUMULET_CHANNEL_BLUE,
+          CUMULET_CHANNEL_VELOCITY_X, CUMULET_CHANNEL_VELOCITY_Y, CUMULET_CHANNEL_VELOCITY_Z}}};
+    for (const auto& [what, channels] : kinds) {
+      try {
+        built_there.show(there, 0, false, channels);  // what it gives off is asked for first
+        rows_of(built_there, name(what).c_str(), [&](int i) { return built_there.show(there, i, false, channels); });
+        rows_of(built_there, name((std::string(what) + ", a tenth of it").c_str()).c_str(),
+                [&](int i) { return built_there.show(there, i, true, channels); });
+      } catch (const std::exception& error) {
+        std::fprintf(stderr, "%s: %s\n", name(what).c_str(), error.what());  // beyond a driver's limits
+      }
     }
   }
 }

@@ -984,7 +984,7 @@ TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
   EXPECT_EQ(difference(picture(), before), "");
 }
 
-// Of nothing at all, which is a state, too; of more than density, which comes to main memory; and what comes there by
+// Of nothing at all, which is a state, too; of fields that stand apart, which come to main memory; and what comes there by
 // itself.
 TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
@@ -997,11 +997,12 @@ TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   hand_over_density(nothing, types[1]);
   EXPECT_EQ(arrive(), 1U);
   EXPECT_NE(difference(picture(), expected), "");
-  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array)),
-             in_texture(CUMULET_CHANNEL_ANISOTROPY, odd, objects_.texture(odd, types[1], ahead))});
+  cumulet_gl_field apart = in_texture(CUMULET_CHANNEL_ANISOTROPY, odd, objects_.texture(odd, types[1], ahead));
+  apart.index_to_world[12] += 8.0 * apart.index_to_world[0];
+  hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array)), apart});
   EXPECT_EQ(arrive(), 1U);
   State both = dense(odd, array.values);
-  both.dense(CUMULET_CHANNEL_ANISOTROPY, odd, ahead.values);
+  both.dense(CUMULET_CHANNEL_ANISOTROPY, odd, ahead.values).last_dense().index_to_world[12] = apart.index_to_world[12];
   expect_same(newest(live_), alone(both));
   hand_over_density(array, types[1]);
   EXPECT_EQ(arrive(), 1U);
@@ -1014,10 +1015,12 @@ TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   EXPECT_TRUE(shows_voxels());
 }
 
-// Density, temperature and flame of a step, in halves.
+const std::vector<cumulet_channel> of_fire{CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_TEMPERATURE, CUMULET_CHANNEL_FLAME};
+
+// Density, temperature and flame of a step, in halves; or other channels.
 class FireInGl : public LiveInGl {
  protected:
-  static constexpr std::array channels{CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_TEMPERATURE, CUMULET_CHANNEL_FLAME};
+  explicit FireInGl(const std::vector<cumulet_channel>& channels = of_fire) : channels_(channels) {}
   struct Fire {
     std::vector<Array> arrays;
     std::vector<GLuint> textures;
@@ -1025,7 +1028,7 @@ class FireInGl : public LiveInGl {
   };
   Fire fire(int step) {
     Fire made;
-    for (const cumulet_channel channel : channels) {
+    for (const cumulet_channel channel : channels_) {
       made.arrays.emplace_back(types[1].format, simulated(channel, odd, step));
       made.textures.push_back(objects_.texture(odd, types[1], made.arrays.back()));
       made.fields.push_back(in_texture(channel, odd, made.textures.back()));
@@ -1040,9 +1043,9 @@ class FireInGl : public LiveInGl {
     objects_.put(fire.textures[channel], odd, GL_RED, types[1].type, array.bytes.data());
     return fire;
   }
-  static State in_memory(const Fire& fire) {
+  [[nodiscard]] State in_memory(const Fire& fire) const {
     State state;
-    for (std::size_t i = 0; i < channels.size(); ++i) state.dense(channels[i], odd, fire.arrays[i].values);
+    for (std::size_t i = 0; i < channels_.size(); ++i) state.dense(channels_[i], odd, fire.arrays[i].values);
     return state;
   }
   static void burn(cumulet_viewer* viewer, float strength, float blackbody = 0.0F) {
@@ -1091,9 +1094,25 @@ class FireInGl : public LiveInGl {
     for (std::size_t i = 0; i < a.size(); ++i) others += std::abs(int{a[i]} - int{b[i]}) > 1 ? 1U : 0U;
     EXPECT_LE(others, a.size() / 100);
   }
+
+  std::vector<cumulet_channel> channels_;
 };
 
-TEST_F(FireInGl, IsThatOfMainMemory) {
+// Fire, and all that a state may have.
+class StatesInGl : public FireInGl, public testing::WithParamInterface<std::vector<cumulet_channel>> {
+ protected:
+  StatesInGl() : FireInGl(GetParam()) {}
+};
+const std::vector<cumulet_channel> all_channels = [] {
+  std::vector<cumulet_channel> all;
+  for (int channel = CUMULET_CHANNEL_DENSITY; channel <= CUMULET_CHANNEL_VELOCITY_Z; ++channel)
+    all.push_back(static_cast<cumulet_channel>(channel));
+  return all;
+}();
+INSTANTIATE_TEST_SUITE_P(Channels, StatesInGl, testing::Values(of_fire, all_channels),
+                         [](const auto& channels) { return channels.param.size() == of_fire.size() ? "fire" : "all"; });
+
+TEST_P(StatesInGl, IsThatOfMainMemory) {
   burn(v_, 2.0F, 0.5F);
   for (const int step : {0, 3}) {
     const Fire burning = fire(step);
@@ -1126,7 +1145,7 @@ TEST_F(FireInGl, FollowsTheMedium) {
   EXPECT_EQ(handed(), states + 1);
 }
 
-TEST_F(FireInGl, BoxesAreTheWhole) {
+TEST_P(StatesInGl, BoxesAreTheWhole) {
   Fire burning = fire(1);
   burn(v_, 2.0F, 0.5F);
   hand_over(burning.fields);
@@ -1134,7 +1153,7 @@ TEST_F(FireInGl, BoxesAreTheWhole) {
   for (int step = 2; step < 5; ++step) {
     Fire next = fire(step);
     std::vector<cumulet_voxel_box> boxes;
-    for (std::size_t i = 0; i < channels.size(); ++i) {
+    for (std::size_t i = 0; i < channels_.size(); ++i) {
       objects_.put(burning.textures[i], odd, GL_RED, types[1].type, next.arrays[i].bytes.data());
       for (const Sides& b : State::bricks(odd, next.arrays[i].values, burning.arrays[i].values))
         boxes.push_back({{b[0], b[1], b[2]}, {b[0] + 7, b[1] + 7, b[2] + 7}});
@@ -1147,7 +1166,7 @@ TEST_F(FireInGl, BoxesAreTheWhole) {
   }
 }
 
-TEST_F(FireInGl, ComesToMemoryWhereItIsNeeded) {
+TEST_P(StatesInGl, ComesToMemoryWhereItIsNeeded) {
   const Fire burning = fire(2);
   burn(v_, 2.0F);
   hand_over(burning.fields);

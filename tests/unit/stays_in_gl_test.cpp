@@ -1,4 +1,4 @@
-// Density that stays in GL: what is known of it, and the grids that are made of it there.
+// What stays in GL: what is known of it, what is made of it, and the grids that are made of that there.
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,11 @@ constexpr Sides odd = {52, 44, 37};
 struct Cells {
   std::vector<grid::CellRecord> cells;
   bool limited = false;
+  // Empty where there is no such channel.
   std::vector<grid::EmissionRecord> emission;
+  std::vector<std::uint32_t> colour;
+  std::vector<std::int16_t> anisotropy;
+  std::vector<glm::uvec2> velocity;
 };
 
 class StaysInGl : public test::GlTest {
@@ -90,7 +94,7 @@ class StaysInGl : public test::GlTest {
     render::VoxelTransfers::StayInGl stay;
     stay.join = [&](auto arrived) {
       if (before == nullptr)
-        return scene::StateInGl{.name = "smoke", .fields = arrived, .index_to_world = to_world, .emissions = {}};
+        return scene::StateInGl{.name = "smoke", .fields = arrived, .index_to_world = to_world, .products = {}};
       scene::StateInGl joined = *before;
       for (std::size_t i = 0; i < joined.fields.size(); ++i)
         joined.fields[i].bricks =
@@ -140,16 +144,21 @@ class StaysInGl : public test::GlTest {
     while (!work.advance(Deadline::max())) {
     }
     const render::BuiltGrid built = work.take();
-    Cells read{std::vector<grid::CellRecord>(built.count), built.limited, {}};
-    gl_->GetNamedBufferSubData(built.cells.name(), 0, static_cast<GLsizeiptr>(read.cells.size() * 32),
-                               read.cells.data());
-    const gl::Object& emission = built.channels[static_cast<std::size_t>(grid::Channel::emission)];
-    if (emission) {
-      read.emission.resize(built.count);
-      gl_->GetNamedBufferSubData(emission.name(), 0,
-                                 static_cast<GLsizeiptr>(read.emission.size() * sizeof(grid::EmissionRecord)),
-                                 read.emission.data());
-    }
+    Cells read;
+    read.limited = built.limited;
+    const auto get = [&](const gl::Object& from, auto& to) {
+      if (!from) return;
+      to.resize(built.count);
+      gl_->GetNamedBufferSubData(from.name(), 0, static_cast<GLsizeiptr>(to.size() * sizeof to[0]), to.data());
+    };
+    const auto channel = [&](grid::Channel c) -> const gl::Object& {
+      return built.channels[static_cast<std::size_t>(c)];
+    };
+    get(built.cells, read.cells);
+    get(channel(grid::Channel::emission), read.emission);
+    get(channel(grid::Channel::colour), read.colour);
+    get(channel(grid::Channel::anisotropy), read.anisotropy);
+    get(channel(grid::Channel::velocity), read.velocity);
     return read;
   }
   // The same in main memory.
@@ -341,7 +350,7 @@ TEST_P(StaysInGl, WhatBurnsIsFound) {
                                         {volume::Channel::temperature, temperature},
                                         {volume::Channel::flame, flame, true}},
                                        odd, place(), wanted);
-  ASSERT_EQ(state.emissions.size(), wanted.size());
+  ASSERT_EQ(state.products.size(), wanted.size());
   const volume::VolumeFrame in_memory = frame_of({{volume::Channel::density, density},
                                                   {volume::Channel::temperature, temperature},
                                                   {volume::Channel::flame, flame}},
@@ -359,7 +368,7 @@ TEST_P(StaysInGl, WhatBurnsIsFound) {
   }
   const grid::Cube cube = grid::fit_cube(in_gl.density, low, high);
   for (const scene::Emission& settings : wanted) {
-    const auto found = state.components(*state.emission(settings));
+    const auto found = state.emission(settings);
     const auto expected = scene::emission_of(in_memory, settings);
     ASSERT_TRUE(found && expected);
     grid::RgbField::Components read;
@@ -396,14 +405,165 @@ TEST_P(StaysInGl, WhatBurnsIsFound) {
   }
 }
 
-// Boxes, some of which put fire out, leave what is found in a whole state.
-TEST_P(StaysInGl, WhatBurnsInBoxesIsFoundThere) {
+// What scatters, by colours and anisotropies beyond what they may be, and velocities of either sign; coloured: or not.
+std::vector<std::pair<volume::Channel, std::vector<float>>> scattering_fields(bool coloured, int step) {
+  using volume::Channel;
+  std::vector<std::pair<Channel, std::vector<float>>> fields;
+  for (std::size_t i = 0; i < volume::channel_count; ++i) {
+    const auto channel = static_cast<Channel>(i);
+    const bool colour = channel == Channel::red || channel == Channel::green || channel == Channel::blue;
+    if (channel == Channel::temperature || channel == Channel::flame || (colour && !coloured)) continue;
+    // Elsewhere than the density.
+    auto values = simulated(static_cast<cumulet_channel>(i), odd, channel == Channel::density ? step : step + 1);
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      if (colour) values[v] *= v % 7 == 0 ? -1.0F : 2.5F;
+      if (channel == Channel::anisotropy) values[v] *= 4.0F;
+      if (channel == Channel::velocity_y) values[v] *= v % 5 == 0 ? 1e6F : 30.0F;
+    }
+    if (channel == Channel::green) values = as_halves(values);
+    fields.emplace_back(channel, values);
+  }
+  return fields;
+}
+
+void expect_near(const volume::ScalarVolume& found, const volume::ScalarVolume& expected) {
+  ASSERT_EQ(found.brick_origins, expected.brick_origins);
+  EXPECT_EQ(found.bounds_min, expected.bounds_min);
+  EXPECT_EQ(found.bounds_max, expected.bounds_max);
+  EXPECT_EQ(found.active_voxels, expected.active_voxels);
+  EXPECT_NEAR(found.max_value, expected.max_value, 1e-6F * expected.max_value);
+  ASSERT_EQ(found.brick_values.size(), expected.brick_values.size());
+  for (std::size_t i = 0; i < expected.brick_values.size(); ++i)
+    ASSERT_NEAR(found.brick_values[i], expected.brick_values[i], 1e-6F * expected.max_value) << i;
+}
+
+glm::ivec3 colour_of(std::uint32_t packed) { return {packed & 0x7ffU, (packed >> 11U) & 0x7ffU, packed >> 22U}; }
+glm::vec3 velocity_of(const glm::uvec2& packed) {
+  return {glm::unpackHalf2x16(packed.x), glm::unpackHalf2x16(packed.y).x};
+}
+
+void expect_same_channels(const Cells& found, const grid::TetGrid& expected, float fastest) {
+  ASSERT_EQ(found.colour.size(), expected.colour.size());
+  ASSERT_EQ(found.anisotropy.size(), expected.anisotropy.size());
+  ASSERT_EQ(found.velocity.size(), expected.velocity.size());
+  for (std::size_t i = 0; i < expected.colour.size(); ++i) {
+    const glm::ivec3 apart = glm::abs(colour_of(found.colour[i]) - colour_of(expected.colour[i]));
+    ASSERT_LE(std::max({apart.x, apart.y, apart.z}), 1) << i;
+  }
+  for (std::size_t i = 0; i < expected.anisotropy.size(); ++i) {
+    // Next to nothing is known less well: sums above bricks are of floats.
+    float scatters = glm::unpackHalf2x16(expected.cells[i].data.z).x;
+    if (!expected.colour.empty()) scatters *= static_cast<float>(colour_of(expected.colour[i]).y) / 2047.0F;
+    ASSERT_NEAR(found.anisotropy[i], expected.anisotropy[i], scatters > 0.01F ? 4 : 1000) << i;
+  }
+  for (std::size_t i = 0; i < expected.velocity.size(); ++i) {
+    const glm::vec3 apart = glm::abs(velocity_of(found.velocity[i]) - velocity_of(expected.velocity[i]));
+    ASSERT_LE(std::max({apart.x, apart.y, apart.z}), 1e-3F * fastest) << i;
+  }
+}
+
+TEST_P(StaysInGl, WhatScattersIsMade) {
+  for (const bool coloured : {true, false}) {
+    SCOPED_TRACE(coloured);
+    const auto fields = scattering_fields(coloured, 1);
+    std::vector<Values> handed;
+    for (const auto& [channel, values] : fields) handed.push_back({channel, values, channel == volume::Channel::green});
+    // It burns beside.
+    handed.push_back({volume::Channel::flame, simulated(CUMULET_CHANNEL_FLAME, odd, 3)});
+    const scene::Emission burning = emissions()[2];
+    const scene::StateInGl state = bring(handed, odd, place(), {burning});
+    EXPECT_EQ(state.products.size(), coloured ? 4U : 3U);
+    const volume::VolumeFrame in_memory = frame_of(fields, odd);
+    const volume::VolumeFrame in_gl = state.frame();
+    EXPECT_EQ(in_gl.colour.has_value(), coloured);
+    ASSERT_TRUE(in_gl.anisotropy && in_gl.velocity);
+    EXPECT_GE(scene::fastest_of(in_gl), scene::fastest_of(in_memory));
+    const auto scattering = state.scattering();
+    const auto forward = state.forward();
+    const auto momentum = state.momentum();
+    ASSERT_TRUE(scattering.has_value() == coloured && forward && momentum);
+    EXPECT_GE(momentum->fastest, scene::fastest_of(in_memory));
+    grid::RgbField::Components read_scattering;
+    if (coloured) {
+      const auto expected = scene::scattering_of(in_memory);
+      for (std::size_t c = 0; c < 3; ++c) {
+        read_scattering[c] = copied((*scattering)[c]);
+        ASSERT_NO_FATAL_FAILURE(expect_near(read_scattering[c], (*expected)[c]));
+      }
+    }
+    const volume::ScalarVolume read_forward = copied(*forward);
+    ASSERT_NO_FATAL_FAILURE(expect_near(read_forward, *scene::forward_of(in_memory)));
+    const auto expected = scene::momentum_of(in_memory, {}, nullptr, {}, momentum->fastest);
+    grid::MomentumField::Values read_momentum{{}, momentum->fastest};
+    for (std::size_t c = 0; c < 3; ++c) {
+      read_momentum.components[c] = copied(momentum->components[c]);
+      ASSERT_NO_FATAL_FAILURE(expect_near(read_momentum.components[c], expected->components[c]));
+    }
+
+    const auto light = state.emission(burning);
+    ASSERT_TRUE(light);
+    grid::RgbField::Components read_light;
+    for (std::size_t c = 0; c < 3; ++c) read_light[c] = copied((*light)[c]);
+
+    const grid::Cube cube = grid::fit_cube(in_gl.density, glm::min(in_gl.density.bounds_min, in_gl.flame->bounds_min),
+                                           glm::max(in_gl.density.bounds_max, in_gl.flame->bounds_max));
+    grid::Channels known_channels;
+    grid::Channels channels;
+    known_channels.emission = std::make_shared<const grid::RgbField>(*light, cube);
+    channels.emission = std::make_shared<const grid::RgbField>(read_light, cube);
+    if (coloured) {
+      known_channels.scattering = std::make_shared<const grid::RgbField>(*scattering, cube);
+      channels.scattering = std::make_shared<const grid::RgbField>(read_scattering, cube);
+    }
+    known_channels.forward = std::make_shared<const grid::ScalarField>(*forward, cube);
+    channels.forward = std::make_shared<const grid::ScalarField>(read_forward, cube);
+    known_channels.momentum = std::make_shared<const grid::MomentumField>(*momentum, cube);
+    channels.momentum = std::make_shared<const grid::MomentumField>(read_momentum, cube);
+    const GridReference known(in_gl.density, cube, known_channels);
+    const GridReference reference(in_memory.density, cube, channels);
+    for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
+      grid::RefineSettings refine;
+      refine.cells = cells;
+      refine.criterion = grid::Criterion::deviation;  // which nothing is known of but by what is the same, bit for bit
+      for (const double threshold : {0.03, 0.2}) {
+        refine.threshold = threshold;
+        const Cells made = build(known, refine);
+        const grid::TetGrid same = reference.grid(refine);
+        ASSERT_NO_FATAL_FAILURE(expect_same_cells(made, same));
+        ASSERT_NO_FATAL_FAILURE(expect_same_channels(made, same, momentum->fastest));
+      }
+    }
+  }
+}
+
+// Smoke whose colour is nowhere near is black, and what is no smoke has none.
+TEST_P(StaysInGl, WhatIsNowhereScattersNothing) {
+  using volume::Channel;
+  auto density = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+  const std::vector<float> nothing(density.size(), 0.0F);
+  std::vector<Values> fields{{Channel::density, density}};
+  for (const Channel channel : {Channel::red, Channel::green, Channel::blue, Channel::velocity_x, Channel::velocity_y,
+                                Channel::velocity_z, Channel::anisotropy})
+    fields.push_back({channel, nothing});
+  const scene::StateInGl black = bring(fields, odd, place(), {});
+  ASSERT_TRUE(black.scattering() && black.forward());
+  EXPECT_TRUE((*black.scattering())[1].empty());
+  EXPECT_TRUE(black.forward()->empty());
+  EXPECT_FALSE(black.momentum()) << "nothing moves";
+  EXPECT_TRUE(black.has_wanted({}));
+  fields[0].values = nothing;
+  const scene::StateInGl none = bring(fields, odd, place(), {});
+  EXPECT_TRUE(none.products.empty());
+  EXPECT_TRUE(none.has_wanted({}));
+}
+
+// Boxes, some of which take all away, leave what is made of a whole state.
+TEST_P(StaysInGl, WhatBoxesChangeIsMadeThere) {
   const std::vector<scene::Emission> wanted = emissions();
-  const std::vector<volume::Channel> channels{volume::Channel::density, volume::Channel::temperature,
-                                              volume::Channel::flame};
   const auto fields_at = [&](int step) {
     std::vector<Values> fields;
-    for (const volume::Channel channel : channels)
+    for (const auto& [channel, values] : scattering_fields(true, step)) fields.push_back({channel, values});
+    for (const volume::Channel channel : {volume::Channel::temperature, volume::Channel::flame})
       fields.push_back({channel, simulated(static_cast<cumulet_channel>(channel), odd, step)});
     return fields;
   };
@@ -424,15 +584,17 @@ TEST_P(StaysInGl, WhatBurnsInBoxesIsFoundThere) {
     }
     // Others are wanted from the second on.
     state = bring(fields, odd, place(), {wanted[0], wanted[2]}, std::vector{box}, &*state);
-    ASSERT_EQ(state->emissions.size(), 2U);
     const scene::StateInGl whole = bring(fields, odd, place(), {wanted[0], wanted[2]});
-    for (const scene::Emission& settings : {wanted[0], wanted[2]}) {
-      const auto found = state->components(*state->emission(settings));
-      const auto expected = whole.components(*whole.emission(settings));
-      ASSERT_TRUE(found && expected);
-      for (std::size_t c = 0; c < 3; ++c) {
-        const volume::ScalarVolume a = copied((*found)[c]);
-        const volume::ScalarVolume b = copied((*expected)[c]);
+    ASSERT_EQ(state->products.size(), 5U);
+    ASSERT_EQ(whole.products.size(), 5U);
+    for (const scene::ProductInGl& expected : whole.products) {
+      SCOPED_TRACE(expected.what.index());
+      const scene::ProductInGl* found = state->product(expected.what);
+      ASSERT_NE(found, nullptr);
+      ASSERT_EQ(found->components.size(), expected.components.size());
+      for (std::size_t c = 0; c < expected.components.size(); ++c) {
+        const volume::ScalarVolume a = copied(volume::volume_on_device(found->components[c], "", place()));
+        const volume::ScalarVolume b = copied(volume::volume_on_device(expected.components[c], "", place()));
         EXPECT_EQ(a.brick_origins, b.brick_origins);
         ASSERT_EQ(a.brick_values.size(), b.brick_values.size());
         for (std::size_t i = 0; i < b.brick_values.size(); ++i) ASSERT_EQ(a.brick_values[i], b.brick_values[i]);

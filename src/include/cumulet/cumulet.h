@@ -629,8 +629,8 @@ typedef struct cumulet_live_desc {
   double bounds_min[3];
   double bounds_max[3];
   /*
-   * 1: density, temperature and flame that cumulet_live_set_gl is given stay in GL, where their grid is made; only what
-   * is known of each 8^3 voxels comes to main memory, half a kilobyte. 0: their voxels do. See there.
+   * 1: what cumulet_live_set_gl is given stays in GL, where its grid is made; only what is known of each 8^3 voxels of
+   * a field comes to main memory, half a kilobyte. 0: the voxels do. See there.
    */
   int32_t stays_in_gl;
 } cumulet_live_desc;
@@ -1038,19 +1038,20 @@ typedef struct cumulet_gl_state_desc {
  * its way when the viewer is detached, or its context is lost, never arrives: the state before stays, and boxes on top
  * of it would miss it, so that a whole state is next.
  *
- * With cumulet_live_desc.stays_in_gl density stays in this viewer's context, alone or with temperature and flame that
- * stand where it does, but with no other channel: priorities of splits, values of cells, and what is given off are
- * found there. Its grid is that of the same numbers in main memory but for roundings of priorities and, by some 1e-6,
- * of colours; its control cube begins at a multiple of 16 voxels. What temperature and flame give off is found again
- * where the medium or a ramp of theirs changes, by the next cumulet_render, as one more state; a viewer that shows them
- * in another medium has its own. Viewers that share programs (cumulet_programs), and whose contexts share objects, have
- * it together; by other viewers boxes do not come. These take their bricks alone. Of what is not finite the line names
- * its 8^3 voxels. Who cannot do without the voxels ends that for the live volume, for good: another march or a build on
- * the CPU, a density ramp, a viewer without these programs that shows it, more GL memory than is allowed,
- * cumulet_live_get_volume. Then the next cumulet_render of a viewer that has them brings the voxels of the newest state
- * to main memory, as one more state, and those of the next ones come there at once. cumulet_get_volume gives NULL of a
- * state in GL, and cumulet_live_update is refused on top of one. With the last of these viewers' contexts the state is
- * gone, and nothing of it is shown in another until the next one comes, which the log says.
+ * With cumulet_live_desc.stays_in_gl density stays in this viewer's context, alone or with other channels that stand
+ * where it does: priorities of splits, values of cells, what is given off, and what density has of the other channels
+ * are found there. Its grid is that of the same numbers in main memory but for roundings of priorities and, by some
+ * 1e-6, of colours; its control cube begins at a multiple of 16 voxels. What temperature and flame give off is found
+ * again where the medium or a ramp of theirs changes, by the next cumulet_render, as one more state; a viewer that
+ * shows them in another medium has its own. Viewers that share programs (cumulet_programs), and whose contexts share
+ * objects, have it together; by other viewers boxes do not come. These take their bricks alone. Of what is not finite
+ * the line names its 8^3 voxels. Who cannot do without the voxels ends that for the live volume, for good: another
+ * march or a build on the CPU, a density ramp, a shutter that is open while it moves, a viewer without these programs
+ * that shows it, more GL memory than is allowed, cumulet_live_get_volume. Then the next cumulet_render of a viewer that
+ * has them brings the voxels of the newest state to main memory, as one more state, and those of the next ones come
+ * there at once. cumulet_get_volume gives NULL of a state in GL, and cumulet_live_update is refused on top of one. With
+ * the last of these viewers' contexts the state is gone, and nothing of it is shown in another until the next one
+ * comes, which the log says.
  */
 CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
                                                const cumulet_gl_state_desc* desc);

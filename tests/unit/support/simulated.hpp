@@ -116,6 +116,7 @@ class State {
     return desc;
   }
   std::vector<cumulet_field>& fields() { return fields_; }
+  cumulet_dense_desc& last_dense() { return denses_.back(); }
   cumulet_sparse_desc& last_sparse() { return sparses_.back(); }
 
   static std::size_t at(const Sides& p, const Sides& size) {

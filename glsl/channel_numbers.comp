@@ -1,0 +1,42 @@
+#version 450
+// Of bricks of a channel's fields the numbers that its records are sums of, as grid::ChannelFields has them: a group a
+// brick. CM_FIELDS: how many there are.
+// variants: CM_CHANNEL=0 CM_FIELDS=3 or CM_CHANNEL=1,3 CM_FIELDS=4 or CM_CHANNEL=2 CM_FIELDS=2,4
+layout(local_size_x = 64) in;
+
+#include "bindings.glsl"
+#include "shared.glsl"
+#include "cell.glsl"
+#include "lattice.glsl"
+#include "luminance.glsl"
+
+layout(std430, binding = CM_STORAGE_BRICKS_TOGETHER) readonly buffer CmTogether { float cm_together[]; };
+layout(std430, binding = CM_STORAGE_BRICKS_NUMBERS) writeonly buffer CmNumbers { float cm_numbers[]; };
+layout(location = 0) uniform uvec2 cm_range;    // of bricks: the first, and the end
+layout(location = 1) uniform uint cm_to_first;  // where the first goes
+
+float cm_field(uint voxel, uint i) { return cm_together[voxel * uint(CM_FIELDS) + i]; }
+
+void cm_put(uint from, uint to) {
+#if CM_CHANNEL == CM_CHANNEL_ANISOTROPY
+#if CM_FIELDS == 4
+  float scatters = cm_luminance(vec3(cm_field(from, 1u), cm_field(from, 2u), cm_field(from, 3u)));
+#else
+  float scatters = cm_field(from, 1u);
+#endif
+  cm_numbers[2u * to] = 2.0 * cm_field(from, 0u) - scatters;
+  cm_numbers[2u * to + 1u] = scatters;
+#elif CM_CHANNEL == CM_CHANNEL_VELOCITY
+  float density = cm_field(from, 3u);
+  for (uint i = 0u; i < 3u; ++i) cm_numbers[4u * to + i] = 2.0 * cm_field(from, i) - density;
+  cm_numbers[4u * to + 3u] = density;
+#else
+  for (uint i = 0u; i < uint(CM_FIELDS); ++i) cm_numbers[uint(CM_FIELDS) * to + i] = cm_field(from, i);
+#endif
+}
+
+void main() {
+  uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  uint brick = min(cm_range.x + work, cm_range.y - 1u);  // the last ones do the last once more
+  for (uint v = gl_LocalInvocationIndex; v < 512u; v += 64u) cm_put(512u * brick + v, 512u * (cm_to_first + brick) + v);
+}
