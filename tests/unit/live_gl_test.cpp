@@ -984,8 +984,8 @@ TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
   EXPECT_EQ(difference(picture(), before), "");
 }
 
-// Of nothing at all, which is a state, too; of fields that stand apart, which come to main memory; and what comes there by
-// itself.
+// Of nothing at all, which is a state, too; of fields that stand apart, which come to main memory; and what comes there
+// by itself.
 TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array nothing(CUMULET_VOXEL_FORMAT_R16F, std::vector<float>(array.values.size(), 0.0F));
