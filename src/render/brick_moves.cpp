@@ -10,7 +10,7 @@ namespace cumulet::render {
 void BrickMoves::plan(Upload& upload, const volume::DeviceBricks& bricks, std::span<const MovedBrick> moved,
                       BrickCopies copies) {
   std::vector<std::vector<MovedBrick>> moves = moves_of(bricks, moved);
-  constexpr std::uint32_t a_step = 4096;
+  const std::uint32_t a_step = gl_->dispatches_in_call ? 512 : 4096;
   for (std::size_t m = 0; m < moves.size(); ++m) {
     if (moves[m].empty()) continue;
     const volume::DeviceMemory& memory = *bricks.memories[m];
@@ -33,17 +33,22 @@ void BrickMoves::plan(Upload& upload, const volume::DeviceBricks& bricks, std::s
 
 void BrickMoves::plan_together(Upload& upload, std::span<const volume::DeviceBricksPtr> fields,
                                std::span<const glm::ivec3> origins, const Use& use) {
-  constexpr std::size_t at_a_time = 2048;
+  constexpr std::size_t at_a_time = 1024;
   const std::size_t bytes = std::min(origins.size(), at_a_time) * volume::brick_voxels * fields.size() * sizeof(float);
   if (bytes == 0) return;
   upload.add(
       [this, bytes] { together_ = gl::make_buffer(gl_, bytes, nullptr, 0, "creating room for fields' bricks"); });
   for (std::size_t first = 0; first < origins.size(); first += at_a_time) {
     const auto part = origins.subspan(first, std::min(at_a_time, origins.size() - first));
-    upload.add([this, bytes] {
-      gl_->ClearNamedBufferSubData(together_.name(), GL_R32UI, 0, static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER,
-                                   GL_UNSIGNED_INT, nullptr);
-    });
+    const auto has_all = [&](const volume::DeviceBricksPtr& field) {
+      return field && std::ranges::all_of(part, [&](const glm::ivec3& at) { return field->find(at).has_value(); });
+    };
+    if (!std::ranges::all_of(fields, has_all)) {
+      upload.add([this, bytes] {
+        gl_->ClearNamedBufferSubData(together_.name(), GL_R32UI, 0, static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER,
+                                     GL_UNSIGNED_INT, nullptr);
+      });
+    }
     for (std::size_t f = 0; f < fields.size(); ++f) {
       if (!fields[f]) continue;
       std::vector<MovedBrick> moved;

@@ -238,39 +238,48 @@ void LatticeUpload::plan_priorities() {
 }
 
 void LatticeUpload::plan_priorities(const grid::Statistics& field, const grid::BricksToRate::Field& rated) {
-  if (rated.nodes.empty()) return;
   const grid::Lattice& l = *data_->lattice_;
   const bool of_density = &field == statistics_.get();
-  // Of each its number, and which brick of the buffer of values it has.
-  std::vector<glm::uvec2> list;
-  std::vector<MovedBrick> moved;
-  for (const std::uint32_t node : rated.nodes) {
-    const grid::Statistics::Node& brick =
-        field.node_at(core::cm_node_corner(l.own.nodes[l.own.to_rate.first_node + node]));
-    const auto at = static_cast<std::uint32_t>(list.size());
-    list.emplace_back(node, of_density ? static_cast<std::uint32_t>(l.even_bricks.size()) + brick.moments / 6 : at);
-    moved.emplace_back(static_cast<std::uint32_t>(brick.values), at);
+  // Other values are copied to where they are rated, so many at a time.
+  const std::size_t at_a_time = of_density ? std::max<std::size_t>(rated.nodes.size(), 1) : 4096;
+  for (std::size_t first = 0; first < rated.nodes.size(); first += at_a_time) {
+    // Of each its number, and which brick of the buffer of values it has.
+    std::vector<glm::uvec2> list;
+    std::vector<MovedBrick> moved;
+    for (std::size_t i = first; i < std::min(first + at_a_time, rated.nodes.size()); ++i) {
+      const glm::ivec3 corner = core::cm_node_corner(l.own.nodes[l.own.to_rate.first_node + rated.nodes[i]]);
+      const grid::Statistics::Node& brick = field.node_at(corner);
+      const auto at = static_cast<std::uint32_t>(list.size());
+      list.emplace_back(rated.nodes[i],
+                        of_density ? static_cast<std::uint32_t>(l.even_bricks.size()) + brick.moments / 6 : at);
+      moved.emplace_back(static_cast<std::uint32_t>(brick.values), at);
+    }
+    if (!of_density) {
+      upload_.add([this, bytes = moved.size() * volume::brick_voxels * sizeof(float)] {
+        scratch_.values = {};
+        scratch_.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the values of bricks to rate");
+      });
+      moves_.plan(upload_, *field.on_device(), moved, {.to = &scratch_.values});
+      upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
+    }
+    plan_priorities(list, of_density, rated.measure);
   }
-  upload_.add([this, list = std::move(list)] {
+}
+
+void LatticeUpload::plan_priorities(const std::vector<glm::uvec2>& list, bool of_density,
+                                    const grid::OwnMeasure& measure) {
+  const grid::Lattice& l = *data_->lattice_;
+  const auto count = static_cast<std::uint32_t>(list.size());
+  upload_.add([this, list] {
     scratch_.to_rate =
         gl::make_buffer(gl_, list.size() * sizeof list[0], list.data(), 0, "creating the list of bricks to rate");
   });
-  if (!of_density) {
-    const std::uint64_t bytes = moved.size() * volume::brick_voxels * sizeof(float);
-    require_block(limits_, bytes, "the bricks to rate of a field");
-    upload_.add([this, bytes] {
-      scratch_.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the values of bricks to rate");
-    });
-    moves_.plan(upload_, *field.on_device(), moved, {.to = &scratch_.values});
-    upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
-  }
-  const grid::OwnMeasure& measure = rated.measure;
   const gl::Object& values = of_density ? data_->bricks_ : scratch_.values;
   const gl::ProgramKey key{"own_priorities.comp",
                            {of_density && l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
                             "CM_CRITERION " + std::to_string(static_cast<int>(measure.criterion))}};
   upload_.add_dispatches(
-      programs_, key, static_cast<std::uint32_t>(rated.nodes.size()), bricks_a_step(*gl_),
+      programs_, key, count, bricks_a_step(*gl_),
       [this, &l, &measure, &values](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
         const GLuint name = program.name();
         gl_->ProgramUniform2ui(name, 0, first, end);
@@ -815,8 +824,9 @@ BuiltGrid nothing_of(const scene::MarchSource& source) {
 
 volume::DeviceBricksPtr GridBuilds::not_here(const scene::MarchSource& source) const {
   std::vector<volume::DeviceBricksPtr> all{source.statistics->on_device()};
-  const auto& emission = source.channels.emission;
-  for (std::size_t i = 0; emission && i < 3; ++i) all.push_back(emission->component(i).on_device());
+  for (const grid::ChannelFields& fields : grid::fields_of(*source.statistics, source.channels)) {
+    for (const grid::Statistics* field : fields.statistics()) all.push_back(field->on_device());
+  }
   const auto found = std::ranges::find_if(all, [&](const volume::DeviceBricksPtr& bricks) {
     return bricks && (memories_ == nullptr || !memories_->has(*bricks));
   });

@@ -87,6 +87,8 @@ class LatticeUpload {
   void plan_device_bricks(const grid::LatticeChannel& channel, const grid::ChannelFields& fields, const gl::Object& to);
   void plan_priorities();
   void plan_priorities(const grid::Statistics& field, const grid::BricksToRate::Field& rated);
+  // list: of bricks their numbers, and which of the values they have.
+  void plan_priorities(const std::vector<glm::uvec2>& list, bool of_density, const grid::OwnMeasure& measure);
   void plan_channels();
   // Bricks of whole values, which fill puts where it is told, one after another.
   using FillBrick = std::function<void(std::size_t brick, std::byte* to)>;

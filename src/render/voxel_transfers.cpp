@@ -682,7 +682,9 @@ bool VoxelTransfers::take_in_gl(Transfer& transfer, Deadline deadline) {
   }
   Staying& staying = *transfer.staying;
   try {
-    return std::ranges::all_of(staying.making, [&](BrickProducts& products) { return products.advance(deadline); });
+    bool all = true;
+    for (BrickProducts& products : staying.making) all = products.advance(deadline) && all;
+    return all;
   } catch (const Error& error) {
     if (error.code() == ErrorCode::context_lost) throw;
     staying.failure = std::current_exception();

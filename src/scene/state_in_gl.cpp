@@ -40,7 +40,11 @@ struct FieldsOf {
 bool any(const volume::DeviceBricksPtr& bricks) { return bricks && !bricks->origins.empty(); }
 
 // Powers of two: what changes a little is in units of the same.
-float unit_above(double fastest) { return static_cast<float>(std::exp2(std::ceil(std::log2(fastest)))); }
+float unit_above(double fastest) {
+  constexpr double least = 1e-9;
+  const double power = std::exp2(std::ceil(std::log2(std::max(fastest, least))));
+  return static_cast<float>(std::min(power, volume::fastest_velocity));
+}
 
 std::vector<volume::ScalarVolume> volumes_of(const ProductInGl& product, const std::string& name,
                                              const glm::dmat4& index_to_world) {
@@ -92,8 +96,17 @@ std::vector<Product> StateInGl::wanted(const std::vector<Emission>& settings) co
   const Scatters how = scatters();
   if (how.coloured) wanted.emplace_back(Scattering{});
   if (how.anisotropic) wanted.emplace_back(Forward{how.coloured});
-  if (how.moves) wanted.emplace_back(Momentum{unit_above(fastest_of(frame()))});
+  if (how.moves) wanted.emplace_back(Momentum{unit_above(fastest())});
   return wanted;
+}
+
+double StateInGl::fastest() const {
+  StateInGl moving{.name = {}, .fields = {}, .index_to_world = index_to_world, .products = {}};
+  moving.fields.push_back({Channel::density, std::make_shared<const volume::DeviceBricks>()});
+  for (const Channel channel : velocities) {
+    if (auto bricks = field(channel)) moving.fields.push_back({channel, std::move(bricks)});
+  }
+  return fastest_of(moving.frame());
 }
 
 bool StateInGl::has_wanted(const std::vector<Emission>& settings) const {

@@ -86,6 +86,8 @@ struct StateInGl {
     bool moves = false;
   };
   [[nodiscard]] Scatters scatters() const;
+  // As fastest_of(). O(bricks of velocity).
+  [[nodiscard]] double fastest() const;
 };
 using StateInGlPtr = std::shared_ptr<const StateInGl>;
 
