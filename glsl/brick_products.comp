@@ -32,7 +32,7 @@ layout(std430, binding = CM_STORAGE_BRICKS_FIRST) writeonly buffer CmFirst { flo
 layout(std430, binding = CM_STORAGE_BRICKS_SECOND) writeonly buffer CmSecond { float cm_second[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_THIRD) writeonly buffer CmThird { float cm_third[]; };
 #endif
-layout(location = 0) uniform uvec2 cm_range;   // of bricks: the first, and the end
+layout(location = 0) uniform uvec2 cm_range;    // of bricks: the first, and the end
 layout(location = 1) uniform uint cm_to_first;  // where the first goes
 
 #if CM_PRODUCT == 0

@@ -40,10 +40,13 @@ void BrickMoves::plan_together(Upload& upload, std::span<const volume::DeviceBri
       [this, bytes] { together_ = gl::make_buffer(gl_, bytes, nullptr, 0, "creating room for fields' bricks"); });
   for (std::size_t first = 0; first < origins.size(); first += at_a_time) {
     const auto part = origins.subspan(first, std::min(at_a_time, origins.size() - first));
-    const auto has_all = [&](const volume::DeviceBricksPtr& field) {
-      return field && std::ranges::all_of(part, [&](const glm::ivec3& at) { return field->find(at).has_value(); });
-    };
-    if (!std::ranges::all_of(fields, has_all)) {
+    std::vector<std::vector<MovedBrick>> moved(fields.size());
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      for (std::uint32_t i = 0; fields[f] && i < part.size(); ++i) {
+        if (const auto brick = fields[f]->find(part[i])) moved[f].emplace_back(*brick, i);
+      }
+    }
+    if (!std::ranges::all_of(moved, [&](const auto& bricks) { return bricks.size() == part.size(); })) {
       upload.add([this, bytes] {
         gl_->ClearNamedBufferSubData(together_.name(), GL_R32UI, 0, static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER,
                                      GL_UNSIGNED_INT, nullptr);
@@ -51,11 +54,7 @@ void BrickMoves::plan_together(Upload& upload, std::span<const volume::DeviceBri
     }
     for (std::size_t f = 0; f < fields.size(); ++f) {
       if (!fields[f]) continue;
-      std::vector<MovedBrick> moved;
-      for (std::uint32_t i = 0; i < part.size(); ++i) {
-        if (const auto brick = fields[f]->find(part[i])) moved.emplace_back(*brick, i);
-      }
-      plan(upload, *fields[f], moved,
+      plan(upload, *fields[f], moved[f],
            {.to = &together_, .numbers = {static_cast<std::uint32_t>(fields.size()), static_cast<std::uint32_t>(f)}});
     }
     upload.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });

@@ -252,7 +252,7 @@ void LatticeUpload::plan_priorities(const grid::Statistics& field, const grid::B
       const auto at = static_cast<std::uint32_t>(list.size());
       list.emplace_back(rated.nodes[i],
                         of_density ? static_cast<std::uint32_t>(l.even_bricks.size()) + brick.moments / 6 : at);
-      moved.emplace_back(static_cast<std::uint32_t>(brick.values), at);
+      if (!of_density) moved.emplace_back(static_cast<std::uint32_t>(brick.values), at);
     }
     if (!of_density) {
       upload_.add([this, bytes = moved.size() * volume::brick_voxels * sizeof(float)] {

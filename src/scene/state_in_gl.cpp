@@ -4,7 +4,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <type_traits>
 #include <utility>
 
 #include "volume/bricks.hpp"
@@ -96,36 +95,27 @@ std::vector<Product> StateInGl::wanted(const std::vector<Emission>& settings) co
   const Scatters how = scatters();
   if (how.coloured) wanted.emplace_back(Scattering{});
   if (how.anisotropic) wanted.emplace_back(Forward{how.coloured});
-  if (how.moves) wanted.emplace_back(Momentum{unit_above(fastest())});
+  if (how.moves) wanted.emplace_back(Momentum{unit_above(fastest_of({.density = {}, .velocity = velocity()}))});
   return wanted;
 }
 
-double StateInGl::fastest() const {
-  StateInGl moving{.name = {}, .fields = {}, .index_to_world = index_to_world, .products = {}};
-  moving.fields.push_back({Channel::density, std::make_shared<const volume::DeviceBricks>()});
-  for (const Channel channel : velocities) {
-    if (auto bricks = field(channel)) moving.fields.push_back({channel, std::move(bricks)});
-  }
-  return fastest_of(moving.frame());
+template <class Kind>
+const ProductInGl* StateInGl::made() const {
+  const auto found = std::ranges::find_if(
+      products, [](const ProductInGl& product) { return std::holds_alternative<Kind>(product.what); });
+  return found == products.end() ? nullptr : &*found;
 }
 
 bool StateInGl::has_wanted(const std::vector<Emission>& settings) const {
-  const auto has = [&]<class Kind>(std::type_identity<Kind>) {
-    return std::ranges::any_of(products,
-                               [](const ProductInGl& product) { return std::holds_alternative<Kind>(product.what); });
-  };
   const Scatters how = scatters();
-  return (!how.coloured || has(std::type_identity<Scattering>())) &&
-         (!how.anisotropic || has(std::type_identity<Forward>())) &&
-         (!how.moves || has(std::type_identity<Momentum>())) &&
+  return (!how.coloured || made<Scattering>()) && (!how.anisotropic || made<Forward>()) &&
+         (!how.moves || made<Momentum>()) &&
          std::ranges::all_of(settings, [&](const Emission& light) { return !emits(light) || product(light); });
 }
 
 const Emission* StateInGl::some_emission() const {
-  for (const ProductInGl& product : products) {
-    if (const auto* emission = std::get_if<Emission>(&product.what)) return emission;
-  }
-  return nullptr;
+  const ProductInGl* light = made<Emission>();
+  return light != nullptr ? &std::get<Emission>(light->what) : nullptr;
 }
 
 bool StateInGl::emits(const Emission& settings) const {
@@ -154,61 +144,71 @@ bool StateInGl::gone() const {
   return std::ranges::any_of(all(), [](const volume::DeviceBricks* bricks) { return bricks->gone(); });
 }
 
-volume::VolumeFrame StateInGl::frame() const {
-  const auto volume_of = [&](Channel channel) {
-    const volume::DeviceBricksPtr bricks = field(channel);
-    std::string of = channel == Channel::density ? name : volume::name_of(channel);
-    return bricks ? std::optional(volume::volume_on_device(bricks, std::move(of), index_to_world)) : std::nullopt;
-  };
+std::optional<volume::ScalarVolume> StateInGl::volume_of(Channel channel) const {
+  const volume::DeviceBricksPtr bricks = field(channel);
+  if (!bricks) return std::nullopt;
+  return volume::volume_on_device(bricks, channel == Channel::density ? name : volume::name_of(channel),
+                                  index_to_world);
+}
+
+volume::ScalarVolume StateInGl::none() const {
   volume::ScalarVolume none;
   none.index_to_world = index_to_world;
   none.bounds_max = none.bounds_min;
+  return none;
+}
+
+std::optional<volume::Velocity> StateInGl::velocity() const {
+  std::optional<volume::Velocity> velocity;
+  for (std::size_t i = 0; i < 3; ++i) {
+    auto part = volume_of(velocities[i]);
+    if (!part) continue;
+    if (!velocity)
+      velocity.emplace(volume::Velocity{{}, volume::Velocity::to_index_of(index_to_world)}).parts.fill(none());
+    velocity->parts[2 * i] = std::move(*part);
+  }
+  return velocity;
+}
+
+volume::VolumeFrame StateInGl::frame() const {
   volume::VolumeFrame frame;
   frame.density = *volume_of(Channel::density);
   frame.temperature = volume_of(Channel::temperature);
   frame.flame = volume_of(Channel::flame);
-  if (auto anisotropy = volume_of(Channel::anisotropy)) frame.anisotropy = {std::move(*anisotropy), none};
   for (std::size_t i = 0; i < 3; ++i) {
-    if (auto colour = volume_of(colours[i])) {
-      if (!frame.colour) frame.colour = {none, none, none};
-      (*frame.colour)[i] = std::move(*colour);
-    }
-    if (auto part = volume_of(velocities[i])) {
-      if (!frame.velocity) {
-        frame.velocity = volume::Velocity{{}, volume::Velocity::to_index_of(index_to_world)};
-        frame.velocity->parts.fill(none);
-      }
-      frame.velocity->parts[2 * i] = std::move(*part);
-    }
+    auto colour = volume_of(colours[i]);
+    if (!colour) continue;
+    if (!frame.colour) frame.colour.emplace().fill(none());
+    (*frame.colour)[i] = std::move(*colour);
   }
+  if (auto anisotropy = volume_of(Channel::anisotropy)) frame.anisotropy = {std::move(*anisotropy), none()};
+  frame.velocity = velocity();
   return frame;
 }
 
 std::optional<grid::RgbField::Components> StateInGl::emission(const Emission& settings) const {
-  const ProductInGl* made = product(settings);
-  if (made == nullptr || !any(made->components[0])) return std::nullopt;
-  return three(volumes_of(*made, "emission", index_to_world));
+  const ProductInGl* light = product(settings);
+  if (light == nullptr || !any(light->components[0])) return std::nullopt;
+  return three(volumes_of(*light, "emission", index_to_world));
 }
 
 std::optional<grid::RgbField::Components> StateInGl::scattering() const {
-  const ProductInGl* made = product(Scattering{});
-  if (made == nullptr) return std::nullopt;
-  return three(volumes_of(*made, "scattering", index_to_world));
+  const ProductInGl* scattering = made<Scattering>();
+  if (scattering == nullptr) return std::nullopt;
+  return three(volumes_of(*scattering, "scattering", index_to_world));
 }
 
 std::optional<volume::ScalarVolume> StateInGl::forward() const {
-  for (const ProductInGl& made : products) {
-    if (std::holds_alternative<Forward>(made.what)) return std::move(volumes_of(made, "anisotropy", index_to_world)[0]);
-  }
-  return std::nullopt;
+  const ProductInGl* forward = made<Forward>();
+  if (forward == nullptr) return std::nullopt;
+  return std::move(volumes_of(*forward, "anisotropy", index_to_world)[0]);
 }
 
 std::optional<grid::MomentumField::Values> StateInGl::momentum() const {
-  for (const ProductInGl& made : products) {
-    if (const auto* momentum = std::get_if<Momentum>(&made.what))
-      return grid::MomentumField::Values{three(volumes_of(made, "velocity", index_to_world)), momentum->fastest};
-  }
-  return std::nullopt;
+  const ProductInGl* momentum = made<Momentum>();
+  if (momentum == nullptr) return std::nullopt;
+  return grid::MomentumField::Values{three(volumes_of(*momentum, "velocity", index_to_world)),
+                                     std::get<Momentum>(momentum->what).fastest};
 }
 
 }  // namespace cumulet::scene

@@ -57,7 +57,8 @@ struct StateInGl {
   [[nodiscard]] volume::DeviceBricksPtr field(volume::Channel channel) const;
   /// Null: it was not made.
   [[nodiscard]] const ProductInGl* product(const Product& what) const;
-  /// All that volumes need of it where its light is wanted by these settings, as far as the fields tell. O(bricks).
+  /// All that volumes need of it where its light is wanted by these settings, as far as the fields tell. O(bricks of
+  /// velocity).
   [[nodiscard]] std::vector<Product> wanted(const std::vector<Emission>& settings) const;
   /// Whether it has all of that. O(1).
   [[nodiscard]] bool has_wanted(const std::vector<Emission>& settings) const;
@@ -86,8 +87,14 @@ struct StateInGl {
     bool moves = false;
   };
   [[nodiscard]] Scatters scatters() const;
-  // As fastest_of(). O(bricks of velocity).
-  [[nodiscard]] double fastest() const;
+  // Of a kind of product that was made; null: none.
+  template <class Kind>
+  [[nodiscard]] const ProductInGl* made() const;
+  // Nothing: it has no such field.
+  [[nodiscard]] std::optional<volume::ScalarVolume> volume_of(volume::Channel channel) const;
+  [[nodiscard]] std::optional<volume::Velocity> velocity() const;
+  // Of its lattice, without a voxel.
+  [[nodiscard]] volume::ScalarVolume none() const;
 };
 using StateInGlPtr = std::shared_ptr<const StateInGl>;
 
