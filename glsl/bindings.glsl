@@ -118,6 +118,7 @@ const int CM_STORAGE_GRID_BRICKS = 7;
 const int CM_STORAGE_GRID_TREE = 7;
 const int CM_STORAGE_GRID_CHANNEL = 4;  // grid_channels.comp, grid_glow.comp
 const int CM_STORAGE_GRID_GLOWING = 7;
+const int CM_STORAGE_GRID_CLEAR = 7;  // grid_clear.comp
 
 // Images.
 const int CM_IMAGE_SUM = 0;

@@ -138,7 +138,8 @@ CM_FN void cm_root_cell(uint root, uint exponent, CM_OUT(vec3) v0, CM_OUT(uint) 
 
 // The record, 32 bytes: links (4 neighbours across faces 0 to 3, CM_NONE outside) and
 // data: x, y = v0 and shape, and CM_RECORD_EMITS in y if it gives off light (glsl/channels.glsl), z = half2(density at the centroid, gradient x),
-// w = half2(gradient y, z); gradient along the frame's axes per unit, density relative to the volume's maximum.
+// w = half2(gradient y, z); gradient along the frame's axes per unit, density relative to the volume's maximum. Where z
+// is 0 the cell is empty, and w has its clear cones (glsl/clear_cones.glsl) instead.
 #define CM_RECORD_EMITS 0x80000000u
 // Of cubes up to 2^15: x = v0.x | v0.y << 16, y = v0.z | shape << 16.
 CM_FN vec3 cm_record_v0(uvec4 data) {
@@ -226,6 +227,9 @@ CM_FN vec4 cm_fit(uint low_word, uint high_word) {
   return vec4(low.x, low.y, high.x, high.y);
 }
 
+CM_FN vec4 cm_record_fit(uvec4 data) { return cm_fit(data.z, data.z == 0u ? 0u : data.w); }
+CM_FN uint cm_record_clear(uvec4 data) { return data.z == 0u ? data.w : 0u; }
+
 // That at o + t d, as a linear function of t: value at t = 0 in x, slope in y.
 CM_FN vec2 cm_fit_along(vec4 fit, CmFrame f, uint shape) {
   float inverse_unit = cm_shape_inverse_unit(shape);
@@ -235,6 +239,6 @@ CM_FN vec2 cm_fit_along(vec4 fit, CmFrame f, uint shape) {
 }
 
 // Density (relative) of a record, likewise.
-CM_FN vec2 cm_cell_density(uvec4 data, CmFrame f, uint shape) { return cm_fit_along(cm_fit(data.z, data.w), f, shape); }
+CM_FN vec2 cm_cell_density(uvec4 data, CmFrame f, uint shape) { return cm_fit_along(cm_record_fit(data), f, shape); }
 
 #endif

@@ -13,12 +13,12 @@ struct CmExtinction {
 
 // The part of the volume glsl/here.glsl tells of.
 CM_FN float cm_extinction_here(vec3 o, vec3 d, uvec3 cell) {
-  vec3 along = cm_in_volume(d);
+  CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
   float t_1;
   float r_0;
   float r_1;
   uvec3 next;
-  cm_march_step(cell, cm_in_volume_point(o), along, vec3(1.0f, 1.0f, 1.0f) / along, 0.0f, t_1, r_0, r_1, next);
+  cm_march_step(cell, ray, 0.0f, t_1, r_0, r_1, next);
   return CM_MEDIUM.extinction * r_0;
 }
 

@@ -1,9 +1,10 @@
 // The stages of a path that march. Shared by GLSL and C++; the includer provides what
 // glsl/path.glsl asks for, and
 //   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that holds point p of cube space
-//   void cm_march_step(uvec3 cell, o, d, inv_d, t, t_1, r_0, r_1, next)
+//   CmMarchRay cm_march_ray(vec3 o, vec3 d)
+//   void cm_march_step(uvec3 cell, CmMarchRay ray, t, t_1, r_0, r_1, next)
 // which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
-// the next cell; next.x == CM_NONE outside. The third word of a cell is the march's own cache, CM_NONE when unknown.
+// the next cell; next.x == CM_NONE outside, or where the ray meets nothing any more. The third word of a cell is the march's own cache, CM_NONE when unknown.
 // With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
 //   vec3 cm_march_colour(uvec2 cell)              of what scatters
@@ -160,7 +161,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #if CM_INSTANCES
   if (p.gathers != 0u) extinction = 0.0f;
 #endif
-  vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / d;
+  CmMarchRay ray = cm_march_ray(o, d);
   bool nowhere = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE;
   uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
@@ -179,7 +180,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     float r_0 = 0.0f;
     float r_1 = 0.0f;
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
-    cm_march_step(cell, o, d, inv_d, p.t, t_1, r_0, r_1, next);
+    cm_march_step(cell, ray, p.t, t_1, r_0, r_1, next);
 #if CM_CHANNELS
     emission = cm_march_emission(cell, o, d);
     emission.mean *= cm_balance(flights, looks * cm_cell_pdf(emission));

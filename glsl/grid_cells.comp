@@ -236,7 +236,9 @@ void main() {
   uint rank = cm_order[i].x;
   cm_records[2u * rank] = uvec4(cm_resolve(links.x, v0, shape, 0u), cm_resolve(links.y, v0, shape, 1u),
                                 cm_resolve(links.z, v0, shape, 2u), cm_resolve(links.w, v0, shape, 3u));
-  cm_records[2u * rank + 1u] = uvec4(cell.where, leaf.coefficients);
+  // Without the first two it is empty.
+  cm_records[2u * rank + 1u] =
+      uvec4(cell.where, leaf.coefficients.x, leaf.coefficients.x == 0u ? 0u : leaf.coefficients.y);
 }
 
 #endif

@@ -100,8 +100,7 @@ CmFaces cm_faces(uvec3 cell, vec3 p) {
 float cm_density_at(uvec3 cell, vec3 p) {
   float t_1, r_0, r_1;
   uvec3 next;
-  vec3 d = vec3(1.0, 0.0, 0.0);
-  cm_march_step(cell, p, d, 1.0 / d, 0.0, t_1, r_0, r_1, next);
+  cm_march_step(cell, cm_march_ray(p, vec3(1.0, 0.0, 0.0)), 0.0, t_1, r_0, r_1, next);
   return r_0;
 }
 

@@ -13,6 +13,8 @@
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
+#include "clear_cones.glsl"
+
 // With CM_WIDE grids may be of cubes wider than 2^15; all other kernels know but one kind of record.
 #ifndef CM_WIDE
 #define CM_WIDE 0
@@ -47,10 +49,24 @@ CM_FN uvec3 cm_march_enter(vec3 p) {
   return uvec3(leaf, 0u, CM_NONE);
 }
 
+// A ray in cube space, and what a march has of it.
+struct CmMarchRay {
+  vec3 o;
+  vec3 d;
+  uint cone;
+};
+CM_FN CmMarchRay cm_march_ray(vec3 o, vec3 d) {
+  CmMarchRay ray;
+  ray.o = o;
+  ray.d = d;
+  ray.cone = cm_clear_cone(d);
+  return ray;
+}
+
 // A cell's density. With CM_MOTION that of cm_now: a record's is in the middle, and the change half of that from one end
 // to the other, so that along a ray it is linear at any moment, and its depth as closed as at rest.
 CM_FN vec4 cm_march_fit(uvec4 data, uint cell) {
-  vec4 fit = cm_fit(data.z, data.w);
+  vec4 fit = cm_record_fit(data);
 #if CM_MOTION
   if (CM_MEDIUM.changes != 0u) {
     uvec2 change = cm_change_record(cell);
@@ -60,13 +76,13 @@ CM_FN vec4 cm_march_fit(uvec4 data, uint cell) {
   return fit;
 }
 
-CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT(float) t_1, CM_OUT(float) r_0,
-                         CM_OUT(float) r_1, CM_OUT(uvec3) next) {
+CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1, CM_OUT(float) r_0, CM_OUT(float) r_1,
+                         CM_OUT(uvec3) next) {
   uvec4 links = cm_record(cell.x, 0u);
   uvec4 data = cm_record(cell.x, 1u);
   bool wide = cm_grid_is_wide();
   uint shape = cm_record_shape(data, wide);
-  CmFrame frame = cm_cell_frame(cm_record_v0(data, wide), shape, o, d);
+  CmFrame frame = cm_cell_frame(cm_record_v0(data, wide), shape, ray.o, ray.d);
   float t_exit;
   uint face;
   cm_cell_exit(frame, shape, t_exit, face);
@@ -82,7 +98,8 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
 #endif
   r_1 = r_0;
 #endif
-  next = uvec3(cm_link(links, face), 0u, CM_NONE);
+  bool clear = (cm_record_clear(data) & ray.cone) != 0u;
+  next = uvec3(clear ? CM_NONE : cm_link(links, face), 0u, CM_NONE);
 }
 
 #if CM_CHANNELS

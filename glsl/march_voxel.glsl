@@ -27,8 +27,25 @@ CM_FN uvec3 cm_march_enter(vec3 p) {
   return cm_voxel_cell(clamp(ivec3(floor(p)), low, high), CM_NONE);
 }
 
-CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT(float) t_1, CM_OUT(float) r_0,
-                         CM_OUT(float) r_1, CM_OUT(uvec3) next) {
+// A ray in cube space, and what a march has of it.
+struct CmMarchRay {
+  vec3 o;
+  vec3 d;
+  vec3 inv_d;
+};
+CM_FN CmMarchRay cm_march_ray(vec3 o, vec3 d) {
+  CmMarchRay ray;
+  ray.o = o;
+  ray.d = d;
+  ray.inv_d = vec3(1.0f, 1.0f, 1.0f) / d;
+  return ray;
+}
+
+CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1, CM_OUT(float) r_0, CM_OUT(float) r_1,
+                         CM_OUT(uvec3) next) {
+  vec3 o = ray.o;
+  vec3 d = ray.d;
+  vec3 inv_d = ray.inv_d;
   ivec3 voxel = cm_voxel_of(cell);
   ivec3 low = voxel;
   int size = 1;

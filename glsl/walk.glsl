@@ -45,12 +45,12 @@ void cm_stand_at(CmFront front) {
 // Into front.next, from t on.
 void cm_front_step(vec3 o, vec3 d, float t, inout CmFront front) {
   cm_stand_at(front);
-  vec3 along = cm_in_volume(d);
+  CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
   front.cell = front.next;
   front.t_0 = t;
   float r_0;
   float r_1;
-  cm_march_step(front.cell, cm_in_volume_point(o), along, 1.0 / along, t, front.t_1, r_0, r_1, front.next);
+  cm_march_step(front.cell, ray, t, front.t_1, r_0, r_1, front.next);
   front.e_0 = CM_MEDIUM.extinction * r_0;
   front.e_1 = CM_MEDIUM.extinction * r_1;
 }

@@ -16,6 +16,7 @@
 #include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "grid/cell.hpp"
+#include "grid/clear_cones.hpp"
 
 namespace cumulet::grid {
 
@@ -522,7 +523,7 @@ CellRecord GridBuilder::record(std::uint32_t index, const vec4& fit, bool emits)
   record.data.y = place.y | (emits ? CM_RECORD_EMITS : 0U);
   const glm::uvec2 packed = pack_fit(fit);
   record.data.z = packed.x;
-  record.data.w = packed.y;
+  record.data.w = packed.x == 0 ? 0 : packed.y;
   return record;
 }
 
@@ -582,6 +583,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     grid.content_min = all.low;
     grid.content_max = all.high;
   }
+  find_clear_cones(grid);
   return grid;
 }
 

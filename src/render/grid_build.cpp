@@ -42,6 +42,10 @@ static_assert(sizeof(TreeCell) == 16);
 // With their links and their place in the order.
 constexpr std::uint64_t tree_cell_bytes = sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2);
 
+// As glsl/grid_clear.comp has them: rows of what is full, then those of each cone.
+constexpr std::uint64_t full_bytes = std::uint64_t{2} * CM_CLEAR_ROWS * sizeof(glm::uvec2);
+constexpr std::uint64_t clear_bytes = full_bytes + std::uint64_t{CM_CLEAR_CONES} * CM_CLEAR_ROWS * sizeof(glm::uvec2);
+
 using BrickPointWords = std::array<std::uint32_t, (CM_BRICK_POINTS + 3) / 4 * 4>;
 BrickPointWords brick_point_words() {
   BrickPointWords words{};
@@ -582,7 +586,7 @@ void GridBuild::plan_cells() {
   built_.limited = state_.limited != 0;
   built_.levels = static_cast<std::uint32_t>(level_first.size() - 2);
   // Before any of it is made.
-  std::uint64_t needs = count * tree_cell_bytes;
+  std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
   for (const grid::LatticeChannel& channel : data_->lattice().channels)
     needs += channel_bytes(channel.channel, built_.count);
   require_room(needs + built_.bytes());
@@ -626,15 +630,34 @@ void GridBuild::plan_cells() {
   records.defines.emplace_back(data_->lattice().halves ? "CM_HALVES 1" : "CM_HALVES 0");
   plan_pass(*cells_, {records, 32}, 0, count, bind);
   plan_channels(count);
+  // What is not the grid's goes, before there is more of that.
+  cells_->add([this, count] {
+    for (gl::Object* scratch : {&tree_cells_, &links_, &order_}) *scratch = {};
+    bytes_ -= count * tree_cell_bytes;
+  });
+  plan_clear_cones();
   plan_read_back(*cells_);
   cells_->add([this] {
     if (state_.low[0] <= state_.high[0]) {
       built_.content_min = {state_.low[0], state_.low[1], state_.low[2]};
       built_.content_max = {state_.high[0], state_.high[1], state_.high[2]};
     }
-    // What is not the grid's goes.
-    for (gl::Object* scratch : {&tree_cells_, &links_, &order_, &level_bytes_}) *scratch = {};
+    for (gl::Object* scratch : {&level_bytes_, &clear_}) *scratch = {};
   });
+}
+
+void GridBuild::plan_clear_cones() {
+  cells_->add([this] { clear_ = make_storage(clear_bytes, "creating the map of what is clear"); });
+  plan_clear(*cells_, clear_, full_bytes);
+  const auto bind = [this](GLuint /*program*/) {
+    bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
+                  {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
+                  {core::CM_STORAGE_GRID_CLEAR, &clear_}});
+  };
+  const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {"CM_STAGE " + std::to_string(stage)}}; };
+  plan_pass(*cells_, {key(0), 8}, 0, built_.count, bind);
+  plan_pass(*cells_, {key(1), 4096, true}, 0, CM_CLEAR_CONES, bind);
+  plan_pass(*cells_, {key(2), 8}, 0, built_.count, bind);
 }
 
 void GridBuild::plan_channels(std::uint32_t count) {

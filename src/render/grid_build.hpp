@@ -202,6 +202,7 @@ class GridBuild {
   // What cells carry, of all in the tree.
   void plan_channels(std::uint32_t count);
   void plan_channel(std::size_t index, std::uint32_t count);
+  void plan_clear_cones();
   void plan_glow();
   void begin_glow_table();
   void plan_read_back(Upload& upload);
@@ -227,7 +228,7 @@ class GridBuild {
   Deadline deadline_{};  // of the call
   std::uint64_t bytes_ = 0;
   gl::Object level_bytes_;
-  gl::Object tree_cells_, links_, order_, glowing_;
+  gl::Object tree_cells_, links_, order_, clear_, glowing_;
   BuiltGrid built_;
   gl::ReadBack read_back_;
   gl::Fence fence_;

@@ -81,6 +81,41 @@ TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
   EXPECT_GT(same_pixels(cpu_dense, dense), 0.99);
 }
 
+// What lies behind an empty cell's clear cones is nothing.
+TEST_P(CpuTracer, WhereNothingIsMetAnyMorePathsEndAndTheSameBitsStay) {
+  const auto volume = test::puffs({40, 36, 30}, ivec3(0));
+  const auto viewer = make();
+  viewer->set_volume(volume);
+  viewer->set_medium({9.0, vec3(0.9F), {0.4F}, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  const test::Image image{24, 24, 4, 5, render::View::shaded};
+  viewer->set_grid(settings_of(March::tet));
+  test::render(*viewer, image);
+  const grid::TetGrid with = grid_of(volume, settings_of(March::tet));
+  grid::TetGrid without = with;
+  for (grid::CellRecord& cell : without.cells) {
+    if (cell.data.z == 0) cell.data.w = 0;
+  }
+  const auto trace = [&](const grid::TetGrid& grid) {
+    std::vector<glm::vec4> sums;
+    core::CpuTet twin;
+    twin.cm = viewer->viewer().trace_parameters();
+    twin.cm.dispatch.samples = image.samples;
+    twin.grid = &grid;
+    std::size_t steps = 0;
+    for (std::uint32_t i = 0; i < image.width * image.height; ++i) {
+      const core::CpuTet::CmPixel pixel = twin.traced({i % image.width, i / image.width});
+      sums.push_back(pixel.sum);
+      steps += pixel.steps;
+    }
+    return std::pair(sums, steps);
+  };
+  const auto [sums, steps] = trace(with);
+  const auto [wanted, most_steps] = trace(without);
+  EXPECT_EQ(sums, wanted);
+  EXPECT_LT(static_cast<double>(steps), 0.9 * static_cast<double>(most_steps));
+}
+
 /// A room around a volume: a textured floor, a coated ball, a veil, and a lamp that shines in.
 std::shared_ptr<StillScene> room() {
   auto scene = std::make_shared<StillScene>();

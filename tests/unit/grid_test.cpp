@@ -580,13 +580,12 @@ TEST(Grid, KeepsTheMassAndIsNeverNegative) {
     const Built built = build(volume, settings);
     double sum = 0.0;
     for (const grid::CellRecord& cell : built.grid.cells) {
-      const glm::vec2 low = glm::unpackHalf2x16(cell.data.z);
-      const glm::vec2 high = glm::unpackHalf2x16(cell.data.w);
-      sum += double(low.x) * volume_of(vertices_of(cell)) * built.grid.density_unit;
+      const glm::vec4 fit = core::cm_record_fit(cell.data);
+      sum += double(fit.x) * volume_of(vertices_of(cell)) * built.grid.density_unit;
       const std::uint32_t cell_class = core::cm_shape_class(core::cm_record_shape(cell.data));
       for (unsigned i = 0; i < 4; ++i) {
         const vec3 offset = core::cm_frame_vertex(cell_class, i) - core::cm_frame_centroid(cell_class);
-        EXPECT_GE(low.x + glm::dot(vec3(low.y, high.x, high.y), offset), -2e-3F);
+        EXPECT_GE(fit.x + glm::dot(vec3(fit.y, fit.z, fit.w), offset), -2e-3F);
       }
     }
     EXPECT_NEAR(sum, mass, 1e-3 * mass);

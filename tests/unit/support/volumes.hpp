@@ -121,6 +121,19 @@ void for_each_sixth(int size, Function f) {
   }
 }
 
+/// Three puffs in a box that they are far from filling.
+inline volume::ScalarVolume puffs(const glm::ivec3& size, const glm::ivec3& low) {
+  constexpr std::array<std::array<float, 4>, 3> balls{
+      {{0.3F, 0.35F, 0.4F, 0.17F}, {0.55F, 0.5F, 0.3F, 0.12F}, {0.7F, 0.75F, 0.8F, 0.1F}}};
+  return make_volume(size, low, [=](const glm::ivec3& p) {
+    const glm::vec3 at = (glm::vec3(p - low) + 0.5F) / glm::vec3(size);
+    float density = 0.0F;
+    for (const auto& [x, y, z, radius] : balls)
+      density += std::max(0.0F, radius - glm::distance(at, glm::vec3(x, y, z)));
+    return density;
+  });
+}
+
 /// A lumpy ball with empty parts, deterministic.
 inline volume::ScalarVolume noise_volume(const glm::ivec3& size, const glm::ivec3& low, int seed) {
   const glm::vec3 centre = glm::vec3(low) + 0.5F * glm::vec3(size);

@@ -1,0 +1,110 @@
+#version 450
+// The clear cones of a grid's empty cells, which rays end by: what src/grid/clear_cones.cpp computes.
+// CM_STAGE 0: cubes that have anything. 1: cubes that are clear, a work group a cone. 2: cells.
+// variants: CM_STAGE=0,1,2
+layout(local_size_x = 64) in;
+
+#include "bindings.glsl"
+#include "shared.glsl"
+#include "cell.glsl"
+#include "clear_cones.glsl"
+#include "grid_state.glsl"
+
+layout(std430, binding = CM_STORAGE_GRID_STATE) readonly buffer CmState { CmGridState cm_state; };
+layout(std430, binding = CM_STORAGE_GRID_RECORDS) buffer CmRecords { uvec4 cm_records[]; };
+// Rows along x and along z that say which cubes are full, two words each; then those of each cone, which are clear.
+layout(std430, binding = CM_STORAGE_GRID_CLEAR) buffer CmClear { uint cm_clear[]; };
+layout(location = 0) uniform uint cm_first;
+layout(location = 1) uniform uint cm_end;
+layout(location = 2) uniform uint cm_log2_size;  // of the cube
+
+const uint cm_clear_begins = 4u * CM_CLEAR_ROWS;
+
+uvec2 cm_row(uint word) { return uvec2(cm_clear[word], cm_clear[word + 1u]); }
+
+#if CM_STAGE == 1
+
+shared uvec2 cm_behind[CM_CLEAR_SIDE];
+
+void main() {
+  uint cone = cm_first + gl_WorkGroupID.x;
+  uint row = gl_LocalInvocationID.x;
+  uint full = cone < 8u ? 2u * CM_CLEAR_ROWS * CM_CLEAR_ALONG_Z : 2u * CM_CLEAR_ROWS * CM_CLEAR_ALONG_X;
+  uint clear = cm_clear_begins + 2u * CM_CLEAR_ROWS * cone;
+  bool bits_up = cm_clear_up(cone, cm_clear_axis_of_bits(cone));
+  uint beside = cm_clear_up(cone, cm_clear_axis_of_rows(cone)) ? row + 1u : row - 1u;
+  bool inside = beside < CM_CLEAR_SIDE;
+  beside = inside ? beside : row;
+  cm_behind[row] = uvec2(0xffffffffu);
+  barrier();
+  for (uint i = 0u; i < CM_CLEAR_SIDE; ++i) {
+    uint layer = cm_clear_up(cone, cone >> 3) ? CM_CLEAR_SIDE - 1u - i : i;
+    uint at = cm_clear_row_of_layer(cone, layer, row);
+    uvec2 full_beside = cm_row(full + 2u * cm_clear_row_of_layer(cone, layer, beside));
+    uvec2 here = cm_clear_row(cm_row(full + 2u * at), inside ? full_beside : uvec2(0u), cm_behind[row],
+                              inside ? cm_behind[beside] : uvec2(0xffffffffu), bits_up);
+    cm_clear[clear + 2u * at] = here.x;
+    cm_clear[clear + 2u * at + 1u] = here.y;
+    barrier();
+    cm_behind[row] = here;
+    barrier();
+  }
+}
+
+#else
+
+void cm_fill(uint rows, int layer, int y, uvec2 bits) {
+  int side = int(CM_CLEAR_SIDE);
+  if (layer < 0 || layer >= side || y < 0 || y >= side) return;
+  uint at = 2u * (CM_CLEAR_ROWS * rows + uint(layer * side + y));
+  if (bits.x != 0u) atomicOr(cm_clear[at], bits.x);
+  if (bits.y != 0u) atomicOr(cm_clear[at + 1u], bits.y);
+}
+
+void main() {
+  uint i = cm_first + gl_GlobalInvocationID.x;
+  if (i >= cm_end) return;
+  uvec4 data = cm_records[2u * i + 1u];
+  bool wide = cm_is_wide(cm_log2_size - 1u);
+  vec3 v0 = cm_record_v0(data, wide);
+  uint shape = cm_record_shape(data, wide);
+  CmClearMap map = cm_clear_map(uvec3(cm_state.low[0], cm_state.low[1], cm_state.low[2]),
+                                uvec3(cm_state.high[0], cm_state.high[1], cm_state.high[2]));
+  CmClearRange range = cm_clear_range(v0, shape, map);
+  bool empty = data.z == 0u && (data.y & CM_RECORD_EMITS) == 0u;
+#if CM_STAGE == 0
+  if (empty) return;
+#else
+  if (!empty) return;
+  bool found = range.step == 1 && cm_clear_has(range);
+  uint cones = found ? (1u << CM_CLEAR_CONES) - 1u : 0u;
+  if (!found) range.last = range.first - ivec3(1);
+#endif
+  ivec3 at;
+  for (at.z = range.first.z; at.z <= range.last.z; at.z += range.step) {
+    for (at.y = range.first.y; at.y <= range.last.y; at.y += range.step) {
+      for (at.x = range.first.x; at.x <= range.last.x; at.x += range.step) {
+        if (!cm_clear_touches(v0, shape, map, at, range.step)) continue;
+#if CM_STAGE == 0
+        for (int y = 0; y < range.step; ++y) {
+          for (int k = 0; k < range.step; ++k) {
+            cm_fill(CM_CLEAR_ALONG_X, at.z + k, at.y + y, cm_clear_bits(at.x, range.step));
+            cm_fill(CM_CLEAR_ALONG_Z, at.x + k, at.y + y, cm_clear_bits(at.z, range.step));
+          }
+        }
+#else
+        for (uint cone = 0u; cone < CM_CLEAR_CONES; ++cone) {
+          uint bit = cm_clear_bit_of_cube(cone, at);
+          uint word = cm_clear_begins + 2u * (CM_CLEAR_ROWS * cone + cm_clear_row_of_cube(cone, at)) + bit / 32u;
+          if (((cm_clear[word] >> (bit % 32u)) & 1u) == 0u) cones &= ~(1u << cone);
+        }
+#endif
+      }
+    }
+  }
+#if CM_STAGE == 2
+  cm_records[2u * i + 1u].w = cones;
+#endif
+}
+
+#endif
