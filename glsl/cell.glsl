@@ -23,17 +23,27 @@ CM_FN uint cm_shape_class(uint shape) { return (shape >> 9) & 3u; }
 CM_FN uint cm_shape_exponent(uint shape) { return shape >> 11; }
 // 2^exponent and 2^-exponent, exactly.
 CM_FN float cm_shape_unit(uint shape) { return uintBitsToFloat((127u + cm_shape_exponent(shape)) << 23); }
-CM_FN float cm_shape_inverse_unit(uint shape) { return uintBitsToFloat((127u - cm_shape_exponent(shape)) << 23); }
-
-CM_FN float cm_pick(vec3 v, uint axis) { return axis == 0u ? v.x : (axis == 1u ? v.y : v.z); }
-CM_FN float cm_signed(float value, uint sign_bit) {
-  return uintBitsToFloat(floatBitsToUint(value) ^ ((sign_bit & 1u) << 31));
+CM_FN float cm_shape_inverse_unit(uint shape) {
+  return uintBitsToFloat(0x7f000000u - floatBitsToUint(cm_shape_unit(shape)));
 }
 
-// A cube-space vector in the cell's frame (not scaled): exact.
+CM_FN float cm_pick(vec3 v, uint axis) { return axis == 0u ? v.x : (axis == 1u ? v.y : v.z); }
+// sign_bit: the lowest one.
+CM_FN float cm_signed(float value, uint sign_bit) {
+  return uintBitsToFloat(floatBitsToUint(value) ^ (sign_bit << 31));
+}
+
+// A cube-space vector in the cell's frame (not scaled): exact. The cube axis behind frame axis z is the one that is left,
+// which its bits need not be asked for.
 CM_FN vec3 cm_to_frame(vec3 v, uint shape) {
-  return vec3(cm_signed(cm_pick(v, (shape >> 3) & 3u), shape), cm_signed(cm_pick(v, (shape >> 5) & 3u), shape >> 1),
-              cm_signed(cm_pick(v, (shape >> 7) & 3u), shape >> 2));
+  bool x_is_x = (shape & 0x18u) == 0u;
+  bool x_is_y = (shape & 0x18u) == 0x08u;
+  bool y_is_x = (shape & 0x60u) == 0u;
+  bool y_is_y = (shape & 0x60u) == 0x20u;
+  float x = x_is_x ? v.x : (x_is_y ? v.y : v.z);
+  float y = y_is_x ? v.x : (y_is_y ? v.y : v.z);
+  float z = !(x_is_x || y_is_x) ? v.x : (!(x_is_y || y_is_y) ? v.y : v.z);
+  return vec3(cm_signed(x, shape), cm_signed(y, shape >> 1), cm_signed(z, shape >> 2));
 }
 
 // The inverse of cm_to_frame.
@@ -191,9 +201,10 @@ CM_FN CmFrame cm_cell_frame(vec3 v0, uint shape, vec3 o, vec3 d) {
   return f;
 }
 
-// Where a ray leaves a cell: t_exit is the smallest (c - n.o) / (n.d) over the faces with n.d > 0, each rounded the same
-// way from both sides, so neighbours agree bit for bit; face is CM_NONE for a ray that leaves through none (d = 0).
-CM_FN void cm_cell_exit(CmFrame f, uint shape, CM_OUT(float) t_exit, CM_OUT(uint) face) {
+// How far along a ray a cell's faces are: (c - n.o) / (n.d) where n.d > 0, each rounded the same way from both sides, so
+// that neighbours agree bit for bit; else CM_FAR_FACE.
+#define CM_FAR_FACE 3.0e38f
+CM_FN vec4 cm_face_distances(CmFrame f, uint shape) {
   uint cell_class = cm_shape_class(shape);
   float unit = cm_shape_unit(shape);
   bool cap_y = cell_class == 0u;
@@ -201,23 +212,34 @@ CM_FN void cm_cell_exit(CmFrame f, uint shape, CM_OUT(float) t_exit, CM_OUT(uint
   float cap_a = cap_y ? f.v0.y : (cap_z ? f.v0.z : 0.0f);
   float cap_o = cap_y ? f.o.y : (cap_z ? f.o.z : 0.0f);
   float cap_d = cap_y ? f.d.y : (cap_z ? f.d.z : 0.0f);
-  float far_away = 3.0e38f;
   // Precise: both cells of a face round its distance alike.
   CM_PRECISE float n_d_0 = -f.d.z;
   CM_PRECISE float n_d_1 = f.d.y - f.d.x;
   CM_PRECISE float n_d_2 = f.d.z - f.d.y;
   CM_PRECISE float n_d_3 = f.d.x + cap_d;
-  CM_PRECISE float t_0 = n_d_0 > 0.0f ? (f.o.z - f.v0.z) / n_d_0 : far_away;
-  CM_PRECISE float t_1 = n_d_1 > 0.0f ? ((f.v0.y - f.v0.x) - (f.o.y - f.o.x)) / n_d_1 : far_away;
-  CM_PRECISE float t_2 = n_d_2 > 0.0f ? ((f.v0.z - f.v0.y) - (f.o.z - f.o.y)) / n_d_2 : far_away;
+  CM_PRECISE float t_0 = n_d_0 > 0.0f ? (f.o.z - f.v0.z) / n_d_0 : CM_FAR_FACE;
+  CM_PRECISE float t_1 = n_d_1 > 0.0f ? ((f.v0.y - f.v0.x) - (f.o.y - f.o.x)) / n_d_1 : CM_FAR_FACE;
+  CM_PRECISE float t_2 = n_d_2 > 0.0f ? ((f.v0.z - f.v0.y) - (f.o.z - f.o.y)) / n_d_2 : CM_FAR_FACE;
   CM_PRECISE float cap_c = (f.v0.x + cap_a) + (cell_class == 1u ? unit : 2.0f * unit);
-  CM_PRECISE float t_3 = n_d_3 > 0.0f ? (cap_c - (f.o.x + cap_o)) / n_d_3 : far_away;
-  t_exit = min(min(t_0, t_1), min(t_2, t_3));
-  face = t_exit >= far_away ? CM_NONE : (t_exit == t_0 ? 0u : (t_exit == t_1 ? 1u : (t_exit == t_2 ? 2u : 3u)));
+  CM_PRECISE float t_3 = n_d_3 > 0.0f ? (cap_c - (f.o.x + cap_o)) / n_d_3 : CM_FAR_FACE;
+  return vec4(t_0, t_1, t_2, t_3);
+}
+CM_FN float cm_nearest_face(vec4 t) { return min(min(t.x, t.y), min(t.z, t.w)); }
+
+// Where a ray leaves a cell, through the nearest face; CM_NONE for a ray that leaves through none (d = 0).
+CM_FN void cm_cell_exit(CmFrame f, uint shape, CM_OUT(float) t_exit, CM_OUT(uint) face) {
+  vec4 t = cm_face_distances(f, shape);
+  t_exit = cm_nearest_face(t);
+  face = t_exit >= CM_FAR_FACE ? CM_NONE : (t_exit == t.x ? 0u : (t_exit == t.y ? 1u : (t_exit == t.z ? 2u : 3u)));
 }
 
 CM_FN uint cm_link(uvec4 links, uint face) {
   return face == 0u ? links.x : (face == 1u ? links.y : (face == 2u ? links.z : (face == 3u ? links.w : CM_NONE)));
+}
+
+// The link of the face that is as far as that.
+CM_FN uint cm_link_at(uvec4 links, vec4 t, float t_exit) {
+  return t_exit == t.x ? links.x : (t_exit == t.y ? links.y : (t_exit == t.z ? links.z : links.w));
 }
 
 // Of its second two words, the density at the centroid and the gradient.
@@ -229,6 +251,7 @@ CM_FN vec4 cm_fit(uint low_word, uint high_word) {
 
 CM_FN vec4 cm_record_fit(uvec4 data) { return cm_fit(data.z, data.z == 0u ? 0u : data.w); }
 CM_FN uint cm_record_clear(uvec4 data) { return data.z == 0u ? data.w : 0u; }
+CM_FN bool cm_record_is_clear(uvec4 data, uint cone) { return data.z == 0u && (data.w & cone) != 0u; }
 
 // That at o + t d, as a linear function of t: value at t = 0 in x, slope in y.
 CM_FN vec2 cm_fit_along(vec4 fit, CmFrame f, uint shape) {

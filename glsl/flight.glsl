@@ -165,8 +165,10 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   bool nowhere = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE;
   uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
-  float e_0 = 0.0f;
-  float e_1 = 0.0f;
+  float half_extinction = 0.5f * extinction;
+  // Of the last cell.
+  float r_0 = 0.0f;
+  float r_1 = 0.0f;
   float span = 0.0f;
 #if CM_CHANNELS
   CmEmission emission;
@@ -177,8 +179,6 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
-    float r_0 = 0.0f;
-    float r_1 = 0.0f;
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
     cm_march_step(cell, ray, p.t, t_1, r_0, r_1, next);
 #if CM_CHANNELS
@@ -186,12 +186,10 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     emission.mean *= cm_balance(flights, looks * cm_cell_pdf(emission));
 #endif
     p.steps += 1u;
-    e_0 = extinction * r_0;
-    e_1 = extinction * r_1;
     span = t_1 - p.t;
-    float used = 0.5f * (e_0 + e_1) * span;
+    float used = half_extinction * (r_0 + r_1) * span;
     // To a surface or a lamp inside the cell, not beyond.
-    if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(e_0, e_1, span, p.t_end - p.t);
+    if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(extinction * r_0, extinction * r_1, span, p.t_end - p.t);
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
     } else {
@@ -206,6 +204,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   }
   p.cell = uvec2(cell.x, cell.y);
   p.cache = cell.z;
+  float e_0 = extinction * r_0;
+  float e_1 = extinction * r_1;
   // After the loop, not in it: software drivers run both sides of every branch, each step.
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;

@@ -83,9 +83,8 @@ CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1,
   bool wide = cm_grid_is_wide();
   uint shape = cm_record_shape(data, wide);
   CmFrame frame = cm_cell_frame(cm_record_v0(data, wide), shape, ray.o, ray.d);
-  float t_exit;
-  uint face;
-  cm_cell_exit(frame, shape, t_exit, face);
+  vec4 faces = cm_face_distances(frame, shape);
+  float t_exit = cm_nearest_face(faces);
   t_1 = max(t, t_exit);
 #if CM_LINEAR
   vec2 density = cm_fit_along(cm_march_fit(data, cell.x), frame, shape);
@@ -98,8 +97,9 @@ CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1,
 #endif
   r_1 = r_0;
 #endif
-  bool clear = (cm_record_clear(data) & ray.cone) != 0u;
-  next = uvec3(clear ? CM_NONE : cm_link(links, face), 0u, CM_NONE);
+  uint link = cm_link_at(links, faces, t_exit);
+  // Words that never change need no select where a ray stays.
+  next = uvec3(cm_record_is_clear(data, ray.cone) ? CM_NONE : link, cell.y, cell.z);
 }
 
 #if CM_CHANNELS

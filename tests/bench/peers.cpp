@@ -25,10 +25,11 @@ constexpr double megabyte = 1e6;
 /// A march of the table.
 struct Entry {
   std::string name;
-  std::unique_ptr<EditedShaders> shaders;  ///< of a NanoVDB grid
+  std::unique_ptr<EditedShaders> shaders;  ///< of others than ours
   std::unique_ptr<BoundGrid> grid;         ///< that one
   std::unique_ptr<Subject> subject;
   double bytes = 0.0;
+  double threshold = 0.0;           ///< of its refinement
   std::optional<ImageError> error;  ///< what is not exact
   std::vector<Run> runs;
 };
@@ -54,12 +55,26 @@ Entry peer(headless::Context& context, const Asset& asset, NanoType type, Look l
   return entry;
 }
 
+/// The same cells, through which rays go on where nothing is met any more: what clear cones save.
+Entry to_the_box(headless::Context& context, const Asset& asset, const Entry& tets, const Options& options,
+                 double density_scale) {
+  const std::array edits{Edit{"march_tet.glsl", "cm_record_is_clear(data, ray.cone) ? CM_NONE : link", "link"}};
+  Entry entry;
+  entry.name = tets.name + ", on to the box";
+  entry.shaders = std::make_unique<EditedShaders>(edits);
+  entry.subject = std::make_unique<Subject>(context, asset.volume, Kind::tet_linear, options, density_scale,
+                                            entry.shaders->programs());
+  entry.subject->refine(grid::Criterion::transmittance, tets.threshold, options.max_cells);
+  return entry;
+}
+
 /// Of ours, the coarsest grid within the target of the voxels' picture; else the finest.
 void fit(Entry& tets, const ImageReference& reference, const Options& options) {
   std::vector<double> thresholds = options.thresholds;
   if (thresholds.empty()) thresholds.assign(usual_thresholds.begin(), usual_thresholds.end());
   std::ranges::sort(thresholds, std::greater{});
   for (const double threshold : thresholds) {
+    tets.threshold = threshold;
     tets.subject->refine(grid::Criterion::transmittance, threshold, options.max_cells);
     tets.error = reference.error_of(*tets.subject);
     std::array<char, 120> line{};
@@ -112,6 +127,7 @@ void measure_peers(headless::Context& context, const Asset& asset, const Options
     const ImageReference reference(*entries[1].subject, options.error_samples, options.error_parts);
     fit(entries[2], reference, options);
   }
+  entries.push_back(to_the_box(context, asset, entries[2], options, density_scale));
   for (Entry& entry : entries) {
     entry.subject->shaded(1, 1);
     entry.bytes = static_cast<double>(entry.subject->stats().cell_bytes);
