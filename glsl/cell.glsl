@@ -224,20 +224,14 @@ CM_FN vec4 cm_face_distances(CmFrame f, uint shape) {
   CM_PRECISE float t_3 = n_d_3 > 0.0f ? (cap_c - (f.o.x + cap_o)) / n_d_3 : CM_FAR_FACE;
   return vec4(t_0, t_1, t_2, t_3);
 }
+// Where it leaves the cell; CM_FAR_FACE for a ray that leaves through none (d = 0).
 CM_FN float cm_nearest_face(vec4 t) { return min(min(t.x, t.y), min(t.z, t.w)); }
-
-// Where a ray leaves a cell, through the nearest face; CM_NONE for a ray that leaves through none (d = 0).
-CM_FN void cm_cell_exit(CmFrame f, uint shape, CM_OUT(float) t_exit, CM_OUT(uint) face) {
-  vec4 t = cm_face_distances(f, shape);
-  t_exit = cm_nearest_face(t);
-  face = t_exit >= CM_FAR_FACE ? CM_NONE : (t_exit == t.x ? 0u : (t_exit == t.y ? 1u : (t_exit == t.z ? 2u : 3u)));
-}
 
 CM_FN uint cm_link(uvec4 links, uint face) {
   return face == 0u ? links.x : (face == 1u ? links.y : (face == 2u ? links.z : (face == 3u ? links.w : CM_NONE)));
 }
 
-// The link of the face that is as far as that.
+// The link of the face that is as far as that, one of t.
 CM_FN uint cm_link_at(uvec4 links, vec4 t, float t_exit) {
   return t_exit == t.x ? links.x : (t_exit == t.y ? links.y : (t_exit == t.z ? links.z : links.w));
 }

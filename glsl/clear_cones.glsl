@@ -5,8 +5,9 @@
 // They are found on a map of cubes, CM_CLEAR_SIDE along an axis at most, over the box of what there is: full cubes are
 // those that cells with anything touch. From a cube rays of a cone get into the same layer's next cubes of the two
 // shorter axes and, of the next layer, into those four; so layer by layer, from where rays leave, a cube is clear if
-// those of its own layer are not full and those of the next are clear. Rows of cubes are words of a bit each. All of it
-// is in whole numbers, so that the CPU and GL find the same. Shared by GLSL and C++.
+// those of its own layer are not full and those of the next are clear. Rows of cubes are words of a bit each. Floats here
+// are whole numbers and halves of them, below 2^21, so that the CPU and GL find the same of the same records. Shared by
+// GLSL and C++.
 #ifndef CM_CLEAR_CONES_GLSL
 #define CM_CLEAR_CONES_GLSL
 
@@ -63,7 +64,8 @@ CM_FN CmClearRange cm_clear_range(vec3 v0, uint shape, CmClearMap map) {
   return range;
 }
 
-// Whether the map has all of them. Where it has not, rays do not come, but for what they are rounded by.
+// Whether the map has all of them. Cells that it has not are beside the box, where rays do not come but for what they are
+// rounded by, or stand across its end, which they soon get to.
 CM_FN bool cm_clear_has(CmClearRange range) {
   ivec3 low = range.first;
   ivec3 high = range.last;

@@ -4,7 +4,8 @@
 //   CmMarchRay cm_march_ray(vec3 o, vec3 d)
 //   void cm_march_step(uvec3 cell, CmMarchRay ray, t, t_1, r_0, r_1, next)
 // which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
-// the next cell; next.x == CM_NONE outside, or where the ray meets nothing any more. The third word of a cell is the march's own cache, CM_NONE when unknown.
+// the next cell; next.x == CM_NONE outside, or where the ray meets nothing any more. The third word of a cell is the
+// march's own cache, CM_NONE when unknown.
 // With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
 //   vec3 cm_march_colour(uvec2 cell)              of what scatters
@@ -165,7 +166,6 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   bool nowhere = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE;
   uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
-  float half_extinction = 0.5f * extinction;
   // Of the last cell.
   float r_0 = 0.0f;
   float r_1 = 0.0f;
@@ -187,7 +187,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #endif
     p.steps += 1u;
     span = t_1 - p.t;
-    float used = half_extinction * (r_0 + r_1) * span;
+    float used = extinction * (0.5f * (r_0 + r_1) * span);
     // To a surface or a lamp inside the cell, not beyond.
     if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(extinction * r_0, extinction * r_1, span, p.t_end - p.t);
     if (used > p.depth) {

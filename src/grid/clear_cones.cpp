@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/progress_part.hpp"
 #include "grid/cell.hpp"
 
 namespace cumulet::grid {
@@ -115,8 +116,9 @@ class ClearMap {
 
 }  // namespace
 
-void find_clear_cones(TetGrid& grid) {
+void find_clear_cones(TetGrid& grid, Progress* progress) {
   ClearMap map(grid);
+  ProgressPart part(progress, 0.9, 1.0, 2 * grid.cells.size());
   const bool wide = grid.cube.wide();
   const auto for_cells = [&](bool empty, const auto& visit) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, grid.cells.size(), 4096), [&](const auto& range) {
@@ -124,6 +126,7 @@ void find_clear_cones(TetGrid& grid) {
         const glm::uvec4& data = grid.cells[i].data;
         if (is_empty(grid, i) == empty) visit(i, core::cm_record_v0(data, wide), core::cm_record_shape(data, wide));
       }
+      part.add(range.size());
     });
   };
   for_cells(false, [&](std::size_t, const glm::vec3& v0, std::uint32_t shape) { map.fill(v0, shape); });

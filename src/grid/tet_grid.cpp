@@ -548,7 +548,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     vec3 high{-3.0e38F};
   };
   tbb::combinable<Box> boxes;
-  ProgressPart part(progress, 0.1, 1.0, count);
+  ProgressPart part(progress, 0.1, 0.9, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     LeafDensity density(*statistics_, channels, cells, grid.density_unit);
     const auto beside = std::make_unique<LeafChannels>(*statistics_, channels, cells);
@@ -583,7 +583,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     grid.content_min = all.low;
     grid.content_max = all.high;
   }
-  find_clear_cones(grid);
+  find_clear_cones(grid, progress);
   return grid;
 }
 

@@ -350,6 +350,8 @@ std::uint64_t building_bytes_a_cell(bool emits) {
   return 2 * tree_cell_bytes + (emits ? glowing_words * sizeof(std::uint32_t) : 0);
 }
 
+std::uint64_t building_bytes_at_least() { return clear_bytes; }
+
 std::uint64_t BuiltGrid::bytes() const {
   if (grid) return 0;
   std::uint64_t bytes = std::uint64_t{count} * (sizeof(grid::CellRecord) + 4) + 28 * sizeof(std::uint32_t);
@@ -587,8 +589,10 @@ void GridBuild::plan_cells() {
   built_.levels = static_cast<std::uint32_t>(level_first.size() - 2);
   // Before any of it is made.
   std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
-  for (const grid::LatticeChannel& channel : data_->lattice().channels)
+  for (const grid::LatticeChannel& channel : data_->lattice().channels) {
     needs += channel_bytes(channel.channel, built_.count);
+    if (channel.channel == grid::Channel::emission) needs += std::uint64_t{built_.count} * glowing_words * 4;
+  }
   require_room(needs + built_.bytes());
   cells_.emplace(gl_, "building the grid");
   cells_->add([this, count] {

@@ -136,6 +136,8 @@ struct BuiltGrid {
 std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells);
 /// Of GL memory, what building a grid takes a cell beside what is built.
 std::uint64_t building_bytes_a_cell(bool emits);
+/// And how much it takes at least, of however few cells.
+std::uint64_t building_bytes_at_least();
 
 /// What kernels that build grids take, by how long they took: of an item, in ms.
 class GridPace {

@@ -57,8 +57,10 @@ std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, con
                                                     const Allowance& allowance) {
   // Beside the cells there are the lattice, what it builds of, the grid before, a copy, and what is left of the heap's
   // pages.
-  const std::uint64_t in_gl = left_of(allowance.gl_bytes(), lattice.device_bytes() + tables) /
-                              (4 * bytes_a_cell(carried) + render::building_bytes_a_cell(carried.emission));
+  const std::uint64_t room = left_of(allowance.gl_bytes(), lattice.device_bytes() + tables);
+  const std::uint64_t kept = 4 * bytes_a_cell(carried);
+  const std::uint64_t in_gl = std::min(room / (kept + render::building_bytes_a_cell(carried.emission)),
+                                       left_of(room, render::building_bytes_at_least()) / kept);
   // Beside a small lattice it is two fifths of what the CPU's may have, and more.
   if (in_gl < std::min(max_cells, fit_in_gl(carried, allowance) / 4)) return std::nullopt;
   return std::min({max_cells, fit_in_memory(carried, held, allowance), in_gl});

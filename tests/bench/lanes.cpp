@@ -23,7 +23,7 @@ using namespace cumulet;
 enum class Work : std::uint8_t { camera, aim, event, step, finish };
 
 // Instructions.
-constexpr std::array<double, 5> cost{300.0, 200.0, 600.0, 170.0, 120.0};
+constexpr std::array<double, 5> cost{300.0, 200.0, 600.0, 145.0, 120.0};
 constexpr double turn_cost = 15.0;
 double cost_of(Work work) { return cost.at(static_cast<std::size_t>(work)); }
 

@@ -318,7 +318,7 @@ void print_ancestors(const core::Recording& recording, const std::vector<std::ve
           steps += 1.0;
           if (i == 0 || ancestors.region[lane[i]] != ancestors.region[lane[i - 1]]) merged += 1.0;
           const glm::uvec4 data = recording.grid->cells[lane[i]].data;
-          if (data.z == 0U && data.w == 0U) dark += 1.0;
+          if (data.z == 0U) dark += 1.0;
         }
       }
     }

@@ -351,13 +351,13 @@ TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
     for (std::uint32_t cell = grid::locate(grid, o), steps = 0; cell != CM_NONE && steps < 4000; ++steps) {
       const glm::uvec4& data = grid.cells[cell].data;
       const std::uint32_t shape = core::cm_record_shape(data, wide);
-      float t_exit = 0.0F;
-      std::uint32_t face = 0;
-      core::cm_cell_exit(core::cm_cell_frame(core::cm_record_v0(data, wide), shape, o, d), shape, t_exit, face);
+      const glm::vec4 faces =
+          core::cm_face_distances(core::cm_cell_frame(core::cm_record_v0(data, wide), shape, o, d), shape);
+      const float t_exit = core::cm_nearest_face(faces);
       const float t_next = std::max(t, t_exit);
       depth += double(t_next - t) * glm::unpackHalf2x16(data.z).x;
       t = t_next;
-      cell = core::cm_link(grid.cells[cell].links, face);
+      cell = core::cm_link_at(grid.cells[cell].links, faces, t_exit);
     }
     return depth;
   };
@@ -743,11 +743,11 @@ TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
     bool tracked = true;
     const unsigned limit = 4000;
     while (cell != CM_NONE && steps < limit) {
-      float t_exit = 0.0F;
-      std::uint32_t face = 0;
       const auto& data = cells[cell].data;
       const std::uint32_t shape = core::cm_record_shape(data);
-      core::cm_cell_exit(core::cm_cell_frame(core::cm_record_v0(data), shape, o, d), shape, t_exit, face);
+      const glm::vec4 faces =
+          core::cm_face_distances(core::cm_cell_frame(core::cm_record_v0(data), shape, o, d), shape);
+      const float t_exit = core::cm_nearest_face(faces);
       const float t_next = std::max(t, t_exit);
       // The middle of every segment lies in its cell.
       if (ray % 97 == 0 && t_next - t > 1e-3F * std::abs(t_next)) {
@@ -763,7 +763,7 @@ TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
       }
       depth += double(t_next - t) * glm::unpackHalf2x16(data.z).x;
       t = t_next;
-      cell = core::cm_link(cells[cell].links, face);
+      cell = core::cm_link_at(cells[cell].links, faces, t_exit);
       ++steps;
     }
     if (steps >= limit) ++stuck;
