@@ -436,10 +436,14 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
         // Lattices serve views to come alone.
         if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.most_bytes, deadline);
         // Cells that were made for more memory would keep out those made for less. Where some of them stay the rest is
-        // not worth it: they would have to be made again.
-        const auto stays = [&](const scene::MarchSourcePtr& source) { return data_->grid(*source) != nullptr; };
-        if (data_ && of.front()->march == scene::March::tet && !fits_beside(data_bytes() + other_bytes()) &&
-            fits_beside(other_bytes()) && std::ranges::none_of(of, stays)) {
+        // not worth it, for they would have to be made again, unless all is too much by itself; then what main memory
+        // has comes from there.
+        const std::uint64_t held = data_bytes() + other_bytes();
+        const auto is_kept = [&](const scene::MarchSourcePtr& source) {
+          return data_->grid(*source) != nullptr && (source->plan || held <= wanted.most_bytes);
+        };
+        if (data_ && of.front()->march == scene::March::tet && !fits_beside(held) && fits_beside(other_bytes()) &&
+            std::ranges::none_of(of, is_kept)) {
           work.reset();
           data_.clear();
           data_of_.clear();

@@ -132,12 +132,13 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
         scene::make_planned_source({lattice, std::move(levels), *planned}, voxels, statistics, channels);
     source.optical_depth = statistics->mean_optical_depth();
     built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+    built.most_cells = *planned;
     allowance.require(built.bytes(), volume->name());
     built.seconds.refine = watch.lap();
     return built;
   }
   grid::RefineSettings refine = settings.refine;
-  refine.max_cells = cells_that_fit(max_cells, carried, volume->bytes(), allowance);
+  refine.max_cells = built.most_cells = cells_that_fit(max_cells, carried, volume->bytes(), allowance);
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);

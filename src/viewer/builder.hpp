@@ -79,6 +79,7 @@ struct Built {
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;
+  std::uint64_t most_cells = 0;  ///< that it was allowed to have, if it is of tetrahedra
   BuildSeconds seconds;
 
   /// Main memory, with what others may hold as well.

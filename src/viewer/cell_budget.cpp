@@ -66,18 +66,19 @@ std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, con
   return std::min({max_cells, fit_in_memory(carried, held, allowance), in_gl});
 }
 
-std::uint64_t cells_allowed(const Built& built, const Allowance& allowance) {
+bool has_cells_allowed(const Built& built, const Allowance& allowance) {
   const scene::MarchSource& source = *built.source;
   const Carried carried = Carried::of(source);
   const std::uint64_t max_cells = built.settings.refine.max_cells;
   const std::uint64_t held = built.volume ? built.volume->bytes() : 0;
   const auto planned =
       source.plan ? planned_cells_that_fit(max_cells, carried, *source.plan->lattice, held, allowance) : std::nullopt;
-  return planned ? *planned : cells_that_fit(max_cells, carried, held, allowance);
-}
-
-std::uint64_t cells_granted(const Built& built) {
-  return built.source->plan ? built.source->plan->max_cells : built.cells;
+  const std::uint64_t allowed = planned ? *planned : cells_that_fit(max_cells, carried, held, allowance);
+  if (allowed < fewest_cells) return true;  // there is nothing coarser
+  // How many a plan comes to only GL knows.
+  const std::uint64_t has = source.plan ? built.most_cells : built.cells;
+  const bool wants_more = built.limited || source.plan;
+  return has <= allowed && !(wants_more && built.most_cells < allowed);
 }
 
 }  // namespace cumulet::viewer

@@ -35,9 +35,7 @@ struct Carried {
 [[nodiscard]] std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, const Carried& carried,
                                                                   const grid::Lattice& lattice, std::uint64_t held,
                                                                   const Allowance& allowance);
-/// One of tetrahedra, built anew.
-[[nodiscard]] std::uint64_t cells_allowed(const Built& built, const Allowance& allowance);
-/// That it was built to have; of the CPU's those that it has.
-[[nodiscard]] std::uint64_t cells_granted(const Built& built);
+/// Whether one of tetrahedra has as many cells as it may have. Else it would be another, built anew.
+[[nodiscard]] bool has_cells_allowed(const Built& built, const Allowance& allowance);
 
 }  // namespace cumulet::viewer

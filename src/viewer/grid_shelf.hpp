@@ -8,6 +8,7 @@ namespace cumulet::viewer {
 struct GridWish {
   VolumeAssetPtr volume;
   BuildSettings settings;
+  std::uint64_t gl_bytes = Allowance::no_limit;  ///< its part of what there is for volumes
   bool operator==(const GridWish&) const = default;
 };
 
@@ -19,7 +20,9 @@ class GridShelf : public Shelf<GridWish, Built> {
       : Shelf(
             "building the grids of several volumes", Progress::Stage::refining,
             [log](const Wish& wish, Progress& progress) {
-              return build_grid(log, wish.volume, wish.settings, progress);
+              Allowance part;
+              part.set_gl(wish.gl_bytes);
+              return build_grid(log, wish.volume, wish.settings, progress, part);
             },
             std::move(notify), trace, std::move(allowance)) {}
 };

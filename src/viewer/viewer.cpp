@@ -59,6 +59,12 @@ void join(BuildSettings& a, const BuildSettings& b) {
                                    b.refine.camera->places.end());
 }
 
+bool is_of_cells(const Built& built) { return built.source && built.source->march == scene::March::tet; }
+
+bool apart_by_an_eighth(std::uint64_t a, std::uint64_t b) {
+  return std::max(a, b) - std::min(a, b) > std::max(a, b) / 8;
+}
+
 // Of what is anywhere in a box.
 VolumeFactsPtr facts_of(const Bounds& bounds) {
   volume::ScalarVolume box;
@@ -165,6 +171,7 @@ void Viewer::sync() {
       if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
     }
     built_ = std::move(*built);
+    cuts_own_ = false;
     wishes_due_ = true;
     if (built_.volume == volume_) {  // else the volume before, of which a grid was asked for
       drop_stand_in();
@@ -832,7 +839,7 @@ std::optional<Built> Viewer::grid_of(const GridShelf::Wish& wish) const {
   const auto is = [&](const Built& built) { return built.volume == wish.volume && built.settings == wish.settings; };
   if (built_.source && is(built_)) return built_;
   for (const Shown& shown : shown_) {
-    if (shown.built && is(*shown.built)) return shown.built;
+    if (shown.built && is(*shown.built) && fits(*shown.built)) return shown.built;
   }
   return shelf_.built(wish);
 }
@@ -863,8 +870,10 @@ BuildSettings Viewer::settings_of(const Shown& shown) const {
 }
 
 void Viewer::reuse_grid(GridShelf::Wish& wish) const {
-  const auto serves = [&](const Built& built) { return built.volume == wish.volume && built.serves(wish.settings); };
-  if (built_.source && serves(built_)) {
+  const auto serves = [&](const Built& built) {
+    return built.volume == wish.volume && built.serves(wish.settings) && fits(built);
+  };
+  if (built_.source && built_.volume == wish.volume && built_.serves(wish.settings)) {
     wish.settings = built_.settings;
     return;
   }
@@ -875,7 +884,8 @@ void Viewer::reuse_grid(GridShelf::Wish& wish) const {
     }
   }
   for (const Shown& shown : shown_) {
-    if (shown.wish && shown.wish->volume == wish.volume && suits(shown.wish->settings, wish.settings)) {
+    if (shown.wish && shown.wish->volume == wish.volume && shown.wish->gl_bytes == wish.gl_bytes &&
+        suits(shown.wish->settings, wish.settings)) {
       wish.settings = shown.wish->settings;
       return;
     }
@@ -895,10 +905,25 @@ void Viewer::wish_for_grids() {
     });
     wish_of[i] = static_cast<std::size_t>(same - wishes.begin());
     if (same == wishes.end()) {
-      wishes.push_back({shown.settings.volume, settings});
+      wishes.push_back({shown.settings.volume, settings, part_of_gl_});
     } else {
       join(same->settings, settings);
     }
+  }
+  const bool own_is_apart =
+      (volume_ && std::ranges::none_of(wishes,
+                                       [&](const GridShelf::Wish& wish) {
+                                         return wish.volume == volume_ && suits(grid_.build, wish.settings);
+                                       })) ||
+      followed_ || watched_;
+  const std::size_t grids = wishes.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
+  const bool others = grids_ != std::max<std::size_t>(grids, 1);
+  grids_ = std::max<std::size_t>(grids, 1);
+  if (most_gl_bytes_ != Allowance::no_limit) {
+    share_gl();
+    // What each frame leaves is never the same; an eighth is.
+    if (others || apart_by_an_eighth(part_of_gl_, allowance_->gl_bytes())) share_gl_anew();
+    for (GridShelf::Wish& wish : wishes) wish.gl_bytes = part_of_gl_;
   }
   waits_for_own_ = false;
   std::vector<GridShelf::Wish> to_build;
@@ -919,6 +944,7 @@ void Viewer::wish_for_grids() {
     shown.wish = wishes[*wish_of[i]];
   }
   shelf_.wish(std::move(to_build));
+  fit_cells();  // the viewer's own has another part, perhaps
 }
 
 void Viewer::rebuild() {
@@ -941,15 +967,36 @@ void Viewer::rebuild() {
 
 void Viewer::share_gl() {
   const bool limited = most_gl_bytes_ != Allowance::no_limit;
-  allowance_->set_gl(limited ? most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_) : Allowance::no_limit);
+  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_);
+  allowance_->set_gl(limited ? left / grids_ : Allowance::no_limit);
+}
+
+void Viewer::share_gl_anew() {
+  share_gl();
+  cells_due_ = true;
+  part_of_gl_ = allowance_->gl_bytes();
+}
+
+bool Viewer::fits(const Built& built) const {
+  Allowance part;
+  part.set_gl(part_of_gl_);
+  return !is_of_cells(built) || has_cells_allowed(built, part);
+}
+
+bool Viewer::makes_room(const Shown& shown) const {
+  return shown.is_seen() && shown.wish && shown.built && shelf_.busy() && !fits(*shown.built) && !grid_of(*shown.wish);
 }
 
 void Viewer::set_limits(const Limits& limits) {
-  // Asked for here alone, not in frames: how many cells are allowed follows what the pictures of each frame leave.
-  cells_due_ = cells_due_ || limits.gl_bytes != most_gl_bytes_ || limits.memory_bytes != allowance_->memory_bytes();
+  // Asked for here, and where there are more or fewer grids, not in frames: how many cells are allowed follows what the
+  // pictures of each frame leave.
+  const bool others = limits.gl_bytes != most_gl_bytes_ || limits.memory_bytes != allowance_->memory_bytes();
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
-  share_gl();
+  if (others) {
+    share_gl_anew();
+    wishes_due_ = wishes_due_ || !shown_.empty();
+  }
   sync();
   if (followed_) followed_->wish_due = true;
   for (const PlayedPtr& played : played_) played->followed.wish_due = true;
@@ -962,10 +1009,8 @@ void Viewer::fit_cells() {
   cells_due_ = false;
   const bool has_cells = volume_ && built_.source && built_.source->march == scene::March::tet;
   if (!has_cells || followed_ || watched_) return;
-  const std::uint64_t allowed = cells_allowed(built_, *allowance_);
-  const std::uint64_t granted = cells_granted(built_);
-  const bool wants_more = built_.limited || built_.source->plan;
-  if (allowed >= fewest_cells && (allowed < granted || (allowed > granted && wants_more))) request_build();
+  cuts_own_ = !has_cells_allowed(built_, *allowance_);
+  if (cuts_own_) request_build();
 }
 
 void Viewer::cancel() {
@@ -1520,6 +1565,7 @@ void Viewer::show_volumes() {
     return !volume.source->goes_with(first);
   };
   if (std::ranges::any_of(volumes, differs)) keep_to_one_march(volumes);
+  keep_until_cells_are_cut(volumes);
   scene_.volumes = std::move(volumes);
 }
 
@@ -1541,6 +1587,20 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
     volume.frame = was->frame;
   }
   std::erase_if(volumes, [&](const scene::Volume& volume) { return !fits(volume); });
+}
+
+void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const {
+  if (most_gl_bytes_ == Allowance::no_limit) return;
+  const bool own = cuts_own_ && builder_.busy() && !builder_.loads() && !stand_in_ && !followed_ && !watched_;
+  if (!own && std::ranges::none_of(shown_, [this](const Shown& shown) { return makes_room(shown); })) return;
+  const auto was = [&](const scene::Volume& volume) {
+    return std::ranges::find(scene_.volumes, volume.id, &scene::Volume::id);
+  };
+  std::erase_if(volumes, [&](const scene::Volume& volume) { return was(volume) == scene_.volumes.end(); });
+  for (scene::Volume& volume : volumes) {
+    volume.source = was(volume)->source;
+    volume.frame = was(volume)->frame;
+  }
 }
 
 scene::SnapshotPtr Viewer::snapshot() {

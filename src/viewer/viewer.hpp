@@ -301,6 +301,10 @@ class Viewer {
   void take_cells(const Context& g);
   // Tells builds what of GL memory the last frame left for volumes.
   void share_gl();
+  // Where limits are others, or grids more or fewer: for cells that are there, too.
+  void share_gl_anew();
+  // Whether a grid has as many cells as its part of GL memory takes.
+  [[nodiscard]] bool fits(const Built& built) const;
   // Of what is shown, this sequence's.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
   // A sequence that is followed: what was asked for, and taken.
@@ -472,10 +476,15 @@ class Viewer {
   // Of all that there are.
   [[nodiscard]] std::optional<Built> grid_of(const GridShelf::Wish& wish) const;
   void take_grids();
+  // Whether its grid is about to be another for others' sake, or for a smaller cap's.
+  [[nodiscard]] bool makes_room(const Shown& shown) const;
   // Whether a grid of one is there.
   [[nodiscard]] bool shows_instances() const;
   // Grids of one march and kind of cells are shown together.
   void keep_to_one_march(std::vector<scene::Volume>& volumes) const;
+  // Under a cap that is too small for all that there are grids go together, and others come with those that are
+  // coarser.
+  void keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const;
   // The snapshot's volumes.
   void show_volumes();
   // The scene as it is now: the last snapshot, if nothing changed.
@@ -587,8 +596,11 @@ class Viewer {
 
   std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
   std::uint64_t most_gl_bytes_ = Allowance::no_limit;
-  bool cells_due_ = false;               // limits are others, and the grid's cells may have to be
-  std::uint64_t gl_beside_volumes_ = 0;  // by the last frame
+  bool cells_due_ = false;                          // limits are others, and the grid's cells may have to be
+  std::uint64_t gl_beside_volumes_ = 0;             // by the last frame
+  bool cuts_own_ = false;                           // what is built is the viewer's own, of other cells for a cap
+  std::size_t grids_ = 1;                           // that share what there is for volumes, each with as much of it
+  std::uint64_t part_of_gl_ = Allowance::no_limit;  // of each, since that was last asked for
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -25,6 +26,7 @@ using cumulet::headless::Context;
 using cumulet::test::converge;
 using cumulet::test::difference;
 using cumulet::test::HostTarget;
+using cumulet::test::InstanceRef;
 using cumulet::test::load_gl;
 using cumulet::test::make_ball;
 using cumulet::test::make_desc;
@@ -283,6 +285,68 @@ TEST_F(Limits, CellsFollowTheCap) {
     EXPECT_EQ(settle().cells, cut.cells) << "once";
     limit(viewer, 0, 0);
     EXPECT_EQ(settle().cells, all.cells);
+  }
+}
+
+// Grids of other volumes have as much of the cap each, also those that come later, and refine again.
+TEST_F(Limits, InstancesShareTheCap) {
+  const std::vector<VolumeRef> balls = [] {
+    std::vector<VolumeRef> made;
+    for (const int size : {24, 56, 48, 40}) made.push_back(make_ball(size));
+    return made;
+  }();
+  for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
+    SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
+    const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
+    split_to_the_voxel(viewer, build);
+    std::vector<InstanceRef> instances;
+    const auto add = [&](std::size_t ball) {
+      auto desc = make_desc<cumulet_instance_desc>();
+      desc.volume = balls[ball].get();
+      cumulet_instance* out = nullptr;
+      std::array<char, 256> error{};
+      ASSERT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
+      instances.emplace_back(out);
+      ASSERT_EQ(cumulet_add_instance(viewer.get(), out), CUMULET_OK);
+    };
+    auto whole = target_.frame();
+    whole.target = CUMULET_TARGET_NONE;
+    const auto settle = [&] {
+      for (int i = 0; i < 4; ++i) {
+        EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+        converge(viewer.get(), whole);
+      }
+      return stats_of(viewer);
+    };
+    picture_of(viewer.get(), balls[0].get(), target_);
+    const cumulet_stats own = stats_of(viewer);
+    add(1);
+    add(2);
+    const cumulet_stats all = settle();
+    ASSERT_EQ(all.limited, 0);
+    ASSERT_GT(all.cells, own.cells);
+    // What is there is cut.
+    const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
+    limit(viewer, 0, room);
+    const cumulet_stats cut = settle();
+    EXPECT_LE(cut.gl_bytes, room);
+    EXPECT_LT(cut.cells, all.cells);
+    EXPECT_GT(cut.cells, all.cells / 12);
+    EXPECT_EQ(cut.limited, 1);
+    EXPECT_EQ(settle().cells, cut.cells) << "once";
+    // And makes room for another.
+    add(3);
+    const cumulet_stats more = settle();
+    EXPECT_LE(more.gl_bytes, room);
+    EXPECT_EQ(more.limited, 1);
+    EXPECT_GE(more.cell_bytes, 32 * more.cells) << "all are in GL";
+    // All are shown: without a limit all have their cells.
+    limit(viewer, 0, 0);
+    const cumulet_stats free = settle();
+    EXPECT_EQ(free.limited, 0);
+    EXPECT_GT(free.cells, all.cells);
+    for (const InstanceRef& instance : instances) cumulet_remove_instance(viewer.get(), instance.get());
+    EXPECT_EQ(settle().cells, own.cells);
   }
 }
 

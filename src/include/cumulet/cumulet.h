@@ -1193,10 +1193,11 @@ typedef struct cumulet_limits_desc {
    */
   uint64_t memory_bytes;
   /*
-   * GL memory. Cells, not instances', are as coarse as two fifths of what the last frame's rest leaves take
-   * (cumulet_stats.limited); those before them go first where both do not fit. Voxels are as they are: a volume that
-   * would bring gl_bytes above it, beside the one before, is not uploaded, and that one stays: cumulet_render tells
-   * CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and pictures count, and are not refused.
+   * GL memory. Cells are as coarse as two fifths of what the last frame's rest leaves take (cumulet_stats.limited), of
+   * several grids each an equal part; those before them go first where both do not fit, and what is added is shown once
+   * the others have made room. Voxels are as they are: a volume that would bring gl_bytes above it, beside the one
+   * before, is not uploaded, and that one stays: cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and
+   * pictures count, and are not refused.
    */
   uint64_t gl_bytes;
 } cumulet_limits_desc;
