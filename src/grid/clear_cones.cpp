@@ -83,7 +83,7 @@ class ClearMap {
   // Of a cell's cubes some may be beside the map, for they are looked at several together.
   static void fill(Rows& rows, int layer, int y, const uvec2& bits) {
     if (layer < 0 || layer >= side || y < 0 || y >= side) return;
-    uvec2& row = rows[static_cast<std::size_t>(layer * side + y)];
+    uvec2& row = rows[static_cast<std::uint32_t>(layer * side + y)];
     set(row.x, bits.x);
     set(row.y, bits.y);
   }
