@@ -27,6 +27,9 @@ CM_FN float cm_shape_inverse_unit(uint shape) {
   return uintBitsToFloat(0x7f000000u - floatBitsToUint(cm_shape_unit(shape)));
 }
 
+// The log2 size of the octree's cube that a cell is of.
+CM_FN uint cm_shape_cube_size(uint shape) { return cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u); }
+
 CM_FN float cm_pick(vec3 v, uint axis) { return axis == 0u ? v.x : (axis == 1u ? v.y : v.z); }
 // sign_bit: the lowest one.
 CM_FN float cm_signed(float value, uint sign_bit) {
@@ -244,7 +247,8 @@ CM_FN vec4 cm_fit(uint low_word, uint high_word) {
 }
 
 CM_FN vec4 cm_record_fit(uvec4 data) { return cm_fit(data.z, data.z == 0u ? 0u : data.w); }
-CM_FN uint cm_record_clear(uvec4 data) { return data.z == 0u ? data.w : 0u; }
+// Neither density nor light.
+CM_FN bool cm_record_is_empty(uvec4 data) { return data.z == 0u && (data.y & CM_RECORD_EMITS) == 0u; }
 CM_FN bool cm_record_is_clear(uvec4 data, uint cone) { return data.z == 0u && (data.w & cone) != 0u; }
 
 // That at o + t d, as a linear function of t: value at t = 0 in x, slope in y.

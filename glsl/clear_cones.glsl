@@ -14,7 +14,7 @@
 #define CM_CLEAR_CONES 24u
 #define CM_CLEAR_SIDE 64u
 // Rows along x stand by z and y, those along z, for cones along x, by x and y.
-#define CM_CLEAR_ROWS 4096u
+#define CM_CLEAR_ROWS (CM_CLEAR_SIDE * CM_CLEAR_SIDE)
 #define CM_CLEAR_ALONG_X 0u
 #define CM_CLEAR_ALONG_Z 1u
 
@@ -30,14 +30,14 @@ struct CmClearMap {
   uint shift;  // cubes are of 2^shift voxels
 };
 
-// Over the voxels from low to high.
+// Over the voxels from low to high, of as small cubes as do. As many of them as a side's length has may be one too few.
 CM_FN CmClearMap cm_clear_map(uvec3 low, uvec3 high) {
+  uvec3 last = high - uvec3(1u, 1u, 1u);
+  ivec3 lengths = ivec3(last - low);
   CmClearMap map;
-  map.shift = 0u;
-  for (uint s = 1u; s < 18u; ++s) {
-    ivec3 cubes = ivec3((high - uvec3(1u, 1u, 1u)) >> uvec3(map.shift)) - ivec3(low >> uvec3(map.shift));
-    if (max(cubes.x, max(cubes.y, cubes.z)) >= int(CM_CLEAR_SIDE)) map.shift = s;
-  }
+  map.shift = uint(max(findMSB(max(max(lengths.x, max(lengths.y, lengths.z)), 0)) - 5, 0));
+  ivec3 cubes = ivec3(last >> uvec3(map.shift)) - ivec3(low >> uvec3(map.shift));
+  if (max(cubes.x, max(cubes.y, cubes.z)) >= int(CM_CLEAR_SIDE)) map.shift += 1u;
   map.low = ivec3(low >> uvec3(map.shift));
   return map;
 }
@@ -55,8 +55,7 @@ CM_FN CmClearRange cm_clear_range(vec3 v0, uint shape, CmClearMap map) {
   vec3 v1 = cm_cell_vertex(v0, shape, 1u);
   vec3 v2 = cm_cell_vertex(v0, shape, 2u);
   vec3 v3 = cm_cell_vertex(v0, shape, 3u);
-  uint size = cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u);
-  uint step = max(size, map.shift + 2u) - map.shift - 2u;
+  uint step = max(cm_shape_cube_size(shape), map.shift + 2u) - map.shift - 2u;
   ivec3 at = ivec3(int(map.shift + step));
   range.step = 1 << int(step);
   range.first = ((ivec3(min(min(v0, v1), min(v2, v3))) >> at) << ivec3(int(step))) - map.low;
@@ -110,6 +109,8 @@ CM_FN uvec2 cm_clear_row(uvec2 full, uvec2 full_beside, uvec2 clear, uvec2 clear
 // Whether a cone's rays go towards higher cubes along an axis.
 CM_FN bool cm_clear_up(uint cone, uint axis) { return ((cone >> axis) & 1u) != 0u; }
 
+// Whose rows a cone's are numbered as.
+CM_FN uint cm_clear_rows(uint cone) { return cone < 8u ? CM_CLEAR_ALONG_Z : CM_CLEAR_ALONG_X; }
 // The row of a cone's that has a cube, and the cube's bit there.
 CM_FN uint cm_clear_row_of_cube(uint cone, ivec3 cube) {
   return uint(cone < 8u ? cube.x : cube.z) * CM_CLEAR_SIDE + uint(cube.y);

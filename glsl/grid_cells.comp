@@ -188,7 +188,7 @@ CmLeaf cm_fine_leaf(vec3 v0, uint shape, uint level, ivec3 voxel) {
 
 // Above bricks.
 CmLeaf cm_coarse_leaf(vec3 v0, uint shape, ivec3 voxel) {
-  uint size = cm_coarse_size(shape);
+  uint size = cm_shape_cube_size(shape);
   ivec3 corner = (voxel >> ivec3(int(size))) << ivec3(int(size));
   uint coarse = CM_COARSE_WORDS * cm_coarse_at(corner, size);
   if (coarse == 0u) {

@@ -31,7 +31,7 @@ const uint cm_first_part[11] = uint[11](CM_PARTS_OF_LEVELS);
 
 // Where a cell's records above bricks begin; 0: its cube has the same numbers all over.
 uint cm_coarse_records(vec3 v0, uint shape, ivec3 voxel, out ivec3 corner) {
-  uint size = cm_coarse_size(shape);
+  uint size = cm_shape_cube_size(shape);
   corner = (voxel >> ivec3(int(size))) << ivec3(int(size));
   return cm_coarse_channel_words(CM_RECORD_WORDS) * cm_coarse_at(corner, size);
 }

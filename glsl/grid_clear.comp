@@ -29,7 +29,7 @@ shared uvec2 cm_behind[CM_CLEAR_SIDE];
 void main() {
   uint cone = cm_first + gl_WorkGroupID.x;
   uint row = gl_LocalInvocationID.x;
-  uint full = cone < 8u ? 2u * CM_CLEAR_ROWS * CM_CLEAR_ALONG_Z : 2u * CM_CLEAR_ROWS * CM_CLEAR_ALONG_X;
+  uint full = 2u * CM_CLEAR_ROWS * cm_clear_rows(cone);
   uint clear = cm_clear_begins + 2u * CM_CLEAR_ROWS * cone;
   bool bits_up = cm_clear_up(cone, cm_clear_axis_of_bits(cone));
   uint beside = cm_clear_up(cone, cm_clear_axis_of_rows(cone)) ? row + 1u : row - 1u;
@@ -71,7 +71,7 @@ void main() {
   CmClearMap map = cm_clear_map(uvec3(cm_state.low[0], cm_state.low[1], cm_state.low[2]),
                                 uvec3(cm_state.high[0], cm_state.high[1], cm_state.high[2]));
   CmClearRange range = cm_clear_range(v0, shape, map);
-  bool empty = data.z == 0u && (data.y & CM_RECORD_EMITS) == 0u;
+  bool empty = cm_record_is_empty(data);
 #if CM_STAGE == 0
   if (empty) return;
 #else

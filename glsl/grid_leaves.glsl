@@ -32,7 +32,7 @@ ivec3 cm_leaf_voxel(vec3 v0, uint shape) {
   return ivec3(v0 + cm_from_frame(cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape), shape));
 }
 // Whether it is within a brick; then its level there.
-bool cm_is_fine(uint shape) { return cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u) <= 3u; }
+bool cm_is_fine(uint shape) { return cm_shape_cube_size(shape) <= 3u; }
 uint cm_fine_level(uint shape) {
   uint cell_class = cm_shape_class(shape);
   return 3u * (3u - cm_shape_exponent(shape)) - (cell_class == 1u ? 0u : (cell_class == 2u ? 2u : 1u));
@@ -51,9 +51,6 @@ ivec3 cm_voxel_steps(uint shape) {
 int cm_voxel_of_part(uint word, ivec3 steps) {
   return int(word & 15u) * steps.x + int((word >> 4) & 15u) * steps.y + int((word >> 8) & 15u) * steps.z;
 }
-
-// The octree's cube that a cell above bricks is of.
-uint cm_coarse_size(uint shape) { return cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u); }
 
 // The box of all that there is to see grows by the cell.
 void cm_put_in_box(vec3 v0, uint shape) {

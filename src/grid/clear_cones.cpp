@@ -27,8 +27,7 @@ void set(std::uint32_t& word, std::uint32_t bits) {
 }
 
 bool is_empty(const TetGrid& grid, std::size_t cell) {
-  const glm::uvec4& data = grid.cells[cell].data;
-  return data.z == 0 && (data.y & CM_RECORD_EMITS) == 0 && (grid.change.empty() || grid.change[cell] == uvec2(0U));
+  return core::cm_record_is_empty(grid.cells[cell].data) && (grid.change.empty() || grid.change[cell] == uvec2(0U));
 }
 
 class ClearMap {
@@ -88,7 +87,7 @@ class ClearMap {
     set(row.y, bits.y);
   }
   void sweep(std::uint32_t cone) {
-    const Rows& full = full_[cone < 8 ? CM_CLEAR_ALONG_Z : CM_CLEAR_ALONG_X];
+    const Rows& full = full_[core::cm_clear_rows(cone)];
     const bool rows_up = core::cm_clear_up(cone, core::cm_clear_axis_of_rows(cone));
     const bool bits_up = core::cm_clear_up(cone, core::cm_clear_axis_of_bits(cone));
     std::array<uvec2, CM_CLEAR_SIDE> behind;

@@ -65,6 +65,12 @@ bool apart_by_an_eighth(std::uint64_t a, std::uint64_t b) {
   return std::max(a, b) - std::min(a, b) > std::max(a, b) / 8;
 }
 
+// What was shown of a volume is shown on.
+void stay_with(scene::Volume& volume, const scene::Volume& was) {
+  volume.source = was.source;
+  volume.frame = was.frame;
+}
+
 // Of what is anywhere in a box.
 VolumeFactsPtr facts_of(const Bounds& bounds) {
   volume::ScalarVolume box;
@@ -905,7 +911,7 @@ void Viewer::wish_for_grids() {
     });
     wish_of[i] = static_cast<std::size_t>(same - wishes.begin());
     if (same == wishes.end()) {
-      wishes.push_back({shown.settings.volume, settings, part_of_gl_});
+      wishes.push_back({shown.settings.volume, settings});
     } else {
       join(same->settings, settings);
     }
@@ -917,14 +923,12 @@ void Viewer::wish_for_grids() {
                                        })) ||
       followed_ || watched_;
   const std::size_t grids = wishes.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
-  const bool others = grids_ != std::max<std::size_t>(grids, 1);
-  grids_ = std::max<std::size_t>(grids, 1);
-  if (most_gl_bytes_ != Allowance::no_limit) {
-    share_gl();
-    // What each frame leaves is never the same; an eighth is.
-    if (others || apart_by_an_eighth(part_of_gl_, allowance_->gl_bytes())) share_gl_anew();
-    for (GridShelf::Wish& wish : wishes) wish.gl_bytes = part_of_gl_;
-  }
+  const std::size_t before = std::exchange(grids_, std::max<std::size_t>(grids, 1));
+  share_gl();
+  // What each frame leaves is never the same; an eighth is.
+  const bool limited = most_gl_bytes_ != Allowance::no_limit;
+  if (limited && (grids_ != before || apart_by_an_eighth(part_of_gl_, allowance_->gl_bytes()))) share_gl_anew();
+  for (GridShelf::Wish& wish : wishes) wish.gl_bytes = part_of_gl_;
   waits_for_own_ = false;
   std::vector<GridShelf::Wish> to_build;
   for (GridShelf::Wish& wish : wishes) {
@@ -967,12 +971,11 @@ void Viewer::rebuild() {
 
 void Viewer::share_gl() {
   const bool limited = most_gl_bytes_ != Allowance::no_limit;
-  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_);
+  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_.value_or(0));
   allowance_->set_gl(limited ? left / grids_ : Allowance::no_limit);
 }
 
 void Viewer::share_gl_anew() {
-  share_gl();
   cells_due_ = true;
   part_of_gl_ = allowance_->gl_bytes();
 }
@@ -993,6 +996,7 @@ void Viewer::set_limits(const Limits& limits) {
   const bool others = limits.gl_bytes != most_gl_bytes_ || limits.memory_bytes != allowance_->memory_bytes();
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
+  share_gl();
   if (others) {
     share_gl_anew();
     wishes_due_ = wishes_due_ || !shown_.empty();
@@ -1007,8 +1011,7 @@ void Viewer::fit_cells() {
   // What is under way was begun under other limits, perhaps, or another volume comes.
   if (!cells_due_ || builder_.busy()) return;
   cells_due_ = false;
-  const bool has_cells = volume_ && built_.source && built_.source->march == scene::March::tet;
-  if (!has_cells || followed_ || watched_) return;
+  if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
   cuts_own_ = !has_cells_allowed(built_, *allowance_);
   if (cuts_own_) request_build();
 }
@@ -1582,9 +1585,7 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
     if (fits(volume)) continue;
     const auto was = std::ranges::find_if(
         scene_.volumes, [&](const scene::Volume& other) { return other.id == volume.id && fits(other); });
-    if (was == scene_.volumes.end()) continue;
-    volume.source = was->source;
-    volume.frame = was->frame;
+    if (was != scene_.volumes.end()) stay_with(volume, *was);
   }
   std::erase_if(volumes, [&](const scene::Volume& volume) { return !fits(volume); });
 }
@@ -1597,10 +1598,7 @@ void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const
     return std::ranges::find(scene_.volumes, volume.id, &scene::Volume::id);
   };
   std::erase_if(volumes, [&](const scene::Volume& volume) { return was(volume) == scene_.volumes.end(); });
-  for (scene::Volume& volume : volumes) {
-    volume.source = was(volume)->source;
-    volume.frame = was(volume)->frame;
-  }
+  for (scene::Volume& volume : volumes) stay_with(volume, *was(volume));
 }
 
 scene::SnapshotPtr Viewer::snapshot() {

@@ -301,7 +301,7 @@ class Viewer {
   void take_cells(const Context& g);
   // Tells builds what of GL memory the last frame left for volumes.
   void share_gl();
-  // Where limits are others, or grids more or fewer: for cells that are there, too.
+  // And where limits are others, or grids more or fewer, cells that are there.
   void share_gl_anew();
   // Whether a grid has as many cells as its part of GL memory takes.
   [[nodiscard]] bool fits(const Built& built) const;
@@ -597,7 +597,7 @@ class Viewer {
   std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
   std::uint64_t most_gl_bytes_ = Allowance::no_limit;
   bool cells_due_ = false;                          // limits are others, and the grid's cells may have to be
-  std::uint64_t gl_beside_volumes_ = 0;             // by the last frame
+  std::optional<std::uint64_t> gl_beside_volumes_;  // by the last frame
   bool cuts_own_ = false;                           // what is built is the viewer's own, of other cells for a cap
   std::size_t grids_ = 1;                           // that share what there is for volumes, each with as much of it
   std::uint64_t part_of_gl_ = Allowance::no_limit;  // of each, since that was last asked for

@@ -268,7 +268,7 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     // Wishes before the first frame did not know what pictures take.
-    if (gl_beside_volumes_ == 0 && most_gl_bytes_ != Allowance::no_limit) wishes_due_ = wishes_due_ || !shown_.empty();
+    if (!gl_beside_volumes_ && most_gl_bytes_ != Allowance::no_limit) wishes_due_ = wishes_due_ || !shown_.empty();
     gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
     share_gl();
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));

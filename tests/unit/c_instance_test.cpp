@@ -32,11 +32,7 @@ InstanceRef make_instance(cumulet_volume* volume, const std::array<double, 16>& 
   auto desc = make_desc<cumulet_instance_desc>();
   desc.volume = volume;
   std::ranges::copy(place, desc.to_world);
-  cumulet_instance* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_instance_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return InstanceRef(out);
+  return cumulet::test::make_instance(desc);
 }
 
 class CInstance : public testing::Test {

@@ -1,15 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <bit>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "grid/cell.hpp"
 #include "grid/clear_cones.hpp"
-#include "grid/refine.hpp"
-#include "grid/statistics.hpp"
-#include "grid/tet_grid.hpp"
+#include "support/grid_reference.hpp"
 #include "support/volumes.hpp"
 #include "support/wide_volumes.hpp"
 
@@ -19,13 +17,8 @@ using namespace cumulet;
 using glm::ivec3;
 using glm::vec3;
 
-grid::TetGrid grid_of(const volume::ScalarVolume& volume, const grid::RefineSettings& settings,
-                      const grid::Channels& channels = {}) {
-  const grid::Statistics statistics(volume, grid::fit_cube(volume));
-  const grid::DiamondSet diamonds(statistics, settings);
-  grid::GridBuilder builder(statistics, diamonds);
-  builder.bisect();
-  return builder.records(settings.cells, volume.max_value, channels);
+grid::TetGrid grid_of(volume::ScalarVolume volume, const grid::RefineSettings& settings) {
+  return test::GridReference(std::move(volume)).grid(settings);
 }
 
 class Rays {
@@ -56,7 +49,7 @@ class Rays {
   [[nodiscard]] bool meets(std::uint32_t cell, const vec3& o, const vec3& d) const {
     while (cell != CM_NONE) {
       const glm::uvec4& data = grid_.cells[cell].data;
-      if (data.z != 0 || (data.y & CM_RECORD_EMITS) != 0) return true;
+      if (!core::cm_record_is_empty(data)) return true;
       if (!grid_.change.empty() && grid_.change[cell] != glm::uvec2(0U)) return true;
       const std::uint32_t shape = core::cm_record_shape(data, wide_);
       const glm::vec4 faces =
@@ -87,7 +80,7 @@ Found look(const grid::TetGrid& grid) {
     if (data.z != 0) continue;
     for (std::uint32_t cone = 0; cone < CM_CLEAR_CONES; ++cone) {
       ++found.cones;
-      if ((core::cm_record_clear(data) >> cone & 1U) == 0) continue;
+      if (!core::cm_record_is_clear(data, 1U << cone)) continue;
       ++found.clear;
       if (rays.meets(cell, rays.within(cell), rays.within_cone(cone))) ++found.wrong;
     }
@@ -144,7 +137,7 @@ TEST(ClearCones, AreFoundAllAroundABall) {
     if (data.z != 0 || glm::length(out) < radius + 4.0F || glm::any(glm::greaterThan(glm::abs(out), vec3(radius))))
       continue;
     ++cells;
-    if ((core::cm_record_clear(data) & core::cm_clear_cone(out)) != 0) ++clear;
+    if (core::cm_record_is_clear(data, core::cm_clear_cone(out))) ++clear;
   }
   EXPECT_GT(cells, 1000U);
   EXPECT_GT(clear, cells * 8 / 10) << "of " << cells;

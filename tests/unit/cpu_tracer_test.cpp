@@ -1,6 +1,7 @@
 // The tracer against its own source on the CPU.
 
 #include "support/cpu_tracer.hpp"
+#include "support/grid_reference.hpp"
 
 #include <gtest/gtest.h>
 
@@ -33,11 +34,21 @@ viewer::GridSettings settings_of(March march, double threshold = 0.02) {
 }
 
 grid::TetGrid grid_of(const volume::ScalarVolume& volume, const viewer::GridSettings& settings) {
-  const grid::Statistics statistics(volume, grid::fit_cube(volume));
-  const grid::DiamondSet diamonds(statistics, settings.build.refine);
-  grid::GridBuilder builder(statistics, diamonds);
-  builder.bisect();
-  return builder.records(settings.build.refine.cells, volume.max_value);
+  return test::GridReference(volume).grid(settings.build.refine);
+}
+
+core::CpuTet twin_of(test::Still& shown, const grid::TetGrid& grid, std::uint32_t samples) {
+  core::CpuTet twin;
+  twin.cm = shown.viewer().trace_parameters();
+  twin.cm.dispatch.samples = samples;
+  twin.grid = &grid;
+  return twin;
+}
+
+void show(test::Still& in, const volume::ScalarVolume& volume, double density_scale) {
+  in.set_volume(volume);
+  in.set_medium({density_scale, vec3(0.9F), {0.4F}, 0});
+  in.set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
 }
 
 /// The share of pixels that are the twin's.
@@ -56,19 +67,14 @@ double same_pixels(Twin& twin, const test::Picture& gpu) {
 TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
   const auto volume = test::noise_volume({40, 36, 30}, ivec3(0), 2);
   const auto viewer = make();
-  viewer->set_volume(volume);
-  viewer->set_medium({0.3, vec3(0.9F), {0.4F}, 0});
-  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  show(*viewer, volume, 0.3);
   const test::Image image{24, 24, 1, 5, render::View::shaded};
 
   // Where a logarithm or a cosine rounds the other way, a path may part from its twin.
   viewer->set_grid(settings_of(March::tet));
   const test::Picture tet = test::render(*viewer, image);
   const grid::TetGrid grid = grid_of(volume, settings_of(March::tet));
-  core::CpuTet cpu_tet;
-  cpu_tet.cm = viewer->viewer().trace_parameters();
-  cpu_tet.cm.dispatch.samples = image.samples;
-  cpu_tet.grid = &grid;
+  core::CpuTet cpu_tet = twin_of(*viewer, grid, image.samples);
   EXPECT_GT(same_pixels(cpu_tet, tet), 0.99);
 
   viewer->set_grid(settings_of(March::dense));
@@ -85,23 +91,15 @@ TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
 TEST_P(CpuTracer, WhereNothingIsMetAnyMorePathsEndAndTheSameBitsStay) {
   const auto volume = test::puffs({40, 36, 30}, ivec3(0));
   const auto viewer = make();
-  viewer->set_volume(volume);
-  viewer->set_medium({9.0, vec3(0.9F), {0.4F}, 0});
-  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  show(*viewer, volume, 9.0);
   const test::Image image{24, 24, 4, 5, render::View::shaded};
   viewer->set_grid(settings_of(March::tet));
   test::render(*viewer, image);
   const grid::TetGrid with = grid_of(volume, settings_of(March::tet));
-  grid::TetGrid without = with;
-  for (grid::CellRecord& cell : without.cells) {
-    if (cell.data.z == 0) cell.data.w = 0;
-  }
+  const grid::TetGrid without = test::without_clear_cones(with);
   const auto trace = [&](const grid::TetGrid& grid) {
     std::vector<glm::vec4> sums;
-    core::CpuTet twin;
-    twin.cm = viewer->viewer().trace_parameters();
-    twin.cm.dispatch.samples = image.samples;
-    twin.grid = &grid;
+    core::CpuTet twin = twin_of(*viewer, grid, image.samples);
     std::size_t steps = 0;
     for (std::uint32_t i = 0; i < image.width * image.height; ++i) {
       const core::CpuTet::CmPixel pixel = twin.traced({i % image.width, i / image.width});

@@ -119,10 +119,9 @@ class Cryptomatte : public CViewerTest {
     desc.medium = &medium;
     std::ranges::copy(at(0.0, 0.0, z), desc.to_world);
     desc.tag = tag;
-    cumulet_instance* made = nullptr;
-    EXPECT_EQ(cumulet_instance_create(&desc, &made, nullptr, 0), CUMULET_OK);
-    EXPECT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
-    return InstanceRef(made);
+    InstanceRef made = cumulet::test::make_instance(desc);
+    EXPECT_EQ(cumulet_add_instance(v_, made.get()), CUMULET_OK);
+    return made;
   }
   void march(cumulet_march march) {
     auto grid = make_desc<cumulet_grid_desc>();

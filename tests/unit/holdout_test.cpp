@@ -192,9 +192,8 @@ TEST_P(Holdout, OfOneVolumeAmongOthers) {
   auto desc = make_desc<cumulet_instance_desc>();
   desc.volume = ball_.get();
   desc.medium = &medium;
-  cumulet_instance* made = nullptr;
-  ASSERT_EQ(cumulet_instance_create(&desc, &made, nullptr, 0), CUMULET_OK);
-  const InstanceRef other(made);
+  const InstanceRef other = cumulet::test::make_instance(desc);
+  cumulet_instance* const made = other.get();
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
   samples(8);
   const auto put = [&](double z) {

@@ -147,8 +147,7 @@ TEST(Lattice, CoarseCellsHaveTheirRecords) {
     const auto look_up = [&](const grid::CellRecord& cell) {
       const std::uint32_t shape = core::cm_record_shape(cell.data);
       const vec3 v0 = core::cm_record_v0(cell.data);
-      const std::uint32_t cell_class = core::cm_shape_class(shape);
-      const int size = static_cast<int>(core::cm_shape_exponent(shape)) + (cell_class == 1 ? 0 : 1);
+      const int size = static_cast<int>(core::cm_shape_cube_size(shape));
       if (size <= 3) return;
       vec3 middle(0.0F);
       for (std::uint32_t i = 0; i < 4; ++i) middle += 0.25F * core::cm_cell_vertex(v0, shape, i);

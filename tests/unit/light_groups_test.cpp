@@ -256,9 +256,8 @@ TEST_P(LightGroups, OfInstancesAreTheirMedias) {
   desc.medium = &medium;
   const auto place = at(6.0, 3.0, 0.0);
   std::copy(place.begin(), place.end(), desc.to_world);
-  cumulet_instance* made = nullptr;
-  ASSERT_EQ(cumulet_instance_create(&desc, &made, nullptr, 0), CUMULET_OK);
-  const InstanceRef instance(made);
+  const InstanceRef instance = cumulet::test::make_instance(desc);
+  cumulet_instance* const made = instance.get();
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
   auto far = make_desc<cumulet_light_desc>();
   ASSERT_EQ(cumulet_set_light(v_, &far), CUMULET_OK);

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -30,6 +29,7 @@ using cumulet::test::InstanceRef;
 using cumulet::test::load_gl;
 using cumulet::test::make_ball;
 using cumulet::test::make_desc;
+using cumulet::test::make_instance;
 using cumulet::test::make_viewer;
 using cumulet::test::picture_of;
 using cumulet::test::ViewerPtr;
@@ -124,6 +124,28 @@ class Limits : public testing::Test {
     auto stats = make_desc<cumulet_stats>();
     EXPECT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
     return stats;
+  }
+  // By frames alone; then nothing is under way, nor has failed.
+  cumulet_stats settle(const ViewerPtr& viewer) {
+    auto whole = target_.frame();
+    whole.target = CUMULET_TARGET_NONE;
+    for (int i = 0; i < 4; ++i) {
+      converge(viewer.get(), whole);
+      EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+    }
+    return stats_of(viewer);
+  }
+  // A cap that is an eighth of the cells too small cuts them, once, and leaves more than such a part. Returns the cap.
+  std::uint64_t expect_cut(const ViewerPtr& viewer, const cumulet_stats& all, std::uint64_t part) {
+    const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
+    limit(viewer, 0, room);
+    const cumulet_stats cut = settle(viewer);
+    EXPECT_LE(cut.gl_bytes, room);
+    EXPECT_LT(cut.cells, all.cells);
+    EXPECT_GT(cut.cells, all.cells / part);
+    EXPECT_EQ(cut.limited, 1);
+    EXPECT_EQ(settle(viewer).cells, cut.cells) << "once";
+    return room;
   }
 
   Context context_ = Context::create(Backend::automatic);
@@ -269,22 +291,9 @@ TEST_F(Limits, CellsFollowTheCap) {
     picture_of(viewer.get(), ball.get(), target_);
     const cumulet_stats all = stats_of(viewer);
     ASSERT_EQ(all.limited, 0);
-    auto whole = target_.frame();
-    whole.target = CUMULET_TARGET_NONE;
-    const auto settle = [&] {
-      for (int i = 0; i < 3; ++i) converge(viewer.get(), whole);
-      return stats_of(viewer);
-    };
-    const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
-    limit(viewer, 0, room);
-    const cumulet_stats cut = settle();
-    EXPECT_LE(cut.gl_bytes, room);
-    EXPECT_LT(cut.cells, all.cells);
-    EXPECT_GT(cut.cells, all.cells / 10);
-    EXPECT_EQ(cut.limited, 1);
-    EXPECT_EQ(settle().cells, cut.cells) << "once";
+    expect_cut(viewer, all, 10);
     limit(viewer, 0, 0);
-    EXPECT_EQ(settle().cells, all.cells);
+    EXPECT_EQ(settle(viewer).cells, all.cells);
   }
 }
 
@@ -303,50 +312,30 @@ TEST_F(Limits, InstancesShareTheCap) {
     const auto add = [&](std::size_t ball) {
       auto desc = make_desc<cumulet_instance_desc>();
       desc.volume = balls[ball].get();
-      cumulet_instance* out = nullptr;
-      std::array<char, 256> error{};
-      ASSERT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
-      instances.emplace_back(out);
-      ASSERT_EQ(cumulet_add_instance(viewer.get(), out), CUMULET_OK);
-    };
-    auto whole = target_.frame();
-    whole.target = CUMULET_TARGET_NONE;
-    const auto settle = [&] {
-      for (int i = 0; i < 4; ++i) {
-        EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
-        converge(viewer.get(), whole);
-      }
-      return stats_of(viewer);
+      instances.push_back(make_instance(desc));
+      ASSERT_EQ(cumulet_add_instance(viewer.get(), instances.back().get()), CUMULET_OK);
     };
     picture_of(viewer.get(), balls[0].get(), target_);
     const cumulet_stats own = stats_of(viewer);
     add(1);
     add(2);
-    const cumulet_stats all = settle();
+    const cumulet_stats all = settle(viewer);
     ASSERT_EQ(all.limited, 0);
     ASSERT_GT(all.cells, own.cells);
-    // What is there is cut.
-    const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
-    limit(viewer, 0, room);
-    const cumulet_stats cut = settle();
-    EXPECT_LE(cut.gl_bytes, room);
-    EXPECT_LT(cut.cells, all.cells);
-    EXPECT_GT(cut.cells, all.cells / 12);
-    EXPECT_EQ(cut.limited, 1);
-    EXPECT_EQ(settle().cells, cut.cells) << "once";
-    // And makes room for another.
+    // What is there is cut, and makes room for another.
+    const std::uint64_t room = expect_cut(viewer, all, 12);
     add(3);
-    const cumulet_stats more = settle();
+    const cumulet_stats more = settle(viewer);
     EXPECT_LE(more.gl_bytes, room);
     EXPECT_EQ(more.limited, 1);
     EXPECT_GE(more.cell_bytes, 32 * more.cells) << "all are in GL";
     // All are shown: without a limit all have their cells.
     limit(viewer, 0, 0);
-    const cumulet_stats free = settle();
+    const cumulet_stats free = settle(viewer);
     EXPECT_EQ(free.limited, 0);
     EXPECT_GT(free.cells, all.cells);
     for (const InstanceRef& instance : instances) cumulet_remove_instance(viewer.get(), instance.get());
-    EXPECT_EQ(settle().cells, own.cells);
+    EXPECT_EQ(settle(viewer).cells, own.cells);
   }
 }
 

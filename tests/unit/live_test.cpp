@@ -521,11 +521,9 @@ InstanceRef stand(const ViewerPtr& viewer, const std::variant<cumulet_volume*, c
     desc.live = std::get<1>(of);
   }
   std::ranges::copy(at(x, 0, 0), desc.to_world);
-  std::array<char, 256> error{};
-  cumulet_instance* out = nullptr;
-  EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
-  EXPECT_EQ(cumulet_add_instance(viewer.get(), out), CUMULET_OK) << cumulet_last_error(viewer.get());
-  return InstanceRef(out);
+  InstanceRef made = cumulet::test::make_instance(desc);
+  EXPECT_EQ(cumulet_add_instance(viewer.get(), made.get()), CUMULET_OK) << cumulet_last_error(viewer.get());
+  return made;
 }
 
 cumulet_live_info told_of(const ViewerPtr& viewer, const InstanceRef& instance) {

@@ -308,9 +308,8 @@ TEST_P(Motion, OfAnInstanceIsItsOwn) {
   const VolumeRef plate = make_plate(dvec3(0.0));
   auto desc = make_desc<cumulet_instance_desc>();
   desc.volume = plate.get();
-  cumulet_instance* made = nullptr;
-  ASSERT_EQ(cumulet_instance_create(&desc, &made, nullptr, 0), CUMULET_OK);
-  const InstanceRef instance(made);
+  const InstanceRef instance = cumulet::test::make_instance(desc);
+  cumulet_instance* const made = instance.get();
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
   ASSERT_EQ(cumulet_instance_set_previous(made, glm::value_ptr(turned)), CUMULET_OK);
   then(std::nullopt);

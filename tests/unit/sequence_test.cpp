@@ -560,11 +560,7 @@ InstanceRef make_instance(cumulet_sequence* sequence, double x = 0.0, double den
   desc.medium = &medium;
   for (int i = 0; i < 16; i += 5) desc.to_world[i] = 1.0;
   desc.to_world[12] = x;
-  cumulet_instance* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_instance_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return InstanceRef(out);
+  return cumulet::test::make_instance(desc);
 }
 
 class PlayedInstances : public CSequence {
@@ -583,10 +579,8 @@ class PlayedInstances : public CSequence {
       desc.volume = volume;
       for (int i = 0; i < 16; i += 5) desc.to_world[i] = 1.0;
       desc.to_world[12] = x;
-      cumulet_instance* out = nullptr;
-      EXPECT_EQ(cumulet_instance_create(&desc, &out, nullptr, 0), CUMULET_OK);
-      instances.emplace_back(out);
-      EXPECT_EQ(cumulet_add_instance(viewer.get(), out), CUMULET_OK);
+      instances.push_back(cumulet::test::make_instance(desc));
+      EXPECT_EQ(cumulet_add_instance(viewer.get(), instances.back().get()), CUMULET_OK);
     }
     see_all(viewer.get());
     return picture(viewer.get());

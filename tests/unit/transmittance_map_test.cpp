@@ -301,9 +301,7 @@ TEST_F(TransmittanceMaps, AreOfAllInstancesWhereTheyStand) {
   desc.volume = blob_.get();
   desc.medium = &medium;
   for (int i = 0; i < 16; ++i) desc.to_world[i] = place[i / 4][i % 4];
-  cumulet_instance* out = nullptr;
-  ASSERT_EQ(cumulet_instance_create(&desc, &out, nullptr, 0), CUMULET_OK);
-  const InstanceRef one(out);
+  const InstanceRef one = cumulet::test::make_instance(desc);
   ASSERT_EQ(cumulet_add_instance(viewer_.get(), one.get()), CUMULET_OK);
   converge(viewer_.get(), target_.frame());
   standing_.push_back({place, 0.2});

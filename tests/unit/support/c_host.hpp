@@ -83,6 +83,15 @@ inline VolumeRef make_dense(const cumulet_dense_desc& desc) {
   return VolumeRef(out);
 }
 
+/// Throws std::runtime_error.
+inline InstanceRef make_instance(const cumulet_instance_desc& desc) {
+  cumulet_instance* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_instance_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return InstanceRef(out);
+}
+
 /// A lumpy ball of size^3 voxels centred on the origin, as a dense array.
 inline VolumeRef make_ball(int size, float density = 0.4F) {
   std::vector<float> values;
