@@ -15,6 +15,7 @@
 #define CM_CLEAR_SIDE 64u
 // Rows along x stand by z and y, those along z, for cones along x, by x and y.
 #define CM_CLEAR_ROWS (CM_CLEAR_SIDE * CM_CLEAR_SIDE)
+#define CM_CLEAR_CUBES (CM_CLEAR_ROWS * CM_CLEAR_SIDE)
 #define CM_CLEAR_ALONG_X 0u
 #define CM_CLEAR_ALONG_Z 1u
 
@@ -104,6 +105,14 @@ CM_FN uvec2 cm_clear_row(uvec2 full, uvec2 full_beside, uvec2 clear, uvec2 clear
   uvec2 any = full | full_beside;
   uvec2 both = clear & clear_beside;
   return ~(any | cm_clear_shifted(any, up, 0u)) & both & cm_clear_shifted(both, up, 1u);
+}
+
+// Cubes by number.
+CM_FN uint cm_clear_number(ivec3 cube) {
+  return (uint(cube.z) * CM_CLEAR_SIDE + uint(cube.y)) * CM_CLEAR_SIDE + uint(cube.x);
+}
+CM_FN uvec3 cm_clear_cube(uint number) {
+  return uvec3(number % CM_CLEAR_SIDE, number / CM_CLEAR_SIDE % CM_CLEAR_SIDE, number / CM_CLEAR_ROWS);
 }
 
 // Whether a cone's rays go towards higher cubes along an axis.

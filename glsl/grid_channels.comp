@@ -22,7 +22,6 @@ layout(local_size_x = 64) in;
 #define CM_RECORD_WORDS 1u
 #endif
 
-layout(std430, binding = CM_STORAGE_GRID_ORDER) readonly buffer CmOrder { uvec2 cm_order[]; };
 layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { float cm_numbers[]; };  // grid::ChannelNumbers
 layout(std430, binding = CM_STORAGE_GRID_COARSE) readonly buffer CmCoarse { uint cm_coarse[]; };
 layout(std430, binding = CM_STORAGE_GRID_CHANNEL) buffer CmChannel { uint cm_channel[]; };  // CM_RECORD_WORDS each
@@ -179,9 +178,8 @@ void cm_put(vec3 v0, uint shape, uint rank) {
 #endif
 
 void main() {
-  uint i = cm_first + gl_GlobalInvocationID.x;
-  if (i >= cm_end) return;
-  CmTreeCell cell = cm_cells[i];
-  if (cell.child != 0u) return;
-  cm_put(cm_v0_of(cell.where), cm_shape_of(cell.where), cm_order[i].x);
+  uint at = cm_first + gl_GlobalInvocationID.x;
+  if (at >= cm_end) return;
+  CmTreeCell cell = cm_cells[cm_list[at]];
+  cm_put(cm_v0_of(cell.where), cm_shape_of(cell.where), cell.rank);
 }

@@ -1,7 +1,8 @@
 #version 450
 // The clear cones of a grid's empty cells, which rays end by: what src/grid/clear_cones.cpp computes.
-// CM_STAGE 0: cubes that have anything. 1: cubes that are clear, a work group a cone. 2: cells.
-// variants: CM_STAGE=0,1,2
+// CM_STAGE 0: cubes that have anything. 1: cubes that are clear, a work group a cone. 2: which cones each cube is clear
+// in. 3: cells.
+// variants: CM_STAGE=0,1,2,3
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -12,13 +13,15 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = CM_STORAGE_GRID_STATE) readonly buffer CmState { CmGridState cm_state; };
 layout(std430, binding = CM_STORAGE_GRID_RECORDS) buffer CmRecords { uvec4 cm_records[]; };
-// Rows along x and along z that say which cubes are full, two words each; then those of each cone, which are clear.
+// Rows along x and along z that say which cubes are full, two words each; then those of each cone, which are clear; then
+// a word a cube, of its cones.
 layout(std430, binding = CM_STORAGE_GRID_CLEAR) buffer CmClear { uint cm_clear[]; };
 layout(location = 0) uniform uint cm_first;
 layout(location = 1) uniform uint cm_end;
 layout(location = 2) uniform uint cm_log2_size;  // of the cube
 
 const uint cm_clear_begins = 4u * CM_CLEAR_ROWS;
+const uint cm_cubes_begin = cm_clear_begins + 2u * CM_CLEAR_CONES * CM_CLEAR_ROWS;
 
 uvec2 cm_row(uint word) { return uvec2(cm_clear[word], cm_clear[word + 1u]); }
 
@@ -49,6 +52,21 @@ void main() {
     cm_behind[row] = here;
     barrier();
   }
+}
+
+#elif CM_STAGE == 2
+
+void main() {
+  uint i = cm_first + gl_GlobalInvocationID.x;
+  if (i >= cm_end) return;
+  ivec3 cube = ivec3(cm_clear_cube(i));
+  uint cones = 0u;
+  for (uint cone = 0u; cone < CM_CLEAR_CONES; ++cone) {
+    uint bit = cm_clear_bit_of_cube(cone, cube);
+    uint word = cm_clear_begins + 2u * (CM_CLEAR_ROWS * cone + cm_clear_row_of_cube(cone, cube)) + bit / 32u;
+    cones |= ((cm_clear[word] >> (bit % 32u)) & 1u) << cone;
+  }
+  cm_clear[cm_cubes_begin + i] = cones;
 }
 
 #else
@@ -93,16 +111,12 @@ void main() {
           }
         }
 #else
-        for (uint cone = 0u; cone < CM_CLEAR_CONES; ++cone) {
-          uint bit = cm_clear_bit_of_cube(cone, at);
-          uint word = cm_clear_begins + 2u * (CM_CLEAR_ROWS * cone + cm_clear_row_of_cube(cone, at)) + bit / 32u;
-          if (((cm_clear[word] >> (bit % 32u)) & 1u) == 0u) cones &= ~(1u << cone);
-        }
+        cones &= cm_clear[cm_cubes_begin + cm_clear_number(at)];
 #endif
       }
     }
   }
-#if CM_STAGE == 2
+#if CM_STAGE == 3
   cm_records[2u * i + 1u].w = cones;
 #endif
 }

@@ -4,11 +4,14 @@
 
 struct CmTreeCell {
   uint child;   // the first of two; 0: a leaf
-  uint leaves;  // below it, itself if it is one
+  uint rank;    // how many leaves are before it in the order
   uvec2 where;  // v0 and shape, as in a record
 };
 layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };
 layout(std430, binding = CM_STORAGE_GRID_CELLS) buffer CmCells { CmTreeCell cm_cells[]; };
+// Which cells split, and behind these which are leaves, each level by level: so kernels that are of the one or the other
+// have no idle lanes.
+layout(std430, binding = CM_STORAGE_GRID_LIST) buffer CmList { uint cm_list[]; };
 layout(location = 0) uniform uint cm_first;
 layout(location = 1) uniform uint cm_end;
 
@@ -54,13 +57,14 @@ int cm_voxel_of_part(uint word, ivec3 steps) {
 
 // The box of all that there is to see grows by the cell.
 void cm_put_in_box(vec3 v0, uint shape) {
-  for (uint k = 0u; k < 4u; ++k) {
-    vec3 vertex = cm_cell_vertex(v0, shape, k);
-    uint at[3] = uint[3](uint(vertex.x), uint(vertex.y), uint(vertex.z));
-    for (uint axis = 0u; axis < 3u; ++axis) {
-      if (at[axis] < cm_state.low[axis]) atomicMin(cm_state.low[axis], at[axis]);
-      if (at[axis] > cm_state.high[axis]) atomicMax(cm_state.high[axis], at[axis]);
-    }
+  vec3 v1 = cm_cell_vertex(v0, shape, 1u);
+  vec3 v2 = cm_cell_vertex(v0, shape, 2u);
+  vec3 v3 = cm_cell_vertex(v0, shape, 3u);
+  uvec3 low = uvec3(min(min(v0, v1), min(v2, v3)));
+  uvec3 high = uvec3(max(max(v0, v1), max(v2, v3)));
+  for (uint axis = 0u; axis < 3u; ++axis) {
+    if (low[axis] < cm_state.low[axis]) atomicMin(cm_state.low[axis], low[axis]);
+    if (high[axis] > cm_state.high[axis]) atomicMax(cm_state.high[axis], high[axis]);
   }
 }
 

@@ -30,13 +30,12 @@ uint cm_slot_of(ivec3 vertex) {
 // Whose values a voxel has.
 uint cm_brick_at(ivec3 voxel) {
   uint block = CM_TOP_BLOCK;
-  uint brick = 0u;
+  uint at = 0u;
   for (uint scale = cm_log2_size / 3u; scale > 0u && block != 0u; --scale) {
-    uint at = block * CM_BLOCK_POINTS + cm_in_block(voxel >> ivec3(int(3u * scale)));
+    at = block * CM_BLOCK_POINTS + cm_in_block(voxel >> ivec3(int(3u * scale)));
     block = cm_places[at].block;
-    brick = cm_places[at].brick;
   }
-  return brick;
+  return cm_places[at].brick;
 }
 
 // The cells of the octree's cube of 2^size voxels at this corner; 0: it has one value.

@@ -2,6 +2,7 @@
 #ifndef CM_GRID_STATE_GLSL
 #define CM_GRID_STATE_GLSL
 
+#define CM_ROOTS 24u
 #define CM_SPLIT_LEVELS 52u    // of the largest cube that there can be
 #define CM_PRIORITIES 65536u
 
@@ -12,7 +13,8 @@ struct CmGridState {
   uint low[3];    // box of the cells that have density, in voxels
   uint high[3];
   uint added[CM_SPLIT_LEVELS];   // cells that the splits of a level add
-  uint placed[CM_SPLIT_LEVELS];  // pairs of a level's children that have a place
+  uint split;                    // cells that have been found to split, and to be leaves
+  uint leaves;
   uint glowing;                  // cells that give off light
 };
 

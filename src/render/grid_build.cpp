@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+#include <ranges>
 #include <set>
 #include <span>
 #include <string>
@@ -29,22 +30,25 @@ namespace {
 
 constexpr std::uint32_t group = 64;  // invocations of a work group, of all kernels here
 constexpr std::size_t roots_words = 52;
+constexpr double parts_weight = 0.05;      // of a cell's parts, beside the rest of its record
 constexpr double most_in_flight_ms = 8.0;  // whatever the deadline: the host draws, too
 
-// As glsl/grid_cells.comp has it.
+// As glsl/grid_leaves.glsl has it.
 struct TreeCell {
   std::uint32_t child;
-  std::uint32_t leaves;
+  std::uint32_t rank;
   glm::uvec2 where;
 };
 static_assert(sizeof(TreeCell) == 16);
 
-// With their links and their place in the order.
-constexpr std::uint64_t tree_cell_bytes = sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2);
+// With their links, what is below them, and their place in the list.
+constexpr std::uint64_t tree_cell_bytes =
+    sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2) + sizeof(std::uint32_t);
 
-// As glsl/grid_clear.comp has them: rows of what is full, then those of each cone.
+// As glsl/grid_clear.comp has them: rows of what is full, those of each cone, and the cones of each cube.
 constexpr std::uint64_t full_bytes = std::uint64_t{2} * CM_CLEAR_ROWS * sizeof(glm::uvec2);
-constexpr std::uint64_t clear_bytes = full_bytes + std::uint64_t{CM_CLEAR_CONES} * CM_CLEAR_ROWS * sizeof(glm::uvec2);
+constexpr std::uint64_t clear_bytes = full_bytes + std::uint64_t{CM_CLEAR_CONES} * CM_CLEAR_ROWS * sizeof(glm::uvec2) +
+                                      std::uint64_t{CM_CLEAR_CUBES} * sizeof(std::uint32_t);
 
 using BrickPointWords = std::array<std::uint32_t, (CM_BRICK_POINTS + 3) / 4 * 4>;
 BrickPointWords brick_point_words() {
@@ -464,7 +468,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   const gl::Program& program = programs_->ask(pass.key);
   if (!program.usable()) return std::nullopt;
   constexpr std::uint32_t most_groups = 65535;  // that every driver takes
-  const double ms = pace_->ms(pass.key, pass.cost * cost_ms(*gl_));
+  const double ms = pass.weight * pace_->ms(pass.key, pass.cost * cost_ms(*gl_));
   const double fit = std::clamp(aim_ms() / ms, double{group}, double{most_groups} * (pass.item_a_group ? 1.0 : group));
   const std::uint32_t items = std::min(static_cast<std::uint32_t>(fit), end - first);
   const gl::DebugGroup debug(*gl_, "cumulet: grid");
@@ -476,7 +480,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   const auto begun = std::chrono::steady_clock::now();
   gl_->DispatchCompute(pass.item_a_group ? items : (items + group - 1) / group, 1, 1);
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), static_cast<double>(items)};
+  const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), pass.weight * items};
   if (gl_->dispatches_in_call) {
     pace_->learn({sent}, milliseconds(std::chrono::steady_clock::now() - begun), GridPace::Measured::exactly);
     return first + items;
@@ -576,17 +580,26 @@ void GridBuild::plan_decision() {
   plan_read_back(decision_);
 }
 
-void GridBuild::plan_cells() {
-  // Where levels begin.
-  std::vector<std::uint32_t> level_first{0, 24};
-  for (std::size_t level = 0; level < CM_SPLIT_LEVELS && state_.added[level] != 0; ++level)
-    level_first.push_back(level_first.back() + 2 * state_.added[level]);
-  const std::uint32_t count = level_first.back();
-  if (count != 24 + 2 * (state_.cells - 24))
+std::vector<GridBuild::Level> GridBuild::levels_of_tree() const {
+  std::vector<Level> levels;
+  Level level{.cells_end = CM_ROOTS};
+  for (std::size_t i = 0; i < CM_SPLIT_LEVELS && state_.added[i] != 0; ++i) {
+    level.splits_end = level.splits_begin + state_.added[i];
+    levels.push_back(level);
+    level = {level.cells_end, level.cells_end + 2 * state_.added[i], level.splits_end, level.splits_end};
+  }
+  levels.push_back(level);
+  if (level.splits_end != state_.cells - CM_ROOTS)
     throw Error(ErrorCode::internal, "splits of a level without those above: the set is not closed");
+  return levels;
+}
+
+void GridBuild::plan_cells() {
+  tree_levels_ = levels_of_tree();
+  const std::uint32_t count = tree_levels_.back().cells_end;
   built_.count = state_.cells;
   built_.limited = state_.limited != 0;
-  built_.levels = static_cast<std::uint32_t>(level_first.size() - 2);
+  built_.levels = static_cast<std::uint32_t>(tree_levels_.size() - 1);
   // Before any of it is made.
   std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
   for (const grid::LatticeChannel& channel : data_->lattice().channels) {
@@ -598,45 +611,31 @@ void GridBuild::plan_cells() {
   cells_->add([this, count] {
     tree_cells_ = make_storage(std::uint64_t{count} * sizeof(TreeCell), "creating the tree's cells");
     links_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec4), "creating the tree's links");
-    order_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec2), "creating the order of cells");
+    below_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec2), "creating what is below the tree's cells");
+    list_ = make_storage(std::uint64_t{count} * sizeof(std::uint32_t), "creating the list of the tree's cells");
   });
   cells_->add([this] {
     built_.cells = make_storage(std::uint64_t{built_.count} * sizeof(grid::CellRecord), "creating cell records");
-    built_.tree = make_storage((roots_words + built_.count - 24) * 4, "creating the point-location tree");
+    built_.tree = make_storage((roots_words + built_.count - CM_ROOTS) * 4, "creating the point-location tree");
   });
   cells_->add([this] {
-    std::array<TreeCell, 24> cells{};
-    std::array<glm::uvec4, 24> links{};
-    const std::array<grid::RootCell, 24> roots = grid::root_cells(data_->lattice().cube.log2_size);
+    std::array<TreeCell, CM_ROOTS> cells{};
+    std::array<glm::uvec4, CM_ROOTS> links{};
+    const std::array<grid::RootCell, CM_ROOTS> roots = grid::root_cells(data_->lattice().cube.log2_size);
     const bool wide = data_->lattice().cube.wide();
     for (std::size_t i = 0; i < roots.size(); ++i) {
-      cells[i] = {0, 1, core::cm_record_place(roots[i].v0, roots[i].shape, wide)};
+      cells[i] = {0, 0, core::cm_record_place(roots[i].v0, roots[i].shape, wide)};
       links[i] = {roots[i].links[0], roots[i].links[1], roots[i].links[2], roots[i].links[3]};
     }
     gl_->NamedBufferSubData(tree_cells_.name(), 0, sizeof cells, cells.data());
     gl_->NamedBufferSubData(links_.name(), 0, sizeof links, links.data());
   });
-  plan_tree_cells(level_first);
-  const auto bind = [this](GLuint program) {
-    bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
-                  {core::CM_STORAGE_GRID_COARSE, &data_->coarse_},
-                  {core::CM_STORAGE_GRID_PLACES, &data_->places_},
-                  {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
-                  {core::CM_STORAGE_GRID_LINKS, &links_},
-                  {core::CM_STORAGE_GRID_ORDER, &order_},
-                  {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
-                  {core::CM_STORAGE_GRID_BRICKS, &data_->bricks_}});
-    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_CELL_PARTS, data_->parts_.name());
-    gl_->ProgramUniform1f(program, 3, 1.0F / data_->lattice().density_unit);
-    gl_->ProgramUniform1i(program, 4, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
-  };
-  gl::ProgramKey records = cells_key(5);
-  records.defines.emplace_back(data_->lattice().halves ? "CM_HALVES 1" : "CM_HALVES 0");
-  plan_pass(*cells_, {records, 32}, 0, count, bind);
-  plan_channels(count);
+  plan_tree_cells();
+  plan_records();
+  plan_channels();
   // What is not the grid's goes, before there is more of that.
   cells_->add([this, count] {
-    for (gl::Object* scratch : {&tree_cells_, &links_, &order_}) *scratch = {};
+    for (gl::Object* scratch : {&tree_cells_, &links_, &below_, &list_}) *scratch = {};
     bytes_ -= count * tree_cell_bytes;
   });
   plan_clear_cones();
@@ -650,6 +649,45 @@ void GridBuild::plan_cells() {
   });
 }
 
+void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind) {
+  // Cells of a level are all of one size.
+  std::uint32_t shape = grid::root_cells(data_->lattice().cube.log2_size)[0].shape;
+  std::size_t fine_level = 0;
+  std::uint32_t begin = tree_levels_.back().splits_end;
+  for (const Level& level : tree_levels_) {
+    Pass pass = coarse;
+    if (core::cm_shape_cube_size(shape) <= 3) {
+      pass = fine;
+      const unsigned parts = grid::parts_of_levels[fine_level + 1] - grid::parts_of_levels[fine_level];
+      pass.weight = 1.0 + parts_weight * parts;
+      ++fine_level;
+    }
+    plan_pass(*cells_, pass, begin, begin + level.leaves(), bind);
+    begin += level.leaves();
+    shape = core::cm_child_shape(shape, 0);
+  }
+}
+
+void GridBuild::plan_records() {
+  const auto bind = [this](GLuint program) {
+    bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
+                  {core::CM_STORAGE_GRID_COARSE, &data_->coarse_},
+                  {core::CM_STORAGE_GRID_PLACES, &data_->places_},
+                  {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
+                  {core::CM_STORAGE_GRID_LINKS, &links_},
+                  {core::CM_STORAGE_GRID_LIST, &list_},
+                  {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
+                  {core::CM_STORAGE_GRID_BRICKS, &data_->bricks_}});
+    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_CELL_PARTS, data_->parts_.name());
+    gl_->ProgramUniform1f(program, 3, 1.0F / data_->lattice().density_unit);
+    gl_->ProgramUniform1i(program, 4, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
+  };
+  const auto key = [this](const char* size) {
+    return gl::ProgramKey{"grid_records.comp", {size, data_->lattice().halves ? "CM_HALVES 1" : "CM_HALVES 0"}};
+  };
+  plan_leaves({key("CM_FINE 0"), 32}, {key("CM_FINE 1"), 32}, bind);
+}
+
 void GridBuild::plan_clear_cones() {
   cells_->add([this] { clear_ = make_storage(clear_bytes, "creating the map of what is clear"); });
   plan_clear(*cells_, clear_, full_bytes);
@@ -661,11 +699,12 @@ void GridBuild::plan_clear_cones() {
   const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {"CM_STAGE " + std::to_string(stage)}}; };
   plan_pass(*cells_, {key(0), 8}, 0, built_.count, bind);
   plan_pass(*cells_, {key(1), 4096, true}, 0, CM_CLEAR_CONES, bind);
-  plan_pass(*cells_, {key(2), 8}, 0, built_.count, bind);
+  plan_pass(*cells_, {key(2), 8}, 0, CM_CLEAR_CUBES, bind);
+  plan_pass(*cells_, {key(3), 8}, 0, built_.count, bind);
 }
 
-void GridBuild::plan_channels(std::uint32_t count) {
-  for (std::size_t i = 0; i < data_->lattice().channels.size(); ++i) plan_channel(i, count);
+void GridBuild::plan_channels() {
+  for (std::size_t i = 0; i < data_->lattice().channels.size(); ++i) plan_channel(i);
   const gl::Object& emission = built_.channels[static_cast<std::size_t>(grid::Channel::emission)];
   if (std::ranges::none_of(data_->lattice().channels,
                            [](const auto& channel) { return channel.channel == grid::Channel::emission; }))
@@ -682,7 +721,7 @@ void GridBuild::plan_channels(std::uint32_t count) {
   plan_pass(*cells_, {{"grid_glow.comp", {}}, 2, false, false}, 0, built_.count, bind);
 }
 
-void GridBuild::plan_channel(std::size_t index, std::uint32_t count) {
+void GridBuild::plan_channel(std::size_t index) {
   const grid::LatticeChannel& channel = data_->lattice().channels[index];
   gl::Object& records = built_.channels[static_cast<std::size_t>(channel.channel)];
   const std::uint64_t bytes = (channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
@@ -695,7 +734,7 @@ void GridBuild::plan_channel(std::size_t index, std::uint32_t count) {
                   {core::CM_STORAGE_GRID_PLACES, &data.places},
                   {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
                   {core::CM_STORAGE_GRID_CHANNEL, &records},
-                  {core::CM_STORAGE_GRID_ORDER, &order_},
+                  {core::CM_STORAGE_GRID_LIST, &list_},
                   {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
                   {core::CM_STORAGE_GRID_BRICKS, &data.bricks}});
     gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_CELL_PARTS, data_->parts_.name());
@@ -703,8 +742,8 @@ void GridBuild::plan_channel(std::size_t index, std::uint32_t count) {
       gl_->ProgramUniform1i(program, 3, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
     if (channel.channel == grid::Channel::velocity) gl_->ProgramUniform1f(program, 3, channel.fastest);
   };
-  plan_pass(*cells_, {{"grid_channels.comp", {"CM_CHANNEL " + std::to_string(static_cast<int>(channel.channel))}}, 32},
-            0, count, bind);
+  const Pass pass{{"grid_channels.comp", {"CM_CHANNEL " + std::to_string(static_cast<int>(channel.channel))}}, 32};
+  plan_leaves(pass, pass, bind);
 }
 
 void GridBuild::plan_glow() {
@@ -768,32 +807,32 @@ void GridBuild::begin_glow_table() {
                                              });
 }
 
-void GridBuild::plan_tree_cells(const std::vector<std::uint32_t>& level_first) {
-  const auto bind = [this](GLuint /*program*/) {
+void GridBuild::plan_tree_cells() {
+  const auto bind_splits = [this, first_leaf = tree_levels_.back().splits_end](GLuint program) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_PRIORITIES, &data_->priorities_},
                   {core::CM_STORAGE_GRID_PLACES, &data_->places_},
                   {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
+                  {core::CM_STORAGE_GRID_LIST, &list_},
+                  {core::CM_STORAGE_GRID_BELOW, &below_}});
+    gl_->ProgramUniform1ui(program, 3, first_leaf);
+  };
+  const auto bind = [this](GLuint /*program*/) {
+    bind_storage({{core::CM_STORAGE_GRID_CELLS, &tree_cells_},
                   {core::CM_STORAGE_GRID_LINKS, &links_},
-                  {core::CM_STORAGE_GRID_ORDER, &order_},
+                  {core::CM_STORAGE_GRID_LIST, &list_},
+                  {core::CM_STORAGE_GRID_BELOW, &below_},
                   {core::CM_STORAGE_GRID_TREE, &built_.tree}});
   };
-  const std::size_t splitting = level_first.size() - 2;  // levels
-  for (std::size_t level = 0; level < splitting; ++level) {
-    const std::uint32_t next = level_first[level + 1];
-    const auto bind_level = [this, bind, level, next](GLuint program) {
-      bind(program);
-      gl_->ProgramUniform1ui(program, 3, static_cast<GLuint>(level));
-      gl_->ProgramUniform1ui(program, 4, next);
-    };
-    plan_pass(*cells_, {cells_key(0), 4}, level_first[level], next, bind_level);
-    plan_pass(*cells_, {cells_key(1), 8}, level_first[level], next, bind);
+  for (const Level& level : tree_levels_) {
+    plan_pass(*cells_, {cells_key(0), 8}, level.cells_begin, level.cells_end, bind_splits);
+    plan_pass(*cells_, {cells_key(1), 16}, level.splits_begin, level.splits_end, bind);
   }
-  for (std::size_t level = splitting; level-- > 0;)
-    plan_pass(*cells_, {cells_key(2), 1}, level_first[level], level_first[level + 1], bind);
+  for (const Level& level : tree_levels_ | std::views::reverse)
+    plan_pass(*cells_, {cells_key(2), 2}, level.splits_begin, level.splits_end, bind);
   plan_pass(*cells_, {cells_key(3), 1, true}, 0, 1, bind);
-  for (std::size_t level = 0; level < splitting; ++level)
-    plan_pass(*cells_, {cells_key(4), 2}, level_first[level], level_first[level + 1], bind);
+  for (const Level& level : tree_levels_)
+    plan_pass(*cells_, {cells_key(4), 4}, level.splits_begin, level.splits_end, bind);
 }
 
 LatticeDataPtr GridBuilds::find(const grid::LatticePtr& lattice) const {

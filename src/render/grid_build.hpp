@@ -195,15 +195,28 @@ class GridBuild {
     std::uint32_t cost = 1;
     bool item_a_group = false;  // a work group of 64 an item, else an invocation
     bool of_lattice = true;     // knows glsl/grid_places.glsl
+    double weight = 1.0;        // of an item, where the kernel has others that weigh 1
   };
   using Bind = std::function<void(GLuint program)>;
+  // Of the tree: its cells, and where those that split stand in the list, in front of all leaves. Of the last none do.
+  struct Level {
+    std::uint32_t cells_begin = 0;
+    std::uint32_t cells_end = 0;
+    std::uint32_t splits_begin = 0;
+    std::uint32_t splits_end = 0;
+    [[nodiscard]] std::uint32_t leaves() const { return cells_end - cells_begin - (splits_end - splits_begin); }
+  };
+  [[nodiscard]] std::vector<Level> levels_of_tree() const;
   void plan_decision();
   void plan_clear(Upload& upload, const gl::Object& buffer, std::uint64_t bytes);
   void plan_cells();
-  void plan_tree_cells(const std::vector<std::uint32_t>& level_first);
-  // What cells carry, of all in the tree.
-  void plan_channels(std::uint32_t count);
-  void plan_channel(std::size_t index, std::uint32_t count);
+  void plan_tree_cells();
+  void plan_records();
+  // Of the leaves, those above bricks by one kernel, those within by another.
+  void plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind);
+  // What cells carry.
+  void plan_channels();
+  void plan_channel(std::size_t index);
   void plan_clear_cones();
   void plan_glow();
   void begin_glow_table();
@@ -230,7 +243,7 @@ class GridBuild {
   Deadline deadline_{};  // of the call
   std::uint64_t bytes_ = 0;
   gl::Object level_bytes_;
-  gl::Object tree_cells_, links_, order_, clear_, glowing_;
+  gl::Object tree_cells_, links_, below_, list_, clear_, glowing_;
   BuiltGrid built_;
   gl::ReadBack read_back_;
   gl::Fence fence_;
@@ -242,6 +255,7 @@ class GridBuild {
   gl::ReadBack glow_read_back_;
   std::vector<std::uint32_t> glow_words_;
   std::future<scene::GlowTable> glow_table_;
+  std::vector<Level> tree_levels_;
   std::optional<Upload> cells_;  // once it is known how many; their steps use the above
   std::optional<Upload> glow_;   // once it is known how many give off light
 };

@@ -174,11 +174,12 @@ void print_bytes(const grid::Lattice& lattice, std::size_t cells) {
   // Cleared, raised (its own priorities read), closed (read once, and its parents), counted twice.
   const double points = static_cast<double>(lattice.blocks.size()) * CM_BLOCK_POINTS * 4.0;
   const double splits = 4.0 * points + static_cast<double>(lattice.own.bytes());
-  // Of a node of the tree (two a cell): marking reads 16 and the priority, writes 4; children read 16 + 16 and three
-  // neighbours' 16 a parent, write 32 a child; leaves 4 read a child, 4 written; order 8 + 4 read, 8 + 4 written; the
-  // record reads 16 + 16 + 8 and four neighbours' 24, writes 32. Clear cones read half of a record twice, and write 4.
-  const double cell =
-      2.0 * (16.0 + 4.0 + 4.0) + (32.0 + 48.0 + 64.0) + 2.0 * 8.0 + (12.0 + 20.0) + 40.0 + 96.0 + 32.0 + 36.0;
+  // Of a node of the tree (two a cell): marking reads 8 and the priority, writes 4 and its place in the list, a leaf 4
+  // more. Of a parent (one a cell) children read the list, 8 + 16, 12 of two neighbours and 8 of two others, write 24 a
+  // child; leaves read the list and 8, write 4; order the list and 12, writes 4 and 8 a child. The record reads the
+  // list, 16 + 16, four neighbours' 12, writes 32. Clear cones read half of a record twice, and write 4.
+  const double cell = 2.0 * (8.0 + 4.0 + 4.0 + 4.0) + 4.0 + (4.0 + 24.0 + 24.0 + 16.0 + 48.0) + (4.0 + 8.0 + 4.0) +
+                      (4.0 + 12.0 + 4.0 + 16.0) + (4.0 + 32.0 + 48.0 + 32.0) + 36.0;
   std::printf("  bytes moved: %.1f MB to decide, %.0f a cell; of a cell %.0f in all\n", splits * 1e-6, cell,
               splits / static_cast<double>(std::max<std::size_t>(cells, 1)) + cell);
 }
