@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
-#include <ranges>
 #include <set>
 #include <span>
 #include <string>
@@ -828,8 +827,8 @@ void GridBuild::plan_tree_cells() {
     plan_pass(*cells_, {cells_key(0), 8}, level.cells_begin, level.cells_end, bind_splits);
     plan_pass(*cells_, {cells_key(1), 16}, level.splits_begin, level.splits_end, bind);
   }
-  for (const Level& level : tree_levels_ | std::views::reverse)
-    plan_pass(*cells_, {cells_key(2), 2}, level.splits_begin, level.splits_end, bind);
+  for (auto level = tree_levels_.rbegin(); level != tree_levels_.rend(); ++level)
+    plan_pass(*cells_, {cells_key(2), 2}, level->splits_begin, level->splits_end, bind);
   plan_pass(*cells_, {cells_key(3), 1, true}, 0, 1, bind);
   for (const Level& level : tree_levels_)
     plan_pass(*cells_, {cells_key(4), 4}, level.splits_begin, level.splits_end, bind);

@@ -77,6 +77,10 @@ ParseResult parse(int argc, char** argv) {
   app.add_flag("--peers", o.peers,
                "Only what marches take to equal variance, those through NanoVDB grids among them, on the coarsest of "
                "--threshold's grids within --target of the voxels' picture");
+  app.add_option(
+      "--block-bytes", o.block_bytes,
+      "With --peers: what storage blocks are taken to hold, not what the driver says (llvmpipe's 128 MiB are "
+      "not where they end)");
   app.add_flag("--by-clock", o.by_clock, "With --peers: the clock's time, as of a GPU, instead of the processors'");
   auto* few = app.add_option("--samples", o.fewest_samples, "A pixel, at least, in a timed run (default: 8; quick: 4)");
   few->check(CLI::Range(1U, 1024U));

@@ -46,6 +46,7 @@ struct Options {
   std::vector<double> deviations;     ///< and by deviation
   bool costs = false;                 ///< only what channels and lights cost
   bool peers = false;                 ///< only what marches through NanoVDB grids take beside ours
+  std::uint64_t block_bytes = 0;      ///< that they may take of a storage block; 0: what the driver says
   bool by_clock = false;              ///< they by the clock, not by processors' time
   bool equal_error = false;           ///< only what marches take to an error of a fire's picture
   std::string color_grid;             ///< of the volume whose channels are measured; empty: none

@@ -41,10 +41,11 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
   return std::make_unique<EditedShaders>(edits, files);
 }
 
-BoundGrid::BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words) : gl_(std::move(gl)) {
-  GLint64 most = 0;
-  gl_->GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
-  if (words.size_bytes() > static_cast<std::uint64_t>(most)) {
+BoundGrid::BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words, std::uint64_t block_bytes)
+    : gl_(std::move(gl)) {
+  const std::uint64_t most =
+      block_bytes != 0 ? block_bytes : static_cast<std::uint64_t>(gl::query_limits(*gl_).storage_block_bytes);
+  if (words.size_bytes() > most) {
     throw std::runtime_error("a NanoVDB grid of " + std::to_string(words.size_bytes()) +
                              " bytes; this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE is " + std::to_string(most));
   }

@@ -20,8 +20,9 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look);
 /// A grid's words where such programs look for them, from now on: as a host binds what is its own.
 class BoundGrid {
  public:
-  /// Throws std::runtime_error that names the limit that does not suffice.
-  BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words);
+  /// block_bytes: what a storage block is taken to hold; 0: what the driver says. Throws std::runtime_error that names
+  /// the limit that does not suffice.
+  BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words, std::uint64_t block_bytes = 0);
   /// Again, after another.
   void bind() const;
 

@@ -49,7 +49,8 @@ Entry peer(headless::Context& context, const Asset& asset, NanoType type, Look l
   const std::vector<std::uint32_t> words = make_nano_grid(asset.volume->volume(), type);
   entry.bytes = static_cast<double>(words.size() * sizeof(std::uint32_t));
   entry.shaders = peer_shaders(type, look);
-  entry.grid = std::make_unique<BoundGrid>(gl::load_functions(headless::Context::get_proc, &context), words);
+  entry.grid = std::make_unique<BoundGrid>(gl::load_functions(headless::Context::get_proc, &context), words,
+                                           options.block_bytes);
   entry.subject =
       std::make_unique<Subject>(context, asset.volume, Kind::dense, options, density_scale, entry.shaders->programs());
   return entry;
