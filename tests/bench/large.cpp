@@ -2,18 +2,21 @@
 // processes:
 //
 //     cumulet-bench-large --enlarge N IN.vdb OUT.vdb
-//     cumulet-bench-large [--threshold T] [--max-cells N] [--gl] FILE...
+//     cumulet-bench-large [--threshold T] [--max-cells N] [--gl] [--plots FOLDER] FILE...
 //
 // --enlarge: the first grid of a file with N voxels for each along each axis: interpolated, and with detail of some
 // voxels, for such a file has none of its own. Halves, compressed by Blosc, as productions keep them.
 //
-// Else a line a file, as in the table of README.md. Seconds are of the processors, of all threads, and by the clock in
-// brackets: others may have the cores. The peak is that of the process (VmHWM) after each stage.
+// Else a line a file, as in the table of README.md; --plots: large-time.svg and large-memory.svg of them, too. Each
+// file has a process of its own. Seconds are of the processors, of all threads, and by the clock in brackets: others
+// may have the cores. The peak is that of the process (VmHWM) after each stage.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -29,6 +32,7 @@
 #include <string>
 #include <vector>
 
+#include "plot.hpp"
 #include "viewer/builder.hpp"
 
 namespace {
@@ -142,7 +146,16 @@ std::string text_of(const Stage& stage) {
   return text.data();
 }
 
-void measure(const std::string& file, viewer::BuildSettings settings) {
+double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576.0; }
+
+struct Measured {
+  Stage load, statistics, grid;
+  std::uint64_t voxels, kept;
+  [[nodiscard]] double processor() const { return load.processor + statistics.processor + grid.processor; }
+  [[nodiscard]] double clock() const { return load.clock + statistics.clock + grid.clock; }
+};
+
+Measured measure(const std::string& file, viewer::BuildSettings settings) {
   Stages stages;
   Progress progress;
   const auto volume = viewer::VolumeFile{.path = file, .grids = {}}.read(Log(), &progress);
@@ -153,15 +166,62 @@ void measure(const std::string& file, viewer::BuildSettings settings) {
   settings.refine.density_scale = volume->coarse().suggest_density_scale().value_or(1.0);
   const viewer::Built built = viewer::build_grid(Log(), volume, settings, progress);
   const Stage grid = stages.lap();
-  const auto mebibytes = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1048576.0; };
   const std::size_t bricks = volume->volume().brick_origins.size();
-  std::printf("| %.3g | %zu | %.0f | %s | %s | %s | %.2f | %.0f | %.0f | %.0f | %.0f | %llu%s |\n",
-              static_cast<double>(volume->volume().active_voxels), bricks, mebibytes(std::filesystem::file_size(file)),
-              text_of(load).c_str(), text_of(statistics).c_str(), text_of(grid).c_str(),
-              load.processor + statistics.processor + grid.processor, mebibytes(load.peak), mebibytes(statistics.peak),
-              mebibytes(grid.peak), mebibytes(built.bytes()), static_cast<unsigned long long>(built.cells),
-              built.limited ? ", limited" : "");
+  const Measured measured{load, statistics, grid, volume->volume().active_voxels, built.bytes()};
+  std::printf("| %.3g | %zu | %.0f | %s | %s | %s | %.2f (%.1f) | %.0f | %.0f | %.0f | %.0f | %llu%s |\n",
+              static_cast<double>(measured.voxels), bricks, mebibytes(std::filesystem::file_size(file)),
+              text_of(load).c_str(), text_of(statistics).c_str(), text_of(grid).c_str(), measured.processor(),
+              measured.clock(), mebibytes(load.peak), mebibytes(statistics.peak), mebibytes(grid.peak),
+              mebibytes(measured.kept), static_cast<unsigned long long>(built.cells), built.limited ? ", limited" : "");
   std::fflush(stdout);
+  return measured;
+}
+
+// By another process, for peaks are of processes.
+Measured measure_apart(const std::string& file, const viewer::BuildSettings& settings) {
+  std::array<int, 2> ends{};
+  if (pipe(ends.data()) != 0) throw std::runtime_error("no pipe");
+  const pid_t child = fork();
+  if (child < 0) throw std::runtime_error("no other process");
+  if (child == 0) {
+    try {
+      const Measured measured = measure(file, settings);
+      _exit(write(ends[1], &measured, sizeof measured) == sizeof measured ? 0 : 1);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "cumulet-bench-large: %s\n", error.what());
+      _exit(1);
+    }
+  }
+  close(ends[1]);
+  Measured measured{};
+  const bool whole = read(ends[0], &measured, sizeof measured) == sizeof measured;
+  close(ends[0]);
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (!whole) throw std::runtime_error(file + " was not measured");
+  return measured;
+}
+
+void plot(const std::vector<Measured>& all, const std::filesystem::path& folder) {
+  const auto series = [&](const char* label, int colour, bool dashed, const auto& value) {
+    bench::Series made{label, colour, dashed, {}};
+    for (const Measured& m : all) made.points.emplace_back(static_cast<double>(m.voxels), value(m));
+    return made;
+  };
+  bench::write_file(
+      folder / "large-time.svg",
+      bench::line_plot("Reading and building a cloud", "active voxels", "seconds of processors",
+                       {series("all", 2, false, [](const Measured& m) { return m.processor(); }),
+                        series("load", 0, false, [](const Measured& m) { return m.load.processor; }),
+                        series("statistics", 1, false, [](const Measured& m) { return m.statistics.processor; }),
+                        series("grid", 3, false, [](const Measured& m) { return m.grid.processor; }),
+                        series("all, by the clock", 2, true, [](const Measured& m) { return m.clock(); })}));
+  bench::write_file(
+      folder / "large-memory.svg",
+      bench::line_plot("Memory of a cloud", "active voxels", "MiB",
+                       {series("at the peak", 2, false, [](const Measured& m) { return mebibytes(m.grid.peak); }),
+                        series("while it is read", 0, false, [](const Measured& m) { return mebibytes(m.load.peak); }),
+                        series("kept", 3, false, [](const Measured& m) { return mebibytes(m.kept); })}));
 }
 
 }  // namespace
@@ -179,12 +239,15 @@ int main(int argc, char** argv) try {
   settings.refine.criterion = grid::Criterion::transmittance;
   settings.refine.threshold = 0.15;
   std::vector<std::string> files;
+  std::filesystem::path plots;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const bool more = i + 1 < arguments.size();
     if (arguments[i] == "--threshold" && more) {
       settings.refine.threshold = std::atof(arguments[++i].c_str());
     } else if (arguments[i] == "--max-cells" && more) {
       settings.refine.max_cells = std::strtoull(arguments[++i].c_str(), nullptr, 10);
+    } else if (arguments[i] == "--plots" && more) {
+      plots = arguments[++i];
     } else if (arguments[i] == "--gl") {
       settings.on = viewer::BuildOn::gpu;
     } else {
@@ -193,12 +256,14 @@ int main(int argc, char** argv) try {
   }
   if (files.empty()) {
     std::fputs(
-        "usage: cumulet-bench-large [--threshold T] [--max-cells N] [--gl] FILE...\n"
+        "usage: cumulet-bench-large [--threshold T] [--max-cells N] [--gl] [--plots FOLDER] FILE...\n"
         "       cumulet-bench-large --enlarge N IN.vdb OUT.vdb\n",
         stderr);
     return 2;
   }
-  for (const std::string& file : files) measure(file, settings);
+  std::vector<Measured> all;
+  for (const std::string& file : files) all.push_back(measure_apart(file, settings));
+  if (!plots.empty()) plot(all, plots);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "cumulet-bench-large: %s\n", error.what());

@@ -84,6 +84,7 @@ struct LogAxis {
 };
 
 std::string short_number(double value) {
+  if (value >= 1e9) return format("%.4gG", value / 1e9);
   if (value >= 1e6) return format("%.4gM", value / 1e6);
   if (value >= 1e3) return format("%.4gk", value / 1e3);
   return format("%.4g", value);
@@ -130,6 +131,14 @@ std::string line_plot(const std::string& title, const std::string& x_label, cons
   svg += text_at(0.5 * (x.from + x.to), height - 16.0, "middle", x_label);
   svg += format("<g transform=\"translate(24 %.1f) rotate(-90)\">", 0.5 * (y.from + y.to));
   svg += text_at(0.0, 0.0, "middle", y_label) + "</g>\n";
+  // Where lines that rise, or fall, leave room.
+  const bool rises =
+      std::ranges::count_if(
+          series,
+          [](const Series& s) { return !s.points.empty() && s.points.back().second > s.points.front().second; }) *
+          2 >
+      static_cast<std::ptrdiff_t>(series.size());
+  const double legend_from = rises ? x.from + 18.0 : x.to - 212.0;
   double legend = y.to + 18.0;
   for (const Series& s : series) {
     const char* dash = s.dashed ? " stroke-dasharray=\"7 5\"" : "";
@@ -145,8 +154,8 @@ std::string line_plot(const std::string& title, const std::string& x_label, cons
     }
     svg += dots + "\n";
     svg += format("<line class=\"line%d\" stroke-width=\"2\"%s x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>\n",
-                  s.colour, dash, x.to - 212.0, legend - 4.0, x.to - 176.0, legend - 4.0);
-    svg += text_at(x.to - 168.0, legend, "start", s.label);
+                  s.colour, dash, legend_from, legend - 4.0, legend_from + 36.0, legend - 4.0);
+    svg += text_at(legend_from + 44.0, legend, "start", s.label);
     legend += 19.0;
   }
   return svg + "</svg>\n";
