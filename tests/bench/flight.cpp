@@ -1,7 +1,7 @@
 // What it brings to fit the grid to the view: errors at equal time on a flight into a volume. By hand:
 //
-//     cumulet-bench-flight [--views N] [--size P] [--samples S] [--threshold T] [--max-cells N] [--optical-depth D]
-//     FILE
+//     cumulet-bench-flight [--views N] [--to DISTANCE] [--size P] [--samples S] [--threshold T] [--max-cells N]
+//     [--optical-depth D] FILE
 //
 // The camera comes nearer by the same factor from view to view. Each view is traced through the voxels (the brick
 // march), and through three grids of at most as many cells by the same threshold: fitted to each view by compute
@@ -31,12 +31,12 @@ using namespace cumulet;
 constexpr std::size_t parts = 2;
 constexpr std::array<double, 2> times{4.0, 64.0};  // a view, in seconds
 constexpr double first_distance = 2.4;             // of half the diagonal of the bounds
-constexpr double last_distance = 0.6;
 
 struct FlightOptions {
   int views = 5;
   std::uint32_t size = 96;
   std::uint32_t samples = 48;  // a pixel, each time
+  double last_distance = 0.6;  // of half the diagonal
   double threshold = 0.02;
   std::uint64_t max_cells = 300'000;
   double optical_depth = 10.0;
@@ -213,7 +213,7 @@ void run(const FlightOptions& options) {
   print_head();
   for (int view = 0; view < options.views; ++view) {
     const double along = options.views > 1 ? static_cast<double>(view) / (options.views - 1) : 0.0;
-    const double distance = first_distance * std::pow(last_distance / first_distance, along);
+    const double distance = first_distance * std::pow(options.last_distance / first_distance, along);
     for (const auto& flyer : flyers) flyer->fly_to(pose_at(*asset.volume, distance));
     for (std::size_t part = 0; part < parts; ++part) {
       for (const auto& flyer : flyers) flyer->trace(part);
@@ -236,6 +236,8 @@ int main(int argc, char** argv) try {
       options.size = static_cast<std::uint32_t>(std::atoi(argv[++i]));
     } else if (argument == "--samples" && more) {
       options.samples = static_cast<std::uint32_t>(std::atoi(argv[++i]));
+    } else if (argument == "--to" && more) {
+      options.last_distance = std::atof(argv[++i]);
     } else if (argument == "--threshold" && more) {
       options.threshold = std::atof(argv[++i]);
     } else if (argument == "--max-cells" && more) {
@@ -248,8 +250,8 @@ int main(int argc, char** argv) try {
   }
   if (options.file.empty()) {
     std::fputs(
-        "usage: cumulet-bench-flight [--views N] [--size P] [--samples S] [--threshold T] [--max-cells N] "
-        "[--optical-depth D] FILE\n",
+        "usage: cumulet-bench-flight [--views N] [--to DISTANCE] [--size P] [--samples S] [--threshold T]\n"
+        "                            [--max-cells N] [--optical-depth D] FILE\n",
         stderr);
     return 2;
   }
