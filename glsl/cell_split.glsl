@@ -2,13 +2,6 @@
 #ifndef CM_CELL_SPLIT_GLSL
 #define CM_CELL_SPLIT_GLSL
 
-// Vertex opposite to a face.
-CM_FN uint cm_opposite(uint cell_class, uint face) {
-  if (face == 3u) return 0u;
-  if (cell_class == 1u) return face == 0u ? 1u : (face == 1u ? 3u : 2u);
-  return face == 0u ? 3u : (cell_class == 0u ? face : 3u - face);
-}
-
 // The one face of a child (0 or 1) that is a whole face of its parent, and which. Face 3 of both is between them.
 CM_FN uvec2 cm_whole_face(uint parent_class, uint child) {
   uint face = parent_class == 0u ? 1u : (parent_class == 1u ? 0u : 2u);

@@ -24,26 +24,38 @@ layout(std430, binding = CM_STORAGE_GRID_PRIORITIES) readonly buffer CmPrioritie
 layout(std430, binding = CM_STORAGE_GRID_BELOW) writeonly buffer CmBelow { uvec2 cm_below[]; };
 layout(location = 3) uniform uint cm_first_leaf;  // in the list
 
-void main() {
-  uint i = cm_first + gl_GlobalInvocationID.x;
-  if (i >= cm_end) return;
+bool cm_splits(uint i) {
   uvec2 where = cm_cells[i].where;
   uint shape = cm_shape_of(where);
   uint cell_class = cm_shape_class(shape);
-  bool splits = false;
-  if (cell_class != 1u || cm_shape_exponent(shape) != 0u) {  // no sixth of a voxel
-    vec3 middle = cm_v0_of(where) + cm_from_frame(cm_frame_midpoint(cell_class) * cm_shape_unit(shape), shape);
-    splits = cm_priorities[cm_slot_of(ivec3(middle))] >= cm_state.cut;
+  if (cell_class == 1u && cm_shape_exponent(shape) == 0u) return false;  // a sixth of a voxel
+  vec3 middle = cm_v0_of(where) + cm_from_frame(cm_frame_midpoint(cell_class) * cm_shape_unit(shape), shape);
+  return cm_priorities[cm_slot_of(ivec3(middle))] >= cm_state.cut;
+}
+
+// Of a work group: cells that split, and leaves; and where they begin in the list.
+shared uint cm_counts[2];
+shared uint cm_begins[2];
+
+void main() {
+  uint i = cm_first + gl_GlobalInvocationID.x;
+  bool inside = i < cm_end;
+  bool splits = inside && cm_splits(i);
+  uint lane = gl_LocalInvocationID.x;
+  if (lane < 2u) cm_counts[lane] = 0u;
+  barrier();
+  uint place = inside ? atomicAdd(cm_counts[splits ? 0u : 1u], 1u) : 0u;
+  barrier();
+  if (lane == 0u) {
+    cm_begins[0] = atomicAdd(cm_state.split, cm_counts[0]);
+    cm_begins[1] = cm_first_leaf + atomicAdd(cm_state.leaves, cm_counts[1]);
   }
-  if (splits) {
-    uint place = atomicAdd(cm_state.split, 1u);
-    cm_list[place] = i;
-    cm_cells[i].child = cm_children(place);
-  } else {
-    cm_list[cm_first_leaf + atomicAdd(cm_state.leaves, 1u)] = i;
-    cm_cells[i].child = 0u;
-    cm_below[i].x = 1u;
-  }
+  barrier();
+  if (!inside) return;
+  place += cm_begins[splits ? 0u : 1u];
+  cm_list[place] = i;
+  cm_cells[i].child = splits ? cm_children(place) : 0u;
+  if (!splits) cm_below[i].x = 1u;
 }
 
 #elif CM_STAGE == 1
@@ -109,7 +121,7 @@ void main() {
 // 24 pairs, as many leaves and inner cells are before a root, an end mark, and room; then of each inner cell how many its
 // child 0 has.
 layout(std430, binding = CM_STORAGE_GRID_TREE) writeonly buffer CmTree { uint cm_tree[]; };
-const uint cm_roots_words = 52u;
+const uint cm_roots_words = 2u * CM_ROOTS + 4u;
 
 void main() {
 #if CM_STAGE == 3
@@ -122,10 +134,10 @@ void main() {
     cm_tree[2u * root + 1u] = leaves - root;
     leaves += cm_below[root].x;
   }
-  cm_tree[48] = leaves;
-  cm_tree[49] = leaves - CM_ROOTS;
-  cm_tree[50] = 0u;
-  cm_tree[51] = 0u;
+  cm_tree[2u * CM_ROOTS] = leaves;
+  cm_tree[2u * CM_ROOTS + 1u] = leaves - CM_ROOTS;
+  cm_tree[2u * CM_ROOTS + 2u] = 0u;
+  cm_tree[2u * CM_ROOTS + 3u] = 0u;
 #else
   uint place = cm_first + gl_GlobalInvocationID.x;
   if (place >= cm_end) return;

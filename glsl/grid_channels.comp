@@ -180,6 +180,7 @@ void cm_put(vec3 v0, uint shape, uint rank) {
 void main() {
   uint at = cm_first + gl_GlobalInvocationID.x;
   if (at >= cm_end) return;
-  CmTreeCell cell = cm_cells[cm_list[at]];
-  cm_put(cm_v0_of(cell.where), cm_shape_of(cell.where), cell.rank);
+  uint i = cm_list[at];
+  uvec2 where = cm_cells[i].where;
+  cm_put(cm_v0_of(where), cm_shape_of(where), cm_cells[i].rank);
 }

@@ -153,7 +153,7 @@ void main() {
   cm_sums[lane] = sum;
   barrier();
   if (lane != 0u) return;
-  uint cells = 24u;
+  uint cells = CM_ROOTS;
   uint run = 0u;
   while (run < 64u && cm_sums[run] <= cm_max_cells - cells) cells += cm_sums[run++];
   uint cut = CM_PRIORITIES - run * cm_run;

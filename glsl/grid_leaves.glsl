@@ -34,12 +34,6 @@ uint cm_half(float value) {
 ivec3 cm_leaf_voxel(vec3 v0, uint shape) {
   return ivec3(v0 + cm_from_frame(cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape), shape));
 }
-// Whether it is within a brick; then its level there.
-bool cm_is_fine(uint shape) { return cm_shape_cube_size(shape) <= 3u; }
-uint cm_fine_level(uint shape) {
-  uint cell_class = cm_shape_class(shape);
-  return 3u * (3u - cm_shape_exponent(shape)) - (cell_class == 1u ? 0u : (cell_class == 2u ? 2u : 1u));
-}
 
 // Voxels are counted along the frame's axes, from the one at v0: the place of that one in the brick, and steps.
 int cm_voxel_at_v0(vec3 v0, uint shape) {

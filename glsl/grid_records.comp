@@ -100,15 +100,16 @@ void main() {
   uint at = cm_first + gl_GlobalInvocationID.x;
   if (at >= cm_end) return;
   uint i = cm_list[at];
-  CmTreeCell cell = cm_cells[i];
-  vec3 v0 = cm_v0_of(cell.where);
-  uint shape = cm_shape_of(cell.where);
+  uvec2 where = cm_cells[i].where;
+  uint rank = cm_cells[i].rank;
+  vec3 v0 = cm_v0_of(where);
+  uint shape = cm_shape_of(where);
   CmLeaf leaf = cm_leaf(v0, shape, cm_leaf_voxel(v0, shape));
   if (leaf.dense) cm_put_in_box(v0, shape);
   uvec4 links = cm_links[i];
-  cm_records[2u * cell.rank] = uvec4(cm_rank_behind(links.x, i), cm_rank_behind(links.y, i), cm_rank_behind(links.z, i),
-                                     cm_rank_behind(links.w, i));
+  cm_records[2u * rank] = uvec4(cm_rank_behind(links.x, i), cm_rank_behind(links.y, i), cm_rank_behind(links.z, i),
+                                cm_rank_behind(links.w, i));
   // Without the first two it is empty.
-  cm_records[2u * cell.rank + 1u] =
-      uvec4(cell.where, leaf.coefficients.x, leaf.coefficients.x == 0u ? 0u : leaf.coefficients.y);
+  cm_records[2u * rank + 1u] =
+      uvec4(where, leaf.coefficients.x, leaf.coefficients.x == 0u ? 0u : leaf.coefficients.y);
 }

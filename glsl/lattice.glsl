@@ -70,6 +70,13 @@ CM_FN uint cm_split_level(ivec3 vertex, uint octave, uint log2_size) {
   return 3u * (log2_size - 1u - octave) + uint(1 - (odd.x + odd.y + odd.z));
 }
 
+// Whether a cell is within a brick; then its level there.
+CM_FN bool cm_is_fine(uint shape) { return cm_shape_cube_size(shape) <= 3u; }
+CM_FN uint cm_fine_level(uint shape) {
+  uint cell_class = cm_shape_class(shape);
+  return 3u * (3u - cm_shape_exponent(shape)) - (cell_class == 1u ? 0u : (cell_class == 2u ? 2u : 1u));
+}
+
 // Which of a cube's cells this is, above bricks: of a cube of the octree at this corner six Kuhn tetrahedra (B), their
 // 12 halves (C), each on a face, and 24 quarters (A), each on an edge and a face; of the whole cube the roots alone.
 CM_FN uint cm_coarse_cell(vec3 v0, uint shape, vec3 corner) {

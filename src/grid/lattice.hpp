@@ -15,7 +15,7 @@
 namespace cumulet::grid {
 
 /// What stands at a point of the lattice of a scale m, 1 and up: of the cube of 8^m voxels from there on, and about it.
-/// glsl/lattice.glsl; glsl/grid_cells.comp reads it.
+/// glsl/lattice.glsl; glsl/grid_places.glsl reads it.
 struct LatticePlace {
   std::uint32_t block = 0;   ///< the block of the next finer scale there; 0: none
   std::uint32_t brick = 0;   ///< whose values the cube has, if there is no such block, or it is a brick
@@ -102,7 +102,7 @@ struct Lattice {
 using LatticePtr = std::shared_ptr<const Lattice>;
 
 /// Part of a cell within a brick: what it has of one voxel, in the cell's frame. As shaders read it:
-/// glsl/grid_cells.comp.
+/// glsl/grid_records.comp, glsl/grid_channels.comp.
 struct CellPart {
   glm::vec3 from_centroid;  ///< of that part's middle, from the cell's, in the cell's units
   std::uint32_t packed;     ///< x | y << 4 | z << 8 | sixths << 12; x, y, z: the voxel's low corner from v0 on

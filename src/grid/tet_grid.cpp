@@ -63,12 +63,13 @@ std::array<RootCell, 24> root_cells(int log2_size) {
     core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size - 1), roots[root].v0, roots[root].shape);
     for (unsigned i = 0; i < 4; ++i) vertices[root][i] = core::cm_cell_vertex(roots[root].v0, roots[root].shape, i);
   }
+  constexpr std::array<unsigned, 4> opposite{3, 1, 2, 0};  // to each face: the vertex
   for (unsigned a = 0; a < 24; ++a) {
     for (unsigned face = 0; face < 4; ++face) {
       for (unsigned b = 0; b < 24; ++b) {
         unsigned shared = 0;
         for (unsigned i = 0; i < 4; ++i) {
-          if (i == core::cm_opposite(0, face)) continue;
+          if (i == opposite[face]) continue;
           shared += std::count(vertices[b].begin(), vertices[b].end(), vertices[a][i]) > 0 ? 1U : 0U;
         }
         if (a != b && shared == 3) roots[a].links[face] = b;
@@ -128,6 +129,13 @@ std::uint32_t GridBuilder::mark_splits(std::uint32_t first, std::uint32_t last) 
   return splits;
 }
 
+// What has the face that a cell and the other have whole. If this splits elsewhere its cap (face 3) goes to child 1,
+// its other whole face to child 0.
+std::uint32_t GridBuilder::behind_whole(std::uint32_t other, std::uint32_t cell) const {
+  if (other == CM_NONE || nodes_[other].child == 0) return other;
+  return nodes_[other].child + (nodes_[other].links[3] == cell ? 1 : 0);
+}
+
 void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
   const Node node = nodes_[parent];
   const std::uint32_t cell_class = core::cm_shape_class(node.shape);
@@ -155,12 +163,7 @@ void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
     child.links[faces.x] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
   }
   const glm::uvec2 faces = core::cm_whole_face(cell_class, side);
-  std::uint32_t whole = node.links[faces.y];
-  if (whole != CM_NONE && nodes_[whole].child != 0) {
-    // It splits in this round too, elsewhere: its cap (face 3) goes to child 1, its other whole face to child 0.
-    whole = nodes_[whole].child + (nodes_[whole].links[3] == parent ? 1 : 0);
-  }
-  child.links[faces.x] = whole;
+  child.links[faces.x] = behind_whole(node.links[faces.y], parent);
 }
 
 void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part) {
@@ -200,21 +203,9 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressP
   level_first_.push_back(next);
 }
 
-// A link may point to a cell that has split since: go down to the child that has the face. No edge that is bisected
-// lies in the face (the grid conforms), so the face has exactly one end of it.
+// A link may point to a cell that has split since: once at most, for a face that neither split cuts is cut by the next.
 std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
-  const Node& node = nodes_[from];
-  std::uint32_t other = node.links[face];
-  while (other != CM_NONE && nodes_[other].child != 0) {
-    const vec3 end = vec3(nodes_[other].v0);
-    bool has_end = false;
-    for (std::uint32_t i = 0; i < 4; ++i) {
-      if (i == core::cm_opposite(core::cm_shape_class(node.shape), face)) continue;
-      has_end = has_end || core::cm_cell_vertex(vec3(node.v0), node.shape, i) == end;
-    }
-    other = nodes_[other].child + (has_end ? 0 : 1);
-  }
-  return other;
+  return behind_whole(nodes_[from].links[face], from);
 }
 
 void GridBuilder::order(Progress* progress) {

@@ -132,6 +132,7 @@ class GridBuilder {
   // Of these nodes; returns how many split.
   std::uint32_t mark_splits(std::uint32_t first, std::uint32_t last);
   void make_child(std::uint32_t parent, unsigned side);
+  [[nodiscard]] std::uint32_t behind_whole(std::uint32_t other, std::uint32_t cell) const;
   [[nodiscard]] std::uint32_t resolve(std::uint32_t from, unsigned face) const;
   void order(Progress* progress);
   // The roots and the tree of point location.

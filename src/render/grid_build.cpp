@@ -373,7 +373,7 @@ void GridPace::learn(const std::vector<Sent>& sent, double ms, Measured measured
   double expected = 0.0;
   bool first = false;
   for (const Sent& s : sent) {
-    expected += this->ms(s.key, s.cost) * s.items;
+    expected += this->ms(s.key, s.cost) * s.weight * s.items;
     first = known_.try_emplace(s.key, s.cost).second || first;
   }
   if (first) return;
@@ -398,7 +398,7 @@ GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Li
       limits_(limits),
       data_(std::move(data)),
       levels_(std::move(levels)),
-      max_cells_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(max_cells, 24, std::uint64_t{1} << 30U))),
+      max_cells_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(max_cells, CM_ROOTS, std::uint64_t{1} << 30U))),
       most_bytes_(most_bytes),
       pace_(std::move(pace)),
       decision_(gl_, "deciding which cells split") {
@@ -479,7 +479,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   const auto begun = std::chrono::steady_clock::now();
   gl_->DispatchCompute(pass.item_a_group ? items : (items + group - 1) / group, 1, 1);
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), pass.weight * items};
+  const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), static_cast<double>(items), pass.weight};
   if (gl_->dispatches_in_call) {
     pace_->learn({sent}, milliseconds(std::chrono::steady_clock::now() - begun), GridPace::Measured::exactly);
     return first + items;
@@ -492,6 +492,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
 }
 
 void GridBuild::plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind) {
+  if (first == end) return;  // a call is a step at least
   upload.add_until([this, pass, next = first, end, bind]() mutable {
     while (next < end) {
       const std::optional<std::uint32_t> left = dispatch(pass, next, end, bind);
@@ -651,15 +652,13 @@ void GridBuild::plan_cells() {
 void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind) {
   // Cells of a level are all of one size.
   std::uint32_t shape = grid::root_cells(data_->lattice().cube.log2_size)[0].shape;
-  std::size_t fine_level = 0;
   std::uint32_t begin = tree_levels_.back().splits_end;
   for (const Level& level : tree_levels_) {
     Pass pass = coarse;
-    if (core::cm_shape_cube_size(shape) <= 3) {
+    if (core::cm_is_fine(shape)) {
       pass = fine;
-      const unsigned parts = grid::parts_of_levels[fine_level + 1] - grid::parts_of_levels[fine_level];
-      pass.weight = 1.0 + parts_weight * parts;
-      ++fine_level;
+      const std::uint32_t fine_level = core::cm_fine_level(shape);
+      pass.weight += parts_weight * (grid::parts_of_levels[fine_level + 1] - grid::parts_of_levels[fine_level]);
     }
     plan_pass(*cells_, pass, begin, begin + level.leaves(), bind);
     begin += level.leaves();
@@ -827,8 +826,8 @@ void GridBuild::plan_tree_cells() {
     plan_pass(*cells_, {cells_key(0), 8}, level.cells_begin, level.cells_end, bind_splits);
     plan_pass(*cells_, {cells_key(1), 16}, level.splits_begin, level.splits_end, bind);
   }
-  for (auto level = tree_levels_.rbegin(); level != tree_levels_.rend(); ++level)
-    plan_pass(*cells_, {cells_key(2), 2}, level->splits_begin, level->splits_end, bind);
+  for (std::size_t i = tree_levels_.size(); i-- > 0;)
+    plan_pass(*cells_, {cells_key(2), 2}, tree_levels_[i].splits_begin, tree_levels_[i].splits_end, bind);
   plan_pass(*cells_, {cells_key(3), 1, true}, 0, 1, bind);
   for (const Level& level : tree_levels_)
     plan_pass(*cells_, {cells_key(4), 4}, level.splits_begin, level.splits_end, bind);

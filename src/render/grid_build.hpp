@@ -148,6 +148,7 @@ class GridPace {
     gl::ProgramKey key;
     double cost = 0.0;
     double items = 0.0;
+    double weight = 1.0;  ///< of an item, where a kernel's differ
   };
   enum class Measured {
     exactly,  ///< of these alone
@@ -195,7 +196,7 @@ class GridBuild {
     std::uint32_t cost = 1;
     bool item_a_group = false;  // a work group of 64 an item, else an invocation
     bool of_lattice = true;     // knows glsl/grid_places.glsl
-    double weight = 1.0;        // of an item, where the kernel has others that weigh 1
+    double weight = 1.0;        // of an item, where a kernel's differ
   };
   using Bind = std::function<void(GLuint program)>;
   // Of the tree: its cells, and where those that split stand in the list, in front of all leaves. Of the last none do.

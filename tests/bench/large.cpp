@@ -196,8 +196,7 @@ Measured measure_apart(const std::string& file, const viewer::BuildSettings& set
   Measured measured{};
   const bool whole = read(ends[0], &measured, sizeof measured) == sizeof measured;
   close(ends[0]);
-  int status = 0;
-  waitpid(child, &status, 0);
+  waitpid(child, nullptr, 0);
   if (!whole) throw std::runtime_error(file + " was not measured");
   return measured;
 }
