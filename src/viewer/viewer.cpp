@@ -971,7 +971,10 @@ void Viewer::rebuild() {
 
 void Viewer::share_gl() {
   const bool limited = most_gl_bytes_ != Allowance::no_limit;
-  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_.value_or(0));
+  // Pictures take some KiB more or less from frame to frame; cells are to be as many again.
+  constexpr std::uint64_t step = std::uint64_t{1} << 18U;
+  const std::uint64_t beside = (gl_beside_volumes_.value_or(0) + step - 1) / step * step;
+  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, beside);
   allowance_->set_gl(limited ? left / grids_ : Allowance::no_limit);
 }
 
