@@ -28,7 +28,7 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t group = 64;  // invocations of a work group, of all kernels here
-constexpr std::size_t roots_words = 52;
+constexpr std::size_t roots_words = 2 * CM_ROOTS + 4;
 constexpr double parts_weight = 0.05;      // of a cell's parts, beside the rest of its record
 constexpr double most_in_flight_ms = 8.0;  // whatever the deadline: the host draws, too
 

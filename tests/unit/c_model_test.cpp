@@ -92,11 +92,7 @@ ModelRef make_model(cumulet_surfaces* surfaces, const Matrix& place = {}, bool s
   desc.shadow_only = shadow_only ? 1 : 0;
   desc.tag = tag;
   std::ranges::copy(place, desc.to_world);
-  cumulet_model* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_model_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return ModelRef(out);
+  return cumulet::test::made_by<ModelRef>(cumulet_model_create, desc);
 }
 
 double mean_of(const Picture& picture) {

@@ -36,11 +36,7 @@ SequenceRef make_sequence(const std::vector<std::string>& files, const cumulet_v
   desc.paths = paths.data();
   desc.count = paths.size();
   desc.file = file;
-  cumulet_sequence* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_sequence_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return SequenceRef(out);
+  return cumulet::test::made_by<SequenceRef>(cumulet_sequence_create, desc);
 }
 
 class CSequence : public cumulet::test::CPlaybackTest {

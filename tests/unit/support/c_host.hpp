@@ -74,22 +74,21 @@ inline std::array<double, 16> at(double x, double y, double z) {
   return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
 }
 
-/// Throws std::runtime_error.
-inline VolumeRef make_dense(const cumulet_dense_desc& desc) {
-  cumulet_volume* out = nullptr;
+/// What such a call of the C API makes of a description. Throws std::runtime_error with its words.
+template <class Ref, class Create, class Desc>
+Ref made_by(Create create, const Desc& desc) {
+  typename Ref::pointer out = nullptr;
   std::array<char, 256> error{};
-  if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return VolumeRef(out);
+  if (create(&desc, &out, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
+  return Ref(out);
 }
 
-/// Throws std::runtime_error.
+inline VolumeRef make_dense(const cumulet_dense_desc& desc) {
+  return made_by<VolumeRef>(cumulet_volume_from_dense, desc);
+}
+
 inline InstanceRef make_instance(const cumulet_instance_desc& desc) {
-  cumulet_instance* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_instance_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return InstanceRef(out);
+  return made_by<InstanceRef>(cumulet_instance_create, desc);
 }
 
 /// A lumpy ball of size^3 voxels centred on the origin, as a dense array.
@@ -275,13 +274,8 @@ struct ViewerOptions {
   cumulet_build build = CUMULET_BUILD_CPU;
 };
 
-/// As the library makes one. Throws std::runtime_error.
-inline ViewerPtr make_plain_viewer(const cumulet_create_desc& desc) {
-  std::array<char, 256> error{};
-  cumulet_viewer* out = nullptr;
-  if (cumulet_create(&desc, &out, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
-  return ViewerPtr(out);
-}
+/// As the library makes one.
+inline ViewerPtr make_plain_viewer(const cumulet_create_desc& desc) { return made_by<ViewerPtr>(cumulet_create, desc); }
 
 /// From there, by a camera of its own. Throws std::runtime_error.
 inline void look(cumulet_viewer* viewer, const cumulet_camera_desc& stand) {

@@ -152,13 +152,8 @@ class State {
   std::vector<cumulet_field> fields_;
 };
 
-/// Throws std::runtime_error.
 inline LiveRef make_live(const cumulet_live_desc& desc = make_desc<cumulet_live_desc>()) {
-  cumulet_live* out = nullptr;
-  std::array<char, 256> error{};
-  if (cumulet_live_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return LiveRef(out);
+  return made_by<LiveRef>(cumulet_live_create, desc);
 }
 
 }  // namespace cumulet::test
