@@ -48,8 +48,8 @@ struct VolumeFrame {
   [[nodiscard]] std::vector<ScalarVolume*> fields();
 };
 
-/// Which grids of a file are which field. "none" leaves a field out. Empty: the grid whose name, in whatever case,
-/// comes first among those below, but for one that is named for another field.
+/// Which grids of a file are which field. "none" leaves a field out. Empty: the grid whose name comes first among those
+/// below, but for one that is named for another field. A name in this case comes before the same name in another case.
 struct GridNames {
   /// density, smoke, soot; of a file without any of density, temperature and flame, what import_volume reads.
   std::string density = {};
@@ -92,9 +92,10 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 ///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
 /// out; but a velocity that nobody named is left out where it fails, with a warning that says why. Warnings:
-/// import_volume's; the grids that are not shown; temperature, colour, anisotropy or velocity that lies nowhere over
-/// density; anisotropy beyond -1 and 1, which counts as these; velocities that are clamped. An info tells of colour in
-/// three grids that is not read, and of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
+/// import_volume's; the grids that are not shown; grids that fit a field's name as well as the one that is read;
+/// temperature, colour, anisotropy or velocity that lies nowhere over density; anisotropy beyond -1 and 1, which counts
+/// as these; velocities that are clamped. An info tells of colour in three grids that is not read, and of temperatures
+/// that seem to be kelvin, degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

@@ -48,7 +48,7 @@ bool by_name(const std::string& name) { return name.empty(); }
 std::vector<std::size_t> channels(const std::vector<GridInfo>& grids, const std::string& name) {
   std::vector<std::size_t> found;
   for (const char* suffix : {"_r", "_g", "_b"}) {
-    const std::string channel = lower_case(name) + suffix;
+    const std::string channel = name + suffix;
     const auto grid = first_fog(grids, std::array<std::string_view, 1>{channel});
     if (!grid) return {};
     found.push_back(*grid);
@@ -87,27 +87,26 @@ std::vector<std::size_t> choose_velocity(const std::vector<GridInfo>& grids, con
   if (name == no_grid) return {};
   if (!by_name(name)) return choose_vectors(grids, name, velocity_refusal, along_axes(grids, name), {"x", "y", "z"});
   const auto free = [&](std::size_t i) { return std::ranges::find(taken, i) == taken.end(); };
-  const auto first = [&](const auto& suits) -> std::vector<std::size_t> {
-    for (std::size_t i = 0; i < grids.size(); ++i) {
-      if (free(i) && velocity_refusal(grids[i]).empty() && suits(grids[i])) return {i};
-    }
-    return {};
-  };
+  const auto is_vector = [](const GridInfo& grid) { return velocity_refusal(grid).empty(); };
   for (const std::string_view likely : velocity_names) {
-    std::vector<std::size_t> found = first([&](const GridInfo& grid) { return lower_case(grid.name) == likely; });
-    if (found.empty()) found = along_axes(grids, likely);
+    std::vector<std::size_t> found = called_so(grids, likely, is_vector);
+    std::erase_if(found, [&](std::size_t i) { return !free(i); });
+    if (!found.empty()) return {found.front()};
+    found = along_axes(grids, likely);
     if (!found.empty() && std::ranges::all_of(found, free)) return found;
   }
-  return first([](const GridInfo& grid) { return grid.grid_class == "staggered"; });
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (free(i) && is_vector(grids[i]) && grids[i].grid_class == "staggered") return {i};
+  }
+  return {};
 }
 
 std::vector<std::size_t> choose_colour(const std::vector<GridInfo>& grids, const std::string& name) {
   if (name == no_grid) return {};
   if (!by_name(name)) return choose_vectors(grids, name, colour_refusal, channels(grids, name), {"_r", "_g", "_b"});
   for (const std::string_view likely : colour_names) {
-    for (std::size_t i = 0; i < grids.size(); ++i) {
-      if (lower_case(grids[i].name) == likely && colour_refusal(grids[i]).empty()) return {i};
-    }
+    const auto found = called_so(grids, likely, [](const GridInfo& grid) { return colour_refusal(grid).empty(); });
+    if (!found.empty()) return {found.front()};
   }
   return {};
 }
@@ -196,6 +195,7 @@ class FrameImport {
     if (by_name(names.density) && chosen.density) {
       remark(LogLevel::warning, file_, remark_on_choice(reader.grids(), *chosen.density, chosen.all()));
     }
+    remark_on_case(reader.grids(), chosen, names);
     if (by_name(names.colour) && chosen.colour.empty()) remark_on_colour(reader.grids());
     const Portion whole{reader.opened(), 1.0};
     velocity_is_named_ = !by_name(names.velocity);
@@ -428,6 +428,26 @@ class FrameImport {
       field = std::move(volume);
     }
     field.index_to_world = lattice;
+  }
+
+  /// Density has a remark of its own.
+  void remark_on_case(const std::vector<GridInfo>& grids, const Chosen& chosen, const GridNames& names) const {
+    const std::vector<std::size_t> shown = chosen.all();
+    const auto remark_on = [&](const char* field, const std::string& name, std::span<const std::size_t> found) {
+      if (!by_name(name)) return;
+      for (const std::string& text : remarks_on_case(grids, field, found, shown)) {
+        remark(LogLevel::warning, file_, text);
+      }
+    };
+    const auto remark_on_one = [&](const char* field, const std::string& name,
+                                   const std::optional<std::size_t>& found) {
+      if (found) remark_on(field, name, {&*found, 1});
+    };
+    remark_on_one("temperature", names.temperature, chosen.temperature);
+    remark_on_one("flame", names.flame, chosen.flame);
+    remark_on_one("anisotropy", names.anisotropy, chosen.anisotropy);
+    remark_on("color", names.colour, chosen.colour);
+    remark_on("velocity", names.velocity, chosen.velocity);
   }
 
   void remark_on_colour(const std::vector<GridInfo>& grids) const {

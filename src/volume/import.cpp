@@ -101,17 +101,26 @@ std::string detail::lower_case(std::string text) {
   return text;
 }
 
+std::vector<std::size_t> detail::called_so(const std::vector<GridInfo>& grids, std::string_view name,
+                                           const std::function<bool(const GridInfo&)>& suits) {
+  std::vector<std::size_t> found;
+  const std::string lower_name = lower_case(std::string(name));
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (lower_case(grids[i].name) == lower_name && suits(grids[i])) found.push_back(i);
+  }
+  std::stable_partition(found.begin(), found.end(), [&](std::size_t i) { return grids[i].name == name; });
+  return found;
+}
+
 namespace {
 
-// Grids of numbers of this name with an axis' letter behind `join`.
+// Grids of numbers of this name with an axis' letter behind `join`, those in the name's own case first.
 std::array<std::vector<std::size_t>, 3> axes_called(const std::vector<GridInfo>& grids, std::string_view name,
                                                     std::string_view join) {
   std::array<std::vector<std::size_t>, 3> found;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string called = std::string(name).append(join) + "xyz"[axis];
-    for (std::size_t i = 0; i < grids.size(); ++i) {
-      if (grids[i].values == Values::scalars && lower_case(grids[i].name) == called) found[axis].push_back(i);
-    }
+    found[axis] = called_so(grids, called, [](const GridInfo& grid) { return grid.values == Values::scalars; });
   }
   const bool whole = std::ranges::none_of(found, [](const auto& axis) { return axis.empty(); });
   return whole ? found : std::array<std::vector<std::size_t>, 3>{};
@@ -123,7 +132,7 @@ constexpr std::array<std::string_view, 3> axis_joins = {"", "_", "."};
 
 std::vector<std::size_t> detail::along_axes(const std::vector<GridInfo>& grids, std::string_view name) {
   for (const std::string_view join : axis_joins) {
-    const auto found = axes_called(grids, lower_case(std::string(name)), join);
+    const auto found = axes_called(grids, name, join);
     if (!found[0].empty()) return {found[0][0], found[1][0], found[2][0]};
   }
   return {};
@@ -151,10 +160,27 @@ std::string detail::remark_on_choice(const std::vector<GridInfo>& grids, std::si
   for (std::size_t i = 0; i < grids.size(); ++i) {
     if (!grids[i].refusal.empty() || is_among(i, shown) || is_among(i, motion)) continue;
     others.push_back(i);
-    one_density = one_density && grids[i].name != grids[chosen].name;
+    one_density = one_density && lower_case(grids[i].name) != "density";
   }
   if (others.empty() || one_density) return {};
   return "shows its grid " + label(grids[chosen]) + "; there is also " + describe(grids, others);
+}
+
+std::vector<std::string> detail::remarks_on_case(const std::vector<GridInfo>& grids, const std::string& field,
+                                                 std::span<const std::size_t> chosen,
+                                                 std::span<const std::size_t> shown) {
+  std::vector<std::string> remarks;
+  for (const std::size_t grid : chosen) {
+    const auto alike = [&](const GridInfo& other) {
+      return other.values == grids[grid].values && other.refusal.empty() == grids[grid].refusal.empty();
+    };
+    std::vector<std::size_t> others = called_so(grids, grids[grid].name, alike);
+    std::erase_if(others, [&](std::size_t i) { return is_among(i, shown); });
+    if (others.empty()) continue;
+    remarks.push_back("reads its grid " + label(grids[grid]) + " as " + field + "; there is also " +
+                      describe(grids, others));
+  }
+  return remarks;
 }
 
 std::vector<std::size_t> detail::named(const std::vector<GridInfo>& grids, const std::string& name) {
@@ -174,9 +200,8 @@ std::optional<std::size_t> detail::first_fog(const std::vector<GridInfo>& grids,
                                              std::span<const std::string_view> names,
                                              std::span<const std::size_t> taken) {
   for (const std::string_view name : names) {
-    for (std::size_t i = 0; i < grids.size(); ++i) {
-      if (!grids[i].refusal.empty() || is_among(i, taken)) continue;
-      if (lower_case(grids[i].name) == name) return i;
+    for (const std::size_t i : called_so(grids, name, [](const GridInfo& grid) { return grid.refusal.empty(); })) {
+      if (!is_among(i, taken)) return i;
     }
   }
   return std::nullopt;

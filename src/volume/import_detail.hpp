@@ -149,7 +149,11 @@ std::size_t choose_named(const std::vector<GridInfo>& grids, const std::string& 
                          const std::function<std::string(const GridInfo&)>& refusal);
 /// All of this name, or else unique name.
 std::vector<std::size_t> named(const std::vector<GridInfo>& grids, const std::string& name);
-/// The scalar fog grid whose name, in whatever case, comes first among these; of several the file's first. taken: grids
+/// Grids of this name that suit, in the file's order: first those whose name is the same, then those whose name differs
+/// in case.
+std::vector<std::size_t> called_so(const std::vector<GridInfo>& grids, std::string_view name,
+                                   const std::function<bool(const GridInfo&)>& suits);
+/// The scalar fog grid whose name comes first among these; of several the first that called_so() finds. taken: grids
 /// that it is not.
 std::optional<std::size_t> first_fog(const std::vector<GridInfo>& grids, std::span<const std::string_view> names,
                                      std::span<const std::size_t> taken = {});
@@ -167,6 +171,10 @@ std::vector<std::size_t> along_axes(const std::vector<GridInfo>& grids, std::str
 /// are, of whatever field.
 std::string remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,
                              std::span<const std::size_t> shown);
+/// What warnings say of grids that were found for a field by their names, where others differ in case or not at all.
+/// shown: all grids that are read, of any field.
+std::vector<std::string> remarks_on_case(const std::vector<GridInfo>& grids, const std::string& field,
+                                         std::span<const std::size_t> chosen, std::span<const std::size_t> shown);
 /// what, followed by all grids.
 [[noreturn]] void fail_without(const std::vector<GridInfo>& grids, const std::string& what);
 std::string describe(const std::vector<GridInfo>& grids, std::span<const std::size_t> which);

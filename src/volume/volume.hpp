@@ -87,11 +87,13 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 /// Reads one scalar grid of a .vdb or .nvdb file.
 ///
 /// grid_name empty: the scalar fog grid called "density"; else the first of those called "smoke", "soot", "flames",
-/// "flame", "fire", "temperature", "heat", in whatever case; else the first of the file. A warning names the others,
-/// unless it is the only one called "density". Level sets, vector grids, points and unreadable files throw Error(file)
-/// with one line that names file and cause. An empty grid is an empty volume, with a warning; negative and non-finite
-/// voxels are zero, with one warning each that counts them. Any affine transform is accepted; a frustum transform is
-/// not. O(active nodes) time and memory. progress receives the fraction done; cancelled, Error(cancelled) is thrown.
+/// "flame", "fire", "temperature", "heat"; else the first of the file. A name in this case comes before the same name
+/// in another case. A warning names the others, unless it is the only one called "density" in any case. Another warning
+/// names a version of the file that is newer than the known ones. Level sets, vector grids, points and unreadable files
+/// throw Error(file) with one line that names file and cause. An empty grid is an empty volume, with a warning;
+/// negative and non-finite voxels are zero, with one warning each that counts them. Any affine transform is accepted; a
+/// frustum transform is not. O(active nodes) time and memory. progress receives the fraction done; cancelled,
+/// Error(cancelled) is thrown.
 ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
                            Progress* progress = nullptr);
 

@@ -75,6 +75,7 @@
  *     a viewer) gives one line that names the file, where there is one, and the cause. A call that fails leaves the
  *     viewer as it was, and it still draws what it had. No C++ exception leaves the library. Work that fails on the
  *     worker thread is told by cumulet_get_progress and CUMULET_RENDER_FAILED.
+ *     Numbers in texts are those of the classic locale, and files are read alike, in every locale of the process.
  *
  * Descriptors
  *     Set struct_size to sizeof the struct and zero the rest: zero means the default. Unknown enum values are errors.
@@ -260,9 +261,9 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
 
 /*
  * Reads one scalar grid of a .vdb or .nvdb file. grid_name NULL or "": the one called "density"; else the first of
- * those called "smoke", "soot", "flames", "flame", "fire", "temperature", "heat", in whatever case; else the first
- * scalar fog grid of the file (cumulet_load_volume logs a warning that names the others). "name[1]" is the second of
- * that name.
+ * those called "smoke", "soot", "flames", "flame", "fire", "temperature", "heat"; else the first scalar fog grid of the
+ * file. A name in this case comes before the same name in another case. cumulet_load_volume logs a warning that names
+ * the other grids. "name[1]" is the second of that name.
  */
 CUMULET_API cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out,
                                                char* error, size_t error_size);
@@ -441,7 +442,7 @@ CUMULET_API void cumulet_inspection_release(cumulet_inspection* inspection); /* 
 
 typedef struct cumulet_volume_file_info {
   size_t struct_size;
-  const char* format; /* "OpenVDB 224", "NanoVDB 32.3" */
+  const char* format; /* "OpenVDB 225", "NanoVDB 32.9" */
   uint64_t bytes;     /* of the file */
   uint32_t grid_count;
   uint32_t metadata_count; /* entries of the file as a whole */
