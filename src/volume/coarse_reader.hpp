@@ -38,6 +38,7 @@ class CoarseReader final : public Reader {
     [[nodiscard]] const std::vector<GridInfo>& grids() const override { return whole().grids(); }
     [[nodiscard]] const std::vector<Metadata>& metadata() const override { return whole().metadata(); }
     [[nodiscard]] const std::string& format() const override { return whole().format(); }
+    [[nodiscard]] std::vector<std::string> remarks() const override { return whole().remarks(); }
     [[nodiscard]] double opened() const override { return whole().opened(); }
     [[nodiscard]] double reading() const override { return whole().reading(); }
     SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) override;

@@ -191,6 +191,7 @@ class FrameImport {
       : file_(std::move(file)), log_(log), progress_(progress) {}
 
   VolumeFrame run(Reader& reader, const GridNames& names) {
+    for (const std::string& text : reader.remarks()) remark(LogLevel::warning, file_, text);
     const Chosen chosen = choose(reader.grids(), names);
     if (by_name(names.density) && chosen.density) {
       remark(LogLevel::warning, file_, remark_on_choice(reader.grids(), *chosen.density, chosen.all()));

@@ -66,6 +66,10 @@ std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress
   if (got == 0) fail("is empty");
   if (head.starts_with("NanoVDB")) return open_nanovdb(file, progress);
   if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(file, progress);
+  if (head.ends_with("BDVonaN")) fail("is a NanoVDB file in big-endian byte order, which is not supported");
+  if (head == std::string_view("\0\0\0\0VDB ", 8)) {
+    fail("is an OpenVDB file in big-endian byte order, which is not supported");
+  }
   if (got < magic.size()) fail("is too short to be a VDB or NanoVDB file");
   fail("is not a VDB or NanoVDB file");
 }
@@ -738,6 +742,7 @@ ScalarVolume import_volume(const std::filesystem::path& file, const std::string&
                            Progress* progress) {
   return naming(file.string(), [&] {
     const std::unique_ptr<Reader> reader = open(file, progress);
+    for (const std::string& text : reader->remarks()) log.warning(one_line(file.string() + ": " + text));
     const std::size_t chosen = choose_grid(reader->grids(), grid_name);
     if (grid_name.empty()) {
       const std::string remark = remark_on_choice(reader->grids(), chosen, std::span(&chosen, 1));

@@ -126,6 +126,8 @@ class Reader {
   [[nodiscard]] virtual const std::vector<Metadata>& metadata() const = 0;
   /// "OpenVDB 224", "NanoVDB 32.3".
   [[nodiscard]] virtual const std::string& format() const = 0;
+  /// What a warning says of the file as a whole, such as a version that is newer than the known ones.
+  [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
   /// What opening took of the load's fraction.
   [[nodiscard]] virtual double opened() const { return 0.0; }
   /// What read() takes of a grid's import.

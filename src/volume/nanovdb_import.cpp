@@ -1,6 +1,5 @@
 #include <blosc.h>
 #include <nanovdb/NanoVDB.h>
-#include <nanovdb/util/GridChecksum.h>
 #include <nanovdb/util/GridHandle.h>
 #include <nanovdb/util/HostBuffer.h>
 #include <nanovdb/util/IO.h>
@@ -11,6 +10,7 @@
 #include <map>
 
 #include "volume/import_detail.hpp"
+#include "volume/nanovdb_directory.hpp"
 #include "volume/source_file.hpp"
 
 namespace cumulet::volume::detail {
@@ -18,49 +18,6 @@ namespace {
 
 using nanovdb::io::Codec;
 using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
-
-std::string type_name(nanovdb::GridType type) {
-  if (type >= nanovdb::GridType::End) return "unknown type " + std::to_string(static_cast<std::uint32_t>(type));
-  return type == nanovdb::GridType::Unknown ? "unknown" : nanovdb::toStr(type);
-}
-
-std::string class_name(nanovdb::GridClass grid_class) {
-  switch (grid_class) {
-    case nanovdb::GridClass::LevelSet:
-      return "level set";
-    case nanovdb::GridClass::FogVolume:
-      return "fog volume";
-    case nanovdb::GridClass::Staggered:
-      return "staggered";
-    case nanovdb::GridClass::PointIndex:
-    case nanovdb::GridClass::PointData:
-      return "point grid";
-    case nanovdb::GridClass::Topology:
-      return "topology grid";
-    case nanovdb::GridClass::VoxelVolume:
-      return "voxel volume";
-    case nanovdb::GridClass::IndexGrid:
-      return "index grid";
-    default:
-      return "unknown";
-  }
-}
-
-bool is_scalar(nanovdb::GridType type) {
-  switch (type) {
-    case nanovdb::GridType::Float:
-    case nanovdb::GridType::Double:
-    case nanovdb::GridType::Fp4:
-    case nanovdb::GridType::Fp8:
-    case nanovdb::GridType::Fp16:
-    case nanovdb::GridType::FpN:
-      return true;
-    default:
-      return false;
-  }
-}
-
-bool is_vector(nanovdb::GridType type) { return type == nanovdb::GridType::Vec3f || type == nanovdb::GridType::Vec3d; }
 
 glm::ivec3 child_offset(std::uint32_t i, unsigned log2_table, unsigned log2_child) {
   const std::uint32_t mask = (1U << log2_table) - 1U;
@@ -159,14 +116,12 @@ class NanoWalk {
     if (root_offset > size_) damaged("an offset leads outside of the grid");
     const auto* root = at<RootT>(tree, static_cast<std::int64_t>(root_offset));
     const std::uint64_t tiles = root->data()->mTableSize;
-    at<RootT>(root, 0, sizeof(RootT) + tiles * sizeof(typename RootT::DataType::Tile));
+    const std::uint64_t root_bytes = sizeof(RootT) + tiles * sizeof(typename RootT::DataType::Tile);
+    at<RootT>(root, 0, root_bytes);
 
-    nanovdb::GridChecksum stored(grid->data()->mChecksum, nanovdb::ChecksumMode::Partial);
-    // The header's sum is over grid, tree and root in one piece, which damage may have torn apart.
-    if (!stored.isEmpty() && root_offset == sizeof(TreeT)) {
-      nanovdb::GridChecksum computed;
-      computed(*grid, nanovdb::ChecksumMode::Partial);
-      if (!(computed == stored)) log.warning(log_prefix + "its checksum does not match, it may be damaged");
+    // The checksum is over bytes in one piece, which damage may have torn apart.
+    if (root_offset == sizeof(TreeT) && !has_right_checksum(*grid->data(), root_bytes)) {
+      log.warning(log_prefix + "its checksum does not match, it may be damaged");
     }
 
     const nanovdb::Map& map = grid->data()->mMap;
@@ -239,30 +194,24 @@ class NanoWalk {
   std::vector<std::pair<const LeafT*, glm::ivec3>> leaves_;
 };
 
-/// A .nvdb file. Its directory is checked here before NanoVDB's own reader may trust it.
+/// A .nvdb file, read without NanoVDB's own reader, which trusts every size.
 class NanoReader final : public Reader {
  public:
   NanoReader(const std::filesystem::path& file, Progress* progress)
-      : progress_(progress), stream_(file, progress), size_(static_cast<std::uint64_t>(stream_.size())) {
-    for (std::uint64_t position = 0; position < size_;) position = read_segment(position);
+      : progress_(progress),
+        stream_(file, progress),
+        size_(static_cast<std::uint64_t>(stream_.size())),
+        directory_(read_nano_directory(stream_)) {}
 
-    std::map<std::string, int> uses;
-    for (const GridInfo& entry : entries_) ++uses[entry.name];
-    std::map<std::string, int> seen;
-    for (GridInfo& entry : entries_) {
-      const std::string& name = entry.name;
-      entry.unique_name = uses[name] > 1 ? name + "[" + std::to_string(seen[name]++) + "]" : name;
-    }
-  }
-
-  [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
+  [[nodiscard]] const std::vector<GridInfo>& grids() const override { return directory_.grids; }
   [[nodiscard]] const std::vector<Metadata>& metadata() const override { return metadata_; }
-  [[nodiscard]] const std::string& format() const override { return format_; }
+  [[nodiscard]] const std::string& format() const override { return directory_.format; }
+  [[nodiscard]] std::vector<std::string> remarks() const override { return directory_.remarks; }
   [[nodiscard]] double reading() const override { return 0.7; }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& log, const std::string& log_prefix) override {
     std::shared_ptr<const Handle> handle = load_checked(index, portion);
-    switch (places_[index].type) {
+    switch (directory_.places[index].type) {
       case nanovdb::GridType::Float:
         return NanoWalk<float>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Double:
@@ -296,84 +245,32 @@ class NanoReader final : public Reader {
       }
       return out;
     };
-    if (places_[index].type == nanovdb::GridType::Vec3f) return components.template operator()<nanovdb::Vec3f>();
-    if (places_[index].type == nanovdb::GridType::Vec3d) return components.template operator()<nanovdb::Vec3d>();
+    if (directory_.places[index].type == nanovdb::GridType::Vec3f)
+      return components.template operator()<nanovdb::Vec3f>();
+    if (directory_.places[index].type == nanovdb::GridType::Vec3d)
+      return components.template operator()<nanovdb::Vec3d>();
     fail(unreadable);
   }
 
  private:
-  struct Place {
-    std::uint64_t position;
-    std::uint64_t file_bytes;
-    std::uint64_t memory_bytes;
-    Codec codec;
-    nanovdb::GridType type;
-  };
-
   void read_bytes(std::uint64_t position, void* to, std::uint64_t bytes) {
     if (position > size_ || bytes > size_ - position) fail(end_of_file);
     stream_.seekg(static_cast<std::streamoff>(position));
     stream_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
   }
 
-  /// Lists the grids of the segment at this position; gives the position of the next one.
-  std::uint64_t read_segment(std::uint64_t position) {
-    nanovdb::io::Header header;
-    read_bytes(position, &header, sizeof header);
-    if (header.magic != NANOVDB_MAGIC_NUMBER) {
-      fail(position == 0 ? "was written by a NanoVDB version that is not supported" : "the file is damaged");
-    }
-    if (header.version.getMajor() != NANOVDB_MAJOR_VERSION_NUMBER) {
-      fail("was written by NanoVDB " + std::to_string(header.version.getMajor()) + ", this library reads " +
-           std::to_string(NANOVDB_MAJOR_VERSION_NUMBER));
-    }
-    if (header.codec >= Codec::END) fail("the file is damaged: unknown compression");
-    format_ = "NanoVDB " + std::to_string(header.version.getMajor()) + "." + std::to_string(header.version.getMinor());
-    position += sizeof header;
-    const std::size_t first = places_.size();
-    for (int i = 0; i < header.gridCount; ++i) {
-      nanovdb::io::MetaData meta;
-      read_bytes(position, &meta, sizeof meta);
-      position += sizeof meta;
-      std::string name(std::min<std::uint64_t>(meta.nameSize, size_), '\0');
-      read_bytes(position, name.data(), meta.nameSize);
-      position += meta.nameSize;
-      // NanoVDB's reader trusts the terminator.
-      if (name.empty() || name.back() != '\0') fail("the file is damaged: a grid name has no end");
-      name.resize(name.find('\0'));
-      places_.push_back({0, meta.fileSize, meta.gridSize, header.codec, meta.gridType});
-      GridInfo entry;
-      entry.name = name;
-      entry.type = type_name(meta.gridType);
-      entry.grid_class = class_name(meta.gridClass);
-      entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_scalar(meta.gridType));
-      entry.values = is_scalar(meta.gridType)   ? Values::scalars
-                     : is_vector(meta.gridType) ? Values::lengths
-                                                : Values::none;
-      entries_.push_back(std::move(entry));
-    }
-    for (std::size_t i = first; i < places_.size(); ++i) {
-      places_[i].position = position;
-      if (places_[i].file_bytes > size_ - position) {
-        fail("the file is truncated: " + std::to_string(size_) + " bytes of at least " +
-             std::to_string(position + std::min(places_[i].file_bytes, ~position)));
-      }
-      position += places_[i].file_bytes;
-    }
-    return position;
-  }
-
   std::shared_ptr<const Handle> load_checked(std::size_t index, Portion portion) {
-    auto handle = std::make_shared<const Handle>(load(places_[index], portion));
+    auto handle = std::make_shared<const Handle>(load(directory_.places[index], portion));
     if (handle->size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
     const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle->data());
-    if (grid->mMagic != NANOVDB_MAGIC_NUMBER) fail("the file is damaged: no grid where one should be");
-    if (grid->mGridType != places_[index].type) fail("the file is damaged: grid and directory differ in type");
+    if (!is_nano_grid(*grid)) fail("the file is damaged: no grid where one should be");
+    if (grid->mGridType != directory_.places[index].type)
+      fail("the file is damaged: grid and directory differ in type");
     return handle;
   }
 
   /// Reads and decodes a grid, believing no size: NanoVDB's own reader does, and cannot be stopped.
-  Handle load(const Place& place, Portion portion) {
+  Handle load(const NanoPlace& place, Portion portion) {
     // No codec packs tighter than zlib's 1032 to 1: a larger claim is no reason to allocate.
     constexpr std::uint64_t most_expansion = 1040;
     if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(sizes_differ);
@@ -479,9 +376,7 @@ class NanoReader final : public Reader {
   SourceFile stream_;
   std::uint64_t size_;
   std::vector<Metadata> metadata_;  // the format has none
-  std::string format_;
-  std::vector<Place> places_;
-  std::vector<GridInfo> entries_;
+  NanoDirectory directory_;
 };
 
 }  // namespace

@@ -22,5 +22,14 @@ int main(int argc, char** argv) {
         nanovdb::io::Codec::ZIP);
   write("fp8.nvdb", nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::Fp8>(*grid),
         nanovdb::io::Codec::ZIP);
+  // Buffers without a file's header, of two grids, and as OpenVDB 13 writes them.
+  const auto handle = nanovdb::openToNanoVDB(*grid);
+  const std::string buffer(reinterpret_cast<const char*>(handle.data()), handle.size());
+  folder.write("buffers.nvdb", buffer + buffer);
+  std::string later = buffer;
+  auto& data = *reinterpret_cast<nanovdb::GridData*>(later.data());
+  later[7] = '1';
+  data.mVersion = nanovdb::Version(32, 9, 0);
+  folder.write("later_buffer.nvdb", later);
   return 0;
 }
