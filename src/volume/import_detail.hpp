@@ -16,6 +16,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "base/error.hpp"
@@ -36,11 +37,15 @@ ActiveMask not_zero(std::span<const float, brick_voxels> values);
 inline constexpr int max_extent = 1 << 20;
 inline constexpr int max_coordinate = 1 << 30;
 
+/// Whether a grid's values are numbers, halves too, and not vectors.
+template <typename Value>
+inline constexpr bool is_number = std::is_convertible_v<Value, float>;
+
 /// What is taken of a grid's values: numbers as they are, and of vectors the lengths.
 struct Lengths {
   template <typename Value>
   float operator()(const Value& value) const {
-    if constexpr (std::is_arithmetic_v<Value>) {
+    if constexpr (is_number<Value>) {
       return static_cast<float>(value);
     } else {
       const double x = value[0];

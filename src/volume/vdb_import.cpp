@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <mutex>
+#include <string_view>
 
 #include "base/apart.hpp"
 #include "volume/import_detail.hpp"
@@ -34,6 +36,17 @@ std::string class_name(openvdb::GridClass grid_class) {
     default:
       return "unknown";
   }
+}
+
+using HalfGrid = openvdb::Grid<openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type>;
+
+// Its layout differs from that of 224 by nothing but grids of halves.
+constexpr std::uint32_t known_file_version = 225;
+
+/// OpenVDB 10, unlike 13, knows no grids of halves by their type's name, and to register them would change the OpenVDB
+/// of the whole process.
+openvdb::GridBase::Ptr create_grid(const std::string& type) {
+  return type == HalfGrid::gridType() ? HalfGrid::create() : openvdb::GridBase::createGrid(type);
 }
 
 /// Collects the tiles of a node and of all internal nodes below it.
@@ -79,8 +92,8 @@ void with_type(const openvdb::GridBase& grid, Call&& f) {
   const auto try_types = [&]<typename... GridT>() {
     (void)((grid.isType<GridT>() && (f.template operator()<GridT>(), true)) || ...);
   };
-  try_types.template operator()<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid, openvdb::Int64Grid,
-                                openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>();
+  try_types.template operator()<openvdb::FloatGrid, openvdb::DoubleGrid, HalfGrid, openvdb::Int32Grid,
+                                openvdb::Int64Grid, openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>();
 }
 
 std::vector<Metadata> metadata_of(const openvdb::MetaMap& map) {
@@ -94,6 +107,34 @@ std::vector<Metadata> metadata_of(const openvdb::MetaMap& map) {
   return entries;
 }
 
+constexpr const char* unreadable = "is of a type that cannot be read";
+
+template <typename T>
+T read_value(SourceFile& stream) {
+  T value;
+  stream.read(reinterpret_cast<char*>(&value), sizeof value);
+  return value;
+}
+
+/// The header of a file of version 222 or later, which the stream is then past, as this OpenVDB understands it: it
+/// prints a warning about versions that are newer than its own, and cannot read the blank identifier that later ones
+/// may write.
+std::vector<char> understood_header(SourceFile& stream) {
+  constexpr std::size_t version_at = 8;
+  constexpr std::size_t id_at = 8 + 3 * sizeof(std::uint32_t) + 1;
+  constexpr std::string_view id = "00000000-0000-0000-0000-000000000000";
+  std::vector<char> header(id_at);
+  stream.seekg(0);
+  stream.read(header.data(), static_cast<std::streamsize>(header.size()));
+  std::uint32_t version = 0;
+  std::memcpy(&version, header.data() + version_at, sizeof version);
+  version = std::min<std::uint32_t>(version, openvdb::OPENVDB_FILE_VERSION);
+  std::memcpy(header.data() + version_at, &version, sizeof version);
+  header.insert(header.end(), id.begin(), id.end());
+  stream.seekg(static_cast<std::streamoff>(header.size()));
+  return header;
+}
+
 /// A .vdb file read through openvdb's archive.
 ///
 /// Not through openvdb::io::File: that one may copy the file, loads leaves lazily from a mapping
@@ -103,11 +144,22 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
  public:
   VdbReader(const std::filesystem::path& file, Progress* progress) : stream_(file, progress), size_(stream_.size()) {
     initialize_openvdb();
-    read_directory();
+    try {
+      read_directory();
+    } catch (const Error&) {
+      throw;
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& e) {
+      if (remarks_.empty()) throw;
+      const bool at_end = dynamic_cast<const std::ios_base::failure*>(&e) != nullptr;
+      fail(std::string(at_end ? end_of_file : e.what()) + "; it " + remarks_[0]);
+    }
   }
   [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
   [[nodiscard]] const std::vector<Metadata>& metadata() const override { return file_metadata_; }
   [[nodiscard]] const std::string& format() const override { return format_; }
+  [[nodiscard]] std::vector<std::string> remarks() const override { return remarks_; }
 
   [[nodiscard]] double opened() const override { return inputHasGridOffsets() ? 0.0 : 0.35; }
   [[nodiscard]] double reading() const override { return 0.1; }
@@ -132,7 +184,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     const openvdb::GridBase::Ptr grid = read_topology(index, portion);
     std::array<SourceGrid, 3> out;
     with_type(*grid, [&]<typename GridT>() {
-      if constexpr (!std::is_arithmetic_v<typename GridT::ValueType>) {
+      if constexpr (!is_number<typename GridT::ValueType>) {
         const auto tree = tree_of<GridT>(*grid);
         tree->fill(vdb_stream());
         for (int axis = 0; axis < 3; ++axis) {
@@ -146,21 +198,14 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   }
 
  private:
-  template <typename T>
-  T read_value() {
-    T value;
-    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
-    return value;
-  }
-
   void skip_string() {
-    const auto length = read_value<std::uint32_t>();
+    const auto length = read_value<std::uint32_t>(stream_);
     if (length > size_ - stream_.tellg()) fail(end_of_file);
     stream_.seekg(length, std::ios::cur);
   }
 
   void skip_metadata() {
-    const auto count = read_value<std::uint32_t>();
+    const auto count = read_value<std::uint32_t>(stream_);
     for (std::uint32_t i = 0; i < count; ++i) {
       skip_string();  // name
       skip_string();  // type
@@ -178,22 +223,32 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
 
   void check_grid_head() {
     check_lengths([this] {
-      if (fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) read_value<std::uint32_t>();
+      if (fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) read_value<std::uint32_t>(stream_);
       skip_metadata();
       skip_string();  // the transform's type
     });
   }
 
   void read_directory() {
-    // Checked before OpenVDB sees it, because OpenVDB prints a warning about newer files.
     stream_.seekg(8);
-    const auto version = read_value<std::uint32_t>();
-    if (version > openvdb::OPENVDB_FILE_VERSION || version < openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
-      fail("VDB file format " + std::to_string(version) + " is not supported");
+    const auto version = read_value<std::uint32_t>(stream_);
+    if (version < openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
+      fail("VDB file format " + std::to_string(version) + " is not supported: this library reads " +
+           std::to_string(openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) + " and later");
+    }
+    if (version > known_file_version) {
+      remarks_.push_back("is of VDB file format " + std::to_string(version) + ", which is newer than the known " +
+                         std::to_string(known_file_version));
     }
     format_ = "OpenVDB " + std::to_string(version);
     stream_.seekg(0);
-    readHeader(stream_);
+    if (version < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) {
+      readHeader(stream_);
+    } else {
+      std::vector<char> header = understood_header(stream_);
+      MemoryStream copy(header);
+      readHeader(copy);
+    }
     metadata_ = std::make_shared<openvdb::io::StreamMetadata>();
     metadata_->setSeekable(true);
     openvdb::io::setStreamMetadataPtr(stream_, metadata_, /*transfer=*/false);
@@ -219,10 +274,14 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     try {
       grid = descriptor.read(stream_);
     } catch (const openvdb::LookupError&) {
-      // A type this build does not know: the offsets that follow still lead past it.
-      descriptor.setGridPos(read_value<std::int64_t>());
-      descriptor.setBlockPos(read_value<std::int64_t>());
-      descriptor.setEndPos(read_value<std::int64_t>());
+      if (descriptor.gridType() == HalfGrid::gridType()) {
+        grid = HalfGrid::create();
+        grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
+      }
+      // The offsets lead past a grid of another type that OpenVDB does not know.
+      descriptor.setGridPos(read_value<std::int64_t>(stream_));
+      descriptor.setBlockPos(read_value<std::int64_t>(stream_));
+      descriptor.setEndPos(read_value<std::int64_t>(stream_));
     }
     const std::int64_t body = stream_.tellg();
     if (inputHasGridOffsets()) {
@@ -274,7 +333,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     const bool points = grid.type().find("ptdataidx") != std::string::npos;
     entry.type = is_float && descriptor.saveFloatAsHalf() ? "half" : points ? "points" : grid.valueType();
     entry.grid_class = class_name(grid.getGridClass());
-    entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_float || grid.isType<openvdb::DoubleGrid>());
+    entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class,
+                                       is_float || grid.isType<openvdb::DoubleGrid>() || grid.isType<HalfGrid>());
     entry.metadata = metadata_of(grid);
     if (!grid.transform().isLinear()) {
       if (entry.refusal.empty()) entry.refusal = "has a frustum transform, which is not affine";
@@ -282,7 +342,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     }
     if (points) return;
     with_type(grid, [&]<typename GridT>() {
-      entry.values = std::is_arithmetic_v<typename GridT::ValueType> ? Values::scalars : Values::lengths;
+      entry.values = is_number<typename GridT::ValueType> ? Values::scalars : Values::lengths;
     });
   }
 
@@ -319,7 +379,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
           inputHasGridOffsets() ? descriptor.getEndPos() - descriptor.getGridPos() : size_ - descriptor.getGridPos();
       stream_.begin(portion.from, portion.to, static_cast<std::uint64_t>(bytes));
     }
-    openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(descriptor.gridType());
+    openvdb::GridBase::Ptr grid = create_grid(descriptor.gridType());
     own_tree(*grid);
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
     readGrid(grid, descriptor, stream_);
@@ -330,11 +390,10 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
 
   VdbStream vdb_stream() { return {stream_, metadata_}; }
 
-  static constexpr const char* unreadable = "is of a type that cannot be read";
-
   openvdb::io::StreamMetadata::Ptr metadata_;  // the stream points to it
   std::vector<Metadata> file_metadata_;
   std::string format_;
+  std::vector<std::string> remarks_;
   SourceFile stream_;
   std::int64_t size_;
   std::vector<openvdb::io::GridDescriptor> descriptors_;

@@ -23,5 +23,15 @@ int main(int argc, char** argv) {
   write("zip.vdb", openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK, {grid, vectors});
   write("blosc.vdb", openvdb::io::COMPRESS_BLOSC, {half});
   write("shared.vdb", openvdb::io::COMPRESS_NONE, {grid, grid->copyGrid()});
+  // As OpenVDB 13 writes them: of a later version, and with a grid of halves.
+  using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
+  const auto halves = openvdb::Grid<HalfTree>::create();
+  halves->setName("density");
+  halves->fill(openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(5)), openvdb::math::half(0.5F));
+  write("halves.vdb", openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK, {halves});
+  std::fstream later(folder.path() / "halves.vdb", std::ios::binary | std::ios::in | std::ios::out);
+  later.seekp(8);
+  const std::uint32_t version = 225;
+  later.write(reinterpret_cast<const char*>(&version), sizeof version);
   return 0;
 }

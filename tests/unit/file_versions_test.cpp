@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/io/Stream.h>
 #include <zlib.h>
 
 #include <array>
@@ -34,6 +35,7 @@ using nanovdb::io::Codec;
 using openvdb::Coord;
 
 using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
+using HalfGrid = openvdb::Grid<openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type>;
 
 /// Voxels of halves that are no constants, and a tile.
 template <class GridT>
@@ -153,6 +155,12 @@ class FileVersions : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return folder_ / name;
   }
+  [[nodiscard]] std::string vdb(const openvdb::GridPtrVec& grids) const {
+    const fs::path file = folder_ / "written.vdb";
+    openvdb::io::File(file.string()).write(grids);
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
   static std::string refusal(const fs::path& file) {
     return cumulet::test::refusal(file, [&] { (void)import_volume(file, "", {}); });
   }
@@ -175,6 +183,8 @@ void expect_same(const ScalarVolume& a, const ScalarVolume& b) {
   EXPECT_EQ(a.max_value, b.max_value);
   EXPECT_EQ(a.active_voxels, b.active_voxels);
 }
+
+void patch(std::string& vdb, std::uint32_t version) { std::memcpy(vdb.data() + 8, &version, sizeof version); }
 
 template <class BuildT>
 Handle nano_of(const openvdb::FloatGrid& grid) {
@@ -360,6 +370,93 @@ TEST_F(FileVersions, DamagedNanoVdbBuffersNeverCrash) {
       EXPECT_TRUE(what.find("truncated") != std::string::npos || what.find("damaged") != std::string::npos) << what;
     }
   }
+}
+
+TEST_F(FileVersions, VdbIsNeverRefusedForItsNumber) {
+  const auto grid = cloud<openvdb::FloatGrid>("density");
+  std::string bytes = vdb({grid});
+  const ScalarVolume wanted = read(write(bytes, "224.vdb"));
+  patch(bytes, 225);
+  // OpenVDB 13 leaves the identifier blank where it cannot make one.
+  std::string blank = bytes;
+  std::fill_n(blank.begin() + 21, 36, '\0');
+  for (const std::string& file : {bytes, blank}) {
+    expect_same(read(write(file, "225.vdb")), wanted);
+    EXPECT_EQ(cumulet::volume::Inspection(write(file, "225.vdb")).format(), "OpenVDB 225");
+  }
+  for (const std::uint32_t later : {226U, 300U, 0xffffffffU}) {
+    patch(bytes, later);
+    Messages messages;
+    const fs::path file = write(bytes, "later.vdb");
+    expect_same(import_volume(file, "", messages.log), wanted);
+    ASSERT_EQ(messages.warnings.size(), 1U);
+    EXPECT_EQ(messages.warnings[0], file.string() + ": is of VDB file format " + std::to_string(later) +
+                                        ", which is newer than the known 225");
+    messages.warnings.clear();
+    (void)import_frame(file, {}, messages.log);
+    EXPECT_EQ(messages.warnings.size(), 1U);
+  }
+  // What fails in a later format says which one that is.
+  patch(bytes, 231);
+  EXPECT_HAS(refusal(write(bytes.substr(0, 90), "cut.vdb")), "231, which is newer than the known 225");
+  patch(bytes, 215);
+  EXPECT_HAS(refusal(write(bytes, "old.vdb")), "VDB file format 215 is not supported");
+}
+
+TEST_F(FileVersions, VdbGridsOfHalvesAreRead) {
+  const auto grid = cloud<HalfGrid>("density");
+  const auto same = cloud<openvdb::FloatGrid>("density");
+  const auto other = cloud<openvdb::FloatGrid>("flame");
+  const ScalarVolume wanted = read(write(vdb({same}), "float.vdb"));
+  for (const bool half : {false, true}) {
+    grid->setSaveFloatAsHalf(half);
+    for (const std::uint32_t flags :
+         {std::uint32_t{openvdb::io::COMPRESS_NONE}, std::uint32_t{openvdb::io::COMPRESS_ACTIVE_MASK},
+          std::uint32_t{openvdb::io::COMPRESS_ZIP} | openvdb::io::COMPRESS_ACTIVE_MASK,
+          std::uint32_t{openvdb::io::COMPRESS_BLOSC} | openvdb::io::COMPRESS_ACTIVE_MASK}) {
+      const fs::path file = folder_ / "half.vdb";
+      openvdb::io::File out(file.string());
+      out.setCompression(flags);
+      out.write({other, grid});
+      out.close();
+      std::ifstream stream(file, std::ios::binary);
+      std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+      patch(bytes, 225);
+      const fs::path later = write(bytes, "later.vdb");
+      const auto listed = list_grids(later);
+      ASSERT_EQ(listed.size(), 2U);
+      const auto& entry = listed[0].name == "density" ? listed[0] : listed[1];
+      EXPECT_EQ(entry.type, "half");
+      EXPECT_EQ(entry.refusal, "");
+      expect_same(read(later, "density"), wanted);
+      expect_same(read(later, "flame"), wanted);
+    }
+  }
+  // Written to a pipe, without offsets: the second grid is behind the first.
+  std::ofstream(folder_ / "pipe.vdb", std::ios::binary).close();
+  {
+    std::ofstream out(folder_ / "pipe.vdb", std::ios::binary);
+    openvdb::io::Stream(out).write(openvdb::GridCPtrVec{grid, other});
+  }
+  expect_same(read(folder_ / "pipe.vdb", "density"), wanted);
+  expect_same(read(folder_ / "pipe.vdb", "flame"), wanted);
+}
+
+TEST_F(FileVersions, OnlyAnUnknownTypeOfGridIsRefused) {
+  const auto grid = cloud<openvdb::FloatGrid>("density");
+  std::string bytes = vdb({grid, cloud<openvdb::FloatGrid>("future")});
+  patch(bytes, 226);
+  const std::string known = "Tree_float_5_4_3";
+  const std::size_t at = bytes.find(known, bytes.find("future"));
+  const std::size_t first = bytes.find("future");
+  ASSERT_NE(at, std::string::npos);
+  ASSERT_LT(at, first + 20);
+  bytes.replace(at, known.size(), "Tree_quarter_543");
+  Messages messages;
+  const fs::path file = write(bytes, "future.vdb");
+  EXPECT_EQ(import_volume(file, "density", messages.log).max_value, grid->tree().cbeginLeaf() ? 255.0F / 64.0F : 0.0F);
+  const std::string refused = cumulet::test::refusal(file, [&] { (void)import_volume(file, "future", {}); });
+  EXPECT_HAS(refused, "grid \"future\" is of type Tree_quarter_543");
 }
 
 }  // namespace
