@@ -1,7 +1,7 @@
 #pragma once
 
 #include <array>
-#include <cstdio>
+#include <charconv>
 #include <string>
 #include <string_view>
 
@@ -24,9 +24,10 @@ inline constexpr std::string_view sky_background = "sky";
 
 /// For people.
 [[nodiscard]] inline std::string comments_text(const std::string& of_version, double a_pixel) {
-  std::array<char, 96> text{};
-  std::snprintf(text.data(), text.size(), "Cumulet %s, %g samples a pixel", of_version.c_str(), a_pixel);
-  return text.data();
+  std::array<char, 32> number{};
+  char* const end =
+      std::to_chars(number.data(), number.data() + number.size(), a_pixel, std::chars_format::general, 6).ptr;
+  return "Cumulet " + of_version + ", " + std::string(number.data(), end) + " samples a pixel";
 }
 
 }  // namespace cumulet::image::attributes

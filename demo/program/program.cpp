@@ -1,8 +1,10 @@
 #include "program.hpp"
 
+#include <clocale>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
+#include <locale>
 #include <new>
 
 namespace cumulet::demo {
@@ -32,7 +34,22 @@ std::string user_folder(const char* variable, const std::string& in_home) {
   return home.empty() ? "" : home + "/" + in_home;
 }
 
+namespace {
+
+/// Command lines and files have the same numbers in every locale. The programs set none, but a library that is loaded
+/// with them may have done so.
+void use_classic_locale() {
+  static_cast<void>(std::setlocale(LC_NUMERIC, "C"));
+  const std::locale& classic = std::locale::classic();
+  std::locale::global(classic);
+  static_cast<void>(std::cin.imbue(classic));
+  for (std::ostream* stream : {&std::cout, &std::cerr, &std::clog}) static_cast<void>(stream->imbue(classic));
+}
+
+}  // namespace
+
 int run_program(const char* name, const std::function<void()>& body) {
+  use_classic_locale();
   const auto fail = [name](const std::string& message, int status) {
     std::fprintf(stderr, "%s: %s\n", name, one_line(message).c_str());
     return status;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <charconv>
 #include <fstream>
+#include <locale>
 #include <stdexcept>
 #include <string>
 
@@ -13,8 +14,9 @@ namespace {
 
 std::string gib(std::uint64_t bytes) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.1f GiB", static_cast<double>(bytes) / static_cast<double>(1U << 30U));
-  return text.data();
+  const double number = static_cast<double>(bytes) / static_cast<double>(1U << 30U);
+  char* const end = std::to_chars(text.data(), text.data() + text.size(), number, std::chars_format::fixed, 1).ptr;
+  return std::string(text.data(), end) + " GiB";
 }
 
 }  // namespace
@@ -50,6 +52,7 @@ PictureMemory picture_memory(const RenderOptions& options) {
 
 std::optional<std::uint64_t> available_memory() {
   std::ifstream file("/proc/meminfo");
+  file.imbue(std::locale::classic());
   for (std::string key; file >> key;) {
     std::uint64_t kib = 0;
     if (key == "MemAvailable:" && file >> kib) return kib * 1024;

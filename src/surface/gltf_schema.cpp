@@ -1,13 +1,12 @@
 #include "surface/gltf_schema.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <unordered_map>
 
+#include "base/number_text.hpp"
 #include "surface/gltf_file.hpp"
 
 namespace cumulet::surface::detail {
@@ -312,10 +311,10 @@ class Schema {
   void check_range(double number, const Range& range, const std::string& where) {
     if (number >= range.least && number <= range.most) return;
     const bool below = number < range.least;
-    std::array<char, 64> told{};
-    std::snprintf(told.data(), told.size(), " is %g, %s than glTF's %g", number, below ? "less" : "more",
-                  below ? range.least : range.most);
-    if (outside_++ == 0) remark_ = where + told.data();
+    if (outside_++ == 0) {
+      remark_ = where + " is " + general_text(number) + ", " + (below ? "less" : "more") + " than glTF's " +
+                general_text(below ? range.least : range.most);
+    }
   }
 
   /// tinygltf keeps integers of extensions in an int.

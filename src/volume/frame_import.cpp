@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 #include <span>
-#include <sstream>
 #include <utility>
 #include <vector>
 
+#include "base/number_text.hpp"
 #include "volume/bricks.hpp"
 #include "volume/coarse_reader.hpp"
 #include "volume/frame.hpp"
@@ -162,18 +162,17 @@ bool apart(const ScalarVolume& a, const ScalarVolume& b) {
 /// What the values of a temperature seem to be where they are not what simulations have, 0 to 3.
 std::string remark_on_temperature(const ScalarVolume& field) {
   constexpr float hottest_simulated = 20.0F;
-  std::ostringstream out;
+  const std::string reaches = "reaches " + general_text(field.max_value);
   if (field.max_value > hottest_simulated) {
-    out << "reaches " << field.max_value;
     if (field.negative_voxels > 0) {
-      out << " and has negative values, as degrees Celsius do: the scale of those is 1, the offset 273.15";
-    } else {
-      out << ", as kelvin do: the scale of those is 1";
+      return reaches + " and has negative values, as degrees Celsius do: the scale of those is 1, the offset 273.15";
     }
-  } else if (field.max_value > 0.0F && field.max_value <= 1.0F) {
-    out << "reaches " << field.max_value << " only, as temperatures from 0 to 1 do: those may want a larger scale";
+    return reaches + ", as kelvin do: the scale of those is 1";
   }
-  return out.str();
+  if (field.max_value > 0.0F && field.max_value <= 1.0F) {
+    return reaches + " only, as temperatures from 0 to 1 do: those may want a larger scale";
+  }
+  return {};
 }
 
 /// Whether vectors are of their grid's own index space: OpenVDB's metadata.
@@ -407,9 +406,9 @@ class FrameImport {
     velocity.to_index = Velocity::to_index_of(out_.density.index_to_world) * velocity.to_index;
     const std::uint64_t beyond = clamp_to(velocity.most(), velocity.parts);
     if (beyond == 0) return;
-    std::ostringstream text;
-    text << beyond << " components beyond " << fastest_velocity << " voxels a second clamped to that";
-    remark(LogLevel::warning, name_of(velocity.parts[0]), text.str());
+    remark(LogLevel::warning, name_of(velocity.parts[0]),
+           std::to_string(beyond) + " components beyond " + general_text(fastest_velocity) +
+               " voxels a second clamped to that");
   }
 
   void put_on_lattice(ScalarVolume& field, const std::optional<Box>& within, Portion portion) const {

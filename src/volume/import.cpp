@@ -14,7 +14,6 @@
 #include <fstream>
 #include <limits>
 #include <numeric>
-#include <sstream>
 
 #include "base/apart.hpp"
 #include "base/progress_part.hpp"
@@ -33,9 +32,8 @@ std::string detail::scalar_fog_refusal(std::string_view type, std::string_view g
 }
 
 std::string detail::to_string(glm::ivec3 v) {
-  std::ostringstream out;
-  out << '(' << v.x << ", " << v.y << ", " << v.z << ')';
-  return out.str();
+  std::string text(1, '(');
+  return text.append(std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")");
 }
 
 ActiveMask detail::not_zero(std::span<const float, brick_voxels> values) {

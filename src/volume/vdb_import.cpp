@@ -15,6 +15,7 @@
 #include "volume/import_detail.hpp"
 #include "volume/source_file.hpp"
 #include "volume/vdb_leaves.hpp"
+#include "volume/vdb_metadata.hpp"
 #include "volume/vdb_trees.hpp"
 
 namespace cumulet::volume::detail {
@@ -94,17 +95,6 @@ void with_type(const openvdb::GridBase& grid, Call&& f) {
   };
   try_types.template operator()<openvdb::FloatGrid, openvdb::DoubleGrid, HalfGrid, openvdb::Int32Grid,
                                 openvdb::Int64Grid, openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>();
-}
-
-std::vector<Metadata> metadata_of(const openvdb::MetaMap& map) {
-  std::vector<Metadata> entries;
-  for (auto it = map.beginMeta(); it != map.endMeta(); ++it) {
-    // OpenVDB's own index into the file: bytes, and large.
-    if (it->second->typeName() == "__delayedload") continue;
-    constexpr std::size_t longest = 4096;
-    entries.push_back({it->first, it->second->typeName(), it->second->str().substr(0, longest)});
-  }
-  return entries;
 }
 
 constexpr const char* unreadable = "is of a type that cannot be read";

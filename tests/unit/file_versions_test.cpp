@@ -10,6 +10,7 @@
 #include <openvdb/io/Stream.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <fstream>
@@ -440,6 +441,21 @@ TEST_F(FileVersions, VdbGridsOfHalvesAreRead) {
   }
   expect_same(read(folder_ / "pipe.vdb", "density"), wanted);
   expect_same(read(folder_ / "pipe.vdb", "flame"), wanted);
+}
+
+TEST_F(FileVersions, VdbMetadataOfHalvesAreNumbers) {
+  const auto grid = cloud<openvdb::FloatGrid>("density");
+  openvdb::UnknownMetadata half("half");
+  half.setValue({0x00, 0x3e});
+  grid->insertMeta("scale", half);
+  std::string bytes = vdb({grid});
+  patch(bytes, 225);
+  const cumulet::volume::Inspection inspection(write(bytes, "metadata.vdb"));
+  const auto& entries = inspection.grids().at(0).metadata;
+  const auto found = std::ranges::find(entries, "scale", &cumulet::volume::Metadata::name);
+  ASSERT_NE(found, entries.end());
+  EXPECT_EQ(found->type, "half");
+  EXPECT_EQ(found->value, "1.5");
 }
 
 TEST_F(FileVersions, OnlyAnUnknownTypeOfGridIsRefused) {
