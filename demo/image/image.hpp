@@ -39,7 +39,7 @@ struct PngOptions {
 // All writers replace the file in one step (replace_file in file.hpp) and throw std::runtime_error, one line with
 // the path and the cause. The readers throw likewise.
 
-/// 8 bits a channel, sRGB.
+/// 8 bits a channel, sRGB, with chunks that say so (sRGB, gAMA and cHRM).
 void write_png(const std::string& path, const Image& image, const PngOptions& options = {});
 /// The same from bytes, width x height x 4, first pixel top left, straight alpha.
 void write_png(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba);

@@ -1,9 +1,11 @@
 // PNG by stb: built in (stb.c), so the portable package carries no libpng beside OpenEXR's own zlib, and the glTF
 // importer brings stb along anyway.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <string_view>
 
 #include "checks.hpp"
 #include "file.hpp"
@@ -28,6 +30,42 @@ float displayable(float value) {
   return std::min(value, 1e30f);
 }
 
+void append_big_endian(std::string& bytes, std::uint32_t value) {
+  for (const unsigned shift : {24u, 16u, 8u, 0u}) bytes += static_cast<char>(value >> shift & 0xffu);
+}
+
+/// PNG 1.2, annex D.
+std::uint32_t crc(std::string_view bytes) {
+  std::uint32_t value = 0xffffffffu;
+  for (const char byte : bytes) {
+    value ^= static_cast<unsigned char>(byte);
+    for (int bit = 0; bit < 8; ++bit) value = (value & 1u) != 0 ? 0xedb88320u ^ value >> 1u : value >> 1u;
+  }
+  return ~value;
+}
+
+void append_chunk(std::string& file, const char* type, std::string_view data) {
+  append_big_endian(file, static_cast<std::uint32_t>(data.size()));
+  const std::string typed = std::string(type).append(data);
+  file += typed;
+  append_big_endian(file, crc(typed));
+}
+
+/// Chunks that say sRGB, and its gamma and Rec. 709 primaries to those that do not know it (PNG 1.2, 4.2.2.3).
+std::string color_chunks() {
+  constexpr std::uint32_t gamma = 45455;
+  constexpr std::array<std::uint32_t, 8> white_and_primaries = {31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000};
+  std::string chunks;
+  append_chunk(chunks, "sRGB", std::string_view("\0", 1));  // perceptual intent
+  std::string data;
+  append_big_endian(data, gamma);
+  append_chunk(chunks, "gAMA", data);
+  data.clear();
+  for (const std::uint32_t value : white_and_primaries) append_big_endian(data, value);
+  append_chunk(chunks, "cHRM", data);
+  return chunks;
+}
+
 void write_bytes(const std::string& path, std::uint32_t width, std::uint32_t height, std::size_t channels,
                  std::span<const std::uint8_t> bytes) {
   std::string file;
@@ -38,6 +76,8 @@ void write_bytes(const std::string& path, std::uint32_t width, std::uint32_t hei
   if (stbi_write_png_to_func(append, &file, row, static_cast<int>(height), static_cast<int>(channels), bytes.data(),
                              row * static_cast<int>(channels)) == 0)
     fail(path, "the PNG encoder failed: the picture may be too large for it");
+  constexpr std::size_t after_header = 8 + 25;  // the signature and IHDR
+  file.insert(after_header, color_chunks());
   replace_file(path, file);
 }
 

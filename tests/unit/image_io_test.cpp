@@ -112,6 +112,25 @@ TEST_F(ImageIo, ExrLayersRoundTripIsExact) {
   EXPECT_EQ(count(), 1u);
 }
 
+TEST_F(ImageIo, PicturesSayTheirPrimaries) {
+  write_exr(path("a.exr"), gradient(8, 4));
+  const Imf::InputFile file(path("a.exr").c_str());
+  ASSERT_TRUE(Imf::hasChromaticities(file.header()));
+  EXPECT_EQ(Imf::chromaticities(file.header()), Imf::Chromaticities());
+  write_png(path("a.png"), gradient(8, 4));
+  const std::string png = read_file(path("a.png"));
+  // Between IHDR and the pixels, each with its length before its type and its sum after its data.
+  const std::string srgb("\0\0\0\1sRGB\0\xae\xce\x1c\xe9", 13);
+  const std::string gama("\0\0\0\4gAMA\0\0\xb1\x8f\x0b\xfc\x61\x05", 16);
+  const std::string chrm(
+      "\0\0\0\x20"
+      "cHRM\0\0\x7a\x26\0\0\x80\x84\0\0\xfa\0\0\0\x80\xe8\0\0\x75\x30\0\0\xea\x60\0\0\x3a\x98\0\0\x17\x70"
+      "\x9c\xba\x51\x3c",
+      44);
+  EXPECT_EQ(png.substr(33, srgb.size() + gama.size() + chrm.size()), srgb + gama + chrm);
+  EXPECT_EQ(png.find("IDAT"), 33 + srgb.size() + gama.size() + chrm.size() + 4);
+}
+
 TEST_F(ImageIo, ExrOfAPartOfAPictureSaysWhich) {
   const Rendered rendered;
   const Windows windows{Rendered::width, Rendered::height, 4, 7, 100, 50};
