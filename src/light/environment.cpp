@@ -155,6 +155,7 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
   }
   const auto made = make_left<Environment>();
   made->name = name;
+  made->remarks = pixels.remarks;
   made->width = pixels.width;
   made->height = pixels.height;
   std::vector<double> weights;

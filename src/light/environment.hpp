@@ -21,6 +21,7 @@ struct EnvironmentPixels {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<glm::vec3> values;
+  std::vector<std::string> remarks{};  ///< what a reader had to choose, convert or ignore
 };
 
 /// What radiance of all directions has beyond its mean: coefficients of x, y, z, xy, yz, zx, xx - zz and yy - zz, in
@@ -44,7 +45,8 @@ struct Environment {
   /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
   /// sine, inverted. 0: there is no light.
   float density = 0.0F;
-  std::uint64_t replaced = 0;  ///< pixels that were not finite, negative or above 1e30, where that counts as 0
+  std::vector<std::string> remarks;  ///< what its reader had to choose, convert or ignore
+  std::uint64_t replaced = 0;        ///< pixels that were not finite, negative or above 1e30, where that counts as 0
 
   [[nodiscard]] std::size_t texels() const { return words.size(); }
 };

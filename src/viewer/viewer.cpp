@@ -1291,6 +1291,11 @@ const light::EnvironmentPtr& Viewer::environment() {
 }
 
 void Viewer::show_environment(light::EnvironmentPtr environment) {
+  if (environment && !environment->remarks.empty()) {
+    std::string remarks;
+    for (const std::string& remark : environment->remarks) remarks.append(remarks.empty() ? ": " : "; ").append(remark);
+    log_.warning(one_line(environment->name) + remarks);
+  }
   if (environment && environment->replaced > 0) {
     log_.warning(one_line(environment->name) + ": " + std::to_string(environment->replaced) +
                  " pixels are in part not finite, negative or above 1e30, which counts as 0");

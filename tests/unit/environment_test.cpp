@@ -376,7 +376,8 @@ TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
   EXPECT_EQ(why(radiance_file("-Y 9999 +X 9999", runs)), path + ": a Radiance picture that is cut short");
   EXPECT_EQ(why(radiance_file("-Y 16 +X 32000", runs)),
             path + ": an environment of 32000x16 pixels; at most 16384 a side");
-  EXPECT_EQ(why(radiance_file("+X 8 -Y 1", runs)), path + ": a resolution of '+X 8 -Y 1', not '-Y HEIGHT +X WIDTH'");
+  EXPECT_EQ(why(radiance_file("+X 8 -Z 1", runs)),
+            path + ": a resolution of '+X 8 -Z 1', not '-Y HEIGHT +X WIDTH' or the like");
   runs[4] = '\xff';
   EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs)), path + ": a run beyond its row");
   EXPECT_EQ(test::refusal([&] { light::read_environment((folder / "none.hdr").string()); }),

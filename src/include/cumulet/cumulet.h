@@ -794,7 +794,13 @@ CUMULET_API cumulet_status cumulet_surfaces_get_variant(const cumulet_surfaces* 
  * thread; error as in cumulet_create. cumulet_load_environment is the asynchronous way.
  */
 
-/* Reads a Radiance (.hdr) or OpenEXR (.exr) file, of up to 16384 pixels a side, told apart by content. */
+/*
+ * Reads a Radiance (.hdr) or OpenEXR (.exr) file, of up to 16384 pixels a side, which it recognizes by content. Of an
+ * OpenEXR file it reads one flat part of channels R, G and B, or Y with or without RY and BY, or X, Y and Z, without a
+ * layer if there are such; it places the data window in the display window, resamples a cube map (envmap) of up to 4096
+ * pixels a face, and converts its chromaticities to Rec. 709. Of a Radiance file it applies orientation, EXPOSURE,
+ * COLORCORR and PRIMARIES. What it chose, converted, ignored or assumed, cumulet_set_environment logs as a warning.
+ */
 CUMULET_API cumulet_status cumulet_environment_open(const char* path, cumulet_environment** out, char* error,
                                                     size_t error_size);
 

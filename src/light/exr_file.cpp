@@ -1,0 +1,373 @@
+#include "light/exr_file.hpp"
+
+#include <IlmThreadPool.h>
+#include <ImfEnvmap.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputPart.h>
+#include <ImfIntAttribute.h>
+#include <ImfMultiPartInputFile.h>
+#include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "base/apart.hpp"
+#include "base/error.hpp"
+#include "base/one_line.hpp"
+#include "base/progress_part.hpp"
+#include "light/chroma.hpp"
+#include "light/cube_map.hpp"
+#include "light/environment_reading.hpp"
+#include "light/exr_channels.hpp"
+#include "light/primaries.hpp"
+
+namespace cumulet::light {
+
+namespace {
+
+// OpenEXR's own statics, made when the library is loaded: at exit they then go after a decode that was left
+// (base/apart), which is waited for. Made with the first file they would go before it.
+[[maybe_unused]] const bool open_exr_is_made = []() noexcept {
+  Imf::staticInitialize();
+  return IlmThread::ThreadPool::globalThreadPool().numThreads() >= 0;
+}();
+
+[[noreturn]] void fail(const std::string& path, const std::string& cause) {
+  throw Error(ErrorCode::file, one_line(path) + ": " + cause);
+}
+
+/// A file's bytes, for OpenEXR.
+class ByteStream : public Imf::IStream {
+ public:
+  ByteStream(std::vector<std::uint8_t> bytes, const std::string& name)
+      : Imf::IStream(name.c_str()), bytes_(std::move(bytes)) {}
+
+  bool read(char to[], int count) override {
+    const auto wanted = static_cast<std::size_t>(count);
+    if (at_ > bytes_.size() || wanted > bytes_.size() - at_) throw std::runtime_error("the file is cut short");
+    std::memcpy(to, bytes_.data() + at_, wanted);
+    at_ += wanted;
+    return at_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return at_; }
+  void seekg(std::uint64_t to) override { at_ = to; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+  std::uint64_t at_ = 0;
+};
+
+/// A rectangle of pixels. Numbers of 64 bits: a file's windows may be anything.
+struct Window {
+  std::int64_t left = 0;
+  std::int64_t top = 0;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+
+  bool operator==(const Window&) const = default;
+};
+
+Window window_of(const Imath::Box2i& box) {
+  return {box.min.x, box.min.y, std::int64_t{box.max.x} - box.min.x + 1, std::int64_t{box.max.y} - box.min.y + 1};
+}
+
+/// What a header says of the picture's shape and colors.
+struct Description {
+  ExrChannels channels;
+  Window data;
+  Window display;
+  bool cube = false;
+  Primaries primaries;
+};
+
+bool is_flat(const Imf::Header& header) { return !header.hasType() || !Imf::isDeepData(header.type()); }
+
+Primaries primaries_of(const Imf::Header& header) {
+  Primaries primaries;
+  const auto* const aces = header.findTypedAttribute<Imf::IntAttribute>("acesImageContainerFlag");
+  if (aces != nullptr && aces->value() == 1) primaries = aces_primaries;
+  const auto point = [](const Imath::V2f& xy) { return glm::dvec2(xy.x, xy.y); };
+  if (Imf::hasChromaticities(header)) {
+    const Imf::Chromaticities& c = Imf::chromaticities(header);
+    primaries = {point(c.red), point(c.green), point(c.blue), point(c.white)};
+  }
+  // The color that counts as white, as OpenEXR's own AcesInputFile has it.
+  if (Imf::hasAdoptedNeutral(header)) primaries.white = point(Imf::adoptedNeutral(header));
+  return primaries;
+}
+
+/// An OpenEXR picture on its way from bytes to pixels. Owns all of it: see apart().
+class ExrPicture {
+ public:
+  ExrPicture(std::vector<std::uint8_t> bytes, const std::string& path)
+      : path_(path), stream_(std::move(bytes), path), file_(stream_) {}
+
+  /// Chooses the part and its channels and makes room for the pixels.
+  void open(Progress* progress) {
+    const int part = choose_part();
+    const Imf::Header& header = file_.header(part);
+    describe(header);
+    const auto width = static_cast<std::uint32_t>(description_.data.width);
+    const auto height = static_cast<std::uint32_t>(description_.data.height);
+    pixels_.width = width;
+    pixels_.height = height;
+    resize(pixels_.values, std::size_t{width} * height, progress);
+    part_.emplace(file_, part);
+    Imf::FrameBuffer frame;
+    for (std::size_t c = 0; c < description_.channels.count(); ++c) {
+      const std::string& name = description_.channels.names[c];
+      const Imf::Channel& channel = *header.channels().findChannel(name);
+      frame.insert(name, slice(channel, c));
+    }
+    part_->setFrameBuffer(frame);
+  }
+
+  /// Rows from 0, as many as there are from this one on, at most so many. Returns the next.
+  std::uint32_t decode(std::uint32_t row, std::uint32_t most) {
+    const std::uint32_t end = row + std::min(most, pixels_.height - row);
+    const auto top = static_cast<int>(description_.data.top);
+    part_->readPixels(top + static_cast<int>(row), top + static_cast<int>(end) - 1);
+    return end;
+  }
+  /// Whether combine() is needed.
+  [[nodiscard]] bool is_coded() const {
+    using Kind = ExrChannels::Kind;
+    const Kind kind = description_.channels.kind;
+    return kind == Kind::luminance || kind == Kind::luminance_chroma ||
+           std::ranges::any_of(planes_, [](const SampledPlane& plane) { return !plane.values.empty(); });
+  }
+  /// Notes the luminance at samples of chroma, before combine() replaces it.
+  void prepare_chroma() {
+    if (description_.channels.kind != ExrChannels::Kind::luminance_chroma) return;
+    for (std::size_t c = 1; c < planes_.size(); ++c) {
+      if (planes_[c].values.empty()) continue;
+      SampledPlane& at = luminance_[c];
+      at = planes_[c];
+      for (std::uint32_t y = 0; y < at.height; ++y) {
+        for (std::uint32_t x = 0; x < at.width; ++x) {
+          at.values[std::size_t{y} * at.width + x] =
+              pixels_.values[std::size_t{y} * at.y_step * pixels_.width + std::size_t{x} * at.x_step].x;
+        }
+      }
+    }
+  }
+  /// Replaces what was read of a row by RGB of the file's primaries, or by XYZ. All rows have been decoded.
+  void combine(std::uint32_t y) {
+    const std::span<glm::vec3> row(&pixels_.values[std::size_t{y} * pixels_.width], pixels_.width);
+    std::vector<float> values(row.size());
+    std::vector<float> luminance;
+    for (const glm::vec3& value : row) luminance.push_back(value.x);
+    for (std::size_t c = 0; c < planes_.size(); ++c) {
+      if (planes_[c].values.empty()) continue;
+      if (luminance_[c].values.empty()) {
+        planes_[c].row(y, values);
+      } else {
+        planes_[c].row(y, values, luminance, luminance_[c]);
+      }
+      for (std::size_t x = 0; x < row.size(); ++x) row[x][static_cast<int>(c)] = values[x];
+    }
+    if (description_.channels.kind == ExrChannels::Kind::luminance) {
+      for (glm::vec3& value : row) value = glm::vec3(value.x);
+    }
+    if (description_.channels.kind == ExrChannels::Kind::luminance_chroma) {
+      for (glm::vec3& value : row) value = from_chroma(value);
+    }
+  }
+  [[nodiscard]] const Description& description() const { return description_; }
+  [[nodiscard]] std::uint32_t height() const { return pixels_.height; }
+  [[nodiscard]] EnvironmentPixels take() { return std::move(pixels_); }
+
+ private:
+  int choose_part() {
+    std::optional<int> first_flat;
+    std::optional<int> chosen;
+    for (int p = 0; p < file_.parts(); ++p) {
+      if (!is_flat(file_.header(p))) continue;
+      if (!first_flat) first_flat = p;
+      auto found = find_colors(file_.header(p).channels());
+      if (!found || (chosen && (description_.channels.layer.empty() || !found->layer.empty()))) continue;
+      chosen = p;
+      description_.channels = std::move(*found);
+    }
+    if (!first_flat) fail(path_, "a deep OpenEXR picture, of which Cumulet reads none");
+    if (!chosen) fail(path_, "has no channel " + missing_channel(file_.header(*first_flat).channels()));
+    if (file_.parts() > 1) {
+      const Imf::Header& header = file_.header(*chosen);
+      const std::string name = header.hasName() ? " (" + one_line(header.name(), 60) + ")" : "";
+      pixels_.remarks.push_back("part " + std::to_string(*chosen + 1) + name + " of " + std::to_string(file_.parts()) +
+                                " is read");
+    }
+    const std::string& layer = description_.channels.layer;
+    if (!layer.empty()) pixels_.remarks.push_back("the layer " + one_line(layer, 60) + " is read");
+    return *chosen;
+  }
+
+  void describe(const Imf::Header& header) {
+    description_.data = window_of(header.dataWindow());
+    description_.display = window_of(header.displayWindow());
+    description_.primaries = primaries_of(header);
+    if (const auto to_xyz = xyz_matrix(description_.primaries); to_xyz && (*to_xyz)[1].y > 0.0) {
+      weights_ = glm::vec3((*to_xyz)[0].y, (*to_xyz)[1].y, (*to_xyz)[2].y);
+    }
+    description_.cube = Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE;
+    const Window& data = description_.data;
+    const auto fits = [](const Window& window) { return window.width >= 1 && window.height == 6 * window.width; };
+    if (description_.cube) {
+      // A cube is its data window (ImfEnvmap.h); one that a program has cropped, its display window.
+      if (fits(data)) description_.display = data;
+      const Window& whole = description_.display;
+      if (!fits(whole)) {
+        fail(path_, "a cube map of " + std::to_string(whole.width) + "x" + std::to_string(whole.height) +
+                        " pixels, not six square faces");
+      }
+      if (whole.width > CubeMap::max_side) {
+        fail(path_, "a cube map with faces of " + std::to_string(whole.width) + " pixels a side; at most " +
+                        std::to_string(CubeMap::max_side));
+      }
+      if (data != whole) check_environment_size(path_, data.width, data.height);
+    } else {
+      check_environment_size(path_, data.width, data.height);
+      check_environment_size(path_, description_.display.width, description_.display.height);
+      if (fits(description_.display)) {
+        pixels_.remarks.emplace_back("has the shape of a cube map, and no envmap attribute that says so");
+      }
+    }
+    if (header.hasTileDescription()) {
+      const Imf::TileDescription& tiles = header.tileDescription();
+      constexpr unsigned most = Environment::max_side;
+      if (tiles.xSize > most || tiles.ySize > most) {
+        fail(path_, "tiles of " + std::to_string(tiles.xSize) + "x" + std::to_string(tiles.ySize) + " pixels");
+      }
+    }
+  }
+
+  /// Where a channel goes: to its component of the pixels or, if it has not a sample a pixel, to a plane.
+  Imf::Slice slice(const Imf::Channel& channel, std::size_t c) {
+    const auto x_step = static_cast<std::uint32_t>(channel.xSampling);
+    const auto y_step = static_cast<std::uint32_t>(channel.ySampling);
+    char* base = reinterpret_cast<char*>(pixels_.values.data()) + c * sizeof(float);
+    std::int64_t stride = sizeof(glm::vec3);
+    std::int64_t row = stride * pixels_.width;
+    if (x_step != 1 || y_step != 1) {
+      planes_[c] = SampledPlane(pixels_.width, pixels_.height, x_step, y_step);
+      base = reinterpret_cast<char*>(planes_[c].values.data());
+      stride = sizeof(float);
+      row = stride * planes_[c].width;
+    }
+    // A slice's base is where pixel (0, 0) would be, which the data window may not contain.
+    base -= description_.data.left / channel.xSampling * stride + description_.data.top / channel.ySampling * row;
+    return {Imf::FLOAT,       base, static_cast<std::size_t>(stride), static_cast<std::size_t>(row), channel.xSampling,
+            channel.ySampling};
+  }
+
+  /// Y, RY = (R - Y) / Y and BY = (B - Y) / Y, as ImfRgbaYca.h has it.
+  [[nodiscard]] glm::vec3 from_chroma(const glm::vec3& value) const {
+    const float red = (value.y + 1.0F) * value.x;
+    const float blue = (value.z + 1.0F) * value.x;
+    return {red, (value.x - weights_.x * red - weights_.z * blue) / weights_.y, blue};
+  }
+
+  std::string path_;
+  ByteStream stream_;
+  Imf::MultiPartInputFile file_;
+  std::optional<Imf::InputPart> part_;
+  Description description_;
+  EnvironmentPixels pixels_;
+  std::array<SampledPlane, 3> planes_;
+  std::array<SampledPlane, 3> luminance_;         ///< at the samples of chroma
+  glm::vec3 weights_{0.2126F, 0.7152F, 0.0722F};  ///< of the file's primaries in luminance
+};
+
+/// The display window of a picture that has values in its data window; the rest is black.
+EnvironmentPixels placed(EnvironmentPixels from, const Window& data, const Window& display, const std::string& path,
+                         Progress* progress) {
+  if (data == display) return from;
+  const std::int64_t left = std::max(data.left, display.left);
+  const std::int64_t right = std::min(data.left + data.width, display.left + display.width);
+  const std::int64_t top = std::max(data.top, display.top);
+  const std::int64_t bottom = std::min(data.top + data.height, display.top + display.height);
+  if (left >= right || top >= bottom) fail(path, "has no pixels in its display window");
+  EnvironmentPixels to;
+  to.width = static_cast<std::uint32_t>(display.width);
+  to.height = static_cast<std::uint32_t>(display.height);
+  to.remarks = std::move(from.remarks);
+  if (right - left < display.width || bottom - top < display.height) {
+    to.remarks.emplace_back("its data window is smaller than its display window, and what is outside is black");
+  }
+  resize(to.values, std::size_t{to.width} * to.height, progress);
+  for (std::int64_t y = top; y < bottom; ++y) {
+    check(progress);
+    const auto row = from.values.begin() + (y - data.top) * data.width + (left - data.left);
+    std::copy(row, row + (right - left), to.values.begin() + (y - display.top) * display.width + (left - display.left));
+  }
+  return to;
+}
+
+EnvironmentPixels to_rec709(EnvironmentPixels pixels, const Description& description, Progress* progress) {
+  std::optional<glm::dmat3> matrix;
+  std::string from;
+  if (description.channels.kind == ExrChannels::Kind::xyz) {
+    matrix = rec709_matrix_of_xyz();
+    from = "CIE XYZ";
+  } else if (description.channels.kind != ExrChannels::Kind::luminance &&
+             !similar(description.primaries, Primaries{})) {
+    matrix = rec709_matrix(description.primaries);
+    from = name_of(description.primaries);
+    if (!matrix) pixels.remarks.emplace_back("its chromaticities are no color space's, and Rec. 709 is assumed");
+  }
+  if (matrix) {
+    convert_rows(pixels, *matrix, from, progress);
+  } else if (description.channels.kind == ExrChannels::Kind::luminance_chroma) {
+    // Chroma between samples may leave the gamut.
+    for (std::uint32_t y = 0; y < pixels.height; ++y) {
+      check(progress);
+      for (glm::vec3& value : row_of(pixels, y)) value = into_gamut(value);
+    }
+  }
+  return pixels;
+}
+
+}  // namespace
+
+EnvironmentPixels read_exr(std::vector<std::uint8_t> bytes, const std::string& path, Progress* progress) {
+  try {
+    const auto file = make_left<ExrPicture>(std::move(bytes), path);
+    file->open(progress);
+    const Description& description = file->description();
+    // OpenEXR keeps the block of rows that it decoded last.
+    constexpr std::uint32_t rows = 64;
+    ProgressPart part(progress, decoded_from, decoded_to, file->height());
+    for (std::uint32_t y = 0; y < file->height();) {
+      const std::uint32_t next = apart(progress, [file, y] { return file->decode(y, rows); });
+      part.add(next - y);
+      y = next;
+    }
+    file->prepare_chroma();
+    for (std::uint32_t y = 0; file->is_coded() && y < file->height(); ++y) {
+      part.check();
+      file->combine(y);
+    }
+    EnvironmentPixels pixels =
+        placed(to_rec709(file->take(), description, progress), description.data, description.display, path, progress);
+    if (!description.cube) return pixels;
+    EnvironmentPixels flat = resample({pixels.width, std::move(pixels.values)}, progress);
+    flat.remarks = std::move(pixels.remarks);
+    return flat;
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    fail(path, "not a readable OpenEXR file: " + one_line(error.what(), 200));
+  }
+}
+
+}  // namespace cumulet::light
