@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -14,6 +13,7 @@
 
 #include "base/progress_part.hpp"
 #include "surface/gltf_schema.hpp"
+#include "surface/gltf_uri.hpp"
 
 namespace cumulet::surface::detail {
 
@@ -129,60 +129,6 @@ Container unpack(std::span<const std::uint8_t> bytes) {
   }
   if (container.json.empty()) malformed("has no chunk of JSON");
   return container;
-}
-
-std::vector<std::uint8_t> decode_base64(std::string_view text, const Budget& budget) {
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(text.size() / 4 * 3 + 3);
-  std::uint32_t bits = 0;
-  int count = 0;
-  while (!text.empty() && (text.back() == '=' || std::isspace(static_cast<unsigned char>(text.back())) != 0)) {
-    text.remove_suffix(1);
-  }
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    budget.check(i);
-    const char c = text[i];
-    std::uint32_t value = 0;
-    if (c >= 'A' && c <= 'Z') {
-      value = static_cast<std::uint32_t>(c - 'A');
-    } else if (c >= 'a' && c <= 'z') {
-      value = static_cast<std::uint32_t>(c - 'a') + 26;
-    } else if (c >= '0' && c <= '9') {
-      value = static_cast<std::uint32_t>(c - '0') + 52;
-    } else if (c == '+' || c == '-') {
-      value = 62;
-    } else if (c == '/' || c == '_') {
-      value = 63;
-    } else {
-      malformed("a data URI is not base64");
-    }
-    bits = bits << 6U | value;
-    count += 6;
-    if (count >= 8) {
-      count -= 8;
-      bytes.push_back(static_cast<std::uint8_t>(bits >> static_cast<unsigned>(count)));
-    }
-  }
-  return bytes;
-}
-
-std::string decode_percent(std::string_view uri) {
-  const auto digit = [](char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    return -1;
-  };
-  std::string text;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0) {
-      text += static_cast<char>(digit(uri[i + 1]) * 16 + digit(uri[i + 2]));
-      i += 2;
-    } else {
-      text += uri[i];
-    }
-  }
-  return text;
 }
 
 /// Takes what tinygltf must not see out of the JSON, whose types are checked: bytes, which are loaded here with checks,
@@ -430,6 +376,11 @@ bool GltfFile::without_data(int accessor) const {
   return empty(of.bufferView) || sparse;
 }
 
+bool GltfFile::without_elements(int accessor) const {
+  return accessor >= 0 && static_cast<std::size_t>(accessor) < model.accessors.size() &&
+         model.accessors[static_cast<std::size_t>(accessor)].count == 0;
+}
+
 void Budget::take(std::uint64_t count, std::uint64_t size, std::string_view what) {
   cumulet::check(progress_);
   if (size != 0 && count > left_ / size) {
@@ -461,35 +412,6 @@ std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& b
     if (static_cast<std::size_t>(file.gcount()) != bytes.size() - done) malformed("cannot be read");
   }
   return bytes;
-}
-
-std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optional<std::filesystem::path>& folder,
-                                      Budget& budget) {
-  if (uri.starts_with("data:")) {
-    const std::size_t comma = uri.find(',');
-    if (comma == std::string::npos) malformed("a data URI has no data");
-    const std::string_view head = std::string_view(uri).substr(0, comma);
-    const std::string_view data = std::string_view(uri).substr(comma + 1);
-    budget.take(data.size(), 1, "a data URI");
-    if (head.ends_with(";base64")) return decode_base64(data, budget);
-    const std::string plain = decode_percent(data);
-    return {plain.begin(), plain.end()};
-  }
-  const std::string text = decode_percent(uri);
-  if (text.empty()) malformed("its URI is empty");
-  const std::size_t end_of_scheme = text.find(':');
-  if (end_of_scheme != std::string::npos && text.find('/') > end_of_scheme) {
-    malformed("\"" + one_line(uri) + "\" is not a relative path");
-  }
-  if (text.front() == '/' || text.front() == '\\' || text.find('\0') != std::string::npos) {
-    malformed("\"" + one_line(uri) + "\" is not a relative path");
-  }
-  if (!folder) malformed("\"" + one_line(uri) + "\" is a file of its own, and there is no folder to look in");
-  try {
-    return read_file(*folder / text, budget);
-  } catch (const Error& error) {
-    throw Error(error.code(), one_line(uri) + ": " + error.what());
-  }
 }
 
 std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,

@@ -109,11 +109,9 @@ struct GltfFile {
   [[nodiscard]] Bytes view(std::int64_t index) const;
   /// Whether an accessor, if there is such a one, lies in a buffer that names no data.
   [[nodiscard]] bool without_data(int accessor) const;
+  /// Whether there is such an accessor, and its count is 0.
+  [[nodiscard]] bool without_elements(int accessor) const;
 };
-
-/// Bytes of a data URI, or of a file named by a URI relative to `folder`. Throws Error(file).
-std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optional<std::filesystem::path>& folder,
-                                      Budget& budget);
 
 /// Reads a whole regular file. Throws Error(file) that names the cause only.
 std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& budget);

@@ -83,6 +83,14 @@ class Assembler {
         continue;
       }
       const tinygltf::Value& attributes = extension->second.Get("attributes");
+      const auto without_elements = [&](const std::string& name) {
+        return file_.without_elements(attributes.Get(name).GetNumberAsInt());
+      };
+      if (std::ranges::any_of(attributes.Keys(), without_elements)) {
+        scene_->rig.hidden[node] = true;
+        ++without_instances_;
+        continue;
+      }
       if (!attributes.Keys().empty()) placings_[node] = placings(accessors, node, attributes);
     }
   }
@@ -302,6 +310,10 @@ class Assembler {
       log_.warning(name_ + ": " + std::to_string(remarks_.without_data) +
                    " primitives are not drawn: their buffer has no data");
     }
+    if (remarks_.without_elements > 0) {
+      log_.warning(name_ + ": " + std::to_string(remarks_.without_elements) +
+                   " primitives are not drawn: an accessor of theirs has a count of 0");
+    }
     if (remarks_.unbound > 0) {
       log_.warning(name_ + ": " + std::to_string(remarks_.unbound) +
                    " primitives have a skin and no joints, and stand still");
@@ -312,6 +324,10 @@ class Assembler {
     if (skinned_instances_ > 0) {
       log_.warning(name_ + ": " + std::to_string(skinned_instances_) +
                    " nodes have instances and a skin, and are drawn once");
+    }
+    if (without_instances_ > 0) {
+      log_.warning(name_ + ": " + std::to_string(without_instances_) +
+                   " nodes are not drawn: an accessor of their instances has a count of 0");
     }
     if (!own_attributes_.empty()) {
       std::string list;
@@ -333,6 +349,7 @@ class Assembler {
   std::size_t absent_joints_ = 0;
   std::map<std::uint32_t, std::vector<glm::dmat4>> placings_;  ///< of nodes with EXT_mesh_gpu_instancing
   std::size_t skinned_instances_ = 0;
+  std::size_t without_instances_ = 0;
   std::set<std::string> own_attributes_;  ///< of instances, beside their transforms
 };
 

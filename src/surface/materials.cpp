@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/progress_part.hpp"
+#include "surface/gltf_uri.hpp"
 #include "surface/specular_glossiness.hpp"
 
 namespace cumulet::surface::detail {
@@ -384,7 +385,7 @@ class Materials {
     try {
       return decode_image(*bytes, bytes, budget_);
     } catch (const Error& error) {
-      if (image.uri.starts_with("data:")) throw;
+      if (is_data_uri(image.uri)) throw;
       throw Error(error.code(), one_line(image.uri) + " " + error.what());
     }
   }

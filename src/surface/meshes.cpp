@@ -82,8 +82,14 @@ class Primitive {
       ++remarks_.not_triangles;
       return std::nullopt;
     }
-    if (without_data()) {
+    if (any_accessor([this](int accessor) { return file_.without_data(accessor); })) {
       ++remarks_.without_data;
+      return std::nullopt;
+    }
+    // What Draco has compressed has counts of its own.
+    const bool counted = !from_.extensions.contains("KHR_draco_mesh_compression");
+    if (counted && any_accessor([this](int accessor) { return file_.without_elements(accessor); })) {
+      ++remarks_.without_elements;
       return std::nullopt;
     }
     decompress();
@@ -103,11 +109,12 @@ class Primitive {
   }
 
  private:
-  [[nodiscard]] bool without_data() const {
-    const auto any = [this](const auto& attributes) {
-      return std::ranges::any_of(attributes, [this](const auto& a) { return file_.without_data(a.second); });
+  template <class Predicate>
+  [[nodiscard]] bool any_accessor(const Predicate& predicate) const {
+    const auto any = [&](const auto& attributes) {
+      return std::ranges::any_of(attributes, [&](const auto& attribute) { return predicate(attribute.second); });
     };
-    return file_.without_data(from_.indices) || any(from_.attributes) || std::ranges::any_of(from_.targets, any);
+    return predicate(from_.indices) || any(from_.attributes) || std::ranges::any_of(from_.targets, any);
   }
   [[nodiscard]] bool has(const std::string& attribute) const { return from_.attributes.contains(attribute); }
   [[nodiscard]] std::string label(const std::string& attribute) const { return what_ + ", " + attribute; }

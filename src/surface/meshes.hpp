@@ -37,11 +37,12 @@ struct MeshPart {
 
 /// What of a file is not drawn as it was meant, for one line each.
 struct MeshRemarks {
-  std::size_t not_triangles = 0;  ///< primitives of points and lines
-  std::size_t incomplete = 0;     ///< primitives with indices left over
-  std::size_t not_finite = 0;     ///< primitives with normals, tangents, coordinates or colours that are not
-  std::size_t without_data = 0;   ///< primitives in buffers that name no data
-  std::size_t unbound = 0;        ///< primitives under a node with a skin that no joint holds
+  std::size_t not_triangles = 0;     ///< primitives of points and lines
+  std::size_t incomplete = 0;        ///< primitives with indices left over
+  std::size_t not_finite = 0;        ///< primitives with normals, tangents, coordinates or colours that are not
+  std::size_t without_data = 0;      ///< primitives in buffers that name no data
+  std::size_t without_elements = 0;  ///< primitives with an accessor that has a count of 0
+  std::size_t unbound = 0;           ///< primitives under a node with a skin that no joint holds
 };
 
 /// All primitives of a mesh that draw triangles, in a file of so many variants. Throws Error(file).

@@ -46,6 +46,10 @@ class Importer {
       log_.warning(name_ + ": " + std::to_string(without_data_) +
                    " skins and animation channels are as at rest: their buffer has no data");
     }
+    if (without_elements_ > 0) {
+      log_.warning(name_ + ": " + std::to_string(without_elements_) +
+                   " skins and animation channels are as at rest: an accessor of theirs has a count of 0");
+    }
     if (frozen_ > 0) {
       log_.warning(name_ + ": " + std::to_string(frozen_) +
                    " animation channels of nodes that have a matrix, or no morph targets, are ignored");
@@ -180,6 +184,8 @@ class Importer {
     }
     if (file_.without_data(from.inverseBindMatrices)) {
       ++without_data_;
+    } else if (file_.without_elements(from.inverseBindMatrices)) {
+      ++without_elements_;
     } else if (from.inverseBindMatrices >= 0) {
       to.inverse_bind = accessors_.matrices(from.inverseBindMatrices, what + ", inverseBindMatrices");
       if (to.inverse_bind.size() < to.joints.size()) {
@@ -333,6 +339,10 @@ class Importer {
       ++without_data_;
       return std::nullopt;
     }
+    if (file_.without_elements(sampler.input) || file_.without_elements(sampler.output)) {
+      ++without_elements_;
+      return std::nullopt;
+    }
     to.times = accessors_.scalars(sampler.input, what + ", input");
     for (std::size_t k = 0; k < to.times.size(); ++k) {
       if (!std::isfinite(to.times[k]) || to.times[k] < 0.0F || (k > 0 && to.times[k] < to.times[k - 1])) {
@@ -381,6 +391,7 @@ class Importer {
   Rig rig_;
   std::size_t unmatched_ = 0;
   std::size_t without_data_ = 0;
+  std::size_t without_elements_ = 0;
   std::size_t frozen_ = 0;
   std::size_t not_followed_ = 0;
   std::string first_not_followed_;
