@@ -24,6 +24,7 @@ find_package(draco CONFIG REQUIRED)
 set_property(TARGET TinyGLTF::TinyGLTF APPEND PROPERTY INTERFACE_LINK_LIBRARIES draco::draco)
 find_package(meshoptimizer CONFIG REQUIRED)
 pkg_check_modules(CUMULET_WEBP REQUIRED IMPORTED_TARGET GLOBAL libwebp)
+pkg_check_modules(CUMULET_JPEG REQUIRED IMPORTED_TARGET GLOBAL libjpeg)
 find_path(CUMULET_JSON_INCLUDE_DIR nlohmann/json.hpp REQUIRED)
 
 find_path(CUMULET_GLM_INCLUDE_DIR glm/glm.hpp REQUIRED)

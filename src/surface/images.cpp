@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/apart.hpp"
+#include "surface/jpeg.h"
 #include "surface/materials.hpp"
 
 namespace cumulet::surface::detail {
@@ -37,29 +38,18 @@ Header png_header(std::span<const std::uint8_t> bytes) {
   return header;
 }
 
-/// Looks for a frame header, of any coding (ITU-T T.81, B.2.2).
-Header jpeg_header(std::span<const std::uint8_t> bytes) {
-  std::size_t at = 2;
-  while (at + 4 <= bytes.size()) {
-    if (bytes[at] != 0xFF) malformed("is a malformed JPEG");
-    const std::uint8_t marker = bytes[at + 1];
-    if (marker == 0xFF) {
-      ++at;
-      continue;
-    }
-    const std::uint64_t length = big_endian(bytes, at + 2, 2);
-    const bool frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
-    if (frame && at + 9 <= bytes.size()) {
-      Header header;
-      header.height = big_endian(bytes, at + 5, 2);
-      header.width = big_endian(bytes, at + 7, 2);
-      // A block of 8 x 8 has at least one bit, and a component at least one block of 32 x 32 pixels.
-      header.least_bytes = header.width * header.height / 8192;
-      return header;
-    }
-    at += 2 + length;
+bool is_jpeg(Bytes bytes) { return bytes.size() >= 4 && bytes[0] == 0xFF && bytes[1] == 0xD8; }
+
+Header jpeg_header(Bytes bytes) {
+  cumulet_jpeg_header found{};
+  cumulet_jpeg_report report{};
+  if (cumulet_jpeg_read_header(bytes.data(), bytes.size(), &found, &report) == 0) {
+    malformed("is a JPEG that cannot be read: " + one_line(report.error));
   }
-  malformed("is a JPEG cut short");
+  Header header{found.width, found.height, 0};
+  // By Huffman's codes a block of 8 x 8 has at least one bit, and a component at least one block of 32 x 32 pixels.
+  if (found.arithmetic == 0) header.least_bytes = header.width * header.height / 8192;
+  return header;
 }
 
 /// Of RIFF, whose form is WEBP.
@@ -83,7 +73,7 @@ Header read_header(std::span<const std::uint8_t> bytes) {
   if (bytes.size() >= png_signature.size() && std::equal(png_signature.begin(), png_signature.end(), bytes.begin())) {
     return png_header(bytes);
   }
-  if (bytes.size() >= 4 && bytes[0] == 0xFF && bytes[1] == 0xD8) return jpeg_header(bytes);
+  if (is_jpeg(bytes)) return jpeg_header(bytes);
   if (is_webp(bytes)) return webp_header(bytes);
   constexpr std::array<std::uint8_t, 4> ktx2 = {0xAB, 'K', 'T', 'X'};
   if (bytes.size() >= ktx2.size() && std::equal(ktx2.begin(), ktx2.end(), bytes.begin())) {
@@ -104,8 +94,23 @@ Image decode_webp(Bytes bytes, const Header& header) {
   return result;
 }
 
+DecodedImage decode_jpeg(Bytes bytes, const Header& header) {
+  DecodedImage result;
+  Image& image = result.image;
+  image.width = static_cast<std::uint32_t>(header.width);
+  image.height = static_cast<std::uint32_t>(header.height);
+  image.rgba.resize(std::size_t{image.width} * image.height * 4);
+  const cumulet_jpeg_header expected{image.width, image.height, 0};
+  cumulet_jpeg_report report{};
+  if (cumulet_jpeg_decode(bytes.data(), bytes.size(), &expected, image.rgba.data(), &report) == 0) {
+    malformed("cannot be decoded: " + one_line(report.error));
+  }
+  result.damage = one_line(report.damage);
+  return result;
+}
+
 /// What is known to fit.
-Image decode(Bytes bytes) {
+Image decode_png(Bytes bytes) {
   tinygltf::Image image;
   std::string error;
   std::string warning;
@@ -133,7 +138,7 @@ Image decode(Bytes bytes) {
 
 }  // namespace
 
-Image decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
+DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
   // The library reads more formats, and trusts sizes; this lets pass what glTF knows and memory holds.
   const Header header = read_header(bytes);
   const std::string size = std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
@@ -147,8 +152,10 @@ Image decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
     malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
   const std::uint64_t pixels = header.width * header.height;
   budget.take(pixels, 4, "an image of " + size);
-  return apart(budget.progress_for(4 * pixels),
-               [bytes, owner, header] { return is_webp(bytes) ? decode_webp(bytes, header) : decode(bytes); });
+  return apart(budget.progress_for(4 * pixels), [bytes, owner, header] {
+    if (is_jpeg(bytes)) return decode_jpeg(bytes, header);
+    return DecodedImage{is_webp(bytes) ? decode_webp(bytes, header) : decode_png(bytes), {}};
+  });
 }
 
 }  // namespace cumulet::surface::detail

@@ -367,23 +367,32 @@ class Materials {
     check(progress_);
     const ImageSource& image = file_.images[source];
     try {
-      Image decoded = load(image);
-      decoded.name = image.name;
-      return decoded;
+      DecodedImage decoded = load(image);
+      if (!decoded.damage.empty()) {
+        log_.warning(name_ + ": " + called(source) + " is damaged, and shown as far as it can be: " + decoded.damage);
+      }
+      decoded.image.name = image.name;
+      return std::move(decoded.image);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::file) throw;
-      const std::string named = image.name.empty() ? "" : " (" + image.name + ")";
-      log_.warning(name_ + ": " + numbered("image", source) + named + " is left out: " + error.what());
+      log_.warning(name_ + ": " + called(source) + " is left out: " + error.what());
     }
     return std::nullopt;
   }
 
-  Image load(const ImageSource& image) {
+  [[nodiscard]] std::string called(std::size_t image) const {
+    const std::string& name = file_.images[image].name;
+    return numbered("image", image) + (name.empty() ? "" : " (" + name + ")");
+  }
+
+  DecodedImage load(const ImageSource& image) {
     if (image.view >= 0) return decode_image(file_.view(image.view), file_.storage, budget_);
     if (image.uri.empty()) malformed("it has neither a URI nor a buffer view");
     const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(resolve_uri(image.uri, file_.folder, budget_));
     try {
-      return decode_image(*bytes, bytes, budget_);
+      DecodedImage decoded = decode_image(*bytes, bytes, budget_);
+      if (!decoded.damage.empty() && !is_data_uri(image.uri)) decoded.damage.insert(0, one_line(image.uri) + ": ");
+      return decoded;
     } catch (const Error& error) {
       if (is_data_uri(image.uri)) throw;
       throw Error(error.code(), one_line(image.uri) + " " + error.what());

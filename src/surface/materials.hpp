@@ -14,8 +14,13 @@ namespace cumulet::surface::detail {
 std::vector<MovableMaterial> import_materials(const GltfFile& file, const Log& log, const std::string& name,
                                               Budget& budget, Progress* progress, Scene& scene);
 
+struct DecodedImage {
+  Image image;
+  std::string damage;  ///< why some of its pixels are missing; empty if they are not
+};
+
 /// Decodes a PNG, JPEG or WebP, whose bytes `owner` keeps; 16-bit channels are rounded to 8. Throws Error(file).
-Image decode_image(Bytes bytes, const Owner& owner, Budget& budget);
+DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget);
 
 /// A number of the file as a float: what is too large for one becomes the largest.
 float narrow(double value);

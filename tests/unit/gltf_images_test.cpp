@@ -1,7 +1,12 @@
-// URIs of glTF files, and accessors without elements.
+// JPEG textures and URIs of glTF files.
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
+// After <cstdio>, which it needs.
+#include <jpeglib.h>
+
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -27,6 +32,59 @@ using test::imported;
 using test::json;
 using test::Lines;
 
+struct Coding {
+  J_COLOR_SPACE from = JCS_RGB;
+  std::optional<J_COLOR_SPACE> to{};
+  bool progressive = false;
+  bool arithmetic = false;
+  unsigned restart = 0;
+  bool adobe = true;
+  int sampling = 2;
+};
+
+/// side x side pixels of one color, but for a dark square in the lower right quarter.
+Bytes jpeg(std::uint32_t side, const std::vector<std::uint8_t>& color, const Coding& coding = {}) {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* packed = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&info, &packed, &size);
+  info.image_width = side;
+  info.image_height = side;
+  info.input_components = static_cast<int>(color.size());
+  info.in_color_space = coding.from;
+  jpeg_set_defaults(&info);
+  if (coding.to) jpeg_set_colorspace(&info, *coding.to);
+  jpeg_set_quality(&info, 95, TRUE);
+  info.arith_code = coding.arithmetic ? TRUE : FALSE;
+  info.restart_interval = coding.restart;
+  if (!coding.adobe) info.write_Adobe_marker = FALSE;
+  info.comp_info[0].h_samp_factor = coding.sampling;
+  if (coding.progressive) jpeg_simple_progression(&info);
+  jpeg_start_compress(&info, TRUE);
+  for (std::uint32_t y = 0; y < side; ++y) {
+    std::vector<std::uint8_t> row;
+    for (std::uint32_t x = 0; x < side; ++x) {
+      for (const std::uint8_t c : color) row.push_back(x >= side / 2 && y >= side / 2 ? c / 2 : c);
+    }
+    JSAMPROW rows = row.data();
+    jpeg_write_scanlines(&info, &rows, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  Bytes file(packed, packed + size);
+  std::free(packed);
+  return file;
+}
+
+/// Bytes before the last `back` ones of a file, which end with the end marker.
+Bytes with_tail(Bytes file, const Bytes& bytes, std::ptrdiff_t back = 2) {
+  file.insert(file.end() - back, bytes.begin(), bytes.end());
+  return file;
+}
+
 GltfModel textured(const json& image) {
   GltfModel model;
   model.add("images", image);
@@ -34,6 +92,127 @@ GltfModel textured(const json& image) {
   model.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
   model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"material", 0}});
   return model;
+}
+
+struct Read {
+  std::optional<Image> image;
+  std::vector<std::string> warnings;
+};
+
+Read read(const Bytes& bytes) {
+  Lines lines;
+  const ScenePtr scene = imported(textured({{"uri", "data:image/jpeg;base64," + test::base64(bytes)}}), lines.log);
+  Read read{{}, lines.warnings};
+  if (!scene->images.empty()) read.image = scene->images[0];
+  return read;
+}
+
+void expect_color(const Read& read, std::uint32_t x, std::uint32_t y, int r, int g, int b) {
+  ASSERT_TRUE(read.image) << (read.warnings.empty() ? "" : read.warnings[0]);
+  const std::uint8_t* at = &read.image->rgba[std::size_t{4} * (y * read.image->width + x)];
+  EXPECT_NEAR(at[0], r, 4);
+  EXPECT_NEAR(at[1], g, 4);
+  EXPECT_NEAR(at[2], b, 4);
+  EXPECT_EQ(at[3], 255);
+}
+
+TEST(GltfJpeg, WhatLibjpegReadsIsRead) {
+  for (const Coding& coding :
+       {Coding{}, Coding{.progressive = true}, Coding{.progressive = true, .restart = 2}, Coding{.restart = 1},
+        Coding{.arithmetic = true}, Coding{.sampling = 1}, Coding{.sampling = 4}, Coding{.to = JCS_RGB}}) {
+    const Bytes whole = jpeg(64, {200, 40, 90}, coding);
+    Bytes padded = whole;  // fill bytes before a marker
+    padded.insert(padded.begin() + 2, {0xFF, 0xFF, 0xFF});
+    Bytes restart = whole;  // a marker without a length in the header
+    restart.insert(restart.begin() + 2, {0xFF, 0xD0});
+    Bytes temporary = whole;
+    temporary.insert(temporary.begin() + 2, {0xFF, 0x01});
+    Bytes after = whole;
+    after.insert(after.end(), 300, 0x55);
+    std::vector<Bytes> files = {whole, padded, restart, temporary, after};
+    // The last bytes of arithmetic coding may be left out, so what is in their place would be data.
+    if (!coding.arithmetic) {
+      for (const Bytes& tail :
+           {Bytes{0xFF, 0xFF, 0xFF}, Bytes{0xFF, 0xD0}, Bytes{0xFF, 0x00}, Bytes{1, 2, 3, 4, 5, 6, 7}, Bytes(16, 0)}) {
+        files.push_back(with_tail(whole, tail));
+      }
+    }
+    for (const Bytes& file : files) {
+      const Read got = read(file);
+      expect_color(got, 5, 5, 200, 40, 90);
+      expect_color(got, 60, 60, 100, 20, 45);
+      EXPECT_TRUE(got.warnings.empty()) << got.warnings.at(0);
+    }
+  }
+}
+
+TEST(GltfJpeg, GrayAndInksAreColors) {
+  expect_color(read(jpeg(32, {120}, {.from = JCS_GRAYSCALE})), 3, 3, 120, 120, 120);
+  // Adobe's programs write complements.
+  for (const J_COLOR_SPACE space : {JCS_CMYK, JCS_YCCK}) {
+    expect_color(read(jpeg(32, {200, 40, 90, 255}, {.from = JCS_CMYK, .to = space, .sampling = 1})), 3, 3, 200, 40, 90);
+    expect_color(read(jpeg(32, {200, 40, 90, 128}, {.from = JCS_CMYK, .to = space, .sampling = 1})), 3, 3, 100, 20, 45);
+  }
+  expect_color(read(jpeg(32, {55, 215, 165, 0}, {.from = JCS_CMYK, .to = JCS_CMYK, .adobe = false, .sampling = 1})), 3,
+               3, 200, 40, 90);
+}
+
+TEST(GltfJpeg, DamageIsToldAndTheRestIsShown) {
+  for (const Coding& coding : {Coding{}, Coding{.progressive = true}}) {
+    const Bytes whole = jpeg(64, {200, 40, 90}, coding);
+    // Without its end marker alone all pixels are there.
+    const Read endless = read(Bytes(whole.begin(), whole.end() - 2));
+    expect_color(endless, 5, 5, 200, 40, 90);
+    EXPECT_EQ(endless.warnings.size(), coding.progressive ? 1U : 0U);
+    bool damaged = false;
+    for (std::size_t size = 0; size < whole.size() - 2; size += size < 40 ? 1 : 13) {
+      const Read got = read(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)));
+      if (got.image && got.warnings.empty()) continue;  // of blocks that end with it
+      ASSERT_EQ(got.warnings.size(), 1U) << size;
+      EXPECT_TRUE(has(got.warnings[0],
+                      got.image ? "image 0 is damaged, and shown as far as it can be: " : "image 0 is left out: "))
+          << got.warnings[0];
+      damaged |= got.image.has_value();
+    }
+    EXPECT_TRUE(damaged);
+  }
+  Bytes deep = jpeg(32, {200, 40, 90});
+  for (std::size_t i = 0; i + 1 < deep.size(); ++i) {
+    if (deep[i] == 0xFF && deep[i + 1] == 0xC0) deep[i + 4] = 12;
+  }
+  const Read got = read(deep);
+  EXPECT_FALSE(got.image);
+  ASSERT_EQ(got.warnings.size(), 1U);
+  EXPECT_TRUE(has(got.warnings[0], "Unsupported JPEG data precision 12")) << got.warnings[0];
+}
+
+TEST(GltfJpeg, AnyBytesAreRefusedOrRead) {
+  const Bytes whole = jpeg(32, {200, 40, 90}, {.progressive = true, .restart = 1});
+  std::uint32_t random = 1;
+  for (int i = 0; i < 300; ++i) {
+    Bytes file = whole;
+    for (int k = 0; k < 3; ++k) {
+      random = random * 1664525U + 1013904223U;
+      file[2 + (random >> 8U) % (file.size() - 2)] = static_cast<std::uint8_t>(random >> 24U);
+    }
+    const Read got = read(file);
+    EXPECT_TRUE(got.image || got.warnings.size() == 1) << i;
+  }
+}
+
+TEST(GltfJpeg, TheSharedTrialsAreRead) {
+  const fs::path trials = fs::path(CUMULET_SHARED_DATA) / "trials" / "jpeg-tails";
+  if (!fs::exists(trials)) GTEST_SKIP() << "no shared data";
+  std::size_t count = 0;
+  for (const auto& entry : fs::directory_iterator(trials)) {
+    if (entry.path().extension() != ".gltf") continue;
+    Lines lines;
+    const ScenePtr scene = import_gltf(entry.path().string(), lines.log);
+    EXPECT_EQ(scene->images.size(), 1U) << entry.path();
+    EXPECT_TRUE(lines.warnings.empty()) << entry.path() << lines.warnings.at(0);
+    ++count;
+  }
+  EXPECT_GE(count, 12U);
 }
 
 TEST(GltfUris, AreUrlReferencesThenNames) {

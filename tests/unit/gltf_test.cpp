@@ -917,7 +917,7 @@ TEST(Gltf, TexturesThatCannotBeHadAreLeftOutWithALine) {
   Bytes cut = test::png(2, 2, 8, 2, Bytes(12));
   cut.resize(50);
   EXPECT_TRUE(has(line(embedded(cut)), "cannot be decoded"));
-  EXPECT_TRUE(has(line(embedded({0xFF, 0xD8, 0xFF, 0xE0, 0, 16})), "JPEG cut short"));
+  EXPECT_TRUE(has(line(embedded({0xFF, 0xD8, 0xFF, 0xE0, 0, 16})), "is a JPEG that cannot be read"));
   // Set 2 of coordinates.
   GltfModel far = embedded(test::png(1, 1, 8, 2, {1, 2, 3}));
   far.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 2;
