@@ -447,6 +447,7 @@ bool Session::begin_volume() {
   try {
     row = FrameRow::of_name(scene_.volume);
     if (row) sequence = open_sequence(row->files(), file);
+    if (const std::string line = row ? row->pattern().passed_over() : ""; !line.empty()) tell(false, line);
   } catch (const std::exception& error) {
     tell(true, error.what());
     return false;

@@ -27,9 +27,9 @@ void Panel::sequence(Model& model, std::vector<Command>& commands) {
   Frame first = play.row.number(played.first_frame);
   Frame last = play.row.number(played.first_frame + played.frame_count - 1);
   if (ui_.slider("First played", "The frame that playing begins with (I: the one that is shown).", first, least, most,
-                 "%u"))
+                 "%d"))
     sequence.first = std::min(first, last);
-  if (ui_.slider("Last played", "The one that it ends with (O: the one that is shown).", last, least, most, "%u"))
+  if (ui_.slider("Last played", "The one that it ends with (O: the one that is shown).", last, least, most, "%d"))
     sequence.last = std::max(first, last);
   ui_.fact("Ready", std::to_string(play.info.ready_frames) + " of " + std::to_string(play.info.frames) + ", " +
                         short_bytes(static_cast<double>(play.info.bytes)));

@@ -160,6 +160,11 @@ bool Ui::slider(const char* label, const char* tip, double& value, double least,
   return slide(label, tip, ImGuiDataType_Double, value, least, most, format, flags);
 }
 
+bool Ui::slider(const char* label, const char* tip, std::int32_t& value, std::int32_t least, std::int32_t most,
+                const char* format, ImGuiSliderFlags flags) {
+  return slide(label, tip, ImGuiDataType_S32, value, least, most, format, flags);
+}
+
 bool Ui::slider(const char* label, const char* tip, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
                 const char* format, ImGuiSliderFlags flags) {
   return slide(label, tip, ImGuiDataType_U32, value, least, most, format, flags);

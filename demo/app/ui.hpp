@@ -41,6 +41,8 @@ class Ui {
               ImGuiSliderFlags flags = 0);
   bool slider(const char* label, const char* tip, double& value, double least, double most, const char* format,
               ImGuiSliderFlags flags = 0);
+  bool slider(const char* label, const char* tip, std::int32_t& value, std::int32_t least, std::int32_t most,
+              const char* format, ImGuiSliderFlags flags = 0);
   bool slider(const char* label, const char* tip, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
               const char* format, ImGuiSliderFlags flags = 0);
   bool slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,

@@ -68,41 +68,40 @@ struct Grid {
   [[nodiscard]] Frame before(Frame frame) const { return frame < first ? frame : frame - (frame - first) % step; }
 };
 
-constexpr std::uint32_t thousand = 1000;
-
 /// Of what is between two files.
 PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, const Grid& grid) {
-  constexpr std::uint32_t most_parts = 1000;  // the library's
+  constexpr std::int64_t most_parts = 1000;  // the library's
   const Frame before = grid.before(moment.frame);
-  const std::uint64_t way = std::uint64_t{moment.frame - before} * thousand + moment.thousandths;
-  const std::uint64_t length = std::uint64_t{grid.step} * thousand;
-  const std::uint64_t common = std::gcd(way, length);
+  const std::int64_t way = moment.in_thousandths() - Moment(before).in_thousandths();
+  const std::int64_t length = Moment(grid.step).in_thousandths();
+  const std::int64_t common = std::gcd(way, length);
   if (length / common > most_parts)
     throw UsageError("frame " + moment.text() + ": the files are " + std::to_string(grid.step) +
                      " frames apart, of which this is no thousandth");
   return {volume.file(before + grid.step), static_cast<std::uint32_t>(way / common),
-          static_cast<std::uint32_t>(length / common), grid.step};
+          static_cast<std::uint32_t>(length / common), static_cast<std::uint32_t>(grid.step)};
 }
 
 /// By the scene's clock.
 double seconds_of(const Moment& moment, const SceneSequence& sequence, const Grid& grid) {
   cumulet_playback_desc playback = sequence.playback;
   settings::spell_out_zeros(playback);
-  const double frames = double(moment.frame) - sequence.first.value_or(grid.first);
-  return playback.offset_seconds +
-         (frames + double(moment.thousandths) / thousand) / (grid.step * playback.frames_per_second);
+  const Moment first(sequence.first.value_or(grid.first));
+  const double frames = static_cast<double>(moment.in_thousandths() - first.in_thousandths()) / 1000.0;
+  return playback.offset_seconds + frames / (grid.step * playback.frames_per_second);
 }
 
 }  // namespace
 
 std::optional<FramePlan> plan_frames(const RenderOptions& options) {
-  const std::optional<FramePattern> volume = volume_pattern(options);
+  std::optional<FramePattern> volume = volume_pattern(options);
   if (!volume) {
     if (options.overwrite) throw UsageError("--overwrite is of a sequence: one picture replaces what is there");
     if (!options.settled.empty()) throw UsageError("--settled is of a sequence, and this is one picture");
     return std::nullopt;
   }
   if (options.info) throw UsageError("--info is of one file, and '" + volume->text() + "' are many");
+  volume->adopt_padding();
   const std::vector<Frame> there = volume->frames_there();
   if (there.empty()) throw std::runtime_error(volume->text() + ": no file of such a name is there");
   std::vector<Moment> frames = options.frames;
@@ -115,6 +114,7 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   const Grid grid(there);
   const bool moments = std::ranges::any_of(frames, &Moment::is_between);
   FramePlan plan;
+  plan.passed_over = volume->passed_over();
   for (const Moment& frame : frames) {
     PlannedFrame& planned = plan.frames.emplace_back();
     planned.number = frame;

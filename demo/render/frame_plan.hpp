@@ -32,6 +32,8 @@ struct FramePlan {
   /// All volumes of the sequence that are there, the largest file first. What the whole sequence has in common is taken
   /// from the first of them that can be read: whichever frames are asked for, it is the same.
   std::vector<std::string> judged_by;
+  /// FramePattern::passed_over of the volume's name.
+  std::string passed_over;
 };
 
 /// What --frames, and places for a frame's number in the names of volume, output and statistics, ask for; nothing where

@@ -882,6 +882,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
   catch_signals();
   std::signal(SIGPIPE, SIG_IGN);  // whoever reads the lines may go: the frames are made
+  if (!plan.passed_over.empty()) std::fprintf(stderr, "warning: %s\n", one_line(plan.passed_over).c_str());
   std::unique_ptr<Studio> studio;
   Report report(plan);
   for (std::size_t i = 0; i < plan.frames.size(); ++i) {

@@ -763,7 +763,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   add(
       app, group, "--frames", "A-BxS,...", [&](const std::string& text) { options.frames = parse_frames(text); },
       "Frames of the sequence that the volume's name stands for, by ####, %04d, $F4 or <frame04>, or is a file of: "
-      "such as 5, 1-100, 1-100x2, 1-3,7 or 1-10x0.5, with what is between two of them (default: all that are there)");
+      "such as 5, 1-100, 1-100x2, -2-2, 1-3,7 or 1-10x0.5, with what is between two of them (default: all that are "
+      "there)");
   add_settings(app, group, options.scene.sequence.playback);
   app.add_flag("--overwrite", options.overwrite, "Make frames anew that are there already, which are kept else")
       ->group(group);

@@ -567,19 +567,17 @@ void read_models(Reader& reader, SceneOptions& scene) {
 
 void read_sequence(Reader& reader, SceneSequence& sequence) {
   read_settings(reader, sequence.playback);
-  const auto frame = [&](const char* key, std::optional<std::uint32_t>& out) {
-    std::uint32_t number = 0;
+  const auto frame = [&](const char* key, std::optional<Frame>& out) {
+    Frame number = 0;
     if (!reader.has(key)) return;
-    reader.integer(key, number, 0.0, last_frame);
+    reader.integer(key, number, first_frame, last_frame);
     out = number;
   };
   frame("sequence.first_frame", sequence.first);
   frame("sequence.last_frame", sequence.last);
   double position = 0.0;
-  if (reader.number("sequence.frame", position, {0.0, double{last_frame}})) {
-    const auto thousandths = static_cast<std::uint64_t>(std::llround(1000.0 * position));
-    sequence.frame = Moment(static_cast<Frame>(thousandths / 1000), static_cast<std::uint32_t>(thousandths % 1000));
-  }
+  if (reader.number("sequence.frame", position, {double{first_frame}, double{last_frame}}))
+    sequence.frame = Moment::of_thousandths(std::llround(1000.0 * position));
   if (sequence.first && sequence.last && *sequence.first > *sequence.last)
     reader.wrong("sequence.last_frame", "comes before sequence.first_frame");
 }
@@ -817,7 +815,7 @@ void put_sequence(Writer& writer, const SceneSequence& sequence) {
   if (!sequence.frame) return;
   const Moment& moment = *sequence.frame;
   if (moment.is_between()) {
-    writer.put("sequence.frame", (1000.0 * moment.frame + moment.thousandths) / 1000.0);
+    writer.put("sequence.frame", static_cast<double>(moment.in_thousandths()) / 1000.0);
   } else {
     writer.put("sequence.frame", moment.frame);
   }

@@ -35,10 +35,10 @@ struct VolumeFile {
 
 /// How a volume plays, where its file's name has a place for a frame's number (demo/sequence).
 struct SceneSequence {
-  cumulet_playback_desc playback{};         // but for its frames, which are those from...
-  std::optional<std::uint32_t> first = {};  // ...this one's number on: else from the first that is there...
-  std::optional<std::uint32_t> last = {};   // ...to this one's: else to the last
-  std::optional<Moment> frame = {};         // where it stands, as long as no clock says
+  cumulet_playback_desc playback{};  // but for its frames, which are those from...
+  std::optional<Frame> first = {};   // ...this one's number on: else from the first that is there...
+  std::optional<Frame> last = {};    // ...to this one's: else to the last
+  std::optional<Moment> frame = {};  // where it stands, as long as no clock says
 
   SceneSequence() { playback.struct_size = sizeof playback; }
   bool operator==(const SceneSequence& other) const {

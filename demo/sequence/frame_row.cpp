@@ -36,7 +36,7 @@ std::vector<std::string> by_size(const std::vector<std::string>& files) {
 
 FrameRow::FrameRow(FramePattern pattern, const std::vector<Frame>& there)
     : pattern_(std::move(pattern)), first_(there.front()), step_(step_of(there)) {
-  count_ = (there.back() - first_) / step_ + 1;
+  count_ = static_cast<std::uint32_t>((there.back() - first_) / step_) + 1;
 }
 
 std::optional<FrameRow> FrameRow::of_name(const std::string& name) {
@@ -44,6 +44,7 @@ std::optional<FrameRow> FrameRow::of_name(const std::string& name) {
   if (name.empty() || std::filesystem::exists(name, error)) return std::nullopt;
   auto pattern = FramePattern::parse(name);
   if (!pattern) return std::nullopt;
+  pattern->adopt_padding();
   const std::vector<Frame> there = pattern->frames_there();
   if (there.empty()) throw std::runtime_error(pattern->text() + ": no file of such a name is there");
   const FrameRow row(*pattern, there);
@@ -64,7 +65,7 @@ std::optional<FrameRow> FrameRow::around(const std::string& file) {
 
 std::uint32_t FrameRow::index_of(Frame number) const {
   if (number <= first_) return 0;
-  return std::min((number - first_ + step_ / 2) / step_, count_ - 1);
+  return std::min(static_cast<std::uint32_t>((number - first_ + step_ / 2) / step_), count_ - 1);
 }
 
 std::vector<std::string> FrameRow::files() const {

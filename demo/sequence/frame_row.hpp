@@ -28,7 +28,7 @@ class FrameRow {
   [[nodiscard]] static std::optional<FrameRow> around(const std::string& file);
 
   [[nodiscard]] std::uint32_t count() const { return count_; }
-  [[nodiscard]] Frame number(std::uint32_t index) const { return first_ + index * step_; }
+  [[nodiscard]] Frame number(std::uint32_t index) const { return first_ + static_cast<Frame>(index) * step_; }
   /// The nearest.
   [[nodiscard]] std::uint32_t index_of(Frame number) const;
   /// Between its frames, too: the third of 40, 42, 44 and what follows is at 1, and 41 at 0.5.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <program.hpp>
 #include <unordered_set>
 
@@ -12,40 +13,43 @@ namespace {
   throw UsageError("'" + std::string(text) + "' " + why);
 }
 
-constexpr std::uint64_t whole = 1000;  // thousandths
-constexpr std::uint64_t most_moments = last_frame + 1;
+constexpr std::int64_t whole = 1000;  // thousandths
+constexpr std::int64_t most_moments = std::int64_t{last_frame} + 1;
 
-std::uint64_t parse_digits(std::string_view digits, std::string_view part) {
+[[noreturn]] void refuse_number(std::string_view part, bool negative) {
+  refuse(part, "goes beyond frame " + std::to_string(negative ? first_frame : last_frame));
+}
+
+std::int64_t parse_digits(std::string_view digits, std::string_view part, bool negative) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
   const bool is_number = !digits.empty() && end == digits.data() + digits.size();
   if (!is_number || error == std::errc::invalid_argument)
     refuse(part, "is not a frame or a range, such as 5, 1-100x2 or 1-10x0.5");
-  if (error != std::errc{} || number > last_frame) refuse(part, "goes beyond frame " + std::to_string(last_frame));
-  return number;
+  if (error != std::errc{} || number > std::uint64_t{last_frame}) refuse_number(part, negative);
+  return static_cast<std::int64_t>(number);
 }
 
 /// In thousandths.
-std::uint64_t parse_moment(std::string_view text, std::string_view part) {
+std::int64_t parse_moment(std::string_view text, std::string_view part) {
+  const bool negative = text.starts_with('-');
+  if (negative) text.remove_prefix(1);
   const auto point = text.find('.');
-  std::uint64_t moment = whole * parse_digits(text.substr(0, point), part);
-  if (point == std::string_view::npos) return moment;
-  const std::string_view decimals = text.substr(point + 1);
-  if (decimals.size() > 3) refuse(part, "has more than three decimals");
-  std::uint64_t thousandths = parse_digits(decimals, part);
-  for (std::size_t i = decimals.size(); i < 3; ++i) thousandths *= 10;
-  moment += thousandths;
-  if (moment > whole * last_frame) refuse(part, "goes beyond frame " + std::to_string(last_frame));
-  return moment;
+  std::int64_t moment = whole * parse_digits(text.substr(0, point), part, negative);
+  if (point != std::string_view::npos) {
+    const std::string_view decimals = text.substr(point + 1);
+    if (decimals.size() > 3) refuse(part, "has more than three decimals");
+    std::int64_t thousandths = parse_digits(decimals, part, negative);
+    for (std::size_t i = decimals.size(); i < 3; ++i) thousandths *= 10;
+    moment += thousandths;
+    if (moment > whole * last_frame) refuse_number(part, negative);
+  }
+  return negative ? -moment : moment;
 }
 
-Moment moment_of(std::uint64_t thousandths) {
-  return {static_cast<Frame>(thousandths / whole), static_cast<std::uint32_t>(thousandths % whole)};
-}
-
-/// What stands before the character, and what behind it; all and nothing, where it is not.
-std::pair<std::string_view, std::string_view> cut(std::string_view text, char at) {
-  const auto place = text.find(at);
+/// What stands before the character, and what behind it; all and nothing, where it is not. It is searched from there.
+std::pair<std::string_view, std::string_view> cut(std::string_view text, char at, std::size_t from = 0) {
+  const auto place = text.find(at, from);
   if (place == std::string_view::npos) return {text, {}};
   return {text.substr(0, place), text.substr(place + 1)};
 }
@@ -55,7 +59,9 @@ std::pair<std::string_view, std::string_view> cut(std::string_view text, char at
 std::string Moment::part_text(std::size_t decimals) const {
   const std::size_t shown = std::max(decimals, this->decimals());
   if (shown == 0) return "";
-  std::string digits = std::to_string(whole + thousandths);
+  // Halfway from -2 to -1 is -1.5.
+  const std::int64_t part = is_negative() && is_between() ? whole - thousandths : thousandths;
+  std::string digits = std::to_string(whole + part);
   digits.front() = '.';
   digits.resize(1 + shown, '0');
   return digits;
@@ -63,15 +69,25 @@ std::string Moment::part_text(std::size_t decimals) const {
 
 std::size_t Moment::decimals() const {
   std::size_t count = 3;
-  for (std::uint32_t rest = whole + thousandths; count > 0 && rest % 10 == 0; rest /= 10) --count;
+  for (std::int64_t rest = whole + thousandths; count > 0 && rest % 10 == 0; rest /= 10) --count;
   return count;
 }
 
-std::string Moment::text() const { return std::to_string(frame) + part_text(); }
+Moment Moment::of_thousandths(std::int64_t thousandths) {
+  const std::int64_t rest = ((thousandths % whole) + whole) % whole;
+  return {static_cast<Frame>((thousandths - rest) / whole), static_cast<std::uint32_t>(rest)};
+}
+
+std::string Moment::whole_text() const { return std::to_string(std::abs(in_thousandths()) / whole); }
+
+std::string Moment::text() const {
+  std::string text(is_negative() ? "-" : "");
+  return text.append(whole_text()).append(part_text());
+}
 
 std::vector<Moment> parse_frames(std::string_view text) {
   std::vector<Moment> moments;
-  std::unordered_set<std::uint64_t> known;
+  std::unordered_set<std::int64_t> known;
   for (bool more = true; more;) {
     const auto comma = text.find(',');
     const std::string_view part = text.substr(0, comma);
@@ -80,18 +96,21 @@ std::vector<Moment> parse_frames(std::string_view text) {
 
     const bool steps = part.find('x') != std::string_view::npos;
     const auto [range, step_text] = cut(part, 'x');
-    const bool ranges = range.find('-') != std::string_view::npos;
-    const auto [first_text, last_text] = cut(range, '-');
+    // A minus in front is the first number's sign, and the next one is the range's.
+    const std::size_t sign = range.starts_with('-') ? 1 : 0;
+    const bool ranges = range.find('-', sign) != std::string_view::npos;
+    const auto [first_text, last_text] = cut(range, '-', sign);
     if (steps && !ranges) refuse(part, "has a step, but is no range");
-    const std::uint64_t first = parse_moment(first_text, part);
-    const std::uint64_t last = ranges ? parse_moment(last_text, part) : first;
-    const std::uint64_t step = steps ? parse_moment(step_text, part) : whole;
+    const std::int64_t first = parse_moment(first_text, part);
+    const std::int64_t last = ranges ? parse_moment(last_text, part) : first;
+    const std::int64_t step = steps ? parse_moment(step_text, part) : whole;
     if (last < first) refuse(part, "runs backwards");
     if (step == 0) refuse(part, "has a step of 0");
-    if ((last - first) / step + moments.size() >= most_moments)
+    if (step < 0) refuse(part, "has a negative step");
+    if ((last - first) / step + static_cast<std::int64_t>(moments.size()) >= most_moments)
       refuse(part, "makes more than " + std::to_string(most_moments) + " frames");
-    for (std::uint64_t moment = first; moment <= last; moment += step)
-      if (known.insert(moment).second) moments.push_back(moment_of(moment));
+    for (std::int64_t moment = first; moment <= last; moment += step)
+      if (known.insert(moment).second) moments.push_back(Moment::of_thousandths(moment));
   }
   return moments;
 }

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-LINE = re.compile(r"frame (\d+) \((\d+) of (\d+)\) (done|kept|failed) (.+)")
+LINE = re.compile(r"frame (-?\d+) \((\d+) of (\d+)\) (done|kept|failed) (.+)")
 LOOK = ["--size", "32x24", "--spp", "2"]
 
 
@@ -151,6 +151,37 @@ def begins_empty(sequence, out):
     assert made == files(wanted)
 
 
+def negative(sequence, out):
+    """Frames before 0, as C, Houdini and ffmpeg pad them and as Blender does; what is padded otherwise is named."""
+    names = {"c": "{:04d}".format, "b": lambda n: f"-{-n:04d}" if n < 0 else f"{n:04d}"}
+    for style, name in names.items():
+        there = empty(out / f"negative_{style}")
+        for n in range(-2, 3):
+            shutil.copy(sequence.folder / f"explosion_{14 + n:04}.vdb", there / f"n.{name(n)}.vdb")
+        pictures = empty(out / f"negative_{style}_pictures")
+        made = lambda *words: subprocess.run([sequence.render, str(there / "n.####.vdb"), *LOOK, "-o", str(pictures / "p.####.exr"),
+                                              *words], capture_output=True, text=True, timeout=600)
+        for words, numbers in ((["--frames", "-2--1"], [-2, -1]), (["--frames=-2-2", "--overwrite"], [-2, -1, 0, 1, 2]),
+                               (["--overwrite", "--frames", "-4-2x2"], [-4, -2, 0, 2]), (["--overwrite"], [-2, -1, 0, 1, 2])):
+            done = made(*words)
+            frames = [LINE.fullmatch(line) for line in done.stdout.splitlines()]
+            assert [int(m[1]) for m in frames] == numbers, (words, done)
+            assert [m[4] for m in frames] == ["failed" if n < -2 else "done" for n in numbers], (words, done)
+            assert done.returncode == (1 if -4 in numbers else 0) and "passed over" not in done.stderr, (words, done)
+        assert sorted(files(pictures)) == sorted(f"p.{n:04d}.exr" for n in range(-2, 3)), files(pictures)
+        assert len(set(files(pictures).values())) == 5, "each its own frame"
+    shutil.copy(sequence.folder / "explosion_0014.vdb", there / "n.7.vdb")
+    done = made("--overwrite", "--frames", "-1")
+    assert done.returncode == 0 and done.stderr.splitlines()[0] == (
+        f"warning: {there}/n.####.vdb: passed over, for their numbers are written otherwise: n.7.vdb"), done
+    far = empty(out / "far")
+    for n in (9999, 10000, 10001):
+        shutil.copy(sequence.folder / "explosion_0014.vdb", far / f"f.{n}.vdb")
+    done = subprocess.run([sequence.render, str(far / "f.####.vdb"), *LOOK, "-o", str(far / "p.####.exr")], capture_output=True,
+                          text=True, timeout=600)
+    assert sorted(path.name for path in far.glob("p.*")) == ["p.10000.exr", "p.10001.exr", "p.9999.exr"], done
+
+
 def refused(sequence, out):
     """Before anything is made."""
     def said(output, *more):
@@ -213,6 +244,7 @@ def main():
     subprocess.run([scene, str(volumes), "--only", "explosion", "--voxels", "3000"], check=True, timeout=300)
     sequence = Sequence(render, volumes)
     refused(sequence, out)
+    negative(sequence, out)
     bad_frames(sequence, out)
     alone_as_among_others(sequence, out)
     settled(sequence, out)

@@ -7,6 +7,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -259,10 +260,32 @@ def refused(farm, out):
         assert done.returncode == 1 and "x is not there" in done.stdout, done
 
 
+def negative(farm, out):
+    """Frames before 0 are tasks like others, whichever way their files' numbers are padded."""
+    for style, name in (("c", "{:04d}".format), ("b", lambda n: f"-{-n:04d}" if n < 0 else f"{n:04d}")):
+        there = empty(out / f"negative_{style}")
+        for n in range(-2, 2):
+            shutil.copy(farm.volumes / f"explosion_{13 + n:04}.vdb", there / f"n.{name(n)}.vdb")
+        made = empty(out / f"negative_{style}_made")
+        command = lambda action, *options: [str(farm.programs / "cumulet-farm"), action, "-o", str(made / "p.####.exr"), *options,
+                                            "--", str(there / "n.####.vdb"), *farm.look]
+        described = command("describe", "--frames", "-2-1", "--frames-per-task", "2", "--samples", "2")
+        done = subprocess.run(described, capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done
+        tasks = json.loads((made / "p.farm" / "job.json").read_text())["tasks"]
+        assert [task["frames"] for task in tasks] == [[-2, -1], [0, 1]], tasks
+        assert [pathlib.Path(path).name for path in tasks[0]["outputs"]] == ["p.-002.exr", "p.-001.exr"], tasks[0]
+        inputs = {pathlib.Path(path).name for path in tasks[0]["inputs"]}
+        assert inputs == {f"n.{name(-2)}.vdb", f"n.{name(-1)}.vdb"}, inputs
+        done = subprocess.run(command("run", "--frames=-2-1", "--frames-per-task", "2", "--samples", "2"), capture_output=True,
+                              text=True, timeout=300)
+        assert done.returncode == 0 and sorted(files(made)) == [f"p.{n:04d}.exr" for n in (-1, -2, 0, 1)], done
+
+
 def main():
     programs, out = sys.argv[1], empty(pathlib.Path(sys.argv[2]))
     farm = Farm(programs, out, ["--size", "32x24"])
-    for part in (refused, slurm_flags, sent_again, apart, parts, described, scene_files, failing, stopped):
+    for part in (refused, slurm_flags, sent_again, apart, parts, described, scene_files, negative, failing, stopped):
         began = time.monotonic()
         part(farm, out)
         print(f"{part.__name__}: {time.monotonic() - began:.0f} s", flush=True)

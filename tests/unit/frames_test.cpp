@@ -67,8 +67,12 @@ TEST(Frames, WhatIsNoRangeIsRefusedByItsOwnName) {
   EXPECT_EQ(refusal([] { return parse_frames("1-10000000"); }), "'1-10000000' goes beyond frame 9999999");
   EXPECT_EQ(refusal([] { return parse_frames("99999999999999999999"); }),
             "'99999999999999999999' goes beyond frame 9999999");
-  for (const char* text : {"", "a", "1-", "-5", "1--3", "1,", ",1", "1-2-3", "1-3x", "1-3x2x2", "1.", ".5", "1.5.5",
-                           "1-2x.5", "1.0005", " 1", "1:5", "+1"})
+  EXPECT_EQ(refusal([] { return parse_frames("-10000000"); }), "'-10000000' goes beyond frame -9999999");
+  EXPECT_EQ(refusal([] { return parse_frames("1--3"); }), "'1--3' runs backwards");
+  EXPECT_EQ(refusal([] { return parse_frames("1-3x-1"); }), "'1-3x-1' has a negative step");
+  for (const char* text :
+       {"",      "a",    "1-",      "-",  "--5", "-5-",   "-1---3", "-5x2",   "-a", "- 5", "1,", ",1",
+        "1-2-3", "1-3x", "1-3x2x2", "1.", ".5",  "1.5.5", "1-2x.5", "1.0005", " 1", "1:5", "+1"})
     EXPECT_NE(refusal([&] { return parse_frames(text); }), "") << text;
 }
 
@@ -85,6 +89,24 @@ TEST(Frames, WhatIsBetweenThemIsReadInDecimals) {
   EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12, 250)), "out.0012.25.exr");
   EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12), 2), "out.0012.00.exr");
   EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12, 125), 2), "out.0012.125.exr");
+}
+
+TEST(Frames, MayBeNegative) {
+  EXPECT_EQ(parse_frames("-5"), (Moments{-5}));
+  EXPECT_EQ(parse_frames("-0"), (Moments{0}));
+  EXPECT_EQ(parse_frames("-2-2"), (Moments{-2, -1, 0, 1, 2}));
+  EXPECT_EQ(parse_frames("-3--1"), (Moments{-3, -2, -1}));
+  EXPECT_EQ(parse_frames("-4-4x2"), (Moments{-4, -2, 0, 2, 4}));
+  EXPECT_EQ(parse_frames("-4--2,0-1"), (Moments{-4, -3, -2, 0, 1}));
+  EXPECT_EQ(parse_frames("-9999999"), (Moments{first_frame}));
+  EXPECT_EQ(parse_frames("-1-0.5x0.5"), (Moments{-1, {-1, 500}, 0, {0, 500}}));
+  EXPECT_EQ(parse_frames("-1.25"), (Moments{{-2, 750}}));
+  EXPECT_EQ(Moment(-2, 750).text(), "-1.25");
+  EXPECT_EQ(Moment(-1, 500).text(), "-0.5");
+  EXPECT_EQ(Moment(-1).text(), "-1");
+  EXPECT_LT(Moment(-2, 750), Moment(-1));
+  EXPECT_EQ(frames_text({2, -2, -1, 0, 1, {-4, 500}}), "-3.5, -2-2");
+  EXPECT_EQ(parse_frames(frames_text({-3, -2, -1})), (Moments{-3, -2, -1})) << "as it is written it is read";
 }
 
 TEST(Frames, AreToldInFewWords) {
@@ -129,6 +151,57 @@ TEST(FramePattern, AFileKnowsItsNeighbours) {
   EXPECT_EQ(neighbour("cloud.vdb", 3), "none");
   EXPECT_EQ(neighbour("cloud.1234567890.vdb", 3), "none");
   EXPECT_EQ(neighbour("0012", 3), "0003");
+  EXPECT_EQ(neighbour("smoke-0010.vdb", 9), "smoke-0009.vdb") << "the minus separates words";
+  EXPECT_EQ(neighbour("neg.-002.vdb", 1), "neg.0001.vdb") << "here it is a sign";
+  EXPECT_EQ(neighbour("neg.-2.vdb", -10), "neg.-10.vdb");
+}
+
+// The sign counts as a digit in C, Houdini and ffmpeg. In Blender it does not.
+TEST(FramePattern, PadsNegativeNumbersAsThoseThatAreThere) {
+  EXPECT_EQ(file("out.####.exr", -2), "out.-002.exr");
+  EXPECT_EQ(file("out.%04d.exr", -12345), "out.-12345.exr");
+  EXPECT_EQ(file("out.#.exr", -2), "out.-2.exr");
+  EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(-2, 500)), "out.-001.5.exr");
+  const Folder folder;
+  for (const char* name : {"c.-002.vdb", "c.-001.vdb", "c.0000.vdb", "c.0001.vdb", "b.-0002.vdb", "b.-0001.vdb",
+                           "b.0000.vdb", "b.0001.vdb"})
+    write(folder / name, "x");
+  for (const char* name : {"c.####.vdb", "b.####.vdb"}) {
+    auto pattern = FramePattern::parse(folder / name);
+    pattern->adopt_padding();
+    EXPECT_EQ(pattern->frames_there(), (Frames{-2, -1, 0, 1})) << name;
+    EXPECT_EQ(pattern->passed_over(), "");
+  }
+  for (const char* name : {"c.-002.vdb", "c.-001.vdb", "c.0000.vdb", "b.-0002.vdb", "b.0001.vdb"}) {
+    const auto row = FrameRow::around(folder / name);
+    ASSERT_TRUE(row) << name;
+    EXPECT_EQ(row->count(), 4U) << name;
+    EXPECT_EQ(row->number(0), -2) << name;
+    EXPECT_TRUE(std::filesystem::exists(row->file(0))) << row->file(0);
+    EXPECT_EQ(row->index_of(-1), 1U);
+    EXPECT_EQ(row->index_of(-9), 0U);
+    EXPECT_EQ(row->position_of({-2, 500}), 0.5);
+  }
+}
+
+TEST(FramePattern, NamesTheFilesThatItPassesOver) {
+  const Folder folder;
+  for (const char* name : {"f.0001.vdb", "f.0002.vdb", "f.3.vdb", "f.04.vdb", "f.-1.vdb", "f.a.vdb", "f.0005.tmp"})
+    write(folder / name, "x");
+  const auto pattern = FramePattern::parse(folder / "f.####.vdb");
+  EXPECT_EQ(pattern->passed_over(), (folder / "f.####.vdb").string() +
+                                        ": passed over, for their numbers are written otherwise: f.-1.vdb, f.04.vdb, "
+                                        "f.3.vdb");
+  for (int i = 10; i < 20; ++i) write(folder / ("f." + std::to_string(i) + ".vdb"), "x");
+  EXPECT_TRUE(pattern->passed_over().ends_with("f.11.vdb, f.12.vdb and 8 more")) << pattern->passed_over();
+}
+
+// In k_1001_v2.vdb the version is the last number. The frame is the one that files differ in.
+TEST(FramePattern, TheNumberThatFilesDifferInIsTheFrames) {
+  const Folder folder;
+  for (const char* name : {"k_1001_v2.vdb", "k_1002_v2.vdb", "k_1003_v2.vdb", "k_1003_v1.vdb"})
+    write(folder / name, "x");
+  EXPECT_EQ(neighbour(folder / "k_1001_v2.vdb", 1002), folder / "k_1002_v2.vdb");
 }
 
 TEST(FramePattern, ZerosInFrontAreThoseOfTheFolder) {
@@ -143,7 +216,7 @@ TEST(FramePattern, FindsItsFramesAndNoOthers) {
   for (const char* name : {"f.0010.vdb", "f.0002.vdb", "f.12345.vdb", "f.3.vdb", "f.00004.vdb", "f.0005.vdb.tmp",
                            "f..vdb", "g.0006.vdb", "f.-001.vdb", "f.00a7.vdb", "f.vdb"})
     write(folder / name, "x");
-  EXPECT_EQ(FramePattern::parse(folder / "f.####.vdb")->frames_there(), (Frames{2, 10, 12345}));
+  EXPECT_EQ(FramePattern::parse(folder / "f.####.vdb")->frames_there(), (Frames{-1, 2, 10, 12345}));
   EXPECT_EQ(FramePattern::parse(folder / "f.#.vdb")->frames_there(), (Frames{3, 12345}));
   EXPECT_EQ(FramePattern::parse(folder / "none/f.####.vdb")->frames_there(), Frames{});
 }
@@ -176,7 +249,7 @@ TEST_F(Plan, APatternIsAllThatIsThere) {
   ASSERT_EQ(said(), "");
   ASSERT_TRUE(plan);
   ASSERT_EQ(plan->frames.size(), 3u);
-  EXPECT_EQ(plan->frames[2].number, 3u);
+  EXPECT_EQ(plan->frames[2].number, 3);
   EXPECT_EQ(plan->frames[2].volume, folder / "f.0003.vdb");
   EXPECT_EQ(plan->frames[2].output, "out.0003.exr");
   EXPECT_EQ(plan->frames[2].stats, "s.3.json");
@@ -249,7 +322,7 @@ TEST_F(Plan, ASceneThatStandsAtAFrameIsThatFrame) {
   options.output = "pic.exr";
   ASSERT_EQ(said(), "");
   ASSERT_EQ(plan->frames.size(), 1U);
-  EXPECT_EQ(plan->frames[0].number, 2U);
+  EXPECT_EQ(plan->frames[0].number, 2);
   options.frames = {1, 3};
   options.output = "pic.#.exr";
   ASSERT_EQ(said(), "");
@@ -285,12 +358,39 @@ TEST_F(Plan, WhatIsBetweenTwoFilesIsOfBoth) {
   EXPECT_EQ(said(), "frame 10.333: the files are 2 frames apart, of which this is no thousandth");
 }
 
+TEST_F(Plan, BeginsBeforeZero) {
+  for (const char* name : {"n.-002.vdb", "n.-001.vdb", "n.0000.vdb", "n.0001.vdb", "n.0002.vdb"}) there(name, 10);
+  options.scene.volume = folder / "n.####.vdb";
+  ASSERT_EQ(said(), "");
+  std::vector<std::string> outputs;
+  for (const PlannedFrame& frame : plan->frames) outputs.push_back(frame.output);
+  EXPECT_EQ(outputs,
+            (std::vector<std::string>{"out.-002.exr", "out.-001.exr", "out.0000.exr", "out.0001.exr", "out.0002.exr"}));
+  EXPECT_EQ(plan->passed_over, "");
+  EXPECT_EQ(plan->judged_by.size(), 5U);
+  EXPECT_DOUBLE_EQ(plan->frames[2].seconds, 2.0 / 24.0) << "the clock begins with the first";
+  options.frames = parse_frames("-2-0x0.5");
+  ASSERT_EQ(said(), "");
+  ASSERT_EQ(plan->frames.size(), 5U);
+  EXPECT_EQ(plan->frames[1].volume, folder / "n.-002.vdb") << "-1.5 is between -2 and -1";
+  EXPECT_EQ(plan->frames[1].next->volume, folder / "n.-001.vdb");
+  EXPECT_EQ(plan->frames[1].output, "out.-001.5.exr");
+  options.frames = {};
+  options.scene.sequence.frame = -1;
+  ASSERT_EQ(said(), "");
+  ASSERT_EQ(plan->frames.size(), 1U);
+  EXPECT_EQ(plan->frames[0].volume, folder / "n.-001.vdb");
+  there("n.-1.vdb", 10);
+  ASSERT_EQ(said(), "");
+  EXPECT_NE(plan->passed_over.find("n.-1.vdb"), std::string::npos);
+}
+
 TEST_F(Plan, ARowHasGapsAndEqualSteps) {
   for (const char* name : {"f.0010.vdb", "f.0014.vdb", "f.0012.vdb", "f.0020.vdb", "other.0011.vdb"}) there(name, 10);
   const auto row = FrameRow::of_name(folder / "f.####.vdb");
   ASSERT_TRUE(row);
   EXPECT_EQ(row->count(), 6U);
-  EXPECT_EQ(row->number(1), 12U);
+  EXPECT_EQ(row->number(1), 12);
   EXPECT_EQ(row->file(3), (folder / "f.0016.vdb").string());
   EXPECT_EQ(row->index_of(12), 1U);
   EXPECT_EQ(row->index_of(3), 0U);

@@ -482,6 +482,10 @@ TEST(Options, FramesOfASequence) {
   const RenderOptions options = parse({"--frames", "1-5x2", "--overwrite"});
   EXPECT_EQ(options.frames, (std::vector<Moment>{1, 3, 5}));
   EXPECT_TRUE(options.overwrite);
+  EXPECT_EQ(parse({"--frames=-2-2"}).frames, (std::vector<Moment>{-2, -1, 0, 1, 2}));
+  EXPECT_EQ(parse({"--frames", "-2--1"}).frames, (std::vector<Moment>{-2, -1}));
+  EXPECT_EQ(parse({"--frames", "-4-4x2"}).frames, (std::vector<Moment>{-4, -2, 0, 2, 4}));
+  EXPECT_EQ(parse({"--frames", "-3"}).frames, (std::vector<Moment>{-3}));
   EXPECT_EQ(parse({"--frames", "1-2x0.5"}).frames, (std::vector<Moment>{1, {1, 500}, 2}));
   EXPECT_EQ(parse({"--between", "blend"}).scene.sequence.playback.between, CUMULET_BETWEEN_BLEND);
   EXPECT_EQ(parse({"--velocity-scale", "24"}).scene.sequence.playback.velocity_scale, 24.0);

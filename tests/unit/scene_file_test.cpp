@@ -643,12 +643,12 @@ TEST(SceneFile, ASequenceIsKept) {
   EXPECT_EQ(scene.sequence.playback.frames_per_second, 12.5);
   EXPECT_EQ(scene.sequence.playback.offset_seconds, -1.0);
   EXPECT_EQ(scene.sequence.playback.repeat, CUMULET_REPEAT_PING_PONG);
-  EXPECT_EQ(scene.sequence.first, 3U);
-  EXPECT_EQ(scene.sequence.last, 40U);
-  EXPECT_EQ(scene.sequence.frame, 7U);
+  EXPECT_EQ(scene.sequence.first, 3);
+  EXPECT_EQ(scene.sequence.last, 40);
+  EXPECT_EQ(scene.sequence.frame, 7);
   const SceneOptions again = parse_scene(scene_text(scene, "/folder/scene.json"), "/folder/scene.json");
   EXPECT_TRUE(same_scene(scene, again));
-  EXPECT_EQ(again.sequence.frame, 7U);
+  EXPECT_EQ(again.sequence.frame, 7);
   // The playhead is no change of the scene; how it plays is.
   SceneOptions other = scene;
   other.sequence.frame = 8;
@@ -667,10 +667,21 @@ TEST(SceneFile, ASequenceIsKept) {
   };
   EXPECT_EQ(refused(R"({"repeat": "bounce"})").rfind("scene.json: sequence.repeat: ", 0), 0U);
   EXPECT_EQ(refused(R"({"frames_per_second": 0})").rfind("scene.json: sequence.frames_per_second: ", 0), 0U);
-  EXPECT_EQ(refused(R"({"frame": -1})").rfind("scene.json: sequence.frame: ", 0), 0U);
+  EXPECT_EQ(refused(R"({"frame": -1e8})").rfind("scene.json: sequence.frame: ", 0), 0U);
   EXPECT_EQ(refused(R"({"first_frame": 9, "last_frame": 8})"),
             "scene.json: sequence.last_frame: comes before sequence.first_frame");
   EXPECT_EQ(refused(R"({"speed": 2})"), "scene.json: sequence.speed: there is no such setting");
+}
+
+TEST(SceneFile, ASequenceMayBeginBeforeZero) {
+  const SceneOptions scene = parse_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "fire.####.vdb"}],
+                                            "sequence": {"first_frame": -20, "last_frame": -3, "frame": -7.25}})",
+                                         "/folder/scene.json");
+  EXPECT_EQ(scene.sequence.first, -20);
+  EXPECT_EQ(scene.sequence.last, -3);
+  EXPECT_EQ(scene.sequence.frame, Moment(-8, 750));
+  const SceneOptions again = parse_scene(scene_text(scene, "/folder/scene.json"), "/folder/scene.json");
+  EXPECT_EQ(again.sequence, scene.sequence);
 }
 
 TEST(SceneFile, EachVolumeMayPlay) {
