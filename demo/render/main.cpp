@@ -31,6 +31,7 @@
 #include "denoised.hpp"
 #include "fire.hpp"
 #include "frame_plan.hpp"
+#include "held_lines.hpp"
 #include "info.hpp"
 #include "instances.hpp"
 #include "memory.hpp"
@@ -79,10 +80,18 @@ void catch_signals() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
+struct Log {
+  Progress& progress;
+  cumulet::demo::HeldLines lines = {};
+};
+
 void print_log(void* user, cumulet_log_level level, const char* message) {
   if (level < CUMULET_LOG_WARNING) return;
-  static_cast<Progress*>(user)->clear();
-  std::fprintf(stderr, "%s: %s\n", level == CUMULET_LOG_WARNING ? "warning" : "error", one_line(message).c_str());
+  auto* log = static_cast<Log*>(user);
+  const auto line = log->lines.take(level, message);
+  if (!line) return;
+  log->progress.clear();
+  std::fprintf(stderr, "%s\n", line->c_str());
 }
 
 struct DestroyViewer {
@@ -90,13 +99,13 @@ struct DestroyViewer {
 };
 using Viewer = std::unique_ptr<cumulet_viewer, DestroyViewer>;
 
-Viewer create_viewer(Context& context, Progress& progress, Timeline* timeline, const std::string& shader_cache) {
+Viewer create_viewer(Context& context, Log& log, Timeline* timeline, const std::string& shader_cache) {
   cumulet_create_desc desc{};
   desc.struct_size = sizeof desc;
   desc.get_proc = Context::get_proc;
   desc.get_proc_user = &context;
   desc.log = print_log;
-  desc.log_user = &progress;
+  desc.log_user = &log;
   if (timeline != nullptr) {
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
@@ -493,8 +502,7 @@ class Studio {
       : network_(network_of(options, progress_)),
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
-        viewer_(
-            create_viewer(context_, progress_, options.trace.empty() ? nullptr : &timeline_, options.shader_cache)) {
+        viewer_(create_viewer(context_, log_, options.trace.empty() ? nullptr : &timeline_, options.shader_cache)) {
     check_memory(viewer_, options);
     set_scene(options);
   }
@@ -511,13 +519,12 @@ class Studio {
       cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
       file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
       if (next) {
-        set_between(scene, file, *next);
+        load_both(scene, file, *next);
       } else {
         check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
       }
     }
     wait(viewer_, progress_);
-    if (scene.is_shown() && next) require_both();
     if (frame != nullptr) others_.go_to(frame->seconds);
     open_others(scene);
     open_models(scene);
@@ -629,6 +636,24 @@ class Studio {
     check(viewer_, cumulet_set_sequence(viewer_.get(), sequence.get()));
   }
 
+  /// What the library says of the two files comes after they are read: that another frame is shown instead of one that
+  /// cannot be is not so here.
+  void load_both(const SceneOptions& scene, const cumulet_volume_file_desc& file, const PlannedFrame::Next& next) {
+    const auto print = [this](const std::string& failure) {
+      for (const std::string& line : log_.lines.release(failure)) tell(progress_, line);
+    };
+    log_.lines.hold();
+    try {
+      set_between(scene, file, next);
+      wait(viewer_, progress_);
+      require_both();
+    } catch (const std::runtime_error& error) {
+      print(error.what());
+      throw;
+    }
+    print("");
+  }
+
   /// Nothing stands in for what is between two frames, nor comes after it.
   void require_both() const {
     cumulet_cancel(viewer_.get());
@@ -704,6 +729,7 @@ class Studio {
   }
 
   Progress progress_;
+  Log log_{progress_};
   Timeline timeline_;
   // At once, not after hours of samples.
   std::string network_;

@@ -343,17 +343,24 @@ Log FrameShelf::log_of(const std::string& path) {
   });
 }
 
-void FrameShelf::fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure,
+void FrameShelf::say_failures(std::span<const Error> failures, bool another_is_shown) const {
+  for (const Error& failure : failures) {
+    const std::string cause = failure.what();
+    log_.warning(another_is_shown ? cause + ": another frame of the sequence is shown instead" : cause);
+  }
+}
+
+bool FrameShelf::fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure,
                       const Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
     progress.check();  // who wants it anew asks under the lock, too
-    if (!is_wished(which)) return;
+    if (!is_wished(which)) return false;
     (frame ? own(*frame) : shelf_[which.step]).failure = failure;
     find_stand_ins();
     ++revision_;
   }
-  log_.warning(std::string(failure.what()) + ": another frame of the sequence is shown instead");
+  return true;
 }
 
 void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
@@ -375,6 +382,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
     judged_ = judged;
     ++revision_;
   };
+  std::vector<Error> failures;
   try {
     for (const std::uint32_t frame : by_size(*files)) {
       try {
@@ -394,14 +402,17 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
       } catch (...) {
         const Error failure = caught(what);
         if (failure.code() == ErrorCode::cancelled) throw Error(failure);
-        fail({files, steps, 0}, frame, failure, progress);
+        if (fail({files, steps, 0}, frame, failure, progress)) failures.push_back(failure);
       }
     }
     if (judged.facts) judged.density_scale = judged.facts->coarse.suggest_density_scale();
   } catch (...) {
+    say_failures(failures, judged.facts != nullptr);
     end(Judging::due);
     throw;
   }
+  // Only now is it known whether another frame can be shown.
+  say_failures(failures, judged.facts != nullptr);
   end(judged.facts ? Judging::done : Judging::in_vain);
 }
 
@@ -485,7 +496,13 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, std::o
   }
   const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
   // First: nobody begins it again in between.
-  if (failure && !cancelled) fail(which, reading, *failure, progress);
+  if (failure && !cancelled && fail(which, reading, *failure, progress)) {
+    const bool another = [&] {
+      const std::scoped_lock lock(mutex_);
+      return is_wished(which) && stand_ins_[which.step].has_value();
+    }();
+    say_failures({&*failure, 1}, another);
+  }
   std::vector<Shelved> old;
   {
     const std::scoped_lock lock(mutex_);

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -141,7 +142,9 @@ class FrameShelf {
   VolumeAssetPtr read_frame(const Which& which, std::uint32_t frame, Progress& progress);
   // That tells once a sequence what it is told of each file.
   [[nodiscard]] Log log_of(const std::string& path);
-  void fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure, const Progress& progress);
+  // Keeps that a frame, or else the step, cannot be made. False where that is no longer asked for.
+  bool fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure, const Progress& progress);
+  void say_failures(std::span<const Error> failures, bool another_is_shown) const;
   void tell();
 
   // All of these under the lock.

@@ -182,6 +182,22 @@ def negative(sequence, out):
     assert sorted(path.name for path in far.glob("p.*")) == ["p.10000.exr", "p.10001.exr", "p.9999.exr"], done
 
 
+def gap(sequence, out):
+    """Between two files nothing stands in for one that is not there: its failure is said once, by its own line."""
+    there = empty(out / "gap")
+    for n in (12, 13, 15):
+        shutil.copy(sequence.folder / f"explosion_00{n}.vdb", there)
+    pictures = empty(out / "gap_pictures")
+    done = subprocess.run([sequence.render, str(there / "explosion_####.vdb"), *LOOK, "-o", str(pictures / "p.####.exr"), "--frames",
+                           "13-15x0.5", "--density-scale", "1"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          timeout=600)
+    lines = [line for line in done.stdout.splitlines() if "explosion_0014.vdb" in line]
+    assert len(lines) == 3 and all(" failed " in line for line in lines), done.stdout
+    assert "instead" not in done.stdout, done.stdout
+    assert done.stdout.splitlines()[-1] == "cumulet-render: 3 of 5 frames failed: 13.5, 14, 14.5", done.stdout
+    assert len(files(pictures)) == 2
+
+
 def refused(sequence, out):
     """Before anything is made."""
     def said(output, *more):
@@ -245,6 +261,7 @@ def main():
     sequence = Sequence(render, volumes)
     refused(sequence, out)
     negative(sequence, out)
+    gap(sequence, out)
     bad_frames(sequence, out)
     alone_as_among_others(sequence, out)
     settled(sequence, out)

@@ -172,6 +172,8 @@ TEST_F(Shelf, PlaysOverWhatIsMissingOrCorrupt) {
     const auto names = [&](const std::string& line) { return line.rfind(clip_.path(broken) + ": ", 0) == 0; };
     EXPECT_EQ(std::ranges::count_if(warnings(), names), 1) << broken;
   }
+  for (const std::string& line : warnings())
+    EXPECT_TRUE(line.ends_with(": another frame of the sequence is shown instead")) << line;
   // Once it is there it is shown.
   cumulet::test::write_frame(clip_.path(3), {cumulet::test::clip_ball(3)});
   shelf_.rebuild();
@@ -185,6 +187,9 @@ TEST_F(Shelf, WithoutAnyFrameItHasFailed) {
   EXPECT_FALSE(shelf_.nearest());
   ASSERT_TRUE(shelf_.status().failure);
   EXPECT_EQ(std::string(shelf_.status().failure->what()).rfind(clip_.path(2), 0), 0U);
+  EXPECT_EQ(warnings().size(), std::size_t{count});
+  for (const std::string& line : warnings())
+    EXPECT_EQ(line.find("instead"), std::string::npos) << "there is no other frame: " << line;
   cumulet::test::write_frame(clip_.path(6), {cumulet::test::clip_ball(6)});
   shelf_.rebuild();
   ASSERT_TRUE(shelf_.wait(std::nullopt));
