@@ -715,8 +715,8 @@ void App::accept(const Answer& answer) {
   }
   if (model_.status.compiled && !answer.status.compiled) model_.charts.compiled_percent.add(100.0f);
   if (answer.status.compiled) model_.charts.compiled_percent.add(static_cast<float>(100.0 * *answer.status.compiled));
-  if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)
-    model_.charts.noise_percent.add(static_cast<float>(100.0 * answer.status.noise));
+  if (answer.status.noise && answer.status.noise != model_.status.noise)
+    model_.charts.noise_percent.add(static_cast<float>(100.0 * *answer.status.noise));
   if (answer.density_scale) model_.scene.medium.density_scale = *answer.density_scale;
   if (answer.look && is_unsaid()) {
     look_ = answer.look;
@@ -899,7 +899,7 @@ void App::write_report(const std::string& path) const {
   json["cells"] = status.stats.cells;
   json["cell_bytes"] = status.stats.cell_bytes;
   json["samples"] = status.stats.samples;
-  json["noise"] = status.noise;
+  json["noise"] = status.noise ? Json(*status.noise) : Json();
   json["undo_steps"] = history_->depth();
   json["frame_ms"] = model_.charts.frame_ms.values();
   json["picture_ms"] = model_.charts.picture_ms.values();

@@ -168,7 +168,7 @@ struct Status {
   std::optional<Play> play;                                // where it is a sequence's
   std::optional<FrameRow> neighbours;                      // where it is one of several that are numbered
   std::string grid;                                        // of the file, that is shown
-  double noise = 0.0;                                      // relative standard error, 0: not known
+  std::optional<double> noise;                             // relative standard error; nothing while it is unknown
   std::array<FieldValues, settings::ramps.size()> fields;  // each ramp's
   Boxes boxes;                                             // of the files that are there
 };

@@ -459,8 +459,7 @@ void Panel::statistics(const Model& model) {
   ui_.plot("Samples per second", "Camera paths finished.", charts.samples_per_second.values(),
            short_count(static_cast<double>(charts.samples_per_second.latest())) + "/s");
   ui_.plot("Noise", "Relative standard error of the picture, measured each second while it refines.",
-           charts.noise_percent.values(),
-           status.noise > 0.0 ? print("%.2f %%", 100.0 * status.noise) : std::string("-"));
+           charts.noise_percent.values(), status.noise ? print("%.2f %%", 100.0 * *status.noise) : std::string("-"));
   ui_.plot("Device time", "Milliseconds of the GPU that the library's passes took, from frame to frame.",
            charts.device_ms.values(), print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
   if (const double all = device_seconds(stats); all > 0.0) {
@@ -573,7 +572,7 @@ void Panel::state_line(const Model& model) {
     text += print("   preview %ux%u", status.frame.width, status.frame.height);
   else
     text += print("   %ux%u", status.frame.width, status.frame.height);
-  if (status.noise > 0.0) text += print("   noise %.2f %%", 100.0 * status.noise);
+  if (status.noise) text += print("   noise %.2f %%", 100.0 * *status.noise);
   if (model.navigation.fly != 0) text += "   flying";
   state_ = text;
   ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,

@@ -915,14 +915,18 @@ void Session::measure_noise() {
                         !wish_.paused && frame.width > 0 && frame.progress > 0.0 &&
                         (frame.flags & CUMULET_RENDER_PREVIEW) == 0 && scene_.sampling.view == CUMULET_VIEW_SHADED;
   // Fewer samples than when it was measured: another picture.
-  if (samples < noise_samples_) status_.noise = 0.0;
+  if (samples < noise_samples_) {
+    status_.noise.reset();
+    noise_samples_ = 0;
+  }
   const double now = glfwGetTime();
   if (!refining || now - last_noise_ < period) return;
-  if (status_.noise > 0.0 && samples == noise_samples_) return;
+  if (samples == noise_samples_) return;
   last_noise_ = now;
   noise_samples_ = samples;
   double noise = 0.0;
-  if (check(cumulet_measure_noise(viewer_.get(), &noise))) status_.noise = std::isfinite(noise) ? noise : 0.0;
+  if (!check(cumulet_measure_noise(viewer_.get(), &noise))) return;
+  status_.noise = std::isfinite(noise) ? std::optional(noise) : std::nullopt;
 }
 
 }  // namespace cumulet::demo

@@ -192,8 +192,8 @@ std::vector<float> error_of(const std::vector<Part>& parts) {
   return errors;
 }
 
-/// As of docs/aovs.md.
-double noise_of(std::span<const float> rgba, std::span<const float> errors) {
+/// As of docs/aovs.md; nothing where it is unknown.
+std::optional<double> noise_of(std::span<const float> rgba, std::span<const float> errors) {
   double squares = 0.0;
   double bright = 0.0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
@@ -201,6 +201,7 @@ double noise_of(std::span<const float> rgba, std::span<const float> errors) {
     bright += luminance(rgba.subspan(4 * i, 4));
   }
   const auto pixels = static_cast<double>(errors.size());
+  if (pixels == 0.0 || !std::isfinite(squares) || !std::isfinite(bright)) return std::nullopt;
   return bright > 0.0 ? std::sqrt(squares / pixels) / (bright / pixels) : 0.0;
 }
 
@@ -247,7 +248,8 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
              attributes::comments_text(*find<std::string>(first, attributes::version), samples)});
   if (with_error && sky) {
     made.emplace_back(layers::error, error_of(parts));
-    if (merged.samples > 1) set(said, {std::string(attributes::noise), noise_of(made[0].second, made.back().second)});
+    if (const auto noise = noise_of(made[0].second, made.back().second))
+      set(said, {std::string(attributes::noise), *noise});
   }
   std::vector<image::Layer> written;
   written.reserve(made.size());

@@ -375,7 +375,8 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   passes["inspect"] = stats.pass_seconds_inspect;
   passes["display"] = stats.pass_seconds_display;
   json["samples"] = stats.samples;
-  if (options.scene.sampling.view == CUMULET_VIEW_SHADED) json["noise"] = stats.noise;
+  if (options.scene.sampling.view == CUMULET_VIEW_SHADED)
+    json["noise"] = std::isfinite(stats.noise) ? Json(stats.noise) : Json();  // null: unknown
   if (stats.trace_seconds > 0.0) json["samples_per_second"] = static_cast<double>(stats.samples) / stats.trace_seconds;
   if (stats.samples > 0)
     json["mean_steps_per_path"] = static_cast<double>(stats.steps) / static_cast<double>(stats.samples);
@@ -473,11 +474,12 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, const std::opti
   return Traced::stopped;
 }
 
-void tell_ending(const RenderOptions& options, Traced traced, double noise, double samples, Progress& progress) {
+void tell_ending(const RenderOptions& options, Traced traced, double measured, double samples, Progress& progress) {
   using cumulet::demo::Ending;
-  // The library's sums are in single precision. Of one sample a pixel no noise is known.
+  // The library's sums are in single precision.
   const double target = 0.01 * 1.0001 * options.scene.sampling.noise_target_percent;
-  Ending ending = target > 0.0 && samples >= 2.0 && noise <= target ? Ending::noise : Ending::samples;
+  const auto noise = std::isfinite(measured) ? std::optional(measured) : std::nullopt;
+  Ending ending = target > 0.0 && noise && *noise <= target ? Ending::noise : Ending::samples;
   if (traced == Traced::late) ending = Ending::time;
   tell(progress, options.output + ": " +
                      cumulet::demo::ending_line(ending, noise, samples, options.scene.sampling.noise_target_percent,

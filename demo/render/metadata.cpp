@@ -98,7 +98,7 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   // No pixel has more than are asked for.
   if (shaded && samples == double(sampling.samples)) add(names::first_sample, double(sampling.first_sample));
   add(names::seed, double(sampling.seed));
-  if (shaded) add(names::noise, stats.noise);
+  if (shaded && std::isfinite(stats.noise)) add(names::noise, stats.noise);
   attributes.push_back({"cumulet:eye", three(stands.eye)});
   attributes.push_back({"cumulet:target", three(stands.target)});
   attributes.push_back({"cumulet:up", three(stands.up)});

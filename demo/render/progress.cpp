@@ -78,16 +78,16 @@ double part_done(double part, double seconds, std::optional<double> limit) {
   return limit ? std::clamp(std::max(part, seconds / *limit), 0.0, 1.0) : part;
 }
 
-std::string ending_line(Ending ending, double noise, double samples, double target_percent,
+std::string ending_line(Ending ending, std::optional<double> noise, double samples, double target_percent,
                         std::optional<double> limit) {
   const auto number = [](const char* format, double value) {
     std::array<char, 64> text{};
     std::snprintf(text.data(), text.size(), format, value);
     return std::string(text.data());
   };
-  std::string line = "noise " + number("%.3g", 100.0 * noise) + " %";
+  std::string line = "noise " + (noise ? number("%.3g", 100.0 * *noise) + " %" : std::string("unknown"));
   if (target_percent > 0.0) line += " (target " + number("%g", target_percent) + " %)";
-  line += " after " + number("%.4g", samples) + " samples a pixel";
+  line += " after " + number("%.4g", samples) + (samples == 1.0 ? " sample a pixel" : " samples a pixel");
   if (ending == Ending::samples) line += ", the most that one may have";
   if (ending == Ending::time && limit) line += ", at the time limit of " + number("%g", *limit) + " s";
   return line;

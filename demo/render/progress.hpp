@@ -51,9 +51,9 @@ class Progress {
 /// Why a picture ended.
 enum class Ending { samples, noise, time };
 
-/// How it went, for people: "noise 1.87 % (target 2 %) after 91 samples a pixel". noise is relative; target_percent and
-/// limit as they were asked for, if they were. samples: a pixel.
-[[nodiscard]] std::string ending_line(Ending ending, double noise, double samples, double target_percent,
+/// How it went, for people: "noise 1.87 % (target 2 %) after 91 samples a pixel". noise is relative, and nothing where
+/// it is unknown; target_percent and limit as they were asked for, if they were. samples: a pixel.
+[[nodiscard]] std::string ending_line(Ending ending, std::optional<double> noise, double samples, double target_percent,
                                       std::optional<double> limit);
 
 /// "1:05", "2:01:40", "0:00".

@@ -146,9 +146,8 @@ ErrorSums& ErrorSums::operator+=(const ErrorSums& other) {
   return *this;
 }
 
-double ErrorSums::noise() const {
-  // What is no number is no picture without noise.
-  if (!std::isfinite(squared) || !std::isfinite(brightness)) return std::numeric_limits<double>::infinity();
+std::optional<double> ErrorSums::noise() const {
+  if (pixels <= 0.0 || !std::isfinite(squared) || !std::isfinite(brightness)) return std::nullopt;
   return brightness > 0.0 ? std::sqrt(squared * pixels) / brightness : 0.0;
 }
 

@@ -66,8 +66,9 @@ struct ErrorSums {
   double pixels = 0.0;
 
   ErrorSums& operator+=(const ErrorSums& other);
-  /// Root of the mean squared standard error over the mean luminance; 0 of black.
-  [[nodiscard]] double noise() const;
+  /// Root of the mean squared standard error over the mean luminance; 0 of black. Nothing where it is unknown: of no
+  /// pixels, and where a sum is not finite.
+  [[nodiscard]] std::optional<double> noise() const;
 };
 
 /// Of a square of pixels, those with two samples: ErrorSums, of even and of odd rows apart where they are squared.

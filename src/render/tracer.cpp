@@ -269,15 +269,15 @@ void Picture::end_pass() {
     error += {square.squared[0] + square.squared[1], square.brightness, square.pixels};
   // Not where a noise target came in the middle of the pass: of some tiles only.
   if (measures() && error.pixels == static_cast<double>(box_.area())) {
-    const double noise = error.noise();
-    noise_ = noise;
+    noise_ = error.noise();
     progress_before_ = progress();
     samples_before_ = samples();
-    // Of noise that falls with the root of the samples; a little more, for it is only likely so.
-    const double ratio = noise / *noise_target_;
+    // Of noise that falls with the root of the samples; a little more, for it is only likely so. Unknown noise reaches
+    // no target.
+    const double ratio = noise_.value_or(std::numeric_limits<double>::infinity()) / *noise_target_;
     const double needed = 1.05 * ratio * ratio * pass_target_;
     const double each = needed < target_samples_ ? pass_after(static_cast<std::uint32_t>(needed)) : target_samples_;
-    if (noise <= *noise_target_) {
+    if (noise_ && *noise_ <= *noise_target_) {
       done_ = true;
     } else if (adaptive_) {
       allotment_.decide(errors_, *noise_target_, pass_target_);

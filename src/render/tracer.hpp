@@ -35,8 +35,8 @@ struct Totals {
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
   /// Root of the mean over pixels of the squared standard error of their luminance, over the mean luminance: of those
-  /// that have two samples.
-  double noise = 0.0;
+  /// that have two samples. Nothing while none has, and it is unknown.
+  std::optional<double> noise;
 };
 
 /// What paths end at, or find, beside the volume's data: the host's depth as render::HostDepth keeps it, triangles, an

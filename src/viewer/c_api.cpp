@@ -1,6 +1,7 @@
 // The C ABI's viewer: checks arguments, translates descriptors, keeps exceptions in.
 
 #include <array>
+#include <limits>
 
 #include "base/callback_scope.hpp"
 #include "base/murmur_hash.hpp"
@@ -16,6 +17,8 @@ namespace {
 using namespace cumulet::c_abi;
 namespace core = cumulet::viewer;
 namespace render = cumulet::render;
+
+constexpr double unknown_noise = std::numeric_limits<double>::infinity();
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
 
@@ -706,7 +709,7 @@ uint32_t cumulet_cryptomatte_id(const char* name) { return name == nullptr ? 0 :
 cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(noise != nullptr, "noise is NULL");
-    *noise = v.measure_noise();
+    *noise = v.measure_noise().value_or(unknown_noise);
   });
 }
 
@@ -754,7 +757,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.pass_seconds_display = had.pass_seconds.display;
     s.samples = had.samples;
     s.steps = had.steps;
-    s.noise = had.noise;
+    s.noise = had.noise.value_or(unknown_noise);
     if (const auto facts = v.facts()) {
       const core::Bounds bounds = v.bounds_of(*facts);
       for (int axis = 0; axis < 3; ++axis) {

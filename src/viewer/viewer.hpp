@@ -46,7 +46,7 @@ struct Stats {
   render::PassSeconds pass_seconds;
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
-  double noise = 0.0;
+  std::optional<double> noise;  // unknown: nothing
   GlStrings strings;
 };
 
@@ -194,7 +194,7 @@ class Viewer {
   /// What read_display makes of this, as read_linear gives it.
   void encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const;
   void read_aov(Aov aov, float* values, std::size_t count);
-  double measure_noise();
+  std::optional<double> measure_noise();
   /// Of what read_accumulation gives. Both throw Error(invalid_argument) of what is no picture of samples alone.
   std::size_t accumulation_bytes();
   void read_accumulation(std::span<std::byte> bytes);

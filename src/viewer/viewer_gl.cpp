@@ -647,7 +647,7 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
   }
 }
 
-double Viewer::measure_noise() {
+std::optional<double> Viewer::measure_noise() {
   with_gl([&](Context& g) { totals_ = g.totals(); });
   return totals_.noise;
 }

@@ -148,6 +148,23 @@ class Exr : public testing::TestWithParam<Backend> {
   cumulet::test::Folder folder_;
 };
 
+TEST_P(Exr, NoiseOfOneSampleIsUnknown) {
+  cumulet_stats stats{};
+  stats.struct_size = sizeof stats;
+  ASSERT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
+  EXPECT_TRUE(std::isinf(stats.noise)) << "there is no picture yet";
+  scene_.sampling.samples = 1;
+  scene_.sampling.noise_target_percent = 5.0F;
+  render();
+  double noise = 0.0;
+  ASSERT_EQ(cumulet_measure_noise(viewer_.get(), &noise), CUMULET_OK);
+  EXPECT_TRUE(std::isinf(noise) && noise > 0.0) << "so it is below no target: " << noise;
+  ASSERT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
+  EXPECT_TRUE(std::isinf(stats.noise));
+  const std::string path = write("one.exr");
+  EXPECT_EQ(Imf::InputFile(path.c_str()).header().findTypedAttribute<Imf::DoubleAttribute>("cumulet:noise"), nullptr);
+}
+
 TEST_P(Exr, SaysHowThePictureWasMade) {
   render();
   const std::string path = write("a.exr");

@@ -461,7 +461,7 @@ TEST_P(EmitterTrace, AgreesWithWhatChanceMeets) {
         viewer->set_light(light);
       }
       pictures[by_chance ? 1 : 0] = test::render(*viewer, {24, 16, by_chance ? 512U : 256U, 3, render::View::shaded});
-      noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise();
+      noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise().value();
     }
     const double mean = pictures[1].mean().x;
     Picture difference = pictures[0];
@@ -521,7 +521,7 @@ TEST_P(EmitterTrace, LookingForALampTakesFewerSamples) {
       // Without the lamp in the picture: its rim is as noisy either way.
       viewer->set_camera(camera_at({32.0, 20.0, 140.0}, {32.0, 8.0, 32.0}, 18.0));
       test::render(*viewer, {32, 32, 64, 3, render::View::shaded});
-      noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise();
+      noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise().value();
     }
     RecordProperty(sigma < 1e-3 ? "vacuum" : "fog", std::to_string(noise[1] / noise[0]));
     EXPECT_LT(noise[0], noise[1] / 3.0) << sigma;  // a ninth of the samples

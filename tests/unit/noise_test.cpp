@@ -53,7 +53,7 @@ TEST_P(Noise, ErrorIsTheSpreadBetweenSeedsPixelByPixel) {
     }
     // The picture's noise is that of its pixels.
     const double mean = std::accumulate(bright.begin(), bright.end(), 0.0) / double(pixels);
-    EXPECT_NEAR(viewer().measure_noise(), std::sqrt(all / double(pixels)) / mean, 1e-5);
+    EXPECT_NEAR(viewer().measure_noise().value(), std::sqrt(all / double(pixels)) / mean, 1e-5);
     EXPECT_EQ(viewer().stats().noise, viewer().measure_noise());
   }
   std::vector<double> truly(pixels);
@@ -80,10 +80,20 @@ TEST_P(Noise, ErrorIsTheSpreadBetweenSeedsPixelByPixel) {
 TEST_P(Noise, OneSampleTellsNothingOfItsError) {
   picture(1, 0);
   for (const float error : errors()) EXPECT_TRUE(std::isinf(error));
-  EXPECT_EQ(viewer().measure_noise(), 0.0);
+  EXPECT_FALSE(viewer().measure_noise()) << "unknown is not 0";
+  EXPECT_FALSE(viewer().stats().noise);
   picture(2, 0);
   for (const float error : errors()) EXPECT_TRUE(std::isfinite(error));
   EXPECT_GT(viewer().measure_noise(), 0.0);
+}
+
+// In the dark all samples of a pixel are equal: then there really is none.
+TEST_P(Noise, ABlackPictureHasNone) {
+  viewer().set_light({});
+  picture(2, 0);
+  EXPECT_EQ(viewer().measure_noise(), 0.0);
+  picture(1, 0);
+  EXPECT_FALSE(viewer().measure_noise());
 }
 
 // Everything but how long it goes on.
@@ -134,11 +144,11 @@ std::vector<std::uint32_t> looks() {
 
 TEST_P(Stops, AtTheFirstLookThatIsEnough) {
   end(sampling(std::nullopt, 16));
-  const double first = viewer().measure_noise();
+  const double first = viewer().measure_noise().value();
   for (const double part : {1.01, 0.9, 0.3}) {
     const double target = part * first;
     const Ended stopped = end(sampling(target));
-    EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+    EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
     const std::vector<std::uint32_t> counts = looks();
     const auto at = std::ranges::find(counts, static_cast<std::uint32_t>(stopped.samples));
     ASSERT_NE(at, counts.end()) << stopped.samples;
@@ -146,7 +156,7 @@ TEST_P(Stops, AtTheFirstLookThatIsEnough) {
     EXPECT_EQ(stopped, end(sampling(std::nullopt, *at))) << "the picture of that many samples";
     if (at == counts.begin()) continue;
     end(sampling(std::nullopt, at[-1]));
-    EXPECT_GT(viewer().measure_noise(), target);
+    EXPECT_GT(viewer().measure_noise().value(), target);
   }
 }
 
@@ -163,11 +173,11 @@ TEST_P(Stops, AtTheSameSamplesWhateverTheBudget) {
 TEST_P(Stops, InPicturesOfSeveralTiles) {
   const glm::uvec2 size(520, 12);
   end(sampling(std::nullopt, 16), 50.0, size);
-  const double target = 0.6 * viewer().measure_noise();
+  const double target = 0.6 * viewer().measure_noise().value();
   const Ended stopped = end(sampling(target), 50.0, size);
   EXPECT_GT(stopped.samples, 16.0);
   EXPECT_LT(stopped.samples, double(most));
-  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+  EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
   EXPECT_EQ(stopped, end(sampling(std::nullopt, static_cast<std::uint32_t>(stopped.samples)), 50.0, size));
 }
 
@@ -219,7 +229,7 @@ TEST_P(Adaptive, ReachesTheTargetWithFewerSamples) {
   const double target = 0.03;
   const Ended even = end_small(sampling(target));
   const Ended ended = end_small(adaptive(target));
-  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+  EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
   EXPECT_LT(ended.samples, 0.8 * even.samples);
   // The sky has no noise, and is looked at once.
   EXPECT_GT(ended.samples, 16.0);
@@ -287,14 +297,14 @@ TEST_P(Adaptive, RefusesWhatIsSavedOfAnother) {
 TEST_P(Adaptive, OfSeveralTilesAndOfARegion) {
   const glm::uvec2 wide(520, 12);
   end(sampling(std::nullopt, 16), 50.0, wide);
-  const double target = 0.4 * viewer().measure_noise();
+  const double target = 0.4 * viewer().measure_noise().value();
   const Ended ended = end(adaptive(target), 50.0, wide);
-  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+  EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
   EXPECT_LT(ended.samples, 0.8 * end(sampling(target), 50.0, wide).samples);
   viewer::Sampling part = adaptive(target);
   part.region = {{0.4F, 0.1F}, {0.5F, 0.8F}};
   end(part, 50.0, wide);
-  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+  EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <timeline.hpp>
 #include <vector>
 
+#include "held_lines.hpp"
 #include "memory.hpp"
 #include "progress.hpp"
 #include "support/folder.hpp"
@@ -523,6 +524,26 @@ TEST(Progress, TheLastLineSaysWhyItEnded) {
             "noise 2.4 % (target 2 %) after 64 samples a pixel, the most that one may have");
   EXPECT_EQ(ending_line(Ending::time, 0.1, 10.26, 0.0, 30.0),
             "noise 10 % after 10.26 samples a pixel, at the time limit of 30 s");
+  EXPECT_EQ(ending_line(Ending::samples, std::nullopt, 1.0, 2.0, std::nullopt),
+            "noise unknown (target 2 %) after 1 sample a pixel, the most that one may have");
+  EXPECT_EQ(ending_line(Ending::noise, 0.0, 16.0, 2.0, std::nullopt), "noise 0 % (target 2 %) after 16 samples a pixel")
+      << "a black picture has none";
+}
+
+TEST(HeldLines, AFailureIsSaidOnceAndInItsOrder) {
+  HeldLines lines;
+  EXPECT_EQ(lines.take(CUMULET_LOG_WARNING, "one"), "warning: one");
+  lines.hold();
+  EXPECT_FALSE(lines.take(CUMULET_LOG_WARNING, "a.3.vdb: it is not there: another frame is shown instead"));
+  EXPECT_FALSE(lines.take(CUMULET_LOG_ERROR, "two\nlines"));
+  EXPECT_FALSE(lines.take(CUMULET_LOG_WARNING, "three"));
+  EXPECT_EQ(lines.release("a.3.vdb: it is not there"),
+            (std::vector<std::string>{"error: two lines", "warning: three"}));
+  EXPECT_EQ(lines.take(CUMULET_LOG_WARNING, "four"), "warning: four");
+  lines.hold();
+  EXPECT_FALSE(lines.take(CUMULET_LOG_WARNING, "five"));
+  EXPECT_EQ(lines.release(), std::vector<std::string>{"warning: five"});
+  EXPECT_TRUE(lines.release().empty());
 }
 
 TEST(Options, WhatStopsAPictureHasRoomForSamples) {

@@ -503,7 +503,7 @@ TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.3F, 0.7F, 1e-3F)});
   const test::Picture sky = test::render(*viewer, {8, 8, 3000, 1, render::View::shaded});
   for (const glm::vec4& pixel : sky.pixels) EXPECT_EQ(pixel, glm::vec4(0.3F, 0.7F, 1e-3F, 0.0F));
-  EXPECT_LT(viewer->viewer().measure_noise(), 1e-4);
+  EXPECT_LT(viewer->viewer().measure_noise().value(), 1e-4);
 }
 
 }  // namespace

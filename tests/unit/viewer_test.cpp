@@ -467,7 +467,7 @@ TEST_P(ViewerSlab, NoiseIsTheSpreadBetweenSeeds) {
     viewer().set_sampling({32, seed, render::View::shaded, false});
     converge(frame(24, 24));
     pictures.push_back(read({24, 24}));
-    told += viewer().measure_noise() / 12.0;
+    told += viewer().measure_noise().value() / 12.0;
   }
   double variance = 0.0;
   double mean = 0.0;

@@ -2214,9 +2214,10 @@ CUMULET_API cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumu
  */
 CUMULET_API uint32_t cumulet_cryptomatte_id(const char* name);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
- * their luminance (CUMULET_AOV_ERROR), over the mean luminance; of the pixels that have two samples, and 0 where none
- * has. Samples count as independent: what they spread more evenly than chance makes the true error less. Reads the
- * picture back: now and then, not every frame. */
+ * their luminance (CUMULET_AOV_ERROR), over the mean luminance; of the pixels that have two samples. Infinite while it
+ * is unknown: no pixel has two samples, or the picture is not finite. So it reaches no target, and 0 means that the
+ * samples of each pixel are equal. Samples count as independent: what they spread more evenly than chance makes the
+ * true error less. Reads the picture back: now and then, not every frame. */
 CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise);
 
 /*
@@ -2236,7 +2237,7 @@ CUMULET_API cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, voi
  */
 CUMULET_API cumulet_status cumulet_restore_accumulation(cumulet_viewer* viewer, const void* bytes, size_t size);
 
-/* What happened, in SI units; fields without a value are 0. */
+/* What happened, in SI units; fields without a value are 0, but for noise. */
 typedef struct cumulet_stats {
   size_t struct_size;
   uint64_t cells;
@@ -2270,7 +2271,8 @@ typedef struct cumulet_stats {
   double pass_seconds_trace;
   double pass_seconds_inspect; /* debug views, and the volume's depth */
   double pass_seconds_display;
-  double noise;          /* as cumulet_measure_noise told it, or a readback of the picture, last; 0 before the first */
+  double noise; /* as cumulet_measure_noise or a readback of the picture found it last; infinite before the first,
+                   and where it is unknown */
   uint64_t memory_bytes; /* main memory that cumulet_limits_desc.memory_bytes counts */
 } cumulet_stats;
 

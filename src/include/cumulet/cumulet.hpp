@@ -26,6 +26,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -1556,10 +1557,11 @@ class Viewer {
   [[nodiscard]] static std::uint32_t cryptomatte_id(const std::string& name) noexcept {
     return cumulet_cryptomatte_id(name.c_str());
   }
-  [[nodiscard]] Result<double> measure_noise() noexcept {
+  /// Nothing while it is unknown, as of one sample a pixel.
+  [[nodiscard]] Result<std::optional<double>> measure_noise() noexcept {
     double noise = 0.0;
     if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();
-    return noise;
+    return std::isfinite(noise) ? std::optional<double>(noise) : std::nullopt;
   }
   /// How many bytes cumulet_read_accumulation gives.
   [[nodiscard]] Result<std::size_t> accumulation_size() noexcept {
