@@ -114,7 +114,8 @@ void App::frame() {
   if (scale != ui_scale_) Window::set_ui_scale(scale);
   ui_scale_ = scale;
   take();
-  if (model_.playing) advance_clock(stepped() ? replay_frame : now_ - before);
+  // A picture that is to be saved is that of one moment.
+  if (model_.playing && model_.status.saving.empty()) advance_clock(stepped() ? replay_frame : now_ - before);
 
   order_ = {};
   if (player_) {
@@ -170,8 +171,9 @@ void App::frame() {
   take_statistics();
   ++frames_;
 
-  const std::string name = std::filesystem::path(model_.scene.volume).filename().string();
-  window_->set_title(name.empty() ? "Cumulet" : name + " - Cumulet");
+  const std::string name = std::filesystem::path(main_file(model_.scene)).filename().string();
+  title_ = name.empty() ? "Cumulet" : name + " - Cumulet";
+  window_->set_title(title_);
 }
 
 void App::handle(const std::vector<Event>& events) {
@@ -377,11 +379,11 @@ void App::execute(const Command& command) {
       save_scene(command.text);
       break;
     case Action::png_dialog:
-      if (model_.status.has_volume)
+      if (model_.status.has_content)
         panel_.dialog().open("Save the picture", Action::save_png, {".png"}, suggest_path(model_, ".png"));
       break;
     case Action::exr_dialog:
-      if (model_.status.has_volume)
+      if (model_.status.has_content)
         panel_.dialog().open("Save linear radiance", Action::save_exr, {".exr"}, suggest_path(model_, ".exr"));
       break;
     case Action::save_png:
@@ -499,6 +501,8 @@ void App::cancel() {
     model_.help = false;
   else if (!model_.messages.empty())
     model_.messages.pop_back();
+  else if (!model_.status.saving.empty())
+    requests_.push_back({Request::Type::forget_saves});
   else if (model_.status.busy || waiting())
     renderer_->cancel();
   else if (model_.chosen)
@@ -896,6 +900,9 @@ void App::write_report(const std::string& path) const {
   json["viewport"] = {viewport_.x, viewport_.y, viewport_.width, viewport_.height};
   json["busy"] = status.busy;
   json["has_volume"] = status.has_volume;
+  json["has_content"] = status.has_content;
+  json["title"] = title_;
+  json["saving"] = status.saving;
   json["cells"] = status.stats.cells;
   json["cell_bytes"] = status.stats.cell_bytes;
   json["samples"] = status.stats.samples;

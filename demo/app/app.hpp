@@ -154,6 +154,7 @@ class App {
   double drawn_at_ = -1.0;
   FrameTimes frame_times_;
   std::string last_state_;  // the state line of the frame before this
+  std::string title_;       // the window's
   std::uint64_t frames_ = 0;
   std::uint64_t drawn_frames_ = 0;  // the others would have looked as the one before
 };

@@ -3,12 +3,20 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "panel.hpp"
 
 namespace cumulet::demo {
+namespace {
+
+std::string surfaces_row(const SceneOptions& scene) {
+  return "Surfaces: " + std::filesystem::path(scene.surfaces).filename().string();
+}
+
+}  // namespace
 
 void Panel::items(Model& model) {
   int tool = static_cast<int>(model.tool);
@@ -25,6 +33,12 @@ void Panel::items(Model& model) {
                   {"Local", static_cast<int>(Axes::local), "The thing's own."}},
                  axes))
     model.axes = static_cast<Axes>(axes);
+  if (!model.scene.surfaces.empty()) {
+    ImGui::Indent(ui_.px(6.0f));
+    ImGui::TextUnformatted(surfaces_row(model.scene).c_str());
+    ui_.remember("Scene/Surfaces", "Stands as its file has it. One that is added under Models can be moved.");
+    ImGui::Unindent(ui_.px(6.0f));
+  }
   const std::vector<Item> items = items_of(model.scene);
   if (items.empty()) return;
   // A sky of a thousand clouds is no longer than this.

@@ -220,8 +220,15 @@ Work work_of(const Status& status) {
   return {stage_text(status.work.stage), std::clamp(status.work.fraction, 0.0, 1.0), true};
 }
 
+std::string main_file(const SceneOptions& scene) {
+  if (!scene.volume.empty()) return scene.volume;
+  if (!scene.surfaces.empty()) return scene.surfaces;
+  if (!scene.others.empty()) return scene.others.front().volume;
+  return scene.models.empty() ? scene.environment : scene.models.front().file;
+}
+
 std::string suggest_path(const Model& model, const std::string& ending) {
-  std::string stem = fs::path(model.scene.volume).stem().string();
+  std::string stem = fs::path(main_file(model.scene)).stem().string();
   if (stem.empty()) stem = "cumulet";
   const fs::path folder(model.preferences.folder);
   constexpr int most = 1000;

@@ -165,6 +165,8 @@ struct Status {
   std::string loading;                 // the file that is read, until what it shows is there
   ThumbnailPtr thumbnail;              // of the environment that is shown; null: none, or not yet
   bool has_volume = false;
+  bool has_content = false;                                // a volume, a model or an environment is shown
+  std::string saving;                                      // the file that waits for a whole picture; "": none
   std::optional<Play> play;                                // where it is a sequence's
   std::optional<FrameRow> neighbours;                      // where it is one of several that are numbered
   std::string grid;                                        // of the file, that is shown
@@ -234,7 +236,10 @@ struct Work {
 };
 [[nodiscard]] Work work_of(const Status& status);
 
-/// Where a new file may go: the volume's name, a free number and the ending, in the folder used last.
+/// The file that a scene is called by: its volume's, or that of the first other thing in it.
+[[nodiscard]] std::string main_file(const SceneOptions& scene);
+
+/// Where a new file may go: the main file's name, a free number and the ending, in the folder used last.
 [[nodiscard]] std::string suggest_path(const Model& model, const std::string& ending);
 
 /// Whether a name ends so, whatever its case; with the dot.

@@ -49,12 +49,12 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   view_ = viewport(model, static_cast<double>(screen.x), static_cast<double>(screen.y), scale);
   if (model.panel) side(model, commands);
   if (model.status.play) timeline(model, commands);
-  if (!model.status.has_volume && !model.status.busy) hint();
+  if (!model.status.has_content && !model.status.busy) hint();
   // What is computed in the blink of an eye, as skies are while the sun is dragged, needs no bar.
   const bool works = model.status.work.stage != CUMULET_STAGE_IDLE || model.status.compiled;
   if (model.status.busy && (works || !model.status.loading.empty())) loading(model, commands);
   state_.clear();
-  if (model.status.has_volume) state_line(model);
+  if (model.status.has_content) state_line(model);
   messages(model, commands);
   if (model.help) help(model);
   help_was_closed_ = !model.help;
@@ -173,8 +173,8 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
   ImGui::EndDisabled();
   const float spacing = ImGui::GetStyle().ItemSpacing.x;
   const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
-  ImGui::BeginDisabled(!model.status.has_volume);
-  if (ui_.button("Save PNG", "Save the picture as it is shown (F12).", {width, 0.0f}))
+  ImGui::BeginDisabled(!model.status.has_content);
+  if (ui_.button("Save PNG", "Save the picture as it is shown, at its full size (F12).", {width, 0.0f}))
     commands.push_back({Action::png_dialog});
   ImGui::SameLine();
   if (ui_.button("Save EXR", "Save the picture's linear radiance as OpenEXR (Shift+F12).", {width, 0.0f}))
@@ -432,8 +432,8 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
     other = true;
   }
   if (other) end_shutter(model.scene);
-  ImGui::BeginDisabled(!model.status.has_volume);
-  if (ui_.button("Frame all", "The whole volume in the picture (F, Home).", {-1.0f, 0.0f}))
+  ImGui::BeginDisabled(!model.status.has_content);
+  if (ui_.button("Frame all", "The whole scene in the picture (F, Home).", {-1.0f, 0.0f}))
     commands.push_back({Action::frame_all});
   ImGui::EndDisabled();
   cameras(model);
@@ -470,9 +470,11 @@ void Panel::statistics(const Model& model) {
                                     print("%.0f %%", share(stats.pass_seconds_display)));
   }
   ImGui::Spacing();
-  if (!status.has_volume) return;
-  ui_.fact("Active voxels", short_count(static_cast<double>(stats.active_voxels)));
-  ui_.fact("Build", print("%.2f s", stats.build_seconds_total));
+  if (!status.has_content) return;
+  if (status.has_volume) {
+    ui_.fact("Active voxels", short_count(static_cast<double>(stats.active_voxels)));
+    ui_.fact("Build", print("%.2f s", stats.build_seconds_total));
+  }
   ui_.fact("Trace", print("%.1f s", stats.trace_seconds));
   if (stats.steps > 0 && stats.samples > 0)
     ui_.fact("Steps a path", print("%.1f", static_cast<double>(stats.steps) / static_cast<double>(stats.samples)));
@@ -574,6 +576,7 @@ void Panel::state_line(const Model& model) {
     text += print("   %ux%u", status.frame.width, status.frame.height);
   if (status.noise) text += print("   noise %.2f %%", 100.0 * *status.noise);
   if (model.navigation.fly != 0) text += "   flying";
+  if (!status.saving.empty()) text += "   saving " + file_name(status.saving) + " once the picture is whole";
   state_ = text;
   ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
                           {0.0f, 1.0f});

@@ -14,10 +14,9 @@
 #include <tuple>
 #include <utility>
 
-#include "aovs.hpp"
 #include "fire.hpp"
 #include "history.hpp"
-#include "metadata.hpp"
+#include "saved_picture.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -93,7 +92,6 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
     throw std::runtime_error(cumulet_last_error(viewer_.get()));
   camera_.reset(camera);
   seen_.struct_size = sizeof seen_;
-  navigation_.struct_size = sizeof navigation_;
 }
 
 void Session::on_log(void* user, cumulet_log_level level, const char* message) {
@@ -125,10 +123,7 @@ void Session::follow(const Wish& wish) {
   wish_ = std::move(next);
   scene_.sampling.preview = wish_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
   // What was given is known even if it was refused: the refusal is told once.
-  if (first) {
-    known_ = SceneOptions();
-    known_->sampling.samples = 0;
-  }
+  if (first) known_ = SceneOptions();
   if (first || load) {
     fit_.reset();
     if (is_unplaced(scene_.camera)) {
@@ -144,7 +139,7 @@ void Session::follow(const Wish& wish) {
   }
   if (load && !scene_.volume.empty()) known_->volume.clear();
   const auto give = [this](auto group, auto set) {
-    if (!same((*known_).*group, scene_.*group)) check(set(viewer_.get(), &(scene_.*group)));
+    if (given_.take(scene_.*group)) check(set(viewer_.get(), &(scene_.*group)));
     (*known_).*group = scene_.*group;
   };
   give(&SceneOptions::medium, cumulet_set_medium);
@@ -158,8 +153,7 @@ void Session::follow(const Wish& wish) {
   give(&SceneOptions::display, cumulet_set_display);
   if (!(wish_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
   if (!same(known_->camera, scene_.camera)) set_camera();
-  if (!same(navigation_, wish_.navigation)) check(cumulet_set_navigation(viewer_.get(), &wish_.navigation));
-  navigation_ = wish_.navigation;
+  follow_navigation();
   follow_surfaces();
   follow_places();
   follow_volume();
@@ -346,7 +340,8 @@ void Session::drop_thumbnail() {
 }
 
 void Session::follow_surfaces() {
-  if (!same(known_->surface, scene_.surface) || known_->surface_variant != scene_.surface_variant) {
+  const bool other_settings = given_.take(scene_.surface);
+  if (other_settings || known_->surface_variant != scene_.surface_variant) {
     set_surfaces();
     if (known_->surface.animation != scene_.surface.animation) read_surfaces();
   }
@@ -598,6 +593,7 @@ void Session::see_work() {
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
+  tell_warnings();  // they happened before the end that they led to
   see_sequence();
   see_ends();
   finish_others();
@@ -610,8 +606,44 @@ void Session::see_work() {
                                                   : std::string();
   see_camera();
   see_boxes();
+  status_.has_content = status_.has_volume || !shown_surfaces_.empty() || !shown_environment_.empty() ||
+                        !status_.boxes.volumes.empty() || !status_.boxes.models.empty();
+  follow_backdrop();
   measure_noise();
+  finish_saves();
+}
 
+// The library makes no picture of an empty scene. So an environment by itself is seen around a volume without density.
+void Session::follow_backdrop() {
+  const bool others =
+      status_.has_volume || !shown_surfaces_.empty() || !status_.boxes.volumes.empty() || !status_.boxes.models.empty();
+  const bool wanted = !shown_environment_.empty() && !others && scene_.volume.empty() && !waits();
+  if (wanted && !backdrop_) {
+    backdrop_ = make_backdrop();
+    check(cumulet_set_volume(viewer_.get(), backdrop_.get()));
+  }
+  const bool ends = backdrop_ && !wanted && (others || shown_environment_.empty()) && !waiting_;
+  if (!ends) return;
+  backdrop_.reset();
+  if (status_.has_volume) return;  // that took its place
+  check(cumulet_set_volume(viewer_.get(), nullptr));
+  if (others) check(cumulet_frame_all(viewer_.get()));
+}
+
+Session::VolumePtr Session::make_backdrop() {
+  const float nothing = 0.0f;
+  cumulet_dense_desc dense{};
+  dense.struct_size = sizeof dense;
+  dense.values = &nothing;
+  dense.value_count = 1;
+  std::ranges::fill(dense.size, 1);
+  cumulet_volume* volume = nullptr;
+  std::array<char, 512> error{};
+  if (cumulet_volume_from_dense(&dense, &volume, error.data(), error.size()) != CUMULET_OK) tell(true, error.data());
+  return VolumePtr(volume);
+}
+
+void Session::tell_warnings() {
   const std::lock_guard lock(shared_->mutex);
   for (const std::string& warning : shared_->warnings) tell(false, warning);
   shared_->warnings.clear();
@@ -796,7 +828,7 @@ void Session::suggest_density() {
   density_scale_ = scale;
   // At once: what is fitted next depends on it.
   known_->medium.density_scale = scene_.medium.density_scale = scale;
-  check(cumulet_set_medium(viewer_.get(), &known_->medium));
+  give_known_medium();
 }
 
 void Session::pick(double x, double y) {
@@ -822,7 +854,11 @@ void Session::suggest_look() {
   look = medium_of_fire(volume.get(), look).value_or(look);
   settings::spell_out_zeros(look);
   look_ = known_->medium = scene_.medium = look;
-  check(cumulet_set_medium(viewer_.get(), &known_->medium));
+  give_known_medium();
+}
+
+void Session::give_known_medium() {
+  if (given_.take(known_->medium)) check(cumulet_set_medium(viewer_.get(), &known_->medium));
 }
 
 void Session::move_by_keys(int key) {
@@ -858,52 +894,41 @@ void Session::execute(const Request& request) {
       check(cumulet_frame_all(viewer_.get()));
     return;
   }
+  if (request.type == Request::Type::forget_saves) {
+    saves_.clear();
+    return;
+  }
+  // A preview, or a picture of another size, is no picture to keep: see_work() saves the first whole one.
+  saves_.push_back(request);
+}
+
+void Session::finish_saves() {
+  if (!saves_.empty() && is_whole(status_.frame, wish_.width, wish_.height)) {
+    for (const Request& request : std::exchange(saves_, {})) save(request);
+    // The turntable goes on.
+    follow_navigation();
+    shared_->wake();
+  }
+  status_.saving = saves_.empty() ? "" : saves_.front().path;
+}
+
+void Session::save(const Request& request) {
   try {
-    if (request.type == Request::Type::save_exr) {
-      write_exr(request.path);
-    } else {
-      image::PngOptions png;
-      png.tone_mapping = image::ToneMapping::none;
-      const float(&region)[4] = scene_.sampling.region;
-      const bool part = std::ranges::any_of(region, [](float value) { return value != 0.0f; });
-      png.keep_alpha = part || scene_.display.background == CUMULET_BACKGROUND_TRANSPARENT;
-      image::write_png(request.path, read_display(), png);
-    }
+    const auto write = request.type == Request::Type::save_exr ? save_exr : save_png;
+    write(viewer_.get(), scene_, status_.frame, request.path);
     files_.push_back({request.path, Answer::File::Fate::saved});
-    tell(false, "Saved " + request.path);
+    tell(false, "Saved " + request.path + ", " + std::to_string(status_.frame.width) + "x" +
+                    std::to_string(status_.frame.height));
   } catch (const std::exception& error) {
     tell(true, error.what());
   }
 }
 
-void Session::write_exr(const std::string& path) {
-  const std::uint32_t width = status_.frame.width;
-  const std::uint32_t height = status_.frame.height;
-  if (width == 0) throw std::runtime_error("there is no picture yet");
-  std::vector<float> rgba(std::size_t{4} * width * height);
-  if (cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()) != CUMULET_OK)
-    throw std::runtime_error(cumulet_last_error(viewer_.get()));
-  // All but the volume alone, which would cost every frame something.
-  constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
-                            CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
-                            CUMULET_AOV_VELOCITY,      CUMULET_AOV_MOTION,        CUMULET_AOV_VOLUME_MOTION};
-  const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
-  demo::write_exr(viewer_.get(), path, windows_of(scene_.sampling.region, width, height), {rgba},
-                  std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer_.get(), scene_, width, height));
-}
-
-image::Image Session::read_display() {
-  image::Image picture{status_.frame.width, status_.frame.height, {}};
-  if (picture.width == 0) throw std::runtime_error("there is no picture yet");
-  std::vector<std::uint8_t> bytes(std::size_t{4} * picture.width * picture.height);
-  if (cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()) != CUMULET_OK)
-    throw std::runtime_error(cumulet_last_error(viewer_.get()));
-  picture.rgba.resize(bytes.size());
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const float value = static_cast<float>(bytes[i]) / 255.0f;
-    picture.rgba[i] = i % 4 == 3 ? value : image::srgb_decode(value);
-  }
-  return picture;
+void Session::follow_navigation() {
+  cumulet_navigation_desc navigation = wish_.navigation;
+  // A camera that turns shows previews only.
+  if (!saves_.empty()) navigation.turntable_degrees_per_second = 0.0;
+  if (given_.take(navigation)) check(cumulet_set_navigation(viewer_.get(), &navigation));
 }
 
 // Each second while the picture refines.

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <future>
-#include <image.hpp>
 #include <instances.hpp>
 #include <memory>
 #include <models.hpp>
@@ -17,6 +16,7 @@
 #include <timeline.hpp>
 #include <vector>
 
+#include "given_settings.hpp"
 #include "model.hpp"
 
 namespace cumulet::demo {
@@ -29,7 +29,7 @@ struct ViewerInput {
 
 /// What is asked for once, beside what is wished all the time.
 struct Request {
-  enum class Type { frame_all, save_png, save_exr, suggest_density, pick };
+  enum class Type { frame_all, save_png, save_exr, forget_saves, suggest_density, pick };
   Type type = Type::frame_all;
   std::string path = {};
   double x = 0.0;  // pick: pixels of the picture
@@ -215,10 +215,14 @@ class Session {
   void pick(double x, double y);
   // With it the medium, where nothing is said of that.
   void suggest_look();
-  /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
-  [[nodiscard]] image::Image read_display();
-  /// The picture in linear radiance with its layers, as docs/aovs.md says; debug views have none.
-  void write_exr(const std::string& path);
+  void give_known_medium();
+  void tell_warnings();
+  void follow_backdrop();
+  VolumePtr make_backdrop();
+  void follow_navigation();
+  /// Saves what was asked for, once the picture is whole.
+  void finish_saves();
+  void save(const Request& request);
 
   std::unique_ptr<Shared> shared_;
   std::unique_ptr<cumulet_viewer, DestroyViewer> viewer_;
@@ -226,7 +230,8 @@ class Session {
   Wish wish_;
   SceneOptions& scene_ = wish_.scene;  // with what the viewer has made of it
   std::optional<SceneOptions> known_;  // what the viewer was given last
-  cumulet_navigation_desc navigation_{};
+  GivenSettings given_;
+  std::vector<Request> saves_;  // that wait for a whole picture
   cumulet_camera_desc seen_{};  // the viewer's camera
   std::uint32_t drawn_width_ = 0;
   std::uint32_t drawn_height_ = 0;
@@ -252,6 +257,7 @@ class Session {
   double last_noise_ = 0.0;
   std::uint64_t noise_samples_ = 0;
   Status status_;
+  VolumePtr backdrop_;                          // an empty volume, while an environment is all that is shown
   VolumePtr hidden_;                            // the viewer's volume, while it is not to be seen
   std::shared_ptr<cumulet_sequence> sequence_;  // in its place
   std::optional<FrameRow> row_;                 // of that

@@ -16,6 +16,7 @@
 
 #include "demo_options.hpp"
 #include "environment_view.hpp"
+#include "given_settings.hpp"
 #include "history.hpp"
 #include "input.hpp"
 #include "model.hpp"
@@ -23,6 +24,7 @@
 #include "preferences.hpp"
 #include "ramp_edit.hpp"
 #include "replay.hpp"
+#include "saved_picture.hpp"
 #include "sun_dial.hpp"
 #include "support/folder.hpp"
 
@@ -604,6 +606,75 @@ TEST(Model, DefaultsAreSpelledOut) {
   EXPECT_TRUE(same_scene(scene, twice));
 }
 
+/// Another value of a setting.
+template <class Value>
+void change(Value& value) {
+  if constexpr (std::is_array_v<Value>)
+    value[0] += 1;
+  else if constexpr (std::is_enum_v<Value>)
+    value = static_cast<Value>(static_cast<int>(value) + 1);
+  else
+    value += 1;
+}
+
+// The demo's defaults are not the library's: one that both start with has not been given yet.
+TEST(GivenSettings, EachGroupIsGivenAtFirstAndThenEachChange) {
+  std::ostringstream out;
+  SceneOptions first = parse_demo_options({}, out)->scene;
+  for (SceneOptions scene : {SceneOptions(), first}) {
+    GivenSettings given;
+    std::size_t groups = 0;
+    for_each_group(scene, [&]<class Desc>(Desc& group) {
+      ++groups;
+      EXPECT_TRUE(given.take(group)) << cumulet::settings::Table<Desc>::name;
+      EXPECT_FALSE(given.take(group)) << cumulet::settings::Table<Desc>::name;
+      cumulet::settings::for_each<Desc>([&](const auto& setting) {
+        Desc other = group;
+        change(other.*setting.field);
+        EXPECT_TRUE(given.take(other)) << setting.name;
+        EXPECT_TRUE(given.take(group)) << setting.name;
+      });
+    });
+    EXPECT_EQ(groups, 8U);
+    cumulet_navigation_desc navigation{};
+    navigation.struct_size = sizeof navigation;
+    EXPECT_TRUE(given.take(navigation));
+    EXPECT_FALSE(given.take(navigation));
+  }
+}
+
+TEST(SavedPicture, APreviewIsNotWhole) {
+  cumulet_frame_result shown{};
+  EXPECT_FALSE(is_whole(shown, 0, 0)) << "there is none";
+  shown.width = 640;
+  shown.height = 480;
+  EXPECT_TRUE(is_whole(shown, 640, 480));
+  EXPECT_FALSE(is_whole(shown, 800, 480)) << "the window has grown";
+  EXPECT_FALSE(is_whole(shown, 640, 481));
+  shown.flags = CUMULET_RENDER_PREVIEW | CUMULET_RENDER_MORE;
+  EXPECT_FALSE(is_whole(shown, 640, 480));
+  shown.flags = CUMULET_RENDER_MORE;
+  EXPECT_TRUE(is_whole(shown, 640, 480));
+}
+
+TEST(Model, ASceneIsCalledByWhatIsInIt) {
+  SceneOptions scene;
+  EXPECT_EQ(main_file(scene), "");
+  scene.environment = "sky.hdr";
+  EXPECT_EQ(main_file(scene), "sky.hdr");
+  scene.models.push_back({"tree.glb"});
+  EXPECT_EQ(main_file(scene), "tree.glb");
+  scene.others.emplace_back().volume = "smoke.vdb";
+  EXPECT_EQ(main_file(scene), "smoke.vdb");
+  scene.surfaces = "town.glb";
+  EXPECT_EQ(main_file(scene), "town.glb");
+  scene.volume = "cloud.vdb";
+  EXPECT_EQ(main_file(scene), "cloud.vdb");
+  Model model;
+  model.scene.surfaces = "/a/town.glb";
+  EXPECT_TRUE(suggest_path(model, ".png").ends_with("town-001.png")) << suggest_path(model, ".png");
+}
+
 TEST(Model, TypingKeepsItsKeys) {
   EXPECT_TRUE(command_of(GLFW_KEY_F, 0, false).has_value());
   EXPECT_FALSE(command_of(GLFW_KEY_F, 0, true).has_value());
@@ -631,7 +702,7 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     int width = 0;
     int height = 0;
     io.Fonts->GetTexDataAsAlpha8(&pixels, &width, &height);
-    model_.status.has_volume = true;
+    model_.status.has_volume = model_.status.has_content = true;
     model_.status.stats.gl_renderer[0] = 'x';
     model_.status.stats.samples = model_.status.stats.steps = 1;
     model_.grids = {{"density", "float", ""}, {"velocity", "vec3s", "not a scalar"}};
@@ -753,6 +824,18 @@ TEST_P(PanelTest, DrawingChangesNothing) {
   for (int i = 0; i < 5; ++i) frame();
   EXPECT_TRUE(same_scene(before, model_.scene));
   EXPECT_TRUE(commands_.empty());
+}
+
+TEST_P(PanelTest, AModelByItselfIsListedAndSaved) {
+  model_ = Model();
+  model_.scene.surfaces = "/a/town.glb";
+  model_.status.has_content = true;
+  for (int i = 0; i < 2; ++i) frame();
+  EXPECT_TRUE(panel_.ui().controls().contains("Scene/Surfaces"));
+  EXPECT_NE(panel_.state(), "");
+  model_.status.saving = "/b/picture.png";
+  frame();
+  EXPECT_NE(panel_.state().find("saving picture.png"), std::string::npos) << panel_.state();
 }
 
 TEST_P(PanelTest, AButtonSaysWhatItIsFor) {

@@ -627,6 +627,105 @@ def test_surfaces(s):
     assert_alike(none, look(s, "back")[0], area)
 
 
+def roughness(picture, area):
+    """Mean difference between a pixel and the next in its row: noise has much of it."""
+    x, y, width, height = (int(v) for v in area)
+    n = picture.channels
+    total = 0
+    for row in picture.rows[y: y + height]:
+        greens = row[x * n + 1: (x + width) * n: n]
+        total += sum(abs(a - b) for a, b in zip(greens, greens[1:]))
+    return total / ((width - 1) * height)
+
+
+def test_first_start(s):
+    """What the panel says is so from the first picture on: Denoise is Fast, and the picture has no noise."""
+    choose = lambda name: ['click "Denoise"', "frames 2", f'click "Denoise/{name}"', "frames 3", "wait converged", "frames 20"]
+    s.play("replay", ["wait loaded", "wait converged", "frames 20", *shot("first"), *choose("Off"), *shot("off"), *choose("Fast"),
+                      *shot("again")], "--volume", s.cumulus, "--spp", "4", "--denoise", "fast")
+    first, report, area = look(s, "first")
+    off, again = look(s, "off")[0], look(s, "again")[0]
+    assert report["scene"]["display"]["denoise"] == "fast", report["scene"]["display"]
+    rough = {name: roughness(picture, area) for name, picture in (("first", first), ("off", off), ("again", again))}
+    assert rough["again"] < 0.7 * rough["off"], f"the filter does nothing: {rough}"
+    assert rough["first"] < 0.7 * rough["off"], f"it is off at first: {rough}"
+
+
+def window(path):
+    """Size of an OpenEXR file's data window."""
+    header = path.read_bytes()[:4096]
+    at = header.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    left, top, right, bottom = struct.unpack("<4i", header[at: at + 16])
+    return [right - left + 1, bottom - top + 1]
+
+
+def save_as(key, name):
+    return [f"key {key}", "frames 2", "key ctrl+a", f'text "{name}"', "key enter", "frames 1"]
+
+
+def test_alone(s):
+    """A model or an environment by itself is a scene: with a title, a state, a place in the list and a picture to save."""
+    mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
+    write_environment(s.out / "sky.hdr", lambda x: x < 8)
+    for name, file in (("model", mountains), ("environment", s.out / "sky.hdr")):
+        s.play(name, ["frames 5", *shot(f"{name}_empty"), f'drop "{file}"', "frames 3", "wait loaded", "wait converged", "key escape",
+                      "frames 2", *shot(name), *save_as("f12", f"{name}_saved.png"), "frames 3", "key escape", "key escape",
+                      *save_as("shift+f12", f"{name}_saved.exr"), "frames 3", "wait converged", *shot(f"{name}_end")], "--spp", "2")
+        empty, report, end = s.report(f"{name}_empty"), s.report(name), s.report(f"{name}_end")
+        assert not empty["has_content"] and empty["title"] == "Cumulet" and empty["state"] == "", empty
+        assert report["has_content"] and report["title"] == f"{file.name} - Cumulet", report["title"]
+        assert "2 samples" in report["state"], report["state"]
+        assert [m for m in end["messages"] if m["error"]] == [], end["messages"]
+        picture, _, area = look(s, name)
+        saved = s.picture(f"{name}_saved")
+        assert [saved.width, saved.height] == report["viewport"][2:] == window(s.out / f"{name}_saved.exr")
+        assert_alike(picture, saved, area)
+    assert_drawn(look(s, "model")[0], look(s, "model")[2])
+
+
+def test_save_whole(s):
+    """What is saved while previews are shown is the first whole picture after them. It says so meanwhile."""
+    # The view changes right before the dialog opens, and nothing is traced while that is open.
+    view = lambda x: ["move viewport 0.3 0.5", "down left", f"move viewport {x} 0.5", "up left"]
+    s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("f12", "early.png"), 'report "early.json"', "frames 1",
+                      "wait converged", "frames 2", *shot("rest"),
+                      *view(0.5), *save_as("shift+f12", "early.exr"), "wait converged", "frames 2", 'report "exr.json"',
+                      "key n", *save_as("shift+f12", "wide.exr"), "wait converged", "frames 2", *shot("wide"),
+                      "key t", "frames 3", *save_as("f12", "turning.png"), "frames 100", 'report "turning.json"', "key t",
+                      *view(0.4), *save_as("f12", "never.png"), "key escape", "wait converged", "frames 3", 'report "end.json"'],
+           "--volume", s.cumulus, "--spp", "1", size=["--size", "900x304"])
+    early = s.report("early")
+    assert early["preview"] and early["picture"] != early["viewport"][2:], "it was a whole picture already"
+    assert early["saving"].endswith("early.png") and "saving early.png" in early["state"], (early["saving"], early["state"])
+    rest, report, area = look(s, "rest")
+    saved = s.picture("early")
+    assert [saved.width, saved.height] == report["viewport"][2:] and report["saving"] == "", report["saving"]
+    assert_alike(rest, saved, area)
+    assert window(s.out / "early.exr") == s.report("exr")["viewport"][2:]
+    wide = s.report("wide")
+    assert window(s.out / "wide.exr") == wide["viewport"][2:] != report["viewport"][2:], wide["viewport"]
+    turning = s.picture("turning")
+    assert [turning.width, turning.height] == wide["viewport"][2:]
+    assert s.report("turning")["saving"] == "" and s.report("turning")["turntable"] != 0
+    assert not (s.out / "never.png").exists(), "Escape takes it back"
+    assert [m for m in s.report("end")["messages"] if m["error"]] == [], s.report("end")["messages"]
+
+
+def test_negative_frames(s):
+    """A sequence that begins before 0 plays from there."""
+    for number in (-2, -1, 0, 1):
+        shutil.copy(s.explosion if number < 0 else s.cumulus, s.out / f"fire.{'%04d' % number}.vdb")
+    there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
+    s.play("replay", [*there, *shot("first"), "key .", *there, "key i", "key .", *there, *shot("third"), "key ctrl+s", "frames 2",
+                      "key ctrl+a", 'text "played.json"', "key enter", "frames 3"],
+           "fire.####.vdb", "--spp", "1", "--max-bounces", "2", size=["--size", "640x260"])
+    first, third = s.report("first")["sequence"], s.report("third")["sequence"]
+    assert first["first"] == -2 and first["count"] == 4 and first["frame"] == first["drawn"] == -2, first
+    assert third["frame"] == third["drawn"] == 0 and third["first_played"] == -1 and third["failed"] == 0, third
+    scene = json.loads((s.out / "played.json").read_text())
+    assert scene["sequence"]["first_frame"] == -1 and scene["sequence"]["frame"] == 0, scene["sequence"]
+
+
 def test_exposure(s):
     s.play("replay", ["wait loaded", "wait converged", *shot("first"), 'drag "Exposure" to "Exposure" 0.6 0.5', "frames 3",
                       *shot("bright"), "key ctrl+z", "frames 3", *shot("undone")], "--volume", s.cumulus)

@@ -1,0 +1,69 @@
+#include "saved_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <image.hpp>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "aovs.hpp"
+#include "metadata.hpp"
+
+namespace cumulet::demo {
+namespace {
+
+void check(cumulet_viewer* viewer, cumulet_status status) {
+  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+}
+
+void require_picture(const cumulet_frame_result& shown) {
+  if (shown.width == 0) throw std::runtime_error("there is no picture yet");
+}
+
+/// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
+image::Image read_display(cumulet_viewer* viewer, const cumulet_frame_result& shown) {
+  image::Image picture{shown.width, shown.height, {}};
+  std::vector<std::uint8_t> bytes(std::size_t{4} * picture.width * picture.height);
+  check(viewer, cumulet_read_display(viewer, bytes.data(), bytes.size()));
+  picture.rgba.resize(bytes.size());
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const float value = static_cast<float>(bytes[i]) / 255.0f;
+    picture.rgba[i] = i % 4 == 3 ? value : image::srgb_decode(value);
+  }
+  return picture;
+}
+
+}  // namespace
+
+bool is_whole(const cumulet_frame_result& shown, std::uint32_t width, std::uint32_t height) {
+  return shown.width > 0 && shown.width == width && shown.height == height &&
+         (shown.flags & CUMULET_RENDER_PREVIEW) == 0;
+}
+
+void save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+              const std::string& path) {
+  require_picture(shown);
+  image::PngOptions png;
+  png.tone_mapping = image::ToneMapping::none;
+  const float(&region)[4] = scene.sampling.region;
+  const bool part = std::ranges::any_of(region, [](float value) { return value != 0.0f; });
+  png.keep_alpha = part || scene.display.background == CUMULET_BACKGROUND_TRANSPARENT;
+  image::write_png(path, read_display(viewer, shown), png);
+}
+
+void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+              const std::string& path) {
+  require_picture(shown);
+  std::vector<float> rgba(std::size_t{4} * shown.width * shown.height);
+  check(viewer, cumulet_read_linear(viewer, rgba.data(), rgba.size()));
+  // All but the volume alone, which would cost every frame something.
+  constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
+                            CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
+                            CUMULET_AOV_VELOCITY,      CUMULET_AOV_MOTION,        CUMULET_AOV_VOLUME_MOTION};
+  const bool shaded = scene.sampling.view == CUMULET_VIEW_SHADED;
+  write_exr(viewer, path, windows_of(scene.sampling.region, shown.width, shown.height), {rgba},
+            std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer, scene, shown.width, shown.height));
+}
+
+}  // namespace cumulet::demo
