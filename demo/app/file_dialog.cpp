@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <system_error>
 #include <tuple>
 #include <utility>
@@ -42,9 +43,7 @@ void FileDialog::enter(const std::string& folder) {
     if (name.empty() || name[0] == '.') continue;
     std::error_code ignored;
     const bool is_folder = iterator->is_directory(ignored);
-    const bool wanted = std::any_of(endings_.begin(), endings_.end(),
-                                    [&](const std::string& ending) { return has_ending(name, ending); });
-    if (is_folder || wanted) entries.push_back({name, is_folder});
+    if (is_folder || takes(name)) entries.push_back({name, is_folder});
   }
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
     return std::make_tuple(!a.folder, a.name) < std::make_tuple(!b.folder, b.name);
@@ -53,6 +52,10 @@ void FileDialog::enter(const std::string& folder) {
   folder_ = there.string();
   entries_ = std::move(entries);
   trouble_.clear();
+}
+
+bool FileDialog::takes(const std::string& file) const {
+  return std::ranges::any_of(endings_, [&](const std::string& ending) { return has_ending(file, ending); });
 }
 
 void FileDialog::choose(std::vector<Command>& commands) {
@@ -64,11 +67,12 @@ void FileDialog::choose(std::vector<Command>& commands) {
     return;
   }
   if (saving()) {
-    const bool ended = std::any_of(endings_.begin(), endings_.end(),
-                                   [&](const std::string& ending) { return has_ending(path_, ending); });
-    if (!ended) path_ += endings_.front();
+    if (!takes(path_)) path_ += endings_.front();
   } else if (!fs::exists(path_, error)) {
     trouble_ = path_ + ": there is no such file";
+    return;
+  } else if (!takes(path_)) {
+    trouble_ = path_ + ": its name ends in none of these: " + endings_text();
     return;
   }
   commands.push_back({done_, path_});
@@ -104,9 +108,12 @@ void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
 }
 
 void FileDialog::recent(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
-  if (saving() || preferences.recent.empty()) return;
+  // Those of the kind that the dialog opens: a volume is no environment.
+  std::vector<std::string> files;
+  std::ranges::copy_if(preferences.recent, std::back_inserter(files), [this](const auto& file) { return takes(file); });
+  if (saving() || files.empty()) return;
   Ui::heading("Recent");
-  for (const std::string& file : preferences.recent) {
+  for (const std::string& file : files) {
     const std::string name = fs::path(file).filename().string();
     const std::string shown = end_of(file, ImGui::GetContentRegionAvail().x);
     if (ImGui::Selectable(std::string(shown).append("##recent").append(file).c_str(), false,
@@ -117,6 +124,12 @@ void FileDialog::recent(Ui& ui, const Preferences& preferences, std::vector<Comm
     ui.remember(("Recent/" + name).c_str(), file.c_str());
   }
   ImGui::Spacing();
+}
+
+std::string FileDialog::endings_text() const {
+  std::string text;
+  for (const std::string& ending : endings_) text += (text.empty() ? "" : ", ") + ending;
+  return text;
 }
 
 void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
@@ -133,11 +146,7 @@ void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Comman
   }
   if (opening_) ImGui::SetKeyboardFocusHere();
   opening_ = false;
-  const std::string endings = [this] {
-    std::string text;
-    for (const std::string& ending : endings_) text += (text.empty() ? "" : ", ") + ending;
-    return text;
-  }();
+  const std::string endings = endings_text();
   if (ui.text("Path", ("The file's full path: " + endings + ". Enter takes it.").c_str(),
               saving() ? "Where to save" : "Type, or choose below", path_))
     choose(commands);

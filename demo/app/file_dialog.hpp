@@ -23,7 +23,12 @@ class FileDialog {
     std::string name;
     bool folder = false;
   };
-  [[nodiscard]] bool saving() const { return done_ != Action::open; }
+  [[nodiscard]] bool saving() const {
+    return done_ == Action::save_png || done_ == Action::save_exr || done_ == Action::save_scene_as;
+  }
+  /// Whether the file's name has one of the endings.
+  [[nodiscard]] bool takes(const std::string& file) const;
+  [[nodiscard]] std::string endings_text() const;
   void enter(const std::string& folder);
   /// Opens a folder, or takes the file.
   void choose(std::vector<Command>& commands);

@@ -826,6 +826,19 @@ TEST_P(PanelTest, DrawingChangesNothing) {
   EXPECT_TRUE(commands_.empty());
 }
 
+TEST_P(PanelTest, ADialogOffersFilesOfItsKindOnly) {
+  model_.preferences.recent = {"/a/cloud.vdb", "/a/sky.HDR", "/a/town.glb"};
+  const auto offers = [&](const char* name) { return panel_.ui().controls().contains(std::string("Recent/") + name); };
+  panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, "");
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_TRUE(offers("sky.HDR"));
+  EXPECT_FALSE(offers("cloud.vdb") || offers("town.glb"));
+  panel_.dialog().open("Add a volume", Action::add_volume, {".vdb", ".nvdb"}, "");
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_TRUE(offers("cloud.vdb")) << "what is added is opened, not saved";
+  EXPECT_FALSE(offers("sky.HDR"));
+}
+
 TEST_P(PanelTest, AModelByItselfIsListedAndSaved) {
   model_ = Model();
   model_.scene.surfaces = "/a/town.glb";
