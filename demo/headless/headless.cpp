@@ -137,7 +137,7 @@ struct Egl {
 
 class EglDriver final : public Context::Driver {
  public:
-  EglDriver(const Egl& egl, EGLDisplay display, const char* name, bool debug)
+  EglDriver(const Egl& egl, EGLDisplay display, const char* name, bool debug, Profile profile)
       : egl_(egl), display_(display), name_(name) {
     EGLint major = 0;
     EGLint minor = 0;
@@ -157,14 +157,21 @@ class EglDriver final : public Context::Driver {
       if (!has_extension(extensions, "EGL_KHR_no_config_context")) fail("no config for desktop OpenGL");
       config = EGL_NO_CONFIG_KHR;
     }
-    std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION,       gl_major,
-                                      EGL_CONTEXT_MINOR_VERSION,       gl_minor,
-                                      EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT};
+    std::vector<EGLint> attributes = {
+        EGL_CONTEXT_MAJOR_VERSION,
+        gl_major,
+        EGL_CONTEXT_MINOR_VERSION,
+        gl_minor,
+        EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        profile == Profile::core ? EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT : EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT};
     // The extension's spelling: EGL 1.4 drivers know no other, and 1.5 ones list the extension too.
     if (debug) attributes.insert(attributes.end(), {EGL_CONTEXT_FLAGS_KHR, EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR});
     attributes.push_back(EGL_NONE);
     context_ = egl_.CreateContext(display_, config, EGL_NO_CONTEXT, attributes.data());
-    if (context_ == EGL_NO_CONTEXT) egl_.fail_with_error("eglCreateContext for OpenGL 4.5 core");
+    if (context_ == EGL_NO_CONTEXT) {
+      egl_.fail_with_error(profile == Profile::core ? "eglCreateContext for OpenGL 4.5 core"
+                                                    : "eglCreateContext for OpenGL 4.5 compatibility");
+    }
     try {
       if (!has_extension(extensions, "EGL_KHR_surfaceless_context")) {
         if (config == EGL_NO_CONFIG_KHR) fail("neither a surfaceless context nor a pixel buffer");
@@ -205,14 +212,14 @@ class EglDriver final : public Context::Driver {
   EGLSurface surface_ = EGL_NO_SURFACE;
 };
 
-std::unique_ptr<Context::Driver> create_egl(bool debug) {
+std::unique_ptr<Context::Driver> create_egl(bool debug, Profile profile) {
   const Egl egl;
   std::string reasons;
   const auto attempt = [&](EGLDisplay display, const char* name,
                            const std::string& label) -> std::unique_ptr<Context::Driver> {
     try {
       if (display == EGL_NO_DISPLAY) fail("no display");
-      return std::make_unique<EglDriver>(egl, display, name, debug);
+      return std::make_unique<EglDriver>(egl, display, name, debug, profile);
     } catch (const std::exception& error) {
       reasons += (reasons.empty() ? "" : "; ") + label + ": " + error.what();
       return nullptr;
@@ -263,6 +270,7 @@ struct OsMesa {
   static constexpr int stencil_bits = 0x31;
   static constexpr int profile = 0x33;
   static constexpr int core_profile = 0x34;
+  static constexpr int compatibility_profile = 0x35;
   static constexpr int major_version = 0x36;
   static constexpr int minor_version = 0x37;
   static constexpr unsigned unsigned_byte = 0x1401;
@@ -285,22 +293,24 @@ struct OsMesa {
 
 class OsMesaDriver final : public Context::Driver {
  public:
-  OsMesaDriver() {
-    const std::array<int, 13> attributes = {OsMesa::format,
-                                            OsMesa::rgba,
-                                            OsMesa::depth_bits,
-                                            0,
-                                            OsMesa::stencil_bits,
-                                            0,
-                                            OsMesa::profile,
-                                            OsMesa::core_profile,
-                                            OsMesa::major_version,
-                                            gl_major,
-                                            OsMesa::minor_version,
-                                            gl_minor,
-                                            0};
+  explicit OsMesaDriver(Profile profile) {
+    const std::array<int, 13> attributes = {
+        OsMesa::format,
+        OsMesa::rgba,
+        OsMesa::depth_bits,
+        0,
+        OsMesa::stencil_bits,
+        0,
+        OsMesa::profile,
+        profile == Profile::core ? OsMesa::core_profile : OsMesa::compatibility_profile,
+        OsMesa::major_version,
+        gl_major,
+        OsMesa::minor_version,
+        gl_minor,
+        0};
     context_ = osmesa_.CreateContextAttribs(attributes.data(), nullptr);
-    if (context_ == nullptr) fail("no OpenGL 4.5 core context");
+    if (context_ == nullptr)
+      fail(profile == Profile::core ? "no OpenGL 4.5 core context" : "no OpenGL 4.5 compatibility context");
     try {
       OsMesaDriver::make_current();
       check_version(*this);
@@ -331,18 +341,18 @@ class OsMesaDriver final : public Context::Driver {
   std::array<std::uint32_t, 1> pixel_{};  // OSMesa's default framebuffer: nobody draws to it, but it must exist
 };
 
-std::unique_ptr<Context::Driver> create_driver(Backend backend, bool debug) {
+std::unique_ptr<Context::Driver> create_driver(Backend backend, bool debug, Profile profile) {
   std::string reasons;
   if (backend != Backend::osmesa) {
     try {
-      return create_egl(debug);
+      return create_egl(debug, profile);
     } catch (const std::exception& error) {
       reasons = std::string("EGL (") + error.what() + ")";
     }
   }
   if (backend != Backend::egl) {
     try {
-      return std::make_unique<OsMesaDriver>();
+      return std::make_unique<OsMesaDriver>(profile);
     } catch (const std::exception& error) {
       reasons += (reasons.empty() ? "" : ", ") + std::string("OSMesa (") + error.what() + ")";
     }
@@ -357,7 +367,9 @@ Context::Context(Context&&) noexcept = default;
 Context& Context::operator=(Context&&) noexcept = default;
 Context::~Context() = default;
 
-Context Context::create(Backend backend, bool debug) { return Context(create_driver(backend, debug)); }
+Context Context::create(Backend backend, bool debug, Profile profile) {
+  return Context(create_driver(backend, debug, profile));
+}
 
 void Context::make_current() { driver_->make_current(); }
 

@@ -5,8 +5,9 @@
 namespace cumulet::headless {
 
 enum class Backend { automatic, egl, osmesa };
+enum class Profile { core, compatibility };
 
-/// An OpenGL 4.5 core context that needs no display and no window.
+/// An OpenGL 4.5 context that needs no display and no window.
 ///
 /// EGL is tried first: every device of the device platform (hardware before software), then Mesa's surfaceless
 /// platform, then the default display. OSMesa, a software driver, comes last and only when EGL gives no GL 4.5.
@@ -17,7 +18,7 @@ class Context {
   /// Makes a context and makes it current on this thread. With debug the driver is asked for a debug context
   /// (OSMesa has none and ignores it). Throws std::runtime_error, one line, that says what was tried and why
   /// each failed; whatever was current before may then no longer be.
-  [[nodiscard]] static Context create(Backend backend, bool debug = false);
+  [[nodiscard]] static Context create(Backend backend, bool debug = false, Profile profile = Profile::core);
 
   Context(Context&&) noexcept;
   Context& operator=(Context&&) noexcept;

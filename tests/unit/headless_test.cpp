@@ -15,6 +15,7 @@ namespace {
 
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
+using cumulet::headless::Profile;
 
 constexpr unsigned gl_version_enum = 0x1F02;
 constexpr unsigned gl_major_version_enum = 0x821B;
@@ -74,6 +75,21 @@ TEST(Headless, EglGivesGl45) {
 TEST(Headless, EglDebugContext) {
   Context context = Context::create(Backend::egl, true);
   expect_works(context);
+}
+
+TEST(Headless, EachBackendGivesACompatibilityContext) {
+  constexpr unsigned profile_mask = 0x9126;
+  for (const Backend backend : {Backend::egl, Backend::osmesa}) {
+    for (const Profile profile : {Profile::core, Profile::compatibility}) {
+      Context context = Context::create(backend, false, profile);
+      const auto get_integer = reinterpret_cast<void (*)(unsigned, int*)>(Context::get_proc(&context, "glGetIntegerv"));
+      ASSERT_NE(get_integer, nullptr);
+      int mask = 0;
+      get_integer(profile_mask, &mask);
+      EXPECT_EQ(mask, profile == Profile::core ? 1 : 2) << context.name();
+      expect_works(context);
+    }
+  }
 }
 
 TEST(Headless, OsMesaGivesGl45) {
