@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "base/error.hpp"
+#include "gl/compatibility_state.hpp"
 
 namespace cumulet::gl {
 
@@ -23,6 +24,14 @@ GLADapiproc load_one(void* loader, const char* name) {
   return reinterpret_cast<GLADapiproc>(l->get_proc(l->user, name));
 }
 
+// A current context says its version, unless it is lost or between glBegin and glEnd.
+bool is_between_begin_and_end(const Functions& gl, void* (*get_proc)(void* user, const char* name), void* user) {
+  if (gl.GetString == nullptr || find_current_context(get_proc, user) == nullptr) return false;
+  const auto reset_status =
+      reinterpret_cast<PFNGLGETGRAPHICSRESETSTATUSPROC>(get_proc(user, "glGetGraphicsResetStatus"));
+  return reset_status != nullptr && reset_status() == GL_NO_ERROR;
+}
+
 }  // namespace
 
 std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user) {
@@ -30,6 +39,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   Loader loader{get_proc, user};
   const int version = gladLoadGLContextUserPtr(gl.get(), load_one, &loader);
   if (version == 0) {
+    if (is_between_begin_and_end(*gl, get_proc, user)) throw Error(ErrorCode::gl, between_begin_and_end_message);
     throw Error(ErrorCode::unsupported, "no OpenGL: get_proc gave no glGetString, or no context is current");
   }
   if (version < GLAD_MAKE_VERSION(4, 5)) {
@@ -44,6 +54,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   GLint draw_buffers = 0;
   gl->GetIntegerv(GL_MAX_DRAW_BUFFERS, &draw_buffers);
   gl->draw_buffers = static_cast<GLuint>(std::clamp(draw_buffers, 1, 16));
+  gl->compatibility = load_compatibility(*gl, get_proc, user);
   return gl;
 }
 
@@ -51,6 +62,7 @@ std::shared_ptr<const Functions> copy_of(const Functions& gl) {
   auto copy = std::make_shared<Functions>();
   static_cast<GladGLContext&>(*copy) = gl;
   copy->draw_buffers = gl.draw_buffers;
+  copy->compatibility = gl.compatibility;
   return copy;
 }
 

@@ -11,6 +11,7 @@
 namespace cumulet::gl {
 
 class StateGuard;
+struct CompatibilityFunctions;
 
 /// The GL function table of one context, loaded through the host's callback. Nothing is linked.
 ///
@@ -25,6 +26,8 @@ struct Functions : GladGLContext {
   mutable StateGuard* guard = nullptr;
   /// The constant GL_MAX_DRAW_BUFFERS.
   GLuint draw_buffers = 8;
+  /// Null in a core context.
+  std::shared_ptr<const CompatibilityFunctions> compatibility;
 
   void UseProgram(GLuint program) const;
   void BindProgramPipeline(GLuint pipeline) const;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "base/error.hpp"
+#include "gl/compatibility_state.hpp"
 
 namespace cumulet::gl {
 
@@ -29,8 +30,12 @@ bool ShareGroup::has_label() const {
 void ShareGroup::require() const {
   if (is_current()) return;
   check_reset(*gl_);
+  const BetweenBeginAndEnd between = between_begin_and_end(*gl_);
+  if (between.certain) throw Error(ErrorCode::gl, between_begin_and_end_message);
   throw Error(ErrorCode::gl,
-              "no OpenGL context is current on this thread, or one that does not share objects with the viewer's");
+              std::string("no OpenGL context is current on this thread, or one that does not share objects with the "
+                          "viewer's") +
+                  (between.possible ? ", or the call came between glBegin and glEnd" : ""));
 }
 
 }  // namespace cumulet::gl

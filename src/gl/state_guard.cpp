@@ -100,7 +100,7 @@ void require_within(GLuint index, GLuint count, const char* what) {
 }  // namespace
 
 StateGuard::StateGuard(const Functions& gl, bool restore)
-    : gl_(&gl), restore_(restore), outer_(std::exchange(gl.guard, this)) {
+    : gl_(&gl), restore_(restore), outer_(std::exchange(gl.guard, this)), compatibility_(gl, restore) {
   static_assert(texture_targets.size() == targets && capability_table.size() == capabilities &&
                 pixel_table.size() == pixel_parameters);
 }
@@ -116,6 +116,7 @@ StateGuard::~StateGuard() {
   restore_images();
   restore_pixels();
   restore_raster();
+  compatibility_.restore();
 }
 
 GLint StateGuard::get(GLenum name) const {
@@ -155,7 +156,11 @@ void StateGuard::read_framebuffer() {
 }
 
 void StateGuard::active_texture() {
-  if (!active_texture_.use() || !restore_) return;
+  if (!active_texture_.use()) return;
+  if (!restore_) {
+    if (gl_->compatibility) plain().ActiveTexture(GL_TEXTURE0 + active_unit_);  // it has state besides bindings
+    return;
+  }
   active_texture_.value = get(GL_ACTIVE_TEXTURE);
   active_unit_ = name_of(active_texture_.value) - GL_TEXTURE0;
 }
@@ -189,10 +194,11 @@ void StateGuard::bound_texture(GLenum target) {
 void StateGuard::sampler(GLuint unit) {
   require_within(unit, units, "a sampler");
   if (!samplers_[unit].use()) return;
-  if (restore_) {
+  if (restore_ || gl_->compatibility) {
     active_texture();
     if (unit != active_unit_) plain().ActiveTexture(GL_TEXTURE0 + unit);
     samplers_[unit].value = get(GL_SAMPLER_BINDING);
+    compatibility_.prepare_unit(unit);
     if (unit != active_unit_) plain().ActiveTexture(GL_TEXTURE0 + active_unit_);
   }
   if (samplers_[unit].value != 0 || !restore_) plain().BindSampler(unit, 0);
@@ -254,12 +260,15 @@ void StateGuard::pixels(bool pack) {
   for (std::size_t i = 0; i < pixel_parameters; ++i) {
     saved.value.parameters[i] = get(pack ? pixel_table[i].pack : pixel_table[i].unpack);
   }
+  if (pack) saved.value.read_clamp = get(GL_CLAMP_READ_COLOR);
   set_pixels(pack);
+  compatibility_.prepare_pixels();
 }
 
 void StateGuard::set_pixels(bool pack) const {
   plain().BindBuffer(pack ? GL_PIXEL_PACK_BUFFER : GL_PIXEL_UNPACK_BUFFER, 0);
   for (const PixelParameter& p : pixel_table) plain().PixelStorei(pack ? p.pack : p.unpack, p.known);
+  if (pack) plain().ClampColor(GL_CLAMP_READ_COLOR, GL_FALSE);
 }
 
 // ---- raster ----
@@ -284,6 +293,7 @@ void StateGuard::raster() {
   }
   blend_enable(0);
   set_raster();
+  compatibility_.prepare_fragments();
 }
 
 void StateGuard::set_raster() {
@@ -419,6 +429,7 @@ void StateGuard::restore_textures() const {
     if (samplers_[unit].used) {
       const GLuint sampler = name_of(samplers_[unit].value);
       gl.BindSampler(unit, sampler != 0 && gl.IsSampler(sampler) != GL_FALSE ? sampler : 0);
+      compatibility_.restore_unit(unit);
     }
   }
   if (active_texture_.used) gl.ActiveTexture(name_of(active_texture_.value));
@@ -476,6 +487,7 @@ void StateGuard::restore_pixels() const {
     for (std::size_t i = 0; i < pixel_parameters; ++i) {
       gl.PixelStorei(pack ? pixel_table[i].pack : pixel_table[i].unpack, saved.value.parameters[i]);
     }
+    if (pack) gl.ClampColor(GL_CLAMP_READ_COLOR, name_of(saved.value.read_clamp));
   }
 }
 

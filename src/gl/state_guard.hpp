@@ -5,6 +5,7 @@
 
 #include "gl/api.hpp"
 #include "gl/bindings.hpp"
+#include "gl/compatibility_state.hpp"
 
 namespace cumulet::gl {
 
@@ -19,6 +20,8 @@ namespace cumulet::gl {
 /// State that the library never sets is not saved: the values (not the enables) of blend colour, sample coverage and
 /// mask, stencil, polygon offset, logic op and restart index, and viewports, scissors and depth ranges but the first:
 /// use the indexed calls.
+///
+/// In a compatibility context, CompatibilityState does the same for the state that core contexts lack.
 ///
 /// Produces no GL error. What the host has deleted while it was bound, or a program that no longer links, cannot be
 /// bound again in GL: that binding ends as 0, if the library used it.
@@ -79,6 +82,7 @@ class StateGuard {
   struct Pixels {
     GLint buffer = 0;
     std::array<GLint, pixel_parameters> parameters{};
+    GLint read_clamp = 0;  // of pack only
   };
   struct Raster {
     std::array<bool, capabilities> enabled{};
@@ -150,6 +154,7 @@ class StateGuard {
   Saved<Cull> cull_;
   Saved<std::array<GLfloat, 4>> viewport_;
   Saved<std::array<GLint, 4>> scissor_box_;
+  CompatibilityState compatibility_;
 };
 
 }  // namespace cumulet::gl

@@ -12,6 +12,7 @@
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
 #include "denoise/tza.hpp"
+#include "gl/compatibility_state.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
 #include "viewer/viewer.hpp"
@@ -55,6 +56,7 @@ void Viewer::attach(GetProc get_proc, void* user) {
   if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is attached to a GL context already");
   auto functions = gl::load_functions(get_proc, user);
   gl::clear_errors(*functions);
+  gl::require_rendering(*functions);
   Commons commons = sharing_->of_current(*functions);
   gl_ = std::make_unique<Context>(std::move(functions), std::move(commons));
   notify();
@@ -91,6 +93,7 @@ void Viewer::with_gl(Body&& body) {
     gl::clear_errors(*functions);
     gl::check_reset(*functions);
     g.group().require();  // before anything is begun that could not be undone
+    gl::require_rendering(*functions);
     const gl::Programs::Turn turn(g.programs(), log_);
     const gl::StateGuard guard(*functions, restore_state_);
     g.find_out_dispatches();

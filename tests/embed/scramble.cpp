@@ -33,10 +33,10 @@ class Scramble : public GlTest {
                    const std::function<cumulet_status()>& call) {
     SCOPED_TRACE(what + ", seed " + std::to_string(seed));
     host.scramble(seed);
-    const auto before = read_gl_state(*gl_);
+    const auto before = read_gl_state(*gl_, legacy_);
     const cumulet_status status = call();
     EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
-    EXPECT_EQ(state_differences(before, read_gl_state(*gl_)), "");
+    EXPECT_EQ(state_differences(before, read_gl_state(*gl_, legacy_)), "");
     EXPECT_EQ(status, CUMULET_OK);
   }
   [[nodiscard]] cumulet_create_desc create_desc() const {
@@ -48,7 +48,7 @@ class Scramble : public GlTest {
 };
 
 TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const auto small = cumulet::test::make_ball(12);
   const auto large = cumulet::test::make_ball(16);
@@ -160,7 +160,7 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
 // With surfaces, in everything that a viewer can do with them: textures, blended ones, lamps and emitters; each light,
 // rays and raster, previews, the host's depth of each kind, targets, read-backs and AOVs.
 TEST_P(Scramble, EveryCallWithSurfacesToo) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
   const auto file = cumulet::test::seed_materials().glb();
@@ -250,7 +250,7 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
 
 // With an environment and with a physical sky: their uploads, what previews draw of them, and taking them away.
 TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
   const auto panes = cumulet::test::make_panes(3.0F);
@@ -315,7 +315,7 @@ TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
 
 // A failing call is a call as well.
 TEST_P(Scramble, FailuresLeaveTheStateToo) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
   const auto volume = cumulet::test::make_ball(12);
@@ -354,7 +354,7 @@ TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
   const auto depths = target.depths();
   EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 60);
   EXPECT_LT(*std::min_element(depths.begin(), depths.end()), 1.0F);
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   for (std::uint32_t seed = 200; seed < 212; ++seed) {
     SCOPED_TRACE(seed);
     target.clear({}, 1.0F);
@@ -400,6 +400,6 @@ TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   gl_->DebugMessageCallback(nullptr, nullptr);
 }
 
-CUMULET_ON_BACKENDS(Scramble);
+CUMULET_ON_PROFILES(Scramble);
 
 }  // namespace

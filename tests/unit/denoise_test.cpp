@@ -131,7 +131,8 @@ CUMULET_ON_BACKENDS(Denoise);
 
 // What takes longer, on one driver.
 class DenoiseMore : public Denoise {};
-INSTANTIATE_TEST_SUITE_P(Gl, DenoiseMore, testing::Values(headless::Backend::egl), [](const auto&) { return "egl"; });
+INSTANTIATE_TEST_SUITE_P(Gl, DenoiseMore, testing::Values(test::Door{headless::Backend::egl}),
+                         [](const auto&) { return "egl"; });
 
 TEST_P(Denoise, IsTheNetworkOfPlainLoops) {
   expect_reference(random_archive(small_widths, 3, 1), Scene({48, 32}), "small", random_mean, random_most);

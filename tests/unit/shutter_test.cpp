@@ -93,7 +93,7 @@ class Shutter : public test::CloudTest {
   }
 };
 // Numbers alone are looked at here, in one driver's.
-INSTANTIATE_TEST_SUITE_P(Gl, Shutter, testing::Values(headless::Backend::egl), test::backend_name);
+INSTANTIATE_TEST_SUITE_P(Gl, Shutter, testing::Values(test::Door{headless::Backend::egl}), test::backend_name);
 
 // A ray is within the box for a part of the time.
 TEST_P(Shutter, ABoxThatPassesCoversForItsPartOfTheTime) {

@@ -29,7 +29,7 @@ namespace gl = cumulet::gl;
 namespace render = cumulet::render;
 
 class State : public cumulet::test::GlTest {};
-CUMULET_ON_BACKENDS(State);
+CUMULET_ON_PROFILES(State);
 
 /// Changes all that the contract lets a call change.
 class Scribbler {
@@ -189,14 +189,14 @@ struct Frame {
 };
 
 TEST_P(State, TheReaderSeesWhatIsScrambled) {
-  ScramblingHost host(gl_);
-  const GlState fresh = read_gl_state(*gl_);
-  EXPECT_EQ(state_differences(fresh, read_gl_state(*gl_)), "");
+  ScramblingHost host(gl_, legacy_);
+  const GlState fresh = read_gl_state(*gl_, legacy_);
+  EXPECT_EQ(state_differences(fresh, read_gl_state(*gl_, legacy_)), "");
   // Every value but for a few that cannot be anything else here has been different at some time.
   std::vector<bool> moved(fresh.size(), false);
   for (std::uint32_t seed = 0; seed < 24; ++seed) {
     host.scramble(seed);
-    const GlState state = read_gl_state(*gl_);
+    const GlState state = read_gl_state(*gl_, legacy_);
     for (std::size_t i = 0; i < state.size(); ++i) {
       if (state[i].values != fresh[i].values) moved[i] = true;
     }
@@ -207,40 +207,41 @@ TEST_P(State, TheReaderSeesWhatIsScrambled) {
   }
   EXPECT_EQ(still,
             "GL_LINE_WIDTH GL_DRAW_BUFFER2 GL_DEBUG_GROUP_STACK_DEPTH GL_DEBUG_OUTPUT GL_DEBUG_CALLBACK_FUNCTION "
-            "GL_DEBUG_CALLBACK_USER_PARAM ");
+            "GL_DEBUG_CALLBACK_USER_PARAM " +
+                (legacy_ ? std::string("GL_LIST_INDEX GL_RENDER_MODE GL_CURRENT_RASTER_POSITION ") : std::string()));
 }
 
 TEST_P(State, EverythingComesBack) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const Scribbler scribbler(gl_);
   for (std::uint32_t seed = 0; seed < 32; ++seed) {
     host.scramble(seed);
-    const GlState before = read_gl_state(*gl_);
+    const GlState before = read_gl_state(*gl_, legacy_);
     {
       const StateGuard guard(*gl_);
       scribbler.scribble();
       ASSERT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR}) << seed;
     }
     ASSERT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR}) << seed;
-    ASSERT_EQ(state_differences(before, read_gl_state(*gl_)), "") << seed;
+    ASSERT_EQ(state_differences(before, read_gl_state(*gl_, legacy_)), "") << seed;
   }
 }
 
 /// The frame is the same and leaves everything as it was, whatever the host has set by these seeds, the last one left
 /// out.
-void expect_untouched(const gl::FunctionsPtr& functions, Frame& frame, const std::vector<float>& expected,
-                      std::pair<std::uint32_t, std::uint32_t> seeds) {
-  ScramblingHost host(functions);
+void expect_untouched(const gl::FunctionsPtr& functions, const cumulet::test::LegacyGlPtr& legacy, Frame& frame,
+                      const std::vector<float>& expected, std::pair<std::uint32_t, std::uint32_t> seeds) {
+  ScramblingHost host(functions, legacy);
   for (std::uint32_t seed = seeds.first; seed < seeds.second; ++seed) {
     host.scramble(seed);
-    const GlState before = read_gl_state(*functions);
+    const GlState before = read_gl_state(*functions, legacy);
     frame.draw();
     ASSERT_EQ(functions->GetError(), GLenum{GL_NO_ERROR}) << seed;
-    ASSERT_EQ(state_differences(before, read_gl_state(*functions)), "") << seed;
+    ASSERT_EQ(state_differences(before, read_gl_state(*functions, legacy)), "") << seed;
     const std::vector<float> read = frame.read();
     const auto [is, was] = std::ranges::mismatch(read, expected);
     ASSERT_EQ(is, read.end()) << seed << ": " << *is << " for " << *was << " at " << is - read.begin();
-    ASSERT_EQ(state_differences(before, read_gl_state(*functions)), "") << seed;
+    ASSERT_EQ(state_differences(before, read_gl_state(*functions, legacy)), "") << seed;
   }
 }
 
@@ -252,7 +253,7 @@ TEST_P(State, ADenoisedFrameLeavesNothingAndReadsNothing) {
   frame.draw();
   EXPECT_EQ(frame.compositor.bytes(), 64U * (16U + 112U));
   const std::vector<float> expected = frame.read();
-  expect_untouched(gl_, frame, expected, {200, 216});
+  expect_untouched(gl_, legacy_, frame, expected, {200, 216});
 }
 
 TEST_P(State, AFrameLeavesNothingAndReadsNothing) {
@@ -262,11 +263,11 @@ TEST_P(State, AFrameLeavesNothingAndReadsNothing) {
   EXPECT_NE(expected[4 * 9], expected[0]);           // drawn inside the viewport
   EXPECT_EQ(expected[64 * 4 + 9], 1.0F - 1.0F / 4);  // with its depth
   EXPECT_EQ(expected[64 * 4], 1.0F);
-  expect_untouched(gl_, frame, expected, {100, 132});
+  expect_untouched(gl_, legacy_, frame, expected, {100, 132});
 }
 
 TEST_P(State, KnownValuesDoNotDependOnTheHost) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const Scribbler scribbler(gl_);
   const auto is_known = [](const std::string& name) {
     for (const char* prefix : {"GL_PACK_",
@@ -299,7 +300,7 @@ TEST_P(State, KnownValuesDoNotDependOnTheHost) {
     const StateGuard guard(*gl_, restore);
     scribbler.touch();
     GlState known;
-    for (const auto& value : read_gl_state(*gl_)) {
+    for (const auto& value : read_gl_state(*gl_, legacy_)) {
       if (is_known(value.name)) known.push_back(value);
     }
     ASSERT_GT(known.size(), 60U);
@@ -309,17 +310,17 @@ TEST_P(State, KnownValuesDoNotDependOnTheHost) {
 }
 
 TEST_P(State, WhereTheHostResetsNothingElseChanges) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const Scribbler scribbler(gl_);
   host.scramble(5);
-  const GlState before = read_gl_state(*gl_);
+  const GlState before = read_gl_state(*gl_, legacy_);
   GlState inside;
   {
     const StateGuard guard(*gl_, false);
     scribbler.scribble();
-    inside = read_gl_state(*gl_);
+    inside = read_gl_state(*gl_, legacy_);
   }
-  const GlState after = read_gl_state(*gl_);
+  const GlState after = read_gl_state(*gl_, legacy_);
   EXPECT_EQ(state_differences(inside, after), "");  // nothing was restored
   EXPECT_NE(state_differences(before, after), "");
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -340,21 +341,21 @@ TEST_P(State, WhereTheHostResetsNothingElseChanges) {
 }
 
 TEST_P(State, GuardsNest) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   const Scribbler scribbler(gl_);
   host.scramble(11);
-  const GlState before = read_gl_state(*gl_);
+  const GlState before = read_gl_state(*gl_, legacy_);
   {
     const StateGuard outer(*gl_);
     scribbler.scribble();
-    const GlState between = read_gl_state(*gl_);
+    const GlState between = read_gl_state(*gl_, legacy_);
     {
       const StateGuard inner(*gl_);
       scribbler.scribble();
     }
-    EXPECT_EQ(state_differences(between, read_gl_state(*gl_)), "");
+    EXPECT_EQ(state_differences(between, read_gl_state(*gl_, legacy_)), "");
   }
-  EXPECT_EQ(state_differences(before, read_gl_state(*gl_)), "");
+  EXPECT_EQ(state_differences(before, read_gl_state(*gl_, legacy_)), "");
 }
 
 GLint integer(const gl::Functions& gl, GLenum name) {
@@ -466,12 +467,12 @@ TEST_P(State, ObjectsDeletedInAnotherContextWhileBound) {
     shared.use(shared.first);
     gl_->ActiveTexture(GL_TEXTURE2);
     ASSERT_EQ(integer(*gl_, GL_TEXTURE_BINDING_2D), name);  // still bound here
-    const GlState before = read_gl_state(*gl_);
+    const GlState before = read_gl_state(*gl_, legacy_);
     {
       const StateGuard guard(*gl_);
       gl_->UseProgram(0);
     }
-    const std::string lost = state_differences(before, read_gl_state(*gl_));
+    const std::string lost = state_differences(before, read_gl_state(*gl_, legacy_));
     EXPECT_EQ(lost.find("GL_TEXTURE_BINDING"), std::string::npos) << lost;  // what was not touched stays
     {
       const StateGuard guard(*gl_);
@@ -492,17 +493,17 @@ TEST_P(State, ImageUnitsWithoutATexture) {
   gl_->BindImageTexture(0, 0, 2, GL_TRUE, 3, GL_WRITE_ONLY, GL_RGBA16F);
   const GLuint none = 0;
   gl_->BindImageTextures(1, 1, &none);
-  const GlState before = read_gl_state(*gl_);
+  const GlState before = read_gl_state(*gl_, legacy_);
   {
     const StateGuard guard(*gl_);
     scribbler.scribble();
   }
   EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
-  EXPECT_EQ(state_differences(before, read_gl_state(*gl_)), "");
+  EXPECT_EQ(state_differences(before, read_gl_state(*gl_, legacy_)), "");
 }
 
 TEST_P(State, CostOfAGuard) {
-  ScramblingHost host(gl_);
+  ScramblingHost host(gl_, legacy_);
   host.scramble(3);
   for (const bool restore : {true, false}) {
     std::vector<double> times;

@@ -42,9 +42,10 @@
  * held around calls for such handles.
  *
  * OpenGL state
- *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
- *     reads no state but: pixel buffers and parameters, bindings and capabilities are set to what it needs first. What
- *     a call does not use it neither asks for nor sets; what it does it asks for once, and puts back. It may use:
+ *     Version 4.5, core or compatibility profile. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all
+ *     state as it found it. It reads no state but: pixel buffers and parameters, bindings and capabilities are set to
+ *     what it needs first. What a call does not use it neither asks for nor sets; what it does it asks for once, and
+ *     puts back. It may use:
  *       - the current program and program pipeline, the vertex array binding, the draw and read framebuffer bindings
  *       - active texture; on units 0-15 the texture bindings of every target and the sampler
  *       - storage buffer bindings 0-7, uniform buffer bindings 0-7 and their generic points, the dispatch indirect
@@ -56,14 +57,36 @@
  *       - cull face (enable, mode), front face, polygon mode and smoothing, polygon offset enables
  *       - rasterizer discard, logic op, multisample, sample shading, sample alpha to coverage and to one
  *       - sample coverage and mask, primitive restart (both), clip distances 0-7, clip control, dither
- *       - GL_FRAMEBUFFER_SRGB
+ *       - GL_FRAMEBUFFER_SRGB, read color clamp
+ *     and in a context of the compatibility profile:
+ *       - alpha test, polygon stipple, fragment color clamp
+ *       - on units 0-15 the level-of-detail bias (glTexEnv, GL_TEXTURE_LOD_BIAS)
+ *       - pixel transfer: color and stencil maps (their enables), index shift and offset, all scales and biases
+ *       - with GL_ARB_imaging: the enables of color tables, convolutions, histogram and minmax, the color matrix, the
+ *         matrix mode
  *
  *     and the contents of the frame's own target. It never touches: queries, transform feedback, sync objects of the
  *     host (but to wait for, on the device, the one in cumulet_gl_state_desc), the debug callback and its filters, or
  *     any other object. Do not call it inside transform feedback, conditional rendering or a query of the host's. With
  *     CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is undefined.
  *     Objects get labels and passes are debug groups (KHR_debug), up to two on top of the host's own. glGetError is
- *     clean after every call; errors that were pending before are dropped.
+ *     clean after every call; errors that were pending before are dropped. State of extensions, such as a depth bounds
+ *     test or window rectangles, is the host's to disable.
+ *
+ * Compatibility profile
+ *     Other legacy state neither changes pictures nor is touched: fog, lighting, shade model, texture enables, client
+ *     arrays, pixel maps, matrix and attribute stacks. Calls may come between glPushAttrib and glPopAttrib. A [GL] call
+ *     is CUMULET_ERROR_GL, names the cause and changes nothing
+ *       - while a display list is open (glNewList), which would record it
+ *       - while the render mode is GL_SELECT or GL_FEEDBACK
+ *       - between glBegin and glEnd. GL then keeps an error of its own, which glGetError gives after glEnd.
+ *     The next call outside of these goes on. cumulet_detach and cumulet_destroy work in display lists and render
+ *     modes, because GL deletes objects at once. Between glBegin and glEnd, cumulet_destroy leaves GL objects behind.
+ *     get_proc must give glPixelTransferf, glTexEnvf and glGetTexEnvfv, and with GL_ARB_imaging glMatrixMode and
+ *     glLoadMatrixf; without one of them, attaching is CUMULET_ERROR_UNSUPPORTED. It is also asked for
+ *     eglGetCurrentContext, OSMesaGetCurrentContext, wglGetCurrentContext and glXGetCurrentContext, and may give NULL
+ *     for each. They tell a call between glBegin and glEnd from one without a context; without them, the error names
+ *     both. Object names must come from glGen or glCreate calls: names that a host makes up may be the library's.
  *
  * Ownership
  *     Handles belong to the caller that got them and end with the function named beside the type; what a handle refers

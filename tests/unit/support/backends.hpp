@@ -5,18 +5,35 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <ostream>
 #include <string>
 
 #include "headless.hpp"
 
 namespace cumulet::test {
 
+/// A backend and the profile of its context.
+struct Door {
+  headless::Backend backend = headless::Backend::automatic;
+  headless::Profile profile = headless::Profile::core;
+
+  friend bool operator==(const Door& door, headless::Backend backend) { return door.backend == backend; }
+};
+
+inline std::string name_of(const Door& door) {
+  return std::string(door.backend == headless::Backend::egl ? "egl" : "osmesa") +
+         (door.profile == headless::Profile::core ? "" : "_compatibility");
+}
+
+inline void PrintTo(const Door& door, std::ostream* out) { *out << name_of(door); }
+
 /// A context of its own; skipped where the backend has none.
-class BackendTest : public testing::TestWithParam<headless::Backend> {
+class BackendTest : public testing::TestWithParam<Door> {
  protected:
   void SetUp() override {
     try {
-      context_ = std::make_unique<headless::Context>(headless::Context::create(GetParam()));
+      context_ =
+          std::make_unique<headless::Context>(headless::Context::create(GetParam().backend, false, GetParam().profile));
     } catch (const std::exception& error) {
       GTEST_SKIP() << error.what();
     }
@@ -25,14 +42,22 @@ class BackendTest : public testing::TestWithParam<headless::Backend> {
   std::unique_ptr<headless::Context> context_;
 };
 
-inline std::string backend_name(const testing::TestParamInfo<headless::Backend>& info) {
-  return info.param == headless::Backend::egl ? "egl" : "osmesa";
-}
+inline std::string backend_name(const testing::TestParamInfo<Door>& info) { return name_of(info.param); }
 
 }  // namespace cumulet::test
 
 /// Runs a suite of BackendTest on both.
-#define CUMULET_ON_BACKENDS(suite)                                                                               \
-  INSTANTIATE_TEST_SUITE_P(Gl, suite,                                                                            \
-                           testing::Values(cumulet::headless::Backend::egl, cumulet::headless::Backend::osmesa), \
+#define CUMULET_ON_BACKENDS(suite)                                                                   \
+  INSTANTIATE_TEST_SUITE_P(Gl, suite,                                                                \
+                           testing::Values(cumulet::test::Door{cumulet::headless::Backend::egl},     \
+                                           cumulet::test::Door{cumulet::headless::Backend::osmesa}), \
                            cumulet::test::backend_name)
+/// And in a context of the compatibility profile of each.
+#define CUMULET_ON_PROFILES(suite)                                                                             \
+  CUMULET_ON_BACKENDS(suite);                                                                                  \
+  INSTANTIATE_TEST_SUITE_P(                                                                                    \
+      GlCompatibility, suite,                                                                                  \
+      testing::Values(                                                                                         \
+          cumulet::test::Door{cumulet::headless::Backend::egl, cumulet::headless::Profile::compatibility},     \
+          cumulet::test::Door{cumulet::headless::Backend::osmesa, cumulet::headless::Profile::compatibility}), \
+      cumulet::test::backend_name)

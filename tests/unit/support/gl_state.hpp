@@ -14,6 +14,7 @@
 
 #include "gl/programs.hpp"
 #include "support/backends.hpp"
+#include "support/legacy_gl.hpp"
 
 namespace cumulet::test {
 
@@ -25,6 +26,7 @@ class GlTest : public BackendTest {
     if (IsSkipped()) return;
     gl_ = gl::load_functions(headless::Context::get_proc, context_.get());
     programs_ = std::make_shared<gl::Programs>(*gl_, nullptr);
+    if (GetParam().profile == headless::Profile::compatibility) legacy_ = std::make_shared<const LegacyGl>(*context_);
   }
   void TearDown() override {
     if (gl_) {
@@ -34,6 +36,7 @@ class GlTest : public BackendTest {
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
+  LegacyGlPtr legacy_;  // null in a core context
 };
 
 /// One value of the state, by its name (with unit or index).
@@ -243,8 +246,8 @@ inline const std::vector<Indexed>& indexed_values() {
 }  // namespace detail
 
 /// All that glGet tells of the current context. Leaves it as it was. A value that the driver does not know is a
-/// failure.
-inline GlState read_gl_state(const gl::Functions& gl) {
+/// failure. legacy: null in a core context.
+inline GlState read_gl_state(const gl::Functions& gl, const LegacyGlPtr& legacy = nullptr) {
   gl.CheckFramebufferStatus(GL_DRAW_FRAMEBUFFER);  // Mesa clamps GL_STENCIL_REF to bits that it counts only then
   GlState state;
   const auto add = [&](const std::string& name, std::vector<double> values) {
@@ -298,6 +301,9 @@ inline GlState read_gl_state(const gl::Functions& gl) {
     }
   }
   gl.ActiveTexture(static_cast<GLenum>(active));
+  if (legacy) {
+    for (auto& [name, read] : read_legacy_state(gl, *legacy)) state.push_back({name, std::move(read)});
+  }
   return state;
 }
 
@@ -323,7 +329,9 @@ inline std::string state_differences(const GlState& before, const GlState& after
 /// callback.
 class ScramblingHost {
  public:
-  explicit ScramblingHost(gl::FunctionsPtr gl) : gl_(std::move(gl)) {
+  /// legacy: null in a core context.
+  explicit ScramblingHost(gl::FunctionsPtr gl, const LegacyGlPtr& legacy = nullptr) : gl_(std::move(gl)) {
+    if (legacy) legacy_ = std::make_unique<LegacyHost>(*gl_, legacy);
     make_programs();
     make_textures();
     for (int i = 0; i < 4; ++i) {
@@ -360,6 +368,7 @@ class ScramblingHost {
     scramble_pixels();
     scramble_raster();
     scramble_fragments();
+    if (legacy_) legacy_->scramble(random_);
     gl::check(*gl_, "scrambling");
   }
 
@@ -598,6 +607,7 @@ class ScramblingHost {
   }
 
   gl::FunctionsPtr gl_;
+  std::unique_ptr<LegacyHost> legacy_;
   std::mt19937 random_;
   std::vector<gl::Object> programs_;
   GLuint pipeline_ = 0;

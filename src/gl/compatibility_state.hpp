@@ -1,0 +1,92 @@
+#pragma once
+
+#include <glad/gl.h>
+
+#include <array>
+#include <cstddef>
+#include <memory>
+
+#include "gl/bindings.hpp"
+
+namespace cumulet::gl {
+
+struct Functions;
+
+/// The functions that only a compatibility context has, as far as the library needs them. The host's callback gives
+/// them, as it gives all others.
+struct CompatibilityFunctions {
+  using GetProc = void* (*)(void* user, const char* name);
+
+  void(GLAD_API_PTR* PixelTransferf)(GLenum name, GLfloat value) = nullptr;
+  void(GLAD_API_PTR* TexEnvf)(GLenum target, GLenum name, GLfloat value) = nullptr;
+  void(GLAD_API_PTR* GetTexEnvfv)(GLenum target, GLenum name, GLfloat* values) = nullptr;
+  // Null where the context lacks GL_ARB_imaging.
+  void(GLAD_API_PTR* MatrixMode)(GLenum mode) = nullptr;
+  void(GLAD_API_PTR* LoadMatrixf)(const GLfloat* matrix) = nullptr;
+  /// The window system's query for the current context. Null if the host's callback has none.
+  void* (*current_context)() = nullptr;
+};
+
+/// Null in a core context, or in a forward-compatible one. Throws Error(unsupported) that names a missing function.
+std::shared_ptr<const CompatibilityFunctions> load_compatibility(const Functions& gl,
+                                                                 CompatibilityFunctions::GetProc get_proc, void* user);
+
+/// The window system's query, where the host's callback has one that knows the current context; else null.
+void* (*find_current_context(CompatibilityFunctions::GetProc get_proc, void* user))();
+
+/// Whether the calling thread is between glBegin and glEnd, where GL answers no question. `certain` is false if the
+/// window system could not be asked: then there may be no context at all.
+struct BetweenBeginAndEnd {
+  bool possible = false;
+  bool certain = false;
+};
+BetweenBeginAndEnd between_begin_and_end(const Functions& gl);
+inline constexpr const char* between_begin_and_end_message =
+    "this call came between glBegin and glEnd, where OpenGL allows no such call: make it after glEnd";
+
+/// Throws Error(gl) if a display list is open, or if glRenderMode is GL_SELECT or GL_FEEDBACK. Nothing in a core
+/// context.
+void require_rendering(const Functions& gl);
+
+/// The state of a compatibility context that changes what our draws and pixel transfers give, and that core contexts
+/// lack. Part of StateGuard: each part is saved and set to the value of a core context when it is first used.
+///
+/// All calls do nothing in a core context.
+class CompatibilityState {
+ public:
+  CompatibilityState(const Functions& gl, bool restore) : gl_(&gl), restore_(restore) {}
+
+  /// Before draws: alpha test, polygon stipple, fragment color clamp.
+  void prepare_fragments();
+  /// Before pixels are transferred: scales, biases, maps, and the imaging subset.
+  void prepare_pixels();
+  /// The level-of-detail bias of a texture unit, which is the active one.
+  void prepare_unit(GLuint unit);
+  /// Makes the unit active where it has something to restore.
+  void restore_unit(GLuint unit) const;
+
+  /// All but units.
+  void restore() const;
+
+ private:
+  static constexpr std::size_t fragment_tests = 2;
+  static constexpr std::size_t transfers = 30;
+  static constexpr std::size_t basic_transfers = 14;  // without the imaging subset
+  static constexpr std::size_t imaging_steps = 8;
+
+  [[nodiscard]] std::size_t transfer_count() const;
+  void load_color_matrix(const std::array<GLfloat, 16>& matrix) const;
+
+  const Functions* gl_;
+  bool restore_;
+  bool fragments_used_ = false;
+  std::array<bool, fragment_tests> tests_{};
+  GLint fragment_clamp_ = 0;
+  bool pixels_used_ = false;
+  std::array<GLfloat, transfers> transfers_{};
+  std::array<bool, imaging_steps> imaging_{};
+  std::array<GLfloat, 16> color_matrix_{};
+  std::array<GLfloat, core::CM_UNITS> level_biases_{};
+};
+
+}  // namespace cumulet::gl
