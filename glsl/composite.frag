@@ -115,9 +115,7 @@ void main() {
 #else
   vec4 value = cm_texel(pixel);
 #endif
-  float alpha = min(cm_displayable(value.a), 1.0);
-  vec3 straight = alpha > 0.0 ? value.rgb / alpha : vec3(0.0);
-  cm_colour = vec4(cm_display(straight, cm_exposure, CM_TONE_MAP, CM_ENCODE) * alpha, alpha);
+  cm_colour = cm_display_over(value, cm_exposure, CM_TONE_MAP, CM_ENCODE);
 #else
   float z = texelFetch(cm_volume_z, min(ivec2(at), size - 1), 0).x;
   if (!cm_is_positive(z)) discard;

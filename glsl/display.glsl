@@ -34,14 +34,38 @@ CM_FN float cm_srgb_encode(float x) {
   return x <= 0.0031308f ? 12.92f * x : 1.055f * pow(x, 1.0f / 2.4f) - 0.055f;
 }
 
-// Straight (not premultiplied) radiance to colour; with encode by the sRGB curve.
-CM_FN vec3 cm_display(vec3 radiance, float exposure, uint tone_map, bool encode) {
+CM_FN vec3 cm_srgb_encode_each(vec3 c) { return vec3(cm_srgb_encode(c.x), cm_srgb_encode(c.y), cm_srgb_encode(c.z)); }
+
+// Exposed and tone-mapped, not encoded.
+CM_FN vec3 cm_tone_mapped(vec3 radiance, float exposure, uint tone_map) {
   vec3 c = radiance * exposure;
   c = vec3(cm_displayable(c.x), cm_displayable(c.y), cm_displayable(c.z));
   if (tone_map == CM_TONE_MAP_NEUTRAL) c = cm_tone_map_neutral(c);
   if (tone_map == CM_TONE_MAP_FILMIC) c = cm_tone_map_filmic(c);
   if (tone_map != CM_TONE_MAP_NONE) c = min(c, vec3(1.0f));
-  return encode ? vec3(cm_srgb_encode(c.x), cm_srgb_encode(c.y), cm_srgb_encode(c.z)) : c;
+  return c;
+}
+
+// Radiance to colour; with encode by the sRGB curve.
+CM_FN vec3 cm_display(vec3 radiance, float exposure, uint tone_map, bool encode) {
+  vec3 c = cm_tone_mapped(radiance, exposure, tone_map);
+  return encode ? cm_srgb_encode_each(c) : c;
+}
+
+// Premultiplied radiance and alpha to what a target blends as color + (1 - alpha) x target. Light without alpha is added
+// to what is behind it: nothing is divided by alpha. The color is that of the same radiance before black. Where the
+// target holds linear values alpha stays. Encoded values are no sums of light: there alpha is the one with which the
+// blend is right over black and over white, and near it in between. All channels have the least of their three, so that
+// light darkens none of them.
+CM_FN vec4 cm_display_over(vec4 value, float exposure, uint tone_map, bool encode) {
+  float alpha = min(cm_displayable(value.w), 1.0f);
+  vec3 c = cm_tone_mapped(vec3(value.x, value.y, value.z), exposure, tone_map);
+  if (!encode) return vec4(c, alpha);
+  vec3 encoded = cm_srgb_encode_each(c);
+  float least = min(c.x, min(c.y, c.z));
+  float white = cm_srgb_encode(min(least + (1.0f - alpha), 1.0f));
+  float kept = white - min(encoded.x, min(encoded.y, encoded.z));
+  return vec4(encoded, alpha < 1.0f ? clamp(1.0f - kept, 0.0f, 1.0f) : 1.0f);
 }
 
 #endif

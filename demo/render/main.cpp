@@ -31,6 +31,7 @@
 #include "denoised.hpp"
 #include "fire.hpp"
 #include "frame_plan.hpp"
+#include "glow.hpp"
 #include "held_lines.hpp"
 #include "info.hpp"
 #include "instances.hpp"
@@ -310,8 +311,23 @@ std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, c
   }
 }
 
+/// Where a picture has light that its file cannot hold.
+void tell_glow(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised,
+               std::size_t floats, Progress& progress) {
+  const SceneOptions& scene = options.scene;
+  if (scene.display.background != CUMULET_BACKGROUND_TRANSPARENT || scene.sampling.view != CUMULET_VIEW_SHADED) return;
+  std::vector<float> linear(denoised);
+  if (linear.empty()) {
+    linear.resize(floats);
+    check(viewer, cumulet_read_linear(viewer.get(), linear.data(), linear.size()));
+  }
+  const std::size_t pixels = cumulet::demo::glowing_pixels(linear, scene.display.exposure_stops);
+  const std::string note = cumulet::demo::glow_note(options.output, pixels);
+  if (!note.empty()) tell(progress, "warning: " + note);
+}
+
 void write_picture(const Viewer& viewer, const RenderOptions& options, const cumulet::demo::Instances& others,
-                   const std::vector<float>& denoised) {
+                   const std::vector<float>& denoised, Progress& progress) {
   cumulet::image::Image image{options.scene.width, options.scene.height, {}};
   const std::size_t count = std::size_t{4} * image.width * image.height;
   const cumulet::image::Windows windows =
@@ -320,6 +336,7 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const cum
     std::vector<std::uint8_t> bytes(count);
     check(viewer, denoised.empty() ? cumulet_read_display(viewer.get(), bytes.data(), bytes.size())
                                    : cumulet_encode_display(viewer.get(), denoised.data(), bytes.data(), bytes.size()));
+    tell_glow(viewer, options, denoised, count, progress);
     cumulet::demo::clear_around(windows, bytes);
     cumulet::image::write_png(options.output, image.width, image.height, bytes);
     return;
@@ -586,7 +603,7 @@ class Studio {
       check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
       write_stats(options, stats_of(viewer_), context_.name());
     }
-    write_picture(viewer_, options, others_, denoised);
+    write_picture(viewer_, options, others_, denoised, progress_);
   }
 
   /// For another run with a time limit.

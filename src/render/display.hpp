@@ -29,6 +29,7 @@ struct Display {
   std::optional<glm::vec3> backdrop{};  // opaque: radiance to show instead of the background
   ColourEncoding encoding = ColourEncoding::srgb;
   bool denoise = false;
+  bool operator==(const Display&) const = default;
 
   /// Whether the background's radiance is part of what is shown.
   [[nodiscard]] bool shows_background() const { return !transparent && !backdrop; }
@@ -43,8 +44,28 @@ inline std::uint32_t curve_of(const Display& display) {
   return display.legend ? CM_TONE_MAP_CLIP : static_cast<std::uint32_t>(display.tone_map);
 }
 
-/// Linear RGBA as cumulet_read_linear gives it to sRGB bytes as cumulet_read_display does: straight alpha, opaque
-/// unless display.transparent. The encoding of display does not count. bytes is as long as linear.
+/// Premultiplied, exposed radiance as a color with straight alpha, sRGB-encoded. What covers no more than its alpha
+/// keeps both: color = display(radiance / alpha). What glows beyond that has no straight color: the glow counts as what
+/// shines between the parts that cover, and alpha is raised until it holds the color, so that over black nothing is
+/// lost of it.
+inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve) {
+  const float alpha = std::min(core::cm_displayable(exposed.w), 1.0F);
+  glm::vec3 covering(0.0F);
+  glm::vec3 glow(0.0F);
+  for (int c = 0; c < 3; ++c) {
+    const float radiance = core::cm_displayable(exposed[c]);
+    const bool glows = radiance > alpha;
+    glow[c] = glows ? radiance - alpha : 0.0F;
+    if (alpha > 0.0F) covering[c] = glows ? radiance + (1.0F - alpha) : radiance / alpha;
+  }
+  const glm::vec3 color = alpha * core::cm_display(covering, 1.0F, curve, true) +
+                          (1.0F - alpha) * core::cm_display(glow, 1.0F, curve, true);
+  const float raised = std::max({alpha, color.x, color.y, color.z});
+  return raised > 0.0F ? glm::vec4(color / raised, raised) : glm::vec4(0.0F);
+}
+
+/// Linear RGBA as cumulet_read_linear gives it to sRGB bytes as cumulet_read_display does: straight_display where
+/// display.transparent, else opaque. The encoding of display does not count. bytes is as long as linear.
 inline void to_display(std::span<const float> linear, const Display& display, std::span<std::uint8_t> bytes) {
   const auto to_byte = [](float unit) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0F, 1.0F) * 255.0F));
@@ -54,12 +75,9 @@ inline void to_display(std::span<const float> linear, const Display& display, st
   const float exposure = exposure_of(encoded);
   const std::uint32_t curve = curve_of(encoded);
   for (std::size_t i = 0; i + 4 <= linear.size(); i += 4) {
-    const float alpha = display.transparent ? core::cm_displayable(linear[i + 3]) : 1.0F;
-    const float scale = alpha > 0.0F ? 1.0F / std::min(alpha, 1.0F) : 0.0F;
-    const glm::vec3 straight = scale * glm::vec3(linear[i], linear[i + 1], linear[i + 2]);
-    const glm::vec3 colour = core::cm_display(straight, exposure, curve, true);
-    for (int c = 0; c < 3; ++c) bytes[i + static_cast<std::size_t>(c)] = to_byte(colour[c]);
-    bytes[i + 3] = to_byte(alpha);
+    const glm::vec3 exposed = exposure * glm::vec3(linear[i], linear[i + 1], linear[i + 2]);
+    const glm::vec4 color = straight_display({exposed, display.transparent ? linear[i + 3] : 1.0F}, curve);
+    for (int c = 0; c < 4; ++c) bytes[i + static_cast<std::size_t>(c)] = to_byte(color[c]);
   }
 }
 

@@ -204,8 +204,7 @@ glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 p
                               picture.texel(low + glm::ivec2(1, 1), display), weight.x),
                      weight.y);
   }
-  if (value.a <= 0.0) return glm::dvec4(0.0);
-  glm::dvec3 c = glm::dvec3(value) / value.a;
+  glm::dvec3 c(value);
   if (!display.legend) c *= std::exp2(double(display.exposure_stops));
   if (display.encoding != ColourEncoding::hdr) {
     if (!display.legend && display.tone_map == ToneMap::neutral) {
@@ -216,10 +215,13 @@ glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 p
     }
     c = glm::clamp(c, 0.0, 1.0);
   }
-  if (display.encoding == ColourEncoding::srgb) {
-    for (int k = 0; k < 3; ++k) c[k] = image::srgb_encode(float(c[k]));
-  }
-  return {c * value.a, value.a};
+  if (display.encoding != ColourEncoding::srgb) return {c, value.a};
+  // The alpha that is right over white for the least of the three.
+  const double least = std::min({c.x, c.y, c.z});
+  const double white = image::srgb_encode(float(std::min(least + 1.0 - value.a, 1.0)));
+  const double alpha = std::clamp(1.0 - (white - image::srgb_encode(float(least))), 0.0, 1.0);
+  for (int k = 0; k < 3; ++k) c[k] = image::srgb_encode(float(c[k]));
+  return {c, alpha};
 }
 
 class Compositing : public cumulet::test::GlTest {

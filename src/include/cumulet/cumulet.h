@@ -1484,7 +1484,8 @@ typedef enum cumulet_tone_map {
 
 typedef enum cumulet_background {
   CUMULET_BACKGROUND_SKY = 0,         /* the sky's radiance, or the environment, behind the volume: opaque */
-  CUMULET_BACKGROUND_TRANSPARENT = 1, /* premultiplied colour and alpha: what the framebuffer holds shows through */
+  CUMULET_BACKGROUND_TRANSPARENT = 1, /* premultiplied color and alpha: the content of the framebuffer shows through,
+                                         and light without alpha, as of flames, is added to it: see cumulet_blend */
   CUMULET_BACKGROUND_COLOR = 2        /* background_color behind the volume: opaque */
 } cumulet_background;
 
@@ -1910,6 +1911,14 @@ typedef enum cumulet_colour {
   CUMULET_COLOUR_HDR = 3               /* radiance x exposure, neither tone-mapped nor encoded; for float formats */
 } cumulet_colour;
 
+/*
+ * Color and alpha are premultiplied: exposure, tone map and encoding are of the premultiplied radiance, so that over
+ * black a transparent picture has the colors of the opaque one.
+ * With CUMULET_COLOUR_LINEAR, _HDR and _SRGB_FRAMEBUFFER sums are of light: alpha is the part of the pixel that is
+ * covered, 0 where it only glows, and color + (1 - alpha) x target is right over any target. CUMULET_COLOUR_SRGB gives encoded values, whose
+ * sums are not of light: alpha there is the weight with which the blend is right over black and over white, and between
+ * them within 0.1 (of gray pixels; colored flames are up to 0.3 too bright in a channel over middle gray).
+ */
 typedef enum cumulet_blend {
   CUMULET_BLEND_OVER = 0,   /* premultiplied over what the target holds */
   CUMULET_BLEND_REPLACE = 1 /* colour and alpha replace it, for a host that composites by itself */
@@ -2112,7 +2121,9 @@ CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box
  */
 CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count);
 /* [GL] The same as it is displayed: denoised where cumulet_display_desc says so and cumulet_read_denoised can, exposed,
- * tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque unless the background is transparent). */
+ * tone-mapped, sRGB-encoded, 4 bytes a pixel, opaque unless the background is transparent. Alpha is straight then, as
+ * PNG has it: light that is brighter than alpha, as of flames, has no straight color, so alpha is raised until it holds
+ * it. Over black such a pixel is as it is displayed; what is behind it shows less than it should. */
 CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count);
 /* What cumulet_read_display makes of values as cumulet_read_linear and cumulet_read_denoised give them, of any picture
  * in the shaded view: count floats to as many bytes, a multiple of 4. */
