@@ -7,6 +7,7 @@
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "gl/transient_framebuffer.hpp"
+#include "render/target_format.hpp"
 
 namespace cumulet::render {
 
@@ -395,14 +396,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const glm::ivec4 viewport = target.viewport;
   if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0 || viewport.z <= 0 || viewport.w <= 0) return;
   const auto& gl = *gl_;
-  if (target.framebuffer != 0 && gl.IsFramebuffer(target.framebuffer) == GL_FALSE) {
-    throw Error(ErrorCode::invalid_argument,
-                "the target, " + std::to_string(target.framebuffer) + ", is no framebuffer of the current context");
-  }
-  if (gl.CheckNamedFramebufferStatus(target.framebuffer, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-    throw Error(ErrorCode::invalid_argument,
-                "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
-  }
+  static_cast<void>(check_target(gl, target, display.encoding));
   const Background background = background_of(picture, display);
   const bool layered = background == Background::apart;
   const gl::Object vertex_array = gl::make_vertex_array(gl_);

@@ -26,6 +26,8 @@ enum class Wait {
 
 struct FrameTarget {
   GLuint framebuffer = 0;
+  glm::uvec2 size{0U};     // that it has at least
+  bool needs_depth = false;
   glm::ivec4 viewport{0};  // as glViewport
   Region region;           // of it, that is drawn: the rest stays as it is
   bool flip_y = false;     // true: the picture's top row at y = 0
@@ -49,8 +51,7 @@ class Compositor {
   Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(std::move(gl)), programs_(std::move(programs)), wavelet_(gl_, programs_) {}
   /// Draws nothing without a picture or into a rectangle of size 0. Writes colour to draw buffer 0 alone, whatever the
-  /// depth there; alpha is premultiplied after exposure, tone map and encoding. Throws Error(invalid_argument) for a
-  /// name that is no framebuffer, or one that is not complete. Denoised, where the display is and the picture has
+  /// depth there; alpha is premultiplied. Throws Error(invalid_argument) as check_target. Denoised, where the display is and the picture has
   /// guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same wish, else as
   /// it is. Throws Error(out_of_memory, gl), once for each size, where there is no memory for that, or the driver does
   /// not build it: it is drawn as it is.

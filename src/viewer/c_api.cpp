@@ -32,6 +32,22 @@ std::vector<cumulet::scene::Place> places_of(const double* to_world, uint32_t co
   return places;
 }
 
+// Of a texture of the viewer's own, where the host does not name one.
+GLenum format_for(render::ColourEncoding encoding) {
+  if (encoding == render::ColourEncoding::hdr) return GL_RGBA16F;
+  return encoding == render::ColourEncoding::srgb_framebuffer ? GL_SRGB8_ALPHA8 : GL_RGBA8;
+}
+
+void require_format(const core::Frame& f) {
+  const bool is_float = f.format == GL_RGBA16F || f.format == GL_RGBA32F;
+  require(f.format == GL_RGBA8 || f.format == GL_SRGB8_ALPHA8 || is_float,
+          "cumulet_frame_desc.format is not GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGBA16F or GL_RGBA32F");
+  require(f.encoding != render::ColourEncoding::hdr || is_float,
+          "cumulet_frame_desc.format clamps CUMULET_COLOUR_HDR: it needs GL_RGBA16F or GL_RGBA32F");
+  require(f.encoding != render::ColourEncoding::srgb_framebuffer || f.format == GL_SRGB8_ALPHA8,
+          "cumulet_frame_desc.format is not encoded by OpenGL: CUMULET_COLOUR_SRGB_FRAMEBUFFER needs GL_SRGB8_ALPHA8");
+}
+
 core::Frame read_frame(const cumulet_frame_desc* desc) {
   const cumulet_frame_desc d = read_desc(desc, "cumulet_frame_desc");
   require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is not up to 1e9");
@@ -62,12 +78,9 @@ core::Frame read_frame(const cumulet_frame_desc* desc) {
     f.viewport = {v[0], v[1], v[2], v[3]};
   }
   f.flip_y = d.flip_y == 1;
-  if (d.format != 0) f.format = d.format;
-  if (f.target == core::Target::texture) {
-    require(f.format == GL_RGBA8 || f.format == GL_SRGB8_ALPHA8 || f.format == GL_RGBA16F || f.format == GL_RGBA32F,
-            "cumulet_frame_desc.format is not GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGBA16F or GL_RGBA32F");
-  }
   f.encoding = static_cast<render::ColourEncoding>(d.colour);
+  f.format = d.format != 0 ? d.format : format_for(f.encoding);
+  if (f.target == core::Target::texture) require_format(f);
   f.blend_over = d.blend == CUMULET_BLEND_OVER;
   f.write_depth = d.write_depth == 1;
   f.depth_source = static_cast<render::DepthSource>(d.depth_source);

@@ -318,6 +318,10 @@ render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const 
   target.region = &shown == progressive_.shown() ? shown.region() : shot.sampling.region;
   target.flip_y = frame.flip_y;
   target.blend_over = frame.blend_over;
+  if (frame.target == Target::framebuffer) {
+    target.size = frame.size;
+    target.needs_depth = frame.write_depth;
+  }
   target.filter_ms = part_to_filter * std::max(0.0, frame.budget_ms);
   target.write_depth = frame.write_depth && shown.film().has(render::film_layers::depth);
   if (shot.view()) {

@@ -1903,7 +1903,11 @@ typedef enum cumulet_target {
   CUMULET_TARGET_NONE = 2         /* nothing is drawn: for readback */
 } cumulet_target;
 
-/* What the target's colours mean. The first three take tone-mapped colours. */
+/*
+ * What the target's colours mean. The first three take tone-mapped colours. A target's format that cannot hold them is
+ * CUMULET_ERROR_INVALID_ARGUMENT; of windows (framebuffer 0) drivers other than Mesa do not report reliably whether
+ * they are sRGB, so that this is not checked there.
+ */
 typedef enum cumulet_colour {
   CUMULET_COLOUR_SRGB = 0,             /* encoded by us; for a format that stores what it is given (GL_RGBA8) */
   CUMULET_COLOUR_SRGB_FRAMEBUFFER = 1, /* encoded by GL (GL_FRAMEBUFFER_SRGB); for sRGB formats (GL_SRGB8_ALPHA8) */
@@ -1936,14 +1940,20 @@ typedef struct cumulet_frame_desc {
   double budget_ms; /* for uploads, tracing and drawing; 0: 10; negative: draw what there is, trace nothing */
 
   cumulet_target target;
-  uint32_t framebuffer; /* GL name; 0 is the context's default framebuffer, if the host says so */
-  uint32_t width;       /* of the whole target, 0 to 16384; with 0 nothing is drawn */
+  /*
+   * GL name; 0 is the context's default framebuffer, if the host says so. Its draw buffer 0 is drawn to.
+   * CUMULET_ERROR_INVALID_ARGUMENT for one that is not complete, has no color there, integers, no green or blue, or an
+   * attachment with layers, is smaller than width x height, or has no depth where write_depth is 1.
+   */
+  uint32_t framebuffer;
+  uint32_t width; /* of the whole target, 0 to 16384; with 0 nothing is drawn */
   uint32_t height;
   int32_t viewport[4]; /* x, y, width, height in the target, as glViewport takes them; zero: all of it */
   int32_t flip_y;      /* 0: the picture's top row is at the largest y, as OpenGL has it; 1: at y = 0 */
   double scale;        /* physical pixels a logical one; widths of lines and clicks follow it; 0: 1 */
   uint32_t format;     /* internal format of the target's colour, for its own textures GL_RGBA8, GL_SRGB8_ALPHA8,
-                          GL_RGBA16F or GL_RGBA32F; 0: GL_RGBA8 */
+                          GL_RGBA16F or GL_RGBA32F, which colour must suit; 0: GL_RGBA16F with
+                          CUMULET_COLOUR_HDR, GL_SRGB8_ALPHA8 with CUMULET_COLOUR_SRGB_FRAMEBUFFER, else GL_RGBA8 */
   cumulet_colour colour;
   cumulet_blend blend;
   int32_t write_depth; /* 1: where the volume is at least half opaque, its depth there, in the camera's convention,
