@@ -11,6 +11,8 @@
 #define CM_SQUARE_EDGE 8u
 #define CM_SQUARE_PIXELS 64u
 #define CM_MOST_SQUARES 16384u  // of a tile
+#define CM_BAND_ROWS 16u  // of a tile: a dispatch says of each so many rows whether it has changed them
+#define CM_BANDS 64u      // of a tile at most
 // A word of the list: the square's number in the tile, and from this bit on whether its even and its odd rows are sampled.
 #define CM_SQUARE_ROWS 30
 

@@ -7,7 +7,8 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 #include "path_blocks.glsl"
 
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
-  uvec4 cm_total;  // x: rounds that lanes marched: full ones, or visits of trace_travel.comp
+  uvec4 cm_total;  // x: rounds that lanes marched: full ones, or visits of trace_travel.comp; y, z: a bit for each band of
+                   // the tile's rows that has changed
   uvec4 cm_blocks[CM_MOST_BLOCKS];    // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block its
                                       // lanes that have a pixel, those whose pixel has no sample, and the samples
                                       // that they finished in this dispatch
@@ -23,6 +24,17 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
 #define CM_ZERO_FLOAT(name) p.name = 0.0;
 #define CM_ZERO_UINT(name) p.name = 0u;
 #define CM_ZERO_BITS(name, bits) p.name = 0u;
+
+// A pixel of the film has changed. Most bits are set already, and reading is cheaper than an atomic.
+void cm_mark_row(uint y) {
+  uint band = (y - cm.dispatch.tile_corner.y) / CM_BAND_ROWS;
+  uint bit = 1u << (band & 31u);
+  if (band < 32u) {
+    if ((cm_total.y & bit) == 0u) atomicOr(cm_total.y, bit);
+  } else if ((cm_total.z & bit) == 0u) {
+    atomicOr(cm_total.z, bit);
+  }
+}
 
 uint cm_lanes() { return cm.dispatch.lanes; }
 

@@ -37,6 +37,9 @@ void cm_store_pixel(CmPixel pixel, uvec2 at) {
   imageStore(cm_background, texel, vec4(pixel.background, 0.0));
   imageStore(cm_moments, texel, vec4(pixel.square));
   imageStore(cm_counts, texel, uvec4(pixel.samples, pixel.steps, 0u, 0u));
+#ifdef CM_PATH_STORE_GLSL
+  cm_mark_row(at.y);
+#endif
 }
 
 #endif

@@ -6,14 +6,15 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "means.glsl"
+layout(location = 0) uniform uvec2 cm_rows;  // the first that is resolved, and the first after it that is not
 layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
 #if CM_BACKGROUND == 2
 layout(rgba32f, binding = CM_IMAGE_BACKGROUND_MEANS) uniform writeonly image2D cm_background_means;
 #endif
 
 void main() {
-  ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(texel, textureSize(cm_sum, 0)))) return;
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
+  if (any(greaterThanEqual(texel, ivec2(textureSize(cm_sum, 0).x, cm_rows.y)))) return;
   CmMean mean = cm_mean(texel);
 #if CM_BACKGROUND == 1
   mean.front.rgb += mean.background;

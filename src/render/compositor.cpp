@@ -7,7 +7,6 @@
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "gl/transient_framebuffer.hpp"
-#include "render/target_format.hpp"
 
 namespace cumulet::render {
 
@@ -75,7 +74,7 @@ const gl::Program& Compositor::program(const gl::ProgramKey& key, Wait wait, boo
   return program.usable() || wait == Wait::never || serves ? program : programs_->get(key);
 }
 
-Compositor::MeansOf Compositor::means_of(const PictureTextures& picture, Background background, bool filtered) {
+MeansOf Compositor::means_of(const PictureTextures& picture, Background background, bool filtered) {
   return {picture.sum,   picture.holes ? picture.sum_before : 0,
           picture.holes, background,
           picture.size,  picture.picture,
@@ -227,7 +226,10 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
                         GL_RGBA32F);
   }
   program.use(gl);
-  gl.DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
+  for (const RowRange& rows : changed_rows(means->of, wanted, picture.rows)) {
+    gl.ProgramUniform2ui(program.name(), 0, rows.first, rows.end);
+    gl.DispatchCompute((picture.size.x + 7) / 8, (rows.end - rows.first + 7) / 8, 1);
+  }
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT);
   means->of = wanted;
   newest_ = means;
@@ -285,7 +287,10 @@ void Compositor::aim(const FrameTarget& target, const Display& display) const {
   const glm::vec4 viewport(target.viewport);
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, viewport.x, viewport.y, viewport.z, viewport.w);
-  if (!target.region.is_whole()) {
+  if (target.is_hidden) {
+    gl.Enablei(GL_SCISSOR_TEST, 0);
+    gl.ScissorIndexed(0, 0, 0, 0, 0);
+  } else if (!target.region.is_whole()) {
     const PixelBox box = target.region.pixels({target.viewport.z, target.viewport.w});
     const glm::ivec2 first(box.first);
     const glm::ivec2 size(box.size);
@@ -315,7 +320,7 @@ void Compositor::place(const gl::Functions& gl, const gl::Program& program, cons
   gl.ProgramUniform1i(program.name(), 1, as_bool(target.flip_y));
 }
 
-void Compositor::draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
+void Compositor::bind_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
                              const FrameTarget& target) const {
   const auto& gl = *gl_;
   const bool resolved = shown.means != nullptr;
@@ -339,9 +344,65 @@ void Compositor::draw_colour(const Shown& shown, const PictureTextures& picture,
     gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
                         picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
   }
+}
+
+void Compositor::draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
+                             const FrameTarget& target) const {
+  bind_colour(shown, picture, display, target);
   aim(target, display);
+  shown.program->use(*gl_);
+  gl_->DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void Compositor::compose(GLuint texture, const std::vector<RowRange>& rows, const Shown& shown,
+                         const PictureTextures& picture, const Display& display, const FrameTarget& target) const {
+  const auto& gl = *gl_;
+  const glm::ivec2 size(target.viewport.z, target.viewport.w);
+  const glm::uvec2 extent(size);
+  const PixelBox box = target.region.is_whole() ? PixelBox{glm::uvec2(0U), extent} : target.region.pixels(extent);
+  const gl::TransientFramebuffer framebuffer(gl_, texture, 0);
+  FrameTarget whole;
+  whole.framebuffer = framebuffer.name();
+  whole.viewport = {0, 0, size};
+  whole.flip_y = true;
+  whole.blend_over = false;
+  bind_colour(shown, picture, display, whole);
+  aim(whole, display);
   shown.program->use(gl);
+  gl.Enablei(GL_SCISSOR_TEST, 0);
+  for (const RowRange& range : rows) {
+    const std::uint32_t first = std::max(range.first, box.first.y);
+    const std::uint32_t end = std::min(range.end, box.first.y + box.size.y);
+    if (first >= end) continue;
+    gl.ScissorIndexed(0, static_cast<GLint>(box.first.x), static_cast<GLint>(first), static_cast<GLsizei>(box.size.x),
+                      static_cast<GLsizei>(end - first));
+    gl.DrawArrays(GL_TRIANGLES, 0, 3);
+  }
+  gl.Disablei(GL_SCISSOR_TEST, 0);
+}
+
+bool Compositor::draw_composed(const Shown& shown, const PictureTextures& picture, const Display& display,
+                               const FrameTarget& target, const TargetFormat& format) {
+  const auto& gl = *gl_;
+  // Asked for in each frame, so that none waits for it once it is needed.
+  const gl::Program& copy = programs_->ask({"copy.frag", {}, "composite.vert"});
+  const Composed::Of of{shown.means->of,       display,
+                        shown.program->name(), {target.viewport.z, target.viewport.w},
+                        target.region,         copy_format(format, display.encoding)};
+  if (!composed_.is_kept(of, gl.dispatches_in_call) || !copy.usable()) return false;
+  // llvmpipe would wait for what is queued before it draws into a texture that queued drawing reads.
+  if (gl.dispatches_in_call && !drawn_.passed() && !composed_.is_current(of, picture.rows)) return false;
+  const GLuint texture = composed_.update(of, picture.rows, [&](GLuint made, const std::vector<RowRange>& rows) {
+    compose(made, rows, shown, picture, display, target);
+  });
+  if (texture == 0) return false;
+  composed_rows_ = composed_.composed_rows();
+  gl.BindTextureUnit(core::CM_UNIT_SUM, texture);
+  place(gl, copy, target);
+  aim(target, display);
+  copy.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
+  return true;
 }
 
 void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
@@ -382,7 +443,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
 }
 
 std::uint64_t Compositor::bytes() const {
-  std::uint64_t bytes = wavelet_.bytes();
+  std::uint64_t bytes = wavelet_.bytes() + composed_.bytes();
   for (const auto& means : means_) {
     bytes += std::uint64_t{means->of.size.x} * means->of.size.y * (means->background ? 32 : 16);
   }
@@ -396,7 +457,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const glm::ivec4 viewport = target.viewport;
   if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0 || viewport.z <= 0 || viewport.w <= 0) return;
   const auto& gl = *gl_;
-  static_cast<void>(check_target(gl, target, display.encoding));
+  const TargetFormat format = check_target(gl, target, display.encoding);
   const Background background = background_of(picture, display);
   const bool layered = background == Background::apart;
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
@@ -415,15 +476,22 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     if (!enlarge->usable()) lags_ = true;
   }
   if ((resolved && means == nullptr) || shown == nullptr || (enlarge != nullptr && !enlarge->usable())) return;
+  composed_rows_.reset();
   if (enlarge != nullptr) {
     draw_enlarged(*enlarge, {means, shown, layered}, picture, display, target);
   } else {
     small_ = {};
-    draw_colour({means, shown, layered}, picture, display, target);
+    // What is beneath a picture may change without it.
+    const bool composed =
+        means != nullptr && !layered && draw_composed({means, shown, layered}, picture, display, target, format);
+    if (!composed) draw_colour({means, shown, layered}, picture, display, target);
   }
+  if (layered || means == nullptr) composed_.drop();
   if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);
-  if (!target.region.is_whole()) gl.Disablei(GL_SCISSOR_TEST, 0);
-  if (resolved && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
+  if (target.is_hidden || !target.region.is_whole()) gl.Disablei(GL_SCISSOR_TEST, 0);
+  if (gl.dispatches_in_call) drawn_ = gl::Fence(gl_);
+  const bool reads_means = resolved && composed_rows_ != 0U;
+  if (reads_means && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
   gl::check(gl, "drawing the picture");
   if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);

@@ -10,9 +10,11 @@
 
 #include "base/error.hpp"
 #include "gl/programs.hpp"
+#include "render/composed.hpp"
 #include "render/display.hpp"
 #include "render/picture_textures.hpp"
 #include "render/region.hpp"
+#include "render/target_format.hpp"
 #include "render/wavelet.hpp"
 
 namespace cumulet::render {
@@ -26,12 +28,13 @@ enum class Wait {
 
 struct FrameTarget {
   GLuint framebuffer = 0;
-  glm::uvec2 size{0U};     // that it has at least
+  glm::uvec2 size{0U};  // that it has at least
   bool needs_depth = false;
   glm::ivec4 viewport{0};  // as glViewport
   Region region;           // of it, that is drawn: the rest stays as it is
   bool flip_y = false;     // true: the picture's top row at y = 0
   bool blend_over = true;
+  bool is_hidden = false;  // nothing is written: for programs to be used once
   Wait wait = Wait::to_show;
   double filter_ms = 0.0;  // that a denoised picture may take of this frame
   // Depth to write, where the picture has volume_z: a + b / z, or a + b z where orthographic.
@@ -49,12 +52,14 @@ struct FrameTarget {
 class Compositor {
  public:
   Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
-      : gl_(std::move(gl)), programs_(std::move(programs)), wavelet_(gl_, programs_) {}
-  /// Draws nothing without a picture or into a rectangle of size 0. Writes colour to draw buffer 0 alone, whatever the
-  /// depth there; alpha is premultiplied. Throws Error(invalid_argument) as check_target. Denoised, where the display is and the picture has
-  /// guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same wish, else as
-  /// it is. Throws Error(out_of_memory, gl), once for each size, where there is no memory for that, or the driver does
-  /// not build it: it is drawn as it is.
+      : gl_(std::move(gl)), programs_(std::move(programs)), composed_(gl_), wavelet_(gl_, programs_) {}
+  /// Draws nothing without a picture or into a rectangle of size 0. Writes color to draw buffer 0 only, whatever the
+  /// depth there: cm_display_over of glsl/display.glsl of premultiplied radiance. Throws Error(invalid_argument) as
+  /// check_target. What the last frame drew, and on drivers that run dispatches within their call every picture, is
+  /// composed in a texture and copied; only rows that changed are composed again. Denoised, where the display is and
+  /// the picture has guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same
+  /// wish, else as it is. Throws Error(out_of_memory, gl), once for each size, where there is no memory for that, or
+  /// the driver does not build it: it is drawn as it is.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
   /// For frames that do not draw: goes on with denoising what draw() would draw so, for that long. Errors as draw().
   void denoise(const PictureTextures& picture, const Display& display, double filter_ms);
@@ -70,7 +75,7 @@ class Compositor {
   [[nodiscard]] double expected_filter_ms() const;
   /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
   [[nodiscard]] bool drawn() const {
-    return std::ranges::all_of(means_, [](const auto& means) { return means->drawn.passed(); });
+    return drawn_.passed() && std::ranges::all_of(means_, [](const auto& means) { return means->drawn.passed(); });
   }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
   /// that the device has not come to, or as it was drawn then, or nothing (Wait::never), its programs not being there
@@ -80,23 +85,12 @@ class Compositor {
   [[nodiscard]] bool denoising() const { return denoising_; }
   /// Another with every picture that was denoised: what draw() draws is another then.
   [[nodiscard]] std::uint64_t denoised() const { return denoised_; }
+  /// Rows that the last draw composed; nothing where it composed the whole in the target itself.
+  [[nodiscard]] std::optional<std::uint32_t> composed_rows() const { return composed_rows_; }
 
  private:
   using Clock = std::chrono::steady_clock;
   using Background = MeansBackground;
-  /// What the sums were when they were turned into means.
-  struct MeansOf {
-    GLuint sum = 0;
-    GLuint before = 0;
-    bool holes = false;
-    Background background = Background::added;
-    glm::uvec2 size{0U};
-    std::uint64_t picture = 0;
-    std::uint64_t wish = 0;
-    std::optional<std::uint64_t> revision;
-    bool filtered = false;
-    bool operator==(const MeansOf&) const = default;
-  };
   /// Means that are drawn. Where dispatches run within their call, one that writes what queued drawing reads, sums as
   /// well as means, waits for all that the host has queued: so drawing reads means alone, and while anything is queued
   /// none are written a second time, for llvmpipe takes some that were drawn long ago for being read still.
@@ -127,8 +121,16 @@ class Compositor {
   // A rectangle of a framebuffer, and how it takes colours; with a region, until the draw ends nothing else is written.
   void aim(const FrameTarget& target, const Display& display) const;
   static void place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
+  // All that drawing such a picture into that rectangle needs, but the rectangle.
+  void bind_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
+                   const FrameTarget& target) const;
   void draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
                    const FrameTarget& target) const;
+  // The same by a copy of what is composed. Returns whether it did.
+  bool draw_composed(const Shown& shown, const PictureTextures& picture, const Display& display,
+                     const FrameTarget& target, const TargetFormat& format);
+  void compose(GLuint texture, const std::vector<RowRange>& rows, const Shown& shown, const PictureTextures& picture,
+               const Display& display, const FrameTarget& target) const;
   void draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
                      const Display& display, const FrameTarget& target);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
@@ -155,6 +157,9 @@ class Compositor {
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
+  Composed composed_;
+  std::optional<std::uint32_t> composed_rows_;
+  gl::Fence drawn_;  // the last
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
   struct Small {

@@ -6,6 +6,7 @@
 
 #include "gl/api.hpp"
 #include "render/region.hpp"
+#include "render/row_revisions.hpp"
 #include "render/surface_raster.hpp"
 
 namespace cumulet::render {
@@ -50,6 +51,7 @@ struct PictureTextures {
   GLuint background_before = 0;
   GLuint counts_before = 0;
   std::optional<std::uint64_t> revision{};  // another wherever the sums may be others; without, they always may
+  const RowRevisions* rows = nullptr;       // when rows changed, where that is known
   std::uint64_t picture = 0;                // another with every picture that is begun
   std::uint64_t wish = 0;                   // the same of pictures of the same thing, however coarse
   bool may_lag = false;                   // more samples of it are on their way: those of some frames ago may be drawn

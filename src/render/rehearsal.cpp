@@ -38,8 +38,7 @@ void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarge
   picture.may_lag = false;
   target.wait = Wait::never;
   target.filter_ms = coarse_ms;
-  gl_->Enablei(GL_SCISSOR_TEST, 0);
-  gl_->ScissorIndexed(0, 0, 0, 0, 0);
+  target.is_hidden = true;
   const glm::ivec4 whole = target.viewport;
   const glm::ivec4 same(0, 0, glm::ivec2(picture.size));
   for (const bool holes : {false, true}) {
@@ -51,7 +50,6 @@ void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarge
       lags_ = lags_ || compositor_.lags() || compositor_.denoising();
     }
   }
-  gl_->Disablei(GL_SCISSOR_TEST, 0);
 }
 
 }  // namespace cumulet::render

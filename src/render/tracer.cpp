@@ -30,6 +30,7 @@ constexpr std::uint32_t lanes_in_call = 32 * block_lanes;
 static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_MOST_SQUARES);
 static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
 static_assert(CM_MOST_SQUARES <= 1U << CM_SQUARE_ROWS);
+static_assert(tile_edge <= CM_BAND_ROWS * CM_BANDS);
 constexpr double hasty_rest = 0.03;  // of a tile's pixels
 static_assert(lanes_in_call > hasty_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
 // A shader of llvmpipe's ends its loops where it has gone around them 65,535 times, all of them together, and says
@@ -152,6 +153,11 @@ bool Picture::measures() const {
 bool Picture::awaits_error() const {
   return !done_ && view_ == View::shaded && measures() && !tile_errors_ &&
          std::ranges::all_of(*blocks_, [](const Block& block) { return block.unfinished == 0; });
+}
+
+void Picture::change_all(std::uint64_t revision) {
+  revision_ = revision;
+  rows_->change_all(size_.y, revision);
 }
 
 void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) {
@@ -615,7 +621,9 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.complete_ = false;
   picture.done_ = false;
   picture.begin_tile();
-  picture.begun_ = picture.revision_ = ++revision_;
+  picture.rows_ = std::make_shared<RowRevisions>();
+  picture.change_all(++revision_);
+  picture.begun_ = picture.revision_;
   picture.depth_row_ = 0;
   picture.facts_row_ = picture.facts_rays_ = 0;
   picture.facts_ = PixelFacts::guides;
@@ -631,7 +639,9 @@ void Tracer::clear(Picture& picture) {
   picture.layers_.reset();
   drop_unused_layers();
   picture.parameters_ = {};
-  picture.begun_ = picture.revision_ = ++revision_;
+  picture.rows_ = std::make_shared<RowRevisions>();
+  picture.change_all(++revision_);
+  picture.begun_ = picture.revision_;
   picture.view_ = View::shaded;
   picture.depth_row_ = picture.facts_row_ = picture.facts_rays_ = 0;
   picture.facts_ = PixelFacts::guides;
@@ -644,7 +654,7 @@ void Tracer::set_background(Picture& picture, const glm::vec3& radiance) {
   if (picture.parameters_.lights.sky_radiance == radiance) return;
   empty(picture, radiance, 1);
   picture.parameters_.lights.sky_radiance = radiance;
-  picture.revision_ = ++revision_;
+  picture.change_all(++revision_);
 }
 
 void Tracer::bind(const MarchData& data, const Obstacles& obstacles) const {
@@ -674,6 +684,7 @@ void Tracer::collect() {
       continue;
     }
     learn(what, landed->ms, landed->at_most_ms, landed->words[0].x);
+    what.rows->change(what.first_row, landed->words[0].y, landed->words[0].z, what.revision);
     for (const std::uint32_t block : what.blocks) *what.samples += landed->words[1 + block].w;
     if (log_ != nullptr) {
       const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_lanes;
@@ -745,7 +756,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   if (!shaded) {
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
-    picture.revision_ = ++revision_;
+    picture.change_all(++revision_);
     picture.done_ = picture.complete_ = inspect(picture.box_, parameters, program.cost, picture.view_row_, deadline);
     picture.holes_ = !picture.done_;
     *picture.samples_ = std::uint64_t{picture.box_.size.x} * std::min(picture.view_row_, picture.box_.size.y);
@@ -845,6 +856,10 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   picture.revision_ = ++revision_;
   what.tile = picture.blocks_;
   what.samples = picture.samples_;
+  what.rows = picture.rows_;
+  what.first_row = picture.tile_corner().y;
+  what.revision = picture.revision_;
+  what.rows->expect();
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
   kernels_.set_counters(words);
   if (paths_of_.lock() != picture.blocks_) {
@@ -1277,7 +1292,7 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
     }
   });
   gl::check(*gl_, "restoring the accumulation");
-  picture.revision_ = ++revision_;
+  picture.change_all(++revision_);
   if (pass) {
     std::vector<std::uint8_t> live(squares);
     std::memcpy(live.data(), saved.last(squares).data(), squares);

@@ -176,6 +176,8 @@ class Picture {
   [[nodiscard]] std::uint64_t begun() const { return begun_; }
   /// Another with everything that was sent off to be added to it.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  /// When its rows changed; null where that is not known yet of some.
+  [[nodiscard]] const RowRevisions* rows() const { return rows_->known() ? rows_.get() : nullptr; }
   [[nodiscard]] std::uint64_t bytes() const { return film_.bytes(); }
 
  private:
@@ -189,6 +191,9 @@ class Picture {
   Film film_;
   std::uint64_t begun_ = 0;
   std::uint64_t revision_ = 0;
+  std::shared_ptr<RowRevisions> rows_ = std::make_shared<RowRevisions>();  // dispatches tell it, as samples_
+  // All of it is another.
+  void change_all(std::uint64_t revision);
   bool volume_alone_ = false;
   std::uint32_t light_groups_ = 0;
   std::shared_ptr<const SurfaceLayers> layers_;  // of Tracer::drawn_layers_

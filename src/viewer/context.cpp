@@ -258,6 +258,7 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   textures.picture = picture.begun();
   textures.wish = &picture == progressive_.shown() ? progressive_.shown_wish() : 0;
   textures.revision = picture.revision();
+  textures.rows = picture.rows();
   textures.moments = film.texture(render::film_layers::moments);
   if (picture.view() == render::View::shaded && picture.has_facts()) textures.guides = guides_of(picture);
   if (textures.guides && progressive_.previews()) textures.view = view_of(picture);
