@@ -13,6 +13,7 @@
 #include "base/corners.hpp"
 #include "base/error.hpp"
 #include "light/light_table.hpp"
+#include "scene/origin.hpp"
 #include "scene/space.hpp"
 
 namespace cumulet::render {
@@ -105,7 +106,7 @@ void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Dea
   if (sources.empty()) drop_data();
   update_environment(*snapshot.surroundings, wanted, deadline);
   update_models(snapshot, wanted, deadline);
-  if (!sources.empty()) update_data(sources, snapshot.volumes, wanted, deadline);
+  if (!sources.empty()) update_data(sources, snapshot, wanted, deadline);
   find_present(snapshot);
   update_instances(snapshot, wanted);
   update_lamps(snapshot, wanted);
@@ -125,7 +126,13 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
       present.frame = was->frame;
     }
   }
-  if (present_.empty()) present_ = data_of_;
+  if (present_.empty()) present_ = came_with_data(snapshot);
+}
+
+std::vector<scene::Volume> GpuScene::came_with_data(const scene::Snapshot& snapshot) const {
+  std::vector<scene::Volume> volumes = data_of_;
+  for (scene::Volume& volume : volumes) volume = scene::counted_from(std::move(volume), snapshot.origin - data_origin_);
+  return volumes;
 }
 
 bool GpuScene::models_move() const { return placed_ && !placed_->table().ends.empty(); }
@@ -413,14 +420,14 @@ void GpuScene::drop_data() {
   took_ = {};  // and what it holds in main memory
 }
 
-void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vector<scene::Volume>& volumes,
-                           const Wanted& wanted, Deadline deadline) {
+void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Snapshot& snapshot, const Wanted& wanted,
+                           Deadline deadline) {
   // What is under way goes on to its end, though there may be something newer by now: that is next. Begun anew with
   // each, an upload that takes longer than a build would never end.
   while (upload_ || data_.wants(sources, wanted.settings)) {
     const auto begun = Clock::now();
     if (!upload_) {
-      upload_ = VolumeUnderWay{sources, volumes, wanted.settings, nullptr};
+      upload_ = VolumeUnderWay{sources, snapshot.volumes, snapshot.origin, wanted.settings, nullptr};
       took_ = {sources, 0.0};
     }
     const MarchUpload::Sources of = upload_->of;
@@ -459,7 +466,8 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
       data_.put(of, upload_->work->take());
       grids_.clear_built();
       data_of_ = std::move(upload_->volumes);
-      present_ = data_of_;  // should what follows fail
+      data_origin_ = upload_->origin;
+      present_ = came_with_data(snapshot);  // should what follows fail
       upload_.reset();
       data_revision_.advance();
     } catch (...) {

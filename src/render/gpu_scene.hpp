@@ -118,8 +118,10 @@ class GpuScene {
   void update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted);
   // By the environment that is there, or is to be.
   [[nodiscard]] light::Surroundings sky_surroundings(const scene::Snapshot& snapshot) const;
-  void update_data(const MarchUpload::Sources& sources, const std::vector<scene::Volume>& volumes, const Wanted& wanted,
+  void update_data(const MarchUpload::Sources& sources, const scene::Snapshot& snapshot, const Wanted& wanted,
                    Deadline deadline);
+  // Those that came with the data, from the snapshot's origin.
+  [[nodiscard]] std::vector<scene::Volume> came_with_data(const scene::Snapshot& snapshot) const;
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
@@ -130,11 +132,13 @@ class GpuScene {
   struct VolumeUnderWay {
     MarchUpload::Sources of;
     std::vector<scene::Volume> volumes;  // with those
+    glm::dvec3 origin{0.0};              // that they count from
     std::uint64_t settings = 0;
     std::unique_ptr<MarchUpload> work;
   };
   Slot<MarchData, MarchUpload::Sources> data_;
   std::vector<scene::Volume> data_of_;  // that it came with
+  glm::dvec3 data_origin_{0.0};         // that these count from
   Revision<MarchData> data_revision_;
   std::optional<VolumeUnderWay> upload_;  // of what data will be
   struct Took {

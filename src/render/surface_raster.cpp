@@ -291,10 +291,13 @@ void SurfaceRaster::show(std::vector<RasterItem> items) {
   }
   for (Shown& shown : drawn_) {
     std::vector<glm::dmat4> whole;
+    std::vector<glm::dmat4> own;
     for (const RasterItem& item : items_) {
-      if (!item.shadow_only && item.content == shown.content) whole.push_back(item.to_world);
+      if (item.shadow_only || item.content != shown.content) continue;
+      whole.push_back(item.to_world);
+      own.push_back(surface::from_origin(item.to_world, shown.content->pose()));
     }
-    add_places(shown, whole);
+    add_places(shown, std::move(own));
     for (const std::vector<glm::dmat4>& placings : shown.content->pose().placings) {
       std::vector<glm::dmat4> all;
       for (const glm::dmat4& to_world : whole) {
@@ -462,8 +465,9 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sky_turn = glm::vec4(lighting.sky_turn, lighting.gloss_strength, 0.0F);
   std::vector<surface::PunctualLight> lamps;
   for (const RasterItem& item : items_) {
-    for (const surface::PunctualLight& lamp : item.content->pose().lights)
-      lamps.push_back(scene::placed(lamp, item.to_world));
+    const surface::Pose& pose = item.content->pose();
+    for (const surface::PunctualLight& lamp : pose.lights)
+      lamps.push_back(scene::placed(lamp, surface::from_origin(item.to_world, pose)));
   }
   light::Lamps of_host = lighting.lamps;
   for (light::Lamp& lamp : of_host) {

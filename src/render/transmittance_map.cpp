@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <utility>
 
 #include "base/error.hpp"
@@ -96,7 +97,7 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
     view.eye = middle.x * right + middle.y * up + (middle.z - half.z) * forward;
     next.slices_at = {0.0, 2.0 * half.z};
   } else {
-    view.eye = request.light.position;
+    view.eye = request.light.position - of.origin;
     next.slices_at = distances(view.eye, corners);
   }
   scene::Snapshot seen = snapshot;
@@ -122,6 +123,7 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
     next.made.range = next.slices_at;
     next.made.to_map[3] = glm::dvec4(-view.eye, 1.0);
   }
+  next.made.to_map = glm::translate(next.made.to_map, -of.origin);
   next.of = std::move(of);
   under_way_ = std::move(next);
 }
@@ -151,7 +153,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     newest_ = true;
     return;
   }
-  Of of{request, scene.volumes(), scene.data_revision(), scene.instances_revision()};
+  Of of{request, snapshot.origin, scene.volumes(), scene.data_revision(), scene.instances_revision()};
   for (scene::Volume& volume : of.volumes) {
     volume.source = nullptr;
     volume.frame.reset();

@@ -24,6 +24,7 @@ struct MapLight {
   bool operator==(const MapLight&) const = default;
 };
 
+/// In the world.
 struct MapRequest {
   MapLight light;
   std::uint32_t size = 256;   ///< texels of width and height
@@ -64,6 +65,7 @@ class TransmittanceMap {
   // All that it depends on.
   struct Of {
     MapRequest request;
+    glm::dvec3 origin{0.0};  // of the snapshot's places
     std::vector<scene::Volume> volumes;
     Revision<MarchData> data;
     Revision<InstanceData> instances;

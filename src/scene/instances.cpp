@@ -9,6 +9,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "base/origin.hpp"
 #include "light/alias_table.hpp"
 #include "scene/space.hpp"
 #include "scene/threaded_tree.hpp"
@@ -104,10 +105,8 @@ dvec3 origin_of(std::span<const Instance> instances) {
     low = glm::min(low, block.middle - reach);
     high = glm::max(high, block.middle + reach);
   }
-  if (!(low.x <= high.x)) return dvec3(0.0);  // of nothing
-  // A lattice as wide as the scene.
-  const double step = std::exp2(std::ceil(std::log2(glm::distance(low, high))));
-  return glm::round(0.5 * (low + high) / step) * step + 0.0;  // no -0
+  if (!(low.x <= high.x)) return dvec3(0.0);                // of nothing
+  return origin_near(low, high, glm::distance(low, high));  // as wide as the scene
 }
 
 InstanceTable make_instances(std::span<const Instance> instances, const dvec3& origin) {

@@ -214,7 +214,8 @@ void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vec
 void find_meshes(ModelSource& source) {
   const surface::Scene& scene = *source.scene;
   source.meshes.clear();
-  if (scene.first_prototype_draw() > 0) add_mesh(source, 0, scene.first_prototype_draw(), {glm::dmat4(1.0)}, {});
+  if (scene.first_prototype_draw() > 0)
+    add_mesh(source, 0, scene.first_prototype_draw(), {surface::from_origin(glm::dmat4(1.0), source.pose)}, {});
   for (std::size_t p = 0; p < scene.prototypes.size(); ++p) {
     const surface::Prototype& prototype = scene.prototypes[p];
     add_mesh(source, prototype.first_draw, prototype.first_draw + prototype.draw_count, source.pose.placings[p], p);

@@ -39,7 +39,7 @@ struct ModelMesh {
   surface::Bvh bvh;
   double built_cost = 0.0;               ///< of the tree before it was refitted
   std::vector<glm::dmat4> placings{1};   ///< to the model's own world
-  std::optional<std::size_t> prototype;  ///< of the scene; nothing: it is posed in the model's own world
+  std::optional<std::size_t> prototype;  ///< of the scene; nothing: it counts from the pose's origin
   std::uint32_t nodes = 0;               ///< where each of its tables begins
   std::uint32_t records = 0;
   std::uint32_t triangles = 0;

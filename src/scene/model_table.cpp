@@ -241,7 +241,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
       }
     }
     for (const surface::PunctualLight& light : source.pose.lights) {
-      table.lamps.push_back(placed(light, model.to_world));
+      table.lamps.push_back(placed(light, surface::from_origin(model.to_world, source.pose)));
       table.lamp_groups.push_back(model.group);
     }
   }

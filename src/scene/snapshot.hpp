@@ -29,10 +29,10 @@ struct Medium {
   bool operator==(const Medium&) const = default;
 };
 
-/// What one picture is seen through, all in world space. A ray through (x, y), both -1 to 1, y up:
-/// perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along forward.
-/// forward has length 1 along the view axis (off-axis projections add a share of right and up to it), so that the ray's
-/// parameter is the distance z from the eye's plane.
+/// What one picture is seen through, all in world space (in a snapshot, from its origin). A ray through (x, y), both -1
+/// to 1, y up: perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along
+/// forward. forward has length 1 along the view axis (off-axis projections add a share of right and up to it), so that
+/// the ray's parameter is the distance z from the eye's plane.
 struct Viewpoint {
   glm::dvec3 eye{0.0};  // orthographic: in the near plane, from which z counts
   glm::dvec3 forward{0.0, 0.0, -1.0};
@@ -110,6 +110,7 @@ struct Previous {
 /// All that a picture can show, as it is at one moment. Sources are values that never change: another one is another
 /// pointer. What changes in place is parts.
 struct Snapshot {
+  glm::dvec3 origin{0.0};  ///< world; all places here count from it: scene/origin.hpp
   std::vector<Volume> volumes;
   std::vector<Model> models;  ///< likewise
   Part<light::DistantLights> lights;

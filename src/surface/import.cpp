@@ -15,6 +15,7 @@
 #include "surface/gltf_import.hpp"
 #include "surface/materials.hpp"
 #include "surface/posable_scene.hpp"
+#include "surface/precision.hpp"
 #include "surface/winding.hpp"
 
 namespace cumulet::surface {
@@ -49,6 +50,7 @@ class Assembler {
     count();
     remark();
     scene_->finish();
+    look_at_precision();
     return scene_;
   }
 
@@ -283,6 +285,38 @@ class Assembler {
     if (count > 3) some += " and " + std::to_string(count - 3) + " more";
     log_.warning(name_ + ": much of " + some + " faces into its closed shape, and is not seen from outside: " +
                  "double_sided of the surface settings shows it");
+  }
+
+  /// Whether floats hold the shapes of meshes, where their instances are, and where animations take them.
+  void look_at_precision() {
+    PrecisionRemark remark;
+    double largest = 0.0;
+    for (const MeshPart& part : scene_->parts)
+      largest = std::max(largest, glm::distance(glm::dvec3(part.low), glm::dvec3(part.high)));
+    for (const Placings& of : scene_->placings) {
+      double farthest = 0.0;
+      for (const glm::dmat4& in_node : of.in_node) farthest = std::max(farthest, farthest_coordinate(in_node[3]));
+      remark.add(numbered("node", of.node) + "'s instances", farthest, largest);
+    }
+    for (std::size_t i = 0; i < scene_->rig.tracks.size(); ++i) {
+      double farthest = 0.0;
+      for (const Channel& channel : scene_->rig.tracks[i].channels) {
+        if (channel.property != Property::translation) continue;
+        for (const float value : channel.values) farthest = std::max(farthest, double{std::abs(value)});
+      }
+      remark.add(numbered("animation", i), farthest, largest);
+    }
+    for (std::size_t m = 0; m < parts_of_.size(); ++m) {
+      const std::string called = one_line(file_.model.meshes[m].name);
+      const std::string what = numbered("mesh", m) + (called.empty() ? "" : " (" + called + ")");
+      for (const std::size_t place : parts_of_[m])
+        remark.add(what, scene_->parts[place].low, scene_->parts[place].high);
+    }
+    scene_->precision_remark = remark.text(name_);
+  }
+
+  static double farthest_coordinate(const glm::dvec4& p) {
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   }
 
   void count() {

@@ -33,6 +33,8 @@ struct MeshPart {
   std::uint32_t joint_count = 0;  ///< that a skin must have
   std::vector<MorphTarget> targets;
   std::vector<glm::vec3> velocities;  ///< a second, at rest; empty: none
+  glm::vec3 low{0.0F};                ///< bounds of the positions
+  glm::vec3 high{0.0F};
 };
 
 /// What of a file is not drawn as it was meant, for one line each.

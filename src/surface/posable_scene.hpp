@@ -17,12 +17,14 @@ struct Instance {
   std::uint32_t first_vertex = 0;
   std::int32_t skin = -1;
   bool in_prototype = false;  ///< posed in its node's space
+  glm::dvec3 origin{0.0};     ///< of a prototype, there: its vertices count from it
 };
 
 /// Where a prototype is shown, in the space of its node.
 struct Placings {
   std::uint32_t node = 0;
   std::vector<glm::dmat4> in_node;
+  glm::dvec3 origin{0.0};  ///< there: the vertices count from it
 };
 
 /// A light under a node.
@@ -56,7 +58,15 @@ class PosableScene final : public Scene {
 
  private:
   /// drift: seconds, for which parts have gone by their velocities.
-  [[nodiscard]] Pose pose(double time, std::size_t animation, double drift, const Progress* progress) const;
+  /// origin: nothing: that of this moment.
+  [[nodiscard]] Pose pose(double time, std::size_t animation, double drift, const std::optional<glm::dvec3>& origin,
+                          const Progress* progress) const;
+  /// The moment of an animation that a time means; nothing beside it: there is no such animation.
+  [[nodiscard]] std::pair<double, const Track*> moment(double time, std::size_t animation) const;
+  /// Where vertices are to count from: near the middle of what stands there. 0 of what is near the world's origin.
+  [[nodiscard]] glm::dvec3 origin_of(const Stance& now) const;
+  /// Gives prototypes whose vertices are far from their space's origin one that is near.
+  void find_origins_of_prototypes();
   /// Of what is there.
   void bound(Pose& pose) const;
   /// Materials and lights.
@@ -65,6 +75,10 @@ class PosableScene final : public Scene {
   [[nodiscard]] std::vector<std::vector<glm::dmat4>> place_prototypes(const Stance& now) const;
   /// True if the instance mirrors.
   bool place(const Instance& instance, const Stance& now, double drift, Pose& pose, const Progress* progress) const;
+  /// Of floats near the origin, else of doubles. side: -1 where it mirrors.
+  template <class Matrix>
+  void place_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
+                      const Progress* progress) const;
 };
 
 }  // namespace cumulet::surface::detail

@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "base/corners.hpp"
+#include "base/origin.hpp"
 #include "base/progress_part.hpp"
 #include "surface/posable_scene.hpp"
 
@@ -67,7 +70,33 @@ double looped(double time, double duration) {
   return within < 0.0 ? within + duration : within;
 }
 
-// Whether all is in the same place, as far as a picture would show.
+// World bounds of what is added.
+class Box {
+ public:
+  void add(const glm::dvec3& p) {
+    if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < std::numeric_limits<double>::max())) return;
+    low_ = glm::min(low_, p);
+    high_ = glm::max(high_, p);
+  }
+  void add(const MeshPart& part, const glm::dmat4& to_world) {
+    if (part.positions.empty()) return;
+    for (const glm::dvec3& corner : corners_of(part.low, part.high))
+      add(glm::dvec3(to_world * glm::dvec4(corner, 1.0)));
+  }
+  [[nodiscard]] bool is_empty() const { return !(low_.x <= high_.x); }
+  /// A point near its middle, from which floats hold all of it; of nothing 0. size: that it has at least.
+  [[nodiscard]] glm::dvec3 origin(double size = 0.0) const {
+    if (is_empty()) return glm::dvec3(0.0);
+    size = std::max(size, glm::distance(low_, high_));
+    return size > 0.0 ? far_origin(low_, high_, size) : glm::dvec3(0.0);
+  }
+
+ private:
+  glm::dvec3 low_{std::numeric_limits<double>::infinity()};
+  glm::dvec3 high_{-std::numeric_limits<double>::infinity()};
+};
+
+// Whether all is in the same place, as far as a picture would show. Both count from the same origin.
 bool alike(const Pose& a, const Pose& b) {
   const auto most = static_cast<float>(1e-4 * glm::length(a.high - a.low));
   for (std::size_t i = 0; i < a.vertices.size(); ++i) {
@@ -120,50 +149,82 @@ void PosableScene::finish() {
       }
     }
   }
-  for (const MeshPart& part : parts) {
+  for (MeshPart& part : parts) {
     for (const glm::vec3& p : part.positions) {
       if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1e18F)) malformed("a position is too large");
     }
+    if (part.positions.empty()) continue;
+    part.low = part.high = part.positions.front();
+    for (const glm::vec3& p : part.positions) {
+      part.low = glm::min(part.low, p);
+      part.high = glm::max(part.high, p);
+    }
+  }
+  find_origins_of_prototypes();
+}
+
+void PosableScene::find_origins_of_prototypes() {
+  for (std::size_t p = 0; p < placings.size(); ++p) {
+    Box box;
+    const std::size_t first = prototypes[p].first_draw;
+    const std::size_t last = first + prototypes[p].draw_count;
+    for (std::size_t i = first; i < last; ++i) box.add(parts[instances[i].part], glm::dmat4(1.0));
+    placings[p].origin = box.origin();
+    for (std::size_t i = first; i < last; ++i) instances[i].origin = placings[p].origin;
   }
 }
 
-bool PosableScene::place(const Instance& instance, const Stance& now, double drift, Pose& pose,
-                         const Progress* progress) const {
+glm::dvec3 PosableScene::origin_of(const Stance& now) const {
+  Box box;
+  for (const Instance& instance : instances) {
+    if (instance.in_prototype || !now.visible[instance.node]) continue;
+    const MeshPart& part = parts[instance.part];
+    if (instance.skin < 0) {
+      box.add(part, now.to_world[instance.node]);
+      continue;
+    }
+    const Skin& skin = rig.skins[static_cast<std::size_t>(instance.skin)];
+    for (std::size_t j = 0; j < skin.joints.size(); ++j)
+      box.add(part, now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]));
+  }
+  if (!box.is_empty()) return box.origin();
+  // Lights alone count from it then, and bounds.
+  for (const PlacedLight& light : lights) box.add(glm::dvec3(now.to_world[light.node][3]));
+  for (const Placings& of : placings) {
+    for (const glm::dmat4& in_node : of.in_node) box.add(glm::dvec3((now.to_world[of.node] * in_node)[3]));
+  }
+  return box.origin(1.0);
+}
+
+template <class Matrix>
+void PosableScene::place_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
+                                  const Progress* progress) const {
+  using Number = typename Matrix::value_type;
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];
-  const glm::dmat4 to_world = instance.in_prototype ? glm::dmat4(1.0) : now.to_world[instance.node];
-  std::vector<glm::mat4> joints;
-  bool flipped = false;
+  std::vector<Matrix> joints;
   if (instance.skin >= 0) {
     const Skin& skin = rig.skins[static_cast<std::size_t>(instance.skin)];
-    std::size_t mirrored = 0;
-    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
-      const glm::dmat4 matrix = now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]);
-      if (mirrors(matrix)) ++mirrored;
-      joints.emplace_back(matrix);
-    }
-    flipped = 2 * mirrored > joints.size();
-  } else {
-    flipped = mirrors(to_world);
+    for (std::size_t j = 0; j < skin.joints.size(); ++j)
+      joints.emplace_back(counted_from(now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]), pose.origin));
   }
-  const float side = flipped ? -1.0F : 1.0F;
-  const glm::mat4 rigid(to_world);
+  const Matrix rigid(instance.in_prototype ? counted_from(glm::dmat4(1.0), instance.origin)
+                                           : counted_from(now.to_world[instance.node], pose.origin));
   const glm::mat3 rigid_normals = cofactors(glm::mat3(rigid));
-
   PosedVertex* const vertices = &pose.vertices[instance.first_vertex];
   const auto at = [&](std::size_t v) {
     const Shape shape = morph(part, weights, static_cast<float>(drift), v);
-    glm::mat4 matrix = rigid;
+    Matrix matrix = rigid;
     glm::mat3 for_normals = rigid_normals;
     if (instance.skin >= 0) {
-      matrix = glm::mat4(0.0F);
+      matrix = Matrix(0);
       for (std::size_t i = v * part.influences; i < (v + 1) * part.influences; ++i) {
-        if (part.weights[i] != 0.0F) matrix += part.weights[i] * joints[part.joints[i]];
+        if (part.weights[i] != 0.0F) matrix += Number{part.weights[i]} * joints[part.joints[i]];
       }
       for_normals = cofactors(glm::mat3(matrix));
     }
     PosedVertex& to = vertices[v];
-    to.position = glm::vec3(matrix * glm::vec4(shape.position, 1.0F));
+    to.position = glm::vec3(matrix * glm::vec<4, Number>(shape.position, 1));
     if (!detail::finite(to.position)) to.position = glm::vec3(0.0F);
     const glm::vec3 upright = direction(shape.normal, glm::vec3(0, 1, 0));
     to.normal = direction(side * (for_normals * upright), upright);
@@ -174,7 +235,31 @@ bool PosableScene::place(const Instance& instance, const Stance& now, double dri
     check(progress);
     for (std::size_t v = range.begin(); v != range.end(); ++v) at(v);
   });
+}
 
+bool PosableScene::place(const Instance& instance, const Stance& now, double drift, Pose& pose,
+                         const Progress* progress) const {
+  const MeshPart& part = parts[instance.part];
+  bool flipped = false;
+  if (instance.skin >= 0) {
+    const Skin& skin = rig.skins[static_cast<std::size_t>(instance.skin)];
+    std::size_t mirrored = 0;
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      if (mirrors(now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]))) ++mirrored;
+    }
+    flipped = 2 * mirrored > skin.joints.size();
+  } else {
+    flipped = mirrors(instance.in_prototype ? glm::dmat4(1.0) : now.to_world[instance.node]);
+  }
+  const float side = flipped ? -1.0F : 1.0F;
+  const glm::dvec3& origin = instance.in_prototype ? instance.origin : pose.origin;
+  if (origin == glm::dvec3(0.0)) {
+    place_vertices<glm::mat4>(instance, now, drift, side, pose, progress);
+  } else {
+    place_vertices<glm::dmat4>(instance, now, drift, side, pose, progress);
+  }
+
+  PosedVertex* const vertices = &pose.vertices[instance.first_vertex];
   check(progress);
   if (part.flat) {
     for (std::size_t i = 0; i + 3 <= part.indices.size(); i += 3) {
@@ -222,7 +307,7 @@ std::vector<std::vector<glm::dmat4>> PosableScene::place_prototypes(const Stance
     std::vector<glm::dmat4>& placed = all.emplace_back();
     if (!now.visible[of.node]) continue;
     for (const glm::dmat4& in_node : of.in_node) {
-      const glm::dmat4 to_world = now.to_world[of.node] * in_node;
+      const glm::dmat4 to_world = glm::translate(now.to_world[of.node] * in_node, of.origin);
       const double volume = glm::determinant(glm::dmat3(to_world));
       if (finite(to_world) && std::isnormal(volume)) placed.push_back(to_world);
     }
@@ -263,24 +348,32 @@ void PosableScene::bound(Pose& pose) const {
       for (const glm::dvec3& corner : corners_of(own_low, own_high)) points.emplace_back(corner);
     }
     for (const glm::dmat4& to_world : placed) {
-      for (const glm::vec3& p : points) add(glm::vec3(to_world * glm::dvec4(p, 1.0)));
+      const glm::dmat4 from_origin = counted_from(to_world, pose.origin);
+      for (const glm::vec3& p : points) add(glm::vec3(from_origin * glm::dvec4(p, 1.0)));
     }
   }
   if (!any) return;
-  pose.low = low;
-  pose.high = high;
+  pose.low = pose.origin + glm::dvec3(low);
+  pose.high = pose.origin + glm::dvec3(high);
 }
 
 Pose PosableScene::pose(double time, std::size_t animation, const Progress* progress) const {
-  return pose(time, animation, 0.0, progress);
+  return pose(time, animation, 0.0, std::nullopt, progress);
 }
 
-Pose PosableScene::pose(double time, std::size_t animation, double drift, const Progress* progress) const {
-  const Track* track = animation < rig.tracks.size() ? &rig.tracks[animation] : nullptr;
-  if (track != nullptr) time = looped(time, track->duration);
-  const Stance now = stance(rig, track, time);
+std::pair<double, const Track*> PosableScene::moment(double time, std::size_t animation) const {
+  if (animation >= rig.tracks.size()) return {time, nullptr};
+  const Track& track = rig.tracks[animation];
+  return {looped(time, track.duration), &track};
+}
+
+Pose PosableScene::pose(double time, std::size_t animation, double drift, const std::optional<glm::dvec3>& origin,
+                        const Progress* progress) const {
+  const auto [at, track] = moment(time, animation);
+  const Stance now = stance(rig, track, at);
   Pose result;
-  result.time = time;
+  result.time = at;
+  result.origin = origin.value_or(origin_of(now));
   resize(result.vertices, attributes.size(), progress);
   for (const Instance& instance : instances) {
     check(progress);
@@ -291,13 +384,13 @@ Pose PosableScene::pose(double time, std::size_t animation, double drift, const 
   result.placings = place_prototypes(now);
   bound(result);
   std::vector<PlacedLight> lights_now = lights;
-  if (track != nullptr) move(*track, time, result, lights_now);
+  if (track != nullptr) move(*track, at, result, lights_now);
   for (const PlacedLight& light : lights_now) {
     if (!now.visible[light.node]) continue;
     const glm::dmat4& to_world = now.to_world[light.node];
     result.lights.push_back(light.at_rest.now);
     result.lights.back().inner_cone = std::min(result.lights.back().inner_cone, result.lights.back().outer_cone);
-    result.lights.back().position = glm::vec3(to_world[3]);
+    result.lights.back().position = glm::vec3(glm::dvec3(to_world[3]) - result.origin);
     if (!detail::finite(result.lights.back().position)) result.lights.back().position = glm::vec3(0.0F);
     result.lights.back().direction = direction(-glm::vec3(to_world[2]), glm::vec3(0, 0, -1));
   }
@@ -319,18 +412,20 @@ std::optional<PoseEnds> PosableScene::pose_ends(double time, std::size_t animati
   const double half = 0.5 * seconds;
   double open = time - half;
   double close = time + half;
+  const auto [at, track] = moment(time, animation);
+  const glm::dvec3 origin = origin_of(stance(rig, track, at));
   if (animation < rig.tracks.size()) {
     const double duration = rig.tracks[animation].duration;
-    const double moment = looped(time, duration);
-    open = moment - half;
-    close = moment + half;
+    open = at - half;
+    close = at + half;
     const bool leaves = open < 0.0 || close > duration;
-    if (leaves && !(seconds < duration && alike(pose(0.0, animation, progress), pose(duration, animation, progress)))) {
+    if (leaves && !(seconds < duration && alike(pose(0.0, animation, 0.0, origin, progress),
+                                                pose(duration, animation, 0.0, origin, progress)))) {
       open = std::max(open, 0.0);
       close = std::min(close, duration);
     }
   }
-  return PoseEnds{pose(open, animation, -half, progress), pose(close, animation, half, progress)};
+  return PoseEnds{pose(open, animation, -half, origin, progress), pose(close, animation, half, origin, progress)};
 }
 
 }  // namespace cumulet::surface::detail

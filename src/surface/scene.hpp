@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -118,7 +119,7 @@ struct PunctualLight {
   float range = 0.0F;         ///< 0: no limit
   float inner_cone = 0.0F;    ///< radians
   float outer_cone = 0.785398F;
-  glm::vec3 position{0.0F};       ///< world
+  glm::vec3 position{0.0F};       ///< world; of a pose, from its origin
   glm::vec3 direction{0, 0, -1};  ///< world, where it shines, unit
 };
 
@@ -155,7 +156,7 @@ struct VertexAttributes {
   glm::vec4 color{1.0F};  ///< linear
 };
 
-/// What moves, in world space, or in its prototype's.
+/// What moves, in world space, counted from the pose's origin, or in its prototype's space.
 struct PosedVertex {
   glm::vec3 position;
   glm::vec3 normal;         ///< unit
@@ -166,6 +167,7 @@ struct PosedVertex {
 /// Everything in it is finite.
 struct Pose {
   double time = 0.0;
+  glm::dvec3 origin{0.0};             ///< world; vertices and lights count from it, so that floats hold them far away
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
   std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
   std::vector<std::uint8_t> hidden;   ///< a Draw each: 1 where it is not there at this time; empty: none
@@ -176,9 +178,14 @@ struct Pose {
   bool double_sided = false;  ///< all materials count as double sided, whatever they say
   std::vector<PunctualLight> lights;
   std::vector<SceneCamera> cameras;
-  glm::dvec3 low{0.0};  ///< bounds of all triangles that are there
+  glm::dvec3 low{0.0};  ///< world bounds of all triangles that are there
   glm::dvec3 high{0.0};
 };
+
+/// To a model's surroundings, of what its pose has in the world.
+inline glm::dmat4 from_origin(const glm::dmat4& to_world, const Pose& pose) {
+  return to_world * glm::translate(glm::dmat4(1.0), pose.origin);
+}
 
 /// As the shutter opens, and as it closes.
 struct PoseEnds {
@@ -220,6 +227,7 @@ class Scene {
     std::uint32_t textures = 0;
   };
   Counts counts;
+  std::string precision_remark;  ///< one line, on numbers that are too far from 0 for their floats; empty: none are
 
   [[nodiscard]] std::size_t triangle_count() const { return indices.size() / 3; }
   /// Of a prototype's as many as it has placings.
@@ -238,7 +246,8 @@ class Scene {
   [[nodiscard]] virtual bool may_move(std::size_t /*animation*/) const { return false; }
   /// Half of `seconds` before that moment of the animation, and half after it. Past its end it goes on at its beginning
   /// where it is there as it was at the end, and else stops, so that nothing sweeps from the last pose to the first.
-  /// Nothing where it stands still. Cancelled, throws Error(cancelled).
+  /// Nothing where it stands still. Both count from the origin of pose() at that moment. Cancelled, throws
+  /// Error(cancelled).
   [[nodiscard]] virtual std::optional<PoseEnds> pose_ends(double /*time*/, std::size_t /*animation*/,
                                                           double /*seconds*/,
                                                           const Progress* /*progress*/ = nullptr) const {

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "surface/posable_scene.hpp"
+#include "surface/precision.hpp"
 
 namespace cumulet::surface {
 
@@ -104,6 +105,10 @@ ScenePtr import_triangles(std::span<const TriangleMesh> meshes, const std::strin
     scene->counts = {count, count, count, 0};
     if (scene->materials.empty()) scene->materials.emplace_back();
     scene->finish();
+    detail::PrecisionRemark remark;
+    for (std::size_t i = 0; i < scene->parts.size(); ++i)
+      remark.add(detail::numbered("mesh", i), scene->parts[i].low, scene->parts[i].high);
+    scene->precision_remark = remark.text(name);
     return scene;
   } catch (const Error& error) {
     throw Error(ErrorCode::invalid_argument, cumulet::one_line(what + ": " + error.what()));

@@ -80,7 +80,7 @@ void put_before(const render::Display& display, const render::Picture& picture, 
   }
 }
 
-// What of the models a ray has met at the pick's position.
+// What of the models a ray has met at the pick's position, which counts from the snapshot's origin.
 void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle, const dvec3& ray) {
   const scene::ModelTable& table = models.table();
   const std::size_t record = table.record_of(triangle);
@@ -133,6 +133,7 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   pick.position = origin + z * ray;
   pick.distance = z * glm::length(ray);
   if (picked.triangle) meet(pick, *scene_.models(), *picked.triangle, ray);
+  pick.position += shot.scene->origin;
   if (!picked.place) return pick;
   // The places of one volume lie together.
   const std::vector<scene::Volume>& volumes = scene_.volumes();

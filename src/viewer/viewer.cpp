@@ -1,9 +1,12 @@
 #include "viewer/viewer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "base/callback_scope.hpp"
@@ -12,6 +15,7 @@
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
 #include "scene/model_table.hpp"
+#include "scene/origin.hpp"
 #include "scene/space.hpp"
 #include "viewer/cell_budget.hpp"
 
@@ -30,6 +34,12 @@ constexpr std::size_t most_vertices = std::size_t{1} << 24U;
 bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
 
 Bounds both(const Bounds& a, const Bounds& b) { return {glm::min(a.min, b.min), glm::max(a.max, b.max)}; }
+
+// Of all of these; nothing of none.
+std::optional<Bounds> box_of(const std::vector<Bounds>& boxes) {
+  if (boxes.empty()) return std::nullopt;
+  return std::accumulate(boxes.begin() + 1, boxes.end(), boxes.front(), both);
+}
 
 scene::Emission emission_of(const Medium& medium, const Ramps& ramps) {
   scene::Emission emission = medium.field_emission;
@@ -1268,7 +1278,8 @@ void Viewer::set_light(const Light& light) {
 }
 
 void Viewer::set_lamps(light::Lamps lamps) {
-  scene_.lamps.set(std::move(lamps));
+  lamps_ = std::move(lamps);
+  lamps_due_ = true;
   touch();
 }
 
@@ -1416,21 +1427,63 @@ Bounds Viewer::bounds_of(const VolumeFacts& volume) const {
   return all;
 }
 
-std::optional<Bounds> Viewer::box() const {
-  std::optional<Bounds> box;
-  if (const VolumeFactsPtr& facts = seen_facts(); facts && !facts->empty) box = bounds_of(*facts);
-  const auto add = [&](const Bounds& other) { box = box ? both(*box, other) : other; };
+std::vector<Bounds> Viewer::boxes() const {
+  std::vector<Bounds> boxes;
+  if (const VolumeFactsPtr& facts = seen_facts(); facts && !facts->empty) {
+    for (const scene::Place& place : places_) boxes.push_back(facts->bounds(place.to_world));
+  }
   for (const Shown& shown : shown_) {
-    if (shown.is_there() && !shown.facts()->empty) add(shown.facts()->bounds(shown.settings.to_world));
+    if (shown.is_there() && !shown.facts()->empty) boxes.push_back(shown.facts()->bounds(shown.settings.to_world));
   }
   if (model_source_ && model_source_->scene->triangle_count() > 0)
-    add({model_source_->pose.low, model_source_->pose.high});
+    boxes.push_back({model_source_->pose.low, model_source_->pose.high});
   for (const ShownModel& shown : shown_models_) {
     if (!shown.is_shown()) continue;
     const scene::ModelBounds bounds = scene::bounds_of(*shown.source, shown.settings.to_world);
-    if (bounds.any) add({bounds.low, bounds.high});
+    if (bounds.any) boxes.push_back({bounds.low, bounds.high});
   }
-  return box;
+  return boxes;
+}
+
+std::optional<Bounds> Viewer::box() const { return box_of(boxes()); }
+
+dvec3 Viewer::scene_origin(const std::vector<Bounds>& boxes, const std::optional<scene::Ground>& ground) const {
+  std::vector<scene::Extent> things;
+  things.reserve(boxes.size());
+  for (const Bounds& bounds : boxes) things.push_back({bounds.min, bounds.max});
+  if (!view_) return scene::origin_of_scene(things, std::nullopt);
+  if (things.empty() && ground) {
+    const dvec3 below(view_->eye.x, ground->height, view_->eye.z);
+    things.push_back({below, below});
+  }
+  return scene::origin_of_scene(things, view_->eye);
+}
+
+void Viewer::remark_on_precision() {
+  for (const scene::Model& model : scene_.models) {
+    const surface::ScenePtr& scene = model.source->scene;
+    if (scene->precision_remark.empty()) continue;
+    std::erase_if(remarked_scenes_, [](const auto& remarked) { return remarked.expired(); });
+    const auto is = [&](const auto& remarked) { return remarked.lock() == scene; };
+    if (std::ranges::any_of(remarked_scenes_, is)) continue;
+    remarked_scenes_.emplace_back(scene);
+    log_.warning(scene->precision_remark);
+  }
+}
+
+void Viewer::count_from(const dvec3& origin) {
+  if (lamps_due_ || scene_.origin != origin) scene_.lamps.set(scene::counted_from(lamps_, origin));
+  lamps_due_ = false;
+  scene_.origin = origin;
+  for (scene::Volume& volume : scene_.volumes) {
+    const bool is_nothing = volume.id == 0 && built_.volume && built_.volume == empty_volume_;
+    if (!is_nothing) {
+      volume = scene::counted_from(std::move(volume), origin);
+    } else if (origin != dvec3(0.0)) {
+      // What surfaces alone are in: about the origin, wherever it was made.
+      volume.place = {glm::translate(glm::dmat4(1.0), -dvec3(empty_volume_->volume().index_to_world[3]))};
+    }
+  }
 }
 
 bool Viewer::shows_models() const { return model_source_ || std::ranges::any_of(shown_models_, &ShownModel::is_shown); }
@@ -1439,8 +1492,7 @@ bool Viewer::shows_triangles() const {
   return std::ranges::any_of(models(), [](const scene::Model& m) { return m.source->scene->triangle_count() > 0; });
 }
 
-std::optional<scene::Ground> Viewer::ground() const {
-  const auto all = box();
+std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
   // One at a height is there whatever else is: a sequence's frame may be empty.
   if (ground_.place == GroundPlace::none || (ground_.place == GroundPlace::below && !all)) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
@@ -1541,7 +1593,10 @@ VolumeAssetPtr Viewer::empty_volume() {
     empty.name = "nothing";
     empty.bounds_max = glm::ivec3(0);
     const auto all = box();
-    empty.index_to_world[3] = glm::dvec4(all ? 0.5 * (all->min + all->max) : dvec3(0.0), 1.0);
+    const dvec3 middle = all ? 0.5 * (all->min + all->max) : dvec3(0.0);
+    // Far away it stands about the scene's origin: count_from.
+    const bool near = !all || scene::origin_of_scene(std::array{scene::Extent{all->min, all->max}}, {}) == dvec3(0.0);
+    empty.index_to_world[3] = glm::dvec4(near ? middle : dvec3(0.0), 1.0);
     empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));
   }
   return empty_volume_;
@@ -1611,14 +1666,22 @@ void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const
 
 scene::SnapshotPtr Viewer::snapshot() {
   show_volumes();
+  const std::vector<Bounds> boxes = this->boxes();
+  const std::optional<scene::Ground> ground = this->ground(box_of(boxes));
+  const dvec3 origin = scene_origin(boxes, ground);
+  count_from(origin);
   scene_.models = models();
-  scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);
-  scene_.previous.set(
-      {previous_view_ ? std::optional<scene::Viewpoint>(*previous_view_) : std::nullopt, previous_seconds_});
-  scene_.view_ends.set(view_ && sampling_.shutter_seconds > 0.0
-                           ? camera_->ends(double(frame_size_.x) / frame_size_.y, *view_)
-                           : std::nullopt);
-  scene_.ground.set(ground());
+  for (scene::Model& model : scene_.models) model = scene::counted_from(std::move(model), origin);
+  remark_on_precision();
+  const auto seen = [&](const std::optional<ViewFrame>& view) {
+    return scene::counted_from(view ? std::optional<scene::Viewpoint>(*view) : std::nullopt, origin);
+  };
+  scene_.view.set(seen(view_));
+  scene_.previous.set({seen(previous_view_), previous_seconds_});
+  const bool lasts = view_ && sampling_.shutter_seconds > 0.0;
+  scene_.view_ends.set(
+      scene::counted_from(lasts ? camera_->ends(double(frame_size_.x) / frame_size_.y, *view_) : std::nullopt, origin));
+  scene_.ground.set(scene::counted_from(ground, origin));
   if (!snapshot_ || *snapshot_ != scene_) snapshot_ = std::make_shared<const scene::Snapshot>(scene_);
   return snapshot_;
 }

@@ -491,9 +491,19 @@ class Viewer {
   scene::SnapshotPtr snapshot();
   Shot shot();
   [[nodiscard]] std::optional<Bounds> box() const;
+  // World bounds of each thing that is shown.
+  [[nodiscard]] std::vector<Bounds> boxes() const;
+  // Where the scene counts from.
+  [[nodiscard]] glm::dvec3 scene_origin(const std::vector<Bounds>& boxes,
+                                        const std::optional<scene::Ground>& ground) const;
+  // Warns once of each scene whose numbers lack precision.
+  void remark_on_precision();
+  // The snapshot's volumes and lamps from there.
+  void count_from(const glm::dvec3& origin);
   [[nodiscard]] bool shows_triangles() const;
   [[nodiscard]] bool shows_models() const;
-  [[nodiscard]] std::optional<scene::Ground> ground() const;
+  // all: box().
+  [[nodiscard]] std::optional<scene::Ground> ground(const std::optional<Bounds>& all) const;
   /// What cameras fit; good for as long as nothing changes.
   [[nodiscard]] std::optional<Subject> subject() const;
   [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
@@ -537,11 +547,14 @@ class Viewer {
   Built built_;                                     // newest, and what is uploaded again in a new context
   scene::Snapshot scene_;                           // as it is now: of it snapshots are made
   scene::SnapshotPtr snapshot_;                     // the newest
-  std::vector<scene::Place> places_{1};             // of the volume; one at least
-  scene::Part<scene::Medium> shown_medium_;         // its own
-  std::vector<Shown> shown_;                        // in the order in which they were added
-  std::vector<ShownModel> shown_models_;            // likewise
-  std::uint64_t posed_ = 0;                         // of poses_, when it was last looked at
+  light::Lamps lamps_;                              // the host's
+  bool lamps_due_ = false;                          // the snapshot has others
+  std::vector<std::weak_ptr<const surface::Scene>> remarked_scenes_;
+  std::vector<scene::Place> places_{1};            // of the volume; one at least
+  scene::Part<scene::Medium> shown_medium_;        // its own
+  std::vector<Shown> shown_;                       // in the order in which they were added
+  std::vector<ShownModel> shown_models_;           // likewise
+  std::uint64_t posed_ = 0;                        // of poses_, when it was last looked at
   std::uint64_t last_id_ = 0;
   std::uint64_t shelved_ = 0;    // of shelf_, when it was last looked at
   bool poses_due_ = false;       // what is wished of poses_ is to be told anew

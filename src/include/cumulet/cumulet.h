@@ -110,6 +110,12 @@
  *     1 / world unit. Radiance and irradiance are linear Rec. 709 RGB in any consistent unit. Matrices are 16 doubles,
  *     column-major, for column vectors, as OpenGL takes them. Sizes and positions on screen are physical pixels;
  *     pixel (0, 0) is the top left, and positions are of a pixel's top left corner.
+ *
+ *     Places are doubles and may be anywhere within 1e12 of the origin: a scene in map or earth-centered coordinates
+ *     looks as it does at the origin. The viewer subtracts a scene origin, in double precision, before anything becomes
+ *     a float. Where a scene is much wider than what the camera is near to, that origin follows the camera. Floats that
+ *     a host or a file stores far from 0 have lost precision before: keep such offsets in matrices and in nodes'
+ *     translations. A warning in the log reports vertices that are rounded by 1/4096 of their mesh's size or more.
  */
 #ifndef CUMULET_CUMULET_H
 #define CUMULET_CUMULET_H
@@ -734,7 +740,7 @@ CUMULET_API cumulet_status cumulet_surfaces_from_memory(const void* bytes, size_
 /* Triangles of one material (glTF's metallic-roughness model). */
 typedef struct cumulet_mesh_desc {
   size_t struct_size;     /* of all meshes of an array the same: the distance between them */
-  const float* positions; /* 3 a vertex */
+  const float* positions; /* 3 a vertex; near 0: an offset that is much larger than the mesh belongs in to_world */
   const float* normals;   /* 3 a vertex, of any length; NULL: flat, each triangle's own */
   const float* colors;    /* 4 a vertex, each in [0, 1], linear, times base_color; NULL: white */
   uint64_t vertex_count;
@@ -2068,7 +2074,8 @@ typedef struct cumulet_transmittance_map {
   uint32_t slices;
   int32_t more;         /* 1: it is not of the newest scene yet, or coarser than asked for: call again */
   double to_map[16];    /* column by column, as OpenGL has matrices; affine. Of parallel light: world to texture
-                           coordinates. Of a point: world to the vector from it, in world units */
+                           coordinates. Of a point: world to the vector from it, in world units. Far from the
+                           origin, multiply it by your own matrix to the world in double precision, not in the shader */
   double near_distance; /* of a point: how far from it the middles of the first and the last slice are; else 0 */
   double far_distance;
 } cumulet_transmittance_map;

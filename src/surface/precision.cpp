@@ -1,0 +1,58 @@
+#include "surface/precision.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "base/one_line.hpp"
+
+namespace cumulet::surface::detail {
+
+namespace {
+
+// Three digits, whatever the locale.
+std::string digits(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3).ptr;
+  return {text.data(), end};
+}
+
+}  // namespace
+
+std::optional<Rounding> visible_rounding(float farthest, double size) {
+  constexpr float infinite = std::numeric_limits<float>::infinity();
+  const double error = 0.5 * (double{std::nextafter(farthest, infinite)} - double{farthest});
+  // A point may be one on purpose, but not where floats are a thousandth apart.
+  constexpr double least_error = 5e-4;
+  constexpr double visible = 1.0 / 4096.0;
+  if (size > 0.0 ? error < visible * size : error < least_error) return std::nullopt;
+  return Rounding{farthest, error, size};
+}
+
+void PrecisionRemark::add(const std::string& what, const glm::vec3& low, const glm::vec3& high) {
+  const glm::vec3 most = glm::max(glm::abs(low), glm::abs(high));
+  add(what, std::max({most.x, most.y, most.z}), glm::distance(glm::dvec3(low), glm::dvec3(high)));
+}
+
+void PrecisionRemark::add(const std::string& what, double farthest, double size) {
+  const std::optional<Rounding> rounding = visible_rounding(static_cast<float>(farthest), size);
+  if (!rounding) return;
+  ++count_;
+  if (count_ > 1 && rounding->part() <= worst_.part()) return;
+  what_ = what;
+  worst_ = *rounding;
+}
+
+std::string PrecisionRemark::text(const std::string& name) const {
+  if (count_ == 0) return {};
+  const std::string more = count_ == 1 ? "" : ", and those of " + std::to_string(count_ - 1) + " more,";
+  const std::string size =
+      worst_.size > 0.0 ? ", " + digits(100.0 * worst_.part()) + " % of its size" : ", more than its size";
+  return cumulet::one_line(name, 4096) + ": the positions of " + what_ + more + " lose precision: they reach " +
+         digits(worst_.farthest) + ", where 32-bit floats are rounded by up to " + digits(worst_.error) + size +
+         ". A node's translation holds such an offset exactly";
+}
+
+}  // namespace cumulet::surface::detail
