@@ -29,6 +29,7 @@ void cm_add_to_layer(uvec2 at, uint layer, vec3 radiance) {
 
 // Before cm_finish.
 void cm_finish_groups(CmPath p, uvec2 at) {
+  if (!cm_is_sound(p)) return;
   uint count = cm.integrator.groups;
   // What the surface pass has drawn is of no light alone.
   if (p.bounces == 0u && p.at_layer != 0u) cm_add_to_group(0u, p.light);

@@ -30,9 +30,20 @@ void cm_finish_groups(CmPath p, uvec2 at);
 #include "equiangular.glsl"
 #endif
 
+// Whether a film can hold the sample's light: it is finite, and sums of a hundred thousand of its kind are.
+CM_FN bool cm_is_sound(CmPath p) {
+  const float most = 1e33f;
+  return cm_is_within(p.radiance, most) && (p.bounces > 0u || cm_is_within(p.light, most));
+}
+
 // A sample is done: what is in front of the background, and the background itself, apart, for pictures over what a host
-// has drawn.
+// has drawn. One whose light is not sound is black, and counted.
 CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
+  if (!cm_is_sound(p)) {
+    p.radiance = vec3(0.0f, 0.0f, 0.0f);
+    p.light = vec3(0.0f, 0.0f, 0.0f);
+    pixel.unsound += 1u;
+  }
   bool covers = p.bounces > 0u || p.at_layer != 0u;
   vec3 background = covers ? vec3(0.0f, 0.0f, 0.0f) : p.light;
   // Of what met nothing, too: the medium's own light in front of the background.
@@ -44,7 +55,7 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
   float share = 1.0f / float(pixel.samples);
   pixel.background += share * (background - pixel.background);
   float luminance = cm_luminance(p.radiance + background);
-  pixel.square += share * (luminance * luminance - pixel.square);
+  pixel.square += share * (min(luminance * luminance, 1e37f) - pixel.square);
   p.stage = pixel.samples >= cm.dispatch.samples ? CM_STAGE_DONE : CM_STAGE_CAMERA;
 }
 

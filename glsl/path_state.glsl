@@ -161,6 +161,7 @@ struct CmPixel {
   float square;     // mean of squared luminance, of both together
   uint samples;     // finished
   uint steps;       // cells marched, of all of them
+  uint unsound;     // of those that are added now: whose light no film can hold
 };
 
 #endif

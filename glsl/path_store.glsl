@@ -8,7 +8,7 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;  // x: rounds that lanes marched: full ones, or visits of trace_travel.comp; y, z: a bit for each band of
-                   // the tile's rows that has changed
+                   // the tile's rows that has changed; w: samples whose light was not finite
   uvec4 cm_blocks[CM_MOST_BLOCKS];    // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block its
                                       // lanes that have a pixel, those whose pixel has no sample, and the samples
                                       // that they finished in this dispatch

@@ -25,11 +25,15 @@ CmPixel cm_load_pixel(uvec2 at) {
   pixel.square = imageLoad(cm_moments, texel).x;
   pixel.samples = counts.x;
   pixel.steps = counts.y;
+  pixel.unsound = 0u;
   return pixel;
 }
 
 void cm_store_pixel(CmPixel pixel, uvec2 at) {
   ivec2 texel = ivec2(at);
+#ifdef CM_PATH_STORE_GLSL
+  if (pixel.unsound != 0u) atomicAdd(cm_total.w, pixel.unsound);
+#endif
   imageStore(cm_sum, texel, pixel.sum);
 #if CM_AOVS
   imageStore(cm_volume_sum, texel, pixel.volume);

@@ -392,6 +392,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   passes["inspect"] = stats.pass_seconds_inspect;
   passes["display"] = stats.pass_seconds_display;
   json["samples"] = stats.samples;
+  json["nonfinite_samples"] = stats.nonfinite_samples;
   if (options.scene.sampling.view == CUMULET_VIEW_SHADED)
     json["noise"] = std::isfinite(stats.noise) ? Json(stats.noise) : Json();  // null: unknown
   if (stats.trace_seconds > 0.0) json["samples_per_second"] = static_cast<double>(stats.samples) / stats.trace_seconds;

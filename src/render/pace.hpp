@@ -81,11 +81,17 @@ struct SquareError {
 /// A tile's, row by row; empty until they are known.
 using SquareErrors = std::vector<SquareError>;
 
+/// Samples that are known to be finished, and those of them whose light was not finite, which count as black.
+struct SampleCount {
+  std::uint64_t finished = 0;
+  std::uint64_t not_finite = 0;
+};
+
 /// What was dispatched, and what it was thought to take.
 struct Dispatched {
   std::shared_ptr<Blocks> tile;            // that it is of
   std::shared_ptr<SquareErrors> errors;    // of the tile, which it finds, and no samples
-  std::shared_ptr<std::uint64_t> samples;  // of the picture
+  std::shared_ptr<SampleCount> samples;    // of the picture
   std::shared_ptr<RowRevisions> rows;      // likewise
   std::uint32_t first_row = 0;             // of the tile, in the picture
   std::uint64_t revision = 0;              // the picture's, with it

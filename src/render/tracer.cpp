@@ -187,7 +187,7 @@ void Picture::go_on_from(const Accumulated& told, std::optional<std::uint32_t> p
   tile_ = 0;
   errors_.clear();
   noise_.reset();
-  samples_ = std::make_shared<std::uint64_t>(told.all);
+  samples_ = std::make_shared<SampleCount>(SampleCount{told.all});
   progress_before_ = 0.0;
   samples_before_ = 0;
   expected_samples_ = allotment_.expected(target_samples_);
@@ -616,7 +616,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.progress_before_ = 0.0;
   picture.samples_before_ = 0;
   picture.expected_samples_ = picture.allotment_.expected(samples);
-  picture.samples_ = std::make_shared<std::uint64_t>(0);
+  picture.samples_ = std::make_shared<SampleCount>();
   picture.view_row_ = 0;
   picture.complete_ = false;
   picture.done_ = false;
@@ -685,7 +685,8 @@ void Tracer::collect() {
     }
     learn(what, landed->ms, landed->at_most_ms, landed->words[0].x);
     what.rows->change(what.first_row, landed->words[0].y, landed->words[0].z, what.revision);
-    for (const std::uint32_t block : what.blocks) *what.samples += landed->words[1 + block].w;
+    for (const std::uint32_t block : what.blocks) what.samples->finished += landed->words[1 + block].w;
+    what.samples->not_finite += landed->words[0].w;
     if (log_ != nullptr) {
       const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_lanes;
       log_->push_back(
@@ -759,7 +760,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
     picture.change_all(++revision_);
     picture.done_ = picture.complete_ = inspect(picture.box_, parameters, program.cost, picture.view_row_, deadline);
     picture.holes_ = !picture.done_;
-    *picture.samples_ = std::uint64_t{picture.box_.size.x} * std::min(picture.view_row_, picture.box_.size.y);
+    picture.samples_->finished = std::uint64_t{picture.box_.size.x} * std::min(picture.view_row_, picture.box_.size.y);
     return picture.done_;
   }
   std::optional<StagePrograms> stages;

@@ -153,7 +153,9 @@ class Picture {
   [[nodiscard]] bool has_holes() const { return holes_; }
   [[nodiscard]] double progress() const;
   /// Camera paths that are known to be finished.
-  [[nodiscard]] std::uint64_t samples() const { return samples_ ? *samples_ : 0; }
+  [[nodiscard]] std::uint64_t samples() const { return samples_ ? samples_->finished : 0; }
+  /// Those of them whose light was not finite: they count as black.
+  [[nodiscard]] std::uint64_t samples_not_finite() const { return samples_ ? samples_->not_finite : 0; }
   /// Their mean, rounded down.
   [[nodiscard]] std::uint64_t samples_a_pixel() const;
   /// The surface pass that camera rays ended at. Not where layered is no.
@@ -236,8 +238,8 @@ class Picture {
   std::shared_ptr<Blocks> blocks_;  // of the tile and pass under way
   std::size_t block_ = 0;           // where the next dispatch looks for some
   std::uint32_t pass_target_ = 1;
-  std::shared_ptr<std::uint64_t> samples_;  // dispatches count them, even for a picture begun anew meanwhile
-  std::uint32_t view_row_ = 0;              // a debug view is made by rows
+  std::shared_ptr<SampleCount> samples_;  // dispatches count them, even for a picture begun anew meanwhile
+  std::uint32_t view_row_ = 0;            // a debug view is made by rows
   bool hasty_ = false;
   std::optional<double> noise_target_;
   bool motion_ = false;  // something moves while the shutter is open

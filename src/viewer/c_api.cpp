@@ -771,6 +771,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.samples = had.samples;
     s.steps = had.steps;
     s.noise = had.noise.value_or(unknown_noise);
+    s.nonfinite_samples = had.samples_not_finite;
     if (const auto facts = v.facts()) {
       const core::Bounds bounds = v.bounds_of(*facts);
       for (int axis = 0; axis < 3; ++axis) {

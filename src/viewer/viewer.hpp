@@ -45,6 +45,7 @@ struct Stats {
   double trace_seconds = 0.0;
   render::PassSeconds pass_seconds;
   std::uint64_t samples = 0;
+  std::uint64_t samples_not_finite = 0;
   std::uint64_t steps = 0;
   std::optional<double> noise;  // unknown: nothing
   GlStrings strings;
@@ -498,6 +499,8 @@ class Viewer {
                                         const std::optional<scene::Ground>& ground) const;
   // Warns once of each scene whose numbers lack precision.
   void remark_on_precision();
+  // Warns of samples that were not finite: once a picture, or once at all where previews are on.
+  void remark_on_samples(Context& g);
   // The snapshot's volumes and lamps from there.
   void count_from(const glm::dvec3& origin);
   [[nodiscard]] bool shows_triangles() const;
@@ -550,6 +553,7 @@ class Viewer {
   light::Lamps lamps_;                              // the host's
   bool lamps_due_ = false;                          // the snapshot has others
   std::vector<std::weak_ptr<const surface::Scene>> remarked_scenes_;
+  std::optional<std::uint64_t> remarked_picture_;  // the last whose samples were warned of
   std::vector<scene::Place> places_{1};            // of the volume; one at least
   scene::Part<scene::Medium> shown_medium_;        // its own
   std::vector<Shown> shown_;                       // in the order in which they were added

@@ -228,6 +228,16 @@ bool Viewer::something_waits() const {
          std::ranges::any_of(watching_, waits);
 }
 
+void Viewer::remark_on_samples(Context& g) {
+  const render::Picture* picture = g.progressive().newest();
+  const std::uint64_t count = picture != nullptr ? picture->samples_not_finite() : 0;
+  if (count == 0 || (remarked_picture_ && (sampling_.preview || remarked_picture_ == picture->begun()))) return;
+  remarked_picture_ = picture->begun();
+  log_.warning("the light of " + std::to_string(count) +
+               " samples of the picture so far was not finite: they count as black (nonfinite_samples of the "
+               "statistics counts them)");
+}
+
 FrameResult Viewer::render(const Frame& frame) {
   const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
@@ -270,6 +280,7 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: surfaces alone", [&] { g.draw_surfaces_alone(shot, frame); });
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
+    remark_on_samples(g);
     // Wishes before the first frame did not know what pictures take.
     if (!gl_beside_volumes_ && most_gl_bytes_ != Allowance::no_limit) wishes_due_ = wishes_due_ || !shown_.empty();
     gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
@@ -717,6 +728,7 @@ Stats Viewer::stats() {
     s.pass_seconds = gl_->pass_seconds();
     const render::Picture* picture = gl_->progressive().newest();
     s.samples = picture != nullptr ? picture->samples() : 0;
+    s.samples_not_finite = picture != nullptr ? picture->samples_not_finite() : 0;
   }
   return s;
 }

@@ -1,4 +1,5 @@
-// Pictures of scenes far from the world's origin are those of the same scenes at it.
+// Pictures of scenes far from the world's origin are those of the same scenes at it; and light that is not finite never
+// gets into a picture.
 
 #include <gtest/gtest.h>
 
@@ -133,6 +134,7 @@ TEST_P(Far, ScenesLookAsTheyDoAtTheOrigin) {
       const dvec3 at = places[turn++ % places.size()];
       const auto far = show(kind, at);
       expect_alike(test::render(*far, image), near, kind.name + (" at " + std::to_string(at.x)));
+      EXPECT_EQ(far->viewer().stats().samples_not_finite, 0U);
     }
   }
 }
@@ -275,6 +277,62 @@ TEST_P(Far, WhatMovesIsBlurredAsItIsNearby) {
     return test::render(*still, open);
   };
   expect_alike(blurred(ecef), blurred(dvec3(0.0)), "blurred");
+}
+
+// ---- light that is not finite ----
+
+// A floor that gives off more than pictures hold, over half of what is seen.
+std::shared_ptr<test::StillScene> blinding(float emission) {
+  auto scene = std::make_shared<test::StillScene>();
+  surface::Material material = test::diffuse(vec3(0.5F));
+  material.emission = vec3(emission);
+  scene->add_quad({{{-50, 0, 50}, {0, 0, 50}, {0, 0, -50}, {-50, 0, -50}}}, scene->add(material));
+  return scene;
+}
+
+TEST_P(Far, LightThatIsNotFiniteIsBlackAndCounted) {
+  std::vector<std::string> warnings;
+  viewer::Viewer viewer(Log([&](LogLevel level, const char* message) {
+                          if (level >= LogLevel::warning) warnings.emplace_back(message);
+                        }),
+                        nullptr, true);
+  viewer.attach(headless::Context::get_proc, context_.get());
+  viewer.set_light({});
+  viewer::CameraPose above = test::camera_at({0.0, 40.0, 0.0}, dvec3(0.0), 40.0);
+  above.up = {0.0, 0.0, -1.0};
+  viewer.camera()->set(above);
+  viewer.set_sampling({4, 1, render::View::shaded, false});
+  viewer::Frame frame;
+  frame.target = viewer::Target::none;
+  frame.size = {edge, edge};
+  frame.viewport = {0, 0, edge, edge};
+  frame.budget_ms = 1e9;
+  std::vector<vec4> pixels(std::size_t{edge} * edge);
+  const auto show = [&](float emission) {
+    viewer.show_surfaces(test::source_of(blinding(emission)));
+    while (!viewer.render(frame).converged) {
+    }
+    viewer.read_linear(&pixels[0].x, pixels.size() * 4);
+  };
+  for (const bool inside : {false, true}) {
+    // With a medium around, paths are of another variant.
+    if (inside) viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(test::slab(1e-6F)));
+    viewer.wait(-1.0);
+    show(1.0F);
+    EXPECT_EQ(viewer.stats().samples_not_finite, 0U);
+    EXPECT_TRUE(warnings.empty());
+    show(3e38F);
+    const std::uint64_t half = 2 * std::uint64_t{edge} * edge;
+    EXPECT_GE(viewer.stats().samples_not_finite, half / 2);
+    EXPECT_LE(viewer.stats().samples_not_finite, half + 4 * 2 * edge);
+    for (const vec4& p : pixels) {
+      for (int c = 0; c < 4; ++c) ASSERT_TRUE(std::isfinite(p[c]) && p[c] < 1e3F);
+    }
+    EXPECT_TRUE(std::isfinite(viewer.measure_noise()));
+    ASSERT_EQ(warnings.size(), 1U) << "once a picture";
+    EXPECT_NE(warnings[0].find("was not finite: they count as black"), std::string::npos) << warnings[0];
+    warnings.clear();
+  }
 }
 
 }  // namespace

@@ -2325,6 +2325,12 @@ typedef struct cumulet_stats {
   double noise; /* as cumulet_measure_noise or a readback of the picture found it last; infinite before the first,
                    and where it is unknown */
   uint64_t memory_bytes; /* main memory that cumulet_limits_desc.memory_bytes counts */
+  /*
+   * Of samples, those whose light was not finite, or exceeded 1e33. They count as black, so that no NaN or infinity
+   * enters the picture, and a warning in the log reports them once a picture (once a viewer with previews). 0 is
+   * normal.
+   */
+  uint64_t nonfinite_samples;
 } cumulet_stats;
 
 CUMULET_API cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats);
