@@ -13,8 +13,9 @@ inline glm::dvec3 origin_near(const glm::dvec3& low, const glm::dvec3& high, dou
   return glm::round(0.5 * (low + high) / step) * step + 0.0;  // no -0
 }
 
-/// A point from which floats hold what is in a box of that size: exactly 0 if the box is within 256 of its sizes of 0,
-/// where floats round by 2^-16 of the size at most; else one within 64 sizes of the box's middle. size: more than 0.
+/// A point from which floats hold all positions in a box of that size: exactly 0 if the box is within 256 of its sizes
+/// of 0, where floats round by 2^-16 of the size at most; else one within 64 sizes of the box's middle. size: more than
+/// 0.
 inline glm::dvec3 far_origin(const glm::dvec3& low, const glm::dvec3& high, double size) {
   constexpr double near_sizes = 256.0;
   constexpr double sizes_a_step = 64.0;

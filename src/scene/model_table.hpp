@@ -52,7 +52,7 @@ struct ModelTable {
   [[nodiscard]] std::size_t record_of(std::uint32_t triangle) const;
 };
 
-/// A model's lamp, where that stands. Its intensity stays. to_world: from where its position counts.
+/// A model's lamp, placed in the world. Its intensity stays. to_world: from where its position counts.
 surface::PunctualLight placed(surface::PunctualLight light, const glm::dmat4& to_world);
 
 /// World bounds of a model's triangles; nothing where it has none.

@@ -18,7 +18,7 @@ double largest(const dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), 
 
 dvec3 middle_of(const Extent& thing) { return 0.5 * (thing.low + thing.high); }
 
-// The size of what can be told apart of it: its own, or, from far away, that of the whole view.
+// The size at which it is seen: its own, or, from far away, that of the whole view.
 double scale_of(const Extent& thing, const dvec3& eye) {
   return std::max(glm::distance(thing.low, thing.high), glm::distance(eye, glm::clamp(eye, thing.low, thing.high)));
 }

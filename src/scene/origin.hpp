@@ -22,7 +22,7 @@ struct Extent {
 /// where nothing is seen. O(things).
 glm::dvec3 origin_of_scene(std::span<const Extent> things, const std::optional<glm::dvec3>& eye);
 
-/// The same from that origin, of what is in the world.
+/// Things of the world, counted from that origin.
 Place counted_from(Place place, const glm::dvec3& origin);
 Volume counted_from(Volume volume, const glm::dvec3& origin);
 Model counted_from(Model model, const glm::dvec3& origin);

@@ -63,7 +63,7 @@ class PosableScene final : public Scene {
                           const Progress* progress) const;
   /// The moment of an animation that a time means; nothing beside it: there is no such animation.
   [[nodiscard]] std::pair<double, const Track*> moment(double time, std::size_t animation) const;
-  /// Where vertices are to count from: near the middle of what stands there. 0 of what is near the world's origin.
+  /// The point that vertices shall count from, near the middle of all. 0 for a scene near the world's origin.
   [[nodiscard]] glm::dvec3 origin_of(const Stance& now) const;
   /// Gives prototypes whose vertices are far from their space's origin one that is near.
   void find_origins_of_prototypes();
@@ -75,7 +75,7 @@ class PosableScene final : public Scene {
   [[nodiscard]] std::vector<std::vector<glm::dmat4>> place_prototypes(const Stance& now) const;
   /// True if the instance mirrors.
   bool place(const Instance& instance, const Stance& now, double drift, Pose& pose, const Progress* progress) const;
-  /// Of floats near the origin, else of doubles. side: -1 where it mirrors.
+  /// Matrix: of floats near the origin, else of doubles. side: -1 where it mirrors.
   template <class Matrix>
   void place_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
                       const Progress* progress) const;

@@ -70,7 +70,7 @@ double looped(double time, double duration) {
   return within < 0.0 ? within + duration : within;
 }
 
-// World bounds of what is added.
+// World bounds of all points that are added.
 class Box {
  public:
   void add(const glm::dvec3& p) {
@@ -188,7 +188,7 @@ glm::dvec3 PosableScene::origin_of(const Stance& now) const {
       box.add(part, now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]));
   }
   if (!box.is_empty()) return box.origin();
-  // Lights alone count from it then, and bounds.
+  // Only lights and bounds count from it then.
   for (const PlacedLight& light : lights) box.add(glm::dvec3(now.to_world[light.node][3]));
   for (const Placings& of : placings) {
     for (const glm::dmat4& in_node : of.in_node) box.add(glm::dvec3((now.to_world[of.node] * in_node)[3]));

@@ -12,7 +12,7 @@ namespace cumulet::surface::detail {
 
 namespace {
 
-// Three digits, whatever the locale.
+// Three digits, in any locale.
 std::string digits(double value) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3).ptr;
@@ -24,7 +24,7 @@ std::string digits(double value) {
 std::optional<Rounding> visible_rounding(float farthest, double size) {
   constexpr float infinite = std::numeric_limits<float>::infinity();
   const double error = 0.5 * (double{std::nextafter(farthest, infinite)} - double{farthest});
-  // A point may be one on purpose, but not where floats are a thousandth apart.
+  // A point may be one on purpose, but hardly where floats are a thousandth from each other.
   constexpr double least_error = 5e-4;
   constexpr double visible = 1.0 / 4096.0;
   if (size > 0.0 ? error < visible * size : error < least_error) return std::nullopt;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: files whose floats are too coarse for what they hold.
+// Private to surface/: files whose floats are too coarse for their contents.
 
 #include <glm/glm.hpp>
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace cumulet::surface::detail {
 
-/// How far floats round what lies far from 0, next to its size.
+/// How far floats round positions that are far from 0, and the size of the thing that has them.
 struct Rounding {
   double farthest = 0.0;  ///< coordinate
   double error = 0.0;     ///< half the distance of the floats there

@@ -182,7 +182,7 @@ struct Pose {
   glm::dvec3 high{0.0};
 };
 
-/// To a model's surroundings, of what its pose has in the world.
+/// A model's place, from the origin that its pose's vertices count from.
 inline glm::dmat4 from_origin(const glm::dmat4& to_world, const Pose& pose) {
   return to_world * glm::translate(glm::dmat4(1.0), pose.origin);
 }

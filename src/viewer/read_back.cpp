@@ -80,7 +80,7 @@ void put_before(const render::Display& display, const render::Picture& picture, 
   }
 }
 
-// What of the models a ray has met at the pick's position, which counts from the snapshot's origin.
+// Fills in the model that a ray has met at the pick's position, which counts from the snapshot's origin.
 void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle, const dvec3& ray) {
   const scene::ModelTable& table = models.table();
   const std::size_t record = table.record_of(triangle);

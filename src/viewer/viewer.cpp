@@ -35,7 +35,7 @@ bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
 
 Bounds both(const Bounds& a, const Bounds& b) { return {glm::min(a.min, b.min), glm::max(a.max, b.max)}; }
 
-// Of all of these; nothing of none.
+// Around all of these; nothing where there are none.
 std::optional<Bounds> box_of(const std::vector<Bounds>& boxes) {
   if (boxes.empty()) return std::nullopt;
   return std::accumulate(boxes.begin() + 1, boxes.end(), boxes.front(), both);
@@ -1480,7 +1480,7 @@ void Viewer::count_from(const dvec3& origin) {
     if (!is_nothing) {
       volume = scene::counted_from(std::move(volume), origin);
     } else if (origin != dvec3(0.0)) {
-      // What surfaces alone are in: about the origin, wherever it was made.
+      // The empty volume around surfaces moves to the origin, wherever it was made.
       volume.place = {glm::translate(glm::dmat4(1.0), -dvec3(empty_volume_->volume().index_to_world[3]))};
     }
   }
@@ -1594,7 +1594,7 @@ VolumeAssetPtr Viewer::empty_volume() {
     empty.bounds_max = glm::ivec3(0);
     const auto all = box();
     const dvec3 middle = all ? 0.5 * (all->min + all->max) : dvec3(0.0);
-    // Far away it stands about the scene's origin: count_from.
+    // Far away, count_from moves it to the scene's origin.
     const bool near = !all || scene::origin_of_scene(std::array{scene::Extent{all->min, all->max}}, {}) == dvec3(0.0);
     empty.index_to_world[3] = glm::dvec4(near ? middle : dvec3(0.0), 1.0);
     empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));

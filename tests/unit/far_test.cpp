@@ -33,8 +33,11 @@ dmat4 moved(const dvec3& by) { return glm::translate(dmat4(1.0), by); }
 viewer::SurfaceAssetPtr spike(const dmat4& to_world) {
   const std::vector<float> positions{0, 0, 0, 3, 0, 0, 0, 3, 0, 0, 0, 3};
   const std::vector<std::uint32_t> indices{0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
-  surface::TriangleMesh mesh{
-      .positions = positions, .indices = indices, .to_world = to_world, .material = test::diffuse(vec3(0.7F))};
+  surface::TriangleMesh mesh;
+  mesh.positions = positions;
+  mesh.indices = indices;
+  mesh.to_world = to_world;
+  mesh.material = test::diffuse(vec3(0.7F));
   mesh.material.double_sided = true;
   return std::make_shared<const viewer::SurfaceAsset>(surface::import_triangles(std::array{mesh}, "spike"), "spike");
 }
@@ -85,7 +88,11 @@ class Far : public test::ViewerTest {
       settings.medium = medium;
       viewer.add_instance(std::make_shared<viewer::Instance>(settings));
     }
-    if (kind.rasterised) viewer.set_surface_settings({.light = viewer::SurfaceLight::none});
+    if (kind.rasterised) {
+      viewer::SurfaceSettings settings;
+      settings.light = viewer::SurfaceLight::none;
+      viewer.set_surface_settings(settings);
+    }
     still->set_camera(test::camera_at(at + dvec3(24.0, 16.0, 30.0), at + dvec3(7.0, 4.0, 4.0), 35.0));
     return still;
   }
@@ -150,7 +157,7 @@ TEST_P(Far, AllMarchesMeetWhatIsFar) {
   }
 }
 
-// A scene of a marker at the origin and of a house far away is as wide as the way between them: what is near the camera
+// A scene of a marker at the origin and a house far away is as wide as the way between them. The house near the camera
 // is exact.
 TEST_P(Far, WideScenesAreExactWhereTheCameraIs) {
   const Kind house{.name = "house", .model = true};
@@ -161,7 +168,7 @@ TEST_P(Far, WideScenesAreExactWhereTheCameraIs) {
   expect_alike(test::render(*far, image), test::render(*near, image), "house");
 }
 
-// What was shown before stays where it was while the next, far from it, comes; and back.
+// A scene moves far away and back: its picture is the same in both places.
 TEST_P(Far, ScenesMayLeaveAndComeBack) {
   const Kind kind{.name = "model", .model = true};
   const auto still = show(kind, dvec3(0.0));
@@ -281,7 +288,7 @@ TEST_P(Far, WhatMovesIsBlurredAsItIsNearby) {
 
 // ---- light that is not finite ----
 
-// A floor that gives off more than pictures hold, over half of what is seen.
+// A floor that gives off more than pictures hold, over half of the view.
 std::shared_ptr<test::StillScene> blinding(float emission) {
   auto scene = std::make_shared<test::StillScene>();
   surface::Material material = test::diffuse(vec3(0.5F));

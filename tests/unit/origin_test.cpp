@@ -1,4 +1,4 @@
-// Scenes and models count from origins of their own, so that floats hold what is far from the world's.
+// Scenes and models count from origins of their own, so that floats hold them far from the world's origin.
 
 #include <gtest/gtest.h>
 
@@ -59,7 +59,7 @@ TEST(SceneOrigin, OfAWideSceneIsNearWhatTheEyeIsNearTo) {
 
 // ---- models ----
 
-// A box of these half edges about a middle, by six quads, as a mesh's attributes.
+// A primitive: a box with these half edges around a middle, of six quads.
 json box(GltfModel& model, const glm::vec3& half, const glm::vec3& middle = glm::vec3(0.0F)) {
   std::vector<float> positions;
   std::vector<std::uint32_t> indices;
@@ -219,7 +219,7 @@ TEST(FarModels, BendAndMoveAsTheyDoNearby) {
   }
 }
 
-// ---- what the files themselves have lost ----
+// ---- precision that a file itself has lost ----
 
 TEST(FarModels, VerticesThatFloatsDoNotHoldAreWarnedOf) {
   const auto remark = [](const glm::vec3& half, const glm::vec3& middle) {
@@ -254,7 +254,8 @@ TEST(FarModels, VerticesThatFloatsDoNotHoldAreWarnedOf) {
   EXPECT_TRUE(test::has(test::imported(instanced)->precision_remark, "the positions of node 0's instances lose"));
 
   const std::vector<float> positions{1e7F, 0, 0, 1e7F + 1, 0, 0, 1e7F, 1, 0};
-  surface::TriangleMesh mesh{.positions = positions, .material = {}};
+  surface::TriangleMesh mesh;
+  mesh.positions = positions;
   EXPECT_TRUE(test::has(surface::import_triangles(std::array{mesh}, "the host's")->precision_remark,
                         "the host's: the positions of mesh 0 lose precision"));
 }

@@ -113,8 +113,8 @@
  *
  *     Places are doubles and may be anywhere within 1e12 of the origin: a scene in map or earth-centered coordinates
  *     looks as it does at the origin. The viewer subtracts a scene origin, in double precision, before anything becomes
- *     a float. Where a scene is much wider than what the camera is near to, that origin follows the camera. Floats that
- *     a host or a file stores far from 0 have lost precision before: keep such offsets in matrices and in nodes'
+ *     a float. Where a scene is much wider than the thing nearest to the camera, that origin follows the camera. Floats
+ * that a host or a file stores far from 0 have lost precision before: keep such offsets in matrices and in nodes'
  *     translations. A warning in the log reports vertices that are rounded by 1/4096 of their mesh's size or more.
  */
 #ifndef CUMULET_CUMULET_H
@@ -2326,9 +2326,9 @@ typedef struct cumulet_stats {
                    and where it is unknown */
   uint64_t memory_bytes; /* main memory that cumulet_limits_desc.memory_bytes counts */
   /*
-   * Of samples, those whose light was not finite, or exceeded 1e33. They count as black, so that no NaN or infinity
-   * enters the picture, and a warning in the log reports them once a picture (once a viewer with previews). 0 is
-   * normal.
+   * Samples of the picture whose light was not finite, or exceeded 1e33. They count as black, so that no NaN or
+   * infinity enters the picture, and a warning in the log reports them once a picture (once a viewer with previews). 0
+   * is normal.
    */
   uint64_t nonfinite_samples;
 } cumulet_stats;
