@@ -7,6 +7,9 @@
 #define CM_LEVEL_EDGES 6u
 #define CM_BRICK_EDGES 54u
 
+#define CM_BRICK_VOXELS 0xffffu
+#define CM_BRICK_HUGE_SHIFT 16u
+#define CM_BRICK_HUGE 0xfffu
 #define CM_BRICK_NOT_FINITE 0x80000000u
 
 struct CmBrickSummary {
@@ -18,7 +21,7 @@ struct CmBrickSummary {
   uint steepest[9];     // of cells of a level the most, upper halves of floats that are no less: low, of the variance
                         // that a linear fit leaves, high, of the variance; times the square of the edge's length
   uint box;             // of voxels that are not 0, low and high: 3 bits each, x first
-  uint voxels;          // how many are not 0; and CM_BRICK_NOT_FINITE
+  uint voxels;          // how many are not 0; how many were huge, shifted; and CM_BRICK_NOT_FINITE
 };
 #define CM_BRICK_SUMMARY_WORDS 124u
 

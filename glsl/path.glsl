@@ -159,6 +159,10 @@ CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
 #endif
 }
 
+// In what is opaque and white a path would go on for millions of events: from this number on, each doubling of it halves
+// the chance to go on.
+#define CM_LONG_PATH 16384u
+
 // The path goes on from where it collided or met a triangle or the ground, unless Russian roulette or the limit ends it:
 // returns whether it does.
 CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
@@ -172,6 +176,7 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
   // Ground that a camera sees is large, even and dark: there roulette would be all the noise.
   float survival = strongest < 0.5f && !(grounded && p.bounces == 1u) ? max(strongest, 0.05f) : 1.0f;
+  if (p.bounces >= CM_LONG_PATH && (p.bounces & (p.bounces - 1u)) == 0u) survival *= 0.5f;
   float u = cm_random(p.random, p.stream);
   bool last = cm.integrator.max_bounces != 0u && p.bounces > cm.integrator.max_bounces;
   bool ends = !cm_is_positive(strongest) || u >= survival || last;

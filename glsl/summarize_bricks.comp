@@ -1,6 +1,6 @@
 #version 450
 // Of a host's bricks, as pack_bricks.comp has them, the values that volumes keep, and what main memory is to know of them
-// (brick_summary.glsl): a group a brick. What is no number becomes 0, and is told; what is negative becomes 0.
+// (brick_summary.glsl): a group a brick. What is no number or huge becomes 0, and is told; what is negative becomes 0.
 // CM_FIELD: 0, 1: of fields that no cell is of, the most, either way, box and voxels alone; 0: what is negative stays.
 // variants: CM_FORMAT=0,1,2,3 CM_FIELD=0,1,2
 layout(local_size_x = 64) in;
@@ -29,6 +29,7 @@ layout(location = 1) uniform uvec3 cm_bricks;  // of the field, along each axis
 shared uint cm_box[6];  // low, then 7 less high
 shared uint cm_count;
 shared uint cm_bad;
+shared uint cm_huge;
 
 #if CM_CELLS
 #include "brick_sums.glsl"
@@ -82,6 +83,9 @@ void cm_look_at(uint t, uint slot) {
     float value = cm_number(512u * slot + 8u * t + z);
     if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) {
       cm_bad = CM_BRICK_NOT_FINITE;
+      value = 0.0;
+    } else if (abs(value) > 1e30) {  // volume::largest_value
+      atomicAdd(cm_huge, 1u);
       value = 0.0;
     }
 #if CM_FIELD > 0
@@ -163,6 +167,7 @@ void main() {
   if (t == 0u) {
     cm_count = 0u;
     cm_bad = 0u;
+    cm_huge = 0u;
   }
 #if CM_CELLS
   if (t < 2u * CM_BRICK_LEVELS) cm_steepest[t] = 0u;
@@ -182,6 +187,6 @@ void main() {
   if (t == 0u) {
     cm_summaries[slot].box = cm_box[0] | (cm_box[1] << 3) | (cm_box[2] << 6) | ((7u - cm_box[3]) << 9) |
                              ((7u - cm_box[4]) << 12) | ((7u - cm_box[5]) << 15);
-    cm_summaries[slot].voxels = cm_count | cm_bad;
+    cm_summaries[slot].voxels = cm_count | (cm_huge << CM_BRICK_HUGE_SHIFT) | cm_bad;
   }
 }

@@ -42,7 +42,9 @@ Weights Weights::of_density(double depth, const RefineSettings& settings) {
   if (!(depth > 0.0)) return {};
   if (settings.criterion != Criterion::transmittance) return {.per_depth = 1.0 / depth};
   const double scale = settings.density_scale;
-  return {.per_depth = scale / -std::expm1(-scale * depth), .own_hiding = hiding(scale, settings.anisotropy)};
+  const double hidden = -std::expm1(-scale * depth);
+  // What is thinner than doubles tell from nothing hides in proportion.
+  return {.per_depth = hidden > 0.0 ? scale / hidden : 1.0 / depth, .own_hiding = hiding(scale, settings.anisotropy)};
 }
 
 // A deviation counts by the strongest, or by what it does to the luminance where that is more: most of a red fire's is

@@ -7,6 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <iterator>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -22,10 +23,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& source) {
+// extent: of all volumes in the world.
+core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& source, double extent) {
   core::CmMedium m{};
   m.albedo = medium.albedo;
-  m.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
+  const double extinction = medium.density_scale * source.value_unit * std::max(source.max_value, 1e-30F);
+  m.extinction = static_cast<float>(std::min({1e30, extinction, scene::max_extinction(extent)}));
   m.source = medium.emission;
   m.group = medium.group;
   m.holdout = medium.holdout ? 1U : 0U;
@@ -154,12 +157,13 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
   InstancesOf of{present_, data_revision_};
   if (!instances_.wants(of, wanted.settings)) return;
   std::vector<scene::Instance> instances;
+  const double extent = this->extent();
   for (const scene::Volume& volume : present_) {
     const core::CmGrid& grid = *data_->grid(*volume.source);
     instances.push_back({.source = volume.source,
                          .place = volume.place.to_world,
                          .grid = grid,
-                         .medium = medium_of(*volume.medium, *volume.source),
+                         .medium = medium_of(*volume.medium, *volume.source, extent),
                          .ends = volume.place.ends,
                          .glow = *data_->glow(*volume.source)});
   }
@@ -361,6 +365,16 @@ std::vector<glm::dvec3> GpuScene::corners() const {
       corners.emplace_back(to_world * glm::dvec4(corner, 1.0));
   }
   return corners;
+}
+
+double GpuScene::extent() const {
+  glm::dvec3 low(std::numeric_limits<double>::infinity());
+  glm::dvec3 high(-low);
+  for (const glm::dvec3& corner : corners()) {
+    low = glm::min(low, corner);
+    high = glm::max(high, corner);
+  }
+  return low.x <= high.x ? glm::length(high - low) : 0.0;
 }
 
 double GpuScene::optical_depth() const {
@@ -592,7 +606,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
     const scene::Volume& volume = present_.front();
     const scene::MarchSource& source = *volume.source;
     p.grid = *data_->grid(source);
-    p.medium = medium_of(*volume.medium, source);
+    p.medium = medium_of(*volume.medium, source, extent());
     const glm::dmat4& place = volume.place.to_world;
     const glm::dmat4 to_world = place * source.cube.to_world;
     p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);

@@ -76,6 +76,8 @@ class GpuScene {
 
   /// Eight of the box of each volume that is here, in the world.
   [[nodiscard]] std::vector<glm::dvec3> corners() const;
+  /// The diagonal of the world box that holds these; 0: there are none.
+  [[nodiscard]] double extent() const;
 
   /// As the snapshot has it, of the environment that is here.
   [[nodiscard]] light::Surroundings surroundings(const scene::Snapshot& snapshot) const;

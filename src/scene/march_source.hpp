@@ -26,8 +26,9 @@ using GridPlanPtr = std::shared_ptr<const GridPlan>;
 struct MarchSource {
   March march = March::tet;
   grid::Cube cube;
-  float max_value = 0.0F;      // grid value of density 1
-  double optical_depth = 0.0;  // a unit of density scale, as grid::Statistics has the mean
+  float max_value = 0.0F;      // value of density 1, in the unit
+  double value_unit = 1.0;     // values of the volume's grid = this x values here (volume::value_unit)
+  double optical_depth = 0.0;  // a unit of density scale, as grid::Statistics has the mean, of the grid's values
 
   // tet: the grid, or how GL builds it, then with the volume and its statistics
   std::shared_ptr<const grid::TetGrid> grid;

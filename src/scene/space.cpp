@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace cumulet::scene {
 
@@ -40,6 +41,11 @@ core::CmSpace space_of(const glm::dmat4& cube_to_world, const vec3& low, const v
 }
 
 double mean_stretch(const glm::dmat4& place) { return std::cbrt(std::abs(glm::determinant(glm::dmat3(place)))); }
+
+double max_extinction(double extent) {
+  constexpr double max_depth = 0x1p23;
+  return extent > 0.0 ? max_depth / extent : std::numeric_limits<double>::infinity();
+}
 
 bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
   // The determinant is a cubic of the way; columns of the way's matrix in place of the first one's make its terms.

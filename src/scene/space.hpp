@@ -15,6 +15,10 @@ core::CmSpace space_of(const glm::dmat4& cube_to_world, const glm::vec3& low, co
 /// How much a length grows by it, on average: the cube root of how much a volume does.
 double mean_stretch(const glm::dmat4& place);
 
+/// The most extinction that paths are traced with, where all volumes together have this extent: on average they go as
+/// far as floats resolve positions there. With more they would never leave. Infinite for an extent of 0.
+double max_extinction(double extent);
+
 /// Whether what goes straight from one affine place to the other is solid all the way: it is not where it turns halfway
 /// round, or is mirrored.
 bool stays_solid(const glm::dmat4& open, const glm::dmat4& close);

@@ -99,7 +99,7 @@ struct Table<cumulet_medium_desc> {
   using Desc = cumulet_medium_desc;
   static constexpr const char* name = "cumulet_medium_desc";
   static constexpr std::tuple rows = {
-      Setting(&Desc::density_scale, {.name = "density_scale", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
+      Setting(&Desc::density_scale, {.name = "density_scale", .range = {0.0, 1e60}, .given = above_zero, .zero = 1.0,
         .key = "medium.density_scale", .flag = "--density-scale", .type = "K|auto",
         .help = "Extinction is K x grid value, 1 / world unit (default: auto, for a mean optical depth of 8)",
         .row = {.label = "Density scale",

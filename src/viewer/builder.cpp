@@ -5,6 +5,7 @@
 
 #include "base/apart.hpp"
 #include "grid/tet_grid.hpp"
+#include "scene/space.hpp"
 #include "viewer/cell_budget.hpp"
 #include "viewer/stopwatch.hpp"
 #include "volume/advection.hpp"
@@ -59,11 +60,19 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
   }
 }
 
+// Of values in a unit: no more than what paths are traced with.
+double density_scale_in(double unit, const volume::ScalarVolume& voxels, const grid::Cube& cube, double scale) {
+  const glm::dmat3 axes(cube.to_world);
+  const double edge = cube.size() * std::max({glm::length(axes[0]), glm::length(axes[1]), glm::length(axes[2])});
+  const double max_value = voxels.max_value;
+  return max_value > 0.0 ? std::min(scale * unit, scene::max_extinction(edge) / max_value) : scale * unit;
+}
+
 }  // namespace
 
 bool needs_values(const VolumeAsset& volume, const BuildSettings& settings) {
   return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty() ||
-         (settings.shutter_seconds != 0.0 && volume.moves());
+         volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
 }
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -91,16 +100,19 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     log.info(volume->name() +
              ": what moves further than 64 voxels in half of the shutter's time is blurred by that much");
   const double taken = watch.lap();
-  const auto [voxels, statistics] = shown.density(settings.density_ramp, progress, built.seconds.statistics);
+  const auto [voxels, statistics, unit] = shown.density(settings.density_ramp, progress, built.seconds.statistics);
   watch.lap();
   const grid::Channels channels =
       shown.channels(settings.density_ramp, settings.emission, settings.anisotropic, progress, log);
   built.seconds.statistics += taken + watch.lap();
   progress.begin(Progress::Stage::refining);
+  const auto finished = [unit = unit, depth = unit * statistics->mean_optical_depth()](scene::MarchSource source) {
+    source.value_unit = unit;
+    source.optical_depth = depth;
+    return std::make_shared<const scene::MarchSource>(std::move(source));
+  };
   if (settings.march != scene::March::tet) {
-    scene::MarchSource source = scene::make_voxel_source(settings.march, voxels, statistics, channels);
-    source.optical_depth = statistics->mean_optical_depth();
-    built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+    built.source = finished(scene::make_voxel_source(settings.march, voxels, statistics, channels));
     allowance.require(built.bytes(), volume->name());
     built.seconds.records = watch.lap();
     return built;
@@ -109,10 +121,12 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     log.info(volume->name() + ": it moves while the shutter is open, so its grid is built on the CPU");
   const Carried carried = Carried::of(channels);
   const std::uint64_t max_cells = settings.refine.max_cells;
+  grid::RefineSettings refine = settings.refine;
+  refine.density_scale = density_scale_in(unit, *voxels, statistics->cube(), settings.refine.density_scale);
   grid::LatticePtr lattice;
   std::optional<std::uint64_t> planned;
   if (settings.on == BuildOn::gpu && !moving) {
-    lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
+    lattice = volume->lattice(settings.density_ramp, channels, refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), allowance);
     if (!planned && in_gl) {
       in_gl->ask_for_values();
@@ -128,16 +142,13 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
         before && before->lattice == lattice
             ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
-    scene::MarchSource source =
-        scene::make_planned_source({lattice, std::move(levels), *planned}, voxels, statistics, channels);
-    source.optical_depth = statistics->mean_optical_depth();
-    built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+    built.source =
+        finished(scene::make_planned_source({lattice, std::move(levels), *planned}, voxels, statistics, channels));
     built.most_cells = *planned;
     allowance.require(built.bytes(), volume->name());
     built.seconds.refine = watch.lap();
     return built;
   }
-  grid::RefineSettings refine = settings.refine;
   refine.max_cells = built.most_cells = cells_that_fit(max_cells, carried, volume->bytes(), allowance);
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
@@ -152,10 +163,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.levels = grid->levels;
   built.limited = grid->limited;
   if (grid->limited) log_limited(log, refine.max_cells, max_cells);
-  scene::MarchSource source =
-      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress);
-  source.optical_depth = statistics->mean_optical_depth();
-  built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+  built.source = finished(
+      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
   allowance.require(built.bytes(), volume->name());
   return built;
 }

@@ -21,6 +21,7 @@ void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings
   begun_.reset();
   old = std::exchange(ready_, std::nullopt);
   std::swap(live_, live);
+  huge_is_said_ = false;
   wish_.reset();
   settings_ = std::move(settings);
   begin();
@@ -108,6 +109,18 @@ std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeA
   return instead;
 }
 
+void LiveBuilder::warn_of_huge(const VolumeAsset& state) {
+  std::uint64_t voxels = 0;
+  for (const volume::ScalarVolume* field : state.frame().fields()) voxels += field->huge_voxels;
+  if (voxels == 0) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (std::exchange(huge_is_said_, true)) return;
+  }
+  log_.warning(state.name() + ": " + std::to_string(voxels) +
+               " voxels beyond 1e30, as fill values are, counted as 0; later states are not remarked on");
+}
+
 bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   std::shared_ptr<Live> live;
   Begun begun;
@@ -132,6 +145,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
       const Live::State state = live->read(progress);
       const double load_seconds = watch.lap();
       if (!state.volume) return;
+      warn_of_huge(*state.volume);
       const std::optional<BuildSettings> settings = settings_for(*live, *state.volume, begun.settings);
       if (!settings) return;
       // Else it needs voxels, which another state brings.

@@ -59,6 +59,8 @@ class LiveBuilder {
   // What a state in GL gives off may have been found by other settings: the same with these, until it is found by those
   // that are wanted; none: something of it was not made yet.
   std::optional<BuildSettings> settings_for(Live& live, const VolumeAsset& state, const BuildSettings& settings);
+  // Of the first state that has any.
+  void warn_of_huge(const VolumeAsset& state);
   // Returns whether the job is done: no newer state is there in place of one that failed.
   bool build(std::uint64_t job, Progress& progress);
 
@@ -72,7 +74,8 @@ class LiveBuilder {
   std::optional<std::uint64_t> job_;  // that is under way, or waits for the worker
   std::uint64_t last_job_ = 0;
   std::optional<Ready> ready_;
-  Worker worker_;  // last: its thread uses all of the above
+  bool huge_is_said_ = false;  // that some of live_'s voxels are huge
+  Worker worker_;              // last: its thread uses all of the above
 };
 
 }  // namespace cumulet::viewer

@@ -9,6 +9,7 @@
 #include "grid/cube.hpp"
 #include "viewer/patient_lock.hpp"
 #include "volume/advection.hpp"
+#include "volume/value_unit.hpp"
 
 namespace cumulet::viewer {
 
@@ -129,21 +130,27 @@ const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progres
     voxels = make_left<const volume::ScalarVolume>(mean ? std::move(*mean) : open);
     if (mean) ends = make_left<const grid::DensityEnds>(std::move(open), std::move(close), cube_, &progress);
   } else {
-    voxels = make_left<const volume::ScalarVolume>(curved(frame_->density));
+    volume::ScalarVolume density = curved(frame_->density);
+    unit = volume::value_unit(density.max_value);
+    voxels = make_left<const volume::ScalarVolume>(volume::in_units_of(unit, std::move(density), &progress));
   }
   auto statistics = make_left<const grid::Statistics>(*voxels, cube_, &progress);
-  put(ramped_, Ramped{ramp, {std::move(voxels), std::move(statistics)}, std::move(ends)});
+  put(ramped_, Ramped{ramp, {std::move(voxels), std::move(statistics), unit}, std::move(ends)});
   return *ramped_;
 }
 
 VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& progress, double& seconds) const {
   using Clock = std::chrono::steady_clock;
   seconds = 0.0;
+  double unit = 1.0;
   progress.begin(Progress::Stage::statistics);
   const auto lock = patient_lock(computing_, progress);
   const auto start = Clock::now();
+    unit = volume::value_unit(std::max(open.max_value, close.max_value));
+    open = volume::in_units_of(unit, std::move(open), &progress);
+    close = volume::in_units_of(unit, std::move(close), &progress);
   const auto since = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
-  if (ramp.empty() && !close_) {
+  if (ramp.empty() && !close_ && !is_extreme()) {
     if (!statistics_) {
       put(statistics_, make_left<const grid::Statistics>(frame_->density, cube_, &progress));
       seconds = since();
@@ -212,36 +219,57 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   constexpr std::type_identity<grid::ScalarField> numbers;
   constexpr std::type_identity<grid::MomentumField> motion;
   const auto lock = patient_lock(computing_, progress);
-  const volume::VolumeFrame& open = *frame_;
   const volume::VolumeFrame* close = close_.get();
   if (!glowing_ || glowing_->settings != given) {
     drop(latticed_);  // it holds them
     drop(glowing_);
-    auto glow = in_gl_ ? in_gl_->emission(given) : scene::emission_of(open, given, &progress);
+    auto glow = in_gl_ ? in_gl_->emission(given) : scene::emission_of(*frame_, given, &progress);
     if (close != nullptr)
       glow = scene::mean_of(glow, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
     put(glowing_, Glowing{given, field(colours, std::move(glow))});
   }
-  if (!weighted_ || weighted_->density_ramp != density_ramp) {
+  const auto weighs = [&](const std::shared_ptr<const volume::VolumeFrame>& frame) {
+    const bool plain = in_gl_ || !(frame->colour || frame->anisotropy || frame->velocity);
+    return plain ? Weighing{frame, density_ramp} : weighing(frame, density_ramp, progress);
+  };
+  const bool weighs_anew = !weighted_ || weighted_->density_ramp != density_ramp;
+  const bool turns_anew = anisotropic && (weighs_anew || !weighted_->forward);
+  Weighing at_open{frame_, density_ramp};
+  Weighing at_close{close_, density_ramp};
+  if (weighs_anew || turns_anew) {
+    at_open = weighs(frame_);
+    if (close_) at_close = weighs(close_);
+  }
+  if (weighs_anew) {
     drop(latticed_);
     drop(weighted_);
-    auto scattering = in_gl_ ? in_gl_->scattering() : scene::scattering_of(open, density_ramp, &progress);
+    auto scattering = in_gl_ ? in_gl_->scattering() : scene::scattering_of(*at_open.frame, at_open.ramp, &progress);
     auto momentum = in_gl_ ? in_gl_->momentum()
-                           : scene::momentum_of(open, density_ramp, &progress, log,
+                           : scene::momentum_of(*at_open.frame, at_open.ramp, &progress, log,
                                                 close != nullptr ? scene::fastest_of(*close) : 0.0);
+VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::VolumeFrame>& frame,
+                                            const volume::Ramp& ramp, Progress& progress) const {
+  if (ramp.empty() && !is_extreme()) return {frame, ramp};
+  const double unit = ramped(ramp, progress).density.unit;
+  if (unit == 1.0) return {frame, ramp};
+  volume::VolumeFrame copy = *frame;
+  copy.density = volume::in_units_of(unit, volume::apply(ramp, frame->density, &progress), &progress);
+  return {make_left<const volume::VolumeFrame>(std::move(copy)), {}};
+}
+
     if (close != nullptr) {
-      scattering =
-          scene::mean_of(scattering, scene::scattering_of(*close, density_ramp, &progress), "density", &progress);
-      momentum = mean_momentum(std::move(momentum), *close, density_ramp, progress, log);
+      scattering = scene::mean_of(scattering, scene::scattering_of(*at_close.frame, at_close.ramp, &progress),
+                                  "density", &progress);
+      momentum = mean_momentum(std::move(momentum), *at_close.frame, at_close.ramp, progress, log);
     }
     put(weighted_, Weighted{density_ramp, field(colours, std::move(scattering)), field(motion, std::move(momentum)),
                             std::nullopt});
   }
-  if (anisotropic && !weighted_->forward) {
-    auto forward = in_gl_ ? in_gl_->forward() : scene::forward_of(open, density_ramp, &progress);
+  if (turns_anew) {
+    auto forward = in_gl_ ? in_gl_->forward() : scene::forward_of(*at_open.frame, at_open.ramp, &progress);
     if (close != nullptr) {
-      const auto at_close = scene::forward_of(*close, density_ramp, &progress);
-      forward = scene::mean_of(forward ? &*forward : nullptr, at_close ? &*at_close : nullptr, "density", &progress);
+      const auto closing = scene::forward_of(*at_close.frame, at_close.ramp, &progress);
+      forward = scene::mean_of(forward ? &*forward : nullptr, closing ? &*closing : nullptr, "density", &progress);
     }
     put(weighted_->forward, field(numbers, std::move(forward)));
   }

@@ -73,13 +73,15 @@ class VolumeAsset {
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return facts_->coarse; }
   /// Main memory that it holds by now, with what was computed of it.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Density as marches see it; the statistics are good while the voxels are there.
+  /// Density as marches see it; the statistics are good while the voxels are there. Channels that density weighs have
+  /// the same unit.
   struct Density {
     std::shared_ptr<const volume::ScalarVolume> voxels;
     std::shared_ptr<const grid::Statistics> statistics;
   };
   /// The first caller computes it; others wait, and if the first is cancelled the next one computes it. Kept are that
   /// without a ramp and the last with one. seconds receives what computing took, 0 if it was there. Throws
+    double unit = 1.0;  ///< values of the grid = this x values here (volume::value_unit)
   /// Error(cancelled) if this caller's progress is.
   [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
   /// Of density with that ramp and what channels() gave: what grids of any view are built from. The last is kept.
@@ -93,6 +95,8 @@ class VolumeAsset {
   /// What it has beside density; anisotropic: its anisotropy, too. Of one that is in GL it was made there.
   /// The last that were asked for are kept: another threshold or camera asks for the same. log hears of what is left
   /// out, when it is made.
+  /// Whether density without a ramp has another unit than 1.
+  [[nodiscard]] bool is_extreme() const { return unit() != 1.0; }
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
                                         bool anisotropic, Progress& progress, const Log& log = {}) const;
 
@@ -106,6 +110,15 @@ class VolumeAsset {
     const std::scoped_lock lock(mutex_);
     kept = std::forward<Made>(made);
   }
+  // Of density without a ramp.
+  [[nodiscard]] double unit() const;
+  // What channels that density weighs are made of: the frame, and the ramp that its density is still without.
+  struct Weighing {
+    std::shared_ptr<const volume::VolumeFrame> frame;
+    volume::Ramp ramp;
+  };
+  [[nodiscard]] Weighing weighing(const std::shared_ptr<const volume::VolumeFrame>& frame, const volume::Ramp& ramp,
+                                  Progress& progress) const;
   template <class Kept>
   void drop(Kept& kept) const {
     const std::scoped_lock lock(mutex_);

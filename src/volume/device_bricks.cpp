@@ -54,7 +54,9 @@ void DeviceBricks::fill_means(std::size_t brick, BrickValues::Brick& values) con
 void DeviceBricks::drop_empty() {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < origins.size(); ++i) {
-    if (summary(i).voxels == 0) {
+    const std::uint64_t huge = huge_voxels_of(summary(i));
+    if (summary(i).voxels == huge << CM_BRICK_HUGE_SHIFT) {
+      huge_voxels += huge;
       emptied.push_back(origins[i]);
       continue;
     }
@@ -71,6 +73,7 @@ void DeviceBricks::tidy() {
   std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return lexicographic(origins[a], origins[b]); });
   DeviceBricks made;
   made.wanted = wanted;
+  made.huge_voxels = huge_voxels;
   constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> kept(memories.size(), none);
   for (const std::size_t i : order) {
@@ -93,6 +96,7 @@ DeviceBricks DeviceBricks::with(const DeviceBricks& other) const {
   std::ranges::sort(replaced, lexicographic);
   DeviceBricks made;
   made.wanted = wanted;
+  made.huge_voxels = other.huge_voxels;
   made.memories = memories;
   for (std::size_t i = 0; i < origins.size(); ++i) {
     if (std::ranges::binary_search(replaced, origins[i], lexicographic)) continue;
@@ -124,9 +128,11 @@ ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const gl
     };
     volume.bounds_min = glm::min(volume.bounds_min, corner(0));
     volume.bounds_max = glm::max(volume.bounds_max, corner(9));
-    volume.active_voxels += s.voxels & ~CM_BRICK_NOT_FINITE;
+    volume.active_voxels += s.voxels & CM_BRICK_VOXELS;
+    volume.huge_voxels += huge_voxels_of(s);
     for (std::size_t cell = 0; cell < 6; ++cell) volume.max_value = std::max(volume.max_value, s.cells[7 * cell + 6]);
   }
+  volume.huge_voxels += bricks->huge_voxels;
   volume.brick_origins = bricks->origins;
   volume.on_device = std::move(bricks);
   return volume;

@@ -39,6 +39,10 @@ struct DeviceMemory {
   }
   [[nodiscard]] std::size_t bytes() const { return bytes_of(bricks(), halves); }
 };
+/// Voxels of a brick that were huge.
+inline std::uint64_t huge_voxels_of(const BrickSummary& summary) {
+  return (summary.voxels >> CM_BRICK_HUGE_SHIFT) & CM_BRICK_HUGE;
+}
 using DeviceMemoryPtr = std::shared_ptr<const DeviceMemory>;
 
 /// Which of a brick's 64 blocks of 2^3 voxels this voxel is in.
@@ -73,6 +77,7 @@ struct DeviceBricks {
   std::vector<glm::ivec3> origins;
   std::vector<Place> places;
   std::vector<glm::ivec3> emptied;  ///< of what changes another field, where nothing is any more
+  std::uint64_t huge_voxels = 0;    ///< of bricks that were dropped
   ValuesWantedPtr wanted;           ///< who needs values asks there; whoever has the volume brings another state of it
 
   [[nodiscard]] const BrickSummary& summary(std::size_t brick) const {

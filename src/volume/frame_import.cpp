@@ -422,6 +422,7 @@ class FrameImport {
                                  : resample(field, lattice, within, progress_, portion.part(0.0, sampling));
       // What there is to say of its values is said.
       ScalarVolume volume = assemble(std::move(source), {}, {}, progress_, portion.part(sampling, 1.0));
+      volume.huge_voxels = field.huge_voxels;
       volume.name = field.name;
       volume.negative_voxels = field.negative_voxels;
       volume.non_finite_voxels = field.non_finite_voxels;

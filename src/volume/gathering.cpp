@@ -201,6 +201,7 @@ void assemble_in_place_of(std::span<const ScalarVolume* const> before, std::vect
     out[i]->name = before[i]->name;
     out[i]->negative_voxels = before[i]->negative_voxels;
     out[i]->non_finite_voxels = before[i]->non_finite_voxels;
+    out[i]->huge_voxels = before[i]->huge_voxels;
   }
 }
 

@@ -307,13 +307,17 @@ ActiveRegion detail::active_leaf_region(const LeafSource& leaves, ProgressPart& 
 
 namespace {
 
+/// Finite, and further from 0 than anything that is measured.
+bool is_huge(float value) { return std::isfinite(value) && std::abs(value) > largest_value; }
+
 /// A voxel's value as the volume keeps it.
-float counted(float value) { return std::isfinite(value) && value > 0.0F ? value : 0.0F; }  // turns -0 into 0 too
+float counted(float value) { return value > 0.0F && value <= largest_value ? value : 0.0F; }  // turns -0 into 0 too
 
 /// What is found of a brick's voxels within bounds.
 struct CleanBrick {
   std::uint32_t negative = 0;
   std::uint32_t non_finite = 0;
+  std::uint32_t huge = 0;
   float max = 0.0F;
   bool constant = true;  ///< all alike
   float first = 0.0F;    ///< the first of them
@@ -322,23 +326,27 @@ struct CleanBrick {
 /// Makes a leaf's values what the volume keeps. In whole numbers, which vectorize.
 CleanBrick clean_inside(std::span<float, brick_voxels> values) {
   constexpr std::int32_t infinite = 0x7f800000;
+  constexpr auto largest = std::bit_cast<std::int32_t>(largest_value);
   std::uint32_t negative = 0;
   std::uint32_t non_finite = 0;
+  std::uint32_t beyond = 0;  // huge, or not finite
   std::int32_t most = 0;
   std::int32_t other = 0;
-  const auto keep = [](std::int32_t bits) { return bits > 0 && bits < infinite ? bits : 0; };
+  const auto keep = [](std::int32_t bits) { return bits > 0 && bits <= largest ? bits : 0; };
   const std::int32_t first = keep(std::bit_cast<std::int32_t>(values[0]));
   for (float& value : values) {
     const auto bits = std::bit_cast<std::int32_t>(value);
     const std::int32_t size = bits & std::numeric_limits<std::int32_t>::max();
     non_finite += size >= infinite ? 1U : 0U;
-    negative += bits < 0 && size > 0 && size < infinite ? 1U : 0U;
+    beyond += size > largest ? 1U : 0U;
+    negative += bits < 0 && size > 0 && size <= largest ? 1U : 0U;
     const std::int32_t kept = keep(bits);
     most = std::max(most, kept);
     other |= kept ^ first;
     value = std::bit_cast<float>(kept);
   }
-  return {negative, non_finite, std::bit_cast<float>(most), other == 0, std::bit_cast<float>(first)};
+  return {
+      negative, non_finite, beyond - non_finite, std::bit_cast<float>(most), other == 0, std::bit_cast<float>(first)};
 }
 
 /// The same of a leaf that reaches beyond the bounds, where it becomes 0.
@@ -354,6 +362,8 @@ CleanBrick clean_across(std::span<float, brick_voxels> values, const glm::ivec3&
     }
     if (!std::isfinite(value)) {
       ++brick.non_finite;
+    } else if (is_huge(value)) {
+      ++brick.huge;
     } else if (value < 0.0F) {
       ++brick.negative;
     }
@@ -396,11 +406,13 @@ bool keep(std::span<const float, brick_voxels> values, std::uint16_t* out) {
 struct BrickTotals {
   std::uint64_t negative = 0;
   std::uint64_t non_finite = 0;
+  std::uint64_t huge = 0;
   float max = 0.0F;
 
   void add(const BrickTotals& b) {
     negative += b.negative;
     non_finite += b.non_finite;
+    huge += b.huge;
     max = std::max(max, b.max);
   }
 };
@@ -425,7 +437,7 @@ bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vect
     const std::size_t place = bricks.place[leaf];
     if (place == bricks.origins.size()) return true;
     const CleanBrick brick = clean(found, bricks.origins[place], bounds);
-    totals.local().add({brick.negative, brick.non_finite, brick.max});
+    totals.local().add({brick.negative, brick.non_finite, brick.huge, brick.max});
     bricks.constant[place] = brick.constant ? 1 : 0;
     bricks.first[place] = brick.first;
     return brick.constant || keep(found, values.data() + place * brick_voxels);
@@ -563,9 +575,12 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   }
   out.negative_voxels = bricks.totals.negative;
   out.non_finite_voxels = bricks.totals.non_finite;
+  out.huge_voxels = bricks.totals.huge;
   const auto count_uncounted = [&out](float value, std::uint64_t voxels) {
     if (!std::isfinite(value)) {
       out.non_finite_voxels += voxels;
+    } else if (is_huge(value)) {
+      out.huge_voxels += voxels;
     } else if (value < 0.0F) {
       out.negative_voxels += voxels;
     }
@@ -604,6 +619,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   };
   warn(out.negative_voxels, " negative", " clamped to 0");
   warn(out.non_finite_voxels, " non-finite", " counted as 0");
+  warn(out.huge_voxels, "", " beyond 1e30, as fill values are, counted as 0");
   return std::move(out);
 }
 
@@ -676,10 +692,10 @@ class OneSign final : public LeafSource {
  public:
   OneSign(std::shared_ptr<const LeafSource> leaves, float sign) : leaves_(std::move(leaves)), sign_(sign) {}
 
-  /// What is not finite stays so.
+  /// What is not finite or huge stays so.
   [[nodiscard]] float operator()(float value) const {
     const float own = sign_ * value;
-    return std::isfinite(value) && own < 0.0F ? 0.0F : own;
+    return std::isfinite(value) && !is_huge(value) && own < 0.0F ? 0.0F : own;
   }
   [[nodiscard]] std::size_t count() const override { return leaves_->count(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return leaves_->origin(leaf); }

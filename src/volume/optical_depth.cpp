@@ -12,6 +12,7 @@
 
 #include "base/corners.hpp"
 #include "base/progress_part.hpp"
+#include "volume/value_unit.hpp"
 
 namespace cumulet::volume {
 
@@ -25,6 +26,7 @@ constexpr double visible_depth = 0.05129;  // an opacity of 5 %
 constexpr int directions = 24;
 constexpr int rays_a_side = 64;
 constexpr int rays_a_side_of_view = 128;
+constexpr double most_density_scale = 1e60;  // that a setting may have
 
 /// Directions spread evenly over a half of the sphere: a ray has no sense.
 glm::dvec3 direction_of(int i) {
@@ -135,7 +137,8 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
               glm::scale(glm::dmat4(1.0), glm::dvec3(block));
 
   // A slab of cells by one thread: the order of every sum is the volume's own.
-  const double whole = double(block) * block * block;
+  unit_ = value_unit(volume.max_value);
+  const double whole = unit_ * block * block * block;
   tbb::parallel_for(0, size_.x, [&](int x) {
     check(progress);
     const Slab slab(volume, x, block, size_);
@@ -269,14 +272,14 @@ std::optional<double> CoarseVolume::suggest_density_scale() const {
     visible_area += ray.area;
     visible_mass += ray.area * depth;
   }
-  const double scale = wanted_depth * visible_area / visible_mass;
+  const double scale = wanted_depth * visible_area / visible_mass / unit_;
   // What a person reads, and types again.
   std::array<char, 32> digits{};
   const char* end =
       std::to_chars(digits.data(), digits.data() + digits.size(), scale, std::chars_format::scientific, 2).ptr;
   double rounded = scale;
   std::from_chars(digits.data(), end, rounded);
-  return std::clamp(rounded, 1e-30, 1e30);
+  return std::clamp(rounded, std::numeric_limits<double>::min(), most_density_scale);
 }
 
 std::vector<glm::dvec3> CoarseVolume::visible(const glm::dvec3& direction, double density_scale) const {
@@ -285,7 +288,7 @@ std::vector<glm::dvec3> CoarseVolume::visible(const glm::dvec3& direction, doubl
   const glm::dmat4 from_world = glm::inverse(to_world_);
   const glm::dvec3 along(from_world * glm::dvec4(direction, 0.0));
   const Sheet from = sheet(*box, direction, rays_a_side_of_view);
-  const double least = visible_depth / density_scale;
+  const double least = visible_depth / (density_scale * unit_);
   const glm::dvec3 u = 0.5 * from.pixel.x * from.u;
   const glm::dvec3 v = 0.5 * from.pixel.y * from.v;
   std::array<std::vector<glm::dvec3>, rays_a_side_of_view> rows;

@@ -67,6 +67,7 @@ class CoarseVolume {
   [[nodiscard]] std::vector<Ray> rays() const;
 
   glm::ivec3 size_{0};
+  double unit_ = 1.0;  ///< of the means
   std::vector<float> means_;
   glm::dmat4 to_world_{1.0};  ///< cell (i,j,k) is the box from (i,j,k) on
 };

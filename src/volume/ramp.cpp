@@ -34,6 +34,7 @@ ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress*
   out.tiles = volume.tiles;
   out.negative_voxels = volume.negative_voxels;
   out.non_finite_voxels = volume.non_finite_voxels;
+  out.huge_voxels = volume.huge_voxels;
   for (Tile& tile : out.tiles) tile.value = ramp(tile.value);
 
   std::vector<float> values;

@@ -14,6 +14,9 @@
 
 namespace cumulet::volume {
 
+/// Values further from 0 than this count as 0: fill values are (netCDF's is 9.97e36), and no measured value is.
+inline constexpr float largest_value = 1e30F;
+
 /// A box of voxels [min, max], both inclusive, of one value.
 struct Tile {
   glm::ivec3 min;
@@ -24,8 +27,8 @@ struct Tile {
 /// A scalar field on a sparse voxel lattice, free of any file format.
 ///
 /// Voxel (i,j,k) is the unit cube centred on (i,j,k) in index space, of constant value. The field is zero outside
-/// bounds; inside, a voxel is in a brick, else in a tile, else it has the background value. Values are finite and not
-/// negative.
+/// bounds; inside, a voxel is in a brick, else in a tile, else it has the background value. Values are not
+/// negative, and largest_value at most.
 struct ScalarVolume {
   std::string name;                ///< grid name, for messages
   glm::dmat4 index_to_world{1.0};  ///< affine: world = index_to_world * (i,j,k,1)
@@ -47,6 +50,7 @@ struct ScalarVolume {
   // What the source had within bounds, and counts as 0.
   std::uint64_t negative_voxels = 0;
   std::uint64_t non_finite_voxels = 0;
+  std::uint64_t huge_voxels = 0;  ///< finite, beyond largest_value either way
 
   /// No active voxel: bounds are then the one voxel (0, 0, 0), which is 0.
   [[nodiscard]] bool empty() const { return active_voxels == 0; }
@@ -91,9 +95,9 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 /// in another case. A warning names the others, unless it is the only one called "density" in any case. Another warning
 /// names a version of the file that is newer than the known ones. Level sets, vector grids, points and unreadable files
 /// throw Error(file) with one line that names file and cause. An empty grid is an empty volume, with a warning;
-/// negative and non-finite voxels are zero, with one warning each that counts them. Any affine transform is accepted; a
-/// frustum transform is not. O(active nodes) time and memory. progress receives the fraction done; cancelled,
-/// Error(cancelled) is thrown.
+/// negative and non-finite voxels, and those beyond largest_value, are zero, with one warning each that counts them. Any
+/// affine transform is accepted; a frustum transform is not. O(active nodes) time and memory. progress receives the
+/// fraction done; cancelled, Error(cancelled) is thrown.
 ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
                            Progress* progress = nullptr);
 

@@ -77,7 +77,7 @@ TEST_F(CInstance, IsRefusedInOneLine) {
       },
       "cumulet_instance_desc.open_to_world and close_to_world make it flat in between");
   refused([](auto& d) { d.hidden = 2; }, "cumulet_instance_desc.hidden is not 0 or 1");
-  refused([&](auto& d) { d.medium = &medium; }, "cumulet_medium_desc.density_scale is not from 0 to 1e30");
+  refused([&](auto& d) { d.medium = &medium; }, "cumulet_medium_desc.density_scale is not from 0 to 1e60");
   const InstanceRef one = make_instance(ball_.get());
   std::array<double, 16> flat{};
   flat[15] = 1.0;

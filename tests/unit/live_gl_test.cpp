@@ -860,6 +860,38 @@ class LiveInGl : public LiveGl {
   }
 };
 
+// Powers of two change no digit, and so no sample.
+TEST_F(LiveInGl, ExtremeValuesAreDrawnAsOrdinaryOnes) {
+  const std::vector<float> plain = simulated(CUMULET_CHANNEL_DENSITY, odd, 0);
+  auto medium = make_desc<cumulet_medium_desc>();
+  medium.density_scale = 0.5;
+  const ViewerPtr other = make(CUMULET_BUILD_GPU);
+  ASSERT_EQ(cumulet_set_medium(other.get(), &medium), CUMULET_OK);
+  const Picture expected = test::picture_of(other.get(), alone(dense(odd, plain)).get(), target_);
+  for (const int exponent : {-100, 90}) {
+    SCOPED_TRACE(exponent);
+    std::vector<float> values = plain;
+    for (float& value : values) value = std::ldexp(value, exponent);
+    medium.density_scale = std::ldexp(0.5, -exponent);
+    ASSERT_EQ(cumulet_set_medium(v_, &medium), CUMULET_OK) << cumulet_last_error(v_);
+    hand_over_density(Array(CUMULET_VOXEL_FORMAT_R32F, values), types[0]);
+    EXPECT_GE(arrive(), 1U);
+    EXPECT_EQ(difference(picture(), expected), "");
+  }
+}
+
+TEST_F(LiveInGl, FillValuesCountAsZero) {
+  std::vector<float> values = simulated(CUMULET_CHANNEL_DENSITY, odd, 0);
+  std::vector<float> without = values;
+  for (std::size_t i = 0; i < values.size(); i += 97) {
+    values[i] = i % 2 == 0 ? 9.97e36F : -std::numeric_limits<float>::max();
+    without[i] = 0.0F;
+  }
+  hand_over_density(Array(CUMULET_VOXEL_FORMAT_R32F, values), types[0]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), reference(without)), "");
+}
+
 TEST_F(LiveInGl, EveryFormatIsTheSamePicture) {
   int step = 0;
   for (const Type& type : types) {

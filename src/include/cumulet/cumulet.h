@@ -283,7 +283,8 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
 /*
  * A scalar fog volume in main memory: immutable, counted, free of GL, to be shown by any number of viewers. These
  * calls are synchronous, for any thread; error as in cumulet_create. cumulet_load_volume is the asynchronous way.
- * The medium is zero outside the bounds of the active voxels. Negative and non-finite voxels count as zero, and a grid
+ * The medium is zero outside the bounds of the active voxels. Negative and non-finite voxels count as zero, and so do
+ * those beyond 1e30 or -1e30 of every field, as fill values are. A grid
  * without active voxels is an empty volume, which shows nothing: cumulet_volume_info tells, cumulet_load_volume logs
  * warnings.
  */
@@ -440,6 +441,7 @@ typedef struct cumulet_volume_info {
   float max_value;
   uint64_t negative_voxels; /* that count as 0 */
   uint64_t non_finite_voxels;
+  uint64_t huge_voxels; /* finite, but beyond 1e30 or -1e30, as fill values are: they count as 0 */
 } cumulet_volume_info;
 
 CUMULET_API cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_volume_info* info);
@@ -1309,11 +1311,16 @@ typedef enum cumulet_phase {
    transmittance or emission. */
 typedef struct cumulet_medium_desc {
   size_t struct_size;
-  double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
-  float coalbedo[3];    /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
+  /*
+   * Extinction = density_scale x grid value, 1 / world unit; up to 1e60; 0: 1. Paths meet at most 2^23 optical
+   * depths over the extent of all volumes, because floats resolve no shorter distance: a denser medium looks the same.
+   */
+  double density_scale;
+  float coalbedo[3]; /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
   float anisotropy; /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic. Not of Mie, nor where
                        the volume has an anisotropy_grid */
-  uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
+  uint32_t max_bounces; /* scattering events a path may have; 0: no limit, but from 16384 on each doubling of them
+                           halves a path's chance to go on, which keeps the mean */
   /*
    * Source radiance: each point gives off extinction x emission per unit of length, so that a body of the medium too
    * thick to see through glows with this if it does not scatter. It lights the rest of the medium and the surfaces
