@@ -95,7 +95,7 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
 }
 
 void Session::on_log(void* user, cumulet_log_level level, const char* message) {
-  if (level < CUMULET_LOG_WARNING) return;
+  if (level < CUMULET_LOG_INFO) return;
   auto* shared = static_cast<Shared*>(user);
   const std::lock_guard lock(shared->mutex);
   shared->warnings.emplace_back(message);

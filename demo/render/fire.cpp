@@ -19,10 +19,15 @@ double most_of(const cumulet_volume* volume, cumulet_ramp ramp) {
   return cumulet_volume_get_values(volume, ramp, &info) == CUMULET_OK ? double{info.max_value} : 0.0;
 }
 
-double size_of(const cumulet_volume* volume) {
+cumulet_volume_info info_of(const cumulet_volume* volume) {
   cumulet_volume_info info{};
   info.struct_size = sizeof info;
-  if (cumulet_volume_get_info(volume, &info) != CUMULET_OK) return 0.0;
+  // Of a volume that is there, with room for it.
+  static_cast<void>(cumulet_volume_get_info(volume, &info));
+  return info;
+}
+
+double size_of(const cumulet_volume_info& info) {
   const auto edge = [&](int axis) { return info.bounds_max[axis] - info.bounds_min[axis]; };
   return std::hypot(edge(0), edge(1), edge(2));
 }
@@ -38,12 +43,19 @@ bool is_unsaid(const cumulet_medium_desc& medium) {
   return settings::same(said, plain);
 }
 
+std::optional<float> temperature_scale_of(const cumulet_volume* volume) {
+  if (!(most_of(volume, CUMULET_RAMP_TEMPERATURE) > 0.0)) return std::nullopt;
+  return static_cast<float>(info_of(volume).temperature_scale);
+}
+
 std::optional<cumulet_medium_desc> medium_of_fire(const cumulet_volume* volume, const cumulet_medium_desc& plain) {
   cumulet_medium_desc medium = plain;
   settings::spell_out_zeros(medium);
+  const cumulet_volume_info info = info_of(volume);
   Burning burning{.flame = most_of(volume, CUMULET_RAMP_FLAME),
                   .temperature = most_of(volume, CUMULET_RAMP_TEMPERATURE),
-                  .size = size_of(volume)};
+                  .size = size_of(info)};
+  if (medium.temperature_scale == 0.0F) medium.temperature_scale = temperature_scale_of(volume).value_or(0.0F);
   // Smoke may be warm, and a cloud has its kelvin.
   const double kelvin = double{medium.temperature_scale} * burning.temperature;
   if (!(kelvin >= coldest_fire && kelvin <= hottest_fire)) burning.temperature = 0.0;

@@ -27,7 +27,10 @@ std::vector<std::string> HeldLines::release(const std::string& failure) {
 }
 
 std::string HeldLines::line_of(const Message& message) {
-  return (message.level == CUMULET_LOG_WARNING ? "warning: " : "error: ") + one_line(message.text);
+  const char* const kind = message.level == CUMULET_LOG_INFO      ? "note: "
+                           : message.level == CUMULET_LOG_WARNING ? "warning: "
+                                                                  : "error: ";
+  return kind + one_line(message.text);
 }
 
 }  // namespace cumulet::demo

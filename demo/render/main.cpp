@@ -32,10 +32,10 @@
 #include "fire.hpp"
 #include "frame_plan.hpp"
 #include "glow.hpp"
-#include "held_lines.hpp"
 #include "info.hpp"
 #include "instances.hpp"
 #include "memory.hpp"
+#include "messages.hpp"
 #include "metadata.hpp"
 #include "models.hpp"
 #include "object_name.hpp"
@@ -81,32 +81,19 @@ void catch_signals() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-struct Log {
-  Progress& progress;
-  cumulet::demo::HeldLines lines = {};
-};
-
-void print_log(void* user, cumulet_log_level level, const char* message) {
-  if (level < CUMULET_LOG_WARNING) return;
-  auto* log = static_cast<Log*>(user);
-  const auto line = log->lines.take(level, message);
-  if (!line) return;
-  log->progress.clear();
-  std::fprintf(stderr, "%s\n", line->c_str());
-}
-
 struct DestroyViewer {
   void operator()(cumulet_viewer* viewer) const { cumulet_destroy(viewer); }
 };
 using Viewer = std::unique_ptr<cumulet_viewer, DestroyViewer>;
 
-Viewer create_viewer(Context& context, Log& log, Timeline* timeline, const std::string& shader_cache) {
+Viewer create_viewer(Context& context, cumulet::demo::Messages& messages, Timeline* timeline,
+                     const std::string& shader_cache) {
   cumulet_create_desc desc{};
   desc.struct_size = sizeof desc;
   desc.get_proc = Context::get_proc;
   desc.get_proc_user = &context;
-  desc.log = print_log;
-  desc.log_user = &log;
+  desc.log = cumulet::demo::Messages::print;
+  desc.log_user = &messages;
   if (timeline != nullptr) {
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
@@ -522,7 +509,8 @@ class Studio {
       : network_(network_of(options, progress_)),
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
-        viewer_(create_viewer(context_, log_, options.trace.empty() ? nullptr : &timeline_, options.shader_cache)) {
+        viewer_(
+            create_viewer(context_, messages_, options.trace.empty() ? nullptr : &timeline_, options.shader_cache)) {
     check_memory(viewer_, options);
     set_scene(options);
   }
@@ -660,9 +648,9 @@ class Studio {
   /// cannot be is not so here.
   void load_both(const SceneOptions& scene, const cumulet_volume_file_desc& file, const PlannedFrame::Next& next) {
     const auto print = [this](const std::string& failure) {
-      for (const std::string& line : log_.lines.release(failure)) tell(progress_, line);
+      for (const std::string& line : messages_.release(failure)) tell(progress_, line);
     };
-    log_.lines.hold();
+    messages_.hold();
     try {
       set_between(scene, file, next);
       wait(viewer_, progress_);
@@ -749,7 +737,7 @@ class Studio {
   }
 
   Progress progress_;
-  Log log_{progress_};
+  cumulet::demo::Messages messages_{progress_};
   Timeline timeline_;
   // At once, not after hours of samples.
   std::string network_;
@@ -795,7 +783,8 @@ bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, cam
 /// Whether nothing that is the same for all frames of a sequence depends on a volume.
 bool is_settled(const SceneOptions& scene) {
   const bool placed = scene.surface_camera >= 0 || !fits(scene.camera);
-  return placed && !scene.auto_density_scale && scene.ground.place != CUMULET_GROUND_BELOW;
+  const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
+  return placed && !heated && !scene.auto_density_scale && scene.ground.place != CUMULET_GROUND_BELOW;
 }
 
 /// A ground below all that is there: just below a model, for many stand on a floor of their own. Throws where there is
@@ -808,7 +797,8 @@ double ground_below(const Viewer& viewer, const SceneOptions& scene) {
   return least[1] - (scene.surfaces.empty() && scene.models.empty() ? 0.0 : 1e-4 * size);
 }
 
-/// Takes that from the volume that is there: the density scale, how low the ground is, where the camera stands.
+/// Takes that from the volume that is there: the density scale, how hot its temperatures are, how low the
+/// ground is, where the camera stands.
 void settle(const Viewer& viewer, RenderOptions& options) {
   SceneOptions& scene = options.scene;
   const std::optional<cumulet_medium_desc> fire = medium_of_fire(viewer, scene);
@@ -819,6 +809,10 @@ void settle(const Viewer& viewer, RenderOptions& options) {
     } else if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) {
       scale = 0.0;  // nothing to see at any
     }
+    check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
+  }
+  if (scene.is_shown() && scene.medium.temperature_scale == 0.0F) {
+    scene.medium.temperature_scale = cumulet::demo::temperature_scale_of(volume_of(viewer).get()).value_or(0.0F);
     check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   }
   if (scene.ground.place == CUMULET_GROUND_BELOW) {

@@ -541,7 +541,8 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         if (text.empty()) throw UsageError("the file's name is empty");
         scene.set_environment(text);
       },
-      "Environment, an equirectangular .hdr or .exr picture or an .exr cube map, instead of the sky; +Y is up, its middle is +Z");
+      "Environment, an equirectangular .hdr or .exr picture or an .exr cube map, instead of the sky; +Y is up, its "
+      "middle is +Z");
   add_settings(app, group, scene.environment_settings);
   add(
       app, group, "--sky-model", "\"turbidity,ground_albedo\"",

@@ -682,7 +682,8 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
     return Json{one(value[0]), one(value[1]), one(value[2])};
   } else {
     const bool negative = setting.spelling == Spelling::zero_is_negative;
-    if (value == Value{} && (setting.zero != 0.0 || negative)) return std::nullopt;
+    const bool left = setting.zero != 0.0 || negative || (setting.given && !setting.given->holds(0.0));
+    if (value == Value{} && left) return std::nullopt;
     if constexpr (settings::Count<Value>) {
       return value;
     } else {

@@ -101,7 +101,7 @@ class Glow {
     glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_colour_;
     if (temperature > 0.0F && emission_.blackbody > 0.0) {
       const double kelvin =
-          emission_.temperature_offset + emission_.temperature_scale * static_cast<double>(temperature);
+          emission_.temperature_offset + emission_.kelvin_a_value() * static_cast<double>(temperature);
       constexpr double hottest = 1e6;
       const vec3 body = black_body_.emission(static_cast<float>(std::min(kelvin, hottest)), intensity_of(emission_));
       light += glm::dvec3(body) * glm::dvec3(emission_.blackbody_tint);
@@ -210,7 +210,7 @@ core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& 
   glow.tint = emission.blackbody_tint;
   glow.unit = emission.blackbody > 0.0 ? static_cast<float>(light::black_body_radiance(1000.0, 1.0) / 1e12) : 0.0F;
   glow.offset = static_cast<float>(emission.temperature_offset);
-  glow.scale = static_cast<float>(emission.temperature_scale);
+  glow.scale = static_cast<float>(emission.kelvin_a_value());
   glow.most = static_cast<float>(most_radiance);
   put(emission.temperature_ramp, glow.ramps);
   put(emission.flame_ramp, glow.ramps + CM_RAMP_PARTS);

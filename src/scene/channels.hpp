@@ -21,13 +21,17 @@ namespace cumulet::scene {
 struct Emission {
   double flame_strength = 1.0;  ///< radiance a world unit of length where flame is 1
   glm::vec3 flame_colour{1.0F};
-  double temperature_scale = 1500.0;  ///< kelvin = offset + scale x the field's value
+  /// Kelvin = offset + scale x the field's value. Nothing: as suits the volume, which VolumeAsset::emission_by fills
+  /// in; else 1500.
+  std::optional<double> temperature_scale = {};
   double temperature_offset = 0.0;
   double blackbody = 0.0;  ///< intensity of black body light (light::BlackBody); 0: none
   glm::vec3 blackbody_tint{1.0F};
   volume::Ramp temperature_ramp = {};  ///< of the field's values, before offset and scale
   volume::Ramp flame_ramp = {};
   bool operator==(const Emission&) const = default;
+
+  [[nodiscard]] double kelvin_a_value() const { return temperature_scale.value_or(1500.0); }
 
   /// Whether flame does, where there is any.
   [[nodiscard]] bool burns() const { return flame_strength > 0.0 && flame_colour != glm::vec3(0.0F); }

@@ -190,6 +190,7 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
                                   ? volume::import_frame(path, grids, log, progress, {take, least_stand_in_bricks})
                                   : volume::import_frame(path, grids, log, progress);
   place(frame, to_world);
+  frame.temperature_scale = temperature_scale;
   try {
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);
   } catch (const Error& e) {

@@ -26,6 +26,8 @@ struct VolumeFile {
   volume::GridNames grids;
   glm::dmat4 to_world{1.0};              ///< affine, from the file's own world space
   bool suggested_density_scale = false;  ///< the medium gets the one that is suggested for it
+  /// As VolumeFrame has it.
+  std::optional<double> temperature_scale = {};
   /// Below which a file has no stand-in; tests have other ones.
   std::uint64_t least_stand_in_bricks = volume::worth_a_stand_in;
 

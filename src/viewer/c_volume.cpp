@@ -116,6 +116,7 @@ cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_vol
     out.negative_voxels = field.negative_voxels;
     out.non_finite_voxels = field.non_finite_voxels;
     out.huge_voxels = field.huge_voxels;
+    if (asset.frame().temperature) out.temperature_scale = asset.temperature_scale();
     write_desc(info, out, "cumulet_volume_info");
   });
 }

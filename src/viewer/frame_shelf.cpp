@@ -52,6 +52,7 @@ void FrameShelf::wish(Wish wish) {
       old = std::exchange(shelf_, std::vector<Shelved>(wish.steps.count(wish.files->count())));
       judging_ = Judging::due;
       judged_.reset();
+      temperature_scale_.reset();
       said_.clear();
     } else if (other_steps) {
       old = take_other_steps(wish.steps);
@@ -398,6 +399,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
           own(frame).volume_bytes = bytes;
         }
         if (!judged.facts || !volume->empty()) judged.facts = volume->facts();
+        settle_temperature(*files, *volume);
         if (!volume->empty()) break;
       } catch (...) {
         const Error failure = caught(what);
@@ -416,14 +418,26 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
   end(judged.facts ? Judging::done : Judging::in_vain);
 }
 
+void FrameShelf::settle_temperature(const FrameFiles& files, const VolumeAsset& volume) {
+  const auto& temperature = volume.frame().temperature;
+  if (!temperature || !(temperature->max_value > 0.0F)) return;
+  const std::scoped_lock lock(mutex_);
+  if (wish_ && wish_->files.get() == &files && !temperature_scale_) temperature_scale_ = volume.temperature_scale();
+}
+
 VolumeAssetPtr FrameShelf::read_frame(const Which& which, std::uint32_t frame, Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
     if (is_wished(which) && own(frame).volume) return own(frame).volume;
   }
-  const VolumeFile file = which.files->file(frame);
+  VolumeFile file = which.files->file(frame);
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_wished(which)) file.temperature_scale = temperature_scale_;
+  }
   progress.begin(Progress::Stage::loading);
   VolumeAssetPtr volume = file.read(log_of(file.path), &progress);
+  settle_temperature(*which.files, *volume);
   const std::uint64_t bytes = volume->bytes();
   std::vector<Shelved> old;
   const std::scoped_lock lock(mutex_);
@@ -463,11 +477,11 @@ VolumeAssetPtr FrameShelf::read(const Which& which, std::optional<Ends>& ends, s
   const volume::VolumeFrame& before = ends->before->frame();
   const volume::VolumeFrame& after = ends->after->frame();
   try {
-    return std::make_shared<const VolumeAsset>(
-        which.steps.between == scene::Between::advect
-            ? volume::between(before, after, part, which.steps.seconds, &progress)
-            : volume::blend(before, after, part, &progress),
-        &progress);
+    volume::VolumeFrame made = which.steps.between == scene::Between::advect
+                                   ? volume::between(before, after, part, which.steps.seconds, &progress)
+                                   : volume::blend(before, after, part, &progress);
+    made.temperature_scale = ends->after->temperature_scale();
+    return std::make_shared<const VolumeAsset>(std::move(made), &progress);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::cancelled) throw;
     throw Error(error.code(), which.files->paths[frame] + ": what follows it cannot be made: " + error.what());

@@ -134,6 +134,7 @@ class FrameShelf {
 
   void work(Progress& progress);
   void judge(const FrameFilesPtr& files, Progress& progress);
+  void settle_temperature(const FrameFiles& files, const VolumeAsset& volume);
   void build(const Which& which, const BuildSettings& settings, std::optional<Ends>& ends, Progress& progress);
   // What a step shows. reading: whose file is at fault where it fails; none: what is between two.
   VolumeAssetPtr read(const Which& which, std::optional<Ends>& ends, std::optional<std::uint32_t>& reading,
@@ -184,8 +185,11 @@ class FrameShelf {
   std::vector<std::optional<std::uint32_t>> stand_ins_;
   Judging judging_ = Judging::due;
   std::optional<Judged> judged_;  // that nobody took
-  std::set<std::string> said_;    // by the log, but for files' names
-  bool cancelled_ = false;        // until the next wish
+  // VolumeFrame::temperature_scale of all frames, once one with a temperature was read: the largest, unless it has
+  // none.
+  std::optional<double> temperature_scale_;
+  std::set<std::string> said_;  // by the log, but for files' names
+  bool cancelled_ = false;      // until the next wish
   std::atomic<std::uint64_t> revision_ = 0;
   Worker worker_;  // last: its thread uses all of the above
 };

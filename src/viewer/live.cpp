@@ -256,14 +256,22 @@ void Live::refuse_base(std::optional<Whole>& old) {
   base_number_ = newest_;
 }
 
-VolumeAssetPtr Live::read_base(Progress& progress) const {
-  if (const auto* there = std::get_if<scene::StateInGlPtr>(&base_->fields))
-    return std::make_shared<const VolumeAsset>(*there, &progress);
-  const std::vector<MemoryField> fields = base_->view();
-  if (base_->lease) {
-    for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
+VolumeAssetPtr Live::read_base(Progress& progress) {
+  VolumeAssetPtr made;
+  if (const auto* there = std::get_if<scene::StateInGlPtr>(&base_->fields)) {
+    made = std::make_shared<const VolumeAsset>(*there, &progress, temperature_scale_);
+  } else {
+    const std::vector<MemoryField> fields = base_->view();
+    if (base_->lease) {
+      for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
+    }
+    volume::VolumeFrame frame = volume::import_fields(fields, base_->name, {}, &progress);
+    frame.temperature_scale = temperature_scale_;
+    made = std::make_shared<const VolumeAsset>(std::move(frame), &progress);
   }
-  return std::make_shared<const VolumeAsset>(volume::import_fields(fields, base_->name, {}, &progress), &progress);
+  constexpr double kelvin = 1.0;
+  if (made->temperature_scale() == kelvin) temperature_scale_ = kelvin;
+  return made;
 }
 
 Live::State Live::read(Progress& progress) {

@@ -134,7 +134,7 @@ class Live {
   // Of what was handed over last when they were made.
   void hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name);
   // reading_ is held.
-  [[nodiscard]] VolumeAssetPtr read_base(Progress& progress) const;
+  [[nodiscard]] VolumeAssetPtr read_base(Progress& progress);
   // old: what it held before.
   void take_next(std::optional<Whole>& old);
   void refuse_base(std::optional<Whole>& old);
@@ -151,6 +151,8 @@ class Live {
   std::optional<Whole> base_;  // of the state that was taken last, to be read or changed; none where it was refused
   std::uint64_t base_number_ = 0;
   State state_;
+  // VolumeFrame::temperature_scale of states from now on: once temperatures were kelvin they stay so, as a fire cools.
+  std::optional<double> temperature_scale_;
   Listeners listeners_;
   Listeners wish_listeners_;
 };

@@ -63,8 +63,9 @@ struct Medium {
             phase_of(d),
             d.max_bounces,
             glm::make_vec3(d.emission),
-            {d.flame_strength, glm::make_vec3(d.flame_color), d.temperature_scale, d.temperature_offset, d.blackbody,
-             glm::make_vec3(d.blackbody_tint)},
+            {d.flame_strength, glm::make_vec3(d.flame_color),
+             d.temperature_scale > 0.0F ? std::optional<double>(d.temperature_scale) : std::nullopt,
+             d.temperature_offset, d.blackbody, glm::make_vec3(d.blackbody_tint)},
             d.group,
             d.holdout == 1};
   }

@@ -53,9 +53,27 @@ VolumeAsset::VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, co
   begin(progress);
 }
 
-VolumeAsset::VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress)
-    : in_gl_(std::move(in_gl)), frame_(make_left<const volume::VolumeFrame>(in_gl_->frame())) {
+VolumeAsset::VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress, std::optional<double> temperature_scale)
+    : in_gl_(std::move(in_gl)) {
+  volume::VolumeFrame frame = in_gl_->frame();
+  frame.temperature_scale = temperature_scale;
+  frame_ = make_left<const volume::VolumeFrame>(std::move(frame));
   begin(progress);
+}
+
+double VolumeAsset::temperature_scale() const {
+  if (frame_->temperature_scale) return *frame_->temperature_scale;
+  float max_value = 0.0F;
+  for (const auto& frame : frames()) {
+    if (frame->temperature) max_value = std::max(max_value, frame->temperature->max_value);
+  }
+  return volume::temperature_scale_of(max_value);
+}
+
+double VolumeAsset::unit() const {
+  float max_value = 0.0F;
+  for (const auto& frame : frames()) max_value = std::max(max_value, frame->density.max_value);
+  return volume::value_unit(max_value);
 }
 
 VolumeAsset::Frames VolumeAsset::frames() const { return close_ ? Frames{frame_, close_} : Frames{frame_}; }
@@ -122,9 +140,13 @@ const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progres
   std::shared_ptr<const volume::ScalarVolume> voxels;
   std::shared_ptr<const grid::DensityEnds> ends;
   const auto curved = [&](const volume::ScalarVolume& density) { return volume::apply(ramp, density, &progress); };
+  double unit = 1.0;
   if (close_) {
     volume::ScalarVolume open = curved(frame_->density);
     volume::ScalarVolume close = curved(close_->density);
+    unit = volume::value_unit(std::max(open.max_value, close.max_value));
+    open = volume::in_units_of(unit, std::move(open), &progress);
+    close = volume::in_units_of(unit, std::move(close), &progress);
     // Of fire alone there is none.
     auto mean = scene::mean_of(&open, &close, "density", &progress);
     voxels = make_left<const volume::ScalarVolume>(mean ? std::move(*mean) : open);
@@ -142,13 +164,9 @@ const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progres
 VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& progress, double& seconds) const {
   using Clock = std::chrono::steady_clock;
   seconds = 0.0;
-  double unit = 1.0;
   progress.begin(Progress::Stage::statistics);
   const auto lock = patient_lock(computing_, progress);
   const auto start = Clock::now();
-    unit = volume::value_unit(std::max(open.max_value, close.max_value));
-    open = volume::in_units_of(unit, std::move(open), &progress);
-    close = volume::in_units_of(unit, std::move(close), &progress);
   const auto since = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   if (ramp.empty() && !close_ && !is_extreme()) {
     if (!statistics_) {
@@ -171,6 +189,7 @@ std::shared_ptr<const VolumeAsset> VolumeAsset::while_open(double seconds, Progr
   drop(exposed_);
   volume::VolumeFrame open = volume::advect(*frame_, -0.5 * seconds, &progress);
   volume::VolumeFrame close = volume::advect(*frame_, 0.5 * seconds, &progress);
+  open.temperature_scale = close.temperature_scale = temperature_scale();
   put(exposed_, Exposed{seconds, std::make_shared<const VolumeAsset>(std::move(open), std::move(close), &progress)});
   return exposed_->asset;
 }
@@ -201,12 +220,30 @@ grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Chan
   return latticed_->lattice;
 }
 
+double VolumeAsset::scale_of(const volume::Ramp& temperature_ramp) const {
+  if (temperature_ramp.empty()) return temperature_scale();
+  float most = 0.0F;
+  for (const glm::vec2& point : temperature_ramp.points()) most = std::max(most, point.y);
+  return volume::temperature_scale_of(most);
+}
+
 scene::Emission VolumeAsset::emission_by(const scene::Emission& emission) const {
   scene::Emission given = emission;
+  if (!given.temperature_scale && frame_->temperature) given.temperature_scale = scale_of(given.temperature_ramp);
   // What has a temperature alone would be nothing.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
   if (given.blackbody == 0.0 && alone) given.blackbody = 1.0;
   return given;
+}
+
+VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::VolumeFrame>& frame,
+                                            const volume::Ramp& ramp, Progress& progress) const {
+  if (ramp.empty() && !is_extreme()) return {frame, ramp};
+  const double unit = ramped(ramp, progress).density.unit;
+  if (unit == 1.0) return {frame, ramp};
+  volume::VolumeFrame copy = *frame;
+  copy.density = volume::in_units_of(unit, volume::apply(ramp, frame->density, &progress), &progress);
+  return {make_left<const volume::VolumeFrame>(std::move(copy)), {}};
 }
 
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
@@ -247,16 +284,6 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
     auto momentum = in_gl_ ? in_gl_->momentum()
                            : scene::momentum_of(*at_open.frame, at_open.ramp, &progress, log,
                                                 close != nullptr ? scene::fastest_of(*close) : 0.0);
-VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::VolumeFrame>& frame,
-                                            const volume::Ramp& ramp, Progress& progress) const {
-  if (ramp.empty() && !is_extreme()) return {frame, ramp};
-  const double unit = ramped(ramp, progress).density.unit;
-  if (unit == 1.0) return {frame, ramp};
-  volume::VolumeFrame copy = *frame;
-  copy.density = volume::in_units_of(unit, volume::apply(ramp, frame->density, &progress), &progress);
-  return {make_left<const volume::VolumeFrame>(std::move(copy)), {}};
-}
-
     if (close != nullptr) {
       scattering = scene::mean_of(scattering, scene::scattering_of(*at_close.frame, at_close.ramp, &progress),
                                   "density", &progress);

@@ -45,8 +45,9 @@ class VolumeAsset {
   explicit VolumeAsset(volume::VolumeFrame frame, const Progress* progress = nullptr);
   /// As it is while the shutter is open, from one frame to the other, of one lattice: its fields are the means of both.
   VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, const Progress* progress = nullptr);
-  /// What is in GL.
-  explicit VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress = nullptr);
+  /// What is in GL. temperature_scale: as VolumeFrame has it.
+  explicit VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress = nullptr,
+                       std::optional<double> temperature_scale = {});
   explicit VolumeAsset(volume::ScalarVolume density, const Progress* progress = nullptr)
       : VolumeAsset(volume::VolumeFrame{.density = std::move(density)}, progress) {}
 
@@ -59,6 +60,8 @@ class VolumeAsset {
   /// They may outlive it.
   [[nodiscard]] const VolumeFactsPtr& facts() const { return facts_; }
   [[nodiscard]] bool may_emit() const { return facts_->may_emit; }
+  /// Kelvin where its temperature is 1, for media that do not say.
+  [[nodiscard]] double temperature_scale() const;
   [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
   /// Whether anything of it has a velocity.
   [[nodiscard]] bool moves() const { return fastest() > 0.0; }
@@ -78,10 +81,10 @@ class VolumeAsset {
   struct Density {
     std::shared_ptr<const volume::ScalarVolume> voxels;
     std::shared_ptr<const grid::Statistics> statistics;
+    double unit = 1.0;  ///< values of the grid = this x values here (volume::value_unit)
   };
   /// The first caller computes it; others wait, and if the first is cancelled the next one computes it. Kept are that
   /// without a ramp and the last with one. seconds receives what computing took, 0 if it was there. Throws
-    double unit = 1.0;  ///< values of the grid = this x values here (volume::value_unit)
   /// Error(cancelled) if this caller's progress is.
   [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
   /// Of density with that ramp and what channels() gave: what grids of any view are built from. The last is kept.
@@ -92,24 +95,21 @@ class VolumeAsset {
   [[nodiscard]] scene::Emission emission_by(const scene::Emission& emission) const;
   /// The state that is in GL; null: its voxels are in main memory.
   [[nodiscard]] const scene::StateInGlPtr& in_gl() const { return in_gl_; }
+  /// Whether density without a ramp has another unit than 1.
+  [[nodiscard]] bool is_extreme() const { return unit() != 1.0; }
   /// What it has beside density; anisotropic: its anisotropy, too. Of one that is in GL it was made there.
   /// The last that were asked for are kept: another threshold or camera asks for the same. log hears of what is left
   /// out, when it is made.
-  /// Whether density without a ramp has another unit than 1.
-  [[nodiscard]] bool is_extreme() const { return unit() != 1.0; }
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
                                         bool anisotropic, Progress& progress, const Log& log = {}) const;
 
  private:
   void begin(const Progress* progress);
+  // Of what the ramp makes of its temperature.
+  [[nodiscard]] double scale_of(const volume::Ramp& temperature_ramp) const;
   using Frames = std::vector<std::shared_ptr<const volume::VolumeFrame>>;
   // As it is, or as the shutter opens and as it closes.
   [[nodiscard]] Frames frames() const;
-  template <class Kept, class Made>
-  void put(Kept& kept, Made&& made) const {
-    const std::scoped_lock lock(mutex_);
-    kept = std::forward<Made>(made);
-  }
   // Of density without a ramp.
   [[nodiscard]] double unit() const;
   // What channels that density weighs are made of: the frame, and the ramp that its density is still without.
@@ -119,6 +119,11 @@ class VolumeAsset {
   };
   [[nodiscard]] Weighing weighing(const std::shared_ptr<const volume::VolumeFrame>& frame, const volume::Ramp& ramp,
                                   Progress& progress) const;
+  template <class Kept, class Made>
+  void put(Kept& kept, Made&& made) const {
+    const std::scoped_lock lock(mutex_);
+    kept = std::forward<Made>(made);
+  }
   template <class Kept>
   void drop(Kept& kept) const {
     const std::scoped_lock lock(mutex_);

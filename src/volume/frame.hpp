@@ -29,6 +29,11 @@ struct Velocity {
   [[nodiscard]] float most() const;
 };
 
+/// Temperatures that simulations write are 0 to 3 or so; more than this are kelvin.
+inline constexpr float max_relative_temperature = 20.0F;
+/// Kelvin where a temperature field is 1, by the most that it reaches: 1 where its values are kelvin, else 1500.
+constexpr double temperature_scale_of(float max_value) { return max_value > max_relative_temperature ? 1.0 : 1500.0; }
+
 /// The fields of one file, all on one lattice: each has the same index_to_world, and voxel (i,j,k) of each is the same
 /// place. Bounds and bricks are each field's own.
 struct VolumeFrame {
@@ -39,6 +44,8 @@ struct VolumeFrame {
   /// The mean cosine of what scatters, from -1 to 1: how far it is above 0, and how far below.
   std::optional<std::array<ScalarVolume, 2>> anisotropy = {};
   std::optional<Velocity> velocity = {};
+  /// Kelvin where temperature is 1, which the sequence that this is part of has in common; nothing: by its own values.
+  std::optional<double> temperature_scale = {};
 
   /// All that the fields beside density are made of.
   [[nodiscard]] std::vector<const ScalarVolume*> beside_density() const;
@@ -95,7 +102,7 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 /// import_volume's; the grids that are not shown; grids that fit a field's name as well as the one that is read;
 /// temperature, colour, anisotropy or velocity that lies nowhere over density; anisotropy beyond -1 and 1, which counts
 /// as these; velocities that are clamped. An info tells of colour in three grids that is not read, and of temperatures
-/// that seem to be kelvin, degrees Celsius, or from 0 to 1.
+/// that are taken as kelvin, or seem to be degrees Celsius or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

@@ -159,19 +159,17 @@ bool apart(const ScalarVolume& a, const ScalarVolume& b) {
   return Box{a.bounds_min, a.bounds_max}.clipped({b.bounds_min, b.bounds_max}).empty();
 }
 
-/// What the values of a temperature seem to be where they are not what simulations have, 0 to 3.
+/// What the values of a temperature are taken as where they are not what simulations have, 0 to 3. The same for all
+/// frames of a sequence.
 std::string remark_on_temperature(const ScalarVolume& field) {
-  constexpr float hottest_simulated = 20.0F;
-  const std::string reaches = "reaches " + general_text(field.max_value);
-  if (field.max_value > hottest_simulated) {
-    if (field.negative_voxels > 0) {
-      return reaches + " and has negative values, as degrees Celsius do: the scale of those is 1, the offset 273.15";
-    }
-    return reaches + ", as kelvin do: the scale of those is 1";
-  }
-  if (field.max_value > 0.0F && field.max_value <= 1.0F) {
-    return reaches + " only, as temperatures from 0 to 1 do: those may want a larger scale";
-  }
+  if (field.max_value > max_relative_temperature && field.negative_voxels > 0)
+    return "reaches hundreds and has negative values, as degrees Celsius do: they are taken as kelvin, unless "
+           "temperature_offset is 273.15";
+  if (field.max_value > max_relative_temperature)
+    return "reaches more than 20, as kelvin do: its values are taken as such, unless temperature_scale is set";
+  if (field.max_value > 0.0F && field.max_value <= 1.0F)
+    return "reaches 1 at most, as temperatures from 0 to 1 do: 1 is taken as 1500 kelvin, unless temperature_scale is "
+           "set";
   return {};
 }
 
@@ -422,10 +420,10 @@ class FrameImport {
                                  : resample(field, lattice, within, progress_, portion.part(0.0, sampling));
       // What there is to say of its values is said.
       ScalarVolume volume = assemble(std::move(source), {}, {}, progress_, portion.part(sampling, 1.0));
-      volume.huge_voxels = field.huge_voxels;
       volume.name = field.name;
       volume.negative_voxels = field.negative_voxels;
       volume.non_finite_voxels = field.non_finite_voxels;
+      volume.huge_voxels = field.huge_voxels;
       field = std::move(volume);
     }
     field.index_to_world = lattice;

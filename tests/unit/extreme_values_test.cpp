@@ -236,6 +236,42 @@ TEST(ExtremeValues, FillValuesOfEachFieldCountAsZero) {
   }
 }
 
+// ---- Kelvin
+
+viewer::VolumeAssetPtr with_temperature(float most, std::optional<double> of_sequence = {}) {
+  volume::VolumeFrame frame{.density = test::noise_volume(glm::ivec3(16), glm::ivec3(0), 3)};
+  frame.temperature = times(frame.density, double{most} / frame.density.max_value);
+  frame.temperature_scale = of_sequence;
+  return std::make_shared<const viewer::VolumeAsset>(std::move(frame));
+}
+
+TEST(Kelvin, AreKnownByTheirValues) {
+  for (const float relative : {0.5F, 1.0F, 3.0F, 20.0F})
+    EXPECT_EQ(with_temperature(relative)->temperature_scale(), 1500.0);
+  for (const float kelvin : {293.0F, 3000.0F, 1e5F}) EXPECT_EQ(with_temperature(kelvin)->temperature_scale(), 1.0);
+  EXPECT_EQ(with_temperature(5.0F, 1.0)->temperature_scale(), 1.0) << "as the sequence has it";
+}
+
+TEST(Kelvin, WhatIsSaidWins) {
+  const auto hot = with_temperature(2000.0F);
+  EXPECT_EQ(hot->emission_by({.blackbody = 1.0}).temperature_scale, 1.0);
+  EXPECT_EQ(hot->emission_by({.temperature_scale = 700.0, .blackbody = 1.0}).temperature_scale, 700.0);
+  // A ramp decides what the values are.
+  const volume::Ramp to_relative({{0.0F, 0.0F}, {2000.0F, 1.3F}});
+  EXPECT_EQ(hot->emission_by({.blackbody = 1.0, .temperature_ramp = to_relative}).temperature_scale, 1500.0);
+}
+
+TEST(Kelvin, GlowAsRelativeTemperaturesDo) {
+  Progress progress;
+  const auto light = [&](float most) {
+    const auto channels = with_temperature(most)->channels({}, {.blackbody = 1.0}, false, progress);
+    return channels.emission->max_value();
+  };
+  EXPECT_NEAR(light(1800.0F) / light(1.2F), 1.0, 1e-4);
+  // At room temperature next to nothing.
+  EXPECT_LT(light(293.0F), 1e-3F * light(1800.0F));
+}
+
 // ---- Pictures
 
 class ExtremePicture : public test::ViewerTest {

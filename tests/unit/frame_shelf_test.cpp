@@ -113,6 +113,30 @@ TEST_F(Shelf, BuildsAheadWhatOneAloneWouldBe) {
   EXPECT_EQ(shelf_.revision(), revision);  // nothing was built twice
 }
 
+// A fire that goes out: its last frames have but few kelvin.
+TEST_F(Shelf, FramesHaveTheTemperatureScaleOfTheLargest) {
+  const auto heat = [](int frame, float times) {
+    auto grid = cumulet::test::clip_ball(frame, "temperature");
+    for (auto value = grid->beginValueOn(); value; ++value) value.setValue(times * *value);
+    return grid;
+  };
+  const auto write = [&](int frame, float times) {
+    cumulet::test::write_frame(clip_.path(frame), {cumulet::test::clip_ball(frame), heat(frame, times)});
+  };
+  write(4, 1000.0F);  // of the largest balls
+  write(1, 5.0F);
+  const FrameFilesPtr all = files();
+  BuildSettings glowing;
+  glowing.emission.blackbody = 1.0;
+  shelf_.wish({all, from(1), glowing, plenty});
+  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  const auto ready = shelf_.nearest();
+  ASSERT_TRUE(ready && ready->frame == 1U);
+  EXPECT_EQ(ready->built.volume->temperature_scale(), 1.0);
+  EXPECT_FALSE(ready->built.source->emits()) << "of 10 kelvin nothing glows";
+  EXPECT_EQ(all->file(1).read({}, nullptr)->temperature_scale(), 1500.0) << "by itself";
+}
+
 TEST_F(Shelf, KeepsWhatIsNeededSoonestWithinItsMemory) {
   const FrameFilesPtr all = files();
   shelf_.wish({all, from(0), BuildSettings{}, plenty});

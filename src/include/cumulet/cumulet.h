@@ -441,7 +441,9 @@ typedef struct cumulet_volume_info {
   float max_value;
   uint64_t negative_voxels; /* that count as 0 */
   uint64_t non_finite_voxels;
-  uint64_t huge_voxels; /* finite, but beyond 1e30 or -1e30, as fill values are: they count as 0 */
+  uint64_t huge_voxels;     /* finite, but beyond 1e30 or -1e30, as fill values are: they count as 0 */
+  double temperature_scale; /* kelvin where its temperature is 1, for a medium whose temperature_scale is 0;
+                               0: it has no temperature */
 } cumulet_volume_info;
 
 CUMULET_API cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_volume_info* info);
@@ -1340,7 +1342,9 @@ typedef struct cumulet_medium_desc {
    */
   float flame_strength;     /* 0: 1; to be without flames, flame_grid "none" */
   float flame_color[3];     /* linear Rec. 709; all 0: white */
-  float temperature_scale;  /* kelvin; 0: 1500 */
+  float temperature_scale;  /* kelvin; 0: 1 where a value is more than 20, as kelvin are, else 1500
+                               (cumulet_volume_info has it). All frames of a sequence have the scale that suits the
+                               largest of its files; a live volume stays at 1 once it was there */
   float temperature_offset; /* kelvin */
   float blackbody;          /* intensity; 0: none, but 1 for a volume of a temperature without density and flame */
   float blackbody_tint[3];  /* all 0: white */

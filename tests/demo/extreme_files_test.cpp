@@ -1,0 +1,179 @@
+// What cumulet-render makes of files whose values are no ordinary ones: temperatures in kelvin, and fill values.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/folder.hpp"
+#include "support/openvdb.hpp"
+
+namespace {
+
+using openvdb::Coord;
+
+struct Run {
+  int status = 0;
+  std::string said;  // on standard error
+  std::vector<float> pixels;
+
+  [[nodiscard]] bool says(const std::string& part) const { return said.find(part) != std::string::npos; }
+  [[nodiscard]] double mean() const {
+    double sum = 0.0;
+    for (const float value : pixels) sum += double{value};
+    return sum / static_cast<double>(pixels.size());
+  }
+};
+
+class ExtremeFiles : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { openvdb::initialize(); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  void write(const std::string& name, const openvdb::GridPtrVec& grids) const {
+    openvdb::io::File(path(name)).write(grids);
+  }
+  // A picture of few pixels, with these flags more.
+  [[nodiscard]] Run render(const std::string& name, const std::string& more = "") const {
+    const std::string picture = path("picture.pfm");
+    Run run = command(name, picture, more);
+    run.pixels = pixels_of(picture);
+    return run;
+  }
+  [[nodiscard]] Run command(const std::string& name, const std::string& picture, const std::string& more) const {
+    const std::string line = std::string("'" CUMULET_RENDER "' '") + path(name) + "' --size 16x16 --spp 16 -o '" +
+                             picture + "' " + more + " 2>&1 >/dev/null";
+    Run run;
+    FILE* said = popen(line.c_str(), "r");
+    if (said == nullptr) throw std::runtime_error("cannot run a shell");
+    for (int c = std::fgetc(said); c != EOF; c = std::fgetc(said)) run.said.push_back(static_cast<char>(c));
+    const int ended = pclose(said);
+    run.status = WIFEXITED(ended) ? WEXITSTATUS(ended) : -1;
+    EXPECT_EQ(run.status, 0) << line << "\n" << run.said;
+    return run;
+  }
+  static std::vector<float> pixels_of(const std::string& file) {
+    std::ifstream stream(file, std::ios::binary);
+    std::string header;
+    for (int line = 0; line < 3; ++line) std::getline(stream, header);
+    const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
+    std::vector<float> pixels(bytes.size() / sizeof(float));
+    std::memcpy(pixels.data(), bytes.data(), pixels.size() * sizeof(float));
+    return pixels;
+  }
+
+ private:
+  cumulet::test::Folder folder_;
+};
+
+// A ball of 20^3 voxels: 1 in its middle, 0 at its rim.
+openvdb::FloatGrid::Ptr ball(const std::string& name, const std::function<float(float)>& value, int size = 20,
+                             double voxel = 1.0) {
+  auto grid = openvdb::FloatGrid::create(0.0F);
+  grid->setName(name);
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+  const float half = 0.5F * static_cast<float>(size - 1);
+  for (Coord p(0, 0, 0); p.x() < size; ++p.x()) {
+    for (p.y() = 0; p.y() < size; ++p.y()) {
+      for (p.z() = 0; p.z() < size; ++p.z()) {
+        const float away = std::hypot(float(p.x()) - half, float(p.y()) - half, float(p.z()) - half) / half;
+        const float found = value(std::max(0.0F, 1.0F - away));
+        if (found != 0.0F) grid->tree().setValue(p, found);
+      }
+    }
+  }
+  return grid;
+}
+openvdb::FloatGrid::Ptr smoke() {
+  return ball("density", [](float middle) { return middle; });
+}
+openvdb::FloatGrid::Ptr heat(float most, int size = 20, double voxel = 1.0) {
+  return ball(
+      "temperature", [=](float middle) { return most * middle; }, size, voxel);
+}
+
+void expect_same_picture(const Run& a, const Run& b) {
+  ASSERT_EQ(a.pixels.size(), b.pixels.size());
+  ASSERT_GT(a.pixels.size(), 0U);
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    ASSERT_NEAR(a.pixels[i], b.pixels[i], 0.02F + 0.05F * std::abs(b.pixels[i])) << i;
+}
+
+TEST_F(ExtremeFiles, KelvinBurnAsRelativeTemperaturesDo) {
+  constexpr float most = 2250.0F;
+  write("kelvin.vdb", {smoke(), heat(most)});
+  write("relative.vdb", {smoke(), heat(most / 1500.0F)});
+  const Run kelvin = render("kelvin.vdb");
+  const Run relative = render("relative.vdb");
+  EXPECT_TRUE(kelvin.says("note: ") && kelvin.says("as kelvin do")) << kelvin.said;
+  EXPECT_FALSE(relative.says("kelvin")) << relative.said;
+  EXPECT_TRUE(kelvin.says("it burns") && relative.says("it burns")) << kelvin.said;
+  expect_same_picture(kelvin, relative);
+  // What is said decides.
+  EXPECT_GT(render("kelvin.vdb", "--temperature-scale 3 --blackbody 1").mean(),
+            3.0 * render("kelvin.vdb", "--temperature-scale 1 --blackbody 1").mean());
+}
+
+TEST_F(ExtremeFiles, KelvinAloneAreNoWhiteOut) {
+  write("kelvin.vdb", {heat(2250.0F)});
+  write("relative.vdb", {heat(1.5F)});
+  expect_same_picture(render("kelvin.vdb"), render("relative.vdb"));
+}
+
+TEST_F(ExtremeFiles, ACoarserTemperatureBurns) {
+  write("coarse.vdb", {smoke(), heat(2250.0F, 10, 2.0)});
+  const Run coarse = render("coarse.vdb");
+  EXPECT_TRUE(coarse.says("it burns") && coarse.says("as kelvin do")) << coarse.said;
+  EXPECT_GT(coarse.mean(), 1.2 * render("coarse.vdb", "--temperature-grid none --preset explosion").mean());
+}
+
+TEST_F(ExtremeFiles, WarmAirDoesNotGlow) {
+  write("warm.vdb", {smoke(), ball("temperature", [](float) { return 293.0F; })});
+  write("cold.vdb", {smoke()});
+  const Run warm = render("warm.vdb");
+  EXPECT_FALSE(warm.says("it burns")) << warm.said;
+  expect_same_picture(warm, render("cold.vdb"));
+  expect_same_picture(render("warm.vdb", "--blackbody 1"), render("cold.vdb", "--blackbody 1"));
+}
+
+// As a fire goes out, its last frames have but few kelvin.
+TEST_F(ExtremeFiles, FramesOfASequenceHaveOneScale) {
+  write("fire.0001.vdb", {smoke(), heat(2250.0F)});
+  write("fire.0002.vdb", {ball("density", [](float middle) { return middle > 0.5F ? 1.0F : 0.0F; }), heat(15.0F, 6)});
+  const Run run = command("fire.####.vdb", path("p.####.pfm"), "");
+  EXPECT_TRUE(run.says("as kelvin do")) << run.said;
+  double brightest = 0.0;
+  for (const float value : pixels_of(path("p.0002.pfm"))) brightest = std::max(brightest, double{value});
+  EXPECT_GT(brightest, 0.0);
+  EXPECT_LT(brightest, 10.0);
+}
+
+TEST_F(ExtremeFiles, FillValuesAreCountedAndDrawnAsNothing) {
+  for (const float fill : {9.97e36F, 1e31F, 3.4e38F, -9.97e36F}) {
+    auto filled = smoke();
+    auto without = smoke();
+    for (int x = 8; x < 10; ++x) {
+      for (int y = 8; y < 10; ++y) {
+        filled->tree().setValue(Coord(x, y, 9), fill);
+        without->tree().setValue(Coord(x, y, 9), 0.0F);
+      }
+    }
+    write("filled.vdb", {filled});
+    write("without.vdb", {without});
+    const Run run = render("filled.vdb");
+    EXPECT_TRUE(run.says("warning: ") && run.says("4 voxels beyond 1e30")) << run.said;
+    expect_same_picture(run, render("without.vdb"));
+  }
+}
+
+}  // namespace
