@@ -15,7 +15,7 @@ namespace cumulet {
 
 /// Does it on a thread of its own, for nobody to wait for; here and now if too many such are under way, or the process
 /// ends. It must own all that it touches, call nobody back and not throw. Unloading the library and the process' exit
-/// wait for it.
+/// wait for it, however long it takes.
 void leave(const std::function<void()>& work);
 
 /// What the call gives, for what cannot be interrupted: a library's decoder, a sort. Who is cancelled throws

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "base/library_thread.hpp"
+
 namespace cumulet {
 
 /// While one lives, its thread is inside a callback of the host's, which may not call the library. A property of the
@@ -8,7 +10,10 @@ namespace cumulet {
 class CallbackScope {
  public:
   CallbackScope() { ++depth(); }
-  ~CallbackScope() { --depth(); }
+  ~CallbackScope() {
+    --depth();
+    keep_statics(StaticsOf::callback);
+  }
   CallbackScope(const CallbackScope&) = delete;
   CallbackScope& operator=(const CallbackScope&) = delete;
 

@@ -20,7 +20,7 @@ class Log {
   explicit Log(Function function) : function_(std::move(function)) {}
 
   void write(LogLevel level, const std::string& message) const {
-    if (!function_) return;
+    if (!function_ || process_is_ending()) return;
     const CallbackScope inside;
     function_(level, message.c_str());
   }

@@ -29,7 +29,7 @@ class Trace {
     Span(const Span&) = delete;
     Span& operator=(const Span&) = delete;
     ~Span() {
-      if (trace_.function_ == nullptr) return;
+      if (trace_.function_ == nullptr || process_is_ending()) return;
       const double end = now();
       const CallbackScope inside;
       trace_.function_(trace_.user_, name_.c_str(), begin_, end);

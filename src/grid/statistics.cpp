@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "base/never_destroyed.hpp"
 #include "base/progress_part.hpp"
 #include "grid/cell.hpp"
 #include "volume/bricks.hpp"
@@ -142,10 +143,10 @@ std::uint32_t kuhn_frame(const ivec3& corner, int size, std::uint32_t permutatio
 }
 
 const BrickTree& brick_tree(std::uint32_t frame) {
-  static const auto trees = std::make_unique<const BrickTrees>();
+  static const NeverDestroyed<const BrickTrees> trees;
   const auto negative = signs_of_frame(frame);
   const unsigned signs = (negative[0] ? 1U : 0U) | (negative[1] ? 2U : 0U) | (negative[2] ? 4U : 0U);
-  return trees->trees[permutation_of(frame) * 8 + signs];
+  return trees.get().trees[permutation_of(frame) * 8 + signs];
 }
 
 float BrickSums::reference_of(const float* values) {

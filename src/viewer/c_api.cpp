@@ -174,7 +174,8 @@ cumulet_programs* cumulet_programs_retain(cumulet_programs* programs) { return c
 void cumulet_programs_release(cumulet_programs* programs) { cumulet::c_abi::release(programs); }
 
 void cumulet_destroy(cumulet_viewer* viewer) {
-  if (cumulet::CallbackScope::inside()) return;
+  if (viewer == nullptr || cumulet::CallbackScope::inside() || viewer->process != getpid()) return;
+  const cumulet::HostCall host_call;
   delete viewer;
 }
 
@@ -392,11 +393,13 @@ cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance*
 }
 
 void cumulet_cancel(cumulet_viewer* viewer) {
-  if (viewer != nullptr) viewer->viewer->cancel();
+  const cumulet::HostCall host_call;
+  if (viewer != nullptr && viewer->process == getpid()) viewer->viewer->cancel();
 }
 
 cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* progress) {
-  if (viewer == nullptr) return CUMULET_ERROR_INVALID_ARGUMENT;
+  if (viewer == nullptr || viewer->process != getpid()) return CUMULET_ERROR_INVALID_ARGUMENT;
+  const cumulet::HostCall host_call;
   std::string unused;  // the last error belongs to the thread that renders
   return cumulet::c_abi::guarded(unused, [&] {
     const auto status = viewer->viewer->status();

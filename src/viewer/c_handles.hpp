@@ -92,6 +92,7 @@ Handle* retain(Handle* handle) {
 
 template <class Handle>
 void release(Handle* handle) {
+  const HostCall host_call;
   if (handle != nullptr && handle->references.fetch_sub(1, std::memory_order_acq_rel) == 1) delete handle;
 }
 

@@ -16,6 +16,7 @@
 
 #include "base/callback_scope.hpp"
 #include "base/error.hpp"
+#include "base/library_thread.hpp"
 #include "base/one_line.hpp"
 #include "cumulet/cumulet.h"
 #include "scene/snapshot.hpp"
@@ -85,6 +86,7 @@ inline void copy_text(std::string_view text, char* to, size_t size) {
 }
 
 inline constexpr const char* inside_callback = "called from inside a callback";
+inline constexpr const char* process_exits = "the process is exiting";
 
 /// The same for calls that tell their cause in the caller's buffer.
 template <class Call>
@@ -92,6 +94,11 @@ cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
   if (CallbackScope::inside()) {
     copy_text(inside_callback, error, error_size);
     return CUMULET_ERROR_INVALID_ARGUMENT;
+  }
+  const HostCall host_call;
+  if (host_call.refused()) {
+    copy_text(process_exits, error, error_size);
+    return CUMULET_ERROR_CANCELLED;
   }
   std::string message;
   const cumulet_status status = guarded(message, std::forward<Call>(call));

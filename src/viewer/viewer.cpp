@@ -142,6 +142,7 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
           log_, [this] { notify(); }, trace, allowance_),
       lives_(
           log_, [this] { notify(); }, trace, allowance_) {
+  volume::initialize_readers();
   set_medium({});
   set_light({});
   set_camera(std::make_shared<Camera>());
@@ -158,7 +159,7 @@ Viewer::~Viewer() {
 // ---- the host's callback ----
 
 void Viewer::notify() {
-  if (!update_ || update_pending_.exchange(true)) return;
+  if (!update_ || process_is_ending() || update_pending_.exchange(true)) return;
   const CallbackScope inside;
   update_();
 }

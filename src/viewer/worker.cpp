@@ -21,21 +21,24 @@ std::optional<Error> failure_of(const Worker::Job& job, const AllowancePtr& allo
 
 }  // namespace
 
-Worker::~Worker() {
+Worker::~Worker() { stop(); }
+
+void Worker::stop() {
   {
     const std::scoped_lock lock(mutex_);
     stopping_ = true;
     if (current_) current_->progress->cancel();
   }
   changed_.notify_all();
-  if (thread_.joinable()) thread_.join();
 }
 
 void Worker::take(Job job, bool replaces) {
   std::optional<Job> old;  // ends after the lock: what it holds may be large
   {
     const std::scoped_lock lock(mutex_);
-    if (!thread_.joinable()) thread_ = std::thread([this] { run(); });  // may throw: before anything has changed
+    // Both may throw: before anything has changed.
+    if (stopping_) throw Error(ErrorCode::cancelled, "the process is exiting");
+    if (!thread_) thread_.emplace([this] { run(); }, [this] { stop(); });
     if (replaces && current_ && !current_->spared) {
       current_->replaced = true;
       current_->progress->cancel();
@@ -108,7 +111,7 @@ void Worker::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, [this] { return stopping_ || next_; });
-    if (stopping_) return;
+    if (stopping_) break;
     std::optional<Job> job = std::exchange(next_, std::nullopt);
     const auto progress = std::make_shared<Progress>();
     progress->begin(job->stage);
@@ -127,10 +130,17 @@ void Worker::run() {
     // A newer wish makes how this one ended old news.
     if (!next_ && !dropped) failure_ = std::move(failure);
     lock.unlock();
+    keep_statics(StaticsOf::job);
     changed_.notify_all();
     notify_();
     lock.lock();
   }
+  // Who waits for a job that never begins does not wait for ever.
+  std::optional<Job> never_begun = std::exchange(next_, std::nullopt);
+  if (never_begun) failure_ = Error(ErrorCode::cancelled, "cancelled");
+  lock.unlock();
+  changed_.notify_all();
+  if (process_is_ending()) notify_();
 }
 
 }  // namespace cumulet::viewer

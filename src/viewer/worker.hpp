@@ -7,9 +7,9 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "base/error.hpp"
+#include "base/library_thread.hpp"
 #include "base/progress.hpp"
 #include "base/trace.hpp"
 #include "viewer/allowance.hpp"
@@ -17,7 +17,8 @@
 namespace cumulet::viewer {
 
 /// A thread that does one job at a time; of those that wait, the newest. It begins with the first job. All calls are
-/// safe from any thread, but for jobs, which may only look.
+/// safe from any thread, but for jobs, which may only look. When the process ends, jobs end as if they were cancelled,
+/// and others are refused with Error(cancelled).
 class Worker {
  public:
   struct Job {
@@ -77,6 +78,8 @@ class Worker {
     bool dropped = false;
   };
   void take(Job job, bool replaces);
+  // The thread ends soon.
+  void stop();
   void end_jobs(bool loads_only);
   void run();
 
@@ -90,7 +93,7 @@ class Worker {
   bool last_was_replaced_ = false;
   std::optional<Error> failure_;
   bool stopping_ = false;
-  std::thread thread_;  // last: it uses all of the above
+  std::optional<LibraryThread> thread_;  // last: it uses all of the above
 };
 
 }  // namespace cumulet::viewer

@@ -18,13 +18,15 @@
 #include "volume/vdb_metadata.hpp"
 #include "volume/vdb_trees.hpp"
 
-namespace cumulet::volume::detail {
-namespace {
+namespace cumulet::volume {
 
-void initialize_openvdb() {
+void initialize_readers() {
   static std::once_flag once;
   std::call_once(once, [] { openvdb::initialize(); });
 }
+
+namespace detail {
+namespace {
 
 std::string class_name(openvdb::GridClass grid_class) {
   switch (grid_class) {
@@ -133,7 +135,7 @@ std::vector<char> understood_header(SourceFile& stream) {
 class VdbReader final : public Reader, private openvdb::io::Archive {
  public:
   VdbReader(const std::filesystem::path& file, Progress* progress) : stream_(file, progress), size_(stream_.size()) {
-    initialize_openvdb();
+    initialize_readers();
     try {
       read_directory();
     } catch (const Error&) {
@@ -396,4 +398,5 @@ std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* pr
   return std::make_unique<VdbReader>(file, progress);
 }
 
-}  // namespace cumulet::volume::detail
+}  // namespace detail
+}  // namespace cumulet::volume

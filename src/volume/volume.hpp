@@ -85,6 +85,10 @@ struct GridInfo {
   std::vector<Metadata> metadata;
 };
 
+/// Creates the statics of the libraries that read volumes. Called before threads of this library start, which end
+/// before statics are destroyed that exist by then (base/library_thread.hpp). Any thread.
+void initialize_readers();
+
 /// The grids of a .vdb or .nvdb file, without their voxels. Throws Error(file).
 std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 

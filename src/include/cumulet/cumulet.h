@@ -13,8 +13,8 @@
  * between the two (cumulet_load_surfaces, cumulet_set_surfaces).
  *
  * The library makes no window and no context and links no OpenGL: functions come from the host's get_proc callback.
- * There are no globals: viewers, in one context or several, in one thread or several, do not know of each other, unless
- * they share programs (cumulet_programs).
+ * There are no globals that a result depends on: viewers, in one context or several, in one thread or several, do not
+ * know of each other, unless they share programs (cumulet_programs).
  *
  * Life cycle
  *     A viewer is attached to a GL context or detached. cumulet_create attaches it if given get_proc, else
@@ -40,6 +40,17 @@
  * around a [GL] call. Calls that change a camera, an instance, a model, a sequence or a live volume run the update
  * callbacks of the viewers that show it while other calls for the same handle wait for them: nor take a lock that is
  * held around calls for such handles.
+ *
+ * End of the process
+ *     A process may end while viewers work: by exit() on any thread, a callback's included, by a return from main, or
+ *     by dlclose of the library. Work under way is cancelled and the threads of the library are joined before the
+ *     library's static objects, and those of the libraries that it uses, are destroyed. No callback is made from then
+ *     on. Calls that other threads have under way are waited for, 10 seconds at most (1 second if exit() is called in a
+ *     callback), and further calls from them fail with CUMULET_ERROR_CANCELLED. The thread that ends the process may
+ *     still destroy viewers and release handles in destructors of static objects. A callback that may be made while
+ *     the language runtime of the host shuts down (Python's, for example) must be able to run then: destroy the viewer
+ *     before. _exit, quick_exit and abort join nothing. In a forked child, viewers of the parent are refused by every
+ *     call, cumulet_destroy does nothing with them, and exit() does not wait for threads that the child does not have.
  *
  * OpenGL state
  *     Version 4.5, core or compatibility profile. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all
@@ -160,7 +171,7 @@ typedef enum cumulet_status {
   CUMULET_ERROR_OUT_OF_MEMORY = -4,    /* host or GL memory */
   CUMULET_ERROR_GL = -5,               /* any other GL error, a [GL] call without the attached context among them */
   CUMULET_ERROR_INTERNAL = -6,         /* a bug in Cumulet: please report it */
-  CUMULET_ERROR_CANCELLED = -7,        /* by cumulet_cancel */
+  CUMULET_ERROR_CANCELLED = -7,        /* by cumulet_cancel, or because the process ends */
   CUMULET_ERROR_CONTEXT_LOST = -8,     /* the driver reset the context: the viewer is detached now */
   CUMULET_ERROR_DETACHED = -9,         /* a [GL] call on a viewer without a context */
   CUMULET_ERROR_TIMEOUT = -10          /* cumulet_wait: not ready in time */

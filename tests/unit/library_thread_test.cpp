@@ -1,0 +1,197 @@
+// Threads of the library, which end before the process' statics do.
+
+#include "base/library_thread.hpp"
+
+#include <gtest/gtest.h>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+
+#include "base/callback_scope.hpp"
+#include "base/error.hpp"
+#include "viewer/worker.hpp"
+
+namespace {
+
+using namespace cumulet;
+using std::chrono::milliseconds;
+
+constexpr int left_well = 7;
+constexpr int read_destroyed = 8;
+constexpr int was_not_refused = 9;
+
+// A static that is created by its first use, as other libraries have them.
+class Table {
+ public:
+  Table() = default;
+  Table(const Table&) = delete;
+  Table& operator=(const Table&) = delete;
+  ~Table() { there_ = false; }
+  void read() const {
+    if (!there_) std::_Exit(read_destroyed);
+  }
+
+ private:
+  std::atomic<bool> there_ = true;
+};
+const Table& table() {
+  static const Table only;
+  return only;
+}
+
+class LibraryThreadDeathTest : public testing::Test {
+ protected:
+  void SetUp() override { testing::GTEST_FLAG(death_test_style) = "threadsafe"; }
+};
+
+// A thread that reads until it is stopped.
+struct Reader {
+  std::atomic<bool> stopped = false;
+  std::atomic<bool> reads = false;
+  LibraryThread thread{[this] {
+                         while (!stopped) {
+                           if (reads) table().read();
+                         }
+                       },
+                       [this] { stopped = true; }};
+};
+
+TEST(LibraryThread, WaitsForItsWork) {
+  std::atomic<bool> done = false;
+  {
+    const LibraryThread thread([&] {
+      std::this_thread::sleep_for(milliseconds(5));
+      done = true;
+    });
+  }
+  EXPECT_TRUE(done);
+  std::atomic<bool> stopped = false;
+  LibraryThread ended([] {}, [&] { stopped = true; });
+  while (!ended.ended()) std::this_thread::yield();
+  EXPECT_FALSE(stopped) << "its owner has to say so";
+  EXPECT_FALSE(process_is_ending());
+}
+
+// Without it the table is destroyed under the thread: the status is 8 in nearly every run.
+TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatThereWereBefore) {
+  const auto leave = [] {
+    table().read();
+    auto* const reader = new Reader;  // nobody destroys it
+    reader->reads = true;
+    std::this_thread::sleep_for(milliseconds(2));
+    std::exit(left_well);
+  };
+  EXPECT_EXIT(leave(), testing::ExitedWithCode(left_well), "");
+}
+
+TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatJobsAndCallbacksCreate) {
+  const auto leave = [](StaticsOf of) {
+    auto* const reader = new Reader;
+    std::this_thread::sleep_for(milliseconds(2));
+    if (of == StaticsOf::callback) {
+      const CallbackScope callback;
+      table().read();
+    } else {
+      viewer::Worker worker([] {});
+      worker.post({"a job", Progress::Stage::loading, [](Progress& /*progress*/) { table().read(); }});
+      static_cast<void>(worker.wait(std::nullopt));
+    }
+    reader->reads = true;
+    std::this_thread::sleep_for(milliseconds(2));
+    std::exit(left_well);
+  };
+  EXPECT_EXIT(leave(StaticsOf::callback), testing::ExitedWithCode(left_well), "");
+  EXPECT_EXIT(leave(StaticsOf::job), testing::ExitedWithCode(left_well), "");
+}
+
+// The thread that exits cannot wait for itself.
+TEST_F(LibraryThreadDeathTest, ItsOwnWorkMayExit) {
+  const auto leave = [] {
+    auto* const worker = new viewer::Worker([] {
+      const CallbackScope callback;
+      std::exit(left_well);
+    });
+    worker->post({"a job", Progress::Stage::loading, [](Progress& /*progress*/) {}});
+    for (;;) std::this_thread::sleep_for(milliseconds(1));
+  };
+  EXPECT_EXIT(leave(), testing::ExitedWithCode(left_well), "");
+}
+
+// A job that waits is never begun, and who waits for it does not wait for ever; nor does another begin.
+TEST_F(LibraryThreadDeathTest, WhoWaitsForAJobIsAnswered) {
+  const auto leave = [] {
+    auto* const worker = new viewer::Worker([] {});
+    const auto job = [](Progress& progress) {
+      for (;;) progress.check();
+    };
+    worker->post({"one", Progress::Stage::loading, job});
+    worker->post({"another", Progress::Stage::loading, job});
+    std::thread([] {
+      std::this_thread::sleep_for(milliseconds(2));
+      std::exit(left_well);
+    }).detach();
+    const HostCall call;
+    static_cast<void>(worker->wait(std::nullopt));
+    try {
+      worker->post({"a third", Progress::Stage::loading, job});
+      std::_Exit(was_not_refused);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::cancelled) std::_Exit(was_not_refused);
+    }
+  };
+  EXPECT_EXIT((leave(), std::this_thread::sleep_for(std::chrono::minutes(1))), testing::ExitedWithCode(left_well), "");
+}
+
+// Calls under way on other threads end first; others are refused there, but not on the thread that exits.
+TEST_F(LibraryThreadDeathTest, CallsOfOtherThreadsEndFirst) {
+  const auto leave = [] {
+    struct Last {
+      Last() = default;
+      Last(const Last&) = delete;
+      Last& operator=(const Last&) = delete;
+      ~Last() {
+        if (HostCall().refused()) std::_Exit(was_not_refused);
+      }
+    };
+    static const Last last;
+    table().read();
+    const auto* const reader = new Reader;
+    static_cast<void>(reader);
+    std::thread([] {
+      for (;;) {
+        const HostCall call;
+        if (call.refused()) continue;
+        table().read();
+        std::this_thread::sleep_for(milliseconds(1));
+        table().read();
+      }
+    }).detach();
+    std::this_thread::sleep_for(milliseconds(3));
+    std::exit(left_well);
+  };
+  EXPECT_EXIT(leave(), testing::ExitedWithCode(left_well), "");
+}
+
+// It does not have the thread, and would wait for ever.
+TEST(LibraryThread, AForkedChildDoesNotWait) {
+  auto reader = std::make_unique<Reader>();
+  const pid_t child = fork();
+  if (child == 0) {
+    reader.reset();
+    std::exit(left_well);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), left_well);
+  reader->stopped = true;
+}
+
+}  // namespace
