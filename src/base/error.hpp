@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -23,11 +24,15 @@ enum class ErrorCode {
 /// line that names the file (where there is one) and the cause.
 class Error : public std::runtime_error {
  public:
-  Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  Error(ErrorCode code, const std::string& message)
+      : std::runtime_error(message), code_(code), occurrence_(std::make_shared<char>()) {}
   [[nodiscard]] ErrorCode code() const noexcept { return code_; }
+  /// Whether one is a copy of the other: the same operation failed, not a second one with the same message.
+  [[nodiscard]] bool is_copy_of(const Error& other) const noexcept { return occurrence_ == other.occurrence_; }
 
  private:
   ErrorCode code_;
+  std::shared_ptr<const char> occurrence_;
 };
 
 /// What is being handled, as an Error; what: was begun, where there was not enough memory. Only in a handler.

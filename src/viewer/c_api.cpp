@@ -410,8 +410,7 @@ cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* pr
       code = failure ? status_of(failure->code()) : CUMULET_OK;
       copy_text(failure ? failure->what() : "", message, sizeof message);
     };
-    const auto& loaded = status.volume_failure ? status.volume_failure : status.surfaces_failure;
-    tell(loaded ? loaded : status.environment_failure, p.status, p.message);
+    tell(status.failure, p.status, p.message);
     tell(status.volume_failure, p.volume_status, p.volume_message);
     tell(status.surfaces_failure, p.surfaces_status, p.surfaces_message);
     tell(status.environment_failure, p.environment_status, p.environment_message);

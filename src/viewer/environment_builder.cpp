@@ -27,7 +27,7 @@ void EnvironmentBuilder::make_sky(const light::Day& day) {
 }
 
 void EnvironmentBuilder::drop_loads() {
-  if (!files_.busy()) files_.forget_failure();  // of a load that what comes now replaces
+  files_.forget_failure();  // of a load that what comes now replaces
   files_.cancel();
   const std::scoped_lock lock(mutex_);
   environment_.reset();

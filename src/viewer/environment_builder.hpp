@@ -30,6 +30,8 @@ class EnvironmentBuilder {
   /// Loads: skies are settings, and soon there. What was read, and nobody took, is dropped.
   void drop_loads();
   /// Loads under way; what was read is still to be taken.
+  /// How the last sky ended is reported no more.
+  void forget_sky_failure() { skies_.forget_failure(); }
   void cancel() { files_.cancel(); }
 
   /// The newest environment that was read, once.

@@ -39,6 +39,8 @@ class SurfaceBuilder {
   /// Loads alone: other surfaces are there.
   void cancel_loads();
   /// The newest result, once.
+  /// How the last job ended is reported no more.
+  void forget_failure() { worker_.forget_failure(); }
   std::optional<PosedModel> take();
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;

@@ -251,6 +251,7 @@ void Viewer::take_volume(VolumeAssetPtr volume) {
 
 bool Viewer::begin_anew(bool shows, bool showed) {
   if (!shows && !showed) return false;
+  reported_failures_.retire();
   builder_.forget();
   drop_stand_in();
   sync();
@@ -500,6 +501,7 @@ bool Viewer::built_for_another() const {
 }
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
+  reported_failures_.retire();
   const bool loads = builder_.configure_load(settings_at_once());
   if (loads && !followed_ && !watched_) return;
   sync();
@@ -525,6 +527,7 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
 }
 
 void Viewer::load_volume(const VolumeFile& file) {
+  reported_failures_.retire();
   sync();
   const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
@@ -539,6 +542,8 @@ void Viewer::load_volume(const VolumeFile& file) {
 }
 
 void Viewer::set_volume(VolumeAssetPtr volume) {
+  reported_failures_.retire();
+  builder_.forget_failure();
   if (volume) {
     builder_.cancel_loads();  // builds go on: a host may set volumes faster than they build
   } else {
@@ -582,6 +587,7 @@ void Viewer::set_places(const std::vector<scene::Place>& places) {
 }
 
 void Viewer::add_instance(std::shared_ptr<Instance> instance) {
+  reported_failures_.retire();
   sync();
   if (find(*instance) != shown_.end())
     throw Error(ErrorCode::invalid_argument, "the viewer shows the instance already");
@@ -594,8 +600,10 @@ void Viewer::add_instance(std::shared_ptr<Instance> instance) {
 }
 
 void Viewer::remove_instance(const Instance& instance) {
+  reported_failures_.retire();
   shown_.erase(look_up(instance));
   wishes_due_ = true;
+  sync();  // what failed of it is forgotten
   touch();
 }
 
@@ -604,6 +612,7 @@ std::vector<Viewer::Shown>::iterator Viewer::find(const Instance& instance) {
 }
 
 void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
+  reported_failures_.retire();
   sync();
   if (find(*model) != shown_models_.end())
     throw Error(ErrorCode::invalid_argument, "the viewer shows the model already");
@@ -617,11 +626,13 @@ void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
 }
 
 void Viewer::remove_model(const ModelInstance& model) {
+  reported_failures_.retire();
   sync();
   const auto place = find(model);
   if (place == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the model");
   shown_models_.erase(place);
   poses_due_ = true;
+  sync();  // what failed of it is forgotten
   touch();
 }
 
@@ -698,6 +709,7 @@ SurfaceChoice Viewer::while_open(SurfaceChoice choice, const SurfaceAssetPtr& su
 }
 
 void Viewer::pose_surfaces() {
+  reported_failures_.retire();
   if (surface_asset_) surface_builder_.pose(surface_asset_, while_open(surface_settings_.choice, surface_asset_));
 }
 
@@ -963,6 +975,7 @@ void Viewer::wish_for_grids() {
 }
 
 void Viewer::rebuild() {
+  reported_failures_.retire();
   for (Shown& shown : shown_) {
     shown.wish.reset();
     if (shown.built) shown.built->volume = nullptr;  // shown until then, but serves no wish
@@ -1057,12 +1070,15 @@ bool Viewer::builds() const {
 }
 
 void Viewer::load_surfaces(const std::string& path) {
+  reported_failures_.retire();
   sync();
   surface_builder_.load(path, while_open(surface_settings_.choice, nullptr));
   touch();
 }
 
 void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
+  reported_failures_.retire();
+  surface_builder_.forget_failure();
   surface_builder_.cancel();
   sync();
   surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
@@ -1071,6 +1087,8 @@ void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
 }
 
 void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
+  reported_failures_.retire();
+  surface_builder_.forget_failure();
   if (surfaces) {
     surface_builder_.cancel_loads();  // poses go on: a host may set surfaces faster than they are posed
   } else {
@@ -1142,50 +1160,61 @@ void Viewer::wait(double timeout_ms) {
     follow_watching(true);
     sync();
   } while (busy());
-  if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
-  if (const auto failure = poses_.status().failure) throw Error(*failure);
-  if (const auto failure = builder_.status().failure) throw Error(*failure);
-  if (const auto failure = environment_builder_.status().failure) throw Error(*failure);
-  if (const auto failure = shelf_.status().failure) throw Error(*failure);
-  if (const auto failure = frames_.status().failure) throw Error(*failure);
-  if (const auto failure = lives_.status().failure) throw Error(*failure);
-  for (const PlayedPtr& played : played_) {
-    if (const auto failure = played->shelf.status().failure) throw Error(*failure);
+  if (const auto failure = reported_failures_.report(failures(), ReportedFailures::Cancelled::reported))
+    throw Error(*failure);
+}
+
+ContentFailures Viewer::failures() const {
+  const auto first = [](std::optional<Error>& of, std::optional<Error> failure) {
+    if (!of) of = std::move(failure);
+  };
+  ContentFailures failures;
+  std::optional<Error>& volume = failures[ContentKind::volume];
+  first(volume, builder_.status().failure);
+  first(volume, frames_.status().failure);
+  first(volume, lives_.status().failure);
+  std::optional<Error>& instances = failures[ContentKind::instances];
+  first(instances, shelf_.status().failure);
+  {
+    const std::scoped_lock lock(played_mutex_);
+    for (const PlayedPtr& played : played_) first(instances, played->shelf.status().failure);
+    for (const WatchingPtr& watching : watching_) first(instances, watching->builder.status().failure);
   }
-  for (const WatchingPtr& watching : watching_) {
-    if (const auto failure = watching->builder.status().failure) throw Error(*failure);
-  }
+  failures[ContentKind::surfaces] = surface_builder_.status().failure;
+  failures[ContentKind::models] = poses_.status().failure;
+  failures[ContentKind::environment] = environment_builder_.status().failure;
+  return failures;
 }
 
 Viewer::Status Viewer::status() const {
-  const Worker::Status volume = builder_.status();
-  const double upload = upload_progress_.load(std::memory_order_relaxed);
-  const Worker::Status surfaces = surface_builder_.status();
-  const Worker::Status environment = environment_builder_.status();
-  const Worker::Status grids = shelf_.status();
-  const Worker::Status frames = frames_.status();
-  const Worker::Status lives = lives_.status();
-  const Worker::Status poses = poses_.status();
-  std::vector<Worker::Status> played;
+  const ContentFailures failures = this->failures();
+  const auto either = [&](ContentKind kind, ContentKind other) {
+    return failures[kind] ? failures[kind] : failures[other];
+  };
+  Status status;
+  status.volume_failure = either(ContentKind::volume, ContentKind::instances);
+  status.surfaces_failure = either(ContentKind::surfaces, ContentKind::models);
+  status.environment_failure = failures[ContentKind::environment];
+  status.failure = reported_failures_.report(failures, ReportedFailures::Cancelled::reported);
+  std::vector<Worker::Status> all{builder_.status(),
+                                  frames_.status(),
+                                  lives_.status(),
+                                  shelf_.status(),
+                                  surface_builder_.status(),
+                                  poses_.status(),
+                                  environment_builder_.status()};
   {
     const std::scoped_lock lock(played_mutex_);
-    for (const PlayedPtr& p : played_) played.push_back(p->shelf.status());
-    for (const WatchingPtr& w : watching_) played.push_back(w->builder.status());
+    for (const PlayedPtr& p : played_) all.push_back(p->shelf.status());
+    for (const WatchingPtr& w : watching_) all.push_back(w->builder.status());
   }
-  const auto& sequences = frames.failure ? frames.failure : lives.failure;
-  const auto& own = volume.failure ? volume.failure : sequences;
-  Status status{volume.stage, volume.fraction, own ? own : grids.failure,
-                surfaces.failure ? surfaces.failure : poses.failure, environment.failure};
-  for (const Worker::Status& one : played) {
-    if (!status.volume_failure) status.volume_failure = one.failure;
-  }
-  played.insert(played.begin(), {frames, lives, grids, surfaces, poses, environment});
-  for (const Worker::Status& other : played) {
-    if (status.stage != Progress::Stage::idle) break;
-    status.stage = other.stage;
-    status.fraction = other.fraction;
-  }
-  if (status.stage == Progress::Stage::idle && upload < 1.0) {
+  const auto under_way =
+      std::ranges::find_if(all, [](const Worker::Status& one) { return one.stage != Progress::Stage::idle; });
+  const double upload = upload_progress_.load(std::memory_order_relaxed);
+  if (under_way != all.end()) {
+    status.stage = under_way->stage;
+    status.fraction = under_way->fraction;
+  } else if (upload < 1.0) {
     status.stage = Progress::Stage::uploading;
     status.fraction = upload;
   }
@@ -1285,12 +1314,14 @@ void Viewer::set_lamps(light::Lamps lamps) {
 }
 
 void Viewer::load_environment(const std::string& path) {
+  reported_failures_.retire();
   sync();
   environment_builder_.load(path);
   touch();
 }
 
 void Viewer::set_environment(light::EnvironmentPtr environment) {
+  reported_failures_.retire();
   environment_builder_.drop_loads();
   sync();
   show_environment(std::move(environment));
@@ -1332,6 +1363,7 @@ void Viewer::surround() {
                                    environment_settings_.strength};
   const std::optional<light::Day> wanted = day();
   if (!wanted) {
+    environment_builder_.forget_sky_failure();
     daylight_.reset();
     scene_.lights.set({to_sun(light_.sun_azimuth_degrees, light_.sun_elevation_degrees), light_.sun_irradiance,
                        light_.sky_radiance, light_.sun_angle_degrees});

@@ -27,6 +27,7 @@
 #include "viewer/live_builder.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/pose_shelf.hpp"
+#include "viewer/reported_failures.hpp"
 #include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
@@ -130,7 +131,7 @@ class Viewer {
   /// Of what is begun from now on.
   void set_limits(const Limits& limits);
   void cancel();
-  /// Throws how the last job ended, or Error(timeout).
+  /// Throws Status::failure, or Error(timeout).
   void wait(double timeout_ms);
   struct Status {
     /// Of the volume's jobs, else of the surfaces', else of the environment's, else uploading.
@@ -139,6 +140,7 @@ class Viewer {
     std::optional<Error> volume_failure;  ///< how the last job of each ended, if not well
     std::optional<Error> surfaces_failure;
     std::optional<Error> environment_failure;
+    std::optional<Error> failure;  ///< the first of them, unless it was reported before other work began
   };
   [[nodiscard]] Status status() const;
 
@@ -217,6 +219,8 @@ class Viewer {
   [[nodiscard]] Context& gl() const;
   // A setting changed.
   void touch();
+  // How the last work of each kind of content ended. Any thread.
+  [[nodiscard]] ContentFailures failures() const;
   // What the light and the environment make of the scene's.
   void surround();
   // What a physical sky is to be of.
@@ -516,6 +520,7 @@ class Viewer {
   Trace trace_;
   std::function<void()> update_;
   std::atomic<bool> update_pending_ = false;
+  mutable ReportedFailures reported_failures_;
   bool restore_state_;
   std::atomic<double> upload_progress_ = 1.0;
   std::shared_ptr<Sharing> sharing_;

@@ -43,8 +43,6 @@ struct Failures {
   }
 };
 
-bool failed(const Worker::Status& status) { return status.failure && status.failure->code() != ErrorCode::cancelled; }
-
 }  // namespace
 
 Context& Viewer::gl() const {
@@ -296,11 +294,7 @@ FrameResult Viewer::render(const Frame& frame) {
       result.more = true;
       result.converged = false;
     }
-    result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
-                    failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status()) ||
-                    std::ranges::any_of(played_, [&](const PlayedPtr& p) { return failed(p->shelf.status()); }) ||
-                    std::ranges::any_of(watching_, [&](const WatchingPtr& w) { return failed(w->builder.status()); }) ||
-                    failed(lives_.status()) || failed(poses_.status());
+    result.failed = reported_failures_.report(this->failures(), ReportedFailures::Cancelled::left_out).has_value();
     result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
     if (failures.first && !g.is_news(shot, *failures.first)) failures = {};
   });

@@ -123,6 +123,8 @@ void Worker::run() {
       failure = failure_of(*job, allowance_, *progress);
     }
     job.reset();
+    // Whatever else went wrong meanwhile: nobody waits for its result any more.
+    if (failure && progress->cancelled()) failure = Error(ErrorCode::cancelled, "cancelled");
     lock.lock();
     last_was_replaced_ = current_->replaced;
     const bool dropped = current_->dropped;

@@ -107,9 +107,18 @@
  * Errors
  *     Every function that can fail returns a cumulet_status; cumulet_last_error (or the error buffer of a call without
  *     a viewer) gives one line that names the file, where there is one, and the cause. A call that fails leaves the
- *     viewer as it was, and it still draws what it had. No C++ exception leaves the library. Work that fails on the
- *     worker thread is told by cumulet_get_progress and CUMULET_RENDER_FAILED.
+ *     viewer as it was, and it still draws what it had. No C++ exception leaves the library.
  *     Numbers in texts are those of the classic locale, and files are read alike, in every locale of the process.
+ *
+ *     Work that fails on a worker thread is reported by cumulet_wait, by `status` of cumulet_progress and by
+ *     CUMULET_RENDER_FAILED (which leaves out CUMULET_ERROR_CANCELLED), by one rule for all kinds of content. The kinds
+ *     are, in this order: the volume (of a file, a cumulet_volume, a sequence or a live volume), the volumes of
+ *     instances, the surfaces, the models, and the environment or physical sky. Each kind keeps the failure of its last
+ *     work until the next call that loads or sets this kind, with NULL too; work that such a call ends counts as
+ *     cancelled. For instances and models it is kept as long as one that failed is shown. Reported is the first kind
+ *     that has a failure, each time, until a call begins other work: a load, a set call of any kind, or a setting that
+ *     has something built anew. From then on a failure that was reported is not reported again. volume_status,
+ *     surfaces_status and environment_status of cumulet_progress still have it.
  *
  * Descriptors
  *     Set struct_size to sizeof the struct and zero the rest: zero means the default. Unknown enum values are errors.
@@ -1201,10 +1210,10 @@ typedef struct cumulet_progress {
   size_t struct_size;
   cumulet_stage stage;
   double fraction;       /* of the stage, 0 to 1 */
-  cumulet_status status; /* of the last load or build that ended: CUMULET_OK, its error, or CANCELLED */
+  cumulet_status status; /* how loads and builds ended: CUMULET_OK, or an error as "Errors" has it at the top */
   char message[512];     /* its cause in one line, "" if it succeeded */
-  /* The same of the volume's, of the surfaces' and of the environment's alone: where one fails the others may be there.
-   * `status` is the volume's unless that is CUMULET_OK, then the surfaces'. */
+  /* How the last work on the volume or an instance's, on the surfaces or a model, and on the environment ended. Where
+   * one fails the others may be there. */
   cumulet_status volume_status;
   char volume_message[512];
   cumulet_status surfaces_status;
@@ -1216,8 +1225,9 @@ typedef struct cumulet_progress {
 /* What the worker does. Any thread, any time. */
 CUMULET_API cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* progress);
 /*
- * Waits until the worker is idle, at most timeout_ms milliseconds (negative: for ever), and returns how the last load
- * or build ended, with its line as the last error. What is ready is uploaded by the next cumulet_render.
+ * Waits until the worker is idle, at most timeout_ms milliseconds (negative: for ever), and returns how loads and
+ * builds ended, as "Errors" has it at the top, with the line as the last error: the same as `status` of
+ * cumulet_progress. What is ready is uploaded by the next cumulet_render.
  */
 CUMULET_API cumulet_status cumulet_wait(cumulet_viewer* viewer, double timeout_ms);
 /* Builds the grid anew though nothing asks for it. */
@@ -1999,7 +2009,7 @@ enum {
   CUMULET_RENDER_MORE = 1,      /* there is more to do: render again soon */
   CUMULET_RENDER_CONVERGED = 2, /* every pixel has its samples, at full resolution, of the newest settings */
   CUMULET_RENDER_LOADING = 4,   /* the worker is busy: see cumulet_get_progress */
-  CUMULET_RENDER_FAILED = 8,    /* the last load or build failed: see cumulet_get_progress */
+  CUMULET_RENDER_FAILED = 8,    /* a load or build failed: see "Errors" at the top, and cumulet_get_progress */
   CUMULET_RENDER_PREVIEW = 16,  /* what is shown is coarser than the frame */
   CUMULET_RENDER_UNDRAWN = 32 /* after a frame that draws nothing (CUMULET_TARGET_NONE): the newest picture is not what
                                  was last drawn: without, drawing again is in vain unless the display changes */
