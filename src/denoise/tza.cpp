@@ -121,16 +121,16 @@ TensorArchive read_tza(std::span<const std::uint8_t> bytes, const std::string& n
   return Reader(bytes, name).read();
 }
 
-TensorArchive read_tza(const std::string& path) {
-  const auto fail = [&](const std::string& cause) { throw Error(ErrorCode::file, path + ": " + cause); };
-  std::ifstream file(path, std::ios::binary);
+TensorArchive read_tza(const FilePath& path) {
+  const auto fail = [&](const std::string& cause) { throw Error(ErrorCode::file, path.given() + ": " + cause); };
+  std::ifstream file(path.absolute(), std::ios::binary);
   if (!file) fail(std::strerror(errno));
   std::vector<std::uint8_t> bytes;
   read_rest(file, bytes, [&](std::size_t /*count*/) {
     if (bytes.size() > most_tza_bytes) fail("is larger than 64 MiB, which no network of Open Image Denoise is");
   });
   if (file.bad()) fail(std::strerror(errno));
-  return read_tza(bytes, path);
+  return read_tza(bytes, path.given());
 }
 
 }  // namespace cumulet::denoise

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "base/file_path.hpp"
+
 namespace cumulet::denoise {
 
 /// Numbers of any count of dimensions, the last the fastest.
@@ -27,7 +29,7 @@ using TensorArchive = std::map<std::string, Tensor>;
 /// that are not finite.
 TensorArchive read_tza(std::span<const std::uint8_t> bytes, const std::string& name);
 /// The same of a file, whose path messages begin with; of at most most_tza_bytes.
-TensorArchive read_tza(const std::string& path);
+TensorArchive read_tza(const FilePath& path);
 
 /// The published networks have 2 MB.
 inline constexpr std::size_t most_tza_bytes = std::size_t{64} << 20U;

@@ -95,7 +95,7 @@ std::uint64_t sum_of(std::uint64_t format, std::span<const std::byte> bytes) {
 std::optional<ProgramFiles::Binary> ProgramFiles::find(const std::string& driver, const std::string& source) {
   const std::scoped_lock lock(mutex_);
   const Key key = key_of(driver, source);
-  const fs::path path = file_of(folder_, key);
+  const fs::path path = file_of(folder_.absolute(), key);
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
   if (error || size <= sizeof(Header) || size > most_bytes_) return std::nullopt;
@@ -117,10 +117,12 @@ std::optional<ProgramFiles::Binary> ProgramFiles::find(const std::string& driver
 void ProgramFiles::keep(const std::string& driver, const std::string& source, const Binary& binary) {
   const std::scoped_lock lock(mutex_);
   std::error_code error;
-  fs::create_directories(folder_, error);
-  if (error) fail(folder_, error.message());
+  const fs::path folder = folder_.absolute();
+  fs::create_directories(folder, error);
+  if (error) fail(folder_.given(), error.message());
+  const auto as_given = [&](const fs::path& file) { return fs::path(folder_.given()) / file.filename(); };
   const Key key = key_of(driver, source);
-  const fs::path path = file_of(folder_, key);
+  const fs::path path = file_of(folder, key);
   fs::path part = path;
   part += std::to_string(std::random_device{}());  // another process may write the same
   part += unfinished;
@@ -132,14 +134,14 @@ void ProgramFiles::keep(const std::string& driver, const std::string& source, co
     file.close();
     if (!file) {
       fs::remove(part, error);
-      fail(part, "cannot be written");
+      fail(as_given(part), "cannot be written");
     }
   }
   fs::rename(part, path, error);
   if (error) {
     const std::string why = error.message();
     fs::remove(part, error);
-    fail(path, why);
+    fail(as_given(path), why);
   }
   make_room();
 }
@@ -154,7 +156,7 @@ void ProgramFiles::make_room() const {
   std::vector<File> files;
   std::uintmax_t bytes = 0;
   std::error_code error;
-  for (fs::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
+  for (fs::directory_iterator at(folder_.absolute(), error), end; !error && at != end; at.increment(error)) {
     std::error_code gone;  // by another process
     const File file{at->path(), at->last_write_time(gone), at->file_size(gone)};
     if (gone) continue;

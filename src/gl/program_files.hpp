@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "base/file_path.hpp"
+
 namespace cumulet::gl {
 
 /// A folder of program binaries, of drivers that give them (glGetProgramBinary): good for the driver and the source
@@ -22,13 +24,13 @@ class ProgramFiles {
   };
 
   /// The folder is made with the first file.
-  explicit ProgramFiles(std::filesystem::path folder, std::uintmax_t most_bytes = default_most_bytes)
+  explicit ProgramFiles(FilePath folder, std::uintmax_t most_bytes = default_most_bytes)
       : folder_(std::move(folder)), most_bytes_(most_bytes) {}
 
   [[nodiscard]] std::optional<Binary> find(const std::string& driver, const std::string& source);
   /// Throws Error(file).
   void keep(const std::string& driver, const std::string& source, const Binary& binary);
-  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  [[nodiscard]] const FilePath& folder() const { return folder_; }
 
   static constexpr std::uintmax_t default_most_bytes = std::uintmax_t{256} << 20U;
 
@@ -36,7 +38,7 @@ class ProgramFiles {
   void make_room() const;
 
   std::mutex mutex_;
-  std::filesystem::path folder_;
+  FilePath folder_;
   std::uintmax_t most_bytes_;
 };
 

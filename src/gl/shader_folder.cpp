@@ -27,13 +27,13 @@ std::optional<std::string> included(const std::string& line) {
   return line.substr(begin, end - begin);
 }
 
-void append(const fs::path& path, std::set<fs::path>& seen, std::string& text) {
-  std::ifstream file(path);
-  if (!file) throw Error(ErrorCode::file, path.string() + ": cannot be read");
+void append(const FilePath& folder, const fs::path& name, std::set<fs::path>& seen, std::string& text) {
+  std::ifstream file(folder.absolute() / name);
+  if (!file) throw Error(ErrorCode::file, (folder.given() / name).string() + ": cannot be read");
   for (std::string line; std::getline(file, line);) {
-    if (const auto name = included(line)) {
-      const fs::path other = path.parent_path() / *name;
-      if (seen.insert(other).second) append(other, seen, text);
+    if (const auto include = included(line)) {
+      const fs::path other = name.parent_path() / *include;
+      if (seen.insert(other).second) append(folder, other, seen, text);
     } else {
       text.append(line).append(1, '\n');
     }
@@ -45,7 +45,7 @@ void append(const fs::path& path, std::set<fs::path>& seen, std::string& text) {
 std::string ShaderFolder::source(const std::string& name) const {
   std::string text;
   std::set<fs::path> seen;
-  append(folder_ / name, seen, text);
+  append(folder_, name, seen, text);
   return text;
 }
 
@@ -56,7 +56,7 @@ bool ShaderFolder::changed() {
   looked_ = now;
   auto newest = fs::file_time_type::min();
   std::error_code error;
-  for (fs::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
+  for (fs::directory_iterator at(folder_.absolute(), error), end; !error && at != end; at.increment(error)) {
     std::error_code gone;
     const fs::file_time_type time = at->last_write_time(gone);
     if (!gone) newest = std::max(newest, time);

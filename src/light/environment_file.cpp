@@ -27,33 +27,33 @@ namespace {
 }
 
 /// All of it, in pieces between which a load may be cancelled.
-std::vector<std::uint8_t> read_bytes(const std::string& path, Progress* progress) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) fail(path, std::strerror(errno));
+std::vector<std::uint8_t> read_bytes(const FilePath& path, Progress* progress) {
+  std::ifstream file(path.absolute(), std::ios::binary);
+  if (!file) fail(path.given(), std::strerror(errno));
   std::error_code unknown;
-  const std::uintmax_t told = std::filesystem::file_size(path, unknown);
+  const std::uintmax_t told = std::filesystem::file_size(path.absolute(), unknown);
   const std::uintmax_t size = unknown ? 0 : told;
   constexpr std::size_t piece = std::size_t{1} << 20U;
   ProgressPart part(progress, 0.0, decoded_from, size);
   std::vector<std::uint8_t> bytes;
   bytes.reserve(size + piece);
   read_rest(file, bytes, [&part](std::size_t count) { part.add(count); });
-  if (file.bad()) fail(path, std::strerror(errno));
+  if (file.bad()) fail(path.given(), std::strerror(errno));
   return bytes;
 }
 
 }  // namespace
 
-EnvironmentPixels read_environment(const std::string& path, Progress* progress) {
+EnvironmentPixels read_environment(const FilePath& path, Progress* progress) {
   std::vector<std::uint8_t> bytes = read_bytes(path, progress);
   constexpr std::array<std::uint8_t, 4> open_exr = {0x76, 0x2F, 0x31, 0x01};
   const bool exr = bytes.size() >= open_exr.size() && std::equal(open_exr.begin(), open_exr.end(), bytes.begin());
-  return exr ? read_exr(std::move(bytes), path, progress) : read_radiance(bytes, path, progress);
+  return exr ? read_exr(std::move(bytes), path.given(), progress) : read_radiance(bytes, path.given(), progress);
 }
 
-EnvironmentPtr open_environment(const std::string& path, Progress* progress) {
+EnvironmentPtr open_environment(const FilePath& path, Progress* progress) {
   const auto pixels = make_left<const EnvironmentPixels>(read_environment(path, progress));
-  return make_environment(*pixels, path, progress);
+  return make_environment(*pixels, path.given(), progress);
 }
 
 }  // namespace cumulet::light

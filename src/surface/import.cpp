@@ -409,18 +409,19 @@ ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& label,
   }
 }
 
-ScenePtr import_gltf(const std::string& path, const Log& log, Progress* progress) {
+ScenePtr import_gltf(const FilePath& path, const Log& log, Progress* progress) {
+  const std::filesystem::path file = path.absolute();
   std::vector<std::uint8_t> bytes;
   try {
     GltfLimits limits;
     detail::Budget budget(limits, progress);
-    bytes = detail::read_file(path, budget);
+    bytes = detail::read_file(file, budget);
   } catch (const Error& error) {
-    throw Error(error.code(), path + ": " + error.what());
+    throw Error(error.code(), path.given() + ": " + error.what());
   } catch (const std::bad_alloc&) {
-    throw Error(ErrorCode::out_of_memory, path + ": there is not enough memory for it");
+    throw Error(ErrorCode::out_of_memory, path.given() + ": there is not enough memory for it");
   }
-  return import_gltf(std::move(bytes), path, std::filesystem::path(path).parent_path(), log, progress);
+  return import_gltf(std::move(bytes), path.given(), file.parent_path(), log, progress);
 }
 
 }  // namespace cumulet::surface

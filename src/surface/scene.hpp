@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
 
@@ -281,6 +282,6 @@ using ScenePtr = std::shared_ptr<const Scene>;
 /// Reads a .gltf or .glb. Throws Error(file), one line that names the file and the cause, for what cannot be read or is
 /// malformed; Error(unsupported) by name for an extensionsRequired that is not known; logs a warning for
 /// extensionsUsed that are ignored. Checks `progress` (may be null) for cancellation.
-ScenePtr import_gltf(const std::string& path, const Log& log, Progress* progress = nullptr);
+ScenePtr import_gltf(const FilePath& path, const Log& log, Progress* progress = nullptr);
 
 }  // namespace cumulet::surface

@@ -195,7 +195,7 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);
   } catch (const Error& e) {
     if (e.code() == ErrorCode::cancelled) throw;
-    throw Error(e.code(), path + ": " + e.what());
+    throw Error(e.code(), path.given() + ": " + e.what());
   }
 }
 
@@ -204,7 +204,7 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
   const auto load = std::make_shared<Load>(Load{std::move(settings), std::move(stand_in)});
   const std::scoped_lock lock(mutex_);
   load_ = load;
-  worker_.replace({file.path, Progress::Stage::loading,
+  worker_.replace({file.path.given(), Progress::Stage::loading,
                    [this, file, load](Progress& progress) {
                      try {
                        read(file, load, progress);
@@ -226,7 +226,7 @@ void Builder::read(const VolumeFile& file, const std::shared_ptr<Load>& load, Pr
   LoadedVolume loaded{file.read(log_, &progress, take_stand_in), {}};
   if (file.suggested_density_scale) loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
   const double seconds = watch.lap();
-  allowance_->require(loaded.volume->bytes(), file.path);
+  allowance_->require(loaded.volume->bytes(), file.path.given());
   {
     const std::scoped_lock handing(mutex_);
     progress.check();

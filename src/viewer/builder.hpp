@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "grid/refine.hpp"
@@ -22,7 +23,7 @@ namespace cumulet::viewer {
 
 /// A file, what of it is shown, and where it stands.
 struct VolumeFile {
-  std::string path;
+  FilePath path;
   volume::GridNames grids;
   glm::dmat4 to_world{1.0};              ///< affine, from the file's own world space
   bool suggested_density_scale = false;  ///< the medium gets the one that is suggested for it

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/file_path.hpp"
 #include "surface/gltf_import.hpp"
 #include "surface/triangles.hpp"
 #include "viewer/c_handles.hpp"
@@ -79,7 +80,7 @@ cumulet_status cumulet_surfaces_from_memory(const void* bytes, size_t size, cons
     const std::string what = name_or(name, "memory");
     const auto file = array_of(static_cast<const std::uint8_t*>(bytes), size, 1, what + ": bytes");
     std::optional<std::filesystem::path> folder;
-    if (base_directory != nullptr) folder = base_directory;
+    if (base_directory != nullptr) folder = FilePath(base_directory).absolute();
     return asset_of(surface::import_gltf({file.begin(), file.end()}, what, folder, {}), what);
   });
 }

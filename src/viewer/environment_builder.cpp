@@ -5,9 +5,9 @@
 
 namespace cumulet::viewer {
 
-void EnvironmentBuilder::load(const std::string& path) {
+void EnvironmentBuilder::load(const FilePath& path) {
   const std::scoped_lock lock(mutex_);
-  files_.replace({path, Progress::Stage::loading,
+  files_.replace({path.given(), Progress::Stage::loading,
                   [this, path](Progress& progress) {
                     light::EnvironmentPtr made = light::open_environment(path, &progress);
                     const std::scoped_lock handing(mutex_);

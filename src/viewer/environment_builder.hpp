@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "base/file_path.hpp"
 #include "light/environment.hpp"
 #include "light/sky.hpp"
 #include "viewer/worker.hpp"
@@ -24,14 +25,14 @@ class EnvironmentBuilder {
       : files_(notify, trace, allowance), skies_(notify, trace, allowance) {}
 
   /// Reads a file. Replaces what is under way, as Worker::replace() does.
-  void load(const std::string& path);
+  void load(const FilePath& path);
   /// After the sky under way, which is shown first.
   void make_sky(const light::Day& day);
   /// Loads: skies are settings, and soon there. What was read, and nobody took, is dropped.
   void drop_loads();
-  /// Loads under way; what was read is still to be taken.
   /// How the last sky ended is reported no more.
   void forget_sky_failure() { skies_.forget_failure(); }
+  /// Loads under way; what was read is still to be taken.
   void cancel() { files_.cancel(); }
 
   /// The newest environment that was read, once.

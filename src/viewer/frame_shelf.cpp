@@ -20,7 +20,7 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
   std::vector<std::pair<std::uintmax_t, std::uint32_t>> sized;
   for (std::uint32_t frame = 0; frame < files.count(); ++frame) {
     std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(files.paths[frame], error);
+    const std::uintmax_t size = std::filesystem::file_size(files.path(frame).absolute(), error);
     sized.emplace_back(error ? 0 : size, frame);
   }
   std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -389,7 +389,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
       try {
         progress.begin(Progress::Stage::loading);
         const VolumeFile file = files->file(frame);
-        const VolumeAssetPtr volume = file.read(log_of(file.path), &progress);
+        const VolumeAssetPtr volume = file.read(log_of(file.path.given()), &progress);
         progress.check();
         const std::uint64_t bytes = volume->bytes();
         {
@@ -436,7 +436,7 @@ VolumeAssetPtr FrameShelf::read_frame(const Which& which, std::uint32_t frame, P
     if (is_wished(which)) file.temperature_scale = temperature_scale_;
   }
   progress.begin(Progress::Stage::loading);
-  VolumeAssetPtr volume = file.read(log_of(file.path), &progress);
+  VolumeAssetPtr volume = file.read(log_of(file.path.given()), &progress);
   settle_temperature(*which.files, *volume);
   const std::uint64_t bytes = volume->bytes();
   std::vector<Shelved> old;

@@ -17,15 +17,16 @@ namespace cumulet::viewer {
 
 /// What frames are read from: files that are there or not.
 struct FrameFiles {
-  std::vector<std::string> paths;  ///< one at least
-  VolumeFile shown;                ///< of each; its own path is of no meaning
+  std::vector<std::string> paths;  ///< one at least, relative to the folder that the path of `shown` is relative to
+  VolumeFile shown;                ///< of each
 
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(paths.size()); }
   [[nodiscard]] VolumeFile file(std::uint32_t frame) const {
     VolumeFile file = shown;
-    file.path = paths[frame];
+    file.path = path(frame);
     return file;
   }
+  [[nodiscard]] FilePath path(std::uint32_t frame) const { return {paths[frame], shown.path}; }
 };
 using FrameFilesPtr = std::shared_ptr<const FrameFiles>;
 

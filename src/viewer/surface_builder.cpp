@@ -2,16 +2,16 @@
 
 namespace cumulet::viewer {
 
-void SurfaceBuilder::load(const std::string& path, SurfaceChoice choice) {
+void SurfaceBuilder::load(const FilePath& path, SurfaceChoice choice) {
   const auto load = std::make_shared<Load>(Load{choice});
   const std::scoped_lock lock(mutex_);
   load_ = load;
-  worker_.replace(
-      {path, Progress::Stage::loading, [this, path, load](Progress& progress) { read(path, *load, progress); }, true});
+  worker_.replace({path.given(), Progress::Stage::loading,
+                   [this, path, load](Progress& progress) { read(path, *load, progress); }, true});
 }
 
-void SurfaceBuilder::read(const std::string& path, Load& load, Progress& progress) {
-  const auto asset = std::make_shared<const SurfaceAsset>(surface::import_gltf(path, log_, &progress), path);
+void SurfaceBuilder::read(const FilePath& path, Load& load, Progress& progress) {
+  const auto asset = std::make_shared<const SurfaceAsset>(surface::import_gltf(path, log_, &progress), path.given());
   scene::ModelSourcePtr made;
   SurfaceChoice choice;
   for (;;) {

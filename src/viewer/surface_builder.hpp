@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "viewer/surface_asset.hpp"
@@ -30,7 +31,7 @@ class SurfaceBuilder {
       : log_(std::move(log)), worker_(std::move(notify), trace, std::move(allowance)) {}
 
   /// Reads a file, then poses it. Replaces what is under way, as Worker::replace() does.
-  void load(const std::string& path, SurfaceChoice choice);
+  void load(const FilePath& path, SurfaceChoice choice);
   /// Another choice for a load under way. Returns false if there is none: then take what it made, and call pose.
   bool configure_load(SurfaceChoice choice);
   /// Poses a scene, after the pose under way: a pose that takes long is shown before the next.
@@ -38,9 +39,9 @@ class SurfaceBuilder {
   void cancel();
   /// Loads alone: other surfaces are there.
   void cancel_loads();
-  /// The newest result, once.
   /// How the last job ended is reported no more.
   void forget_failure() { worker_.forget_failure(); }
+  /// The newest result, once.
   std::optional<PosedModel> take();
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
@@ -54,7 +55,7 @@ class SurfaceBuilder {
     SurfaceChoice choice;
     bool open = true;
   };
-  void read(const std::string& path, Load& load, Progress& progress);
+  void read(const FilePath& path, Load& load, Progress& progress);
 
   Log log_;
   mutable std::mutex mutex_;

@@ -1069,7 +1069,7 @@ bool Viewer::builds() const {
   return frame_comes || state_comes || builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_;
 }
 
-void Viewer::load_surfaces(const std::string& path) {
+void Viewer::load_surfaces(const FilePath& path) {
   reported_failures_.retire();
   sync();
   surface_builder_.load(path, while_open(surface_settings_.choice, nullptr));
@@ -1313,7 +1313,7 @@ void Viewer::set_lamps(light::Lamps lamps) {
   touch();
 }
 
-void Viewer::load_environment(const std::string& path) {
+void Viewer::load_environment(const FilePath& path) {
   reported_failures_.retire();
   sync();
   environment_builder_.load(path);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/trace.hpp"
 #include "denoise/network.hpp"
@@ -144,7 +146,7 @@ class Viewer {
   };
   [[nodiscard]] Status status() const;
 
-  void load_surfaces(const std::string& path);
+  void load_surfaces(const FilePath& path);
   /// Shows these at once. Cancels a load under way.
   void show_surfaces(scene::ModelSourcePtr surfaces);
   /// Poses these, then shows them; null: none, at once. Cancels a load under way.
@@ -161,7 +163,7 @@ class Viewer {
   [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   void set_light(const Light& light);
   void set_lamps(light::Lamps lamps);
-  void load_environment(const std::string& path);
+  void load_environment(const FilePath& path);
   /// Null: the sky of the light. Cancels a load under way.
   void set_environment(light::EnvironmentPtr environment);
   void set_environment_settings(const EnvironmentSettings& settings);
@@ -540,8 +542,8 @@ class Viewer {
   scene::ModelSourcePtr model_source_;  // newest that is posed
   Sampling sampling_;
   DisplaySettings display_;
-  denoise::NetworkPtr network_;  // the last that a picture was denoised by...
-  std::string denoiser_file_;    // ...of this file
+  denoise::NetworkPtr network_;          // the last that a picture was denoised by...
+  std::filesystem::path denoiser_file_;  // ...of this file
   std::shared_ptr<Camera> camera_;
   std::shared_ptr<void> camera_listener_;
   Navigation navigation_;

@@ -614,9 +614,12 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
 
 void Viewer::read_denoised(const char* network_file, float* rgba, std::size_t count) {
   with_gl([&](Context& g) {
-    if (network_file != nullptr && (denoiser_file_ != network_file || network_ == nullptr)) {
-      network_ = denoise::make_network(denoise::read_tza(network_file), network_file);
-      denoiser_file_ = network_file;
+    if (network_file != nullptr) {
+      const FilePath file(network_file);
+      if (network_ == nullptr || denoiser_file_ != file.absolute()) {
+        network_ = denoise::make_network(denoise::read_tza(file), network_file);
+        denoiser_file_ = file.absolute();
+      }
     }
     g.read_denoised(shot(), network_file != nullptr ? network_ : nullptr, rgba, count);
     totals_ = g.totals();

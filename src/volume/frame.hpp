@@ -103,8 +103,7 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 /// temperature, colour, anisotropy or velocity that lies nowhere over density; anisotropy beyond -1 and 1, which counts
 /// as these; velocities that are clamped. An info tells of colour in three grids that is not read, and of temperatures
 /// that are taken as kelvin, or seem to be degrees Celsius or from 0 to 1.
-VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
-                         Progress* progress = nullptr);
+VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress = nullptr);
 
 /// The same of fields in memory, which check_fields() accepts and which are copied. Velocities are world units a second
 /// along the world's axes. name begins every message. Throws Error(file), also of a velocity that cannot be had.

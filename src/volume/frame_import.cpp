@@ -544,10 +544,9 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
   return channels;
 }
 
-VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
-                         Progress* progress) {
-  return naming(file.string(),
-                [&] { return FrameImport(file.string(), log, progress).run(*open(file, progress), names); });
+VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress) {
+  return naming(file.given(),
+                [&] { return FrameImport(file.given(), log, progress).run(*open(file.absolute(), progress), names); });
 }
 
 namespace {
@@ -572,16 +571,17 @@ constexpr std::uint64_t least_bytes_a_brick = 128;
 
 }  // namespace
 
-VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log, Progress* progress,
+VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
                          const StandInWish& stand_in) {
-  return naming(file.string(), [&] {
-    const std::unique_ptr<Reader> reader = open(file, progress);
-    FrameImport import(file.string(), log, progress);
+  return naming(file.given(), [&] {
+    const std::filesystem::path path = file.absolute();
+    const std::unique_ptr<Reader> reader = open(path, progress);
+    FrameImport import(file.given(), log, progress);
     std::error_code unknown;
-    const bool is_large = std::filesystem::file_size(file, unknown) / least_bytes_a_brick >= stand_in.least_bricks;
+    const bool is_large = std::filesystem::file_size(path, unknown) / least_bytes_a_brick >= stand_in.least_bricks;
     if (!is_large || unknown || !reader->streams()) return import.run(*reader, names);
     CoarseReader coarse(*reader, stand_in.least_bricks, progress);
-    if (auto made = stand_in_of(coarse, file.string(), names, progress)) stand_in.take(std::move(*made));
+    if (auto made = stand_in_of(coarse, file.given(), names, progress)) stand_in.take(std::move(*made));
     CoarseReader::Rest rest(coarse);
     return import.run(rest, names);
   });

@@ -623,8 +623,8 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   return std::move(out);
 }
 
-std::vector<GridInfo> list_grids(const std::filesystem::path& file) {
-  return naming(file.string(), [&] { return open(file, nullptr)->grids(); });
+std::vector<GridInfo> list_grids(const FilePath& file) {
+  return naming(file.given(), [&] { return open(file.absolute(), nullptr)->grids(); });
 }
 
 namespace {
@@ -752,17 +752,16 @@ std::array<std::array<ScalarVolume, 2>, 3> detail::import_signed_vector_grid(Rea
       });
 }
 
-ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
-                           Progress* progress) {
-  return naming(file.string(), [&] {
-    const std::unique_ptr<Reader> reader = open(file, progress);
-    for (const std::string& text : reader->remarks()) log.warning(one_line(file.string() + ": " + text));
+ScalarVolume import_volume(const FilePath& file, const std::string& grid_name, const Log& log, Progress* progress) {
+  return naming(file.given(), [&] {
+    const std::unique_ptr<Reader> reader = open(file.absolute(), progress);
+    for (const std::string& text : reader->remarks()) log.warning(one_line(file.given() + ": " + text));
     const std::size_t chosen = choose_grid(reader->grids(), grid_name);
     if (grid_name.empty()) {
       const std::string remark = remark_on_choice(reader->grids(), chosen, std::span(&chosen, 1));
-      if (!remark.empty()) log.warning(one_line(file.string() + ": " + remark));
+      if (!remark.empty()) log.warning(one_line(file.given() + ": " + remark));
     }
-    return import_grid(*reader, chosen, file.string(), log, progress, {reader->opened(), 1.0});
+    return import_grid(*reader, chosen, file.given(), log, progress, {reader->opened(), 1.0});
   });
 }
 

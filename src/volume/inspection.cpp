@@ -136,10 +136,10 @@ std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume) 
   return counts;
 }
 
-Inspection::Inspection(const std::filesystem::path& file) : file_(file) {
-  naming(file.string(), [&] {
-    const std::unique_ptr<Reader> reader = open(file, nullptr);
-    bytes_ = std::filesystem::file_size(file);
+Inspection::Inspection(const FilePath& file) : file_(file) {
+  naming(file.given(), [&] {
+    const std::unique_ptr<Reader> reader = open(file.absolute(), nullptr);
+    bytes_ = std::filesystem::file_size(file.absolute());
     format_ = reader->format();
     metadata_ = reader->metadata();
     grids_ = reader->grids();
@@ -161,10 +161,10 @@ const GridFacts& Inspection::facts(std::size_t grid) {
   if (grids_[grid].values != Values::none) {
     try {
       // A reader of its own: one that fails leaves its stream in no state to go on from.
-      const std::unique_ptr<Reader> reader = open(file_, nullptr);
+      const std::unique_ptr<Reader> reader = open(file_.absolute(), nullptr);
       found.values = values_of(reader->read(grid, {}, {}, ""));
     } catch (const std::bad_alloc&) {
-      throw Error(ErrorCode::out_of_memory, one_line(file_.string() + ": not enough memory to read it"));
+      throw Error(ErrorCode::out_of_memory, one_line(file_.given() + ": not enough memory to read it"));
     } catch (const std::ios_base::failure&) {
       found.refusal = end_of_file;
     } catch (const std::exception& e) {

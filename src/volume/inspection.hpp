@@ -44,7 +44,7 @@ struct GridFacts {
 class Inspection {
  public:
   /// Reads the directory. Throws Error(file).
-  explicit Inspection(const std::filesystem::path& file);
+  explicit Inspection(const FilePath& file);
 
   [[nodiscard]] const std::string& format() const { return format_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -58,7 +58,7 @@ class Inspection {
   [[nodiscard]] const GridFacts& facts(std::size_t grid);
 
  private:
-  std::filesystem::path file_;
+  FilePath file_;
   std::uint64_t bytes_ = 0;
   std::string format_;
   std::vector<Metadata> metadata_;

@@ -38,7 +38,7 @@ struct StandInWish {
 /// The same as the other import_frame, but that a .vdb file of many bricks has a stand-in first, which takes about a
 /// twentieth of the time. None of a file from before OpenVDB 3, nor where anything of it fails: what is wrong with a
 /// file is told of the whole.
-VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log, Progress* progress,
+VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
                          const StandInWish& stand_in);
 
 }  // namespace cumulet::volume

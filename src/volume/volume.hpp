@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "volume/brick_values.hpp"
@@ -90,7 +91,7 @@ struct GridInfo {
 void initialize_readers();
 
 /// The grids of a .vdb or .nvdb file, without their voxels. Throws Error(file).
-std::vector<GridInfo> list_grids(const std::filesystem::path& file);
+std::vector<GridInfo> list_grids(const FilePath& file);
 
 /// Reads one scalar grid of a .vdb or .nvdb file.
 ///
@@ -102,7 +103,7 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 /// negative and non-finite voxels, and those beyond largest_value, are zero, with one warning each that counts them. Any
 /// affine transform is accepted; a frustum transform is not. O(active nodes) time and memory. progress receives the
 /// fraction done; cancelled, Error(cancelled) is thrown.
-ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
+ScalarVolume import_volume(const FilePath& file, const std::string& grid_name, const Log& log,
                            Progress* progress = nullptr);
 
 }  // namespace cumulet::volume

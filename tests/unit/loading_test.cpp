@@ -1,4 +1,4 @@
-// Loads: which failures are reported, and for how long.
+// Loads: which failures are reported and for how long, and that paths are those of the moment of the call.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/file_path.hpp"
 #include "cumulet/cumulet.h"
 #include "support/c_host.hpp"
 #include "support/clip.hpp"
@@ -293,6 +294,100 @@ TEST(ReportedFailures, CopiesAreTheSameFailure) {
   failures[ContentKind::volume] = Error(ErrorCode::cancelled, "cancelled");
   EXPECT_EQ(reported.report(failures, ReportedFailures::Cancelled::left_out)->code(), ErrorCode::file);
   EXPECT_EQ(report(failures), "cancelled");
+}
+
+// ---- paths ----
+
+// The process' current folder, until it goes.
+class CurrentFolder {
+ public:
+  explicit CurrentFolder(const std::filesystem::path& folder) { std::filesystem::current_path(folder); }
+  CurrentFolder(const CurrentFolder&) = delete;
+  CurrentFolder& operator=(const CurrentFolder&) = delete;
+  ~CurrentFolder() { std::filesystem::current_path(before_); }
+
+ private:
+  std::filesystem::path before_ = std::filesystem::current_path();
+};
+
+TEST(FilePaths, AreThoseOfTheMomentAndHaveTheNameThatWasGiven) {
+  const Folder here;
+  const Folder there;
+  const CurrentFolder current(here.path());
+  const FilePath path("clouds/a.vdb");
+  const FilePath whole((here / "b.vdb").string());
+  const FilePath other("c.vdb", path);
+  std::filesystem::current_path(there.path());
+  EXPECT_EQ(path.given(), "clouds/a.vdb");
+  EXPECT_EQ(path.absolute(), here / "clouds/a.vdb");
+  EXPECT_EQ(whole.absolute(), here / "b.vdb");
+  EXPECT_EQ(other.absolute(), here / "c.vdb");
+  EXPECT_EQ(FilePath().absolute(), std::filesystem::path());
+  // A folder that was removed: the name as it was given.
+  std::filesystem::current_path(here.path());
+  std::filesystem::create_directory("gone");
+  std::filesystem::current_path("gone");
+  std::filesystem::remove(here / "gone");
+  EXPECT_EQ(FilePath("d.vdb").absolute(), std::filesystem::path("d.vdb"));
+}
+
+// A worker reads while the current folder is another: it waits until the folder has changed.
+TEST_F(Loading, RelativePathsAreOfTheFolderAtTheCall) {
+  const Folder elsewhere;
+  const CurrentFolder current(folder_.path());
+  for (int frame = 0; frame < 2; ++frame)
+    std::filesystem::copy_file(clip_.path(frame), "clip." + std::to_string(frame) + ".vdb");
+  // What the workers do meanwhile keeps them from the files.
+  const auto after_leaving = [&](const char* what, const std::function<void()>& call) {
+    SCOPED_TRACE(what);
+    std::filesystem::current_path(folder_.path());
+    call();
+    std::filesystem::current_path(elsewhere.path());
+    EXPECT_EQ(wait(), CUMULET_OK) << error();
+  };
+  for (int round = 0; round < 10; ++round) {
+    after_leaving("volume", [&] { ASSERT_EQ(cumulet_load_volume(v_, "clip.0.vdb", nullptr), CUMULET_OK); });
+    after_leaving("surfaces", [&] { ASSERT_EQ(cumulet_load_surfaces(v_, "triangle.gltf"), CUMULET_OK); });
+    after_leaving("environment", [&] { ASSERT_EQ(cumulet_load_environment(v_, "./sky.hdr"), CUMULET_OK); });
+    after_leaving("sequence", [&] {
+      ASSERT_EQ(cumulet_set_sequence(v_, make_sequence({"clip.0.vdb", "clip.1.vdb"}).get()), CUMULET_OK);
+    });
+  }
+  // A frame is read much later.
+  std::filesystem::current_path(folder_.path());
+  const SequenceRef sequence = make_sequence({"clip.0.vdb", "clip.1.vdb", "none.vdb"});
+  std::filesystem::current_path(elsewhere.path());
+  ASSERT_EQ(cumulet_set_sequence(v_, sequence.get()), CUMULET_OK);
+  ASSERT_EQ(wait(), CUMULET_OK) << error();
+  ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 1.0), CUMULET_OK);
+  ASSERT_EQ(wait(), CUMULET_OK) << error();
+  ASSERT_EQ(cumulet_rebuild(v_), CUMULET_OK);
+  ASSERT_EQ(wait(), CUMULET_OK) << error();
+  // Messages have the name that was given.
+  ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 2.0), CUMULET_OK);
+  ASSERT_EQ(wait(), CUMULET_OK) << error();
+  std::array<char, 256> cause{};
+  ASSERT_EQ(cumulet_get_sequence_frame(v_, 2, cause.data(), cause.size()), CUMULET_OK);
+  EXPECT_EQ(std::string(cause.data()), "none.vdb: no such file");
+  for (const auto& [load, name] :
+       {std::pair(cumulet_load_surfaces, "gone.gltf"), {cumulet_load_environment, "gone.hdr"}}) {
+    ASSERT_EQ(load(v_, name), CUMULET_OK);
+    EXPECT_EQ(wait(), CUMULET_ERROR_FILE);
+    EXPECT_EQ(error().rfind(std::string(name) + ": ", 0), 0U) << error();
+  }
+}
+
+// An inspection reads a grid's voxels when it is asked for them.
+TEST_F(Loading, AnInspectionReadsTheFileThatWasNamed) {
+  const Folder elsewhere;
+  const CurrentFolder current(std::filesystem::path(clip_.path(0)).parent_path());
+  cumulet_inspection* inspection = nullptr;
+  ASSERT_EQ(cumulet_inspect_volume_file("clip.0.vdb", &inspection, nullptr, 0), CUMULET_OK);
+  std::filesystem::current_path(elsewhere.path());
+  auto info = make_desc<cumulet_grid_info>();
+  EXPECT_EQ(cumulet_inspection_get_grid(inspection, 0, &info), CUMULET_OK);
+  EXPECT_GT(info.active_voxels, 0U);
+  cumulet_inspection_release(inspection);
 }
 
 }  // namespace

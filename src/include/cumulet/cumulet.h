@@ -120,6 +120,11 @@
  *     has something built anew. From then on a failure that was reported is not reported again. volume_status,
  *     surfaces_status and environment_status of cumulet_progress still have it.
  *
+ * Files
+ *     Paths are UTF-8. A relative path is relative to the current folder of the process at the time of the call that
+ *     gives it, as are files that this file names; the folder may change while a worker reads. Messages have the path
+ *     as it was given.
+ *
  * Descriptors
  *     Set struct_size to sizeof the struct and zero the rest: zero means the default. Unknown enum values are errors.
  *     A struct from an older header is shorter, and what it lacks is zero. Any other size, one that cuts a field or
