@@ -55,6 +55,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   gl->GetIntegerv(GL_MAX_DRAW_BUFFERS, &draw_buffers);
   gl->draw_buffers = static_cast<GLuint>(std::clamp(draw_buffers, 1, 16));
   gl->compatibility = load_compatibility(*gl, get_proc, user);
+  gl->GetIntegerv(GL_MAX_DEBUG_GROUP_STACK_DEPTH, &gl->max_debug_groups);
   return gl;
 }
 
@@ -63,6 +64,7 @@ std::shared_ptr<const Functions> copy_of(const Functions& gl) {
   static_cast<GladGLContext&>(*copy) = gl;
   copy->draw_buffers = gl.draw_buffers;
   copy->compatibility = gl.compatibility;
+  copy->max_debug_groups = gl.max_debug_groups;
   return copy;
 }
 

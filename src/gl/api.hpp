@@ -28,6 +28,11 @@ struct Functions : GladGLContext {
   GLuint draw_buffers = 8;
   /// Null in a core context.
   std::shared_ptr<const CompatibilityFunctions> compatibility;
+  /// The constant GL_MAX_DEBUG_GROUP_STACK_DEPTH.
+  GLint max_debug_groups = 0;
+  /// Of DebugGroup: how many of them are open, and may be, beside those of the host. One thread has the context.
+  mutable GLint open_debug_groups = 0;
+  mutable GLint debug_group_room = 0;
 
   void UseProgram(GLuint program) const;
   void BindProgramPipeline(GLuint pipeline) const;

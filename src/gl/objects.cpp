@@ -36,6 +36,25 @@ Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) 
 
 }  // namespace
 
+DebugGroup::DebugGroup(const Functions& gl, std::string_view name) : gl_(gl) {
+  // Asked once for groups within each other: the host pushes none between them.
+  if (gl_.open_debug_groups == 0) {
+    GLint depth = 0;
+    gl_.GetIntegerv(GL_DEBUG_GROUP_STACK_DEPTH, &depth);
+    gl_.debug_group_room = gl_.max_debug_groups - depth;
+  }
+  pushed_ = gl_.open_debug_groups < gl_.debug_group_room;
+  if (!pushed_) return;
+  ++gl_.open_debug_groups;
+  gl_.PushDebugGroup(GL_DEBUG_SOURCE_THIRD_PARTY, 0, static_cast<GLsizei>(name.size()), name.data());
+}
+
+DebugGroup::~DebugGroup() {
+  if (!pushed_) return;
+  --gl_.open_debug_groups;
+  if (!gl_.abandoned.load(std::memory_order_relaxed)) gl_.PopDebugGroup();
+}
+
 Object::~Object() {
   if (name_ == 0 || gl_->abandoned.load(std::memory_order_relaxed)) return;
   switch (kind_) {

@@ -50,19 +50,18 @@ class Object {
 void label(const Functions& gl, Object::Kind kind, GLuint name, std::string_view what);
 
 /// A pass, for the same: the commands between its beginning and its end are its. name: "cumulet: ..." by convention.
+/// Where the host's own groups fill the driver's stack there is none: a push would fail, and its pop end a host's
+/// group.
 class DebugGroup {
  public:
-  DebugGroup(const Functions& gl, std::string_view name) : gl_(gl) {
-    gl_.PushDebugGroup(GL_DEBUG_SOURCE_THIRD_PARTY, 0, static_cast<GLsizei>(name.size()), name.data());
-  }
+  DebugGroup(const Functions& gl, std::string_view name);
   DebugGroup(const DebugGroup&) = delete;
   DebugGroup& operator=(const DebugGroup&) = delete;
-  ~DebugGroup() {
-    if (!gl_.abandoned.load(std::memory_order_relaxed)) gl_.PopDebugGroup();
-  }
+  ~DebugGroup();
 
  private:
   const Functions& gl_;
+  bool pushed_ = false;
 };
 
 /// A point in the stream of commands; deleted with the context current.

@@ -640,6 +640,7 @@ cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet_frame_desc*
 cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick) {
   return guarded(viewer, [&](core::Viewer& v) {
     read_desc(pick, "cumulet_pick");
+    require(std::isfinite(x) && std::isfinite(y), "x or y is not finite");
     const core::Pick p = v.pick(x, y);
     cumulet_pick out{};
     out.hit = p.hit ? 1 : 0;
@@ -670,11 +671,17 @@ cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], dou
 }
 
 cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.read_linear(rgba, count); });
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(rgba != nullptr, "rgba is NULL");
+    v.read_linear(rgba, count);
+  });
 }
 
 cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.read_display(rgba, count); });
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(rgba != nullptr, "rgba is NULL");
+    v.read_display(rgba, count);
+  });
 }
 
 cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
@@ -682,6 +689,7 @@ cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoi
   return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_denoise_desc d = read_desc(desc, "cumulet_denoise_desc");
     require(d.network == nullptr || *d.network != '\0', "network is empty");
+    require(rgba != nullptr, "rgba is NULL");
     v.read_denoised(d.network, rgba, count);
   });
 }
@@ -697,12 +705,16 @@ cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linea
 cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(number(aov) <= CUMULET_AOV_VOLUME_MOTION, "the AOV is unknown");
+    require(values != nullptr, "values is NULL");
     v.read_aov(static_cast<core::Aov>(aov), values, count);
   });
 }
 
 cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.read_light_group(group, rgb, count); });
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(rgb != nullptr, "rgb is NULL");
+    v.read_light_group(group, rgb, count);
+  });
 }
 
 cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_name_fn name, void* user, uint32_t ranks,
@@ -710,6 +722,7 @@ cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_n
   return guarded(viewer, [&](core::Viewer& v) {
     require(name != nullptr, "name is NULL");
     require(ranks >= 1 && ranks <= render::most_matte_ranks, "ranks is not from 1 to 16");
+    require(values != nullptr, "values is NULL");
     const auto id_of = [&](const core::MatteObject& object) {
       const cumulet::CallbackScope inside;
       const char* text = name(user, static_cast<cumulet_object_kind>(object.kind), object.tag, object.place);

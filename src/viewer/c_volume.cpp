@@ -149,7 +149,7 @@ cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_r
 
 cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* user, char* error, size_t error_size) {
   return guarded(error, error_size, [&] {
-    require(path != nullptr, "path is NULL");
+    require(path != nullptr && *path != '\0', "path is NULL or empty");
     require(fn != nullptr, "fn is NULL");
     for (const volume::GridInfo& grid : volume::list_grids(path)) {
       fn(user, grid.unique_name.c_str(), grid.type.c_str(), grid.refusal.c_str());
@@ -163,7 +163,7 @@ cumulet_status cumulet_inspect_volume_file(const char* path, cumulet_inspection*
   return guarded(error, error_size, [&] {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
-    require(path != nullptr, "path is NULL");
+    require(path != nullptr && *path != '\0', "path is NULL or empty");
     *out = new cumulet_inspection(path);
   });
 }

@@ -80,9 +80,9 @@
  *     host (but to wait for, on the device, the one in cumulet_gl_state_desc), the debug callback and its filters, or
  *     any other object. Do not call it inside transform feedback, conditional rendering or a query of the host's. With
  *     CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is undefined.
- *     Objects get labels and passes are debug groups (KHR_debug), up to two on top of the host's own. glGetError is
- *     clean after every call; errors that were pending before are dropped. State of extensions, such as a depth bounds
- *     test or window rectangles, is the host's to disable.
+ *     Objects get labels and passes are debug groups (KHR_debug), up to two on top of the host's own, and none where
+ *     these fill the driver's stack. glGetError is clean after every call; errors that were pending before are dropped.
+ *     State of extensions, such as a depth bounds test or window rectangles, is the host's to disable.
  *
  * Compatibility profile
  *     Other legacy state neither changes pictures nor is touched: fog, lighting, shade model, texture enables, client
