@@ -24,6 +24,15 @@
 #ifndef CUMULET_CUMULET_HPP
 #define CUMULET_CUMULET_HPP
 
+#if defined(_MSVC_LANG)
+#define CUMULET_CPLUSPLUS _MSVC_LANG /* __cplusplus is 199711 there, unless /Zc:__cplusplus is given */
+#else
+#define CUMULET_CPLUSPLUS __cplusplus
+#endif
+#if CUMULET_CPLUSPLUS <= 201703L
+#error "cumulet.hpp needs C++20: compile with -std=c++20 (MSVC: /std:c++20), or include cumulet.h, which is C"
+#else
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -1627,5 +1636,8 @@ class Viewer {
 
 }  // namespace v0_2
 }  // namespace cumulet
+
+#endif /* C++20 */
+#undef CUMULET_CPLUSPLUS
 
 #endif
