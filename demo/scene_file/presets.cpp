@@ -52,7 +52,9 @@ void apply(Preset preset, cumulet_medium_desc& medium) {
 
 void apply(const Burning& burning, cumulet_medium_desc& medium) {
   const bool smoke = medium.density_scale > 0.0;
+  const float temperature_scale = medium.temperature_scale;
   apply(smoke ? Preset::explosion : Preset::fire, medium);
+  medium.temperature_scale = temperature_scale;
   // Light a unit of length, over what a unit of length hides: the brightness of what is opaque.
   const double hides = smoke ? medium.density_scale : 16.0 / burning.size;
   const auto strength = [](double value) { return static_cast<float>(std::clamp(value, 0.0, 1e6)); };

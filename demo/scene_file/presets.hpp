@@ -33,7 +33,7 @@ struct Burning {
 
 /// Where nothing was said of the medium of a volume that burns: the preset "explosion" for the medium's density scale;
 /// with none, of fire alone, "fire". Its light is such that what burns most is as bright in its smoke as the preset's
-/// is in the sample explosion, however dense or large the volume is.
+/// is in the sample explosion, however dense or large the volume is. temperature_scale stays; it must be set.
 void apply(const Burning& burning, cumulet_medium_desc& medium);
 
 /// The preset that the medium is, whatever its density scale.

@@ -21,7 +21,9 @@ class FilePath {
   FilePath(std::string given, const FilePath& other) : given_(std::move(given)), folder_(other.folder_) {}
 
   [[nodiscard]] const std::string& given() const { return given_; }
-  [[nodiscard]] std::filesystem::path absolute() const { return folder_ ? *folder_ / given_ : std::filesystem::path(given_); }
+  [[nodiscard]] std::filesystem::path absolute() const {
+    return folder_ ? *folder_ / given_ : std::filesystem::path(given_);
+  }
 
  private:
   // Null where it cannot be found out, as of one that was removed: then names are as they were given.

@@ -149,6 +149,11 @@ Registry& registry() {
 
 void end_threads() { registry().end(); }
 
+void end_call() {
+  --of_thread().calls;
+  --registry().calls();
+}
+
 }  // namespace
 
 bool process_is_ending() { return registry().ending(); }
@@ -182,12 +187,13 @@ HostCall::HostCall() {
   OfThread& own = of_thread();
   ++own.calls;
   ++registry().calls();
+  // After it is counted: the end of the process sees the call, or the call sees the end.
   refused_ = registry().ending() && !own.ends_process;
+  if (refused_) end_call();
 }
 
 HostCall::~HostCall() {
-  --of_thread().calls;
-  --registry().calls();
+  if (!refused_) end_call();
 }
 
 }  // namespace cumulet

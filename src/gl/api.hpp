@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 
@@ -30,9 +31,10 @@ struct Functions : GladGLContext {
   std::shared_ptr<const CompatibilityFunctions> compatibility;
   /// The constant GL_MAX_DEBUG_GROUP_STACK_DEPTH.
   GLint max_debug_groups = 0;
-  /// Of DebugGroup: how many of them are open, and may be, beside those of the host. One thread has the context.
+  /// For DebugGroup: how many of them are open. One thread has the context.
   mutable GLint open_debug_groups = 0;
-  mutable GLint debug_group_room = 0;
+  /// How many may be open beside those of the host; nothing until a call queries it.
+  mutable std::optional<GLint> debug_group_room;
 
   void UseProgram(GLuint program) const;
   void BindProgramPipeline(GLuint pipeline) const;

@@ -37,13 +37,13 @@ Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) 
 }  // namespace
 
 DebugGroup::DebugGroup(const Functions& gl, std::string_view name) : gl_(gl) {
-  // Asked once for groups within each other: the host pushes none between them.
-  if (gl_.open_debug_groups == 0) {
+  // A StateGuard forgets it at the start of a call. The host pushes no group within one.
+  if (!gl_.debug_group_room || (gl_.guard == nullptr && gl_.open_debug_groups == 0)) {
     GLint depth = 0;
     gl_.GetIntegerv(GL_DEBUG_GROUP_STACK_DEPTH, &depth);
     gl_.debug_group_room = gl_.max_debug_groups - depth;
   }
-  pushed_ = gl_.open_debug_groups < gl_.debug_group_room;
+  pushed_ = gl_.open_debug_groups < *gl_.debug_group_room;
   if (!pushed_) return;
   ++gl_.open_debug_groups;
   gl_.PushDebugGroup(GL_DEBUG_SOURCE_THIRD_PARTY, 0, static_cast<GLsizei>(name.size()), name.data());

@@ -103,6 +103,7 @@ StateGuard::StateGuard(const Functions& gl, bool restore)
     : gl_(&gl), restore_(restore), outer_(std::exchange(gl.guard, this)), compatibility_(gl, restore) {
   static_assert(texture_targets.size() == targets && capability_table.size() == capabilities &&
                 pixel_table.size() == pixel_parameters);
+  if (outer_ == nullptr) gl.debug_group_room.reset();
 }
 
 StateGuard::~StateGuard() {

@@ -52,9 +52,8 @@ GLuint Composed::update(const Of& of, const RowRevisions* rows,
       texture_ =
           gl::make_texture_2d(gl_, of.format, of.size.x, of.size.y, "creating the texture of the composed picture");
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::out_of_memory) throw;
-      no_memory_for_ = of.size;  // it is composed in each frame
-      return 0;
+      if (error.code() == ErrorCode::out_of_memory) no_memory_for_ = of.size;  // it is composed in each frame
+      throw;
     }
     no_memory_for_.reset();
     gl_->TextureParameteri(texture_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);

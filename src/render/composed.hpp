@@ -59,7 +59,8 @@ class Composed {
   /// Whether it is worth keeping: where the last frame drew the same, or all the time.
   [[nodiscard]] bool is_kept(const Of& of, bool always);
   /// Brings it up to this. compose draws these rows of it, of which the first is the picture's top, into the texture of
-  /// that name. Returns the texture; 0 where there is no memory for one of this size.
+  /// that name. Returns the texture. Throws Error(out_of_memory) the first time that there is no memory for one of
+  /// this size, and returns 0 after that.
   GLuint update(const Of& of, const RowRevisions* rows,
                 const std::function<void(GLuint texture, const std::vector<RowRange>& rows)>& compose);
   /// Whether it is as it shall be: nothing is to be composed.

@@ -390,11 +390,17 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
                         shown.program->name(), {target.viewport.z, target.viewport.w},
                         target.region,         copy_format(format, display.encoding)};
   if (!composed_.is_kept(of, gl.dispatches_in_call) || !copy.usable()) return false;
-  // llvmpipe would wait for what is queued before it draws into a texture that queued drawing reads.
-  if (gl.dispatches_in_call && !drawn_.passed() && !composed_.is_current(of, picture.rows)) return false;
-  const GLuint texture = composed_.update(of, picture.rows, [&](GLuint made, const std::vector<RowRange>& rows) {
-    compose(made, rows, shown, picture, display, target);
-  });
+  // llvmpipe would wait for what is queued before it draws into a texture that was read.
+  if (gl.dispatches_in_call && !composed_.is_current(of, picture.rows) && !gl::Fence(gl_).passed()) return false;
+  GLuint texture = 0;
+  try {
+    texture = composed_.update(of, picture.rows, [&](GLuint made, const std::vector<RowRange>& rows) {
+      compose(made, rows, shown, picture, display, target);
+    });
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::out_of_memory) throw;
+    untold_ = error;  // slower, but drawn
+  }
   if (texture == 0) return false;
   composed_rows_ = composed_.composed_rows();
   gl.BindTextureUnit(core::CM_UNIT_SUM, texture);

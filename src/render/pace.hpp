@@ -89,12 +89,12 @@ struct SampleCount {
 
 /// What was dispatched, and what it was thought to take.
 struct Dispatched {
-  std::shared_ptr<Blocks> tile;            // that it is of
-  std::shared_ptr<SquareErrors> errors;    // of the tile, which it finds, and no samples
-  std::shared_ptr<SampleCount> samples;    // of the picture
-  std::shared_ptr<RowRevisions> rows;      // likewise
-  std::uint32_t first_row = 0;             // of the tile, in the picture
-  std::uint64_t revision = 0;              // the picture's, with it
+  std::shared_ptr<Blocks> tile;          // that it is of
+  std::shared_ptr<SquareErrors> errors;  // of the tile, which it finds, and no samples
+  std::shared_ptr<SampleCount> samples;  // of the picture
+  std::shared_ptr<RowRevisions> rows;    // likewise
+  std::uint32_t first_row = 0;           // of the tile, in the picture
+  std::uint64_t revision = 0;            // the picture's, with it
   std::vector<std::uint32_t> blocks;
   std::uint32_t rounds = 1;
   double lanes = 0.0;  // that had something to do

@@ -1,23 +1,17 @@
 #include "surface/precision.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
+#include "base/number_text.hpp"
 #include "base/one_line.hpp"
 
 namespace cumulet::surface::detail {
 
 namespace {
 
-// Three digits, in any locale.
-std::string digits(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3).ptr;
-  return {text.data(), end};
-}
+std::string digits(double value) { return general_text(value, 3); }
 
 }  // namespace
 

@@ -1153,6 +1153,8 @@ void Viewer::wait(double timeout_ms) {
   };
   // What comes of one may be work for another.
   do {
+    // What has stopped never becomes idle by itself.
+    if (process_is_ending()) throw Error(ErrorCode::cancelled, "the process is exiting");
     sync();
     if (!idle()) throw Error(ErrorCode::timeout, "not ready in time");
     // The newest is waited for: what is newer than what was drawn is not kept back for that.

@@ -232,7 +232,7 @@ class FrameImport {
     constexpr double finding = 0.3;
     SourceGrid source = source_of(field, progress_, portion.part(0.0, finding));
     const std::string name = cumulet::volume::name_of(field.channel);
-    const std::string prefix = one_line(file_ + ": " + name + ": ");
+    const std::string prefix = one_line(file_ + ": " + name) + ": ";
     const auto numbers = [&] {
       ScalarVolume volume = assemble(std::move(source), log_, prefix, progress_, portion.part(finding, 1.0));
       volume.name = name;

@@ -100,8 +100,8 @@ std::vector<GridInfo> list_grids(const FilePath& file);
 /// in another case. A warning names the others, unless it is the only one called "density" in any case. Another warning
 /// names a version of the file that is newer than the known ones. Level sets, vector grids, points and unreadable files
 /// throw Error(file) with one line that names file and cause. An empty grid is an empty volume, with a warning;
-/// negative and non-finite voxels, and those beyond largest_value, are zero, with one warning each that counts them. Any
-/// affine transform is accepted; a frustum transform is not. O(active nodes) time and memory. progress receives the
+/// negative and non-finite voxels, and those beyond largest_value, are zero, with one warning each that counts them.
+/// Any affine transform is accepted; a frustum transform is not. O(active nodes) time and memory. progress receives the
 /// fraction done; cancelled, Error(cancelled) is thrown.
 ScalarVolume import_volume(const FilePath& file, const std::string& grid_name, const Log& log,
                            Progress* progress = nullptr);

@@ -222,7 +222,8 @@ void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings, c
   double seconds = 0.0;
   const viewer::VolumeAsset::Density density = asset.density({}, progress, seconds);
   const grid::Channels channels = asset.channels({}, emission, true, progress);
-  const auto& [volume, statistics] = density;
+  const auto& volume = density.voxels;
+  const auto& statistics = density.statistics;
   std::printf("%s: %.2fM active voxels, %zu bricks\n", std::filesystem::path(file).filename().c_str(),
               static_cast<double>(volume->active_voxels) * 1e-6, statistics->nodes_of_size(3).size());
   const auto start = Clock::now();

@@ -688,12 +688,12 @@ def test_save_whole(s):
     # The view changes right before the dialog opens, and nothing is traced while that is open.
     view = lambda x: ["move viewport 0.3 0.5", "down left", f"move viewport {x} 0.5", "up left"]
     s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("f12", "early.png"), 'report "early.json"', "frames 1",
-                      "wait converged", "frames 2", *shot("rest"),
+                      "wait converged", "key escape", "frames 2", *shot("rest"),
                       *view(0.5), *save_as("shift+f12", "early.exr"), "wait converged", "frames 2", 'report "exr.json"',
                       "key n", *save_as("shift+f12", "wide.exr"), "wait converged", "frames 2", *shot("wide"),
-                      "key t", "frames 3", *save_as("f12", "turning.png"), "frames 100", 'report "turning.json"', "key t",
-                      *view(0.4), *save_as("f12", "never.png"), "key escape", "wait converged", "frames 3", 'report "end.json"'],
-           "--volume", s.cumulus, "--spp", "1", size=["--size", "900x304"])
+                      "key t", "frames 3", *save_as("f12", "turning.png"), "frames 300", 'report "turning.json"', "key t",
+                      *view(0.4), *save_as("f12", "never.png"), *["key escape"] * 4, "wait converged", "frames 3", 'report "end.json"'],
+           "--volume", s.cumulus, "--spp", "1", size=["--size", "760x240"])
     early = s.report("early")
     assert early["preview"] and early["picture"] != early["viewport"][2:], "it was a whole picture already"
     assert early["saving"].endswith("early.png") and "saving early.png" in early["state"], (early["saving"], early["state"])

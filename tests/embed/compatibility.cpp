@@ -140,6 +140,30 @@ class Compatibility : public testing::Test {
     return pictures;
   }
 
+  /// With this set around all calls of the viewer.
+  void expect_pictures(const Pictures& expected, const Case& one, cumulet_gl_state gl_state) {
+    SCOPED_TRACE(one.name);
+    // The calls come within the host's glPushAttrib.
+    const Pictures is = pictures_of(
+        context_, gl_, scene_, programs_.get(),
+        [&] {
+          legacy_.PushAttrib(legacy::all_attributes);
+          legacy_.PushClientAttrib(legacy::client_all_attributes);
+          one.set();
+        },
+        [&] {
+          legacy_.PopClientAttrib();
+          legacy_.PopAttrib();
+          gl_.ClampColor(GL_CLAMP_READ_COLOR, GL_FIXED_ONLY);
+        },
+        gl_state);
+    EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+    EXPECT_TRUE(is.drawn == expected.drawn);
+    EXPECT_TRUE(is.depths == expected.depths);
+    EXPECT_TRUE(is.linear == expected.linear);
+    EXPECT_TRUE(is.rasterized == expected.rasterized);
+  }
+
   /// Each [GL] call is an error that says this, and leaves GL as it was.
   void expect_refused(const std::string& text, const std::string& not_text = "no such text") {
     auto frame = target_.frame();
@@ -295,35 +319,12 @@ TEST_F(Compatibility, PicturesAreThoseOfACoreContextWhateverIsSet) {
   ASSERT_LT(*std::ranges::min_element(expected.depths), 1.0F);
   std::vector<Case> cases = fragment_cases();
   for (const auto& more : {pixel_cases(), vertex_cases()}) cases.insert(cases.end(), more.begin(), more.end());
-  const auto expect_the_same = [&](const std::string& name, const std::function<void()>& set,
-                                   cumulet_gl_state gl_state) {
-    SCOPED_TRACE(name);
-    // The calls come within the host's glPushAttrib.
-    const Pictures is = pictures_of(
-        context_, gl_, scene_, programs_.get(),
-        [&] {
-          legacy_.PushAttrib(legacy::all_attributes);
-          legacy_.PushClientAttrib(legacy::client_all_attributes);
-          set();
-        },
-        [&] {
-          legacy_.PopClientAttrib();
-          legacy_.PopAttrib();
-          gl_.ClampColor(GL_CLAMP_READ_COLOR, GL_FIXED_ONLY);
-        },
-        gl_state);
-    EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
-    EXPECT_TRUE(is.drawn == expected.drawn);
-    EXPECT_TRUE(is.depths == expected.depths);
-    EXPECT_TRUE(is.linear == expected.linear);
-    EXPECT_TRUE(is.rasterized == expected.rasterized);
-  };
-  for (const auto& [name, set] : cases) expect_the_same(name, set, CUMULET_GL_STATE_RESTORE);
+  for (const Case& one : cases) expect_pictures(expected, one, CUMULET_GL_STATE_RESTORE);
   const auto set_all = [&] {
     for (const Case& one : cases) one.set();
   };
-  expect_the_same("all of them", set_all, CUMULET_GL_STATE_RESTORE);
-  expect_the_same("all of them, and the host resets", set_all, CUMULET_GL_STATE_HOST_RESETS);
+  expect_pictures(expected, {"all of them", set_all}, CUMULET_GL_STATE_RESTORE);
+  expect_pictures(expected, {"all of them, and the host resets", set_all}, CUMULET_GL_STATE_HOST_RESETS);
 }
 
 TEST_F(Compatibility, AnOpenDisplayListIsRefusedByName) {

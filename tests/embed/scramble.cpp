@@ -400,6 +400,76 @@ TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   gl_->DebugMessageCallback(nullptr, nullptr);
 }
 
+/// A program whose vertices transform feedback captures.
+GLuint make_capturing_program(const GladGLContext& gl) {
+  const char* source = "#version 450\nout float captured;\nvoid main() { captured = 1.0; gl_Position = vec4(0); }\n";
+  const GLuint shader = gl.CreateShader(GL_VERTEX_SHADER);
+  gl.ShaderSource(shader, 1, &source, nullptr);
+  gl.CompileShader(shader);
+  const GLuint program = gl.CreateProgram();
+  gl.AttachShader(program, shader);
+  const char* varying = "captured";
+  gl.TransformFeedbackVaryings(program, 1, &varying, GL_INTERLEAVED_ATTRIBS);
+  gl.LinkProgram(program);
+  gl.DeleteShader(shader);
+  return program;
+}
+
+// The host's queries may be active, and its transform feedback paused.
+TEST_P(Scramble, QueriesAndPausedTransformFeedbackGoOn) {
+  const HostTarget target(*gl_, side, side);
+  const auto volume = cumulet::test::make_ball(12);
+  ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get(), .samples = 2});
+  cumulet_viewer* v = viewer.get();
+  const auto expected = cumulet::test::picture_of(v, volume.get(), target);
+  constexpr std::array<GLenum, 4> kinds{GL_SAMPLES_PASSED, GL_PRIMITIVES_GENERATED, GL_TIME_ELAPSED,
+                                        GL_TRANSFORM_FEEDBACK_PRIMITIVES_WRITTEN};
+  std::array<GLuint, kinds.size()> queries{};
+  const GLuint program = make_capturing_program(*gl_);
+  GLuint vertices = 0;
+  GLuint array = 0;
+  gl_->CreateBuffers(1, &vertices);
+  gl_->NamedBufferStorage(vertices, 64, nullptr, 0);
+  gl_->CreateVertexArrays(1, &array);
+  gl_->BindVertexArray(array);
+  gl_->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, vertices);
+  gl_->UseProgram(program);
+  gl_->BindFramebuffer(GL_FRAMEBUFFER, target.framebuffer());
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    gl_->CreateQueries(kinds[i], 1, &queries[i]);
+    gl_->BeginQuery(kinds[i], queries[i]);
+  }
+  gl_->BeginTransformFeedback(GL_POINTS);
+  gl_->DrawArrays(GL_POINTS, 0, 3);
+
+  gl_->PauseTransformFeedback();
+  const auto the_same = cumulet::test::make_ball(12);  // is uploaded and traced again
+  EXPECT_TRUE(cumulet::test::picture_of(v, the_same.get(), target) == expected);
+  EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+  GLint current = 0;
+  gl_->GetIntegerv(GL_CURRENT_PROGRAM, &current);
+  EXPECT_EQ(static_cast<GLuint>(current), program);
+  gl_->ResumeTransformFeedback();
+  gl_->DrawArrays(GL_POINTS, 0, 3);
+  gl_->EndTransformFeedback();
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    GLint active = 0;
+    gl_->GetQueryiv(kinds[i], GL_CURRENT_QUERY, &active);
+    EXPECT_EQ(static_cast<GLuint>(active), queries[i]) << i;
+    gl_->EndQuery(kinds[i]);
+  }
+  GLuint written = 0;
+  gl_->GetQueryObjectuiv(queries.back(), GL_QUERY_RESULT, &written);
+  EXPECT_EQ(written, 6U);
+  EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+  EXPECT_TRUE(cumulet::test::drawn_once(v, target) == expected);
+  gl_->DeleteQueries(static_cast<GLsizei>(queries.size()), queries.data());
+  gl_->UseProgram(0);
+  gl_->DeleteProgram(program);
+  gl_->DeleteBuffers(1, &vertices);
+  gl_->DeleteVertexArrays(1, &array);
+}
+
 CUMULET_ON_PROFILES(Scramble);
 
 }  // namespace

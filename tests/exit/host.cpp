@@ -3,7 +3,7 @@
 //   host WORK WAY MILLISECONDS FOLDER
 //
 // WORK: load, build, pose, sequence, live or frames, begun again and again. WAY: how the process ends after so many
-// milliseconds: exit, return, thread (a second thread calls exit), callback (the update callback calls exit), static
+// milliseconds: exit, return, thread (a second thread calls exit), callback (the trace callback calls exit), static
 // (a static object destroys the viewer), fork (a child leaves, and returns). Compiled with CUMULET_EXIT_LOADS the host
 // loads the library, and WAY may be unload (dlclose, then return). FOLDER has the files of exits.py.
 // The exit status is 7 if all went well.
@@ -101,7 +101,10 @@ std::atomic<bool> leave_in_callback = false;
 
 void log(void* /*user*/, cumulet_log_level /*level*/, const char* /*message*/) { journal().note(); }
 
-void update(void* /*user*/) {
+void update(void* /*user*/) { journal().note(); }
+
+// When a job ends, on its thread; in a frame, within the call.
+void trace(void* /*user*/, const char* /*name*/, double /*begin*/, double /*end*/) {
   journal().note();
   if (leave_in_callback.exchange(false)) std::exit(left_well);
 }
@@ -113,6 +116,7 @@ class Host {
     auto desc = make_desc<cumulet_create_desc>();
     desc.log = log;
     desc.update = update;
+    desc.trace = trace;
 #ifndef CUMULET_EXIT_LOADS
     if (work_ == "frames") {
       context_ = cumulet::headless::Context::create(cumulet::headless::Backend::automatic);
@@ -235,15 +239,18 @@ class Host {
 #endif
 };
 
-// Destroys the viewer while the process exits.
+// Destroys the viewer while the process exits, after the library's threads have ended. A forked child goes no further:
+// log4cplus, which Debian's OpenVDB links, waits for threads of its own that the child does not have either.
 struct Owner {
   Owner() = default;
   Owner(const Owner&) = delete;
   Owner& operator=(const Owner&) = delete;
   ~Owner() {
     if (host != nullptr) host->of.cumulet_destroy(host->viewer);
+    if (is_child) std::_Exit(left_well);
   }
   Host* host = nullptr;
+  bool is_child = false;
 };
 
 int unload(Host& host) {
@@ -295,7 +302,8 @@ int main(int argc, char** argv) {
   if (way == "fork") {
     const pid_t child = fork();
     if (child != 0) return wait_for_child(*host, child);
-    host->of.cumulet_destroy(host->viewer);
+    owner.host = host;
+    owner.is_child = true;
   }
   if (way == "exit") std::exit(left_well);
   return left_well;

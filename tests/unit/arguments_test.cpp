@@ -56,7 +56,7 @@ TEST_F(Arguments, ReadingToNullSaysSo) {
   expect_refused("display", cumulet_read_display(v_, nullptr, 4 * pixels), "rgba is NULL");
   const auto denoise = make_desc<cumulet_denoise_desc>();
   expect_refused("denoised", cumulet_read_denoised(v_, &denoise, nullptr, 4 * pixels), "rgba is NULL");
-  expect_refused("aov", cumulet_read_aov(v_, CUMULET_AOV_DEPTH, nullptr, pixels), "values is NULL");
+  expect_refused("aov", cumulet_read_aov(v_, CUMULET_AOV_SURFACE_DEPTH, nullptr, pixels), "values is NULL");
   expect_refused("group", cumulet_read_light_group(v_, 0, nullptr, 3 * pixels), "rgb is NULL");
   const auto name = [](void*, cumulet_object_kind, uint64_t, uint32_t) { return "a"; };
   expect_refused("mattes", cumulet_read_cryptomatte(v_, name, nullptr, 2, nullptr, 4 * pixels), "values is NULL");

@@ -51,7 +51,7 @@ class ImagingDriver : public testing::Test {
       if (name == GL_CONTEXT_FLAGS) *value = driver().flags;
       if (name == GL_NUM_EXTENSIONS) *value = driver().has_imaging ? 2 : 1;
       if (name == 0x0BA0) *value = static_cast<GLint>(driver().matrix_mode);
-      if (driver().values.count(name) != 0) *value = static_cast<GLint>(driver().values[name]);
+      if (driver().values.contains(name)) *value = static_cast<GLint>(driver().values[name]);
     };
     gl_.GetFloatv = [](GLenum name, GLfloat* value) {
       if (name == 0x80B1) {
@@ -63,7 +63,7 @@ class ImagingDriver : public testing::Test {
     gl_.GetStringi = [](GLenum, GLuint index) {
       return reinterpret_cast<const GLubyte*>(index == 0 ? "GL_ARB_multitexture" : "GL_ARB_imaging");
     };
-    gl_.GladGLContext::IsEnabled = [](GLenum name) -> GLboolean { return driver().enabled.count(name) != 0; };
+    gl_.GladGLContext::IsEnabled = [](GLenum name) -> GLboolean { return driver().enabled.contains(name); };
     gl_.GladGLContext::Enable = [](GLenum name) {
       ++driver().sets;
       driver().enabled.insert(name);
@@ -103,6 +103,25 @@ class ImagingDriver : public testing::Test {
     return nullptr;
   }
   void load() { gl_.compatibility = gl::load_compatibility(gl_, get_proc, nullptr); }
+  /// What a host may have set: every transfer parameter, every step, and a matrix.
+  static void set_all() {
+    float value = 0.0F;
+    for (GLenum name = 0x0D10; name <= 0x0D1F; ++name) driver().values[name] = value += 0.5F;
+    for (GLenum name = 0x801C; name <= 0x8023; ++name) driver().values[name] = value += 0.5F;
+    for (GLenum name = 0x80B4; name <= 0x80BB; ++name) driver().values[name] = value += 0.5F;
+    driver().values.erase(0x0D16);  // GL_ZOOM_X and GL_ZOOM_Y are not of transfers
+    driver().values.erase(0x0D17);
+    driver().enabled = {steps.begin(), steps.end()};
+    driver().enabled.insert(GL_BLEND);
+    driver().matrices[color_matrix_mode][5] = 3.0F;
+  }
+  /// known: the values of transfers that are not 0.
+  static void expect_core(const std::map<GLenum, GLfloat>& known) {
+    for (const auto& [name, is] : driver().values) EXPECT_EQ(is, known.contains(name) ? 1.0F : 0.0F) << name;
+    EXPECT_EQ(driver().enabled, std::set<GLenum>{GL_BLEND});
+    EXPECT_EQ(driver().matrices[color_matrix_mode], identity);
+    EXPECT_EQ(driver().matrix_mode, modelview);
+  }
   std::string refusal() {
     try {
       load();
@@ -124,26 +143,14 @@ TEST_F(ImagingDriver, IsSetAsACoreContextIsAndRestored) {
   load();
   ASSERT_NE(gl_.compatibility, nullptr);
   const auto known = driver().values;
-  // What a host may have set: every transfer parameter, every step, and a matrix.
-  float value = 0.0F;
-  for (GLenum name = 0x0D10; name <= 0x0D1F; ++name) driver().values[name] = value += 0.5F;
-  for (GLenum name = 0x801C; name <= 0x8023; ++name) driver().values[name] = value += 0.5F;
-  for (GLenum name = 0x80B4; name <= 0x80BB; ++name) driver().values[name] = value += 0.5F;
-  driver().values.erase(0x0D16);  // GL_ZOOM_X and GL_ZOOM_Y are not of transfers
-  driver().values.erase(0x0D17);
-  driver().enabled = {steps.begin(), steps.end()};
-  driver().enabled.insert(GL_BLEND);
-  driver().matrices[color_matrix_mode][5] = 3.0F;
+  set_all();
   const auto values = driver().values;
   const auto enabled = driver().enabled;
   const auto matrices = driver().matrices;
   {
     CompatibilityState state(gl_, true);
     state.prepare_pixels();
-    for (const auto& [name, is] : driver().values) EXPECT_EQ(is, known.count(name) != 0 ? 1.0F : 0.0F) << name;
-    EXPECT_EQ(driver().enabled, std::set<GLenum>{GL_BLEND});
-    EXPECT_EQ(driver().matrices[color_matrix_mode], identity);
-    EXPECT_EQ(driver().matrix_mode, modelview);
+    expect_core(known);
     const int sets = driver().sets;
     state.prepare_pixels();
     EXPECT_EQ(driver().sets, sets) << "once a guard";

@@ -193,7 +193,7 @@ TEST_F(Loading, SettingAKindClearsItsFailure) {
   }
 }
 
-// A live volume's state that cannot be shown, and an instance's volume that does not fit.
+// An instance whose file is missing, and a dynamic volume that does not fit.
 TEST_F(Loading, DynamicVolumesAndInstancesFollowTheSameRule) {
   const auto live_desc = make_desc<cumulet_live_desc>();
   const LiveRef live = test::made_by<LiveRef>(cumulet_live_create, live_desc);
@@ -208,18 +208,19 @@ TEST_F(Loading, DynamicVolumesAndInstancesFollowTheSameRule) {
     EXPECT_EQ(told.volume_status, CUMULET_ERROR_OUT_OF_MEMORY);
     EXPECT_EQ(told.message, error());
   };
+  const auto missing = make_sequence({"none.1.vdb"});
   auto desc = make_desc<cumulet_instance_desc>();
-  desc.volume = volume_.get();
+  desc.sequence = missing.get();
   const InstanceRef instance = test::make_instance(desc);
-  limit(1);
   ASSERT_EQ(cumulet_add_instance(v_, instance.get()), CUMULET_OK);
-  expect_too_large();
+  expect_reported("none.1.vdb");
   ASSERT_EQ(cumulet_set_surfaces(v_, surfaces_.get()), CUMULET_OK);
   expect_none();
-  EXPECT_EQ(progress().volume_status, CUMULET_ERROR_OUT_OF_MEMORY);
+  EXPECT_EQ(progress().volume_status, CUMULET_ERROR_FILE);
   ASSERT_EQ(cumulet_remove_instance(v_, instance.get()), CUMULET_OK);
   EXPECT_EQ(progress().volume_status, CUMULET_OK);
 
+  limit(1);
   std::vector<float> values(512, 1.0F);
   auto dense = make_desc<cumulet_dense_desc>();
   dense.values = values.data();
@@ -369,12 +370,13 @@ TEST_F(Loading, RelativePathsAreOfTheFolderAtTheCall) {
   std::array<char, 256> cause{};
   ASSERT_EQ(cumulet_get_sequence_frame(v_, 2, cause.data(), cause.size()), CUMULET_OK);
   EXPECT_EQ(std::string(cause.data()), "none.vdb: no such file");
-  for (const auto& [load, name] :
-       {std::pair(cumulet_load_surfaces, "gone.gltf"), {cumulet_load_environment, "gone.hdr"}}) {
-    ASSERT_EQ(load(v_, name), CUMULET_OK);
+  const auto expect_missing = [&](cumulet_status loaded, const std::string& name) {
+    ASSERT_EQ(loaded, CUMULET_OK);
     EXPECT_EQ(wait(), CUMULET_ERROR_FILE);
-    EXPECT_EQ(error().rfind(std::string(name) + ": ", 0), 0U) << error();
-  }
+    EXPECT_EQ(error().rfind(name + ": ", 0), 0U) << error();
+  };
+  expect_missing(cumulet_load_surfaces(v_, "gone.gltf"), "gone.gltf");
+  expect_missing(cumulet_load_environment(v_, "gone.hdr"), "gone.hdr");
 }
 
 // An inspection reads a grid's voxels when it is asked for them.

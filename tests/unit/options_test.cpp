@@ -226,6 +226,7 @@ TEST(Options, APresetIsAMediumThatFlagsOverride) {
   const auto burns = [](double scale, double flame, double temperature) {
     cumulet_medium_desc made = SceneOptions().medium;
     made.density_scale = scale;
+    made.temperature_scale = 1500.0F;
     apply({.flame = flame, .temperature = temperature, .size = 10.0}, made);
     return made;
   };

@@ -44,6 +44,8 @@ class Premultiplied : public cumulet::test::GlTest {
     const Object color = gl::make_texture_2d(gl_, format, size.x, size.y, "color");
     const Object framebuffer = gl::make_framebuffer(gl_);
     gl_->NamedFramebufferTexture(framebuffer.name(), GL_COLOR_ATTACHMENT0, color.name(), 0);
+    // What is cleared so is stored as it is.
+    for (int k = 0; k < 3 && format == GL_SRGB8_ALPHA8; ++k) before[k] = encode(before[k]);
     gl_->ClearTexImage(color.name(), 0, GL_RGBA, GL_FLOAT, &before);
     FrameTarget target;
     target.framebuffer = framebuffer.name();

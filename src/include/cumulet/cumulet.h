@@ -1962,9 +1962,10 @@ typedef enum cumulet_colour {
  * Color and alpha are premultiplied: exposure, tone map and encoding are of the premultiplied radiance, so that over
  * black a transparent picture has the colors of the opaque one.
  * With CUMULET_COLOUR_LINEAR, _HDR and _SRGB_FRAMEBUFFER sums are of light: alpha is the part of the pixel that is
- * covered, 0 where it only glows, and color + (1 - alpha) x target is right over any target. CUMULET_COLOUR_SRGB gives encoded values, whose
- * sums are not of light: alpha there is the weight with which the blend is right over black and over white, and between
- * them within 0.1 (of gray pixels; colored flames are up to 0.3 too bright in a channel over middle gray).
+ * covered, 0 where it only glows, and color + (1 - alpha) x target is right over any target. CUMULET_COLOUR_SRGB gives
+ * encoded values, whose sums are not of light: alpha there is the weight with which the blend is right over black and
+ * over white, and between them within 0.1 (of gray pixels; colored flames are up to 0.3 too bright in a channel over
+ * middle gray).
  */
 typedef enum cumulet_blend {
   CUMULET_BLEND_OVER = 0,   /* premultiplied over what the target holds */

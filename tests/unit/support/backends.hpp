@@ -17,7 +17,7 @@ struct Door {
   headless::Backend backend = headless::Backend::automatic;
   headless::Profile profile = headless::Profile::core;
 
-  friend bool operator==(const Door& door, headless::Backend backend) { return door.backend == backend; }
+  friend bool operator==(const Door& door, headless::Backend other) { return door.backend == other; }
 };
 
 inline std::string name_of(const Door& door) {
