@@ -270,6 +270,13 @@ CUMULET_API uint32_t cumulet_version(void);
 
 /* ---- Viewer ------------------------------------------------------------------------------------------------------ */
 
+/**
+ * @defgroup cumulet_viewers Viewers and callbacks
+ *
+ * Functions that create, attach, detach and destroy viewers, and the callbacks that a host gives them.
+ * @{
+ */
+
 /** Severity of a log line. */
 typedef enum cumulet_log_level {
   CUMULET_LOG_DEBUG = 0,
@@ -466,6 +473,8 @@ CUMULET_API cumulet_status cumulet_detach(cumulet_viewer* viewer);
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
 CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
+
+/** @} */
 
 /* ---- Volumes ----------------------------------------------------------------------------------------------------- */
 
@@ -1077,8 +1086,8 @@ CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* 
  *
  * - No call of this group waits for a build. A call copies the voxels and returns, or does not copy them (see
  *   cumulet_state_desc.release).
- * - A state whose build has not begun is dropped when the next one is submitted: at most one is being built and one is
- *   queued, whatever the rate.
+ * - A state whose build has not begun is dropped when the next one is submitted: at every rate, at most one is being
+ *   built and one is queued.
  * - States are numbered from 1, and each call of cumulet_live_set, cumulet_live_update or cumulet_live_set_gl makes
  *   one.
  * - cumulet_live_set_gl takes voxels from OpenGL textures or buffers.
@@ -1222,7 +1231,7 @@ CUMULET_API cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_v
  * - KHR_node_visibility. Hidden nodes are neither rendered nor counted.
  * - KHR_animation_pointer for transforms, weights and visibility of nodes, factors and texture transforms of materials,
  *   and lights. A warning names other animated properties.
- * - EXT_mesh_gpu_instancing. Each mesh is in memory once, whatever the number of its instances; flat ones are not
+ * - EXT_mesh_gpu_instancing. Each mesh is in memory once, with any number of instances; flat ones are not
  *   drawn.
  *
  * Emissive triangles are lights, only on their front if the material is single-sided. Surfaces of alphaMode BLEND cover
@@ -2673,7 +2682,7 @@ CUMULET_API cumulet_status cumulet_get_instance_live_info(cumulet_viewer* viewer
  * - A viewer follows changes in its next call. A new transform uploads a matrix and no triangle. A new time poses the
  *   surfaces on a worker, and the last pose is shown until then.
  * - Models take part in light transport like the viewer's own surfaces, previews draw them, and their emissive
- *   triangles and lamps move with them. Intensities of lamps do not change, whatever the scale of the transform.
+ *   triangles and lamps move with them. Intensities of lamps do not depend on the scale of the transform.
  */
 typedef struct cumulet_model cumulet_model;
 
@@ -3098,7 +3107,7 @@ CUMULET_API cumulet_status cumulet_camera_set_shutter(cumulet_camera* camera, co
                                                       const cumulet_camera_desc* close);
 /**
  * Returns the matrices of a camera, for the host's own drawing and gizmos. After cumulet_camera_set_matrices they are
- * the host's own, whatever the aspect ratio, except for the clip-space range.
+ * the host's own for any aspect ratio, except for the clip-space range.
  *
  * Threads: any thread. No GL.
  *
@@ -3299,6 +3308,9 @@ CUMULET_API cumulet_status cumulet_input(cumulet_viewer* viewer, const cumulet_e
 
 /**
  * @defgroup cumulet_frames Frames
+ *
+ * A host calls cumulet_render once per frame, with a time budget and a target. cumulet_warm_up compiles shader programs
+ * before the first frame.
  * @{
  */
 
@@ -3355,10 +3367,13 @@ typedef struct cumulet_frame_desc {
 
   cumulet_target target;
   /**
-   * GL name of a framebuffer; 0 is the context's default framebuffer. Its draw buffer 0 is drawn to.
-   * CUMULET_ERROR_INVALID_ARGUMENT is returned for a framebuffer that is incomplete or smaller than width x height, for
-   * one without a color attachment, with integers, or without green or blue, for layered attachments, and for one
-   * without depth if write_depth is 1.
+   * GL name of a framebuffer; 0 is the context's default framebuffer. Its draw buffer 0 is drawn to. These give
+   * CUMULET_ERROR_INVALID_ARGUMENT:
+   *
+   * - a framebuffer that is incomplete or smaller than width x height
+   * - no color attachment, or one with integers or without green or blue
+   * - layered attachments
+   * - no depth attachment if write_depth is 1
    */
   uint32_t framebuffer;
   uint32_t width; /**< Width of the whole target in pixels, 0 to 16384. With 0 nothing is drawn. */
@@ -3447,10 +3462,11 @@ CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_
 typedef enum cumulet_warm_up_scope {
   CUMULET_WARM_UP_SCENE = 0, /**< The programs for frames of the present scene with the present settings. */
   /**
-   * Those, and almost all others. The others are compiled but not used, so a driver that compiles more at the first use
-   * does that later. Not included are rare programs: for grids beyond the driver's limit of a texture buffer or volumes
-   * of more than 32,768 voxels per side, for sets of texture maps that the scene's materials do not have, for light
-   * groups, holdouts and motion blur. If one does not build, the call that finishes all others returns its error.
+   * The programs of CUMULET_WARM_UP_SCENE and almost all others. The others are compiled but not used, so a driver that
+   * compiles more at the first use does that later. Not included are rare programs: for grids beyond the driver's limit
+   * of a texture buffer or volumes of more than 32,768 voxels per side, for sets of texture maps that the scene's
+   * materials do not have, for light groups, holdouts and motion blur. If one does not build, the call that finishes
+   * all others returns its error.
    */
   CUMULET_WARM_UP_ALL = 1
 } cumulet_warm_up_scope;
@@ -3498,6 +3514,8 @@ CUMULET_API cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet
 
 /**
  * @defgroup cumulet_maps Shadows on the host's scene
+ *
+ * A transmittance map is a deep shadow map, by which volumes cast shadows on objects that the host draws itself.
  * @{
  */
 
@@ -3757,8 +3775,8 @@ typedef enum cumulet_aov {
   CUMULET_AOV_VELOCITY = 8,
   /**
    * 2 floats: motion vector of the nearest surface at the pixel's center (the viewer's, the host's or the ground), as
-   * if there were no volume, due to the camera, the model's transform and its pose. Where there is no surface, that of
-   * infinitely distant points under the camera's rotation (orthographic: 0).
+   * if there were no volume. It includes the motion of the camera, the model's transform and its pose. Where there is
+   * no surface, it is that of infinitely distant points under the camera's rotation (orthographic: 0).
    *
    * Motion vectors are in pixels, x to the right and y up. They point from the present position to the position in the
    * previous frame, like Nuke's backward and the first half of Blender's Vector. They are 0 where that was behind the
@@ -3832,7 +3850,7 @@ typedef const char* (*cumulet_object_name_fn)(void* user, cumulet_object_kind ki
  * coverage. The coverage is the fraction of the pixel where camera rays hit the object first. In a volume it is where
  * they are scattered or absorbed, so that coverages add up to the image's alpha except for noise. Pairs are sorted by
  * coverage, the largest first; unused pairs are 0. Objects beyond `ranks` pairs, those with the smallest coverages, are
- * left out. Of more than 32 names in one pixel small ones may be left out.
+ * left out. With more than 32 names in one pixel, small ones may be left out.
  *
  * - Hidden objects are excluded. Models with shadow_only have no matte.
  * - Holdouts (of media, surfaces and models) have no matte, as they have no alpha, and occlude the objects behind them;

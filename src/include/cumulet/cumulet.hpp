@@ -1,25 +1,30 @@
-/*
- * Cumulet for C++20: a thin, header-only layer over cumulet.h, and nothing that C cannot do. Owners release what they
- * hold, spans stand for pointer and count, enum classes for enums, std::array for C arrays, and a Result for a status.
+/**
+ * @file
+ * The C++20 interface of Cumulet: a thin, header-only layer over cumulet.h with no features of its own. Classes release
+ * the handles that they own. Spans replace pointer and count, enum classes enums, std::array C arrays, and a Result the
+ * status.
  *
  * Names
- *     Every call and member is one of cumulet.h's, where its meaning, units, threads and [GL] mark are told:
- *     Viewer::set_grid is cumulet_set_grid, GridDesc::threshold is cumulet_grid_desc.threshold. Members begin as zero,
- *     which means the default here too, and descriptors convert to their C counterparts, struct_size filled in:
+ * - Each function and member has its documentation in cumulet.h, with meaning, units, threads and the [GL] mark:
+ *   Viewer::set_grid is cumulet_set_grid, and GridDesc::threshold is cumulet_grid_desc.threshold.
+ * - Members are initialized to zero, which means the default as in C. Descriptors convert to their C counterparts, with
+ *   struct_size filled in:
  *
- *         viewer.set_medium({.density_scale = 4, .anisotropy = 0.7F}).value();
+ *       viewer.set_medium({.density_scale = 4, .anisotropy = 0.7F}).value();
  *
- *     Enums, descriptors and what calls tell are cumulet.h's field for field where they are in cumulet_descriptors.hpp,
- *     which the build makes.
+ * - The build generates cumulet_descriptors.hpp from cumulet.h. It has enums, descriptors and result structs, field for
+ *   field.
+ * - Paths are UTF-8.
  *
  * Errors
- *     Nothing here throws, so that it also serves where exceptions are off. What can fail returns a Result, which the
- *     compiler wants looked at; value() of a failed one calls std::terminate. A handle that is empty (default
- *     constructed or moved from) makes every call fail with StatusCode::invalid_argument.
+ * - No function of this header throws, so that it also works without exceptions. A function that can fail returns a
+ *   Result, which is [[nodiscard]]. value() of a failed one calls std::terminate.
+ * - With an empty handle (default constructed or moved from) every call fails with StatusCode::invalid_argument.
  *
  * Callbacks
- *     They are function objects, kept where they stay while the viewer is moved, until it is destroyed. cumulet.h says
- *     when and on which thread they are called. One that throws ends the program.
+ * - Callbacks are function objects. The viewer keeps them until it is destroyed, at an address that does not change
+ * when the viewer is moved. cumulet.h says when and on which thread they are called.
+ * - A callback that throws ends the program.
  */
 #ifndef CUMULET_CUMULET_HPP
 #define CUMULET_CUMULET_HPP
@@ -52,13 +57,13 @@
 #include "cumulet.h"
 
 namespace cumulet {
-// Parts of one program may be compiled against different versions of this header: their inline functions stay apart.
+// Parts of one program may be compiled against different versions of this header: their inline functions are separate.
 inline namespace v0_2 {
 static_assert(CUMULET_VERSION_MAJOR == 0 && CUMULET_VERSION_MINOR == 2, "the namespace names the version");
 
 // ---- Enums ----------------------------------------------------------------------------------------------------------
 
-/// Not "Status", which is a macro of Xlib's.
+/// cumulet_status. The name Status is a macro of Xlib.
 enum class StatusCode {
   ok = CUMULET_OK,
   invalid_argument = CUMULET_ERROR_INVALID_ARGUMENT,
@@ -72,7 +77,7 @@ enum class StatusCode {
   detached = CUMULET_ERROR_DETACHED,
   timeout = CUMULET_ERROR_TIMEOUT
 };
-/// Letters and digits are their upper-case ASCII codes: Key{'A'}.
+/// cumulet_key. Letters and digits are their upper-case ASCII codes: Key{'A'}.
 enum class Key : std::int32_t {
   none = CUMULET_KEY_NONE,
   home = CUMULET_KEY_HOME,
@@ -92,14 +97,14 @@ enum class Key : std::int32_t {
   up = CUMULET_KEY_UP,
   down = CUMULET_KEY_DOWN
 };
-/// Combined with |.
+/// CUMULET_MODIFIER_* bits, combined with |.
 enum class Modifiers : std::uint32_t {
   none = 0,
   shift = CUMULET_MODIFIER_SHIFT,
   ctrl = CUMULET_MODIFIER_CTRL,
   alt = CUMULET_MODIFIER_ALT
 };
-/// Combined with |.
+/// CUMULET_RENDER_* bits, combined with |.
 enum class RenderFlags : std::uint32_t {
   none = 0,
   more = CUMULET_RENDER_MORE,
@@ -117,20 +122,20 @@ enum class RenderFlags : std::uint32_t {
   return RenderFlags{static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b)};
 }
 
-// ---- What the made part is of ---------------------------------------------------------------------------------------
+// ---- Types of the generated header ----------------------------------------------------------------------------------
 
 using Rgb = std::array<float, 3>;
 using Vector = std::array<double, 3>;
-/// Column-major.
+/// 4x4, column-major.
 using Matrix = std::array<double, 16>;
 
-/// World space.
+/// A bounding box in world space.
 struct Bounds {
   Vector min{};
   Vector max{};
 };
 
-/// Zero-terminated text in an array of its own, cut to fit.
+/// Zero-terminated text in a fixed array, cut to fit.
 template <std::size_t Size>
 class Text {
  public:
@@ -156,13 +161,13 @@ inline namespace v0_2 {
 
 // ---- Results --------------------------------------------------------------------------------------------------------
 
-/// Why a call failed: a status, and one line that names the file, where there is one, and the cause.
+/// Why a call failed: a status, and one line that names the cause, and the file if there is one.
 struct Error {
   StatusCode status = StatusCode::ok;
   Text<512> message;
 };
 
-/// A value, or the error that came instead: std::expected in little, for C++20.
+/// A value or an error: a small std::expected for C++20.
 template <class T = void>
 class [[nodiscard]] Result {
  public:
@@ -171,7 +176,7 @@ class [[nodiscard]] Result {
 
   [[nodiscard]] bool has_value() const noexcept { return value_.has_value(); }
   [[nodiscard]] explicit operator bool() const noexcept { return has_value(); }
-  /// Terminates if there is none; so do * and ->.
+  /// Returns the value. Calls std::terminate if there is none; so do * and ->.
   [[nodiscard]] T& value() & noexcept {
     if (!value_) std::terminate();
     return *value_;
@@ -186,7 +191,7 @@ class [[nodiscard]] Result {
   [[nodiscard]] T operator*() && noexcept { return std::move(value()); }
   [[nodiscard]] T* operator->() noexcept { return &value(); }
   [[nodiscard]] const T* operator->() const noexcept { return &value(); }
-  /// StatusCode::ok and "" if there is a value.
+  /// Returns the error; StatusCode::ok and "" if there is a value.
   [[nodiscard]] const Error& error() const& noexcept { return error_; }
   [[nodiscard]] Error error() && noexcept { return error_; }
 
@@ -203,11 +208,11 @@ class [[nodiscard]] Result<void> {
 
   [[nodiscard]] bool has_value() const noexcept { return error_.status == StatusCode::ok; }
   [[nodiscard]] explicit operator bool() const noexcept { return has_value(); }
-  /// Terminates if the call failed.
+  /// Calls std::terminate if the call failed.
   void value() const noexcept {
     if (!has_value()) std::terminate();
   }
-  /// StatusCode::ok and "" if the call succeeded.
+  /// Returns the error; StatusCode::ok and "" if the call succeeded.
   [[nodiscard]] const Error& error() const& noexcept { return error_; }
   [[nodiscard]] Error error() && noexcept { return error_; }
 
@@ -218,11 +223,11 @@ class [[nodiscard]] Result<void> {
 [[nodiscard]] inline const char* status_text(StatusCode status) noexcept {
   return cumulet_status_text(static_cast<cumulet_status>(status));
 }
-/// The library's, as major * 10000 + minor * 100 + patch.
+/// Returns the library's version as major * 10000 + minor * 100 + patch.
 [[nodiscard]] inline std::uint32_t version() noexcept { return cumulet_version(); }
-/// How many groups lights may be in.
+/// Number of light groups.
 inline constexpr std::uint32_t light_group_count = CUMULET_LIGHT_GROUPS;
-/// GLSL for the host's shaders, zero-terminated.
+/// Returns GLSL for the host's shaders, zero-terminated.
 [[nodiscard]] inline const char* transmittance_map_glsl() noexcept { return cumulet_transmittance_map_glsl(); }
 
 namespace detail {
@@ -231,12 +236,12 @@ namespace detail {
   if (status == CUMULET_OK) return {};
   return Error{static_cast<StatusCode>(status), Text<512>(cause)};
 }
-/// For calls that tell no cause.
+/// For functions that return only a status.
 [[nodiscard]] inline Result<> result(cumulet_status status) noexcept {
   return result(status, cumulet_status_text(status));
 }
 
-/// For calls that make a handle and tell the cause in a buffer: make(&out, error, error_size).
+/// For functions that create a handle and write the cause to a buffer: make(&out, error, error_size).
 template <class Owner, class Make>
 [[nodiscard]] Result<Owner> made(Make&& make) noexcept {
   decltype(std::declval<Owner>().handle()) out = nullptr;
@@ -246,7 +251,7 @@ template <class Owner, class Make>
   return Owner::adopt(out);
 }
 
-/// Descriptors that the library fills.
+/// Returns an empty struct for the library to fill.
 template <class Desc>
 [[nodiscard]] Desc sized() noexcept {
   Desc desc{};
@@ -260,7 +265,7 @@ template <class Desc>
 
 }  // namespace detail
 
-/// The pixels of a region: x, y, width and height.
+/// Returns the pixels of a region: x, y, width and height.
 [[nodiscard]] inline Result<std::array<std::uint32_t, 4>> region_pixels(const std::array<float, 4>& region,
                                                                         std::uint32_t width,
                                                                         std::uint32_t height) noexcept {
@@ -290,8 +295,8 @@ struct DenseDesc {
   }
 };
 
-/// brick_count is brick_origins.size() / 3; Volume::from_sparse checks that the other spans agree. Tiles are C's own,
-/// whose active is 0 or 1, so that none need be copied.
+/// Bricks and tiles. brick_count is brick_origins.size() / 3, and Volume::from_sparse checks the sizes of the other
+/// spans. Tiles have the C type, with active 0 or 1, so that they need not be copied.
 struct SparseDesc {
   std::span<const std::int32_t> brick_origins{};
   std::span<const float> brick_values{};
@@ -317,7 +322,7 @@ struct SparseDesc {
   }
 };
 
-/// A share in an immutable volume: a copy is one more.
+/// A reference to an immutable volume; a copy adds a reference.
 class Volume {
  public:
   Volume() noexcept = default;
@@ -377,11 +382,11 @@ class Volume {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_volume* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_volume* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Volume adopt(cumulet_volume* handle) noexcept {
     Volume volume;
     volume.handle_ = handle;
@@ -392,7 +397,7 @@ class Volume {
   cumulet_volume* handle_ = nullptr;
 };
 
-/// Calls visit(name, type, refusal), three const char*, for each grid of the file.
+/// Calls visit(name, type, refusal) with three const char* for each grid of the file.
 template <class Visit>
 [[nodiscard]] Result<> list_grids(const std::string& path, Visit&& visit) noexcept {
   std::array<char, 512> cause{};
@@ -404,7 +409,7 @@ template <class Visit>
   return detail::result(status, cause.data());
 }
 
-/// What is in a volume's file. Texts of what it tells live as long as it does.
+/// The contents of a volume file. Texts in its structs are valid as long as this object.
 class Inspection {
  public:
   Inspection() noexcept = default;
@@ -432,7 +437,7 @@ class Inspection {
     if (auto done = detail::result(cumulet_inspection_get_grid(handle_, index, &c)); !done) return done.error();
     return GridInfo::of(c);
   }
-  /// grid -1: of the file as a whole.
+  /// Returns a metadata entry of a grid; grid -1: of the whole file.
   [[nodiscard]] Result<Metadata> metadata(std::int32_t grid, std::uint32_t index) const noexcept {
     auto c = detail::sized<cumulet_metadata>();
     if (auto done = detail::result(cumulet_inspection_get_metadata(handle_, grid, index, &c)); !done)
@@ -441,11 +446,11 @@ class Inspection {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_inspection* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_inspection* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's.
+  /// Takes over the caller's handle.
   [[nodiscard]] static Inspection adopt(cumulet_inspection* handle) noexcept {
     Inspection inspection;
     inspection.handle_ = handle;
@@ -458,7 +463,8 @@ class Inspection {
 
 // ---- Surfaces -------------------------------------------------------------------------------------------------------
 
-/// vertex_count is positions.size() / 3; Surfaces::from_triangles checks that the other spans agree.
+/// Triangles of one material. vertex_count is positions.size() / 3, and Surfaces::from_triangles checks the sizes of
+/// the other spans.
 struct MeshDesc {
   std::span<const float> positions{};
   std::span<const float> normals{};
@@ -492,13 +498,14 @@ struct MeshDesc {
   }
 };
 
-/// Becomes no cumulet_triangles_desc, whose meshes are C's own: see Surfaces::from_triangles.
+/// The host's meshes. It does not convert to cumulet_triangles_desc, whose meshes have the C type: use
+/// Surfaces::from_triangles.
 struct TrianglesDesc {
   std::span<const MeshDesc> meshes{};
   const char* name = nullptr;
 };
 
-/// A share in immutable surfaces: a copy is one more.
+/// A reference to immutable surfaces; a copy adds a reference.
 class Surfaces {
  public:
   Surfaces() noexcept = default;
@@ -515,7 +522,7 @@ class Surfaces {
       return cumulet_surfaces_open(path.c_str(), out, error, size);
     });
   }
-  /// base_directory NULL: files that the bytes refer to are an error.
+  /// Reads the bytes of a glTF file. base_directory NULL: references to other files are errors.
   [[nodiscard]] static Result<Surfaces> from_memory(std::span<const std::byte> bytes,
                                                     const char* base_directory = nullptr,
                                                     const char* name = nullptr) noexcept {
@@ -562,11 +569,11 @@ class Surfaces {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_surfaces* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_surfaces* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Surfaces adopt(cumulet_surfaces* handle) noexcept {
     Surfaces surfaces;
     surfaces.handle_ = handle;
@@ -580,13 +587,13 @@ class Surfaces {
 // ---- Environments ---------------------------------------------------------------------------------------------------
 
 struct EnvironmentDesc {
-  std::span<const float> values;  ///< 3 a pixel
+  std::span<const float> values;  ///< 3 per pixel
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   const char* name = nullptr;
 };
 
-/// A share in an immutable environment: a copy is one more.
+/// A reference to an immutable environment; a copy adds a reference.
 class Environment {
  public:
   Environment() noexcept = default;
@@ -615,7 +622,7 @@ class Environment {
     });
   }
 
-  /// At this size, 3 floats a pixel.
+  /// Writes the environment at this size, 3 floats per pixel.
   [[nodiscard]] Result<> get_pixels(std::uint32_t width, std::uint32_t height, std::span<float> rgb) const noexcept {
     return detail::result(cumulet_environment_get_pixels(handle_, width, height, rgb.data(), rgb.size()));
   }
@@ -626,11 +633,11 @@ class Environment {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_environment* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_environment* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Environment adopt(cumulet_environment* handle) noexcept {
     Environment environment;
     environment.handle_ = handle;
@@ -649,7 +656,7 @@ struct SequenceDesc {
   std::uint64_t memory_bytes = 0;
 };
 
-/// A share in volumes that follow each other: a copy is one more of the same. Any thread.
+/// A reference to a sequence of volumes; a copy adds a reference to the same sequence. Any thread.
 class Sequence {
  public:
   Sequence() noexcept = default;
@@ -694,11 +701,11 @@ class Sequence {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_sequence* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_sequence* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Sequence adopt(cumulet_sequence* handle) noexcept {
     Sequence sequence;
     sequence.handle_ = handle;
@@ -711,13 +718,13 @@ class Sequence {
 
 // ---- Live volumes ---------------------------------------------------------------------------------------------------
 
-/// One channel's voxels: of a dense array, or of bricks.
+/// The voxels of one channel: a dense array, or bricks.
 class Field {
  public:
   Field(Channel channel, const DenseDesc& dense) noexcept : channel_(channel), dense_(dense), is_dense_(true) {}
   Field(Channel channel, const SparseDesc& sparse) noexcept : channel_(channel), sparse_(sparse) {}
 
-  /// Good for as long as this is.
+  /// The result is valid as long as this object.
   operator cumulet_field() const noexcept {
     return {.struct_size = sizeof(cumulet_field),
             .channel = static_cast<cumulet_channel>(channel_),
@@ -732,7 +739,7 @@ class Field {
   bool is_dense_ = false;
 };
 
-/// A simulation's state; fields are good for the time of a call.
+/// The fields of a simulation state. They are used only during the call.
 struct StateDesc {
   std::span<const Field> fields{};
   const char* name = nullptr;
@@ -740,7 +747,7 @@ struct StateDesc {
   void* release_user = nullptr;
 };
 
-/// One channel's voxels in the host's OpenGL: a component of a texture, or, where that is 0, numbers in a buffer.
+/// The voxels of one channel in GL: a component of a texture, or if texture is 0, numbers in a buffer.
 struct GlField {
   Channel channel = Channel::density;
   std::uint32_t texture = 0;
@@ -768,20 +775,21 @@ struct GlField {
   }
 };
 
-/// A simulation's state there. changed: boxes of voxels (both ends inclusive) that differ from the last; none: all.
+/// The fields of a simulation state in GL. changed: boxes of voxels (both ends inclusive) that differ from the last
+/// state; nullopt: a complete state.
 struct GlStateDesc {
   std::span<const GlField> fields{};
   std::optional<std::span<const cumulet_voxel_box>> changed{};
-  void* wait = nullptr;  ///< a GLsync
+  void* wait = nullptr;  ///< A GLsync, or null.
   const char* name = nullptr;
 };
 
 namespace detail {
 
-/// Calls with C's descriptor of it.
+/// Calls `call` with the C descriptor of a state.
 template <class Call>
 auto with_state(const StateDesc& desc, Call&& call) {
-  // As many as there are channels: more are refused by the second of one.
+  // One more than there are channels: with more fields one channel occurs twice, which the library refuses.
   constexpr std::size_t most = CUMULET_CHANNEL_VELOCITY_Z + 2;
   std::array<cumulet_field, most> fields{};
   const std::size_t count = std::min(desc.fields.size(), most);
@@ -797,7 +805,7 @@ auto with_state(const StateDesc& desc, Call&& call) {
 
 } /* namespace detail */
 
-/// A volume of several channels, copied.
+/// Creates a volume with several channels, which are copied.
 [[nodiscard]] inline Result<Volume> volume_from_state(const StateDesc& desc) noexcept {
   return detail::with_state(desc, [](const cumulet_state_desc& c) {
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
@@ -806,7 +814,7 @@ auto with_state(const StateDesc& desc, Call&& call) {
   });
 }
 
-/// A share in a volume that goes on changing: a copy is one more of the same. Any thread.
+/// A reference to a dynamic volume; a copy adds a reference to the same volume. Any thread.
 class Live {
  public:
   Live() noexcept = default;
@@ -823,11 +831,11 @@ class Live {
     return detail::made<Live>(
         [&](cumulet_live** out, char* error, std::size_t size) { return cumulet_live_create(&c, out, error, size); });
   }
-  /// The whole of the next state.
+  /// Submits a complete state.
   [[nodiscard]] Result<> set(const StateDesc& desc) const noexcept { return hand_over(desc, cumulet_live_set); }
-  /// The next state is the last one but for these bricks.
+  /// Submits the last state with these bricks replaced.
   [[nodiscard]] Result<> update(const StateDesc& desc) const noexcept { return hand_over(desc, cumulet_live_update); }
-  /// Empty before the first state.
+  /// Returns the newest state; an empty object before the first one.
   [[nodiscard]] Result<Volume> get_volume() const noexcept {
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
       return cumulet_live_get_volume(handle_, out, error, size);
@@ -835,11 +843,11 @@ class Live {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_live* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_live* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Live adopt(cumulet_live* handle) noexcept {
     Live live;
     live.handle_ = handle;
@@ -860,7 +868,7 @@ class Live {
 
 // ---- Instances ------------------------------------------------------------------------------------------------------
 
-/// What an instance is made of: shares the volume, the sequence or the live volume.
+/// Content, transform and medium of an instance. At most one of volume, sequence and live is set.
 struct InstanceDesc {
   Volume volume;
   std::array<double, 16> to_world{};
@@ -873,7 +881,7 @@ struct InstanceDesc {
   std::array<double, 16> close_to_world{};
 };
 
-/// A share in a volume of scenes: a copy is one more of the same. Any thread.
+/// A reference to an instance; a copy adds a reference to the same instance. Any thread.
 class Instance {
  public:
   Instance() noexcept = default;
@@ -900,7 +908,7 @@ class Instance {
   [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
     return detail::result(cumulet_instance_set_to_world(handle_, to_world.data()));
   }
-  /// Null: it stood where it is.
+  /// Sets the transform in the previous frame. Null: it has not moved.
   [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world) const noexcept {
     return detail::result(cumulet_instance_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr));
   }
@@ -910,11 +918,11 @@ class Instance {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_instance* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_instance* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Instance adopt(cumulet_instance* handle) noexcept {
     Instance instance;
     instance.handle_ = handle;
@@ -943,7 +951,7 @@ class Instance {
 
 // ---- Models ---------------------------------------------------------------------------------------------------------
 
-/// What a model is made of: shares the surfaces.
+/// Content, transform and pose of a model.
 struct ModelDesc {
   Surfaces surfaces;
   std::array<double, 16> to_world{};
@@ -960,7 +968,7 @@ struct ModelDesc {
   std::array<double, 16> close_to_world{};
 };
 
-/// A share in surfaces of scenes: a copy is one more of the same. Any thread.
+/// A reference to a model; a copy adds a reference to the same model. Any thread.
 class Model {
  public:
   Model() noexcept = default;
@@ -987,17 +995,17 @@ class Model {
   [[nodiscard]] Result<> set_time(double time) const noexcept {
     return detail::result(cumulet_model_set_time(handle_, time));
   }
-  /// Null: it stood where it is, and at this moment.
+  /// Sets transform and time in the previous frame. Null: they have not changed.
   [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world, const double* time) const noexcept {
     return detail::result(cumulet_model_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr, time));
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_model* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_model* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Model adopt(cumulet_model* handle) noexcept {
     Model model;
     model.handle_ = handle;
@@ -1035,7 +1043,7 @@ struct CameraMatrices {
   Matrix projection{};
 };
 
-/// Move-only. Viewers that look through it keep it alive.
+/// A camera. Move-only; viewers that use it keep it alive.
 class Camera {
  public:
   Camera() noexcept = default;
@@ -1061,7 +1069,7 @@ class Camera {
     return detail::result(cumulet_camera_set_matrices(handle(), matrices.view.data(), matrices.projection.data(),
                                                       static_cast<cumulet_clip>(clip)));
   }
-  /// Null: where it is at the frame's moment.
+  /// Sets the camera at shutter open and close. Null: as at the frame time.
   [[nodiscard]] Result<> set_shutter(const CameraDesc* open, const CameraDesc* close) noexcept {
     const cumulet_camera_desc at_open = open != nullptr ? *open : CameraDesc();
     const cumulet_camera_desc at_close = close != nullptr ? *close : CameraDesc();
@@ -1100,11 +1108,11 @@ class Camera {
   // NOLINTEND(readability-make-member-function-const)
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_camera* handle() const noexcept { return handle_.get(); }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_camera* release() noexcept { return handle_.release(); }
-  /// Takes the caller's.
+  /// Takes over the caller's handle.
   [[nodiscard]] static Camera adopt(cumulet_camera* handle) noexcept {
     Camera camera;
     camera.handle_.reset(handle);
@@ -1149,7 +1157,7 @@ struct FrameResult {
   std::uint32_t texture = 0;
   std::uint32_t depth_texture = 0;
 
-  /// Whether any of these is set.
+  /// Returns whether any of these flags is set.
   [[nodiscard]] constexpr bool has(RenderFlags any) const noexcept {
     return (static_cast<std::uint32_t>(flags) & static_cast<std::uint32_t>(any)) != 0;
   }
@@ -1157,8 +1165,8 @@ struct FrameResult {
 
 // ---- Viewer ---------------------------------------------------------------------------------------------------------
 
-/// Finds OpenGL functions: whatever takes a name and returns an address, be that a void* or a pointer to function
-/// (glfwGetProcAddress, eglGetProcAddress, a lambda), or C's callback and user pointer. Empty: there is no context.
+/// Loads OpenGL functions. It holds any callable that takes a name and returns an address, as void* or as pointer to
+/// function (glfwGetProcAddress, eglGetProcAddress, a lambda), or the C callback and user pointer. Empty: no context.
 class GetProc {
  public:
   GetProc() noexcept = default;
@@ -1195,7 +1203,7 @@ struct ProgramsDesc {
   }
 };
 
-/// A share in what viewers share: a copy is one more. Empty: the viewer's own.
+/// A reference to shared programs; a copy adds a reference. Empty: the viewer has its own.
 class Programs {
  public:
   Programs() noexcept = default;
@@ -1215,11 +1223,11 @@ class Programs {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_programs* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
+  /// Returns the handle, which the caller owns now.
   [[nodiscard]] cumulet_programs* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
+  /// Takes over the caller's reference.
   [[nodiscard]] static Programs adopt(cumulet_programs* handle) noexcept {
     Programs programs;
     programs.handle_ = handle;
@@ -1235,24 +1243,24 @@ struct CreateDesc {
   std::function<void(LogLevel, std::string_view)> log{};
   std::function<void()> update{};
   GlState gl_state{};
-  /// name, begin and end in seconds: cumulet_trace_fn.
+  /// Receives name, begin and end in seconds, see cumulet_trace_fn.
   std::function<void(std::string_view, double, double)> trace{};
   Programs programs{};
 };
 
-/// Move-only.
+/// A viewer. Move-only.
 class Viewer {
  public:
   Viewer() noexcept = default;
   Viewer(Viewer&&) noexcept = default;
   Viewer& operator=(Viewer&& other) noexcept {
-    handle_ = std::move(other.handle_);  // first: the old viewer calls the old callbacks until it is gone
+    handle_ = std::move(other.handle_);  // first, because the old viewer uses the old callbacks until it is destroyed
     callbacks_ = std::move(other.callbacks_);
     return *this;
   }
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
-  /// [GL] if attached, as cumulet_destroy.
+  /// [GL] if attached. Destroys the viewer, see cumulet_destroy.
   ~Viewer() = default;
 
   [[nodiscard]] static Result<Viewer> create(CreateDesc desc = {}) noexcept {
@@ -1289,35 +1297,35 @@ class Viewer {
     const cumulet_volume_file_desc c = desc;
     return result(cumulet_load_volume_file(handle(), &c));
   }
-  /// An empty volume: shows nothing.
+  /// Shows a volume; an empty object shows nothing.
   [[nodiscard]] Result<> set_volume(const Volume& volume) noexcept {
     return result(cumulet_set_volume(handle(), volume.handle()));
   }
-  /// Column-major, affine: where the volume stands; none: where it is.
+  /// Sets the instance transforms of the volume, column-major and affine; an empty span is one identity.
   [[nodiscard]] Result<> set_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
     const double* first = to_world.empty() ? nullptr : to_world.front().data();
     return result(cumulet_set_volume_places(handle(), first, static_cast<uint32_t>(to_world.size())));
   }
-  /// Of as many places each; empty: as at the frame's moment.
+  /// Sets the transforms at shutter open and close, one per instance transform; empty: as at the frame time.
   [[nodiscard]] Result<> set_volume_shutter(std::span<const std::array<double, 16>> open,
                                             std::span<const std::array<double, 16>> close) noexcept {
     const auto first = [](const auto& matrices) { return matrices.empty() ? nullptr : matrices.front().data(); };
-    const bool differ = !open.empty() && !close.empty() && open.size() != close.size();  // 0 is refused
+    const bool differ = !open.empty() && !close.empty() && open.size() != close.size();  // the library refuses 0
     const std::size_t count = differ ? 0 : std::max(open.size(), close.size());
     return result(cumulet_set_volume_shutter(handle(), first(open), first(close), static_cast<uint32_t>(count)));
   }
-  /// An empty sequence: shows none.
+  /// Shows a sequence; an empty object shows none.
   [[nodiscard]] Result<> set_sequence(const Sequence& sequence) noexcept {
     return result(cumulet_set_sequence(handle(), sequence.handle()));
   }
-  /// states: room for a FrameState a frame, or none.
+  /// Returns the state of the sequence. states: room for a FrameState per frame, or empty.
   [[nodiscard]] Result<SequenceInfo> get_sequence_info(std::span<std::uint8_t> states = {}) noexcept {
     auto c = detail::sized<cumulet_sequence_info>();
     std::uint8_t* const first = states.empty() ? nullptr : states.data();
     if (auto done = result(cumulet_get_sequence_info(handle(), &c, first, states.size())); !done) return done.error();
     return SequenceInfo::of(c);
   }
-  /// Why a frame failed, "" if it did not.
+  /// Returns why a frame failed; "" if it did not.
   [[nodiscard]] Result<Text<512>> get_sequence_frame(std::uint32_t frame) noexcept {
     std::array<char, 512> cause{};
     if (auto done = result(cumulet_get_sequence_frame(handle(), frame, cause.data(), cause.size())); !done)
@@ -1330,11 +1338,11 @@ class Viewer {
   [[nodiscard]] Result<> remove_model(const Model& model) noexcept {
     return result(cumulet_remove_model(handle(), model.handle()));
   }
-  /// An empty one: shows none.
+  /// Shows a live volume; an empty object shows none.
   [[nodiscard]] Result<> set_live(const Live& live) noexcept {
     return result(cumulet_set_live(handle(), live.handle()));
   }
-  /// [GL] The next state of a live volume, from voxels in OpenGL.
+  /// [GL] Submits a state of a live volume from voxels in GL.
   [[nodiscard]] Result<> live_set_gl(const Live& live, const GlStateDesc& desc) noexcept {
     constexpr std::size_t most = CUMULET_CHANNEL_VELOCITY_Z + 2;
     constexpr cumulet_voxel_box none{};
@@ -1356,7 +1364,7 @@ class Viewer {
     if (auto done = result(cumulet_get_live_info(handle(), &c)); !done) return done.error();
     return LiveInfo::of(c);
   }
-  /// What it may take of the machine from now on.
+  /// Sets limits on threads and memory.
   [[nodiscard]] Result<> set_limits(const LimitsDesc& desc) noexcept {
     const cumulet_limits_desc c = desc;
     return result(cumulet_set_limits(handle(), &c));
@@ -1367,7 +1375,7 @@ class Viewer {
   [[nodiscard]] Result<> remove_instance(const Instance& instance) noexcept {
     return result(cumulet_remove_instance(handle(), instance.handle()));
   }
-  /// As get_sequence_info and get_sequence_frame, of an instance's.
+  /// Returns the state of an instance's sequence. states: room for a FrameState per frame, or empty.
   [[nodiscard]] Result<SequenceInfo> get_instance_sequence_info(const Instance& instance,
                                                                 std::span<std::uint8_t> states = {}) noexcept {
     auto c = detail::sized<cumulet_sequence_info>();
@@ -1387,13 +1395,13 @@ class Viewer {
     }
     return Text<512>(cause.data());
   }
-  /// As get_live_info, of an instance's.
+  /// Returns the state numbers of an instance's live volume.
   [[nodiscard]] Result<LiveInfo> get_instance_live_info(const Instance& instance) noexcept {
     auto c = detail::sized<cumulet_live_info>();
     if (auto done = result(cumulet_get_instance_live_info(handle(), instance.handle(), &c)); !done) return done.error();
     return LiveInfo::of(c);
   }
-  /// Empty if there is none.
+  /// Returns the volume; an empty object if there is none.
   [[nodiscard]] Result<Volume> get_volume() noexcept {
     cumulet_volume* out = nullptr;
     if (auto done = result(cumulet_get_volume(handle(), &out)); !done) return done.error();
@@ -1402,7 +1410,7 @@ class Viewer {
   void cancel() const noexcept { cumulet_cancel(handle()); }
   [[nodiscard]] Result<Progress> get_progress() const noexcept {
     auto c = detail::sized<cumulet_progress>();
-    // Safe at any time, which the last error is not.
+    // Any thread may call this, so the last error must not be read.
     if (auto done = detail::result(cumulet_get_progress(handle(), &c)); !done) return done.error();
     return Progress::of(c);
   }
@@ -1411,7 +1419,7 @@ class Viewer {
 
   [[nodiscard]] Result<> set_grid(const GridDesc& desc) noexcept { return set(cumulet_set_grid, desc); }
   [[nodiscard]] Result<> set_medium(const MediumDesc& desc) noexcept { return set(cumulet_set_medium, desc); }
-  /// Points: values and what they become. None: values stay as they are.
+  /// Sets a ramp from pairs of value and result; an empty span removes it.
   [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) noexcept {
     const float* first = points.empty() ? nullptr : points.front().data();
     return result(cumulet_set_ramp(handle(), static_cast<cumulet_ramp>(ramp), first, points.size()));
@@ -1419,11 +1427,11 @@ class Viewer {
   [[nodiscard]] Result<> load_surfaces(const std::string& path) noexcept {
     return result(cumulet_load_surfaces(handle(), path.c_str()));
   }
-  /// Empty: shows no surfaces.
+  /// Shows surfaces; an empty object shows none.
   [[nodiscard]] Result<> set_surfaces(const Surfaces& surfaces) noexcept {
     return result(cumulet_set_surfaces(handle(), surfaces.handle()));
   }
-  /// Empty if there are none.
+  /// Returns the surfaces; an empty object if there are none.
   [[nodiscard]] Result<Surfaces> get_surfaces() noexcept {
     cumulet_surfaces* out = nullptr;
     if (auto done = result(cumulet_get_surfaces(handle(), &out)); !done) return done.error();
@@ -1436,7 +1444,7 @@ class Viewer {
     return result(cumulet_use_surface_camera(handle(), index));
   }
   [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
-  /// None: none.
+  /// Replaces the lamps; an empty span removes all.
   [[nodiscard]] Result<> set_lamps(std::span<const LampDesc> lamps) noexcept {
     const std::unique_ptr<cumulet_lamp_desc[]> c(new (std::nothrow) cumulet_lamp_desc[lamps.size()]);
     if (!c) return Error{StatusCode::out_of_memory, Text<512>("out of memory")};
@@ -1446,11 +1454,11 @@ class Viewer {
   [[nodiscard]] Result<> load_environment(const std::string& path) noexcept {
     return result(cumulet_load_environment(handle(), path.c_str()));
   }
-  /// Empty: the light's sky.
+  /// Sets the environment; an empty object selects the sky of the light.
   [[nodiscard]] Result<> set_environment(const Environment& environment) noexcept {
     return result(cumulet_set_environment(handle(), environment.handle()));
   }
-  /// Empty if there is none.
+  /// Returns the environment; an empty object if there is none.
   [[nodiscard]] Result<Environment> get_environment() noexcept {
     cumulet_environment* out = nullptr;
     if (auto done = result(cumulet_get_environment(handle(), &out)); !done) return done.error();
@@ -1466,7 +1474,7 @@ class Viewer {
   [[nodiscard]] Result<> set_camera(const Camera& camera) noexcept {
     return result(cumulet_set_camera(handle(), camera.handle()));
   }
-  /// Empty: it stood where it is.
+  /// Sets the camera of the previous frame; an empty object: it has not moved.
   [[nodiscard]] Result<> set_previous_camera(const Camera& camera, double seconds) noexcept {
     return result(cumulet_set_previous_camera(handle(), camera.handle(), seconds));
   }
@@ -1483,7 +1491,7 @@ class Viewer {
   [[nodiscard]] Result<> set_navigation(const NavigationDesc& desc) noexcept {
     return set(cumulet_set_navigation, desc);
   }
-  /// Whether the event meant something.
+  /// Returns whether the event was used.
   [[nodiscard]] Result<bool> input(const Event& event) noexcept {
     const cumulet_event c = event;
     std::int32_t handled = 0;
@@ -1552,7 +1560,8 @@ class Viewer {
   [[nodiscard]] Result<> read_light_group(std::uint32_t group, std::span<float> rgb) noexcept {
     return result(cumulet_read_light_group(handle(), group, rgb.data(), rgb.size()));
   }
-  /// name(ObjectKind, tag, place) -> const char*: cumulet_object_name_fn. It may not throw.
+  /// `name` is called as name(ObjectKind, tag, place) and returns const char*, see cumulet_object_name_fn. It must not
+  /// throw.
   template <class Name>
   [[nodiscard]] Result<> read_cryptomatte(Name&& name, std::uint32_t ranks, std::span<float> values) noexcept {
     const auto call = [](void* user, cumulet_object_kind kind, std::uint64_t tag,
@@ -1562,23 +1571,23 @@ class Viewer {
     void* user = const_cast<void*>(static_cast<const void*>(std::addressof(name)));
     return result(cumulet_read_cryptomatte(handle(), call, user, ranks, values.data(), values.size()));
   }
-  /// The id of a name in these mattes; thread-safe.
+  /// Returns the Cryptomatte id of a name. Any thread.
   [[nodiscard]] static std::uint32_t cryptomatte_id(const std::string& name) noexcept {
     return cumulet_cryptomatte_id(name.c_str());
   }
-  /// Nothing while it is unknown, as of one sample a pixel.
+  /// Returns the noise; nullopt while it is unknown, for example with one sample per pixel.
   [[nodiscard]] Result<std::optional<double>> measure_noise() noexcept {
     double noise = 0.0;
     if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();
     return std::isfinite(noise) ? std::optional<double>(noise) : std::nullopt;
   }
-  /// How many bytes cumulet_read_accumulation gives.
+  /// Returns the number of bytes that read_accumulation() needs.
   [[nodiscard]] Result<std::size_t> accumulation_size() noexcept {
     std::size_t size = 0;
     if (auto done = result(cumulet_read_accumulation(handle(), nullptr, &size)); !done) return done.error();
     return size;
   }
-  /// Into so much room; how much of it there is.
+  /// Writes the accumulation into `bytes` and returns its size.
   [[nodiscard]] Result<std::size_t> read_accumulation(std::span<std::byte> bytes) noexcept {
     std::size_t size = bytes.size();
     if (auto done = result(cumulet_read_accumulation(handle(), bytes.data(), &size)); !done) return done.error();
@@ -1594,9 +1603,10 @@ class Viewer {
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
+  /// Returns the handle, which this object still owns.
   [[nodiscard]] cumulet_viewer* handle() const noexcept { return handle_.get(); }
-  /// Takes the caller's, whose callbacks stay the caller's. There is no release(): the callbacks live here.
+  /// Takes over the caller's viewer; its callbacks still belong to the caller. There is no release(), because this
+  /// object owns its callbacks.
   [[nodiscard]] static Viewer adopt(cumulet_viewer* handle) noexcept {
     Viewer viewer;
     viewer.handle_.reset(handle);
@@ -1630,7 +1640,7 @@ class Viewer {
     return result(setter(handle(), &desc));
   }
 
-  std::unique_ptr<Callbacks> callbacks_;  // outlives the viewer below
+  std::unique_ptr<Callbacks> callbacks_;  // must outlive the viewer below
   std::unique_ptr<cumulet_viewer, Destroy> handle_;
 };
 

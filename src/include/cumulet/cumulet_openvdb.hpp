@@ -1,8 +1,10 @@
-/*
- * Cumulet volumes of OpenVDB grids that a host has in memory.
+/**
+ * @file
+ * Creates Cumulet volumes from OpenVDB grids in the host's memory.
  *
- * Header-only, on top of cumulet_volume_from_sparse, and compiled with the host's own OpenVDB: that may be of another
- * version or ABI than the one inside Cumulet. C++17; link OpenVDB and TBB, which every user of OpenVDB links.
+ * It is header-only, built on cumulet_volume_from_sparse, and compiled with the host's own OpenVDB, which may have
+ * another version or ABI than the one inside Cumulet. It needs C++17. Link OpenVDB and TBB, as every user of OpenVDB
+ * does.
  */
 #ifndef CUMULET_CUMULET_OPENVDB_HPP
 #define CUMULET_CUMULET_OPENVDB_HPP
@@ -21,10 +23,10 @@
 namespace cumulet {
 namespace openvdb_detail {
 
-/* What cumulet_sparse_desc takes, flat. */
+/* The arrays of a cumulet_sparse_desc. */
 struct Flat {
   std::vector<int32_t> origins;
-  std::unique_ptr<float[]> values; /* not a vector: that would fill it first */
+  std::unique_ptr<float[]> values; /* not a vector, which would zero it first */
   std::unique_ptr<uint64_t[]> active;
   std::vector<cumulet_tile> tiles;
   float background = 0.0F;
@@ -45,7 +47,7 @@ void flatten(const TreeT& tree, Flat& flat) {
     const LeafT& leaf = *leaves[i];
     for (int axis = 0; axis < 3; ++axis) flat.origins[3 * i + static_cast<std::size_t>(axis)] = leaf.origin()[axis];
     for (openvdb::Index x = 0; x < 8; ++x) flat.active[8 * i + x] = leaf.valueMask().template getWord<uint64_t>(x);
-    const auto* values = leaf.buffer().data(); /* reads it now if its loading was delayed */
+    const auto* values = leaf.buffer().data(); /* loads it now if it was delay-loaded */
     for (std::size_t n = 0; n < 512; ++n) flat.values[512 * i + n] = static_cast<float>(values[n]);
   });
 
@@ -74,14 +76,14 @@ bool flatten_if(const openvdb::TreeBase& tree, Flat& flat) {
   return true;
 }
 
-/* A grid as cumulet.h takes it. */
+/* A grid in the form of cumulet.h. */
 struct Sparse {
   std::string name = "openvdb";
   Flat flat;
-  cumulet_sparse_desc desc{}; /* of the above, where they are */
+  cumulet_sparse_desc desc{}; /* points into `name` and `flat` */
 };
 
-/* "" or why the grid cannot be had; status: what that is. Throws what OpenVDB does. */
+/* Returns "" or why the grid is refused, and its status. Throws the exceptions of OpenVDB. */
 inline std::string flatten_grid(const openvdb::GridBase::ConstPtr& grid, Sparse& sparse, cumulet_status& status) {
   status = CUMULET_ERROR_INVALID_ARGUMENT;
   if (!grid) return "grid is NULL";
@@ -107,7 +109,7 @@ inline std::string flatten_grid(const openvdb::GridBase::ConstPtr& grid, Sparse&
   desc.tile_count = flat.tiles.size();
   desc.background = flat.background;
   desc.name = sparse.name.c_str();
-  /* OpenVDB multiplies row vectors from the left: its rows are columns here. */
+  /* OpenVDB multiplies row vectors from the left, so its rows are columns here. */
   const openvdb::Mat4d matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
   for (int i = 0; i < 16; ++i) desc.index_to_world[i] = matrix(i / 4, i % 4);
   return std::string();
@@ -126,10 +128,18 @@ inline cumulet_status refuse(cumulet_status status, const std::string& name, con
 
 } /* namespace openvdb_detail */
 
-/*
- * The volume of a float, half or double grid, with the grid's name; as if it had been written to a file and opened.
- * The grid is copied (once, flat, for the time of the call) and not kept. Level sets, other value types and frustum
- * transforms are refused: CUMULET_ERROR_FILE, with one line in error, as cumulet_create has it. Any thread.
+/**
+ * Creates a volume from a float, half or double grid, with the grid's name. The result is the same as if the grid had
+ * been written to a file and opened. The grid is copied during the call and not kept.
+ *
+ * Threads: any thread. No GL.
+ *
+ * @param grid       The grid.
+ * @param out        Receives the volume, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for a null grid; CUMULET_ERROR_FILE for a level set, another value
+ *         type or a frustum transform; or CUMULET_ERROR_OUT_OF_MEMORY.
  */
 inline cumulet_status volume_from_openvdb(const openvdb::GridBase::ConstPtr& grid, cumulet_volume** out,
                                           char* error = nullptr, size_t error_size = 0) {
@@ -150,15 +160,25 @@ inline cumulet_status volume_from_openvdb(const openvdb::GridBase::ConstPtr& gri
   }
 }
 
-/* A grid, and what it is of. */
+/** A grid and its channel. */
 struct OpenVdbField {
   cumulet_channel channel;
   openvdb::GridBase::ConstPtr grid;
 };
 
-/*
- * cumulet_live_set of grids, each refused as above. They are copied flat, and again by that; what of it is tiles stays
- * tiles, and takes no updates. name: for messages. Any thread.
+/**
+ * Submits a complete state of a live volume from OpenVDB grids (cumulet_live_set). The grids are copied during the
+ * call. Grids with tiles keep them, and such a state takes no cumulet_live_update.
+ *
+ * Threads: any thread; runs update callbacks of viewers that show the live volume. No GL.
+ *
+ * @param live       The live volume.
+ * @param fields     The grids and their channels.
+ * @param name       Name in messages. NULL or "": "openvdb".
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return The status of cumulet_live_set; CUMULET_ERROR_INVALID_ARGUMENT for a null grid; or CUMULET_ERROR_FILE for a
+ *         level set, another value type or a frustum transform.
  */
 inline cumulet_status live_set_openvdb(cumulet_live* live, const std::vector<OpenVdbField>& fields, const char* name,
                                        char* error = nullptr, size_t error_size = 0) {
