@@ -494,17 +494,17 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
  */
 
 /**
- * Reads one scalar grid of a .vdb or .nvdb file, with the other fields that docs/grids.md finds by name.
+ * Reads the density of a .vdb or .nvdb file, and the other fields that are found by name (docs/grids.md).
  *
- * Without a name, the grid is the one called "density". If there is none, it is the first of "smoke", "soot", "flames",
- * "flame", "fire", "temperature", "heat" that exists, and otherwise the first scalar fog grid of the file. A name in
- * exactly this case is preferred to the same name in another case. cumulet_load_volume logs a warning that names the
- * grids that were not read.
+ * Without a name, the density is the grid called "density", or else "smoke" or "soot". A file that has none of these,
+ * but a temperature or a flame, has no density: it shows only fire. In a file without any of them, the first scalar fog
+ * grid is the density. A name in exactly this case is preferred to the same name in another case. cumulet_load_volume
+ * logs a warning that names the grids that were not read.
  *
  * Threads: any thread; returns when the file is read. No GL.
  *
  * @param path       UTF-8 path of the file.
- * @param grid_name  The grid. "name[1]" is the second grid of that name. NULL or "": see above.
+ * @param grid_name  The density grid. "name[1]" is the second grid of that name. NULL or "": by name.
  * @param out        Receives the volume, which the caller releases; NULL on failure.
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
@@ -3405,7 +3405,7 @@ typedef struct cumulet_frame_desc {
 
 /** Bits of cumulet_frame_result.flags. */
 enum {
-  CUMULET_RENDER_MORE = 1,      /**< The image is incomplete: render again soon. */
+  CUMULET_RENDER_MORE = 1,      /**< Work is left, on the image or in transfer: render again soon. */
   CUMULET_RENDER_CONVERGED = 2, /**< Every pixel has its samples, at full resolution, for the newest settings. */
   CUMULET_RENDER_LOADING = 4,   /**< Workers are busy, see cumulet_get_progress. */
   CUMULET_RENDER_FAILED = 8,    /**< A load or build failed, see @ref cumulet_errors and cumulet_get_progress. */

@@ -4,7 +4,8 @@
  * the handles that they own. Spans replace pointer and count, enum classes enums, std::array C arrays, and a Result the
  * status.
  *
- * Names
+ * Names:
+ *
  * - Each function and member has its documentation in cumulet.h, with meaning, units, threads and the [GL] mark:
  *   Viewer::set_grid is cumulet_set_grid, and GridDesc::threshold is cumulet_grid_desc.threshold.
  * - Members are initialized to zero, which means the default as in C. Descriptors convert to their C counterparts, with
@@ -16,14 +17,16 @@
  *   field.
  * - Paths are UTF-8.
  *
- * Errors
+ * Errors:
+ *
  * - No function of this header throws, so that it also works without exceptions. A function that can fail returns a
  *   Result, which is [[nodiscard]]. value() of a failed one calls std::terminate.
  * - With an empty handle (default constructed or moved from) every call fails with StatusCode::invalid_argument.
  *
- * Callbacks
+ * Callbacks:
+ *
  * - Callbacks are function objects. The viewer keeps them until it is destroyed, at an address that does not change
- * when the viewer is moved. cumulet.h says when and on which thread they are called.
+ *   when the viewer is moved. cumulet.h says when and on which thread they are called.
  * - A callback that throws ends the program.
  */
 #ifndef CUMULET_CUMULET_HPP
