@@ -53,8 +53,9 @@
  * Callbacks:
  *
  * - The update callback may be called on any thread, including a worker thread, until cumulet_destroy returns.
- * - A callback must not call the library, with these exceptions: cumulet_cancel, cumulet_get_progress, and the
- *   functions that retain or release handles. Other calls inside a callback, for any viewer or handle, return
+ * - A callback must not call the library, with these exceptions: cumulet_cancel, cumulet_get_progress, the functions
+ *   that retain or release handles, cumulet_status_text, cumulet_version, cumulet_cryptomatte_id, cumulet_region_pixels
+ *   and cumulet_transmittance_map_glsl. Other calls inside a callback, for any viewer or handle, return
  *   CUMULET_ERROR_INVALID_ARGUMENT; cumulet_destroy does nothing.
  * - Callbacks may be called while [GL] calls of other viewers with the same programs wait for their turn. Take no lock
  *   in a callback that is also held around a [GL] call.
