@@ -386,10 +386,12 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
   const auto& gl = *gl_;
   // Asked for in each frame, so that none waits for it once it is needed.
   const gl::Program& copy = programs_->ask({"copy.frag", {}, "composite.vert"});
-  const Composed::Of of{shown.means->of,       display,
-                        shown.program->name(), {target.viewport.z, target.viewport.w},
-                        target.region,         copy_format(format, display.encoding)};
-  if (!composed_.is_kept(of, gl.dispatches_in_call) || !copy.usable()) return false;
+  if (target.is_hidden && !copy.usable()) lags_ = true;
+  // A hidden frame uses both programs, whether this driver keeps pictures or not; a pixel is enough for that.
+  const glm::ivec2 size = target.is_hidden ? glm::ivec2(1) : glm::ivec2(target.viewport.z, target.viewport.w);
+  const Composed::Of of{
+      shown.means->of, display, shown.program->name(), size, target.region, copy_format(format, display.encoding)};
+  if (!composed_.is_kept(of, gl.dispatches_in_call || target.is_hidden) || !copy.usable()) return false;
   // llvmpipe would wait for what is queued before it draws into a texture that was read.
   if (gl.dispatches_in_call && !composed_.is_current(of, picture.rows) && !gl::Fence(gl_).passed()) return false;
   GLuint texture = 0;
@@ -408,7 +410,7 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
   aim(target, display);
   copy.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
-  return true;
+  return !target.is_hidden;
 }
 
 void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
