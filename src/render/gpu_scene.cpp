@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// extent: of all volumes in the world.
+// extent: the length of the diagonal of all volumes' bounds in the world.
 core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& source, double extent) {
   core::CmMedium m{};
   m.albedo = medium.albedo;
@@ -606,7 +606,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
     const scene::Volume& volume = present_.front();
     const scene::MarchSource& source = *volume.source;
     p.grid = *data_->grid(source);
-    p.medium = medium_of(*volume.medium, source, extent());
+    // Where several volumes were refused, this one is drawn as if it were the only one.
+    p.medium = medium_of(*volume.medium, source, 2.0 * ball_of(volume).radius);
     const glm::dmat4& place = volume.place.to_world;
     const glm::dmat4 to_world = place * source.cube.to_world;
     p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);
