@@ -56,6 +56,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   gl->draw_buffers = static_cast<GLuint>(std::clamp(draw_buffers, 1, 16));
   gl->compatibility = load_compatibility(*gl, get_proc, user);
   gl->GetIntegerv(GL_MAX_DEBUG_GROUP_STACK_DEPTH, &gl->max_debug_groups);
+  gl->GetIntegerv(GL_MAX_TEXTURE_SIZE, &gl->max_texture_size);
   return gl;
 }
 
@@ -65,6 +66,7 @@ std::shared_ptr<const Functions> copy_of(const Functions& gl) {
   copy->draw_buffers = gl.draw_buffers;
   copy->compatibility = gl.compatibility;
   copy->max_debug_groups = gl.max_debug_groups;
+  copy->max_texture_size = gl.max_texture_size;
   return copy;
 }
 
@@ -76,7 +78,7 @@ Limits query_limits(const Functions& gl) {
   gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &value);
   limits.storage_block_bytes = value;
   gl.GetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &limits.texture_size_3d);
-  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &limits.texture_size_2d);
+  limits.texture_size_2d = gl.max_texture_size;
   return limits;
 }
 

@@ -31,6 +31,8 @@ struct Functions : GladGLContext {
   std::shared_ptr<const CompatibilityFunctions> compatibility;
   /// The constant GL_MAX_DEBUG_GROUP_STACK_DEPTH.
   GLint max_debug_groups = 0;
+  /// The constant GL_MAX_TEXTURE_SIZE, in texels.
+  GLint max_texture_size = 0;
   /// For DebugGroup: how many of them are open. One thread has the context.
   mutable GLint open_debug_groups = 0;
   /// How many may be open beside those of the host; nothing until a call queries it.

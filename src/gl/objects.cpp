@@ -17,8 +17,7 @@ Object make_texture(const FunctionsPtr& gl, GLenum target) {
 
 // Else the driver's error is that a value is invalid.
 void require_size(const Functions& gl, int width, int height, const char* what) {
-  GLint most = 0;
-  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  const GLint most = gl.max_texture_size;
   if (width <= most && height <= most) return;
   throw Error(ErrorCode::unsupported, std::string(what) + ": " + std::to_string(width) + "x" + std::to_string(height) +
                                           " texels are more than this driver's GL_MAX_TEXTURE_SIZE, " +
