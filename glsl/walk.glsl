@@ -169,7 +169,7 @@ vec3 cm_walk_source(inout CmWalk walk) {
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     cm_stand_at(walk.front[k]);
     float extinction = walk.front[k].e_0 + walk.front[k].e_1;
-    source += extinction * CM_MEDIUM.source;
+    if (CM_MEDIUM.holdout == 0u) source += extinction * CM_MEDIUM.source;
     sum += extinction;
   }
   return sum > 0.0 ? source / sum : vec3(0.0);
@@ -221,6 +221,7 @@ vec3 cm_walk_emitted(inout CmWalk walk, float t_1) {
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     CmFront front = walk.front[k];
     cm_stand_at(front);
+    if (CM_MEDIUM.holdout != 0u) continue;
     CmEmission emission =
         cm_march_emission(front.cell, cm_in_volume_point(walk.o), cm_in_volume(walk.d));
     emitted += cm_emitted(emission, walk.t, t_1);
