@@ -131,12 +131,7 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     if (out == nullptr) refuse("out is NULL");
     const cumulet_create_desc d = read_desc(desc, "cumulet_create_desc");
     require(number(d.gl_state) <= CUMULET_GL_STATE_HOST_RESETS, "cumulet_create_desc.gl_state is unknown");
-    cumulet::Log log;
-    if (d.log != nullptr) {
-      log = cumulet::Log([call = d.log, user = d.log_user](cumulet::LogLevel level, const char* message) {
-        call(user, static_cast<cumulet_log_level>(level), message);
-      });
-    }
+    cumulet::Log log = cumulet::c_abi::log_of(d.log, d.log_user);
     std::function<void()> update;
     if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
     auto viewer = std::make_unique<cumulet_viewer>();

@@ -17,6 +17,7 @@
 #include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "base/library_thread.hpp"
+#include "base/log.hpp"
 #include "base/one_line.hpp"
 #include "cumulet/cumulet.h"
 #include "scene/snapshot.hpp"
@@ -24,6 +25,13 @@
 #include "viewer/c_fields.hpp"
 
 namespace cumulet::c_abi {
+
+/// Logs through a host's callback; drops every line if log is null.
+inline Log log_of(cumulet_log_fn log, void* user) {
+  if (log == nullptr) return {};
+  return Log(
+      [log, user](LogLevel level, const char* message) { log(user, static_cast<cumulet_log_level>(level), message); });
+}
 
 inline cumulet_status status_of(ErrorCode code) {
   switch (code) {

@@ -363,6 +363,12 @@ typedef struct cumulet_volume_file_desc {
    * warning.
    */
   const char* velocity_grid;
+  /*
+   * Gets the notes and warnings of cumulet_volume_open and cumulet_volume_open_file, on the calling thread, before they
+   * return. NULL: they are dropped. Calls that load through a viewer log to that viewer's callback and ignore this one.
+   */
+  cumulet_log_fn log;
+  void* log_user;
 } cumulet_volume_file_desc;
 
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
