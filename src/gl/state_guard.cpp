@@ -159,9 +159,7 @@ void StateGuard::read_framebuffer() {
 void StateGuard::active_texture() {
   if (!active_texture_.use()) return;
   if (!restore_) {
-    if (gl_->compatibility)
-      plain().ActiveTexture(GL_TEXTURE0 +
-                            active_unit_);  // makes active_unit_ valid: units have state besides bindings here
+    if (gl_->compatibility) plain().ActiveTexture(GL_TEXTURE0 + active_unit_);  // units have state besides bindings
     return;
   }
   active_texture_.value = get(GL_ACTIVE_TEXTURE);

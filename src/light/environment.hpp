@@ -46,8 +46,7 @@ struct Environment {
   /// sine). 0: the environment is black.
   float density = 0.0F;
   std::vector<std::string> remarks;  ///< choices, conversions and ignored data of the reader
-  std::uint64_t replaced =
-      0;  ///< number of pixels with a component that was not finite, negative or above 1e30 and was set to 0
+  std::uint64_t replaced = 0;        ///< pixels with components not finite, negative or > 1e30, which became 0
 
   [[nodiscard]] std::size_t texels() const { return words.size(); }
 };

@@ -13,9 +13,8 @@ namespace cumulet::light {
 
 /// Parameters of the sky other than the sun's position.
 struct SkyModel {
-  double turbidity = 3.0;  ///< Linke's, 1 to 10: 1 air without aerosols, 2 very clear, 3 clear, 6 hazy
-  double ground_albedo =
-      0.3;  ///< 0 to 1: of the ground, which reflects light to the air and is visible below the horizon
+  double turbidity = 3.0;      ///< Linke's, 1 to 10: 1 air without aerosols, 2 very clear, 3 clear, 6 hazy
+  double ground_albedo = 0.3;  ///< 0 to 1; the ground lights the air and is visible below the horizon
   bool operator==(const SkyModel&) const = default;
 };
 
@@ -71,8 +70,7 @@ class Sky {
 struct Day {
   SkyModel model;
   double sun_elevation_degrees = 90.0;
-  bool above_alone =
-      false;  ///< black below the horizon, where another object covers it, so that NEE samples only the visible part
+  bool above_alone = false;  ///< below the horizon it is black (covered by other objects), so that NEE avoids it
   bool operator==(const Day&) const = default;
 };
 

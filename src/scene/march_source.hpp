@@ -41,9 +41,8 @@ struct MarchSource {
   std::shared_ptr<const grid::Statistics> statistics;
   glm::ivec3 box_low{0};  // voxels, cube space
   glm::ivec3 box_size{0};
-  std::vector<std::uint16_t> brick_values;  // half floats, 512 per slot
-  std::vector<std::uint16_t>
-      brick_changes;  // half floats, 512 per slot: half the change from shutter open to close; empty if none changes
+  std::vector<std::uint16_t> brick_values;   // half floats, 512 per slot
+  std::vector<std::uint16_t> brick_changes;  // 512 per slot: half the change while the shutter is open; else empty
   std::vector<std::uint32_t> brick_slots;
   glm::ivec3 brick_count{0};
   grid::Channels channels;
