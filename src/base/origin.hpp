@@ -14,7 +14,7 @@ inline glm::dvec3 origin_near(const glm::dvec3& low, const glm::dvec3& high, dou
 }
 
 /// Returns an origin relative to which floats can represent all positions in a box of the given size (> 0). It is
-/// exactly 0 if the box center is within 256 sizes of 0 on each axis, where floats round by 2^-16 of the size at most.
+/// exactly 0 if the box center is within 256 sizes of 0 on each axis. Floats there round by at most 2^-16 of the size.
 /// Otherwise it is within 64 sizes of the center.
 inline glm::dvec3 far_origin(const glm::dvec3& low, const glm::dvec3& high, double size) {
   constexpr double near_sizes = 256.0;

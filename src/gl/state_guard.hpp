@@ -18,7 +18,7 @@ namespace cumulet::gl {
 /// bindings are the host's until a pass sets its own.
 ///
 /// State that the library never sets is not saved: the values (not the enables) of blend color, sample coverage and
-/// mask, stencil, polygon offset, logic op and restart index. Of viewports, scissors and depth ranges only the first is
+/// mask, stencil, polygon offset, logic op and restart index. Only the first viewport, scissor and depth range is
 /// saved: use the indexed calls.
 ///
 /// In a compatibility context, CompatibilityState does this for the state that core contexts lack.

@@ -36,8 +36,8 @@ class WordHeap {
   struct Pages {
     std::vector<std::unique_ptr<Page>> all;
     std::size_t usual_units = 0;  // of a page
-    // Frees pages without a span. Unless all_of_them is set, one is kept for spans that are recreated all the time,
-    // provided that it is not large compared with the used space.
+    // Frees pages without a span. Unless all_of_them is set, one page is kept for spans that are recreated often, if it
+    // is not large compared with the used space.
     void drop_empty(bool all_of_them);
   };
 

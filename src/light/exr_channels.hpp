@@ -19,8 +19,8 @@ struct ExrChannels {
   [[nodiscard]] std::size_t count() const { return kind == Kind::luminance ? 1 : 3; }
 };
 
-/// Returns the color channels without a layer, else those of a layer named "Combined" or similar, else of the first
-/// layer with R, G and B. Returns nullopt if there are none.
+/// Returns the color channels without a layer, else those of a layer named "Combined" or similar, else of the first RGB
+/// layer. Returns nullopt if there are none.
 std::optional<ExrChannels> find_colors(const Imf::ChannelList& channels);
 
 /// Returns the first channel that is missing for an image, among the channels without a layer.

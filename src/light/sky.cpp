@@ -194,9 +194,9 @@ class Atmosphere {
     return result;
   }
 
-  // Marches along a ray from radius r. Calls visit(radius, cosine of the sun, air, aerosols) per step, where the last
-  // two are per band the fraction of light that they scatter and that reaches the start. Returns the transmittance of
-  // the whole ray.
+  // Marches along a ray from radius r. Calls visit(radius, cosine of the sun, air, aerosols) per step. The last two
+  // are, per band, the fraction of light that they scatter and that reaches the start. Returns the transmittance of the
+  // whole ray.
   template <class Visit>
   Bands march(double r, double mu, double azimuth, double sun_mu, int steps, const Visit& visit) const {
     const dvec3 start(0.0, r, 0.0);

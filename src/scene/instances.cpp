@@ -140,7 +140,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     dvec3 low = block.middle - reach_of(block);
     dvec3 high = block.middle + reach_of(block);
     if (instance.ends) {
-      // Corners move on straight lines, so positions in between lie within the bounds of both ends.
+      // Corners move on straight lines, so positions in between are within the bounds of both ends.
       const std::size_t at = table.records.size();
       for (const Block& end :
            {stand(instance.ends->open, table.ends[at]), stand(instance.ends->close, table.ends[count + at])}) {

@@ -31,8 +31,8 @@ struct Medium {
 
 /// A camera, in world space (in a snapshot, relative to its origin). For image coordinates (x, y), both -1 to 1, y up,
 /// the ray is: perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along
-/// forward. forward has length 1 along the view axis (off-axis projections add multiples of right and up to it), so
-/// that the ray parameter is the distance z from the eye's plane.
+/// forward. forward has length 1 along the view axis, so that the ray parameter is the distance z from the eye's plane.
+/// (Off-axis projections add multiples of right and up to it.)
 struct Viewpoint {
   glm::dvec3 eye{0.0};  // orthographic: a point in the near plane, where z = 0
   glm::dvec3 forward{0.0, 0.0, -1.0};
