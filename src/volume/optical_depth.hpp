@@ -20,12 +20,13 @@ class CoarseVolume {
   /// all directions through the visibly occupied region. A ray counts if its depth is at least a twentieth of the
   /// depth-weighted mean depth, which excludes haze. Depths are clamped to that of the densest 0.5 % of all rays that
   /// hit the volume, because of extreme voxels. The result is rounded to three significant digits. It depends only on
-  /// the volume, and nearly not on its rotation and scale. Returns nullopt for a volume without extinction.
+  /// the volume: rotation hardly changes it, and scaling changes it in inverse proportion. Returns nullopt for a volume
+  /// without extinction.
   [[nodiscard]] std::optional<double> suggest_density_scale() const;
 
-  /// Returns world-space points around the visible part for this view direction (unit) and density scale. They bound
-  /// every ray with an opacity of at least 5 %. On the ray, they bound the part between half of that opacity from
-  /// either end. The result is symmetric in the direction. Empty if there is no such ray.
+  /// Returns world-space points around the visible part for this view direction (unit) and density scale. Each ray with
+  /// an opacity of at least 5 % contributes the two points at which half of the corresponding optical depth is reached
+  /// from either end. The opposite direction gives the same points. Empty if there is no such ray.
   [[nodiscard]] std::vector<glm::dvec3> visible(const glm::dvec3& direction, double density_scale) const;
 
  private:

@@ -30,7 +30,7 @@ struct StandIn {
 inline constexpr std::uint64_t worth_a_stand_in = 50'000;
 
 struct StandInWish {
-  /// Called on the import's thread, at most once, before the full-resolution import. Its exceptions leave the import.
+  /// Called on the import's thread, at most once, before the full-resolution import. Its exceptions propagate.
   std::function<void(StandIn)> take;
   std::uint64_t least_bricks = worth_a_stand_in;  ///< minimum bricks of the first field; smaller files get no proxy
 };
