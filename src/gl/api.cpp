@@ -15,7 +15,8 @@ struct Loader {
   void* user;
 };
 
-// glad lists the extensions, of which we use none; a lost context gives null for their names, which glad would read.
+// glad lists the extensions, which the library does not use. A lost context returns null for their names, which glad
+// would read.
 const GLubyte* no_string(GLenum /*name*/, GLuint /*index*/) { return reinterpret_cast<const GLubyte*>(""); }
 
 GLADapiproc load_one(void* loader, const char* name) {
@@ -24,7 +25,7 @@ GLADapiproc load_one(void* loader, const char* name) {
   return reinterpret_cast<GLADapiproc>(l->get_proc(l->user, name));
 }
 
-// A current context says its version, unless it is lost or between glBegin and glEnd.
+// A current context returns its version unless it is lost or the thread is between glBegin and glEnd.
 bool is_between_begin_and_end(const Functions& gl, void* (*get_proc)(void* user, const char* name), void* user) {
   if (gl.GetString == nullptr || find_current_context(get_proc, user) == nullptr) return false;
   const auto reset_status =
@@ -103,7 +104,7 @@ void check_reset(const Functions& gl) {
 }
 
 void clear_errors(const Functions& gl) {
-  // A lost context may report errors for ever.
+  // A lost context may report errors forever.
   for (int i = 0; i < 64 && gl.GetError() != GL_NO_ERROR; ++i) {
   }
 }
