@@ -63,7 +63,7 @@ class Camera {
   /// nullopt if the camera does not move.
   [[nodiscard]] std::optional<scene::ViewEnds> ends(double aspect, const scene::Viewpoint& now) const;
 
-  /// Rotates about the pose's up axis and stops just short of it. Angles in radians. yaw: counter-clockwise as seen
+  /// Rotates about the pose's up axis and stops just short of it. Angles are in radians. yaw: counter-clockwise as seen
   /// from above (an eye on +Z moves towards +X; a view along -Z turns towards -X). pitch: raises the eye (orbit) or the
   /// view direction (look).
   void orbit(double yaw, double pitch);

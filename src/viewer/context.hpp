@@ -80,7 +80,7 @@ class Context {
 
   // ---- a frame ----
 
-  /// Returns true if the driver's work competes with the host's for CPU cores.
+  /// Returns true if GL executes on CPU cores that the host's own GL work is still using.
   [[nodiscard]] bool shares_cores() const;
   /// Returns the deadline for tracing in a call that started at `begun`. The budget also covers the expected drawing
   /// time.
