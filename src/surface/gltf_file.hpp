@@ -56,7 +56,8 @@ class Budget {
   void check(std::size_t turn) const {
     if (turn % 16384 == 0) cumulet::check(progress_);
   }
-  /// Returns the progress for an apart() call on this many bytes; null for few bytes, which are not worth a thread.
+  /// Returns the progress to pass to apart() for work on this many bytes; null for few bytes, which are not worth a
+  /// thread.
   [[nodiscard]] const Progress* progress_for(std::uint64_t bytes) const {
     constexpr std::uint64_t few = 65536;
     return bytes < few ? nullptr : progress_;

@@ -280,9 +280,9 @@ inline bool is_hidden(const Pose& pose, std::size_t draw) { return !pose.hidden.
 
 using ScenePtr = std::shared_ptr<const Scene>;
 
-/// Reads a .gltf or .glb. Throws Error(file), one line with the file and the cause, for a file that cannot be read or
-/// is malformed. Throws Error(unsupported) with the name of an unknown extension in extensionsRequired. Logs a warning
-/// for extensions in extensionsUsed that are ignored. Checks `progress` (may be null) for cancellation.
+/// Reads a .gltf or .glb. Throws Error(file), one line with the file and the cause, if the file cannot be read or is
+/// malformed. Throws Error(unsupported) with the name of an unknown extension in extensionsRequired. Logs a warning for
+/// extensions in extensionsUsed that are ignored. Checks `progress` (may be null) for cancellation.
 ScenePtr import_gltf(const FilePath& path, const Log& log, Progress* progress = nullptr);
 
 }  // namespace cumulet::surface

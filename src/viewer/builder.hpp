@@ -32,7 +32,7 @@ struct VolumeFile {
   /// Minimum number of bricks for which a low-resolution proxy is made; tests use other values.
   std::uint64_t least_stand_in_bricks = volume::worth_a_stand_in;
 
-  /// Throws what import_frame and VolumeAsset throw.
+  /// Throws the errors of import_frame() and of VolumeAsset's constructor.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
   /// take_stand_in: receives the low-resolution proxy from import_frame(), transformed by to_world.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress,
@@ -176,8 +176,8 @@ class Builder {
                       const Progress& loading);
   // jobs: cancels the jobs.
   void stop(const std::function<void()>& jobs);
-  // Drops the proxy, also one that is being built. That build has a Progress of its own, because the load's reports
-  // reading the whole file. mutex_ must be held.
+  // Drops the proxy and cancels a proxy that is being built. Such a build has its own Progress, because the load's
+  // reports reading the whole file. mutex_ must be held.
   void drop_stand_in();
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress,
                 const scene::GridPlanPtr& before = nullptr);

@@ -78,7 +78,7 @@ class Context {
   /// Must be called once, before anything else.
   void find_out_dispatches();
 
-  // ---- a frame ----
+  // ---- frames ----
 
   /// Returns true if GL executes on CPU cores that the host's own GL work is still using.
   [[nodiscard]] bool shares_cores() const;
@@ -108,18 +108,18 @@ class Context {
   /// Updates the time-budget margin with the time taken, for frames in which the host shared the cores.
   void learn(const Frame& frame, double taken_ms) { reserve_.learn(frame.budget_ms, taken_ms); }
 
-  // ---- for the host's own drawing ----
+  // ---- transmittance maps for the host's own drawing ----
 
   [[nodiscard]] MapResult update_map(const Shot& shot, const MapRequest& request, render::Deadline deadline);
   void drop_map(std::uint32_t slot) { maps_.erase(slot); }
 
-  // ---- before the first ----
+  // ---- warm-up before the first frame ----
 
   /// Compiles the programs that frames like this need and uses each once, until about the deadline. all: also compiles
   /// all other programs, and finally throws the first build failure. waits: further programs may be needed later.
   WarmUp warm_up(const Shot& shot, const Frame& frame, bool all, bool waits, render::Deadline deadline);
 
-  // ---- reading back: waits for what is under way ----
+  // ---- read-back; waits for in-flight dispatches ----
 
   /// Returns the image for read-back. Throws Error(invalid_argument) before the first one.
   render::Picture& readable();

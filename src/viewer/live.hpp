@@ -32,8 +32,8 @@ class Live {
       : bounds_(bounds), values_wanted_(stays_in_gl ? std::make_shared<volume::ValuesWanted>() : nullptr) {}
 
   /// Submits a complete new state. lease: called after all checks that may fail; the voxels are then read in place
-  /// until it is destroyed. Null: they are copied. Throws what check_fields() throws, and for copied voxels what
-  /// require_finite() throws; nothing is submitted then.
+  /// until it is destroyed. Null: they are copied. Throws the errors of check_fields(), and for copied voxels those of
+  /// require_finite(); nothing is submitted then.
   void set(const std::vector<volume::MemoryField>& fields, std::string name, const MakeLease& lease = nullptr);
   /// Submits a state that equals the last one except for these bricks. Throws as set(), and Error(invalid_argument) for
   /// fields that accept no bricks.
@@ -94,8 +94,8 @@ class Live {
     std::uint64_t number = 0;  ///< 0: none
   };
   /// Returns the newest state. The first caller reads it, others wait. Throws Error(cancelled) if this caller's
-  /// progress is cancelled. For a state that is refused it throws once what import_fields(), require_finite() and
-  /// VolumeAsset throw; the last valid state then stays the newest.
+  /// progress is cancelled. For a state that is refused it throws the error of import_fields(), require_finite() or
+  /// VolumeAsset once; the last valid state then stays the newest.
   [[nodiscard]] State read(Progress& progress);
   /// Bounds of all states, if known.
   [[nodiscard]] const std::optional<Bounds>& bounds() const { return bounds_; }

@@ -54,9 +54,9 @@ struct Stats {
   GlStrings strings;
 };
 
-/// The implementation behind the C ABI: takes settings, renders images. It rebuilds only what a change has outdated.
-/// Threads, GL context and GL state: see cumulet.h. Functions throw Error; a call that throws leaves the viewer
-/// unchanged.
+/// The implementation behind the C ABI: takes settings, renders images. A change causes only the rebuilds that it
+/// requires. Threads, GL context and GL state: see cumulet.h. Functions throw Error; a call that throws leaves the
+/// viewer unchanged.
 class Viewer {
  public:
   using GetProc = void* (*)(void* user, const char* name);
@@ -323,7 +323,7 @@ class Viewer {
   [[nodiscard]] bool fits(const Built& built) const;
   // Returns the displayed frame of a sequence.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
-  // A sequence that is shown: what was requested and taken.
+  // A sequence that is shown, with the last request and the last frame taken.
   struct Followed {
     std::shared_ptr<Sequence> sequence;
     std::shared_ptr<void> listener;
@@ -371,7 +371,7 @@ class Viewer {
   };
   using PlayedPtr = std::shared_ptr<Played>;
   struct Shown;
-  // A dynamic volume that is shown: what was taken and displayed.
+  // A dynamic volume that is shown, with the last states taken and displayed.
   struct Watched {
     std::shared_ptr<Live> live;
     std::shared_ptr<void> listener;
@@ -632,7 +632,7 @@ class Viewer {
   std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
   std::uint64_t most_gl_bytes_ = Allowance::no_limit;
   bool cells_due_ = false;                          // limits changed, so the grid may need another number of cells
-  std::optional<std::uint64_t> gl_beside_volumes_;  // GPU memory not used by volumes in the last frame
+  std::optional<std::uint64_t> gl_beside_volumes_;  // GPU memory used by everything except volumes in the last frame
   bool cuts_own_ = false;                           // the running build coarsens the viewer's own grid to fit a limit
   std::size_t grids_ = 1;                           // number of grids that share the GPU memory for volumes equally
   std::uint64_t part_of_gl_ = Allowance::no_limit;  // share of each grid when cells were last requested
