@@ -47,9 +47,9 @@ Weights Weights::of_density(double depth, const RefineSettings& settings) {
   return {.per_depth = hidden > 0.0 ? scale / hidden : 1.0 / depth, .own_hiding = hiding(scale, settings.anisotropy)};
 }
 
-// A deviation is weighted relative to the strongest component, or by its effect on the luminance if that is larger:
-// most of the luminance of a red fire is green. The factor is one fifth above that of density, because scattering blurs
-// density. With it fires meet the same image error as clouds (tests/bench/README.md, Grids by default).
+// A deviation is weighted relative to the strongest component, or by its effect on the luminance if that is larger: in
+// a red fire, green has most of the luminance. The factor is one fifth above that of density, because scattering blurs
+// density. It was chosen so that fires have the same image error as clouds (tests/bench/README.md, Grids by default).
 Weights Weights::of_emission(const dvec3& depth, int component, const RefineSettings& settings) {
   const double most = std::max({depth.r, depth.g, depth.b});
   if (!(most > 0.0)) return {};

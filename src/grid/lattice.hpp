@@ -92,10 +92,10 @@ struct Lattice {
   void fill_coarse(const Statistics& statistics, const Progress* progress);
   [[nodiscard]] LatticeChannel make_channel(const ChannelFields& fields, const Progress* progress) const;
   void fill_bricks(const ChannelFields& fields, LatticeChannel& made, const Progress* progress) const;
-  // Calls visit(index, corner, scale) for each place within the cube.
+  // Calls visit(index, corner, scale) for each entry of `places` within the cube.
   template <class Visit>
   void for_each_place(const Progress* progress, Visit&& visit) const;
-  // Returns the index of the place at the center of this octree cube.
+  // Returns the index in `places` for the point at the center of this octree cube.
   [[nodiscard]] std::size_t place_about(const glm::ivec3& corner, int log2_size) const;
   // Returns the index of the block with this corner and scale; 0: none.
   [[nodiscard]] std::uint32_t block_at(const glm::ivec3& corner, std::uint32_t scale) const;

@@ -58,9 +58,9 @@ struct BricksToRate {
   }
 };
 
-/// View-independent priorities of splits. For each octree cube in which a split is worthwhile it has the 16-bit
-/// priorities that the cube's own cells give to their split vertices, down to the last level with any. A view only
-/// limits the number of levels per cube. Memory: at most 2 bytes per point of 9^3 per brick.
+/// View-independent priorities of splits. It has an entry for each octree cube in which a split is worthwhile. The
+/// entry has the 16-bit priorities that the cube's own cells give to their split vertices, down to the last level with
+/// any. A view only limits the number of levels per cube. Memory: at most 2 bytes per point of 9^3 per brick.
 struct OwnPriorities {
   /// Layout: glsl/lattice.glsl.
   using Node = glm::uvec3;

@@ -119,9 +119,8 @@ void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
                                const scene::GridPlanPtr& before = nullptr);
 
 /// Loads volumes and builds their grids on a worker thread, one job at a time. Requests are coalesced: the latest wins.
-/// A running build is finished first, and of consecutive running loads at least every second is finished, so
-/// intermediate results are displayed. Held at a time: one running job, one queued job and one result. All calls are
-/// thread-safe.
+/// A running build is finished first. In a stream of loads at least every second one is finished, so intermediate
+/// results are displayed. Held at a time: one running job, one queued job and one result. All calls are thread-safe.
 class Builder {
  public:
   /// notify: called on the worker thread after a job ended.

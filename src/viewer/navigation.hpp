@@ -30,9 +30,10 @@ struct InputEvent {
 };
 
 /// Converts a viewer's input into camera operations. Buttons and keys act only with exactly the modifiers of the style.
-/// A drag continues until its own button is released. With speed 1 a drag over the image's height orbits by half a
-/// turn, looks by a quarter, pans by the height at the target, or dollies by a factor of 10. A wheel step dollies by
-/// 1.15.
+/// A drag continues until its own button is released.
+///
+/// With speed 1, a drag over the image's height orbits by half a turn or looks by a quarter turn. It pans by the height
+/// at the target, or dollies by a factor of 10. A wheel step dollies by 1.15.
 ///
 /// Keys in every style: F, Home, keypad '.': fit the subject; arrows: orbit by 15 degrees, with shift: pan by a
 /// twentieth; + (or =) and -: dolly as the wheel does. Additional keypad keys of Blender: 1, 3, 7 (ctrl: the opposite

@@ -135,7 +135,8 @@ class Viewer {
     std::uint64_t memory_bytes = Allowance::no_limit;  ///< for volumes and grids in main memory
     std::uint64_t gl_bytes = Allowance::no_limit;      ///< no volume is uploaded beyond it
   };
-  /// Applies to work started after this call. Grids are rebuilt if the memory limits changed.
+  /// Applies to work started after this call. Grids whose number of cells no longer suits the memory limits are
+  /// rebuilt.
   void set_limits(const Limits& limits);
   void cancel();
   /// timeout_ms: negative: no limit. Throws Status::failure, or Error(timeout).
@@ -336,7 +337,7 @@ class Viewer {
     bool take_due = false;
     std::uint64_t id = 0;                       // identifies this object
     std::optional<scene::SequenceFrame> frame;  // frame taken last
-    bool is_wanted = false;                     // it is final: nothing better will come
+    bool is_wanted = false;                     // it is final: nothing better is expected
     bool is_rendered = false;                   // a frame has rendered it
 
     // True if there is work pending for it.
