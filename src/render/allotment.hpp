@@ -17,15 +17,16 @@ namespace cumulet::render {
 /// samples.
 ///
 /// A half-block is the even or the odd rows of a block of 8 x 8 pixels. For half-blocks of w pixels with a standard
-/// deviation s per sample, sum(w s^2 / n) is the squared error. The allocation n ~ s gives the squared error V with the
-/// minimum total sum(w n) (Neyman, "On the Two Different Aspects of the Representative Method", 1934). Half-blocks that
-/// already have more samples leave less for the others to do.
-/// A half-block stops when it has its n samples. It starts again when n has grown to more than twice its samples, or
-/// when the samples per pixel of the picture reach 16 times its own, so that rare light that neither half has sampled
-/// is not missed for good.
+/// deviation s per sample, sum(w s^2 / n) is the squared error. The allocation n ~ s reaches a squared error V with the
+/// minimum total sum(w n). Reference: Neyman, "On the Two Different Aspects of the Representative Method", 1934.
+/// Half-blocks that already have more samples leave less for the others to do.
+/// A half-block stops when it has its n samples. It starts again when n has grown to more than twice its samples. It
+/// also starts again when other pixels have 16 times its samples, so that rare light that neither half has sampled is
+/// not missed for good.
 /// The deviation that decides is that of the other half of the block, because its samples are independent of the
-/// half-block's own: a pixel's sample count must not depend on its sample values. A block without a second half uses
-/// the block above. If no half-block continues by this rule although noise is left, the half-blocks' own errors decide.
+/// half-block's own. The sample count of a pixel must hardly depend on its sample values, which would bias the result.
+/// A block without a second half uses the block above. If no half-block continues by this rule although noise is left,
+/// the half-blocks' own errors decide.
 class Allotment {
  public:
   static constexpr unsigned edge = CM_SQUARE_EDGE;

@@ -33,7 +33,7 @@ class BrickMoves {
   void plan_together(Upload& upload, std::span<const volume::DeviceBricksPtr> fields,
                      std::span<const glm::ivec3> origins, const Use& use);
   /// The interleaved buffer; valid in the steps that `use` plans. Voxel v of brick b and field f has index (512 b + v)
-  /// * fields + f; it is 0 if the field has no such brick.
+  /// * fields + f. Missing bricks are 0.
   [[nodiscard]] const gl::Object& together() const { return together_; }
   /// Frees the lists of copies. Call it after the last planned step.
   void drop() { lists_.clear(); }

@@ -46,18 +46,18 @@ struct FrameTarget {
 };
 
 /// Draws an accumulated picture into a rectangle of a framebuffer, with one triangle, bilinearly filtered if sizes
-/// differ. A picture over rasterized surfaces of another size than the rectangle is composed at the surfaces' size,
-/// which is most of the work, and then enlarged. Needs a current context and an active StateGuard; changes GL state
+/// differ. A picture over rasterized surfaces of another size than the rectangle is composed at the surfaces' size, and
+/// then enlarged. Composing is most of the work. Needs a current context and an active StateGuard; changes GL state
 /// freely. Vertex arrays and framebuffers belong to one context of a share group, so they are created per call.
 class Compositor {
  public:
   Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(std::move(gl)), programs_(std::move(programs)), composed_(gl_), wavelet_(gl_, programs_) {}
   /// Draws the picture. Draws nothing if there is no picture or the rectangle is empty. Writes color to draw buffer 0
-  /// only, whatever the depth there: cm_display_over() of glsl/display.glsl, from premultiplied radiance. Throws
+  /// only, without a depth test: cm_display_over() of glsl/display.glsl, from premultiplied radiance. Throws
   /// Error(invalid_argument) as check_target().
-  /// The image is composed into a texture and copied if the last frame drew the same image, or if the driver runs
-  /// dispatches within the call. Only rows that changed are composed again.
+  /// The image is composed into a texture and copied if the last frame drew the same image. Drivers that run dispatches
+  /// within the call always use that texture. Only rows that changed are composed again.
   /// If display.denoise is set and the picture has guides, it is denoised over several frames within filter_ms. Until
   /// that is done, the last denoised picture of the same request is drawn, or else the noisy one. Throws
   /// Error(out_of_memory, gl), once per size, if there is no memory for denoising or its programs do not build; the
@@ -80,8 +80,8 @@ class Compositor {
   [[nodiscard]] bool drawn() const {
     return drawn_.passed() && std::ranges::all_of(means_, [](const auto& means) { return means->drawn.passed(); });
   }
-  /// True if the last draw() showed an older image, or none, because all buffers were in use by the GPU or a program
-  /// was still compiling. Draw again.
+  /// True if the last draw() showed an older image, or none. The reason is that all buffers were in use by the GPU, or
+  /// that a program was still compiling. Draw again.
   [[nodiscard]] bool lags() const { return lags_; }
   /// True if a picture that has all its samples is not denoised yet.
   [[nodiscard]] bool denoising() const { return denoising_; }
@@ -93,9 +93,9 @@ class Compositor {
  private:
   using Clock = std::chrono::steady_clock;
   using Background = MeansBackground;
-  /// A texture of mean radiance that is drawn. On drivers that run dispatches within the call, a dispatch that writes a
-  /// texture which queued drawing reads waits for everything that the host has queued. This holds for sums as well as
-  /// for means. Therefore drawing reads only means, and while anything is queued a new texture is used for each write:
+  /// A texture of mean radiance that is drawn. Some drivers run dispatches within the call. A dispatch that writes a
+  /// texture which queued drawing reads then waits for everything that the host has queued. This holds for sums as well
+  /// as for means, so drawing reads only means. While anything is queued, each write uses a new texture, because
   /// llvmpipe may consider textures of old frames as still in use.
   struct Means {
     gl::Object texture;

@@ -46,7 +46,7 @@ inline std::uint32_t curve_of(const Display& display) {
 
 /// Converts premultiplied, exposed radiance to an sRGB-encoded color with straight alpha. If radiance does not exceed
 /// alpha, the color is display(radiance / alpha) and alpha is unchanged. Radiance beyond that, as of emission, has no
-/// straight color: the excess is treated as light from the uncovered part of the pixel, and alpha is raised until it
+/// straight color. The excess is treated as light from the uncovered part of the pixel, and alpha is raised until it
 /// can hold the color. Over black nothing is lost.
 inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve) {
   const float alpha = std::min(core::cm_displayable(exposed.w), 1.0F);

@@ -459,8 +459,8 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
         // Lattices are only needed for later views, so they are freed first.
         if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.most_bytes, deadline);
         // If the new cells do not fit beside the old ones, the old ones are freed first. They are kept if they include
-        // some of the new grids, because those would have to be made again. Exception: if the memory in use alone
-        // exceeds the limit, grids in main memory are uploaded again from there.
+        // some of the new grids, because those would have to be made again. Exception: if the memory in use exceeds the
+        // limit by itself, grids in main memory are uploaded again from there.
         const std::uint64_t held = data_bytes() + other_bytes();
         const auto is_kept = [&](const scene::MarchSourcePtr& source) {
           return data_->grid(*source) != nullptr && (source->plan || held <= wanted.most_bytes);

@@ -68,7 +68,7 @@ class GpuScene {
   /// The part of other_bytes() that can be freed when volumes arrive: grid builds in progress, and free space of the
   /// heap's pages.
   [[nodiscard]] std::uint64_t passing_bytes() const { return grids_.bytes() + heap_.free_bytes(); }
-  /// Of a tetrahedral grid; null: it is not uploaded.
+  /// Cell counts of a tetrahedral grid; null: it is not uploaded.
   [[nodiscard]] const MarchData::Cells* cells(const scene::MarchSourcePtr& of) const {
     return data_ && of ? data_->cells(*of) : nullptr;
   }

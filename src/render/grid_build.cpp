@@ -107,7 +107,7 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
       upload_(gl, "uploading the lattice") {
   data_->lattice_ = std::move(lattice);
   const grid::Lattice& l = *data_->lattice_;
-  // The shader counts the cells of each block in 32 bits.
+  // The shader's counters of added cells have 32 bits.
   constexpr std::size_t most_blocks = std::size_t{1} << 20U;
   if (l.blocks.size() > most_blocks) {
     throw Error(ErrorCode::unsupported,
@@ -872,7 +872,7 @@ BuiltGrid built_of(grid::TetGrid grid) {
   return made;
 }
 
-// Returns an empty grid, for a source whose voxels are not available.
+// Returns an empty grid: the source's voxels are not available.
 BuiltGrid nothing_of(const scene::MarchSource& source) {
   volume::ScalarVolume none;
   none.index_to_world = source.volume->index_to_world;

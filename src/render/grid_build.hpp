@@ -90,7 +90,7 @@ class LatticeUpload {
   // list: per brick its node number, and the index of its values.
   void plan_priorities(const std::vector<glm::uvec2>& list, bool of_density, const grid::OwnMeasure& measure);
   void plan_channels();
-  // Plans a buffer of bricks with constant values, or with values that fill() writes to the given address.
+  // Plans the upload of complete bricks. fill: writes the values of a brick to the given address.
   using FillBrick = std::function<void(std::size_t brick, std::byte* to)>;
   void plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill);
 

@@ -23,16 +23,16 @@ struct HostDepthInput {
   bool unchanged = false;  // the host says so: nothing is read if all other fields except the name are as before
 };
 
-/// Converts the host's depth buffer to view depth z: one layer per sample (at most 8), row 0 at the picture's top,
-/// infinity without a surface (at or beyond the far value). Needs a current context and an active StateGuard; changes
-/// GL state freely.
+/// Converts the host's depth buffer to view depth z, with one layer per sample (at most 8) and row 0 at the picture's
+/// top. Pixels at or beyond the far value have no surface and get infinity. Needs a current context and an active
+/// StateGuard; changes GL state freely.
 class HostDepth {
  public:
   HostDepth(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
   /// Reads the input. Returns whether z is known to differ anywhere from before (or its size or layer count does). The
-  /// result may be that of an earlier call, because update() does not wait for the device. (Mesa's llvmpipe does wait
-  /// for the host's drawing to the depth buffer.) Throws Error(invalid_argument) if the name is not such a texture or
-  /// framebuffer, has no depth, or is smaller than the viewport; z is then unchanged. O(pixels).
+  /// result may be that of an earlier call, because update() does not wait for the device. Exception: Mesa's llvmpipe
+  /// waits for the host's drawing to the depth buffer. Throws Error(invalid_argument) if the name is not such a texture
+  /// or framebuffer, has no depth, or is smaller than the viewport. In that case z is unchanged. O(pixels).
   bool update(const HostDepthInput& input);
   /// True if the result of a comparison is not known yet; a later update() returns it.
   [[nodiscard]] bool pending() const { return waits_ || !asked_.empty(); }

@@ -73,8 +73,8 @@ class PlacedModels {
   [[nodiscard]] const light::SceneLights& lights() const { return table_.lights; }
   [[nodiscard]] const scene::ModelTable& table() const { return table_; }
   [[nodiscard]] const std::vector<scene::Model>& models() const { return models_; }
-  /// Identity that stays the same while paths in flight stay valid. Triangle numbers must then mean the same triangles,
-  /// whatever their pose or transform; with extended materials, word offsets must mean the same materials.
+  /// Identity that stays the same while paths in flight stay valid. Triangle numbers must then mean the same triangles;
+  /// poses and transforms may differ. With extended materials, word offsets must mean the same materials.
   [[nodiscard]] std::shared_ptr<const void> numbering() const { return numbering_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 

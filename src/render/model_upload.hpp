@@ -8,7 +8,7 @@
 
 namespace cumulet::render {
 
-/// Which GPU data of surfaces are made: for paths, for the surface pass, or both.
+/// Selects the GPU data of surfaces to make: for paths, for the surface pass, or both.
 enum class ModelParts { paths, raster, both };
 
 /// Uploads posed surfaces in steps, while the previous ones are still shown. All calls need a current context and an

@@ -109,7 +109,7 @@ struct Dispatched {
 
 /// A slot: this many lanes cost about as much as one.
 constexpr double lanes_a_slot = 8.0;
-/// Minimum GPU time per frame, whatever its budget, so that there is progress.
+/// Minimum GPU time per frame for any budget, so that there is progress.
 constexpr double least_ms = 1.0;
 /// Maximum time of a dispatch: well below any driver's watchdog, well above its overhead.
 constexpr double dispatch_ms = 500.0;
@@ -121,7 +121,7 @@ constexpr double part_of_rest = 0.9;
 [[nodiscard]] std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from,
                                                const std::shared_ptr<RoundCost>& cost, double aim_ms,
                                                std::uint32_t most_rounds);
-/// Chooses a dispatch of least_ms, with at least one round of one block, whatever that takes.
+/// Chooses a dispatch of least_ms, with at least one round of one block even if that takes longer.
 [[nodiscard]] std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from,
                                                      const std::shared_ptr<RoundCost>& cost, std::uint32_t most_rounds);
 /// Updates the cost estimate with a finished dispatch. ms: GPU time, if known; at_most_ms: its upper bound.
@@ -192,10 +192,10 @@ class Flights {
     bool in_call = false;  // finished when its call returns
     std::optional<double> in_call_ms;
   };
-  // Layout of a slot of the ring: the results, two timestamps, and two marks that the device writes when it reaches and
-  // when it finishes the dispatch. Marks are polled because zink waits for all work of the host when a fence is
-  // queried. (Drivers that run dispatches within the call also write marks at once, whatever is queued; fences are used
-  // there.)
+  // Layout of a slot of the ring: the results, two timestamps, and two marks. The device writes the marks when it
+  // reaches and when it finishes the dispatch. Marks are polled because zink waits for all work of the host when a
+  // fence is queried. (Drivers that run dispatches within the call also write marks at once, before queued work; fences
+  // are used there.)
   static constexpr std::size_t times_bytes = 16;
   static constexpr std::size_t place_bytes = most_words * 16 + times_bytes + 16;
   enum class Mark : std::size_t { begun = 0, over = 1 };

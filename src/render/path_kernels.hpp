@@ -35,7 +35,7 @@ class PathKernels {
   bool reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
   /// Binds all buffers that reserve() made.
   void bind() const;
-  /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
+  /// The buffer of counters: the blocks that a dispatch covers, and its results (CmBlocks of glsl/path_store.glsl).
   [[nodiscard]] GLuint counters() const { return blocks_.name(); }
   void set_counters(std::span<const glm::uvec4> words) const;
   /// Sets the list of a tile's sampled blocks (CM_SQUARE_ROWS of glsl/path_blocks.glsl). Sets the next free pixel slot

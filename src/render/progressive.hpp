@@ -53,20 +53,21 @@ struct PictureWish {
   PictureParameters parameters;        // of the content, at full resolution
   scene::SequenceFrames frames;        // frames that the data belong to
   std::uint32_t samples = 1;           // samples per pixel
-  std::optional<double> noise_target;  // at full resolution: the picture is done at this noise, whatever its samples
+  std::optional<double> noise_target;  // at full resolution: the picture is done at this noise, even with fewer samples
   bool depth = false;                  // compute the volume's depth at half opacity as well
   bool guides = false;                 // render feature buffers for the denoiser as well
   bool held = false;                   // the user is dragging: another change is likely
 };
 
 /// Progressive refinement. Keeps the newest complete picture to show while the next is rendered. After a change, a
-/// coarse picture that fits the frame time comes first, then pictures of twice the resolution each, then the full one,
-/// which continues to its target samples.
-/// Each coarse picture is shown as soon as it is complete. It continues to a few samples per pixel, at most a quarter
-/// of the work of one sample per pixel at full resolution, so that it has little noise while the next is rendered.
+/// coarse picture that fits the frame time comes first. Pictures of twice the resolution each follow. The full one is
+/// last, and continues to its target samples.
+/// Each coarse picture is shown as soon as it is complete. It then continues to a few samples per pixel, so that it has
+/// little noise while the next is rendered. These samples take at most a quarter of the work of one sample per pixel at
+/// full resolution.
 /// If requests change faster than a coarse picture takes, each is finished before the newest request is processed. Once
-/// requests do not change any more, a picture over a coarse surface pass is replaced by one over a full-size surface
-/// pass, which later pictures share. All calls need a current context and an active StateGuard.
+/// requests do not change any more, a picture over a coarse surface pass is replaced. The new one has a full-size
+/// surface pass, which later pictures share. All calls need a current context and an active StateGuard.
 class Progressive {
  public:
   /// Returns size and layer count of the surface pass for pictures that must appear soon. rests: the request has not

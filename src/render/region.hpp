@@ -31,7 +31,7 @@ struct Region {
   [[nodiscard]] PixelBox pixels(glm::uvec2 size, std::uint32_t margin = 0) const {
     PixelBox box;
     for (int axis = 0; axis < 2; ++axis) {
-      // The tolerance makes an edge shared by two regions fall between the same two centers for both, whatever the
+      // The tolerance makes an edge shared by two regions fall between the same two centers for both, even with
       // rounding of floats.
       constexpr double rounding = 2e-3;  // pixels
       const auto before = [&](double edge) {

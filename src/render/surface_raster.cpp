@@ -42,8 +42,8 @@ glm::dmat3 to_view(const SurfaceView& view) {
   return inverse;
 }
 
-/// Returns the coefficients of clip-space depth x + y z, from 1 at the near plane to 0 at the far one (perspective: at
-/// infinity), for the content of the bounds.
+/// Returns the coefficients (x, y) of clip-space depth x + y z for content in the bounds. The depth is 1 at the near
+/// plane and 0 at the far one (perspective: at infinity).
 glm::dvec2 depth_of(const SurfaceView& view, const glm::dmat3& matrix, const glm::dvec3& low, const glm::dvec3& high) {
   double nearest = std::numeric_limits<double>::infinity();
   double farthest = -nearest;

@@ -42,9 +42,9 @@ struct SurfaceLayers {
   [[nodiscard]] std::uint64_t bytes() const { return std::uint64_t{size.x} * size.y * layers * (blended ? 24U : 12U); }
 };
 
-/// Returns the sample position of a layer in its pixel: x to the right, y down the picture, from the pixel's corner,
-/// both in (0, 1). `layers` (1 to 8) positions form an n-rooks pattern: each column and each row of layers x layers
-/// cells has one. See glsl/jitter.glsl.
+/// Returns the sample position of a layer, relative to the pixel's corner: x to the right, y down the picture, both in
+/// (0, 1). `layers` (1 to 8) positions form an n-rooks pattern: each column and each row of layers x layers cells has
+/// one. See glsl/jitter.glsl.
 glm::vec2 surface_jitter(unsigned layer, unsigned layers);
 
 /// A scene in a pose, uploaded for the surface pass of one context.
@@ -114,7 +114,7 @@ struct RasterItem {
 /// composited over them.
 ///
 /// Materials are metallic-roughness with KHR_materials_ior, _specular, _clearcoat, _emissive_strength and _unlit, as in
-/// glsl/bsdf.glsl, with normal and occlusion maps (occlusion dims only the sky) and vertex colors. There are no
+/// glsl/bsdf.glsl. Normal maps, occlusion maps (which dim only the sky) and vertex colors are supported. There are no
 /// shadows. If the vertices of a normal map have no tangents, screen-space derivatives are used.
 ///
 /// BLEND triangles are drawn into layers of their own, tested against the opaque z. They are sorted back to front by

@@ -251,7 +251,7 @@ void Picture::end_tile() {
   const bool all_begun = has_lanes_for_all();
   if (all_begun && empty <= rest) complete_ = true;
   holes_ = all_begun ? empty > 0 : hasty_ && pass_ < 2;
-  // The first pass of a hasty picture leaves its last few pixels to the second.
+  // With PictureSettings::hasty, the first pass leaves its last few pixels to the second.
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
   if (measures()) {

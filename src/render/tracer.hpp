@@ -39,8 +39,8 @@ struct Totals {
   std::optional<double> noise;
 };
 
-/// Inputs of the path tracer other than the volume data: host depth as HostDepth keeps it, triangles, environment,
-/// lights, and the instance table if there are several volumes.
+/// Trace inputs other than the volume data: host depth as of HostDepth, triangles, environment, lights, and the
+/// instance table if there are several volumes.
 struct Obstacles {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
@@ -95,7 +95,7 @@ constexpr std::size_t channels_of(PixelFact fact) {
   if (fact == PixelFact::motion || fact == PixelFact::volume_motion) return 2;
   return fact == PixelFact::normal || fact == PixelFact::albedo || fact == PixelFact::velocity ? 3 : 1;
 }
-/// Which feature buffers are rendered together: denoiser guides, or velocity and motion vectors as well.
+/// Feature buffers that are rendered together: denoiser guides, or velocity and motion vectors as well.
 enum class PixelFacts { guides, all };
 
 /// Feature rays per pixel when feature buffers are read back; the denoiser starts with fewer. Pixels whose rays differ,
@@ -129,7 +129,7 @@ struct Accumulated {
 /// In a dispatch a lane runs a bounded number of rounds and keeps its path for the next dispatch.
 /// Samples come in passes: each pass ends in every tile before the next begins. A picture with a lane for every pixel
 /// has one pass.
-/// Each pixel belongs to one lane at a time and adds its samples in order, and a sample that is started again gives the
+/// Each pixel belongs to one lane at a time and adds its samples in order. A sample that is started again gives the
 /// same result. So the image depends only on parameters and sample count, not on tiles, lanes, budgets, timing, or when
 /// results of dispatches arrive.
 class Picture {
@@ -156,7 +156,7 @@ class Picture {
   [[nodiscard]] double progress() const;
   /// Camera paths that are known to be finished.
   [[nodiscard]] std::uint64_t samples() const { return samples_ ? samples_->finished : 0; }
-  /// Those among them with nonfinite radiance, which count as black.
+  /// Finished camera paths with nonfinite radiance, which count as black.
   [[nodiscard]] std::uint64_t samples_not_finite() const { return samples_ ? samples_->not_finite : 0; }
   /// Mean number of samples per pixel, rounded down.
   [[nodiscard]] std::uint64_t samples_a_pixel() const;
@@ -333,9 +333,9 @@ class Tracer {
   bool able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   /// Reads a feature buffer, channels_of(fact) floats per pixel, after find_facts() has rendered it.
   void read_fact(const Picture& picture, PixelFact fact, float* values) const;
-  /// Reads Cryptomatte: width * height * ranks pairs of floats, an ID as a float's bits and its coverage of the pixel,
-  /// sorted by descending coverage: glsl/cryptomatte.comp. Rendered again in each call. ranks: 1 to most_matte_ranks.
-  /// data, obstacles: those that the picture was started with.
+  /// Renders and reads Cryptomatte (glsl/cryptomatte.comp): width * height * ranks pairs of floats, sorted by
+  /// descending coverage. A pair is an ID as a float's bits and its coverage of the pixel. ranks: 1 to
+  /// most_matte_ranks. data, obstacles: those that the picture was started with.
   void read_mattes(const Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
                    std::uint32_t ranks, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;

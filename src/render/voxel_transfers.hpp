@@ -85,8 +85,8 @@ class VoxelTransfers {
   using Arrival = std::variant<Arrive, StayInGl>;
   /// Called if a complete state is invalid. Updates of it that were in flight are dropped.
   using Refuse = std::function<void()>;
-  /// Starts a transfer. whose: identifies the volume. Of the complete states of one volume in flight, the oldest and
-  /// the newest arrive; others are dropped. The caller must have checked channels and transforms. Throws
+  /// Starts a transfer. whose: identifies the volume. If several complete states of one volume are in flight, the
+  /// oldest and the newest arrive; others are dropped. The caller must have checked channels and transforms. Throws
   /// Error(invalid_argument) for invalid objects, Error(unsupported) beyond the driver's limits, and the errors of GL
   /// allocations; then nothing has changed.
   void begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse);
@@ -109,8 +109,8 @@ class VoxelTransfers {
   /// True if any transfer is in flight.
   [[nodiscard]] bool busy() const { return !transfers_.empty(); }
   /// Processes transfers that have arrived, until about the deadline. Throws the errors of the callbacks, and
-  /// Error(file) for voxels that are not finite. That state is then dropped, and if it is complete its updates as well;
-  /// the next call continues.
+  /// Error(file) for voxels that are not finite. The state is then dropped, with its updates if it is a complete one.
+  /// The next call continues.
   void follow(Deadline deadline);
   /// GL memory.
   [[nodiscard]] std::uint64_t bytes() const;

@@ -15,19 +15,19 @@ namespace cumulet::render {
 /// Variance-guided edge-avoiding a-trous wavelet filter (Dammertz et al. 2010; Schied et al. 2017, SVGF) with temporal
 /// reprojection.
 ///
-/// Edges are differences beyond the noise, and differences of the noise-free feature buffers: normal and depth of
-/// surfaces, transmittance of the volume and its depth at half opacity. Radiance is demodulated before filtering: it is
-/// divided by the surface's albedo and by the volume's coverage of the pixel. Both the radiance and the divisor are
-/// filtered as sums, so that no small number divides. The background is that of the pixel's own samples, weighted by
-/// the filtered uncovered fraction.
-/// The filter vanishes as samples come in: with the noise's deviation the filter widths go to 0, and the result
-/// converges to the mean of samples. If the filter's error exceeds the noise, as estimated from the difference that it
-/// makes around a pixel, most of the unfiltered radiance is kept.
+/// Edges are differences beyond the noise, and differences of the noise-free feature buffers. These are normal and
+/// depth of surfaces, transmittance of the volume, and its depth at half opacity. Radiance is demodulated before
+/// filtering: it is divided by the surface's albedo and by the volume's coverage of the pixel. Both the radiance and
+/// the divisor are filtered as sums, so that no small number divides. The background is that of the pixel's own
+/// samples, weighted by the filtered uncovered fraction.
+/// As samples come in, the tolerance of edges goes to 0 with the noise's deviation, and the result converges to the
+/// mean of samples. If the filter's error exceeds the noise, as estimated from the difference that it makes around a
+/// pixel, most of the unfiltered radiance is kept.
 ///
 /// Temporal accumulation: pictures with a view keep a history of at most 32 samples per pixel, including earlier
 /// history, for the next picture. Pixels are reprojected by depth: of surfaces, or the mean scattering depth of the
 /// medium. History is accepted if depth, normal and transmittance match. It is clamped to the range of the new samples
-/// around the pixel, and its confidence is reduced if it differs from them by more than their noise. It counts as the
+/// around the pixel. Its confidence is reduced if it differs from them by more than their noise. It counts as the
 /// pixel's own samples, and fades out as the pixel gets 64 new ones.
 ///
 /// Memory: 112 bytes per pixel while denoising, and 80 more for pictures with a view. All calls except the queries need
@@ -97,7 +97,7 @@ class Wavelet {
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>(),
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>()};
   glm::uvec2 size_{0U};
-  // Of each pair the first is read and the second written.
+  // In each pair, the first is read and the second written.
   std::array<gl::Object, 2> front_;
   std::array<gl::Object, 2> spread_;
   gl::Object guides_;
