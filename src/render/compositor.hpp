@@ -140,7 +140,7 @@ class Compositor {
                      const Display& display, const FrameTarget& target);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   [[nodiscard]] static MeansOf means_of(const PictureTextures& picture, Background background, bool filtered);
-  // Returns the means to draw; null if there is no memory for them.
+  // Returns the Means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture, Background background, Wait wait);
   // Returns denoised means; null if they are not ready and there are none of the same request.
   Means* filter(const PictureTextures& picture, Background background, const FrameTarget& target);

@@ -29,7 +29,7 @@ namespace {
 
 constexpr std::uint32_t group = 64;  // invocations per work group, of all kernels here
 constexpr std::size_t roots_words = 2 * CM_ROOTS + 4;
-constexpr double parts_weight = 0.05;      // of a part of a cell, relative to the rest of its record
+constexpr double parts_weight = 0.05;      // cost of a part of a cell, relative to the rest of its record
 constexpr double most_in_flight_ms = 8.0;  // independent of the deadline, because the host draws, too
 
 // Layout as in glsl/grid_leaves.glsl.

@@ -17,8 +17,8 @@ namespace cumulet::render {
 
 namespace {
 
-// visits: state of paths among several volumes. within: stack of transmissive objects; it is stored behind the visits
-// in any case. groups: of lights; stored behind both.
+// visits: state of paths among several volumes. within: the transmissive materials that contain the ray, stored behind
+// the visits in any case. groups: of lights; stored behind both.
 constexpr std::size_t lane_bytes(bool visits, bool within, std::uint32_t groups) {
   const bool both = groups > 0;
   return std::size_t{16} * (CM_PATH_QUADS + (visits || within || both ? CM_VISIT_QUADS : 0) +

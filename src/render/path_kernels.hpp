@@ -30,8 +30,8 @@ class PathKernels {
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
   /// Allocates buffers for this many paths. stages: with queues for the wavefront stages. visits: with the state of
-  /// paths among several volumes. within: with the stack of transmissive objects that contain the path. groups: with
-  /// sums of this many light groups. Returns whether the in-flight paths were kept. Throws on a GL error.
+  /// paths among several volumes. within: with the transmissive materials that contain the ray. groups: with sums of
+  /// this many light groups. Returns whether the in-flight paths were kept. Throws on a GL error.
   bool reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
   /// Binds all buffers that reserve() made.
   void bind() const;

@@ -84,7 +84,7 @@ struct PictureSettings {
   bool adaptive = false;
   /// Number of light groups with separate sums; 0: none.
   std::uint32_t light_groups = 0;
-  /// Render region, and a margin of pixels around it. The settings above apply to the region.
+  /// Render region, and a margin of pixels around it. Tiles and noise cover only these pixels.
   Region region;
   unsigned margin = 0;
 };
@@ -98,8 +98,8 @@ constexpr std::size_t channels_of(PixelFact fact) {
 /// Feature buffers that are rendered together: denoiser guides, or velocity and motion vectors as well.
 enum class PixelFacts { guides, all };
 
-/// Feature rays per pixel when feature buffers are read back; the denoiser starts with fewer. Pixels whose rays differ,
-/// such as those with triangles or shadows finer than a pixel, improve the denoiser with up to most_fact_rays.
+/// Feature rays per pixel when feature buffers are read back; the denoiser starts with fewer. In pixels whose rays
+/// differ, as with triangles or shadows finer than a pixel, more rays improve denoising, up to most_fact_rays.
 constexpr std::uint32_t fact_rays = 16;
 constexpr std::uint32_t most_fact_rays = 64;
 
@@ -216,7 +216,7 @@ class Picture {
     return box_.first + glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_;
   }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, box_.first + box_.size - tile_corner()); }
-  // Returns the samples per pixel after the pass that follows one that ended with `samples`.
+  // Returns the target samples per pixel of the pass that follows one with target `samples`.
   [[nodiscard]] std::uint32_t pass_after(std::uint32_t samples) const;
   // True if each pixel has a lane of its own.
   [[nodiscard]] bool has_lanes_for_all() const;
