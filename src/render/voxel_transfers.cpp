@@ -84,7 +84,8 @@ VoxelFormat format_of(GLint internal) {
   }
 }
 
-/// Uses integer operations for normal numbers because a host may have set its threads to flush denormals to 0.
+/// Converts a half by integer operations. Floats in between are never denormal, because a host may have set its threads
+/// to flush denormals to 0.
 float float_of(std::uint16_t half) {
   constexpr std::uint32_t rebias = 112U << 23U;
   constexpr auto least = std::bit_cast<float>(113U << 23U);  // smallest normal half
