@@ -269,7 +269,7 @@ void main() {
         volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
       }
       used += depth;
-      // Scattering in this segment: its probability, and its mean place, as if extinction were constant.
+      // Scattering in this segment: its probability, and its mean position, as if extinction were constant.
       float chance = 1.0 - exp(-depth);
       float middle = t + cm_middle_of_part(depth, chance) * min(span, walk.t_end - t);
 #if CM_CHANNELS

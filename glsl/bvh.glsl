@@ -95,7 +95,7 @@ CM_FN bool cm_bvh_near(vec3 o, vec3 d, float t_min, float t_max) {
 
 // Initializes a hit: none before t_max.
 CM_FN void cm_bvh_begin(float t_max, CM_OUT(CmHit) hit) {
-  hit.t = min(t_max, 1.0e25f);  // beyond any hit, but before the place where the builder puts empty boxes
+  hit.t = min(t_max, 1.0e25f);  // beyond any hit, but before the position where the builder puts empty boxes
   hit.triangle = CM_BVH_NONE;
   hit.record = 0u;
   hit.flags = 0u;

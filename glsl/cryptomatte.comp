@@ -123,7 +123,7 @@ void main() {
       float depth = cm_depth_of(e_0, e_1, span, way);
       used += depth;
       float chance = 1.0 - exp(-depth);
-      // Splits the probability by the volumes' extinctions at the mean place of scattering.
+      // Splits the probability by the volumes' extinctions at the mean position of scattering.
       float middle = walk.t + cm_middle_of_part(depth, chance) * min(span, way);
       float extinction = 0.0;
       for (int k = 0; CM_IS_FRONT(k, walk); ++k) extinction += cm_front_extinction(walk.front[k], middle);

@@ -22,7 +22,7 @@
 #define CM_RAY_TO_LIGHT 1u  // shadow ray of next-event estimation
 #define CM_RAY_EQUIANGULAR 2u  // shadow ray from a point of the scattered ray, after that ray (glsl/equiangular.glsl)
 
-// The place of a ray's origin.
+// The location of a ray's origin.
 #define CM_AT_CAMERA 0u
 #define CM_IN_MEDIUM 1u
 #define CM_ON_TRIANGLE 2u

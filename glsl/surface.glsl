@@ -372,7 +372,7 @@ CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent
   s.sheen_roughness = clamp(sheen.w * maps.sheen_roughness.a, 0.0f, 1.0f);
   s.transmission = clamp(cm_floats(word + CM_MATERIAL_COAT).y * maps.transmission.r, 0.0f, 1.0f);
   s.eta = volume_ior > 0.0f ? cm_apart(from_back ? 1.0f / volume_ior : volume_ior) : 0.0f;
-  // The coat and the sheen of a volume are outside.
+  // A volume's coat and sheen are only on its outside.
   if (volume_ior > 0.0f && from_back) {
     s.clearcoat = 0.0f;
     s.sheen = vec3(0.0f);
