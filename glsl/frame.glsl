@@ -2,7 +2,8 @@
 #ifndef CM_FRAME_GLSL
 #define CM_FRAME_GLSL
 
-// u, v and the unit vector w are right-handed. Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
+// Completes the unit vector w to a right-handed orthonormal basis u, v, w. Duff et al., "Building an Orthonormal
+// Basis, Revisited", JCGT 6(1), 2017.
 CM_FN void cm_frame(vec3 w, CM_OUT(vec3) u, CM_OUT(vec3) v) {
   float sign_z = w.z >= 0.0f ? 1.0f : -1.0f;
   float a = -1.0f / (sign_z + w.z);
