@@ -47,7 +47,7 @@ def enum_class(name, body):
 def fields(body):
     """Type, name and length (None: no array) of each."""
     for declaration in body.split(";"):
-        match = re.fullmatch(r"\s*(const char\*|\w+)\s+(\w+)(?:\[(\w+)\])?\s*", declaration)
+        match = re.fullmatch(r"\s*(const char\*|void\*|\w+)\s+(\w+)(?:\[(\w+)\])?\s*", declaration)
         if match and match[2] != "struct_size":
             length = match[3]
             yield match[1], match[2], int(length) if length and length.isdigit() else length
@@ -61,8 +61,8 @@ def member(c_type, name, length):
         cpp = ARRAYS.get((c_type, length), f"std::array<{NUMBERS.get(c_type, ('std::' + c_type,))[0]}, {length}>")
         elements = ", ".join(f"{name}[{i}]" for i in range(length)) if isinstance(length, int) else None
         return f"{cpp} {name}{{}};", f"{{{elements}}}", f"std::to_array(c.{name})"
-    if c_type == "const char*":
-        return f"const char* {name} = nullptr;", name, None
+    if c_type in ("const char*", "void*") or c_type.endswith("_fn"):
+        return f"{c_type} {name} = nullptr;", name, None
     if c_type in NUMBERS:
         cpp, zero = NUMBERS[c_type]
         return f"{cpp} {name} = {zero};", name, f"c.{name}"

@@ -1,26 +1,26 @@
 #version 450
-// What is known of a pixel without light, as AOVs: no noise but that of BLEND surfaces' chance, and anti-aliased by a
-// fixed set of rays, cm.dispatch.samples of them; rays_before of them earlier dispatches have looked along. A pixel whose
-// rays are alike goes on with rays_least of them alone.
-//   normal        mean shading normal of the nearest surface (world space, towards the eye), 0 where there is none
-//   albedo        mean base colour of the nearest surface, likewise; both as if there were no volume
-//   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
-//   surface z     view depth of that surface at the pixel's centre, infinity where there is none
-//   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
-//   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
-//                 it the nearest surface, none behind the ground; and the sun's light that they scatter to the eye, whose
-//                 share is beside it: of the surface's matte part, with shadows, and about that of the volume, neither
-//                 where light may come through glass; of holdouts nothing; mean
-//   velocity      of the volume where it scatters light for the first time, world units a second; mean, 0 where nothing
-//                 scatters
-//   motion        from where it is seen to where it was a frame ago, pixels, y up: of what is solid (the ground too), or
-//                 else the background, at the pixel's centre, as if there were no volume; and of the volume where it
-//                 scatters light for the first time, mean, 0 where nothing scatters
-// and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
-// pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
-// for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
-// volume's depth the share that the ground covers. Behind the first of these two: how many rays all that is of, and the
-// mean square of what they are compared by.
+// Feature buffers (AOVs), without noise except that of BLEND surfaces' stochastic coverage. They are anti-aliased by a
+// fixed set of feature rays. cm.dispatch.samples is the number of rays per pixel; earlier dispatches traced rays_before
+// of them. A pixel whose first rays_least rays agree traces no more.
+//   normal        mean shading normal of the nearest surface (world space, towards the eye), 0 if there is none; the
+//                 volume is ignored
+//   albedo        mean base color of the nearest surface, 0 if there is none; the volume is ignored
+//   transmittance of the volume up to the nearest surface (including the host's), or through all of it; mean
+//   surface z     view depth of that surface at the pixel's center, infinity if there is none
+//   volume z      view depth at the pixel's center where the volume in front of it reaches half opacity, else infinity
+//   emission      directly visible emission, unscattered: of the volume along the ray, and of the nearest surface
+//                 through it, if it is not behind the ground; plus sunlight scattered once to the eye. Alpha is the
+//                 fraction of the sunlight. Sunlight on surfaces is their diffuse part, with shadows; in the volume it
+//                 is approximate. Neither is included if the scene has extended materials. Holdouts add no sunlight,
+//                 and holdout surfaces no emission; mean
+//   velocity      of the volume at its first scattering, world units per second; mean, 0 if nothing scatters
+//   motion        motion vectors from the current position to that one frame ago, pixels, y up. xy: of the surface or
+//                 ground, or else the background, at the pixel's center; the volume is ignored. zw: of the volume at
+//                 its first scattering, mean, 0 if nothing scatters
+// Additional components, for temporal reprojection: normal.w is the view depth of the surface or ground at the pixel's
+// center. albedo.w is the mean view depth of the volume's first scattering, infinity if there is none. transmittance.y
+// is the fraction covered by surfaces, volume z's second component the fraction covered by the ground. For the
+// convergence test, transmittance.z is the number of rays and .w the mean square of cm_seen_along per ray.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_VELOCITY=1
@@ -67,7 +67,7 @@ layout(std140, binding = CM_STORAGE_MOTION) readonly buffer CmMotions {
 vec3 cm_move(uint map, vec3 v) { return cm_motions[map].x * v.x + cm_motions[map].y * v.y + cm_motions[map].z * v.z; }
 vec3 cm_move_point(uint map, vec3 p) { return cm_move(map, p) + cm_motions[map].origin; }
 
-// Pixels between two places in views; none where one of them is behind the eye.
+// Motion vector in pixels between two positions in views; 0 if one of them is behind the eye.
 vec2 cm_backward(vec3 now, vec3 then) {
   bool parallel_now = cm_motion_frame.orthographic_now != 0u;
   bool parallel_then = cm_motion_frame.orthographic_then != 0u;
@@ -77,19 +77,19 @@ vec2 cm_backward(vec3 now, vec3 then) {
   return 0.5 * vec2(cm.view.size) * (to - from);
 }
 
-// Of a point of the space that rays are in, that a map moves.
+// Motion vector of a point in ray space, moved by a map.
 vec2 cm_backward_point(vec3 now, vec3 then, uint map) {
   return cm_backward(cm_move_point(CM_MOTION_NOW, now), cm_move_point(map, then));
 }
 
-// Of what is far away, in that direction.
+// Motion vector of the background in this direction.
 vec2 cm_backward_far(vec3 d) {
   if (cm_motion_frame.orthographic_now != 0u || cm_motion_frame.orthographic_then != 0u) return vec2(0.0);
   return cm_backward(cm_move(CM_MOTION_NOW, d), cm_move(CM_MOTION_STILL, d));
 }
 
 #if CM_SURFACES
-// Of a point of a triangle, which is at p now.
+// Motion vector of a point of a triangle, which is now at p.
 vec2 cm_backward_surface(CmHit hit, vec3 p) {
   uint model = cm_model_of(hit.triangle);
   CmVertexMix m = cm_vertex_mix(model, hit.triangle - cm_models[model].first, hit.barycentrics);
@@ -101,7 +101,7 @@ vec2 cm_backward_surface(CmHit hit, vec3 p) {
 }
 #endif
 
-// Of the media in a part of a ray up to t_1, of whose scattering p is the middle.
+// Mean motion vector of the media in the ray's segment up to t_1, weighted by extinction. p: middle of the scattering.
 vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
   vec2 motion = vec2(0.0);
   float sum = 0.0;
@@ -122,7 +122,7 @@ vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 #define CM_OCTAVES 4u
 
-// A direction to a point of the sun.
+// Direction to a point of the sun.
 vec3 cm_to_sun(vec2 u) {
   vec3 across;
   vec3 along;
@@ -131,7 +131,7 @@ vec3 cm_to_sun(vec2 u) {
   return normalize(cm.lights.sun_direction + apart.x * across + apart.y * along);
 }
 
-// The optical depth from a point (world) to what is far away along d, 1e30 behind a surface or the ground.
+// Optical depth from a point (world) to infinity along d; 1e30 if a surface or the ground is in between.
 float cm_depth_to_far(vec3 from, vec3 d) {
   vec3 o = cm_to_cube_point(from);
   if (cm_ground_distance(o, cm_to_cube(d)) < CM_NO_GROUND) return 1e30;
@@ -150,9 +150,9 @@ float cm_depth_to_far(vec3 from, vec3 d) {
   return used;
 }
 
-// Of light through so much of a medium, about what it scatters by that cosine, by many events as well: each doubling of
-// their number halves what is left, its optical depth and its mean cosine (Wrenninge, Kulla and Lundqvist, "Oz: The Great
-// and Volumetric", SIGGRAPH Talks 2013).
+// Approximate phase function with multiple scattering, times transmittance, for light through this optical depth. Each
+// octave halves the weight, the optical depth and the mean cosine (Wrenninge, Kulla and Lundqvist, "Oz: The Great and
+// Volumetric", SIGGRAPH Talks 2013).
 float cm_scattered_by_many(float g, float cosine, float depth) {
   uint most = cm.integrator.max_bounces == 0u ? CM_OCTAVES : min(CM_OCTAVES, cm.integrator.max_bounces);
   float sum = 0.0;
@@ -162,17 +162,19 @@ float cm_scattered_by_many(float g, float cosine, float depth) {
   return sum;
 }
 
-// Where in a medium a ray asks for the sun, in standard deviations from the mean depth at which it scatters: as depths are
-// spread that fall exponentially, so that shadows are as soft in it as they are.
+// Depth at which feature ray i samples the sunlight in a medium, in standard deviations from its mean scattering depth.
+// The rays follow an exponential distribution of depths, so that shadows in the medium are as soft as they should be.
 float cm_deviation_of_ray(int i) { return -log(1.0 - fract(0.5 + float(i) * 0.6180339887)) - 1.0; }
 
-// By what rays are compared: light that is known, in parts of what far light there is, colour and transmittance. Linear.
+// Scalar for the convergence test of feature rays: noise-free light (relative to the distant light), albedo and
+// transmittance. It is linear in these.
 float cm_seen_along(vec3 known, vec3 albedo, float transmittance) {
   float far = cm_luminance(cm.lights.sun_irradiance) * 0.318309886 + cm_luminance(cm.lights.sky_radiance);
   return cm_luminance(known) / max(far, 1e-6) + cm_luminance(albedo) + transmittance;
 }
 
-// Whether the mean of so many is known to a hundredth, but for what no eye sees.
+// Returns true if the standard error of the mean over the rays is at most 1 %, with a floor that ignores invisible
+// errors.
 bool cm_is_settled(float seen, float square, float transmittance, float rays) {
   float least = 0.01 * (seen - transmittance + 0.05);
   return square - seen * seen <= rays * least * least;
@@ -188,7 +190,7 @@ void main() {
   float surface_z = CM_INFINITE;
   float volume_z = CM_INFINITE;
   float solid_z = CM_INFINITE;
-  float scattered_z = 0.0;  // sum, and of the chances
+  float scattered_z = 0.0;  // sum over scattering probabilities, and the sum of these
   float scattered = 0.0;
   vec2 covered = vec2(0.0);  // by surfaces, by the ground
   vec3 emission = vec3(0.0);
@@ -214,10 +216,10 @@ void main() {
     float t_per_z = ray.t_per_z;
     float surface_t = ray.end;
     vec3 to_sun = cm_to_sun(fract(0.5 + float(i) * vec2(0.8191725134, 0.6710436067)));
-    vec3 sun_from[2];  // of a surface, of the medium
-    vec2 scatters = vec2(0.0);  // this ray's chances, and sum of depths
-    vec4 medium = vec4(0.0);    // its albedo and mean cosine, sums; of what is before all that is solid
-    vec3 before = vec3(0.0);    // likewise, of that, and of squared depths; from the first such depth on
+    vec3 sun_from[2];  // points lit by the sun: on the surface, in the medium
+    vec2 scatters = vec2(0.0);  // of this ray: sums of scattering probabilities, and of depths
+    vec4 medium = vec4(0.0);    // sums of albedo and mean cosine, in front of the surface and the ground
+    vec3 before = vec3(0.0);    // sums of the probabilities there, of depths and of squared depths, relative to first_z
     float first_z = 0.0;
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
@@ -256,7 +258,7 @@ void main() {
     float used = 0.0;
     float clear = 1.0;
     CmWalk walk = cm_walk(o, d, surface_t, true);
-    // Beyond e^-40 nothing is left to know.
+    // Beyond e^-40 nothing remains visible.
     for (int j = 0; j < 100000 && used < 40.0; ++j) {
       float t_1, e_0, e_1;
       if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
@@ -267,11 +269,11 @@ void main() {
         volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
       }
       used += depth;
-      // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
+      // Scattering in this segment: its probability, and its mean position, as if extinction were constant.
       float chance = 1.0 - exp(-depth);
       float middle = t + cm_middle_of_part(depth, chance) * min(span, walk.t_end - t);
 #if CM_CHANNELS
-      // As if it were dimmed evenly within this part.
+      // Absorption as if extinction were constant in this segment.
       float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
       emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
 #endif
@@ -293,7 +295,7 @@ void main() {
     }
     transmittance += exp(-used);
 #if CM_SURFACES
-    // Where another draws the surfaces beneath, their light is none of the picture's.
+    // If another renderer draws the surfaces below, their light is not part of this image.
     bool drawn_here = cm.layers.count == 0u || cm.layers.coloured != 0u;
     of_sun *= exp(-used);
     if (drawn_here && surface_t <= ground_t) {
@@ -324,8 +326,8 @@ void main() {
     squares += (seen - seen_before) * (seen - seen_before);
     seen_before = seen;
   }
-  // What was found along the rays before is means, of which sums are made again. Of a ray the chances that it scatters
-  // are what its transmittance leaves.
+  // The buffers hold the means over earlier rays; converts them back to sums. The sum of a ray's scattering
+  // probabilities is 1 - transmittance.
   float rays = float(cm.dispatch.samples - cm.dispatch.rays_before);
   vec3 known = emission + sunlit;
   float of_sun = known == vec3(0.0) ? 0.0 : cm_luminance(sunlit);

@@ -1,9 +1,9 @@
-// Where shaders find what the library binds; C++ has the same (gl/bindings.hpp). Programs that are told of the same
-// thing have it at the same place; numbers that stand twice are of things that no program has both of.
+// Binding numbers; C++ has the same (gl/bindings.hpp). Programs that share a resource use the same number for it. Two
+// names may share a number if no program uses both.
 #ifndef CM_BINDINGS_GLSL
 #define CM_BINDINGS_GLSL
 
-// What cumulet.h promises the host not to go beyond, and what StateGuard can save: GL's minima for compute shaders.
+// Limits that cumulet.h promises to the host, and that StateGuard can save: GL's minima for compute shaders.
 const int CM_UNITS = 16;
 const int CM_BUFFERS = 8;  // of storage buffers, and of uniform buffers
 const int CM_IMAGES = 8;
@@ -13,15 +13,15 @@ const int CM_UNIT_CELLS = 0;        // to 5: pages of cell records
 const int CM_UNIT_SCATTERING_VOXELS = 1;
 const int CM_UNIT_ANISOTROPY_VOXELS = 2;
 const int CM_UNIT_VELOCITY_VOXELS = 3;
-const int CM_UNIT_CHANGE_VOXELS = 4;  // or of bricks
-const int CM_UNIT_CHANNELS = 6;     // of cells; or what voxels give off
+const int CM_UNIT_CHANGE_VOXELS = 4;  // or changes of bricks' values
+const int CM_UNIT_CHANNELS = 6;     // channels of cells; or emission of voxels
 const int CM_UNIT_ENVIRONMENT = 7;  // a page of a WordHeap
 const int CM_UNIT_LAYER_COLOUR = 8;
-const int CM_UNIT_SCENE_WORDS = 9;  // a page of a WordHeap, as the tree's
+const int CM_UNIT_SCENE_WORDS = 9;  // a page of a WordHeap, like the tree
 const int CM_UNIT_ATLAS = 10;
 const int CM_UNIT_HOST_DEPTH = 11;
 const int CM_UNIT_TREE = 12;
-const int CM_UNIT_VOXELS = 13;  // or values of bricks
+const int CM_UNIT_VOXELS = 13;  // or brick values
 const int CM_UNIT_BRICK_SLOTS = 14;
 const int CM_UNIT_LAYER_Z = 15;
 // resolve.comp and composite.frag:
@@ -40,7 +40,7 @@ const int CM_UNIT_HOST_VOXELS = 0;
 const int CM_UNIT_DENOISE_COLOUR = 0;
 const int CM_UNIT_DENOISE_ALBEDO = 1;
 const int CM_UNIT_DENOISE_NORMAL = 2;
-const int CM_UNIT_MOMENTS = 7;       // denoise_guides.comp and wavelet_*.comp, beside what resolve.comp has
+const int CM_UNIT_MOMENTS = 7;       // denoise_guides.comp and wavelet_*.comp, beside those of resolve.comp
 const int CM_UNIT_GUIDE_EMISSION = 2;
 const int CM_UNIT_GUIDE_ALBEDO = 8;
 const int CM_UNIT_GUIDE_NORMAL = 9;
@@ -146,7 +146,7 @@ const int CM_IMAGE_GUIDE_COLOUR = 0;  // denoise_guides.comp
 const int CM_IMAGE_GUIDE_ALBEDO = 1;
 const int CM_IMAGE_GUIDE_NORMAL = 2;
 const int CM_IMAGE_GUIDE_MISSING = 3;
-const int CM_IMAGE_WAVELET_FRONT = 2;  // wavelet_*.comp, beside resolve.comp's
+const int CM_IMAGE_WAVELET_FRONT = 2;  // wavelet_*.comp, beside those of resolve.comp
 const int CM_IMAGE_WAVELET_SPREAD = 3;
 const int CM_IMAGE_WAVELET_GUIDES = 4;
 const int CM_IMAGE_WAVELET_UNFILTERED = 4;  // wavelet_variance.comp

@@ -1,7 +1,7 @@
 #version 450
-// What volumes have of a state's bricks beside its fields, as scene/channels.hpp has it: a group a brick.
-// CM_PRODUCT: 0: light given off, 1: scattering, 2: what goes forward of it, 3: the same where it has a colour,
-// 4: momentum.
+// Computes fields of a volume from the fields of an uploaded update, brick by brick, like scene/channels.hpp: one work
+// group per brick. CM_PRODUCT: 0: emission, 1: scattering, 2: forward-scattered part of it, 3: the same with a
+// scattering color, 4: momentum.
 // variants: CM_PRODUCT=0,1,2,3,4
 layout(local_size_x = 64) in;
 
@@ -32,14 +32,14 @@ layout(std430, binding = CM_STORAGE_BRICKS_FIRST) writeonly buffer CmFirst { flo
 layout(std430, binding = CM_STORAGE_BRICKS_SECOND) writeonly buffer CmSecond { float cm_second[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_THIRD) writeonly buffer CmThird { float cm_third[]; };
 #endif
-layout(location = 0) uniform uvec2 cm_range;    // of bricks: the first, and the end
-layout(location = 1) uniform uint cm_to_first;  // where the first goes
+layout(location = 0) uniform uvec2 cm_range;    // bricks: first, and one past the last
+layout(location = 1) uniform uint cm_to_first;  // destination of brick 0
 
 #if CM_PRODUCT == 0
 layout(std430, binding = CM_STORAGE_BRICKS_GLOW) readonly buffer CmGlowing { CmBrickGlow cm_glow; };
 
-// As volume::Ramp: 0 stays. first: of its parts. Found by halves: no branch is the same for all voxels, which zink of
-// Mesa 22.3 would keep.
+// Evaluates a ramp like volume::Ramp: 0 stays 0. first: its first part. The binary search has no branch that is the
+// same for all voxels, because zink of Mesa 22.3 would keep the first outcome of such a branch.
 float cm_ramp(uint first, float value) {
   uint part = first;
   for (uint step = CM_RAMP_PARTS / 2u; step > 0u; step /= 2u)
@@ -52,7 +52,7 @@ vec3 cm_body_colour(uint i) {
   return vec3(cm_glow.colours[3u * i], cm_glow.colours[3u * i + 1u], cm_glow.colours[3u * i + 2u]);
 }
 
-// As light::BlackBody::emission.
+// The same function as light::BlackBody::emission.
 vec3 cm_black_body(float kelvin) {
   const float coldest = 100.0;
   const float log_range = 5.99146455;  // log(40000 / coldest)
@@ -92,8 +92,8 @@ vec3 cm_product(float fields[CM_FIELDS]) {
   return vec3(scatters * (0.5 + 0.5 * clamp(fields[CM_FIELDS - 1u], -1.0, 1.0)));
 }
 #else
-layout(location = 2) uniform vec3 cm_to_relative[3];  // columns: of a velocity in parts of the fastest
-layout(location = 5) uniform float cm_most;           // a component is no more
+layout(location = 2) uniform vec3 cm_to_relative[3];  // columns: map a velocity to fractions of the largest speed
+layout(location = 5) uniform float cm_most;           // maximum magnitude of a component
 
 vec3 cm_product(float fields[CM_FIELDS]) {
   vec3 given = clamp(vec3(fields[1], fields[2], fields[3]), vec3(-cm_most), vec3(cm_most));
@@ -105,7 +105,7 @@ vec3 cm_product(float fields[CM_FIELDS]) {
 
 void main() {
   uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  uint brick = min(cm_range.x + work, cm_range.y - 1u);  // the last ones do the last once more
+  uint brick = min(cm_range.x + work, cm_range.y - 1u);  // surplus groups repeat the last brick
   for (uint v = gl_LocalInvocationIndex; v < 512u; v += 64u) {
     float fields[CM_FIELDS];
     for (uint f = 0u; f < CM_FIELDS; ++f) fields[f] = cm_together[(512u * brick + v) * CM_FIELDS + f];

@@ -1,40 +1,41 @@
-// Sums over the cells within a brick, as grid::BrickSums has them: for kernels in which a group of 64 has a brick. The
-// includer has cell.glsl before this, and
-//   void cm_visit(uint level, uint heap, uint frame, CmSums sums)   called for each cell of a tetrahedron, of heap 1 to
-//                                                                   511: of levels 6, 7 and 8 by all of the group
+// Sums over the cells in a brick, like grid::BrickSums, for kernels with one work group of 64 per brick. The includer
+// has cell.glsl before this, and
+//   void cm_visit(uint level, uint heap, uint frame, CmSums sums)   called for each cell of a tetrahedron, with heap
+//                                                                   index 1 to 511; on levels 6 to 8 by all invocations
 #ifndef CM_BRICK_SUMS_GLSL
 #define CM_BRICK_SUMS_GLSL
 
-// A Kuhn tetrahedron's cells in heap order, as grid::BrickTree, of the frame whose axes are the cube's. Bits 0 to 17 four
-// times the centroid, 6 each; of those that split 18 to 26 the frame, 27 and 28 the class, 29 and 30 the exponent.
+// Cells of a Kuhn tetrahedron in heap order, like grid::BrickTree, for the frame whose axes are the cube's. Bits 0 to
+// 17: four times the centroid, 6 bits per axis. For cells that split, bits 18 to 26: frame, 27 and 28: class, 29 and
+// 30: exponent.
 layout(std140, binding = CM_UNIFORM_BRICK_TREE) uniform CmBrickTree {
   uvec4 cm_brick_tree[256];
-  vec4 cm_edges_squared[14];  // CM_LEVEL_EDGES a level
+  vec4 cm_edges_squared[14];  // CM_LEVEL_EDGES per level
 };
 
 struct CmSums {
-  float mass;    // of the value less the reference
-  float square;  // of the square of that
-  vec3 first;    // of that times the centroid, from the brick's low corner
+  float mass;    // sum of the value minus the reference
+  float square;  // sum of its square
+  vec3 first;    // sum of it times the centroid, relative to the brick's low corner
   float low;
   float high;
-  float lit;  // the most
+  float lit;  // maximum transmittance
 };
 
-shared float cm_values[512];  // of the brick
-shared float cm_lit[64];      // of its blocks
+shared float cm_values[512];  // voxels of the brick
+shared float cm_lit[64];      // transmittance of its 2^3 blocks
 shared float cm_reference;
 shared CmSums cm_halves[128];  // in heap order
 
 uint cm_tree_word(uint heap) { return cm_brick_tree[heap >> 2u][heap & 3u]; }
 
-// In cube space, from the brick's low corner.
+// Centroid in cube space, relative to the brick's low corner.
 vec3 cm_tree_centroid(uint word, uint frame) {
   vec3 own = 0.25 * vec3(float(word & 63u), float((word >> 6) & 63u), float((word >> 12) & 63u));
   vec3 low = cm_from_frame(vec3(1.0), frame);
   return cm_from_frame(own, frame) + 8.0 * vec3(low.x < 0.0 ? 1.0 : 0.0, low.y < 0.0 ? 1.0 : 0.0, low.z < 0.0 ? 1.0 : 0.0);
 }
-// With regard to the frame of the tetrahedron.
+// Shape relative to the frame of the tetrahedron.
 uint cm_tree_shape(uint word) {
   return ((word >> 18) & 0x1ffu) | (((word >> 27) & 3u) << 9) | (((word >> 29) & 3u) << 11);
 }
@@ -43,7 +44,7 @@ float cm_edge_squared(uint level, vec3 edge) {
   return cm_edges_squared[i >> 2u][i & 3u];
 }
 
-// As grid::kuhn_frame. odd: of the brick, along each axis.
+// The same function as grid::kuhn_frame. odd: parity of the brick's position along each axis.
 uint cm_kuhn_frame(uvec3 odd, uint permutation) {
   uint x = permutation / 2u;
   uint low = x == 0u ? 1u : 0u;
@@ -73,10 +74,10 @@ CmSums cm_add(CmSums a, CmSums b) {
 struct CmCell {
   float mean;
   float variance;
-  vec3 covariance;  // as grid::frame_covariance
+  vec3 covariance;  // like grid::frame_covariance
   uint cell_class;
   vec3 edge;      // in cube space
-  vec3 midpoint;  // of that, from the brick's low corner
+  vec3 midpoint;  // its midpoint, relative to the brick's low corner
 };
 CmCell cm_cell_of(uint level, uint heap, uint frame, CmSums sums) {
   uint word = cm_tree_word(heap);
@@ -98,7 +99,8 @@ CmCell cm_cell_of(uint level, uint heap, uint frame, CmSums sums) {
 
 void cm_visit(uint level, uint heap, uint frame, CmSums sums);
 
-// Of one tetrahedron; all of the group. Then the whole's sums are in cm_halves[1], for all after a barrier.
+// Sums one tetrahedron; called by the whole work group. The total is in cm_halves[1], for all invocations after a
+// barrier.
 void cm_sum_tree(uint frame) {
   uint t = gl_LocalInvocationIndex;
   CmSums pair[2];
@@ -114,7 +116,7 @@ void cm_sum_tree(uint frame) {
   }
   CmSums sums = cm_add(pair[0], pair[1]);
   cm_visit(6u, 64u + t, frame, sums);
-  barrier();  // all are done with the tetrahedron before
+  barrier();  // all invocations have finished the previous tetrahedron
   cm_halves[64u + t] = sums;
   barrier();
   for (uint level = 6u; level-- > 0u;) {
@@ -129,7 +131,7 @@ void cm_sum_tree(uint frame) {
   }
 }
 
-// Once the values are there, for all.
+// Computes the mean of the brick as the reference. All invocations call it once cm_values is complete.
 void cm_find_reference() {
   uint t = gl_LocalInvocationIndex;
   precise float row = 0.0;

@@ -1,32 +1,33 @@
-// What a surface reflects: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular
-// and _clearcoat; with CM_RICH also _transmission, _volume, _dispersion, _sheen, _anisotropy and _iridescence
-// (glsl/film.glsl, glsl/sheen.glsl). Shared by GLSL and C++; the includer has before this
+// The BSDF: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular and _clearcoat.
+// With CM_RICH also _transmission, _volume, _dispersion, _sheen, _anisotropy and _iridescence (glsl/film.glsl,
+// glsl/sheen.glsl). Shared by GLSL and C++. The includer provides before this
 //   vec2 cm_ggx_albedo(float roughness, float cosine)
 //   vec2 cm_ggx_albedo_average(float roughness)
-// of src/surface/ggx_albedo.hpp's table: a GGX lobe with a Fresnel term of f0 and f90 reflects f0 x + f90 y of constant
-// radiance, towards a cosine and on average over all of them (weighed by the cosine); with CM_RICH
+// which look up the table of src/surface/ggx_albedo.hpp: a GGX lobe with a Fresnel term of f0 and f90 reflects f0 x +
+// f90 y of constant radiance, towards a cosine and as a cosine-weighted average. With CM_RICH also
 //   float cm_sheen_albedo(float roughness, float cosine)
 //   float cm_sheen_albedo_average(float roughness)
-// of src/surface/sheen_albedo.hpp's.
+// which look up the table of src/surface/sheen_albedo.hpp.
 //
-// Three lobes: a GGX coat over a GGX base, and a Lambertian one under the base. Appendix B weighs the Lambertian lobe by
-// 1 - F(v.h), which reflects up to 1.7 times the light that comes in at grazing angles. Here it is coupled to the base by
-// what that reflects, E: (1 - E(n.v)) (1 - E(n.l)) / (1 - E_avg) (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
-// Specular-Matte BRDF Model with Importance Sampling", Eurographics 2001): as reciprocal, and a white dielectric of any
-// roughness reflects exactly what comes in. The coat weighs the Lambertian lobe in the same way, by its own E; the base's
-// own lobe, whose way in is mostly as steep as its way out, by the lesser of 1 - E(n.v) and 1 - E(n.l).
+// There are three lobes: a GGX coat over a GGX base, and a Lambertian lobe under the base. Appendix B weights the
+// Lambertian lobe by 1 - F(v.h), which reflects up to 1.7 times the incident light at grazing angles. Here it is
+// coupled to the albedo E of the base: (1 - E(n.v)) (1 - E(n.l)) / (1 - E_avg) (Kelemen and Szirmay-Kalos, "A
+// Microfacet Based Coupled Specular-Matte BRDF Model with Importance Sampling", Eurographics 2001). This is also
+// reciprocal, and a white dielectric of any roughness reflects exactly the incident light. The coat attenuates the
+// Lambertian lobe in the same way, by its own E. It attenuates the base lobe by the minimum of 1 - E(n.v) and 1 -
+// E(n.l), because that lobe mostly leaves as steeply as it enters.
 //
-// The Lambertian lobe keeps the normal that is not bent: it mirrors nothing, and loses light at rims by a bent one. It
-// ends softly where light sinks below the smooth surface under a normal map: see cm_terminator.
+// The Lambertian lobe keeps the normal that is not bent: it has no mirror direction, and a bent normal would darken it
+// at silhouettes. Under a normal map it fades out where light sinks below the smooth surface: see cm_terminator.
 //
-// wo and wi are unit vectors that point away from the surface, wo towards where the light goes.
+// wo and wi are unit vectors that point away from the surface; light leaves along wo.
 //
-// Transmission, of what passes the interface and is not metal, takes the Lambertian lobe's place. A thin wall has the
-// base lobe's shape on its other side, but as smooth as lobes get it lets light go straight on, which is no lobe:
-// cm_bsdf_passes. A volume's boundary refracts by the same microfacets (Walter, Marschner, Li and Torrance, "Microfacet
-// Models for Refraction through Rough Surfaces", EGSR 2007). Radiance is taken for what it is over the square of the
-// index, so that nothing changes where light goes in and comes out again. What is lost between microfacets is not given
-// back: of constant radiance at most 0.04 at a roughness of 0.2, 0.21 at 0.5 and 0.7 at 1 (rich_bsdf_test).
+// Transmission replaces the Lambertian lobe for the light that passes the interface of the non-metallic part. A thin
+// wall has the shape of the base lobe on its other side. At the minimum roughness it lets light pass straight on, which
+// is no lobe: cm_bsdf_passes. A volume boundary refracts by the same microfacets (Walter, Marschner, Li and Torrance,
+// "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007). Radiance is counted divided by the square of
+// the index, so it is unchanged where light enters and leaves again. Energy lost between microfacets is not restored:
+// of constant radiance at most 0.04 at a roughness of 0.2, 0.21 at 0.5 and 0.7 at 1 (rich_bsdf_test).
 #ifndef CM_BSDF_GLSL
 #define CM_BSDF_GLSL
 #include "frame.glsl"
@@ -41,29 +42,29 @@ struct CmSurface {
   vec3 base_color;            // linear, 0 to 1
   float metallic;             // 0 to 1
   float roughness;            // perceptual, 0 to 1: alpha = max(roughness^2, 1e-3)
-  vec3 normal;                // of shading: unit, world, on wo's side
-  vec3 matte_normal;          // what it would be if it were not bent, unit: the Lambertian lobe's
+  vec3 normal;                // shading normal: unit, world, on wo's side
+  vec3 matte_normal;          // the same before bending, unit: for the Lambertian lobe
   vec3 smooth_normal;         // matte_normal without a normal map, unit
   vec3 f0;                    // reflectance of the dielectric at normal incidence, see cm_dielectric_f0
-  float specular;             // its reflectance at grazing incidence
+  float specular;             // reflectance of the dielectric at grazing incidence
   float clearcoat;            // weight of the coat, of ior 1.5
-  float clearcoat_roughness;  // as roughness
+  float clearcoat_roughness;  // like roughness
 #if CM_RICH
-  vec3 geometric;         // of the triangle, unit, on wo's side: what is transmitted is behind it
-  vec3 tangent;           // unit, at right angles to the normal: where the first alpha is
-  CmAlpha alpha;          // of the base lobe; roughness is that of their mean
+  vec3 geometric;         // triangle normal, unit, on wo's side: transmitted light is behind it
+  vec3 tangent;           // unit, perpendicular to the normal: direction of alpha.x
+  CmAlpha alpha;          // of the base lobe; roughness corresponds to their mean
   vec3 sheen;             // linear, 0 to 1
-  float sheen_roughness;  // as roughness
+  float sheen_roughness;  // like roughness
   CmFilm film;
   float film_average;     // see cm_film_average
   float transmission;     // 0 to 1
-  float eta;              // index of refraction behind the surface over that before it; 0: a thin wall
+  float eta;              // index of refraction behind the surface over that in front; 0: a thin wall
 #endif
 };
 
 const float CM_COAT_F0 = 0.04f;
 
-// f0 of an ior (0: infinite, as KHR_materials_ior has it) and KHR_materials_specular's weight and colour.
+// f0 for an index of refraction (0: infinite, as in KHR_materials_ior) and KHR_materials_specular's weight and color.
 CM_FN vec3 cm_dielectric_f0(float ior, float specular, vec3 specular_color) {
   float r = ior > 0.0f ? (ior - 1.0f) / (ior + 1.0f) : 1.0f;
   return min(specular_color * (r * r), vec3(1.0f)) * specular;
@@ -75,7 +76,7 @@ CM_FN float cm_coat_fresnel(CmSurface s, float cosine) {
   return s.clearcoat * (CM_COAT_F0 + (1.0f - CM_COAT_F0) * cm_schlick(cosine));
 }
 
-// What the dielectric's interface reflects, its largest channel.
+// Largest channel of the dielectric interface's reflectance.
 CM_FN float cm_interface_fresnel(CmSurface s, float cosine) {
   float f0 = cm_max3(s.f0);
   return f0 + (s.specular - f0) * cm_schlick(cosine);
@@ -91,8 +92,8 @@ CM_FN void cm_surface_frame(CmSurface s, CM_OUT(vec3) u, CM_OUT(vec3) v) {
 CM_FN CmAlpha cm_base_alpha(CmSurface s) { return s.alpha; }
 CM_FN CmAlpha cm_coat_alpha(CmSurface s) { return vec2(cm_alpha(s.clearcoat_roughness)); }
 
-// Of an interface of these reflectances, which wo sees at a cosine: at that of the thinner side, where all is reflected
-// if none leads there.
+// Fresnel reflectance of an interface with these parameters. If wo is on the denser side, uses the cosine on the other
+// side; total internal reflection gives 1.
 CM_FN vec3 cm_interface_fresnel_of(CmSurface s, vec3 f0, float f90, float cosine) {
   if (s.eta > 0.0f && s.eta < 1.0f) {
     float sine2 = (1.0f - cosine * cosine) / (s.eta * s.eta);
@@ -111,21 +112,21 @@ CM_FN float cm_dielectric_fresnel(CmSurface s, float cosine) {
   return cm_max3(cm_interface_fresnel_of(s, s.f0, s.specular, cosine));
 }
 
-// What a film adds to the reflectance of the dielectric's interface, towards a cosine and on average.
+// Reflectance added by a thin film on the dielectric interface, towards a cosine and on average.
 CM_FN float cm_film_adds(CmSurface s, float cosine) {
   if (!(s.film.weight > 0.0f)) return 0.0f;
   float f0 = cm_max3(s.f0);
   return cm_dielectric_fresnel(s, cosine) - (f0 + (s.specular - f0) * cm_schlick(cosine));
 }
 CM_FN float cm_film_average(CmSurface s) {
-  // By Gauss and Legendre over the squared cosine.
+  // Gauss-Legendre quadrature over the squared cosine.
   float sum = 8.0f * cm_film_adds(s, 0.70710678f);
   sum += 5.0f * (cm_film_adds(s, 0.33571049f) + cm_film_adds(s, 0.94196513f));
   return sum * (1.0f / 18.0f);
 }
 
-// What is left of constant radiance below the dielectric's interface, towards a cosine and on average, and below the
-// sheen. What a film adds is taken as if the lobe were narrow.
+// Fraction of constant radiance that passes the dielectric interface, towards a cosine and on average, and that passes
+// the sheen. The part added by a film is computed as if the lobe were narrow.
 CM_FN float cm_below_interface_of(CmSurface s, vec2 albedo, float film) {
   float reflected = cm_max3(s.f0) * albedo.x + s.specular * albedo.y;
   return clamp(1.0f - reflected - film * (albedo.x + albedo.y), 0.0f, 1.0f);
@@ -148,15 +149,15 @@ CM_FN void cm_surface_frame(CmSurface s, CM_OUT(vec3) u, CM_OUT(vec3) v) { cm_fr
 CM_FN CmAlpha cm_base_alpha(CmSurface s) { return cm_alpha(s.roughness); }
 CM_FN CmAlpha cm_coat_alpha(CmSurface s) { return cm_alpha(s.clearcoat_roughness); }
 
-// Of the base lobe: dielectric and metal are both linear in f0 and f90.
+// Fresnel term of the base lobe: dielectric and metal are both linear in f0 and f90.
 CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
   vec3 f0 = mix(s.f0, s.base_color, s.metallic);
   float f90 = mix(s.specular, 1.0f, s.metallic);
   return f0 + (vec3(f90) - f0) * cm_schlick(cosine);
 }
 
-// What is left of constant radiance below the dielectric's interface, towards a cosine and on average, and below the
-// coat.
+// Fraction of constant radiance that passes the dielectric interface, towards a cosine and on average, and that passes
+// the coat.
 CM_FN float cm_below_interface_of(CmSurface s, vec2 albedo) {
   return max(0.0f, 1.0f - cm_max3(s.f0) * albedo.x - s.specular * albedo.y);
 }
@@ -176,7 +177,7 @@ CM_FN float cm_below_coat_towards(CmSurface s, float cosine) {
   return s.clearcoat > 0.0f ? cm_below_coat(s, cm_ggx_albedo(s.clearcoat_roughness, cosine)) : 1.0f;
 }
 
-// Reflected share of constant radiance by the Lambertian lobe alone, without the coat.
+// Albedo of only the Lambertian lobe under constant radiance, without the coat.
 CM_FN vec3 cm_matte_albedo(CmSurface s, float cosine) {
   float share = (1.0f - s.metallic) * cm_below_interface(s, cosine);
 #if CM_RICH
@@ -187,14 +188,14 @@ CM_FN vec3 cm_matte_albedo(CmSurface s, float cosine) {
 
 #if CM_RICH
 
-// The colour that goes through, of what passes the interface.
+// Color of the transmitted part of the light that passes the interface.
 CM_FN vec3 cm_transmitted(CmSurface s) { return s.base_color * (s.transmission * (1.0f - s.metallic)); }
 
-// Whether transmission is no lobe: cm_bsdf_passes.
+// Returns true if transmission goes straight on and is no lobe: cm_bsdf_passes.
 CM_FN bool cm_is_clear(CmSurface s) { return s.eta == 0.0f && max(s.alpha.x, s.alpha.y) <= 1.001f * CM_LEAST_ALPHA; }
 
-// What goes straight on: the chance with which paths do so is the largest channel's, and those that do not have the
-// lobes' share of the others.
+// Fraction of light that passes straight on. Paths do so with the largest channel as probability. Paths that do not are
+// shaded with the lobes, weighted by cm_surface_point's `kept`.
 CM_FN vec3 cm_bsdf_passes(CmSurface s, vec3 wo) {
   if (!(s.transmission > 0.0f) || !cm_is_clear(s)) return vec3(0.0f);
   float cosine = clamp(dot(s.normal, wo), 0.0f, 1.0f);
@@ -202,7 +203,7 @@ CM_FN vec3 cm_bsdf_passes(CmSurface s, vec3 wo) {
   return min(cm_transmitted(s) * (below * (1.0f - cm_dielectric_fresnel(s, cosine))), vec3(1.0f));
 }
 
-// Of a microfacet that wo sees at this cosine the chance to reflect, not transmit.
+// Probability that a microfacet seen by wo at this cosine reflects rather than transmits.
 CM_FN float cm_reflects(CmSurface s, float cosine) {
   if (!(s.transmission > 0.0f) || cm_is_clear(s)) return 1.0f;
   float through = cm_max3(cm_transmitted(s)) * (1.0f - cm_dielectric_fresnel(s, cosine));
@@ -210,7 +211,7 @@ CM_FN float cm_reflects(CmSurface s, float cosine) {
   return cm_max3(cm_base_fresnel(s, cosine)) / (cm_max3(cm_base_fresnel(s, cosine)) + through);
 }
 
-// The microfacet's normal that refracts wi to wo; whether there is one.
+// Half vector h that refracts wi to wo. Returns false if there is none.
 CM_FN bool cm_refracting(CmSurface s, vec3 wo, vec3 wi, CM_OUT(vec3) h) {
   h = wo + wi * s.eta;
   float length2 = dot(h, h);
@@ -219,13 +220,13 @@ CM_FN bool cm_refracting(CmSurface s, vec3 wo, vec3 wi, CM_OUT(vec3) h) {
   return h.z > 1e-6f && dot(wo, h) > 0.0f && dot(wi, h) < 0.0f;
 }
 
-// |dh / dwi| of that.
+// The Jacobian |dh / dwi| of refraction.
 CM_FN float cm_refraction_jacobian(CmSurface s, vec3 wo, vec3 wi, vec3 h) {
   float sum = dot(wo, h) + s.eta * dot(wi, h);
   return s.eta * s.eta * abs(dot(wi, h)) / max(sum * sum, 1e-20f);
 }
 
-// Where wo goes on behind a microfacet; its own direction back where all is reflected.
+// Direction refracted at a microfacet; wo itself in case of total internal reflection.
 CM_FN vec3 cm_refracted(CmSurface s, vec3 wo, vec3 h) {
   float cosine = dot(wo, h);
   float sine2 = (1.0f - cosine * cosine) / (s.eta * s.eta);
@@ -233,7 +234,7 @@ CM_FN vec3 cm_refracted(CmSurface s, vec3 wo, vec3 h) {
   return normalize(h * (cosine / s.eta - sqrt(1.0f - sine2)) - wo * (1.0f / s.eta));
 }
 
-// The lobe on the other side times |cos|.
+// The transmission lobe times |cos|.
 CM_FN vec3 cm_through_eval(CmSurface s, vec3 wo, vec3 wi) {
   if (!(wi.z < 0.0f) || !(s.transmission > 0.0f) || cm_is_clear(s)) return vec3(0.0f);
   float below = cm_below_coat_towards(s, wo.z) * cm_below_sheen_towards(s, wo.z);
@@ -248,7 +249,7 @@ CM_FN vec3 cm_through_eval(CmSurface s, vec3 wo, vec3 wi) {
   return lobe > 0.0f ? cm_transmitted(s) * (below * lobe * (1.0f - cm_dielectric_fresnel(s, dot(wo, h)))) : vec3(0.0f);
 }
 
-// Density of what the base lobe's microfacets send there.
+// Solid-angle pdf of directions transmitted by the base lobe's microfacets.
 CM_FN float cm_through_pdf(CmSurface s, vec3 wo, vec3 wi) {
   if (!(s.transmission > 0.0f)) return 0.0f;
   vec3 h = wo + vec3(wi.x, wi.y, -wi.z);
@@ -265,8 +266,8 @@ CM_FN float cm_through_pdf(CmSurface s, vec3 wo, vec3 wi) {
 
 #endif
 
-// Probabilities of choosing the coat (x), the base lobe and what it transmits (y), the Lambertian one (z) and the sheen
-// (w): roughly as they reflect.
+// Selection probabilities of the coat (x), the base lobe with its transmission (y), the Lambertian lobe (z) and the
+// sheen (w), roughly in proportion to their albedo.
 CM_FN vec4 cm_lobe_weights(CmSurface s, float cosine) {
   float below = cm_below_coat_towards(s, cosine);
   float sheen = 0.0f;
@@ -287,7 +288,8 @@ CM_FN vec4 cm_lobe_weights(CmSurface s, float cosine) {
   return sum > 0.0f ? w * (1.0f / sum) : vec4(0.0f, 0.0f, 1.0f, 0.0f);
 }
 
-// The reflected lobes' sum times |cos|; the Lambertian one, which sees wi at matte_cosine, weighed by `terminator`.
+// Sum of the reflection lobes times |cos|. The Lambertian lobe has wi at matte_cosine and is multiplied by
+// `terminator`.
 CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine, vec3 wo, vec3 wi) {
   if (!cm_is_positive(wo.z)) return vec3(0.0f);
   float cosine = 1.0f;
@@ -338,7 +340,7 @@ CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi)
   if (wi.z > 0.0f) pdf += lobes.w * CM_SHEEN_PDF;
   if (lobes.y > 0.0f) pdf += lobes.y * cm_through_pdf(s, wo, wi);
 #endif
-  // Lobes that mirror throw some of their samples below the surface, where the Lambertian one may still see them.
+  // Specular lobes send some samples below the surface, where the Lambertian lobe may still receive light.
   vec3 h = normalize(wo + wi);
   if (!cm_is_positive(h.z)) return pdf;
   float base = lobes.y;
@@ -352,10 +354,10 @@ CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi)
 
 CM_FN vec3 cm_into_frame(vec3 u, vec3 v, vec3 n, vec3 w) { return vec3(dot(u, w), dot(v, w), dot(n, w)); }
 
-// How much of the light from wi the Lambertian lobe gets: all of it where no map has turned the normal, none where wi is
-// below the smooth surface, and between them less and less: Chiang, Li and Burley, "Taming the Shadow Terminator",
-// SIGGRAPH Talks 2019. A mapped normal at c to the smooth one loses so, of constant radiance, 2 % (c = 0.999) to 14 %
-// (0.9), 35 % (0.5) and at most (1 - c) / 2 with c <= 0: the shade that bumps throw on each other, as Cycles has it.
+// Fraction of the light from wi that the Lambertian lobe gets: 1 without a normal map, 0 where wi is below the smooth
+// surface, and a smooth transition in between (Chiang, Li and Burley, "Taming the Shadow Terminator", SIGGRAPH Talks
+// 2019). With cosine c between mapped and smooth normal, it removes 2 % (c = 0.999), 14 % (0.9) or 35 % (0.5) of
+// constant radiance, and at most (1 - c) / 2 with c <= 0. This is the shadowing between bumps, as in Cycles.
 CM_FN float cm_terminator(CmSurface s, vec3 wi) {
   float c = dot(s.matte_normal, s.smooth_normal);
   float above = dot(s.smooth_normal, wi);
@@ -364,8 +366,8 @@ CM_FN float cm_terminator(CmSurface s, vec3 wi) {
   return t * (1.0f + t * (1.0f - t));
 }
 
-// f |cos wi|: 0 where either is not above the surface, but for what is transmitted. f is reciprocal where the normal is
-// not mapped; transmitted, f over the square of the index on wi's side is.
+// f |cos wi|. 0 where wo or wi is below the surface, except for transmission. f is reciprocal without a normal map; for
+// transmission, f over the square of the index on wi's side is.
 CM_FN vec3 cm_bsdf_eval(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
@@ -378,7 +380,7 @@ CM_FN vec3 cm_bsdf_eval(CmSurface s, vec3 wo, vec3 wi) {
   return cm_bsdf_eval_local(s, cm_terminator(s, wi), dot(s.matte_normal, wi), o, i);
 }
 
-// Density of cm_bsdf_sample's wi by solid angle.
+// Solid-angle pdf of cm_bsdf_sample.
 CM_FN float cm_bsdf_pdf(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
@@ -387,7 +389,7 @@ CM_FN float cm_bsdf_pdf(CmSurface s, vec3 wo, vec3 wi) {
                            cm_into_frame(u, v, s.normal, wi));
 }
 
-// A direction for u in [0, 1)^3; u0 picks the lobe. May be where no lobe is: eval is 0 there.
+// Samples a direction with u in [0, 1)^3; u0 picks the lobe. The result may lie outside all lobes, where eval is 0.
 CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   vec3 u;
   vec3 v;
@@ -419,8 +421,9 @@ CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   return normalize(u * i.x + v * i.y + n * i.z);
 }
 
-// A shading normal for the lobes that mirror, bent as far as it must be for the viewer's mirror image to be above the surface, whose own normal is
-// `geometric`, on the viewer's side: halfway to a mirror direction that is lifted to just above it.
+// Bends a shading normal for the specular lobes just so far that wo's mirror direction is above the surface. geometric:
+// the surface's own normal, on wo's side. The result is halfway to a mirror direction raised to slightly above the
+// surface.
 CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
   vec3 mirrored = normal * (2.0f * dot(normal, wo)) - wo;
   float height = dot(mirrored, geometric);
@@ -436,7 +439,7 @@ CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
 
 #if !CM_RICH
 
-// What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi, by lobes.
+// Albedo of each lobe under a sky of constant radiance 1 without occlusion: the integral of cm_bsdf_eval over wi.
 struct CmAlbedos {
   vec3 base;
   vec3 coat;
@@ -444,7 +447,7 @@ struct CmAlbedos {
 };
 
 CM_FN CmAlbedos cm_bsdf_albedos(CmSurface s, vec3 wo) {
-  float cosine = dot(s.normal, wo);  // as cm_bsdf_eval has it: drivers look it up once
+  float cosine = dot(s.normal, wo);  // the same expression as in cm_bsdf_eval, so that drivers look up the table once
   vec3 f0 = mix(s.f0, s.base_color, s.metallic);
   float f90 = mix(s.specular, 1.0f, s.metallic);
   vec2 base = cm_ggx_albedo(s.roughness, cosine);

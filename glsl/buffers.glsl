@@ -1,4 +1,4 @@
-// Bindings of the marches' data, of surfaces' and of the host's depth.
+// Bindings of the grid's data, of surfaces and of the host's depth.
 #include "tree_node.glsl"
 #include "here.glsl"
 
@@ -15,8 +15,9 @@ float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
 layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
 layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
 
-// What a camera ray ends at: a layer's opaque surface, or, by the chance of its coverage, the blended ones before it,
-// which count as one at the nearest. z: where; colour: radiance, and 1 in alpha; 0 where there is none.
+// The surface at which a camera ray ends: the layer's opaque surface, or, with their coverage as probability, the
+// blended ones in front of it, which count as one at the nearest. Returns its view depth. colour: radiance, with alpha
+// 1; alpha 0 if there is no surface.
 float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour) {
   vec2 at = (vec2(pixel) + within) * vec2(cm.layers.size) / vec2(cm.view.size.xy);
   ivec3 texel = ivec3(min(ivec2(at), ivec2(cm.layers.size) - 1), int(sample_number % cm.layers.count));
@@ -72,7 +73,7 @@ uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(CM_GRID.first_gl
 
 #ifdef CM_MARCH
 #if CM_MARCH == 0
-// Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
+// Texture buffers, not storage buffers: two 16-byte fetches per cell, up to 2^27 texels on today's drivers.
 layout(binding = CM_UNIT_CELLS) uniform usamplerBuffer cm_cells[CM_PAGES];
 layout(binding = CM_UNIT_TREE) uniform usamplerBuffer cm_tree_words;
 
@@ -83,7 +84,7 @@ uvec4 cm_record(uint cell, uint part) {
   uint number = CM_GRID.first_cell + cell;
   uint page = number >> CM_GRID.page_shift;
   int texel = int((number & ((1u << CM_GRID.page_shift) - 1u)) * 2u + part);
-  // Samplers may only be indexed by constants here: lanes differ in their page.
+  // Samplers may only be indexed by constants here, because lanes differ in their page.
   if (page == 0u) return texelFetch(cm_cells[0], texel);
 #if CM_PAGES > 2
   if (page == 1u) return texelFetch(cm_cells[1], texel);
@@ -122,7 +123,7 @@ uvec2 cm_change_record(uint cell) { return cm_channel_pair(CM_GRID.first_change 
 
 uint cm_tree_word(uint word) { return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u); }
 uint cm_tree(uint node) { return cm_tree_word(CM_GRID.tree + node); }
-// Before the tree 25 pairs, and room for one: first leaf, first tree node.
+// Before the tree there are 25 pairs (first leaf, first tree node) and one unused pair.
 uint cm_root_leaf(uint root) { return cm_tree_word(CM_GRID.tree - 52u + 2u * root); }
 uint cm_root_node(uint root) { return cm_tree_word(CM_GRID.tree - 51u + 2u * root); }
 #else

@@ -1,6 +1,6 @@
 #version 450
-// Of bricks of a channel's fields the numbers that its records are sums of, as grid::ChannelFields has them: a group a
-// brick. CM_FIELDS: how many there are.
+// Computes the numbers that a channel's records are sums of, from the bricks of the channel's fields, like
+// grid::ChannelFields: one work group per brick. CM_FIELDS: number of fields.
 // variants: CM_CHANNEL=0 CM_FIELDS=3 or CM_CHANNEL=1,3 CM_FIELDS=4 or CM_CHANNEL=2 CM_FIELDS=2,4
 layout(local_size_x = 64) in;
 
@@ -12,8 +12,8 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = CM_STORAGE_BRICKS_TOGETHER) readonly buffer CmTogether { float cm_together[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_NUMBERS) writeonly buffer CmNumbers { float cm_numbers[]; };
-layout(location = 0) uniform uvec2 cm_range;    // of bricks: the first, and the end
-layout(location = 1) uniform uint cm_to_first;  // where the first goes
+layout(location = 0) uniform uvec2 cm_range;    // bricks: first, and one past the last
+layout(location = 1) uniform uint cm_to_first;  // destination of brick 0
 
 float cm_field(uint voxel, uint i) { return cm_together[voxel * uint(CM_FIELDS) + i]; }
 
@@ -37,6 +37,6 @@ void cm_put(uint from, uint to) {
 
 void main() {
   uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  uint brick = min(cm_range.x + work, cm_range.y - 1u);  // the last ones do the last once more
+  uint brick = min(cm_range.x + work, cm_range.y - 1u);  // surplus groups repeat the last brick
   for (uint v = gl_LocalInvocationIndex; v < 512u; v += 64u) cm_put(512u * brick + v, 512u * (cm_to_first + brick) + v);
 }

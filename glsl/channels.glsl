@@ -1,14 +1,14 @@
-// What cells carry beside density: light that they give off, and the colour, the mean cosine and the velocity of what
-// scatters. Shared by GLSL and C++.
+// Values of cells beside density: emission, and scattering color, mean cosine and velocity of the medium. Shared by
+// GLSL and C++.
 //
-// Light is radiance a world unit of length. A record of 16 bytes beside the cell's: the mean, three floats, linear Rec.
-// 709; and how the whole varies over the cell, a gradient over the mean along the frame's axes per unit, 10 bits an axis
-// (src/grid/tet_grid.cpp).
+// Emission is radiance per world unit of length. Its record has 16 bytes, parallel to the cell's record: the mean
+// (three floats, linear Rec. 709), and the variation over the cell. The variation is a gradient over the mean along the
+// frame's axes per unit, 10 bits per axis (src/grid/tet_grid.cpp).
 #ifndef CM_CHANNELS_GLSL
 #define CM_CHANNELS_GLSL
 
-// A linear function that is nowhere negative in a cell, and 1 at its centroid, is at most 4 at a vertex: none is steeper
-// along an axis.
+// Maximum slope per axis: a linear function that is nowhere negative in a cell and 1 at its centroid is at most 4 at a
+// vertex.
 #define CM_EMISSION_STEEPEST 4.0f
 
 CM_FN float cm_emission_slope(uint word, uint axis) {
@@ -23,19 +23,20 @@ CM_FN vec3 cm_emission_gradient(uvec4 record) {
   return vec3(cm_emission_slope(record.w, 0u), cm_emission_slope(record.w, 1u), cm_emission_slope(record.w, 2u));
 }
 
-// How far a cell is at least from a point, given from its centroid in its frame in units; in cube space. 0 nearby.
+// Lower bound of the distance from a point to a cell, in cube space; 0 nearby. The point is given relative to the
+// centroid, in the cell's frame in units.
 CM_FN float cm_cell_distance(vec3 from_centroid, uint shape) {
   uint cell_class = cm_shape_class(shape);
   float farthest_vertex = cell_class == 0u ? 1.1457f : (cell_class == 1u ? 0.9355f : 1.4791f);
   return max(0.0f, sqrt(dot(from_centroid, from_centroid)) - farthest_vertex) * cm_shape_unit(shape);
 }
 
-// The mean and, along a ray o + t d in the cell's frame, how much of it there is: at t = 0 and its slope.
+// Emission along a ray o + t d in the cell's frame: the mean, and the relative value at t = 0 with its slope.
 struct CmEmission {
   vec3 mean;
   float at_0;
   float slope;
-  float distance;  // cm_cell_distance from o
+  float distance;  // cm_cell_distance of o
 };
 
 CM_FN CmEmission cm_cell_emission(uvec4 record, CmFrame f, uint shape) {
@@ -50,8 +51,8 @@ CM_FN CmEmission cm_cell_emission(uvec4 record, CmFrame f, uint shape) {
   return e;
 }
 
-// A point of a cell, each as likely, by three random numbers: in its frame, in units. The gaps between sorted numbers
-// are weights of vertices.
+// Samples a point of a cell uniformly by three random numbers: in its frame, in units. The gaps between the sorted
+// numbers are the weights of the vertices.
 CM_FN vec3 cm_cell_point(uint cell_class, vec3 u) {
   float low = min(u.x, min(u.y, u.z));
   float high = max(u.x, max(u.y, u.z));
@@ -60,26 +61,26 @@ CM_FN vec3 cm_cell_point(uint cell_class, vec3 u) {
          (high - middle) * cm_frame_vertex(cell_class, 3u);
 }
 
-// What there is at such a point, over the mean.
+// Emission at such a point over the mean.
 CM_FN float cm_emission_at(uvec4 record, uint cell_class, vec3 point) {
   return max(0.0f, 1.0f + dot(cm_emission_gradient(record), point - cm_frame_centroid(cell_class)));
 }
 
-// What a ray takes up from t to t_1, without what the medium takes away.
+// Emission that a ray collects from t to t_1, without absorption.
 CM_FN vec3 cm_emitted(CmEmission e, float t, float t_1) {
   float share = 0.5f * (max(0.0f, e.at_0 + e.slope * t) + max(0.0f, e.at_0 + e.slope * t_1));
   return e.mean * (share * max(0.0f, t_1 - t));
 }
 
-// Of what scatters, its mean cosine: 16 bits a cell, two cells a word.
+// Mean cosine of scattering: 16 bits per cell, two cells per word.
 CM_FN float cm_cell_anisotropy(uint word, uint cell) {
   return float(int(word << (16u - 16u * (cell & 1u))) >> 16) * (1.0f / 32767.0f);
 }
 
-// Its velocity, by density, along the axes of cube space, voxels a second: 3 half floats, and room for one.
+// Mean velocity weighted by density, along the axes of cube space, voxels per second: 3 halves, and one unused.
 CM_FN vec3 cm_cell_velocity(uvec2 words) { return vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x); }
 
-// Of what scatters, by density: 11, 11 and 10 bits of a word.
+// Scattering color weighted by density: 11, 11 and 10 bits of a word.
 CM_FN vec3 cm_cell_colour(uint word) {
   return vec3(float(word & 2047u) / 2047.0f, float((word >> 11) & 2047u) / 2047.0f, float(word >> 22) / 1023.0f);
 }

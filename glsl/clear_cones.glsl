@@ -1,25 +1,26 @@
-// Where a ray meets nothing any more: an empty cell's clear cones. Directions are in 24 cones, by their longest axis and
-// the signs of all three; a bit of each tells that no ray from the cell comes to a cell that has anything, whichever way
-// it goes in that cone. So rays end where they get out of a cloud, not where they get out of the box.
+// Empty-space termination of rays. Each empty cell has 24 bits, its clear cones, one per cone of directions: longest
+// axis and signs of all three. A set bit means that no ray from the cell with a direction in that cone reaches a cell
+// with density or emission. So rays end where they leave a cloud, not where they leave the bounds.
 //
-// They are found on a map of cubes, CM_CLEAR_SIDE along an axis at most, over the box of what there is: full cubes are
-// those that cells with anything touch. From a cube rays of a cone get into the same layer's next cubes of the two
-// shorter axes and, of the next layer, into those four; so layer by layer, from where rays leave, a cube is clear if
-// those of its own layer are not full and those of the next are clear. Rows of cubes are words of a bit each. Floats here
-// are whole numbers and halves of them, below 2^21, so that the CPU and GL find the same of the same records. Shared by
-// GLSL and C++.
+// The bits are found on a map of cubes over the bounds of all non-empty cells, with at most CM_CLEAR_SIDE cubes per
+// axis. Cubes touched by a non-empty cell are full. From a cube, rays of a cone reach the neighbors of its layer along
+// the two shorter axes, and the same four cubes of the next layer. So layer by layer, from where rays leave the map, a
+// cube is clear if those of its own layer are not full and those of the next layer are clear. Rows of cubes are words
+// with one bit per cube. Floats here are multiples of 1/2 below 2^21, so that CPU and GL find the same bits for the
+// same records. Shared by GLSL and C++.
 #ifndef CM_CLEAR_CONES_GLSL
 #define CM_CLEAR_CONES_GLSL
 
 #define CM_CLEAR_CONES 24u
 #define CM_CLEAR_SIDE 64u
-// Rows along x stand by z and y, those along z, for cones along x, by x and y.
+// Rows along x are indexed by z and y. Rows along z, for cones along x, are indexed by x and y.
 #define CM_CLEAR_ROWS (CM_CLEAR_SIDE * CM_CLEAR_SIDE)
 #define CM_CLEAR_CUBES (CM_CLEAR_ROWS * CM_CLEAR_SIDE)
 #define CM_CLEAR_ALONG_X 0u
 #define CM_CLEAR_ALONG_Z 1u
 
-// A direction's, as a bit. Where lengths are equal or 0 it is in several, and in the one that this gives.
+// Bit of the cone of a direction. Where lengths are equal or 0, a direction lies in several cones; this returns one of
+// them.
 CM_FN uint cm_clear_cone(vec3 d) {
   vec3 a = abs(d);
   uint axis = a.x >= a.y && a.x >= a.z ? 0u : (a.y >= a.z ? 1u : 2u);
@@ -27,11 +28,12 @@ CM_FN uint cm_clear_cone(vec3 d) {
 }
 
 struct CmClearMap {
-  ivec3 low;   // its first cube, counted in cubes
-  uint shift;  // cubes are of 2^shift voxels
+  ivec3 low;   // its first cube, in cubes
+  uint shift;  // cubes have 2^shift voxels per side
 };
 
-// Over the voxels from low to high, of as small cubes as do. As many of them as a side's length has may be one too few.
+// Map over the voxels from low to high, with the smallest possible cubes. The shift derived from the longest side may
+// be one too small.
 CM_FN CmClearMap cm_clear_map(uvec3 low, uvec3 high) {
   uvec3 last = high - uvec3(1u, 1u, 1u);
   ivec3 lengths = ivec3(last - low);
@@ -43,14 +45,14 @@ CM_FN CmClearMap cm_clear_map(uvec3 low, uvec3 high) {
   return map;
 }
 
-// Of a cell: the cubes that it may touch, from first to last, and by how many along an axis they are looked at together.
+// The cubes that a cell may touch, from first to last, and the number of cubes per axis that are tested together.
 struct CmClearRange {
   ivec3 first;
   ivec3 last;
   int step;
 };
 
-// A cell stands in one of the octree's cubes, of which a quarter along an axis is looked at.
+// A cell lies in an octree cube. The step is a quarter of that cube's side.
 CM_FN CmClearRange cm_clear_range(vec3 v0, uint shape, CmClearMap map) {
   CmClearRange range;
   vec3 v1 = cm_cell_vertex(v0, shape, 1u);
@@ -64,8 +66,8 @@ CM_FN CmClearRange cm_clear_range(vec3 v0, uint shape, CmClearMap map) {
   return range;
 }
 
-// Whether the map has all of them. Cells that it has not are beside the box, where rays do not come but for what they are
-// rounded by, or stand across its end, which they soon get to.
+// Returns true if the map contains the whole range. Other cells are outside the bounds, where rays come only by
+// rounding, or lie across the bounds' end, which rays soon reach.
 CM_FN bool cm_clear_has(CmClearRange range) {
   ivec3 low = range.first;
   ivec3 high = range.last;
@@ -73,7 +75,7 @@ CM_FN bool cm_clear_has(CmClearRange range) {
   return min(low.x, min(low.y, low.z)) >= 0 && max(high.x, max(high.y, high.z)) < side;
 }
 
-// Whether it touches so many cubes along each axis from there on.
+// Returns true if the cell touches the block of `cubes` cubes per axis that begins at `cube`.
 CM_FN bool cm_clear_touches(vec3 v0, uint shape, CmClearMap map, ivec3 cube, int cubes) {
   float voxels = float(1 << int(map.shift));
   float half_size = 0.5f * voxels * float(cubes);
@@ -86,28 +88,29 @@ CM_FN bool cm_clear_touches(vec3 v0, uint shape, CmClearMap map, ivec3 cube, int
   return p.z + half_size > 0.0f && p.x - p.y + 2.0f * half_size > 0.0f && p.y - p.z + 2.0f * half_size > 0.0f && cap;
 }
 
-// A row's bits from `first` on, so many.
+// Mask of `count` bits of a row, from bit `first` on.
 CM_FN uint cm_clear_below(int bit) { return bit <= 0 ? 0u : (bit >= 32 ? 0xffffffffu : (1u << uint(bit)) - 1u); }
 CM_FN uvec2 cm_clear_bits(int first, int count) {
   return uvec2(cm_clear_below(first + count) & ~cm_clear_below(first),
                cm_clear_below(first + count - 32) & ~cm_clear_below(first - 32));
 }
 
-// A row's bits, each where the one before it is, or the one behind; outside: what comes in.
+// Shifts a row by one bit. up: each bit moves to the one before it, else to the one after it. outside: the bit shifted
+// in.
 CM_FN uvec2 cm_clear_shifted(uvec2 row, bool up, uint outside) {
   return up ? uvec2((row.x >> 1) | (row.y << 31), (row.y >> 1) | (outside << 31))
             : uvec2((row.x << 1) | outside, (row.y << 1) | (row.x >> 31));
 }
 
-// Of a cube's row and the next one of its layer, which are full, and of the layer behind, which are clear; up: rays go
-// towards higher bits.
+// Clear bits of a row. full, full_beside: full bits of this row and of the next row of the layer; clear, clear_beside:
+// clear bits of the same rows in the layer behind. up: rays go towards higher bits.
 CM_FN uvec2 cm_clear_row(uvec2 full, uvec2 full_beside, uvec2 clear, uvec2 clear_beside, bool up) {
   uvec2 any = full | full_beside;
   uvec2 both = clear & clear_beside;
   return ~(any | cm_clear_shifted(any, up, 0u)) & both & cm_clear_shifted(both, up, 1u);
 }
 
-// Cubes by number.
+// Conversion between cubes and their numbers.
 CM_FN uint cm_clear_number(ivec3 cube) {
   return (uint(cube.z) * CM_CLEAR_SIDE + uint(cube.y)) * CM_CLEAR_SIDE + uint(cube.x);
 }
@@ -115,21 +118,21 @@ CM_FN uvec3 cm_clear_cube(uint number) {
   return uvec3(number % CM_CLEAR_SIDE, number / CM_CLEAR_SIDE % CM_CLEAR_SIDE, number / CM_CLEAR_ROWS);
 }
 
-// Whether a cone's rays go towards higher cubes along an axis.
+// Returns true if the cone's rays go towards higher cubes along the axis.
 CM_FN bool cm_clear_up(uint cone, uint axis) { return ((cone >> axis) & 1u) != 0u; }
 
-// Whose rows a cone's are numbered as.
+// Selects the set of rows that a cone uses.
 CM_FN uint cm_clear_rows(uint cone) { return cone < 8u ? CM_CLEAR_ALONG_Z : CM_CLEAR_ALONG_X; }
-// The row of a cone's that has a cube, and the cube's bit there.
+// Row that contains a cube in the cone's set, and the bit of the cube in it.
 CM_FN uint cm_clear_row_of_cube(uint cone, ivec3 cube) {
   return uint(cone < 8u ? cube.x : cube.z) * CM_CLEAR_SIDE + uint(cube.y);
 }
 CM_FN uint cm_clear_bit_of_cube(uint cone, ivec3 cube) { return uint(cone < 8u ? cube.z : cube.x); }
-// A cone's row, by the layer that its rays go through, and which of that layer's it is.
+// Index of a row, by the layer along the cone's axis and the row in that layer.
 CM_FN uint cm_clear_row_of_layer(uint cone, uint layer, uint row) {
   return (cone >> 3) == 1u ? row * CM_CLEAR_SIDE + layer : layer * CM_CLEAR_SIDE + row;
 }
-// Which axis a layer's rows are counted along, and which their bits.
+// Axis along which a layer's rows are counted, and axis of their bits.
 CM_FN uint cm_clear_axis_of_rows(uint cone) { return (cone >> 3) == 1u ? 2u : 1u; }
 CM_FN uint cm_clear_axis_of_bits(uint cone) { return cone < 8u ? 2u : 0u; }
 

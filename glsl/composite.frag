@@ -1,7 +1,7 @@
 #version 450
-// An accumulation as displayed colour, or its depth.
-// Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
-// CM_LAYERS 1: surfaces of the rectangle's size beneath, in front of the background.
+// Draws an accumulation as displayed color, or its depth. Variants, not uniforms, select the work per pixel, because
+// software drivers execute both sides of every branch. CM_LAYERS 1: surfaces at the size of the rectangle lie below, in
+// front of the background.
 // variants: CM_DEPTH=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false CM_LAYERS=1
 #ifndef CM_LAYERS
 #define CM_LAYERS 0
@@ -10,7 +10,7 @@
 #include "shared.glsl"
 #include "display.glsl"
 
-layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;  // row 0 is the picture's top; CM_RESOLVED: already what is shown
+layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;  // row 0 is the image's top; CM_RESOLVED: means
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
 layout(binding = CM_UNIT_VOLUME_Z) uniform sampler2D cm_volume_z;
 layout(location = 0) uniform ivec4 cm_viewport;
@@ -18,9 +18,9 @@ layout(location = 1) uniform bool cm_flip_y;
 #if CM_DEPTH == 0
 layout(location = 2) uniform float cm_exposure;
 layout(location = 3) uniform bool cm_transparent;
-layout(location = 4) uniform vec3 cm_backdrop;  // radiance behind all, besides the background's
+layout(location = 4) uniform vec3 cm_backdrop;  // radiance behind everything, beside the background's
 #if CM_LAYERS || !CM_RESOLVED
-layout(location = 6) uniform bool cm_with_background;  // else it is left out
+layout(location = 6) uniform bool cm_with_background;  // false: without the background
 layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // mean radiance
 #endif
 layout(location = 0) out vec4 cm_colour;
@@ -28,9 +28,9 @@ layout(location = 0) out vec4 cm_colour;
 layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
 layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
 layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_host_z;
-layout(location = 5) uniform ivec4 cm_layers;  // how many, whether blended ones follow, how many the host has
+layout(location = 5) uniform ivec4 cm_layers;  // layers, whether blended ones follow, the host's depth layers
 
-// The surface pass's mean at a texel, without what is behind the host's.
+// Mean of the surface pass at a texel, without the surfaces behind the host's depth.
 vec4 cm_surfaces(ivec2 texel) {
   vec2 share = (vec2(texel) + 0.5) / vec2(textureSize(cm_layer_z, 0).xy);
   vec4 sum = vec4(0.0);
@@ -73,7 +73,7 @@ layout(location = 3) uniform bool cm_orthographic;
 #endif
 
 void main() {
-  // Not gl_FragCoord itself: a host that shades every sample would move it off the pixel's centre.
+  // Not gl_FragCoord itself: with per-sample shading by the host it is not at the pixel's center.
   ivec2 pixel = ivec2(floor(gl_FragCoord.xy)) - cm_viewport.xy;
   if (!cm_flip_y) pixel.y = cm_viewport.w - 1 - pixel.y;
   ivec2 size = textureSize(cm_sum, 0);
@@ -85,7 +85,7 @@ void main() {
   ivec2 last = size - 1;
 #if CM_LAYERS
   ivec2 layer_size = textureSize(cm_layer_z, 0).xy;
-  // Of the coarse pixels around, those count whose middle sees as far: no seam of the volume along silhouettes.
+  // Of the four coarse pixels around, those of similar surface depth count most, so that silhouettes have no seam.
   float here = 1.0 / texelFetch(cm_layer_z, ivec3(pixel, 0), 0).x;
   vec4 value = vec4(0.0);
   vec3 background = vec3(0.0);

@@ -1,15 +1,15 @@
 #version 450
-// A picture as it was displayed before, over a rectangle of its own size.
+// Draws an image that is already in display colors, over a rectangle of its own size.
 #include "bindings.glsl"
 
-layout(binding = CM_UNIT_SUM) uniform sampler2D cm_picture;  // nearest; row 0 is the picture's top
+layout(binding = CM_UNIT_SUM) uniform sampler2D cm_picture;  // nearest filter; row 0 is the image's top
 layout(location = 0) uniform ivec4 cm_viewport;
 layout(location = 1) uniform bool cm_flip_y;
 
 layout(location = 0) out vec4 cm_color;
 
 void main() {
-  // Not gl_FragCoord itself: a host that shades every sample would move it off the pixel's center.
+  // Not gl_FragCoord itself: with per-sample shading by the host it is not at the pixel's center.
   ivec2 pixel = ivec2(floor(gl_FragCoord.xy)) - cm_viewport.xy;
   if (!cm_flip_y) pixel.y = cm_viewport.w - 1 - pixel.y;
   // Software drivers filter faster than they fetch.

@@ -1,5 +1,5 @@
 #version 450
-// Bricks from one buffer to places in another: a group a brick. Numbers are exactly the same.
+// Copies bricks between buffers to new positions: one work group per brick. Values are preserved exactly.
 // variants: CM_FROM_HALVES=0,1 CM_TO_HALVES=0,1
 layout(local_size_x = 64) in;
 
@@ -8,9 +8,9 @@ layout(local_size_x = 64) in;
 layout(std430, binding = CM_STORAGE_BRICKS_FROM) readonly buffer CmFrom { uint cm_from[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_TO) writeonly buffer CmTo { uint cm_to[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_MOVED) readonly buffer CmMoved { uvec2 cm_moved[]; };  // from, to
-layout(location = 0) uniform uvec2 cm_range;  // of those moved: the first, and the end
+layout(location = 0) uniform uvec2 cm_range;  // entries of cm_moved: first, and one past the last
 layout(location = 1) uniform uint cm_to_first;
-layout(location = 2) uniform uvec2 cm_numbers;  // how many floats a voxel has there, and which it is; of halves one
+layout(location = 2) uniform uvec2 cm_numbers;  // floats per voxel there, and which one is written; not for halves
 
 float cm_number(uint i) {
 #if CM_FROM_HALVES

@@ -1,11 +1,12 @@
 #version 450
-// Whose a pixel is, as Cryptomatte has it (Friedman and Jones, "Fully automatic ID mattes with support for motion blur and
-// transparency", SIGGRAPH 2015 posters; specification 1.2): the ids of what is seen in it, and of each the share of the
-// pixel at which camera rays end there, by their first scattering or absorption in a volume, or at a surface or the
-// ground. Of a fixed set of rays, cm.dispatch.samples of them, rays_before of which earlier dispatches have looked along;
-// the shares along each are exact, of at most as many volumes at one place as walk.glsl takes. A slice has two ids, as a
-// float's bits, and a share each, the largest share first; behind a share of 0 nothing is written. Texels are of the tile.
-// What has no id, as holes have none, hides what is behind it and is nobody's.
+// Cryptomatte (Friedman and Jones, "Fully automatic ID mattes with support for motion blur and transparency", SIGGRAPH
+// 2015 posters; specification 1.2): the IDs visible in each pixel with their coverage. Coverage is the fraction of
+// camera rays that end at the object: by their first scattering or absorption in a volume, or at a surface or the
+// ground. It uses a fixed set of feature rays. cm.dispatch.samples is their number per pixel; earlier dispatches traced
+// rays_before of them. Coverage along each ray is exact, for as many overlapping volumes as walk.glsl supports. A slice
+// has two pairs of an ID, as a float's bits, and its coverage, in descending order of coverage. Nothing is written
+// after a coverage of 0. Texels are relative to the tile. Objects without an ID (holdouts) occlude and write no
+// coverage.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -29,18 +30,18 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(rgba32f, binding = CM_IMAGE_MATTES) uniform image2DArray cm_mattes;
 
-// Ids, 0 for none: the ground's, one for each volume, and one for each record of models.
+// IDs, 0 for none: of the ground, of each volume, and of each record of models.
 layout(std430, binding = CM_STORAGE_MATTES) readonly buffer CmMatteIds { uint cm_matte_ids[]; };
 const uint CM_MATTE_OF_VOLUMES = 1u;
 
-// Ids that are kept apart in one pixel.
+// Maximum number of IDs per pixel.
 const uint CM_MOST_MATTES = 32u;
 uint cm_matte_id[CM_MOST_MATTES];
 float cm_matte_share[CM_MOST_MATTES];
 uint cm_matte_count = 0u;
-uint cm_matte_last = 0u;  // the one that had something last: seldom is the next another
+uint cm_matte_last = 0u;  // the slot used last: the next contribution is mostly to the same ID
 
-// The slot of an id; with more than there are the least gives way.
+// Returns the slot of an ID. If all slots are in use, the one with the smallest coverage is replaced.
 uint cm_matte_slot(uint id) {
   uint slot = 0u;
   while (slot < cm_matte_count && cm_matte_id[slot] != id) slot += 1u;
@@ -65,7 +66,7 @@ void cm_add_to_matte(uint id, float share) {
   cm_matte_share[cm_matte_last] += share;
 }
 
-// Takes out the one with the largest share: its id, as a float's bits, and that share.
+// Removes the slot with the largest coverage. Returns its ID, as a float's bits, and its coverage.
 vec2 cm_take_largest_matte() {
   uint largest = 0u;
   for (uint i = 1u; i < cm_matte_count; ++i) {
@@ -97,7 +98,7 @@ void main() {
   for (int i = int(cm.dispatch.rays_before); i < int(cm.dispatch.samples); ++i) {
     CmFactRay ray = cm_fact_ray(pixel, i);
     float solid_t = ray.end;
-    uint solid = 0u;  // the host's has no id
+    uint solid = 0u;  // the host's surfaces have no ID
 #if CM_SURFACES
     CmHit hit;
     if (cm_trace_models(cm_from_cube_point(ray.o), ray.w, 0.0, solid_t, false, hit)) {
@@ -113,7 +114,7 @@ void main() {
     float used = 0.0;
     float clear = 1.0;
     CmWalk walk = cm_walk(ray.o, ray.d, solid_t, true);
-    // Beyond e^-40 nothing is left to know.
+    // Beyond e^-40 nothing remains visible.
     for (int j = 0; j < 100000 && used < 40.0; ++j) {
       float t_1, e_0, e_1;
       if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
@@ -122,7 +123,7 @@ void main() {
       float depth = cm_depth_of(e_0, e_1, span, way);
       used += depth;
       float chance = 1.0 - exp(-depth);
-      // Each volume has its share of the extinction there, which is linear.
+      // Splits the probability by the volumes' extinctions at the mean position of scattering.
       float middle = walk.t + cm_middle_of_part(depth, chance) * min(span, way);
       float extinction = 0.0;
       for (int k = 0; CM_IS_FRONT(k, walk); ++k) extinction += cm_front_extinction(walk.front[k], middle);

@@ -1,10 +1,11 @@
-// What kernels of the denoiser share. Channels are halves in blocks of eight, a uvec4 a pixel, block after block.
+// Shared code of the denoiser's kernels. Channels are halves in blocks of eight: one uvec4 per pixel, block after
+// block.
 #ifndef CM_DENOISE_GLSL
 #define CM_DENOISE_GLSL
 #include "numbers.glsl"
 
-// A luminance of which human eyes notice the same steps everywhere, 1 at 65504: the fit to Aydin et al., "Extending
-// Quality Metrics to Full Luminance Range Images" (2008), by which Open Image Denoise's networks were trained.
+// Perceptually uniform luminance, 1 at 65504: the fit to Aydin et al., "Extending Quality Metrics to Full Luminance
+// Range Images" (2008), with which Open Image Denoise's networks were trained.
 const float CM_PU_SCALE = 0.318967155;
 const float CM_PU_DARKEST = 1.57945760e-06;
 const float CM_PU_DARK = 3.22087631e-02;
@@ -23,21 +24,21 @@ float cm_pu_inverse(float encoded) {
   return exp((x - 9.98620152e-01) / 1.92653254e-01) - 6.26026094e-03;
 }
 
-// To the nearest half, even where the driver's packHalf2x16 cuts off; no larger than the largest.
+// Packs two halves, rounded to nearest even if the driver's packHalf2x16 truncates, and clamped to the largest half.
 uint cm_pack(vec2 v) {
   uvec2 bits = floatBitsToUint(min(v, vec2(65504.0)));
   bits = (bits + 0xfffu + ((bits >> 13) & 1u)) & ~0x1fffu;
   return packHalf2x16(uintBitsToFloat(bits));
 }
 
-// Of the light that facts have (aovs.comp) what they have exactly: all but the sun's from a medium, which is about right.
-// Of a pixel that shows both, surface and medium, the sun's counts by the transmittance.
+// Exact part of the noise-free light of aovs.comp: all except sunlight scattered in a medium, which is approximate. If
+// a pixel shows both surface and medium, its sunlight counts by the transmittance.
 vec3 cm_exact_light(vec4 known, float transmittance) {
   vec3 exact = known.rgb * (1.0 - known.a * (1.0 - transmittance));
   return cm_is_finite(exact) ? exact : vec3(0.0);
 }
 
-// What the network sees of a radiance: none of what is no radiance.
+// Radiance as input of the network: non-finite values become 0, negative ones too.
 vec3 cm_radiance(vec3 v) { return cm_is_finite(v) ? max(v, vec3(0.0)) : vec3(0.0); }
 
 #endif

@@ -1,42 +1,42 @@
 #version 450
-// A convolution of 3x3 with all that is around it: the channels of two sources (the first may be of half the size, its
-// texels twice), zeros around them, a bias, nothing below 0. A work group has 16x16 pixels and 16 channels of the
-// result, a lane 2x2 of these pixels; halves are what is kept, floats what is added.
-// CM_RESULT 0: channels; 1: the largest of each 2x2; 2: the picture, three channels decoded.
+// A 3x3 convolution over all channels of two sources, with zero padding, a bias and ReLU. The first source may have
+// half the size; its texels are then doubled. A work group computes 16x16 pixels and 16 channels of the result, a lane
+// 2x2 of these pixels. Storage is in halves, accumulation in floats. CM_RESULT 0: channels; 1: 2x2 max pooling; 2: the
+// image, three channels decoded.
 // variants: CM_RESULT=0,1,2
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "denoise.glsl"
 
-// Vectors of four channels of the result.
+// Groups of four channels of the result.
 #if CM_RESULT == 2
 #define CM_QUADS 1
 #else
 #define CM_QUADS 4
 #endif
-#define CM_SIDE 18  // of the pixels that a work group reads
+#define CM_SIDE 18  // side of the pixel block that a work group reads
 
 layout(std430, binding = CM_STORAGE_DENOISE_CHANNELS) buffer CmChannels { uvec4 cm_channels[]; };
-// Of each work group's channels: biases, then for each block of eight channels of the sources, for each of these and
-// each of 3x3 rows by rows a weight. Four halves each.
+// Per group of channels: the biases; then per block of eight source channels, per channel and per tap of 3x3 (by rows),
+// a weight. Each entry is four halves.
 layout(std430, binding = CM_STORAGE_DENOISE_WEIGHTS) readonly buffer CmWeights { uvec2 cm_weights[]; };
-layout(location = 0) uniform uint cm_first;  // work group of all: channels, then along x, then along y
-layout(location = 1) uniform uint cm_width;  // of what the convolution works at; even where it is pooled
+layout(location = 0) uniform uint cm_first;  // index of the first work group: by channels, then x, then y
+layout(location = 1) uniform uint cm_width;  // size of the input; even if the result is pooled
 layout(location = 2) uniform uint cm_height;
-layout(location = 3) uniform uint cm_groups;    // of the result's channels
+layout(location = 3) uniform uint cm_groups;    // groups of the result's channels
 layout(location = 4) uniform uint cm_weights_at;
-layout(location = 5) uniform uint cm_to;        // of the result
-layout(location = 6) uniform uint cm_from_0;    // of the first source
+layout(location = 5) uniform uint cm_to;        // first block of the result
+layout(location = 6) uniform uint cm_from_0;    // first block of the first source
 layout(location = 7) uniform uint cm_blocks_0;
-layout(location = 8) uniform uint cm_shift_0;   // 1: it is of half the size
+layout(location = 8) uniform uint cm_shift_0;   // 1: the first source has half the size
 layout(location = 9) uniform uint cm_from_1;
 layout(location = 10) uniform uint cm_blocks_1;
 #if CM_RESULT == 2
 layout(std430, binding = CM_STORAGE_DENOISE_BINS) readonly buffer CmBins { float cm_exposure; };
 layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
 layout(rgba32f, binding = CM_IMAGE_DENOISED) uniform writeonly image2D cm_denoised;
-layout(location = 11) uniform ivec2 cm_begin;       // of the tile in the picture
-layout(location = 12) uniform ivec2 cm_keep_begin;  // of what the tile is right about
+layout(location = 11) uniform ivec2 cm_begin;       // corner of the tile in the image
+layout(location = 12) uniform ivec2 cm_keep_begin;  // pixels for which the tile is valid
 layout(location = 13) uniform ivec2 cm_keep_end;
 #endif
 
@@ -54,7 +54,7 @@ uvec4 cm_source(uint block, ivec2 p) {
   return cm_channels[(first ? cm_from_0 : cm_from_1) + (b * (cm_height >> shift) + at.y) * (cm_width >> shift) + at.x];
 }
 
-// Eight channels, nothing of them below 0.
+// Packs eight channels, with ReLU.
 uvec4 cm_block(vec4 lower, vec4 upper) {
   lower = max(lower, vec4(0.0));
   upper = max(upper, vec4(0.0));
@@ -62,7 +62,7 @@ uvec4 cm_block(vec4 lower, vec4 upper) {
 }
 
 #if CM_RESULT == 2
-// What is not finite, before or after, is left as it was.
+// Writes a pixel. If the input or the result is not finite, the input is kept.
 void cm_keep(uvec2 p, vec3 encoded) {
   ivec2 texel = cm_begin + ivec2(p);
   if (any(lessThan(texel, cm_keep_begin)) || any(greaterThanEqual(texel, cm_keep_end))) return;

@@ -1,6 +1,7 @@
 #version 450
-// The exposure at which a picture is denoised: 0.18 over the geometric mean of its luminance, of bins of about 16x16
-// pixels that noise says little in; 1 where all is black. CM_STAGE 0: a bin a work group; 1: all bins, one work group.
+// Exposure for denoising: 0.18 over the geometric mean of the image's luminance. The mean is over bins of about 16x16
+// pixels, in which noise has little effect. The exposure is 1 if everything is black. CM_STAGE 0: one bin per work
+// group; 1: reduction of all bins, one work group.
 // variants: CM_STAGE=0,1
 layout(local_size_x = 64) in;
 #include "bindings.glsl"
@@ -11,14 +12,14 @@ layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
 #endif
 layout(std430, binding = CM_STORAGE_DENOISE_BINS) buffer CmBins {
   float cm_exposure;
-  vec2 cm_bins[];  // logarithm of the luminance, and 1 where it has one
+  vec2 cm_bins[];  // log2 of the luminance, and 1 if it is above 0
 };
-layout(location = 0) uniform uint cm_first;  // work group of all
+layout(location = 0) uniform uint cm_first;  // index of the first work group
 layout(location = 1) uniform uint cm_bins_x;
 layout(location = 2) uniform uint cm_bins_y;
 shared vec2 cm_sums[64];
 
-// Of all that the work group gives, to its first.
+// Sums over the work group; the result is valid in its first lane.
 vec2 cm_sum(vec2 value) {
   uint lane = gl_LocalInvocationID.x;
   cm_sums[lane] = value;

@@ -1,19 +1,18 @@
 #version 450
-// What a denoiser is told of a picture: its means, and what is known of pixels without light. A volume hides what is
-// behind it from these guides as it does from the eye: else geometry that nobody sees would print through clouds. What
-// it has instead is its own albedo, so that its outline is a guide as well, times how bright it is by light that is
-// known, against what is about it, so that its billows are.
-// CM_BACKGROUND 0: what is in front of the background; 1: all radiance.
-// CM_KNOWN 1: less the light that is known without noise. What is left has either sign, which no network takes: in one
-// picture what is left, in another what is missing.
+// Inputs of the denoiser: mean color, albedo and normal. A volume hides the surfaces behind it from these guides as
+// from the eye; otherwise hidden geometry would show through clouds in the result. In place of the surface it adds the
+// medium's own albedo, so that the volume's outline is a guide as well. The albedo is scaled by the local contrast of
+// the noise-free light, so that billows are guides too. CM_BACKGROUND 0: radiance in front of the background; 1: all
+// radiance. CM_KNOWN 1: subtracts the noise-free light. The residual has either sign, which the network does not
+// accept, so its positive and negative parts go to separate images.
 // variants: CM_BACKGROUND=0,1 CM_KNOWN=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "denoise.glsl"
 layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
-layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // already means
-layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;    // of surfaces, as the two that follow
+layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // means
+layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;    // of surfaces, as the next two
 layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
 layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;  // in front of them
 layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
@@ -24,18 +23,18 @@ layout(rgba32f, binding = CM_IMAGE_GUIDE_NORMAL) uniform writeonly image2D cm_no
 layout(rgba32f, binding = CM_IMAGE_GUIDE_MISSING) uniform writeonly image2D cm_missing_out;
 #endif
 layout(location = 0) uniform vec3 cm_medium_albedo;
-layout(location = 1) uniform ivec2 cm_first;  // pixel of the picture
+layout(location = 1) uniform ivec2 cm_first;  // corner in the image
 
 vec3 cm_known_light(ivec2 texel) {
   vec3 known = texelFetch(cm_emission, texel, 0).rgb;
   return cm_is_finite(known) ? known : vec3(0.0);
 }
 
-// What is about a pixel, as far as billows are wide: so many steps to each side, so many pixels long.
+// Neighborhood for the local contrast, about as wide as billows: steps to each side, and pixels per step.
 #define CM_STEPS 4
 #define CM_STEP 3
 
-// How bright what is here is by light that is known: 0 where it has none, a half where it has as much as what is about it.
+// Brightness of the noise-free light relative to its neighborhood: 0 if black, 1/2 if equal to the neighborhood.
 vec3 cm_relief(ivec2 texel) {
   ivec2 end = cm_first + imageSize(cm_colour_out) - 1;
   vec4 about = vec4(0.0);

@@ -1,7 +1,6 @@
 #version 450
-// What a network sees of a picture: colour exposed and encoded, albedo, and normals from 0 to 1; beyond it what is within,
-// mirrored, as its outermost pixels would be taken for an edge of what is seen.
-// CM_GUIDES 0: colour alone.
+// Input channels of the network: exposed and encoded color, albedo, and normals mapped to [0, 1]. Beyond the image it
+// is mirrored, because the network would take the image's border for an edge. CM_GUIDES 0: only color.
 // variants: CM_GUIDES=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
@@ -14,10 +13,10 @@ layout(binding = CM_UNIT_DENOISE_NORMAL) uniform sampler2D cm_normal;
 #endif
 layout(std430, binding = CM_STORAGE_DENOISE_BINS) readonly buffer CmBins { float cm_exposure; };
 layout(std430, binding = CM_STORAGE_DENOISE_CHANNELS) writeonly buffer CmChannels { uvec4 cm_channels[]; };
-layout(location = 0) uniform uint cm_first;   // work group of all
-layout(location = 1) uniform uint cm_width;   // of the tile
+layout(location = 0) uniform uint cm_first;   // index of the first work group
+layout(location = 1) uniform uint cm_width;   // size of the tile
 layout(location = 2) uniform uint cm_height;
-layout(location = 3) uniform ivec2 cm_begin;  // of the tile in the picture
+layout(location = 3) uniform ivec2 cm_begin;  // corner of the tile in the image
 layout(location = 4) uniform uint cm_to;
 
 ivec2 cm_mirrored(ivec2 texel, ivec2 size) {

@@ -1,6 +1,6 @@
 #version 450
-// What is known of a picture's light comes back to what a network left of the rest, less what it left of what was missing
-// (denoise_guides.comp). A pixel that is no number stays as it is.
+// Final color = noise-free light + denoised positive residual - denoised negative residual (denoise_guides.comp).
+// Pixels that are not finite stay unchanged.
 // variants: -
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
@@ -9,7 +9,7 @@ layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_missing;
 layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;
 layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
 layout(rgba32f, binding = CM_IMAGE_DENOISED) uniform image2D cm_denoised;
-layout(location = 0) uniform ivec2 cm_first;  // pixel of the picture
+layout(location = 0) uniform ivec2 cm_first;  // corner in the image
 
 void main() {
   ivec2 at = ivec2(gl_GlobalInvocationID.xy);

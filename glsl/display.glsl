@@ -1,4 +1,4 @@
-// How linear radiance becomes displayed colour. Shared by GLSL and C++.
+// Conversion of linear radiance to displayed color. Shared by GLSL and C++.
 #ifndef CM_DISPLAY_GLSL
 #define CM_DISPLAY_GLSL
 #include "numbers.glsl"
@@ -8,10 +8,10 @@
 #define CM_TONE_MAP_CLIP 2u
 #define CM_TONE_MAP_NONE 3u
 
-// Not negative, not NaN, finite.
+// Makes a value non-negative, finite and not NaN.
 CM_FN float cm_displayable(float x) { return cm_is_positive(x) ? min(x, 1e30f) : 0.0f; }
 
-// Khronos PBR Neutral: https://github.com/KhronosGroup/ToneMapping. To [0, 1].
+// Khronos PBR Neutral: https://github.com/KhronosGroup/ToneMapping. Result in [0, 1].
 CM_FN vec3 cm_tone_map_neutral(vec3 c) {
   float start = 0.8f - 0.04f;
   float room = 1.0f - start;
@@ -24,9 +24,9 @@ CM_FN vec3 cm_tone_map_neutral(vec3 c) {
   return new_peak + (c * (new_peak / peak) - new_peak) * keep;
 }
 
-// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015: (x (a x + b)) / (x (c x + d) + e), to [0, 1].
+// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015: (x (a x + b)) / (x (c x + d) + e), result in [0, 1].
 CM_FN vec3 cm_tone_map_filmic(vec3 c) {
-  c = min(c, vec3(1e6f));  // flat long before its square overflows
+  c = min(c, vec3(1e6f));  // the curve is flat long before the square overflows
   return clamp((c * (2.51f * c + 0.03f)) / (c * (2.43f * c + 0.59f) + 0.14f), vec3(0.0f), vec3(1.0f));
 }
 
@@ -36,7 +36,7 @@ CM_FN float cm_srgb_encode(float x) {
 
 CM_FN vec3 cm_srgb_encode_each(vec3 c) { return vec3(cm_srgb_encode(c.x), cm_srgb_encode(c.y), cm_srgb_encode(c.z)); }
 
-// Exposed and tone-mapped, not encoded.
+// Applies exposure and tone mapping, without encoding.
 CM_FN vec3 cm_tone_mapped(vec3 radiance, float exposure, uint tone_map) {
   vec3 c = radiance * exposure;
   c = vec3(cm_displayable(c.x), cm_displayable(c.y), cm_displayable(c.z));
@@ -46,17 +46,17 @@ CM_FN vec3 cm_tone_mapped(vec3 radiance, float exposure, uint tone_map) {
   return c;
 }
 
-// Radiance to colour; with encode by the sRGB curve.
+// Converts radiance to color; with encode by the sRGB curve.
 CM_FN vec3 cm_display(vec3 radiance, float exposure, uint tone_map, bool encode) {
   vec3 c = cm_tone_mapped(radiance, exposure, tone_map);
   return encode ? cm_srgb_encode_each(c) : c;
 }
 
-// Premultiplied radiance and alpha to what a target blends as color + (1 - alpha) x target. Light without alpha is added
-// to what is behind it: nothing is divided by alpha. The color is that of the same radiance before black. Where the
-// target holds linear values alpha stays. Encoded values are no sums of light: there alpha is the one with which the
-// blend is right over black and over white, and near it in between. All channels have the least of their three, so that
-// light darkens none of them.
+// Converts premultiplied radiance and alpha to values that a target blends as color + (1 - alpha) x target. Radiance
+// without alpha is additive: nothing is divided by alpha. The color is that of the same radiance before black. If the
+// target holds linear values, alpha is unchanged. Encoded values do not add like light, so alpha is chosen such that
+// the blend is exact over black and over white, and close in between. All channels use the minimum of their three
+// alphas, so that light darkens no channel.
 CM_FN vec4 cm_display_over(vec4 value, float exposure, uint tone_map, bool encode) {
   float alpha = min(cm_displayable(value.w), 1.0f);
   vec3 c = cm_tone_mapped(vec3(value.x, value.y, value.z), exposure, tone_map);

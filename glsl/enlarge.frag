@@ -1,15 +1,15 @@
 #version 450
-// A picture that is displayed as it shall be, over a rectangle of another size.
+// Draws an image that is already in display colors, over a rectangle of another size.
 #include "bindings.glsl"
 
-layout(binding = CM_UNIT_SUM) uniform sampler2D cm_picture;  // bilinear; row 0 is the picture's top
+layout(binding = CM_UNIT_SUM) uniform sampler2D cm_picture;  // bilinear filter; row 0 is the image's top
 layout(location = 0) uniform ivec4 cm_viewport;
 layout(location = 1) uniform bool cm_flip_y;
 
 layout(location = 0) out vec4 cm_colour;
 
 void main() {
-  // Not gl_FragCoord itself: a host that shades every sample would move it off the pixel's centre.
+  // Not gl_FragCoord itself: with per-sample shading by the host it is not at the pixel's center.
   vec2 at = (floor(gl_FragCoord.xy) + 0.5 - vec2(cm_viewport.xy)) / vec2(cm_viewport.zw);
   if (!cm_flip_y) at.y = 1.0 - at.y;
   cm_colour = textureLod(cm_picture, at, 0.0);

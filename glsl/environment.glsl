@@ -1,17 +1,17 @@
-// What surrounds all: an equirectangular picture whose upper edge is at +Y and whose middle is at +Z, turned from +Z
-// towards +X. Shared by GLSL and C++; the includer provides
+// The environment map: an equirectangular image with its top at +Y and its center at +Z, rotated from +Z towards +X.
+// Shared by GLSL and C++; the includer provides
 //   cm                                  the parameters
 //   uvec4 cm_environment_word(uint i)   texel i, by rows from the top: src/light/environment.hpp
 //
-// Radiance is bilinear between the middles of texels. So is the density of looks over the picture: a texel is picked by
-// its luminance times the solid angle of its row, and a point by the tent about its middle. So there is no direction
-// that light comes from and no look may take, and a sun of one texel is found as often as it is bright.
+// Radiance is interpolated bilinearly between texel centers, and so is the pdf of NEE over the image. A texel is picked
+// by its luminance times the solid angle of its row, and a point by a tent function about its center. So every
+// direction with light has a pdf above 0, and a sun of one texel is sampled in proportion to its brightness.
 #ifndef CM_ENVIRONMENT_GLSL
 #define CM_ENVIRONMENT_GLSL
 
 #include "frame.glsl"
 
-// Three halves, and the high half of a power of two.
+// RGB as three halves times a power of two, which is stored in the upper half of the last word.
 CM_FN vec3 cm_environment_texel(uint i) {
   uvec4 word = cm_environment_word(i);
   vec2 rg = unpackHalf2x16(word.z);
@@ -21,7 +21,7 @@ CM_FN vec3 cm_environment_texel(uint i) {
 
 struct CmSurrounding {
   vec3 radiance;
-  float density;  // of looks, by solid angle
+  float density;  // solid-angle pdf of NEE
 };
 
 CM_FN CmSurrounding cm_surrounding(vec3 w) {
@@ -47,7 +47,7 @@ CM_FN CmSurrounding cm_surrounding(vec3 w) {
   return found;
 }
 
-// From -1 to 1, likeliest 0.
+// Samples a tent function on [-1, 1], with its peak at 0.
 CM_FN float cm_tent(float u) { return u < 0.5f ? sqrt(2.0f * u) - 1.0f : 1.0f - sqrt(2.0f - 2.0f * u); }
 
 CM_FN vec3 cm_environment_radiance(vec3 w) { return cm_surrounding(w).radiance; }
@@ -61,7 +61,7 @@ CM_FN CmLightSample cm_environment_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u)
   if (pick.y > word.x) i = word.y;
   float x = float(i % size.x) + 0.5f + cm_tent(u.x);
   float y = float(i / size.x) + 0.5f + cm_tent(u.y);
-  // What is beyond a pole is as what is before it.
+  // Reflects coordinates beyond a pole.
   float height = float(size.y);
   y = y < 0.0f ? -y : (y > height ? 2.0f * height - y : y);
   float azimuth = 6.28318531f * (0.5f - x / float(size.x));

@@ -1,62 +1,62 @@
-// Equi-angular sampling (Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media", EGSR
-// 2012): looks for lamps from points that a flight has passed. In a thin medium few flights collide, and those that do
-// seldom near the lamp. Shared by GLSL and C++; the includer has light.glsl and path_vertex.glsl before this, and kernels
-// that march march.glsl.
+// Equi-angular sampling (Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media",
+// EGSR 2012): NEE of lights from points along a camera or scattered ray. In a thin medium few rays collide, and seldom
+// near the light. Shared by GLSL and C++. The includer has light.glsl and path_vertex.glsl before this, and kernels
+// that traverse the grid have march.glsl.
 //
-// What is scattered towards a path on its flight's way is transmittance x extinction x what is lit there. A flight gets as
-// far as t with the chance that is the transmittance, so a point drawn from its way, up to where it ended, needs no other
-// weight (as for emission: flight.glsl). A look after a collision might have found the same, of which the density is
-// extinction x transmittance x the chance of looks for lamps. The share of either is a function of the line, the point and
-// the lamp alone, without the transmittance, which both have: a look from a point that was passed counts by
-// cm_passing_share, one after a collision by the rest.
+// The light scattered towards the path along the ray is transmittance x extinction x lighting at the point. A ray gets
+// as far as t with a probability equal to the transmittance, so a point sampled up to the ray's end needs no other
+// weight (as for emission: flight.glsl). NEE after a collision can find the same light, with pdf extinction x
+// transmittance x probability of picking these lights. The MIS weights depend only on the line, the point and the
+// light, without the transmittance, which both pdfs contain. An equi-angular sample has weight cm_passing_share, NEE
+// after a collision has the rest.
 #ifndef CM_EQUIANGULAR_GLSL
 #define CM_EQUIANGULAR_GLSL
 
-// A point of a flight's way, and the light of a lamp that it looks for.
+// A point on a ray, and a sample of a light from there.
 struct CmPassed {
   bool looks;
   vec3 o;           // cube space
-  bool seen;        // by a camera ray
-  vec3 light;       // what the look brings if nothing stops it, times scattering coefficient and phase function there
-  vec3 direction;   // world, unit: to the lamp
+  bool seen;        // the ray is a camera ray
+  vec3 light;       // light added by an unblocked shadow ray, times scattering coefficient and phase function
+  vec3 direction;   // world, unit: to the light
   float distance;
-  float way;        // of its free path
+  float way;        // random number of its optical depth
 #if CM_GROUPS
-  uint group;       // of lights, that it is in
+  uint group;       // light group
 #endif
 };
 
-// The angle at which a point sees a part of a line, `across` away from it, from `before` to `behind`, both counted from
-// where the line is nearest.
+// Angle under which a point sees the part of a line from `before` to `behind`. Both are measured from the point's
+// projection onto the line; `across` is its distance from the line.
 CM_FN float cm_angle_of(float across, float before, float behind) {
   return atan(across * (behind - before), across * across + before * behind);
 }
 
-// Density by distance with which equi-angular sampling of a line's whole part in the box takes a point o of it, for a
-// point of a lamp at that distance.
+// Pdf by distance with which equi-angular sampling of a line's whole segment in the bounds takes its point o. The
+// light's point is at that distance from o.
 CM_FN float cm_passing_density(vec3 o, vec3 w, vec3 to_light, float distance) {
   float along = dot(w, to_light) * distance;
   float across = max(length(cross(w, to_light)), 1e-4f) * distance;
   vec2 line = cm_box_line(o, cm_to_cube(w));
   float angle = cm_angle_of(across, min(line.x, 0.0f) - along, max(line.y, 0.0f) - along);
-  // Where a line only touches the box it is without bounds, and its square would be no number.
+  // Where a line only touches the bounds the pdf is unbounded, and its square would overflow.
   return min(across / max(angle * distance * distance, 1e-30f), 1e18f);
 }
 
-// The share of what a look from there brings that counts, where the extinction is that: by the power heuristic.
+// MIS weight of an equi-angular sample at a point of this extinction: the power heuristic.
 CM_FN float cm_passing_share(float density, float extinction) {
   float collided = cm.lights.lamp_chance * extinction;
   return cm_balance(density * density, collided * collided);
 }
 
-// Whether looks from points on it are for the flight that ended before the path had so many events. A layer's colour waits in
-// the place of such a look's light.
+// Returns true if a ray that ended when the path had this many events gets an equi-angular sample. Rays that end at a
+// layer do not, because p.light holds the layer's color.
 CM_FN bool cm_is_passed(CmPath p, uint events) {
   bool limited = cm.integrator.max_bounces != 0u && events >= cm.integrator.max_bounces;
   return !limited && !(events == 0u && p.at_layer != 0u);
 }
 
-// Before the flight's end is dealt with.
+// Samples a point on the ray, before the ray's event is handled.
 CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   CmPassed passed;
   passed.looks = false;
@@ -106,12 +106,12 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   vec3 light = cm_lamp_irradiance(lamp, from, o + t * p.w, passed.direction, passed.distance);
   passed.light = p.throughput * light / (lamp.chance * density);
   passed.o = p.o + t * p.d;
-  // A way of no length, or a lamp on it, gives no number.
+  // A ray of no length, or a light on it, gives NaN or infinity.
   bool hidden = cm_ground_distance(passed.o, cm_to_cube(passed.direction)) < passed.distance;
   float strongest = max(passed.light.x, max(passed.light.y, passed.light.z));
   passed.looks = !hidden && angle > 0.0f && cm_is_positive(strongest) && strongest < 3.0e38f;
-  // In a dense medium, by what the flight has met of it, collisions find the lamp as well; and lamps that are a small part
-  // of the light are not worth a ray each.
+  // In a dense medium, estimated from the optical depth that the ray used, collisions find the light as well. Lights
+  // that contribute little are not worth a shadow ray each. Both are skipped by Russian roulette.
   float met = p.depth_0 - max(p.depth, 0.0f);
   float share = cm_passing_share(cm_passing_density(passed.o, p.w, passed.direction, passed.distance),
                                  met / (range.y - range.x));
@@ -121,7 +121,7 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   return passed;
 }
 
-// After it: the look, before the path goes on from there.
+// After the event: starts the shadow ray, before the path continues.
 CM_FN void cm_look_back(CM_INOUT(CmPath) p, CmPassed passed, bool finished) {
   p.seen = passed.seen ? 1u : 0u;
   p.finishes = finished ? 1u : 0u;

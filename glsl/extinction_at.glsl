@@ -1,17 +1,17 @@
-// The extinction at a point of the medium. Shared by GLSL and C++; the includer has march.glsl and path_state.glsl
-// before this.
+// Extinction at a point of the medium. Shared by GLSL and C++; the includer has march.glsl and path_state.glsl before
+// this.
 #ifndef CM_EXTINCTION_AT_GLSL
 #define CM_EXTINCTION_AT_GLSL
 
 struct CmExtinction {
   float extinction;
-  uvec2 cell;  // of what scatters there
+  uvec2 cell;  // cell in which the light scatters
 #if CM_INSTANCES
-  uint instance;  // likewise: one of those that are there, by their extinctions
+  uint instance;  // volume of that cell; chosen at random in proportion to the extinctions there
 #endif
 };
 
-// The part of the volume glsl/here.glsl tells of.
+// Extinction of the current volume of glsl/here.glsl.
 CM_FN float cm_extinction_here(vec3 o, vec3 d, uvec3 cell) {
   CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
   float t_1;
@@ -22,7 +22,8 @@ CM_FN float cm_extinction_here(vec3 o, vec3 d, uvec3 cell) {
   return CM_MEDIUM.extinction * r_0;
 }
 
-// At p.o, which without CM_INSTANCES is in that cell; CM_NONE: nowhere. seen: of what camera rays meet.
+// Extinction at p.o. cell: without CM_INSTANCES the cell of p.o, CM_NONE if it has none. seen: only volumes visible to
+// cameras.
 CM_FN CmExtinction cm_extinction_at(CM_INOUT(CmPath) p, uvec2 cell, bool seen) {
   CmExtinction there;
   there.extinction = 0.0f;

@@ -1,19 +1,19 @@
-// The rays by which a pixel is looked at without chance: a fixed set, spread evenly over the pixel, the lens and, with
-// CM_MOTION, the time that the shutter is open. The includer has buffers.glsl and ray.glsl before this, and with
-// CM_SURFACES surface.glsl.
+// Feature rays: a fixed, deterministic set of rays per pixel, spread uniformly over the pixel, the lens and, with
+// CM_MOTION, the shutter interval. The includer has buffers.glsl and ray.glsl before this, and with CM_SURFACES
+// surface.glsl.
 #ifndef CM_FACT_RAY_GLSL
 #define CM_FACT_RAY_GLSL
 
 struct CmFactRay {
   vec3 o;         // cube space
   vec3 w;         // world, unit
-  vec3 d;         // the same in cube space
+  vec3 d;         // w in cube space
   float t_per_z;  // distance along it per unit of view depth
-  float end;      // where the host's depth is
+  float end;      // distance to the host's depth
 };
 
-// By Roberts's sequences; the first is of the pixel's and the lens' middle, in the middle of that time. Triangles that it
-// meets are those that cameras see, and where they cover in part they have the ray's own chance.
+// Returns ray i, by Roberts's R sequences. Ray 0 is at the center of pixel and lens, at mid-shutter. Rays hit the
+// triangles visible to cameras; partial coverage uses a random number per ray.
 CmFactRay cm_fact_ray(uvec2 pixel, int i) {
   vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
   vec2 lens = fract(0.5 + float(i) * vec2(0.6287067210, 0.5385972572));
@@ -31,8 +31,8 @@ CmFactRay cm_fact_ray(uvec2 pixel, int i) {
   return ray;
 }
 
-// Where in a part of a ray light scatters for the first time, of what does so there: the mean, from 0 at its beginning to
-// 1, as if the part were even. Of its optical depth and of the chance that it does.
+// Mean position of the first scattering in a segment, from 0 at its start to 1, as if extinction were constant. depth:
+// optical depth of the segment; chance: probability of scattering in it.
 float cm_middle_of_part(float depth, float chance) {
   return depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
 }

@@ -1,24 +1,24 @@
-// What a thin film on an interface reflects (KHR_materials_iridescence): light that is mirrored by its two sides interferes,
-// wavelength by wavelength, and what comes of that in linear Rec. 709 has a closed form in Fourier space (Belcour and Barla,
-// "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence", SIGGRAPH 2017), with Schlick's
-// reflectances and without polarization, as the extension has it. Shared by GLSL and C++.
+// Reflectance of a thin film on an interface (KHR_materials_iridescence). Light reflected by its two sides interferes,
+// wavelength by wavelength. The result in linear Rec. 709 has a closed form in Fourier space (Belcour and Barla, "A
+// Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence", SIGGRAPH 2017). As in the
+// extension, reflectances are Schlick's and polarization is ignored. Shared by GLSL and C++.
 #ifndef CM_FILM_GLSL
 #define CM_FILM_GLSL
 #include "ggx.glsl"
 
 struct CmFilm {
-  float weight;     // 0: there is none; between 0 and 1 with and without one are mixed
-  float ior;        // 1 at least
-  float thickness;  // nanometres
-  float outside;    // index of what lies over it
+  float weight;     // 0: no film; between 0 and 1 the results with and without it are mixed
+  float ior;        // at least 1
+  float thickness;  // nanometers
+  float outside;    // index of refraction of the medium above it
 };
 
 CM_FN float cm_square(float v) { return v * v; }
 
-// The eye's response, as linear Rec. 709, to cos(k D + shift) over all wavenumbers k, for a difference of ways D: each of
-// CIE's three curves is a Gaussian or two in k.
+// Response of the eye, in linear Rec. 709, to cos(k D + shift) over all wavenumbers k, for an optical path difference
+// D. Each CIE curve is a Gaussian, or two, in k.
 CM_FN vec3 cm_film_response(float ways, vec3 shift) {
-  float phase = 6.28318531e-9f * ways;  // metres
+  float phase = 6.28318531e-9f * ways;  // meters
   float falls = phase * phase;
   vec3 xyz = vec3(0.846590f, 1.000222f, 1.001122f) * cos(vec3(1.6810e+06f, 1.7953e+06f, 2.2084e+06f) * phase + shift) *
              exp(vec3(-4.3278e+09f, -9.3046e+09f, -6.6121e+09f) * falls);
@@ -28,13 +28,13 @@ CM_FN vec3 cm_film_response(float ways, vec3 shift) {
               0.0556434f * xyz.x - 0.2040259f * xyz.y + 1.0572252f * xyz.z);
 }
 
-// How much of it there is: one of no thickness is none.
+// Weight of the film's reflectance. It fades to 0 with the thickness.
 CM_FN float cm_film_share(CmFilm film) {
   float thin = clamp(film.thickness / 0.03f, 0.0f, 1.0f);
   return film.weight * thin * thin * (3.0f - 2.0f * thin);
 }
 
-// Reflectance, seen at a cosine, over an interface that without the film would have f0 in air.
+// Reflectance at this cosine of an interface that has reflectance f0 in air without the film.
 CM_FN vec3 cm_film_fresnel(CmFilm film, vec3 f0, float cosine) {
   float ior = film.ior;
   float sine2 = cm_square(film.outside / ior) * (1.0f - cosine * cosine);

@@ -1,27 +1,28 @@
-// The stages of a path that march. Shared by GLSL and C++; the includer provides what
-// glsl/path.glsl asks for, and
-//   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that holds point p of cube space
+// The traversal stages of a path: free-flight distance sampling on the grid. Shared by GLSL and C++. The includer
+// provides what glsl/path.glsl asks for, and
+//   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that contains point p of cube space
 //   CmMarchRay cm_march_ray(vec3 o, vec3 d)
 //   void cm_march_step(uvec3 cell, CmMarchRay ray, t, t_1, r_0, r_1, next)
-// which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
-// the next cell; next.x == CM_NONE outside, or where the ray meets nothing any more. The third word of a cell is the
-// march's own cache, CM_NONE when unknown.
-// With CM_CHANNELS also
+// The step returns the end t_1 of the ray's segment in the cell, which begins at t; the density at both ends (linear
+// between them); and the next cell. next.x is CM_NONE outside the grid, or where nothing lies ahead. The third word of
+// a cell is a cache of the traversal, CM_NONE if it is empty. With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
-//   vec3 cm_march_colour(uvec2 cell)              of what scatters
-//   float cm_march_anisotropy(uvec2 cell)         likewise
+//   vec3 cm_march_colour(uvec2 cell)              scattering color
+//   float cm_march_anisotropy(uvec2 cell)         mean cosine of scattering
 //
-// Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
-// quadratic in t, inverted in closed form. No majorant, no step size.
+// Free-flight distances are sampled exactly ("regular tracking" in Novak et al., "Monte Carlo Methods for Volumetric
+// Light Transport Simulation", 2018). An optical depth -ln(1 - u) is used up along the traversal. In a cell the depth
+// is a quadratic in t and is inverted in closed form. There is no majorant and no step size.
 //
-// What cells give off by themselves is integrated along flights up to where they end (Simon, Hanika, Zirr and
-// Dachsbacher, "Line Integration for Rendering Heterogeneous Emissive Volumes", EGSR 2017): they get as far as t with the
-// chance that is the transmittance, so that needs no other weight but that of looks for the same cells (light.glsl).
+// The emission of cells is integrated along scattered rays up to their end (Simon, Hanika, Zirr and Dachsbacher, "Line
+// Integration for Rendering Heterogeneous Emissive Volumes", EGSR 2017). A ray gets as far as t with a probability
+// equal to the transmittance. So the only weight is that against NEE of the same cells (light.glsl).
 //
-// With CM_INSTANCES volumes are marched through one by one, in the order in which the ray enters their boxes, as far as
-// t_end. Extinctions add up where they overlap, so the nearest of independent free paths is one through all of them;
-// and as they have no memory, what is left of an optical depth behind one volume is as good as a new one for the next.
-// Only after a collision, where the ray then ends, another depth is drawn. Looks use up one depth through all.
+// With CM_INSTANCES the ray traverses the volumes one by one, in the order in which it enters their boxes, up to t_end.
+// Extinctions add where volumes overlap, so the nearest of their independent free-flight distances is distributed as
+// that of their sum. Free flights are memoryless, so the depth left after one volume continues in the next. A new depth
+// is drawn only after a collision, which becomes the new end of the ray. A shadow ray uses up one depth through all
+// volumes.
 #ifndef CM_FLIGHT_GLSL
 #define CM_FLIGHT_GLSL
 
@@ -31,16 +32,16 @@
 #endif
 #include "path.glsl"
 
-// Cells marched before events are looked at: keeps neighbouring lanes together.
+// Maximum number of cells traversed before events are handled. Keeps neighboring lanes together.
 #ifndef CM_CHUNK
 #define CM_CHUNK 8
 #endif
-// Events at most before the kernel does something else.
+// Maximum number of events before the kernel does something else.
 #ifndef CM_EVENTS
 #define CM_EVENTS 8
 #endif
 
-// The cell where the ray enters, at p.t.
+// Finds the cell where the ray enters, at p.t.
 CM_FN void cm_enter(CM_INOUT(CmPath) p) {
   uvec3 cell = cm_march_enter_at(p.o, p.d, p.t);
   p.cell = uvec2(cell.x, cell.y);
@@ -48,7 +49,8 @@ CM_FN void cm_enter(CM_INOUT(CmPath) p) {
 }
 
 #if CM_EQUIANGULAR
-// What is scattered towards the path where such a ray starts; where there is nothing it ends.
+// Weighs an equi-angular sample by the light scattered towards the path at its origin. Ends the ray if there is no
+// medium.
 CM_FN void cm_weigh(CM_INOUT(CmPath) p) {
   CmExtinction there = cm_extinction_at(p, p.cell, p.seen != 0u);
 #if CM_INSTANCES
@@ -81,13 +83,13 @@ CM_FN void cm_aim(CM_INOUT(CmPath) p) {
 #endif
 }
 
-// The volume that the ray comes to next, and its cell there; whether there is one before its end.
+// Finds the next volume of the ray and its entry cell. Returns false if there is none before the ray's end.
 CM_FN bool cm_seek(CM_INOUT(CmPath) p) {
   uint own = cm_starts_inside(p) ? p.start_instance : CM_INSTANCE_NONE;
   uint flags = p.start == CM_AT_CAMERA && !cm_is_equiangular(p) ? CM_INSTANCE_SEEN : 0u;
   if (p.gathers != 0u) flags |= CM_INSTANCE_EMITS | CM_INSTANCE_OVERLAPS;
   bool found = false;
-  // Once more where it finds the one that it started in, through which it went first.
+  // Repeated if the result is the volume of the origin, which was traversed first.
   for (int i = 0; i < 2 && (i == 0 || (found && p.instance == own)); ++i) {
     found = cm_next_instance(p.o, p.d, p.t_end, flags, p.entry, p.instance);
   }
@@ -99,7 +101,7 @@ CM_FN bool cm_seek(CM_INOUT(CmPath) p) {
   return found;
 }
 
-// What an event in one volume, or the end of all of them, is for the ray.
+// Converts an event in one volume, or the end of all volumes, into the event of the ray.
 CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
   uint what = event;
   if (over) {
@@ -130,10 +132,11 @@ CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
 
 #else
 
-// A ray's way through the box, as far as it reaches.
+// Clips the ray to the bounds and to its reach.
 CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   vec2 range = cm_box_range(p.o, p.d);
-  // Without triangles a reach is kept no longer than until here, and after the ground another dispatch may come between.
+  // Without triangles `reach` is not kept beyond this point, and after a ground hit another dispatch may come in
+  // between.
   float reach = CM_SURFACES == 0 && p.start == CM_ON_GROUND && !cm_is_equiangular(p) ? p.t_end : p.reach;
   p.t = range.x;
   p.t_end = max(0.0f, min(range.y, reach));
@@ -151,7 +154,7 @@ CM_FN void cm_aim(CM_INOUT(CmPath) p) {
 
 #endif
 
-// Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
+// Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or at the point reached without one.
 CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #if CM_INSTANCES
   cm_here = p.cell.x == CM_NONE ? 0u : p.instance;
@@ -166,14 +169,14 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   bool nowhere = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE;
   uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
-  // Of the last cell.
+  // Values of the last cell.
   float r_0 = 0.0f;
   float r_1 = 0.0f;
   float span = 0.0f;
 #if CM_CHANNELS
   CmEmission emission;
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
-  // Looks might have found it as well.
+  // MIS: NEE samples the same cells.
   float flights = p.bounces > 0u ? p.density : 1.0f;
   float looks = p.bounces > 0u ? cm.lights.cell_chance * cm_look_chance(p, CM_LIGHT_CELL, p.density, 0.0f) : 0.0f;
 #endif
@@ -188,7 +191,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     p.steps += 1u;
     span = t_1 - p.t;
     float used = extinction * (0.5f * (r_0 + r_1) * span);
-    // To a surface or a lamp inside the cell, not beyond.
+    // Only up to a surface or light inside the cell.
     if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(extinction * r_0, extinction * r_1, span, p.t_end - p.t);
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
@@ -206,7 +209,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   p.cache = cell.z;
   float e_0 = extinction * r_0;
   float e_1 = extinction * r_1;
-  // After the loop, not in it: software drivers run both sides of every branch, each step.
+  // Placed after the loop, because software drivers execute both sides of every branch in each step.
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);
@@ -222,7 +225,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #if CM_CHANNELS
   bool takes = p.ray == CM_RAY_FLIGHT && !cm_is_dark(p);
 #if CM_INSTANCES
-  // Where another volume may yet end the ray before here, once that is known.
+  // In overlapping volumes another one may end the ray earlier. Their emission waits for the second sweep.
   takes = takes && (p.gathers != 0u || (cm_instances[cm_here].flags & CM_INSTANCE_OVERLAPS) == 0u);
 #endif
 #if CM_HOLDOUT
@@ -236,7 +239,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   return event;
 }
 
-// What the path does once its ray has come to an event.
+// What the path does once its ray has come to an event. Returns the next stage.
 CM_FN uint cm_after_flight(CmPath p) {
   if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_FLIGHT) {
     return p.found == CM_FOUND_TRIANGLE && p.event == CM_EVENT_ESCAPE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
@@ -245,8 +248,8 @@ CM_FN uint cm_after_flight(CmPath p) {
   return p.ray != CM_RAY_FLIGHT && p.start == CM_ON_TRIANGLE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
 }
 
-// The medium's part of a path: what follows the last event, and some way on, until it waits for triangles, its sample is
-// done, or that was enough. Returns how often it marched.
+// Runs the stages in the medium: handles the last event and continues until the path needs triangles, its sample is
+// finished, or CM_EVENTS iterations are done. Returns the number of traversals.
 CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
   uint marches = 0u;
   for (int j = 0; j < CM_EVENTS && ((CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) || p.stage == CM_STAGE_FLY ||

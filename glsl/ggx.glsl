@@ -3,15 +3,15 @@
 #ifndef CM_GGX_GLSL
 #define CM_GGX_GLSL
 
-// Whether there are materials of more than reflecting lobes of one roughness: the extensions that glsl/bsdf.glsl names
-// after its first. A variant: what has none of them pays for none.
+// 1 for the extended-material variant, which has more than reflecting lobes of one roughness: the extensions listed
+// second in glsl/bsdf.glsl. It is a variant, so that scenes without them do not pay for it.
 #ifndef CM_RICH
 #define CM_RICH 0
 #endif
 
 const float CM_INV_PI = 0.318309886f;
 
-// Entries a side of the table of directional albedos that src/surface/ggx_albedo.hpp makes.
+// Entries per side of the table of directional albedos made by src/surface/ggx_albedo.hpp.
 const int CM_GGX_ALBEDO_SIZE = 32;
 
 const float CM_LEAST_ALPHA = 1e-3f;
@@ -24,8 +24,8 @@ CM_FN float cm_schlick(float cosine) {
   return c2 * c2 * c;
 }
 
-// The functions below take vectors in the frame of the normal: z is the cosine. Where there are lobes of two widths, x and
-// y are along them, and an alpha is one for each.
+// The functions below take vectors in the frame of the normal: z is the cosine. Anisotropic lobes have their two widths
+// along x and y, and alpha is a vector.
 #if CM_RICH
 #define CmAlpha vec2
 CM_FN float cm_ggx_area(CmAlpha alpha) { return alpha.x * alpha.y; }
@@ -46,7 +46,7 @@ CM_FN float cm_stretched_square(CmAlpha alpha, vec3 w) { return alpha * alpha * 
 CM_FN vec3 cm_stretched(CmAlpha alpha, vec3 w, float z) { return vec3(alpha * w.x, alpha * w.y, z); }
 #endif
 
-// GGX density of normals: 1 / (pi a_x a_y (x^2 / a_x^2 + y^2 / a_y^2 + z^2)^2), h unit.
+// GGX distribution of normals: 1 / (pi a_x a_y (x^2 / a_x^2 + y^2 / a_y^2 + z^2)^2), h unit.
 CM_FN float cm_ggx_density(CmAlpha alpha, vec3 h) {
   float s = cm_shrunk_square(alpha, h) + h.z * h.z;
   return CM_INV_PI / (cm_ggx_area(alpha) * s * s);
@@ -57,7 +57,8 @@ CM_FN float cm_ggx_lambda(CmAlpha alpha, vec3 w) {
   return 0.5f * sqrt(1.0f + cm_stretched_square(alpha, w) / (w.z * w.z)) - 0.5f;
 }
 
-// Visible normal: Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018; with u in [0, 1)^2.
+// Samples a visible normal: Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018; with u in [0,
+// 1)^2.
 CM_FN vec3 cm_ggx_visible_normal(CmAlpha alpha, vec3 wo, float u0, float u1) {
   vec3 stretched = normalize(cm_stretched(alpha, wo, wo.z));
   float length2 = stretched.x * stretched.x + stretched.y * stretched.y;
@@ -72,7 +73,7 @@ CM_FN vec3 cm_ggx_visible_normal(CmAlpha alpha, vec3 wo, float u0, float u1) {
   return normalize(cm_stretched(alpha, h, max(h.z, 1e-6f)));
 }
 
-// Density of wi, reflected at a visible normal: G1(wo) D(h) / (4 n.wo).
+// Solid-angle pdf of wi, reflected at a visible normal: G1(wo) D(h) / (4 n.wo).
 CM_FN float cm_ggx_pdf(CmAlpha alpha, vec3 wo, vec3 h) {
   return cm_ggx_density(alpha, h) / ((1.0f + cm_ggx_lambda(alpha, wo)) * 4.0f * wo.z);
 }
@@ -83,8 +84,8 @@ CM_FN float cm_ggx(CmAlpha alpha, vec3 wo, vec3 wi, vec3 h) {
   return cm_ggx_density(alpha, h) * g / (4.0f * wo.z);
 }
 
-// Where an albedo is in the table: the cosine's place and the roughness's, from 0 to CM_GGX_ALBEDO_SIZE - 1. Grazing
-// angles, where it is steep, have the most room.
+// Table coordinates of an albedo, by cosine and roughness, from 0 to CM_GGX_ALBEDO_SIZE - 1. Grazing angles, where the
+// albedo changes fast, have the highest resolution.
 CM_FN vec2 cm_ggx_albedo_place(float roughness, float cosine) {
   return clamp(vec2(sqrt(max(cosine, 0.0f)), roughness), 0.0f, 1.0f) * float(CM_GGX_ALBEDO_SIZE - 1);
 }

@@ -1,8 +1,8 @@
 #version 450
-// The cells of a grid, from the lattice of its splits: what src/grid/tet_grid.cpp computes, level by level. Where cells
-// stand until they are in order is another in each run; the records are not.
-// CM_STAGE 0: which cells of a level split and which are leaves. 1: children and their neighbours. 2: how many leaves are
-// below. 3: the order of the roots, one work group. 4: of the others, and the tree of point location.
+// Builds the cells of a grid from the lattice of its splits, level by level, like src/grid/tet_grid.cpp. The order of
+// cells in the buffers differs between runs until they are sorted; the records do not. CM_STAGE 0: which cells of a
+// level split and which are leaves. 1: children and their neighbors. 2: number of leaves below each cell. 3: order of
+// the roots, one work group. 4: order of the other cells, and the point-location tree.
 // variants: CM_STAGE=0,1,2,3,4
 layout(local_size_x = 64) in;
 
@@ -15,25 +15,25 @@ layout(local_size_x = 64) in;
 #include "grid_places.glsl"
 #include "grid_leaves.glsl"
 
-// The children of the cell that stands there among those that split.
+// First child of the cell at this index in the list of splitting cells.
 uint cm_children(uint place) { return CM_ROOTS + 2u * place; }
 
 #if CM_STAGE == 0
 
 layout(std430, binding = CM_STORAGE_GRID_PRIORITIES) readonly buffer CmPriorities { uint cm_priorities[]; };
 layout(std430, binding = CM_STORAGE_GRID_BELOW) writeonly buffer CmBelow { uvec2 cm_below[]; };
-layout(location = 3) uniform uint cm_first_leaf;  // in the list
+layout(location = 3) uniform uint cm_first_leaf;  // index in the list
 
 bool cm_splits(uint i) {
   uvec2 where = cm_cells[i].where;
   uint shape = cm_shape_of(where);
   uint cell_class = cm_shape_class(shape);
-  if (cell_class == 1u && cm_shape_exponent(shape) == 0u) return false;  // a sixth of a voxel
+  if (cell_class == 1u && cm_shape_exponent(shape) == 0u) return false;  // of a sixth of a voxel
   vec3 middle = cm_v0_of(where) + cm_from_frame(cm_frame_midpoint(cell_class) * cm_shape_unit(shape), shape);
   return cm_priorities[cm_slot_of(ivec3(middle))] >= cm_state.cut;
 }
 
-// Of a work group: cells that split, and leaves; and where they begin in the list.
+// Per work group: numbers of splitting cells and of leaves, and their first indices in the list.
 shared uint cm_counts[2];
 shared uint cm_begins[2];
 
@@ -67,7 +67,8 @@ uvec4 cm_with_link(uvec4 links, uint face, uint other) {
                face == 3u ? other : links.w);
 }
 
-// Children behind half of a face that the split cuts, at this cell's v0 and at its v1: of the same diamond, it splits too.
+// Children of the neighbor behind a face that the split halves: at this cell's v0, and at its v1. The neighbor belongs
+// to the same diamond, so it splits too.
 uvec2 cm_behind_halves(uint other, vec3 v0) {
   if (other == CM_NONE) return uvec2(CM_NONE);
   uint child = cm_cells[other].child;
@@ -104,7 +105,7 @@ void main() {
 
 #else
 
-// Of each cell how many leaves are below it, itself if it is one, and how many inner cells before it.
+// Per cell: number of leaves below it (1 for a leaf), and number of inner cells before it.
 layout(std430, binding = CM_STORAGE_GRID_BELOW) buffer CmBelow { uvec2 cm_below[]; };
 
 #if CM_STAGE == 2
@@ -118,8 +119,8 @@ void main() {
 
 #else
 
-// 24 pairs, as many leaves and inner cells are before a root, an end mark, and room; then of each inner cell how many its
-// child 0 has.
+// 24 pairs (leaves, inner cells before a root), an end mark and an unused pair; then per inner cell the number of inner
+// cells below child 0.
 layout(std430, binding = CM_STORAGE_GRID_TREE) writeonly buffer CmTree { uint cm_tree[]; };
 const uint cm_roots_words = 2u * CM_ROOTS + 4u;
 

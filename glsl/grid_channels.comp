@@ -1,6 +1,6 @@
 #version 450
-// What the cells of a grid carry beside density, a channel a variant: what src/grid/tet_grid.cpp computes, once there are
-// records. Of emission the cells' records are told, too.
+// Computes the channels of a grid's cells beside density, one channel per variant, once the records exist; like
+// src/grid/tet_grid.cpp. Emission also sets CM_RECORD_EMITS in the cells' records.
 // variants: CM_CHANNEL=0,1,2,3
 layout(local_size_x = 64) in;
 
@@ -28,7 +28,7 @@ layout(std430, binding = CM_STORAGE_GRID_CHANNEL) buffer CmChannel { uint cm_cha
 layout(std140, binding = CM_UNIFORM_CELL_PARTS) uniform CmParts { uvec4 cm_parts[CM_CELL_PARTS]; };  // grid::CellPart
 const uint cm_first_part[11] = uint[11](CM_PARTS_OF_LEVELS);
 
-// Where a cell's records above bricks begin; 0: its cube has the same numbers all over.
+// First word of the records of a cube's cells above bricks; 0: the cube has a single value.
 uint cm_coarse_records(vec3 v0, uint shape, ivec3 voxel, out ivec3 corner) {
   uint size = cm_shape_cube_size(shape);
   corner = (voxel >> ivec3(int(size))) << ivec3(int(size));
@@ -60,7 +60,7 @@ CmLight cm_fine_light(vec3 v0, uint shape, uint first_value) {
   vec3 high = vec3(0.0);
   vec3 sum = vec3(0.0);
   mat3 moment = mat3(0.0);
-  // Nothing is negative: sums lose nothing.
+  // No value is negative, so the sums have no cancellation.
   for (uint i = cm_first_part[level]; i < cm_first_part[level + 1u]; ++i) {
     uvec4 words = cm_parts[i];
     vec3 value = cm_voxel(first_value + uint(begin + cm_voxel_of_part(words.w, steps)));
@@ -114,9 +114,9 @@ void cm_put(vec3 v0, uint shape, uint rank) {
 
 #else
 
-layout(location = 3) uniform float cm_fastest;  // of velocity, voxels a second
+layout(location = 3) uniform float cm_fastest;  // largest speed, voxels per second
 
-// What a record has the mean of, times its weight, and the weight.
+// Value that a record averages, times its weight; w: the weight.
 vec4 cm_voxel(uint i) {
 #if CM_CHANNEL == CM_CHANNEL_ANISOTROPY
   return vec4(cm_numbers[2u * i], 0.0, 0.0, cm_numbers[2u * i + 1u]);
@@ -152,7 +152,7 @@ uvec2 cm_pack_sum(vec4 sum) {
 #endif
 }
 
-// A record's words, of which there may be one.
+// A leaf's record, of one or two words.
 uvec2 cm_leaf_record(vec3 v0, uint shape) {
   ivec3 voxel = cm_leaf_voxel(v0, shape);
   if (cm_is_fine(shape)) return cm_pack_sum(cm_fine_sum(v0, shape, CM_BLOCK_POINTS * cm_brick_at(voxel)));
@@ -168,7 +168,7 @@ void cm_put(vec3 v0, uint shape, uint rank) {
 #if CM_CHANNEL == CM_CHANNEL_COLOUR
   cm_channel[rank] = record.x;
 #elif CM_CHANNEL == CM_CHANNEL_ANISOTROPY
-  atomicOr(cm_channel[rank / 2u], record.x << (16u * (rank & 1u)));  // the word is of two cells, and was cleared
+  atomicOr(cm_channel[rank / 2u], record.x << (16u * (rank & 1u)));  // the word belongs to two cells and starts at 0
 #else
   cm_channel[2u * rank] = record.x;
   cm_channel[2u * rank + 1u] = record.y;

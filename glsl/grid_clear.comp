@@ -1,7 +1,6 @@
 #version 450
-// The clear cones of a grid's empty cells, which rays end by: what src/grid/clear_cones.cpp computes.
-// CM_STAGE 0: cubes that have anything. 1: cubes that are clear, a work group a cone. 2: which cones each cube is clear
-// in. 3: cells.
+// Computes the clear cones of a grid's empty cells (clear_cones.glsl), like src/grid/clear_cones.cpp. CM_STAGE 0: full
+// cubes. 1: clear cubes, one work group per cone. 2: clear cones of each cube. 3: clear cones of each empty cell.
 // variants: CM_STAGE=0,1,2,3
 layout(local_size_x = 64) in;
 
@@ -13,12 +12,12 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = CM_STORAGE_GRID_STATE) readonly buffer CmState { CmGridState cm_state; };
 layout(std430, binding = CM_STORAGE_GRID_RECORDS) buffer CmRecords { uvec4 cm_records[]; };
-// Rows along x and along z that say which cubes are full, two words each; then those of each cone, which are clear; then
-// a word a cube, of its cones.
+// Rows along x and along z of full bits, two words each; then the rows of each cone's clear bits; then one word per
+// cube with its clear cones.
 layout(std430, binding = CM_STORAGE_GRID_CLEAR) buffer CmClear { uint cm_clear[]; };
 layout(location = 0) uniform uint cm_first;
 layout(location = 1) uniform uint cm_end;
-layout(location = 2) uniform uint cm_log2_size;  // of the cube
+layout(location = 2) uniform uint cm_log2_size;  // of the root cube
 
 const uint cm_clear_begins = 4u * CM_CLEAR_ROWS;
 const uint cm_cubes_begin = cm_clear_begins + 2u * CM_CLEAR_CONES * CM_CLEAR_ROWS;

@@ -1,5 +1,5 @@
 #version 450
-// The cells of a grid that give off light, in no order: of these the CPU makes a table of lights (src/scene/glow.hpp).
+// Lists the emissive cells of a grid, in no order. The CPU makes a table of lights from them (src/scene/glow.hpp).
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 
 struct CmGlowingCell {
   uint cell;
-  uint place[2];     // as a record has it
+  uint place[2];     // as in a record
   uint emission[4];  // grid::EmissionRecord
 };
 layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };

@@ -1,9 +1,9 @@
 #version 450
-// Which cells of a grid split, for one view: what src/grid/refine.cpp computes, from priorities that were kept. All are
-// whole numbers, and the largest of some: the order does not matter.
-// CM_STAGE 0: cells raise the vertices that they split at, a cube of the octree a work group. 1: vertices raise their
-// parents, those of one octave and of as many odd coordinates. 2: how many cells each priority adds. 3: where the budget
-// cuts, one work group. 4: how many cells each level adds.
+// Decides which cells of a grid split for one view, from stored priorities, like src/grid/refine.cpp. All operations
+// are integer maxima and sums, so the result does not depend on their order. CM_STAGE 0: cells raise the priorities of
+// the vertices at which they split, one work group per octree cube. 1: vertices raise their parents; one dispatch per
+// octave and number of odd coordinates. 2: number of cells that each priority adds. 3: priority at which the budget
+// cuts, one work group. 4: number of cells that each level adds.
 // variants: CM_STAGE=0,1,2,3,4
 layout(local_size_x = 64) in;
 
@@ -22,10 +22,10 @@ layout(location = 1) uniform uint cm_end;
 
 #if CM_STAGE == 0
 
-layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };    // three words each
-layout(std430, binding = CM_STORAGE_GRID_LEVELS) readonly buffer CmLevels { uint cm_levels[]; };  // a byte a node
-layout(std430, binding = CM_STORAGE_GRID_OWN) readonly buffer CmOwn { uint cm_own[]; };           // two priorities each
-layout(std140, binding = CM_UNIFORM_BRICK_POINTS) uniform CmPoints { uvec4 cm_points[(CM_BRICK_POINTS + 3u) / 4u]; };     // four points each
+layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };    // three words per node
+layout(std430, binding = CM_STORAGE_GRID_LEVELS) readonly buffer CmLevels { uint cm_levels[]; };  // one byte per node
+layout(std430, binding = CM_STORAGE_GRID_OWN) readonly buffer CmOwn { uint cm_own[]; };           // two per word
+layout(std140, binding = CM_UNIFORM_BRICK_POINTS) uniform CmPoints { uvec4 cm_points[(CM_BRICK_POINTS + 3u) / 4u]; };     // four per uvec4
 const uint cm_points_of_levels[10] = uint[10](CM_POINTS_OF_LEVELS);
 
 void main() {
@@ -58,14 +58,15 @@ void cm_raise(ivec3 vertex, uint priority) {
 void main() {
   uint i = cm_first + gl_GlobalInvocationID.x;
   if (i >= cm_end) return;
-  // Of each block of two steps a side one vertex, or three that differ in which coordinate is the other way.
+  // Each block of 2^3 lattice steps has one vertex with three odd coordinates. It has three vertices with one or two
+  // odd coordinates, which differ in the axis.
   uint step_shift = cm_octave_of % 3u;
   uint side_shift = 2u - step_shift;
   uint cubes = 1u << (3u * side_shift);
   uint each = cm_odd == 3u ? cubes : 3u * cubes;
   uint block = cm_first_block + i / each;
   uint r = i % each;
-  uint axis = r / cubes;  // that is even where two are odd, or the other way
+  uint axis = r / cubes;  // axis with the other parity than the other two
   ivec3 cube = ivec3(int((r >> (2u * side_shift)) & ((1u << side_shift) - 1u)),
                      int((r >> side_shift) & ((1u << side_shift) - 1u)), int(r & ((1u << side_shift) - 1u)));
   ivec3 single = ivec3(axis == 0u ? 1 : 0, axis == 1u ? 1 : 0, axis == 2u ? 1 : 0);
@@ -77,7 +78,7 @@ void main() {
   ivec3 v = (cm_block_corner(words) * 8 + local) << ivec3(int(3u * cm_block_scale(words)));
   int h = 1 << int(cm_octave_of);
   if (cm_odd == 3u) {
-    // Cube middle: of its corners, low is a multiple of 4 h and high is the opposite one.
+    // Center of a cube. Of its corners, low is the one with multiples of 4 h, and high is opposite to it.
     ivec3 to_low = ivec3(((v.x - h) & (4 * h - 1)) == 0 ? -h : h, ((v.y - h) & (4 * h - 1)) == 0 ? -h : h,
                          ((v.z - h) & (4 * h - 1)) == 0 ? -h : h);
     ivec3 low = v + to_low;
@@ -105,7 +106,7 @@ layout(std430, binding = CM_STORAGE_GRID_BINS) buffer CmBins { uint cm_bins[]; }
 shared uint cm_added[CM_SPLIT_LEVELS];
 #endif
 
-// A work group goes through a block's points.
+// One work group per block of points.
 void main() {
 #if CM_STAGE == 4
   if (gl_LocalInvocationID.x < CM_SPLIT_LEVELS) cm_added[gl_LocalInvocationID.x] = 0u;
@@ -158,7 +159,7 @@ void main() {
   while (run < 64u && cm_sums[run] <= cm_max_cells - cells) cells += cm_sums[run++];
   uint cut = CM_PRIORITIES - run * cm_run;
   bool limited = false;
-  // Within the run that is too much.
+  // Finds the cut within the run that exceeds the budget.
   for (uint i = 0u; run < 64u && i < cm_run && !limited; ++i) {
     uint next = cm_bins[cut - 1u];
     limited = next > cm_max_cells - cells;
@@ -167,7 +168,7 @@ void main() {
       --cut;
     }
   }
-  cm_state.cut = max(cut, 1u);  // what is worth nothing does not split
+  cm_state.cut = max(cut, 1u);  // priority 0 never splits
   cm_state.cells = cells;
   cm_state.limited = limited ? 1u : 0u;
 }

@@ -1,16 +1,16 @@
-// The cells of a grid that is built, and their voxels: for the kernels that make the cells and what these carry.
+// Cells of a built grid, and their voxels: for the kernels that make cells and their records.
 #ifndef CM_GRID_LEAVES_GLSL
 #define CM_GRID_LEAVES_GLSL
 
 struct CmTreeCell {
-  uint child;   // the first of two; 0: a leaf
-  uint rank;    // how many leaves are before it in the order
+  uint child;   // first of two children; 0: a leaf
+  uint rank;    // number of leaves before it in the final order
   uvec2 where;  // v0 and shape, as in a record
 };
 layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };
 layout(std430, binding = CM_STORAGE_GRID_CELLS) buffer CmCells { CmTreeCell cm_cells[]; };
-// Which cells split, and behind these which are leaves, each level by level: so kernels that are of the one or the other
-// have no idle lanes.
+// Splitting cells, and behind them the leaves, each level by level. Separate lists leave no idle lanes in kernels for
+// either kind.
 layout(std430, binding = CM_STORAGE_GRID_LIST) buffer CmList { uint cm_list[]; };
 layout(location = 0) uniform uint cm_first;
 layout(location = 1) uniform uint cm_end;
@@ -19,7 +19,7 @@ bool cm_cube_is_wide() { return cm_is_wide(cm_log2_size - 1u); }
 vec3 cm_v0_of(uvec2 where) { return cm_record_v0(uvec4(where, 0u, 0u), cm_cube_is_wide()); }
 uint cm_shape_of(uvec2 where) { return cm_record_shape(uvec4(where, 0u, 0u), cm_cube_is_wide()); }
 
-// The nearest half, of two as near the larger: drivers round as they like.
+// Rounds to the nearest half, ties away from 0, because drivers differ in their rounding.
 uint cm_half(float value) {
   uint bits = floatBitsToUint(value);
   uint sign_bit = (bits >> 16) & 0x8000u;
@@ -30,12 +30,13 @@ uint cm_half(float value) {
   return shift > 24u ? sign_bit : sign_bit | ((((bits & 0x7fffffu) | 0x800000u) + (1u << (shift - 1u))) >> shift);
 }
 
-// A voxel of the cell.
+// A voxel inside the cell.
 ivec3 cm_leaf_voxel(vec3 v0, uint shape) {
   return ivec3(v0 + cm_from_frame(cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape), shape));
 }
 
-// Voxels are counted along the frame's axes, from the one at v0: the place of that one in the brick, and steps.
+// Voxels are counted along the frame's axes from the one at v0: index of that voxel in the brick, and index steps per
+// axis.
 int cm_voxel_at_v0(vec3 v0, uint shape) {
   return int(cm_in_block(ivec3(floor(v0 + cm_from_frame(vec3(0.5), shape)))));
 }
@@ -44,12 +45,12 @@ ivec3 cm_voxel_steps(uint shape) {
   ivec3 steps = ivec3(64) >> ivec3(3u * axis);
   return steps * (ivec3(1) - 2 * ivec3(int(shape & 1u), int((shape >> 1) & 1u), int((shape >> 2) & 1u)));
 }
-// Of a part (grid::CellPart): how far its voxel is from that at v0.
+// Index offset of a part's voxel (grid::CellPart) from the voxel at v0.
 int cm_voxel_of_part(uint word, ivec3 steps) {
   return int(word & 15u) * steps.x + int((word >> 4) & 15u) * steps.y + int((word >> 8) & 15u) * steps.z;
 }
 
-// The box of all that there is to see grows by the cell.
+// Extends the bounds of all nonempty cells by this cell.
 void cm_put_in_box(vec3 v0, uint shape) {
   vec3 v1 = cm_cell_vertex(v0, shape, 1u);
   vec3 v2 = cm_cell_vertex(v0, shape, 2u);

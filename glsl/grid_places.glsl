@@ -1,4 +1,5 @@
-// What stands where in a lattice, found from its top (src/grid/lattice.hpp): for the kernels that build a grid.
+// Looks up blocks, bricks and cubes in a lattice, from its top (src/grid/lattice.hpp), for the kernels that build a
+// grid.
 #ifndef CM_GRID_PLACES_GLSL
 #define CM_GRID_PLACES_GLSL
 
@@ -8,9 +9,9 @@ struct CmPlace {
   uint coarse;
 };
 layout(std430, binding = CM_STORAGE_GRID_PLACES) readonly buffer CmPlaces { CmPlace cm_places[]; };
-layout(location = 2) uniform uint cm_log2_size;  // of the cube
+layout(location = 2) uniform uint cm_log2_size;  // of the root cube
 
-// The block of that scale at a corner; 0: none.
+// Returns the block of that scale at a corner; 0: none.
 uint cm_block_at(ivec3 corner, uint scale) {
   uint block = CM_TOP_BLOCK;
   for (uint s = cm_log2_size / 3u; s > scale; --s) {
@@ -20,14 +21,14 @@ uint cm_block_at(ivec3 corner, uint scale) {
   return block;
 }
 
-// Where the lattice has a vertex; in block 0, if it has not.
+// Returns the index of a vertex in the lattice; it is in block 0 if the lattice lacks it.
 uint cm_slot_of(ivec3 vertex) {
   uint scale = cm_octave(vertex) / 3u;
   ivec3 point = vertex >> ivec3(int(3u * scale));
   return cm_block_at(point >> ivec3(3), scale) * CM_BLOCK_POINTS + cm_in_block(point);
 }
 
-// Whose values a voxel has.
+// Returns the brick that contains a voxel's value.
 uint cm_brick_at(ivec3 voxel) {
   uint block = CM_TOP_BLOCK;
   uint at = 0u;
@@ -38,7 +39,7 @@ uint cm_brick_at(ivec3 voxel) {
   return cm_places[at].brick;
 }
 
-// The cells of the octree's cube of 2^size voxels at this corner; 0: it has one value.
+// Returns the cells of the octree cube of 2^size voxels at this corner; 0: the cube has a single value.
 uint cm_coarse_at(ivec3 corner, uint size) {
   ivec3 point = (corner + ivec3(1 << int(size - 1u))) >> ivec3(int(3u * ((size - 1u) / 3u)));
   return cm_places[cm_block_at(point >> ivec3(3), (size - 1u) / 3u) * CM_BLOCK_POINTS + cm_in_block(point)].coarse;

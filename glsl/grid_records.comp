@@ -1,6 +1,6 @@
 #version 450
-// The records of a grid's cells, once their order is known: what src/grid/tet_grid.cpp computes, of the cells within
-// bricks (CM_FINE 1), or of those above.
+// Writes the records of a grid's cells once their order is known, like src/grid/tet_grid.cpp: of cells in bricks
+// (CM_FINE 1), or of larger ones.
 // variants: CM_FINE=0,1 CM_HALVES=0,1
 layout(local_size_x = 64) in;
 
@@ -19,7 +19,7 @@ layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint
 layout(std430, binding = CM_STORAGE_GRID_COARSE) readonly buffer CmCoarse { uint cm_coarse[]; };
 layout(std140, binding = CM_UNIFORM_CELL_PARTS) uniform CmParts { uvec4 cm_parts[CM_CELL_PARTS]; };  // grid::CellPart
 const uint cm_first_part[11] = uint[11](CM_PARTS_OF_LEVELS);
-layout(location = 3) uniform float cm_to_relative;  // from the grid's values
+layout(location = 3) uniform float cm_to_relative;  // scale from the grid's values
 layout(location = 4) uniform bool cm_linear;
 
 float cm_value(uint i) {
@@ -32,7 +32,7 @@ float cm_value(uint i) {
 
 struct CmLeaf {
   uvec2 coefficients;  // as in a record
-  bool dense;          // has any density
+  bool dense;          // has density
 };
 
 uvec2 cm_pack(float mean, vec3 gradient) {
@@ -42,7 +42,7 @@ uvec2 cm_pack(float mean, vec3 gradient) {
 
 #if CM_FINE
 
-// The sum over its voxels.
+// Averages and fits the cell's voxels.
 CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
   uint level = cm_fine_level(shape);
   uint first_value = CM_BLOCK_POINTS * cm_brick_at(voxel);
@@ -90,8 +90,8 @@ CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
 
 #endif
 
-// What stands behind a face: a link may point to a cell that has split since, once at most, for a face that neither split
-// cuts is cut by the next.
+// Returns the leaf behind a face. A link may refer to a cell that has split since, but only once: the next split there
+// would cut the face, and split this cell too.
 uint cm_rank_behind(uint other, uint i) {
   return other == CM_NONE ? CM_NONE : cm_cells[cm_behind_whole(other, i)].rank;
 }
@@ -109,7 +109,7 @@ void main() {
   uvec4 links = cm_links[i];
   cm_records[2u * rank] = uvec4(cm_rank_behind(links.x, i), cm_rank_behind(links.y, i), cm_rank_behind(links.z, i),
                                 cm_rank_behind(links.w, i));
-  // Without the first two it is empty.
+  // If the first coefficient word is 0, the cell is empty and the second must be 0.
   cm_records[2u * rank + 1u] =
       uvec4(where, leaf.coefficients.x, leaf.coefficients.x == 0u ? 0u : leaf.coefficients.y);
 }

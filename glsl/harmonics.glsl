@@ -1,10 +1,11 @@
-// Light from all directions by spherical harmonics of the first and second order, beside its mean: what a rasterised
-// matte surface sees of sky or environment (Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment
-// Maps", SIGGRAPH 2001). Shared by GLSL and C++.
+// Spherical harmonics of the first and second order, beside the mean: the light of sky or environment on rasterized
+// diffuse surfaces (Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment Maps", SIGGRAPH
+// 2001). Shared by GLSL and C++.
 #ifndef CM_HARMONICS_GLSL
 #define CM_HARMONICS_GLSL
 
-// Colours: radiance towards a unit w, less the mean, is about the sum of each times its product of w's components.
+// RGB coefficients. Radiance towards a unit w minus the mean is about the sum of each coefficient times its product of
+// w's components.
 struct CmHarmonics {
   vec4 x;
   vec4 y;
@@ -16,7 +17,7 @@ struct CmHarmonics {
   vec4 yy;  // y y - z z
 };
 
-// How much of each order a cosine over pi leaves.
+// Factors by which convolution with cosine / pi scales each order.
 const vec2 CM_MATTE_ORDERS = vec2(0.66666667f, 0.25f);
 
 CM_FN vec3 cm_harmonics(CmHarmonics h, vec3 w, vec2 orders) {

@@ -1,6 +1,7 @@
-// The volume that a path marches through, or has come to an event in: CM_GRID, its data; CM_MEDIUM; CM_GLOW. With
-// CM_INSTANCES one of a table, whose number is in cm_here; then cube space is the scene's frame to all else, and that
-// volume has its own. Shared by GLSL and C++; the includer has parameters.glsl before this, and with CM_INSTANCES
+// The current volume, which a path traverses or has an event in: CM_GRID, its data; CM_MEDIUM; CM_GLOW. With
+// CM_INSTANCES it is an entry of a table, with index cm_here. Then cube space means the scene's frame in all other
+// code, and that volume has its own cube space. Shared by GLSL and C++; the includer has parameters.glsl before this,
+// and with CM_INSTANCES
 //   uint cm_here   where functions may change it
 #ifndef CM_HERE_GLSL
 #define CM_HERE_GLSL
@@ -21,7 +22,7 @@ uint cm_here = 0u;
 #endif
 #include "instance.glsl"
 
-// A vector and a point of the space that rays are in, in the cube space of that volume.
+// Transform a vector and a point from ray space to the cube space of the current volume.
 CM_FN vec3 cm_in_volume(vec3 v) { return cm_in_instance(cm_here, v); }
 CM_FN vec3 cm_in_volume_point(vec3 p) { return cm_in_instance_point(cm_here, p); }
 #else

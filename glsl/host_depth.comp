@@ -1,5 +1,5 @@
 #version 450
-// A host's depth as view depth, one layer a sample, and whether it differs from before.
+// Converts the host's depth buffer to view depth, one layer per sample, and reports whether it changed.
 // variants: CM_MULTISAMPLE=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
@@ -15,14 +15,14 @@ layout(std430, binding = CM_STORAGE_DEPTH_CHANGED) buffer CmChanged { uint cm_ch
 layout(location = 0) uniform ivec2 cm_origin;
 layout(location = 1) uniform bool cm_flip_y;
 layout(location = 2) uniform bool cm_orthographic;
-layout(location = 3) uniform vec3 cm_depth;  // a, what a lacks of its double, b
+layout(location = 3) uniform vec3 cm_depth;  // a; the rest of a in double precision; b
 
-// z = b / (d - a), or (d - a) / b where orthographic; infinite at the far value and beyond, and for NaN.
+// z = b / (d - a), or (d - a) / b if orthographic. Infinite at the far value and beyond, and for NaN.
 float cm_view_depth(float d) {
   float infinite = uintBitsToFloat(0x7f800000u);
   bool rising = (cm_depth.z > 0.0) == cm_orthographic;
   if (cm_is_nan(d) || (rising ? d >= 1.0 : d <= 0.0)) return infinite;
-  // d is often within rounding of a: its difference to the float nearest a is exact, the rest comes after.
+  // d is often almost a. Its difference from the float nearest to a is exact; the rest of a is subtracted after it.
   precise float difference = d - cm_depth.x;
   precise float rest = difference - cm_depth.y;
   if (cm_orthographic) return rest / cm_depth.z;

@@ -1,6 +1,5 @@
 #version 450
-// What one deterministic ray a pixel, through its centre, tells: views that show the grid rather than light, and the
-// depth at half opacity.
+// Views of the grid, and the depth at half opacity, by one deterministic ray through each pixel's center.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -30,7 +29,7 @@ layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 #define CM_VIEW_WIREFRAME 4u
 #define CM_VIEW_DEPTH 5u
 
-// Dark blue, teal, green, yellow: rises in lightness, so it reads without colour too.
+// Dark blue, teal, green, yellow: lightness increases, so the ramp is readable without color.
 vec3 cm_ramp(float x) {
   x = clamp(x, 0.0, 1.0);
   vec3 a = vec3(0.05, 0.03, 0.20);
@@ -40,7 +39,7 @@ vec3 cm_ramp(float x) {
   return x < 0.33 ? mix(a, b, x / 0.33) : (x < 0.66 ? mix(b, c, (x - 0.33) / 0.33) : mix(c, e, (x - 0.66) / 0.34));
 }
 
-// Distance within the cut plane (normal: cube axis) from its point p to a face n.x = c.
+// Distance within the slice plane (normal: cube axis) from its point p to a face n.x = c.
 float cm_edge(vec3 n, float c, vec3 p, uint axis) {
   vec3 in_plane = n;
   if (axis == 0u) in_plane.x = 0.0;
@@ -80,7 +79,7 @@ CmFaces cm_faces(uvec3 cell, vec3 p) {
   faces.level = depth / max(1.0, float(CM_GRID.levels));
   faces.size = unit;
 #else
-  // The four nearest of a voxel's six faces: those that matter.
+  // The three faces of a voxel nearest to p; others are too far away to matter.
   vec3 low = vec3(cm_voxel_of(cell));
   vec3 high = low + 1.0;
   bvec3 upper = greaterThan(p - low, vec3(0.5));
@@ -104,7 +103,7 @@ float cm_density_at(uvec3 cell, vec3 p) {
   return r_0;
 }
 
-// Colour of the cell that the ray is in at t, darkened towards its edges. pixel_size: in world space.
+// Color of the ray's cell at t, darkened towards its edges. pixel_size: in world space.
 vec3 cm_show_cell(inout CmWalk walk, float t, uint axis, float pixel_size) {
   CmFront front = walk.front[0];
   cm_stand_at(front);
@@ -118,7 +117,7 @@ vec3 cm_show_cell(inout CmWalk walk, float t, uint axis, float pixel_size) {
   return mix(vec3(0.0), colour, clamp(0.35 + 0.65 * edge / (pixel_size * length(d)), 0.35, 1.0));
 }
 
-// How far p, on one of the cell's faces, is from that face's nearest edge.
+// Distance of p, on one of the cell's faces, to that face's nearest edge.
 float cm_face_edge(CmFaces faces, vec3 p) {
   int face = 0;
   float nearest = 3.0e38;
@@ -160,14 +159,14 @@ void main() {
   bool solid = cm_trace_models(cm_from_cube_point(o), w, 0.0, surface_t, false, triangle);
   if (solid) surface_t = triangle.t;
 #endif
-  // Width of a pixel in world space, over t where perspective.
+  // Width of a pixel in world space; per unit of t if perspective.
   float footprint = 2.0 * length(cm.view.up) / float(cm.view.size.y);
   CmWalk walk = cm_walk(o, d, surface_t, true);
   bool hit = walk.entry < 3.0e38;
   if (view == CM_VIEW_CELLS) {
     vec3 f = abs(cm_to_cube(cm.view.forward));
     uint axis = f.x >= f.y && f.x >= f.z ? 0u : (f.y >= f.z ? 1u : 2u);
-    float middle = cm_pick(0.5 * (cm.space.box_min + cm.space.box_max), axis) + 0.217;  // off the lattice
+    float middle = cm_pick(0.5 * (cm.space.box_min + cm.space.box_max), axis) + 0.217;  // not on a lattice plane
     float t = (middle - cm_pick(o, axis)) / cm_pick(d, axis);
     if (hit && t > walk.entry && t < walk.t_end && cm_walk_to(walk, t)) {
       float pixel_size = footprint * (cm.view.orthographic != 0u ? 1.0 : t);
@@ -202,7 +201,7 @@ void main() {
           vec3 at = cm_in_volume_point(walk.o) + t * along;
           CmFaces faces = cm_faces(front.cell, at);
           float here = size * length(along);
-          // Edges of cells that are a few pixels wide would cover all.
+          // Edges of cells only a few pixels wide would cover everything, so they fade out.
           float of_front =
               clamp(1.2 - cm_face_edge(faces, at) / here, 0.0, 1.0) * smoothstep(0.0, 12.0, faces.size / here);
           if (of_front > line) level = faces.level;
@@ -216,7 +215,7 @@ void main() {
       steps += 1u;
     }
     alpha = 1.0 - exp(-used);
-    // Steps: each doubling is a tenth of the ramp, 1024 its end.
+    // Steps: each doubling is a tenth of the ramp; 1024 is its end.
     colour = view == CM_VIEW_STEPS ? cm_ramp(log2(1.0 + float(steps)) * 0.1) : vec3(alpha);
     if (view == CM_VIEW_WIREFRAME) colour = lines + clear * vec3(0.02) + 0.04 * alpha;
   }

@@ -1,4 +1,4 @@
-// Which instances of volumes a ray comes to. Shared by GLSL and C++; the includer has instance_table.glsl before this.
+// Finds the volume instances along a ray. Shared by GLSL and C++; the includer has instance_table.glsl before this.
 #ifndef CM_INSTANCE_GLSL
 #define CM_INSTANCE_GLSL
 #include "numbers.glsl"
@@ -15,14 +15,14 @@ CM_FN CmStanding cm_instance_end(uint at) {
   return CmStanding(cm_instances[at].space.from_cube_x, cm_instances[at].space.from_cube_y,
                     cm_instances[at].space.from_cube_z, cm_instances[at].space.cube_origin);
 }
-// One that moves: behind the table's records are others, of where all stand as the shutter opens and as it closes.
+// A moving instance has two further records behind the table's: transforms at shutter open and at shutter close.
 CM_FN bool cm_instance_moves(uint at) { return (cm_instances[at].flags & CM_INSTANCE_MOVES) != 0u; }
 CM_FN CmStanding cm_instance_standing(uint at) {
   return cm_between(cm_instance_end(at + cm.space.volumes), cm_instance_end(at + 2u * cm.space.volumes));
 }
 #endif
 
-// A vector and a point of the scene's frame in an instance's cube space.
+// Transforms a vector and a point from the scene's frame to an instance's cube space.
 CM_FN vec3 cm_in_instance(uint at, vec3 v) {
 #if CM_MOTION
   if (cm_instance_moves(at)) return cm_in_standing(cm_instance_standing(at), v);
@@ -41,13 +41,14 @@ CM_FN vec3 cm_in_instance_point(uint at, vec3 p) {
   return cm_in_instance(at, p - cm_instances[at].space.cube_origin);
 }
 
-// One over d, as cm_instance_span takes it: 0 counts as next to 0, so that no product of it is NaN.
+// Reciprocal of d for cm_instance_span. 0 counts as almost 0, so that no product is NaN.
 CM_FN vec3 cm_instance_inverse(vec3 d) {
   return mix(vec3(1.0f, 1.0f, 1.0f) / d, vec3(1.0e30f), lessThan(abs(d), vec3(1.0e-30f)));
 }
 
-// Where a ray is in a box: from x to y, nowhere unless x < y. Along a face, only at its lower end: of boxes that share a
-// face one has it, and a flat box has none. Monotone, however it rounds: of a larger box x is not larger, y not smaller.
+// Interval of a ray in a box, x to y; empty unless x < y. A ray along a face is inside only at the lower face: of boxes
+// that share a face exactly one contains it, and a flat box never does. Rounding is monotone: for a larger box, x is
+// not larger and y not smaller.
 CM_FN vec2 cm_instance_span(vec3 o, vec3 inverse, vec3 low, vec3 high) {
   CM_PRECISE vec3 t_0 = (low - o) * inverse;
   CM_PRECISE vec3 t_1 = (high - o) * inverse;
@@ -56,17 +57,17 @@ CM_FN vec2 cm_instance_span(vec3 o, vec3 inverse, vec3 low, vec3 high) {
   return vec2(max(max(first.x, first.y), max(first.z, 0.0f)), min(min(last.x, last.y), last.z));
 }
 
-// The instance that a ray o + t d, t >= 0, enters next, after the one that it has entered at `entry`: the least by
-// (entry, number) that is more than the one given and enters before t_end; of those alone that have all of these flags.
-// Begin with -1 and CM_INSTANCE_NONE. False: there is no other; both are then as they were.
+// Finds the next instance that a ray o + t d, t >= 0, enters after `instance`, which it entered at `entry`. It is the
+// minimum of (entry, number) above the given pair, among instances that have all of these flags and are entered before
+// t_end. Begin with -1 and CM_INSTANCE_NONE. Returns false if there is none, and leaves both unchanged.
 //
-// Each instance is met once, and the order depends on their boxes and numbers alone: both tests of an instance are its
-// own, and the tree leaves out only what fails them. A ray that is no number comes to none. O(nodes near the ray) a
-// call, without a stack.
+// Each instance is found once, and the order depends only on boxes and numbers: both tests of an instance use only its
+// own data, and the tree skips only instances that fail them. A ray with NaN finds none. Takes O(nodes near the ray)
+// per call, without a stack.
 CM_FN bool cm_next_instance(vec3 o, vec3 d, float t_end, uint flags, CM_INOUT(float) entry, CM_INOUT(uint) instance) {
   vec3 inverse = cm_instance_inverse(d);
   float least = t_end;
-  uint next = 0u;  // none enters at t_end
+  uint next = 0u;  // no instance enters at t_end
   uint nodes = cm_is_within(o, 1.0e15f) && cm_is_within(d, 1.0e15f) ? cm_instance_nodes[0].skip : 0u;
   uint i = 0u;
   while (i < nodes) {
@@ -93,7 +94,8 @@ CM_FN bool cm_next_instance(vec3 o, vec3 d, float t_end, uint flags, CM_INOUT(fl
   return true;
 }
 
-// Of instances whose cells give off light, in proportion to how much: `drawn` evenly among all, and a random word.
+// Picks an emissive instance in proportion to its power, by an alias table. drawn: a uniformly drawn instance; word: a
+// random word.
 CM_FN uint cm_glowing_instance(uint drawn, uint word) {
   return word < cm_instances[drawn].alias ? drawn : cm_instances[drawn].alias_other;
 }

@@ -1,11 +1,12 @@
-// Where in its pixel each layer of the surface pass is sampled. Shared by GLSL and C++.
+// Sub-pixel position of each layer of the surface pass. Shared by GLSL and C++.
 #ifndef CM_JITTER_GLSL
 #define CM_JITTER_GLSL
 
-// Of `layers` layers, 1 to 8: n rooks far apart, each column and each row of an n x n grid has one, in its cell's middle.
-// x to the right, y down the picture, from the pixel's corner. The mean over all layers is (0.5, 0.5).
+// For 1 to 8 layers: the n-rooks pattern with the largest distances, where each column and each row of an n x n grid
+// has one sample, at its cell's center. x to the right, y down the image, from the pixel's corner. The mean over all
+// layers is (0.5, 0.5).
 CM_FN vec2 cm_layer_jitter(uint layer, uint layers) {
-  // The row of layer i in hexadecimal digit i.
+  // Hexadecimal digit i is the row of layer i.
   uint rows = layers <= 1u   ? 0u
               : layers == 2u ? 0x10u
               : layers == 3u ? 0x210u

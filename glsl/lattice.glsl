@@ -1,29 +1,29 @@
-// The lattice of a grid's splits (src/grid/lattice.hpp): where things are in it. Shared by GLSL and C++.
+// The lattice of a grid's splits (src/grid/lattice.hpp): indexing. Shared by GLSL and C++.
 //
-// A vertex is of octave o if 2^o is the largest power of two that divides its coordinates. Octaves 3 m to 3 m + 2 are of
-// scale m, whose lattice has the spacing 8^m; blocks are of 8^3 of its points. A block at corner c, counted in blocks,
-// stands at the point c of the next scale: so blocks are a tree, of which each one of scale 1 and up has a place for 512
-// others.
+// A vertex has octave o if 2^o is the largest power of two that divides its coordinates. Octaves 3 m to 3 m + 2 form
+// scale m, whose lattice has spacing 8^m. Blocks contain 8^3 points of it. A block at corner c, counted in blocks,
+// belongs to the point c of the next scale. So blocks form a tree, in which each block of scale 1 and up has up to 512
+// children.
 #ifndef CM_LATTICE_GLSL
 #define CM_LATTICE_GLSL
 
 #define CM_BLOCK_POINTS 512u
-#define CM_TOP_BLOCK 1u  // block 0 is that of places that have none
-// How many points of a brick's 9^3 the cells of its first 0 to 9 levels split at.
+#define CM_TOP_BLOCK 1u  // block 0 stands for missing blocks
+// Number of points of a brick's 9^3 at which the cells of its first 0 to 9 levels split.
 #define CM_POINTS_OF_LEVELS 0u, 1u, 7u, 19u, 27u, 63u, 117u, 181u, 421u, 721u
 #define CM_BRICK_POINTS 721u
-// Parts of cells within bricks: voxel by voxel, of the ten shapes from a brick's Kuhn tetrahedron to a voxel's.
+// Parts of cells in bricks, voxel by voxel: of the ten shapes from a brick's Kuhn tetrahedron to a voxel's.
 #define CM_PARTS_OF_LEVELS 0u, 120u, 190u, 230u, 250u, 263u, 271u, 275u, 278u, 280u, 281u
 #define CM_CELL_PARTS 281u
 #define CM_COARSE_CELLS 42u
-#define CM_COARSE_WORDS 86u  // two each, and two of bits
+#define CM_COARSE_WORDS 86u  // two words per cell, and two words of bits
 
-// What cells carry beside density.
+// Channels of cells beside density.
 #define CM_CHANNEL_EMISSION 0
 #define CM_CHANNEL_COLOUR 1
 #define CM_CHANNEL_ANISOTROPY 2
 #define CM_CHANNEL_VELOCITY 3
-// Of a cube's cells above bricks, whose records of a channel have so many words each: with two words of bits.
+// Words of a channel for a cube's cells above bricks: `record` words per cell, and two words of bits.
 CM_FN uint cm_coarse_channel_words(uint record) { return CM_COARSE_CELLS * record + 2u; }
 
 CM_FN uint cm_octave(ivec3 vertex) { return uint(findLSB(vertex.x | vertex.y | vertex.z)); }
@@ -32,14 +32,14 @@ CM_FN uint cm_in_block(ivec3 point) {
   return uint(p.x * 64 + p.y * 8 + p.z);
 }
 
-// Of a block, two words: its corner and its scale.
+// Fields of a block, two words: its corner and its scale.
 CM_FN ivec3 cm_block_corner(uvec2 block) {
   return ivec3(int(block.x & 0xffffu), int(block.x >> 16), int(block.y & 0xffffu));
 }
 CM_FN uint cm_block_scale(uvec2 block) { return block.y >> 16; }
 
-// Of a cube of the octree whose cells split, three words: its corner, in bricks, its log2 size, how many levels of its
-// own cells have priorities, and where these begin.
+// Fields of an octree cube whose cells split, three words: its corner, in bricks; its log2 size; the number of levels
+// of its own cells with priorities; and the index of the first priority.
 CM_FN ivec3 cm_node_corner(uvec3 node) {
   return ivec3(int(node.x & 0xffffu), int(node.x >> 16), int(node.y & 0xffffu)) * 8;
 }
@@ -50,8 +50,8 @@ CM_FN uvec2 cm_node_words(ivec3 corner, uint log2_size, uint levels) {
   return uvec2(brick.x | (brick.y << 16), brick.z | (log2_size << 16) | (levels << 21));
 }
 
-// Of a vertex that is an odd multiple of 2^octave in `odd` of its coordinates: how many cells split there, in a cube of
-// 2^log2_size voxels.
+// Number of cells that split at a vertex of this octave, in a cube of 2^log2_size voxels. It depends on how many
+// coordinates are odd multiples of 2^octave.
 CM_FN uint cm_cells_around(ivec3 vertex, uint octave, uint log2_size) {
   ivec3 odd = (vertex >> ivec3(int(octave))) & ivec3(1);
   ivec3 size = ivec3(1 << int(log2_size));
@@ -64,21 +64,21 @@ CM_FN uint cm_cells_around(ivec3 vertex, uint octave, uint log2_size) {
   return inside >> outside;
 }
 
-// The level of the cells that split there; the roots' is 0.
+// Level of the cells that split there; that of the roots is 0.
 CM_FN uint cm_split_level(ivec3 vertex, uint octave, uint log2_size) {
   ivec3 odd = (vertex >> ivec3(int(octave))) & ivec3(1);
   return 3u * (log2_size - 1u - octave) + uint(1 - (odd.x + odd.y + odd.z));
 }
 
-// Whether a cell is within a brick; then its level there.
+// Returns true if a cell is in a brick; its level there.
 CM_FN bool cm_is_fine(uint shape) { return cm_shape_cube_size(shape) <= 3u; }
 CM_FN uint cm_fine_level(uint shape) {
   uint cell_class = cm_shape_class(shape);
   return 3u * (3u - cm_shape_exponent(shape)) - (cell_class == 1u ? 0u : (cell_class == 2u ? 2u : 1u));
 }
 
-// Which of a cube's cells this is, above bricks: of a cube of the octree at this corner six Kuhn tetrahedra (B), their
-// 12 halves (C), each on a face, and 24 quarters (A), each on an edge and a face; of the whole cube the roots alone.
+// Number of a cell among a cube's cells, above bricks. An octree cube at this corner has six Kuhn tetrahedra (B), their
+// 12 halves (C), each on a face, and 24 quarters (A), each on an edge and a face. The root cube has only the roots.
 CM_FN uint cm_coarse_cell(vec3 v0, uint shape, vec3 corner) {
   uint px = (shape >> 3) & 3u;
   uint py = (shape >> 5) & 3u;

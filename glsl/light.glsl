@@ -1,36 +1,37 @@
-// Lights: what each kind sends, how paths look for them, and how likely they find them so. src/light has the table of
-// which there are and how likely each kind is looked for. Shared by GLSL and C++.
+// Lights: the radiance of each kind, its sampling for next-event estimation (NEE), and its pdf. src/light has the table
+// of the lights and of the selection probability of each kind. Shared by GLSL and C++.
 //
-// A look for light at a vertex is for one kind, by its chance: cm_light_sample. Flights come to some kinds as well, by
-// escaping to what is far away or by meeting a triangle. What either finds counts by the balance heuristic (Veach and
-// Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995), in which the density of
-// looks is cm_light_pdf, whoever asks.
+// NEE at a vertex picks one kind by its probability: cm_light_sample. Scattered rays also reach some kinds, by escaping
+// to distant light or by hitting a triangle. Both are combined by the balance heuristic (Veach and Guibas, "Optimally
+// Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995). cm_light_pdf is the pdf of NEE in all those
+// weights.
 //
-// A kind is a number and a line of CM_FAR_LIGHTS or CM_NEAR_LIGHTS, which is
-//   its number, its chance, a sample, a density, and, if it is far away, a radiance, with
-//   CmLightSample sample(path, here, u)   here: world, where looks start; u.xy for a point of the light, u.z for which
-//   float density(hit)                    by solid angle; 0 of kinds without extent, which no flight comes to
+// A kind is a number and a line of CM_FAR_LIGHTS or CM_NEAR_LIGHTS, with
+//   its number, its probability, a sample, a pdf, and, if it is distant, a radiance, where
+//   CmLightSample sample(path, here, u)   here: world, the vertex; u.xy chooses the point of the light, u.z the light
+//   float pdf(hit)                        by solid angle; 0 for kinds without extent, which no scattered ray reaches
 //   vec3 radiance(w)
 #ifndef CM_LIGHT_GLSL
 #define CM_LIGHT_GLSL
 
 #include "luminance.glsl"
 
-#define CM_LIGHT_SKY 0u       // everywhere: looked for in a direction that a flight might take
-#define CM_LIGHT_SUN 1u       // far away: a disc, or without extent
-#define CM_LIGHT_TRIANGLE 2u  // emissive
-#define CM_LIGHT_LAMP 3u      // of punctual.glsl
-#define CM_LIGHT_GLOW 4u      // the medium's own: flights that leave surfaces are aimed at its box
-#define CM_LIGHT_OTHER 5u     // of CM_MORE_LIGHTS
-#define CM_LIGHT_ENVIRONMENT 6u  // a picture of all that is far away, instead of the sky
-#define CM_LIGHT_CELL 7u  // a cell that gives off light
+#define CM_LIGHT_SKY 0u       // uniform; sampled in the direction of a scattered ray
+#define CM_LIGHT_SUN 1u       // distant: a disk, or without extent
+#define CM_LIGHT_TRIANGLE 2u  // emissive triangles
+#define CM_LIGHT_LAMP 3u      // lights of punctual.glsl
+#define CM_LIGHT_GLOW 4u      // emission of the medium: rays scattered at surfaces are aimed at its bounds
+#define CM_LIGHT_OTHER 5u     // kinds of CM_MORE_LIGHTS
+#define CM_LIGHT_ENVIRONMENT 6u  // environment map, instead of the sky
+#define CM_LIGHT_CELL 7u  // emissive cells
 
 #if CM_GROUPS
-uint cm_look_group = 0u;           // of the lamp, triangle or cell that was picked last
+uint cm_look_group = 0u;           // group of the light, triangle or cell that was picked last
 uint cm_group_lane = 0u;           // glsl/groups.glsl
 void cm_add_to_group(uint group, vec3 radiance);
 
-// Of lights of that kind, which a look has picked last where each has its own.
+// Light group of a light of that kind. For kinds with a group per light, it is the group of the light that NEE picked
+// last.
 uint cm_group_of(uint kind) {
   if (kind == CM_LIGHT_SUN) return cm.integrator.sun_group;
   if (kind == CM_LIGHT_SKY || kind == CM_LIGHT_ENVIRONMENT) return cm.integrator.sky_group;
@@ -38,24 +39,24 @@ uint cm_group_of(uint kind) {
 }
 #endif
 
-// What a look has found.
+// A light sample of NEE.
 struct CmLightSample {
   uint kind;
-  vec3 radiance;   // that comes from there; of kinds without extent an irradiance
+  vec3 radiance;   // arriving radiance; for kinds without extent an irradiance
   vec3 direction;  // world, unit
-  float distance;  // 3e38: far away
-  float density;   // with which it is found: by solid angle; without extent, the chance
+  float distance;  // 3e38: distant
+  float density;   // solid-angle pdf; without extent, the selection probability
 };
 
-// What a ray comes to.
+// The light that a ray reaches.
 struct CmLightHit {
   uint kind;
-  vec3 o;         // cube space: where the ray starts
+  vec3 o;         // cube space: origin of the ray
   vec3 w;         // world, unit: its direction
-  float flight;   // density with which flights take that
-  uint triangle;  // met
-  vec3 point;     // world: of the triangle
-  vec3 normal;    // world, unit: the triangle's
+  float flight;   // solid-angle pdf of the scattered ray's direction
+  uint triangle;  // triangle that was hit
+  vec3 point;     // world: point on that triangle
+  vec3 normal;    // world, unit: normal of that triangle
 };
 
 CM_FN CmLightHit cm_light_hit(uint kind, vec3 o, vec3 w, float flight) {
@@ -77,7 +78,8 @@ CM_FN float cm_sky_pdf(CmLightHit hit) { return hit.flight; }
 CM_FN CmLightSample cm_sky_along(vec3 w, float flight) {
   return CmLightSample(CM_LIGHT_SKY, cm_sky_radiance(w), w, 3.0e38f, flight);
 }
-// To be had by cm_sky_along, once it is known where flights might go; the density is the chance alone until then.
+// Placeholder: cm_scatter replaces it by cm_sky_along once it has sampled a direction. Until then `density` is only the
+// selection probability.
 CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   return cm_sky_along(vec3(0.0f, 1.0f, 0.0f), 1.0f);
 }
@@ -90,7 +92,7 @@ CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #endif
 
-// ---- The sun: a disc of even radiance. One of spread 0 is a direction, which no flight comes to.
+// ---- The sun: a disk of uniform radiance. With spread 0 it is a single direction, which no scattered ray reaches.
 
 CM_FN bool cm_on_sun(vec3 w) {
   vec3 apart = w - cm.lights.sun_direction;
@@ -100,7 +102,7 @@ CM_FN vec3 cm_sun_radiance(vec3 w) { return cm_on_sun(w) ? cm.lights.sun_radianc
 CM_FN float cm_sun_pdf(CmLightHit hit) {
   return cm_on_sun(hit.w) ? 0.159154943f / cm.lights.sun_spread : 0.0f;
 }
-// Evenly over the disc.
+// Samples the disk uniformly by solid angle.
 CM_FN CmLightSample cm_sun_sample(vec3 u) {
   CmLightSample light =
       CmLightSample(CM_LIGHT_SUN, cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38f, 1.0f);
@@ -123,12 +125,13 @@ CM_FN CmLightSample cm_sun_sample(vec3 u) {
 
 #include "channels.glsl"
 
-// ---- Cells that give off light; their table is that of src/scene/glow.hpp
+// ---- Emissive cells; their table is made by src/scene/glow.hpp
 //
-// A look picks a cell by what it gives off and a point of it; flights take up what all cells on their way give off. What
-// either brings from a cell counts by the balance heuristic, with densities that depend on the cell and on where looks
-// and flights start, never on a direction's or a point's own: those of a direction, for flights, and of a point times
-// its squared distance, at least, for looks. Points are of a volume, so CmGlow.extent makes one of the other.
+// NEE picks an emissive cell by its power and samples a point in it; scattered rays accumulate the emission of all
+// cells that they cross. Both are combined by the balance heuristic. For scattered rays the pdf is that of their
+// direction. For NEE it is the cell's volume pdf times a lower bound of the squared distance. The latter depends only
+// on the cell and on the ray's origin, not on the sampled point. CmGlow.extent, a length, converts the volume pdf to a
+// solid-angle pdf.
 
 CM_FN float cm_glow_pdf_of(vec3 mean, float distance) {
   float least = distance * CM_GLOW.least_stretch;
@@ -140,7 +143,7 @@ CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.me
 
 #if CM_CELL_LIGHTS
 
-// O(1).
+// Takes O(1).
 CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 #if CM_INSTANCES
   uint stood = cm_here;
@@ -160,7 +163,8 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uint shape = cm_record_shape(place, wide);
   uint cell_class = cm_shape_class(shape);
   vec3 point = cm_cell_point(cell_class, vec3(u.x, u.y, cm_random(p.random, p.stream)));
-  // Not from `here`, which is a little above a surface: flights through the medium start at p.o as well.
+  // Measured from p.o, not from `here`, which is slightly above a surface: rays through the medium start at p.o as
+  // well.
   vec3 to_v0 = cm_record_v0(place, wide) - cm_in_volume_point(p.o);
   vec3 way = cm_out_of_volume(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
   float length_2 = max(dot(way, way), 1e-24f);
@@ -178,7 +182,7 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   cm_look_group = CM_MEDIUM.group;
 #endif
 #if CM_INSTANCES && CM_MOTION
-  // The table's chances are of the volumes that cells have at the frame's moment.
+  // The table's probabilities assume the volumes of the cells at the frame time.
   if (cm_instance_moves(cm_here))
     light.radiance *= abs(cm_standing_volume(cm_instance_standing(cm_here))) / cm_instances[cm_here].space.unit_volume;
 #endif
@@ -192,11 +196,11 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #if CM_LAMPS
 
-// ---- Lamps; no flight meets them. The includer provides CmLamp cm_lamp(uint i)
+// ---- Punctual and area lights; no scattered ray hits them. The includer provides CmLamp cm_lamp(uint i)
 
 #include "punctual.glsl"
 
-// By light::share_looks. O(1).
+// Picks a light by the alias table of light::share_looks. O(1).
 CM_FN CmLamp cm_pick_lamp(CmPath p, uint salt) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, salt)));
   uint i = cm_below(pick.x, max(cm.lamps.count, 1u));
@@ -221,22 +225,22 @@ CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #if CM_SURFACES
 
-// ---- Emissive triangles; the tables are those of src/light/emitters.hpp, one a mesh
+// ---- Emissive triangles; the tables are made by src/light/emitters.hpp, one per mesh
 
 CM_FN uvec4 cm_emitter(uint model, uint i) { return cm_words(cm_models[model].emitters + i); }
 
-// Density by solid angle of a point on one, picked by its model's power, by its own and then by area: `way` from where it
-// is looked at, along w; n: its unit normal.
+// Solid-angle pdf of a point on an emissive triangle. The model and the triangle are picked by power, the point by
+// area. way: vector from the shading point to that point, along w (unit); n: unit normal of the triangle.
 CM_FN float cm_emitter_density(uint model, uvec4 entry, vec3 way, vec3 w, vec3 n) {
   float by_area = cm_models[model].emitter_chance * abs(uintBitsToFloat(entry.w)) * cm_own_area(model, n);
 #if CM_MOTION
-  // The table's chances are of the areas at the frame's moment.
+  // The table's probabilities assume the triangles' areas at the frame time.
   if (cm_model_deforms(model)) by_area *= cm_area_share(cm_vertex_mix(model, entry.x, vec2(0.0f)));
 #endif
   return by_area * dot(way, way) / max(abs(dot(n, w)), 1e-12f);
 }
 
-// 0 of a triangle that is not in a table. O(log n).
+// Returns 0 for a triangle that is not in a table. O(log n).
 CM_FN float cm_triangle_pdf(CmLightHit hit) {
   uint model = cm_model_of(hit.triangle);
   uint triangle = hit.triangle - cm_models[model].first;
@@ -254,7 +258,7 @@ CM_FN float cm_triangle_pdf(CmLightHit hit) {
   return entry.x == triangle ? cm_emitter_density(model, entry, way, hit.w, hit.normal) : 0.0f;
 }
 
-// O(1). The distance is to just before it.
+// Takes O(1). The distance ends just before the triangle.
 CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uvec2 which = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x7f4a7c15u)));
   uint model = cm_below(which.x, cm.surfaces.models);
@@ -272,7 +276,7 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   vec3 c = cm_out_of_model_point(model, cm_corner(m, 2).position);
   vec3 g = cm_turning_normal(a, b, c);
   vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
-  bool along = dot(g, point - here) > 0.0f;  // seen from where the vertices turn clockwise
+  bool along = dot(g, point - here) > 0.0f;  // seen from the side where the vertices are clockwise
   vec3 aside = along ? -g : g;
   vec3 way = cm_offset_origin(point, aside) + cm_model_room(model, point) * aside - here;
   float length_2 = max(dot(way, way), 1e-24f);
@@ -288,14 +292,14 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   return light;
 }
 
-// ---- The glowing medium: points of its box, each as likely
+// ---- Emission of the medium: uniformly sampled points of its bounds
 
 CM_FN vec3 cm_glow_direction(vec3 o, vec3 u, vec3 otherwise) {
   vec3 way = cm_to_world(mix(cm.space.box_min, cm.space.box_max, u) - o);
   return dot(way, way) > 0.0f ? normalize(way) : otherwise;
 }
 
-// The integral of t^2 over the ray's part inside, over the box's volume.
+// Solid-angle pdf: the integral of t^2 over the ray's segment in the bounds, divided by the volume of the bounds.
 CM_FN float cm_glow_pdf(CmLightHit hit) {
   vec2 range = cm_box_range(hit.o, cm_to_cube(hit.w));
   if (!(range.x < range.y)) return 0.0f;
@@ -310,7 +314,7 @@ CM_FN float cm_glow_pdf(CmLightHit hit) {
 
 CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 
-// A test's own (tests/unit/support/disc_light.glsl).
+// Hook for tests (tests/unit/support/disc_light.glsl).
 #ifndef CM_MORE_LIGHTS
 #define CM_MORE_LIGHTS(LIGHT)
 #endif
@@ -343,17 +347,17 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 #define CM_NEAR_LIGHTS(LIGHT) CM_GLOWING_LIGHTS(LIGHT)
 #endif
 
-// The share of what one technique finds that counts, where another might have found it.
+// The balance heuristic: MIS weight of a technique with pdf `mine` against one with pdf `other`.
 CM_FN float cm_balance(float mine, float other) { return mine / max(mine + other, 1e-30f); }
 
-// The sun's chance is what the others leave.
+// The sun's probability is the rest to 1.
 #define CM_LEAVE(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) -CHANCE
 CM_FN float cm_sun_chance() { return max(0.0f, 1.0f CM_FAR_LIGHTS(CM_LEAVE) CM_NEAR_LIGHTS(CM_LEAVE)); }
 
 #define CM_DENSITY(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
   if (hit.kind == NUMBER) return CHANCE * PDF(hit);
 
-// Of looks for light, to come to what a ray has come to.
+// Solid-angle pdf with which NEE samples the light that a ray has reached.
 CM_FN float cm_light_pdf(CmLightHit hit) {
   CM_FAR_LIGHTS(CM_DENSITY)
   CM_NEAR_LIGHTS(CM_DENSITY)
@@ -371,13 +375,13 @@ CM_FN float cm_light_pdf(CmLightHit hit) {
   }                                                                    \
   before += CHANCE;
 
-// A look for light: u.z decides for which kind.
+// Samples a light for NEE. u.z picks the kind.
 CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   CmLightSample light = cm_sun_sample(u);
   float before = 0.0f;
   CM_FAR_LIGHTS(CM_LOOK)
 #if CM_LAMPS
-  // A number of its own for the kinds that share the rest: which of many lights is drawn by the state behind it.
+  // A new random number for the near kinds. The individual light is picked by the random state after it.
   if (u.z >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
     u.z = before + (1.0f - before) * cm_random(p.random, p.stream);
   }
@@ -387,14 +391,14 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   return light;
 }
 
-// Whether flights come to what a look has found by escaping to it.
+// Returns true if scattered rays reach the light of this sample by escaping.
 #define CM_IS_FAR(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) || light.kind == NUMBER
 CM_FN bool cm_is_far(CmLightSample light) {
   return (light.kind == CM_LIGHT_SUN && cm.lights.sun_spread > 0.0f) CM_FAR_LIGHTS(CM_IS_FAR);
 }
 
-// The share of looks for what is far away and even that are worth making. Flights find it by themselves: those that are
-// not absorbed, and are not at their last event, escape to it in the end, each with as much.
+// Fraction of NEE samples of uniform distant light that are worth a shadow ray. Scattered rays also reach that light:
+// each one that is neither absorbed nor at its last event escapes in the end, with the same contribution.
 CM_FN float cm_look_share_of_even(CmPath p) {
   vec3 albedo = CM_MEDIUM.albedo;
 #if CM_CHANNELS && defined(CM_MARCH)
@@ -405,31 +409,33 @@ CM_FN float cm_look_share_of_even(CmPath p) {
   return min(1.0f, max(3.0f * absorbed, cm.integrator.max_bounces != 0u ? 4.0f / left : 0.0f));
 }
 
-// The chance that a look is made, where one of that kind was drawn with that density (its kind's chance in it) along a
-// direction that flights take with that one: in the medium, looks that would tell little are left out by Russian roulette
-// (tests/bench/README.md has what that is worth).
+// Probability of tracing the shadow ray of a light sample. In media, samples with a small expected contribution are
+// skipped by Russian roulette; tests/bench/README.md has measurements. density: pdf of the light sample, including the
+// probability of its kind. flight: pdf of the same direction by the phase function.
 CM_FN float cm_look_chance(CmPath p, uint kind, float flight, float density) {
   if (p.start != CM_IN_MEDIUM) return 1.0f;
   if (kind == CM_LIGHT_SKY) return cm_look_share_of_even(p);
-  // By what comes along, of which a path of many events needs less; but of what is near it is the distance that counts.
+  // In proportion to the phase function, and lower after many events. For near lights the number of events is ignored,
+  // because their distance matters more.
   float share = 12.5663706f * flight;
   bool near = kind == CM_LIGHT_LAMP || kind == CM_LIGHT_TRIANGLE || kind == CM_LIGHT_CELL;
   if (!near) share *= clamp(8.0f / float(p.bounces), 0.25f, 1.0f);
 #if CM_ENVIRONMENT
-  // Where it is brighter than its mean, as a sun in it, flights seldom find it.
+  // Where the environment is much brighter than its mean, such as a sun in it, scattered rays seldom find it.
   float bright = 12.5663706f * density / max(cm.lights.environment_chance, 1e-30f);
   if (kind == CM_LIGHT_ENVIRONMENT) share *= max(cm_look_share_of_even(p), min(1.0f, 0.125f * bright));
 #endif
   return min(1.0f, share);
 }
 
-// Of looks that are made, to come to what the path's flight has come to.
+// Solid-angle pdf of NEE for the light that the path's scattered ray has reached, including the roulette on shadow
+// rays.
 CM_FN float cm_look_pdf(CmPath p, CmLightHit hit) {
   float density = cm_light_pdf(hit);
   return density * cm_look_chance(p, hit.kind, hit.flight, density);
 }
 
-// What a flight brings that escapes with that transmittance.
+// Weighted radiance of the distant lights that a scattered ray reaches when it escapes with this transmittance.
 #if CM_GROUPS
 #define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                                         \
   of_kind = RADIANCE(p.w) * cm_balance(transmittance * p.density,                                \
@@ -451,7 +457,7 @@ CM_FN vec3 cm_far_light(CmPath p, float transmittance) {
   return brought;
 }
 
-// What is behind all, as cameras see it.
+// Radiance of the background as seen by cameras.
 #define CM_SEEN(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) seen += RADIANCE(w);
 CM_FN vec3 cm_background_radiance(vec3 w) {
   vec3 seen = cm_sun_radiance(w);

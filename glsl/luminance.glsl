@@ -2,7 +2,7 @@
 #ifndef CM_LUMINANCE_GLSL
 #define CM_LUMINANCE_GLSL
 
-// Of linear Rec. 709 colour.
+// Luminance of a linear Rec. 709 color.
 CM_FN float cm_luminance(vec3 colour) { return dot(colour, vec3(0.2126f, 0.7152f, 0.0722f)); }
 
 #endif

@@ -1,4 +1,4 @@
-// The march of CM_MARCH.
+// Includes the traversal of grid type CM_MARCH.
 #if CM_CHANNELS
 #include "channels.glsl"
 #endif
@@ -8,7 +8,7 @@
 #include "march_voxel.glsl"
 #endif
 
-// Where a ray, o + t d in the space that rays are in, enters the volume at t: there, however that rounds.
+// Entry cell of a ray, o + t d in ray space, at t. The point is clamped to the bounds, however it rounds.
 CM_FN uvec3 cm_march_enter_at(vec3 o, vec3 d, float t) {
   return cm_march_enter(clamp(cm_in_volume_point(o) + t * cm_in_volume(d), CM_GRID.box_min, CM_GRID.box_max));
 }

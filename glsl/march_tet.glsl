@@ -1,27 +1,27 @@
-// March through the tetrahedral grid. Shared by GLSL and C++; the includer provides
+// Traversal of the tetrahedral grid. Shared by GLSL and C++; the includer provides
 //   uvec4 cm_record(uint cell, uint part)   part 0: links, part 1: data (glsl/cell.glsl)
 //   uint cm_tree(uint node)                 the point-location tree
 //   uint cm_root_leaf(uint root), uint cm_root_node(uint root)
-// and with CM_CHANNELS
+// with CM_CHANNELS also
 //   uvec4 cm_emission_record(uint cell)     glsl/channels.glsl
-//   uint cm_colour_record(uint cell)        likewise
-//   uint cm_anisotropy_record(uint cell)    likewise
-// with CM_MOTION
-//   uvec2 cm_change_record(uint cell)       how the density of its record changes
+//   uint cm_colour_record(uint cell)        glsl/channels.glsl
+//   uint cm_anisotropy_record(uint cell)    glsl/channels.glsl
+// with CM_MOTION also
+//   uvec2 cm_change_record(uint cell)       change of the density in its record
 // and with CM_VELOCITY
-//   uvec2 cm_velocity_record(uint cell)     likewise
+//   uvec2 cm_velocity_record(uint cell)     glsl/channels.glsl
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
 #include "clear_cones.glsl"
 
-// With CM_WIDE grids may be of cubes wider than 2^15; all other kernels know but one kind of record.
+// CM_WIDE 1: the grid's cube may be wider than 2^15. Other kernels decode only one record format.
 #ifndef CM_WIDE
 #define CM_WIDE 0
 #endif
 CM_FN bool cm_grid_is_wide() { return CM_WIDE != 0 && cm_is_wide(CM_GRID.root_exponent); }
 
-// Point location: descends the bisection, O(level).
+// Point location: descends the bisection tree, O(level).
 CM_FN uvec3 cm_march_enter(vec3 p) {
   float half_size = uintBitsToFloat((127u + CM_GRID.root_exponent) << 23);
   uint root = cm_root_of(p, half_size);
@@ -49,7 +49,7 @@ CM_FN uvec3 cm_march_enter(vec3 p) {
   return uvec3(leaf, 0u, CM_NONE);
 }
 
-// A ray in cube space, and what a march has of it.
+// A ray in cube space, with data that the traversal precomputes.
 struct CmMarchRay {
   vec3 o;
   vec3 d;
@@ -63,8 +63,8 @@ CM_FN CmMarchRay cm_march_ray(vec3 o, vec3 d) {
   return ray;
 }
 
-// A cell's density. With CM_MOTION that of cm_now: a record's is in the middle, and the change half of that from one end
-// to the other, so that along a ray it is linear at any moment, and its depth as closed as at rest.
+// Density of a cell. With CM_MOTION at cm_now: the record holds the value at mid-shutter, and the change is half of the
+// difference between both ends. So density along a ray is linear at any time, and optical depth keeps its closed form.
 CM_FN vec4 cm_march_fit(uvec4 data, uint cell) {
   vec4 fit = cm_record_fit(data);
 #if CM_MOTION
@@ -93,12 +93,12 @@ CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1,
 #else
   r_0 = cm_march_fit(data, cell.x).x;
 #if CM_MOTION
-  r_0 = max(0.0f, r_0);  // as halves are rounded
+  r_0 = max(0.0f, r_0);  // halves are rounded
 #endif
   r_1 = r_0;
 #endif
   uint link = cm_link_at(links, faces, t_exit);
-  // Words that never change need no select where a ray stays.
+  // Unchanged words need no select for lanes that stay in their cell.
   next = uvec3(cm_record_is_clear(data, ray.cone) ? CM_NONE : link, cell.y, cell.z);
 }
 

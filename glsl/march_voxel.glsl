@@ -1,17 +1,17 @@
-// The two opponents: a 3D DDA over every voxel (Amanatides and Woo 1987), and the same with empty 8^3 bricks skipped.
-// A cell is a voxel of cube space: x | y << 16, z, and (bricks) the slot of its brick, CM_NONE if not looked up yet.
-// Shared by GLSL and C++; the includer provides
-//   float cm_voxel(ivec3 voxel)                   dense: density of a voxel of the box
-//   uint cm_brick_slot(ivec3 brick)               bricks: slot of a brick of the box, CM_EMPTY_BRICK if it is empty
+// Traversal of voxel grids, for comparison: a 3D DDA over every voxel (Amanatides and Woo 1987), and the same with
+// empty 8^3 bricks skipped. A cell is a voxel of cube space: x | y << 16, z, and (bricks) the slot of its brick,
+// CM_NONE if not looked up yet. Shared by GLSL and C++; the includer provides
+//   float cm_voxel(ivec3 voxel)                   dense: density of a voxel in the bounds
+//   uint cm_brick_slot(ivec3 brick)               bricks: slot of a brick in the bounds, CM_EMPTY_BRICK if it is empty
 //   float cm_brick_voxel(uint slot, uint index)   bricks: density; index = (x * 8 + y) * 8 + z
-// and with CM_CHANNELS
-//   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
-//   vec3 cm_scattering_voxel(ivec3 voxel)         density x colour
+// with CM_CHANNELS also
+//   vec3 cm_emission_voxel(ivec3 voxel)           voxel in the bounds; 0 in empty bricks
+//   vec3 cm_scattering_voxel(ivec3 voxel)         density x color
 //   float cm_anisotropy_voxel(ivec3 voxel)
-// with CM_MOTION, half of how density changes from one end of the shutter's time to the other
+// with CM_MOTION also half of the density's change from shutter open to shutter close
 //   float cm_voxel_change(ivec3 voxel), float cm_brick_change(uint slot, uint index)
 // and with CM_VELOCITY
-//   vec3 cm_velocity_voxel(ivec3 voxel)           voxels a second
+//   vec3 cm_velocity_voxel(ivec3 voxel)           voxels per second
 #ifndef CM_MARCH_VOXEL_GLSL
 #define CM_MARCH_VOXEL_GLSL
 
@@ -27,7 +27,7 @@ CM_FN uvec3 cm_march_enter(vec3 p) {
   return cm_voxel_cell(clamp(ivec3(floor(p)), low, high), CM_NONE);
 }
 
-// A ray in cube space, and what a march has of it.
+// A ray in cube space, with data that the traversal precomputes.
 struct CmMarchRay {
   vec3 o;
   vec3 d;
@@ -72,9 +72,9 @@ CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1,
 #endif
 #endif
 #if CM_MOTION
-  density = max(0.0f, density);  // as halves are rounded
+  density = max(0.0f, density);  // halves are rounded
 #endif
-  // The plane that the ray meets on each axis, from the integer, so that both sides agree; axis of the nearest.
+  // Plane that the ray reaches on each axis, from the integer, so that both sides agree; then the axis of the nearest.
   vec3 plane = vec3(float(low.x + (d.x > 0.0f ? size : 0)), float(low.y + (d.y > 0.0f ? size : 0)),
                     float(low.z + (d.z > 0.0f ? size : 0)));
   float t_x = d.x != 0.0f ? (plane.x - o.x) * inv_d.x : 3.0e38f;

@@ -1,12 +1,12 @@
-// What a pixel of an accumulation shows so far: its mean. Where CM_HOLES is 1, one without a sample takes after those
-// around it, and where none of these has a sample either it shows what was there before.
+// Current mean of an accumulation's pixel. CM_HOLES 1: a pixel without samples gets the mean of its neighbors. If these
+// have no samples either, it gets the previous image's value.
 #ifndef CM_MEANS_GLSL
 #define CM_MEANS_GLSL
 
 layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
-layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // already means
-layout(binding = CM_UNIT_SUM_BEFORE) uniform sampler2D cm_sum_before;  // of any size
+layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // means
+layout(binding = CM_UNIT_SUM_BEFORE) uniform sampler2D cm_sum_before;  // previous image, of any size
 layout(binding = CM_UNIT_COUNTS_BEFORE) uniform usampler2D cm_counts_before;
 layout(binding = CM_UNIT_BACKGROUND_BEFORE) uniform sampler2D cm_background_before;
 
@@ -21,7 +21,7 @@ CmMean cm_mean_of(sampler2D sums, usampler2D counts, sampler2D backgrounds, ivec
 }
 
 #if CM_HOLES
-// The mean of those texels around that have samples; its own, of none, where there are none.
+// Mean of the neighbors that have samples; the texel itself, without samples, if there are none.
 CmMean cm_around(sampler2D sums, usampler2D counts, sampler2D backgrounds, ivec2 texel, out bool has) {
   ivec2 last = textureSize(sums, 0) - 1;
   CmMean sum = CmMean(vec4(0.0), vec3(0.0));

@@ -1,13 +1,13 @@
-// The two levels of a scene's triangles: a tree over the boxes of models, and in each the tree of its mesh (bvh.glsl), in
-// the mesh's own space, with the same parameter along rays: what moves is a record, not a triangle. Shared by GLSL and
-// C++; the includer has what bvh.glsl asks for, the tables of model_table.glsl, and
-//   uint cm_model   where functions may change it: the model that the mesh's words are of
+// Two-level BVH of a scene's triangles: a tree over the boxes of models, and per model the tree of its mesh (bvh.glsl)
+// in the mesh's own space. Rays keep the same parameter t in both. So a moving model changes a record, not triangles.
+// Shared by GLSL and C++. The includer has the requirements of bvh.glsl, the tables of model_table.glsl, and
+//   uint cm_model   where functions may change it: the model whose mesh the words belong to
 #ifndef CM_MODEL_GLSL
 #define CM_MODEL_GLSL
 
 #include "model_space.glsl"
 
-// cm_bvh_trace through all models. Camera rays (cm_hit_camera) pass those that only cast shadows.
+// cm_bvh_trace through all models. Camera rays (cm_hit_camera) pass models that only cast shadows.
 CM_FN bool cm_trace_models(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_OUT(CmHit) hit) {
   cm_bvh_begin(t_max, hit);
   float t_first = max(t_min, 0.0f);

@@ -1,4 +1,4 @@
-// Where models stand. Shared by GLSL and C++; the includer has the tables of model_table.glsl.
+// Instance transforms of models. Shared by GLSL and C++; the includer has the tables of model_table.glsl.
 #ifndef CM_MODEL_SPACE_GLSL
 #define CM_MODEL_SPACE_GLSL
 
@@ -6,18 +6,18 @@
 CM_FN CmStanding cm_model_end(uint at) {
   return CmStanding(cm_models[at].to_world_x, cm_models[at].to_world_y, cm_models[at].to_world_z, cm_models[at].origin);
 }
-// Behind the table's records are others, of where all stand as the shutter opens and as it closes.
+// The table has further records behind its own: the transforms of all models at shutter open and at shutter close.
 CM_FN uint cm_model_open(uint at) { return at + cm.surfaces.models; }
 CM_FN uint cm_model_close(uint at) { return at + 2u * cm.surfaces.models; }
 CM_FN bool cm_model_moves(uint at) { return (cm_models[at].flags & CM_MODEL_MOVES) != 0u; }
 CM_FN CmStanding cm_model_standing(uint at) {
   return cm_between(cm_model_end(cm_model_open(at)), cm_model_end(cm_model_close(at)));
 }
-// One that deforms: those records have a tree and vertices as they are then.
+// For a deforming model those records name a tree and vertices of that time.
 CM_FN bool cm_model_deforms(uint at) { return (cm_models[at].flags & CM_MODEL_DEFORMS) != 0u; }
 #endif
 
-// Where the origin of a model's own space is in the world.
+// World position of the origin of a model's own space.
 CM_FN vec3 cm_model_origin(uint at) {
 #if CM_MOTION
   if (cm_model_moves(at)) return cm_model_standing(at).origin;
@@ -25,7 +25,7 @@ CM_FN vec3 cm_model_origin(uint at) {
   return cm_models[at].origin;
 }
 
-// A vector and a point of the world in a model's own space, and back.
+// Transforms a vector and a point from the world to a model's own space, and back.
 CM_FN vec3 cm_in_model(uint at, vec3 v) {
 #if CM_MOTION
   if (cm_model_moves(at)) return cm_in_standing(cm_model_standing(at), v);
@@ -41,16 +41,16 @@ CM_FN vec3 cm_out_of_model(uint at, vec3 v) {
 }
 CM_FN vec3 cm_out_of_model_point(uint at, vec3 p) { return cm_out_of_model(at, p) + cm_model_origin(at); }
 
-// A direction of a model's own space in the world, unit.
+// Transforms a direction from a model's own space to the world, unit.
 CM_FN vec3 cm_model_direction(uint at, vec3 d) {
   vec3 v = cm_out_of_model(at, d);
   float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
   return largest > 0.0f ? normalize(v / largest) : d;
 }
 
-// A normal of a model's own space in the world, unit, on the same side of the surface.
+// Transforms a normal from a model's own space to the world, unit, on the same side of the surface.
 CM_FN vec3 cm_model_normal(uint at, vec3 n) {
-  // The rows of the inverse are what normals go by.
+  // Normals transform by the rows of the inverse.
   vec3 v = vec3(dot(cm_models[at].to_own_x, n), dot(cm_models[at].to_own_y, n), dot(cm_models[at].to_own_z, n));
 #if CM_MOTION
   if (cm_model_moves(at)) {
@@ -62,7 +62,7 @@ CM_FN vec3 cm_model_normal(uint at, vec3 n) {
   return largest > 0.0f ? normalize(v / largest) : n;
 }
 
-// The area in a model's own space of a unit of area of the world, upright to n (unit).
+// Area in a model's own space per unit area in the world, on a plane perpendicular to n (unit).
 CM_FN float cm_own_area(uint at, vec3 n) {
 #if CM_MOTION
   if (cm_model_moves(at)) {
@@ -74,14 +74,14 @@ CM_FN float cm_own_area(uint at, vec3 n) {
   return cm_models[at].own_volume * length(v);
 }
 
-// How far a point of a model's surface may be off it in the world's floats, and a ray off in its own.
+// Bound of the rounding error of a surface point in world space, and of a ray in the model's own space.
 CM_FN float cm_model_room(uint at, vec3 p) {
   vec3 o = abs(cm_model_origin(at));
   vec3 from = abs(p);
   return 5e-7f * (max(max(o.x, o.y), o.z) + max(max(from.x, from.y), from.z));
 }
 
-// The model that has a triangle of this number. O(log models).
+// Returns the model that contains the triangle of this number. O(log models).
 CM_FN uint cm_model_of(uint triangle) {
   uint low = 0u;
   uint high = cm.surfaces.models;

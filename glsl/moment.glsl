@@ -1,14 +1,15 @@
-// When a path sees the scene, with CM_MOTION. Shared by GLSL and C++; the includer has random.glsl before this, and
+// The shutter time of a path, with CM_MOTION. Shared by GLSL and C++; the includer has random.glsl before this, and
 //   float cm_now   where functions may change it
 //
-// A path has one moment, from 0, as the shutter opens, to 1, as it closes, drawn evenly over that time and, as a pixel's
-// other numbers, over its samples (Cook, Porter and Carpenter, "Distributed Ray Tracing", SIGGRAPH 1984). All of it, with
-// its looks for light, is of that moment: a picture is the mean of still ones. It follows from what a path keeps anyway.
+// Each path has one time, from 0 (shutter open) to 1 (shutter close), uniform and stratified over the pixel's samples
+// (Cook, Porter and Carpenter, "Distributed Ray Tracing", SIGGRAPH 1984). All rays of the path, including its shadow
+// rays, use that time, so an image is the mean of still images. The time is recomputed from fields that a path keeps
+// anyway.
 #ifndef CM_MOMENT_GLSL
 #define CM_MOMENT_GLSL
 #if CM_MOTION
 
-// A set that no event has, nor the lens.
+// A set that neither events nor the lens use.
 const uint CM_SET_MOMENT = 0xfffffffeu;
 
 CM_FN float cm_moment(uint number, uint stream) { return cm_even_pair(number, stream, CM_SET_MOMENT).x; }
@@ -17,15 +18,15 @@ CM_FN float cm_moment(uint number, uint stream) { return cm_even_pair(number, st
 float cm_now = 0.0;
 #endif
 
-// Straight from one end to the other. What is no larger at both ends is no larger in between, to the last bit: boxes hold
-// what they hold at both.
+// Linear interpolation between both ends of the shutter interval. If a <= b holds at both ends, it holds between them
+// to the last bit. So interpolated boxes contain what they contain at both ends.
 CM_FN vec3 cm_straight(vec3 open, vec3 close) {
   CM_PRECISE vec3 v = (1.0f - cm_now) * open + cm_now * close;
   return v;
 }
 
-// Where something stands that moves: columns of the linear part of its own space to that which rays are in, and where
-// its origin is there. All of them go straight from one end to the other, and so does each of its points.
+// Interpolated instance transform of a moving object: columns of the linear part from its own space to the ray space,
+// and the position of its origin there. All of them, and so every point of the object, move linearly.
 struct CmStanding {
   vec3 x;
   vec3 y;
@@ -33,7 +34,7 @@ struct CmStanding {
   vec3 origin;
 };
 
-// Of the columns at both ends.
+// Interpolates the columns of both ends.
 CM_FN CmStanding cm_between(CmStanding open, CmStanding close) {
   CM_PRECISE vec3 x = open.x + cm_now * (close.x - open.x);
   CM_PRECISE vec3 y = open.y + cm_now * (close.y - open.y);
@@ -42,10 +43,11 @@ CM_FN CmStanding cm_between(CmStanding open, CmStanding close) {
   return CmStanding(x, y, z, origin);
 }
 
-// Of a unit of its own space: negative where it is mirrored.
+// Signed volume of a unit cell of its own space; negative if the transform mirrors.
 CM_FN float cm_standing_volume(CmStanding s) { return dot(s.x, cross(s.y, s.z)); }
 
-// A vector in its own space: by Cramer's rule, for the inverse between two ends is none between their inverses.
+// Transforms a vector to its own space by Cramer's rule. The inverse of the interpolated transform is not the
+// interpolation of the inverses.
 CM_FN vec3 cm_in_standing(CmStanding s, vec3 v) {
   CM_PRECISE vec3 x = cross(s.y, s.z);
   CM_PRECISE vec3 y = cross(s.z, s.x);

@@ -1,7 +1,7 @@
 #version 450
-// How much noise a tile's pixels have: of each square, over its pixels with two samples, the sums of their luminances'
-// squared standard errors, of even and of odd rows, the sum of these luminances, and how many they are. A work group a
-// square; always in the same order, so that what is decided by it is the same every time.
+// Noise of a tile, per 8x8 adaptive-sampling block, over pixels with at least two samples. Returns the sums of the
+// squared standard errors of luminance in even and in odd rows, the sum of the luminances, and the number of pixels.
+// One work group per block. The order of summation is fixed, so that decisions based on it are reproducible.
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

@@ -1,7 +1,8 @@
 #version 450
-// Priorities that a brick's own cells give the vertices that they split at, as grid::OwnPriorities has them, where main
-// memory has no values of it: a group a brick. What another field gave there counts as well.
-// CM_CRITERION: as grid::Criterion. A variant, for zink of Mesa 22.3 keeps what uniforms alone decided once.
+// Computes the priorities that a brick's own cells give to the vertices at which they split, like grid::OwnPriorities,
+// for bricks without voxels in main memory: one work group per brick. The maximum with the priorities of other fields
+// is kept. CM_CRITERION: values of grid::Criterion. It is a variant, because zink of Mesa 22.3 keeps the first outcome
+// of branches that depend only on uniforms.
 // variants: CM_HALVES=0,1 CM_CRITERION=0,1,2
 layout(local_size_x = 64) in;
 
@@ -12,26 +13,26 @@ layout(local_size_x = 64) in;
 #include "brick_summary.glsl"
 #include "lattice.glsl"
 
-layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };  // three words each
-layout(std430, binding = CM_STORAGE_GRID_OWN) buffer CmOwn { uint cm_own[]; };                 // two values each
+layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };  // three words per node
+layout(std430, binding = CM_STORAGE_GRID_OWN) buffer CmOwn { uint cm_own[]; };                 // two values per word
 layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint cm_bricks[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_TO_RATE) readonly buffer CmToRate { uvec2 cm_to_rate[]; };  // node, brick
 layout(std430, binding = CM_STORAGE_BRICKS_LIT) readonly buffer CmBricksLit { float cm_bricks_lit[]; };
-layout(location = 0) uniform uvec2 cm_range;       // of those to rate: the first, and the end
-layout(location = 1) uniform uint cm_first_node;   // of those to rate
-layout(location = 2) uniform vec3 cm_measure;      // as grid::Measure: scale, own hiding, the floor
-layout(location = 3) uniform bool cm_linear;       // cells are
-layout(location = 4) uniform float cm_back;        // 1: light passes what hides a cell twice, 0: once
+layout(location = 0) uniform uvec2 cm_range;       // entries of cm_to_rate: first, and one past the last
+layout(location = 1) uniform uint cm_first_node;   // node of the first entry
+layout(location = 2) uniform vec3 cm_measure;      // like grid::Measure: scale, own reduced extinction, floor
+layout(location = 3) uniform bool cm_linear;       // cells have linear density
+layout(location = 4) uniform float cm_back;        // 1: two-way transmittance, 0: one-way
 
 #include "brick_sums.glsl"
 
 shared uint cm_found[CM_BRICK_POINTS];
-shared uint cm_points;  // that have a place
+shared uint cm_points;  // number of points that may split
 
 const uint cm_points_of_levels[10] = uint[10](CM_POINTS_OF_LEVELS);
 
 layout(std140, binding = CM_UNIFORM_POINT_PLACES) uniform CmPointPlaces {
-  uvec4 cm_point_places[183];  // of 9^3 points, four a uvec4: where brick_points() has it
+  uvec4 cm_point_places[183];  // 9^3 points, four per uvec4: their index in brick_points()
 };
 
 float cm_squared(CmCell cell, CmSums sums, float edge_squared) {
@@ -90,7 +91,7 @@ void main() {
   uvec3 odd = uvec3(cm_node_corner(node) >> 3) & 1u;
   for (uint permutation = 0u; permutation < 6u; ++permutation) cm_sum_tree(cm_kuhn_frame(odd, permutation));
   barrier();
-  // Its first value has an even place.
+  // The first value of a node has an even index.
   for (uint k = t; k < (cm_points + 1u) / 2u; k += 64u) {
     uint high = 2u * k + 1u < cm_points ? cm_found[2u * k + 1u] : 0u;
     uint there = cm_own[node.z / 2u + k];

@@ -1,12 +1,12 @@
 #version 450
-// Bricks of a host's voxels one behind another, but for those that are empty: a group a brick, an invocation its eight
-// voxels along z. Numbers keep their bits.
+// Packs the nonempty bricks of a host's voxels one after another: one work group per brick, one invocation per eight
+// voxels along z. Values keep their bits.
 // variants: CM_BUFFER=0,1
 // variants: CM_CHOSEN=0,1
 layout(local_size_x = 64) in;
 #include "bindings.glsl"
 
-const int CM_FLOATS = 0;  // as render::VoxelFormat
+const int CM_FLOATS = 0;  // values of render::VoxelFormat
 const int CM_HALVES = 1;
 const int CM_SHORTS = 2;
 const int CM_BYTES = 3;
@@ -14,18 +14,18 @@ const int CM_BYTES = 3;
 layout(std430, binding = CM_STORAGE_PACKED_PLACES) buffer CmPlaces {
   uint cm_filled;
   uint cm_emptied;
-  uint cm_places[];  // of filled ones from the beginning, of those that are empty from the end
+  uint cm_places[];  // filled bricks from the beginning, empty ones from the end
 };
 layout(std430, binding = CM_STORAGE_PACKED_VALUES) writeonly buffer CmValues { uint cm_values[]; };
 #if CM_CHOSEN
 layout(std430, binding = CM_STORAGE_PACKED_CHOICE) readonly buffer CmChoice { uint cm_choice[]; };
 #endif
 layout(location = 0) uniform ivec3 cm_size;    // in voxels
-layout(location = 1) uniform uvec2 cm_bricks;  // the first, and how many
+layout(location = 1) uniform uvec2 cm_bricks;  // first brick, number of bricks
 layout(location = 2) uniform int cm_format;
 #if CM_BUFFER
 layout(std430, binding = CM_STORAGE_HOST_VOXELS) readonly buffer CmHostVoxels { uint cm_words[]; };
-layout(location = 3) uniform uvec4 cm_strides;  // of x, y and z, and where the first is, in numbers
+layout(location = 3) uniform uvec4 cm_strides;  // of x, y and z, and the index of the first voxel, in values
 #else
 layout(binding = CM_UNIT_HOST_VOXELS) uniform sampler3D cm_voxels;
 layout(location = 3) uniform int cm_component;
@@ -34,7 +34,7 @@ layout(location = 3) uniform int cm_component;
 shared uint cm_any;
 shared uint cm_slot;
 
-// The bits of its number.
+// Bits of a voxel's value.
 uint cm_voxel(ivec3 p) {
   if (any(greaterThanEqual(p, cm_size))) return 0u;
 #if CM_BUFFER

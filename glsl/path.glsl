@@ -1,18 +1,18 @@
-// The path tracer: one path at a time, as a machine that can stop after any number of steps and go on later with the
-// same result. Shared by GLSL and C++; the includer provides
+// The path tracer: a state machine per path. It can stop after any number of steps and resume later with the same
+// result. Shared by GLSL and C++. The includer provides
 //   cm                                            the parameters
-//   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface there
+//   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface in that pixel
 //
-// The stages are functions: here cm_camera, cm_handle (which is cm_end_ray, cm_look and cm_scatter) and cm_finish; in
-// glsl/path_vertex.glsl cm_meet, and what else differs where there are triangles; in glsl/flight.glsl cm_aim and cm_fly,
-// which march. One kernel runs them all (glsl/trace.comp), or several do, each over the paths that wait for it
-// (glsl/path_queue.glsl).
+// The stages are functions. This file has cm_camera, cm_handle (which calls cm_end_ray, cm_look and cm_scatter) and
+// cm_finish. glsl/path_vertex.glsl has cm_meet and the code that differs with triangles. glsl/flight.glsl has cm_aim
+// and cm_fly, which traverse the grid. Either one megakernel runs all stages (glsl/trace.comp), or a wavefront of
+// kernels runs one stage each over a queue of paths (glsl/path_queue.glsl).
 //
-// With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has surface.glsl before
-// this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which CM_SURFACES implies) camera
-// rays may end at the surface pass instead:
+// CM_SURFACES 1: rays also end and scatter at triangles; the includer has surface.glsl before this file. CM_SURFACES 2:
+// next-event estimation (NEE) also samples emissive triangles. CM_LAYERS 1 (implied by CM_SURFACES): camera rays may
+// end at the surface pass instead. The includer then provides
 //   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour)   its view depth
-// With CM_AOVS 1 samples that first met the volume are summed apart, too.
+// CM_AOVS 1: samples whose camera ray scattered in the volume are also summed separately.
 #ifndef CM_PATH_GLSL
 #define CM_PATH_GLSL
 
@@ -30,14 +30,14 @@ void cm_finish_groups(CmPath p, uvec2 at);
 #include "equiangular.glsl"
 #endif
 
-// Whether a film can hold the sample's light: it is finite, and sums of a hundred thousand of its kind are.
+// Returns true if the film can hold the sample's radiance: it is finite, and sums of 100000 such values are finite.
 CM_FN bool cm_is_sound(CmPath p) {
   const float most = 1e33f;
   return cm_is_within(p.radiance, most) && (p.bounces > 0u || cm_is_within(p.light, most));
 }
 
-// A sample is done: what is in front of the background, and the background itself, apart, for pictures over what a host
-// has drawn. One whose light is not sound is black, and counted.
+// Adds a finished sample to its pixel. The radiance in front of the background and the background are kept separate, so
+// that the image can be drawn over the host's. A sample that is not sound counts as black and increments `unsound`.
 CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
   if (!cm_is_sound(p)) {
     p.radiance = vec3(0.0f, 0.0f, 0.0f);
@@ -46,7 +46,7 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
   }
   bool covers = p.bounces > 0u || p.at_layer != 0u;
   vec3 background = covers ? vec3(0.0f, 0.0f, 0.0f) : p.light;
-  // Of what met nothing, too: the medium's own light in front of the background.
+  // Samples without a collision count as well: they may hold emission of the medium in front of the background.
   if (p.in_volume != 0u || p.bounces == 0u) pixel.volume += vec4(p.radiance, float(p.in_volume));
   if (p.bounces == 0u && p.at_layer != 0u) p.radiance += p.light;
   pixel.sum += vec4(p.radiance, covers ? 1.0f : 0.0f);
@@ -59,7 +59,8 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
   p.stage = pixel.samples >= cm.dispatch.samples ? CM_STAGE_DONE : CM_STAGE_CAMERA;
 }
 
-// Where the surface pass ends a camera ray, in units of view depth; and whether its colour waits there.
+// Returns where the surface pass or the host's depth ends a camera ray, in units of view depth. If the ray ends at a
+// layer with a color, sets at_layer and puts the color into p.light.
 CM_FN float cm_camera_end(CM_INOUT(CmPath) p, uvec2 at, vec2 within, uint layer, float u) {
   float host_z = cm_surface_z(at, within, layer);
 #if CM_LAYERS
@@ -76,7 +77,7 @@ CM_FN float cm_camera_end(CM_INOUT(CmPath) p, uvec2 at, vec2 within, uint layer,
   return host_z;
 }
 
-// A camera ray for the next sample of the pixel, which has so many.
+// Starts the camera ray of the pixel's next sample. samples: the number of samples that the pixel has.
 CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   uint sample_number = cm.integrator.first_sample + samples;
   uint number = at.y * cm.view.size.x + at.x;
@@ -116,7 +117,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.ray = CM_RAY_FLIGHT;
   p.found = CM_FOUND_NOT_ASKED;
   p.start = CM_AT_CAMERA;
-  // Samples go through the layers in turn, each pixel from one of its own.
+  // Consecutive samples use consecutive layers; each pixel starts at a random one.
   uint layer = (pixel.y >> 16) + sample_number;
   p.reach = t_per_z * cm_camera_end(p, at, within, layer, along.y);
   float ground = cm_ground_distance(p.o, p.d);
@@ -130,8 +131,8 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
 #endif
 }
 
-// A ray has left the box, or come to its end: what it brings. A flight that escapes with transmittance T may have been
-// found by a look as well, and what a look has found, with transmittance T, by a flight that escapes.
+// Adds the contribution of a ray that left the bounds or reached its end. Distant light can be found both by NEE and by
+// a scattered ray that escapes. The MIS weights of both include the transmittance.
 CM_FN void cm_escape(CM_INOUT(CmPath) p) {
   float depth = p.depth_0 - p.depth;
   float transmittance = exp(-depth);
@@ -146,10 +147,11 @@ CM_FN void cm_escape(CM_INOUT(CmPath) p) {
   }
 }
 
-// The medium's own light: S e^-x dx over the flight. A collision tells of S (its chance is 1 - e^-x), but seldom in a
-// thin flame. Where the depth x that a flight came through is known, 2 S (1 - e^-x) where it collides and S (1 - e^-x)
-// where it does not have the same mean, and next to no noise in thin flames. Among triangles it is not: one may be
-// nearer than the march has been; nor is there one S where there are several volumes.
+// Adds the medium's own emission, the integral of S e^-x dx along the ray. Adding S at a collision (probability 1 -
+// e^-x) is unbiased, but noisy in thin flames. If the optical depth x of the ray is known, the estimator adds 2 S (1 -
+// e^-x) at a collision and S (1 - e^-x) without one. It has the same mean and almost no noise in thin flames. With
+// triangles x is not known, because a triangle may be nearer than the traversal went. With several volumes S is not
+// constant.
 CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
   float glow = collided ? 1.0f : 0.0f;
   if (CM_SURFACES == 0 && CM_INSTANCES == 0) glow = (collided ? 2.0f : (ended ? 1.0f : 0.0f)) * (1.0f - exp(max(0.0f, p.depth) - p.depth_0));
@@ -159,22 +161,22 @@ CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
 #endif
 }
 
-// In what is opaque and white a path would go on for millions of events: from this number on, each doubling of it halves
-// the chance to go on.
+// In an opaque medium of albedo 1 a path could have millions of events. At this number of events, and at each further
+// doubling, the survival probability is halved.
 #define CM_LONG_PATH 16384u
 
-// The path goes on from where it collided or met a triangle or the ground, unless Russian roulette or the limit ends it:
-// returns whether it does.
+// Moves the path to its collision or to its point on a triangle or the ground, and applies the albedo there. Returns
+// true if the path ends, by Russian roulette or by the bounce limit.
 CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   if (collided && p.bounces == 0u) p.in_volume = 1u;
   p.bounces += 1u;
   if (collided) p.throughput *= CM_MEDIUM.albedo;
   if (grounded) p.throughput *= cm.ground.albedo;
-#if CM_CHANNELS && defined(CM_MARCH)  // what has no march collides with nothing
+#if CM_CHANNELS && defined(CM_MARCH)  // without CM_MARCH there are no collisions
   if (collided && CM_MEDIUM.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
-  // Ground that a camera sees is large, even and dark: there roulette would be all the noise.
+  // The ground as seen by the camera is large, uniform and dark. There Russian roulette would be the only noise.
   float survival = strongest < 0.5f && !(grounded && p.bounces == 1u) ? max(strongest, 0.05f) : 1.0f;
   if (p.bounces >= CM_LONG_PATH && (p.bounces & (p.bounces - 1u)) == 0u) survival *= 0.5f;
   float u = cm_random(p.random, p.stream);
@@ -190,9 +192,9 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   return ends;
 }
 
-// A look for light after a collision or on a triangle, if there is light.
+// A light sample for NEE, taken after a collision or on a triangle.
 struct CmLook {
-  bool looks;  // else light is where flights might find the sky
+  bool looks;  // false: there is no shadow ray, and `light` only marks a scattered ray (kind sky)
   CmLightSample light;
   CmDraw draw;
 };
@@ -205,22 +207,23 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   vec3 u = vec3(look.draw.turn.x, look.draw.turn.y, look.draw.choice);
   look.light = cm_sky_sample(p, here, u);
   if (look.looks) look.light = cm_light_sample(p, here, u);
-#ifdef CM_MARCH  // what has no march is on triangles
+#ifdef CM_MARCH  // without CM_MARCH the vertex is on a triangle
   if (look.looks) {
     float chance = cm_look_chance(p, look.light.kind, cm_scattered(p, look.light.direction), look.light.density);
     look.looks = look.draw.way < chance;
     float rest = look.looks ? look.draw.way / chance : (look.draw.way - chance) / (1.0f - chance);
-    look.draw.way = min(rest, 0.99999994f);  // below 1, however a driver divides
+    look.draw.way = min(rest, 0.99999994f);  // below 1, whatever the rounding of the driver's division
     look.light.density *= chance;
     if (!look.looks) {
-      // The chance may depend on the light's direction, and so on the numbers that it was drawn with.
+      // The probability may depend on the light's direction, and thus on the random numbers that chose it. The
+      // scattered ray needs new ones.
       look.draw.turn.x = cm_random(p.random, p.stream);
       look.draw.turn.y = cm_random(p.random, p.stream);
       look.light = cm_sky_sample(p, here, u);
     }
   }
 #endif
-  // Of the choices of the sky each is as likely: for a lobe.
+  // Stretches the sky's range of u.z to [0, 1], so that the number can choose a lobe.
   if (look.looks && look.light.kind == CM_LIGHT_SKY) look.draw.choice = min(1.0f, u.z / cm.lights.sky_chance);
   if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);
 #if CM_EQUIANGULAR && defined(CM_MARCH)
@@ -235,7 +238,8 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
 }
 
 #if CM_INSTANCES
-// Through all volumes, or through some once more; first through the one that it starts in.
+// Starts the traversal of all volumes, or of the emissive overlapping ones for the second sweep. The volume that
+// contains the ray's origin comes first.
 CM_FN void cm_begin_visits(CM_INOUT(CmPath) p) {
   uint again = CM_INSTANCE_EMITS | CM_INSTANCE_OVERLAPS;
   bool inside = cm_starts_inside(p) &&
@@ -252,12 +256,12 @@ CM_FN void cm_begin_march(CM_INOUT(CmPath) p) {
   p.t_end = p.reach;
   p.met = CM_INSTANCE_NONE;
   p.gathers = 0u;
-  if (p.start != CM_IN_MEDIUM) p.start_instance = 0u;  // what no kernel has kept is nothing to look up by
+  if (p.start != CM_IN_MEDIUM) p.start_instance = 0u;  // otherwise stale: kernels store it only for origins in a medium
   cm_begin_visits(p);
 }
 #endif
 
-// The look's ray, or a new flight after it.
+// Starts the shadow ray, or the scattered ray if there is none.
 CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   bool looks = look.looks;
   CmLightSample light = look.light;
@@ -267,7 +271,8 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   if (along) light = cm_sky_along(w, light.density * turn.density);
   p.density = turn.density;
   if (looks) {
-    // What escapes weighs looks and flights with the transmittance that it finds; among triangles, without.
+    // For distant lights, cm_escape applies the balance heuristic, with the transmittance. For triangles and cells, the
+    // heuristic leaves the transmittance out and is applied here.
     if ((light.kind == CM_LIGHT_TRIANGLE && !turn.lifted) || light.kind == CM_LIGHT_CELL) light.density += turn.density;
     float rare = 1.0f / max(light.density, 1e-30f);
     p.light = p.throughput * light.radiance * (turn.share * rare);
@@ -307,12 +312,13 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
     p.cache = CM_NONE;
     p.stage = p.start == CM_ON_GROUND ? CM_STAGE_AIM : CM_STAGE_FLY;
   } else {
-    if (looks && !cm_is_positive(max(p.light.x, max(p.light.y, p.light.z)))) p.reach = 0.0f;  // no light to look for
+    if (looks && !cm_is_positive(max(p.light.x, max(p.light.y, p.light.z)))) p.reach = 0.0f;  // no light
     p.stage = CM_STAGE_AIM;
   }
 }
 
-// What a ray that came to an event has brought; whether the path is finished. arrived: it goes on from the ray's end.
+// Adds the contribution of a ray that came to an event. Returns true if the path is finished. arrived: the path
+// continues from the ray's end.
 CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   bool met = vertex.on_triangle && flight;
@@ -323,7 +329,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   cm_here = collided ? p.instance : p.start_instance;
 #endif
 #if CM_HOLDOUT
-  // What a camera ray has taken up before it stays; behind it there is nothing, not even the background.
+  // Emission in front of the holdout stays. Behind it the sample is empty, without the background.
   bool cut = collided && CM_MEDIUM.holdout != 0u;
 #if CM_SURFACES
   cut = cut || (met && (cm_models[cm_model_of(p.triangle)].flags & CM_MODEL_HOLDOUT) != 0u);
@@ -342,7 +348,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   arrived = collided || met || grounded;
   if (grounded) p.t = cm_ground_distance(p.o, p.d);
   if (arrived) {
-    // Where another kernel has found it by a hair.
+    // Another kernel found the ground, but here rounding places it just out of reach.
     bool missed = grounded && p.t >= CM_NO_GROUND;
     finished = cm_arrive(p, collided, grounded) || dark || missed;
     if (met) finished = cm_stand(p, vertex) || finished;
@@ -358,8 +364,9 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   return finished;
 }
 
-// What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
-// In stage CM_STAGE_VERTEX it is on a triangle, else, in CM_STAGE_EVENT, in the medium.
+// Handles an event: end of the ray, then light sample, then scattering. Each costly step is called in one place only,
+// because software drivers execute both sides of every branch. Stage CM_STAGE_VERTEX: the path is on a triangle. Stage
+// CM_STAGE_EVENT: it is in the medium or on the ground.
 CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {
 #if CM_EQUIANGULAR
   CmPassed passed = cm_pass(p, vertex);
@@ -373,7 +380,8 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {
   }
 #endif
   if (!finished) {
-    // Not in one call: of p, which both change, the outer one may have a copy of before.
+    // Two statements, because both calls change p: in a nested call the outer one may get a copy from before the inner
+    // one.
     CmLook look = cm_look(p, vertex, arrived);
     cm_scatter(p, vertex, look);
   }

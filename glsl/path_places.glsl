@@ -1,11 +1,12 @@
-// Which pixels lanes have. Places are the pixels of the squares in the tile's list, square by square: a lane begins with
-// the place of its own number, and takes the next that no lane has had once its pixel is done. So vectors of lanes stay
-// full, however much longer some pixels take than others. Those who include this have glsl/path_store.glsl and
-// glsl/pixel_store.glsl before it.
+// Assigns pixels to lanes: persistent threads with path regeneration (Aila and Laine 2009; Novak, Havran and
+// Dachsbacher 2010). Pixel slots are the pixels of the tile's listed 8x8 blocks, block by block. A lane begins with the
+// slot of its own number. When its pixel is finished, it takes the next unused slot from a counter. This keeps SIMD
+// groups full, although some pixels take much longer than others. The includer has glsl/path_store.glsl and
+// glsl/pixel_store.glsl before this.
 #ifndef CM_PATH_PLACES_GLSL
 #define CM_PATH_PLACES_GLSL
 
-// Of the picture; perhaps outside the tile.
+// Returns the pixel of a slot, in image coordinates. It may lie outside the tile.
 uvec2 cm_pixel_of(uint place) {
   uint square = bitfieldExtract(cm_squares[place / CM_SQUARE_PIXELS], 0, CM_SQUARE_ROWS);
   uint across = (cm.dispatch.tile_size.x + CM_SQUARE_EDGE - 1u) / CM_SQUARE_EDGE;
@@ -14,7 +15,7 @@ uvec2 cm_pixel_of(uint place) {
          uvec2(within % CM_SQUARE_EDGE, within / CM_SQUARE_EDGE);
 }
 
-// Whether its pixel is to be sampled; then how many samples it has.
+// Returns true if the slot's pixel needs samples. samples: the number it has.
 bool cm_is_due(uint place, out uint samples) {
   uvec2 at = cm_pixel_of(place);
   samples = 0u;
@@ -25,7 +26,7 @@ bool cm_is_due(uint place, out uint samples) {
   return samples < cm.dispatch.samples;
 }
 
-// A pixel for the path from this place on, or it is done.
+// Gives the path the first pixel from this slot on that needs samples, or sets CM_STAGE_DONE if there is none.
 void cm_take_place(inout CmPath p, uint place, inout uint samples) {
   p.stage = CM_STAGE_DONE;
   while (place < cm.dispatch.places) {

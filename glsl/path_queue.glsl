@@ -1,11 +1,11 @@
-// Queues of paths that wait for a kernel. Each kernel runs over its queue and puts each path into that of its next
-// stage. A round is
-//   trace_travel.comp   the medium's part of paths
-//   trace_meet.comp     the tree is asked
-//   trace_shade.comp    what happens on triangles
-//   trace_camera.comp   samples are added to their pixels, and the next begun
-// and a dispatch is trace_camera.comp over all lanes of its blocks (CM_DENSE), and some rounds. After a round no path
-// waits but for the next round.
+// Queues of the wavefront path tracer (Laine, Karras and Aila 2013). Each kernel runs over its queue and appends each
+// path to the queue of the path's next stage. A round is
+//   trace_travel.comp   traverses the medium
+//   trace_meet.comp     queries the BVH
+//   trace_shade.comp    shades triangles
+//   trace_camera.comp   adds finished samples to their pixels and starts the next ones
+// A dispatch is trace_camera.comp over all lanes of its blocks (CM_DENSE), followed by several rounds. After a round
+// only the travel queue of the next round has paths.
 #ifndef CM_PATH_QUEUE_GLSL
 #define CM_PATH_QUEUE_GLSL
 
@@ -15,20 +15,20 @@
 #define CM_QUEUE_CAMERA 3u
 #define CM_QUEUES 4u
 #define CM_MOST_ROUNDS 64u
-#define CM_QUEUE_GROUP 64u  // lanes a work group
+#define CM_QUEUE_GROUP 64u  // lanes per work group
 #define CM_ROUND_LOCATION 0
 
 #ifndef __cplusplus
 struct CmQueueHead {
-  uint groups;  // what glDispatchComputeIndirect reads: work groups for so many paths, and twice 1
+  uint groups;  // arguments of glDispatchComputeIndirect: work groups for `count` paths, 1, 1
   uint groups_y;
   uint groups_z;
   uint count;
 };
 
 layout(std430, binding = CM_STORAGE_QUEUES) buffer CmQueues {
-  CmQueueHead cm_heads[CM_QUEUES * (CM_MOST_ROUNDS + 1u)];  // of each round
-  uint cm_waiting[];  // lanes: one list a queue, but two of CM_QUEUE_TRAVEL, for this round and the next
+  CmQueueHead cm_heads[CM_QUEUES * (CM_MOST_ROUNDS + 1u)];  // per round
+  uint cm_waiting[];  // lanes: one list per queue; CM_QUEUE_TRAVEL has two, for this round and the next
 };
 
 layout(location = CM_ROUND_LOCATION) uniform uint cm_round;
@@ -44,12 +44,12 @@ void cm_enqueue(uint queue, uint round_number, uint lane) {
   cm_waiting[cm_queue_list(queue, round_number) + place] = lane;
 }
 
-// This lane's path of a queue in this round.
+// Index of this invocation in its queue, length of the queue, and the invocation's lane.
 uint cm_queue_place() { return gl_WorkGroupID.x * CM_QUEUE_GROUP + gl_LocalInvocationIndex; }
 uint cm_queue_count(uint queue) { return cm_heads[cm_round * CM_QUEUES + queue].count; }
 uint cm_queue_lane(uint queue) { return cm_waiting[cm_queue_list(queue, cm_round) + cm_queue_place()]; }
 
-// Into the queue of its next stage: in this round if that kernel is still to come.
+// Appends the path to the queue of its next stage: in this round if that kernel is still to run, else in the next.
 void cm_send_on(CmPath p, uint lane) {
   bool travels = p.stage != CM_STAGE_MEET && p.stage != CM_STAGE_VERTEX && p.stage != CM_STAGE_FINISH;
   uint queue = p.stage == CM_STAGE_MEET

@@ -1,87 +1,87 @@
-// A path, as it is kept between dispatches. Shared by GLSL and C++.
+// The state of a path between dispatches. Shared by GLSL and C++.
 #ifndef CM_PATH_STATE_GLSL
 #define CM_PATH_STATE_GLSL
 
-// What a path does next.
-#define CM_STAGE_CAMERA 0u  // begins: a camera ray is due
-#define CM_STAGE_AIM 1u     // its ray's way through the box is to be found
-#define CM_STAGE_FLY 2u     // marches
-#define CM_STAGE_MEET 3u    // the tree is asked whether a triangle is nearer than the event that the march came to
-#define CM_STAGE_EVENT 4u   // what follows the event, in the medium
-#define CM_STAGE_VERTEX 5u  // what follows on a triangle: one that a flight has met, or that a shadow ray started on
-#define CM_STAGE_FINISH 6u  // its sample is to be added to the pixel
-#define CM_STAGE_DONE 7u    // nothing: its pixel has the samples it shall have
+// The path's next step.
+#define CM_STAGE_CAMERA 0u  // start a camera ray
+#define CM_STAGE_AIM 1u     // clip the ray to the bounds and find its first cell
+#define CM_STAGE_FLY 2u     // traverse the grid
+#define CM_STAGE_MEET 3u    // test in the BVH whether a triangle is nearer than the event of the traversal
+#define CM_STAGE_EVENT 4u   // handle the event in the medium or on the ground
+#define CM_STAGE_VERTEX 5u  // handle the event on a triangle: a hit, or the end of a shadow ray that started there
+#define CM_STAGE_FINISH 6u  // add the sample to its pixel
+#define CM_STAGE_DONE 7u    // nothing: the pixel has all its samples
 
-// The event that ends a ray.
+// The event that ended a ray.
 #define CM_EVENT_NONE 0u
-#define CM_EVENT_COLLISION 1u  // with the medium: its optical depth is used up; of shadow rays: or a triangle stops it
-#define CM_EVENT_ESCAPE 2u     // out of the box, or at its end
+#define CM_EVENT_COLLISION 1u  // the optical depth is used up in the medium; shadow rays: or a triangle blocks it
+#define CM_EVENT_ESCAPE 2u     // the ray left the bounds or reached its end
 
-// What its ray is.
+// The kind of a ray.
 #define CM_RAY_FLIGHT 0u
-#define CM_RAY_TO_LIGHT 1u  // a next-event estimate: a shadow ray
-#define CM_RAY_EQUIANGULAR 2u  // one from a point of the flight's way, after the flight (glsl/equiangular.glsl)
+#define CM_RAY_TO_LIGHT 1u  // shadow ray of next-event estimation
+#define CM_RAY_EQUIANGULAR 2u  // shadow ray from a point of the scattered ray, after that ray (glsl/equiangular.glsl)
 
-// Where its ray starts.
+// The location of a ray's origin.
 #define CM_AT_CAMERA 0u
 #define CM_IN_MEDIUM 1u
 #define CM_ON_TRIANGLE 2u
 #define CM_ON_GROUND 3u
 
-// What is known of triangles before a flight marches, in media that give off light.
+// Result of the BVH query before the traversal. In emissive media the query comes first.
 #define CM_FOUND_NOT_ASKED 0u
 #define CM_FOUND_NONE 1u
-#define CM_FOUND_TRIANGLE 2u  // it ends there
+#define CM_FOUND_TRIANGLE 2u  // the ray ends at a triangle
 
-// The one list of a path's fields: the struct, how it is packed into words (glsl/path_store.glsl), and so its size. In
-// parts: a kernel need not store what it does not change.
-// CM_PATH_RAY, the ray under way:
-//   o               its start, cube space
+// The only list of a path's fields. It defines the struct, its packing into words (glsl/path_store.glsl) and its size.
+// It has parts, because a kernel need not store fields that it does not change.
+// CM_PATH_RAY, the current ray:
+//   o               its origin, cube space
 //   d               its direction, cube space, per unit of world distance
-//   t, t_end        world distance from o, and where the ray leaves the box, or ends
-//   depth, depth_0  optical depth left before the collision (or the end of the shadow ray), and at the ray's start
-//   cell, cache     that the ray is in, and what the march keeps of it; start_cell: it was in at o, in the medium
-//   reach           its own end: a lamp, the host's surface
+//   t, t_end        world distance from o; distance where the ray leaves the bounds or ends
+//   depth, depth_0  optical depth left until the collision (or the end of the shadow ray); the same at the ray's origin
+//   cell, cache     current cell, and the traversal's cached data of it; start_cell: cell of o if o is in the medium
+//   reach           distance where the ray itself ends: at a light or at the host's surface
 // CM_PATH_SUM, the sample so far:
-//   radiance        without what is behind all
-//   bounces         events of the path
-//   steps           cells marched
-//   number          the sample's, of its pixel
-//   place           the pixel's (glsl/path_places.glsl)
-//   ahead           with CM_EQUIANGULAR, of such a ray: how far ahead of o, along w, the path goes on
-// CM_PATH_FLIGHT, what goes on to the next ray:
-//   w               world direction of flight, kept during shadow rays
+//   radiance        sum, without the background
+//   bounces         number of events
+//   steps           number of cells traversed
+//   number          number of the sample in its pixel
+//   place           slot of its pixel (glsl/path_places.glsl)
+//   ahead           CM_RAY_EQUIANGULAR only: distance along w from o to the point where the path continues
+// CM_PATH_FLIGHT, state that passes to the next ray:
+//   w               world direction of the camera or scattered ray; kept while a shadow ray is traced
 //   throughput      of the path
-//   light           what the ray brings if nothing stops it: a shadow ray; a camera ray, of a layer's colour or of what
-//                   is behind all
-//   density         of a flight: by solid angle, with which it took its direction; of a shadow ray to what flights may
-//                   come to by escaping: the flights' density there over the look's own; else 0
-//   random, stream  of its random numbers; stream is the pixel's
-// CM_PATH_ENDS, what is known of the ray's ends:
-//   triangle, weights     that o is on, of its second and third vertex
-//   stage, event, ray, start, found     as above
-//   behind          1: the path met the side of the triangle from which its vertices turn clockwise
-//   back            1: it met the back
-//   blurred         1: it was scattered wider than a surface of the least roughness does
-//   in_volume       1: this sample met the volume first
-//   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
-//   lifted          1: the ray started above the triangle that its path had met
-//   to_ground       1: a flight comes to the ground if nothing stops it
-//   finishes        with CM_EQUIANGULAR, of such a ray, 1: the path ends with it
-//   seen            likewise, 1: the flight was a camera ray
-//   group           with CM_GROUPS, of the light that a shadow ray looks for
-// CM_PATH_VISIT, only with CM_INSTANCES, and only for kernels that march:
-//   instance        that the ray marches through, or has entered last; of a collision the one that it is with
-//   entry           where it entered that; -1 of the one that it started in
-//   start_instance  that o is in, in the medium; then start_cell is a cell of that
-//   met, met_cell   of a flight: where the nearest collision is that it knows, which is at t_end; CM_NONE: none
-//   gathers         1: all is known of its end, and it goes through what glows and overlaps once more
-// CM_PATH_WITHIN, only with CM_RICH, and only for kernels that know of triangles' materials:
-//   within          first word of the material whose volume the flight is within, plus one; 0: of none
-//   outside         likewise, what that lies in
-//   through         1: the ray starts on the side of its triangle that the path did not come from
-//   dispersed       1: the path is of one wavelength
-// BITS have a number of bits of a word that they share with their neighbours.
+//   light           radiance that an unblocked ray adds. Shadow ray: the light's. Camera ray: the layer's color or the
+//                   background
+//   density         pdf. Scattered ray: solid-angle pdf of its direction. Shadow ray to a distant light: scattering pdf
+//                   over light pdf, for MIS. Other shadow rays: 0
+//   random, stream  state of the random generator; its stream, which belongs to the pixel
+// CM_PATH_ENDS, the two ends of the ray:
+//   triangle, weights     triangle of o; barycentrics of its second and third vertex
+//   stage, event, ray, start, found     see the constants above
+//   behind          1: the path arrived on the side from which the triangle's vertices are clockwise
+//   back            1: the path hit the back face
+//   blurred         1: a bounce was wider than the lobe of a surface with the minimum roughness (path regularization)
+//   in_volume       1: the sample's first event was in the volume
+//   at_layer        1: the camera ray ends at the surface pass and gets its color, not the background
+//   lifted          1: the ray's origin is above its triangle (cm_lift)
+//   to_ground       1: a ray that nothing blocks hits the ground
+//   finishes        CM_RAY_EQUIANGULAR only, 1: the path ends after this ray
+//   seen            CM_RAY_EQUIANGULAR only, 1: the ray that it samples is a camera ray
+//   group           CM_GROUPS only: light group of the shadow ray's light
+// CM_PATH_VISIT, only with CM_INSTANCES, and only in kernels that traverse volumes:
+//   instance        volume instance that the ray traverses or entered last; after a collision, the instance it is with
+//   entry           distance where the ray entered that instance; -1 for the instance that contains o
+//   start_instance  instance that contains o if o is in a medium; start_cell is a cell of it
+//   met, met_cell   scattered or camera ray: instance (or CM_NONE) and cell of the nearest collision so far, at t_end
+//   gathers         1: the ray's end is known, and a second sweep visits the emissive overlapping instances
+// CM_PATH_WITHIN, only with CM_RICH, and only in kernels that use triangle materials:
+//   within          first word of the material whose volume contains the ray, plus one; 0: none
+//   outside         the same for the volume that encloses `within`
+//   through         1: the ray's origin is on the other side of its triangle than the path came from
+//   dispersed       1: the path has a single wavelength
+// BITS fields have a number of bits in a word that they share with their neighbors.
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
@@ -122,7 +122,7 @@
 #define CM_PATH_UINT(name) uint name;
 #define CM_PATH_BITS(name, bits) uint name;
 
-// Quads of words that each part takes: a part's words, and one for its bits.
+// Number of 4-word quads per part: the words of the part, and one word per 32 bits of its bit fields.
 #define CM_PATH_THREE(name) +3
 #define CM_PATH_TWO(name) +2
 #define CM_PATH_ONE(name) +1
@@ -153,15 +153,15 @@ struct CmPath {
 #endif
 };
 
-// A pixel's samples so far.
+// The sums of a pixel's samples.
 struct CmPixel {
-  vec4 sum;         // of radiance in front of the background, and of alpha
-  vec4 volume;      // the same of those that met the volume first
-  vec3 background;  // mean of radiance that camera rays met behind all: exact where that is the same in each
-  float square;     // mean of squared luminance, of both together
-  uint samples;     // finished
-  uint steps;       // cells marched, of all of them
-  uint unsound;     // of those that are added now: whose light no film can hold
+  vec4 sum;         // radiance in front of the background, and alpha
+  vec4 volume;      // the same, only samples whose first event was in the volume
+  vec3 background;  // mean background radiance of camera rays; exact where it is the same for all of them
+  float square;     // mean squared luminance of front and background together
+  uint samples;     // number of finished samples
+  uint steps;       // number of cells traversed by all of them
+  uint unsound;     // number of samples in this update whose radiance the film cannot hold
 };
 
 #endif

@@ -1,5 +1,6 @@
-// Where paths are kept between dispatches: a plane of lanes for each four words of a path. A lane has a pixel of the tile
-// until that is done, and then another (glsl/path_places.glsl). Those who include this have glsl/path_state.glsl before it.
+// Storage of paths between dispatches: structure of arrays, one plane of lanes per four words of a path. A lane keeps
+// its pixel of the tile until that is finished and then takes another (glsl/path_places.glsl). The includer has
+// glsl/path_state.glsl before this.
 #ifndef CM_PATH_STORE_GLSL
 #define CM_PATH_STORE_GLSL
 
@@ -7,15 +8,15 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 #include "path_blocks.glsl"
 
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
-  uvec4 cm_total;  // x: rounds that lanes marched: full ones, or visits of trace_travel.comp; y, z: a bit for each band of
-                   // the tile's rows that has changed; w: samples whose light was not finite
-  uvec4 cm_blocks[CM_MOST_BLOCKS];    // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block its
-                                      // lanes that have a pixel, those whose pixel has no sample, and the samples
-                                      // that they finished in this dispatch
-  uint cm_next_place;                 // that no lane has had
-  uint cm_squares[CM_MOST_SQUARES];   // the list of those that are sampled: CM_SQUARE_ROWS
-  uint cm_rank_counts[CM_TURNS * CM_MOST_BLOCKS];  // by turns, of each block: its lanes that have a path
-  uint cm_ranks[];                    // by turns: lanes of all blocks, of each those first that have a path
+  uvec4 cm_total;  // x: full rounds of traversal, or visits of trace_travel.comp; y, z: bits of the tile's changed
+                   // bands of rows; w: number of samples whose radiance was not finite
+  uvec4 cm_blocks[CM_MOST_BLOCKS];    // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
+                                      // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
+                                      // dispatch
+  uint cm_next_place;                 // first unused pixel slot
+  uint cm_squares[CM_MOST_SQUARES];   // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
+  uint cm_rank_counts[CM_TURNS * CM_MOST_BLOCKS];  // per list and block: number of lanes with a path
+  uint cm_ranks[];                    // per list: lanes of all blocks; in each block the active lanes come first
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
@@ -25,7 +26,7 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
 #define CM_ZERO_UINT(name) p.name = 0u;
 #define CM_ZERO_BITS(name, bits) p.name = 0u;
 
-// A pixel of the film has changed. Most bits are set already, and reading is cheaper than an atomic.
+// Marks the band of rows of a changed film pixel. Most bits are set already, and a read is cheaper than an atomic.
 void cm_mark_row(uint y) {
   uint band = (y - cm.dispatch.tile_corner.y) / CM_BAND_ROWS;
   uint bit = 1u << (band & 31u);
@@ -38,7 +39,7 @@ void cm_mark_row(uint y) {
 
 uint cm_lanes() { return cm.dispatch.lanes; }
 
-// Words of a part, in the list's order; the places are constants to every compiler.
+// Words of a part, in the order of the list. All indices are compile-time constants.
 #define CM_UNPACK_UINT(name) p.name = words[word++];
 #define CM_UNPACK_FLOAT(name) p.name = uintBitsToFloat(words[word++]);
 #define CM_UNPACK_UVEC2(name) CM_UNPACK_UINT(name.x) CM_UNPACK_UINT(name.y)
@@ -53,7 +54,7 @@ uint cm_lanes() { return cm.dispatch.lanes; }
 #define CM_PACK_VEC3(name) CM_PACK_VEC2(name) CM_PACK_FLOAT(name.z)
 #define CM_PACK_BITS(name, bits) words[word] |= p.name << at_bit; at_bit += bits;
 
-// How a part is loaded and stored; first: its first quad's place in a path.
+// Loads and stores a part. first: index of its first quad in a path.
 #define CM_LOAD(PART, quads, first)                                                                               \
   uint words[4 * quads];                                                                                          \
   for (int i = 0; i < quads; ++i) {                                                                               \
@@ -97,7 +98,7 @@ void cm_load_visit(inout CmPath p, uint lane) {}
 void cm_store_visit(CmPath p, uint lane) {}
 #endif
 
-// What a path is within, behind what visits may take; a path begins within nothing.
+// The CM_PATH_WITHIN part lies behind the space of the CM_PATH_VISIT part. A new path is in no volume.
 #define CM_FIRST_WITHIN (CM_PATH_QUADS + CM_VISIT_QUADS)
 #if CM_RICH
 void cm_load_within(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_WITHIN, CM_WITHIN_QUADS, CM_FIRST_WITHIN) }
@@ -106,7 +107,7 @@ void cm_store_within(CmPath p, uint lane) { CM_STORE(CM_PATH_WITHIN, CM_WITHIN_Q
 void cm_load_within(inout CmPath p, uint lane) {}
 void cm_store_within(CmPath p, uint lane) {}
 #endif
-// What groups of lights have come to, a quad each, behind both.
+// Radiance by light group, one quad each, behind both parts.
 #define CM_FIRST_GROUPS (CM_FIRST_WITHIN + CM_WITHIN_QUADS)
 
 void cm_begin_within(uint lane) {
@@ -149,16 +150,17 @@ void cm_store_path(CmPath p, uint lane) {
   cm_store_ends(p, lane);
 }
 
-// A kernel that has a row of work groups for each block of the dispatch: its lane, which there may not be; and whether a
-// tile begins, so that no lane has a path.
+// For kernels with a row of work groups per block of the dispatch: number of the block, and of the invocation in it.
+// cm_block_lane may be beyond cm_lanes(). cm_block_begins: a tile begins, so that no lane has a path.
 uint cm_block() { return bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, 0, CM_TURN); }
 uint cm_place_in_block() { return gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex; }
 uint cm_block_lane() { return cm_block() * CM_BLOCK_LANES + cm_place_in_block(); }
 bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
 uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
 
-// The same with closed ranks: where many lanes are done those that are not share vectors. Turn by turn a dispatch reads
-// the list that the block's last one has made, makes the next, and empties the one after that.
+// Stream compaction: packs the active lanes of a block, so that SIMD groups stay full when many lanes are done. There
+// are three lists in rotation. Each dispatch reads the list that the block's last dispatch wrote, writes the next one
+// and clears the third.
 uint cm_turn(uint ahead) { return (bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, CM_TURN, 2) + ahead) % CM_TURNS; }
 uint cm_ranked_lane() {
   if (cm_place_in_block() == 0u) cm_rank_counts[cm_turn(2u) * CM_MOST_BLOCKS + cm_block()] = 0u;
@@ -166,7 +168,7 @@ uint cm_ranked_lane() {
   if (cm_place_in_block() >= cm_rank_counts[cm_turn(0u) * CM_MOST_BLOCKS + cm_block()]) return cm_lanes();
   return cm_ranks[cm_turn(0u) * cm_lanes() + cm_block_lane()];
 }
-// It goes on in the next dispatch.
+// Adds the lane to the list of the next dispatch.
 void cm_join_ranks(uint lane) {
   uint rank = atomicAdd(cm_rank_counts[cm_turn(1u) * CM_MOST_BLOCKS + cm_block()], 1u);
   cm_ranks[cm_turn(1u) * cm_lanes() + cm_block() * CM_BLOCK_LANES + rank] = lane;

@@ -1,21 +1,23 @@
-// Where paths scatter: in the medium, on the ground, or at a triangle. What glsl/path.glsl does there in either way, with
-// functions of the same names where there are no triangles.
+// Scattering vertices of a path: in the medium, on the ground or on a triangle. glsl/path.glsl calls the same functions
+// in builds with and without triangles.
 #ifndef CM_PATH_VERTEX_GLSL
 #define CM_PATH_VERTEX_GLSL
 
-// Next-event transmittance below e^-2 is estimated by Russian roulette: an opaque way out costs no more than it tells.
+// Transmittance of shadow rays below e^-2 is estimated by Russian roulette, so that shadow rays in opaque media stay
+// cheap.
 #define CM_SHADOW_DEPTH 2.0f
 
-// Events of a path whose rays take numbers that are even over the pixel's samples: later ones gain next to nothing.
+// The first events of a path use low-discrepancy numbers over the pixel's samples. For later events they gain almost
+// nothing.
 #define CM_EVEN_EVENTS 4u
-// Beyond their sets.
+// A set beyond those of the events.
 #define CM_WAVELENGTH_SET 64u
 
-// The numbers that a ray from an event takes.
+// The random numbers of a ray from an event.
 struct CmDraw {
-  vec2 turn;     // for its direction, or a point of the light that it looks for
-  float choice;  // of a lobe, or of that light
-  float way;     // for its free path
+  vec2 turn;     // direction, or point on the sampled light
+  float choice;  // choice of a lobe, or of a light
+  float way;     // free-flight distance
 };
 
 CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool looks) {
@@ -39,25 +41,26 @@ CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool looks) {
 #include "dispersion.glsl"
 #endif
 
-// What a path does with light along a direction from a vertex.
+// Scattering of light at a vertex along a direction: value, pdf and weight of the BSDF or phase function.
 struct CmTurn {
-  vec3 share;          // of light that goes on: the phase function, or the BSDF times the cosine
-  float density;       // by solid angle, with which flights take the direction
-  float lobe_density;  // the same, of the lobes alone
-  vec3 weight;         // share over density
-  bool lifted;         // the ray starts above its triangle
+  vec3 share;          // value: the phase function, or the BSDF times the cosine
+  float density;       // solid-angle pdf with which scattered rays take the direction
+  float lobe_density;  // the same, only of the lobes
+  vec3 weight;         // share / density
+  bool lifted;         // the ray's origin is above its triangle (cm_lift)
 #if CM_RICH
-  bool through;        // it starts behind its triangle
-  bool disperses;      // from then on it is of one wavelength
+  bool through;        // the ray's origin is behind its triangle
+  bool disperses;      // the path has a single wavelength from here on
 #endif
 };
 
-// Of a medium whose phase function has a second lobe. A variant, for software drivers run what is not taken.
+// 1 if the medium's phase function has a second lobe. This is a variant, because software drivers also execute branches
+// that are not taken.
 #ifndef CM_SECOND_LOBE
 #define CM_SECOND_LOBE 0
 #endif
 
-// Of what the path has collided with.
+// Mean cosine of the medium at the path's collision.
 CM_FN float cm_anisotropy(CmPath p) {
 #if CM_CHANNELS && defined(CM_MARCH)
   if (CM_MEDIUM.anisotropic != 0u && p.start == CM_IN_MEDIUM) return cm_march_anisotropy(p.start_cell);
@@ -81,8 +84,8 @@ CM_FN float cm_medium_phase(float g, float cosine) { return cm_henyey_greenstein
 CM_FN float cm_medium_cosine(float g, float u) { return cm_henyey_greenstein_cosine(g, u); }
 #endif
 
-// The share of light that goes on along a direction, in the medium or on the ground, of what is not absorbed; and the
-// density of the directions that are sampled, which is the same.
+// Fraction of the light not absorbed that is scattered into wi, in the medium or on the ground, per solid angle. This
+// is also the pdf of the sampled directions.
 CM_FN float cm_scattered(CmPath p, vec3 wi) {
   return p.start == CM_ON_GROUND ? max(0.0f, wi.y) * 0.318309886f : cm_medium_phase(cm_anisotropy(p), dot(p.w, wi));
 }
@@ -94,10 +97,11 @@ CM_FN vec3 cm_scattered_direction(CmPath p, float u_0, float u_1) {
 
 CM_FN bool cm_is_equiangular(CmPath p) { return CM_EQUIANGULAR != 0 && p.ray == CM_RAY_EQUIANGULAR; }
 
-// Whether the ray starts where the path has collided, in that cell.
+// Returns true if the ray's origin is the path's collision, in cell start_cell.
 CM_FN bool cm_starts_inside(CmPath p) { return p.start == CM_IN_MEDIUM && !cm_is_equiangular(p); }
 
-// Without light among surfaces: what has left one sees the sky alone, and the volume sees none.
+// Returns true without light among surfaces (light_among_surfaces 0) and after the first event: rays that left a
+// surface then see only distant light, and surfaces do not light the volume.
 CM_FN bool cm_among_surfaces_dark(CmPath p) {
   return CM_SURFACES != 0 && cm.integrator.light_among_surfaces == 0u && p.bounces > 0u;
 }
@@ -107,16 +111,16 @@ CM_FN bool cm_is_dark(CmPath p) { return cm_among_surfaces_dark(p) && p.start ==
 
 struct CmVertex {
   bool on_triangle;
-  CmSurfacePoint surface;  // if so
+  CmSurfacePoint surface;  // valid only if on_triangle
 #if CM_RICH
-  uint bounds;   // first word of the material whose volume the triangle bounds, plus one; 0: of none
+  uint bounds;   // first word of the material whose volume the triangle bounds, plus one; 0: none
   bool leaves;   // the path comes from inside
-  vec3 colour;   // of the wavelength that goes on, where that is new; else white
+  vec3 colour;   // color of the path's wavelength if it is chosen at this vertex; else white
   bool disperses;
 #endif
 };
 
-// A flight that has come through a surface is no light among surfaces.
+// Transmitted rays are not light among surfaces: they are traced even if light_among_surfaces is 0.
 CM_FN bool cm_came_through(CmPath p) {
 #if CM_RICH
   return p.through != 0u && p.start == CM_ON_TRIANGLE;
@@ -127,7 +131,7 @@ CM_FN bool cm_came_through(CmPath p) {
 
 #if CM_RICH
 
-// Of a material's volume, by its first word plus one; of none: air.
+// Index of refraction of a material's volume, by its first word plus one; 0: air.
 CM_FN float cm_index(uint within) { return within == 0u ? 1.0f : cm_floats(within - 1u + CM_MATERIAL_VOLUME).w; }
 CM_FN float cm_index_at(uint within, float wavelength) {
   if (within == 0u) return 1.0f;
@@ -141,11 +145,11 @@ CM_FN vec3 cm_transmittance_within(uint within, float way) {
   return exp(vec3(cm_floats(within - 1u + CM_MATERIAL_VOLUME)) * -way);
 }
 
-// What lies beyond the boundary of a volume that a path within `within`, in `outside`, leaves. Closed meshes may lie one
-// in another, and two deep.
+// Returns the medium on the far side when a path leaves the volume `bounds`; it is in `within`, enclosed by `outside`.
+// Closed meshes may be nested, up to two deep.
 CM_FN uint cm_beyond(uint bounds, uint within, uint outside) { return within == bounds ? outside : within; }
 
-// Crosses it.
+// Updates `within` and `outside` when the path crosses the boundary.
 CM_FN void cm_cross(uint bounds, bool leaves, CM_INOUT(uint) within, CM_INOUT(uint) outside) {
   if (bounds == 0u) return;
   if (leaves) {
@@ -157,7 +161,7 @@ CM_FN void cm_cross(uint bounds, bool leaves, CM_INOUT(uint) within, CM_INOUT(ui
   }
 }
 
-// The first word plus one of a triangle's material, if it bounds a volume.
+// Returns the first word plus one of the triangle's material if it bounds a volume, else 0.
 CM_FN uint cm_bounds(uint triangle) {
   uint model = cm_model_of(triangle);
   uint number = cm_words(cm_models[model].triangles + triangle - cm_models[model].first).w;
@@ -165,7 +169,7 @@ CM_FN uint cm_bounds(uint triangle) {
   return cm_floats(material + CM_MATERIAL_VOLUME).w > 0.0f ? material + 1u : 0u;
 }
 
-// What the path knows of both sides of a triangle that it is on.
+// Sets the indices of refraction on both sides of the path's triangle, and the fields that follow from them.
 CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
   vertex.bounds = cm_bounds(p.triangle);
   vertex.leaves = p.back != 0u;
@@ -185,7 +189,7 @@ CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
       vertex.disperses = true;
       vertex.colour = cm_wavelength_colour(wavelength);
     }
-    // White light is mirrored as by the middle index.
+    // White light is reflected with the index at the middle wavelength.
     if (p.dispersed != 0u || vertex.leaves) ratio = eta;
   }
   float r = (ratio - 1.0f) / (ratio + 1.0f);
@@ -195,17 +199,17 @@ CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
   vertex.surface.material.film_average = cm_film_average(vertex.surface.material);
 }
 
-// What a ray on its way through the tree finds of volumes between its start and where it ends, or comes to a collision.
+// Applies the absorption of material volumes between a ray's origin and its hit, collision or end.
 CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool met, CmHit hit) {
   bool flight = p.ray == CM_RAY_FLIGHT;
-  // Media that glow are marched after this: what a flight meets then is dimmed where it meets it.
+  // Emissive media are traversed after this query. cm_see then dims the light of the triangle that was hit.
   if (flight && cm.medium.emits != 0u) return;
   uint within = p.within;
   uint outside = p.outside;
   if (!flight && p.start == CM_ON_TRIANGLE && p.through != 0u) cm_cross(cm_bounds(p.triangle), p.back != 0u, within, outside);
-  if (flight && met && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // cameras may be inside
+  if (flight && met && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // a camera may be inside
   float way = met ? hit.t : (flight && p.event == CM_EVENT_COLLISION ? p.t : p.reach);
-  // What never ends has left through a hole of a mesh.
+  // A ray without end left through a hole in the mesh.
   if (way > 1e30f) return;
   vec3 transmittance = cm_transmittance_within(within, way);
   if (flight) p.throughput *= transmittance;
@@ -214,26 +218,27 @@ CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool met, CmHit hit) {
 
 #endif
 
-// Whether a triangle may be nearer than the event that the ray has come to. The tree is asked after the march, not
-// before: in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the
-// medium.
+// Returns true if a triangle may be nearer than the ray's event, so that the BVH must be queried. The query comes after
+// the traversal: in a dense medium the distance to a collision is short and few boxes are near it, and most shadow rays
+// end in the medium.
 CM_FN bool cm_asks(CmPath p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   if (p.event == CM_EVENT_COLLISION && !flight) return false;
   if (flight && p.bounces == 0u && cm.layers.count != 0u) return false;
-  if (p.start == CM_ON_TRIANGLE && !cm_is_equiangular(p)) return flight || p.reach > 0.0f;  // from a little above it
+  if (p.start == CM_ON_TRIANGLE && !cm_is_equiangular(p)) return flight || p.reach > 0.0f;  // from above it
   float reach = p.event == CM_EVENT_COLLISION ? p.t : p.reach;
   return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, reach);
 }
 
-// Whether the tree is to be asked before the flight marches: what it takes up on its way depends on where it ends.
+// Returns true if the BVH must be queried before the traversal, because the emission collected along the ray depends on
+// where it ends.
 CM_FN bool cm_asks_first(CmPath p) {
   if (p.ray != CM_RAY_FLIGHT || p.found != CM_FOUND_NOT_ASKED) return false;
   if (p.bounces == 0u && cm.layers.count != 0u) return false;
   return p.start == CM_ON_TRIANGLE || cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, p.reach);
 }
 
-// Asks the tree.
+// Intersects the ray with the triangles.
 CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   bool first = flight && cm.medium.emits != 0u;
@@ -243,17 +248,18 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
     vec3 shift;
     bool lifts = !cm_came_through(p);
     o = cm_surface_origin(p.triangle, p.weights, p.behind != 0u, lifts, d, shift);
-    // Shadow rays end where they would from the point itself: at a lamp.
+    // The shadow ray ends where a ray from the point itself would: at a light.
     if (!flight) d -= shift / p.reach;
   }
-  cm_hit_seed = p.random + p.ray;  // a look and the flight after it
+  cm_hit_seed = p.random + p.ray;  // differs between a shadow ray and the scattered ray after it
   cm_hit_camera = flight && p.bounces == 0u;
   CmHit hit;
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
 #if CM_RICH
   cm_hit_direction = normalize(d);
   bool met = false;
-  // Once more up to where a flight ends: on its way the tree shows it what it passes, and what lies behind.
+  // Camera and scattered rays are traced again up to their hit: on the way to it the BVH also visited surfaces behind
+  // it.
   for (int turn = 0; turn < 2; ++turn) {
     CmHit found;
     cm_hit_passed = vec3(1.0f);
@@ -290,17 +296,17 @@ CM_FN CmVertex cm_in_medium() {
   return vertex;
 }
 
-// Of the triangle that the path is on, or has met: of its fields it needs w and CM_PATH_ENDS.
+// Shading data of the triangle that the path is on or has hit. Reads only w and CM_PATH_ENDS of p.
 CM_FN CmVertex cm_on_triangle(CmPath p) {
   CmVertex vertex;
   vertex.on_triangle = true;
   vertex.surface = cm_surface_point(p.triangle, p.weights, p.w, p.back != 0u);
-  // Path space regularization: Kaplanyan and Dachsbacher, 2013.
+  // Path space regularization: Kaplanyan and Dachsbacher 2013.
   if (p.blurred != 0u) {
     float least = cm.integrator.blurred_roughness;
     vertex.surface.material.roughness = max(vertex.surface.material.roughness, least);
 #if CM_RICH
-    // What is clear lets light pass as it is.
+    // Clear surfaces still transmit without blur.
     if (vertex.surface.kept == 1.0f) {
       vertex.surface.material.alpha = max(vertex.surface.material.alpha, vec2(cm_alpha(least)));
     }
@@ -313,13 +319,13 @@ CM_FN CmVertex cm_on_triangle(CmPath p) {
   return vertex;
 }
 
-// How far a flight has come that has ended.
+// Distance that a finished ray covered.
 CM_FN float cm_flight_end(CmPath p, CmVertex vertex) {
   if (vertex.on_triangle) return dot(vertex.surface.position - cm_from_cube_point(p.o), p.w);
   return p.event == CM_EVENT_COLLISION ? p.t : p.t_end;
 }
 
-// The light of what a path has met.
+// Adds the emission of the triangle that was hit.
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
   vec3 emission = vertex.surface.emission;
 #if CM_RICH
@@ -328,8 +334,9 @@ CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
     p.throughput *= cm_transmittance_within(within, max(0.0f, cm_flight_end(p, vertex)));
   }
 #endif
-  // The look for light before the flight that met it might have found it, whatever the medium between; not at the same
-  // angle where the flight started above its triangle: then looks alone count.
+  // The triangle may also be found by NEE at the previous vertex, whatever medium is between: weigh by the balance
+  // heuristic. If the ray's origin was lifted above its triangle, the two see the light at different angles, and only
+  // NEE counts.
   if (CM_SURFACES > 1 && p.bounces > 0u && !vertex.surface.unlit) {
     CmLightHit hit = cm_light_hit(CM_LIGHT_TRIANGLE, p.o, p.w, p.density);
     hit.triangle = p.triangle;
@@ -343,7 +350,7 @@ CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
 #endif
 }
 
-// The path is on the triangle that it has met, after cm_arrive. Whether it ends there.
+// Places the path on the triangle that it hit, after cm_arrive. Returns true if the path ends there.
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   p.o = cm_to_cube_point(vertex.surface.position);
   p.start = CM_ON_TRIANGLE;
@@ -351,13 +358,14 @@ CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   return vertex.surface.unlit;
 }
 
-// Where looks for light start, in the world.
+// Origin of light samples, world space.
 CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
   if (vertex.on_triangle) return cm_offset_origin(vertex.surface.position, vertex.surface.geometric);
   return cm_from_cube_point(p.o);
 }
 
-// A direction that a flight might take. Some that leave a triangle are aimed at the glowing medium.
+// Samples a direction for the scattered ray. From triangles, some samples are aimed at the bounds of the emissive
+// medium.
 CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
   float u_0 = draw.turn.x;
   float u_1 = draw.turn.y;
@@ -400,7 +408,7 @@ CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
 
 #if CM_RICH
 
-// Which side the ray starts on, and what a flight is within from there.
+// Sets the side of the ray's origin, and for a scattered ray the volume that it is in.
 CM_FN void cm_leave_surface(CM_INOUT(CmPath) p, CmVertex vertex, CmTurn turn, bool looks) {
   p.through = turn.through ? 1u : 0u;
   if (!vertex.on_triangle) return;
@@ -412,8 +420,8 @@ CM_FN void cm_leave_surface(CM_INOUT(CmPath) p, CmVertex vertex, CmTurn turn, bo
 
 #endif
 
-// Whether a path is scattered wider than a surface of the least roughness does: a quarter of that lobe's highest
-// density, and no matte surface is smooth.
+// Returns true if the bounce is wider than the lobe of a surface with the minimum roughness. The bound is a quarter of
+// that lobe's peak pdf. Diffuse surfaces always count as wide.
 CM_FN bool cm_blurs(CmTurn turn) {
   float alpha = cm_alpha(cm.integrator.blurred_roughness);
   return turn.lobe_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha));

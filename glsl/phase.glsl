@@ -1,11 +1,11 @@
-// Phase functions. Shared by GLSL and C++. Cosines are between the directions of flight before and after, so g > 0
-// scatters forward; each integrates to 1 over the sphere.
+// Phase functions. Shared by GLSL and C++. Cosines are between the directions of propagation before and after, so g > 0
+// scatters forward. Each phase function integrates to 1 over the sphere.
 #ifndef CM_PHASE_GLSL
 #define CM_PHASE_GLSL
 #include "frame.glsl"
 
-// One lobe of Henyey and Greenstein, and a part of the light in a second one, of Draine (2003): that of Henyey and
-// Greenstein with g = second_anisotropy, times 1 + second_bend cosine^2, normalised.
+// A Henyey-Greenstein lobe, mixed by second_share with a second lobe of Draine (2003). The latter is Henyey-Greenstein
+// with g = second_anisotropy times 1 + second_bend cosine^2, normalized.
 struct CmPhase {
   float anisotropy;
   float second_anisotropy;
@@ -30,22 +30,22 @@ CM_FN float cm_phase(CmPhase phase, float cosine) {
   return mix(first, cm_draine(phase.second_anisotropy, phase.second_bend, cosine), phase.second_share);
 }
 
-// Cosine with density 2 pi of each, by inversion.
+// Samples a cosine by inversion; its pdf is 2 pi times the phase function.
 CM_FN float cm_henyey_greenstein_cosine(float g, float u) {
   if (abs(g) < 1e-3f) return 1.0f - 2.0f * u;
   float s = (1.0f - g * g) / (1.0f - g + 2.0f * g * u);
   return clamp((1.0f + g * g - s * s) / (2.0f * g), -1.0f, 1.0f);
 }
 
-// Of v = 1 / sqrt(1 + g^2 - 2 g cosine): up to a factor and a constant, how much of Draine's lobe has less; b is
-// bend / (4 g^2), c is 1 + g^2. Its derivative is 1 + bend cosine^2.
+// Cumulative distribution of Draine's lobe, up to a factor and a constant, as a function of v = 1 / sqrt(1 + g^2 - 2 g
+// cosine). b: bend / (4 g^2); c: 1 + g^2. Its derivative is 1 + bend cosine^2.
 CM_FN float cm_draine_below(float b, float c, float v) {
   float w = 1.0f / v;
   return (1.0f + b * c * c) * v + b * w * (2.0f * c - w * w / 3.0f);
 }
 
-// g > 0.1. By Newton's steps from the end where that is steep, to either side of cosine 0, so that none overshoots: for a
-// bend of 30 eight are exact to 1e-6.
+// Samples Draine's lobe for g > 0.1, by Newton's method. On either side of cosine 0 it starts at the end where the
+// function is steep, so that no step overshoots. For a bend of 30, eight steps are exact to 1e-6.
 CM_FN float cm_draine_cosine(float g, float bend, float u) {
   float c = 1.0f + g * g;
   float b = bend / (4.0f * g * g);
@@ -68,7 +68,7 @@ CM_FN float cm_phase_cosine(CmPhase phase, float u) {
   return cm_draine_cosine(phase.second_anisotropy, phase.second_bend, u);
 }
 
-// Unit vector at the cosine and angle around unit vector w.
+// Unit vector at this cosine and angle around the unit vector w.
 CM_FN vec3 cm_around(vec3 w, float cosine, float angle) {
   vec3 u;
   vec3 v;

@@ -1,4 +1,4 @@
-// A pixel's samples so far, in the film's images.
+// Loads and stores a pixel's sums in the film's images.
 #ifndef CM_PIXEL_STORE_GLSL
 #define CM_PIXEL_STORE_GLSL
 
@@ -7,7 +7,7 @@ layout(rg32ui, binding = CM_IMAGE_COUNTS) uniform uimage2D cm_counts;          /
 layout(rgba32f, binding = CM_IMAGE_BACKGROUND) uniform image2D cm_background;
 layout(r32f, binding = CM_IMAGE_MOMENTS) uniform image2D cm_moments;
 #if CM_AOVS
-layout(rgba32f, binding = CM_IMAGE_VOLUME_SUM) uniform image2D cm_volume_sum;  // of the samples that met the volume first
+layout(rgba32f, binding = CM_IMAGE_VOLUME_SUM) uniform image2D cm_volume_sum;  // first event in the volume
 #endif
 
 uint cm_pixel_samples(uvec2 at) { return imageLoad(cm_counts, ivec2(at)).x; }

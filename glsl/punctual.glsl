@@ -1,4 +1,4 @@
-// Lamps: KHR_lights_punctual's and the host's. Shared by GLSL and C++.
+// Punctual and area lights: those of KHR_lights_punctual and of the host. Shared by GLSL and C++.
 #ifndef CM_PUNCTUAL_GLSL
 #define CM_PUNCTUAL_GLSL
 
@@ -8,23 +8,23 @@ const uint CM_LAMP_DISC = 2u;
 const uint CM_LAMP_RECTANGLE = 3u;
 
 struct CmLamp {
-  vec3 position;   // of its middle
+  vec3 position;   // of its center
   uint kind;
-  vec3 direction;  // unit, where it shines
+  vec3 direction;  // unit, direction of emission
   float range;     // 0: no limit
-  vec3 intensity;  // radiant: W/sr along its direction, or W/m2 where distant
-  uint extended;   // 1: light comes from all over its area; a distant one's is what it covers of the sky at distance 1
-  vec3 across;     // from the middle to the edge, of a rectangle to the side
-  float cone_scale;  // the cone's share is clamp(scale cosine + offset, 0, 1)^2
-  vec3 along;        // likewise, upright to it
+  vec3 intensity;  // radiant: W/sr along its direction, or W/m2 if distant
+  uint extended;   // 1: an area light; a distant one's area is the part of the sky that it covers at distance 1
+  vec3 across;     // from the center to the edge; of a rectangle, half its width
+  float cone_scale;  // cone attenuation: clamp(scale cosine + offset, 0, 1)^2
+  vec3 along;        // perpendicular to `across`; of a rectangle, half its height
   float cone_offset;
-  float chance;  // to be the one that is looked for
-  uint stays;    // drawn evenly, it is looked for where a random word is at most this, else the other
+  float chance;  // selection probability for NEE
+  uint stays;    // alias table: a uniformly drawn entry stays if a random word is at most this, else `other`
   uint other;
-  uint group;    // of lights
+  uint group;    // light group
 };
 
-// From its middle to a point of it, each as likely by area.
+// Samples a point uniformly by area. Returns its offset from the center.
 CM_FN vec3 cm_lamp_point(CmLamp lamp, float u_0, float u_1) {
   if (lamp.kind == CM_LAMP_RECTANGLE) return (2.0f * u_0 - 1.0f) * lamp.across + (2.0f * u_1 - 1.0f) * lamp.along;
   float radius = sqrt(u_0);
@@ -32,15 +32,15 @@ CM_FN vec3 cm_lamp_point(CmLamp lamp, float u_0, float u_1) {
   return radius * cos(angle) * lamp.across + radius * sin(angle) * lamp.along;
 }
 
-// What arrives at a point on a plane that faces the lamp, nothing in its way, were it all at `from` beside its middle:
-// intensity / d^2, windowed by clamp(1 - (d / range)^4, 0, 1), times the share that leaves it that way. to_light: unit;
-// distance: 3e38 where distant.
+// Irradiance at `point` on a plane that faces the light, without occlusion, as if all its power came from `from`, an
+// offset from its center. This is intensity / d^2 times clamp(1 - (d / range)^4, 0, 1) times the emission profile.
+// to_light: unit; distance_to: 3e38 if distant.
 CM_FN vec3 cm_lamp_irradiance(CmLamp lamp, vec3 from, vec3 point, CM_OUT(vec3) to_light, CM_OUT(float) distance_to) {
   to_light = -lamp.direction;
   distance_to = 3.0e38f;
   if (lamp.kind == CM_LAMP_DISTANT) {
     if (lamp.extended == 0u) return lamp.intensity;
-    // Of one radiance from its whole disc, whose area at distance 1 covers cosine^3 of that of directions.
+    // Uniform radiance over the disk. An area of it at distance 1 covers cosine^3 times that area in solid angle.
     vec3 slanted = from - lamp.direction;
     float cosine = inversesqrt(dot(slanted, slanted));
     to_light = slanted * cosine;
@@ -57,7 +57,7 @@ CM_FN vec3 cm_lamp_irradiance(CmLamp lamp, vec3 from, vec3 point, CM_OUT(vec3) t
     float r2 = d2 / (lamp.range * lamp.range);
     share *= clamp(1.0f - r2 * r2, 0.0f, 1.0f);
   }
-  return min(lamp.intensity * share, vec3(1e30f));  // an infinite one beside a share of 0 would be no number
+  return min(lamp.intensity * share, vec3(1e30f));  // an infinite intensity times a factor of 0 would be NaN
 }
 
 #endif

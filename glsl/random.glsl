@@ -1,4 +1,4 @@
-// Random numbers: a PCG stream a path, and sets that are even over a pixel's samples. Shared by GLSL and C++.
+// Random numbers: a PCG stream per path, and low-discrepancy pairs over a pixel's samples. Shared by GLSL and C++.
 #ifndef CM_RANDOM_GLSL
 #define CM_RANDOM_GLSL
 
@@ -15,10 +15,10 @@ CM_FN uvec3 cm_hash3(uvec3 v) {
   return v;
 }
 
-// The high 24 bits as a number in [0, 1).
+// Converts the upper 24 bits to [0, 1).
 CM_FN float cm_unit_float(uint word) { return float(word >> 8) * (1.0f / 16777216.0f); }
 
-// A random word as a number below count, each as likely.
+// Maps a random word to a uniform integer below count.
 CM_FN uint cm_below(uint word, uint count) {
   uint number;
   uint unused;
@@ -26,7 +26,7 @@ CM_FN uint cm_below(uint word, uint count) {
   return number;
 }
 
-// PCG-RXS-M-XS 32 (O'Neill 2014); odd stream number selects one of 2^31 sequences. In [0, 1), 24 bits.
+// PCG-RXS-M-XS 32 (O'Neill 2014). The odd stream number selects one of 2^31 sequences. Returns 24 bits in [0, 1).
 CM_FN float cm_random(CM_INOUT(uint) state, uint stream) {
   uint word = ((state >> ((state >> 28) + 4u)) ^ state) * 277803737u;
   state = state * 747796405u + stream;
@@ -34,8 +34,8 @@ CM_FN float cm_random(CM_INOUT(uint) state, uint stream) {
   return cm_unit_float(word);
 }
 
-// Laine and Karras' hash with Vegdahl's constants: Owen's scramble of a number whose digits after the point begin with
-// the lowest bit.
+// Owen scrambling of a number whose lowest bit is the first digit after the point: Laine and Karras' hash with
+// Vegdahl's constants.
 CM_FN uint cm_owen_scramble(uint digits, uint seed) {
   digits ^= digits * 0x3d20adeau;
   digits += seed;
@@ -45,13 +45,13 @@ CM_FN uint cm_owen_scramble(uint digits, uint seed) {
   return digits;
 }
 
-// The pair that sample `number` of a pixel has of a set: Sobol's (0,2)-sequence, scrambled, and in an order scrambled so
-// that any first 2^k of it are even, each set of each pixel by itself (Burley, "Practical Hash-based Owen Scrambling",
-// JCGT 9(4), 2020). In [0, 1), 24 bits.
+// Point `number` of a pixel's low-discrepancy set: the (0,2)-sequence of Sobol' with Owen-scrambled values. The order
+// is scrambled too: any first 2^k points stay well distributed, and the sets of all pixels are independent. (Burley,
+// "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020.) Returns 24 bits in [0, 1).
 CM_FN vec2 cm_even_pair(uint number, uint pixel, uint set) {
   uvec3 seed = cm_hash3(uvec3(pixel, set, 0x2545f491u));
   uint first = bitfieldReverse(cm_owen_scramble(bitfieldReverse(number), seed.x));
-  // Times Pascal's triangle modulo 2.
+  // Multiplies by Pascal's triangle modulo 2.
   uint second = first;
   second ^= (second >> 1) & 0x55555555u;
   second ^= (second >> 2) & 0x33333333u;
@@ -62,10 +62,10 @@ CM_FN vec2 cm_even_pair(uint number, uint pixel, uint set) {
               cm_unit_float(bitfieldReverse(cm_owen_scramble(second, seed.z))));
 }
 
-// A set that no event has (glsl/path_vertex.glsl counts theirs from 2).
+// A set that no event uses (glsl/path_vertex.glsl counts their sets from 2).
 const uint CM_SET_LENS = 0xffffffffu;
 
-// Free path in optical depth of u in [0, 1).
+// Samples a free-flight optical depth with u in [0, 1).
 CM_FN float cm_free_depth(float u) { return -log(1.0f - u); }
 
 #endif

@@ -1,5 +1,4 @@
-// Camera rays, the box that holds all density, and optical depths within a cell. Shared by GLSL and C++; the includer
-// has
+// Camera rays, the bounds of all density, and optical depths within a cell. Shared by GLSL and C++; the includer has
 //   cm   the parameters (glsl/parameters.glsl)
 #ifndef CM_RAY_GLSL
 #define CM_RAY_GLSL
@@ -9,7 +8,7 @@ CM_FN vec3 cm_to_cube(vec3 v) { return cm.space.to_cube_x * v.x + cm.space.to_cu
 CM_FN vec3 cm_to_world(vec3 v) {
   return cm.space.from_cube_x * v.x + cm.space.from_cube_y * v.y + cm.space.from_cube_z * v.z;
 }
-// A vector of the cube space that glsl/here.glsl tells of, in the world.
+// Transforms a vector from the cube space of the current volume (glsl/here.glsl) to the world.
 CM_FN vec3 cm_out_of_volume(vec3 v) {
 #if CM_INSTANCES
 #if CM_MOTION
@@ -24,7 +23,7 @@ CM_FN vec3 cm_out_of_volume(vec3 v) {
 CM_FN vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm.space.cube_origin; }
 CM_FN vec3 cm_to_cube_point(vec3 p) { return cm_to_cube(p - cm.space.cube_origin); }
 
-// Where a line, o + t d of any t, is inside the box: t.x to t.y, empty if t.x > t.y.
+// Interval of a line, o + t d for any t, inside the bounds: t.x to t.y, empty if t.x > t.y.
 CM_FN vec2 cm_box_line(vec3 o, vec3 d) {
   float t_in = -3.0e38f;
   float t_out = 3.0e38f;
@@ -41,14 +40,14 @@ CM_FN vec2 cm_box_line(vec3 o, vec3 d) {
   }
   return vec2(t_in, t_out);
 }
-// Of a ray, whose t is not negative.
+// Interval of a ray inside the bounds, for t >= 0.
 CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   vec2 line = cm_box_line(o, d);
   return vec2(max(0.0f, line.x), line.y);
 }
 
-// A point of the unit square on the unit disc, evenly, its middle in the middle (Shirley and Chiu, "A Low Distortion Map
-// Between Disk and Square", 1997).
+// Maps the unit square uniformly onto the unit disk, center to center (Shirley and Chiu, "A Low Distortion Map Between
+// Disk and Square", 1997).
 CM_FN vec2 cm_on_disc(vec2 square) {
   vec2 s = 2.0f * square - vec2(1.0f, 1.0f);
   bool wide = abs(s.x) > abs(s.y);
@@ -64,7 +63,7 @@ CM_FN vec3 cm_turned(vec3 v) {
   float s = sin(cm.shutter.angle * cm_now);
   return c * v + s * cross(cm.shutter.axis, v) + ((1.0f - c) * dot(cm.shutter.axis, v)) * cm.shutter.axis;
 }
-// The camera at cm_now: its axes turn evenly about one axis, and all else goes straight from one end to the other.
+// The camera at cm_now: its axes rotate uniformly about one axis; all other fields are interpolated linearly.
 CM_FN CmView cm_view() {
   CmView view = cm.view;
   view.eye = mix(cm.shutter.open.eye, cm.shutter.close.eye, cm_now);
@@ -81,7 +80,7 @@ CM_FN CmView cm_view() {
 #define CM_VIEW cm.view
 #endif
 
-// The ray through a point of a pixel and one of the lens (unit disc): o in cube space, w a unit vector in world space.
+// Ray through a point of a pixel and a point of the lens (unit disk). o: cube space; w: unit vector in world space.
 // Returns the distance along it per unit of view depth.
 CM_FN float cm_lens_ray(uvec2 pixel, vec2 within, vec2 lens, CM_OUT(vec3) o, CM_OUT(vec3) w) {
 #if CM_MOTION
@@ -96,19 +95,20 @@ CM_FN float cm_lens_ray(uvec2 pixel, vec2 within, vec2 lens, CM_OUT(vec3) o, CM_
   w = normalize(v);
   return length(v);
 }
-// Through the middle of the lens.
+// Ray through the center of the lens.
 CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
   return cm_lens_ray(pixel, within, vec2(0.0f, 0.0f), o, w);
 }
 
-// The optical depth of the first `way` of a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends.
+// Optical depth of the first `way` of a ray's segment in a cell. span: the segment's length; e_0, e_1: extinctions at
+// its ends.
 CM_FN float cm_depth_of(float e_0, float e_1, float span, float way) {
   float part = clamp(way / max(span, 1e-30f), 0.0f, 1.0f);
   return (e_0 + 0.5f * (e_1 - e_0) * part) * part * span;
 }
 
-// How far into a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends, this optical depth is used up:
-// e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
+// Distance into a ray's segment in a cell at which this optical depth is used up. span: the segment's length; e_0, e_1:
+// extinctions at its ends. Solves e_0 s + (e_1 - e_0) s^2 / (2 span) = depth in the form without cancellation.
 CM_FN float cm_depth_distance(float e_0, float e_1, float span, float depth) {
   float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * depth));
   return min(span, 2.0f * depth / (e_0 + root));

@@ -1,12 +1,12 @@
 #version 450
-// An accumulation's means. CM_HOLES 1: a pixel whose first path is still under way takes after those around it, and
-// where none of these has a sample either it shows what was there before. CM_BACKGROUND 0: what is in front of the
-// background, premultiplied; 1: all radiance, with the same alpha; 2: as 0, and the background's radiance apart.
+// Writes an accumulation's means. CM_HOLES 1: a pixel without samples gets the mean of its neighbors, or the previous
+// image's value if these have no samples either. CM_BACKGROUND 0: radiance in front of the background, premultiplied;
+// 1: all radiance, with the same alpha; 2: as 0, and the background's radiance separately.
 // variants: CM_HOLES=0,1 CM_BACKGROUND=0,1,2
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "means.glsl"
-layout(location = 0) uniform uvec2 cm_rows;  // the first that is resolved, and the first after it that is not
+layout(location = 0) uniform uvec2 cm_rows;  // rows to resolve: first, and one past the last
 layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
 #if CM_BACKGROUND == 2
 layout(rgba32f, binding = CM_IMAGE_BACKGROUND_MEANS) uniform writeonly image2D cm_background_means;

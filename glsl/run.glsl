@@ -1,20 +1,21 @@
-// All stages of a path that meets no triangles, in one kernel. Shared by GLSL and C++; the includer provides what glsl/flight.glsl asks for, and
+// Runs all stages of a path in one kernel, without triangles. Shared by GLSL and C++. The includer provides what
+// glsl/flight.glsl asks for, and
 //   uvec2 cm_pixel_of(uint place)                 the path's pixel
-//   CmPixel cm_load_pixel(uvec2 at)               what its samples have come to
+//   CmPixel cm_load_pixel(uvec2 at)               the sums of its samples
 //   void cm_store_pixel(CmPixel pixel, uvec2 at)
-//   void cm_take_next_place(inout CmPath p, inout uint samples)   another one, with so many samples, if there is any
+//   void cm_take_next_place(inout CmPath p, inout uint samples)   gives it another pixel, if there is one
 #ifndef CM_RUN_GLSL
 #define CM_RUN_GLSL
 
 #include "flight.glsl"
 
-// What lanes did.
+// Work done by lanes.
 struct CmRun {
   uint marches;
   uint finished;  // samples
 };
 
-// At most so many rounds, of a path whose pixel has so many samples.
+// Runs at most this many rounds. samples: the number of samples of the path's pixel.
 CM_FN CmRun cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uint rounds) {
   CmRun run;
   run.marches = 0u;

@@ -1,10 +1,10 @@
-// The sheen of cloth (KHR_materials_sheen): fibres that stand about the normal, by Estevez and Kulla, "Production Friendly
+// The sheen of cloth (KHR_materials_sheen), with fibers upright on the surface: Estevez and Kulla, "Production Friendly
 // Microfacet Sheen BRDF", SIGGRAPH 2017 courses. Shared by GLSL and C++.
 #ifndef CM_SHEEN_GLSL
 #define CM_SHEEN_GLSL
 #include "ggx.glsl"
 
-// Their fit of Smith's Lambda, which is exp of this up to a cosine of 0.5 and mirrored there beyond.
+// Their fit of Smith's Lambda: Lambda is exp of this up to a cosine of 0.5, and point-mirrored beyond.
 CM_FN float cm_sheen_fit(float alpha, float x) {
   float smooth2 = (1.0f - alpha) * (1.0f - alpha);
   float a = mix(21.5473f, 25.3245f, smooth2);
@@ -28,7 +28,7 @@ CM_FN float cm_sheen(float roughness, vec3 wo, vec3 wi, vec3 h) {
   return density / ((1.0f + cm_sheen_lambda(alpha, wo.z) + cm_sheen_lambda(alpha, wi.z)) * 4.0f * wo.z);
 }
 
-// Its directions are looked for over the hemisphere, each as likely: most of it is at grazing angles.
+// Directions are sampled uniformly over the hemisphere, because most of the lobe is at grazing angles.
 const float CM_SHEEN_PDF = 0.159154943f;
 CM_FN vec3 cm_sheen_direction(float u0, float u1) {
   float sine = sqrt(max(0.0f, 1.0f - u0 * u0));

@@ -1,7 +1,8 @@
 #version 450
-// Of a host's bricks, as pack_bricks.comp has them, the values that volumes keep, and what main memory is to know of them
-// (brick_summary.glsl): a group a brick. What is no number or huge becomes 0, and is told; what is negative becomes 0.
-// CM_FIELD: 0, 1: of fields that no cell is of, the most, either way, box and voxels alone; 0: what is negative stays.
+// Converts a host's packed bricks (pack_bricks.comp) to the values that volumes store, and summarizes them for main
+// memory (brick_summary.glsl): one work group per brick. NaN, infinite and huge values become 0 and are reported;
+// negative values become 0. CM_FIELD 2: the field of the cells. 0, 1: other fields, which need only maximum magnitude,
+// box and voxel counts; with 0 negative values are kept.
 // variants: CM_FORMAT=0,1,2,3 CM_FIELD=0,1,2
 layout(local_size_x = 64) in;
 
@@ -11,7 +12,7 @@ layout(local_size_x = 64) in;
 #include "cell_fit.glsl"
 #include "brick_summary.glsl"
 
-// CM_FORMAT: as render::VoxelFormat.
+// CM_FORMAT: values of render::VoxelFormat.
 #define CM_HALVES (CM_FORMAT == 1)
 #define CM_CELLS (CM_FIELD == 2)
 
@@ -23,10 +24,10 @@ layout(std430, binding = CM_STORAGE_PACKED_PLACES) readonly buffer CmPlaces {
 layout(std430, binding = CM_STORAGE_PACKED_VALUES) readonly buffer CmPacked { uint cm_packed[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_KEPT) writeonly buffer CmKept { uint cm_kept[]; };
 layout(std430, binding = CM_STORAGE_BRICK_SUMMARIES) writeonly buffer CmSummaries { CmBrickSummary cm_summaries[]; };
-layout(location = 0) uniform uvec2 cm_range;   // bricks: the first, and the end
-layout(location = 1) uniform uvec3 cm_bricks;  // of the field, along each axis
+layout(location = 0) uniform uvec2 cm_range;   // bricks: first, and one past the last
+layout(location = 1) uniform uvec3 cm_bricks;  // bricks of the field along each axis
 
-shared uint cm_box[6];  // low, then 7 less high
+shared uint cm_box[6];  // low corner, then 7 - high corner
 shared uint cm_count;
 shared uint cm_bad;
 shared uint cm_huge;
@@ -49,7 +50,7 @@ void cm_visit(uint level, uint heap, uint frame, CmSums sums) {
   CmCell cell = cm_cell_of(level, heap, frame, sums);
   float left = max(0.0, cell.variance - cm_fit_linear(cell.cell_class, cell.covariance, cell.mean).explained);
   vec2 steepest = vec2(cell.variance, left) * cm_edge_squared(level, cell.edge);
-  // All at once to one place would be one after another.
+  // Collected per invocation first: atomics of all invocations on one address would be serialized.
   if (level == 8u) {
     cm_steepest_own[2] = max(cm_steepest_own[2], steepest);
   } else if (level == 7u) {
@@ -62,7 +63,7 @@ void cm_visit(uint level, uint heap, uint frame, CmSums sums) {
 }
 #else
 shared float cm_values[512];  // of the brick
-shared uint cm_most;          // of their bits
+shared uint cm_most;          // maximum magnitude of the values, as bits
 #endif
 
 float cm_number(uint i) {
@@ -122,7 +123,7 @@ void cm_look_at(uint t, uint slot) {
 }
 
 #if CM_CELLS
-// Of one that is no less.
+// Upper half of a float's bits, rounded up.
 uint cm_upper_half(uint bits) { return min((bits >> 16) + ((bits & 0xffffu) != 0u ? 1u : 0u), 0x7f80u); }
 
 void cm_put_cells(uint t, uint slot) {
@@ -135,7 +136,7 @@ void cm_put_cells(uint t, uint slot) {
   uint brick = cm_places[slot];
   uvec3 odd = uvec3(brick % cm_bricks.x, brick / cm_bricks.x % cm_bricks.y, brick / (cm_bricks.x * cm_bricks.y)) & 1u;
   for (uint permutation = 0u; permutation < 6u; ++permutation) {
-    // Cubes of such bricks begin at even ones (grid::fit_cube).
+    // Cubes of such bricks begin at an even brick (grid::fit_cube).
     cm_sum_tree(cm_kuhn_frame(odd, permutation));
     if (t == 0u) {
       CmSums whole = cm_halves[1];
@@ -161,7 +162,7 @@ void cm_put_cells(uint t, uint slot) {
 
 void main() {
   uint work = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  uint slot = min(cm_range.x + work, cm_range.y - 1u);  // the last ones do the last once more
+  uint slot = min(cm_range.x + work, cm_range.y - 1u);  // surplus groups repeat the last brick
   uint t = gl_LocalInvocationIndex;
   if (t < 6u) cm_box[t] = 7u;
   if (t == 0u) {

@@ -1,7 +1,8 @@
 #version 450
-// A surface as it is lit without shadows: by the sun, the scene's lights and the sky. Linear, premultiplied.
-// CM_ALPHA: 0 opaque, 1 mask, 2 blend, which transmission is drawn as too. CM_USED: a bit a map that there is; CM_COATED:
-// 1 with a coat. What a material has not is not even compiled: not every driver skips what a uniform forbids.
+// Shades a surface without shadows: by the sun, the scene's lights and the sky. The result is linear and premultiplied.
+// CM_ALPHA: 0 opaque, 1 mask, 2 blend, which also draws transmission. CM_USED: a bit per existing map. CM_COATED: 1
+// with a coat. Features that a material lacks are not compiled, because not every driver skips code that a uniform
+// disables.
 // variants: CM_ALPHA=0,1,2 CM_USED=0..1023 CM_COATED=0,1
 #include "bindings.glsl"
 #include "shared.glsl"
@@ -11,7 +12,7 @@
 #include "luminance.glsl"
 #include "punctual.glsl"
 
-layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
+layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // of surface/ggx_albedo.hpp
 
 vec2 cm_ggx_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
@@ -32,9 +33,9 @@ layout(location = 3) in vec4 cm_texture_uv;
 layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
-layout(binding = CM_UNIT_GLOSS) uniform sampler2DArray cm_gloss;  // light/gloss.hpp's
+layout(binding = CM_UNIT_GLOSS) uniform sampler2DArray cm_gloss;  // of light/gloss.hpp
 layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
-layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };  // from the eye
+layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };  // relative to the eye
 
 layout(location = 0) out vec4 cm_colour;
 layout(location = 1) out float cm_depth_z;
@@ -48,7 +49,8 @@ vec2 cm_uv_of(int map) {
 
 #define CM_SAMPLE(map) texture(cm_maps[map], cm_uv_of(map))
 
-// Unit, on the viewer's side: the front's, which back faces turn over. matte_normal: not bent; smooth_normal: nor mapped.
+// Shading normal, unit, on the viewer's side; back faces flip it. matte_normal: before bending; smooth_normal: also
+// without normal map.
 vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
   vec3 dx = dFdx(cm_from_eye);
   vec3 dy = dFdy(cm_from_eye);
@@ -66,7 +68,7 @@ vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
     vec3 t = cm_shading_tangent.xyz;
     float turn = cm_shading_tangent.w;
     if (turn == 0.0) {
-      // Along growing u; v grows downwards in a texture, a normal map's y upwards.
+      // Tangent along increasing u. v runs down a texture, a normal map's y runs up.
       vec2 uv = cm_uv_of(CM_MAP_NORMAL);
       vec2 ux = dFdx(uv);
       vec2 uy = dFdy(uv);
@@ -91,7 +93,7 @@ vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
   return cm_bend_normal(matte_normal, g, wo);
 }
 
-// What lobes see of the sky beyond its mean.
+// Light of the sky beyond its mean, as the lobes receive it.
 vec3 cm_matte_beyond(vec3 normal) {
   vec3 seen = cm_harmonics(cm_view.sky, cm_turned(normal, cm_view.sky_turn.xy), CM_MATTE_ORDERS);
   return max(seen, -cm_view.sky_radiance.rgb);
@@ -137,7 +139,7 @@ void main() {
     s.clearcoat_roughness = coat.y;
 #if CM_ALPHA == 2
     float cosine = clamp(dot(s.normal, wo), 0.0, 1.0);
-    // What is transmitted is not scattered back; thin, unrefracted, and of one colour: an approximation.
+    // Transmitted light is not scattered back. An approximation: thin, without refraction, and of one color.
     float through = coat.z * (1.0 - s.metallic);
     alpha *= 1.0 - through * (1.0 - cm_interface_fresnel(s, cosine)) * cm_luminance(s.base_color);
     s.base_color *= 1.0 - through;
@@ -171,9 +173,9 @@ void main() {
     colour *= alpha;
   }
 #if CM_ALPHA == 1
-  if (base.a < cm_material.emission.w) discard;  // not before the last derivative
+  if (base.a < cm_material.emission.w) discard;  // after the last use of derivatives
 #endif
   cm_colour = vec4(clamp(colour, 0.0, 65000.0), alpha);
-  // What is as good as not there is nowhere.
+  // Nearly invisible fragments get infinite depth.
   cm_depth_z = CM_ALPHA != 2 || alpha > 0.002 ? cm_z : uintBitsToFloat(0x7f800000u);
 }

@@ -1,8 +1,8 @@
-// Triangles and materials as the path tracer meets them: what the tables of one buffer of words say of a point
-// (surface_tables.glsl). Includes bvh.glsl and bsdf.glsl. Shared by GLSL and C++; the includer provides
-//   uvec4 cm_words(uint word)       of the tables
+// Triangles and materials of the path tracer: evaluates the tables of surface_tables.glsl at a point. Includes bvh.glsl
+// and bsdf.glsl. Shared by GLSL and C++; the includer provides
+//   uvec4 cm_words(uint word)       word of the tables
 //   CmModel cm_models[], CmInstanceNode cm_model_nodes[]   and uint cm_model: model.glsl
-//   vec4 cm_atlas_value(ivec3 at)   of the layers of images: a texel of straight alpha, each channel from 0 to 1
+//   vec4 cm_atlas_value(ivec3 at)   texel of the texture atlas layers: straight alpha, each channel from 0 to 1
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
 #include "ggx.glsl"
@@ -14,7 +14,8 @@
 CM_FN vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
 
 #if CM_MOTION
-// A tree's texel now, of those at both ends: both have the same links, and the same triangles in the same order.
+// Interpolates a BVH texel between both ends of the shutter interval. Both trees have the same links and the same
+// triangles in the same order.
 CM_FN uvec4 cm_tree_between(uint open, uint close) {
   uvec4 first = cm_words(open);
   return uvec4(floatBitsToUint(cm_straight(uintBitsToFloat(uvec3(first)), vec3(cm_floats(close)))), first.w);
@@ -40,12 +41,12 @@ CM_FN uvec4 cm_bvh_triangle(uint texel) {
   return cm_words(cm_models[cm_model].records + texel);
 }
 
-// What the ray under way is, for cm_hit_accept.
+// Properties of the current ray, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
 #if CM_RICH
 vec3 cm_hit_direction = vec3(0.0f);  // world, unit
-vec3 cm_hit_passed = vec3(1.0f);     // what is left of its light by what it has passed so far, over the chance to pass
+vec3 cm_hit_passed = vec3(1.0f);     // transmittance over pass probability of the clear surfaces passed so far
 #endif
 
 CM_FN vec2 cm_ggx_albedo(float roughness, float cosine) {
@@ -88,7 +89,7 @@ CM_FN float cm_sheen_albedo_average(float roughness) {
 
 #include "bsdf.glsl"
 
-// Unit vector of two signed 16-bit coordinates.
+// Unpacks a unit vector from two signed 16-bit octahedral coordinates.
 CM_FN vec3 cm_octahedral(uint word) { return cm_from_octahedron(unpackSnorm2x16(word)); }
 
 struct CmVertexMix {
@@ -101,7 +102,7 @@ struct CmVertexMix {
   vec4 color;
 };
 
-// Of a model's triangle, which has this number in its mesh.
+// Interpolates the vertices of a model's triangle. triangle: its number in the mesh.
 CM_FN CmVertexMix cm_vertex_mix(uint model, uint triangle, vec2 weights) {
   CmVertexMix m;
   m.model = model;
@@ -141,8 +142,8 @@ CM_FN vec3 cm_from_srgb(vec3 v) {
   return mix(v / 12.92f, pow((v + 0.055f) / 1.055f, vec3(2.4f)), greaterThan(v, vec3(0.04045f)));
 }
 
-// A material's texture at a point, filtered bilinearly (samples are spread over the pixel: that is the minification
-// filter); white where there is none.
+// Samples a material's texture, filtered bilinearly; white if there is none. Samples are spread over the pixel, which
+// acts as the minification filter.
 CM_FN vec4 cm_texture(CmVertexMix m, uint use, bool srgb) {
   uint word = m.material + use;
   uvec4 head = cm_words(word);
@@ -153,7 +154,7 @@ CM_FN vec4 cm_texture(CmVertexMix m, uint use, bool srgb) {
   uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + vec2(tail.y, tail.z);
   uvec4 t = cm_words(cm_models[m.model].textures + (head.x & ~CM_USE_SECOND_UV) - 1u);
   vec2 size = vec2(t.y & 0xffffu, t.y >> 16);
-  // Far outside, whole turns would lose the fraction's precision: each wrap mode repeats after two.
+  // Far from 0, whole periods would cost the fraction's precision. Each wrap mode repeats after two.
   bvec2 clamped = bvec2((t.w & CM_WRAP_MASK) == CM_WRAP_CLAMP, ((t.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK) == CM_WRAP_CLAMP);
   vec2 at = uv - 2.0f * floor(0.5f * uv) * vec2(clamped.x ? 0.0f : 1.0f, clamped.y ? 0.0f : 1.0f);
   at = clamp(at, vec2(-4.0f), vec2(4.0f)) * size;
@@ -170,8 +171,8 @@ CM_FN vec4 cm_texture(CmVertexMix m, uint use, bool srgb) {
   return sum;
 }
 
-// The share of rays that a point of a triangle is there for. Coverage (BLEND) is a chance, so that no order of surfaces
-// and volume has to be found.
+// Probability that a ray hits the triangle at this point. Coverage (BLEND) is stochastic, so that surfaces and volume
+// need not be sorted.
 CM_FN float cm_coverage(CmVertexMix m) {
   uint word = m.material;
   uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
@@ -183,21 +184,21 @@ CM_FN float cm_coverage(CmVertexMix m) {
 struct CmSurfacePoint {
   CmSurface material;
   vec3 position;   // world
-  vec3 geometric;  // unit normal of the triangle, on the side the path came from
-  bool behind;     // that side is the one from which its vertices turn clockwise
-  bool lifted;     // rays that leave it at grazing angles start above it: see cm_lift
-  vec3 emission;   // to that side
+  vec3 geometric;  // unit normal of the triangle, on the path's side
+  bool behind;     // the path came from the side where the vertices are clockwise
+  bool lifted;     // rays that leave at grazing angles start above the triangle: see cm_lift
+  vec3 emission;   // emission to that side
   bool unlit;
 #if CM_RICH
-  float kept;      // one over the chance that a path ends here, of what does not pass
+  float kept;      // 1 / (1 - probability that a path passes through here)
 #endif
 };
 
-// What a vertex has that moves, in its mesh's own space.
+// The fields of a vertex that may move, in the mesh's own space.
 struct CmCorner {
   vec3 position;
   vec3 normal;
-  vec4 tangent;  // w: its hand; 0: it has none
+  vec4 tangent;  // w: handedness; 0: no tangent
 };
 
 CM_FN CmCorner cm_corner_at(uint first) {
@@ -222,7 +223,7 @@ CM_FN CmCorner cm_corner(CmVertexMix m, int i) {
 }
 
 #if CM_MOTION
-// Of a triangle of a mesh that deforms, in its own space: its area at the frame's moment, over that now.
+// Area of a triangle of a deforming mesh at the frame time, divided by its area at cm_now, in the mesh's own space.
 CM_FN float cm_area_share(CmVertexMix m) {
   vec3 now = cm_corner(m, 0).position;
   now = cross(cm_corner(m, 1).position - now, cm_corner(m, 2).position - now);
@@ -232,7 +233,7 @@ CM_FN float cm_area_share(CmVertexMix m) {
 }
 #endif
 
-// The corners of a triangle in the world.
+// The corners of a triangle in world space.
 struct CmCorners {
   vec3 position[3];
   vec3 normal[3];
@@ -255,16 +256,17 @@ CM_FN bool cm_mirrors(uint model) {
   return (cm_models[model].flags & CM_MODEL_MIRRORS) != 0u;
 }
 
-// The unit normal on the side from which a triangle's vertices turn counter-clockwise in the world.
+// Unit normal on the side from which a triangle's vertices are counter-clockwise in world space.
 CM_FN vec3 cm_turning_normal(vec3 a, vec3 b, vec3 c) {
   vec3 g = cross(b - a, c - a);
-  // Scaled first: the cross product of a tiny triangle has no length in fp32.
+  // Scaled first, because the cross product of a tiny triangle underflows in fp32.
   return normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
 }
 
-// From a point of a triangle to the smooth surface that its vertices' normals speak of, where that bulges towards
-// `geometric`: the mean of the point's projections onto the vertices' tangent planes (Hanika, "Hacking the Shadow
-// Terminator", Ray Tracing Gems II, chapter 4, 2021). 0 where it is flat, to what normals of 16 bits can tell.
+// Offset from a point of a triangle to the smooth surface implied by the vertex normals, where that bulges towards
+// `geometric`. It is the weighted mean of the point's offsets to the vertices' tangent planes (Hanika, "Hacking the
+// Shadow Terminator", Ray Tracing Gems II, chapter 4, 2021). 0 on flat surfaces, within the precision of 16-bit
+// normals.
 CM_FN vec3 cm_lift(vec3 p, vec3 weight, CmCorners corners, vec3 geometric) {
   vec3 lift = vec3(0.0f);
   for (int i = 0; i < 3; ++i) {
@@ -276,13 +278,13 @@ CM_FN vec3 cm_lift(vec3 p, vec3 weight, CmCorners corners, vec3 geometric) {
   return lift;
 }
 
-// How much of that a ray starts above the triangle, `cosine` to its normal: all of it along the triangle and below. So
-// light that the smooth normals face is not stopped by the flat triangles that stand for them, and nothing is lost at
-// their edges; whoever looks for light and whoever happens on it start alike.
+// Fraction of the lift for a ray at `cosine` to the triangle's normal: 1 along the triangle and below it. So the flat
+// triangles do not block light that the smooth normals face, and no light is lost at their edges. Shadow rays and
+// scattered rays start alike.
 const float CM_GRAZING = 0.1f;
 CM_FN float cm_lift_share(float cosine) { return clamp(1.0f - cosine / CM_GRAZING, 0.0f, 1.0f); }
 
-// A material's textures at a point.
+// Values of a material's textures at a point.
 struct CmMaps {
   vec4 base_color;
   vec4 metallic_roughness;
@@ -308,7 +310,7 @@ const uint CM_LAST_USE = CM_USE_FILM_THICKNESS;
 const uint CM_LAST_USE = CM_USE_CLEARCOAT_ROUGHNESS;
 #endif
 
-// In a loop: one after the other they would be the most of a kernel's code.
+// A loop, because the unrolled code would be most of a kernel.
 CM_FN CmMaps cm_maps(CmVertexMix m) {
   CmMaps maps;
   for (uint use = CM_USE_BASE_COLOR; use <= CM_LAST_USE; use += 2u) {
@@ -337,14 +339,14 @@ CM_FN CmMaps cm_maps(CmVertexMix m) {
   return maps;
 }
 
-// What a material emits where it is seen from its front.
+// Emission of a material, seen from the front.
 CM_FN vec3 cm_emission(CmVertexMix m) {
   return vec3(cm_floats(m.material + CM_MATERIAL_EMISSION)) * vec3(cm_texture(m, CM_USE_EMISSION, true));
 }
 
 #if CM_RICH
 
-// The tangent that a base lobe is turned by: across the normal.
+// Projects a tangent onto the plane of the normal. Returns an arbitrary tangent if there is none.
 CM_FN vec3 cm_across(vec3 normal, vec3 tangent) {
   vec3 across = tangent - dot(tangent, normal) * normal;
   float length2 = dot(across, across);
@@ -355,10 +357,11 @@ CM_FN vec3 cm_across(vec3 normal, vec3 tangent) {
   return u;
 }
 
-// An index over another that is not quite 1, where refraction has no half vector.
+// Moves a relative index of refraction away from 1, where refraction has no half vector.
 CM_FN float cm_apart(float eta) { return abs(eta - 1.0f) < 1e-3f ? (eta < 1.0f ? 0.999f : 1.001f) : eta; }
 
-// What the extensions say of the surface. tangent: along growing u, and its hand; shading: the normal that they are about.
+// Sets the fields of the material extensions. tangent: along increasing u, w its handedness; shading: the normal they
+// refer to.
 CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent, vec3 shading, vec3 geometric, bool from_back) {
   vec4 sheen = cm_floats(word + CM_MATERIAL_SHEEN);
   vec4 film = cm_floats(word + CM_MATERIAL_FILM);
@@ -369,7 +372,7 @@ CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent
   s.sheen_roughness = clamp(sheen.w * maps.sheen_roughness.a, 0.0f, 1.0f);
   s.transmission = clamp(cm_floats(word + CM_MATERIAL_COAT).y * maps.transmission.r, 0.0f, 1.0f);
   s.eta = volume_ior > 0.0f ? cm_apart(from_back ? 1.0f / volume_ior : volume_ior) : 0.0f;
-  // The coat and the sheen of a volume are outside.
+  // A volume's coat and sheen are only on its outside.
   if (volume_ior > 0.0f && from_back) {
     s.clearcoat = 0.0f;
     s.sheen = vec3(0.0f);
@@ -402,8 +405,8 @@ CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent
 
 #endif
 
-// The point of a triangle that a path along w (world) has met, on its back or its front. With CM_RICH a volume's boundary
-// bounds air: cm_bound (path_vertex.glsl) knows better.
+// Shading data of the point of a triangle that a path along w (world) has hit, on its back or front. With CM_RICH a
+// volume boundary is assumed to be in air; cm_bound (path_vertex.glsl) corrects that.
 CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
   uint model = cm_model_of(triangle);
@@ -448,7 +451,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
     }
   }
 #if CM_RICH
-  vec3 shading = normal;  // of the front
+  vec3 shading = normal;  // shading normal of the front side
 #endif
   if (back) normal = -normal;
   point.material.matte_normal = normal;
@@ -470,7 +473,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
 #if CM_RICH
   cm_enrich(point.material, word, maps, tangent, shading, point.geometric, from_back);
   if (point.unlit) point.material.transmission = 0.0f;
-  // What passes has not come here: the others stand for it.
+  // Rays that pass through are not shaded here, so the shaded ones are weighted by 1 / (1 - pass probability).
   vec3 passes = cm_bsdf_passes(point.material, -w);
   point.kept = 1.0f / max(1.0f - cm_max3(passes), 1e-6f);
   point.emission *= point.kept;
@@ -478,8 +481,8 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
   return point;
 }
 
-// Whether a ray ends at a triangle of the mesh that asks. What is clear lets light pass by the chance of the channel that
-// passes most.
+// Called by the BVH: returns true if the ray ends at this triangle. Clear surfaces let rays pass with the transmittance
+// of their most transparent channel.
 CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
   float solid = cm_coverage(cm_vertex_mix(cm_model, triangle, weights));
   uint number = cm_models[cm_model].first + triangle;
@@ -497,7 +500,7 @@ CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
 #endif
 }
 
-// Cameras see through the backs of single-sided materials; light does not.
+// Camera rays pass the backs of single-sided materials; other rays do not.
 #define CM_HIT_ACCEPT
 #define CM_BVH_CULLS cm_hit_camera
 #define CM_BVH_LOW cm.surfaces.low
@@ -506,8 +509,8 @@ CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
 #include "bvh.glsl"
 #include "model.glsl"
 
-// Reflected share of light from wi (world, unit) towards where the path came from, times the cosine. Not 0 below the
-// triangle: what is seen there from the ray's start counts, often the surface itself.
+// BSDF times cosine for light from wi (world, unit) scattered to where the path came from. It is not 0 below the
+// triangle: light found there from the ray's origin counts, often that of the surface itself.
 CM_FN vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
   vec3 share = cm_bsdf_eval(point.material, -w, wi);
 #if CM_RICH
@@ -516,17 +519,17 @@ CM_FN vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
   return share;
 }
 
-// Density of cm_surface_sample's directions by solid angle.
+// Solid-angle pdf of cm_surface_sample.
 CM_FN float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
 
-// A direction to go on in.
+// Samples a direction for the scattered ray.
 CM_FN vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2) {
   return cm_bsdf_sample(point.material, -w, u_0, u_1, u_2);
 }
 
-// Where a ray along d (world, unit) starts from a point of a triangle, in the world: beside it, on the side from which
-// its vertices turn clockwise, or on the other. lifts: cm_lift applies. shift: from the point itself, but for the
-// rounding.
+// Origin of a ray along d (world, unit) that starts at a point of a triangle, in world space. behind: the origin is on
+// the side where the vertices are clockwise. lifts: apply cm_lift. shift: offset from the point itself, without the
+// rounding margin.
 CM_FN vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, bool lifts, vec3 d, CM_OUT(vec3) shift) {
   uint model = cm_model_of(triangle);
   CmVertexMix m = cm_vertex_mix(model, triangle - cm_models[model].first, weights);

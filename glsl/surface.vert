@@ -1,20 +1,20 @@
 #version 450
-// A vertex of the scene, seen from the eye; row 0 of the target is the picture's top.
+// Transforms a vertex of the scene, relative to the eye; row 0 of the target is the image's top.
 #include "bindings.glsl"
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 
-layout(location = 0) in vec3 cm_position;  // its own space
+layout(location = 0) in vec3 cm_position;  // in its own space
 layout(location = 1) in vec3 cm_normal;
 layout(location = 2) in vec4 cm_tangent;
-layout(location = 3) in vec4 cm_uv;  // both sets
+layout(location = 3) in vec4 cm_uv;  // both sets of texture coordinates
 layout(location = 4) in vec4 cm_color;
-layout(location = 5) in vec3 cm_place_x;  // columns of the linear part of its own space to the world
+layout(location = 5) in vec3 cm_place_x;  // columns of the linear part from its own space to the world
 layout(location = 6) in vec3 cm_place_y;
 layout(location = 7) in vec3 cm_place_z;
-layout(location = 8) in vec3 cm_place_high;  // its origin, from the eye; with the next a sum of more digits than a float has
+layout(location = 8) in vec3 cm_place_high;  // its origin relative to the eye, as a sum of two floats
 layout(location = 9) in vec3 cm_place_low;
-layout(location = 0) uniform vec2 cm_shift;  // of the layer, in normalised device coordinates
+layout(location = 0) uniform vec2 cm_shift;  // jitter of the layer, in normalized device coordinates
 
 layout(location = 0) out vec3 cm_from_eye;
 layout(location = 1) out vec3 cm_shading_normal;
@@ -28,11 +28,12 @@ void main() {
   precise vec3 turned = cm_place_x * cm_position.x + cm_place_y * cm_position.y + cm_place_z * cm_position.z;
   precise vec3 q = (turned + cm_place_high) + cm_place_low;
   precise vec3 v = cm_view.to_view_x.xyz * q.x + cm_view.to_view_y.xyz * q.y + cm_view.to_view_z.xyz * q.z;
-  // One sum for every projection: of "orthographic ? 1 : z" NVIDIA's 580 makes varyings that nothing divides by w again.
+  // One expression for every projection: with "orthographic ? 1 : z", NVIDIA's driver 580 does not divide varyings by w
+  // again.
   float w = cm_view.clip.z + cm_view.clip.w * v.z;
   gl_Position = vec4(v.x + cm_shift.x * w, -v.y + cm_shift.y * w, cm_view.clip.x + cm_view.clip.y * v.z, w);
   cm_from_eye = q;
-  // Products of short columns would vanish.
+  // Scaled, because products of short columns would underflow.
   vec3 longest = max(max(abs(cm_place_x), abs(cm_place_y)), abs(cm_place_z));
   float scale = 1.0 / max(max(longest.x, longest.y), longest.z);
   vec3 x = scale * cm_place_x;
@@ -42,7 +43,7 @@ void main() {
   float side = dot(x, across) < 0.0 ? -1.0 : 1.0;
   vec3 normal = across * cm_normal.x + cross(z, x) * cm_normal.y + cross(x, y) * cm_normal.z;
   vec3 tangent = x * cm_tangent.x + y * cm_tangent.y + z * cm_tangent.z;
-  // Of equal lengths: they are interpolated.
+  // Normalized to equal lengths, because they are interpolated.
   float n_n = dot(normal, normal);
   float t_t = dot(tangent, tangent);
   cm_shading_normal = n_n > 0.0 ? side * normal * inversesqrt(n_n) * length(cm_normal) : cm_normal;

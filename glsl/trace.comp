@@ -1,6 +1,6 @@
 #version 450
-// The path tracer as one kernel, where paths meet no triangles. Each lane of some blocks loads its path, runs it for a
-// bounded number of rounds, stores it.
+// The path tracer as a megakernel, for scenes without triangles. Each lane of the dispatch's blocks loads its path,
+// runs it for a bounded number of rounds and stores it.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_HOLDOUT=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1
 // variants: - or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 or CM_LAMPS=1 CM_LAYERS=1 or CM_LAMPS=1 CM_AOVS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1 or CM_LAMPS=1 CM_LAYERS=1 CM_GROUPS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 CM_GROUPS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
@@ -23,7 +23,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "run.glsl"
 #include "groups.glsl"
 
-// What paths have of triangles takes no registers where there are none.
+// Constants for the fields that only triangles use, so that they take no registers.
 void cm_forget_triangles(inout CmPath p) {
 #if !CM_EQUIANGULAR
   p.reach = 0.0;

@@ -1,6 +1,6 @@
 #version 450
-// Adds the samples that are done to their pixels, and begins the next: glsl/path_queue.glsl. With CM_DENSE it begins a
-// dispatch: each lane of its blocks goes on where it was, or takes its first pixel.
+// Adds finished samples to their pixels and starts the next ones: glsl/path_queue.glsl. With CM_DENSE it is the first
+// kernel of a dispatch: each lane of its blocks continues its path or takes its first pixel.
 // variants: CM_SURFACES=1
 // variants: - or CM_AOVS=1
 // variants: CM_DENSE=0,1

@@ -1,12 +1,12 @@
 #version 450
-// Asks the tree for paths that wait for it: glsl/path_queue.glsl.
+// Intersects queued rays with the triangles: glsl/path_queue.glsl.
 // variants: CM_SURFACES=1
 // variants: - or CM_RICH=1
 // variants: - or CM_GROUPS=1
 // variants: - or CM_MOTION=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
-#define CM_KEEPS_EQUIANGULAR  // what kernels before and behind this one have of a path
+#define CM_KEEPS_EQUIANGULAR  // same layout of a path as the kernels before and after this one
 
 #include "bindings.glsl"
 #include "shared.glsl"
@@ -29,9 +29,9 @@ void main() {
   cm_load_within(p, lane);
   cm_meet(p);
 #if CM_RICH
-  cm_store_flight(p, lane);  // of which what it went through has taken its share
+  cm_store_flight(p, lane);  // throughput and light, dimmed by absorption
 #endif
-  if (cm.medium.emits != 0u) cm_store_ray(p, lane);  // which ends there
+  if (cm.medium.emits != 0u) cm_store_ray(p, lane);  // the ray may end earlier
   cm_store_ends(p, lane);
   cm_send_on(p, lane);
 }

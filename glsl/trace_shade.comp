@@ -1,5 +1,5 @@
 #version 450
-// What happens on the triangles that paths have met, or whose shadow rays have ended: glsl/path_queue.glsl.
+// Shades the triangles that paths have hit, or where their shadow rays started: glsl/path_queue.glsl.
 // variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_RICH=1 CM_GROUPS=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1 or CM_MOTION=1 or CM_CHANNELS=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_ENVIRONMENT=1
@@ -19,7 +19,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path_queue.glsl"
 #include "groups.glsl"
 
-// What has ended with the ray takes no registers.
+// Clears the fields that ended with the ray, so that they take no registers.
 void cm_forget_ray(inout CmPath p) {
   p.t = 0.0;
   p.d = vec3(0.0);
@@ -35,8 +35,8 @@ void cm_forget_ray(inout CmPath p) {
   p.event = CM_EVENT_NONE;
 }
 
-// A triangle, a look for light and what the path is of would not fit into the registers that leave GPUs lanes to wait
-// with: each is loaded when it is needed, and stored, or loaded again, rather than kept.
+// The shading data of a triangle, a light sample and the path together need too many registers for good occupancy. Each
+// is loaded when it is needed, and stored or loaded again rather than kept.
 void main() {
   if (cm_queue_place() >= cm_queue_count(CM_QUEUE_SHADE)) return;
   uint lane = cm_queue_lane(CM_QUEUE_SHADE);

@@ -1,5 +1,5 @@
 #version 450
-// The medium's part of paths among triangles: glsl/path_queue.glsl.
+// Traverses the medium in scenes with triangles: glsl/path_queue.glsl.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_HOLDOUT=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1
 // variants: CM_SURFACES=1,2 or CM_SURFACES=2 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
@@ -8,7 +8,8 @@
 // variants: - or CM_EQUIANGULAR=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// A path that waits leaves its lane to the next one in the queue: few events a visit, and longer marches.
+// A path that waits for another kernel frees its lane for the next one in the queue: few events per visit, and longer
+// traversals.
 #define CM_EVENTS 2
 #define CM_CHUNK 16
 

@@ -1,9 +1,9 @@
 #version 450
-// A light's transmittance map (cumulet_update_transmittance_map): what of it comes through all volumes to the points of
-// a lattice, slice behind slice along its rays. A deep shadow map (Lokovic and Veach 2000) at even depths; without
-// noise, in closed form from cell to cell. Parallel rays are those of an orthographic view from the light; those of a
-// point are by octahedra (octahedron.glsl), whose folds texels lie on, so that what is filtered across one is of the same
-// rays.
+// A light's transmittance map (cumulet_update_transmittance_map): the transmittance from the light through all volumes
+// to the points of a lattice, slice by slice along its rays. This is a deep shadow map (Lokovic and Veach 2000) at
+// uniform depths, in closed form per cell and without noise. Parallel rays are those of an orthographic view from the
+// light. Rays of a point light use octahedral mapping (octahedron.glsl). Texels lie on its folds, so that filtering
+// across a fold mixes equal rays.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -19,7 +19,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(r16f, binding = CM_IMAGE_TRANSMITTANCE_MAP) uniform writeonly image3D cm_map;
 layout(location = 0) uniform bool cm_from_point;
-layout(location = 1) uniform vec2 cm_range;  // world: where the first and the last slice are on a ray
+layout(location = 1) uniform vec2 cm_range;  // world: distances of the first and the last slice along a ray
 
 void main() {
   uvec2 texel = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
@@ -34,7 +34,7 @@ void main() {
   float step_t = (cm_range.y - cm_range.x) / float(slices - 1);
   int slice = 0;
   float used = 0.0;
-  // Who is hidden from cameras has its shadow.
+  // Volumes hidden from cameras still cast shadows.
   CmWalk walk = cm_walk(o, cm_to_cube(w), cm_range.y, false);
   for (int i = 0; i < 100000 && slice < slices; ++i) {
     float t_1, e_0, e_1;

@@ -1,16 +1,16 @@
-// A node of a tree over the boxes of what stands in a scene, instances of volumes or models, in the order that needs no
-// stack. Shared by GLSL and C++; the includer has parameters.glsl before this. Made by src/scene/threaded_tree.hpp.
+// A node of a tree over the boxes of a scene's instances, of volumes or of models, in threaded order: traversal needs
+// no stack. Shared by GLSL and C++; the includer has parameters.glsl before this. Made by src/scene/threaded_tree.hpp.
 #ifndef CM_TREE_NODE_GLSL
 #define CM_TREE_NODE_GLSL
 
 const uint CM_INSTANCE_NONE = 0xffffffffu;
 
-// In the order in which they are met: after a node that a ray comes near the one behind it, else the one that it names.
+// Nodes are stored in traversal order. If the ray comes near a node's box, the next node follows, else node `skip`.
 CM_BLOCK(CmInstanceNode) {
   CM_ALIGN(16) vec3 low;  // scene's frame
-  uint skip;              // of the first node, the root: how many there are
+  uint skip;              // in the root: the number of nodes
   CM_ALIGN(16) vec3 high;
-  uint instance;           // CM_INSTANCE_NONE: an inner node, of all up to skip
+  uint instance;           // CM_INSTANCE_NONE: an inner node, whose subtree ends before skip
 };
 
 #endif

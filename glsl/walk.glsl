@@ -1,19 +1,19 @@
-// A ray's way through the volume, or through all of them together, part by part: over a part extinction is linear. For
-// what is known without chance; paths go through volumes one by one (flight.glsl). The includer has march.glsl and
-// ray.glsl before this.
+// Deterministic traversal of a ray through the volume, or through all volumes together, segment by segment. Extinction
+// is linear in each segment. Used for feature rays and transmittance; paths traverse volumes one by one (flight.glsl).
+// The includer has march.glsl and ray.glsl before this.
 #ifndef CM_WALK_GLSL
 #define CM_WALK_GLSL
 
-// That a ray may be in at once. With more of them at one place those that it enters last are taken up when others end.
+// Maximum number of volumes that a ray may be in at once. If more overlap, those entered last wait until others end.
 #if CM_INSTANCES
 #define CM_MOST_FRONTS 4
 #define CM_IS_FRONT(k, walk) (k < walk.count)
 #else
 #define CM_MOST_FRONTS 1
-#define CM_IS_FRONT(k, walk) (k < 1 && k < walk.count)  // no loop
+#define CM_IS_FRONT(k, walk) (k < 1 && k < walk.count)  // without a loop
 #endif
 
-// A volume that the ray is in: its cell, from t_0 to t_1, with the extinctions there.
+// An active volume of the ray: its current cell, which spans t_0 to t_1, with the extinctions there.
 struct CmFront {
   uvec3 cell;
   uvec3 next;
@@ -27,13 +27,13 @@ struct CmFront {
 struct CmWalk {
   vec3 o;
   vec3 d;
-  float t;  // where the part begins
+  float t;  // start of the current segment
   float t_end;
-  bool of_camera;  // it comes to what cameras see, else to all
+  bool of_camera;  // a camera ray, which skips volumes hidden from cameras
   int count;
   CmFront front[CM_MOST_FRONTS];
-  float entry;   // where it enters the volume that comes next, 3e38: none does
-  uint volume;   // that one
+  float entry;   // distance where it enters the next volume; 3e38: there is none
+  uint volume;   // that next volume
 };
 
 void cm_stand_at(CmFront front) {
@@ -42,7 +42,7 @@ void cm_stand_at(CmFront front) {
 #endif
 }
 
-// Into front.next, from t on.
+// Steps into front.next, from t on.
 void cm_front_step(vec3 o, vec3 d, float t, inout CmFront front) {
   cm_stand_at(front);
   CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
@@ -60,7 +60,7 @@ float cm_front_extinction(CmFront front, float t) {
   return front.e_0 + (front.e_1 - front.e_0) * ((t - front.t_0) / (front.t_1 - front.t_0));
 }
 
-// The volume that comes next.
+// Finds the next volume.
 void cm_walk_seek(inout CmWalk walk) {
 #if CM_INSTANCES
   uint flags = walk.of_camera ? CM_INSTANCE_SEEN : 0u;
@@ -91,7 +91,8 @@ CmWalk cm_walk(vec3 o, vec3 d, float t_end, bool of_camera) {
   return walk;
 }
 
-// The part from walk.t on: where it ends, perhaps behind t_end, and the extinctions at its ends. False: there is none.
+// The segment from walk.t on. t_1: its end, which may be beyond t_end; e_0, e_1: extinctions at both ends. Returns
+// false if there is none.
 bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1) {
   t_1 = 3.0e38;
   e_0 = 0.0;
@@ -117,7 +118,7 @@ bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1
   return true;
 }
 
-// Goes on to the next part, behind t_1.
+// Advances to the segment after t_1.
 void cm_walk_on(inout CmWalk walk, float t_1) {
   walk.t = t_1;
   int kept = 0;
@@ -132,7 +133,8 @@ void cm_walk_on(inout CmWalk walk, float t_1) {
   walk.count = kept;
 }
 
-// Of a volume that the ray is in at t, if any: where, as the first front.
+// Advances to a volume that contains the point at t, and locates its cell as the first front. Returns false if there is
+// none.
 bool cm_walk_to(inout CmWalk walk, float t) {
   while (walk.entry < t) {
     CmFront front;
@@ -149,7 +151,7 @@ bool cm_walk_to(inout CmWalk walk, float t) {
   return false;
 }
 
-// Of those that the ray is in, the one with the most extinction at t.
+// Returns the active volume with the maximum extinction at t.
 uint cm_walk_densest(inout CmWalk walk, float t) {
   uint densest = walk.front[0].volume;
   float most = -1.0;
@@ -161,7 +163,7 @@ uint cm_walk_densest(inout CmWalk walk, float t) {
   return densest;
 }
 
-// Of the part, per extinction: what their media give off.
+// Source radiance (emission over extinction) of the active media in the current segment.
 vec3 cm_walk_source(inout CmWalk walk) {
 #if CM_INSTANCES
   vec3 source = vec3(0.0);
@@ -169,7 +171,7 @@ vec3 cm_walk_source(inout CmWalk walk) {
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     cm_stand_at(walk.front[k]);
     float extinction = walk.front[k].e_0 + walk.front[k].e_1;
-    source += extinction * CM_MEDIUM.source;
+    if (CM_MEDIUM.holdout == 0u) source += extinction * CM_MEDIUM.source;
     sum += extinction;
   }
   return sum > 0.0 ? source / sum : vec3(0.0);
@@ -178,7 +180,7 @@ vec3 cm_walk_source(inout CmWalk walk) {
 #endif
 }
 
-// Likewise: their albedo, and the mean cosine that they scatter by.
+// Albedo and mean scattering cosine of the active media, weighted by extinction.
 vec4 cm_walk_scatters(inout CmWalk walk) {
   vec4 scatters = vec4(0.0);
   float sum = 0.0;
@@ -198,7 +200,7 @@ vec4 cm_walk_scatters(inout CmWalk walk) {
 }
 
 #if CM_VELOCITY
-// Of the part up to t_1: the mean velocity of what scatters, world units a second.
+// Mean velocity of the medium in the segment up to t_1, weighted by extinction; world units per second.
 vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
   vec3 velocity = vec3(0.0);
   float sum = 0.0;
@@ -215,12 +217,13 @@ vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
 #endif
 
 #if CM_CHANNELS
-// What their cells give off from the part's beginning to t_1.
+// Emission of the active cells from the segment's start to t_1.
 vec3 cm_walk_emitted(inout CmWalk walk, float t_1) {
   vec3 emitted = vec3(0.0);
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     CmFront front = walk.front[k];
     cm_stand_at(front);
+    if (CM_MEDIUM.holdout != 0u) continue;
     CmEmission emission =
         cm_march_emission(front.cell, cm_in_volume_point(walk.o), cm_in_volume(walk.d));
     emitted += cm_emitted(emission, walk.t, t_1);

@@ -1,22 +1,22 @@
-// What the passes of the wavelet filter (render::Wavelet says how they go together) have in common. A pixel has
-//   front    radiance in front of the background, over the surface's albedo, and the part that nothing covers
-//   spread   that part as rays without noise found it, the variances of the radiance's and of the part's means; before
-//            wavelet_variance.comp the second is a sample's second moment and the third the number of samples
-//   guides   what is known of it without noise
+// Shared code of the passes of the wavelet filter (src/render/wavelet.hpp describes their order). A pixel has
+//   front    radiance in front of the background, divided by the surface's albedo (demodulated); uncovered fraction
+//   spread   uncovered fraction from feature rays; variance of the mean radiance; variance of the uncovered fraction.
+//            Before wavelet_variance.comp the second is a sample's second moment and the third the number of samples
+//   guides   noise-free features
 #ifndef CM_WAVELET_GLSL
 #define CM_WAVELET_GLSL
 #include "shared.glsl"
 #include "luminance.glsl"
 #include "numbers.glsl"
 
-layout(location = 0) uniform ivec2 cm_rows;  // of this dispatch: the first, and the one after the last
+layout(location = 0) uniform ivec2 cm_rows;  // rows of this dispatch: first, and one past the last
 
 struct CmGuides {
-  vec3 normal;          // of what is seen of the surface: as long as that share
-  float transmittance;  // of the volume in front of it
-  float surface_z;      // view depths; beyond CM_NOTHING_Z there is none
+  vec3 normal;          // of the visible part of the surface: its length is that fraction
+  float transmittance;  // of the volume in front of the surface
+  float surface_z;      // view depths; above CM_NOTHING_Z: none
   float volume_z;
-  bool finite;  // else the pixel is no number, and none of another's business
+  bool finite;  // false: the pixel has NaN or infinity, and other pixels ignore it
 };
 
 #define CM_NOTHING_Z 1e37
@@ -36,17 +36,17 @@ CmGuides cm_unpacked(uvec4 words) {
 layout(binding = CM_UNIT_WAVELET_FRONT) uniform sampler2D cm_front;
 layout(binding = CM_UNIT_WAVELET_SPREAD) uniform sampler2D cm_spread;
 layout(binding = CM_UNIT_WAVELET_GUIDES) uniform usampler2D cm_guides;
-layout(location = 2) uniform vec2 cm_footprint;   // of a pixel at depth z, in the world: x + y z
+layout(location = 2) uniform vec2 cm_footprint;   // world size of a pixel at depth z: x + y z
 
 CmGuides cm_guides_at(ivec2 texel) { return cm_unpacked(texelFetch(cm_guides, texel, 0)); }
 
-// What a pixel's radiance is in proportion to, if what scatters there looks the same: how much of it there is.
+// Coverage of a pixel. Its radiance is proportional to this if the material there looks the same.
 float cm_cover(float open) { return 1.0 - 0.98 * open; }
 
-// The smaller step to either side: the larger may be over an edge.
+// Returns the difference of smaller magnitude. The other one may cross an edge.
 float cm_smaller(float a, float b) { return abs(a) < abs(b) ? a : b; }
 
-// By how much a depth changes from pixel to pixel, to the right and down: surfaces', volume's.
+// Depth differences from pixel to pixel, to the right and down: of surfaces (xy), of the volume (zw).
 vec4 cm_slopes(ivec2 texel, CmGuides here) {
   ivec2 last = textureSize(cm_guides, 0) - 1;
   vec2 z = vec2(here.surface_z, here.volume_z);
@@ -63,7 +63,7 @@ vec4 cm_slopes(ivec2 texel, CmGuides here) {
   return mix(slopes, vec4(0.0), greaterThan(abs(slopes), vec4(0.1 * CM_NOTHING_Z)));
 }
 
-// How far a depth is from the plane through another, in what a slope of pixels like these allows.
+// Distance of a depth from the plane through another pixel's depth, relative to the tolerance of that slope.
 float cm_off_plane(float here, float there, vec2 slope, vec2 offset) {
   if (max(here, there) > CM_NOTHING_Z) return min(here, there) > CM_NOTHING_Z ? 0.0 : 10.0;
   float expected = dot(slope, offset);
@@ -71,7 +71,7 @@ float cm_off_plane(float here, float there, vec2 slope, vec2 offset) {
   return min(10.0, abs(there - here - expected) / (0.5 * abs(expected) + 2.0 * footprint * length(offset)));
 }
 
-// Of two pixels, how likely they are to show the same thing, 0 to 1. Surfaces count as far as they are seen.
+// Similarity of two pixels, 0 to 1. Surfaces count by their visibility.
 float cm_alike(CmGuides here, CmGuides there, vec4 slopes, vec2 offset) {
   vec3 bend = here.normal - there.normal;
   float far = 20.0 * dot(bend, bend) + 2.0 * abs(here.transmittance - there.transmittance);
@@ -84,14 +84,14 @@ float cm_alike(CmGuides here, CmGuides there, vec4 slopes, vec2 offset) {
 }
 #endif
 
-// A surface's albedo, as far as it is seen: what its light is divided by, to be smooth where only its colour is not.
-// covered: the share of the pixel that surfaces cover. What samples and facts differ by of light that is given off has
-// nothing to do with an albedo, which may be black.
+// Visible albedo of a surface, by which its light is divided (demodulation), so that the result is smooth where only
+// the color is not. covered: fraction of the pixel covered by surfaces. Emission is added, because its difference
+// between samples and feature rays is unrelated to the albedo, which may be black.
 vec3 cm_tint(vec3 albedo, float covered, float transmittance, vec4 known) {
   return clamp(1.0 + transmittance * (albedo - covered) + (1.0 - known.a) * known.rgb, 0.05, 1.0);
 }
 
-// The part of a pixel that neither surfaces, the ground nor the volume cover.
+// Fraction of a pixel covered by neither surfaces, ground nor volume.
 float cm_open(float covered, float grounded, float transmittance) {
   return transmittance * max(0.0, 1.0 - covered - grounded);
 }

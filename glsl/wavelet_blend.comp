@@ -1,25 +1,25 @@
 #version 450
-// What the filter takes away is noise, and where it is more than that, is given back.
+// Blends unfiltered light back in where the filter changed more than noise.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #define CM_WAVELET_READS
 #include "wavelet.glsl"
-layout(binding = CM_UNIT_WAVELET_UNFILTERED) uniform sampler2D cm_unfiltered;  // over cover, and its variance
+layout(binding = CM_UNIT_WAVELET_UNFILTERED) uniform sampler2D cm_unfiltered;  // over coverage; a: its variance
 layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
 
 #define CM_RADIUS 2
-// Times the noise: what filtered and unfiltered light differ by for certain.
+// Differences between filtered and unfiltered light count as bias beyond this multiple of the noise.
 #define CM_CERTAIN 1.1
 
-// How much of a pixel's light is best taken unfiltered: most of it where the filter is off by more than the noise. Of
-// noise of variance v the filter has left r v, at most by keeping a part c of the pixel itself, the root of r. Then
-// filtered and unfiltered light differ by b^2 + (1 - c)^2 v, which is known of the pixels about it, and so is the bias b;
-// the mix of both that is least off, by (1 - w)^2 b^2 + (c + w (1 - c))^2 v, follows.
+// Weight w of the unfiltered light. It is large where the filter's bias exceeds the noise. Of noise of variance v the
+// filter leaves r v, and it keeps at most a part c = sqrt(r) of the pixel itself. Then filtered and unfiltered light
+// differ by b^2 + (1 - c)^2 v. The neighborhood gives that difference, and thus the bias b. w minimizes the error (1 -
+// w)^2 b^2 + (c + w (1 - c))^2 v.
 float cm_unfiltered_share(ivec2 texel, CmGuides here) {
   ivec2 size = textureSize(cm_guides, 0);
   vec4 slopes = cm_slopes(texel, here);
   float off = 0.0;
-  vec2 noise = vec2(0.0);  // without the filter, with it
+  vec2 noise = vec2(0.0);  // variance without the filter, and with it
   for (int y = -CM_RADIUS; y <= CM_RADIUS; ++y) {
     for (int x = -CM_RADIUS; x <= CM_RADIUS; ++x) {
       ivec2 at = texel + ivec2(x, y);

@@ -1,24 +1,24 @@
-// What is kept of a picture for those that follow it, two texels of words: its light (as wavelet.glsl's front, with the
-// samples that tell of it), and where it is.
+// History of an image for temporal reprojection, two uvec4 per pixel: its light (like front of wavelet.glsl, with the
+// number of samples behind it), and its geometry.
 #ifndef CM_WAVELET_HISTORY_GLSL
 #define CM_WAVELET_HISTORY_GLSL
 #include "wavelet.glsl"
 
 struct CmLit {
   vec4 front;
-  float moment;   // a sample's mean squared luminance
-  float samples;  // 0: nothing is known
+  float moment;   // mean squared luminance of a sample
+  float samples;  // 0: no history
 };
 
 struct CmPlace {
-  vec3 normal;  // as CmGuides'
+  vec3 normal;  // like CmGuides'
   float transmittance;
-  float open;        // what nothing covers
-  float solid_z;     // view depths; beyond CM_NOTHING_Z there is none
+  float open;        // uncovered fraction
+  float solid_z;     // view depths; above CM_NOTHING_Z: none
   float scattered_z;
 };
 
-// As parts of the largest, so that halves will do for any unit of light.
+// Stored relative to the largest value, so that halves suffice for any unit of light.
 uvec4 cm_packed_light(CmLit lit) {
   float deviation = sqrt(lit.moment);
   float most = max(max(lit.front.r, lit.front.g), max(lit.front.b, deviation));
@@ -49,7 +49,7 @@ CmPlace cm_unpacked_place(uvec4 words) {
 layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
 layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
 
-// Of the picture that is filtered: aovs.comp has depths beside normals and albedos.
+// Geometry of the image being filtered. aovs.comp stores depths beside normals and albedos.
 CmPlace cm_place_at(ivec2 texel) {
   CmGuides guides = cm_guides_at(texel);
   return CmPlace(guides.normal, guides.transmittance, texelFetch(cm_spread, texel, 0).x,

@@ -1,5 +1,5 @@
 #version 450
-// What the wavelet filter begins with, of an accumulation as it is now. CM_HOLES as resolve.comp's.
+// First pass of the wavelet filter: reads the current accumulation. CM_HOLES as in resolve.comp.
 // variants: CM_HOLES=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
@@ -12,14 +12,14 @@ layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance
 layout(binding = CM_UNIT_GUIDE_SURFACE_Z) uniform sampler2D cm_surface_z;
 layout(binding = CM_UNIT_GUIDE_VOLUME_Z) uniform sampler2D cm_volume_z;
 layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
-layout(location = 3) uniform float cm_surfaces;  // 0: surfaces are drawn beneath, by another
-layout(location = 4) uniform ivec4 cm_box;       // pixels that are made: the first, and the one after the last
+layout(location = 3) uniform float cm_surfaces;  // 0: another renderer draws the surfaces below
+layout(location = 4) uniform ivec4 cm_box;       // pixels of the crop window: first, and one past the last
 layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
 layout(rgba32ui, binding = CM_IMAGE_WAVELET_GUIDES) uniform writeonly uimage2D cm_guides_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform writeonly image2D cm_behind_out;
 
-#define CM_SQUARABLE 1e15  // what can be squared is less
+#define CM_SQUARABLE 1e15  // larger values overflow when squared
 
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
@@ -36,7 +36,7 @@ void main() {
   guides.surface_z = texelFetch(cm_surface_z, texel, 0).x;
   guides.volume_z = volume.x;
   float covered = cm_surfaces * through.y;
-  // What is known without noise is not filtered: it comes back at the end.
+  // The noise-free light is not filtered; wavelet_output.comp adds it back.
   vec4 known_light = texelFetch(cm_emission, texel, 0);
   vec3 emission = known_light.rgb;
   vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, guides.transmittance, known_light);
@@ -48,7 +48,7 @@ void main() {
                   cm_is_within(mean.front.a, CM_SQUARABLE) && cm_is_within(emission, CM_SQUARABLE) &&
                   cm_is_within(1e-15 * square, CM_SQUARABLE) && all(greaterThanEqual(texel, cm_box.xy)) &&
                   all(lessThan(texel, cm_box.zw));
-  // A sample is covered or it is not: of its square, what is behind can be taken off.
+  // A sample is either covered or not, so the background can be subtracted from the mean square.
   float behind = cm_luminance(mean.background);
   float luminance = cm_luminance(front);
   float apart = cm_luminance(lit);
@@ -65,6 +65,6 @@ void main() {
   imageStore(cm_front_out, texel, vec4(front, part));
   imageStore(cm_spread_out, texel, vec4(open, moment, samples, 0.0));
   imageStore(cm_guides_out, texel, cm_packed(guides));
-  // The mean of those samples that nothing covers; alpha says whether there were any.
+  // Mean over the uncovered samples; alpha is 1 if there were any.
   imageStore(cm_behind_out, texel, part > 0.0 ? vec4(mean.background / part, 1.0) : vec4(0.0));
 }

@@ -1,7 +1,7 @@
 #version 450
-// A level of the edge-avoiding a-trous wavelet (Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast
-// Global Illumination Filtering", 2010), its edges found by the noise's deviation (Schied et al., "Spatiotemporal
-// Variance-Guided Filtering", 2017): what differs by less is taken for the same.
+// One level of the edge-avoiding a-trous wavelet (Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast
+// Global Illumination Filtering", 2010). As in SVGF (Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017),
+// differences within the noise's standard deviation are no edges.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #define CM_WAVELET_READS
@@ -12,7 +12,7 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_
 
 #define CM_RADIUS 2
 const float cm_kernel[3] = float[3](0.375, 0.25, 0.0625);
-// Of the deviation of two pixels' difference.
+// Times the standard deviation of two pixels' difference.
 #define CM_TOLERANCE 1.2
 
 void main() {

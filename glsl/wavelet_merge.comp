@@ -1,13 +1,13 @@
 #version 450
-// A picture's samples, and those that pictures before it had of the same (CM_HISTORY 1), as if they were its own; and
-// what is kept of both for the pictures that follow. What is remembered counts for less where it is off from the new
-// samples about it by more than their noise, and for nothing once there are CM_ENOUGH of them.
+// Merges a pixel's samples with the reprojected history (CM_HISTORY 1), and writes the history for the following
+// images. History counts for less where it differs from the new samples around it by more than their noise. It counts
+// for nothing once there are CM_ENOUGH new samples.
 // variants: CM_HISTORY=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #define CM_WAVELET_READS
 #include "wavelet_history.glsl"
-layout(location = 3) uniform float cm_most;  // samples that are kept
+layout(location = 3) uniform float cm_most;  // maximum number of samples in the history
 layout(rgba32ui, binding = CM_IMAGE_HISTORY_LIGHT) uniform writeonly uimage2D cm_light_out;
 layout(rgba32ui, binding = CM_IMAGE_HISTORY_GUIDES) uniform writeonly uimage2D cm_guides_out;
 #if CM_HISTORY
@@ -17,19 +17,19 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_
 
 #define CM_RADIUS 2
 #define CM_ENOUGH 64.0
-// Deviations of samples that what is remembered may be off.
+// Clamping range of the history, in standard deviations of the neighborhood.
 #define CM_CLAMP 2.0
-// Of the noise's variance, what a difference is not taken for more than.
+// Squared differences up to this multiple of the noise's variance count as chance.
 #define CM_BY_CHANCE 2.0
-// Fewer new samples tell less of their noise than those that are remembered do.
+// The history's variance counts as at most this many samples beside the new ones.
 #define CM_FEW 4.0
 
-// Of a pixel and those about it.
+// Statistics of a pixel's neighborhood, itself included.
 struct CmAround {
-  vec3 now;  // means, over cover
+  vec3 now;  // means over coverage: of new samples, of the history
   vec3 then;
-  vec3 deviation;   // of pixels' means
-  float variance;   // of a sample's luminance
+  vec3 deviation;   // standard deviation of pixels' means
+  float variance;   // variance of a sample's luminance
   float samples_now;
   float samples_then;
 };
@@ -75,13 +75,13 @@ CmAround cm_around(ivec2 texel, CmGuides here, vec4 slopes) {
   return around;
 }
 
-// What is remembered of the pixel, as far as it agrees with what is new.
+// History of the pixel, reduced and clamped where it disagrees with the new samples.
 CmLit cm_believed(CmLit lit, CmAround around, float cover, float samples) {
   if (around.samples_now == 0.0 || lit.samples == 0.0) return lit;
   float off = cm_luminance(around.then - around.now);
   float noise = around.variance * (1.0 / around.samples_now + 1.0 / around.samples_then);
   float bias = max(0.0, off * off - CM_BY_CHANCE * noise);
-  // As good as so many samples: their variance is bias^2 + variance / lit.samples.
+  // Equivalent number of samples: the history's error is bias^2 + variance / lit.samples.
   lit.samples *= around.variance > 0.0 ? around.variance / (around.variance + lit.samples * bias)
                                        : (bias > 0.0 ? 0.0 : 1.0);
   lit.samples *= max(0.0, 1.0 - samples / CM_ENOUGH);

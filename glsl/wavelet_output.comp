@@ -1,5 +1,5 @@
 #version 450
-// What the wavelet filter found, as means. CM_BACKGROUND as resolve.comp's.
+// Last pass of the wavelet filter: writes the result as means. CM_BACKGROUND as in resolve.comp.
 // variants: CM_BACKGROUND=0,1,2
 layout(local_size_x = 8, local_size_y = 8) in;
 #define CM_HOLES 0
@@ -30,7 +30,7 @@ void main() {
     vec4 known = texelFetch(cm_emission, texel, 0);
     vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, through.x, known);
     float own = cm_open(covered, texelFetch(cm_volume_z, texel, 0).y, through.x);
-    // Where only its own samples count, these are what they are.
+    // If only the pixel's own samples count, the uncovered fraction is theirs.
     float part = clamp(front.a + own - open, 0.0, 1.0);
     vec3 lit = tint * front.rgb * (cm_cover(own) / cm_cover(open));
     mean.front = vec4(max(vec3(0.0), lit + known.rgb), 1.0 - part);

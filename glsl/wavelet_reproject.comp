@@ -1,27 +1,27 @@
 #version 450
-// Where each pixel of a picture was in the view of one before it, and what that one knows of it. What is solid is
-// followed by its depth, the medium by its mean one, and of pixels that show both, both, by the transmittance. Where
-// something else was seen nothing is known.
+// Temporal reprojection: finds each pixel's position in the view of an earlier image, and that image's history there.
+// Surfaces are reprojected by their depth, the medium by its mean scattering depth. Pixels that show both use both,
+// weighted by the transmittance. On disocclusion there is no history.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #define CM_WAVELET_READS
 #include "wavelet_history.glsl"
 layout(binding = CM_UNIT_HISTORY_LIGHT) uniform usampler2D cm_history_light;
 layout(binding = CM_UNIT_HISTORY_GUIDES) uniform usampler2D cm_history_guides;
-layout(location = 3) uniform mat3 cm_to_before;      // from a point as seen now to one as seen then:
-layout(location = 4) uniform vec3 cm_moved;          // (x z, y z, z), of orthographic views (x, y, z); x and y as in clip space
-layout(location = 5) uniform ivec2 cm_orthographic;  // now, then
+layout(location = 3) uniform mat3 cm_to_before;      // maps points of the current view to the earlier view; their form:
+layout(location = 4) uniform vec3 cm_moved;          // (x z, y z, z), orthographic (x, y, z); x and y as in clip space
+layout(location = 5) uniform ivec2 cm_orthographic;  // of the current and of the earlier view
 layout(location = 6) uniform vec2 cm_footprint_before;
 layout(location = 7) uniform float cm_surfaces;
-layout(location = 8) uniform float cm_most;  // samples that count
+layout(location = 8) uniform float cm_most;  // maximum number of samples
 layout(rgba32ui, binding = CM_IMAGE_HISTORY_LIGHT) uniform writeonly uimage2D cm_light_out;
 
-// Depths that are this much of themselves apart may be the same.
+// Relative depth tolerance for surfaces.
 #define CM_SAME 0.003
-// In the medium, whose mean depth is not where all its light is from.
+// Relative depth tolerance in the medium, whose mean depth is not the origin of all its light.
 #define CM_SAME_MEDIUM 0.02
 
-// Picture coordinates then, in texels, and depth. w: 0 where that is behind the eye.
+// Position in the earlier image, in texels, and depth there. w: 0 if that is behind the eye.
 vec4 cm_before(vec2 at, float z) {
   bool far = z > CM_NOTHING_Z;
   vec3 here = cm_orthographic.x != 0 ? vec3(at, far ? 0.0 : z) : (far ? vec3(at, 1.0) : z * vec3(at, 1.0));
@@ -32,11 +32,12 @@ vec4 cm_before(vec2 at, float z) {
   return vec4(share * vec2(textureSize(cm_history_light, 0)) - 0.5, far ? 2.0 * CM_NOTHING_Z : there.z, seen);
 }
 
-// By how much a pixel's own neighbours differ, to the smaller side: what is found between pixels may as well.
+// Tolerances from the differences between a pixel and its neighbors, on the smaller side. Positions between pixels may
+// differ as much.
 struct CmRoom {
   float solid_z;
   float scattered_z;
-  float normal;  // squared
+  float normal;  // squared length
 };
 
 CmRoom cm_room(ivec2 texel, CmPlace here) {
@@ -57,7 +58,8 @@ CmRoom cm_room(ivec2 texel, CmPlace here) {
   return room;
 }
 
-// Adds what was known there, as far as it is likely to be of the same.
+// Adds the history at a reprojected position, weighted by its similarity. solid: compare depths of surfaces, else of
+// the medium. share: weight.
 void cm_recall(inout CmLit sum, CmPlace here, float cover, vec4 before, bool solid, CmRoom room, float share) {
   ivec2 size = textureSize(cm_history_light, 0);
   if (before.w == 0.0 || any(lessThan(before.xy, vec2(-1.0))) || any(greaterThan(before.xy, vec2(size)))) return;
@@ -112,7 +114,7 @@ void main() {
     sum.front /= sum.samples;
     sum.front.a = clamp(sum.front.a, 0.0, 1.0);
     sum.moment /= sum.samples;
-    // A coarser picture's sample is for many pixels of this.
+    // A sample of a lower-resolution image counts for several pixels.
     vec2 coarser = vec2(textureSize(cm_history_light, 0)) / vec2(size);
     sum.samples = min(cm_most, sum.samples * min(1.0, coarser.x * coarser.y));
   }

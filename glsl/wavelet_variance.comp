@@ -1,10 +1,10 @@
 #version 450
-// How much noise there is: a pixel's few samples tell little of that (at one, nothing), so that those around tell with
-// it. What they differ by among each other counts only where none has two samples.
+// Estimates the noise's variance. A pixel's few samples say little about it (a single one nothing), so its neighbors
+// contribute. Differences between pixels count only if no pixel has two samples.
 //
-// A speck, a pixel far brighter than any like it nearby and than its own samples tell for certain, is dimmed to little
-// more than the next before it tells anything: it would be spread over many, as dots, or be taken for an edge and stay.
-// Not where few have found any light: there it may be all that is known.
+// Fireflies are dimmed first. A firefly is a pixel much brighter than all similar pixels nearby, and than its own
+// samples make certain. It is dimmed to slightly more than the brightest neighbor; otherwise it would spread as a blob,
+// or be kept as an edge. If only few pixels nearby have any light, it is kept, because it may be all there is.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #define CM_WAVELET_READS
@@ -15,18 +15,18 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_UNFILTERED) uniform writeonly image2D
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform image2D cm_behind;
 
 #define CM_RADIUS 2
-// Fewer degrees of freedom tell less than the pixels' differences do.
+// With fewer degrees of freedom, the differences between pixels are the better estimate.
 #define CM_ENOUGH 3.0
 #define CM_FEW 2.0
-// How much brighter than the next a pixel may be.
+// Maximum brightness relative to the second brightest pixel.
 #define CM_BRIGHTER 1.5
-// Standard errors.
+// In standard errors.
 #define CM_CERTAIN 2.0
-// Pixels less alike are no measure, nor are fewer.
+// Minimum similarity of a pixel, and minimum number of lit pixels, for the test.
 #define CM_ALIKE 0.1
 #define CM_LIT 6u
 
-// Where nothing escaped, what others saw behind: of those about it, then of some farther away.
+// Background for pixels without an uncovered sample: the mean over neighbors, first near ones, then some farther away.
 vec3 cm_behind_near(ivec2 texel) {
   ivec2 last = textureSize(cm_guides, 0) - 1;
   for (int stride = 1; stride <= 5; stride += 4) {
@@ -34,7 +34,7 @@ vec3 cm_behind_near(ivec2 texel) {
     for (int y = -2; y <= 2; ++y) {
       for (int x = -2; x <= 2; ++x) {
         vec4 there = imageLoad(cm_behind, clamp(texel + stride * ivec2(x, y), ivec2(0), last));
-        if (there.a == 1.0) sum += there;  // those filled in here are not marked
+        if (there.a == 1.0) sum += there;  // alpha 1; pixels filled in here have alpha 0
       }
     }
     if (sum.a > 0.0) return sum.rgb / sum.a;
@@ -42,11 +42,11 @@ vec3 cm_behind_near(ivec2 texel) {
   return vec3(0.0);
 }
 
-// Luminance over cover.
+// Brightest pixels of a neighborhood: luminance over coverage.
 struct CmBrightest {
-  float most;  // of those about a pixel, itself among them
+  float most;  // of the brightest pixel, which may be the center; next: of the second brightest
   float next;
-  uint lit;    // how many have any
+  uint lit;    // number of pixels with light
 };
 
 CmBrightest cm_brightest(ivec2 texel, CmGuides here, vec4 slopes) {
@@ -67,7 +67,7 @@ CmBrightest cm_brightest(ivec2 texel, CmGuides here, vec4 slopes) {
   return about;
 }
 
-// What is left of a pixel that is a speck; spread as before this pass.
+// Dimming factor of a pixel, 1 if it is no firefly. spread: input of this pass.
 float cm_dimmed(vec3 front, vec4 spread, CmBrightest about) {
   float cover = cm_cover(spread.x);
   float luminance = cm_luminance(front);
@@ -89,13 +89,13 @@ void main() {
   vec4 slopes = cm_slopes(texel, here);
   CmBrightest about = cm_brightest(texel, here, slopes);
   float own_samples = spread.z;
-  vec4 front = vec4(0.0);   // and cover, of all samples, for their means
-  vec3 either = vec3(0.0);  // of either sign
+  vec4 front = vec4(0.0);   // sums over all samples: radiance, and coverage
+  vec3 either = vec3(0.0);  // sum of absolute values
   float square = 0.0;
   float open = 0.0;
   float count = 0.0;
-  float deviation = 0.0;    // sum of squared ones from pixels' own means
-  float freedom = 0.0;      // its degrees, times cover
+  float deviation = 0.0;    // sum of squared deviations from the pixels' means
+  float freedom = 0.0;      // its degrees of freedom, times coverage
   float degrees = 0.0;
   for (int y = -CM_RADIUS; y <= CM_RADIUS; ++y) {
     for (int x = -CM_RADIUS; x <= CM_RADIUS; ++x) {
@@ -128,15 +128,15 @@ void main() {
     float mean = cover * cm_luminance(front.rgb) / front.a;
     float sample_variance =
         degrees >= CM_ENOUGH ? cover * deviation / freedom : max(0.0, cover * square / front.a - mean * mean);
-    // As of a channel, where colours differ by all of them.
+    // Variance per channel, if the colors differ in all channels.
     vec3 colour = either / count;
     float luminance = cm_luminance(colour);
     float channels = dot(colour, colour) / 3.0;
-    // At most as of light that is all blue: what is left of emission has either sign.
+    // At most as for pure blue: the residual after subtracting emission has either sign.
     if (channels > 0.0) sample_variance *= min(64.0, channels / max(luminance * luminance, 1e-30));
-    // None of few samples is not never (Krichevsky and Trofimov 1981).
+    // None of few samples does not mean never: the Krichevsky-Trofimov estimator (1981).
     open = (open + 0.5) / (count + 1.0);
-    // Means of few are skewed, and what is known of their noise is noise.
+    // Means of few samples are skewed, and the estimate of their noise is itself noisy.
     float samples = max(own_samples, 0.5);
     variance = (1.0 + CM_FEW / samples) / samples * vec2(sample_variance, open * (1.0 - open));
   }

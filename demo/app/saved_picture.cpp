@@ -5,6 +5,7 @@
 #include <image.hpp>
 #include <span>
 #include <stdexcept>
+#include <straight_alpha.hpp>
 #include <vector>
 
 #include "aovs.hpp"
@@ -34,6 +35,12 @@ image::Image read_display(cumulet_viewer* viewer, const cumulet_frame_result& sh
   return picture;
 }
 
+std::vector<float> read_linear(cumulet_viewer* viewer, const cumulet_frame_result& shown) {
+  std::vector<float> rgba(std::size_t{4} * shown.width * shown.height);
+  check(viewer, cumulet_read_linear(viewer, rgba.data(), rgba.size()));
+  return rgba;
+}
+
 }  // namespace
 
 bool is_whole(const cumulet_frame_result& shown, std::uint32_t width, std::uint32_t height) {
@@ -41,8 +48,8 @@ bool is_whole(const cumulet_frame_result& shown, std::uint32_t width, std::uint3
          (shown.flags & CUMULET_RENDER_PREVIEW) == 0;
 }
 
-void save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-              const std::string& path) {
+std::string save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+                     const std::string& path) {
   require_picture(shown);
   image::PngOptions png;
   png.tone_mapping = image::ToneMapping::none;
@@ -50,13 +57,16 @@ void save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_f
   const bool part = std::ranges::any_of(region, [](float value) { return value != 0.0f; });
   png.keep_alpha = part || scene.display.background == CUMULET_BACKGROUND_TRANSPARENT;
   image::write_png(path, read_display(viewer, shown), png);
+  const bool transparent = scene.display.background == CUMULET_BACKGROUND_TRANSPARENT;
+  if (!transparent || scene.sampling.view != CUMULET_VIEW_SHADED) return {};
+  const std::vector<float> linear = read_linear(viewer, shown);
+  return image::raised_alpha_note(path, image::pixels_brighter_than_alpha(linear, scene.display.exposure_stops));
 }
 
-void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-              const std::string& path) {
+std::string save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+                     const std::string& path) {
   require_picture(shown);
-  std::vector<float> rgba(std::size_t{4} * shown.width * shown.height);
-  check(viewer, cumulet_read_linear(viewer, rgba.data(), rgba.size()));
+  const std::vector<float> rgba = read_linear(viewer, shown);
   // All but the volume alone, which would cost every frame something.
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
                             CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
@@ -64,6 +74,7 @@ void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_f
   const bool shaded = scene.sampling.view == CUMULET_VIEW_SHADED;
   write_exr(viewer, path, windows_of(scene.sampling.region, shown.width, shown.height), {rgba},
             std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer, scene, shown.width, shown.height));
+  return {};
 }
 
 }  // namespace cumulet::demo

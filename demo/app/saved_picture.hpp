@@ -11,12 +11,14 @@ namespace cumulet::demo {
 /// Whether the picture that is shown has this size and is no preview: each of its pixels has a sample.
 [[nodiscard]] bool is_whole(const cumulet_frame_result& shown, std::uint32_t width, std::uint32_t height);
 
-/// Writes the shown picture to a PNG file, as it is displayed. Throws std::runtime_error, one line.
-void save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-              const std::string& path);
+/// Writes the shown picture to a PNG file, as it is displayed. Returns a note of one line if pixels are brighter than
+/// PNG's straight alpha can hold, else "". Throws std::runtime_error, one line.
+std::string save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+                     const std::string& path);
 
-/// The same in linear radiance with its layers, as docs/aovs.md says. Debug views have none. Throws likewise.
-void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-              const std::string& path);
+/// Writes the shown picture to an EXR file in linear radiance, with the layers that docs/aovs.md lists. Debug views
+/// have no layers. Returns "". Throws std::runtime_error, one line.
+std::string save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+                     const std::string& path);
 
 }  // namespace cumulet::demo

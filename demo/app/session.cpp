@@ -247,7 +247,7 @@ void Session::follow_others() {
                   : std::shared_ptr<cumulet_volume>(shown());
   opening_.made = std::async(std::launch::async, [file = opening_.file, own, shared = shared_.get()] {
     const Opened tell{shared, &Shared::opened};
-    return own ? look_into(own) : open_volume(file);
+    return own ? look_into(own) : open_volume(file, on_log, shared);
   });
 }
 
@@ -915,10 +915,11 @@ void Session::finish_saves() {
 void Session::save(const Request& request) {
   try {
     const auto write = request.type == Request::Type::save_exr ? save_exr : save_png;
-    write(viewer_.get(), scene_, status_.frame, request.path);
+    const std::string note = write(viewer_.get(), scene_, status_.frame, request.path);
     files_.push_back({request.path, Answer::File::Fate::saved});
     tell(false, "Saved " + request.path + ", " + std::to_string(status_.frame.width) + "x" +
                     std::to_string(status_.frame.height));
+    if (!note.empty()) tell(false, note);
   } catch (const std::exception& error) {
     tell(true, error.what());
   }

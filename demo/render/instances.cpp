@@ -42,14 +42,16 @@ OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
   return open;
 }
 
-OpenVolume open_volume(const VolumeFile& file) {
+OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user) {
   if (auto row = FrameRow::of_name(file.volume)) {
+    if (const std::string line = row->pattern().passed_over(); log != nullptr && !line.empty())
+      log(log_user, CUMULET_LOG_WARNING, line.c_str());
     std::string failure;
     for (const std::string& name : by_size(row->files())) {
       VolumeFile frame = file;
       frame.volume = name;
       try {
-        OpenVolume open = open_volume(frame);
+        OpenVolume open = open_volume(frame, nullptr, nullptr);
         open.volume.reset();
         open.row = std::move(row);
         return open;
@@ -59,7 +61,9 @@ OpenVolume open_volume(const VolumeFile& file) {
     }
     throw std::runtime_error(failure);
   }
-  const cumulet_volume_file_desc desc = volume_file(file);
+  cumulet_volume_file_desc desc = volume_file(file);
+  desc.log = log;
+  desc.log_user = log_user;
   cumulet_volume* opened = nullptr;
   std::array<char, 1024> error{};
   check(cumulet_volume_open_file(&desc, &opened, error.data(), error.size()), error.data());

@@ -23,8 +23,10 @@ struct OpenVolume {
 
 /// In any thread, some milliseconds a million voxels.
 [[nodiscard]] OpenVolume look_into(std::shared_ptr<cumulet_volume> volume);
-/// Likewise. Throws std::runtime_error with the library's cause.
-[[nodiscard]] OpenVolume open_volume(const VolumeFile& file);
+/// Opens a file, or the first readable frame of a sequence, in any thread. Logs the notes and warnings of a file, and
+/// the files that a sequence passes over; frames log when they are played. Throws std::runtime_error with the library's
+/// cause.
+[[nodiscard]] OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user);
 /// Of a file a frame. file: what all of them are read as; its path is not looked at. memory_bytes: 0 is the library's
 /// default. Reads nothing yet. Throws std::runtime_error with the library's cause.
 [[nodiscard]] std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& files,

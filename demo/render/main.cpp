@@ -20,6 +20,7 @@
 #include <program.hpp>
 #include <shader_cache.hpp>
 #include <stdexcept>
+#include <straight_alpha.hpp>
 #include <string>
 #include <system_error>
 #include <timeline.hpp>
@@ -31,7 +32,6 @@
 #include "denoised.hpp"
 #include "fire.hpp"
 #include "frame_plan.hpp"
-#include "glow.hpp"
 #include "info.hpp"
 #include "instances.hpp"
 #include "memory.hpp"
@@ -299,8 +299,8 @@ std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, c
 }
 
 /// Where a picture has light that its file cannot hold.
-void tell_glow(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised,
-               std::size_t floats, Progress& progress) {
+void warn_of_raised_alpha(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised,
+                          std::size_t floats, Progress& progress) {
   const SceneOptions& scene = options.scene;
   if (scene.display.background != CUMULET_BACKGROUND_TRANSPARENT || scene.sampling.view != CUMULET_VIEW_SHADED) return;
   std::vector<float> linear(denoised);
@@ -308,8 +308,8 @@ void tell_glow(const Viewer& viewer, const RenderOptions& options, const std::ve
     linear.resize(floats);
     check(viewer, cumulet_read_linear(viewer.get(), linear.data(), linear.size()));
   }
-  const std::size_t pixels = cumulet::demo::glowing_pixels(linear, scene.display.exposure_stops);
-  const std::string note = cumulet::demo::glow_note(options.output, pixels);
+  const std::size_t pixels = cumulet::image::pixels_brighter_than_alpha(linear, scene.display.exposure_stops);
+  const std::string note = cumulet::image::raised_alpha_note(options.output, pixels);
   if (!note.empty()) tell(progress, "warning: " + note);
 }
 
@@ -323,7 +323,7 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const cum
     std::vector<std::uint8_t> bytes(count);
     check(viewer, denoised.empty() ? cumulet_read_display(viewer.get(), bytes.data(), bytes.size())
                                    : cumulet_encode_display(viewer.get(), denoised.data(), bytes.data(), bytes.size()));
-    tell_glow(viewer, options, denoised, count, progress);
+    warn_of_raised_alpha(viewer, options, denoised, count, progress);
     cumulet::demo::clear_around(windows, bytes);
     cumulet::image::write_png(options.output, image.width, image.height, bytes);
     return;
@@ -676,7 +676,8 @@ class Studio {
     for (const cumulet::demo::VolumeFile& file : others_.missing(scene.others)) {
       progress_.stage("loading " + file.volume);
       const bool shown = scene.is_shown() && file == static_cast<const cumulet::demo::VolumeFile&>(scene);
-      others_.give(file, shown ? cumulet::demo::look_into(volume_of(viewer_)) : cumulet::demo::open_volume(file));
+      others_.give(file, shown ? cumulet::demo::look_into(volume_of(viewer_))
+                               : cumulet::demo::open_volume(file, cumulet::demo::Messages::print, &messages_));
       check_not_interrupted();
     }
     others_.show(viewer_.get(), scene.others);

@@ -11,17 +11,17 @@ namespace cumulet {
 
 namespace {
 
-/// The process' threads of what was left. They are joined, not detached: code must not be unloaded under them.
+/// The background threads of leave(). They are joined, not detached: code must not be unloaded while they run.
 class Threads {
  public:
-  /// False if there is none to be had, as when the process ends.
+  /// Returns false if no thread is available, for example because the process is ending.
   bool run(const std::function<void()>& work) {
     const std::scoped_lock lock(mutex_);
     all_.remove_if([](const LibraryThread& one) { return one.ended(); });
     if (all_.size() >= max_threads) return false;
     try {
       all_.emplace_back(work);
-    } catch (const std::exception&) {  // no memory, no thread
+    } catch (const std::exception&) {  // out of memory or of threads
       return false;
     }
     return true;

@@ -13,19 +13,19 @@
 
 namespace cumulet {
 
-/// Does it on a thread of its own, for nobody to wait for; here and now if too many such are under way, or the process
-/// ends. It must own all that it touches, call nobody back and not throw. Unloading the library and the process' exit
-/// wait for it, however long it takes.
+/// Runs `work` on a background thread, or inline if too many such threads are active, none can be created, or the
+/// process is exiting. `work` must own everything it touches, call no callback of the host and not throw. Unloading the
+/// library and process exit wait for it, however long it takes.
 void leave(const std::function<void()>& work);
 
-/// What the call gives, for what cannot be interrupted: a library's decoder, a sort. Who is cancelled throws
-/// Error(cancelled) within a few milliseconds, and the call is left to end by itself; so it must own all that it
-/// touches, and call nobody back. Without a Progress it is just called.
+/// Runs `call`, which cannot be interrupted (a library's decoder, a sort), and returns its result. On cancellation it
+/// throws Error(cancelled) within a few milliseconds, and `call` continues in the background. `call` must therefore own
+/// everything it touches and call no callback of the host. Without a Progress it is called directly.
 template <class Call>
 std::invoke_result_t<Call&> apart(const Progress* progress, Call call) {
   if (progress == nullptr) return call();
   progress->check();
-  // What it throws is handed over like what it returns: none but the caller owns it then.
+  // An exception is moved to the caller like a result, so that only the caller owns it.
   using Outcome = std::variant<std::invoke_result_t<Call&>, std::exception_ptr>;
   const auto task = std::make_shared<std::packaged_task<Outcome()>>([call = std::move(call)]() mutable {
     try {
@@ -42,7 +42,8 @@ std::invoke_result_t<Call&> apart(const Progress* progress, Call call) {
   return std::get<0>(std::move(outcome));
 }
 
-/// Owns what takes long to free, a tree of many nodes or gigabytes: its last owner does not wait for that.
+/// Creates a shared object that takes long to free (a tree of many nodes, gigabytes). It is deleted on a background
+/// thread, so the last owner does not wait.
 template <class T, class... Arguments>
 std::shared_ptr<T> make_left(Arguments&&... arguments) {
   auto whole = std::make_unique<T>(std::forward<Arguments>(arguments)...);

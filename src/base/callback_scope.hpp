@@ -4,9 +4,9 @@
 
 namespace cumulet {
 
-/// While one lives, its thread is inside a callback of the host's, which may not call the library. A property of the
-/// thread, whichever viewer or handle the callback is of: so calls are refused before they touch a lock that the caller
-/// of the callback may hold.
+/// Marks its thread as being inside a callback of the host for as long as the object lives. Such a callback may not
+/// call the library. The mark belongs to the thread, independent of the viewer or handle that made the callback. Calls
+/// can therefore be rejected before they touch a lock that the caller of the callback may hold.
 class CallbackScope {
  public:
   CallbackScope() { ++depth(); }
@@ -17,7 +17,7 @@ class CallbackScope {
   CallbackScope(const CallbackScope&) = delete;
   CallbackScope& operator=(const CallbackScope&) = delete;
 
-  /// Whether the calling thread is inside one.
+  /// Whether the calling thread is inside a callback of the host.
   [[nodiscard]] static bool inside() { return depth() > 0; }
 
  private:

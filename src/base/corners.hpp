@@ -6,7 +6,7 @@
 
 namespace cumulet {
 
-/// Of the box from low to high; x changes first.
+/// Returns the corners of the box from low to high; x varies fastest.
 inline std::array<glm::dvec3, 8> corners_of(const glm::dvec3& low, const glm::dvec3& high) {
   std::array<glm::dvec3, 8> corners;
   for (std::size_t i = 0; i < corners.size(); ++i)

@@ -6,7 +6,7 @@
 
 namespace cumulet {
 
-/// Why an operation failed. The C ABI maps each to one cumulet_status.
+/// Reason why an operation failed. The C ABI maps each to one cumulet_status.
 enum class ErrorCode {
   invalid_argument,
   unsupported,
@@ -20,14 +20,15 @@ enum class ErrorCode {
   timeout
 };
 
-/// The library's one exception. It never crosses the C ABI. The message is one
-/// line that names the file (where there is one) and the cause.
+/// The only exception type of the library. It never crosses the C ABI. The message is one line that names the file (if
+/// there is one) and the cause.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message)
       : std::runtime_error(message), code_(code), occurrence_(std::make_shared<char>()) {}
   [[nodiscard]] ErrorCode code() const noexcept { return code_; }
-  /// Whether one is a copy of the other: the same operation failed, not a second one with the same message.
+  /// True if one object is a copy of the other, so both report the same failure. Two failures with equal messages are
+  /// not copies.
   [[nodiscard]] bool is_copy_of(const Error& other) const noexcept { return occurrence_ == other.occurrence_; }
 
  private:
@@ -35,7 +36,8 @@ class Error : public std::runtime_error {
   std::shared_ptr<const char> occurrence_;
 };
 
-/// What is being handled, as an Error; what: was begun, where there was not enough memory. Only in a handler.
+/// Converts the exception that is being handled to an Error. Call it only in a handler. what: the operation, for the
+/// message if memory ran out.
 [[nodiscard]] Error caught(const std::string& what);
 
 }  // namespace cumulet

@@ -8,16 +8,16 @@
 
 namespace cumulet {
 
-/// A file or folder as a caller names it. Messages have the name as it was given; what is opened is absolute, so that
-/// the process may change its current folder before a worker opens it.
+/// A file or folder path from a caller. Messages use the path as given; files are opened by the absolute path, so that
+/// the process may change its current directory before a worker thread opens the file.
 class FilePath {
  public:
   FilePath() = default;
-  /// Relative to the folder that is current now.
+  /// Relative to the current directory at the time of construction.
   FilePath(std::string given) : given_(std::move(given)), folder_(current_folder()) {}
   FilePath(const char* given) : FilePath(std::string(given)) {}
   FilePath(const std::filesystem::path& given) : FilePath(given.string()) {}
-  /// Relative to the folder that other is relative to.
+  /// Relative to the same directory as `other`.
   FilePath(std::string given, const FilePath& other) : given_(std::move(given)), folder_(other.folder_) {}
 
   [[nodiscard]] const std::string& given() const { return given_; }
@@ -26,7 +26,8 @@ class FilePath {
   }
 
  private:
-  // Null where it cannot be found out, as of one that was removed: then names are as they were given.
+  // Null if the current directory cannot be determined, for example because it was removed. Paths are then used as
+  // given.
   static std::shared_ptr<const std::filesystem::path> current_folder() {
     std::error_code error;
     auto folder = std::make_shared<const std::filesystem::path>(std::filesystem::current_path(error));

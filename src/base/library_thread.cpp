@@ -26,8 +26,8 @@ struct LibraryThread::Entry {
   pid_t process = getpid();
   std::atomic<bool> ended = false;
   std::mutex mutex;
-  std::function<void()> request_stop;  // null once the owner is about to go
-  std::thread thread;                  // moved out by who joins it
+  std::function<void()> request_stop;  // null once the owner is being destroyed
+  std::thread thread;                  // moved out by the thread that joins it
   const bool stoppable;
 };
 
@@ -36,12 +36,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using EntryPtr = std::shared_ptr<LibraryThread::Entry>;
 
-// How long the end of the process waits for what may itself wait for the thread that exits.
+// Time that process exit waits for threads and calls that may themselves wait for the exiting thread.
 constexpr std::chrono::seconds patience{10};
 constexpr std::chrono::seconds patience_in_callback{1};
 constexpr std::chrono::milliseconds poll{1};
 
-// What this thread has under way.
+// State of the calling thread.
 struct OfThread {
   int calls = 0;
   bool ends_process = false;
@@ -55,7 +55,7 @@ void sleep_until_ended(const LibraryThread::Entry& entry, Clock::time_point unti
   while (!entry.ended && Clock::now() < until) std::this_thread::sleep_for(poll);
 }
 
-// A thread cannot join itself: a callback on it has called exit().
+// Joins the thread. It cannot join itself, which happens if a callback on it has called exit(); it is then detached.
 void join(LibraryThread::Entry& entry) {
   std::thread thread;
   {
@@ -80,13 +80,13 @@ class Registry {
     entries_.push_back(entry);
     try {
       entry->thread = std::thread([entry, work = std::move(work)]() mutable {
-        // However it ends: a host's callback may end the thread itself, as Python's do.
+        // Set even if a callback of the host ends the thread itself, as Python's do.
         struct End {
           LibraryThread::Entry& entry;
           ~End() { entry.ended = true; }
         } const end{*entry};
         work();
-        work = nullptr;  // what it owns may take long to free
+        work = nullptr;  // destroyed before `ended` is set: its captures may take long to free
       });
     } catch (...) {
       entries_.pop_back();
@@ -128,7 +128,7 @@ class Registry {
   [[nodiscard]] std::uint64_t count(StaticsOf of) { return ++kept_.at(static_cast<std::size_t>(of)); }
 
  private:
-  // In a forked child: what the parent's other threads do is not done here.
+  // In a forked child, forgets the calls that the other threads of the parent had under way.
   void forget_parent() {
     const pid_t before = process_.exchange(getpid());
     if (before != 0 && before != getpid()) calls_ = of_thread().calls;
@@ -136,7 +136,7 @@ class Registry {
 
   std::mutex mutex_;
   std::list<EntryPtr> entries_;
-  std::atomic<pid_t> process_ = 0;  // that has started a thread
+  std::atomic<pid_t> process_ = 0;  // the process that last started a thread
   std::atomic<bool> ending_ = false;
   std::atomic<int> calls_ = 0;
   std::array<std::atomic<std::uint64_t>, 3> kept_{};  // by StaticsOf
@@ -159,9 +159,9 @@ void end_call() {
 bool process_is_ending() { return registry().ending(); }
 
 void keep_statics(StaticsOf of) noexcept {
-  // The first, second, fourth, eighth ... time: handlers cannot be taken back, and hosts may run for ever.
+  // Registers at the first, second, fourth, eighth ... call: handlers cannot be removed, and hosts may run forever.
   if (!std::has_single_bit(registry().count(of))) return;
-  // Where there is no memory for another, those before serve.
+  // If there is no memory for another handler, the earlier handlers still run.
   static_cast<void>(std::atexit(end_threads));
 }
 
@@ -187,7 +187,7 @@ HostCall::HostCall() {
   OfThread& own = of_thread();
   ++own.calls;
   ++registry().calls();
-  // After it is counted: the end of the process sees the call, or the call sees the end.
+  // Checked after counting: either the exiting thread sees this call, or this call sees the exit.
   refused_ = registry().ending() && !own.ends_process;
   if (refused_) end_call();
 }

@@ -8,11 +8,11 @@
 
 namespace cumulet {
 
-/// Who is told of changes of a thing. All calls are safe from any thread.
+/// Change listeners of an object. All calls are safe from any thread.
 class Listeners {
  public:
-  /// Calls changed with every tell(), on its thread, until the token is gone; then no call is under way any more. It
-  /// must not throw, nor listen or end a token.
+  /// Calls `changed` in every tell(), on the thread of tell(), until the returned token is destroyed. After that no
+  /// call is under way. `changed` must not throw, call listen() or destroy a token.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     const std::scoped_lock lock(all_->mutex);
     const auto place = all_->calls.insert(all_->calls.end(), std::move(changed));

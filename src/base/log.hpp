@@ -10,8 +10,8 @@ namespace cumulet {
 
 enum class LogLevel { debug = 0, info = 1, warning = 2, error = 3 };
 
-/// The host's log callback. The library never prints; without a callback the
-/// message is dropped. May be called from any thread.
+/// The host's log callback. The library never prints; without a callback messages are dropped. The callback may be
+/// called from any thread.
 class Log {
  public:
   using Function = std::function<void(LogLevel level, const char* message)>;

@@ -7,7 +7,7 @@
 
 namespace cumulet {
 
-/// MurmurHash3_x86_32 of these bytes, seed 0 (Appleby 2011, public domain): what Cryptomatte makes ids of names by.
+/// MurmurHash3_x86_32 of the bytes, seed 0 (Appleby 2011, public domain). Cryptomatte derives IDs from names with it.
 [[nodiscard]] constexpr std::uint32_t murmur_hash_3(std::string_view bytes) {
   const auto word = [&](std::size_t first, std::size_t count) {
     std::uint32_t value = 0;
@@ -25,8 +25,8 @@ namespace cumulet {
   return hash ^ hash >> 16;
 }
 
-/// The id that a name has in Cryptomatte (specification 1.2): its hash, which as the bits of a float is a finite number
-/// and no denormal one, as a bit of the exponent is turned over where it would be. Never 0.
+/// Returns the Cryptomatte ID of a name (specification 1.2): its hash. If the hash, read as the bits of a float, would
+/// be denormal, zero, infinite or NaN, one bit of the exponent is flipped. Never 0.
 [[nodiscard]] constexpr std::uint32_t cryptomatte_id(std::string_view name) {
   constexpr std::uint32_t exponent = 0x7f800000U;
   const std::uint32_t hash = murmur_hash_3(name);

@@ -6,8 +6,8 @@
 
 namespace cumulet {
 
-/// A static object whose destructor never runs, so that threads can use it while the process exits. The memory is the
-/// object's own: nothing leaks where the library is unloaded.
+/// A static object whose destructor never runs, so that threads can use it while the process exits. The storage is a
+/// member: this class leaks nothing if the library is unloaded.
 template <class T>
 class NeverDestroyed {
  public:

@@ -5,12 +5,12 @@
 #include <cstddef>
 #include <string>
 
-// Texts of numbers for messages and files. They do not depend on the process' locales, neither C's, which printf and
-// std::to_string follow, nor C++'s global one, which every new stream takes.
+// Numbers as text for messages and files. The text does not depend on the locales of the process: neither on the C
+// locale that printf and std::to_string use, nor on the global C++ locale of new streams.
 
 namespace cumulet {
 
-/// As "%.Ng" prints it in the C locale.
+/// Formats like "%.Ng" in the C locale.
 inline std::string general_text(double value, int digits = 6) {
   std::array<char, 64> text{};
   const auto [end, error] =
@@ -18,7 +18,7 @@ inline std::string general_text(double value, int digits = 6) {
   return {text.data(), end};
 }
 
-/// As "%.Nf" prints it in the C locale.
+/// Formats like "%.Nf" in the C locale.
 inline std::string fixed_text(double value, int decimals) {
   // The largest double has 309 digits.
   std::array<char, 400> text{};

@@ -6,7 +6,7 @@ namespace cumulet {
 
 namespace {
 
-/// A character of a text, or a byte of it that is none.
+/// A character of a text. If `good` is false it is one byte that is not valid UTF-8.
 struct Character {
   std::size_t bytes = 1;
   std::uint32_t code = 0;
@@ -15,7 +15,7 @@ struct Character {
 
 std::uint32_t byte_at(std::string_view text, std::size_t at) { return static_cast<unsigned char>(text[at]); }
 
-/// The first character (RFC 3629).
+/// Decodes the first character (RFC 3629).
 Character first_of(std::string_view text) {
   const std::uint32_t lead = byte_at(text, 0);
   if (lead < 0x80) return {1, lead, true};
@@ -32,7 +32,7 @@ Character first_of(std::string_view text) {
   return {bytes, code, true};
 }
 
-/// Blanks and control characters, those of ISO 6429's second set and Unicode's line breaks among them.
+/// True for blanks and control characters, including ISO 6429's second set and Unicode's line breaks.
 bool is_blank(std::uint32_t code) {
   return code <= 0x20 || (code >= 0x7F && code <= 0xA0) || code == 0x2028 || code == 0x2029;
 }

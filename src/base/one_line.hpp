@@ -7,8 +7,9 @@
 
 namespace cumulet {
 
-/// Makes a text a part of one line of a message. Runs of blanks and control characters become one blank, and none is
-/// left at the ends. Bytes that are not UTF-8 become "\xNN". What is longer than `longest` bytes ends in "...".
+/// Makes a text fit for one line of a message. Runs of blanks and control characters become one blank, and blanks at
+/// the ends are removed. Bytes that are not UTF-8 become "\xNN". Text longer than about `longest` bytes is cut and ends
+/// in "...".
 std::string one_line(std::string_view text, std::size_t longest = std::numeric_limits<std::size_t>::max());
 
 }  // namespace cumulet

@@ -1,6 +1,6 @@
 #pragma once
 
-// glsl/parameters.glsl as C++: the uniform block of every kernel that makes pictures.
+// glsl/parameters.glsl as C++: the uniform block of every kernel that renders images.
 
 #include "base/shared_code.hpp"
 

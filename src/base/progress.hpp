@@ -6,7 +6,7 @@
 
 namespace cumulet {
 
-/// How far a long piece of work is, told to other threads, and their wish that it stop. Safe from any thread.
+/// Progress of a long job, readable from other threads, and their request to cancel it. Safe from any thread.
 class Progress {
  public:
   enum class Stage { idle = 0, loading = 1, statistics = 2, refining = 3, records = 4, uploading = 5 };
@@ -16,7 +16,7 @@ class Progress {
     fraction_.store(0.0, std::memory_order_relaxed);
     stage_.store(stage, std::memory_order_relaxed);
   }
-  /// Throws Error(cancelled) if somebody asked for that. Cheap: call it between pieces of a few milliseconds.
+  /// Throws Error(cancelled) if cancellation was requested. Cheap: call it between pieces of a few milliseconds.
   void check() const {
     if (cancelled_.load(std::memory_order_relaxed)) throw Error(ErrorCode::cancelled, "cancelled");
   }

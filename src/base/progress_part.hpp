@@ -15,7 +15,7 @@ inline void check(const Progress* progress) {
   if (progress != nullptr) progress->check();
 }
 
-/// vector.resize(size), looking at the cancel flag while gigabytes are filled.
+/// Like vector.resize(size), but checks for cancellation between blocks of 4 MiB.
 template <class T>
 void resize(std::vector<T>& vector, std::size_t size, const Progress* progress, const T& value = T()) {
   constexpr std::size_t piece = std::max<std::size_t>((std::size_t{4} << 20U) / sizeof(T), 1);
@@ -26,8 +26,8 @@ void resize(std::vector<T>& vector, std::size_t size, const Progress* progress, 
   }
 }
 
-/// One step of a stage: maps a count of things done, by any number of threads, to a span of the stage's fraction.
-/// Without a Progress it does nothing. Methods throw Error(cancelled) when that is asked for.
+/// One step of a stage: maps a count of completed items, added by any number of threads, to a span of the stage's
+/// fraction. Without a Progress it does nothing. Methods throw Error(cancelled) if cancellation was requested.
 class ProgressPart {
  public:
   ProgressPart(Progress* progress, double from, double to, std::uint64_t total)
@@ -41,14 +41,15 @@ class ProgressPart {
     if (progress_ == nullptr) return;
     done_.fetch_add(done, std::memory_order_relaxed);
     progress_->check();
-    // One teller at a time, so that the fraction never falls; what others add it tells the next time.
+    // Only one thread at a time updates the fraction, so that it never falls. Items added by other threads are included
+    // in the next update.
     if (telling_.test_and_set(std::memory_order_acquire)) return;
     const double part = static_cast<double>(done_.load(std::memory_order_relaxed)) / static_cast<double>(total_);
     progress_->at(from_ + (to_ - from_) * std::min(part, 1.0));
     telling_.clear(std::memory_order_release);
   }
 
-  /// As cumulet::resize().
+  /// Like cumulet::resize().
   template <class T>
   void resize(std::vector<T>& vector, std::size_t size, const T& value = T()) const {
     cumulet::resize(vector, size, progress_, value);

@@ -7,8 +7,8 @@
 
 namespace cumulet {
 
-/// Appends what is left of a stream, whose size, as a pipe's, may not be known before; a failure leaves bad() set.
-/// added(count) is called after each piece of at most a megabyte, and may throw.
+/// Appends the rest of a stream, whose size may be unknown (a pipe). A failure leaves bad() set. added(count) is called
+/// after each piece of at most 1 MiB, and may throw.
 template <class Added>
 void read_rest(std::istream& stream, std::vector<std::uint8_t>& bytes, Added&& added) {
   constexpr std::size_t piece = std::size_t{1} << 20U;

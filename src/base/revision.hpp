@@ -4,8 +4,8 @@
 
 namespace cumulet {
 
-/// Which state of one thing it is: equal where nothing changed. Of is the kind of thing, so that revisions of different
-/// ones are not compared.
+/// Revision number of one object: equal if nothing has changed. `Of` is the kind of object, so that revisions of
+/// different kinds cannot be compared.
 template <class Of>
 class Revision {
  public:

@@ -8,17 +8,17 @@
 
 namespace cumulet {
 
-/// The host's trace callback, told of every piece of work as it ends: frames, their passes, jobs. Any thread. Without a
-/// callback nobody looks at a clock.
+/// The host's trace callback. It is called at the end of every piece of work: frames, their passes, jobs. Any thread.
+/// Without a callback no clock is read.
 class Trace {
  public:
-  /// Seconds of the steady clock.
+  /// begin, end: seconds of the steady clock.
   using Function = void (*)(void* user, const char* name, double begin, double end);
 
   Trace() = default;
   Trace(Function function, void* user) : function_(function), user_(user) {}
 
-  /// A piece of work, as long as it lives.
+  /// Measures a piece of work, from construction to destruction.
   class Span {
    public:
     Span(const Trace& trace, std::string name) : trace_(trace) {

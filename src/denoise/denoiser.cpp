@@ -13,20 +13,20 @@ namespace {
 
 constexpr std::uint32_t quad_channels = 4;
 constexpr std::uint32_t taps = 9;
-constexpr std::uint32_t group_side = 16;       // pixels of a work group of convolutions
-constexpr std::uint32_t input_group_side = 8;  // and of the input's
+constexpr std::uint32_t group_side = 16;       // pixels per side of a convolution work group
+constexpr std::uint32_t input_group_side = 8;  // pixels per side of an input work group
 constexpr std::uint32_t bin_side = 16;
-constexpr std::uint32_t most_groups = 65535;  // GL's minimum
-// What a pixel of other kernels takes, in multiplications and additions: about, by its arithmetic.
+constexpr std::uint32_t most_groups = 65535;  // the minimum that GL guarantees
+// Approximate multiply-adds per pixel of the other kernels.
 constexpr double bin_cost = 30.0;
 constexpr double input_cost = 200.0;
 
-/// Channels of the result that a work group has, by fours: the last convolution has three of them alone.
+/// Output channels of a work group, in units of four; the last convolution has only three channels.
 std::uint32_t quads_of(std::size_t convolution) {
   return convolution + 1 == Network::convolution_count ? 1 : group_channels / quad_channels;
 }
 
-/// Of a place in the picture with its rim.
+/// Converts a position in the padded image to the image.
 glm::ivec2 in_picture(glm::uvec2 place) { return glm::ivec2(place) - static_cast<int>(rim); }
 
 std::uint32_t groups_of(const Network& network, std::size_t convolution) {
@@ -43,7 +43,7 @@ std::uint32_t blocks_of(const Network& network, const Convolution& convolution) 
   return blocks;
 }
 
-/// A convolution's weights in the order of denoise_convolution.comp, a uvec2 four halves.
+/// Packs the weights of a convolution in the order of denoise_convolution.comp; a uvec2 holds four halves.
 class WeightPacker {
  public:
   explicit WeightPacker(const Network& network) : network_(network) {}
@@ -57,7 +57,7 @@ class WeightPacker {
       for (std::uint32_t quad = 0; quad < quads; ++quad) {
         add_quad([&](std::uint32_t k) { return at_or_zero(convolution.biases, first + quad * quad_channels + k); });
       }
-      std::uint32_t input = 0;  // before this source
+      std::uint32_t input = 0;  // channels before this source
       for (const Source& source : convolution.sources) {
         const std::uint32_t inputs =
             source.convolution ? network_.convolutions.at(*source.convolution).outputs : network_.inputs;
@@ -122,7 +122,7 @@ void Denoiser::begin(const Pictures& pictures) {
     bins_bytes_ = bins_bytes;
   }
 
-  // What a pixel takes, of a tile large enough to tell.
+  // Memory per pixel, measured on a tile large enough to be representative.
   constexpr std::uint32_t side = 1024;
   const double pixel_bytes = double(memory_of(*network_, glm::uvec2(side)).size) * sizeof(glm::uvec4) / (side * side);
   const std::uint64_t other_bytes = weights_bytes_ + bins_bytes_;

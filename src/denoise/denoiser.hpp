@@ -12,40 +12,39 @@
 
 namespace cumulet::denoise {
 
-/// Textures of a picture, a texel a pixel.
+/// Textures of an image, with a texel per pixel.
 struct Pictures {
   glm::uvec2 size{0U};
-  GLuint colour = 0;    ///< rgba: radiance, linear Rec. 709, of any exposure, and whatever goes with it
-  GLuint albedo = 0;    ///< rgb, 0 to 1, and...
-  GLuint normal = 0;    ///< ...xyz, -1 to 1; both of networks of nine inputs alone
-  GLuint denoised = 0;  ///< GL_RGBA32F, written: colour's rgb denoised, and its alpha as it is
+  GLuint colour = 0;    ///< rgba: radiance, linear Rec. 709, any exposure; alpha is passed through
+  GLuint albedo = 0;    ///< rgb, 0 to 1; only for networks with nine inputs
+  GLuint normal = 0;    ///< xyz, -1 to 1; only for networks with nine inputs
+  GLuint denoised = 0;  ///< GL_RGBA32F, written: denoised rgb and the alpha of `colour`
 };
 
-/// A network of Open Image Denoise by compute shaders: halves are stored, floats are added. A pixel of colour that is
-/// not finite stays as it is, and nothing else sees it. The same pictures on the same driver give the same result, in
-/// whatever tiles and steps. Calls need the context current and a StateGuard around.
+/// Runs a network of Open Image Denoise in compute shaders: values are stored as halves and summed as floats. A
+/// non-finite color pixel is passed through and does not affect other pixels. The result for the same images on the
+/// same driver does not depend on tiles and steps. Calls need the context current and a StateGuard in scope.
 class Denoiser {
  public:
-  /// Uploads the weights. most_bytes: what its buffers may take; pictures that need more are denoised in tiles. Those
-  /// of 256x256 are the smallest: what these take (16 MiB) is taken in any case. Throws Error(out_of_memory, gl).
+  /// Uploads the weights. most_bytes: memory limit of its buffers; larger images are denoised in tiles. The minimum
+  /// tile is 256x256; its memory (16 MiB) is allocated in any case. Throws Error(out_of_memory, gl).
   Denoiser(gl::FunctionsPtr gl, gl::ProgramsPtr programs, NetworkPtr network, std::uint64_t most_bytes);
 
-  /// Begins to denoise; what was under way is given up. Throws Error(out_of_memory, gl).
+  /// Begins to denoise; cancels denoising under way. Throws Error(out_of_memory, gl).
   void begin(const Pictures& pictures);
-  /// Waits until the driver has compiled all that it takes. Throws Error(gl).
+  /// Waits until the driver has compiled all required shaders. Throws Error(gl).
   void build() const;
-  /// One dispatch of about so many multiplications and additions, no more unless one work group has more. Returns
-  /// whether there is none left: the result is there. While the driver still compiles a shader it does nothing. Throws
-  /// Error(gl).
+  /// Runs one dispatch of at most that many multiply-adds, but at least one work group. Returns true if denoising is
+  /// complete. Does nothing while the driver still compiles the shader. Throws Error(gl).
   bool step(double multiply_adds);
-  /// Part of what was begun that is done, 0 to 1.
+  /// Returns the completed fraction since begin(), 0 to 1.
   [[nodiscard]] double progress() const;
-  /// Of begin() to its end.
+  /// Returns the total from begin() to completion.
   [[nodiscard]] double multiply_adds() const { return total_; }
   [[nodiscard]] std::uint64_t bytes() const { return weights_bytes_ + channels_bytes_ + bins_bytes_; }
 
  private:
-  // What a step takes a part of: work groups of one program, one after the other.
+  // The work groups of one program. Each step runs a range of them, in order.
   struct Stage {
     enum class Kind { bins, exposure, input, convolution };
     Kind kind;
@@ -78,8 +77,8 @@ class Denoiser {
   std::vector<Tile> tiles_;
   Memory memory_;
   std::vector<Stage> stages_;
-  std::size_t stage_ = 0;    // the next
-  std::uint32_t group_ = 0;  // the next of it
+  std::size_t stage_ = 0;    // index of the next stage
+  std::uint32_t group_ = 0;  // next work group of this stage
   double done_ = 0.0;
   double total_ = 0.0;
 };

@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t most_channels = 512;
 constexpr std::uint32_t colours = 3;
 
-/// The list without shapes, weights and biases. Numbers are places in it.
+/// The convolutions without shapes, weights and biases. Numbers are indices into the list.
 std::array<Convolution, Network::convolution_count> topology() {
   const Source input{};
   const auto of = [](std::size_t convolution) { return Source{convolution, false}; };

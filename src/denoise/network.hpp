@@ -13,44 +13,44 @@
 
 namespace cumulet::denoise {
 
-/// Where a convolution's channels come from: the network's input, or a convolution's result by its place in the list.
+/// A source of a convolution's channels: the network's input, or the result of another convolution, by index.
 struct Source {
-  std::optional<std::size_t> convolution;  ///< none: the network's input
-  bool enlarged = false;                   ///< twice in both directions, the nearest
+  std::optional<std::size_t> convolution;  ///< empty: the network's input
+  bool enlarged = false;                   ///< upsampled by 2 in both directions, nearest neighbor
 };
 
-/// A convolution of 3x3 with what comes before and after it: sources one after the other, zeros around them; a bias;
-/// nothing below 0; and the largest of each 2x2, where it is pooled.
+/// A 3x3 convolution layer: its sources are concatenated and zero-padded. It is followed by bias and ReLU, and by 2x2
+/// max pooling if `pooled`.
 struct Convolution {
   std::string_view name;
   std::vector<Source> sources;
   bool pooled = false;
   std::uint32_t inputs = 0;    ///< channels of all sources
   std::uint32_t outputs = 0;   ///< channels
-  unsigned level = 0;          ///< it works at a size of the picture's >> level
-  std::vector<float> weights;  ///< of [output][input][y][x]
+  unsigned level = 0;          ///< it runs at the image size >> level
+  std::vector<float> weights;  ///< indexed [output][input][y][x]
   std::vector<float> biases;
 };
 
-/// A U-Net of Open Image Denoise: what is written of its training (training/model.py there) and the tensors' shapes
-/// say the same. Sides of what it works on are multiples of `alignment`.
+/// A U-Net of Open Image Denoise. The structure follows its training code (training/model.py there) and the tensors'
+/// shapes. The sides of its input are multiples of `alignment`.
 struct Network {
   static constexpr unsigned alignment = 16;
-  /// Pixels around one that its result depends on, in whole alignments: radii of the convolutions, each times its
-  /// level's pixels, are 79, and places in pooled blocks add up to 15.
+  /// Receptive-field radius in pixels, rounded up to whole alignments: the radii of the convolutions, each times its
+  /// level's pixel size, sum to 79, and positions within pooled blocks add up to 15.
   static constexpr unsigned reach = 96;
   static constexpr std::size_t convolution_count = 16;
 
-  std::uint32_t inputs = 0;  ///< 3: colour; 9: colour, albedo, normal
+  std::uint32_t inputs = 0;  ///< 3: color; 9: color, albedo, normal
   std::array<Convolution, convolution_count> convolutions;
-  /// Multiplications (with an addition each) a pixel.
+  /// Returns the multiply-adds per pixel.
   [[nodiscard]] double multiply_adds() const;
 };
 
 using NetworkPtr = std::shared_ptr<const Network>;
 
-/// Of an archive's tensors. name: what messages begin with. Throws Error(file) that names the tensor which is not
-/// there, or not of the shape that those before it ask for.
+/// Makes a network of an archive's tensors. name: prefix of messages. Throws Error(file) with the name of a tensor that
+/// is missing or does not have the shape that the previous tensors require.
 NetworkPtr make_network(const TensorArchive& archive, const std::string& name);
 
 }  // namespace cumulet::denoise

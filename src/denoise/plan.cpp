@@ -8,13 +8,13 @@ namespace {
 
 constexpr std::uint32_t rounded_up(std::uint32_t value, std::uint32_t to) { return divided_up(value, to) * to; }
 
-// Less would be for surroundings almost alone.
+// A smaller kept region would spend almost all work on the surroundings.
 constexpr std::uint32_t least_kept = 64;
 
-/// One direction of a picture in tiles.
+/// Tiling along one axis of an image.
 struct Cut {
-  std::uint32_t whole = 0;  // in whole alignments
-  std::uint32_t kept = 0;   // that a tile is right about
+  std::uint32_t whole = 0;  // size, rounded up to whole alignments
+  std::uint32_t kept = 0;   // size of the part of a tile that is valid
 
   explicit Cut(std::uint32_t size) : whole(rounded_up(size, Network::alignment)), kept(whole) {}
   [[nodiscard]] std::uint32_t tile() const { return std::min(kept + 2 * Network::reach, whole); }
@@ -25,7 +25,7 @@ struct Cut {
   }
 };
 
-/// Lowest place first.
+/// First-fit allocator with lifetimes.
 class Arena {
  public:
   std::uint32_t take(std::uint32_t size, std::size_t until) {
@@ -38,7 +38,7 @@ class Arena {
     size_ = std::max(size_, at + size);
     return at;
   }
-  /// What is needed until before that.
+  /// Frees allocations that are last used before this step.
   void free_before(std::size_t step) {
     std::erase_if(held_, [&](const Held& held) { return held.until < step; });
   }
@@ -50,7 +50,7 @@ class Arena {
     std::uint32_t end;
     std::size_t until;
   };
-  std::vector<Held> held_;  // in the order of their places
+  std::vector<Held> held_;  // sorted by begin
   std::uint32_t size_ = 0;
 };
 

@@ -9,41 +9,40 @@
 
 namespace cumulet::denoise {
 
-/// Channels that kernels read and write at once, a uvec4 a pixel; and of their results.
+/// Channels that kernels read and write at once (a uvec4 per pixel), and output channels per work group.
 inline constexpr std::uint32_t block_channels = 8;
 inline constexpr std::uint32_t group_channels = 16;
 
 constexpr std::uint32_t divided_up(std::uint32_t value, std::uint32_t by) { return (value + by - 1) / by; }
 
-/// Blocks of that many channels: the network's input is filled up to a block, results to a group.
+/// Number of channel blocks: the network's input is padded to whole blocks, results to whole groups.
 std::uint32_t input_blocks(const Network& network);
 std::uint32_t result_blocks(const Convolution& convolution);
 
-/// Pixels around a picture that a network sees as well: its own, mirrored, so that its outermost ones are as good as
-/// others.
+/// Padding around an image: its own pixels, mirrored, so that pixels at the border are denoised as well as others.
 inline constexpr std::uint32_t rim = 16;
 
-/// A part of a picture that is denoised by itself, in pixels of the picture with its rim.
+/// A part of an image that is denoised separately, in pixels of the padded image.
 struct Tile {
   glm::uvec2 begin{0U};
-  glm::uvec2 size{0U};  ///< multiples of Network::alignment; may go beyond the picture and its rim
-  /// Where it is what denoising all at once gives. Of all tiles together: the picture with its rim.
+  glm::uvec2 size{0U};  ///< multiples of Network::alignment; may extend beyond the padded image
+  /// The region where the result equals denoising without tiles. These regions cover the padded image.
   glm::uvec2 keep_begin{0U};
   glm::uvec2 keep_end{0U};
 };
 
-/// Tiles of a picture with its rim, of at most so many pixels each, as far as 64 of them in each direction and what
-/// these depend on fit.
+/// Splits a padded image into tiles of at most that many pixels. Tiles keep at least 64 pixels per axis plus the pixels
+/// that these depend on, even if that exceeds the limit.
 std::vector<Tile> tiles_of(glm::uvec2 picture, std::uint64_t most_pixels);
 
-/// Where a tile's channels are while it is denoised: what is needed no more makes room for what comes.
+/// Offsets of a tile's channels while it is denoised: memory that is no longer needed is reused.
 struct Memory {
-  std::uint32_t input = 0;                                          ///< in uvec4, as all
-  std::array<std::uint32_t, Network::convolution_count> results{};  ///< the last has none: it is the picture
+  std::uint32_t input = 0;                                          ///< all in uvec4
+  std::array<std::uint32_t, Network::convolution_count> results{};  ///< unused for the last, which writes the image
   std::uint32_t size = 0;
 };
 
-/// Of tiles up to that size.
+/// Returns the layout for tiles up to that size.
 Memory memory_of(const Network& network, glm::uvec2 tile);
 
 }  // namespace cumulet::denoise

@@ -28,7 +28,7 @@ class Reader {
     if (bytes_.size() < 2 || number(2) != magic) fail("no tensor archive (.tza) of Open Image Denoise");
     if (bytes_.size() < header_bytes) fail("is cut short in its header");
     const std::uint64_t major = number(1);
-    number(1);  // the minor version, which changes nothing for readers
+    number(1);  // the minor version is irrelevant for readers
     if (major != version) fail("is a tensor archive of version " + std::to_string(major) + ", not 2");
     const std::uint64_t table = number(8);
     if (table > bytes_.size()) fail("is cut short before its table");
@@ -72,7 +72,7 @@ class Reader {
     std::uint64_t count = 1;
     for (std::uint64_t i = 0; i < dimensions; ++i) {
       tensor.shape.push_back(static_cast<std::uint32_t>(number(4)));
-      // More than the file has bytes is refused below, so that this does not go over.
+      // The clamp avoids overflow: counts beyond the file size are rejected below.
       count = std::min<std::uint64_t>(count * tensor.shape.back(), most_tza_bytes);
     }
     tensor.layout = text(static_cast<std::size_t>(dimensions));
@@ -84,7 +84,7 @@ class Reader {
     if (offset > bytes_.size() || count > (bytes_.size() - offset) / value_bytes) {
       fail(tensor_ + "goes beyond the file's end");
     }
-    // Else a small file could ask for any amount of memory.
+    // Otherwise a small file with overlapping tensors could request any amount of memory.
     used_ += count * value_bytes;
     if (used_ > bytes_.size()) fail(tensor_ + "lies over others");
     tensor.values = values(bytes_.subspan(static_cast<std::size_t>(offset)), static_cast<std::size_t>(count), type);
@@ -111,8 +111,8 @@ class Reader {
   std::span<const std::uint8_t> bytes_;
   const std::string& name_;
   std::size_t at_ = 0;
-  std::uint64_t used_ = 0;  // bytes of values so far
-  std::string tensor_;      // the one being read, for messages
+  std::uint64_t used_ = 0;  // total bytes of values so far
+  std::string tensor_;      // the tensor being read, for messages
 };
 
 }  // namespace

@@ -15,7 +15,8 @@ struct Loader {
   void* user;
 };
 
-// glad lists the extensions, of which we use none; a lost context gives null for their names, which glad would read.
+// glad lists the extensions, which the library does not use. A lost context returns null for their names, which glad
+// would read.
 const GLubyte* no_string(GLenum /*name*/, GLuint /*index*/) { return reinterpret_cast<const GLubyte*>(""); }
 
 GLADapiproc load_one(void* loader, const char* name) {
@@ -24,7 +25,7 @@ GLADapiproc load_one(void* loader, const char* name) {
   return reinterpret_cast<GLADapiproc>(l->get_proc(l->user, name));
 }
 
-// A current context says its version, unless it is lost or between glBegin and glEnd.
+// A current context returns its version unless it is lost or the thread is between glBegin and glEnd.
 bool is_between_begin_and_end(const Functions& gl, void* (*get_proc)(void* user, const char* name), void* user) {
   if (gl.GetString == nullptr || find_current_context(get_proc, user) == nullptr) return false;
   const auto reset_status =
@@ -56,6 +57,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   gl->draw_buffers = static_cast<GLuint>(std::clamp(draw_buffers, 1, 16));
   gl->compatibility = load_compatibility(*gl, get_proc, user);
   gl->GetIntegerv(GL_MAX_DEBUG_GROUP_STACK_DEPTH, &gl->max_debug_groups);
+  gl->GetIntegerv(GL_MAX_TEXTURE_SIZE, &gl->max_texture_size);
   return gl;
 }
 
@@ -65,6 +67,7 @@ std::shared_ptr<const Functions> copy_of(const Functions& gl) {
   copy->draw_buffers = gl.draw_buffers;
   copy->compatibility = gl.compatibility;
   copy->max_debug_groups = gl.max_debug_groups;
+  copy->max_texture_size = gl.max_texture_size;
   return copy;
 }
 
@@ -76,7 +79,7 @@ Limits query_limits(const Functions& gl) {
   gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &value);
   limits.storage_block_bytes = value;
   gl.GetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &limits.texture_size_3d);
-  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &limits.texture_size_2d);
+  limits.texture_size_2d = gl.max_texture_size;
   return limits;
 }
 
@@ -101,7 +104,7 @@ void check_reset(const Functions& gl) {
 }
 
 void clear_errors(const Functions& gl) {
-  // A lost context may report errors for ever.
+  // A lost context may report errors forever.
   for (int i = 0; i < 64 && gl.GetError() != GL_NO_ERROR; ++i) {
   }
 }

@@ -14,16 +14,16 @@ namespace cumulet::gl {
 class StateGuard;
 struct CompatibilityFunctions;
 
-/// The GL function table of one context, loaded through the host's callback. Nothing is linked.
+/// The GL function table of one context, loaded through the host's callback. The library links no GL.
 ///
-/// Functions that set state, or that need some to be known, hide glad's of the same name: they tell the innermost
-/// StateGuard that is in scope before they call. Without one they just call.
+/// Functions that set state, or that depend on state, hide glad's function of the same name: they notify the innermost
+/// StateGuard in scope before they call GL. Without a guard they only call GL.
 struct Functions : GladGLContext {
-  /// The context is gone: objects are forgotten, not deleted.
+  /// True once the context is lost: objects are then forgotten, not deleted.
   mutable std::atomic<bool> abandoned = false;
-  /// Dispatches are over when their call returns, as on software drivers: find_out_dispatches().
+  /// True if a dispatch is complete when its call returns, as on software drivers. Set by find_out_dispatches().
   mutable std::atomic<bool> dispatches_in_call = false;
-  /// The innermost that is in scope.
+  /// The innermost guard in scope.
   mutable StateGuard* guard = nullptr;
   /// The constant GL_MAX_DRAW_BUFFERS.
   GLuint draw_buffers = 8;
@@ -31,9 +31,11 @@ struct Functions : GladGLContext {
   std::shared_ptr<const CompatibilityFunctions> compatibility;
   /// The constant GL_MAX_DEBUG_GROUP_STACK_DEPTH.
   GLint max_debug_groups = 0;
-  /// For DebugGroup: how many of them are open. One thread has the context.
+  /// The constant GL_MAX_TEXTURE_SIZE, in texels.
+  GLint max_texture_size = 0;
+  /// Number of DebugGroup objects that are open. Not atomic: one thread has the context.
   mutable GLint open_debug_groups = 0;
-  /// How many may be open beside those of the host; nothing until a call queries it.
+  /// Number of debug groups that fit on the driver's stack besides the host's. Empty until a DebugGroup queries it.
   mutable std::optional<GLint> debug_group_room;
 
   void UseProgram(GLuint program) const;
@@ -86,17 +88,17 @@ struct Functions : GladGLContext {
   void BlitNamedFramebuffer(GLuint from, GLuint to, GLint x0, GLint y0, GLint x1, GLint y1, GLint u0, GLint v0,
                             GLint u1, GLint v1, GLbitfield mask, GLenum filter) const;
 
-  // These note what a texture is, so that binding one is about one target, and asks for that alone.
+  // These record the target of each texture, so that the guard saves only the binding of that target when one is bound.
   void CreateTextures(GLenum target, GLsizei count, GLuint* names) const;
   void DeleteTextures(GLsizei count, const GLuint* names) const;
-  /// 0 for a texture that was not made here.
+  /// Returns 0 for a texture that was not created through this table.
   [[nodiscard]] GLenum target_of(GLuint texture) const;
 
  private:
   mutable std::unordered_map<GLuint, GLenum> texture_targets_;
 };
 
-/// What the library needs of the context's limits.
+/// The limits of the context that the library needs.
 struct Limits {
   std::int64_t texture_buffer_texels = 0;
   std::int64_t storage_block_bytes = 0;
@@ -104,26 +106,26 @@ struct Limits {
   int texture_size_2d = 0;
 };
 
-/// Loads the table and checks version 4.5 and compute. Throws Error(unsupported) that says what is missing.
+/// Loads the table and checks for OpenGL 4.5 with compute shaders. Throws Error(unsupported) with the missing feature.
 std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user);
-/// The same functions, for what outlives the viewer whose those are, with states of its own.
+/// Copies the functions, but not the state, for objects that outlive the viewer that owns `gl`.
 std::shared_ptr<const Functions> copy_of(const Functions& gl);
 Limits query_limits(const Functions& gl);
 
-/// Takes all pending GL errors; throws Error(out_of_memory, context_lost or gl) that names the step.
+/// Consumes all pending GL errors. If there was one, throws Error(out_of_memory, context_lost or gl) with the step.
 void check(const Functions& gl, const char* step);
-/// Whether the driver says that it reset the context.
+/// Whether the driver reports that it reset the context.
 bool was_reset(const Functions& gl);
 inline constexpr const char* reset_message = "the driver reset the GL context";
-/// Throws Error(context_lost) if the driver says that it reset the context.
+/// Throws Error(context_lost) if the driver reports that it reset the context.
 void check_reset(const Functions& gl);
-/// Drops errors that were pending before we came.
+/// Drops errors that are pending, for example from calls of the host.
 void clear_errors(const Functions& gl);
 
-/// Whether the current context has it.
+/// Whether the current context supports the extension.
 bool has_extension(const Functions& gl, const char* name);
 
-/// The GL name of a context string, "" if the driver gives none.
+/// Returns a string of the context (GL_VENDOR, GL_VERSION, ...), or "" if the driver returns none.
 std::string string_of(const Functions& gl, GLenum name);
 
 }  // namespace cumulet::gl

@@ -1,6 +1,6 @@
 #pragma once
 
-// glsl/bindings.glsl as C++: the places that shaders and the calls that bind for them share.
+// glsl/bindings.glsl as C++: the binding points that shaders and C++ share.
 
 namespace cumulet::core {
 #include "bindings.glsl"

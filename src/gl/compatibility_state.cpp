@@ -69,7 +69,7 @@ constexpr std::array<GLenum, 8> imaging_table{0x80D0,               // GL_COLOR_
                                               0x802E};              // GL_MINMAX
 constexpr std::array<GLfloat, 16> identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
 
-/// Calls no guard.
+/// The table without the guard's hooks.
 const GladGLContext& plain(const Functions& gl) { return gl; }
 
 template <class Function>
@@ -196,7 +196,7 @@ void CompatibilityState::restore_unit(GLuint unit) const {
   gl_->compatibility->TexEnvf(texture_filter_control, GL_TEXTURE_LOD_BIAS, level_biases_.at(unit));
 }
 
-// ---- back ----
+// ---- restore ----
 
 void CompatibilityState::restore() const {
   const GladGLContext& gl = plain(*gl_);

@@ -12,8 +12,8 @@ namespace cumulet::gl {
 
 struct Functions;
 
-/// The functions that only a compatibility context has, as far as the library needs them. The host's callback gives
-/// them, as it gives all others.
+/// The functions that only a compatibility context has, as far as the library needs them. They are loaded through the
+/// host's callback.
 struct CompatibilityFunctions {
   using GetProc = void* (*)(void* user, const char* name);
 
@@ -23,19 +23,20 @@ struct CompatibilityFunctions {
   // Null where the context lacks GL_ARB_imaging.
   void(GLAD_API_PTR* MatrixMode)(GLenum mode) = nullptr;
   void(GLAD_API_PTR* LoadMatrixf)(const GLfloat* matrix) = nullptr;
-  /// The window system's query for the current context. Null if the host's callback has none.
+  /// The window system's query for the current context. Null if the host's callback does not provide one.
   void* (*current_context)() = nullptr;
 };
 
-/// Null in a core context, or in a forward-compatible one. Throws Error(unsupported) that names a missing function.
+/// Returns null in a core or forward-compatible context. Throws Error(unsupported) with the name of a missing function.
 std::shared_ptr<const CompatibilityFunctions> load_compatibility(const Functions& gl,
                                                                  CompatibilityFunctions::GetProc get_proc, void* user);
 
-/// The window system's query, where the host's callback has one that knows the current context; else null.
+/// Returns the window system's query for the current context. Null if the host's callback provides none that returns a
+/// context.
 void* (*find_current_context(CompatibilityFunctions::GetProc get_proc, void* user))();
 
-/// Whether the calling thread is between glBegin and glEnd, where GL answers no question. `certain` is false if the
-/// window system could not be asked: then there may be no context at all.
+/// Whether the calling thread is between glBegin and glEnd, where GL answers no query. `certain` is false if the window
+/// system cannot be queried; there may then be no current context.
 struct BetweenBeginAndEnd {
   bool possible = false;
   bool certain = false;
@@ -44,28 +45,28 @@ BetweenBeginAndEnd between_begin_and_end(const Functions& gl);
 inline constexpr const char* between_begin_and_end_message =
     "this call came between glBegin and glEnd, where OpenGL allows no such call: make it after glEnd";
 
-/// Throws Error(gl) if a display list is open, or if glRenderMode is GL_SELECT or GL_FEEDBACK. Nothing in a core
+/// Throws Error(gl) if a display list is open, or if glRenderMode is GL_SELECT or GL_FEEDBACK. Does nothing in a core
 /// context.
 void require_rendering(const Functions& gl);
 
-/// The state of a compatibility context that changes what our draws and pixel transfers give, and that core contexts
-/// lack. Part of StateGuard: each part is saved and set to the value of a core context when it is first used.
+/// Compatibility-profile state that affects the library's draws and pixel transfers and that core contexts lack. Used
+/// by StateGuard: each group is saved and set to the value of a core context at its first use.
 ///
 /// All calls do nothing in a core context.
 class CompatibilityState {
  public:
   CompatibilityState(const Functions& gl, bool restore) : gl_(&gl), restore_(restore) {}
 
-  /// Before draws: alpha test, polygon stipple, fragment color clamp.
+  /// Call before draws: alpha test, polygon stipple, fragment color clamp.
   void prepare_fragments();
-  /// Before pixels are transferred: scales, biases, maps, and the imaging subset.
+  /// Call before pixel transfers: scales, biases, maps, and the imaging subset.
   void prepare_pixels();
-  /// The level-of-detail bias of a texture unit, which is the active one.
+  /// Resets the level-of-detail bias of the texture unit, which must be active.
   void prepare_unit(GLuint unit);
-  /// Makes the unit active where it has something to restore.
+  /// Restores the bias of the unit; makes the unit active if there is something to restore.
   void restore_unit(GLuint unit) const;
 
-  /// All but units.
+  /// Restores everything but texture units.
   void restore() const;
 
  private:

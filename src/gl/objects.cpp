@@ -15,10 +15,9 @@ Object make_texture(const FunctionsPtr& gl, GLenum target) {
   return {gl, Object::Kind::texture, name};
 }
 
-// Else the driver's error is that a value is invalid.
+// Without this check the driver only reports an invalid value.
 void require_size(const Functions& gl, int width, int height, const char* what) {
-  GLint most = 0;
-  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  const GLint most = gl.max_texture_size;
   if (width <= most && height <= most) return;
   throw Error(ErrorCode::unsupported, std::string(what) + ": " + std::to_string(width) + "x" + std::to_string(height) +
                                           " texels are more than this driver's GL_MAX_TEXTURE_SIZE, " +
@@ -37,7 +36,7 @@ Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) 
 }  // namespace
 
 DebugGroup::DebugGroup(const Functions& gl, std::string_view name) : gl_(gl) {
-  // A StateGuard forgets it at the start of a call. The host pushes no group within one.
+  // A StateGuard resets the value at the start of a call. The host pushes no group within a call.
   if (!gl_.debug_group_room || (gl_.guard == nullptr && gl_.open_debug_groups == 0)) {
     GLint depth = 0;
     gl_.GetIntegerv(GL_DEBUG_GROUP_STACK_DEPTH, &depth);
@@ -85,7 +84,7 @@ Object::~Object() {
 void label(const Functions& gl, Object::Kind kind, GLuint name, std::string_view what) {
   constexpr std::array<GLenum, 7> identifiers{GL_BUFFER,  GL_TEXTURE,     GL_SAMPLER,     GL_SHADER,
                                               GL_PROGRAM, GL_FRAMEBUFFER, GL_VERTEX_ARRAY};
-  constexpr std::size_t longest = 255;  // that every driver takes
+  constexpr std::size_t longest = 255;  // accepted by every driver
   for (const std::string_view prefix : {"creating ", "the ", "a "}) {
     if (what.starts_with(prefix)) what.remove_prefix(prefix.size());
   }
@@ -101,7 +100,7 @@ Fence::~Fence() {
   if (sync_ != nullptr && !gl_->abandoned.load(std::memory_order_relaxed)) gl_->DeleteSync(sync_);
 }
 
-// Without GL_SYNC_FLUSH_COMMANDS_BIT, which makes Mesa's zink wait: it was flushed.
+// GL_SYNC_FLUSH_COMMANDS_BIT is left out: it makes Mesa's zink wait, and the fence was flushed.
 bool Fence::passed() const { return sync_ == nullptr || gl_->ClientWaitSync(sync_, 0, 0) != GL_TIMEOUT_EXPIRED; }
 
 void Fence::wait() const {

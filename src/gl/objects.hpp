@@ -14,8 +14,8 @@ namespace cumulet::gl {
 
 using FunctionsPtr = std::shared_ptr<const Functions>;
 
-/// A GL name with its deleter; movable, deleted with the context current. Framebuffers and vertex arrays belong to the
-/// one context they were made in, the other kinds to its share group.
+/// A GL name with its deleter. Movable; must be destroyed with the context current. Framebuffers and vertex arrays
+/// belong to the context that created them, all other kinds to its share group.
 class Object {
  public:
   enum class Kind { buffer, texture, sampler, shader, program, framebuffer, vertex_array };
@@ -45,13 +45,12 @@ class Object {
   GLuint name_ = 0;
 };
 
-/// Names an object for debuggers and drivers' output (KHR_debug, core since 4.3): after the step that makes it
-/// ("creating the sums": "cumulet: sums").
+/// Labels an object for debuggers and driver messages (KHR_debug, core since 4.3). The label is derived from the
+/// creation step: "creating the sums" becomes "cumulet: sums".
 void label(const Functions& gl, Object::Kind kind, GLuint name, std::string_view what);
 
-/// A pass, for the same: the commands between its beginning and its end are its. name: "cumulet: ..." by convention.
-/// Where the host's own groups fill the driver's stack there is none: a push would fail, and its pop end a host's
-/// group.
+/// A debug group: covers the commands issued during its lifetime. name: "cumulet: ..." by convention. If the host's own
+/// groups fill the driver's stack, no group is pushed: the push would fail, and the pop would end a group of the host.
 class DebugGroup {
  public:
   DebugGroup(const Functions& gl, std::string_view name);
@@ -64,11 +63,11 @@ class DebugGroup {
   bool pushed_ = false;
 };
 
-/// A point in the stream of commands; deleted with the context current.
+/// A fence in the command stream. Must be destroyed with the context current.
 class Fence {
  public:
   Fence() = default;
-  /// After all commands so far, which are sent off.
+  /// Placed after all commands issued so far, which are flushed.
   explicit Fence(FunctionsPtr gl);
   Fence(Fence&& other) noexcept : gl_(std::move(other.gl_)), sync_(std::exchange(other.sync_, nullptr)) {}
   Fence& operator=(Fence&& other) noexcept {
@@ -79,11 +78,12 @@ class Fence {
   Fence(const Fence&) = delete;
   Fence& operator=(const Fence&) = delete;
   ~Fence();
-  /// Whether the commands before it are done; true where there is none. Never waits.
+  /// Whether the commands before the fence are complete; true for an empty Fence. Never waits.
   [[nodiscard]] bool passed() const;
-  /// Until they are.
+  /// Waits until they are complete.
   void wait() const;
-  /// What the context does from now on comes after, though another context of the share group made it. Never waits.
+  /// Makes later commands of the current context wait on the GPU for this fence, which may belong to another context of
+  /// the share group. Does not block the CPU.
   void order() const;
 
  private:
@@ -91,13 +91,14 @@ class Fence {
   GLsync sync_ = nullptr;
 };
 
-/// A buffer that the driver writes and we read, without asking for it, once a fence after the writing has passed.
+/// A persistently mapped buffer that the GPU writes and the CPU reads without a further call, once a fence after the
+/// write has passed.
 class ReadBack {
  public:
   ReadBack() = default;
-  /// Of zeros at first.
+  /// Initially zero.
   ReadBack(const FunctionsPtr& gl, std::size_t bytes, const char* what);
-  /// Of whatever is there: for large ones, of which only what was written is read.
+  /// Uninitialized: for large buffers of which only the written part is read.
   static ReadBack unfilled(const FunctionsPtr& gl, std::size_t bytes, const char* what);
   [[nodiscard]] GLuint name() const { return buffer_.name(); }
   [[nodiscard]] const std::byte* data() const { return data_; }
@@ -110,13 +111,13 @@ class ReadBack {
   const std::byte* data_ = nullptr;
 };
 
-/// glMemoryBarrier, where it is needed: a driver whose dispatches are over when their call returns orders all that
-/// follows, but its barrier (Mesa's llvmpipe) waits for whatever the host has queued.
+/// Calls glMemoryBarrier if it is needed. A driver that completes dispatches within the call orders all that follows,
+/// but its barrier (Mesa's llvmpipe) waits for everything the host has queued.
 void memory_barrier(const Functions& gl, GLbitfield barriers);
 
-/// An immutable buffer; data may be null. flags as for glNamedBufferStorage. Throws on a GL error.
+/// Creates an immutable buffer; data may be null. flags: as for glNamedBufferStorage. Throws on a GL error.
 Object make_buffer(const FunctionsPtr& gl, std::size_t bytes, const void* data, GLbitfield flags, const char* what);
-/// A texture buffer over the whole of a buffer.
+/// Creates a texture buffer over a whole buffer.
 Object make_texture_buffer(const FunctionsPtr& gl, GLenum format, const Object& buffer, const char* what);
 Object make_texture_2d(const FunctionsPtr& gl, GLenum format, int width, int height, const char* what);
 Object make_texture_2d_array(const FunctionsPtr& gl, GLenum format, int width, int height, int layers,
@@ -126,7 +127,7 @@ Object make_texture_2d_multisample(const FunctionsPtr& gl, GLenum format, int sa
 Object make_texture_3d(const FunctionsPtr& gl, GLenum format, int x, int y, int z, const char* what);
 Object make_framebuffer(const FunctionsPtr& gl);
 Object make_vertex_array(const FunctionsPtr& gl);
-/// Nearest, no comparison: reads any complete texture as it is.
+/// Creates a sampler with nearest filtering and no comparison, so that any complete texture is read unchanged.
 Object make_sampler(const FunctionsPtr& gl);
 
 }  // namespace cumulet::gl

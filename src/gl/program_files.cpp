@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr std::array<char, 8> magic{'C', 'U', 'M', 'P', 'R', 'O', 'G', '1'};
 constexpr std::string_view suffix = ".program";
 constexpr std::string_view unfinished = ".part";
-constexpr auto given_up = std::chrono::hours(1);  // what a writer has left behind
+constexpr auto given_up = std::chrono::hours(1);  // leftovers of a writer that died
 
 struct Key {
   std::uint64_t first = 0, second = 0;
@@ -38,7 +38,7 @@ struct Header {
 };
 static_assert(sizeof(Header) == 48);
 
-// FNV-1a, and the end of MurmurHash3 after it.
+// FNV-1a, followed by the finalizer of MurmurHash3.
 std::uint64_t hash(std::span<const std::byte> bytes, std::uint64_t basis) {
   std::uint64_t h = basis;
   for (const std::byte b : bytes) h = (h ^ static_cast<std::uint64_t>(b)) * 0x100000001b3U;
@@ -64,7 +64,7 @@ fs::path file_of(const fs::path& folder, const Key& key) {
   return folder / std::string(digits.data()).append(suffix);
 }
 
-// Whether that is such a file's name.
+// Whether the name is that of a finished cache file.
 bool is_whole(std::string_view name) {
   constexpr std::size_t digits = 32;
   if (!name.ends_with(suffix)) return false;
@@ -72,7 +72,7 @@ bool is_whole(std::string_view name) {
   return name.size() == digits && name.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
-// One that keep() has begun: a number and unfinished after it.
+// Whether the name is that of a temporary file of keep(): the final name, a number, and `unfinished`.
 bool is_part(std::string_view name) {
   if (!name.ends_with(unfinished)) return false;
   name.remove_suffix(unfinished.size());
@@ -80,7 +80,7 @@ bool is_part(std::string_view name) {
   return end < name.size() && is_whole(name.substr(0, end));
 }
 
-// Of all that a driver is given.
+// Checksum of everything that is passed to the driver.
 std::uint64_t sum_of(std::uint64_t format, std::span<const std::byte> bytes) {
   const std::array<std::uint64_t, 2> words{format, bytes.size()};
   return hash(bytes, hash(std::as_bytes(std::span(words)), basis));
@@ -110,7 +110,7 @@ std::optional<ProgramFiles::Binary> ProgramFiles::find(const std::string& driver
     return std::nullopt;
   }
   binary.format = static_cast<std::uint32_t>(header.format);
-  fs::last_write_time(path, fs::file_time_type::clock::now(), error);  // used
+  fs::last_write_time(path, fs::file_time_type::clock::now(), error);  // marks it as recently used
   return binary;
 }
 
@@ -124,7 +124,7 @@ void ProgramFiles::keep(const std::string& driver, const std::string& source, co
   const Key key = key_of(driver, source);
   const fs::path path = file_of(folder, key);
   fs::path part = path;
-  part += std::to_string(std::random_device{}());  // another process may write the same
+  part += std::to_string(std::random_device{}());  // another process may write the same key
   part += unfinished;
   {
     const Header header{magic, key, binary.bytes.size(), sum_of(binary.format, binary.bytes), binary.format};
@@ -157,7 +157,7 @@ void ProgramFiles::make_room() const {
   std::uintmax_t bytes = 0;
   std::error_code error;
   for (fs::directory_iterator at(folder_.absolute(), error), end; !error && at != end; at.increment(error)) {
-    std::error_code gone;  // by another process
+    std::error_code gone;  // deleted by another process
     const File file{at->path(), at->last_write_time(gone), at->file_size(gone)};
     if (gone) continue;
     const std::string name = file.path.filename().string();

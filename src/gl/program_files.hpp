@@ -12,10 +12,10 @@
 
 namespace cumulet::gl {
 
-/// A folder of program binaries, of drivers that give them (glGetProgramBinary): good for the driver and the source
-/// that made them, to which a file's name is the key. What is damaged, cut short or not of this kind counts as not
-/// there and is written anew. Bounded: what was not used for longest goes. Any number of processes may use one folder.
-/// Safe from any thread.
+/// A disk cache of program binaries, for drivers that provide them (glGetProgramBinary). A file's name is a hash of the
+/// driver and the source, for which the binary is valid. Files that are damaged, truncated or of another kind count as
+/// missing and are rewritten. The cache is bounded: the least recently used files are deleted. Several processes may
+/// share a folder. Safe from any thread.
 class ProgramFiles {
  public:
   struct Binary {
@@ -23,7 +23,7 @@ class ProgramFiles {
     std::vector<std::byte> bytes;
   };
 
-  /// The folder is made with the first file.
+  /// The folder is created with the first file.
   explicit ProgramFiles(FilePath folder, std::uintmax_t most_bytes = default_most_bytes)
       : folder_(std::move(folder)), most_bytes_(most_bytes) {}
 

@@ -16,7 +16,7 @@ namespace cumulet::gl {
 
 namespace {
 
-// KHR_parallel_shader_compile, and ARB's of the same meaning.
+// KHR_parallel_shader_compile; ARB_parallel_shader_compile has the same value.
 constexpr GLenum completion_status = 0x91B1;
 
 std::string text_of(const ProgramKey& key) {
@@ -47,7 +47,7 @@ std::string source_of(const ShaderFolder* folder, const std::string& name, const
   return own.with(defines);
 }
 
-// The last names the variants.
+// The last stage is the one that declares the variants.
 std::vector<Stage> stages_of(const ShaderFolder* folder, const ProgramKey& key) {
   if (key.vertex.empty()) return {{GL_COMPUTE_SHADER, key.name, source_of(folder, key.name, key.defines, true)}};
   return {{GL_VERTEX_SHADER, key.vertex, source_of(folder, key.vertex, key.defines, false)},
@@ -169,7 +169,7 @@ bool Programs::load(const ProgramKey& key, Program& program) {
   gl_->ProgramBinary(name, binary->format, binary->bytes.data(), static_cast<GLsizei>(binary->bytes.size()));
   GLint linked = 0;
   gl_->GetProgramiv(name, GL_LINK_STATUS, &linked);
-  clear_errors(*gl_);  // a format that the driver has no more
+  clear_errors(*gl_);  // the driver may no longer support the format
   return linked != 0;
 }
 
@@ -197,7 +197,7 @@ void Programs::finish(const ProgramKey& key, Program& program) {
 }
 
 std::string Programs::failure(const ProgramKey& key, const Program& program) const {
-  // The first shader that has something to say, else the linker.
+  // Reports the first shader with a log, else the linker's log.
   std::array<char, 2048> log{};
   std::string culprit = key.vertex.empty() ? key.name : key.vertex;
   for (const Object& shader : program.shaders_) {
@@ -226,18 +226,18 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
   GLsizei written = 0;
   gl_->GetProgramBinary(name, length, &written, &binary.format, binary.bytes.data());
   binary.bytes.resize(static_cast<std::size_t>(std::clamp(written, 0, length)));
-  clear_errors(*gl_);  // it gives none: then there is none
+  clear_errors(*gl_);  // the driver may provide no binary
   if (binary.bytes.empty()) return;
   try {
     files_->keep(driver_, sources_of(shaders_.get(), key), binary);
   } catch (const Error& error) {
     if (log_ != nullptr) log_->warning(std::string("no program binaries are kept: ") + error.what());
-    files_.reset();  // once is enough
+    files_.reset();  // log the failure only once
   }
 }
 
 std::vector<ProgramKey> all_programs() {
-  // They would be half of all and more.
+  // These are more than half of all variants.
   const auto rare = [](const ShaderMacro& macro) {
     return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT" || macro.name == "CM_MOTION" ||
            macro.name == "CM_WIDE";
@@ -271,7 +271,7 @@ void find_out_dispatches(const FunctionsPtr& gl, Programs& programs) {
   programs.get({"sign.comp", {}}).use(*gl);
   gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_SIGN, seen.name());
   gl->DispatchCompute(1, 1, 1);
-  // Nothing was flushed: what is written now was written in the call.
+  // Nothing was flushed: a value that is visible now was written within the call.
   std::uint32_t sign = 0;
   std::memcpy(&sign, seen.data(), sizeof(sign));
   gl->dispatches_in_call = sign != 0;

@@ -19,25 +19,25 @@
 
 namespace cumulet::gl {
 
-/// Which program: a file of glsl/ and one of the variants that it names (cmake/embed_glsl.py).
+/// Identifies a program: a file of glsl/ and one of the variants that the file declares (cmake/embed_glsl.py).
 struct ProgramKey {
   std::string name;                  ///< a compute or a fragment shader
-  std::vector<std::string> defines;  ///< "NAME VALUE", each
-  std::string vertex{};              ///< the vertex shader that goes before a fragment shader
+  std::vector<std::string> defines;  ///< each "NAME VALUE"
+  std::string vertex{};              ///< the vertex shader to link with a fragment shader
   bool operator<(const ProgramKey& other) const {
     return std::tie(name, vertex, defines) < std::tie(other.name, other.vertex, other.defines);
   }
 };
 
-/// A program of Programs. Its uniforms are set anew before each use: viewers share it.
+/// A program of Programs. Its uniforms must be set before each use, because viewers share it.
 class Program {
  public:
   enum class State {
-    absent,     // nobody has asked for it
-    compiling,  // the driver is at it
-    linked,     // it can be used; the driver may compile more in the first use
-    ready,      // it was used
-    failed,     // it does not build
+    absent,     // not requested yet
+    compiling,  // the driver is compiling it
+    linked,     // usable; the driver may compile more at the first use
+    ready,      // has been used
+    failed,     // failed to compile or link
   };
   Program() = default;
   Program(const Program&) = delete;
@@ -48,9 +48,9 @@ class Program {
 
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] bool usable() const { return state_ == State::linked || state_ == State::ready; }
-  /// Only of one that is usable.
+  /// Only valid if usable.
   [[nodiscard]] GLuint name() const { return object_.name(); }
-  /// Makes it current for the dispatch or the draws that follow. Only of one that is usable.
+  /// Makes the program current for the following dispatches or draws. Only valid if usable.
   void use(const Functions& gl) const {
     gl.UseProgram(object_.name());
     state_ = State::ready;
@@ -59,26 +59,26 @@ class Program {
  private:
   friend class Programs;
   Object object_;
-  std::vector<Object> shaders_;   // while it compiles
-  std::optional<Error> failure_;  // why the driver does not build it
+  std::vector<Object> shaders_;   // only while compiling
+  std::optional<Error> failure_;  // the driver's build error
   mutable State state_ = State::absent;
 };
 
-/// All programs of one share group, by their keys: each is made when it is first asked for, and kept. Calls need a
-/// context of the group current, and a Turn around them.
+/// All shader programs of one share group by key. Each is built at the first request and kept. Calls need a context of
+/// the group current, and a Turn in scope.
 class Programs {
  public:
-  /// Of the current context. files: where binaries are kept between runs; none: nowhere. Throws on a GL error.
-  /// shaders: what their sources are instead of what is embedded; null: those.
+  /// Uses the share group of the current context. files: disk cache for binaries; null: none. shaders: folder whose
+  /// sources replace the embedded ones; null: the embedded sources. Throws on a GL error.
   Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files, std::shared_ptr<ShaderFolder> shaders = nullptr);
   Programs(const Programs&) = delete;
   Programs& operator=(const Programs&) = delete;
   Programs(Programs&&) = delete;
   Programs& operator=(Programs&&) = delete;
-  /// Without a context of the group its programs stay behind.
+  /// If no context of the group is current, its programs are not deleted.
   ~Programs();
 
-  /// One viewer's turn: those of other threads wait. What there is to log goes to its log.
+  /// Exclusive access by one viewer; other threads wait. Messages go to the log of this viewer.
   class Turn {
    public:
     Turn(std::shared_ptr<Programs> programs, const Log& log) : programs_(std::move(programs)), lock_(programs_->turn_) {
@@ -95,24 +95,25 @@ class Programs {
     std::scoped_lock<std::mutex> lock_;
   };
 
-  /// The program, begun if it is not there: where the driver compiles in parallel it may still be compiling, else it is
-  /// linked on return. Throws Error(gl) with the driver's log if it does not build, again and again without asking the
-  /// driver anew until try_again(), and Error(internal) for macros that are none of the variants that the shader's
-  /// source names: those are validated, and their cost on GPUs is known (tests/gpu_cost).
+  /// Returns the program, and starts to build it if needed. If the driver compiles in parallel the program may still be
+  /// compiling on return; otherwise it is linked. Throws Error(gl) with the driver's log if the build fails, and
+  /// repeats that error without another build until try_again(). Throws Error(internal) for macros that the shader's
+  /// source does not declare as a variant: the declared variants are validated, and their GPU cost is measured
+  /// (tests/gpu_cost).
   const Program& ask(const ProgramKey& key);
-  /// The same, linked: waits for the driver, and tries again what did not build.
+  /// Like ask(), but waits until the program is linked, and retries a failed build.
   const Program& get(const ProgramKey& key);
-  /// What did not build is built anew where it is asked for next.
+  /// Failed programs are built again at their next request.
   void try_again();
-  /// Without asking the driver.
+  /// Returns the state without a driver call.
   [[nodiscard]] Program::State state(const ProgramKey& key) const;
-  /// Builds programs anew whose sources have changed. One that does not build is one line in the log, and stays what it
-  /// was.
+  /// Rebuilds programs whose sources have changed. If a build fails, one line is logged and the program stays
+  /// unchanged.
   void refresh();
-  /// Another whenever that changed any, or one that did not build may do so now.
+  /// Revision number; changes when refresh() replaced a program, or when a failed program may be built again.
   [[nodiscard]] const Revision<Programs>& revision() const { return revision_; }
-  /// Those that were asked for, and those of them that were used: the driver has no more to compile for these, nor for
-  /// those that failed.
+  /// `asked`: programs requested. `usable`: of these, the linked ones. `ready`: of these, the ones that were used, for
+  /// which the driver has nothing more to compile. `failed`: programs that do not build.
   struct Counts {
     std::size_t asked = 0;
     std::size_t usable = 0;
@@ -120,52 +121,52 @@ class Programs {
     std::size_t failed = 0;
   };
   [[nodiscard]] Counts counts() const;
-  /// Whether the driver compiles while the calling thread does other things (KHR_parallel_shader_compile).
+  /// Whether the driver compiles in the background (KHR_parallel_shader_compile).
   [[nodiscard]] bool parallel() const { return parallel_; }
   /// Whether a context of the group is current on the calling thread.
   [[nodiscard]] bool is_current() const { return group_.is_current(); }
-  /// The contexts are gone, and with them the programs.
+  /// Marks the contexts as lost, and the programs with them.
   void abandon() const { gl_->abandoned = true; }
 
  private:
   void begin(const ProgramKey& key, Program& program);
-  // Whether the binary of an earlier run served.
+  // Loads the binary of an earlier run. Returns false if there is none or the driver rejects it.
   bool load(const ProgramKey& key, Program& program);
   [[nodiscard]] bool complete(const Program& program) const;
-  // What the driver made of it. Throws if that is nothing.
+  // Waits for the driver and fetches the result. Throws if the build failed.
   void finish(const ProgramKey& key, Program& program);
   [[nodiscard]] std::string failure(const ProgramKey& key, const Program& program) const;
-  // For the next run.
+  // Stores the binary for the next run.
   void keep(const ProgramKey& key, const Program& program);
 
-  FunctionsPtr gl_;  // its own: viewers come and go
+  FunctionsPtr gl_;  // its own copy: viewers are destroyed earlier
   ShareGroup group_;
   bool parallel_ = false;
   std::shared_ptr<ProgramFiles> files_;
   std::shared_ptr<ShaderFolder> shaders_;
   Revision<Programs> revision_;
-  std::string driver_;  // what binaries are good for
+  std::string driver_;  // identifies the driver in the keys of binaries
   std::map<ProgramKey, std::unique_ptr<Program>> programs_;
   std::mutex turn_;
-  const Log* log_ = nullptr;  // of the viewer whose turn it is
+  const Log* log_ = nullptr;  // of the viewer that holds the Turn
 };
 
 using ProgramsPtr = std::shared_ptr<Programs>;
 
-/// Every variant in the table but those that few pictures need: groups of lights, holdouts, motion blur. Of macros with
-/// a range of numbers the first.
+/// Returns every variant in the table except rarely used ones: light groups, holdouts, motion blur, wide grids. For
+/// macros with a range of numbers, only the first number.
 std::vector<ProgramKey> all_programs();
 
-/// Finds out Functions::dispatches_in_call, by a small dispatch. Needs a StateGuard around. Throws on a GL error.
+/// Determines Functions::dispatches_in_call with a small dispatch. Needs a StateGuard in scope. Throws on a GL error.
 void find_out_dispatches(const FunctionsPtr& gl, Programs& programs);
 
-/// What viewers that share programs have in common: the Programs of each share group that one of them is attached to.
-/// Safe from any thread.
+/// Shader programs of viewers that share them: one Programs per share group that such a viewer is attached to. Safe
+/// from any thread.
 class ProgramPool {
  public:
   explicit ProgramPool(std::shared_ptr<ProgramFiles> files = nullptr, std::shared_ptr<ShaderFolder> shaders = nullptr)
       : files_(std::move(files)), shaders_(std::move(shaders)) {}
-  /// Those of the current context's group. Throws on a GL error.
+  /// Returns the programs of the current context's share group. Throws on a GL error.
   ProgramsPtr of_current(const Functions& gl);
 
  private:

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr auto pause = std::chrono::milliseconds(250);
 
-// "x.glsl" of a line that includes it.
+// Returns "x.glsl" if the line includes that file.
 std::optional<std::string> included(const std::string& line) {
   constexpr std::string_view directive = "#include \"";
   const std::size_t at = line.find_first_not_of(" \t");

@@ -9,20 +9,21 @@
 
 namespace cumulet::gl {
 
-/// Whether this build takes shaders from a folder: debug builds do.
+/// True if this build can load shaders from a folder, as debug builds do.
 #ifdef NDEBUG
 inline constexpr bool reloads_shaders = false;
 #else
 inline constexpr bool reloads_shaders = true;
 #endif
 
-/// A folder like glsl/ whose files are read anew when they change, for whoever works on them.
+/// A folder like glsl/ whose files are reloaded when they change, for shader development.
 class ShaderFolder {
  public:
   explicit ShaderFolder(FilePath folder) : folder_(std::move(folder)) {}
-  /// A shader with its includes, as cmake/embed_glsl.py has it. Throws Error(file).
+  /// Returns a shader with its includes resolved, like cmake/embed_glsl.py. Throws Error(file).
   [[nodiscard]] std::string source(const std::string& name) const;
-  /// Whether a file was written since this was last asked; not the first time. Looks a few times a second at most.
+  /// Whether a file was written since the previous check; false at the first call. Checks the folder a few times per
+  /// second at most.
   bool changed();
 
  private:

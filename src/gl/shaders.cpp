@@ -23,7 +23,7 @@ bool Shader::has_variant(std::span<const std::string> defines) const {
 }
 
 std::string Shader::with(std::span<const std::string> defines) const {
-  const std::size_t end = source.find('\n') + 1;  // #version stays first
+  const std::size_t end = source.find('\n') + 1;  // #version must stay first
   std::string text(source.substr(0, end));
   for (const std::string& define : defines) text += "#define " + define + "\n";
   text += source.substr(end);

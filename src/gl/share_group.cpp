@@ -22,7 +22,7 @@ bool ShareGroup::is_current() const {
 }
 
 bool ShareGroup::has_label() const {
-  std::array<char, 64> label{};  // longer than ours
+  std::array<char, 64> label{};  // longer than label_
   gl_->GetObjectLabel(GL_BUFFER, token_.name(), static_cast<GLsizei>(label.size()), nullptr, label.data());
   return label_ == label.data();
 }

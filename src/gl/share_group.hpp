@@ -6,20 +6,19 @@
 
 namespace cumulet::gl {
 
-/// Tells contexts apart in which our objects are from those in which they are not, and from none, through the function
-/// table alone. It asks for a buffer and its label: names count from 1 in every share group, and without a context
-/// every query's answer is 0. (Sync objects do not tell: on NVIDIA's 580 every context of the process knows all of
-/// them.)
+/// Detects whether a context of the right share group is current, using only GL calls: it queries a buffer and its
+/// label. The label is needed because names count from 1 in every share group. Without a context every query returns 0.
+/// (Sync objects cannot be used: on NVIDIA's 580 driver they are valid in every context of the process.)
 class ShareGroup {
  public:
-  /// Of the current context. Throws on a GL error.
+  /// Uses the share group of the current context. Throws on a GL error.
   explicit ShareGroup(FunctionsPtr gl);
   ShareGroup(const ShareGroup&) = delete;
   ShareGroup& operator=(const ShareGroup&) = delete;
 
   /// Whether a context of this group is current on the calling thread.
   [[nodiscard]] bool is_current() const;
-  /// Throws Error(gl) if none is, Error(context_lost) if that is why.
+  /// Throws Error(gl) if no context of this group is current, or Error(context_lost) if the driver reset the context.
   void require() const;
 
  private:
@@ -27,8 +26,8 @@ class ShareGroup {
 
   FunctionsPtr gl_;
   Object token_;
-  std::string label_;         // unlike any other's that there is
-  bool keeps_label_ = false;  // a driver need not
+  std::string label_;         // unique among share groups
+  bool keeps_label_ = false;  // drivers are not required to keep labels
 };
 
 }  // namespace cumulet::gl

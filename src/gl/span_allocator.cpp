@@ -12,7 +12,7 @@ std::optional<std::size_t> SpanAllocator::take(std::size_t size) {
   }
   if (best == gaps_.end()) return std::nullopt;
   const auto [first, all] = *best;
-  auto rest = gaps_.extract(best);  // put back without memory, which there may be none of
+  auto rest = gaps_.extract(best);  // the node is reinserted without an allocation, which could fail
   if (all > size) {
     rest.key() = first + size;
     rest.mapped() = all - size;

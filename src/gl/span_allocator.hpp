@@ -6,17 +6,17 @@
 
 namespace cumulet::gl {
 
-/// Which parts of one page are taken. Gaps that touch are one gap.
+/// Best-fit allocator for the units of one page. Adjacent gaps are merged.
 class SpanAllocator {
  public:
-  /// All of it is free.
+  /// Initially, the whole page is free.
   explicit SpanAllocator(std::size_t size) : size_(size), free_(size) {
     if (size > 0) gaps_.emplace(0, size);
   }
 
-  /// The first place of the smallest gap that holds so many units (> 0). O(gaps).
+  /// Returns the start of the smallest gap that holds `size` units (> 0), or nullopt. O(gaps).
   std::optional<std::size_t> take(std::size_t size);
-  /// Of what was taken there, whole. O(log gaps).
+  /// Frees a span that take() returned, as a whole. O(log gaps).
   void give_back(std::size_t first, std::size_t size);
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -27,7 +27,7 @@ class SpanAllocator {
  private:
   std::size_t size_;
   std::size_t free_;
-  std::map<std::size_t, std::size_t> gaps_;  // their sizes, by where they begin
+  std::map<std::size_t, std::size_t> gaps_;  // size of each gap, keyed by its start
 };
 
 }  // namespace cumulet::gl

@@ -26,7 +26,7 @@ constexpr std::array<TextureTarget, 11> texture_targets{
      {GL_TEXTURE_CUBE_MAP_ARRAY, GL_TEXTURE_BINDING_CUBE_MAP_ARRAY},
      {GL_TEXTURE_2D_MULTISAMPLE_ARRAY, GL_TEXTURE_BINDING_2D_MULTISAMPLE_ARRAY}}};
 
-/// The place of a target in the table; its end for none.
+/// Returns the index of a target in the table, or the table's size if there is none.
 std::size_t index_of(GLenum target) {
   const auto* found = std::ranges::find(texture_targets, target, &TextureTarget::target);
   return static_cast<std::size_t>(found - texture_targets.begin());
@@ -87,12 +87,12 @@ constexpr std::array<GLenum, 4> blend_functions{GL_BLEND_SRC_RGB, GL_BLEND_DST_R
                                                 GL_BLEND_DST_ALPHA};
 constexpr std::array<GLenum, 2> blend_equations{GL_BLEND_EQUATION_RGB, GL_BLEND_EQUATION_ALPHA};
 
-/// A name or an enumerator as glGet gives it.
+/// Converts a name or an enumerator from glGet.
 GLuint name_of(GLint value) { return static_cast<GLuint>(value); }
 
 GLboolean as_boolean(bool value) { return value ? GL_TRUE : GL_FALSE; }
 
-/// Of what cumulet.h says a frame may use.
+/// Checks against the ranges that cumulet.h documents for a frame.
 void require_within(GLuint index, GLuint count, const char* what) {
   if (index >= count) throw Error(ErrorCode::internal, std::string(what) + " beyond those that are saved");
 }
@@ -159,7 +159,7 @@ void StateGuard::read_framebuffer() {
 void StateGuard::active_texture() {
   if (!active_texture_.use()) return;
   if (!restore_) {
-    if (gl_->compatibility) plain().ActiveTexture(GL_TEXTURE0 + active_unit_);  // it has state besides bindings
+    if (gl_->compatibility) plain().ActiveTexture(GL_TEXTURE0 + active_unit_);  // units have state besides bindings
     return;
   }
   active_texture_.value = get(GL_ACTIVE_TEXTURE);
@@ -183,7 +183,7 @@ void StateGuard::textures(GLuint unit, GLuint name) {
     texture(unit, target);
     return;
   }
-  // A host's texture, or none, which unbinds all.
+  // A texture of the host, or 0, which unbinds all targets.
   for (std::size_t t = 0; t < targets; ++t) texture(unit, t);
 }
 
@@ -235,7 +235,7 @@ void StateGuard::range(GLenum target, GLuint index) {
   if (!saved.use() || !restore_) return;
   gl_->GetIntegeri_v(storage ? GL_SHADER_STORAGE_BUFFER_BINDING : GL_UNIFORM_BUFFER_BINDING, index,
                      &saved.value.buffer);
-  if (saved.value.buffer == 0) return;  // of no part, then
+  if (saved.value.buffer == 0) return;  // then it has no range
   gl_->GetInteger64i_v(storage ? GL_SHADER_STORAGE_BUFFER_START : GL_UNIFORM_BUFFER_START, index, &saved.value.offset);
   gl_->GetInteger64i_v(storage ? GL_SHADER_STORAGE_BUFFER_SIZE : GL_UNIFORM_BUFFER_SIZE, index, &saved.value.size);
 }
@@ -400,7 +400,7 @@ void StateGuard::set_known() {
   if (cull_.used) set_cull();
 }
 
-// ---- back ----
+// ---- restore ----
 
 void StateGuard::restore_bindings() const {
   const auto& gl = plain();
@@ -422,7 +422,7 @@ void StateGuard::restore_textures() const {
     for (std::size_t t = 0; t < targets; ++t) {
       if (!textures_[unit][t].used) continue;
       const GLuint texture = name_of(textures_[unit][t].value);
-      // Ours goes even if the name is of another target by now.
+      // Unbind the library's texture first: `texture` may have another target by now.
       gl.ActiveTexture(GL_TEXTURE0 + unit);
       gl.BindTexture(texture_targets[t].target, 0);
       if (texture != 0 && gl.IsTexture(texture) != GL_FALSE) gl.BindTextureUnit(unit, texture);
@@ -469,7 +469,7 @@ void StateGuard::restore_images() const {
     if (!images_[i].used) continue;
     const ImageUnit& saved = images_[i].value;
     const GLuint texture = name_of(saved.name);
-    // Some drivers tell no format of a unit that nothing was ever bound to.
+    // Some drivers return no format for a unit that nothing was ever bound to.
     gl.BindImageTexture(i, texture != 0 && gl.IsTexture(texture) != GL_FALSE ? texture : 0, saved.level,
                         as_boolean(saved.layered != 0), saved.layer,
                         name_of(saved.access == 0 ? GL_READ_ONLY : saved.access),
@@ -512,7 +512,7 @@ void StateGuard::restore_raster() const {
     const GLenum back = name_of(saved.polygon_mode[1]);
     if (back == 0 || back == front) {
       gl.PolygonMode(GL_FRONT_AND_BACK, front);
-    } else {  // a compatibility context's
+    } else {  // compatibility contexts only
       gl.PolygonMode(GL_FRONT, front);
       gl.PolygonMode(GL_BACK, back);
     }
@@ -545,7 +545,7 @@ void StateGuard::restore_raster() const {
   if (scissor_box_.used) gl.ScissorIndexedv(0, scissor_box_.value.data());
 }
 
-// ---- what tells it ----
+// ---- functions that notify the guard ----
 
 void Functions::UseProgram(GLuint program) const {
   if (guard != nullptr) guard->program();

@@ -9,54 +9,54 @@
 
 namespace cumulet::gl {
 
-/// Gives passes the GL state that cumulet.h lists at values that they can start from, and puts the host's back on
-/// destruction. Lazily: the functions of gl::Functions tell it what they are about to set or need, so that only what a
-/// call uses is asked for, set and put back, once, and nothing can be forgotten.
+/// Sets the GL state that cumulet.h lists to known values for the library's passes, and restores the host's values on
+/// destruction. This is lazy: the functions of gl::Functions notify the guard of the state they are about to set or
+/// depend on. Only that state is queried, set and restored, once per call, and no state can be forgotten.
 ///
-/// The values are GL's defaults, except that dither is off and only draw buffer 0 can be written. They are there for
-/// every draw, clear, blit and transfer of pixels, and a texture is read without a sampler object until one is bound.
-/// All other bindings are the host's until a pass sets its own.
+/// The known values are GL's defaults, except that dither is off and only draw buffer 0 can be written. They apply to
+/// every draw, clear, blit and pixel transfer. A texture is read without a sampler object until one is bound. All other
+/// bindings are the host's until a pass sets its own.
 ///
-/// State that the library never sets is not saved: the values (not the enables) of blend colour, sample coverage and
-/// mask, stencil, polygon offset, logic op and restart index, and viewports, scissors and depth ranges but the first:
-/// use the indexed calls.
+/// State that the library never sets is not saved: the values (not the enables) of blend color, sample coverage and
+/// mask, stencil, polygon offset, logic op and restart index. Only the first viewport, scissor and depth range is
+/// saved: use the indexed calls.
 ///
-/// In a compatibility context, CompatibilityState does the same for the state that core contexts lack.
+/// In a compatibility context, CompatibilityState does this for the state that core contexts lack.
 ///
-/// Produces no GL error. What the host has deleted while it was bound, or a program that no longer links, cannot be
-/// bound again in GL: that binding ends as 0, if the library used it.
+/// Produces no GL error. GL cannot rebind an object that the host has deleted while it was bound, or a program that no
+/// longer links. If the library used such a binding, it ends as 0.
 class StateGuard {
  public:
-  /// restore false (CUMULET_GL_STATE_HOST_RESETS): asks for nothing and puts nothing back. Guards that restore may
-  /// nest.
+  /// restore: false (CUMULET_GL_STATE_HOST_RESETS) queries nothing and restores nothing. Guards that restore may be
+  /// nested.
   explicit StateGuard(const Functions& gl, bool restore = true);
   ~StateGuard();
   StateGuard(const StateGuard&) = delete;
   StateGuard& operator=(const StateGuard&) = delete;
 
-  /// The first values again, for passes that come after one that changed them.
+  /// Sets the known values again, for a pass that follows one that changed them.
   void set_known();
 
-  // What the library may use.
+  // Number of units and bindings that the library may use.
   static constexpr GLuint units = core::CM_UNITS;
   static constexpr GLuint ranges = core::CM_BUFFERS;
   static constexpr GLuint images = core::CM_IMAGES;
   static constexpr GLuint blended_buffers = 2;
 
  private:
-  friend struct Functions;  // it tells what is about to be used
+  friend struct Functions;  // it reports the state that is about to be used
 
   static constexpr std::size_t targets = 11;
   static constexpr std::size_t most_draw_buffers = 16;  // drivers have 8
   static constexpr std::size_t capabilities = 28;
   static constexpr std::size_t pixel_parameters = 12;
 
-  /// A value that is asked for when it is first used.
+  /// A value that is queried at its first use.
   template <class T>
   struct Saved {
     T value{};
     bool used = false;
-    /// Whether this is the first use.
+    /// Returns true at the first use.
     bool use() { return !std::exchange(used, true); }
   };
   struct BufferRange {
@@ -68,7 +68,7 @@ class StateGuard {
     GLint name = 0, level = 0, layered = 0, layer = 0, access = 0, format = 0;
   };
   struct Blend {
-    std::array<GLint, 4> function{};  // source and destination of colour, then of alpha
+    std::array<GLint, 4> function{};  // source and destination of color, then of alpha
     std::array<GLint, 2> equation{};
   };
   struct Depth {
@@ -82,17 +82,17 @@ class StateGuard {
   struct Pixels {
     GLint buffer = 0;
     std::array<GLint, pixel_parameters> parameters{};
-    GLint read_clamp = 0;  // of pack only
+    GLint read_clamp = 0;  // only used for pack
   };
   struct Raster {
     std::array<bool, capabilities> enabled{};
     std::array<std::array<GLboolean, 4>, most_draw_buffers> masks{};
     bool scissor = false;
-    std::array<GLint, 2> polygon_mode{};  // some drivers tell front and back, core ones have only one
+    std::array<GLint, 2> polygon_mode{};  // front and back; core contexts have only one value
     GLint clip_origin = 0, clip_depth = 0;
   };
 
-  // About to be used, each.
+  // Each of these announces that the state is about to be used.
   void program();
   void pipeline();
   void vertex_array();
@@ -139,7 +139,7 @@ class StateGuard {
 
   Saved<GLint> program_, pipeline_, vertex_array_, draw_framebuffer_, read_framebuffer_;
   Saved<GLint> active_texture_;
-  GLuint active_unit_ = 0;  // as it is now, once it was used
+  GLuint active_unit_ = 0;  // the current active unit, once active_texture_ was used
   std::array<std::array<Saved<GLint>, targets>, units> textures_{};
   std::array<Saved<GLint>, units> samplers_{};
   std::array<Saved<BufferRange>, ranges> storage_{}, uniform_{};
@@ -147,7 +147,7 @@ class StateGuard {
   std::array<Saved<ImageUnit>, images> images_{};
   Saved<Pixels> pack_, unpack_;
   Saved<Raster> raster_;
-  std::array<bool, capabilities> enabled_{};  // as they are now, once raster_ was used
+  std::array<bool, capabilities> enabled_{};  // the current values, once raster_ was used
   std::array<Saved<bool>, most_draw_buffers> blend_enables_{};
   std::array<Saved<Blend>, blended_buffers> blends_{};
   Saved<Depth> depth_;

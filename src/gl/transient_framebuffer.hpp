@@ -4,10 +4,10 @@
 
 namespace cumulet::gl {
 
-/// A framebuffer of the current context, for one call: they are not shared. Of whole textures.
+/// A framebuffer for one call: framebuffers belong to one context and are not shared. It covers whole textures.
 class TransientFramebuffer {
  public:
-  /// depth: 0: none. Throws Error(gl).
+  /// depth: a texture, or 0 for none. Throws Error(gl).
   TransientFramebuffer(const FunctionsPtr& gl, GLuint colour, GLuint depth) : framebuffer_(make_framebuffer(gl)) {
     label(*gl, Object::Kind::framebuffer, name(), "framebuffer of one call");
     gl->NamedFramebufferTexture(name(), GL_COLOR_ATTACHMENT0, colour, 0);

@@ -48,7 +48,7 @@ WordHeap::Span WordHeap::take(std::size_t wanted, const char* what) {
   const std::size_t units = whole(wanted) / alignment;
   const std::size_t usual = whole(sizes_.page_bytes) / alignment;
   for (const auto& page : pages_->all) {
-    // A trifle shall not keep a large one.
+    // A small span must not keep a large page alive.
     if (page->units.size() > std::max(usual, 4 * units)) continue;
     if (Span span = take_of(*page, units)) return span;
   }

@@ -11,18 +11,18 @@
 
 namespace cumulet::gl {
 
-/// Buffers, pages, that many things share: each has a span of one, found by an offset that shaders are told, so that
-/// things cost no bindings. Shaders read pages as texture buffers of RGBA32UI: storage buffers are slower by 15 % on
-/// Mesa's llvmpipe where surfaces are traced. All calls, and the ends of spans and of the heap, need the context
+/// Suballocates GPU buffers (pages): each user has a span of a page, which shaders address by an offset, so that users
+/// need no bindings of their own. Shaders read pages as texture buffers of RGBA32UI: storage buffers are 15 % slower on
+/// Mesa's llvmpipe where surfaces are traced. All calls, and the destruction of spans and of the heap, need the context
 /// current.
 class WordHeap {
  public:
   struct Sizes {
-    std::size_t page_bytes = std::size_t{4} << 20U;                      ///< of a page, unless one span needs a larger
-    std::size_t largest_page = std::numeric_limits<std::size_t>::max();  ///< that the driver can bind
-    std::size_t most_bytes = std::numeric_limits<std::size_t>::max();    ///< of all pages
+    std::size_t page_bytes = std::size_t{4} << 20U;                      ///< of a page, unless one span needs more
+    std::size_t largest_page = std::numeric_limits<std::size_t>::max();  ///< maximum size that the driver can bind
+    std::size_t most_bytes = std::numeric_limits<std::size_t>::max();    ///< total of all pages
   };
-  /// Where spans begin and end: whole 16-byte words, on a cache line of any GPU.
+  /// Alignment of spans: whole 16-byte words, on a cache line of any GPU.
   static constexpr std::size_t alignment = 256;
 
  private:
@@ -36,13 +36,13 @@ class WordHeap {
   struct Pages {
     std::vector<std::unique_ptr<Page>> all;
     std::size_t usual_units = 0;  // of a page
-    // Those without a span, but for one: what changes all the time finds it again. None that is large beside what is in
-    // use.
+    // Frees pages without a span. Unless all_of_them is set, one page is kept for spans that are recreated often, if it
+    // is not large compared with the used space.
     void drop_empty(bool all_of_them);
   };
 
  public:
-  /// Part of a page, which it gives back at its end. It may outlive the heap.
+  /// A part of a page, returned to it on destruction. It may outlive the heap.
   class Span {
    public:
     Span() = default;
@@ -57,13 +57,13 @@ class WordHeap {
     ~Span();
 
     explicit operator bool() const { return page_ != nullptr; }
-    /// The page, as shaders read it.
+    /// The page's texture buffer for shaders.
     [[nodiscard]] GLuint texture() const { return page_->texture.name(); }
-    /// Filled by glNamedBufferSubData.
+    /// The page's buffer, to be filled with glNamedBufferSubData.
     [[nodiscard]] GLuint buffer() const { return page_->buffer.name(); }
-    /// Where it begins in the buffer.
+    /// Byte offset of the span in the buffer.
     [[nodiscard]] std::size_t offset() const { return first_ * alignment; }
-    /// As many as were asked for, or up to the next whole units.
+    /// The requested size, rounded up to whole units.
     [[nodiscard]] std::size_t bytes() const { return units_ * alignment; }
 
    private:
@@ -84,22 +84,22 @@ class WordHeap {
     pages_->usual_units = sizes_.page_bytes / alignment;
   }
 
-  /// Of undefined content. what: "creating the surfaces' tables". Throws Error(unsupported) for more than the driver
-  /// binds at once, Error(out_of_memory) beyond most_bytes or where GL has no more, and then nothing has changed but
-  /// that pages without a span are gone. O(pages + gaps).
+  /// Allocates a span of undefined content. what: the step, such as "creating the surfaces' tables". Throws
+  /// Error(unsupported) for more than the driver can bind at once, and Error(out_of_memory) beyond most_bytes or if GL
+  /// is out of memory. After an error only pages without a span may be gone. O(pages + gaps).
   Span take(std::size_t wanted, const char* what);
-  /// The same, from the beginning of a page that nothing else is in.
+  /// Like take(), but at the beginning of a new page.
   Span take_page(std::size_t wanted, const char* what);
 
   [[nodiscard]] std::size_t pages() const { return pages_->all.size(); }
-  /// Of all pages.
+  /// Total size of all pages.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Of those, without a span.
+  /// Free bytes in all pages.
   [[nodiscard]] std::uint64_t free_bytes() const;
 
  private:
   Span take_of(Page& page, std::size_t units) const;
-  // The page has usual units where that is more.
+  // Creates a page of `usual` units, or `units` if that is more, limited by the remaining memory.
   Span take_of_new_page(std::size_t units, std::size_t usual, const char* what);
 
   FunctionsPtr gl_;

@@ -1,8 +1,8 @@
 #pragma once
 
-// What glsl/ has of cells as C++: shapes, records, children and faces (cell.glsl), linear fits over them
-// (cell_fit.glsl), their faces when they split (cell_split.glsl), what they give off (channels.glsl), and the lattice
-// of their splits (lattice.glsl), and where nothing is met any more (clear_cones.glsl).
+// Compiles the shared shader code for cells as C++: shapes, records, children and faces (cell.glsl), linear fits
+// (cell_fit.glsl), faces of split cells (cell_split.glsl), emission and other channels (channels.glsl), empty-space
+// termination (clear_cones.glsl) and the lattice of split vertices (lattice.glsl).
 
 #include "base/shared_code.hpp"
 

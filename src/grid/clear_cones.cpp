@@ -20,7 +20,7 @@ using glm::uvec2;
 
 constexpr auto side = static_cast<int>(CM_CLEAR_SIDE);
 
-// Rows of cubes, a bit each.
+// Rows of cubes, one bit per cube.
 using Rows = std::vector<uvec2>;
 void set(std::uint32_t& word, std::uint32_t bits) {
   if (bits != 0) std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
@@ -37,7 +37,7 @@ class ClearMap {
     for (Rows& rows : full_) rows.assign(CM_CLEAR_ROWS, uvec2(0U));
     for (Rows& rows : clear_) rows.resize(CM_CLEAR_ROWS);
   }
-  /// By several threads.
+  /// Marks the cubes that a cell touches as occupied. Thread-safe.
   void fill(const glm::vec3& v0, std::uint32_t shape) {
     const core::CmClearRange range = core::cm_clear_range(v0, shape, map_);
     for_cubes(range, [&](const ivec3& at) {
@@ -50,7 +50,7 @@ class ClearMap {
       }
     });
   }
-  /// Once all is filled.
+  /// Computes the clear cubes of every cone. Must be called after the last fill().
   void sweep() {
     tbb::parallel_for(std::uint32_t{0}, CM_CLEAR_CONES, [this](std::uint32_t cone) { sweep(cone); });
   }
@@ -79,7 +79,7 @@ class ClearMap {
       }
     }
   }
-  // Of a cell's cubes some may be beside the map, for they are looked at several together.
+  // The cubes of a large cell are tested in groups of step^3 cubes, so some of them may lie outside the map.
   static void fill(Rows& rows, int layer, int y, const uvec2& bits) {
     if (layer < 0 || layer >= side || y < 0 || y >= side) return;
     uvec2& row = rows[static_cast<std::uint32_t>(layer * side + y)];

@@ -5,9 +5,10 @@
 
 namespace cumulet::grid {
 
-/// Gives empty cells their clear cones (glsl/clear_cones.glsl): no ray from there in such a cone meets density, at
-/// whatever moment of the shutter's, or light. Of a grid that is whole, its content's box known, whose empty cells have
-/// none yet. In parallel. progress: its last tenth. O(cells + CM_CLEAR_SIDE^3).
+/// Computes the clear cones of empty cells, for empty-space termination (glsl/clear_cones.glsl). A ray that leaves such
+/// a cell within a clear cone meets no density and no emission at any shutter time. grid: complete, with content_min
+/// and content_max set and no clear cones yet. progress: receives the last tenth. Runs in parallel. O(cells +
+/// CM_CLEAR_SIDE^3).
 void find_clear_cones(TetGrid& grid, Progress* progress = nullptr);
 
 }  // namespace cumulet::grid

@@ -19,7 +19,7 @@ Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, 
   Cube cube;
   std::int64_t extent = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    // Which octant of a cube a brick is has to be known where it is summed up (glsl/summarize_bricks.comp).
+    // glsl/summarize_bricks.comp needs the octant of each brick in its parent cube, hence the alignment to two bricks.
     const int step = volume.on_device ? 2 * volume::brick_size : volume::brick_size;
     cube.origin[axis] = bounds_min[axis] & ~(step - 1);
     extent = std::max<std::int64_t>(extent, std::int64_t{bounds_max[axis]} - cube.origin[axis] + 1);

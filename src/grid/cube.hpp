@@ -6,23 +6,24 @@
 
 namespace cumulet::grid {
 
-/// The control cube over a volume: the smallest power-of-two cube of voxels, aligned to bricks, that holds the bounds.
+/// The control cube of a volume: the smallest power-of-two cube of voxels, aligned to bricks, that holds the bounds.
 ///
-/// Cube space has the voxel as its unit: voxel (i,j,k) of the volume is the box [p, p + 1] with p = (i,j,k) - origin,
-/// so cells tile voxels exactly (six a voxel at the finest).
+/// The unit of cube space is the voxel. Voxel (i,j,k) of the volume is the box [p, p + 1] with p = (i,j,k) - origin, so
+/// cells tile voxels exactly (at the finest level six cells per voxel).
 struct Cube {
   glm::ivec3 origin{0};  ///< index-space voxel at the cube's low corner, a multiple of 8
-  int log2_size = 4;     ///< edge length is 2^log2_size voxels, 4 (the first cells hold a brick) to max_log2_size
+  int log2_size = 4;     ///< edge length is 2^log2_size voxels; 4 (the first cells hold a brick) to max_log2_size
   glm::dmat4 to_world{1.0};
 
-  static constexpr int max_log2_size = 18;  // what a cell's record holds: glsl/cell.glsl
+  static constexpr int max_log2_size = 18;  // limit of the cell record: glsl/cell.glsl
   [[nodiscard]] int size() const { return 1 << log2_size; }
-  /// Whether its cells have the records of wide cubes (glsl/cell.glsl).
+  /// Returns true if the cells use the record layout of wide cubes (glsl/cell.glsl).
   [[nodiscard]] bool wide() const;
 };
 
-/// Over these bounds of the volume's lattice, inclusive; of one on a device aligned to two bricks. Throws
-/// Error(unsupported) if they are wider than 2^18 voxels.
+/// Returns the control cube for these inclusive index-space bounds. For a GPU-resident volume the origin is aligned to
+/// two bricks. Throws Error(unsupported) if the bounds are wider than 2^18 voxels, and Error(file) if the transform is
+/// singular.
 Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max);
 inline Cube fit_cube(const volume::ScalarVolume& volume) {
   return fit_cube(volume, volume.bounds_min, volume.bounds_max);

@@ -26,7 +26,7 @@ double mass_of(const Statistics& statistics) {
   return mass;
 }
 
-// Of all that scatters.
+// Mean over all scattering.
 double mean_anisotropy(const Statistics& density, const Channels& channels) {
   double scattering = mass_of(density);
   if (const RgbField* coloured = channels.scattering.get()) {
@@ -43,13 +43,13 @@ Weights Weights::of_density(double depth, const RefineSettings& settings) {
   if (settings.criterion != Criterion::transmittance) return {.per_depth = 1.0 / depth};
   const double scale = settings.density_scale;
   const double hidden = -std::expm1(-scale * depth);
-  // What is thinner than doubles tell from nothing hides in proportion.
+  // If the occlusion underflows in double precision, it is proportional to the depth.
   return {.per_depth = hidden > 0.0 ? scale / hidden : 1.0 / depth, .own_hiding = hiding(scale, settings.anisotropy)};
 }
 
-// A deviation counts by the strongest, or by what it does to the luminance where that is more: most of a red fire's is
-// green. And by a fifth more than density's, which scattering blurs: fires are so within the image error that clouds
-// are (tests/bench/README.md, Grids by default).
+// A deviation is weighted relative to the strongest component, or by its effect on the luminance if that is larger: in
+// a red fire, green has most of the luminance. The factor is one fifth above that of density, because scattering blurs
+// density. It was chosen so that fires have the same image error as clouds (tests/bench/README.md, Grids by default).
 Weights Weights::of_emission(const dvec3& depth, int component, const RefineSettings& settings) {
   const double most = std::max({depth.r, depth.g, depth.b});
   if (!(most > 0.0)) return {};
@@ -128,7 +128,7 @@ std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world) {
   for (int octant = 0; octant < 8; ++octant) {
     const ivec3 corner = 8 * ivec3(octant & 1, (octant >> 1) & 1, octant >> 2);
     for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-      // Whatever edge a cell has, a first child has in another of these.
+      // The edges of all cells occur among the first children of these tetrahedra.
       std::uint32_t shape = brick_tree(kuhn_frame(corner, 8, permutation)).shape[1];
       for (unsigned level = 0; level < CM_BRICK_LEVELS; ++level) {
         const double edge = length(shape);
@@ -144,7 +144,7 @@ std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world) {
 std::vector<EvaluatedField> evaluated_fields(const Statistics& density, const Channels& channels) {
   std::vector<EvaluatedField> fields;
   if (channels.ends) {
-    // What is between two fields deviates no more than one of them.
+    // A field between both ends deviates no more than one of them.
     fields = {{&channels.ends->open.statistics(), {}}, {&channels.ends->close.statistics(), {}}};
   } else {
     fields = {{&density, {}}};

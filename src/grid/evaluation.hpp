@@ -1,6 +1,7 @@
 #pragma once
 
-// What the criterion says of each cell that a grid may have: each split's own priority.
+// Evaluates the refinement criterion for every cell that a grid may have. The results are the priorities of splits
+// before the closure of the diamond set.
 
 #include <algorithm>
 #include <array>
@@ -20,13 +21,14 @@
 
 namespace cumulet::grid {
 
-/// A positive float's high half sorts like the float: 7 bits of mantissa, steps under one percent. At least 1.
+/// Returns the high half of a positive float, which sorts like the float: 7 bits of mantissa, steps below one percent.
+/// Minimum: 1.
 inline std::uint16_t quantize(double squared) {
   const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(squared));
   return static_cast<std::uint16_t>(std::max<std::uint32_t>(bits >> 16U, 1));
 }
 
-/// World length of the refinement edge of every shape, by class and frame: |M edge|.
+/// World-space length of the refinement edge of every shape, by class and frame: |M edge|.
 class EdgeLengths {
  public:
   explicit EdgeLengths(const glm::dmat4& to_world) : linear_(to_world) {}
@@ -38,19 +40,20 @@ class EdgeLengths {
   glm::dmat3 linear_;
 };
 
-/// How deviations of a field count.
+/// Weights of a field's deviations in the criterion.
 struct Weights {
-  double per_depth = 0.0;      ///< times a deviation and its length
-  double own_hiding = 0.0;     ///< reduced extinction of a value: of what hides itself
-  bool there_and_back = true;  ///< light passes what hides a cell twice
+  double per_depth = 0.0;      ///< factor for deviation times edge length
+  double own_hiding = 0.0;     ///< reduced (similarity-scaled) extinction per grid value, for a cell's occlusion of
+                               ///< itself; 0: none
+  bool there_and_back = true;  ///< true: two-way transmittance, for density; false: one-way, for emission
 
-  /// depth: of the mean ray.
+  /// depth: mean optical depth of a ray per unit extinction scale.
   static Weights of_density(double depth, const RefineSettings& settings);
-  /// depth: of each component.
+  /// depth: mean of each component's integral along a ray. component: 0 to 2.
   static Weights of_emission(const glm::dvec3& depth, int component, const RefineSettings& settings);
 };
 
-/// The criterion's squared value for a cell.
+/// Computes the squared criterion of a cell.
 class Measure {
  public:
   Measure(const Weights& weights, const RefineSettings& settings)
@@ -60,21 +63,22 @@ class Measure {
         own_hiding_(static_cast<float>(weights.own_hiding)),
         there_and_back_(weights.there_and_back) {}
 
-  /// No cell of a region whose values lie in [min, max] exceeds this: a variance is at most a quarter of the range
-  /// squared. lit: the most of the region.
+  /// Returns an upper bound for all cells of a region whose values lie in [min, max]: a variance is at most a quarter
+  /// of the range squared. lit: maximum transmittance of the region.
   [[nodiscard]] float bound(float min, float max, float edge_squared, float lit) const;
-  /// The same of what the largest variances of a level's cells are, times the squares of their edges: `left` of those
-  /// that a linear fit leaves.
+  /// Returns an upper bound for all cells of a level. variance: maximum over these cells of variance times squared edge
+  /// length. left: the same maximum for the variance that a linear fit leaves.
   [[nodiscard]] float bound_of_steepest(float variance, float left, float lit) const;
   [[nodiscard]] OwnMeasure numbers(float floor) const {
     return {scale_, own_hiding_, floor, cells_ == CellKind::linear, there_and_back_, criterion_};
   }
-  /// covariance: of position and density in the frame, per unit. No more than floor: the exact value does not matter.
+  /// covariance: of position and density in the cell's frame, per unit. A result that is not above the floor may be
+  /// inexact.
   [[nodiscard]] float squared(std::uint32_t cell_class, float mean, float variance, const glm::vec3& covariance,
                               float min, float max, float edge_squared, float lit, float floor) const;
 
  private:
-  // lit: what part of the light gets there, or back.
+  // lit: transmittance from outside to the cell.
   [[nodiscard]] float seen_squared(float lit) const { return there_and_back_ ? lit * lit * lit * lit : lit * lit; }
 
   Criterion criterion_;
@@ -84,26 +88,26 @@ class Measure {
   bool there_and_back_;
 };
 
-/// The criterion of one field.
+/// The refinement criterion of one field.
 class Evaluation {
  public:
-  /// transmittance: of density; null where nothing is hidden.
+  /// transmittance: of the density field; null: no occlusion.
   Evaluation(const Statistics& statistics, const Weights& weights, const Transmittance* transmittance,
              const RefineSettings& settings);
 
   [[nodiscard]] const Statistics& statistics() const { return *statistics_; }
 
-  /// Of a brick that is known by its summary, how many levels of its cells may split at the most.
+  /// Returns the maximum number of levels of a brick's cells that may split, from the brick's summary.
   [[nodiscard]] unsigned levels_at_most(const Statistics::Node& brick, float floor) const;
-  /// What part of the light gets to each of its blocks; null where nothing is hidden.
+  /// Returns the transmittance to each block of the brick; null without occlusion.
   [[nodiscard]] const float* lit(const Statistics::Node& brick) const {
     return transmittance_ != nullptr ? transmittance_->blocks(brick.corner) : nullptr;
   }
   [[nodiscard]] OwnMeasure measure(float floor) const { return measure_.numbers(floor); }
 
-  /// Calls visit(vertex, squared) for every cell whose criterion is above the floor, of one node that is not uniform:
-  /// inside a brick all, of a larger one a Kuhn tetrahedron's first three levels, of the whole cube the roots. Only of
-  /// the bisection's first levels. sums: room.
+  /// Calls visit(vertex, squared) for every cell of a non-uniform node whose criterion is above the floor. A brick
+  /// visits all its cells, a larger cube the first three levels of its Kuhn tetrahedra, the whole cube its roots.
+  /// levels: only cells of that many first bisection levels are visited. sums: scratch memory.
   template <class Visit>
   void node(const Statistics::Node& node, unsigned levels, BrickSums& sums, float floor, Visit visit) const {
     if (node.log2_size == 3) {
@@ -124,10 +128,10 @@ class Evaluation {
  private:
   template <class Visit>
   void brick(const Statistics::Node& node, unsigned levels, BrickSums& sums, float floor, Visit visit) const;
-  // One cell above bricks.
+  // Evaluates one cell above bricks.
   template <class Visit>
   void cell(const glm::vec3& v0, std::uint32_t shape, unsigned levels, float lit, float floor, Visit visit) const;
-  // A Kuhn cell (B) of a node above bricks, its two halves (C) and four quarters (A).
+  // Evaluates a Kuhn cell (B) of a node above bricks, its two halves (C) and its four quarters (A).
   template <class Visit>
   void kuhn_cell(const Statistics::Node& node, std::uint32_t permutation, unsigned levels, float floor,
                  Visit visit) const;
@@ -136,31 +140,30 @@ class Evaluation {
   const Transmittance* transmittance_;
   Measure measure_;
   EdgeLengths edge_length_;
-  std::array<std::array<float, 512>, 48> edge_squared_{};  // of a brick tree's nodes
-  std::array<float, 9> longest_{};                         // of a level of those
+  std::array<std::array<float, 512>, 48> edge_squared_{};  // squared edge lengths of each brick tree's nodes
+  std::array<float, 9> longest_{};                         // maximum of edge_squared_ per level
 };
 
-/// The squares of lengths of a brick's refinement edges, CM_LEVEL_EDGES a level (glsl/brick_summary.glsl).
+/// Returns the squared lengths of a brick's refinement edges, CM_LEVEL_EDGES per level (glsl/brick_summary.glsl).
 std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world);
 
-/// A field that a grid's cells are split for.
+/// A field that can cause cells to split.
 struct EvaluatedField {
   const Statistics* field;
-  std::optional<int> light;  ///< which component of emission it is; none: it is weighed as density is
+  std::optional<int> light;  ///< component of emission, 0 to 2; nullopt: weighted like density
 };
-/// All of them: density, and those of its channels, in the order of Evaluations.
+/// Returns density (or its two shutter ends) and the fields of the channels, in the order of Evaluations.
 std::vector<EvaluatedField> evaluated_fields(const Statistics& density, const Channels& channels);
 
-/// Those of all that a grid's cells are split for: of density, and of its channels.
+/// The criteria of all fields that can cause cells to split: density and its channels.
 class Evaluations {
  public:
-  /// statistics: of density. The fields have to outlive it. progress: where it is cancelled, Error(cancelled) is
-  /// thrown.
+  /// statistics: of density. All fields must outlive this object. Throws Error(cancelled) if progress is cancelled.
   Evaluations(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
               const Progress* progress = nullptr);
   [[nodiscard]] auto begin() const { return all_.begin(); }
   [[nodiscard]] auto end() const { return all_.end(); }
-  /// Null: nothing is hidden.
+  /// Null: no occlusion.
   [[nodiscard]] const Transmittance* transmittance() const { return transmittance_.get(); }
 
  private:
@@ -168,12 +171,12 @@ class Evaluations {
   std::vector<Evaluation> all_;
 };
 
-/// Of a cell, in cube space.
+/// Centroid of a cell, in cube space.
 inline glm::dvec3 centroid_of(const glm::vec3& v0, std::uint32_t shape) {
   const glm::vec3 in_frame = core::cm_frame_centroid(core::cm_shape_class(shape)) * core::cm_shape_unit(shape);
   return glm::dvec3(v0) + glm::dvec3(core::cm_from_frame(in_frame, shape));
 }
-/// Of its refinement edge.
+/// Midpoint of a cell's refinement edge, in cube space.
 inline glm::ivec3 midpoint_of(const glm::vec3& v0, std::uint32_t shape) {
   const glm::vec3 in_frame = core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape);
   return {v0 + core::cm_from_frame(in_frame, shape)};
@@ -199,7 +202,7 @@ void Evaluation::brick(const Statistics::Node& node, unsigned levels, BrickSums&
     if (whole.min >= whole.max) continue;
     const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
     const auto& edges = edge_squared_[signs * 6 + permutation];
-    // Edges shrink from level to level: below some level nothing can exceed the floor.
+    // Edges shrink from level to level, so below some level no cell can exceed the floor.
     unsigned end = 1;
     while (end < last && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1], most) > floor)
       end *= 2;

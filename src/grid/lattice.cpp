@@ -29,7 +29,7 @@ uvec2 pack_block(const ivec3& corner, std::uint32_t scale) {
   return {c.x | (c.y << 16U), c.z | (scale << 16U)};
 }
 
-// Coarse scales first, then by place.
+// Orders blocks by scale, coarsest first, then by position.
 bool before(const uvec2& a, const uvec2& b) {
   const auto key = [](const uvec2& block) {
     return std::make_tuple(~core::cm_block_scale(block), block.x, block.y & 0xffffU);
@@ -37,7 +37,7 @@ bool before(const uvec2& a, const uvec2& b) {
   return key(a) < key(b);
 }
 
-// What a record has of a cell above bricks.
+// Returns the density data of a record for a cell above bricks.
 uvec2 coefficients_of(const Moments& m, const vec3& v0, std::uint32_t shape, CellKind cells, double to_relative) {
   const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
   vec3 gradient(0.0F);
@@ -51,7 +51,8 @@ uvec2 coefficients_of(const Moments& m, const vec3& v0, std::uint32_t shape, Cel
           glm::packHalf2x16({gradient.y, gradient.z})};
 }
 
-// Calls visit(v0, shape) for the cells of an octree's cube: its Kuhn tetrahedra, their halves and quarters; the roots.
+// Calls visit(v0, shape) for the coarse cells of an octree cube: its Kuhn tetrahedra, their halves and quarters. For
+// the control cube these are the roots.
 template <class Visit>
 void for_coarse_cells(const ivec3& corner, int cube_size, int log2_size, Visit visit) {
   if (cube_size == log2_size) {
@@ -108,10 +109,10 @@ void Lattice::find_blocks(const Statistics& statistics, const std::vector<Channe
   resize(all, own.nodes.size(), progress);
   std::ranges::transform(own.nodes, all.begin(),
                          [](const auto& node) { return static_cast<std::uint8_t>(core::cm_node_levels(node)); });
-  // Whatever the view, what is raised is raised here, too.
+  // With all levels enabled, this set contains every vertex that any view can raise.
   const DiamondSet everywhere(own, all, std::numeric_limits<std::uint64_t>::max(), progress);
   blocks = everywhere.blocks(progress);
-  // Whoever is found from the top needs all between.
+  // Lookups start at the coarsest block, so every block's ancestors must exist.
   const auto pair_less = [](const uvec2& a, const uvec2& b) { return before(a, b); };
   std::set<uvec2, decltype(pair_less)> above(pair_less);
   const auto add_above = [&](ivec3 corner, std::uint32_t scale) {
@@ -176,7 +177,7 @@ void Lattice::fill_places(const Statistics& statistics, const Progress* progress
   };
   std::vector<Brick> with_values;
   for (std::uint32_t b = 2; b < blocks.size(); ++b) {
-    // By the point of the next coarser scale that it stands at.
+    // The entry for a block is at the point of the next coarser scale at its corner.
     const ivec3 corner = core::cm_block_corner(blocks[b]);
     const std::uint32_t above = block_at(corner >> 3, core::cm_block_scale(blocks[b]) + 1);
     places[std::size_t{above} * CM_BLOCK_POINTS + core::cm_in_block(corner)].block = b;
@@ -223,7 +224,7 @@ void Lattice::fill_coarse(const Statistics& statistics, const Progress* progress
 
 namespace {
 
-// The octree's cubes above bricks in which the fields vary, each once.
+// Octree cubes above bricks in which any of the fields varies, without duplicates.
 struct CoarseCube {
   int log2_size;
   ivec3 corner;
@@ -293,7 +294,7 @@ void Lattice::fill_bricks(const ChannelFields& fields, LatticeChannel& made, con
 
 namespace {
 
-// Of a voxel: sixths, and the sum of their middles.
+// Sixths of one voxel and the sum of their centroids.
 struct Sixths {
   unsigned count = 0;
   glm::dvec3 sum{0.0};
@@ -316,7 +317,7 @@ void collect(const vec3& v0, std::uint32_t shape, Voxels& voxels) {
 CellParts make_cell_parts() {
   CellParts all{};
   std::size_t count = 0;
-  // In the frame whose axes are the cube's.
+  // Frame whose axes are the cube's axes.
   std::uint32_t shape = (1U << 5U) | (2U << 7U) | (1U << 9U) | (3U << 11U);
   for (unsigned level = 0; level <= brick_levels; ++level) {
     Voxels voxels;

@@ -14,32 +14,34 @@
 
 namespace cumulet::grid {
 
-/// What stands at a point of the lattice of a scale m, 1 and up: of the cube of 8^m voxels from there on, and about it.
-/// glsl/lattice.glsl; glsl/grid_places.glsl reads it.
+/// Entry for a lattice point p of scale m >= 1. It describes the cube of 8^m voxels with its low corner at p and the
+/// octree cube with its center at p. Layout: glsl/lattice.glsl; reader: glsl/grid_places.glsl.
 struct LatticePlace {
-  std::uint32_t block = 0;   ///< the block of the next finer scale there; 0: none
-  std::uint32_t brick = 0;   ///< whose values the cube has, if there is no such block, or it is a brick
-  std::uint32_t coarse = 0;  ///< of the octree's cube about this point; 0: it has one value, or is none
+  std::uint32_t block = 0;   ///< index of the block of the next finer scale in this cube; 0: none
+  std::uint32_t brick = 0;   ///< index of the brick with the cube's values, if the cube is a brick or has no finer
+                             ///< block
+  std::uint32_t coarse = 0;  ///< index of the coarse cells of the octree cube centered here; 0: that cube is uniform or
+                             ///< does not exist
 };
 
-/// What the records of a cube's cells above bricks have of density: by cm_coarse_cell().
+/// Density data of the records of a cube's cells above bricks, indexed by cm_coarse_cell().
 struct CoarseCells {
-  std::array<glm::uvec2, CM_COARSE_CELLS> coefficients{};  ///< as in a record's data
-  std::array<std::uint32_t, 2> dense{};                    ///< a bit each: has any density
+  std::array<glm::uvec2, CM_COARSE_CELLS> coefficients{};  ///< as in CellRecord::data
+  std::array<std::uint32_t, 2> dense{};                    ///< one bit per cell: the cell has density
 };
 static_assert(sizeof(CoarseCells) == 4 * CM_COARSE_WORDS);
 
-/// Where what cells have of a channel comes from, as the lattice has it for density: glsl/grid_channels.comp reads it.
+/// Source data of a channel's cell records, as Lattice has it for density. Reader: glsl/grid_channels.comp.
 struct LatticeChannel {
   Channel channel = Channel::emission;
-  std::size_t numbers = 0;           ///< of a voxel
-  std::vector<LatticePlace> places;  ///< as the lattice's, with bricks and coarse cells of its own
-  /// Of each cube's cells above bricks their records, by cm_coarse_cell(); of emission then a bit each: any light. The
-  /// first is of none.
+  std::size_t numbers = 0;           ///< values per voxel
+  std::vector<LatticePlace> places;  ///< as Lattice::places, with this channel's bricks and coarse cells
+  /// Per octree cube above bricks: the records of its cells, indexed by cm_coarse_cell(). For emission one bit per cell
+  /// follows, set if the cell emits. The first cube is an empty placeholder.
   std::vector<std::uint32_t> coarse;
-  std::vector<ChannelNumbers> even_bricks;  ///< of one voxel like all others, the very first 0
-  std::vector<glm::ivec3> bricks;           ///< the corners of those that follow
-  float fastest = 0.0F;                     ///< of velocity: voxels a second
+  std::vector<ChannelNumbers> even_bricks;  ///< voxel values of each uniform brick; the first is 0
+  std::vector<glm::ivec3> bricks;           ///< corners of the non-uniform bricks, numbered after even_bricks
+  float fastest = 0.0F;                     ///< for velocity: maximum, in voxels per second
 
   [[nodiscard]] std::uint64_t bytes() const {
     return places.size() * sizeof(LatticePlace) + coarse.size() * 4 + even_bricks.size() * sizeof(ChannelNumbers) +
@@ -47,42 +49,41 @@ struct LatticeChannel {
   }
 };
 
-/// All that a grid for any view and any budget is made of, packed: the splits' own priorities, the blocks of the
-/// lattice that any of them can ever raise, and where the values of cells come from. Made once a volume and medium;
-/// what a view adds is a byte a node (OwnPriorities::levels).
+/// Packed data from which the grid for any view and any cell budget is built: the priorities of splits, the lattice
+/// blocks that any of them can raise, and the source of cell values. It is built once per volume and medium. A view
+/// adds one byte per node (OwnPriorities::levels).
 struct Lattice {
-  /// settings: but for the camera and the budget. In parallel. progress: as
-  /// for Statistics.
+  /// settings: all except the camera and the cell budget are used. Runs in parallel. progress: as for Statistics.
   Lattice(const Statistics& statistics, const Channels& beside, const RefineSettings& settings, float max_value,
           Progress* progress = nullptr);
 
   Cube cube;
   OwnPriorities own;
-  /// By scale, the coarsest first; the first is none, the second the one that all others are found from.
+  /// Sorted by scale, coarsest first. Block 0 is an empty placeholder, block 1 the root from which lookups start.
   std::vector<glm::uvec2> blocks;
-  /// Blocks of a scale: from `first` of it up to that of the scale below, of scale 0 to the end.
+  /// Blocks of scale s are [first[s], first[s - 1]); those of scale 0 extend to the end.
   std::array<std::uint32_t, Cube::max_log2_size / 3 + 1> first{};
-  /// CM_BLOCK_POINTS for each block of scale 1 and up, and for the first.
+  /// CM_BLOCK_POINTS entries for the placeholder and for each block of scale 1 or coarser.
   std::vector<LatticePlace> places;
-  std::vector<CoarseCells> coarse;  ///< the first is of none
-  /// The first bricks have one value each, the very first 0; then follow the statistics', in the order of
+  std::vector<CoarseCells> coarse;  ///< the first is an empty placeholder
+  /// Values of uniform bricks; the first is 0. Higher brick numbers are bricks of the statistics, in the order of
   /// nodes_of_size(3).
   std::vector<float> even_bricks;
-  std::size_t bricks = 0;     ///< all of them
-  bool halves = false;        ///< what all their values are exactly
+  std::size_t bricks = 0;     ///< number of bricks, uniform ones included
+  bool halves = false;        ///< all brick values are exactly representable as half floats
   float density_unit = 1.0F;  ///< grid value of a record's density 1
   CellKind cells = CellKind::linear;
-  std::vector<LatticeChannel> channels;  ///< of those that there are
+  std::vector<LatticeChannel> channels;  ///< one for each channel that the volume has
 
   [[nodiscard]] std::uint32_t top_scale() const { return static_cast<std::uint32_t>(cube.log2_size) / 3; }
-  /// Main memory, without the volume's.
+  /// Main memory in bytes, without the volume's.
   [[nodiscard]] std::uint64_t bytes() const {
     std::uint64_t beside = 0;
     for (const LatticeChannel& channel : channels) beside += channel.bytes();
     return beside + own.bytes() + blocks.size() * sizeof(glm::uvec2) + places.size() * sizeof(LatticePlace) +
            coarse.size() * sizeof(CoarseCells) + even_bricks.size() * 4;
   }
-  /// In buffers for shaders, with the values of bricks and room for priorities.
+  /// GPU buffer memory in bytes, with brick values and space for priorities.
   [[nodiscard]] std::uint64_t device_bytes() const;
 
  private:
@@ -91,25 +92,25 @@ struct Lattice {
   void fill_coarse(const Statistics& statistics, const Progress* progress);
   [[nodiscard]] LatticeChannel make_channel(const ChannelFields& fields, const Progress* progress) const;
   void fill_bricks(const ChannelFields& fields, LatticeChannel& made, const Progress* progress) const;
-  // Calls visit(index, corner, scale) for the places of cubes.
+  // Calls visit(index, corner, scale) for each entry of `places` within the cube.
   template <class Visit>
   void for_each_place(const Progress* progress, Visit&& visit) const;
-  // Of the octree's cube that has its middle there.
+  // Returns the index in `places` for the point at the center of this octree cube.
   [[nodiscard]] std::size_t place_about(const glm::ivec3& corner, int log2_size) const;
-  // Of a scale; 0: none.
+  // Returns the index of the block with this corner and scale; 0: none.
   [[nodiscard]] std::uint32_t block_at(const glm::ivec3& corner, std::uint32_t scale) const;
 };
 using LatticePtr = std::shared_ptr<const Lattice>;
 
-/// Part of a cell within a brick: what it has of one voxel, in the cell's frame. As shaders read it:
+/// The part of a cell that lies in one voxel, for cells within a brick, in the cell's frame. Readers:
 /// glsl/grid_records.comp, glsl/grid_channels.comp.
 struct CellPart {
-  glm::vec3 from_centroid;  ///< of that part's middle, from the cell's, in the cell's units
-  std::uint32_t packed;     ///< x | y << 4 | z << 8 | sixths << 12; x, y, z: the voxel's low corner from v0 on
+  glm::vec3 from_centroid;  ///< from the cell's centroid to this part's centroid, in the cell's units
+  std::uint32_t packed;     ///< x | y << 4 | z << 8 | sixths << 12; x, y, z: the voxel's low corner relative to v0
 };
 static_assert(sizeof(CellPart) == 16);
-/// Those of cells of each of the ten shapes within bricks, by level from a brick's Kuhn tetrahedron (0) to a sixth of a
-/// voxel (9): those of a level are [parts_of_levels[level], parts_of_levels[level + 1]).
+/// Parts of the ten cell shapes within bricks, by level: 0 is a brick's Kuhn tetrahedron, 9 a sixth of a voxel. Parts
+/// of a level are [parts_of_levels[level], parts_of_levels[level + 1]).
 using CellParts = std::array<CellPart, CM_CELL_PARTS>;
 inline constexpr std::array<unsigned, brick_levels + 2> parts_of_levels{CM_PARTS_OF_LEVELS};
 const CellParts& cell_parts();

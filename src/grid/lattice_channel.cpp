@@ -80,7 +80,7 @@ ChannelNumbers ChannelFields::numbers(const std::array<float, most_fields>& valu
     case Channel::velocity:
       break;
   }
-  // Of what moves slowly the difference is exact, and is not lost in sums.
+  // For slow motion this difference is exact, so sums do not lose it.
   const auto relative = [&](std::size_t i) { return 2.0F * values[i] - values[3]; };
   return {relative(0), relative(1), relative(2), values[3]};
 }
@@ -97,7 +97,7 @@ std::optional<ChannelNumbers> ChannelFields::even(const ivec3& corner, int log2_
 
 void ChannelFields::fill(const ivec3& corner, std::span<float> out) const {
   struct Found {
-    const float* values = nullptr;  // of a brick; null: one
+    const float* values = nullptr;  // of a brick; null: uniform
     float uniform = 0.0F;
     volume::BrickValues::Brick room{};
   };

@@ -17,7 +17,8 @@ namespace {
 
 using glm::ivec3;
 
-// The level in a brick of the cells that split at a point of its 9^3; brick_levels at its corners, where none do.
+// Level, within a brick, of the cells that split at a point of its 9^3. Returns brick_levels for its corners, at which
+// no cell splits.
 unsigned level_in_brick(const ivec3& point) {
   const std::uint32_t octave = point == ivec3(0) ? 3 : core::cm_octave(point);
   return octave >= 3 ? brick_levels : core::cm_split_level(point, octave, 4) - 1;
@@ -27,7 +28,7 @@ unsigned place_of(const ivec3& point) { return static_cast<unsigned>((point.x * 
 
 struct Points {
   BrickPoints points;
-  PlacesOfBrickPoints index{};  // by place_of
+  PlacesOfBrickPoints index{};  // indexed by place_of()
   Points() {
     unsigned count = 0;
     for (unsigned level = 0; level < brick_levels; ++level) {
@@ -46,7 +47,7 @@ const Points& points() {
   return all;
 }
 
-// Of one cube, by index in brick_points().
+// Priorities of one cube, indexed as brick_points().
 using Found = std::array<std::uint16_t, points_of_levels.back()>;
 
 unsigned levels_of(const Found& found) {
@@ -57,7 +58,7 @@ unsigned levels_of(const Found& found) {
   return levels;
 }
 
-// The cubes that any of the fields has detail in, each once.
+// Cubes in which any of the fields varies, without duplicates.
 struct CubeKey {
   int log2_size;
   ivec3 corner;
@@ -116,7 +117,7 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
   const auto floor = static_cast<float>(threshold * threshold);
   const bool on_device = statistics.on_device() != nullptr;
   const std::vector<CubeKey> cubes = cubes_of(evaluations, log2_size, progress);
-  // Found piece by piece, then put one after another.
+  // Threads fill separate pieces, which are then concatenated.
   constexpr std::size_t piece = 64;
   struct Piece {
     std::vector<Node> nodes;
@@ -165,7 +166,7 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
 }
 
 void OwnPriorities::plan_to_rate(const Evaluations& evaluations, const std::vector<ivec3>& bricks, float floor) {
-  // Two share a word, but not those of two nodes.
+  // The GPU writes two values per word, so nodes must not share a word.
   if (values.size() % 2 != 0) values.push_back(0);
   to_rate.first_node = nodes.size();
   to_rate.edges_squared = brick_edges(evaluations.begin()->statistics().cube().to_world);

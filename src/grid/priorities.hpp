@@ -14,40 +14,41 @@
 
 namespace cumulet::grid {
 
-/// Levels of cells inside a brick that may split, its Kuhn tetrahedra the first. Of cells of larger cubes the first
-/// three are the cube's own.
+/// Number of levels of splitting cells inside a brick, starting with its Kuhn tetrahedra. For larger cubes the first
+/// three levels are the cube's own.
 inline constexpr unsigned brick_levels = CM_BRICK_LEVELS;
-/// How many points of a brick's 9^3 the cells of its first levels split at.
+/// Number of points of a brick's 9^3 at which the cells of its first levels split, by number of levels.
 inline constexpr std::array<unsigned, brick_levels + 1> points_of_levels{CM_POINTS_OF_LEVELS};
-/// Those points, level by level; of a larger cube they are larger by as much.
+/// Split points of a brick, level by level. For a larger cube they are scaled with its size.
 using BrickPoints = std::array<glm::u8vec3, CM_BRICK_POINTS>;
 const BrickPoints& brick_points();
 
-/// Of a brick's 9^3 points, x first, which of brick_points() each is.
+/// Maps each of a brick's 9^3 points, x first, to its index in brick_points().
 using PlacesOfBrickPoints = std::array<std::uint16_t, 9 * 9 * 9>;
 const PlacesOfBrickPoints& places_of_brick_points();
 
-/// Numbers of a criterion of density, as shaders are told them.
+/// Parameters of the refinement criterion for a field, as passed to shaders.
 struct OwnMeasure {
   float scale = 0.0F;
   float own_hiding = 0.0F;
-  float floor = 0.0F;  ///< no more is nothing
+  float floor = 0.0F;  ///< criteria not above it count as 0
   bool linear = false;
-  bool there_and_back = true;  ///< light passes what hides a cell twice
+  bool there_and_back = true;  ///< two-way transmittance (density) instead of one-way (emission)
   Criterion criterion = Criterion::transmittance;
 };
 
-/// Bricks whose values are in GL, and so are to be the priorities that their cells give (glsl/own_priorities.comp).
+/// GPU-resident bricks. glsl/own_priorities.comp computes their priorities on the GPU.
 struct BricksToRate {
-  /// Its nodes, by number from first_node on, have the most of what each gives.
+  /// Nodes in which this field varies, as numbers relative to first_node. The priority of a node's vertex is the
+  /// maximum over its fields.
   struct Field {
     OwnMeasure measure;
     std::vector<std::uint32_t> nodes;
   };
-  std::size_t first_node = 0;  ///< theirs are the last ones
-  std::vector<Field> fields;   ///< density; red, green and blue of emission, if there is any
-  std::vector<float> lit;      ///< of each node what part of the light gets to its blocks, 64 each; empty: all of it
-  std::size_t values = 0;      ///< of all, from the end of those that are known on
+  std::size_t first_node = 0;  ///< these bricks are the last nodes of OwnPriorities::nodes
+  std::vector<Field> fields;   ///< density; then the fields of the channels, in the order of Evaluations
+  std::vector<float> lit;      ///< transmittance to each node's 64 blocks; empty: 1 everywhere
+  std::size_t values = 0;      ///< number of priorities of all these bricks, after OwnPriorities::values
   std::array<float, CM_BRICK_EDGES> edges_squared{};
 
   [[nodiscard]] std::uint64_t bytes() const {
@@ -57,31 +58,32 @@ struct BricksToRate {
   }
 };
 
-/// What does not depend on the view of which splits are worth it: of each cube of the octree in which any is, the
-/// priorities that its own cells give the vertices that they split at, 16 bits each, as far down as there are any. A
-/// view says how many levels of each cube count. 2 bytes a point of 9^3 a brick at most.
+/// View-independent priorities of splits. It has an entry for each octree cube in which a split is worthwhile. The
+/// entry has the 16-bit priorities that the cube's own cells give to their split vertices, down to the last level with
+/// any. A view only limits the number of levels per cube. Memory: at most 2 bytes per point of 9^3 per brick.
 struct OwnPriorities {
-  /// As shaders read it: glsl/lattice.glsl.
+  /// Layout: glsl/lattice.glsl.
   using Node = glm::uvec3;
 
-  /// Of all that is above the settings' threshold; not of their camera nor of their budget. In parallel. progress: as
-  /// for DiamondSet.
+  /// Contains everything above the settings' threshold. The camera and the cell budget are not used. Runs in parallel.
+  /// progress: as for DiamondSet.
   OwnPriorities(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                 Progress* progress = nullptr);
 
   int log2_size;
   std::vector<Node> nodes;
-  std::vector<std::uint16_t> values;  ///< but those of
+  std::vector<std::uint16_t> values;  ///< priorities of all nodes except those in to_rate
   BricksToRate to_rate;
 
-  /// Of each node, how many levels of its cells may split and have priorities: 0 to brick_levels. O(nodes).
+  /// Returns for each node how many levels of its cells may split and have priorities: 0 to brick_levels. O(nodes).
   [[nodiscard]] std::vector<std::uint8_t> levels(const ViewLevels& view, const Progress* progress = nullptr) const;
-  /// The same in motion: no less than these settings want, and what there was before as far as with_slack() allows it.
+  /// Returns the levels for a moving camera: at least those of these settings, and those of `before` as far as
+  /// with_slack() allows them.
   [[nodiscard]] std::vector<std::uint8_t> levels(const Cube& cube, const RefineSettings& settings,
                                                  std::span<const std::uint8_t> before,
                                                  const Progress* progress = nullptr) const;
-  /// Calls visit(vertex, priority) for what a node's cells of that many levels give; of one to be rated for what they
-  /// might, at 1.
+  /// Calls visit(vertex, priority) for the priorities of a node's first `levels` levels. For a brick of to_rate it
+  /// visits all split points, with priority 1.
   template <class Visit>
   void for_each(const Node& node, unsigned levels, Visit&& visit) const;
   [[nodiscard]] std::uint64_t bytes() const {
@@ -90,7 +92,7 @@ struct OwnPriorities {
   [[nodiscard]] std::size_t all_values() const { return values.size() + to_rate.values; }
 
  private:
-  // bricks: corners of those in which any of the fields varies.
+  // bricks: corners of the bricks in which any field varies.
   void plan_to_rate(const class Evaluations& evaluations, const std::vector<glm::ivec3>& bricks, float floor);
 };
 

@@ -60,7 +60,7 @@ struct DiamondSet::Blocks {
   tbb::concurrent_unordered_map<std::uint64_t, std::unique_ptr<Block>, Hash> by_key;
 };
 
-// Raises vertices; remembers the last block.
+// Raises the priorities of vertices. Caches the last block.
 class DiamondSet::Raiser {
  public:
   explicit Raiser(DiamondSet& set) : blocks_(set.blocks_.get()) {}
@@ -104,8 +104,9 @@ bool DiamondCursor::is_split(const ivec3& vertex) {
 
 namespace {
 
-// A value that the cut of max_cells will not fall below: the brick cells above it would alone be too many. From every
-// 16th brick; the closure only adds cells. Saves evaluating and keeping what is cut off anyway.
+// Returns a lower bound for the threshold that max_cells will cause: the brick cells above it would exceed max_cells on
+// their own. It is estimated from every 16th brick; the closure only adds cells. It avoids evaluating and storing cells
+// that the limit removes anyway.
 double estimate_floor(const Evaluation& evaluation, const ViewLevels& view, std::uint64_t max_cells,
                       double threshold_squared, const Progress* progress) {
   constexpr std::size_t stride = 16;
@@ -153,7 +154,7 @@ DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, c
   evaluate(evaluations, view, floor, progress, 0.02, 0.5);
   choose_cut(settings.max_cells, progress);
   if (!limited_ && floor > threshold * threshold) {
-    // The estimate was too high after all.
+    // The estimate was too high.
     blocks_->by_key.clear();
     evaluate(evaluations, view, threshold * threshold, progress, 0.5, progress_part);
     choose_cut(settings.max_cells, progress);
@@ -233,7 +234,7 @@ void DiamondSet::close(Progress* progress, double from, double to) {
   // From the finest level up: edge middles (A), face middles (C), cube middles (B), then twice the spacing.
   for (int octave = 0; octave < log2_size_; ++octave) {
     for (int odd = 1; odd <= 3; ++odd) {
-      if (octave == log2_size_ - 1) break;  // the control cube's own edges: their cells are there from the start
+      if (octave == log2_size_ - 1) break;  // edges of the control cube: their cells are the roots
       close_octave(octave, odd, blocks_of(octave / 3, progress), progress);
       part.add(1);
     }
@@ -296,7 +297,7 @@ void DiamondSet::raise_parents(Raiser& raise, const ivec3& v, const ivec3& odd, 
 }
 
 void DiamondSet::choose_cut(std::uint64_t max_cells, const Progress* progress) {
-  // How many cells each priority adds; splitting a diamond adds one cell for each that it has.
+  // Histogram of the cells that each priority adds. Splitting a diamond adds one cell for each cell that it has.
   std::vector<Block*> blocks;
   blocks.reserve(blocks_->by_key.size());
   for (const auto& [key, block] : blocks_->by_key) blocks.push_back(block.get());

@@ -9,27 +9,26 @@
 
 namespace cumulet::grid {
 
-/// A field of colours, as the grid needs it: statistics of each component over the density's cube.
+/// An RGB field with statistics of each component over the density's control cube.
 class RgbField {
  public:
   using Components = std::array<volume::ScalarVolume, 3>;
 
-  /// components: red, green and blue, on the lattice that the cube is of, all with the same bounds. progress: as for
-  /// Statistics.
+  /// components: red, green and blue, on the cube's lattice, all with the same bounds. progress: as for Statistics.
   RgbField(Components components, const Cube& cube, Progress* progress = nullptr);
   RgbField(const RgbField&) = delete;
   RgbField& operator=(const RgbField&) = delete;
 
   [[nodiscard]] const Statistics& component(std::size_t i) const { return *statistics_[i]; }
-  /// Of each component the integral along the mean ray that meets any, along an axis.
+  /// Integral of each component along a ray: the mean over the axis-parallel rays that meet any of it.
   [[nodiscard]] glm::dvec3 mean_depth() const;
   [[nodiscard]] float max_value() const;
-  /// Of what is not black: voxels, inclusive.
+  /// Inclusive voxel bounds of everything that is not black.
   [[nodiscard]] const glm::ivec3& bounds_min() const { return components_[0].bounds_min; }
   [[nodiscard]] const glm::ivec3& bounds_max() const { return components_[0].bounds_max; }
-  /// Whether the brick at this corner (cube space) is black.
+  /// Returns true if the brick at this corner (cube space) is black.
   [[nodiscard]] bool is_zero(const glm::ivec3& corner) const;
-  /// Main memory.
+  /// Main memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const {
     std::uint64_t bytes = 0;
     for (std::size_t i = 0; i < 3; ++i) bytes += components_[i].bytes() + statistics_[i]->bytes();
@@ -37,11 +36,11 @@ class RgbField {
   }
 
  private:
-  Components components_;  // the statistics point into it
+  Components components_;  // statistics_ points into it
   std::array<std::unique_ptr<const Statistics>, 3> statistics_;
 };
 
-/// A field of numbers, likewise.
+/// A scalar field with its statistics.
 class ScalarField {
  public:
   ScalarField(volume::ScalarVolume values, const Cube& cube, Progress* progress = nullptr)
@@ -50,21 +49,21 @@ class ScalarField {
   ScalarField& operator=(const ScalarField&) = delete;
 
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
-  /// Main memory.
+  /// Main memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const { return values_.bytes() + statistics_.bytes(); }
 
  private:
-  volume::ScalarVolume values_;  // the statistics point into it
+  volume::ScalarVolume values_;  // statistics_ points into it
   Statistics statistics_;
 };
 
-/// How what scatters moves, of which with the density a mean velocity is had.
+/// Density-weighted velocity. Its sum divided by the density's gives a cell's mean velocity.
 class MomentumField {
  public:
-  /// Of each axis of the cube density x (velocity / fastest + 1) / 2, so that none is negative.
+  /// For each axis of the cube: density x (velocity / fastest + 1) / 2, which is never negative.
   struct Values {
     RgbField::Components components;
-    float fastest;  ///< voxels a second: no velocity is more along an axis
+    float fastest;  ///< maximum velocity component along any axis, in voxels per second
   };
 
   MomentumField(Values values, const Cube& cube, Progress* progress = nullptr)
@@ -72,7 +71,7 @@ class MomentumField {
 
   [[nodiscard]] const Statistics& component(std::size_t i) const { return components_.component(i); }
   [[nodiscard]] float fastest() const { return fastest_; }
-  /// Main memory.
+  /// Main memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const { return components_.bytes(); }
 
  private:
@@ -80,7 +79,7 @@ class MomentumField {
   float fastest_;
 };
 
-/// Density as the shutter opens, and as it closes.
+/// Density at shutter open and at shutter close.
 struct DensityEnds {
   DensityEnds(volume::ScalarVolume at_open, volume::ScalarVolume at_close, const Cube& cube,
               Progress* progress = nullptr)
@@ -89,25 +88,25 @@ struct DensityEnds {
   ScalarField open;
   ScalarField close;
 
-  /// Main memory.
+  /// Main memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const { return open.bytes() + close.bytes(); }
 };
 
-/// What cells carry beside density; null: nothing.
+/// Fields that cells store beside density. A null field is absent.
 struct Channels {
-  /// Light that the volume gives off by itself: radiance a world unit of length, linear Rec. 709. It needs no density.
+  /// Emitted radiance per world unit of length, linear Rec. 709. It is independent of density.
   std::shared_ptr<const RgbField> emission;
-  /// Density x colour: the mean of products is not the product of means.
+  /// Density x color. The product is stored because the mean of products is not the product of means.
   std::shared_ptr<const RgbField> scattering;
-  /// What scatters (luminance of density x colour) x (1 + anisotropy) / 2: the part of it that goes forward.
+  /// Scattering (luminance of density x color) x (1 + anisotropy) / 2: the part that is scattered forward.
   std::shared_ptr<const ScalarField> forward;
-  /// Light knows nothing of it: no cell is split for it.
+  /// Does not affect light transport, so no cell is split for it.
   std::shared_ptr<const MomentumField> momentum;
-  /// Of which the density that goes with these is the mean: cells are split for both in its place.
+  /// Shutter ends whose mean is the density of this grid. Cells are split for both ends instead of for the density.
   std::shared_ptr<const DensityEnds> ends = nullptr;
 
   bool operator==(const Channels&) const = default;
-  /// Main memory.
+  /// Main memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const {
     return (emission ? emission->bytes() : 0) + (scattering ? scattering->bytes() : 0) +
            (forward ? forward->bytes() : 0) + (momentum ? momentum->bytes() : 0) + (ends ? ends->bytes() : 0);

@@ -150,7 +150,7 @@ const BrickTree& brick_tree(std::uint32_t frame) {
 }
 
 float BrickSums::reference_of(const float* values) {
-  // As glsl/brick_sums.glsl adds them up.
+  // The order of additions matches glsl/brick_sums.glsl.
   std::array<float, 128> sums{};
   for (std::size_t row = 0; row < 64; ++row) {
     for (std::size_t z = 0; z < 8; ++z) sums[64 + row] += values[8 * row + z];
@@ -185,7 +185,7 @@ void BrickSums::compute(const float* values, float of_brick, const BrickTree& tr
 
 namespace {
 
-// Of sums over so many leaves, relative to the reference; centroid: from the brick's low corner.
+// Converts sums over `leaves` leaves, relative to the reference, to moments. centroid: from the brick's low corner.
 Moments moments_of_sums(double leaves, float reference, float mass, float square, const vec3& first,
                         const vec3& centroid, const ivec3& corner) {
   constexpr double leaf_volume = 1.0 / 6.0;
@@ -254,7 +254,7 @@ bool Statistics::values_are_halves() const {
 
 namespace {
 
-// Inclusive of high.
+// A box of voxels; high is inclusive.
 struct VoxelBox {
   ivec3 low;
   ivec3 high;
@@ -268,7 +268,7 @@ struct VoxelBox {
 
 VoxelBox box_of(const volume::Tile& tile) { return {tile.min, tile.max}; }
 
-// The value of all of a box without bricks that these tiles meet, if it is one.
+// Returns the value of a box without bricks if it is uniform. tiles: all tiles that meet the box.
 std::optional<float> one_value(const volume::ScalarVolume& volume, const VoxelBox& box,
                                const std::vector<std::uint32_t>& tiles) {
   const VoxelBox bounds{volume.bounds_min, volume.bounds_max};
@@ -302,7 +302,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
   struct Work {
     std::uint32_t node;
     std::uint32_t first, last;         // range of bricks
-    std::vector<std::uint32_t> tiles;  // that meet the node
+    std::vector<std::uint32_t> tiles;  // tiles that meet the node
   };
   std::vector<std::uint32_t> bricks(volume.brick_origins.size());
   for (std::uint32_t i = 0; i < bricks.size(); ++i) bricks[i] = i;
@@ -340,7 +340,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
     }
     if (log2_size == 3) {
       node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
-      // Where a tile or the background ends.
+      // A tile or the background ends inside this brick.
       extra_values_.resize(extra_values_.size() + volume::brick_voxels);
       volume::fill_brick(volume, low, work.tiles, &extra_values_[extra_values_.size() - volume::brick_voxels]);
       continue;
@@ -439,8 +439,8 @@ void Statistics::compute_moments(Progress* progress) {
 
 namespace {
 
-// Columns of voxels along an axis that meet any density. Memory as there are bricks and cubes of one value, however
-// large these are.
+// Set of the voxel columns along an axis that meet any density. Memory is proportional to the number of bricks and
+// uniform cubes, not to their size.
 class Shadow {
  public:
   Shadow(int axis, int log2_size) : axis_(axis), squares_(static_cast<std::size_t>(log2_size) + 1) {}
@@ -469,7 +469,7 @@ class Shadow {
     return (std::uint64_t(std::uint32_t(corner[(axis_ + 1) % 3] >> log2_size)) << 32U) |
            std::uint32_t(corner[(axis_ + 2) % 3] >> log2_size);
   }
-  // The square of 2^size there, by one of 2^from or more.
+  // Returns true if the square of side 2^size at this position lies within one of side 2^from or larger.
   [[nodiscard]] bool covered(std::uint64_t at, std::size_t size, std::size_t from) const {
     for (std::size_t larger = from; larger < squares_.size(); ++larger) {
       if (squares_[larger].empty()) continue;
@@ -482,7 +482,7 @@ class Shadow {
 
   int axis_;
   std::unordered_map<std::uint64_t, std::uint64_t> bricks_;
-  std::vector<std::unordered_set<std::uint64_t>> squares_;  // by log2 of their side
+  std::vector<std::unordered_set<std::uint64_t>> squares_;  // indexed by log2 of their side
 };
 
 }  // namespace

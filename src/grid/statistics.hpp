@@ -25,28 +25,30 @@ struct Moments {
   [[nodiscard]] double variance() const;
 };
 
-/// Of position and f over a cell about its centroid, in the cell's frame and unit: integral of (f - mean)(x - centroid)
-/// / volume.
+/// Returns the covariance of position and f over a cell, in the cell's frame and unit: integral of (f - mean)(x -
+/// centroid) / volume.
 glm::vec3 frame_covariance(const Moments& moments, std::uint32_t shape, const glm::dvec3& centroid);
 
-/// The least-squares linear fit of f over a cell, scaled so that it is nowhere negative; the mean is kept.
+/// The least-squares linear fit of f over a cell, scaled so that it is not negative anywhere. The mean is kept.
 struct LinearFit {
   glm::vec3 gradient{0.0F};  ///< along the cell's frame axes, per frame unit
   float explained = 0.0F;    ///< the part of the variance that the fit removes
 };
 
-/// covariance: as frame_covariance has it.
-/// Normal equations with the tetrahedron's own covariance matrix, a constant of its class (glsl/cell_fit.glsl).
+/// Solves the normal equations with the tetrahedron's own covariance matrix, a constant of its class
+/// (glsl/cell_fit.glsl). covariance: from frame_covariance().
 LinearFit fit_linear(std::uint32_t cell_class, const glm::vec3& covariance, float mean);
 
-/// How a brick's Kuhn tetrahedron (class B, unit 8) falls into 512 sixths of voxels; one table for each of the 48
+/// Subdivision of a brick's Kuhn tetrahedron (class B, unit 8) into 512 sixths of voxels; one table for each of the 48
 /// frames. Heap order: 1 is the whole, 2h and 2h + 1 are the children of h, 512 to 1023 are the sixths.
 struct BrickTree {
-  std::array<std::uint16_t, 512> voxel;            ///< index into the brick's values, a leaf
-  std::array<std::array<float, 512>, 3> centroid;  ///< x, y and z of a leaf's, from the brick's low corner
-  std::array<std::uint16_t, 512> shape;            ///< of internal node h
-  std::array<glm::u8vec3, 512> midpoint;           ///< of its refinement edge, from the brick's low corner
-  std::array<glm::vec3, 512> node_centroid;        ///< of internal node h, from the brick's low corner
+  std::array<std::uint16_t, 512> voxel;            ///< per leaf: index into the brick's values
+  std::array<std::array<float, 512>, 3> centroid;  ///< per leaf: x, y and z of its centroid, from the brick's low
+                                                   ///< corner
+  std::array<std::uint16_t, 512> shape;            ///< shape of internal node h
+  std::array<glm::u8vec3, 512> midpoint;           ///< midpoint of the refinement edge of node h, from the brick's low
+                                                   ///< corner
+  std::array<glm::vec3, 512> node_centroid;        ///< centroid of internal node h, from the brick's low corner
 };
 const BrickTree& brick_tree(std::uint32_t frame);
 
@@ -55,7 +57,7 @@ std::uint32_t permutation_of(std::uint32_t shape);
 /// The frame (bits 0-8 of a shape word) of the Kuhn tetrahedron with this permutation in the octree cube at corner.
 std::uint32_t kuhn_frame(const glm::ivec3& corner, int size, std::uint32_t permutation);
 
-/// Sums over the heap of one brick tetrahedron, relative to a reference value (so that float loses nothing).
+/// Sums over the heap of one brick tetrahedron, relative to a reference value to avoid float cancellation.
 struct BrickSums {
   float reference = 0.0F;
   std::array<float, 1024> mass;     ///< sum of (f - reference) over the leaves below
@@ -63,20 +65,20 @@ struct BrickSums {
   std::array<float, 1024> x, y, z;  ///< sum of (f - reference) * leaf centroid, from the brick's low corner
   std::array<float, 1024> min, max;
 
-  /// What the sums of a brick are relative to: its mean, the same for all of its trees. It takes as long as one of
-  /// them.
+  /// Returns the reference value of a brick's sums: its mean, the same for all of its trees. This takes as long as one
+  /// compute().
   static float reference_of(const float* values);
   void compute(const float* values, float of_brick, const BrickTree& tree);
-  /// Moments of heap node h of a brick whose low corner is at corner.
+  /// Returns the moments of heap node h of a brick whose low corner is at corner.
   [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner, const BrickTree& tree) const;
 };
-/// Of the whole tetrahedron, of a brick that is known by its summary.
+/// Returns the moments of a brick's whole tetrahedron, from the brick's summary.
 Moments moments_of(const volume::BrickSummary& summary, std::uint32_t permutation, const glm::ivec3& corner,
                    const BrickTree& tree);
 
 /// The volume's octree down to bricks, with exact moments of the six Kuhn tetrahedra of every cube.
 ///
-/// Only cubes that are not uniform have nodes: O(active nodes) memory.
+/// Only non-uniform cubes are subdivided: O(active nodes) memory.
 class Statistics {
  public:
   struct Node {
@@ -84,28 +86,28 @@ class Statistics {
     int log2_size = 0;
     std::uint32_t child = 0;       ///< first of 8 children (x fastest bit), 0: none
     std::int32_t values = -1;      ///< brick payload: index into brick_values(), -1: none
-    float uniform = 0.0F;          ///< the value where there are neither children nor payload
+    float uniform = 0.0F;          ///< the value if there are neither children nor payload
     std::uint32_t moments = none;  ///< index of six Moments, none for a uniform node
     static constexpr std::uint32_t none = 0xffffffffU;
     [[nodiscard]] bool is_uniform() const { return child == 0 && values < 0; }
   };
 
-  /// progress, here and below: receives the fraction done; cancelled, Error(cancelled) is thrown.
+  /// progress, here and below: receives the fraction done. Throws Error(cancelled) if it is cancelled.
   Statistics(const volume::ScalarVolume& volume, const Cube& cube, Progress* progress = nullptr);
 
   [[nodiscard]] const Cube& cube() const { return cube_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  /// The 512 values of a brick node, which may be in `room`. Not of one with a summary.
+  /// Returns the 512 values of a brick node, possibly stored in `room`. Not available for a brick with a summary.
   const float* values(const Node& node, volume::BrickValues::Brick& room) const;
-  /// Of a brick node whose values are in GL what is known of it; else null.
+  /// Returns the summary of a GPU-resident brick node, else null.
   [[nodiscard]] const volume::BrickSummary* summary(const Node& node) const {
     return on_device_ && node.values >= 0 ? &on_device_->summary(static_cast<std::size_t>(node.values)) : nullptr;
   }
-  /// Null: they are in main memory.
+  /// Null if brick values are in main memory.
   [[nodiscard]] const volume::DeviceBricksPtr& on_device() const { return on_device_; }
-  /// Whether halves are exactly what all values of bricks are.
+  /// Returns true if all brick values are exactly representable as half floats.
   [[nodiscard]] bool values_are_halves() const;
-  /// Exact moments of any cell no smaller than a brick's Kuhn tetrahedron, or in a uniform part.
+  /// Exact moments of any cell no smaller than a brick's Kuhn tetrahedron, or within a uniform node.
   [[nodiscard]] Moments moments(const glm::vec3& v0, std::uint32_t shape) const;
   /// The smallest node that holds voxel p of the cube.
   [[nodiscard]] const Node& node_at(const glm::ivec3& p, int min_log2_size = 3) const;
@@ -115,11 +117,11 @@ class Statistics {
   /// Optical depth per unit extinction scale, in grid value x world unit: the mean over the rays along the three axes
   /// that meet any density.
   [[nodiscard]] double mean_optical_depth() const { return mean_optical_depth_; }
-  /// Nodes of one size, coarse ones computed from fine ones.
+  /// Nodes of one size that are not uniform.
   [[nodiscard]] const std::vector<std::uint32_t>& nodes_of_size(int log2_size) const {
     return by_size_[static_cast<std::size_t>(log2_size)];
   }
-  /// Main memory, without the volume's.
+  /// Main memory in bytes, without the volume's.
   [[nodiscard]] std::uint64_t bytes() const {
     return nodes_.size() * (sizeof(Node) + 4) + moments_.size() * sizeof(Moments) + extra_values_.size() * 4;
   }
@@ -135,11 +137,11 @@ class Statistics {
   std::vector<Moments> moments_;
   const volume::BrickValues* brick_values_;
   volume::DeviceBricksPtr on_device_;
-  std::vector<float> extra_values_;  // payloads made here: where a tile or the background ends inside a brick
+  std::vector<float> extra_values_;  // payloads of bricks in which a tile or the background ends
   double mean_optical_depth_ = 0.0;
 };
 
-/// Moments of a cell in which f is one value.
+/// Moments of a cell in which f is uniform.
 Moments uniform_moments(const glm::vec3& v0, std::uint32_t shape, float value);
 
 }  // namespace cumulet::grid

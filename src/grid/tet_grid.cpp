@@ -63,7 +63,7 @@ std::array<RootCell, 24> root_cells(int log2_size) {
     core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size - 1), roots[root].v0, roots[root].shape);
     for (unsigned i = 0; i < 4; ++i) vertices[root][i] = core::cm_cell_vertex(roots[root].v0, roots[root].shape, i);
   }
-  constexpr std::array<unsigned, 4> opposite{3, 1, 2, 0};  // to each face: the vertex
+  constexpr std::array<unsigned, 4> opposite{3, 1, 2, 0};  // per face: the opposite vertex
   for (unsigned a = 0; a < 24; ++a) {
     for (unsigned face = 0; face < 4; ++face) {
       for (unsigned b = 0; b < 24; ++b) {
@@ -129,8 +129,8 @@ std::uint32_t GridBuilder::mark_splits(std::uint32_t first, std::uint32_t last) 
   return splits;
 }
 
-// What has the face that a cell and the other have whole. If this splits elsewhere its cap (face 3) goes to child 1,
-// its other whole face to child 0.
+// Returns the cell on the other side of a face that `cell` shares with `other`, if the face stays whole when `other`
+// splits. Face 3 of `other` then belongs to its child 1, and its other whole face to child 0.
 std::uint32_t GridBuilder::behind_whole(std::uint32_t other, std::uint32_t cell) const {
   if (other == CM_NONE || nodes_[other].child == 0) return other;
   return nodes_[other].child + (nodes_[other].links[3] == cell ? 1 : 0);
@@ -158,7 +158,7 @@ void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
       child.links[faces.x] = CM_NONE;
       continue;
     }
-    // The neighbour is of the same diamond and splits too: its child at the same end of the edge.
+    // The neighbor belongs to the same diamond and splits too: link to its child at the same end of the edge.
     const Node& neighbour = nodes_[other];
     child.links[faces.x] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
   }
@@ -172,7 +172,7 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressP
   const auto begin_of = [&](std::uint32_t c) { return first + c * chunk; };
   const auto end_of = [&](std::uint32_t c) { return std::min(last, begin_of(c + 1)); };
   std::vector<std::uint32_t> splits(chunks);
-  // Mark what splits; then children get consecutive places in the order of their parents.
+  // Mark splits first. Then children get consecutive indices in the order of their parents.
   tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
     part.check();
     splits[c] = mark_splits(begin_of(c), end_of(c));
@@ -203,7 +203,8 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressP
   level_first_.push_back(next);
 }
 
-// A link may point to a cell that has split since: once at most, for a face that neither split cuts is cut by the next.
+// A link may refer to a cell that has split since. This happens at most once, because the next split cuts a face that
+// neither cell's split cuts.
 std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
   return behind_whole(nodes_[from].links[face], from);
 }
@@ -245,8 +246,8 @@ void GridBuilder::order(Progress* progress) {
 void GridBuilder::number_nodes(TetGrid& grid, ProgressPart& part) const {
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
   part.resize(grid.tree, count - 24);
-  // Depth-first number of an internal node: leaves before it minus roots before it, plus its internal ancestors...
-  // which a walk per level hands down: child 0 comes next, child 1 after all of child 0.
+  // The depth-first number of an internal node is (leaves before it) - (roots before it) + (its internal ancestors). It
+  // is computed level by level: child 0 follows its parent, child 1 follows the whole subtree of child 0.
   for (unsigned root = 0; root < 24; ++root) {
     grid.roots[root] = {first_leaf_[root], first_leaf_[root] - root};
   }
@@ -269,7 +270,7 @@ void GridBuilder::number_nodes(TetGrid& grid, ProgressPart& part) const {
   }
 }
 
-// Moments of leaves, one after another: those in one brick's tree share its sums.
+// Computes moments of consecutive leaves. Leaves in one brick's tree share its sums.
 class GridBuilder::LeafMoments {
  public:
   explicit LeafMoments(const Statistics& statistics) : statistics_(&statistics) {}
@@ -292,13 +293,13 @@ class GridBuilder::LeafMoments {
   const Statistics* statistics_;
   std::unique_ptr<BrickSums> sums_ = std::make_unique<BrickSums>();
   volume::BrickValues::Brick room_{};
-  const Statistics::Node* brick_ = nullptr;  // what the sums are of
+  const Statistics::Node* brick_ = nullptr;  // brick of sums_
   unsigned permutation_ = 0;
   const BrickTree* tree_ = nullptr;
 };
 
-// The density of leaves: its mean and gradient, in units of the grid's; and, of what changes while the shutter is open,
-// half of how they do.
+// Computes the density of leaves: mean and gradient, in units of density_unit. With shutter ends it returns the mean of
+// both and half of their difference.
 class GridBuilder::LeafDensity {
  public:
   LeafDensity(const Statistics& density, const Channels& channels, CellKind cells, float unit)
@@ -341,19 +342,19 @@ class GridBuilder::LeafDensity {
     return {vec4(static_cast<float>(mean * to_relative_), gradient), vec4(0.0F), m.mass, m.max > 0.0F};
   }
 
-  std::vector<LeafMoments> fields_;  // the one, or both ends
+  std::vector<LeafMoments> fields_;  // density, or both shutter ends
   bool linear_;
   double to_relative_;
 };
 
-// What leaves give off: the sum of three components, each fitted.
+// Computes the emission of leaves. Each of the three components is fitted.
 class GridBuilder::LeafEmission {
  public:
   LeafEmission(const RgbField& emission, CellKind cells)
       : component_{LeafMoments(emission.component(0)), LeafMoments(emission.component(1)),
                    LeafMoments(emission.component(2))},
         cells_(cells) {}
-  // Into record; returns whether it is any light.
+  // Writes the record; returns true if the leaf emits light.
   bool put(const Node& node, const vec3& centroid, EmissionRecord& record) {
     const std::array<Moments, 3> moments{component_[0](node, centroid), component_[1](node, centroid),
                                          component_[2](node, centroid)};
@@ -366,7 +367,7 @@ class GridBuilder::LeafEmission {
   CellKind cells_;
 };
 
-// What scatters in leaves: density x colour.
+// Computes the scattering of leaves: density x color.
 class GridBuilder::LeafScattering {
  public:
   explicit LeafScattering(const RgbField& scattering)
@@ -380,8 +381,8 @@ class GridBuilder::LeafScattering {
   std::array<LeafMoments, 3> component_;
 };
 
-// How leaves move. BrickSums lose what is thin beside its brick, and here a quotient is all that counts: within bricks
-// voxels are summed up in double precision.
+// Computes the mean velocity of leaves. BrickSums lose precision where density is thin relative to its brick, and a
+// velocity is a quotient. So within bricks voxels are summed in double precision.
 class GridBuilder::LeafVelocity {
  public:
   LeafVelocity(const Statistics& density, const MomentumField& momentum)
@@ -406,7 +407,7 @@ class GridBuilder::LeafVelocity {
   }
 
  private:
-  // A brick of a field, or what stands for it.
+  // Values of a field's brick, or its uniform value.
   struct Found {
     const float* values = nullptr;
     float uniform = 0.0F;
@@ -422,12 +423,12 @@ class GridBuilder::LeafVelocity {
 
   std::array<const Statistics*, 4> fields_;  // density, then momentum along each axis
   float fastest_;
-  ivec3 corner_{-1};  // of the brick that was found
+  ivec3 corner_{-1};  // corner of the brick in found_
   std::array<Found, 4> found_;
   std::array<volume::BrickValues::Brick, 4> rooms_;
 };
 
-// All that leaves carry beside density.
+// Computes all channels of leaves other than density.
 class GridBuilder::LeafChannels {
  public:
   LeafChannels(const Statistics& density, const Channels& channels, CellKind cells) {
@@ -436,7 +437,7 @@ class GridBuilder::LeafChannels {
     if (channels.forward) forward_.emplace(channels.forward->statistics());
     if (channels.momentum) velocity_.emplace(density, *channels.momentum);
   }
-  // Into the grid's arrays; mass: of its density. Whether it gives off light.
+  // Writes to the grid's arrays. mass: of the leaf's density. Returns true if the leaf emits light.
   bool put(const Node& node, const vec3& centroid, double mass, TetGrid& grid, std::uint32_t rank) {
     bool emits = false;
     if (emitted_) emits = emitted_->put(node, centroid, grid.emission[rank]);
@@ -488,7 +489,7 @@ std::uint32_t pack_colour(const dvec3& scattering, double mass) {
 
 std::int16_t pack_anisotropy(double forward, double scattering) {
   if (!(scattering > 0.0)) return 0;
-  // Of more, the lobe is narrower than floats tell cosines apart.
+  // Beyond this limit the lobe is narrower than the float resolution of cosines.
   constexpr double most = 0.999;
   const double mean = std::clamp(2.0 * forward / scattering - 1.0, -most, most);
   return static_cast<std::int16_t>(std::lround(mean * std::numeric_limits<std::int16_t>::max()));

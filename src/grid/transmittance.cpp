@@ -14,10 +14,10 @@ namespace {
 
 using glm::ivec3;
 
-// Of a node that is not uniform: bricks come first, in the order of nodes_of_size(3).
+// Index of a non-uniform node. Bricks come first, in the order of nodes_of_size(3).
 std::size_t place(const Statistics::Node& node) { return node.moments / 6; }
 
-// Index of a block by its place along an axis and across it.
+// Index of a block by its position along an axis and across it.
 std::size_t block_at(int axis, int along, int u, int v) {
   ivec3 block;
   block[axis] = along;
@@ -26,8 +26,6 @@ std::size_t block_at(int axis, int along, int u, int v) {
   const int index = (block.x * 4 + block.y) * 4 + block.z;
   return static_cast<std::size_t>(index);
 }
-
-// Of a voxel of a brick.
 
 }  // namespace
 
@@ -74,7 +72,7 @@ void Transmittance::sum_blocks(const Progress* progress) {
 }
 
 void Transmittance::sweep(int axis, const Progress* progress) {
-  std::vector<ivec3> columns;  // their corners on the cube's face
+  std::vector<ivec3> columns;  // corner of each column on the cube's face
   for (const std::uint32_t n : statistics_->nodes_of_size(3)) {
     columns.push_back(statistics_->nodes()[n].corner);
     columns.back()[axis] = 0;
@@ -88,14 +86,14 @@ void Transmittance::sweep(int axis, const Progress* progress) {
 }
 
 void Transmittance::sweep_column(int axis, ivec3 at) {
-  // In front of a brick, for each of its 4 x 4 rows of blocks.
+  // Optical depth in front of a brick, for each of its 4 x 4 rows of blocks.
   struct Passed {
     std::size_t brick;
     std::array<float, 16> before;
   };
   std::vector<Passed> bricks;
   std::array<float, 16> depth{};
-  const float to_depth = 0.25F * voxel_depth_[axis];  // of a block's sum: four rows of voxels
+  const float to_depth = 0.25F * voxel_depth_[axis];  // from a block's sum: a block has four rows of voxels
   while (at[axis] < statistics_->cube().size()) {
     const Statistics::Node& node = statistics_->node_at(at);
     at[axis] = node.corner[axis] + (1 << node.log2_size);

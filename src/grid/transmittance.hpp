@@ -9,21 +9,22 @@
 
 namespace cumulet::grid {
 
-/// What part of the light outside gets to a place in a medium, as the refinement wants to know it: roughly, fast, never
-/// 0. Of each block of 2^3 voxels along the six axes, 1 / (1 + optical depth), which is how light falls with the depth
-/// where it is scattered; three directions of full light, as before a wall, count as all of it.
+/// Approximate transmittance from outside to each block of 2^3 voxels, for the refinement criterion. It is fast to
+/// compute and never 0. For each of the six axis directions it is 1 / (1 + optical depth), which is how light falls off
+/// with depth in scattering media. The result is the sum of the six divided by 3, at most 1, so three directions in
+/// full light count as full light.
 class Transmittance {
  public:
   static constexpr int blocks_a_brick = 64;
 
-  /// extinction: of a grid value of the statistics' field, per world unit. In parallel; O(voxels of bricks). progress:
-  /// where it is cancelled, Error(cancelled) is thrown.
+  /// extinction: per grid value and world unit. Runs in parallel; O(voxels of bricks). Throws Error(cancelled) if
+  /// progress is cancelled.
   Transmittance(const Statistics& statistics, double extinction, const Progress* progress = nullptr);
 
-  /// Of the 64 blocks of the brick at this corner (cube space), z fastest, each at most 1; null where the field has no
-  /// such brick.
+  /// Returns the values of the 64 blocks of the brick at this corner (cube space), z fastest, each at most 1. Null if
+  /// the field has no such brick.
   [[nodiscard]] const float* blocks(const glm::ivec3& corner) const;
-  /// The most in the cube of the octree at this corner; 1 where the field has no detail there.
+  /// Returns the maximum in the octree cube at this corner; 1 where the field has no detail.
   [[nodiscard]] float most(const glm::ivec3& corner, int log2_size) const;
 
  private:
@@ -34,12 +35,12 @@ class Transmittance {
 
   const Statistics* statistics_;
   glm::vec3 voxel_depth_{0.0F};       // optical depth of a voxel of value 1, along each axis
-  std::vector<float> sums_;           // of a block's voxels
-  std::vector<float> transmittance_;  // of a block
-  std::vector<float> most_;           // of a node that is not uniform, by the place of its moments
+  std::vector<float> sums_;           // per block: sum of its voxels
+  std::vector<float> transmittance_;  // per block
+  std::vector<float> most_;           // per non-uniform node: the maximum, in the order of its moments
 };
 
-/// The most over the heap of one brick tetrahedron, as BrickSums has sums.
+/// Maximum transmittance per heap node of one brick tetrahedron, in the heap order of BrickSums.
 struct BrickTransmittance {
   std::array<float, 1024> most;
 

@@ -14,7 +14,7 @@ namespace {
 using glm::dvec3;
 using glm::ivec3;
 
-// The largest singular value, by power iteration: where that converges slowly others are as large.
+// Largest singular value, by power iteration. Slow convergence is harmless: then other singular values are as large.
 double largest_stretch(const glm::dmat3& linear) {
   const glm::dmat3 square = glm::transpose(linear) * linear;
   dvec3 v = glm::normalize(dvec3(1.0, 0.9, 0.8));
@@ -38,7 +38,7 @@ double longest_edge(const glm::dmat3& linear, std::uint32_t cell_class) {
 }  // namespace
 
 unsigned level_of(std::uint32_t shape, int log2_size) {
-  constexpr std::array<int, 3> within{0, 1, -1};  // an octave
+  constexpr std::array<int, 3> within{0, 1, -1};  // level within an octave
   const int octave = log2_size - 1 - static_cast<int>(core::cm_shape_exponent(shape));
   return static_cast<unsigned>(3 * octave + within[core::cm_shape_class(shape)]);
 }
@@ -63,7 +63,7 @@ ViewLevels::ViewLevels(const Cube& cube, const RefineSettings& settings) : log2_
     const dvec3 diagonal(1.0, (i & 1) != 0 ? -1.0 : 1.0, (i & 2) != 0 ? -1.0 : 1.0);
     unit_radius_ = std::max(unit_radius_, 0.5 * glm::length(linear * diagonal));
   }
-  // Level 3 n is of edges of cubes (A), 3 n + 1 of their diagonals (B), 3 n + 2 of diagonals of the next ones' faces.
+  // Level 3 n has edges of cubes (A), 3 n + 1 their diagonals (B), 3 n + 2 face diagonals of cubes of half the size.
   const std::array<double, 3> edge{longest_edge(linear, 0), longest_edge(linear, 1), 0.5 * longest_edge(linear, 2)};
   longest_.resize(splitting_levels(log2_size_));
   double finer = 0.0;
@@ -100,7 +100,7 @@ RefineSettings with_slack(const RefineSettings& settings) {
   return slack;
 }
 
-// Infinity: out of sight.
+// Infinity: outside the frustum.
 double ViewLevels::shortest_edge(const Placed& placed, const dvec3& centre, double radius) const {
   const dvec3 to = dvec3(placed.to_camera * glm::dvec4(centre, 1.0)) - eye_;
   radius *= placed.stretch;

@@ -11,11 +11,11 @@ std::vector<Alias> alias_table(std::vector<double> weights, double sum, const Pr
   std::vector<std::uint32_t> large;
   for (std::uint32_t i = 0; i < n; ++i) {
     table[i].other = i;
-    weights[i] *= static_cast<double>(n) / sum;  // in units of the mean
+    weights[i] *= static_cast<double>(n) / sum;  // relative to the mean
     (weights[i] < 1.0 ? small : large).push_back(i);
   }
   check(progress);
-  // What is left at the end, by rounding alone or with the mean's weight, stands for itself.
+  // Entries that remain, because of rounding or because their weight is the mean, return themselves.
   while (!small.empty() && !large.empty()) {
     const std::uint32_t low = small.back();
     const std::uint32_t high = large.back();

@@ -19,7 +19,7 @@ constexpr float log_range = 5.99146455F;  // log(hottest / coldest)
 }  // namespace
 
 glm::dvec3 black_body_colour(double kelvin) {
-  // Planck's law, over its value at 555 nm: of cold bodies too little is left for a double otherwise.
+  // Planck's law divided by its value at 555 nm: for cold bodies the unnormalized values would underflow.
   constexpr double second_constant = 1.438776877e7;  // h c / k, nm K
   const double reference = second_constant / (555.0 * kelvin);
   Spectrum spectrum{};

@@ -7,7 +7,7 @@ namespace cumulet::light {
 
 namespace {
 
-/// The samples beside a pixel, in one direction.
+/// The two samples around a pixel along one axis, with linear weights.
 struct Beside {
   std::array<std::uint32_t, 2> samples{};
   std::array<float, 2> weights{};
@@ -19,7 +19,7 @@ Beside beside(std::uint32_t pixel, std::uint32_t step, std::uint32_t count) {
   return {{before, std::min(before + 1, count - 1)}, {1.0F - part, part}};
 }
 
-/// From 1, for equal luminance, to nearly 0.
+/// Returns 1 for equal luminances, down to nearly 0.
 float similarity(float a, float b) {
   constexpr float tolerance = 1e-3F;
   const float sum = a + b;
@@ -28,7 +28,7 @@ float similarity(float a, float b) {
   return tolerance / (tolerance + difference * difference);
 }
 
-/// One pixel; weight(index) is how much a sample counts beside its distance.
+/// Interpolates one pixel. weight(index) is multiplied with the distance weight of a sample.
 template <class Weight>
 float interpolated(const SampledPlane& plane, const Beside& across, const Beside& down, const Weight& weight) {
   float sum = 0.0F;

@@ -6,7 +6,7 @@
 
 namespace cumulet::light {
 
-/// One channel of a picture with a sample at every `x_step`-th pixel of every `y_step`-th row, from the first on.
+/// A subsampled channel of an image: a sample at every `x_step`-th pixel of every `y_step`-th row, starting at 0.
 struct SampledPlane {
   std::uint32_t width = 0;  ///< samples
   std::uint32_t height = 0;
@@ -22,12 +22,12 @@ struct SampledPlane {
         y_step(step_y),
         values(std::size_t{width} * height) {}
 
-  /// A row of the picture, one value a pixel, interpolated linearly between samples.
+  /// Interpolates a row of the image linearly between samples, one value per pixel.
   void row(std::uint32_t y, std::span<float> pixels) const;
 
-  /// The same of chroma, where samples count by how similar the picture is there: `luminance` is the row's, and
-  /// `sampled` has the luminance of the pixels with samples. So colors do not bleed across edges, as of the sun, and do
-  /// not ring beside them, as by the filter of OpenEXR's RgbaInputFile.
+  /// Interpolates a row of chroma with luminance-guided weights (joint bilateral upsampling). `luminance` is the row's;
+  /// `sampled` has the luminance at the chroma samples. Colors therefore do not bleed across edges, for example of the
+  /// sun. They also do not ring beside edges, unlike those of OpenEXR's RgbaInputFile.
   void row(std::uint32_t y, std::span<float> pixels, std::span<const float> luminance,
            const SampledPlane& sampled) const;
 };

@@ -22,7 +22,7 @@ struct FacePoint {
   vec2 at{0.0F};  ///< from -1 to 1: right, down
 };
 
-/// The place of a direction on the cube (ImfEnvmap.h).
+/// Projects a direction to a cube face (ImfEnvmap.h).
 FacePoint project(const vec3& w) {
   const vec3 size = glm::abs(w);
   if (size.x >= size.y && size.x >= size.z) {
@@ -53,7 +53,7 @@ EnvironmentPixels resample(const CubeMap& cube, Progress* progress) {
   pixels.width = 4 * cube.side;
   pixels.height = 2 * cube.side;
   resize(pixels.values, std::size_t{pixels.width} * pixels.height, progress);
-  // Points a texel and direction, so that no texel of the cube is missed.
+  // Sampling points per texel and axis, so that no texel of the cube is missed.
   const std::uint32_t points = cube.side <= 512 ? 4 : 2;
   std::vector<vec2> level;  // sine and cosine of each point's azimuth
   level.reserve(std::size_t{pixels.width} * points);

@@ -8,8 +8,8 @@
 
 namespace cumulet::light {
 
-/// Six square faces below each other, +X, -X, +Y, -Y, +Z and -Z, oriented as OpenEXR defines cube maps
-/// (ImfEnvmap.h). The middles of a face's outer pixels lie on the edges of the cube.
+/// Six square faces below each other: +X, -X, +Y, -Y, +Z and -Z, oriented as in OpenEXR cube maps (ImfEnvmap.h). The
+/// centers of a face's outer pixels are on the edges of the cube.
 struct CubeMap {
   static constexpr std::uint32_t max_side = Environment::max_side / 4;
 
@@ -17,7 +17,7 @@ struct CubeMap {
   std::vector<glm::vec3> values;  ///< side x 6 side
 };
 
-/// Resamples to latitude and longitude, 4 x 2 sides. Throws Error(cancelled).
+/// Resamples to an equirectangular image of 4 x 2 sides. Throws Error(cancelled).
 EnvironmentPixels resample(const CubeMap& cube, Progress* progress);
 
 }  // namespace cumulet::light

@@ -27,8 +27,8 @@ using surface::Material;
 using surface::Scene;
 using surface::Wrap;
 
-// A triangle's texture is looked at in this many points; of an image's mean at least this share counts, for what they
-// miss.
+// The texture of a triangle is sampled at this many points. Because these may miss bright texels, the result is at
+// least this fraction of the image's mean.
 constexpr int looks = 16;
 constexpr float least_share = 0.05F;
 
@@ -55,12 +55,12 @@ std::uint32_t wrapped(float at, std::uint32_t size, Wrap wrap) {
   float turns = at;
   if (wrap == Wrap::repeat) turns = at - std::floor(at);
   if (wrap == Wrap::mirrored) turns = 1.0F - std::abs(1.0F - (at - 2.0F * std::floor(0.5F * at)));
-  if (!(turns > 0.0F)) return 0;  // nor where a transform has led nowhere
+  if (!(turns > 0.0F)) return 0;  // also catches NaN from a degenerate transform
   const float texel = std::min(turns, 1.0F) * static_cast<float>(size);
   return std::min(size - 1U, static_cast<std::uint32_t>(texel));
 }
 
-// What a material emits, by place.
+// The emission of a material, averaged over triangles.
 class Emission {
  public:
   Emission(const FromSrgb& linear, const Scene& scene, const Material& material, const Progress* progress)
@@ -76,7 +76,7 @@ class Emission {
     mean_ = luminance(material.emission * mean);
   }
 
-  /// 0: nothing, anywhere.
+  /// Returns the mean luminance; 0 if the material does not emit.
   [[nodiscard]] float mean() const { return mean_; }
 
   [[nodiscard]] float over(std::uint32_t triangle) const {
@@ -89,7 +89,7 @@ class Emission {
     }
     vec3 sum(0.0F);
     for (int i = 0; i < looks; ++i) {
-      // The R2 sequence, folded into the triangle.
+      // Points of the R2 sequence, folded into the triangle.
       vec2 b = glm::fract(vec2(0.5F) + static_cast<float>(i) * vec2(0.7548777F, 0.5698403F));
       if (b.x + b.y > 1.0F) b = vec2(1.0F) - b;
       const vec2 at = uv[0] + b.x * (uv[1] - uv[0]) + b.y * (uv[2] - uv[0]);
@@ -169,7 +169,7 @@ EmitterTable emitter_table(std::span<const EmissiveTriangle> triangles, const Sc
     table.entries[i].y = aliases[i].stays;
     table.entries[i].z = aliases[i].other;
   }
-  // Chances as the table's words give them, not as they were meant.
+  // Computed from the quantized alias words, as shaders use them.
   std::vector<double> chance(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     const double stays = (static_cast<double>(table.entries[i].y) + 1.0) / 4294967296.0;

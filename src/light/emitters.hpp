@@ -1,6 +1,7 @@
 #pragma once
 
-// Emissive triangles as lights: which there are, and how often the path tracer picks each. No GL.
+// Emissive triangles as lights: which triangles there are, and the alias table by which the path tracer samples them.
+// No GL.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -15,26 +16,25 @@ namespace cumulet::light {
 struct EmissiveTriangle {
   std::uint32_t triangle = 0;
   std::uint32_t draw = 0;
-  float luminance =
-      0.0F;  ///< of its radiance, the mean over the triangle as far as a few texels of its texture tell; > 0
+  float luminance = 0.0F;  ///< of the radiance, > 0: mean over the triangle, estimated from a few texels
 };
 
-/// The scene's emissive triangles in a pose, in ascending order; those of unlit materials are not among them, nor those
-/// that are hidden. They serve for all poses with its materials and draws. O(n), and over the texels of emissive
-/// images, on TBB's threads. Throws Error(cancelled).
+/// Returns the emissive triangles of a scene in a pose, in ascending order, without hidden ones and without those of
+/// unlit materials. The list is valid for all poses with the same materials and visible draws. O(n), and over the
+/// texels of emissive images, on TBB threads. Throws Error(cancelled).
 std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, const surface::Pose& pose,
                                                  const Progress* progress = nullptr);
 
-/// Picks triangles in proportion to their power (light/alias_table.hpp).
+/// Samples triangles in proportion to their power (light/alias_table.hpp).
 struct EmitterTable {
-  /// One a triangle that has an area, in ascending order of x: x: triangle, from the first; y: entry i, drawn evenly,
-  /// stands for itself where a random word is at most y, z: else for this entry; w: a float, the chance to be picked
-  /// per area, negative where the triangle's front is where its vertices turn clockwise.
+  /// One entry per triangle with an area, in ascending order of x. x: triangle number, relative to `first`. y, z: the
+  /// alias: entry i, drawn uniformly, returns itself if a random word is at most y, else entry z. w: a float, the
+  /// sampling pdf by area; it is negative if the triangle's front side is the one with clockwise vertices.
   std::vector<glm::uvec4> entries;
-  double flux = 0.0;  ///< luminance of all that they emit: pi x radiance x area x sides
+  double flux = 0.0;  ///< luminance of the total emitted power: pi x radiance x area x sides
 };
 
-/// The table of a pose, of those of its emissive triangles that are given; first: the number of what they count from.
+/// Builds the table of the given emissive triangles in a pose. first: number of the triangle that entries count from.
 /// O(n). Throws Error(cancelled).
 EmitterTable emitter_table(std::span<const EmissiveTriangle> triangles, const surface::Scene& scene,
                            const surface::Pose& pose, const Progress* progress = nullptr, std::uint32_t first = 0);

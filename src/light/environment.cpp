@@ -23,10 +23,10 @@ namespace {
 
 using glm::vec3;
 
-// Above, sums and products of radiance would not be finite.
+// Above this limit, sums and products of radiance would overflow.
 constexpr float brightest = 1e30F;
 
-/// A colour as Environment's z and w; what is read back of it follows.
+/// A color as it is stored in the z and w words of Environment.
 struct Packed {
   std::uint32_t z = 0;
   std::uint32_t w = 0;
@@ -35,7 +35,7 @@ struct Packed {
 Packed pack(const vec3& colour) {
   const float most = std::max(colour.x, std::max(colour.y, colour.z));
   if (!(most > 0.0F)) return {};
-  // The largest of the three from 1 to 2, so that its half has all its digits; of the smallest floats fewer.
+  // Scales the largest component to [1, 2), so that its half has full precision; denormal floats have less.
   const auto unit = std::max(std::bit_cast<std::uint32_t>(most) & 0x7F800000U, 0x00800000U);
   const vec3 halves = colour / std::bit_cast<float>(unit);
   return {glm::packHalf2x16({halves.x, halves.y}), glm::packHalf2x16({halves.z, 0.0F}) | unit};
@@ -47,11 +47,12 @@ vec3 unpack(const Packed& packed) {
   return vec3(rg, b.x) * std::bit_cast<float>(packed.w & 0xFFFF0000U);
 }
 
-/// What a row of texels adds to means over all directions: sums, by the sine of its angle from +Y.
+/// Contribution of a row of texels to the means over all directions: sums, weighted by the sine of the row's angle from
+/// +Y.
 struct RowSums {
-  double weight = 0.0;  // of its luminance
+  double weight = 0.0;  // sum of luminance x sine
   glm::dvec3 mean{0.0};
-  // Of radiance times w, and times products of w's components.
+  // Sums of radiance times w, and times products of w's components.
   std::array<glm::dvec3, 3> first{};
   std::array<glm::dvec3, 5> second{};  // xy, yz, zx, xx, yy
   std::uint64_t replaced = 0;
@@ -72,7 +73,8 @@ struct RowSums {
     for (std::size_t i = 0; i < second.size(); ++i) second[i] += row.second[i];
     replaced += row.replaced;
   }
-  /// 3 <L v> w, and 15/2 w (<L v v> - <L> / 3) w, whose last diagonal element is the others' less. sines: all texels'.
+  /// Returns 3 <L v> w, and 15/2 w (<L v v> - <L> / 3) w. The last diagonal element is minus the sum of the others.
+  /// sines: sum over all texels.
   [[nodiscard]] Harmonics harmonics(double sines) const {
     Harmonics found{};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -84,7 +86,7 @@ struct RowSums {
   }
 };
 
-/// The row's texels, each of which stands for itself, and their weights.
+/// Makes the texels of a row, without aliases yet, and their sampling weights.
 class RowMaker {
  public:
   RowMaker(const EnvironmentPixels& pixels, std::vector<glm::uvec4>& words, std::vector<double>& weights)
@@ -124,10 +126,10 @@ class RowMaker {
   const EnvironmentPixels& pixels_;
   std::vector<glm::uvec4>& words_;
   std::vector<double>& weights_;
-  std::vector<glm::dvec2> level_;  // of each column, the sine and cosine of its azimuth
+  std::vector<glm::dvec2> level_;  // sine and cosine of the azimuth, per column
 };
 
-/// Calls visit with each row, on TBB's threads.
+/// Calls visit with each row, on TBB threads.
 template <class Visit>
 void for_each_row(std::uint32_t rows, const Visit& visit) {
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows), [&](const auto& range) {
@@ -170,7 +172,7 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
       part.add(1);
     });
   }
-  // In the order of rows, whatever thread made them.
+  // Summed in the order of rows, so that the result does not depend on threads.
   RowSums all;
   double sines = 0.0;
   for (std::uint32_t y = 0; y < pixels.height; ++y) {
@@ -207,7 +209,7 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
 }
 
 std::vector<vec3> pixels_of(const Environment& environment, std::uint32_t width, std::uint32_t height) {
-  // Of `many` in a row, those in the place of one of `few`: at least one.
+  // The range of source texels (of `many`) that target pixel i (of `few`) covers; at least one.
   const auto covered = [](std::uint32_t i, std::uint32_t few, std::uint32_t many) {
     const auto edge = [&](std::uint32_t at) { return static_cast<std::uint32_t>(std::uint64_t{at} * many / few); };
     return std::pair(edge(i), std::max(edge(i + 1), edge(i) + 1));

@@ -1,6 +1,6 @@
 #pragma once
 
-// An equirectangular picture of all that is far away, as a light. No GL.
+// Environment maps: an equirectangular image of the distant surroundings as a light. No GL.
 
 #include <array>
 #include <cstddef>
@@ -15,59 +15,59 @@
 
 namespace cumulet::light {
 
-/// Radiance of all directions, linear Rec. 709, rows from the top (+Y) down; the middle is at +Z and +X left of it, as
-/// seen from within.
+/// Radiance of all directions, linear Rec. 709, rows from the top (+Y) down. The image center is at +Z; seen from
+/// inside, +X is to the left of it.
 struct EnvironmentPixels {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<glm::vec3> values;
-  std::vector<std::string> remarks{};  ///< what a reader had to choose, convert or ignore
+  std::vector<std::string> remarks{};  ///< choices, conversions and ignored data of the reader
 };
 
-/// What radiance of all directions has beyond its mean: coefficients of x, y, z, xy, yz, zx, xx - zz and yy - zz, in
-/// the order of glsl/harmonics.glsl.
+/// Spherical harmonics of radiance without the mean (order 1 and 2): coefficients of x, y, z, xy, yz, zx, xx - zz and
+/// yy - zz, in the order of glsl/harmonics.glsl.
 using Harmonics = std::array<glm::vec3, 8>;
 
-/// The picture with what it takes to look for light in it (glsl/environment.glsl). Immutable, and shared.
+/// An environment map with the tables for importance sampling (glsl/environment.glsl). Immutable and shared.
 struct Environment {
   static constexpr std::uint32_t max_side = 16384;
 
   std::string name;  ///< for messages
   std::uint32_t width = 0;
   std::uint32_t height = 0;
-  /// One a texel. x: texel i, drawn evenly, stands for itself where a random word is at most x, y: else for this texel
-  /// (Walker's alias method, as of light::EmitterTable), by luminance times the sine of the row's angle from +Y; z, w:
-  /// red and green, blue as halves in units of the float whose upper half is w's.
+  /// One word per texel. x, y: the alias (Walker's alias method): texel i, drawn uniformly, returns itself if a random
+  /// word is at most x, else texel y. Texels are sampled by luminance times the sine of the row's angle from +Y. z, w:
+  /// red and green, and blue, as halves, in units of the float whose upper half is that of w.
   std::vector<glm::uvec4> words;
   glm::dvec3 mean{0.0};  ///< over all directions
   Harmonics harmonics{};
-  GlossPtr gloss;  ///< null: nothing beyond the mean
-  /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
-  /// sine, inverted. 0: there is no light.
+  GlossPtr gloss;  ///< prefiltered maps for glossy reflection; null: the environment is constant
+  /// Solid-angle pdf of sampling a texel, divided by the texel's luminance: 1 / (sum of weights x texel solid angle /
+  /// sine). 0: the environment is black.
   float density = 0.0F;
-  std::vector<std::string> remarks;  ///< what its reader had to choose, convert or ignore
-  std::uint64_t replaced = 0;        ///< pixels that were not finite, negative or above 1e30, where that counts as 0
+  std::vector<std::string> remarks;  ///< choices, conversions and ignored data of the reader
+  std::uint64_t replaced = 0;        ///< pixels with components not finite, negative or > 1e30, which became 0
 
   [[nodiscard]] std::size_t texels() const { return words.size(); }
 };
 using EnvironmentPtr = std::shared_ptr<const Environment>;
 
-/// Throws Error(file) that begins with the name for a picture without pixels, or of a side above max_side.
+/// Throws Error(file), with the name first, for an image without pixels or with a side above max_side.
 void check_environment_size(const std::string& name, std::int64_t width, std::int64_t height);
 
-/// O(texels), on TBB's threads, the same by any number of them; the second half of a load's progress. Throws as
-/// check_environment_size does, Error(file) that begins with the name for another number of values than pixels, and
-/// Error(cancelled).
+/// Builds the environment. O(texels), on TBB threads; the result does not depend on their number. Reports the second
+/// half of a load's progress. Throws as check_environment_size() does, Error(file) with the name first if the number of
+/// values differs from the number of pixels, and Error(cancelled).
 EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name, Progress* progress = nullptr);
 
-/// It at another size, rows from the top down: each pixel the mean of the texels in its place.
+/// Returns the image at another size, rows from the top down: each pixel is the mean of the texels it covers.
 std::vector<glm::vec3> pixels_of(const Environment& environment, std::uint32_t width, std::uint32_t height);
 
-/// How a scene is surrounded by one.
+/// An environment as used in a scene.
 struct Surroundings {
-  EnvironmentPtr environment;     ///< null: by the sky of DistantLights
+  EnvironmentPtr environment;     ///< null: the sky of DistantLights
   float rotation_degrees = 0.0F;  ///< about +Y, from +Z towards +X
-  float strength = 1.0F;          ///< times its radiance
+  float strength = 1.0F;          ///< factor for its radiance
   bool operator==(const Surroundings&) const = default;
 };
 

@@ -26,7 +26,7 @@ namespace {
   throw Error(ErrorCode::file, one_line(name) + ": " + cause);
 }
 
-/// All of it, in pieces between which a load may be cancelled.
+/// Reads the whole file in pieces, so that a load can be cancelled.
 std::vector<std::uint8_t> read_bytes(const FilePath& path, Progress* progress) {
   std::ifstream file(path.absolute(), std::ios::binary);
   if (!file) fail(path.given(), std::strerror(errno));

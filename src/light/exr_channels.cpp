@@ -29,7 +29,7 @@ std::optional<ExrChannels> find_rgb(const Imf::ChannelList& channels, const std:
   return std::nullopt;
 }
 
-/// Names that programs give to the layer of the finished picture.
+/// Whether the layer has a name that programs give to the layer of the final image.
 bool is_main(std::string_view layer) {
   std::string last(layer.substr(layer.rfind('.') + 1));
   std::ranges::transform(last, last.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

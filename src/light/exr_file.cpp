@@ -33,8 +33,8 @@ namespace cumulet::light {
 
 namespace {
 
-// OpenEXR's own statics, made when the library is loaded: at exit they then go after a decode that was left
-// (base/apart), which is waited for. Made with the first file they would go before it.
+// Creates OpenEXR's statics when the library is loaded. At exit they are then destroyed after decoding that continues
+// in the background (base/apart) has ended. If they were created with the first file, they would be destroyed before.
 [[maybe_unused]] const bool open_exr_is_made = []() noexcept {
   Imf::staticInitialize();
   return IlmThread::ThreadPool::globalThreadPool().numThreads() >= 0;
@@ -44,7 +44,7 @@ namespace {
   throw Error(ErrorCode::file, one_line(path) + ": " + cause);
 }
 
-/// A file's bytes, for OpenEXR.
+/// An OpenEXR stream over a file's bytes.
 class ByteStream : public Imf::IStream {
  public:
   ByteStream(std::vector<std::uint8_t> bytes, const std::string& name)
@@ -65,7 +65,7 @@ class ByteStream : public Imf::IStream {
   std::uint64_t at_ = 0;
 };
 
-/// A rectangle of pixels. Numbers of 64 bits: a file's windows may be anything.
+/// A rectangle of pixels, with 64-bit numbers because a file's windows may be arbitrary.
 struct Window {
   std::int64_t left = 0;
   std::int64_t top = 0;
@@ -79,7 +79,7 @@ Window window_of(const Imath::Box2i& box) {
   return {box.min.x, box.min.y, std::int64_t{box.max.x} - box.min.x + 1, std::int64_t{box.max.y} - box.min.y + 1};
 }
 
-/// What a header says of the picture's shape and colors.
+/// The geometry and colors of the image, from its header.
 struct Description {
   ExrChannels channels;
   Window data;
@@ -99,18 +99,18 @@ Primaries primaries_of(const Imf::Header& header) {
     const Imf::Chromaticities& c = Imf::chromaticities(header);
     primaries = {point(c.red), point(c.green), point(c.blue), point(c.white)};
   }
-  // The color that counts as white, as OpenEXR's own AcesInputFile has it.
+  // The color that counts as white, as in OpenEXR's AcesInputFile.
   if (Imf::hasAdoptedNeutral(header)) primaries.white = point(Imf::adoptedNeutral(header));
   return primaries;
 }
 
-/// An OpenEXR picture on its way from bytes to pixels. Owns all of it: see apart().
+/// An OpenEXR image while it is decoded. Owns all of its data, as apart() requires.
 class ExrPicture {
  public:
   ExrPicture(std::vector<std::uint8_t> bytes, const std::string& path)
       : path_(path), stream_(std::move(bytes), path), file_(stream_) {}
 
-  /// Chooses the part and its channels and makes room for the pixels.
+  /// Chooses the part and its channels, and allocates the pixels.
   void open(Progress* progress) {
     const int part = choose_part();
     const Imf::Header& header = file_.header(part);
@@ -130,7 +130,7 @@ class ExrPicture {
     part_->setFrameBuffer(frame);
   }
 
-  /// Rows from 0, as many as there are from this one on, at most so many. Returns the next.
+  /// Decodes up to `most` rows from `row` on, counted from 0. Returns the next row.
   std::uint32_t decode(std::uint32_t row, std::uint32_t most) {
     const std::uint32_t end = row + std::min(most, pixels_.height - row);
     const auto top = static_cast<int>(description_.data.top);
@@ -144,7 +144,7 @@ class ExrPicture {
     return kind == Kind::luminance || kind == Kind::luminance_chroma ||
            std::ranges::any_of(planes_, [](const SampledPlane& plane) { return !plane.values.empty(); });
   }
-  /// Notes the luminance at samples of chroma, before combine() replaces it.
+  /// Saves the luminance at the chroma samples, before combine() overwrites it.
   void prepare_chroma() {
     if (description_.channels.kind != ExrChannels::Kind::luminance_chroma) return;
     for (std::size_t c = 1; c < planes_.size(); ++c) {
@@ -159,7 +159,7 @@ class ExrPicture {
       }
     }
   }
-  /// Replaces what was read of a row by RGB of the file's primaries, or by XYZ. All rows have been decoded.
+  /// Converts a decoded row to RGB with the file's primaries, or to XYZ. All rows must have been decoded.
   void combine(std::uint32_t y) {
     const std::span<glm::vec3> row(&pixels_.values[std::size_t{y} * pixels_.width], pixels_.width);
     std::vector<float> values(row.size());
@@ -221,7 +221,7 @@ class ExrPicture {
     const Window& data = description_.data;
     const auto fits = [](const Window& window) { return window.width >= 1 && window.height == 6 * window.width; };
     if (description_.cube) {
-      // A cube is its data window (ImfEnvmap.h); one that a program has cropped, its display window.
+      // The data window is the cube (ImfEnvmap.h); if a program has cropped it, the display window is the cube.
       if (fits(data)) description_.display = data;
       const Window& whole = description_.display;
       if (!fits(whole)) {
@@ -249,7 +249,7 @@ class ExrPicture {
     }
   }
 
-  /// Where a channel goes: to its component of the pixels or, if it has not a sample a pixel, to a plane.
+  /// Returns the destination of a channel: its component of the pixels or, if it is subsampled, a plane.
   Imf::Slice slice(const Imf::Channel& channel, std::size_t c) {
     const auto x_step = static_cast<std::uint32_t>(channel.xSampling);
     const auto y_step = static_cast<std::uint32_t>(channel.ySampling);
@@ -262,13 +262,13 @@ class ExrPicture {
       stride = sizeof(float);
       row = stride * planes_[c].width;
     }
-    // A slice's base is where pixel (0, 0) would be, which the data window may not contain.
+    // A slice's base is the address of pixel (0, 0), which may be outside of the data window.
     base -= description_.data.left / channel.xSampling * stride + description_.data.top / channel.ySampling * row;
     return {Imf::FLOAT,       base, static_cast<std::size_t>(stride), static_cast<std::size_t>(row), channel.xSampling,
             channel.ySampling};
   }
 
-  /// Y, RY = (R - Y) / Y and BY = (B - Y) / Y, as ImfRgbaYca.h has it.
+  /// Y, RY = (R - Y) / Y and BY = (B - Y) / Y, as in ImfRgbaYca.h.
   [[nodiscard]] glm::vec3 from_chroma(const glm::vec3& value) const {
     const float red = (value.y + 1.0F) * value.x;
     const float blue = (value.z + 1.0F) * value.x;
@@ -282,11 +282,11 @@ class ExrPicture {
   Description description_;
   EnvironmentPixels pixels_;
   std::array<SampledPlane, 3> planes_;
-  std::array<SampledPlane, 3> luminance_;         ///< at the samples of chroma
-  glm::vec3 weights_{0.2126F, 0.7152F, 0.0722F};  ///< of the file's primaries in luminance
+  std::array<SampledPlane, 3> luminance_;         ///< at the chroma samples
+  glm::vec3 weights_{0.2126F, 0.7152F, 0.0722F};  ///< luminance weights of the file's primaries
 };
 
-/// The display window of a picture that has values in its data window; the rest is black.
+/// Returns the display window of an image that has pixels in its data window; the rest is black.
 EnvironmentPixels placed(EnvironmentPixels from, const Window& data, const Window& display, const std::string& path,
                          Progress* progress) {
   if (data == display) return from;
@@ -326,7 +326,7 @@ EnvironmentPixels to_rec709(EnvironmentPixels pixels, const Description& descrip
   if (matrix) {
     convert_rows(pixels, *matrix, from, progress);
   } else if (description.channels.kind == ExrChannels::Kind::luminance_chroma) {
-    // Chroma between samples may leave the gamut.
+    // Interpolated chroma may be outside of the gamut.
     for (std::uint32_t y = 0; y < pixels.height; ++y) {
       check(progress);
       for (glm::vec3& value : row_of(pixels, y)) value = into_gamut(value);
@@ -342,7 +342,7 @@ EnvironmentPixels read_exr(std::vector<std::uint8_t> bytes, const std::string& p
     const auto file = make_left<ExrPicture>(std::move(bytes), path);
     file->open(progress);
     const Description& description = file->description();
-    // OpenEXR keeps the block of rows that it decoded last.
+    // OpenEXR caches the block of rows that it decoded last.
     constexpr std::uint32_t rows = 64;
     ProgressPart part(progress, decoded_from, decoded_to, file->height());
     for (std::uint32_t y = 0; y < file->height();) {

@@ -31,7 +31,7 @@ vec3 direction(int x, int y) {
   return {std::sin(down) * std::sin(azimuth), std::cos(down), std::sin(down) * std::cos(azimuth)};
 }
 
-/// A lobe that is looked at from above, over the sine of half the angle to its middle.
+/// A GGX lobe viewed along the normal, tabulated over the sine of half the angle to its center.
 class Lobe {
  public:
   explicit Lobe(float roughness) {
@@ -56,14 +56,14 @@ class Lobe {
   std::array<float, entries> weights_{};
 };
 
-/// The source beyond its mean, in cells of the size of a texel.
+/// The source without its mean, averaged over cells of the size of a result texel.
 struct Cells {
-  std::vector<vec3> w;                             // to the middles
-  std::array<float, height> area{};                // of each in a row
-  std::vector<std::array<vec3, 2 * width>> light;  // in rows, each twice: turned ones go on
+  std::vector<vec3> w;                             // directions of the cell centers
+  std::array<float, height> area{};                // area of a cell, per row
+  std::vector<std::array<vec3, 2 * width>> light;  // rows, each stored twice, so that rotated lobes wrap around
 };
 
-/// A row of cells: means over what each covers of the sphere.
+/// Returns a row of cells: means over the solid angle that each cell covers.
 std::array<glm::dvec3, width> row_of(const GlossSource& source, int y, const ProgressPart& part) {
   const auto turn = [](std::uint64_t at, std::uint64_t of) {
     return std::cos(std::numbers::pi * static_cast<double>(at) / static_cast<double>(of));
@@ -77,7 +77,7 @@ std::array<glm::dvec3, width> row_of(const GlossSource& source, int y, const Pro
   for (std::uint64_t v = top / height; v * height < bottom; ++v) {
     part.check();
     source.read(static_cast<std::uint32_t>(v), texels);
-    // Where a texel is in two cells, each has its part.
+    // A texel that overlaps two cells contributes to each in proportion.
     const double share =
         (turn(std::max(top, v * height), rows) - turn(std::min(bottom, (v + 1) * height), rows)) / area;
     for (std::size_t x = 0; x < width; ++x) {
@@ -120,7 +120,7 @@ bool even(const Cells& cells, const glm::dvec3& mean) {
   });
 }
 
-/// What the lobes see whose middles are a row's: turned, they are one.
+/// Filters a row: its lobes are rotations of one lobe about +Y, so they share the weights.
 std::array<vec3, width> seen(const Cells& cells, const Lobe& lobe, int y) {
   const vec3 middle = cells.w[static_cast<std::size_t>(y) * width];
   std::array<vec3, width> sums{};
@@ -148,7 +148,7 @@ GlossPtr make_gloss(const GlossSource& source, const glm::dvec3& mean, Progress*
   if (even(cells, mean)) return nullptr;
   auto gloss = std::make_shared<Gloss>();
   gloss->reserve(core::CM_GLOSS_LEVELS * texels);
-  // The smoothest sees a texel.
+  // The smoothest level is not filtered.
   for (const auto& row : cells.light) {
     for (std::size_t x = 0; x < width; ++x) gloss->emplace_back(row.at(x), 0.0F);
   }

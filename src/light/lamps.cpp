@@ -13,9 +13,9 @@ namespace cumulet::light {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double alike = 0.2;  // part of the looks that all lamps share evenly
+constexpr double alike = 0.2;  // fraction of the light samples that is distributed uniformly over the lights
 
-// By luminance.
+// Returns the luminance of the irradiance at the ball.
 double arriving(const core::CmLamp& lamp, const Lit& at) {
   const double intensity = luminance(glm::dvec3(lamp.intensity));
   if (lamp.kind == core::CM_LAMP_DISTANT) return intensity;
@@ -25,7 +25,7 @@ double arriving(const core::CmLamp& lamp, const Lit& at) {
   return intensity / (way * way);
 }
 
-// narrowest: of the band in which it dims, in cosine.
+// narrowest: minimum difference of the cosines of the inner and the outer cone angle.
 void set_cone(core::CmLamp& record, float inner, float outer, float narrowest) {
   const float edge = std::cos(outer);
   record.cone_scale = 1.0F / std::max(narrowest, std::cos(inner) - edge);
@@ -44,7 +44,7 @@ core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& 
   record.intensity = light.intensity;
   record.cone_offset = 1.0F;
   if (light.kind == Kind::spot)
-    set_cone(record, light.inner_cone, light.outer_cone, 0.001F);  // as KHR_lights_punctual has it
+    set_cone(record, light.inner_cone, light.outer_cone, 0.001F);  // as in KHR_lights_punctual
   return record;
 }
 
@@ -55,7 +55,7 @@ core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin) {
   record.direction = glm::vec3(lamp.direction);
   record.intensity = lamp.power;
   record.cone_offset = 1.0F;
-  glm::dvec2 half(0.0);  // of its extent
+  glm::dvec2 half(0.0);  // half extents
   switch (lamp.kind) {
     case Lamp::Kind::point:
     case Lamp::Kind::spot:
@@ -64,7 +64,7 @@ core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin) {
       if (lamp.kind == Lamp::Kind::spot) {
         const double outer = 0.5 * lamp.angle;
         const double sine = std::sin(0.5 * outer);
-        // A thousandth of the cone's own, or a narrow one would never be bright.
+        // A thousandth of the cone's own range: with a fixed limit, a narrow cone would never reach full brightness.
         const float narrowest = std::max(1e-7F, static_cast<float>(2e-3 * sine * sine));
         set_cone(record, static_cast<float>(outer * (1.0 - lamp.blend)), static_cast<float>(outer), narrowest);
       }
@@ -81,7 +81,7 @@ core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin) {
       record.kind = core::CM_LAMP_DISTANT;
       const double cosine = std::cos(0.5 * lamp.angle);
       half = glm::dvec2(std::tan(0.5 * lamp.angle));
-      record.intensity *= static_cast<float>(1.0 / (cosine * cosine));  // radiance times the disc's area at distance 1
+      record.intensity *= static_cast<float>(1.0 / (cosine * cosine));  // radiance times the disk's area at distance 1
       break;
     }
   }
@@ -141,7 +141,8 @@ std::optional<double> nearest_lamp(std::span<const core::CmLamp> records, const 
 }
 
 bool suits_equiangular(std::optional<double> nearest, double optical_depth) {
-  // Of one outside, light is even over a flight's way, and it is only that few flights collide.
+  // For a light outside, irradiance is nearly constant along a ray; equiangular sampling then helps only because few
+  // rays collide.
   constexpr double most_within = 3.0;
   constexpr double most_outside = 0.25;
   return nearest && optical_depth < (*nearest <= 1.0 ? most_within : most_outside);
@@ -149,7 +150,7 @@ bool suits_equiangular(std::optional<double> nearest, double optical_depth) {
 
 void add_lamps(SceneLights& lights, const Lamps& lamps) {
   for (const Lamp& lamp : lamps) {
-    double share = 1.0;  // of its power that it sends out
+    double share = 1.0;  // emitted power / `power`
     if (lamp.kind == Lamp::Kind::disc || lamp.kind == Lamp::Kind::rectangle) share = 0.25 * pi;
     if (lamp.kind == Lamp::Kind::spot) share = 0.5 * (1.0 - std::cos(0.5 * lamp.angle));
     if (lamp.kind == Lamp::Kind::sun) share = lights.cross_section;

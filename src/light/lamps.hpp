@@ -1,6 +1,6 @@
 #pragma once
 
-// Lamps, glTF's and the host's, and glsl/punctual.glsl as C++: the raster pass and the path tracer take the same
+// Lights of glTF files and of the host, and glsl/punctual.glsl as C++. The raster pass and the path tracer use the same
 // records.
 
 #include <cstdint>
@@ -19,54 +19,56 @@ namespace cumulet::core {
 
 namespace cumulet::light {
 
-/// A lamp of the host's. Colours are linear Rec. 709.
+/// A light of the host. Colors are linear Rec. 709.
 struct Lamp {
   enum class Kind : std::uint8_t { point, spot, disc, rectangle, sun };
   Kind kind = Kind::point;
-  glm::dvec3 position{0.0};              ///< world, of its middle; not of a sun
-  glm::dvec3 direction{0.0, -1.0, 0.0};  ///< world, unit: where it shines; not of a point
-  glm::dvec3 across{1.0, 0.0, 0.0};      ///< world, unit, upright to the direction: a rectangle's width is along it
-  glm::vec3 power{0.0F};                 ///< W; of a sun W/m2 on a plane that faces it
-  double width = 1.0;                    ///< of a rectangle, or a disc's diameter; world units
-  double height = 1.0;                   ///< of a rectangle
-  double angle = 0.0;       ///< radians: the whole cone of a spot; what a sun's disc covers of the sky, less than pi
-  double blend = 0.0;       ///< of a spot: the part of the half angle over which it dims, from 0 to 1
-  std::uint32_t group = 0;  ///< of lights
+  glm::dvec3 position{0.0};              ///< world, center; unused for a sun
+  glm::dvec3 direction{0.0, -1.0, 0.0};  ///< world, unit: emission direction; unused for a point light
+  glm::dvec3 across{1.0, 0.0, 0.0};  ///< world, unit, perpendicular to the direction: the axis of a rectangle's width
+  glm::vec3 power{0.0F};             ///< W; for a sun, W/m2 on a plane perpendicular to it
+  double width = 1.0;                ///< width of a rectangle, or diameter of a disk; world units
+  double height = 1.0;               ///< height of a rectangle; world units
+  double angle = 0.0;                ///< radians: full cone angle of a spot; angular diameter of a sun, < pi
+  double blend = 0.0;                ///< spot: fraction of the half angle over which it falls off, 0 to 1
+  std::uint32_t group = 0;           ///< light group
   bool operator==(const Lamp&) const = default;
 };
 using Lamps = std::vector<Lamp>;
 
-/// What glTF says in candela and lux is taken as radiant (surface::PunctualLight). origin: what positions count from.
+/// Converts a glTF light; candela and lux are used as radiometric units (surface::PunctualLight). origin: positions
+/// become relative to it.
 core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& origin);
-/// Power as Blender's lamps have it: a point sends out power / (4 pi) a steradian, a spot the same inside of its cone,
-/// a disc and a rectangle power / (4 x area) of radiance on the side where they shine.
+/// Converts a light of the host. Power is defined as in Blender: a point emits power / (4 pi) per steradian, a spot the
+/// same inside of its cone. A disk and a rectangle emit a radiance of power / (4 x area) on their front side.
 core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin);
 
-/// Of the host's, then of the scene's.
+/// Returns the records of the host's lights, followed by those of the scene.
 std::vector<core::CmLamp> lamp_records(const Lamps& of_host, std::span<const surface::PunctualLight> of_scene,
                                        const glm::dvec3& origin);
 
-/// A ball of what lamps may light.
+/// Bounding ball of an object that is lit.
 struct Lit {
   glm::dvec3 centre{0.0};
   double radius = 0.0;
   bool operator==(const Lit&) const = default;
 };
 
-/// How likely paths look for each: by the luminance of what arrives on a plane that faces it, at the middle of what is
-/// lit or, of one within, at its rim; of several the mean of their shares. A fifth of the looks goes to all alike, for
-/// places where the bright ones are in shadow. Returns what arrives of all. lit: those of no radius do not count.
+/// Sets the probability with which next-event estimation samples each light: by the luminance of its irradiance at the
+/// ball's center, or at the ball's surface if the light is inside. With several balls, probabilities are averaged. A
+/// fifth of the samples is distributed uniformly, for places where the bright lights are occluded. Returns the maximum
+/// total irradiance. lit: balls of radius 0 are ignored.
 double share_looks(std::span<core::CmLamp> records, std::span<const Lit> lit);
 
-/// How far the nearest lamp that stands somewhere is from the middle of a ball, over its radius. Nothing where there is
-/// none, or no ball.
+/// Returns the distance of the nearest non-distant light from a ball's center, divided by the radius. Returns nullopt
+/// if there is no such light or no ball.
 std::optional<double> nearest_lamp(std::span<const core::CmLamp> records, const Lit& ball);
 
-/// Whether looks for lamps from points that flights have passed (glsl/equiangular.glsl) are worth their time in a
-/// medium of this mean optical depth. Measured: docs/architecture.md.
+/// Whether equiangular sampling of lights (glsl/equiangular.glsl) is worth its time in a medium of this mean optical
+/// depth. Measured: docs/architecture.md.
 bool suits_equiangular(std::optional<double> nearest, double optical_depth);
 
-/// Counts these, too.
+/// Adds these lights to the counts.
 void add_lamps(SceneLights& lights, const Lamps& lamps);
 
 }  // namespace cumulet::light

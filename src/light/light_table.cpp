@@ -10,43 +10,44 @@ namespace cumulet::light {
 
 namespace {
 
-// Half of the sky's share of the light: paths that escape sample it as well.
+// Half of the sky's fraction of the light: escaping paths sample the sky as well.
 double sky_chance(double sun, double sky, bool near) {
   if (sun > 0.0) return 0.5 * sky / (sky + sun);
   if (!(sky > 0.0)) return 0.0;
   return near ? 0.25 : 1.0;
 }
 
-// Flights that escape find it, too; but one with a sun in it seldom.
+// Escaping paths sample it as well, but rarely hit a sun in the image.
 double environment_chance(double sun, double environment, bool near) {
   if (sun > 0.0 && environment > 0.0) return std::clamp(environment / (environment + sun), 0.2, 0.8);
   if (!(environment > 0.0)) return 0.0;
   return near ? 0.5 : 1.0;
 }
 
-// Of what is not the sky: the triangles' share of the flux, but 0.2 to 0.8 where there are others.
+// Triangles' fraction of all light samples that are not for the sky: by flux, but 0.2 to 0.8 if there are other lights.
 double triangle_share(const SceneLights& scene, double sun) {
   if (scene.triangles == 0) return 0.0;
   const double others = scene.lamp_flux + sun * scene.cross_section;
   return others > 0.0 ? std::clamp(scene.triangle_flux / (scene.triangle_flux + others), 0.2, 0.8) : 1.0;
 }
 
-// Of what the sun and lamps have: by what arrives, but 0.2 to 0.8.
+// The sun's fraction of the samples for sun and lights: by irradiance, but 0.2 to 0.8 if there are lights.
 double sun_share(const SceneLights& scene, double sun) {
   if (!(sun > 0.0)) return 0.0;
   return scene.lamps > 0 ? std::clamp(sun / (sun + scene.lamps_arrive), 0.2, 0.8) : 1.0;
 }
 
-// What the medium gives off by what there is beside it, as they are about its box: at its rim.
+// Probability of sampling emissive cells: by their irradiance at the rim of the medium's box, compared with that of all
+// other lights.
 double cell_chance(const MediumLight& medium, const SceneLights& scene, double distant) {
   if (!(medium.power > 0.0)) return 0.0;
   const double square = std::max(medium.radius * medium.radius, 1e-30);
-  // Flights come to a large fire by themselves, and what is within it looks see as little as they: a frame of
-  // Mantaflow's cost 1.7 times the steps for a tenth of the noise. To a small one they seldom come.
+  // Scattered rays reach a large fire often enough, and inside of it NEE sees as little as they do: on Mantaflow's
+  // frame it cost 1.7 times the steps for a tenth less noise. They rarely reach a small fire.
   const double seen = 1.0 - medium.length * medium.length / (0.04 * square);
   if (!(seen > 0.0)) return 0.0;
   const double others = distant + (scene.lamp_flux + scene.triangle_flux) / (4.0 * std::numbers::pi * square);
-  // A distant lamp has no flux where no surface is to catch it.
+  // A distant light has no flux if there is no surface to catch it.
   if (!(others > 0.0)) return scene.lamps + scene.triangles > 0 ? 0.5 : 1.0;
   const double cells = medium.power / square;
   return seen * std::clamp(cells / (cells + others), 0.2, 0.8);
@@ -110,10 +111,10 @@ core::CmLights LightTable::parameters() const {
   p.sun_direction = glm::vec3(distant_.to_sun);
   p.sun_irradiance = distant_.sun_irradiance;
   p.sky_radiance = distant_.sky_radiance;
-  // Of less than a thousandth of a degree it is a direction: floats cannot tell.
+  // Below a thousandth of a degree it is a direction, because of float precision.
   if (const double half = distant_.sun_angle_degrees * std::numbers::pi / 360.0;
       half > 1e-5 && chance(Kind::sun) > 0.0F) {
-    // Over the disc, radiance times the cosine to its middle is the irradiance.
+    // Irradiance is the integral of radiance times the cosine over the disk.
     p.sun_radiance = distant_.sun_irradiance / static_cast<float>(std::numbers::pi * std::pow(std::sin(half), 2.0));
     p.sun_spread = static_cast<float>(2.0 * std::pow(std::sin(0.5 * half), 2.0));
   }

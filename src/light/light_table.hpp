@@ -1,6 +1,6 @@
 #pragma once
 
-// Which lights there are, and how likely paths look for each kind: one selection over all of them. No GL.
+// The kinds of lights in a scene, and the probability with which NEE samples each kind. No GL.
 
 #include <vector>
 
@@ -14,44 +14,44 @@ namespace cumulet::light {
 /// The kinds of glsl/light.glsl.
 enum class Kind { sky, sun, triangle, lamp, glow, environment, cell };
 
-/// What there is of a medium's own light.
+/// The emission of a medium.
 struct MediumLight {
-  /// Flights that surfaces send off are aimed at its box: it falls on surfaces.
+  /// If set, a part of the rays scattered at surfaces is aimed at the medium's box.
   bool aimed = false;
-  /// Luminance a steradian of all that looks may find; 0: none.
+  /// Luminance per steradian of all cells that NEE may sample; 0: none.
   double power = 0.0;
-  double length = 0.0;  ///< world: the cube root of the volume that would give off as much, were it even
-  double radius = 0.0;  ///< world: of the box that it is in
+  double length = 0.0;  ///< world: cube root of the volume of a uniform emitter, see scene::GlowSum
+  double radius = 0.0;  ///< world: radius of the bounding box of the medium
 };
 
-/// Cosine and sine of what an environment is turned by, from +Z towards +X.
+/// Returns cosine and sine of an environment's rotation, from +Z towards +X.
 glm::vec2 turn_of(const Surroundings& surroundings);
 
-/// What an environment is beyond its mean, before it is turned; of a sky nothing.
+/// Returns the harmonics of an environment without its mean, before rotation; 0 for a sky.
 Harmonics harmonics_of(const Surroundings& surroundings);
 
-/// The sky's radiance; the mean over all directions of an environment that is there instead.
+/// Returns the radiance of the sky, or the mean radiance of the environment that replaces it.
 glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings);
 
-/// A value: made anew when a light changes.
+/// A value: recomputed when a light changes.
 class LightTable {
  public:
-  /// All the lights of a kind.
+  /// All lights of a kind.
   struct Entry {
     Kind kind = Kind::sky;
-    /// Of what is looked for at a vertex, the share that these are; their shares sum to 1, or there is no light. Of
-    /// glow: the share of flights that surfaces send off towards it.
+    /// Probability of sampling this kind at a vertex. Probabilities sum to 1 unless there is no light. For Kind::glow:
+    /// the fraction of rays scattered at surfaces that is aimed at the medium.
     float chance = 0.0F;
   };
 
-  /// Surroundings with an environment are there instead of the sky.
+  /// An environment in `surroundings` replaces the sky.
   LightTable(const DistantLights& distant, const Surroundings& surroundings, const SceneLights& scene,
              const MediumLight& medium);
 
   [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
-  /// 0 for a kind that is not there.
+  /// Returns 0 for a kind that does not occur.
   [[nodiscard]] float chance(Kind kind) const;
-  /// What kernels are told.
+  /// Returns the parameters of the kernels.
   [[nodiscard]] core::CmLights parameters() const;
 
  private:

@@ -64,7 +64,7 @@ std::optional<dmat3> xyz_matrix(const Primaries& primaries) {
   constexpr double smallest_determinant = 1e-4;
   if (!(std::abs(glm::determinant(directions)) > smallest_determinant)) return std::nullopt;
   const dvec3 lengths = glm::inverse(directions) * (xyz_of(white) / white.y);
-  // A white that is not between the primaries has no positive mixture.
+  // A white point outside of the primaries' triangle has no positive mixture.
   if (!(lengths.x > 0.0 && lengths.y > 0.0 && lengths.z > 0.0)) return std::nullopt;
   return dmat3(directions[0] * lengths.x, directions[1] * lengths.y, directions[2] * lengths.z);
 }
@@ -90,7 +90,7 @@ vec3 into_gamut(const vec3& color) {
 }
 
 std::uint64_t convert(std::span<vec3> pixels, const dmat3& matrix) {
-  // Less than this of its luminance is what half floats lose.
+  // Out-of-gamut amounts below this fraction of the luminance are within the error of half floats.
   constexpr float clearly = 0.01F;
   std::uint64_t outside = 0;
   for (vec3& pixel : pixels) {

@@ -19,27 +19,29 @@ struct Primaries {
 /// ACES2065-1 (SMPTE ST 2065-1), also called AP0.
 inline constexpr Primaries aces_primaries{{0.7347, 0.2653}, {0.0, 1.0}, {0.0001, -0.077}, {0.32168, 0.33767}};
 
-/// The name of a well-known set of primaries, else "other primaries".
+/// Returns the name of a well-known set of primaries, else "other primaries".
 std::string name_of(const Primaries& primaries);
 
-/// Whether two sets agree to three digits, which is how exactly files give them.
+/// Whether two sets agree to three digits, the precision in files.
 bool similar(const Primaries& a, const Primaries& b);
 
-/// Linear RGB of these primaries to CIE XYZ; white (1, 1, 1) has Y = 1. Nothing if the primaries span no color space.
+/// Returns the matrix from linear RGB of these primaries to CIE XYZ; white (1, 1, 1) has Y = 1. Returns nullopt if the
+/// primaries span no color space.
 std::optional<glm::dmat3> xyz_matrix(const Primaries& primaries);
 
-/// Linear RGB of these primaries to linear Rec. 709. White becomes white (Bradford). Nothing if the primaries span no
-/// color space.
+/// Returns the matrix from linear RGB of these primaries to linear Rec. 709, with Bradford adaptation of white. Returns
+/// nullopt if the primaries span no color space.
 std::optional<glm::dmat3> rec709_matrix(const Primaries& primaries);
 
-/// CIE XYZ to linear Rec. 709, without adaptation of the white point.
+/// Returns the matrix from CIE XYZ to linear Rec. 709, without adaptation of the white point.
 glm::dmat3 rec709_matrix_of_xyz();
 
-/// Moves a color with a negative component towards gray of the same luminance until no component is negative. Leaves
-/// other colors and values that are not finite as they are.
+/// Desaturates a color with a negative component at constant luminance until no component is negative. Leaves other
+/// colors and non-finite values unchanged.
 glm::vec3 into_gamut(const glm::vec3& color);
 
-/// Converts pixels by a matrix and moves them into the gamut of Rec. 709. Returns how many were clearly outside.
+/// Converts pixels by a matrix and moves them into the Rec. 709 gamut. Returns the number of pixels that were clearly
+/// outside.
 std::uint64_t convert(std::span<glm::vec3> pixels, const glm::dmat3& matrix);
 
 }  // namespace cumulet::light

@@ -22,12 +22,12 @@ using Pixel = std::array<std::uint8_t, 4>;
   throw Error(ErrorCode::file, one_line(name) + ": " + cause);
 }
 
-/// Lines of pixels, one after another. stb_image takes a file that is cut short for one whose rest is black.
+/// Decodes lines of pixels. stb_image is not used: it reads a truncated file as one whose rest is black.
 class RadianceLines {
  public:
   RadianceLines(std::span<const std::uint8_t> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
-  /// Either flat or in runs, by how the line begins.
+  /// Reads a line, flat or run-length encoded; the line's first bytes show which.
   void read(std::vector<Pixel>& line) {
     const std::size_t length = line.size();
     const bool coded = length >= 8 && length < 32768 && left() >= 4 && bytes_[at_] == 2 && bytes_[at_ + 1] == 2 &&
@@ -50,7 +50,7 @@ class RadianceLines {
     }
   }
 
-  /// Pixels without any coding.
+  /// Reads pixels without any coding.
   void read_flat(std::vector<Pixel>& line) {
     for (Pixel& pixel : line) {
       for (std::uint8_t& byte : pixel) byte = next();
@@ -65,7 +65,8 @@ class RadianceLines {
     return bytes_[at_++];
   }
 
-  /// Pixels as they are; 1, 1, 1, n among them repeats the last one n times, shifted by 8 bits more each time.
+  /// Old run-length encoding: 1, 1, 1, n repeats the previous pixel n times; directly following counts are shifted by 8
+  /// more bits each.
   void read_old(std::vector<Pixel>& line) {
     unsigned shift = 0;
     for (std::size_t x = 0; x < line.size();) {
@@ -98,7 +99,7 @@ class RadianceReader {
 
   EnvironmentPixels read() {
     check_environment_size(name_, header_.width, header_.height);
-    // A line is at least this long, whatever its coding.
+    // Minimum size of a line in any coding.
     const std::size_t least = std::min<std::size_t>(header_.line_length(), 4);
     if (data_.size() / least < header_.lines()) fail(name_, "a Radiance picture that is cut short");
     decode();
@@ -113,7 +114,7 @@ class RadianceReader {
   }
 
  private:
-  /// Bytes of the picture, if no line of it is coded.
+  /// Size of the image in bytes if no line is coded.
   [[nodiscard]] std::size_t flat_size() const { return std::size_t{4} * header_.width * header_.height; }
 
   void decode() {
@@ -123,11 +124,11 @@ class RadianceReader {
     } catch (const Error& error) {
       if (error.code() != ErrorCode::file || !may_be_flat) throw;
     }
-    // Colors of a flat picture may look like the beginning of a coded line.
+    // The colors of a flat image may look like the beginning of a coded line.
     lines(true);
   }
 
-  /// Returns the bytes that are left.
+  /// Decodes all lines. Returns the number of bytes left.
   std::size_t lines(bool flat) {
     values_.clear();
     values_.reserve(std::size_t{header_.width} * header_.height);
@@ -149,7 +150,7 @@ class RadianceReader {
     return from.left();
   }
 
-  /// Brings lines into the order of "-Y HEIGHT +X WIDTH".
+  /// Reorders lines to "-Y HEIGHT +X WIDTH".
   void turn() {
     if (!header_.in_columns && !header_.upwards && !header_.leftwards) return;
     std::vector<glm::vec3> turned;

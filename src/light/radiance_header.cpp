@@ -14,7 +14,7 @@ namespace cumulet::light {
 
 namespace {
 
-/// What follows it in the first line differs from program to program.
+/// The rest of the first line differs between programs.
 constexpr std::string_view identifier = "#?";
 constexpr std::string_view blanks = " \t\r\v\f";
 
@@ -32,7 +32,7 @@ std::string_view take_word(std::string_view& text) {
   return word;
 }
 
-/// All of a text as a number that may have a sign; nothing if it is none.
+/// Parses a whole text as a number with an optional sign; nullopt on failure.
 template <class Number>
 std::optional<Number> number_of(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
@@ -43,7 +43,7 @@ std::optional<Number> number_of(std::string_view text) {
   return value;
 }
 
-/// As many numbers as there are words; nothing if there are not so many, or others.
+/// Parses exactly `count` finite numbers; nullopt on failure.
 template <std::size_t count>
 std::optional<std::array<double, count>> numbers_of(std::string_view text) {
   std::array<double, count> values{};
@@ -137,7 +137,7 @@ class HeaderReader {
     header_.remarks.emplace_back("its PRIMARIES are no color space's, and Rec. 709 is assumed");
   }
 
-  /// "-Y HEIGHT +X WIDTH", or any other signs and order.
+  /// Parses "-Y HEIGHT +X WIDTH", with any signs and order.
   void resolution(std::string_view text) {
     const std::string_view whole = trimmed(text);
     const auto refuse = [&] { fail("a resolution of " + quoted(whole) + ", not '-Y HEIGHT +X WIDTH' or the like"); };

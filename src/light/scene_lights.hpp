@@ -7,17 +7,17 @@
 
 namespace cumulet::light {
 
-/// What there is of a scene's own lights at a moment. Flux: the luminance of all that they send out.
+/// Statistics of the lights of a scene at one moment. Flux is the luminance of the total emitted power.
 struct SceneLights {
-  std::uint32_t lamps = 0;      ///< glTF's and the host's
-  std::uint32_t triangles = 0;  ///< emissive; of several models, of the one that has most
+  std::uint32_t lamps = 0;      ///< number of lights, of glTF files and of the host
+  std::uint32_t triangles = 0;  ///< emissive triangles; the maximum over all records of the model table
   double lamp_flux = 0.0;
-  double lamps_arrive = 0.0;  ///< luminance of what arrives of them where they light (light::share_looks)
+  double lamps_arrive = 0.0;  ///< luminance of the lights' irradiance at lit objects (light::share_looks)
   double triangle_flux = 0.0;
-  double cross_section = 0.0;  ///< of the scene's bounding sphere: what it takes of a distant light
+  double cross_section = 0.0;  ///< cross-section of the scene's bounding sphere, which catches distant light
 };
 
-/// Those lamps, in a scene whose bounding sphere has that radius.
+/// Returns the statistics of these lights, for a scene with a bounding sphere of that radius.
 SceneLights scene_lights(std::span<const surface::PunctualLight> lamps, double radius);
 
 }  // namespace cumulet::light

@@ -28,14 +28,14 @@ constexpr double ozone_height = 25.0;
 constexpr double ozone_half_width = 15.0;
 
 constexpr double sun_angular_radius = 0.00465;  // radians
-constexpr double sun_outside = 5.0;             // its irradiance outside of the atmosphere, all colours alike
-constexpr double aerosol_albedo = 0.9;          // of what aerosols take out of a ray, the part that they scatter
+constexpr double sun_outside = 5.0;     // sun's irradiance outside of the atmosphere, equal in all color components
+constexpr double aerosol_albedo = 0.9;  // single-scattering albedo of aerosols
 constexpr double aerosol_anisotropy = 0.8;
-constexpr double ozone_column = 300.0 * 2.687e20;  // 300 Dobson units, molecules per square metre
+constexpr double ozone_column = 300.0 * 2.687e20;  // 300 Dobson units, molecules per square meter
 
-// 370 to 380, ..., 780 to 790 nm: the sun's irradiance outside of the atmosphere, W / (m^2 nm) (ASTM G-173), and
-// ozone's cross-section at 233 K, m^2 (Serdyuchenko et al. 2014), each the mean over the bin, as collected by Bruneton
-// (2017).
+// Bins of 370 to 380, ..., 780 to 790 nm. solar_irradiance: the sun's irradiance outside of the atmosphere, W / (m^2
+// nm) (ASTM G-173). ozone_cross_section: at 233 K, m^2 (Serdyuchenko et al. 2014). Each is the mean over the bin, as
+// collected by Bruneton (2017).
 constexpr std::array<double, 42> solar_irradiance = {
     1.14259, 1.01249, 1.14716, 1.72765, 1.73054, 1.6887,  1.61253, 1.91198, 2.03474, 2.02042, 2.02212,
     1.93377, 1.95809, 1.91686, 1.8298,  1.8685,  1.8931,  1.85149, 1.8504,  1.8341,  1.8345,  1.8147,
@@ -58,7 +58,7 @@ double at_band(const std::array<double, 42>& bins, std::size_t band) {
   return 0.5 * (bins[sample_of(band)] + bins[sample_of(band) + 1]);
 }
 
-// What a band adds to a colour: a Spectrum that falls to nothing at the bands beside it.
+// Contribution of a band to a color: a triangular spectrum that falls to 0 at the adjacent bands.
 std::array<vec3, band_count> band_colours() {
   std::array<vec3, band_count> colours{};
   dvec3 all(0.0);
@@ -77,14 +77,14 @@ std::array<vec3, band_count> band_colours() {
   return colours;
 }
 
-// Of air, aerosols and ozone how much there is per km, in units of what lies above the ground in all.
+// Densities of air, aerosols and ozone per km, as fractions of the whole column above the ground.
 dvec3 density(double height) {
   return {std::exp(-height / air_scale_height) / air_scale_height,
           std::exp(-height / aerosol_scale_height) / aerosol_scale_height,
           std::max(0.0, 1.0 - std::abs(height - ozone_height) / ozone_half_width) / ozone_half_width};
 }
 
-// Distances along a ray that starts at radius r, at the cosine mu from straight up.
+// Distances along a ray from radius r; mu is the cosine to the zenith.
 double to_top(double r, double mu) {
   return std::max(0.0, -r * mu + std::sqrt(std::max(0.0, r * r * (mu * mu - 1.0) + top * top)));
 }
@@ -94,7 +94,7 @@ double to_ground(double r, double mu) {
   return std::max(0.0, -r * mu - std::sqrt(std::max(0.0, r * r * (mu * mu - 1.0) + ground * ground)));
 }
 
-// A piecewise linear table's place: between i and i + 1.
+// Position in a piecewise linear table: between i and i + 1.
 struct Between {
   std::size_t i = 0;
   float part = 0.0F;
@@ -106,14 +106,14 @@ Between between(double share, std::size_t count) {
 }
 double share_of(std::size_t i, std::size_t count) { return static_cast<double>(i) / static_cast<double>(count - 1); }
 
-// How much of air, aerosols and ozone lies on rays that leave the atmosphere. By Bruneton and Neyret's mapping,
+// Column densities of air, aerosols and ozone along rays that leave the atmosphere. Uses Bruneton and Neyret's mapping,
 // "Precomputed Atmospheric Scattering" (2008), which is smooth at the horizon.
 class Paths {
  public:
   Paths() : table_(radii * cosines) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radii), [&](const auto& range) {
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
-        const double tangent = farthest() * share_of(i, radii);  // to where the ray along the ground touches it
+        const double tangent = farthest() * share_of(i, radii);  // distance to the ray's tangent point on the ground
         const double r = std::sqrt(tangent * tangent + ground * ground);
         for (std::size_t j = 0; j < cosines; ++j) {
           const double d = (top - r) + (tangent + farthest() - (top - r)) * share_of(j, cosines);
@@ -124,7 +124,7 @@ class Paths {
     });
   }
 
-  // Of a ray that does not meet the ground.
+  // For a ray that does not hit the ground.
   [[nodiscard]] vec3 operator()(double r, double mu) const {
     const double tangent = std::sqrt(std::max(0.0, r * r - ground * ground));
     const double nearest = top - r;
@@ -146,7 +146,7 @@ class Paths {
     const double length = to_top(r, mu);
     dvec3 result(0.0);
     for (int i = 0; i < steps; ++i) {
-      // Closer together at the start, where the air is densest.
+      // Steps are smaller at the start, where the air is densest.
       const double x = (i + 0.5) / steps;
       const double t = length * x * x;
       const double height = std::sqrt(r * r + t * t + 2.0 * r * mu * t) - ground;
@@ -160,7 +160,7 @@ class Paths {
 
 }  // namespace
 
-// Light is as if the sun's were white and of irradiance 1.
+// Light in units of a white sun with irradiance 1.
 class Atmosphere {
  public:
   explicit Atmosphere(const SkyModel& model) : ground_albedo_(model.ground_albedo) {
@@ -179,12 +179,12 @@ class Atmosphere {
 
   [[nodiscard]] double ground_albedo() const { return ground_albedo_; }
 
-  // Of the sun's light at radius r, where it stands at the cosine mu from straight up.
+  // Returns the sunlight at radius r; mu is the cosine of the sun's zenith angle.
   [[nodiscard]] Bands sunlight(double r, double mu) const {
     const double above = (mu - horizon(r)) / sun_angular_radius;
     Bands result{};
     if (above <= -1.0) return result;
-    // The part of the disc that the ground does not hide.
+    // The fraction of the sun's disk that the ground does not occlude.
     const double edge = std::min(above, 1.0);
     const auto part = static_cast<float>(0.5 + (edge * std::sqrt(1.0 - edge * edge) + std::asin(edge)) / pi);
     const vec3 path = paths_(r, std::max(mu, horizon(r)));
@@ -194,8 +194,9 @@ class Atmosphere {
     return result;
   }
 
-  // Along a ray from radius r: calls visit(radius, cosine of the sun, per band: what aerosols and air scatter and what
-  // reaches the start) a step. Returns what comes through from its end.
+  // Marches along a ray from radius r. Calls visit(radius, cosine of the sun, air, aerosols) per step. The last two
+  // are, per band, the fraction of light that they scatter and that reaches the start. Returns the transmittance of the
+  // whole ray.
   template <class Visit>
   Bands march(double r, double mu, double azimuth, double sun_mu, int steps, const Visit& visit) const {
     const dvec3 start(0.0, r, 0.0);
@@ -206,7 +207,7 @@ class Atmosphere {
     Bands through{};
     through.fill(1.0F);
     for (int i = 0; i < steps; ++i) {
-      // Closer together at the start, as in Paths.
+      // Steps are smaller at the start, as in Paths.
       const double x0 = static_cast<double>(i) / steps;
       const double x1 = static_cast<double>(i + 1) / steps;
       const double x = 0.5 * (x0 + x1);
@@ -220,7 +221,7 @@ class Atmosphere {
         const float by_aerosols = amount.y * aerosols_[b];
         const float depth = by_air + by_aerosols + amount.z * ozone_[b];
         const float passes = std::exp(-depth);
-        // The mean over the step of what comes through from there.
+        // The mean transmittance over the step.
         const float mean = depth > 1.0e-4F ? (1.0F - passes) / depth : 1.0F - 0.5F * depth;
         air[b] = through[b] * mean * by_air;
         aerosols[b] = through[b] * mean * by_aerosols * static_cast<float>(aerosol_albedo);
@@ -231,7 +232,7 @@ class Atmosphere {
     return through;
   }
 
-  // Of light scattered more than once what a unit of scattering adds, from everywhere alike.
+  // Returns the radiance that multiple scattering adds per unit of scattering, from all directions equally.
   [[nodiscard]] Bands more(double r, double sun_mu) const {
     const Between i = between(std::sqrt(std::max(0.0, r - ground) / (top - ground)), more_radii);
     const Between j = between(0.5 + 0.5 * std::copysign(std::sqrt(std::abs(sun_mu)), sun_mu), more_cosines);
@@ -260,7 +261,8 @@ class Atmosphere {
     });
   }
 
-  // Hillaire's: the second scattering with even phase functions, and all that follow as a geometric series of it.
+  // Hillaire's method: second-order scattering with isotropic phase functions, and all higher orders as a geometric
+  // series.
   [[nodiscard]] Bands scattered_more(double r, double sun_mu) const {
     constexpr int cosines = 16;
     constexpr int azimuths = 2;
@@ -286,7 +288,7 @@ class Atmosphere {
       const double across = std::sqrt(std::max(0.0, 1.0 - mu * mu));
       const double sun_across = std::sqrt(std::max(0.0, 1.0 - sun_mu * sun_mu));
       const double sun =
-          ((r + length * mu) * sun_mu + length * across * std::cos(azimuth) * sun_across) / ground;  // where it ends
+          ((r + length * mu) * sun_mu + length * across * std::cos(azimuth) * sun_across) / ground;  // at the ray's end
       if (!(sun > 0.0)) continue;
       const Bands light = sunlight(ground, sun);
       const float back = each * static_cast<float>(ground_albedo_) * static_cast<float>(sun / pi);
@@ -298,7 +300,7 @@ class Atmosphere {
 
   double ground_albedo_;
   Paths paths_;
-  // Optical depths of all that is straight above the ground.
+  // Optical depths of the vertical column above the ground.
   Bands air_{};
   Bands aerosols_{};
   Bands ozone_{};
@@ -357,7 +359,7 @@ Sky::Sky(const Atmosphere& atmosphere, const dvec3& to_sun) : to_sun_(to_sun), t
 
   sun_irradiance_ = glm::max(colour_of(colours, atmosphere.sunlight(ground, to_sun.y)), vec3(0.0F));
 
-  // Evenly over the disc below the hemisphere, by which its light falls on the ground.
+  // Samples uniform over the unit disk below the hemisphere are cosine-weighted.
   constexpr int rings = 64;
   constexpr int sectors = 128;
   dvec3 sum(0.0);
@@ -388,7 +390,7 @@ Sky::Scattered Sky::scattered(double elevation, double azimuth) const {
 
 vec3 Sky::radiance(const dvec3& direction) const {
   if (direction.y < 0.0) return ground_radiance_;
-  // From the sun's azimuth, to either side alike.
+  // Azimuth relative to the sun's; both sides are equal.
   const double sine = direction.x * to_sun_.z - direction.z * to_sun_.x;
   const double cosine = direction.x * to_sun_.x + direction.z * to_sun_.z;
   const Scattered s = scattered(std::asin(std::min(direction.y, 1.0)), std::abs(std::atan2(sine, cosine)));
@@ -405,7 +407,7 @@ Daylight make_daylight(const Day& day, const Daylight* last) {
   const Sky sky(*atmosphere, {0.0, std::sin(up), std::cos(up)});
   EnvironmentPixels pixels{.width = 512, .height = 256, .values = {}};
   pixels.values.resize(std::size_t{pixels.width} * pixels.height);
-  // One row more: what is just above the horizon is between it and the one before.
+  // One row more: directions just above the horizon are interpolated between it and the row above.
   const std::uint32_t rows = day.above_alone ? pixels.height / 2 + 1 : pixels.height;
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows), [&](const auto& range) {
     for (std::uint32_t y = range.begin(); y != range.end(); ++y) {

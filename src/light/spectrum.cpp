@@ -4,7 +4,7 @@ namespace cumulet::light {
 
 namespace {
 
-// The colour matching functions of the CIE's 1931 2-degree standard observer (CIE 15).
+// Color matching functions of the CIE 1931 2-degree standard observer (CIE 15).
 constexpr std::array<std::array<double, 3>, 41> observer = {{
     {0.0014, 0.0000, 0.0065}, {0.0042, 0.0001, 0.0201}, {0.0143, 0.0004, 0.0679}, {0.0435, 0.0012, 0.2074},
     {0.1344, 0.0040, 0.6456}, {0.2839, 0.0116, 1.3856}, {0.3483, 0.0230, 1.7471}, {0.3362, 0.0380, 1.7721},

@@ -52,7 +52,7 @@ double Allotment::even_out(double squared) {
         deviations += count * half.deviation;
       }
     });
-    // It only grows, and with it what counts as it is.
+    // The ratio only grows, and with it the number of half-blocks that keep their current error.
     if (deviations <= 0.0 || left / deviations <= least) break;
     least = left / deviations;
   }
@@ -69,7 +69,7 @@ void Allotment::decide(std::span<const SquareError> errors, double noise_target,
     all += error.pixels;
   }
   const double mean = brightness / std::max(1.0, all);
-  const double squared = noise_target * mean * noise_target * mean;  // a pixel
+  const double squared = noise_target * mean * noise_target * mean;  // per pixel
   halves_.resize(live_.size());
   for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
     if (is_live(square, number)) half.samples = samples;
@@ -79,7 +79,7 @@ void Allotment::decide(std::span<const SquareError> errors, double noise_target,
   };
   for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
     const bool alone = pixels(square, 1 - number) == 0;
-    // Of a last row that is alone the square above; of a picture that is no more than that itself.
+    // If the block has no second half, the block above is used; if there is none above either, the half-block itself.
     const glm::uvec2 teller = alone && square.y > 0 ? square - glm::uvec2(0U, 1U) : square;
     const unsigned other = alone ? number : 1 - number;
     half.deviation = std::sqrt(own(teller, other) * halves_[index(teller)].at(other).samples);
@@ -89,7 +89,7 @@ void Allotment::decide(std::span<const SquareError> errors, double noise_target,
   for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
     half.wanted = ratio > 0.0 ? half.deviation / ratio : 0.0;
     const bool rests = !is_live(square, number);
-    // What is so rare that neither half has found it is looked for now and then.
+    // Rare light that neither half has sampled is looked for again from time to time.
     const bool forgotten = rests && samples >= looked_after * half.samples;
     const bool goes_on = half.wanted > (rests ? woken : 1.0) * half.samples || forgotten;
     set_live(square, number, goes_on);
@@ -97,7 +97,7 @@ void Allotment::decide(std::span<const SquareError> errors, double noise_target,
   });
   decided_ = true;
   if (any) return;
-  // The halves' own samples show more noise than the others' told.
+  // The half-blocks' own samples show more noise than the other halves' samples do.
   for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
     if (own(square, number) <= squared) return;
     half.wanted = own(square, number) / squared * half.samples;

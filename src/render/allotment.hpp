@@ -13,42 +13,48 @@
 
 namespace cumulet::render {
 
-/// Which pixels of a picture are sampled on, so that its noise comes down to a target with few samples.
+/// Adaptive sampler: decides which pixels of a picture are sampled further, so that the noise reaches a target with few
+/// samples.
 ///
-/// A half is the even or the odd rows of a square of 8 x 8 pixels. Of halves of w pixels with a sample's deviation s,
-/// those n ~ s have a squared error sum(w s^2 / n) of V with the least sum(w n) (Neyman, "On the Two Different Aspects
-/// of the Representative Method", 1934), less what those that have more already leave to the others. A half that has
-/// its n rests; it is woken where that has come to more than twice as many since, and where others have 16 times as
-/// many: rare light that neither half has found is not lost for good. The deviation that decides is that of the
-/// square's other half (of a last row that is alone, the square above), whose samples are independent of its own: how
-/// many a pixel has says next to nothing of what they are. Only where no half goes on by that, though there is noise
-/// left, do their own errors decide.
+/// A half-block is the even or the odd rows of a block of 8 x 8 pixels. For half-blocks of w pixels with a standard
+/// deviation s per sample, sum(w s^2 / n) is the squared error. The allocation n ~ s reaches a squared error V with the
+/// minimum total sum(w n). Reference: Neyman, "On the Two Different Aspects of the Representative Method", 1934.
+/// Half-blocks that already have more samples leave less for the others to do.
+/// A half-block stops when it has its n samples. It starts again when n has grown to more than twice its samples. It
+/// also starts again when other pixels have 16 times its samples, so that rare light that neither half has sampled is
+/// not missed for good.
+/// The deviation that decides is that of the other half of the block, because its samples are independent of the
+/// half-block's own. The sample count of a pixel must hardly depend on its sample values, which would bias the result.
+/// A block without a second half uses the block above. If no half-block continues by this rule although noise is left,
+/// the half-blocks' own errors decide.
 class Allotment {
  public:
   static constexpr unsigned edge = CM_SQUARE_EDGE;
 
-  /// Of a picture of that size, all of which is sampled.
+  /// Starts a picture of this size; all its pixels are sampled.
   void begin(glm::uvec2 size);
-  /// Decides anew, where pixels that are sampled have so many samples. errors: of all squares, row by row.
+  /// Decides which half-blocks continue. errors: of all blocks, row by row. samples: samples per pixel of the
+  /// half-blocks that are sampled now.
   void decide(std::span<const SquareError> errors, double noise_target, std::uint32_t samples);
-  /// Samples of all pixels that it will likely take, with that many of each at most.
+  /// Returns the expected total number of samples of all pixels; most: maximum samples per pixel.
   [[nodiscard]] double expected(double most) const;
 
-  /// That there are, in rows.
+  /// Number of blocks in x and y.
   [[nodiscard]] glm::uvec2 squares() const { return squares_; }
-  /// Of a square: bit 0 its even rows, bit 1 its odd, where they are sampled.
+  /// Bit 0: the block's even rows are sampled; bit 1: its odd rows.
   [[nodiscard]] std::uint32_t live(glm::uvec2 square) const { return live_[index(square)]; }
   [[nodiscard]] bool is_live(glm::uvec2 pixel) const { return is_live(pixel / edge, pixel.y & 1U); }
-  /// How many pixels of a square are sampled.
+  /// Returns how many pixels of the block are sampled.
   [[nodiscard]] std::uint32_t live_pixels(glm::uvec2 square) const;
 
-  /// A byte a square: with pixels' samples all that it goes on from.
+  /// State for a checkpoint, one byte per block. Together with the pixels' sample counts it is all that restore()
+  /// needs.
   [[nodiscard]] std::span<const std::uint8_t> saved() const { return live_; }
   void restore(std::span<const std::uint8_t> saved, const std::function<std::uint32_t(glm::uvec2 pixel)>& samples_of);
 
  private:
   struct Half {
-    std::uint32_t samples = 0;  // a pixel, as of the last decision
+    std::uint32_t samples = 0;  // per pixel, at the last decision
     double wanted = 0.0;
     double deviation = 0.0;
   };
@@ -56,16 +62,17 @@ class Allotment {
   [[nodiscard]] bool is_live(glm::uvec2 square, unsigned half) const { return (live(square) >> half & 1U) != 0; }
   void set_live(glm::uvec2 square, unsigned half, bool live);
   [[nodiscard]] std::uint32_t pixels(glm::uvec2 square, unsigned half) const;
-  // Calls visit with each half that has pixels, its square, its number there and its pixels.
+  // Calls visit with each half-block that has pixels, its block, its number in the block and its pixel count.
   template <class Visit>
   void for_each_half(Visit&& visit);
-  // What is to be had of s / n in every half: that of V, where those that have it count as they are.
+  // Returns the common ratio deviation / samples at which the total squared error equals `squared`. Half-blocks already
+  // below the ratio keep their current error.
   double even_out(double squared);
 
   glm::uvec2 size_{0U};
   glm::uvec2 squares_{0U};
   std::vector<std::uint8_t> live_;
-  std::vector<std::array<Half, 2>> halves_;  // empty until something is decided
+  std::vector<std::array<Half, 2>> halves_;  // empty until the first decision
   bool decided_ = false;
 };
 

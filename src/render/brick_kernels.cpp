@@ -38,8 +38,8 @@ gl::Object make_brick_tree(const gl::FunctionsPtr& gl, const std::array<float, C
 }
 
 std::uint32_t bricks_a_step(const gl::Functions& gl) {
-  // Where a processor computes them, what a call takes is known when it returns: little enough that a frame can stop
-  // between two.
+  // If a driver runs dispatches within the call, the call takes as long as the kernel. The count is small enough that a
+  // frame can stop between two dispatches.
   return gl.dispatches_in_call ? 64 : 4096;
 }
 

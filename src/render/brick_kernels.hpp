@@ -1,6 +1,6 @@
 #pragma once
 
-// What shaders do to bricks that are in GL.
+// Dispatches of the compute kernels that process bricks in GL buffers.
 
 #include <array>
 #include <cstdint>
@@ -16,57 +16,60 @@
 
 namespace cumulet::render {
 
-/// As glsl/pack_bricks.comp: floats, halves, and whole numbers that stand for 0 to 1.
+/// Voxel formats, numbered as in glsl/pack_bricks.comp: float, half float, and 16-bit and 8-bit unsigned normalized.
 enum class VoxelFormat { floats = 0, halves = 1, shorts = 2, bytes = 3 };
 
-/// So many groups, of kernels that count them along x, then along y.
+/// Dispatches this many work groups, for kernels that number their groups along x, then y.
 void dispatch_groups(const gl::Functions& gl, std::uint32_t groups);
 
-/// What kernels know of a brick's cells, for CM_UNIFORM_BRICK_TREE. Throws what GL's allocations throw.
+/// Makes the uniform buffer CM_UNIFORM_BRICK_TREE: geometry of the cells within a brick. Throws the errors of GL
+/// allocations.
 [[nodiscard]] gl::Object make_brick_tree(const gl::FunctionsPtr& gl,
                                          const std::array<float, CM_BRICK_EDGES>& edges_squared);
 
-/// How many bricks a dispatch has of kernels that look at every cell of theirs.
+/// Returns the number of bricks per dispatch for kernels that visit every cell of a brick.
 [[nodiscard]] std::uint32_t bricks_a_step(const gl::Functions& gl);
 
-/// Of a brick that is copied: which of its memory, and where to.
+/// A copied brick: its index in the source memory and its index in the destination.
 using MovedBrick = glm::uvec2;
-/// The same by the memories that they are in; moved: which of the field, and where to.
+/// Splits copies by source memory. moved: index of the brick in the field, and index in the destination. Returns, per
+/// memory of the field, the indices in that memory.
 [[nodiscard]] std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks,
                                                             std::span<const MovedBrick> moved);
-/// Copies of bricks that a buffer of MovedBrick names.
+/// Copies of the bricks that a buffer of MovedBrick lists.
 struct BrickCopies {
   const gl::Object* from = nullptr;
   bool from_halves = false;
   const gl::Object* to = nullptr;
   bool to_halves = false;
-  std::uint32_t to_first = 0;  ///< brick of `to` that places count from
+  std::uint32_t to_first = 0;  ///< brick of `to` that destination indices start at
   const gl::Object* moved = nullptr;
-  glm::uvec2 numbers{1, 0};  ///< how many floats a voxel has in `to`, and which it is; of halves one
+  glm::uvec2 numbers{1, 0};  ///< floats per voxel in `to`, and the component to write; 1 and 0 for half floats
 
   [[nodiscard]] gl::ProgramKey program() const;
-  /// Of these that are moved; with that program, which is usable.
+  /// Copies the entries [first, end) of `moved`. program: program(), usable.
   void dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first, std::uint32_t end) const;
 };
 
-/// Of bricks, as glsl/pack_bricks.comp leaves them, the values that are kept, and what main memory is to know of them.
+/// Converts bricks as glsl/pack_bricks.comp leaves them into the values that are kept, and summarizes them for main
+/// memory.
 struct BrickSummaries {
   VoxelFormat format = VoxelFormat::floats;
   enum class Field {
-    as_is,         ///< may be negative; the most, either way, the box and how many voxels are not 0
-    not_negative,  ///< the same
-    cells          ///< the same, and what is known of its cells
+    as_is,  ///< values may be negative; the summary has the maximum magnitude, the box and the number of nonzero voxels
+    not_negative,  ///< the same summary; negative values become 0
+    cells          ///< a complete summary, with the sums of the cells in the brick; negative values become 0
   };
   Field field = Field::cells;
   const gl::Object* places = nullptr;
-  glm::uvec3 bricks{0};  ///< that places count, along each axis
+  glm::uvec3 bricks{0};  ///< size of the lattice that `places` index, in bricks per axis
   const gl::Object* values = nullptr;
-  const gl::Object* kept = nullptr;  ///< may be the values themselves, where these are floats
+  const gl::Object* kept = nullptr;  ///< may be `values` itself if these are floats
   const gl::Object* summaries = nullptr;
-  const gl::Object* tree = nullptr;  ///< make_brick_tree(), of cells
+  const gl::Object* tree = nullptr;  ///< make_brick_tree(); for Field::cells
 
   [[nodiscard]] gl::ProgramKey program() const;
-  /// With that program, which is usable.
+  /// Processes the bricks [first, end). program: program(), usable.
   void dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first, std::uint32_t end) const;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Bricks that steps of an upload copy from the memories that they are in.
+// Upload steps that copy bricks between buffers in GL.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,23 +16,26 @@
 
 namespace cumulet::render {
 
-/// Plans copies. It has to live until the last step is made.
+/// Plans copies of bricks as upload steps. The object must outlive the last step.
 class BrickMoves {
  public:
   BrickMoves(gl::FunctionsPtr gl, gl::ProgramsPtr programs, DeviceMemoriesPtr memories)
       : gl_(std::move(gl)), programs_(std::move(programs)), memories_(std::move(memories)) {}
   BrickMoves(const BrickMoves&) = delete;
   BrickMoves& operator=(const BrickMoves&) = delete;
-  /// Of a field's bricks these, to where copies says. Throws Error(unsupported) where the memories have them not.
+  /// Plans copies of the field's bricks `moved` to the destination that copies gives. Throws Error(unsupported) if a
+  /// memory of the field is not in this share group.
   void plan(Upload& upload, const volume::DeviceBricks& bricks, std::span<const MovedBrick> moved, BrickCopies copies);
-  /// Those of fields side by side, some at a time. use: called for each part of these places, of which the first is
-  /// told and how many they are, to plan what is done with them. Throws as plan() does.
+  /// Plans copies of several fields' bricks into one interleaved buffer, a batch of origins at a time. use is called
+  /// once per batch, with the batch's first index in origins and its size, and plans the steps that read the batch.
+  /// Throws as plan() does.
   using Use = std::function<void(std::size_t first, std::uint32_t count)>;
   void plan_together(Upload& upload, std::span<const volume::DeviceBricksPtr> fields,
                      std::span<const glm::ivec3> origins, const Use& use);
-  /// While those are used: of voxel v of brick b field f has number (512 b + v) * fields + f; 0 where it has no brick.
+  /// The interleaved buffer; valid in the steps that `use` plans. Voxel v of brick b and field f has index (512 b + v)
+  /// * fields + f. Missing bricks are 0.
   [[nodiscard]] const gl::Object& together() const { return together_; }
-  /// Once all steps that were planned are made.
+  /// Frees the lists of copies. Call it after the last planned step.
   void drop() { lists_.clear(); }
 
  private:

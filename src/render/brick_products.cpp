@@ -67,7 +67,7 @@ void BrickProducts::find_origins(const std::optional<std::vector<glm::ivec3>>& c
     std::ranges::sort(origins, volume::lexicographic);
     origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
   };
-  // Light is where any of its fields is, all else where density is.
+  // Emission is computed where any of its fields has a brick, the other products where density has one.
   std::vector<volume::DeviceBricksPtr> where = fields_;
   if (!std::holds_alternative<scene::Emission>(product_)) where.resize(1);
   std::erase(where, nullptr);
@@ -93,7 +93,7 @@ void BrickProducts::prepare(const light::BlackBody& body, const glm::dmat4& inde
   }
   upload_.add([this, &body, index_to_world] {
     if (const auto* light = std::get_if<scene::Emission>(&product_)) {
-      // Of whole vectors, as blocks of shaders are.
+      // Padded to a multiple of 16 bytes, as uniform blocks are.
       struct alignas(16) Block {
         core::CmBrickGlow glow;
       };
@@ -180,7 +180,7 @@ scene::ProductInGl BrickProducts::take(const scene::ProductInGl* before) {
     for (std::size_t c = 0; c < components(); ++c)
       std::memcpy(part.kept[c]->summaries.data(), part.back[c].data(), part.count * sizeof(volume::BrickSummary));
     for (std::uint32_t i = 0; i < part.count; ++i) {
-      // Those that are 0 in all of them are in none.
+      // Bricks that are 0 in all components are left out.
       const auto is_zero = [&](const auto& kept) { return kept->summaries[i].voxels == 0; };
       if (std::ranges::all_of(part.kept, is_zero)) continue;
       for (volume::DeviceBricks& component : made) {

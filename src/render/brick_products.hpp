@@ -15,25 +15,26 @@
 
 namespace cumulet::render {
 
-/// Makes of a state's bricks what volumes have beside them, where they are: in GL, piece by piece. All calls need the
-/// context current and a StateGuard around.
+/// Computes a product of a GPU-resident state's bricks (emission, scattering, anisotropy, momentum) in GL, in steps.
+/// All calls need a current context and an active StateGuard.
 class BrickProducts {
  public:
-  /// body: outlives it. changed: bricks that are other than in the state before, however they were changed; none: there
-  /// was none. The memories have the state's. Allocates nothing yet.
+  /// Allocates nothing yet. body: must outlive this object. changed: origins of the bricks that differ from the
+  /// previous state, including emptied ones; nullopt: there is no previous state. memories: holds the state's bricks.
   BrickProducts(gl::FunctionsPtr gl, gl::ProgramsPtr programs, DeviceMemoriesPtr memories, const light::BlackBody& body,
                 const scene::StateInGl& state, scene::Product product,
                 const std::optional<std::vector<glm::ivec3>>& changed);
   BrickProducts(const BrickProducts&) = delete;
   BrickProducts& operator=(const BrickProducts&) = delete;
-  /// As Upload has it. Never waits.
+  /// Works until the deadline, as Upload::advance(). Never waits for the device. Returns whether all is done.
   bool advance(Deadline deadline);
   [[nodiscard]] const scene::Product& product() const { return product_; }
-  /// Once that returned true. before: that of the state before; null where there was none.
+  /// Returns the product; call it once after advance() returned true. before: the product of the previous state; null:
+  /// there is none.
   [[nodiscard]] scene::ProductInGl take(const scene::ProductInGl* before);
 
  private:
-  // As many bricks as a storage block has room for; by component.
+  // A batch of bricks that fits a storage block; the vectors have one entry per component.
   struct Part {
     std::size_t first = 0;
     std::size_t count = 0;
@@ -54,18 +55,18 @@ class BrickProducts {
   gl::ProgramsPtr programs_;
   DeviceMemoriesPtr memories_;
   scene::Product product_;
-  std::vector<volume::DeviceBricksPtr> fields_;  // null: none, or none that counts
+  std::vector<volume::DeviceBricksPtr> fields_;  // null: the state has no such field, or the product does not need it
   volume::ValuesWantedPtr values_wanted_;
-  std::vector<glm::ivec3> origins_;  // of what it is made of
-  std::vector<glm::ivec3> changed_;  // and where it is nothing any more
+  std::vector<glm::ivec3> origins_;  // bricks that the product has values for
+  std::vector<glm::ivec3> changed_;  // all changed bricks, including those that became empty
   glm::ivec3 bricks_{0};
-  glm::mat3 to_relative_{1.0F};  // of velocities
+  glm::mat3 to_relative_{1.0F};  // transforms velocities
   float most_ = 0.0F;
   gl::Object glow_, tree_;
   BrickMoves moves_;
   std::deque<Part> parts_;
   gl::Fence fence_;
-  Upload upload_;  // its steps use the above
+  Upload upload_;  // its steps use the members above
 };
 
 }  // namespace cumulet::render

@@ -29,7 +29,7 @@ std::vector<RowRange> Composed::stale_rows(const Of& of, const RowRevisions* row
   Of same = *of_;
   same.means = of.means;
   if (same != of) return all;
-  // Rows of the picture to rows of the rectangle, which may be larger or smaller: with all that filtering reaches.
+  // Converts rows of the picture to rows of the rectangle, widened by the reach of bilinear filtering if sizes differ.
   const double scale = double(height) / of.means.size.y;
   const double reach = of.means.size.y == height ? 0.0 : 1.0;
   std::vector<RowRange> stale;
@@ -52,7 +52,8 @@ GLuint Composed::update(const Of& of, const RowRevisions* rows,
       texture_ =
           gl::make_texture_2d(gl_, of.format, of.size.x, of.size.y, "creating the texture of the composed picture");
     } catch (const Error& error) {
-      if (error.code() == ErrorCode::out_of_memory) no_memory_for_ = of.size;  // it is composed in each frame
+      // The image is composed in every frame then.
+      if (error.code() == ErrorCode::out_of_memory) no_memory_for_ = of.size;
       throw;
     }
     no_memory_for_.reset();
@@ -64,7 +65,7 @@ GLuint Composed::update(const Of& of, const RowRevisions* rows,
     format_ = of.format;
   }
   const std::vector<RowRange> stale = stale_rows(of, rows);
-  of_.reset();  // until it is whole
+  of_.reset();  // until composing has succeeded
   if (!stale.empty()) compose(texture_.name(), stale);
   for (const RowRange& range : stale) composed_rows_ += range.end - range.first;
   of_ = of;

@@ -14,7 +14,7 @@
 
 namespace cumulet::render {
 
-/// What the sums were when they were turned into means.
+/// Identifies the sums, and how they were turned into means.
 struct MeansOf {
   GLuint sum = 0;
   GLuint before = 0;
@@ -27,8 +27,8 @@ struct MeansOf {
   bool filtered = false;
   bool operator==(const MeansOf&) const = default;
 
-  /// Whether these are of the same picture, and of unfiltered sums that are known apart by their revision alone: then
-  /// rows that did not change between the two are the same in both.
+  /// True if both are of the same picture and of unfiltered sums, and differ at most in their revision. Then rows that
+  /// did not change between the two revisions have equal means.
   [[nodiscard]] bool differs_in_rows(const MeansOf& other) const {
     MeansOf same = other;
     same.revision = revision;
@@ -36,19 +36,19 @@ struct MeansOf {
   }
 };
 
-/// The rows in which means of these sums differ from older ones; all rows where that is not known. One beside those
-/// that changed, where pixels without samples take after their neighbors.
+/// Returns the rows in which the means of newer differ from those of older; all rows if this is unknown. If pixels may
+/// be unsampled, one more row on each side, because unsampled pixels take values from their neighbors.
 [[nodiscard]] std::vector<RowRange> changed_rows(const MeansOf& older, const MeansOf& newer, const RowRevisions* rows);
 
-/// A picture as it is displayed, to be copied as long as nothing of it changes. Needs the context current.
+/// Cache of the displayed image, copied to the target while nothing of it changes. Needs a current context.
 class Composed {
  public:
-  /// All that decides how it looks, but what a target holds.
+  /// Everything that decides how the image looks, except the target's previous content.
   struct Of {
     MeansOf means;
     Display display;
     GLuint program = 0;
-    glm::ivec2 size{0};  // of the rectangle that it is drawn into
+    glm::ivec2 size{0};  // of the destination rectangle
     Region region;
     GLenum format = GL_RGBA8;
     bool operator==(const Of&) const = default;
@@ -56,18 +56,18 @@ class Composed {
 
   explicit Composed(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Whether it is worth keeping: where the last frame drew the same, or all the time.
+  /// Returns whether the composed image should be cached: always, or if the last frame drew the same image.
   [[nodiscard]] bool is_kept(const Of& of, bool always);
-  /// Brings it up to this. compose draws these rows of it, of which the first is the picture's top, into the texture of
-  /// that name. Returns the texture. Throws Error(out_of_memory) the first time that there is no memory for one of
-  /// this size, and returns 0 after that.
+  /// Brings the cached image up to date. compose draws the given rows, counted from the picture's top, into the given
+  /// texture. Returns the texture. If there is no memory for this size, throws Error(out_of_memory) the first time and
+  /// returns 0 after that.
   GLuint update(const Of& of, const RowRevisions* rows,
                 const std::function<void(GLuint texture, const std::vector<RowRange>& rows)>& compose);
-  /// Whether it is as it shall be: nothing is to be composed.
+  /// True if the cached image is up to date, so that update() composes nothing.
   [[nodiscard]] bool is_current(const Of& of, const RowRevisions* rows) const {
     return texture_ && size_ == of.size && format_ == of.format && stale_rows(of, rows).empty();
   }
-  /// Rows that the last update composed.
+  /// Rows that the last update() composed.
   [[nodiscard]] std::uint32_t composed_rows() const { return composed_rows_; }
   void drop();
   [[nodiscard]] std::uint64_t bytes() const;
@@ -77,9 +77,9 @@ class Composed {
 
   gl::FunctionsPtr gl_;
   gl::Object texture_;
-  std::optional<Of> of_;    // what it holds
-  std::optional<Of> last_;  // what the last frame drew
-  glm::ivec2 size_{0};      // of the texture
+  std::optional<Of> of_;    // content of texture_
+  std::optional<Of> last_;  // drawn by the last frame
+  glm::ivec2 size_{0};      // of texture_
   GLenum format_ = GL_RGBA8;
   std::optional<glm::ivec2> no_memory_for_;
   std::uint32_t composed_rows_ = 0;

@@ -14,9 +14,9 @@ namespace {
 
 GLint as_bool(bool value) { return value ? 1 : 0; }
 
-// More than what a host draws ahead.
+// More frames than a host queues ahead.
 constexpr std::size_t most_means = 3;
-// Of a picture under way, between means of it, in times that they took.
+// Minimum time between two means of an unfinished picture, as a multiple of the time that they took.
 constexpr double pause = 4.0;
 
 gl::ProgramKey key_of(std::vector<std::string> defines) {
@@ -70,7 +70,7 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool over
 
 const gl::Program& Compositor::program(const gl::ProgramKey& key, Wait wait, bool serves) {
   if (wait == Wait::always) return programs_->get(key);
-  const gl::Program& program = programs_->ask(key);  // throws again what has failed
+  const gl::Program& program = programs_->ask(key);  // throws again if the program failed to build
   return program.usable() || wait == Wait::never || serves ? program : programs_->get(key);
 }
 
@@ -91,7 +91,8 @@ Compositor::Means* Compositor::some_means(const MeansOf& wanted, bool overwrite,
     newest_ = nullptr;
     no_memory_for_ = wanted.size;
     untold_ = error;
-    return nullptr;  // slower and with holes, but drawn
+    // The picture is drawn from its sums then: slower and with unsampled pixels.
+    return nullptr;
   }
 }
 
@@ -104,11 +105,12 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   Means* const serves = older || (alike && newest_->of.wish == wanted.wish) ? newest_ : nullptr;
   if (no_memory_for_ == picture.size || cannot_filter_ == picture.size) return nullptr;
   const bool always = target.wait == Wait::always;
-  if (wavelet_.of() != picture.picture) wavelet_.drop();  // of which it might ask for another variant
+  // able() might ask for another program variant otherwise.
+  if (wavelet_.of() != picture.picture) wavelet_.drop();
   try {
     if (!wavelet_.able(picture, background, always)) return serves;
   } catch (const Error& error) {
-    // A driver that does not build them shows pictures as they are.
+    // If the driver does not build the programs, pictures are shown without denoising.
     cannot_filter_ = picture.size;
     untold_ = error;
     return nullptr;
@@ -129,7 +131,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
     filtering_ms_ = 0.0;
   }
   const auto begun = Clock::now();
-  // What is rehearsed is small.
+  // Warm-up pictures are small, so they are denoised at once.
   const bool at_once = target.wait != Wait::to_show;
   bool done = wavelet_.work(picture, deadline_after(target.filter_ms));
   while (!done && at_once) done = wavelet_.work(picture, deadline_after(target.filter_ms));
@@ -137,7 +139,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   if (!done) return serves;
   Means* means = some_means(filtering_, always, serves != nullptr);
   if (means == nullptr) {
-    // Without the filter there is memory for the means perhaps.
+    // There may be memory for the means without the denoiser.
     if (no_memory_for_ == filtering_.size) {
       wavelet_.free();
       cannot_filter_ = std::exchange(no_memory_for_, std::nullopt);
@@ -149,7 +151,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   newest_ = means;
   ++denoised_;
   filtered_ = Clock::now();
-  // On a GPU calls return before the work is done.
+  // On a GPU, calls return before the work is done.
   filter_ms_ = std::max(filtering_ms_, wavelet_.left_ms(filtering_.size).value_or(0.0));
   return means;
 }
@@ -165,9 +167,9 @@ Compositor::Means* Compositor::go_on_filtering(const PictureTextures& picture, B
                                                const Display& display, const FrameTarget& target) {
   denoising_ = false;
   if (!display.denoise) rest();
-  // Where guides are only late, what is remembered is of use later.
+  // If guides are only late, the history is kept, because it is needed later.
   if (!display.denoise || !picture.guides) return nullptr;
-  // A frame without a budget says nothing of those that have one.
+  // A frame without a budget does not change the budget of frames that have one.
   if (target.filter_ms > 0.0) may_filter_ms_ = target.filter_ms;
   Means* const means = filter(picture, background, target);
   const bool can = no_memory_for_ != picture.size && cannot_filter_ != picture.size;
@@ -246,7 +248,7 @@ const gl::Program* Compositor::colour_program(const Kind& kind, const Display& d
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
                                    kind.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   if (kind.layered) defines.emplace_back("CM_LAYERS 1");
-  const bool serves = colour_ != nullptr && colour_kind_ == kind;  // the one of before
+  const bool serves = colour_ != nullptr && colour_kind_ == kind;  // colour_ can be used meanwhile
   const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
   if (wanted.usable()) {
     colour_ = &wanted;
@@ -303,7 +305,7 @@ void Compositor::aim(const FrameTarget& target, const Display& display) const {
   } else {
     gl.Disable(GL_FRAMEBUFFER_SRGB);
   }
-  if (target.blend_over && display.transparent) {  // else it is opaque
+  if (target.blend_over && display.transparent) {  // otherwise the image is opaque
     gl.Enablei(GL_BLEND, 0);
     gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
     gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -384,13 +386,15 @@ void Compositor::compose(GLuint texture, const std::vector<RowRange>& rows, cons
 bool Compositor::draw_composed(const Shown& shown, const PictureTextures& picture, const Display& display,
                                const FrameTarget& target, const TargetFormat& format) {
   const auto& gl = *gl_;
-  // Asked for in each frame, so that none waits for it once it is needed.
+  // The program is requested in every frame, so that it is linked when it is needed.
   const gl::Program& copy = programs_->ask({"copy.frag", {}, "composite.vert"});
-  const Composed::Of of{shown.means->of,       display,
-                        shown.program->name(), {target.viewport.z, target.viewport.w},
-                        target.region,         copy_format(format, display.encoding)};
-  if (!composed_.is_kept(of, gl.dispatches_in_call) || !copy.usable()) return false;
-  // llvmpipe would wait for what is queued before it draws into a texture that was read.
+  if (target.is_hidden && !copy.usable()) lags_ = true;
+  // A hidden frame uses both programs, even if this driver does not keep images. One pixel is enough for that.
+  const glm::ivec2 size = target.is_hidden ? glm::ivec2(1) : glm::ivec2(target.viewport.z, target.viewport.w);
+  const Composed::Of of{
+      shown.means->of, display, shown.program->name(), size, target.region, copy_format(format, display.encoding)};
+  if (!composed_.is_kept(of, gl.dispatches_in_call || target.is_hidden) || !copy.usable()) return false;
+  // llvmpipe waits for queued work before it draws into a texture that was read.
   if (gl.dispatches_in_call && !composed_.is_current(of, picture.rows) && !gl::Fence(gl_).passed()) return false;
   GLuint texture = 0;
   try {
@@ -399,7 +403,8 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
     });
   } catch (const Error& error) {
     if (error.code() != ErrorCode::out_of_memory) throw;
-    untold_ = error;  // slower, but drawn
+    // The image is drawn directly then, which is slower.
+    untold_ = error;
   }
   if (texture == 0) return false;
   composed_rows_ = composed_.composed_rows();
@@ -408,17 +413,18 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
   aim(target, display);
   copy.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
-  return true;
+  return !target.is_hidden;
 }
 
 void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
                                const Display& display, const FrameTarget& target) {
   const auto& gl = *gl_;
-  // Bytes of what is not encoded would show steps.
+  // Without sRGB encoding, 8 bits would show banding.
   const GLenum format = display.encoding == ColourEncoding::srgb ? GL_RGBA8 : GL_RGBA32F;
   const Small kind{picture.beneath->size, format};
   const glm::ivec2 size(kind.size);
-  if (no_memory_for_small_ == kind) return;  // once is told, and at rest there is a picture
+  // The error is thrown once. Pictures at rest need no enlarging.
+  if (no_memory_for_small_ == kind) return;
   if (!small_ || small_kind_ != kind) {
     small_ = {};
     try {
@@ -470,7 +476,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.BindVertexArray(vertex_array.name());
   Means* const means = means_to_draw(picture, background, display, target);
   const auto begun = Clock::now();
-  // Without means either there is no memory for them, or the driver is at their program still.
+  // Without means there is either no memory for them, or their program is still compiling.
   const bool resolved = means != nullptr || lags_;
   const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
@@ -487,7 +493,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     draw_enlarged(*enlarge, {means, shown, layered}, picture, display, target);
   } else {
     small_ = {};
-    // What is beneath a picture may change without it.
+    // The surfaces beneath a picture may change while the picture does not.
     const bool composed =
         means != nullptr && !layered && draw_composed({means, shown, layered}, picture, display, target, format);
     if (!composed) draw_colour({means, shown, layered}, picture, display, target);

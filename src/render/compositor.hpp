@@ -19,25 +19,25 @@
 
 namespace cumulet::render {
 
-/// When drawing waits for the driver's compiler.
+/// When drawing waits for the driver's shader compiler.
 enum class Wait {
-  never,    ///< what is not there yet draws nothing
-  to_show,  ///< where nothing was drawn yet that serves instead
-  always,   ///< what is drawn is read back, and may not lag
+  never,    ///< draws nothing while a program is missing
+  to_show,  ///< waits if there is nothing older to show
+  always,   ///< waits; for images that are read back and must be current
 };
 
 struct FrameTarget {
   GLuint framebuffer = 0;
-  glm::uvec2 size{0U};  // that it has at least
+  glm::uvec2 size{0U};  // lower bound of the attachments' size
   bool needs_depth = false;
   glm::ivec4 viewport{0};  // as glViewport
-  Region region;           // of it, that is drawn: the rest stays as it is
-  bool flip_y = false;     // true: the picture's top row at y = 0
+  Region region;           // part of the viewport to draw; the rest is unchanged
+  bool flip_y = false;     // true: the picture's top row is at y = 0
   bool blend_over = true;
-  bool is_hidden = false;  // nothing is written: for programs to be used once
+  bool is_hidden = false;  // nothing is written; used to warm up programs
   Wait wait = Wait::to_show;
-  double filter_ms = 0.0;  // that a denoised picture may take of this frame
-  // Depth to write, where the picture has volume_z: a + b / z, or a + b z where orthographic.
+  double filter_ms = 0.0;  // time of this frame for denoising
+  // Depth to write if the picture has volume_z: a + b / z, or a + b z if orthographic.
   bool write_depth = false;
   bool reversed = false;
   bool orthographic = false;
@@ -45,62 +45,65 @@ struct FrameTarget {
   double depth_b = 0.0;
 };
 
-/// Draws an accumulation over a rectangle of a framebuffer: one triangle, bilinear where sizes differ. One over
-/// surfaces of another size than the rectangle is drawn at theirs first, which is most of the work, and enlarged as
-/// displayed. Needs the context current and a StateGuard around; leaves any state it likes. Vertex arrays and
-/// framebuffers belong to one context of a share group: those it needs live for one call.
+/// Draws an accumulated picture into a rectangle of a framebuffer, with one triangle, bilinearly filtered if sizes
+/// differ. A picture over rasterized surfaces of another size than the rectangle is composed at the surfaces' size, and
+/// then enlarged. Composing is most of the work. Needs a current context and an active StateGuard; changes GL state
+/// freely. Vertex arrays and framebuffers belong to one context of a share group, so they are created per call.
 class Compositor {
  public:
   Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(std::move(gl)), programs_(std::move(programs)), composed_(gl_), wavelet_(gl_, programs_) {}
-  /// Draws nothing without a picture or into a rectangle of size 0. Writes color to draw buffer 0 only, whatever the
-  /// depth there: cm_display_over of glsl/display.glsl of premultiplied radiance. Throws Error(invalid_argument) as
-  /// check_target. What the last frame drew, and on drivers that run dispatches within their call every picture, is
-  /// composed in a texture and copied; only rows that changed are composed again. Denoised, where the display is and
-  /// the picture has guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same
-  /// wish, else as it is. Throws Error(out_of_memory, gl), once for each size, where there is no memory for that, or
-  /// the driver does not build it: it is drawn as it is.
+  /// Draws the picture. Draws nothing if there is no picture or the rectangle is empty. Writes color to draw buffer 0
+  /// only, without a depth test: cm_display_over() of glsl/display.glsl, from premultiplied radiance. Throws
+  /// Error(invalid_argument) as check_target().
+  /// The image is composed into a texture and copied if the last frame drew the same image. Drivers that run dispatches
+  /// within the call always use that texture. Only rows that changed are composed again.
+  /// If display.denoise is set and the picture has guides, it is denoised over several frames within filter_ms. Until
+  /// that is done, the last denoised picture of the same request is drawn, or else the noisy one. Throws
+  /// Error(out_of_memory, gl), once per size, if there is no memory for denoising or its programs do not build; the
+  /// noisy picture is drawn then.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
-  /// For frames that do not draw: goes on with denoising what draw() would draw so, for that long. Errors as draw().
+  /// Continues denoising for filter_ms, for frames that do not draw. Throws as draw().
   void denoise(const PictureTextures& picture, const Display& display, double filter_ms);
-  /// There is nothing to denoise any more: forgets all that it has for that.
+  /// Stops denoising and frees its memory.
   void rest();
-  /// Begins anew with the picture that it is denoising: what is known of it without noise is another.
+  /// Restarts denoising of the current picture, because its noise-free component has changed.
   void begin_denoising_anew() { wavelet_.drop(); }
-  /// Of GL memory.
+  /// GL memory.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Milliseconds that the next call of draw will take, as far as is known.
+  /// Estimated time of the next call of draw(), in milliseconds.
   [[nodiscard]] double expected_ms() const;
-  /// Of that, for denoising.
+  /// The part of expected_ms() that is for denoising.
   [[nodiscard]] double expected_filter_ms() const;
-  /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
+  /// True if the GPU has executed everything that was drawn. Only tracked on drivers that run dispatches within the
+  /// call. Never waits.
   [[nodiscard]] bool drawn() const {
     return drawn_.passed() && std::ranges::all_of(means_, [](const auto& means) { return means->drawn.passed(); });
   }
-  /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
-  /// that the device has not come to, or as it was drawn then, or nothing (Wait::never), its programs not being there
-  /// yet: to be drawn again.
+  /// True if the last draw() showed an older image, or none. The reason is that all buffers were in use by the GPU, or
+  /// that a program was still compiling. Draw again.
   [[nodiscard]] bool lags() const { return lags_; }
-  /// Whether a picture that has all its samples is still to be denoised.
+  /// True if a picture that has all its samples is not denoised yet.
   [[nodiscard]] bool denoising() const { return denoising_; }
-  /// Another with every picture that was denoised: what draw() draws is another then.
+  /// Revision number; changes with every denoised picture, so that draw() would draw another image.
   [[nodiscard]] std::uint64_t denoised() const { return denoised_; }
-  /// Rows that the last draw composed; nothing where it composed the whole in the target itself.
+  /// Rows that the last draw() composed; nullopt if it drew the whole image directly into the target.
   [[nodiscard]] std::optional<std::uint32_t> composed_rows() const { return composed_rows_; }
 
  private:
   using Clock = std::chrono::steady_clock;
   using Background = MeansBackground;
-  /// Means that are drawn. Where dispatches run within their call, one that writes what queued drawing reads, sums as
-  /// well as means, waits for all that the host has queued: so drawing reads means alone, and while anything is queued
-  /// none are written a second time, for llvmpipe takes some that were drawn long ago for being read still.
+  /// A texture of mean radiance that is drawn. Some drivers run dispatches within the call. A dispatch that writes a
+  /// texture which queued drawing reads then waits for everything that the host has queued. This holds for sums as well
+  /// as for means, so drawing reads only means. While anything is queued, each write uses a new texture, because
+  /// llvmpipe may consider textures of old frames as still in use.
   struct Means {
     gl::Object texture;
-    gl::Object background;  // where that is apart
+    gl::Object background;  // with MeansBackground::apart
     MeansOf of;
     gl::Fence drawn;
   };
-  // What a program that draws colours reads, and what its target takes.
+  // Selects a color program: its inputs, and the encoding of the target.
   struct Kind {
     bool layered = false;
     bool resolved = false;
@@ -108,25 +111,27 @@ class Compositor {
     ColourEncoding encoding = ColourEncoding::srgb;
     bool operator==(const Kind&) const = default;
   };
-  // serves: something else may be drawn until it is linked.
+  // serves: something else can be drawn until the program is linked.
   const gl::Program& program(const gl::ProgramKey& key, Wait wait, bool serves);
-  // Until the one for this display is there, the one of before; null if that is of another kind.
+  // Returns the program for this display. While it is compiling, returns the previous one if it is of the same kind,
+  // else null.
   const gl::Program* colour_program(const Kind& kind, const Display& display, Wait wait);
-  // What is drawn of a picture.
+  // Inputs of a color pass.
   struct Shown {
-    const Means* means = nullptr;  // null: what there is in the picture itself
+    const Means* means = nullptr;  // null: reads the picture's sums
     const gl::Program* program = nullptr;
     bool layered = false;
   };
-  // A rectangle of a framebuffer, and how it takes colours; with a region, until the draw ends nothing else is written.
+  // Binds the framebuffer, and sets the viewport, scissor, blending and encoding. Until the draw ends, nothing outside
+  // the region is written.
   void aim(const FrameTarget& target, const Display& display) const;
   static void place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
-  // All that drawing such a picture into that rectangle needs, but the rectangle.
+  // Binds the inputs of a color pass and sets its uniforms, except the framebuffer state that aim() sets.
   void bind_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
                    const FrameTarget& target) const;
   void draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
                    const FrameTarget& target) const;
-  // The same by a copy of what is composed. Returns whether it did.
+  // Draws by a copy of the composed image. Returns false if it is not used.
   bool draw_composed(const Shown& shown, const PictureTextures& picture, const Display& display,
                      const FrameTarget& target, const TargetFormat& format);
   void compose(GLuint texture, const std::vector<RowRange>& rows, const Shown& shown, const PictureTextures& picture,
@@ -135,22 +140,22 @@ class Compositor {
                      const Display& display, const FrameTarget& target);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   [[nodiscard]] static MeansOf means_of(const PictureTextures& picture, Background background, bool filtered);
-  // The means to draw; null if there is no memory for them.
+  // Returns the Means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture, Background background, Wait wait);
-  // The same, denoised; null where they are not there yet, nor ones of the same wish that serve.
+  // Returns denoised means; null if they are not ready and there are none of the same request.
   Means* filter(const PictureTextures& picture, Background background, const FrameTarget& target);
-  // What is drawn of the two.
+  // Returns the denoised means if there are any, else the noisy ones.
   Means* means_to_draw(const PictureTextures& picture, Background background, const Display& display,
                        const FrameTarget& target);
-  // As far as it is denoised; null: not at all yet, or it shall not be.
+  // Continues denoising. Returns denoised means; null if there are none yet, or if denoising is off.
   Means* go_on_filtering(const PictureTextures& picture, Background background, const Display& display,
                          const FrameTarget& target);
   static Background background_of(const PictureTextures& picture, const Display& display);
-  // As free_means, but where there is no memory keeps that to be told, once, and gives null.
+  // Calls free_means(). If there is no memory, keeps the error in untold_, to be thrown once, and returns null.
   Means* some_means(const MeansOf& wanted, bool overwrite, bool newest_serves);
-  // To be written. Where as many as there may be wait to be drawn: null if the newest serves as well, else in place of
-  // the oldest, whose memory the driver keeps until it is drawn. Else newest_ may be gone. overwrite: takes one that is
-  // still to be drawn.
+  // Returns means to overwrite. May reset newest_. If the maximum number waits to be drawn, returns null if
+  // newest_serves, else replaces the oldest, whose memory the driver keeps until it is drawn. overwrite: takes means
+  // that are still to be drawn.
   Means* free_means(glm::uvec2 size, bool apart, bool overwrite, bool newest_serves);
   [[nodiscard]] bool resolves_now() const;
   [[nodiscard]] bool filters_now() const;
@@ -159,7 +164,7 @@ class Compositor {
   gl::ProgramsPtr programs_;
   Composed composed_;
   std::optional<std::uint32_t> composed_rows_;
-  gl::Fence drawn_;  // the last
+  gl::Fence drawn_;  // of the last draw; only if dispatches run within the call
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
   struct Small {
@@ -167,22 +172,22 @@ class Compositor {
     GLenum format = GL_RGBA8;
     bool operator==(const Small&) const = default;
   };
-  gl::Object small_;  // what is to be enlarged
+  gl::Object small_;  // a picture over surfaces, before it is enlarged
   Small small_kind_;
   std::optional<Small> no_memory_for_small_;
-  const gl::Program* colour_ = nullptr;  // the last
+  const gl::Program* colour_ = nullptr;  // the program that was drawn with last
   Kind colour_kind_;
-  std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
-  std::optional<Error> untold_;              // why something is not there, to be told
-  std::optional<glm::uvec2> cannot_filter_;  // pictures of this size: likewise
+  std::optional<glm::uvec2> no_memory_for_;  // size that did not fit; retried when the size changes
+  std::optional<Error> untold_;              // error to be thrown by the next draw
+  std::optional<glm::uvec2> cannot_filter_;  // size of pictures that cannot be denoised
   Wavelet wavelet_;
-  MeansOf filtering_;             // what it is at
-  double filtering_ms_ = 0.0;     // in all frames so far
-  double filter_ms_ = 0.0;        // of the last that was done...
-  Clock::time_point filtered_{};  // ...then
-  double may_filter_ms_ = 0.0;    // of a frame
-  double resolve_ms_ = 0.0;       // within the call
-  double draw_ms_ = 0.0;          // the rest of it
+  MeansOf filtering_;             // means that are being denoised
+  double filtering_ms_ = 0.0;     // time for it, over all frames so far
+  double filter_ms_ = 0.0;        // time of the last completed denoising
+  Clock::time_point filtered_{};  // when that completed
+  double may_filter_ms_ = 0.0;    // budget per frame
+  double resolve_ms_ = 0.0;       // time of the last resolve, within the call
+  double draw_ms_ = 0.0;          // smoothed time of the rest of draw()
   bool lags_ = false;
   bool denoising_ = false;
   std::uint64_t denoised_ = 0;

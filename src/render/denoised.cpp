@@ -7,7 +7,7 @@ namespace cumulet::render {
 
 namespace {
 
-// Of a dispatch: milliseconds on slow devices.
+// Size of one dispatch: it takes milliseconds on slow devices.
 constexpr double step_multiply_adds = 2e9;
 
 gl::ProgramKey guides_key(const Denoising& denoising) {

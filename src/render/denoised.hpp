@@ -6,20 +6,20 @@
 
 namespace cumulet::render {
 
-/// What is denoised of a picture, and by what.
+/// Settings of the neural denoiser.
 struct Denoising {
   denoise::NetworkPtr network;
-  bool with_background = true;    ///< all radiance; else what is in front of the background
-  glm::vec3 medium_albedo{1.0F};  ///< a guide where the volume is
-  /// Whether facts may have light exactly: of surfaces, or that media give off. It is taken off before the network, and
-  /// put back, so that no detail of it is lost; which takes the network twice.
+  bool with_background = true;    ///< denoises all radiance; else only radiance in front of the background
+  glm::vec3 medium_albedo{1.0F};  ///< albedo guide for the volume
+  /// True if the feature buffers may contain a noise-free component: light of surfaces, or emission of media. It is
+  /// subtracted before the network and added back after it, so that its detail is kept. The network then runs twice.
   bool known_light = false;
-  std::uint64_t most_bytes = 0;  ///< of denoise::Denoiser's buffers
+  std::uint64_t most_bytes = 0;  ///< limit for the buffers of denoise::Denoiser
 };
 
-/// Its radiance denoised, and its alpha as it is: GL_RGBA32F, of the size of its box, row 0 the top. The picture has
-/// its facts (Tracer::find_facts). Waits for the driver's compiler, never for the device. Needs the context current and
-/// a StateGuard around. Throws Error(out_of_memory, gl).
+/// Returns a GL_RGBA32F texture of the picture's box, row 0 at the top: denoised radiance and unchanged alpha. The
+/// picture must have its feature buffers (Tracer::find_facts). Waits for the driver's compiler, never for the device.
+/// Needs a current context and an active StateGuard. Throws Error(out_of_memory, gl).
 gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const Picture& picture,
                     const Denoising& denoising);
 

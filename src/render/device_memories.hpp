@@ -13,33 +13,35 @@
 
 namespace cumulet::render {
 
-/// Bricks in GL that volumes of any thread hold, of one share group. All calls but those that tell need a context of
-/// the group current, one thread at a time; those that tell come from any.
+/// Buffers of GPU-resident bricks, shared by the contexts of a share group and held by volumes of any thread. Calls
+/// that only query may come from any thread. All others need a current context of the group and must not run
+/// concurrently.
 class DeviceMemories {
  public:
-  /// gl: for itself: viewers come and go. programs: of the group. most_bytes: of one: what a storage block may have.
+  /// gl: an instance of its own, because viewers may be destroyed earlier. programs: of the share group. most_bytes:
+  /// maximum size of one memory, the limit of a storage block.
   DeviceMemories(gl::FunctionsPtr gl, gl::ProgramsPtr programs, std::uint64_t most_bytes)
       : gl_(std::move(gl)), programs_(std::move(programs)), most_bytes_(most_bytes) {}
   DeviceMemories(const DeviceMemories&) = delete;
   DeviceMemories& operator=(const DeviceMemories&) = delete;
-  /// Who holds any is told that it is gone. Without a context of the group buffers stay behind.
+  /// Marks all memories that are still held as gone. Without a current context of the group the buffers leak.
   ~DeviceMemories();
-  /// The contexts are gone, and with them the bricks.
+  /// Call it if the contexts are gone, and the bricks with them.
   void abandon() const { gl_->abandoned = true; }
 
-  /// Throws what GL's allocations throw.
+  /// Allocates a memory. Throws the errors of GL allocations.
   [[nodiscard]] std::shared_ptr<volume::DeviceMemory> make(std::size_t bricks, bool halves);
-  /// Null: it is of another group. It stays where it is as long as the memory is held. What the current context does
-  /// from now on comes after what another has written there.
+  /// Returns the buffer of a memory; null if it belongs to another share group. The address is valid as long as the
+  /// memory is held. Later commands of the current context run after the writes of other contexts to the buffer.
   [[nodiscard]] const gl::Object* find(const volume::DeviceMemory& memory) const;
   [[nodiscard]] bool has(const volume::DeviceBricks& bricks) const;
-  /// The same in one memory, copied, all being here; null: that would be too large, or the driver still compiles.
-  /// Throws what GL's allocations throw, and Error(gl).
+  /// Copies all bricks, which must be in this group, into one memory. Returns null if that would be too large, or if
+  /// the driver is still compiling the program. Throws the errors of GL allocations, and Error(gl).
   [[nodiscard]] volume::DeviceBricksPtr gather(const gl::FunctionsPtr& gl, const volume::DeviceBricks& bricks);
-  /// Those go that nobody holds any more.
+  /// Frees the buffers of memories that are not held any more.
   void collect();
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Of one of them.
+  /// Maximum size of one memory.
   [[nodiscard]] std::uint64_t most_bytes() const { return most_bytes_; }
 
  private:
@@ -48,14 +50,14 @@ class DeviceMemories {
     const volume::DeviceMemory* address = nullptr;
     gl::Object buffer;
     std::uint64_t bytes = 0;
-    gl::Fence written;  // by one of the group's contexts, for the others
+    gl::Fence written;  // signaled when another context of the group has written it
   };
   [[nodiscard]] const Kept* kept(const volume::DeviceMemory& memory) const;
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   std::uint64_t most_bytes_;
-  mutable std::mutex mutex_;  // of what tells
+  mutable std::mutex mutex_;  // guards kept_ against calls that query
   std::list<Kept> kept_;
 };
 using DeviceMemoriesPtr = std::shared_ptr<DeviceMemories>;

@@ -1,6 +1,6 @@
 #pragma once
 
-// glsl/display.glsl as C++, and what is built on it.
+// C++ side of glsl/display.glsl: conversion of radiance to displayed colors.
 
 #include <algorithm>
 #include <cmath>
@@ -20,34 +20,34 @@ namespace cumulet::render {
 enum class ToneMap { neutral = 0, filmic = 1, clip = 2 };
 enum class ColourEncoding { srgb = 0, srgb_framebuffer = 1, linear = 2, hdr = 3 };
 
-/// How radiance becomes colour.
+/// How radiance is converted to a displayed color.
 struct Display {
   float exposure_stops = 0.0F;
   ToneMap tone_map = ToneMap::neutral;
-  bool legend = false;                  // a debug view: neither exposed nor tone-mapped
+  bool legend = false;                  // debug view: without exposure and tone mapping
   bool transparent = false;             // premultiplied, without the background
-  std::optional<glm::vec3> backdrop{};  // opaque: radiance to show instead of the background
+  std::optional<glm::vec3> backdrop{};  // opaque: radiance that replaces the background
   ColourEncoding encoding = ColourEncoding::srgb;
   bool denoise = false;
   bool operator==(const Display&) const = default;
 
-  /// Whether the background's radiance is part of what is shown.
+  /// True if the background's radiance is part of the displayed image.
   [[nodiscard]] bool shows_background() const { return !transparent && !backdrop; }
 };
 
-/// The factor on radiance.
+/// Returns the factor on radiance.
 inline float exposure_of(const Display& display) { return display.legend ? 1.0F : std::exp2(display.exposure_stops); }
 
-/// The curve, as display.glsl counts them.
+/// Returns the tone curve, numbered as in glsl/display.glsl.
 inline std::uint32_t curve_of(const Display& display) {
   if (display.encoding == ColourEncoding::hdr) return CM_TONE_MAP_NONE;
   return display.legend ? CM_TONE_MAP_CLIP : static_cast<std::uint32_t>(display.tone_map);
 }
 
-/// Premultiplied, exposed radiance as a color with straight alpha, sRGB-encoded. What covers no more than its alpha
-/// keeps both: color = display(radiance / alpha). What glows beyond that has no straight color: the glow counts as what
-/// shines between the parts that cover, and alpha is raised until it holds the color, so that over black nothing is
-/// lost of it.
+/// Converts premultiplied, exposed radiance to an sRGB-encoded color with straight alpha. If radiance does not exceed
+/// alpha, the color is display(radiance / alpha) and alpha is unchanged. Radiance beyond that, as of emission, has no
+/// straight color. The excess is treated as light from the uncovered part of the pixel, and alpha is raised until it
+/// can hold the color. Over black nothing is lost.
 inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve) {
   const float alpha = std::min(core::cm_displayable(exposed.w), 1.0F);
   glm::vec3 covering(0.0F);
@@ -64,8 +64,8 @@ inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve)
   return raised > 0.0F ? glm::vec4(color / raised, raised) : glm::vec4(0.0F);
 }
 
-/// Linear RGBA as cumulet_read_linear gives it to sRGB bytes as cumulet_read_display does: straight_display where
-/// display.transparent, else opaque. The encoding of display does not count. bytes is as long as linear.
+/// Converts linear RGBA as of cumulet_read_linear to sRGB bytes as of cumulet_read_display: by straight_display() if
+/// display.transparent, else opaque. display.encoding is ignored. bytes must be as long as linear.
 inline void to_display(std::span<const float> linear, const Display& display, std::span<std::uint8_t> bytes) {
   const auto to_byte = [](float unit) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0F, 1.0F) * 255.0F));

@@ -10,7 +10,8 @@
 
 namespace cumulet::render {
 
-/// What paths read of a light::Environment on the GPU. All calls need the context current and a StateGuard around.
+/// A light::Environment (environment map) on the GPU, as paths read it. All calls need a current context and an active
+/// StateGuard.
 class EnvironmentData {
  public:
   void bind(const gl::Functions& gl) const;
@@ -23,23 +24,23 @@ class EnvironmentData {
   core::CmEnvironment parameters_{};
 };
 
-/// Brings one to GL piece by piece. All calls need the context current and a StateGuard around.
+/// Uploads an environment in steps. All calls need a current context and an active StateGuard.
 class EnvironmentUpload {
  public:
   /// Allocates nothing yet.
   EnvironmentUpload(gl::FunctionsPtr gl, gl::WordHeap& heap, light::EnvironmentPtr environment);
   EnvironmentUpload(const EnvironmentUpload&) = delete;
   EnvironmentUpload& operator=(const EnvironmentUpload&) = delete;
-  /// As Upload has them. Throws Error(unsupported) for more than the driver binds.
+  /// Returns and throws as Upload::advance(), and throws Error(unsupported) if the data exceed a limit of the driver.
   bool advance(Deadline deadline) { return upload_.advance(deadline); }
   [[nodiscard]] double progress() const { return upload_.progress(); }
-  /// Only after advance returned true.
+  /// Only after advance() returned true.
   EnvironmentData take() { return std::move(data_); }
 
  private:
   light::EnvironmentPtr environment_;
   EnvironmentData data_;
-  Upload upload_;  // its steps use the above
+  Upload upload_;  // its steps use the members above
 };
 
 }  // namespace cumulet::render

@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// extent: of all volumes in the world.
+// extent: the length of the diagonal of all volumes' bounds in the world.
 core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& source, double extent) {
   core::CmMedium m{};
   m.albedo = medium.albedo;
@@ -59,20 +59,20 @@ core::CmView view_of(const scene::Viewpoint& view, const glm::vec3& eye, glm::uv
   return v;
 }
 
-// Its axes, unit and upright to each other; the third is towards it, or, of a mirrored one, away.
+// Returns orthonormal axes. The third points towards the viewer, or away from it if the view is mirrored.
 glm::dmat3 axes_of(const scene::Viewpoint& view) {
   const glm::dvec3 right = glm::normalize(view.right);
   const glm::dvec3 up = glm::normalize(view.up - right * glm::dot(right, view.up));
   return {right, up, glm::cross(right, up)};
 }
 
-// eye_of: in the space that rays are in.
+// eye_of: converts an eye position to the space of rays.
 core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm::vec3(const glm::dvec3&)>& eye_of,
                            glm::uvec2 size) {
   core::CmShutter shutter{};
   const glm::dmat3 turn = axes_of(ends.close) * glm::transpose(axes_of(ends.open));
   glm::dquat q = glm::quat_cast(turn);
-  if (q.w < 0.0) q = -q;  // the short way round
+  if (q.w < 0.0) q = -q;  // the shorter rotation
   const glm::dvec3 along(q.x, q.y, q.z);
   const double sine = glm::length(along);
   shutter.axis = sine > 0.0 ? glm::vec3(along / sine) : glm::vec3(0.0F, 0.0F, 1.0F);
@@ -91,11 +91,11 @@ bool moves(const scene::Volume& volume) { return volume.place.ends || volume.sou
 
 bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
 
-// Each once.
+// Returns each source once.
 MarchUpload::Sources sources_of(const std::vector<scene::Volume>& volumes) {
   MarchUpload::Sources sources;
   for (const scene::Volume& volume : volumes) {
-    // Most often that of the volume before it.
+    // Usually it is the source of the previous volume.
     if (!sources.empty() && sources.back() == volume.source) continue;
     if (std::ranges::find(sources, volume.source) == sources.end()) sources.push_back(volume.source);
   }
@@ -141,7 +141,8 @@ std::vector<scene::Volume> GpuScene::came_with_data(const scene::Snapshot& snaps
 bool GpuScene::models_move() const { return placed_ && !placed_->table().ends.empty(); }
 
 void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& wanted) {
-  // Where anything moves, a single one is a table, too: fewer programs. And what is a hole is known of those alone.
+  // If anything moves, a single volume also uses an instance table, so that fewer programs are needed. Holdouts exist
+  // only in instance tables.
   const auto stands_alone = [&] {
     return present_.size() < 2 && std::ranges::none_of(present_, is_hole) && std::ranges::none_of(present_, moves) &&
            !snapshot.view_ends->has_value() && !models_move();
@@ -171,7 +172,7 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
   const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };
   const bool same_list = instances_ && !of_other_data && std::ranges::equal(instances_.of().volumes, present_, same);
   try {
-    // Rays count from where the frame begins: what is under way goes on where it stays.
+    // Rays are relative to the frame's origin: in-flight paths can continue if it does not change.
     const glm::dvec3 origin = scene::origin_of(instances);
     const bool keeps = same_list && instances_->origin() == origin;
     InstanceData made = InstanceData::make(gl_, limits_, instances, origin);
@@ -181,7 +182,7 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
     instances_.put(of, std::move(made));
   } catch (const Error&) {
     instances_.fail(of, wanted.settings);
-    // What there is knows where the data were that it is of.
+    // The existing table refers to offsets in the old data.
     if (of_other_data) {
       static_cast<void>(instances_.take());
       instances_revision_.advance();
@@ -238,8 +239,8 @@ void GpuScene::update_models(const scene::Snapshot& snapshot, const Wanted& want
 
 void GpuScene::upload_models(const ModelData::Sources& sources, const std::vector<scene::Model>& models,
                              const Wanted& wanted, Deadline deadline) {
-  // As with volumes: what is under way goes on to its end. What paths meet and what is drawn changes at once, or a
-  // picture would be of two poses.
+  // As with volumes, an upload in progress is finished first. Path-traced and rasterized models are replaced together;
+  // otherwise a picture would show two poses.
   for (;;) {
     if (!model_upload_) {
       const bool paths = model_.wants(sources, wanted.settings);
@@ -257,7 +258,8 @@ void GpuScene::upload_models(const ModelData::Sources& sources, const std::vecto
       if (!upload.work->advance(deadline)) return;
       finish_models();
     } catch (const Error&) {
-      if (!model_upload_) throw;  // it came, and cannot stand where it shall
+      // The data were uploaded, but the instance table failed.
+      if (!model_upload_) throw;
       if (upload.work && upload.work->done()) {
         finish_models();
       } else {
@@ -280,10 +282,10 @@ void GpuScene::finish_models() {
   if (upload.parts != ModelParts::paths) {
     RasterContents raster = upload.work->take_raster();
     const bool failed = raster.empty();
-    show_raster(upload.of, std::move(raster));  // where it failed rays meet the triangles
+    show_raster(upload.of, std::move(raster));  // if the raster data failed, rays hit the triangles
     if (failed) raster_.fail(upload.of, upload.settings);
   }
-  // Last, as it may fail.
+  // This is last because it may throw.
   if (upload.parts != ModelParts::raster) place_models(upload.models, {.settings = upload.settings});
 }
 
@@ -410,7 +412,7 @@ void GpuScene::update_lamps(const scene::Snapshot& snapshot, const Wanted& wante
         models != nullptr ? std::span(models->table().lamps) : std::span<const surface::PunctualLight>();
     const auto groups = models != nullptr ? std::span(models->table().lamp_groups) : std::span<const std::uint32_t>();
     LampsOf of{snapshot.lamps, {}, {}};
-    // What no lamp shines on makes no other table.
+    // If there are no lights, the bounds of lit objects do not matter.
     if (!of_scene.empty()) of.models = models->models();
     if (!of_scene.empty() || !snapshot.lamps->empty()) of.lit = lit();
     if (!lamps.wants(of, wanted.settings)) return;
@@ -431,13 +433,13 @@ void GpuScene::drop_data() {
   data_of_.clear();
   upload_.reset();
   grids_.clear();
-  took_ = {};  // and what it holds in main memory
+  took_ = {};  // frees main memory, too
 }
 
 void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Snapshot& snapshot, const Wanted& wanted,
                            Deadline deadline) {
-  // What is under way goes on to its end, though there may be something newer by now: that is next. Begun anew with
-  // each, an upload that takes longer than a build would never end.
+  // An upload in progress is finished even if there is a newer request, which is processed next. If each request
+  // restarted it, an upload that takes longer than a build would never end.
   while (upload_ || data_.wants(sources, wanted.settings)) {
     const auto begun = Clock::now();
     if (!upload_) {
@@ -454,11 +456,11 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
           held -= std::min(heap_.free_bytes(), work->bytes());
           return work->bytes() <= wanted.most_bytes - std::min(wanted.most_bytes, held);
         };
-        // Lattices serve views to come alone.
+        // Lattices are only needed for later views, so they are freed first.
         if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.most_bytes, deadline);
-        // Cells that were made for more memory would keep out those made for less. Where some of them stay the rest is
-        // not worth it, for they would have to be made again, unless all is too much by itself; then what main memory
-        // has comes from there.
+        // If the new cells do not fit beside the old ones, the old ones are freed first. They are kept if they include
+        // some of the new grids, because those would have to be made again. Exception: if the memory in use exceeds the
+        // limit by itself, grids in main memory are uploaded again from there.
         const std::uint64_t held = data_bytes() + other_bytes();
         const auto is_kept = [&](const scene::MarchSourcePtr& source) {
           return data_->grid(*source) != nullptr && (source->plan || held <= wanted.most_bytes);
@@ -481,7 +483,7 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
       grids_.clear_built();
       data_of_ = std::move(upload_->volumes);
       data_origin_ = upload_->origin;
-      present_ = came_with_data(snapshot);  // should what follows fail
+      present_ = came_with_data(snapshot);  // in case the following steps fail
       upload_.reset();
       data_revision_.advance();
     } catch (...) {
@@ -495,7 +497,7 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
 
 bool GpuScene::build_grids(const MarchUpload::Sources& of, std::uint64_t most_bytes, Deadline deadline) {
   const auto begun = Clock::now();
-  // Those that are here are copied.
+  // Grids that are uploaded are copied.
   MarchUpload::Sources missing;
   std::ranges::copy_if(of, std::back_inserter(missing),
                        [&](const scene::MarchSourcePtr& source) { return !data_ || data_->grid(*source) == nullptr; });
@@ -506,7 +508,7 @@ bool GpuScene::build_grids(const MarchUpload::Sources& of, std::uint64_t most_by
 }
 
 void GpuScene::require_room(std::uint64_t bytes, std::uint64_t most_bytes) const {
-  // What was here stays until all of it has come; what is free of the pages serves.
+  // The old data stay until the new ones are complete. Free space of the heap's pages can be used.
   const std::uint64_t held = data_bytes() + other_bytes() - std::min(heap_.free_bytes(), bytes);
   const std::uint64_t room = most_bytes - std::min(most_bytes, held);
   if (bytes <= room) return;
@@ -538,7 +540,7 @@ std::uint64_t GpuScene::other_bytes() const {
 }
 
 light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) const {
-  // What is not there yet is not turned or strengthened in what is shown until then.
+  // If the snapshot's environment is not uploaded yet, its rotation and strength do not apply to the previous one.
   if (!environment_) return {};
   return environment_.of() == snapshot.surroundings->environment ? *snapshot.surroundings : surroundings_;
 }
@@ -570,7 +572,7 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
                         .sky_turn = light::turn_of(around),
                         .lamps = *snapshot.lamps};
   obstacles.environment = environment_.get();
-  // Chances are of a table as a whole.
+  // Selection probabilities are normalized over a whole table, so there is one table per case.
   obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
   obstacles.instances = instances_.get();
   obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
@@ -606,7 +608,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
     const scene::Volume& volume = present_.front();
     const scene::MarchSource& source = *volume.source;
     p.grid = *data_->grid(source);
-    p.medium = medium_of(*volume.medium, source, extent());
+    // Where several volumes were refused, this one is drawn as if it were the only one.
+    p.medium = medium_of(*volume.medium, source, 2.0 * ball_of(volume).radius);
     const glm::dmat4& place = volume.place.to_world;
     const glm::dmat4 to_world = place * source.cube.to_world;
     p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);

@@ -27,12 +27,12 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr std::uint32_t group = 64;  // invocations of a work group, of all kernels here
+constexpr std::uint32_t group = 64;  // invocations per work group, of all kernels here
 constexpr std::size_t roots_words = 2 * CM_ROOTS + 4;
-constexpr double parts_weight = 0.05;      // of a cell's parts, beside the rest of its record
-constexpr double most_in_flight_ms = 8.0;  // whatever the deadline: the host draws, too
+constexpr double parts_weight = 0.05;      // cost of a part of a cell, relative to the rest of its record
+constexpr double most_in_flight_ms = 8.0;  // independent of the deadline, because the host draws, too
 
-// As glsl/grid_leaves.glsl has it.
+// Layout as in glsl/grid_leaves.glsl.
 struct TreeCell {
   std::uint32_t child;
   std::uint32_t rank;
@@ -40,11 +40,11 @@ struct TreeCell {
 };
 static_assert(sizeof(TreeCell) == 16);
 
-// With their links, what is below them, and their place in the list.
+// Includes the cell's links, the counts below it, and its list entry.
 constexpr std::uint64_t tree_cell_bytes =
     sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2) + sizeof(std::uint32_t);
 
-// As glsl/grid_clear.comp has them: rows of what is full, those of each cone, and the cones of each cube.
+// Layout as in glsl/grid_clear.comp: rows of occupancy, rows per cone, and the cones of each cube.
 constexpr std::uint64_t full_bytes = std::uint64_t{2} * CM_CLEAR_ROWS * sizeof(glm::uvec2);
 constexpr std::uint64_t clear_bytes = full_bytes + std::uint64_t{CM_CLEAR_CONES} * CM_CLEAR_ROWS * sizeof(glm::uvec2) +
                                       std::uint64_t{CM_CLEAR_CUBES} * sizeof(std::uint32_t);
@@ -64,10 +64,10 @@ void require_block(const gl::Limits& limits, std::uint64_t bytes, const char* wh
                                           std::to_string(limits.storage_block_bytes));
 }
 
-// As glsl/grid_glow.comp has it: which cell it is, then its place and what it gives off.
+// Layout as in glsl/grid_glow.comp: cell number, position, emission.
 constexpr std::size_t glowing_words = 7;
 
-// Cells that glow, as the grid has them one after another.
+// Returns the emissive cells in the order of the grid.
 std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
   const std::size_t count = words.size() / glowing_words;
   std::vector<std::uint32_t> order(count);
@@ -83,8 +83,8 @@ std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
   return cells;
 }
 
-// What a cheap item takes, before any was measured. Where dispatches are over when their call returns, a processor
-// computes them.
+// Estimated time of a cheap item before any measurement. Drivers that run dispatches within the call run them on the
+// CPU.
 double cost_ms(const gl::Functions& gl) { return std::exp2(gl.dispatches_in_call ? -18.0 : -22.0); }
 
 gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {"CM_STAGE " + std::to_string(stage)}}; }
@@ -107,7 +107,7 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
       upload_(gl, "uploading the lattice") {
   data_->lattice_ = std::move(lattice);
   const grid::Lattice& l = *data_->lattice_;
-  // Each counts its cells' changes in 32 bits.
+  // The shader's counters of added cells have 32 bits.
   constexpr std::size_t most_blocks = std::size_t{1} << 20U;
   if (l.blocks.size() > most_blocks) {
     throw Error(ErrorCode::unsupported,
@@ -247,10 +247,10 @@ void LatticeUpload::plan_priorities() {
 void LatticeUpload::plan_priorities(const grid::Statistics& field, const grid::BricksToRate::Field& rated) {
   const grid::Lattice& l = *data_->lattice_;
   const bool of_density = &field == statistics_.get();
-  // Other values are copied to where they are rated, so many at a time.
+  // Values of other fields are copied to a buffer first, a batch at a time.
   const std::size_t at_a_time = of_density ? std::max<std::size_t>(rated.nodes.size(), 1) : 4096;
   for (std::size_t first = 0; first < rated.nodes.size(); first += at_a_time) {
-    // Of each its number, and which brick of the buffer of values it has.
+    // Per brick: its node number, and its index in the buffer of values.
     std::vector<glm::uvec2> list;
     std::vector<MovedBrick> moved;
     for (std::size_t i = first; i < std::min(first + at_a_time, rated.nodes.size()); ++i) {
@@ -349,7 +349,7 @@ std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells) {
 }
 
 std::uint64_t building_bytes_a_cell(bool emits) {
-  // As many as there are leaves are no leaves.
+  // A tree with n leaves has fewer than n inner cells.
   return 2 * tree_cell_bytes + (emits ? glowing_words * sizeof(std::uint32_t) : 0);
 }
 
@@ -377,13 +377,13 @@ void GridPace::learn(const std::vector<Sent>& sent, double ms, Measured measured
     first = known_.try_emplace(s.key, s.cost).second || first;
   }
   if (first) return;
-  // What was seen late is no reason to go slowly.
+  // Late measurements must not slow down the build much.
   const double most = measured == Measured::exactly ? 64.0 : 4.0;
   constexpr double least = 1.0 / 64.0;
   const double step = std::sqrt(std::clamp(ms / std::max(expected, 1e-6), 0.25, 4.0));
   std::set<gl::ProgramKey> known;
   for (const Sent& s : sent) {
-    // Few items tell of the dispatch, not of themselves; a kernel's many are one measurement.
+    // A dispatch of few items mostly measures its overhead. Several dispatches of a kernel count as one measurement.
     if (s.items < group || !known.insert(s.key).second) continue;
     double& of = known_.at(s.key);
     of = std::clamp(of * step, least * s.cost, most * s.cost);
@@ -407,7 +407,7 @@ GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Li
 }
 
 double GridBuild::progress() const {
-  // Cells are most of it.
+  // Cells take most of the time.
   constexpr double decision = 0.2;
   return decision * decision_.progress() + (cells_ ? (1.0 - decision) * cells_->progress() : 0.0);
 }
@@ -466,7 +466,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   if (!has_room_in_flight()) return std::nullopt;
   const gl::Program& program = programs_->ask(pass.key);
   if (!program.usable()) return std::nullopt;
-  constexpr std::uint32_t most_groups = 65535;  // that every driver takes
+  constexpr std::uint32_t most_groups = 65535;  // supported by every driver
   const double ms = pass.weight * pace_->ms(pass.key, pass.cost * cost_ms(*gl_));
   const double fit = std::clamp(aim_ms() / ms, double{group}, double{most_groups} * (pass.item_a_group ? 1.0 : group));
   const std::uint32_t items = std::min(static_cast<std::uint32_t>(fit), end - first);
@@ -492,7 +492,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
 }
 
 void GridBuild::plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind) {
-  if (first == end) return;  // a call is a step at least
+  if (first == end) return;  // an empty pass would still cost a step
   upload.add_until([this, pass, next = first, end, bind]() mutable {
     while (next < end) {
       const std::optional<std::uint32_t> left = dispatch(pass, next, end, bind);
@@ -552,7 +552,7 @@ void GridBuild::plan_decision() {
     gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_POINTS, data_->points_.name());
   };
   plan_pass(decision_, {lattice_key(0), 512, true}, 0, static_cast<std::uint32_t>(l.own.nodes.size()), bind);
-  // From the finest level up, as DiamondSet::close() has it.
+  // From the finest level up, as in DiamondSet::close().
   for (std::uint32_t octave = 0; octave + 1 < static_cast<std::uint32_t>(l.cube.log2_size); ++octave) {
     const std::uint32_t scale = octave / 3;
     const std::uint32_t first_block = l.first[scale];
@@ -600,7 +600,7 @@ void GridBuild::plan_cells() {
   built_.count = state_.cells;
   built_.limited = state_.limited != 0;
   built_.levels = static_cast<std::uint32_t>(tree_levels_.size() - 1);
-  // Before any of it is made.
+  // The memory is checked before anything is allocated.
   std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
   for (const grid::LatticeChannel& channel : data_->lattice().channels) {
     needs += channel_bytes(channel.channel, built_.count);
@@ -633,7 +633,7 @@ void GridBuild::plan_cells() {
   plan_tree_cells();
   plan_records();
   plan_channels();
-  // What is not the grid's goes, before there is more of that.
+  // Temporary buffers are freed before more are allocated.
   cells_->add([this, count] {
     for (gl::Object* scratch : {&tree_cells_, &links_, &below_, &list_}) *scratch = {};
     bytes_ -= count * tree_cell_bytes;
@@ -650,7 +650,7 @@ void GridBuild::plan_cells() {
 }
 
 void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind) {
-  // Cells of a level are all of one size.
+  // All cells of a level have the same size.
   std::uint32_t shape = grid::root_cells(data_->lattice().cube.log2_size)[0].shape;
   std::uint32_t begin = tree_levels_.back().splits_end;
   for (const Level& level : tree_levels_) {
@@ -781,7 +781,7 @@ void GridBuild::plan_glow() {
 
 namespace {
 
-// What a thread of its own makes, whose failures are Errors.
+// Runs `work` on a detached thread; its failures become Errors.
 template <class Made, class Work>
 std::future<Made> make_apart(const char* what, Work work) {
   const auto task = std::make_shared<std::packaged_task<Made()>>([what, work = std::move(work)] {
@@ -860,7 +860,7 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint6
 
 namespace {
 
-// What the CPU made.
+// Wraps a grid that the CPU built.
 BuiltGrid built_of(grid::TetGrid grid) {
   BuiltGrid made;
   made.grid = std::make_shared<const grid::TetGrid>(std::move(grid));
@@ -872,7 +872,7 @@ BuiltGrid built_of(grid::TetGrid grid) {
   return made;
 }
 
-// Where there are no voxels of it.
+// Returns an empty grid: the source's voxels are not available.
 BuiltGrid nothing_of(const scene::MarchSource& source) {
   volume::ScalarVolume none;
   none.index_to_world = source.volume->index_to_world;
@@ -900,7 +900,7 @@ volume::DeviceBricksPtr GridBuilds::not_here(const scene::MarchSource& source) c
 bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
   const volume::DeviceBricksPtr& in_gl = source->statistics->on_device();
   if (const volume::DeviceBricksPtr elsewhere = not_here(*source)) {
-    // Others of the scene are shown meanwhile.
+    // Other volumes of the scene are shown meanwhile.
     BuiltGrid& made = built_.emplace(source, nothing_of(*source)).first->second;
     try {
       elsewhere->ask_for_values();
@@ -918,7 +918,7 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_b
       upload_.reset();
       under_way_.reset();
       if (error.code() != ErrorCode::unsupported && error.code() != ErrorCode::out_of_memory) throw;
-      // What there is no room for leaves it to the cells.
+      // If memory is insufficient, the lattice is freed for the cells.
       if (error.code() == ErrorCode::out_of_memory)
         std::erase_if(lattices_, [&](const auto& data) { return &data->lattice() == source->plan->lattice.get(); });
       if (in_gl) {

@@ -35,12 +35,12 @@ namespace cumulet::core {
 
 namespace cumulet::render {
 
-/// A lattice in GL: all that grids of any view are built from there, and the room to decide what splits. One build at a
-/// time uses it.
+/// A refinement lattice in GL: the input from which grids of any view are built, and the buffers for refinement
+/// decisions. Only one build may use it at a time.
 class LatticeData {
  public:
   [[nodiscard]] const grid::Lattice& lattice() const { return *lattice_; }
-  /// Of GL memory.
+  /// GL memory.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
@@ -51,32 +51,32 @@ class LatticeData {
   struct Channel {
     gl::Object places, coarse, bricks;
   };
-  std::vector<Channel> channels_;  // as the lattice has them
-  gl::Object points_, parts_;      // uniforms
+  std::vector<Channel> channels_;  // as in the lattice
+  gl::Object points_, parts_;      // uniform buffers
   gl::Object priorities_, bins_, state_;
   std::uint64_t bytes_ = 0;
 };
 using LatticeDataPtr = std::shared_ptr<const LatticeData>;
 
-/// Brings a lattice to GL piece by piece. All calls need the context current and a StateGuard around.
+/// Uploads a lattice in steps. All calls need a current context and an active StateGuard.
 class LatticeUpload {
  public:
-  /// statistics, channels: that the lattice was made of; all are held until the last step is made. Throws
-  /// Error(unsupported) that names the limit that does not suffice; allocates nothing yet.
-  /// Of bricks that are in GL the values are copied there, and their priorities found. Throws Error(unsupported) where
-  /// memories has them not.
+  /// Allocates nothing yet. statistics, channels: those that the lattice was made of; they are held until the last step
+  /// is done. Values of GPU-resident bricks are copied on the GPU, and their priorities are computed there. Throws
+  /// Error(unsupported) if a limit of the driver is exceeded, which the message names, or if `memories` does not hold
+  /// the bricks.
   LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
                 grid::LatticePtr lattice, std::shared_ptr<const grid::Statistics> statistics,
                 grid::Channels channels = {}, DeviceMemoriesPtr memories = nullptr);
   LatticeUpload(const LatticeUpload&) = delete;
   LatticeUpload& operator=(const LatticeUpload&) = delete;
-  /// As Upload has them.
+  /// Returns and throws as Upload::advance().
   bool advance(Deadline deadline) { return upload_.advance(deadline); }
   [[nodiscard]] double progress() const { return upload_.progress(); }
-  /// Of GL memory, of what will be there.
+  /// GL memory of the complete data.
   [[nodiscard]] std::uint64_t bytes() const { return data_->bytes(); }
   [[nodiscard]] const grid::LatticePtr& lattice() const { return data_->lattice_; }
-  /// Only after advance returned true.
+  /// Only after advance() returned true.
   LatticeDataPtr take() { return std::move(data_); }
 
  private:
@@ -87,16 +87,16 @@ class LatticeUpload {
   void plan_device_bricks(const grid::LatticeChannel& channel, const grid::ChannelFields& fields, const gl::Object& to);
   void plan_priorities();
   void plan_priorities(const grid::Statistics& field, const grid::BricksToRate::Field& rated);
-  // list: of bricks their numbers, and which of the values they have.
+  // list: per brick its node number, and the index of its values.
   void plan_priorities(const std::vector<glm::uvec2>& list, bool of_density, const grid::OwnMeasure& measure);
   void plan_channels();
-  // Bricks of whole values, which fill puts where it is told, one after another.
+  // Plans the upload of complete bricks. fill: writes the values of a brick to the given address.
   using FillBrick = std::function<void(std::size_t brick, std::byte* to)>;
   void plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill);
 
-  // What steps make for others.
+  // Temporary buffers of the steps.
   struct Scratch {
-    gl::Object to_rate, values;  // of one field after another
+    gl::Object to_rate, values;  // of one field at a time
     gl::Object lit, tree, points;
   };
 
@@ -110,17 +110,18 @@ class LatticeUpload {
   std::vector<grid::ChannelFields> fields_;
   std::shared_ptr<LatticeData> data_;
   BrickMoves moves_;
-  Upload upload_;  // its steps use the above
+  Upload upload_;  // its steps use the members above
 };
 
-/// A grid that was built in GL: what a grid::TetGrid is, bit for bit but for the rounding of coefficients and channels.
+/// A grid that was built on the GPU. Equal to a grid::TetGrid bit for bit, except for rounding of coefficients and
+/// channels.
 struct BuiltGrid {
   gl::Object cells;  ///< grid::CellRecord each
-  gl::Object tree;   ///< 26 grid::RootEntry, the last of which is room, then TetGrid::tree
-  /// By grid::Channel, records as TetGrid has them; null: it has no such.
+  gl::Object tree;   ///< 26 grid::RootEntry, of which the last is padding, then TetGrid::tree
+  /// Records as in TetGrid, indexed by grid::Channel; null: there is no such channel.
   std::array<gl::Object, 4> channels;
   scene::GlowTable glow;  ///< in main memory
-  /// Instead of what GL has: where GL could not build it. Then why.
+  /// Set instead of the buffers if the GPU could not build it; why_not then gives the reason.
   std::shared_ptr<const grid::TetGrid> grid;
   std::string why_not;
   std::uint32_t count = 0;
@@ -129,49 +130,50 @@ struct BuiltGrid {
   glm::vec3 content_min{0.0F};
   glm::vec3 content_max{0.0F};
 
-  /// Of GL memory.
+  /// GL memory.
   [[nodiscard]] std::uint64_t bytes() const;
 };
-/// Of the records of a channel of so many cells.
+/// Returns the size of the records of a channel.
 std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells);
-/// Of GL memory, what building a grid takes a cell beside what is built.
+/// Returns the GL memory per cell of a build in progress, in addition to its result.
 std::uint64_t building_bytes_a_cell(bool emits);
-/// And how much it takes at least, of however few cells.
+/// Returns the minimum GL memory of a build in progress, however few cells it has.
 std::uint64_t building_bytes_at_least();
 
-/// What kernels that build grids take, by how long they took: of an item, in ms.
+/// Measured time per item of the kernels that build grids, in ms.
 class GridPace {
  public:
-  /// cost: what is thought of it before any was measured.
+  /// Returns the time per item. cost: estimate while there is no measurement.
   [[nodiscard]] double ms(const gl::ProgramKey& key, double cost) const;
   struct Sent {
     gl::ProgramKey key;
     double cost = 0.0;
     double items = 0.0;
-    double weight = 1.0;  ///< of an item, where a kernel's differ
+    double weight = 1.0;  ///< per item, if the items of a kernel differ
   };
   enum class Measured {
-    exactly,  ///< of these alone
-    at_most   ///< until it was seen that they are over: a host's own work and its frames count with them
+    exactly,  ///< time of these dispatches only
+    at_most   ///< until they were seen to be finished, so other work of the host is included
   };
-  /// These took that long, one after another. None that has the first of a kernel is believed: drivers compile in it.
+  /// Updates the estimates: these dispatches took `ms` in sequence. Measurements with the first dispatch of a kernel
+  /// are ignored, because drivers compile in it.
   void learn(const std::vector<Sent>& sent, double ms, Measured measured);
 
  private:
-  std::map<gl::ProgramKey, double> known_;  // of an item
+  std::map<gl::ProgramKey, double> known_;  // per item
 };
 using GridPacePtr = std::shared_ptr<GridPace>;
 
-/// Builds a grid for a view, in compute passes: the splits' priorities are raised into the lattice and closed as
-/// grid::DiamondSet has it, a histogram gives the cut of the budget, and cells are made level by level as
-/// grid::GridBuilder does. How many there are of each level is read back once, before the first is made, without
-/// waiting: all that follows has known bounds and exactly the memory that it needs. Of what gives off light the cells
-/// are read back, too, likewise, and a thread of its own makes their table. Passes are cut into dispatches of about a
-/// millisecond by what their kernels were seen to take, between which a frame may stop; what is on its way to the
-/// device is bounded by fences. All calls need the context current and a StateGuard around.
+/// Builds a grid for a view on the GPU, in compute passes. The priorities of splits are raised and closed in the
+/// lattice as in grid::DiamondSet. A histogram gives the priority threshold for the cell budget. Cells are made level
+/// by level as in grid::GridBuilder.
+/// The number of cells per level is read back once, before the first is made, without waiting. All later buffers have
+/// exactly the needed size. Emissive cells are also read back without waiting, and a worker thread makes their table.
+/// Passes are split into dispatches of about a millisecond, by the measured times of their kernels; a frame may stop
+/// between dispatches. Fences bound the work in flight. All calls need a current context and an active StateGuard.
 class GridBuild {
  public:
-  /// levels: grid::OwnPriorities::levels() of the view. max_cells: at most 2^30 are made. most_bytes: of GL memory.
+  /// levels: grid::OwnPriorities::levels() of the view. max_cells: capped at 2^30. most_bytes: limit of GL memory.
   GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, LatticeDataPtr data,
             std::vector<std::uint8_t> levels, std::uint64_t max_cells,
             std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max(),
@@ -179,27 +181,28 @@ class GridBuild {
   GridBuild(const GridBuild&) = delete;
   GridBuild& operator=(const GridBuild&) = delete;
 
-  /// Works until the deadline, one step at least, or until it has to wait for the device or the driver's compiler.
-  /// Returns whether the grid is whole. Throws Error(out_of_memory, unsupported, gl); then there is nothing to go on
-  /// with.
+  /// Works until the deadline, but at least one step, or until it has to wait for the device or the driver's compiler.
+  /// Returns whether the grid is complete. Throws Error(out_of_memory, unsupported, gl); the build cannot be continued
+  /// then.
   bool advance(Deadline deadline);
   [[nodiscard]] double progress() const;
-  /// Of GL memory, while it is built: without the lattice's.
+  /// GL memory of the build in progress, without the lattice's.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// Only after advance returned true.
+  /// Only after advance() returned true.
   BuiltGrid take() { return std::move(built_); }
 
  private:
-  // Of one kernel; cost: of an item, about what a cheap one's is.
+  // A pass of one kernel. cost: estimated time per item, relative to a cheap one.
   struct Pass {
     gl::ProgramKey key;
     std::uint32_t cost = 1;
-    bool item_a_group = false;  // a work group of 64 an item, else an invocation
-    bool of_lattice = true;     // knows glsl/grid_places.glsl
-    double weight = 1.0;        // of an item, where a kernel's differ
+    bool item_a_group = false;  // one work group of 64 invocations per item, else one invocation
+    bool of_lattice = true;     // the kernel includes glsl/grid_places.glsl
+    double weight = 1.0;        // per item, if the items of a kernel differ
   };
   using Bind = std::function<void(GLuint program)>;
-  // Of the tree: its cells, and where those that split stand in the list, in front of all leaves. Of the last none do.
+  // A level of the tree: its range of cells, and the range in the list of those that split. In the list all splits come
+  // before all leaves. The last level has no splits.
   struct Level {
     std::uint32_t cells_begin = 0;
     std::uint32_t cells_end = 0;
@@ -213,21 +216,22 @@ class GridBuild {
   void plan_cells();
   void plan_tree_cells();
   void plan_records();
-  // Of the leaves, those above bricks by one kernel, those within by another.
+  // Plans a pass over the leaves. coarse: kernel for cells larger than bricks; fine: for cells within bricks.
   void plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind);
-  // What cells carry.
+  // Plans the channels of the cells: emission, velocity, color and anisotropy.
   void plan_channels();
   void plan_channel(std::size_t index);
   void plan_clear_cones();
   void plan_glow();
   void begin_glow_table();
   void plan_read_back(Upload& upload);
-  // Items [first, end), by dispatches of bounded length; bind: buffers, and uniforms beyond the first three.
+  // Plans a pass over items [first, end), in dispatches of bounded time. bind: binds buffers, and sets uniforms beyond
+  // the first three.
   void plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind);
-  // One dispatch, of the first of these items. Returns where what is left begins; nothing where it has to wait.
+  // Sends one dispatch with the first of the items. Returns the end of its items; nullopt if it has to wait.
   std::optional<std::uint32_t> dispatch(const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind);
   [[nodiscard]] double aim_ms() const;
-  // Whether what is on its way is little enough.
+  // Returns whether little enough work is in flight.
   bool has_room_in_flight();
   void require_room(std::uint64_t bytes) const;
   void bind_storage(std::initializer_list<std::pair<GLint, const gl::Object*>> buffers) const;
@@ -241,27 +245,27 @@ class GridBuild {
   std::uint32_t max_cells_;
   std::uint64_t most_bytes_;
   GridPacePtr pace_;
-  Deadline deadline_{};  // of the call
+  Deadline deadline_{};  // of the current call
   std::uint64_t bytes_ = 0;
   gl::Object level_bytes_;
   gl::Object tree_cells_, links_, below_, list_, clear_, glowing_;
   BuiltGrid built_;
   gl::ReadBack read_back_;
   gl::Fence fence_;
-  std::vector<GridPace::Sent> in_flight_;       // since those before were seen to be over
-  double in_flight_ms_ = 0.0;                   // that these are thought to take
-  std::chrono::steady_clock::time_point sent_;  // the first of them
-  core::CmGridState state_{};                   // as it was read back
+  std::vector<GridPace::Sent> in_flight_;       // since the previous ones were seen to be finished
+  double in_flight_ms_ = 0.0;                   // estimated time of these
+  std::chrono::steady_clock::time_point sent_;  // when the first of them was sent
+  core::CmGridState state_{};                   // as read back
   Upload decision_;
   gl::ReadBack glow_read_back_;
   std::vector<std::uint32_t> glow_words_;
   std::future<scene::GlowTable> glow_table_;
   std::vector<Level> tree_levels_;
-  std::optional<Upload> cells_;  // once it is known how many; their steps use the above
-  std::optional<Upload> glow_;   // once it is known how many give off light
+  std::optional<Upload> cells_;  // set when the number of cells is known; their steps use the members above
+  std::optional<Upload> glow_;   // set when the number of emissive cells is known
 };
 
-/// The grid of a source with a plan, on a thread of its own: where GL cannot. Dropped, it ends soon.
+/// Builds the grid of a source with a plan on a worker thread, if the GPU cannot. The destructor cancels it.
 class CpuGridBuild {
  public:
   CpuGridBuild(scene::MarchSourcePtr source, std::string why);
@@ -270,7 +274,7 @@ class CpuGridBuild {
   CpuGridBuild(CpuGridBuild&&) = delete;
   CpuGridBuild& operator=(CpuGridBuild&&) = delete;
   ~CpuGridBuild();
-  /// Nothing while it is under way. Throws what the build threw.
+  /// Returns nullopt while the build is in progress. Throws its errors.
   std::optional<BuiltGrid> take();
   [[nodiscard]] const scene::MarchSourcePtr& of() const { return source_; }
   [[nodiscard]] double progress() const { return progress_->fraction(); }
@@ -282,39 +286,39 @@ class CpuGridBuild {
   std::future<BuiltGrid> made_;
 };
 
-/// Grids that GL built, by what they were built of.
+/// Grids that were built for the GPU, by source.
 using BuiltGrids = std::map<scene::MarchSourcePtr, BuiltGrid>;
 
-/// Builds the grids of sources that have a plan, one after another. Their lattices stay for the next views. What GL has
-/// no room for, or is larger than a block of its may be, the CPU builds. All calls but those that tell need the context
-/// current and a StateGuard around.
+/// Builds the grids of sources with a plan, one after another. Their lattices are kept for later views. The CPU builds
+/// grids that exceed the GL memory limit or the driver's block size. All calls except the queries need a current
+/// context and an active StateGuard.
 class GridBuilds {
  public:
   using Sources = std::vector<scene::MarchSourcePtr>;
-  /// memories: where volumes' bricks are that are in GL.
+  /// memories: bricks of GPU-resident volumes.
   GridBuilds(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, DeviceMemoriesPtr memories)
       : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits), memories_(std::move(memories)) {}
 
-  /// Those of sources, until about the deadline. Returns whether all are there. kept: whose lattices stay, these among
-  /// them; others go. most_bytes: of GL memory that lattices and what is built may take. Throws Error(gl), and what the
-  /// CPU's build throws; then none is under way.
+  /// Builds the grids of sources until about the deadline. Returns whether all are built. kept: sources whose lattices
+  /// are kept, these included; other lattices are freed. most_bytes: limit of GL memory for lattices and grids. Throws
+  /// Error(gl), and the errors of the CPU build; then no build is in progress.
   bool advance(const Sources& sources, const Sources& kept, std::uint64_t most_bytes, Deadline deadline);
   [[nodiscard]] const BuiltGrids& built() const { return built_; }
-  /// 0 to 1, of the grid that is under way; else 1.
+  /// Fraction of the current build that is done, 0 to 1; 1 if there is none.
   [[nodiscard]] double progress() const;
-  /// Grids are somewhere else by now, or not wanted any more; lattices stay.
+  /// Frees built grids, which were copied or are not needed any more. Lattices are kept.
   void clear_built();
-  /// And lattices go.
+  /// Frees built grids and lattices.
   void clear();
-  /// Of GL memory, of lattices and of what is built.
+  /// GL memory of lattices and grids.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  // Returns whether it is there.
+  // Returns whether the grid is built.
   bool build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
-  // Of bricks in GL such as are in another context, or went with theirs; null: none.
+  // Returns bricks of the source that are in another context or were lost with it; null: none.
   [[nodiscard]] volume::DeviceBricksPtr not_here(const scene::MarchSource& source) const;
-  // By GL.
+  // Builds on the GPU.
   bool build_there(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
   void begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes);
   [[nodiscard]] LatticeDataPtr find(const grid::LatticePtr& lattice) const;

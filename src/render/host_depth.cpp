@@ -18,7 +18,7 @@ constexpr int most_layers = 8;
   throw Error(ErrorCode::invalid_argument, "the host's depth, " + (kind + std::to_string(input.name)) + ", " + cause);
 }
 
-/// Where the viewport begins in a depth of that size.
+/// Returns the corner of the viewport in a depth image of that size.
 glm::ivec2 origin_in(const HostDepthInput& input, glm::ivec2 size) {
   const glm::ivec2 corner(input.viewport.x, input.viewport.y);
   const glm::ivec2 extent(input.viewport.z, input.viewport.w);
@@ -38,7 +38,7 @@ struct DepthBits {
   GLint type = GL_UNSIGNED_NORMALIZED;
 };
 
-/// The format a copy must have: a blit wants the very same.
+/// Returns the format for a copy: depth blits need equal formats.
 GLenum format_of(const DepthBits& bits) {
   const bool stencil = bits.stencil > 0;
   if (bits.type == GL_FLOAT) return stencil ? GL_DEPTH32F_STENCIL8 : GL_DEPTH_COMPONENT32F;
@@ -64,7 +64,7 @@ TextureLevel level_of(const gl::Functions& gl, GLuint texture, GLint level) {
   return result;
 }
 
-/// Whether a fetch would give something else than level 0's depth.
+/// Returns whether a fetch would return something other than the depth of level 0.
 bool is_remapped(const gl::Functions& gl, GLuint texture) {
   GLint mode = 0;
   GLint swizzle = 0;
@@ -105,7 +105,8 @@ HostDepth::Source HostDepth::copy(GLuint framebuffer, GLenum format, int samples
 HostDepth::Source HostDepth::open_texture(const HostDepthInput& input) {
   const auto& gl = *gl_;
   const bool multisample = input.source == DepthSource::texture_multisample;
-  // The target by way of a binding: asking for GL_TEXTURE_TARGET is an error in Mesa's compatibility contexts.
+  // The target is checked by a binding because a query of GL_TEXTURE_TARGET is an error in Mesa's compatibility
+  // contexts.
   GLint bound = 0;
   if (gl.IsTexture(input.name) != GL_FALSE) {
     gl.ActiveTexture(GL_TEXTURE0 + core::CM_UNIT_DEPTH_SOURCE);
@@ -199,7 +200,8 @@ bool HostDepth::update(const HostDepthInput& input) {
       input.orthographic == last_.orthographic && input.depth_a == last_.depth_a && input.depth_b == last_.depth_b) {
     return earlier;
   }
-  if (asked_.size() == most_asked) return earlier;  // the device is far behind: the next frame's depth will do
+  // If the device is far behind, the depth of a later frame is read instead.
+  if (asked_.size() == most_asked) return earlier;
   const auto& gl = *gl_;
   const Source source = input.source == DepthSource::framebuffer ? open_framebuffer(input) : open_texture(input);
   const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, most_layers));

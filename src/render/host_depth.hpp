@@ -10,7 +10,7 @@ namespace cumulet::render {
 
 enum class DepthSource { none = 0, texture = 1, texture_multisample = 2, framebuffer = 3 };
 
-/// The host's depth of one frame, and what its numbers mean: d = a + b / z, or a + b z where orthographic.
+/// The host's depth buffer of one frame, and its encoding: d = a + b / z, or a + b z if orthographic.
 struct HostDepthInput {
   DepthSource source = DepthSource::none;
   GLuint name = 0;
@@ -20,24 +20,23 @@ struct HostDepthInput {
   bool orthographic = false;
   double depth_a = 0.0;
   double depth_b = 0.0;
-  bool unchanged = false;  // the host says so: nothing is read if all else (but the name) is as before
+  bool unchanged = false;  // the host says so: nothing is read if all other fields except the name are as before
 };
 
-/// Keeps the host's depth as view depth z, a layer a sample (at most 8), row 0 the picture's top; infinity where there
-/// is no surface (the far value, or beyond). Needs the context current and a StateGuard around; leaves any state it
-/// likes.
+/// Converts the host's depth buffer to view depth z, with one layer per sample (at most 8) and row 0 at the picture's
+/// top. Pixels at or beyond the far value have no surface and get infinity. Needs a current context and an active
+/// StateGuard; changes GL state freely.
 class HostDepth {
  public:
   HostDepth(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
-  /// Reads the input. Returns whether it is known by now that z differs from before anywhere (or size or layers do): of
-  /// this call or an earlier one, for the device is not waited for (but Mesa's llvmpipe waits for the host's drawing of
-  /// it). Throws
-  /// Error(invalid_argument) for a name that is no such texture or framebuffer, does not hold depth, or is smaller than
-  /// the viewport; z is then what it was. O(pixels).
+  /// Reads the input. Returns whether z is known to differ anywhere from before (or its size or layer count does). The
+  /// result may be that of an earlier call, because update() does not wait for the device. Exception: Mesa's llvmpipe
+  /// waits for the host's drawing to the depth buffer. Throws Error(invalid_argument) if the name is not such a texture
+  /// or framebuffer, has no depth, or is smaller than the viewport. In that case z is unchanged. O(pixels).
   bool update(const HostDepthInput& input);
-  /// Whether it is still to be told if z differs: a later update will.
+  /// True if the result of a comparison is not known yet; a later update() returns it.
   [[nodiscard]] bool pending() const { return waits_ || !asked_.empty(); }
-  /// Whether the last update could not read, the driver being at its program still.
+  /// True if the last update() could not read because its program was still compiling.
   [[nodiscard]] bool waits_for_program() const { return waits_; }
   /// GL_TEXTURE_2D_ARRAY, r32f; 0 without input.
   [[nodiscard]] GLuint texture() const { return z_.name(); }
@@ -45,7 +44,7 @@ class HostDepth {
   [[nodiscard]] unsigned layers() const { return layers_; }
 
  private:
-  /// A texture to read, and from where.
+  /// A texture to read, and the offset in it.
   struct Source {
     GLuint texture = 0;
     int samples = 0;  // 0: a GL_TEXTURE_2D
@@ -53,7 +52,7 @@ class HostDepth {
   };
   Source open_texture(const HostDepthInput& input);
   Source open_framebuffer(const HostDepthInput& input);
-  // Whether any of those answered says that z differs.
+  // Takes the results that have arrived; returns whether any says that z differs.
   bool answered();
   Source copy(GLuint framebuffer, GLenum format, int samples, glm::ivec4 rectangle);
 
@@ -63,14 +62,14 @@ class HostDepth {
   gl::Object z_;
   glm::uvec2 size_{0U};
   unsigned layers_ = 0;
-  gl::Object copy_;  // of what cannot be read in place
+  gl::Object copy_;  // copy of a depth buffer that cannot be read in place
   glm::ivec2 copy_size_{0};
   GLenum copy_format_ = 0;
   int copy_samples_ = 0;
   gl::Object sampler_;
   gl::Object changed_;
   static constexpr std::size_t most_asked = 8;
-  gl::ReadBack answers_;  // what changed_ was, one place each
+  gl::ReadBack answers_;  // read-back of changed_, one slot per request
   struct Asked {
     std::size_t place = 0;
     gl::Fence fence;

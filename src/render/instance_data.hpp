@@ -8,25 +8,26 @@
 
 namespace cumulet::render {
 
-/// Several volumes, as paths find them, on the GPU: what each is of is MarchData's. All calls need the context current
-/// and a StateGuard around.
+/// Table and BVH of several volume instances on the GPU. Their grids are in MarchData. All calls need a current context
+/// and an active StateGuard.
 class InstanceData {
  public:
-  /// origin: where the scene's frame begins, in the world. Throws as make_instances does, and Error(unsupported) for
-  /// more than the driver binds.
+  /// origin: world position of the origin of the scene's frame. Throws as make_instances() does, and Error(unsupported)
+  /// if the table exceeds a limit of the driver.
   static InstanceData make(const gl::FunctionsPtr& gl, const gl::Limits& limits,
                            std::span<const scene::Instance> instances, const glm::dvec3& origin);
 
   void bind(const gl::Functions& gl) const;
-  /// What rays are told of their frame: the world, counted from its origin.
+  /// The frame of rays: the world, relative to its origin.
   [[nodiscard]] const core::CmSpace& space() const { return space_; }
   [[nodiscard]] const glm::dvec3& origin() const { return origin_; }
-  /// Of the first, but as strong in what decides which programs and lights there are as any is.
+  /// Medium of the first instance. Properties that decide which programs and lights are needed are the maximum over all
+  /// instances.
   [[nodiscard]] const core::CmMedium& medium() const { return medium_; }
-  /// Of all of them, as scene::GlowSum has both.
+  /// Total emitted power and length scale of all instances, as in scene::GlowSum.
   [[nodiscard]] double glow_power() const { return glow_power_; }
   [[nodiscard]] double glow_length() const { return glow_length_; }
-  /// Whether any does while the shutter is open.
+  /// True if any instance moves while the shutter is open.
   [[nodiscard]] bool moves() const { return moves_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 

@@ -16,7 +16,8 @@ LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, co
   data.arrives_ = light::share_looks(records, lit);
   if (!lit.empty()) data.nearest_ = light::nearest_lamp(records, lit.front());
   data.count_ = static_cast<std::uint32_t>(records.size());
-  if (records.empty()) records.emplace_back();  // what kernels are bound to, though they read none
+  // Kernels need a buffer to be bound, even if they read no light.
+  if (records.empty()) records.emplace_back();
   const std::size_t bytes = records.size() * sizeof(core::CmLamp);
   if (static_cast<std::int64_t>(bytes) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(records.size()) +

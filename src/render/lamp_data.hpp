@@ -9,21 +9,21 @@
 
 namespace cumulet::render {
 
-/// The lamps that paths look for, on the GPU. All calls need the context current and a StateGuard around.
+/// The lights that paths sample by NEE, on the GPU. All calls need a current context and an active StateGuard.
 class LampData {
  public:
-  /// groups: those of lights that the scene's are in. lit: what they may light. Throws Error(unsupported) for more than
-  /// the driver binds.
+  /// groups: light groups of the scene's lights. lit: bounds of the objects that the lights may light. Throws
+  /// Error(unsupported) if the lights exceed a limit of the driver.
   static LampData make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
                        std::span<const surface::PunctualLight> of_scene, std::span<const std::uint32_t> groups,
                        std::span<const light::Lit> lit);
 
   void bind(const gl::Functions& gl) const;
-  /// Of both.
+  /// Number of lights of the host and of the scene.
   [[nodiscard]] std::uint32_t count() const { return count_; }
-  /// Of all of them, by luminance (light::share_looks).
+  /// Luminance that arrives from all of them (light::share_looks).
   [[nodiscard]] double arrives() const { return arrives_; }
-  /// light::nearest_lamp, to the first of what they may light: the medium.
+  /// light::nearest_lamp() for the first of `lit`, the medium.
   [[nodiscard]] std::optional<double> nearest() const { return nearest_; }
 
  private:

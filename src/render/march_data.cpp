@@ -32,14 +32,15 @@ void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   }
 }
 
-// Whether velocity a voxel has a texture: a picture needs none, and its 8 bytes a voxel are no reason to refuse one.
+// Returns whether a velocity texture is made. A picture can do without it, so its 8 bytes per voxel are no reason to
+// fail.
 bool holds_motion(const gl::Limits& limits, const ivec3& size) {
   constexpr std::int64_t most = std::int64_t{1} << 27;
   const glm::i64vec3 voxels(size);
   return std::max({size.x, size.y, size.z}) <= limits.texture_size_3d && voxels.x * voxels.y * voxels.z <= most;
 }
 
-// Slices first to last (not included) of a dense volume: put(place in them, value) for each voxel.
+// Calls put(index in the slices, value) for each voxel of the slices [first, last) of a dense volume.
 template <class Put>
 void for_slab(const scene::MarchSource& source, const grid::Statistics& statistics, int first, int last,
               const Put& put) {
@@ -68,7 +69,7 @@ void for_slab(const scene::MarchSource& source, const grid::Statistics& statisti
   });
 }
 
-// Slices of what scatters at each voxel.
+// Returns the scattering coefficient of each voxel of the slices, as luminance if it is colored.
 std::vector<float> scattering_slab(const scene::MarchSource& source, std::size_t voxels, int first, int last) {
   std::vector<float> slab(voxels);
   const auto add = [&](const grid::Statistics& statistics, float weight) {
@@ -96,20 +97,20 @@ core::CmGrid parameters_of(const scene::MarchSource& source) {
   return grid;
 }
 
-// Before each tree: 25 pairs, and room.
+// In front of each tree: 25 pairs, and padding.
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
-// What a grid's cells have in channels, one after another.
+// Byte sizes and offsets of the channels of a grid's cells.
 struct ChannelBytes {
-  // cells, glowing: of a plan.
+  // cells, glowing: counts for grids with a plan.
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing)
       : glow(glowing * sizeof(scene::GlowingCell)) {
     using grid::Channel;
     if (const grid::TetGrid* made = source.grid.get()) {
       emission = channel_bytes(Channel::emission, made->emission.size());
       velocity = channel_bytes(Channel::velocity, made->velocity.size());
-      change = made->change.size() * sizeof(glm::uvec2);  // GL makes none
+      change = made->change.size() * sizeof(glm::uvec2);  // grids built on the GPU have none
       colour = channel_bytes(Channel::colour, made->colour.size());
       anisotropy = channel_bytes(Channel::anisotropy, made->anisotropy.size());
       return;
@@ -125,7 +126,7 @@ struct ChannelBytes {
   [[nodiscard]] std::size_t change_at() const { return velocity_at() + velocity; }
   [[nodiscard]] std::size_t colour_at() const { return change_at() + change; }
   [[nodiscard]] std::size_t anisotropy_at() const { return colour_at() + colour; }
-  // Whole texels.
+  // Rounded up to whole texels.
   [[nodiscard]] std::size_t all() const { return (anisotropy_at() + anisotropy + 15) / 16 * 16; }
 };
 
@@ -216,7 +217,7 @@ void MarchUpload::describe(MarchData::Part& part) const {
   part.grid.box_max = made.content_max;
   part.grid.levels = made.levels;
   part.cells = {made.count, made.limited, made.grid ? std::optional(made.why_not) : std::nullopt};
-  part.inner = made.count - 24;  // each split makes a cell more
+  part.inner = made.count - 24;  // each split adds one cell
   part.glow = made.glow;
   part.glowing = made.glow.cells.size();
 }
@@ -266,7 +267,7 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
     const std::size_t bytes = static_cast<std::size_t>(std::min(page_cells, cells - first)) * sizeof(grid::CellRecord);
     const std::size_t index = data_.cells_.size();
     data_.cells_.emplace_back();
-    // Of several pages each is whole: shaders find a record's by its number alone.
+    // If there are several pages, each is used exclusively, because shaders locate a record only by its number.
     const bool alone = cells > page_cells;
     upload_.add([this, &heap, index, bytes, alone] {
       const char* what = "creating the pages of cell records";
@@ -435,7 +436,7 @@ void MarchUpload::plan_channel_voxels() {
     data_.parts_[0].grid.emission_unit = emission->max_value();
     plan(data_.emission_voxels_, *emission, data_.parts_[0].grid.emission_unit, "creating what voxels give off");
   }
-  // In units of density 1, so that the colour is this over the density.
+  // The unit is that of density 1, so that the color is this value divided by the density.
   if (const grid::RgbField* scattering = source_->channels.scattering.get())
     plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating what voxels scatter");
   if (const grid::ScalarField* forward = source_->channels.forward.get()) {
@@ -502,7 +503,7 @@ void MarchUpload::plan_slabs(gl::Object& texture, const Texels& texels, const ch
   upload_.add([this, &texture, size, texels, what] {
     texture = gl::make_texture_3d(gl_, texels.stored, size.x, size.y, size.z, what);
   });
-  // One layer of bricks at a time: bounded memory.
+  // One layer of bricks per step bounds the memory.
   const int low = source_->box_low.z;
   for (int z = low & ~7; z < low + size.z; z += volume::brick_size) {
     const int first = std::max(z, low);
@@ -562,7 +563,7 @@ void MarchUpload::plan_brick() {
 }
 
 std::vector<std::string> MarchData::defines(bool several, bool motion) const {
-  // One, two or as many as there can be: fewer programs.
+  // The page count is one, two or the maximum, to limit the number of programs.
   std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
   const auto is_wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
   const bool wide = march_ == March::tet && std::ranges::any_of(parts_, is_wide);
@@ -577,7 +578,7 @@ std::vector<std::string> MarchData::defines(bool several, bool motion) const {
 }
 
 void MarchData::bind(const gl::Functions& gl) const {
-  // Every page that a program may have: no cell is in those that only stand there.
+  // All pages that a program may declare are bound. Extra ones repeat the last page and are not read.
   for (std::size_t i = 0; !cells_.empty() && i < max_pages; ++i)
     gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), cells_[std::min(i, cells_.size() - 1)].texture());
   constexpr std::array<GLuint, 2> units{core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};

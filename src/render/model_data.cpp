@@ -15,7 +15,7 @@ namespace cumulet::render {
 
 namespace {
 
-// Each once.
+// Returns each image set once.
 std::vector<scene::TextureImagesPtr> images_of(const ModelData::Sources& sources) {
   std::vector<scene::TextureImagesPtr> images;
   for (const scene::ModelSourcePtr& source : sources) {
@@ -160,7 +160,7 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
   for (const scene::ModelPart& part : table.parts)
     numbering.emplace_back(models[part.model].source->scene,
                            models[part.model].source->meshes[part.mesh].first_triangle);
-  // Paths within glass know its material by a word of the data.
+  // Paths inside transmissive objects store the object's material as a word offset in the data.
   const bool lasts = last != nullptr && *last->numbering_ == numbering &&
                      (last->data_ == data || (placed.tables_.rich | last->tables_.rich) == 0U);
   placed.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));

@@ -11,33 +11,33 @@
 
 namespace cumulet::render {
 
-/// What paths read of the surfaces of a scene on the GPU, each source's once, wherever it stands. All calls need the
-/// context current and a StateGuard around.
+/// Surfaces of a scene on the GPU as paths read them, once per source, independent of instance transforms. All calls
+/// need a current context and an active StateGuard.
 class ModelData {
  public:
   using Sources = std::vector<scene::ModelSourcePtr>;
 
-  /// Plans how it comes to GL: it is whole when all steps are done, and they may not outlive it, nor the last, which
-  /// may be null: what that has is copied from there, and images are shared where the scenes are the same. Throws
-  /// Error(unsupported).
+  /// Plans the upload steps. The data are complete when all steps are done. The steps must not outlive the data or
+  /// `last`, which may be null. Sources that `last` has are copied from there, and images are shared if they are the
+  /// same. Throws Error(unsupported).
   static std::shared_ptr<ModelData> plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, gl::WordHeap& heap,
                                          Upload& upload, const Sources& sources,
                                          const std::shared_ptr<const ModelData>& last);
   void bind(const gl::Functions& gl) const;
-  /// Of one that it is of.
+  /// Returns the word offsets of one of the sources.
   [[nodiscard]] scene::ModelWords words_of(const scene::ModelSource& source) const;
-  /// Words of what surface::GgxAlbedo has.
+  /// Word offsets of the tables of surface::GgxAlbedo.
   [[nodiscard]] std::uint32_t ggx_albedo() const { return first_word() + ggx_albedo_; }
   [[nodiscard]] std::uint32_t ggx_albedo_averages() const { return first_word() + ggx_albedo_averages_; }
-  /// Likewise of surface::SheenAlbedo, of sources among which one is rich.
+  /// Word offset of surface::SheenAlbedo, if any source has extended materials.
   [[nodiscard]] std::uint32_t sheen_albedo() const { return first_word() + sheen_albedo_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
   struct Part {
     scene::ModelSourcePtr source;
-    std::uint32_t first = 0;     // from the first word of all
-    std::uint32_t textures = 0;  // likewise
+    std::uint32_t first = 0;     // from the first word of all sources
+    std::uint32_t textures = 0;  // from the first word of all sources
   };
   struct Atlas {
     gl::Object texture;
@@ -51,7 +51,7 @@ class ModelData {
 
   gl::WordHeap::Span words_;
   std::vector<Part> parts_;
-  std::vector<glm::uvec4> common_;  // of all: textures, then what reflections need
+  std::vector<glm::uvec4> common_;  // shared by all sources: textures, then reflection tables
   std::shared_ptr<Atlas> atlas_;
   std::uint32_t ggx_albedo_ = 0;
   std::uint32_t ggx_albedo_averages_ = 0;
@@ -60,11 +60,12 @@ class ModelData {
 };
 using ModelDataPtr = std::shared_ptr<const ModelData>;
 
-/// Where they stand: what changes when one is moved. All calls need the context current and a StateGuard around.
+/// Instance table of the models: their transforms, and other data that change when a model moves. All calls need a
+/// current context and an active StateGuard.
 class PlacedModels {
  public:
-  /// Of sources that the data has; last: what was there before, or null. Throws as scene::make_model_table does, and
-  /// Error(unsupported) for more than the driver binds.
+  /// models: their sources are in the data. last: the previous table, or null. Throws as scene::make_model_table(), and
+  /// Error(unsupported) if the table exceeds a limit of the driver.
   static PlacedModels make(const gl::FunctionsPtr& gl, const gl::Limits& limits, std::vector<scene::Model> models,
                            ModelDataPtr data, const PlacedModels* last);
   void bind(const gl::Functions& gl) const;
@@ -72,8 +73,8 @@ class PlacedModels {
   [[nodiscard]] const light::SceneLights& lights() const { return table_.lights; }
   [[nodiscard]] const scene::ModelTable& table() const { return table_; }
   [[nodiscard]] const std::vector<scene::Model>& models() const { return models_; }
-  /// The same where what paths keep means the same: a number of a triangle the same one, however it is posed and
-  /// wherever it stands, and of rich ones a word the same material.
+  /// Identity that stays the same while paths in flight stay valid. Triangle numbers must then mean the same triangles;
+  /// poses and transforms may differ. With extended materials, word offsets must mean the same materials.
   [[nodiscard]] std::shared_ptr<const void> numbering() const { return numbering_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
@@ -81,7 +82,8 @@ class PlacedModels {
   ModelDataPtr data_;
   std::vector<scene::Model> models_;
   scene::ModelTable table_;
-  using Numbering = std::vector<std::pair<surface::ScenePtr, std::uint32_t>>;  // of each record, which mesh of which
+  // scene and first triangle of the mesh of each record
+  using Numbering = std::vector<std::pair<surface::ScenePtr, std::uint32_t>>;
   std::shared_ptr<const Numbering> numbering_;
   core::CmSurfaceTables tables_{};
   gl::Object records_;

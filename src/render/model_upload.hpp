@@ -8,30 +8,30 @@
 
 namespace cumulet::render {
 
-/// What comes of surfaces on the GPU: for paths, and for the surface pass.
+/// Selects the GPU data of surfaces to make: for paths, for the surface pass, or both.
 enum class ModelParts { paths, raster, both };
 
-/// Brings posed surfaces to GL piece by piece, beside what is shown until then. All calls need the context current and
-/// a StateGuard around.
+/// Uploads posed surfaces in steps, while the previous ones are still shown. All calls need a current context and an
+/// active StateGuard.
 class ModelUpload {
  public:
-  /// What is shared with the last of each, which may be null and empty, is taken from there. Throws Error(unsupported)
-  /// for what paths need; allocates nothing yet.
+  /// Allocates nothing yet. last_data, last_raster: previous data, which may be null or empty; equal parts are shared.
+  /// Throws Error(unsupported) if the path data exceed a limit of the driver.
   ModelUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits, gl::WordHeap& heap,
               ModelData::Sources sources, ModelParts parts, const ModelDataPtr& last_data, RasterContents last_raster);
-  /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl,
-  /// unsupported): then nothing is to be had, unless done().
+  /// Works until the deadline, but at least one step. Returns whether all is done. Throws Error(out_of_memory, gl,
+  /// unsupported); then nothing can be taken, unless done().
   bool advance(Deadline deadline);
-  /// Whether all is there, or all but a raster that could not be made.
+  /// True if all is done, or all but raster data that failed.
   [[nodiscard]] bool done() const { return paths_.done() && !raster_due_; }
   [[nodiscard]] double progress() const {
-    const double raster = raster_planned_ ? raster_.progress() : 0.0;  // once paths have theirs
+    const double raster = raster_planned_ ? raster_.progress() : 0.0;  // planned when the path data are done
     return 0.5 * (paths_.progress() + (raster_due_ ? raster : 1.0));
   }
 
-  /// Once it is done; null where that was not asked for.
+  /// Returns the path data; null if they were not requested. Call it once after done().
   ModelDataPtr take_data() { return std::move(data_); }
-  /// Likewise; of each source, in their order; none where it failed.
+  /// Returns the raster data of each source, in their order; empty if they failed. Call it once after done().
   RasterContents take_raster() { return std::move(contents_); }
 
  private:
@@ -44,7 +44,7 @@ class ModelUpload {
   RasterContents last_raster_;
   ModelDataPtr data_;
   RasterContents contents_;
-  Upload paths_;  // its steps use the above
+  Upload paths_;  // its steps use the members above
   Upload raster_;
   bool raster_due_;
   bool raster_planned_ = false;

@@ -15,22 +15,23 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Seen to begin and end as closely as this, the clock tells what a dispatch took.
+// If the begin and the end were observed this closely, the clock gives the time of a dispatch.
 constexpr double close_ms = 0.3;
-// Should a driver show its marks no earlier than a fence tells.
+// Fallback for drivers that show marks no earlier than fences.
 constexpr double patience_ms = 200.0;
-// More than this no two dispatches tell.
+// Maximum growth of the estimate by two dispatches.
 constexpr double most_growth = 4.0;
-// The dearest rounds take about three times as long as the cheapest in which all lanes march; more is others' doing.
+// The most expensive rounds take about three times as long as the cheapest in which all lanes traverse cells. Longer
+// times are caused by other processes.
 constexpr double spread = 4.0;
 constexpr double free_spread = 1.5;
-constexpr double forgetting = 1.005;  // the scene may have become dearer
-// Loading and storing paths shall cost little beside running them.
+constexpr double forgetting = 1.005;  // the scene may have become more expensive
+// Loading and storing paths must cost little compared with running them.
 constexpr double worthwhile_rounds = 8.0;
-constexpr std::uint32_t first_rounds = 4;  // while nothing is known of what they cost
+constexpr std::uint32_t first_rounds = 4;  // while their cost is unknown
 
-// Blocks of which so many dispatches are under way, until those chosen are likely to take longer than the aim. Returns
-// what a round of them takes, if that is known.
+// Adds blocks that have this many dispatches in flight, until the dispatch is likely to take longer than its aim.
+// Returns the estimated time of one round, if it is known.
 std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std::uint32_t under_way, bool free,
                                     Dispatched& what) {
   std::optional<double> round_ms;
@@ -55,7 +56,8 @@ std::optional<Dispatched> choose_for(const Blocks& blocks, std::size_t from, con
   Dispatched what;
   what.cost = cost;
   what.aim_ms = aim_ms;
-  // Those of which nothing is under way; if there are none, those of which it may be too little.
+  // Blocks without dispatches in flight are chosen first. If there are none, blocks with one are, whose dispatch may be
+  // too small.
   auto round_ms = choose_blocks(blocks, from, 0, least, what);
   if (what.blocks.empty()) round_ms = choose_blocks(blocks, from, 1, least, what);
   if (what.blocks.empty() || (!least && round_ms.value_or(least_ms) > aim_ms)) return std::nullopt;
@@ -81,8 +83,8 @@ std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from, c
 
 void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds) {
   if (!what.cost) return;
-  // What the lanes did in full rounds, of all that they could have done: lanes that end early, or meet nothing, cost
-  // less and tell little of others.
+  // Fraction of the possible rounds that the lanes ran. Lanes that end early, or hit nothing, cost less and say little
+  // about the cost of others.
   const double high =
       full_rounds > 0.0 ? ms.value_or(at_most_ms) * what.lanes / full_rounds : std::numeric_limits<double>::infinity();
   what.cost->learn(what.slots, ms ? *ms / what.rounds : 0.0, high);
@@ -118,8 +120,8 @@ void RoundCost::learn(double slots, double low_ms, double high_ms) {
       own = {slots, high_ms, high_ms};
     }
   }
-  // Whatever was thought of others: these took as long as they did, unless the machine was interrupted. Twice in a row
-  // it was not.
+  // A minimum above the estimate raises all estimates, unless the machine was interrupted. Two in a row are not
+  // considered interruptions.
   const double ratio = before ? low_ms / *before : 0.0;
   const double sure = std::min(ratio, std::exchange(last_ratio_, ratio));
   if (!(sure > 1.0)) return;
@@ -183,7 +185,7 @@ void Flights::begin(Kind kind) {
     if (gl_->dispatches_in_call && flying_.empty()) next_.before = gl::Fence(gl_);
     leave(Mark::begun);
     if (timers_ && !gl_->dispatches_in_call) {
-      // For this dispatch alone: contexts do not share queries.
+      // The queries are created per dispatch, because contexts do not share queries.
       gl_->CreateQueries(GL_TIMESTAMP, 2, queries_.data());
       if (queries_[0] != 0) gl_->QueryCounter(queries_[0], GL_TIMESTAMP);
     }

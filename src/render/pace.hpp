@@ -15,132 +15,135 @@
 
 namespace cumulet::render {
 
-/// What a round costs, by how much is under way in it: an upper estimate that errs on the safe side where it has to
-/// guess. More at once take longer, but no longer than in proportion.
+/// Estimates the time of one round (one step of every lane) as a function of the number of lanes. The estimate is an
+/// upper bound. More lanes take longer, but at most in proportion.
 class RoundCost {
  public:
-  /// What one round of that many slots takes at most, in ms; nothing while nothing is known. free: on a machine that
-  /// does nothing else: for the least that a frame does, which shall not shrink because others are busy.
+  /// Returns the estimated maximum time of one round of this many slots, in ms; nullopt if nothing is known. free:
+  /// estimate for an otherwise idle machine. It is used for the minimum work per frame, which must not shrink because
+  /// other processes are busy.
   [[nodiscard]] std::optional<double> most(double slots, bool free = false) const;
-  /// A round of that many took between low and high; the first is not believed: drivers compile in it.
+  /// Records that a round of this many slots took between low_ms and high_ms. The first call is ignored, because
+  /// drivers compile in it.
   void learn(double slots, double low_ms, double high_ms);
 
  private:
   struct Known {
     double slots = 0.0;
     double ms = 0.0;
-    double best = 0.0;  // lately
+    double best = 0.0;  // recent minimum
   };
-  std::array<Known, 32> known_;  // by the logarithm of slots
+  std::array<Known, 32> known_;  // indexed by log2 of slots
   bool warm_ = false;
-  double last_ratio_ = 0.0;  // of the last dispatch, what it took at least to what was thought to be most
+  double last_ratio_ = 0.0;  // of the last dispatch: its minimum time over the estimated maximum
 };
 
-/// The part of a budget that is kept back while the host's own work shares the cores with ours, so that nineteen of
-/// twenty calls end within it, nearly: what the system gives to which is not known before. Follows that quantile by
-/// stochastic approximation (Robbins and Monro 1951).
-/// Calls that are later than any reserve could make good teach nothing.
+/// Fraction of a time budget to hold back, so that about 95 % of the calls end within the budget. The host's own work
+/// shares the cores, and the scheduler's decisions are not known in advance. Follows that quantile by stochastic
+/// approximation (Robbins and Monro 1951). Calls that exceed the budget by more than any reserve could cover are
+/// ignored.
 class Reserve {
  public:
   [[nodiscard]] double of(double budget_ms) const { return part_ * budget_ms; }
-  /// What a call with that budget took.
+  /// Records the time of a call with that budget.
   void learn(double budget_ms, double taken_ms);
 
  private:
   double part_ = 0.0;
 };
 
-/// Some of the lanes that sample a tile's pixels in one pass.
+/// A block of the lanes that sample a tile's pixels in one pass.
 struct Block {
-  std::uint32_t unfinished = 0;  // have a pixel, as far as is known: no more have
-  std::uint32_t empty = 0;       // of those: one without a sample
-  std::uint32_t under_way = 0;   // dispatches
+  std::uint32_t unfinished = 0;  // upper bound of the lanes that have a pixel
+  std::uint32_t empty = 0;       // lanes of these whose pixel has no sample
+  std::uint32_t under_way = 0;   // dispatches in flight
   bool begins = true;
-  std::uint32_t turn = 0;  // CM_TURN of glsl/path_blocks.glsl
+  std::uint32_t turn = 0;  // list index: CM_TURN of glsl/path_blocks.glsl
 };
 using Blocks = std::vector<Block>;
 
-/// Sums over the pixels that have two samples: what the noise of all of them is made of.
+/// Sums over all pixels that have two samples, from which the noise is computed.
 struct ErrorSums {
-  double squared = 0.0;     // standard errors of their luminances, squared
+  double squared = 0.0;     // squared standard errors of luminance
   double brightness = 0.0;  // luminances
   double pixels = 0.0;
 
   ErrorSums& operator+=(const ErrorSums& other);
-  /// Root of the mean squared standard error over the mean luminance; 0 of black. Nothing where it is unknown: of no
-  /// pixels, and where a sum is not finite.
+  /// Returns the root mean square standard error over the mean luminance; 0 for black. Returns nullopt if there are no
+  /// pixels or a sum is not finite.
   [[nodiscard]] std::optional<double> noise() const;
 };
 
-/// Of a square of pixels, those with two samples: ErrorSums, of even and of odd rows apart where they are squared.
+/// ErrorSums of one adaptive-sampling block, over its pixels with two samples. The squared errors of even and odd rows
+/// are separate.
 struct SquareError {
   std::array<double, 2> squared{};
   double brightness = 0.0;
   double pixels = 0.0;
 };
-/// A tile's, row by row; empty until they are known.
+/// Blocks of a tile, row by row; empty until they are known.
 using SquareErrors = std::vector<SquareError>;
 
-/// Samples that are known to be finished, and those of them whose light was not finite, which count as black.
+/// Samples that are known to be finished, and those among them with nonfinite radiance, which count as black.
 struct SampleCount {
   std::uint64_t finished = 0;
   std::uint64_t not_finite = 0;
 };
 
-/// What was dispatched, and what it was thought to take.
+/// A dispatch, and its estimated cost.
 struct Dispatched {
-  std::shared_ptr<Blocks> tile;          // that it is of
-  std::shared_ptr<SquareErrors> errors;  // of the tile, which it finds, and no samples
+  std::shared_ptr<Blocks> tile;          // the tile's blocks
+  std::shared_ptr<SquareErrors> errors;  // set if the dispatch measures the tile's error and takes no samples
   std::shared_ptr<SampleCount> samples;  // of the picture
-  std::shared_ptr<RowRevisions> rows;    // likewise
+  std::shared_ptr<RowRevisions> rows;    // of the picture
   std::uint32_t first_row = 0;           // of the tile, in the picture
-  std::uint64_t revision = 0;            // the picture's, with it
+  std::uint64_t revision = 0;            // of the picture, with this dispatch
   std::vector<std::uint32_t> blocks;
   std::uint32_t rounds = 1;
-  double lanes = 0.0;  // that had something to do
-  double slots = 0.0;  // vectors of them
+  double lanes = 0.0;  // lanes that had work
+  double slots = 0.0;  // groups of lanes_a_slot lanes
   std::shared_ptr<RoundCost> cost;
   double aim_ms = 0.0;
   double most_ms = 0.0;
 };
 
-/// Lanes that cost what one of them costs, at least: a slot.
+/// A slot: this many lanes cost about as much as one.
 constexpr double lanes_a_slot = 8.0;
-/// What a frame may take of the device whatever its budget, so that there is progress.
+/// Minimum GPU time per frame for any budget, so that there is progress.
 constexpr double least_ms = 1.0;
-/// What a dispatch may take at most: well under any driver's watchdog, well over its own cost.
+/// Maximum time of a dispatch: well below any driver's watchdog, well above its overhead.
 constexpr double dispatch_ms = 500.0;
-/// Of the time left, that a dispatch may likely take.
+/// Fraction of the remaining time that a dispatch may be estimated to take.
 constexpr double part_of_rest = 0.9;
 
-/// What to dispatch of a tile's blocks, from that one on: as many as are worth a dispatch of aim_ms, and as many rounds
-/// of them, but no more than most_rounds. Nothing if it is likely to take longer.
+/// Chooses blocks of a tile, from block `from` on, and the number of rounds (at most most_rounds) for a dispatch of
+/// aim_ms. Returns nullopt if one round would take longer.
 [[nodiscard]] std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from,
                                                const std::shared_ptr<RoundCost>& cost, double aim_ms,
                                                std::uint32_t most_rounds);
-/// The same for an aim of least_ms, and at least a round of a block, whatever that takes.
+/// Chooses a dispatch of least_ms, with at least one round of one block even if that takes longer.
 [[nodiscard]] std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from,
                                                      const std::shared_ptr<RoundCost>& cost, std::uint32_t most_rounds);
-/// What a dispatch that is over tells of its cost. ms: on the device, if that is known; full_rounds: how often its
-/// lanes marched, all of them together.
+/// Updates the cost estimate with a finished dispatch. ms: GPU time, if known; at_most_ms: its upper bound.
+/// full_rounds: number of rounds that all lanes together traversed cells in.
 void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds);
 
-/// A dispatch that is over, for tests and tuning.
+/// A finished dispatch, for tests and tuning.
 struct DispatchRecord {
   double aim_ms = 0.0;
-  double ms = 0.0;  // on the device, whatever else was queued
+  double ms = 0.0;  // GPU time, without other queued work
   std::uint32_t lanes = 0;
-  std::uint32_t alive = 0;  // of these, as far as was known
+  std::uint32_t alive = 0;  // lanes with a pixel, as far as was known
   std::uint32_t rounds = 0;
-  bool known = false;  // not the first of its kind
+  bool known = false;  // false for the first of its kind
 };
 
-/// The dispatches under way: what each has to tell, and how long it took on the device, whatever else the host has
-/// queued there. Nothing waits but finish(). A driver that runs dispatches within the call has none under way.
+/// In-flight dispatches: reads back their results, and measures their time on the device without other work that the
+/// host has queued. Only finish() waits. If a driver runs dispatches within the call, none are in flight.
 class Flights {
  public:
   static constexpr std::size_t most = 3;
-  static constexpr std::size_t most_words = 16384;  // uvec4, that a dispatch tells: one a square of a tile
+  static constexpr std::size_t most_words = 16384;  // maximum result size in uvec4: one per block of a tile
 
   explicit Flights(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
@@ -148,26 +151,27 @@ class Flights {
   struct Landed {
     Dispatched what;
     std::vector<glm::uvec4> words;
-    /// On the device. Without: no more than at_most_ms, with all that the host had queued.
+    /// GPU time. nullopt: unknown, but no more than at_most_ms, which includes all that the host had queued.
     std::optional<double> ms;
     double at_most_ms = 0.0;
   };
 
-  /// Around a dispatch; at most `most` of them may be under way. words of the buffer are kept as they are then.
+  /// Call begin() before and end() after a dispatch; at most `most` may be in flight. end() copies the first `words`
+  /// uvec4 of the buffer.
   void begin(Kind kind);
   void end(Dispatched what, GLuint buffer, std::size_t words);
-  /// Instead of end(): nothing came of it.
+  /// Call it instead of end() if the dispatch failed.
   void give_up();
-  /// The oldest, if it is over. Never waits.
+  /// Returns the oldest dispatch if it is finished. Never waits.
   std::optional<Landed> land();
-  /// Waits until all are over; land() gives them.
+  /// Waits until all are finished; land() returns them.
   void finish() const;
-  /// What this context does from now on comes after them, whichever made them.
+  /// Makes later commands of this context run after the dispatches, whichever context sent them.
   void order() const;
 
   [[nodiscard]] bool empty() const { return flying_.empty(); }
   [[nodiscard]] bool full() const { return flying_.size() >= most; }
-  /// Milliseconds that those under way will likely take.
+  /// Estimated time of the in-flight dispatches, in milliseconds.
   [[nodiscard]] double expected_ms() const;
 
  private:
@@ -180,17 +184,18 @@ class Flights {
     gl::Fence before;
     gl::Fence after;
     Clock::time_point sent;
-    Clock::time_point asked;                 // last, about the fence
-    Clock::time_point looked;                // last seen under way
-    std::optional<Clock::time_point> began;  // when those before it were seen to be over, if that is known closely
-    bool waits = true;                       // for those before it, as far as is known
+    Clock::time_point asked;                 // when the fence was queried last
+    Clock::time_point looked;                // when it was last seen unfinished
+    std::optional<Clock::time_point> began;  // when its predecessors were seen to be finished, if that is known closely
+    bool waits = true;                       // for its predecessors, as far as is known
     bool timed = false;
-    bool in_call = false;  // over when its call returns
+    bool in_call = false;  // finished when its call returns
     std::optional<double> in_call_ms;
   };
-  // What a flight has of the ring: its words, two times, and two marks that the device leaves as it comes to it and as
-  // it is through: zink waits for what the host has queued when it is asked for a fence. (Drivers that dispatch within
-  // the call leave marks at once, too, whatever is queued; there fences tell.)
+  // Layout of a slot of the ring: the results, two timestamps, and two marks. The device writes the marks when it
+  // reaches and when it finishes the dispatch. Marks are polled because zink waits for all work of the host when a
+  // fence is queried. (Drivers that run dispatches within the call also write marks at once, before queued work; fences
+  // are used there.)
   static constexpr std::size_t times_bytes = 16;
   static constexpr std::size_t place_bytes = most_words * 16 + times_bytes + 16;
   enum class Mark : std::size_t { begun = 0, over = 1 };
@@ -208,22 +213,22 @@ class Flights {
   gl::FunctionsPtr gl_;
   gl::ReadBack ring_;
   std::size_t next_place_ = 0;
-  std::uint32_t serial_ = 0;  // of the newest: what its marks say
+  std::uint32_t serial_ = 0;  // of the newest; the value of its marks
   std::deque<Flight> flying_;
   std::array<GLuint, 2> queries_{};
   Flight next_;
-  bool timers_ = true;   // tell the truth
-  double likely_ = 0.5;  // of what a dispatch takes at most
+  bool timers_ = true;   // timestamp queries work
+  double likely_ = 0.5;  // mean actual time over the estimated maximum
 };
 
-/// While there is nothing to do but to wait for the device: no call into GL waits.
+/// Sleeps briefly while there is nothing to do but wait for the device. No GL call waits.
 void pass_time();
 
-/// What a dispatch of rows that has landed tells of its cost, if it has one.
+/// Updates the cost estimate, if there is one, with a finished dispatch of rows.
 void learn_rows(const Flights::Landed& landed);
-/// Sends rows, from row on, of what is a round for each of its pixels, until all are sent or about the deadline; what
-/// follows in GL comes after them. send gets the first row and the one after the last, and dispatches them; collect
-/// takes up what has landed, and teaches cost.
+/// Dispatches the remaining rows, from `row` on, until all are sent or about the deadline. Each pixel costs one round.
+/// Later GL commands run after them. send: receives the first row and the end of a range, and dispatches it. collect:
+/// takes finished dispatches and updates the cost.
 void send_rows(Flights& flights, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size, std::uint32_t& row,
                std::chrono::steady_clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
                const std::function<void()>& collect);

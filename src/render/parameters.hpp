@@ -4,7 +4,7 @@
 
 namespace cumulet::render {
 
-/// What a picture shall show, of the block: the rest follows from what it is made of, and from how.
+/// The part of the parameter block that the caller sets. The rest follows from the data and settings of the picture.
 struct PictureParameters {
   core::CmView view{};
   core::CmSpace space{};
@@ -16,7 +16,7 @@ struct PictureParameters {
   core::CmGround ground{};
   core::CmIntegrator integrator{};
   core::CmShutter shutter{};
-  bool equiangular = false;  // lamps are looked for from points that flights have passed, too
+  bool equiangular = false;  // NEE samples lights from points on the ray, too (equiangular sampling)
   bool operator==(const PictureParameters&) const = default;
 };
 

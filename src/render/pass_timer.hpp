@@ -7,7 +7,7 @@
 
 namespace cumulet::render {
 
-/// Seconds on the device that passes took, as far as they are known by now.
+/// GPU time of passes in seconds, as far as it is known.
 struct PassSeconds {
   double upload = 0.0;
   double host_depth = 0.0;
@@ -17,12 +17,12 @@ struct PassSeconds {
   double display = 0.0;
 };
 
-/// Times a pass as Flights times dispatches: without waiting, each time that not too many are under way.
+/// Times passes on the GPU as Flights times dispatches, without waiting. A pass is not timed if too many are in flight.
 class PassTimer {
  public:
   explicit PassTimer(gl::FunctionsPtr gl) : flights_(std::move(gl)) {}
 
-  /// Runs the pass. Throws what it throws, and once Error(out_of_memory) where there is no memory for its times.
+  /// Runs the pass. Throws its errors, and once Error(out_of_memory) if there is no memory for timing.
   template <class Pass>
   void run(Pass&& pass) {
     while (const auto landed = flights_.land()) seconds_ += 1e-3 * landed->ms.value_or(0.0);
@@ -32,7 +32,7 @@ class PassTimer {
     }
     try {
       flights_.begin(Flights::Kind::dispatch);
-    } catch (const Error&) {  // no memory for the times: that is told once, and the pass may have what it needs
+    } catch (const Error&) {  // no memory for timing: reported once, so that the pass can use the memory
       times_ = false;
       pass();
       throw;
@@ -45,7 +45,7 @@ class PassTimer {
       ~End() {
         try {
           flights.end({}, 0, 0);
-        } catch (const std::exception&) {  // no memory to know of it: nothing is told of this one
+        } catch (const std::exception&) {  // no memory to record the pass: it is not timed
           flights.finish();
         }
       }

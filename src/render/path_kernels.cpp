@@ -17,20 +17,20 @@ namespace cumulet::render {
 
 namespace {
 
-// visits: of paths among several volumes; within: of what they are within, which lies behind that in any case; groups:
-// of lights, which lie behind both.
+// visits: state of paths among several volumes. within: the transmissive materials that contain the ray, stored behind
+// the visits in any case. groups: of lights; stored behind both.
 constexpr std::size_t lane_bytes(bool visits, bool within, std::uint32_t groups) {
   const bool both = groups > 0;
   return std::size_t{16} * (CM_PATH_QUADS + (visits || within || both ? CM_VISIT_QUADS : 0) +
                             (within || both ? CM_WITHIN_QUADS : 0) + groups);
 }
 
-// A head is what glDispatchComputeIndirect reads, and how many paths wait.
+// A head holds the arguments of glDispatchComputeIndirect and the number of waiting paths.
 constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MOST_ROUNDS + 1) * head_bytes;
-constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // a lane
+constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // per lane
 
-// cm_next_place and what follows it, behind cm_total and cm_blocks.
+// Offsets of cm_next_place and the fields after it, behind cm_total and cm_blocks.
 constexpr std::size_t next_place_at = (1 + CM_MOST_BLOCKS) * sizeof(glm::uvec4);
 constexpr std::size_t squares_at = next_place_at + sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_at = squares_at + CM_MOST_SQUARES * sizeof(std::uint32_t);
@@ -43,7 +43,7 @@ constexpr std::size_t blocks_bytes(std::size_t lanes) {
 
 bool PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
   bool kept = true;
-  const std::size_t ranked_lanes = stages ? 0 : lanes;  // stages have queues
+  const std::size_t ranked_lanes = stages ? 0 : lanes;  // stages use queues instead
   if (!blocks_ || ranked_lanes > ranked_lanes_) {
     kept = false;
     blocks_ = {};

@@ -10,7 +10,7 @@
 
 namespace cumulet::render {
 
-/// Programs that trace paths among triangles, each the paths that wait for it: glsl/path_queue.glsl.
+/// Wavefront programs for paths among triangles. Each processes the paths in its queue: glsl/path_queue.glsl.
 struct StagePrograms {
   const gl::Program* begin = nullptr;  // trace_camera.comp over all pixels of a dispatch
   const gl::Program* travel = nullptr;
@@ -19,8 +19,8 @@ struct StagePrograms {
   const gl::Program* camera = nullptr;
 };
 
-/// What kernels of paths keep between dispatches, and how a dispatch is run: as one kernel, or as several over queues.
-/// All calls need the context current and a StateGuard around.
+/// Buffers that path kernels keep between dispatches, and the dispatch itself: one kernel (megakernel), or several over
+/// queues (wavefront). All calls need a current context and an active StateGuard.
 class PathKernels {
  public:
   static constexpr std::uint32_t block_lanes = CM_BLOCK_LANES;
@@ -29,23 +29,24 @@ class PathKernels {
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Makes room for so many paths, with queues if they are to be run by stages, with what paths among several
-  /// volumes keep of their visits, with what they keep of the glass that they are within, and with sums of so many
-  /// groups of lights. Returns whether paths that were under way still are. Throws on a GL error.
+  /// Allocates buffers for this many paths. stages: with queues for the wavefront stages. visits: with the state of
+  /// paths among several volumes. within: with the transmissive materials that contain the ray. groups: with sums of
+  /// this many light groups. Returns whether the in-flight paths were kept. Throws on a GL error.
   bool reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
-  /// Binds all that reserve made.
+  /// Binds all buffers that reserve() made.
   void bind() const;
-  /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
+  /// The buffer of counters: the blocks that a dispatch covers, and its results (CmBlocks of glsl/path_store.glsl).
   [[nodiscard]] GLuint counters() const { return blocks_.name(); }
   void set_counters(std::span<const glm::uvec4> words) const;
-  /// The list of a tile's squares that are sampled (CM_SQUARE_ROWS of glsl/path_blocks.glsl); no place of theirs is
-  /// taken but those that so many lanes begin with. All blocks begin, with their first turn.
+  /// Sets the list of a tile's sampled blocks (CM_SQUARE_ROWS of glsl/path_blocks.glsl). Sets the next free pixel slot
+  /// to `lanes`, because the lanes start with the first ones. Clears the lane lists, so that all blocks start with
+  /// their first.
   void set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const;
-  /// One kernel over so many blocks of so many lanes; its program is in use.
+  /// Runs the megakernel over this many blocks of lanes; its program must be in use.
   void run_one(std::uint32_t lanes, std::size_t blocks) const;
-  /// Rounds of stages over them.
+  /// Runs rounds of the wavefront stages over the blocks.
   void run_stages(const StagePrograms& programs, std::uint32_t lanes, std::size_t blocks, std::uint32_t rounds) const;
-  /// Rounds that run_stages does at most.
+  /// Maximum rounds of run_stages().
   static std::uint32_t most_rounds();
   [[nodiscard]] std::uint64_t bytes() const;
 

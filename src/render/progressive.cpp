@@ -13,20 +13,20 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t coarsest_divisor = 16;
-// Of a coarse picture.
+// Maximum samples per pixel of a coarse picture.
 constexpr std::uint32_t preview_samples = 16;
-// The last few of a coarse picture's samples are those of the longest paths: nobody waits for them.
+// The last few samples of a coarse picture have the longest paths. The next picture does not wait for them.
 constexpr double nearly_all = 0.9;
-// For the surface pass at full resolution: eight layers at 1080p.
+// Memory for the surface pass at full resolution: eight layers at 1080p.
 constexpr double most_layer_bytes = 256e6;
-// Frames that the first answer to a change may take.
+// Frames that the first picture after a change may take.
 constexpr double answer_frames = 2.0;
-// A pixel, for a filter: more would take longer than samples that say as much.
+// Feature rays per pixel that the denoiser starts with. More would take longer than samples of equal benefit.
 constexpr std::uint32_t first_guide_rays = 4;
 using State = Schedule::State;
 using Clock = std::chrono::steady_clock;
 
-// What is known of pictures before a filtered one helps where its samples are others: in each view they are.
+// Returns a seed per view: the denoiser's history helps only if its samples are independent of the current ones.
 std::uint32_t seed_of(const PictureParameters& parameters) {
   const core::CmView& view = parameters.view;
   std::uint32_t hash = parameters.integrator.seed;
@@ -66,7 +66,7 @@ bool PictureWish::Content::shows_same(const Content& other) const {
 std::uint32_t Progressive::enough(std::uint32_t divisor) const {
   const std::uint32_t wanted = wish_.content.view == View::shaded ? wish_.samples : 1;
   if (divisor <= finest_) return wanted;
-  // A quarter of the samples of one a pixel at full resolution.
+  // A quarter of the work of one sample per pixel at full resolution.
   const std::uint32_t affordable = divisor / finest_ * (divisor / finest_) / 4;
   return std::clamp(std::min(affordable, preview_samples), 1U, wanted);
 }
@@ -98,7 +98,7 @@ std::uint32_t Progressive::coarsest(double budget_ms) const {
 
 Picture& Progressive::acquire(glm::uvec2 size) {
   const auto is_free = [this](const auto& picture) { return picture.get() != shown() && picture.get() != before(); };
-  // The one under way, if it is not shown: it is to be given up.
+  // This includes the picture being rendered if it is not shown, because it is replaced.
   for (const auto& picture : pictures_) {
     if (is_free(picture) && picture->size() == size) return *picture;
   }
@@ -154,7 +154,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
                         const PictureSettings& settings) {
   PictureParameters parameters = wish_.parameters;
   parameters.view.size = size_of(divisor);
-  // Without previews what is read depends on the settings alone.
+  // Without previews the read-back result must depend only on the settings.
   if (wish_.guides && wish_.content.preview) parameters.integrator.seed = seed_of(parameters);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
@@ -189,7 +189,7 @@ bool Progressive::needs_depth() const {
 
 std::uint32_t Progressive::guide_rays(const Work& work) const {
   const Picture& picture = *work.picture;
-  // They take less time than samples so.
+  // The factor keeps the time for feature rays below that for samples.
   const bool rough = work.divisor > finest_ || !picture.has_facts();
   const std::uint64_t more = rough ? 0 : 2 * picture.samples_a_pixel();
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guide_rays + more, most_fact_rays));
@@ -207,7 +207,7 @@ void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles,
     if (!tracer_.able_to_find(*working_->picture, data, obstacles)) return;
     tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays(*working_));
   } catch (const Error& error) {
-    // Nor where a driver does not build their program.
+    // Pictures are also shown without guides if the driver does not build their program.
     if (error.code() != ErrorCode::out_of_memory && error.code() != ErrorCode::gl) throw;
     no_guides_for_ = working_->picture->size();
     no_guides_ = error;
@@ -224,8 +224,8 @@ void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
     if (!wish.content.shows_same(last)) ++scenes_;
     const bool other_data = resized || wish.content.data != last.data;
     if (other_data) finest_ = 1;
-    // Paths of the old data lead nowhere in the new.
-    // So do paths on another scene's triangles, and its program reads what one environment has and another has not.
+    // In-flight paths are invalid for other data or for another scene's triangles. The program in use may read an
+    // environment that does not exist any more.
     const bool other_scene =
         working_ && (scene_met(obstacles) != working_->scene || wish.content.environment != working_->environment);
     if (other_data || wish.content.preview != last.preview || other_scene) {
@@ -259,7 +259,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
         first_divisor_ = coarsest(budget_ms);
         const PictureSettings first = settings(first_divisor_, obstacles, budget_ms, rests);
         const bool ready = able(data, obstacles, first);
-        // The driver may be at the others meanwhile.
+        // The driver can compile the programs of the final picture meanwhile.
         if (first_divisor_ > finest_) able(data, obstacles, settings(finest_, obstacles, budget_ms, true));
         if (!ready) return;
         start(first_divisor_, data, obstacles, first);
@@ -271,7 +271,8 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
         start(divisor, data, obstacles, finer);
       }
       work(data, obstacles, deadline);
-      // What is due now is drawn after the answer to the wish before it has been shown, and of the newest wish then.
+      // In state `due`, the loop ends so that the previous request's picture is shown first. The next one is started
+      // for the newest request.
     } while (state() != State::done && state() != State::due && Clock::now() < deadline);
   } catch (const Error& error) {
     working_.reset();

@@ -16,10 +16,10 @@
 
 namespace cumulet::render {
 
-/// What a picture shall show.
+/// A request for a picture.
 struct PictureWish {
-  /// What samples depend on: where it changes, a picture is begun anew. Values are the newest there are; what comes to
-  /// GL by and by is known by its revision there.
+  /// Inputs that samples depend on: if any changes, a new picture is started. Values are the newest ones. Data that are
+  /// uploaded over several frames are identified by the revision that is on the GPU.
   struct Content {
     scene::Part<std::optional<scene::Viewpoint>> viewpoint;
     scene::Part<scene::Previous> previous;
@@ -28,7 +28,7 @@ struct PictureWish {
     scene::Part<light::Surroundings> surroundings;
     scene::Part<light::Lamps> lamps;
     scene::Part<std::optional<scene::Ground>> ground;
-    std::vector<scene::Volume> volumes;  // without sources and frames: what is there of them is data
+    std::vector<scene::Volume> volumes;  // without sources and frames: `data` identifies the uploaded ones
     Revision<MarchData> data;
     Revision<InstanceData> instances;
     Revision<ModelData> model;
@@ -36,114 +36,119 @@ struct PictureWish {
     Revision<HostDepth> host_depth;
     Revision<gl::Programs> programs;
     core::CmIntegrator integrator{};
-    glm::uvec2 size{0U};  // full resolution
-    Region region;        // that is made of it
+    glm::uvec2 size{0U};  // at full resolution
+    Region region;        // render region
     View view = View::shaded;
-    bool surfaces_traced = true;     // paths meet triangles
-    bool preview = true;             // coarse first; else at full resolution only
-    bool volume_alone = false;       // at full resolution, sum what met the volume first apart as well
-    std::uint32_t light_groups = 0;  // likewise, the radiance of so many groups of lights
+    bool surfaces_traced = true;     // paths hit triangles
+    bool preview = true;             // coarse pictures first; else only at full resolution
+    bool volume_alone = false;       // at full resolution, samples that hit the volume first are also summed separately
+    std::uint32_t light_groups = 0;  // at full resolution, number of light groups with separate sums
     bool stops_by_noise = false;     // there is a noise target
-    bool adaptive = false;           // and samples go where there is most noise
+    bool adaptive = false;           // adaptive sampling
     bool operator==(const Content&) const = default;
-    /// Whether but the view, the host's depth and how pictures are made are the same.
+    /// True if only the view, the host's depth or the settings of rendering differ.
     [[nodiscard]] bool shows_same(const Content& other) const;
   };
   Content content;
   PictureParameters parameters;        // of the content, at full resolution
-  scene::SequenceFrames frames;        // that the data are of
-  std::uint32_t samples = 1;           // a pixel
-  std::optional<double> noise_target;  // at full resolution: enough, whatever the samples
-  bool depth = false;                  // find the volume's depth at half opacity as well
-  bool guides = false;                 // and facts of pixels, for a filter
-  bool held = false;                   // a hand is at what changes it: another change is likely
+  scene::SequenceFrames frames;        // frames that the data belong to
+  std::uint32_t samples = 1;           // samples per pixel
+  std::optional<double> noise_target;  // at full resolution: the picture is done at this noise, even with fewer samples
+  bool depth = false;                  // compute the volume's depth at half opacity as well
+  bool guides = false;                 // render feature buffers for the denoiser as well
+  bool held = false;                   // the user is dragging: another change is likely
 };
 
-/// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
-/// of a frame, then ones of twice the resolution, then the full one, which goes on to its target samples. Each coarse
-/// one is shown as soon as it is whole and goes on to a few samples a pixel, at most a quarter of what a sample a pixel
-/// of the full one takes: so it is worth looking at while the next, which takes longer, is made. As long as
-/// wishes change faster than a coarse picture takes, each is finished before the newest wish is taken up. Once they
-/// rest, one over a coarse surface pass is given up for one over a pass of full size, which those after it share. All
-/// calls need the context current and a StateGuard around.
+/// Progressive refinement. Keeps the newest complete picture to show while the next is rendered. After a change, a
+/// coarse picture that fits the frame time comes first. Pictures of twice the resolution each follow. The full one is
+/// last, and continues to its target samples.
+/// Each coarse picture is shown as soon as it is complete. It then continues to a few samples per pixel, so that it has
+/// little noise while the next is rendered. These samples take at most a quarter of the work of one sample per pixel at
+/// full resolution.
+/// If requests change faster than a coarse picture takes, each is finished before the newest request is processed. Once
+/// requests do not change any more, a picture over a coarse surface pass is replaced. The new one has a full-size
+/// surface pass, which later pictures share. All calls need a current context and an active StateGuard.
 class Progressive {
  public:
-  /// Layers of the surface pass, and their size, for pictures that are to be there soon. At rest never coarser than the
-  /// picture, else (in motion) than half of it: most of what a coarser one would cost is the vertices.
+  /// Returns size and layer count of the surface pass for pictures that must appear soon. rests: the request has not
+  /// changed for a while; the pass then has full size, otherwise at least half of it. Coarser passes would save little,
+  /// because most of their cost is vertex processing.
   static PictureSettings quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms, bool rests);
 
   Progressive(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : tracer_(std::move(gl), std::move(programs)) {}
 
-  /// Works on the wish until about the deadline. Throws once where a picture cannot be made, and goes on with what
-  /// there is, or coarser, later.
+  /// Processes the request until about the deadline. If a picture cannot be made, throws once. Later calls continue
+  /// with the existing picture, or a coarser one.
   void advance(const PictureWish& wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                double budget_ms);
-  /// Forgets all pictures.
+  /// Deletes all pictures.
   void reset();
 
-  /// The newest whole picture; null before the first.
+  /// The newest complete picture; null before the first.
   [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
-  /// The same for all pictures of what was wished when it was begun.
+  /// Number of the request for which the shown picture was started.
   [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
-  /// Of sequences, the frames that it shows.
+  /// Frames of sequences that the shown picture shows.
   [[nodiscard]] scene::SequenceFrames shown_frames() const { return shown_ ? shown_->frames : scene::SequenceFrames(); }
-  /// The same for all pictures of the same scene, from wherever.
+  /// Number of the scene of the shown picture; equal for all pictures of the same scene from any view.
   [[nodiscard]] std::uint64_t shown_scene() const { return shown_ ? shown_->scenes : 0; }
-  /// What was shown before, where that may have pixels without a sample; else null.
+  /// The picture shown before, if the shown one may have pixels without a sample; else null.
   [[nodiscard]] const Picture* before() const { return shown_ && shown_->picture->has_holes() ? before_ : nullptr; }
-  /// Waits for what is under way, so that what is read back is all there is.
+  /// Waits for dispatches in flight, so that a read-back is complete.
   void settle();
-  /// What is to be read back: without preview the picture under way.
+  /// The picture to read back: the shown one, or without previews the one being rendered.
   [[nodiscard]] Picture* newest() { return newest_work() ? newest_work()->picture : nullptr; }
-  /// The picture under way where nothing but its samples makes it: a shaded one at full resolution, without previews.
-  /// Throws Error(invalid_argument) where there is none.
+  /// Returns the picture being rendered if only its samples decide its content: a shaded one at full resolution,
+  /// without previews. Throws Error(invalid_argument) if there is none.
   [[nodiscard]] Picture& accumulating();
-  /// That goes on from what Tracer::save gave. Throws Error(invalid_argument) likewise, and for what is not of it.
+  /// Restores the state that Tracer::save() wrote into accumulating(). Throws Error(invalid_argument) if there is no
+  /// such picture or the data do not match it.
   void restore(std::span<const std::byte> saved);
-  /// Whether that is of these data, where they stand now.
+  /// True if newest() was started with these data and instance transforms.
   [[nodiscard]] bool newest_is_of(Revision<MarchData> data, Revision<InstanceData> instances) const {
     return newest_work() && newest_work()->data == data && newest_work()->instances == instances;
   }
-  /// Whether it is of the view, and of where things were before it, that the scene has now.
+  /// True if newest() has the scene's current view and previous-frame state.
   [[nodiscard]] bool newest_is_seen_as(const scene::Snapshot& scene) const {
     return newest_work() && newest_work()->wish == wishes_ && wish_.content.viewpoint == scene.view &&
            wish_.content.previous == scene.previous;
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
-  /// Whether pictures may come coarse first, and need not be the same whatever was before.
+  /// True if coarse pictures may come first, so that the result may depend on earlier pictures.
   [[nodiscard]] bool previews() const { return wish_.content.preview; }
   [[nodiscard]] bool converged() const;
-  /// Whether no picture of the wish is shown yet, but one is to come.
+  /// True if no picture of the request has been shown yet, but one will be.
   [[nodiscard]] bool owes_picture() const;
-  /// Whether advance has anything left to do.
+  /// True if advance() has work left.
   [[nodiscard]] bool more() const;
-  /// Part of the work on the wish that is done, 0 to 1: never less than before, as long as the wish is the same.
+  /// Fraction of the request's work that is done, 0 to 1. It does not decrease while the request is the same.
   [[nodiscard]] double progress() const;
   [[nodiscard]] Tracer& tracer() { return tracer_; }
   [[nodiscard]] const Tracer& tracer() const { return tracer_; }
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Seconds spent on the picture at full resolution.
+  /// Time spent on the picture at full resolution, in seconds.
   [[nodiscard]] double trace_seconds() const { return trace_seconds_; }
 
  private:
-  // Samples a pixel of a picture with that divisor that take it to the next.
+  // Returns the samples per pixel at which a picture with this divisor gives way to the next.
   [[nodiscard]] std::uint32_t enough(std::uint32_t divisor) const;
   [[nodiscard]] glm::uvec2 size_of(std::uint32_t divisor) const;
-  // That are made of a picture with that divisor; and how many beyond the region, for those that are enlarged.
+  // Number of pixels that are rendered with this divisor. margin_of(): extra pixels around the region, for pictures
+  // that are enlarged.
   [[nodiscard]] double pixels_of(std::uint32_t divisor) const;
   [[nodiscard]] unsigned margin_of(std::uint32_t divisor) const;
   [[nodiscard]] bool is_enough() const;
-  // A picture, and what it is of.
+  // A picture with the inputs that it was started with.
   struct Work {
     Picture* picture = nullptr;
     Revision<MarchData> data;
     Revision<InstanceData> instances;
     std::uint32_t divisor = 1;              // of the resolution
-    std::shared_ptr<const void> scene;      // PlacedModels::numbering() of the triangles that its paths meet
-    Revision<EnvironmentData> environment;  // that they escape to
+    std::shared_ptr<const void> scene;      // PlacedModels::numbering() of the triangles that its paths hit
+    Revision<EnvironmentData> environment;  // hit by paths that escape
     scene::SequenceFrames frames;
-    std::uint64_t wish = 0;    // that it is of
-    std::uint64_t scenes = 0;  // that there had been
+    std::uint64_t wish = 0;    // number of its request
+    std::uint64_t scenes = 0;  // number of its scene
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
     return wish_.content.preview || !working_ ? shown_ : working_;
@@ -151,23 +156,25 @@ class Progressive {
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
   [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Obstacles& obstacles, double budget_ms,
                                          bool still) const;
-  // Whether what is under way is over a coarser surface pass than what rests shall be.
+  // True if the picture being rendered uses a coarser surface pass than pictures at rest do.
   [[nodiscard]] bool blurs() const;
-  // Whether start() can begin; until then there is what there was.
+  // Returns whether start() can begin. Until then the previous picture is shown.
   bool able(const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;
-  // Rays that guides are of by now: the more samples a picture has, the more can be lost by guides that are rough.
+  // Returns the number of feature rays that the picture's guides should have now. It grows with the samples, because
+  // rough guides then lose more detail.
   [[nodiscard]] std::uint32_t guide_rays(const Work& work) const;
   [[nodiscard]] bool needs_guides(const Work& work) const;
-  // Finds them, where it is time: before samples, so that the first are filtered as soon as they are shown.
+  // Renders the guides if they are due: before the samples, so that the first samples are denoised as soon as they are
+  // shown.
   void find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline);
-  // What of the work under way is still of use for this wish.
+  // Accepts a request, and decides whether the picture being rendered can be kept for it.
   void take(const PictureWish& wish, const Obstacles& obstacles);
-  // Goes on with what is under way, and shows it once it is whole.
+  // Continues the picture being rendered, and shows it once it is complete.
   void work(const MarchData& data, const Obstacles& obstacles, Deadline deadline);
-  // Tells the schedule how far what is under way has come.
+  // Updates the schedule with the state of the picture being rendered.
   void follow();
 
   Tracer tracer_;
@@ -175,18 +182,18 @@ class Progressive {
   PictureWish wish_;
   std::uint64_t wishes_ = 0;
   std::uint64_t scenes_ = 0;
-  std::optional<glm::uvec2> no_guides_for_;  // of this size
-  std::optional<Error> no_guides_;           // to be told
+  std::optional<glm::uvec2> no_guides_for_;  // size of pictures without memory for guides
+  std::optional<Error> no_guides_;           // error to be thrown by advance()
   Schedule schedule_;
   Stillness stillness_;
   std::optional<Work> working_;
   std::optional<Work> shown_;
   Picture* before_ = nullptr;
-  std::uint32_t first_divisor_ = 1;  // of the wish
+  std::uint32_t first_divisor_ = 1;  // of the request
   std::uint32_t finest_ = 1;         // finer ones do not fit the driver's memory
   double trace_seconds_ = 0.0;
-  double answer_seconds_ = 0.0;  // that the picture under way took until it was complete
-  double answer_rate_ = 100.0;   // pixels a millisecond, until complete
+  double answer_seconds_ = 0.0;  // time that the picture being rendered took until it was complete
+  double answer_rate_ = 100.0;   // pixels per millisecond, until complete
 };
 
 }  // namespace cumulet::render

@@ -7,7 +7,7 @@
 
 namespace cumulet::render {
 
-/// Pixels of a picture, first pixel top left.
+/// A rectangle of a picture's pixels, counted from the top left.
 struct PixelBox {
   glm::uvec2 first{0U};
   glm::uvec2 size{0U};
@@ -18,18 +18,21 @@ struct PixelBox {
   }
 };
 
-/// A part of a picture, in fractions of it from its upper left corner; an extent of 0 reaches to its end.
+/// Render region (crop window): a part of a picture, in fractions of it from the upper left corner. An extent of 0
+/// reaches to the end.
 struct Region {
   glm::vec2 corner{0.0F};
   glm::vec2 extent{0.0F};
   bool operator==(const Region&) const = default;
 
   [[nodiscard]] bool is_whole() const { return *this == Region{}; }
-  /// Those of a picture of this size, not 0, whose middles it holds, and `margin` more to each side; one at least.
+  /// Returns the pixels whose centers the region contains, at least one, plus `margin` pixels on each side. size: of
+  /// the picture, not 0.
   [[nodiscard]] PixelBox pixels(glm::uvec2 size, std::uint32_t margin = 0) const {
     PixelBox box;
     for (int axis = 0; axis < 2; ++axis) {
-      // An edge of two regions falls between the same two middles for both, whatever floats make of where it is.
+      // The tolerance makes an edge shared by two regions fall between the same two centers for both, even with
+      // rounding of floats.
       constexpr double rounding = 2e-3;  // pixels
       const auto before = [&](double edge) {
         const double middles = std::ceil(edge * size[axis] - 0.5 - rounding);

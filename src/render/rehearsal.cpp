@@ -7,10 +7,10 @@ namespace cumulet::render {
 
 namespace {
 
-// Pixels along an edge: enough for a picture of each kind. Drivers may compile anew for textures whose edges are powers
-// of two, where others are not.
+// Returns an edge length that is enough for a picture of each kind. Drivers may compile separate variants for textures
+// whose edges are powers of two, so that property is kept.
 std::uint32_t edge_like(std::uint32_t edge) { return std::has_single_bit(edge) ? 16 : 24; }
-// A budget that pictures of this size begin at their eighth by.
+// With this budget, pictures of this size start at an eighth of the resolution.
 constexpr double coarse_ms = 0.05;
 
 }  // namespace
@@ -19,11 +19,12 @@ bool Rehearsal::advance(PictureWish wish, const MarchData& data, const Obstacles
                         const std::function<void(const Picture&)>& draw) {
   const glm::uvec2 size = wish.content.size;
   wish.content.size = wish.parameters.view.size = {edge_like(size.x), edge_like(size.y)};
-  wish.samples = wish.noise_target ? Picture::first_measured + 1 : 1;  // with a look at the noise
+  wish.samples = wish.noise_target ? Picture::first_measured + 1 : 1;  // enough that the noise is measured
   wish.held = false;
   const auto now = [] { return std::chrono::steady_clock::now(); };
   do {
-    progressive_.advance(wish, data, obstacles, now(), coarse_ms);  // a picture at a time, so that each is drawn
+    // The deadline is now, so that one picture is made at a time and each is drawn.
+    progressive_.advance(wish, data, obstacles, now(), coarse_ms);
     if (progressive_.shown() != nullptr) draw(*progressive_.shown());
     if (!progressive_.more() && !lags_) {
       if (!std::exchange(picked_, true)) tracer().pick(data, wish.parameters, obstacles, glm::uvec2(0U));
@@ -43,7 +44,7 @@ void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarge
   const glm::ivec4 same(0, 0, glm::ivec2(picture.size));
   for (const bool holes : {false, true}) {
     picture.holes = holes;
-    if (holes) ++picture.picture;  // one that follows, where a filter remembers
+    if (holes) ++picture.picture;  // a later picture, for the denoiser's history
     for (const glm::ivec4& viewport : {whole, same}) {
       target.viewport = viewport;
       compositor_.draw(picture, display, target);

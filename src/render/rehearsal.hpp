@@ -8,26 +8,26 @@
 
 namespace cumulet::render {
 
-/// A picture of few pixels, made as the frames' pictures are and drawn where nothing can be seen: afterwards each
-/// program that these reach was used once, so that the driver has nothing to compile for them any more. All calls need
-/// the context current and a StateGuard around.
+/// Shader warm-up: renders a picture of few pixels as frames do, and draws it invisibly. Afterwards each program that
+/// frames need has been used once, so that the driver has nothing left to compile. All calls need a current context and
+/// an active StateGuard.
 class Rehearsal {
  public:
   Rehearsal(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(gl), progressive_(gl, programs), compositor_(std::move(gl), std::move(programs)) {}
 
-  /// Works on it until about the deadline, one program at least. draw is told each picture, to call draw() with it.
-  /// Returns whether all is done.
+  /// Continues until about the deadline, but uses at least one program. draw: is called with each picture, and must
+  /// call draw() for it. Returns whether all is done.
   bool advance(PictureWish wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                const std::function<void(const Picture&)>& draw);
-  /// Whether something could not be drawn since begin(), the driver being at its program.
+  /// True if something could not be drawn since begin() because a program was still compiling.
   [[nodiscard]] bool lags() const { return lags_; }
-  /// A call of the host's.
+  /// Call it at the start of each call of the host.
   void begin() { lags_ = false; }
-  /// What frames draw before there is a picture.
+  /// The picture that frames draw before there is one.
   [[nodiscard]] Picture& empty() { return empty_; }
   [[nodiscard]] Tracer& tracer() { return progressive_.tracer(); }
-  /// Draws nothing, with all programs that drawing such a picture may need.
+  /// Draws invisibly with all programs that drawing such a picture may need.
   void draw(PictureTextures picture, const Display& display, FrameTarget target);
 
  private:

@@ -9,26 +9,27 @@
 
 namespace cumulet::render {
 
-/// A run of rows, from the first up to one that is not of it.
+/// A range of rows; `end` is excluded.
 struct RowRange {
   std::uint32_t first = 0;
   std::uint32_t end = 0;
   bool operator==(const RowRange&) const = default;
 };
 
-/// At which of a picture's revisions its rows changed last, for bands of rows from the top.
+/// The revision at which rows of a picture changed last, per band of rows from the top.
 class RowRevisions {
  public:
   static constexpr std::uint32_t band_rows = CM_BAND_ROWS;
 
-  /// All of so many rows changed at this revision.
+  /// Marks all rows as changed at this revision. rows: of the picture.
   void change_all(std::uint32_t rows, std::uint64_t revision) {
     rows_ = rows;
     bands_.assign((rows + band_rows - 1) / band_rows, revision);
   }
-  /// What a dispatch over a tile whose first row is that one will change is not known yet.
+  /// Registers a dispatch whose changes are not known yet.
   void expect() { ++under_way_; }
-  /// It is known: the tile's bands of which low and high have a bit, at the dispatch's revision.
+  /// Registers the result of a dispatch at its revision. first_row: of its tile; low, high: one bit per band of the
+  /// tile that changed.
   void change(std::uint32_t first_row, std::uint32_t low, std::uint32_t high, std::uint64_t revision) {
     --under_way_;
     const std::uint64_t bits = std::uint64_t{high} << 32U | low;
@@ -41,9 +42,9 @@ class RowRevisions {
       }
     }
   }
-  /// Whether they are all known.
+  /// True if the changes of all dispatches are known.
   [[nodiscard]] bool known() const { return under_way_ == 0; }
-  /// The rows that changed after a revision, and so many beside them.
+  /// Returns the rows that changed after a revision, each range widened by `beside` rows.
   [[nodiscard]] std::vector<RowRange> since(std::uint64_t revision, std::uint32_t beside = 0) const {
     std::vector<RowRange> ranges;
     for (std::uint32_t i = 0; i < bands_.size(); ++i) {

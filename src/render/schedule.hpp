@@ -4,7 +4,8 @@
 
 namespace cumulet::render {
 
-/// Where the work on a wish stands. No GL and no clock: what happens is told, and what is to be done follows.
+/// State machine of the work on a request. It has no GL and no clock: events are methods, and the caller acts on the
+/// state.
 ///
 ///     state      | a change           | begun     | complete | finished | extended | dropped | failed
 ///     idle       | due                |           |          |          |          |         |
@@ -15,31 +16,33 @@ namespace cumulet::render {
 ///     done       | due                |           |          |          | refining | due     | failed
 ///     failed     | due                |           |          |          |          |         | failed
 ///
-/// What has no entry leaves the state as it is.
+/// An event without an entry leaves the state unchanged.
 class Schedule {
  public:
   enum class State {
-    idle,       // nothing is wished
-    due,        // no picture of the wish is under way: one is to be begun
-    answering,  // the first one is, and has pixels without a sample
-    overtaken,  // such a one is of an older wish, and finished first: else, as wishes go on changing, none ever were
-    refining,   // more samples, then finer pictures
-    done,       // all that was wished is there
-    failed,     // it cannot be made; until the wish changes
+    idle,       // there is no request
+    due,        // no picture of the request has been started: start one
+    answering,  // the first picture is being rendered, and has pixels without a sample
+    // the first picture is of an older request, and is finished first: otherwise none would be while requests keep
+    // changing
+    overtaken,
+    refining,  // more samples, then finer pictures
+    done,      // everything requested is done
+    failed,    // it cannot be made, until the request changes
   };
   [[nodiscard]] State state() const { return state_; }
 
-  /// The wish is another. finish_answer: a first picture that is under way is still worth to be shown.
+  /// The request changed. finish_answer: a first picture in progress is still worth showing.
   void change(bool finish_answer);
-  /// The first picture of the wish is under way.
+  /// The first picture of the request has been started.
   void begin();
-  /// Every pixel of the picture under way has a sample.
+  /// Every pixel of the current picture has a sample.
   void complete();
-  /// The picture under way is the finest, and has all its samples.
+  /// The current picture is the finest, and has all its samples.
   void finish();
-  /// It shall have more.
+  /// The current picture needs more samples.
   void extend();
-  /// What is under way is of no use.
+  /// The current picture is not usable.
   void drop();
   void fail();
   void reset() { state_ = State::idle; }
@@ -48,13 +51,14 @@ class Schedule {
   State state_ = State::idle;
 };
 
-/// Tells a wish that rests from one that is about to change again.
+/// Detects whether a request has come to rest or is about to change again.
 class Stillness {
  public:
   using Clock = std::chrono::steady_clock;
-  /// At each look at the wish. held: a hand is at what changes it.
+  /// Call it whenever the request is read. held: the user is dragging.
   void see(bool changed, bool held, Clock::time_point now);
-  /// Since it last changed some time has passed, longer where a hand may hold still; or the hand has let go.
+  /// True if some time has passed since the last change, a longer time while the user is dragging; or if the user has
+  /// released.
   [[nodiscard]] bool rests(Clock::time_point now) const;
 
  private:

@@ -29,7 +29,8 @@ using core::CmMaterial;
 using core::CmSurfaceView;
 using surface::AlphaMode;
 
-/// World, from the eye, to picture coordinates x z, y z (orthographic: x, y) and view depth z.
+/// Returns the matrix from world, relative to the eye, to picture coordinates x z, y z (orthographic: x, y) and view
+/// depth z.
 glm::dmat3 to_view(const SurfaceView& view) {
   const glm::dmat3 basis(view.right, view.up, view.forward);
   const glm::dmat3 inverse = glm::inverse(basis);
@@ -41,7 +42,8 @@ glm::dmat3 to_view(const SurfaceView& view) {
   return inverse;
 }
 
-/// Clip-space depth x + y z for depths from 1, near, to 0, far (perspective: at infinity), of what the bounds hold.
+/// Returns the coefficients (x, y) of clip-space depth x + y z for content in the bounds. The depth is 1 at the near
+/// plane and 0 at the far one (perspective: at infinity).
 glm::dvec2 depth_of(const SurfaceView& view, const glm::dmat3& matrix, const glm::dvec3& low, const glm::dvec3& high) {
   double nearest = std::numeric_limits<double>::infinity();
   double farthest = -nearest;
@@ -51,7 +53,8 @@ glm::dvec2 depth_of(const SurfaceView& view, const glm::dmat3& matrix, const glm
     farthest = std::max(farthest, z);
   }
   const double extent = std::max(glm::length(high - low), 1e-12);
-  // Reversed floats resolve all depths alike, so that perspective's near plane may be anywhere in front of the scene.
+  // Reversed floating-point depth has the same relative precision everywhere, so the near plane of a perspective may be
+  // anywhere in front of the scene.
   if (!view.orthographic) return {nearest > 0.0 ? std::max(0.5 * nearest, 1e-30) : 1e-7 * extent, 0.0};
   const double margin = 0.01 * extent;
   const double near = std::max(0.0, nearest - margin);
@@ -98,7 +101,7 @@ struct Bounds {
   glm::dvec3 high;
 };
 
-// Of what is drawn.
+// Bounds of the drawn items.
 std::optional<Bounds> bounds_of(std::span<const RasterItem> items) {
   std::optional<Bounds> all;
   for (const RasterItem& item : items) {
@@ -116,7 +119,7 @@ std::optional<Bounds> bounds_of(std::span<const RasterItem> items) {
 
 glm::vec2 surface_jitter(unsigned layer, unsigned layers) { return core::cm_layer_jitter(layer, layers); }
 
-// Adds the steps of a content to an upload.
+// Plans the upload steps of a content.
 class RasterContent::Planner {
  public:
   Planner(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const gl::Limits& limits, Upload& upload)
@@ -157,7 +160,7 @@ class RasterContent::Planner {
     to->bytes += source.material_blocks.size();
   }
 
-  /// A buffer of just these, made before the first of them is copied.
+  /// Adds a buffer of exactly these values, allocated by the first step.
   template <class T>
   void add_buffer(gl::Object& buffer, const std::vector<T>& values, const char* what) {
     const std::size_t bytes = values.size() * sizeof(T);
@@ -205,7 +208,8 @@ class RasterContent::Planner {
     return made;
   }
 
-  // What a material's program is compiled for: how it covers, bits of its maps, whether it has a coat.
+  // Returns the program key of a material: its alpha mode, bits of the maps that it uses, and whether it has a
+  // clearcoat.
   static gl::ProgramKey key_of(const scene::RasterSource::Material& material) {
     return {"surface.frag",
             {"CM_ALPHA " + std::to_string(static_cast<int>(material.pass)),
@@ -316,7 +320,7 @@ void SurfaceRaster::sort_blended(const SurfaceView& view) {
     double z;
     std::uint32_t shown;
     std::uint32_t place;
-    std::uint32_t number;  // of the content's blended
+    std::uint32_t number;  // index among the content's blended triangles
   };
   std::vector<Triangle> order;
   for (std::uint32_t i = 0; i < drawn_.size(); ++i) {
@@ -358,7 +362,7 @@ void SurfaceRaster::fill(gl::Object& buffer, std::size_t& size, const void* from
   if (bytes > 0) gl_->NamedBufferSubData(buffer.name(), 0, static_cast<GLsizeiptr>(bytes), from);
 }
 
-// Columns, and where their origin is from the eye: a sum of more digits than a float has.
+// An instance transform: its columns, and its origin relative to the eye as the sum of two floats, for precision.
 struct SurfaceRaster::PlaceRecord {
   glm::vec3 x;
   glm::vec3 y;
@@ -417,7 +421,7 @@ void SurfaceRaster::make_fixtures() {
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  // Around the horizon, and not beyond the poles.
+  // The texture wraps around the horizon, and is clamped at the poles.
   gloss_sampler_ = gl::make_sampler(gl_);
   gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -441,7 +445,7 @@ void SurfaceRaster::upload_gloss(const light::GlossPtr& gloss) {
   constexpr int levels = core::CM_GLOSS_LEVELS;
   if (!gloss_)
     gloss_ = gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
-  // Without one the shader does not look.
+  // Without gloss the shader does not read it.
   if (!gloss || uploaded_gloss_ == gloss) return;
   gl_->TextureSubImage3D(gloss_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT, gloss->data());
   uploaded_gloss_ = gloss;
@@ -471,7 +475,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   }
   light::Lamps of_host = lighting.lamps;
   for (light::Lamp& lamp : of_host) {
-    // Lit from its middle alone: there a wide sun's disc is brighter than on average.
+    // Only the center of the disk is used, and a wide sun's center is brighter than its mean.
     if (lamp.kind == light::Lamp::Kind::sun) lamp.angle = 0.0;
   }
   const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
@@ -485,13 +489,13 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, light_buffer_.name());
 }
 
-// What has been bound, and draws batches.
+// Draws batches, and skips redundant binds.
 class SurfaceRaster::Pen {
  public:
   Pen(const SurfaceRaster& raster, GLuint vertex_array, bool mirrored)
       : raster_(raster), gl_(*raster.gl_), array_(vertex_array), mirrored_(mirrored) {}
 
-  /// Batches of the content's own indices, each at all of its places.
+  /// Draws the batches of the content's own indices, each with all of its instance transforms.
   void solid(const Shown& shown) {
     const RasterContent& content = *shown.content;
     const std::vector<Batch>& batches = content.scene().solid;
@@ -501,7 +505,7 @@ class SurfaceRaster::Pen {
       const Places& places = shown.places_of(batch.draw);
       const std::uint8_t flipped = content.pose().flipped[batch.draw];
       const std::uint32_t material = material_of(content, batch);
-      // Copies of a mesh come one after the other: one call draws them all.
+      // Copies of a mesh are adjacent, so that one call draws them all.
       std::uint64_t count = batch.count;
       for (++b; b < batches.size(); ++b) {
         const Batch& next = batches[b];
@@ -518,7 +522,7 @@ class SurfaceRaster::Pen {
     }
   }
 
-  /// Of the sorted indices.
+  /// Draws a range of the sorted indices.
   void blended(const Blended& what) {
     const Shown& shown = raster_.drawn_[what.shown];
     take(*shown.content, raster_.sorted_indices_.name());
@@ -568,7 +572,7 @@ class SurfaceRaster::Pen {
       }
       material_ = &material;
     }
-    // The picture stands on its head in the target, which turns the winding round.
+    // The picture is upside down in the target, which reverses the winding.
     const bool flipped = (content.pose().flipped[batch.draw] != 0) != in_mirror;
     gl_.FrontFace(mirrored_ == flipped ? GL_CW : GL_CCW);
     const std::uintptr_t offset = std::uintptr_t{batch.first} * sizeof(std::uint32_t);
@@ -581,7 +585,7 @@ class SurfaceRaster::Pen {
   const SurfaceRaster& raster_;
   const gl::Functions& gl_;
   GLuint array_;
-  bool mirrored_;  // the picture
+  bool mirrored_;  // the picture is mirrored
   const RasterContent* content_ = nullptr;
   GLuint indices_ = 0;
   const gl::Program* program_ = nullptr;
@@ -639,7 +643,7 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   gl.Enable(GL_DEPTH_TEST);
   gl.DepthFunc(GL_GREATER);
   gl.CullFace(GL_BACK);
-  // Blended ones: colours over each other, and the nearest z.
+  // For blended surfaces: colors are blended over each other, and z is the nearest.
   gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
   gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   gl.BlendEquationSeparatei(1, GL_MIN, GL_MIN);

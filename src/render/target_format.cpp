@@ -11,14 +11,14 @@ namespace cumulet::render {
 
 namespace {
 
-// A framebuffer's attachment.
+// An attachment of a framebuffer.
 class Attachment {
  public:
   Attachment(const gl::Functions& gl, GLuint framebuffer, GLenum point)
       : gl_(gl), framebuffer_(framebuffer), point_(point), type_(get(GL_FRAMEBUFFER_ATTACHMENT_OBJECT_TYPE)) {}
 
   [[nodiscard]] bool is_there() const { return type_ != GL_NONE; }
-  // Nothing else is asked of what is not there: that would be a GL error.
+  // If there is no attachment, only its type may be queried: other queries are GL errors.
   [[nodiscard]] GLint get(GLenum name) const {
     GLint value = 0;
     gl_.GetNamedFramebufferAttachmentParameteriv(framebuffer_, point_, name, &value);
@@ -27,7 +27,7 @@ class Attachment {
   [[nodiscard]] bool is_layered() const {
     return type_ == GL_TEXTURE && get(GL_FRAMEBUFFER_ATTACHMENT_LAYERED) != GL_FALSE;
   }
-  // Width and height; the largest there are where GL does not say, as of a window.
+  // Returns width and height; the largest integers if GL does not report them, as for a window.
   [[nodiscard]] glm::ivec2 size() const {
     glm::ivec2 size(std::numeric_limits<GLint>::max());
     if (type_ != GL_TEXTURE && type_ != GL_RENDERBUFFER) return size;
@@ -55,7 +55,7 @@ class Attachment {
               "the target, framebuffer " + std::to_string(target.framebuffer) + ", " + cause);
 }
 
-// A default framebuffer's buffers have other names where they are asked for than where they are drawn to.
+// The default framebuffer's buffers have other names in queries than in glDrawBuffer.
 GLenum attachment_of(GLuint framebuffer, GLenum draw_buffer) {
   if (framebuffer != 0) return draw_buffer;
   switch (draw_buffer) {
@@ -81,7 +81,7 @@ void check_size(const FrameTarget& target, const Attachment& attachment, const c
                      text(wanted));
 }
 
-// Some drivers say of a window that it is linear while GL_FRAMEBUFFER_SRGB encodes for it; Mesa says what is so.
+// Some drivers report a window as linear although GL_FRAMEBUFFER_SRGB encodes for it. Mesa reports the actual encoding.
 bool tells_encoding(const gl::Functions& gl, const FrameTarget& target) {
   return target.framebuffer != 0 || gl::string_of(gl, GL_VERSION).find("Mesa") != std::string::npos;
 }

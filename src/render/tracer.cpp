@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::uint32_t tile_edge = 1024;
 constexpr std::uint32_t block_lanes = PathKernels::block_lanes;
-// Lanes at most. Of one kernel somewhat more than the largest GPU runs at once: the fewer there are, the more take the
-// next pixel. Of stages more: each of their kernels has some of them. Of a driver that runs them on the CPU few enough
-// for its caches.
+// Maximum number of lanes. The megakernel has somewhat more than the largest GPU runs at once: with fewer lanes, more
+// of them fetch another pixel when theirs is done. Wavefront stages have more, because each kernel processes only some
+// of them. Drivers that run dispatches on the CPU have few enough for its caches.
 constexpr std::uint32_t lanes_at_once = 128 * block_lanes;
 constexpr std::uint32_t lanes_of_stages = PathKernels::most_lanes;
 constexpr std::uint32_t lanes_in_call = 32 * block_lanes;
@@ -31,39 +31,40 @@ static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_
 static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
 static_assert(CM_MOST_SQUARES <= 1U << CM_SQUARE_ROWS);
 static_assert(tile_edge <= CM_BAND_ROWS * CM_BANDS);
-constexpr double hasty_rest = 0.03;  // of a tile's pixels
+constexpr double hasty_rest = 0.03;  // fraction of a tile's pixels
 static_assert(lanes_in_call > hasty_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
-// A shader of llvmpipe's ends its loops where it has gone around them 65,535 times, all of them together, and says
-// nothing. So these bound what one dispatch does: each round goes around some hundred times, and each ray some thousand
-// times, for mattes more often than for facts.
+// llvmpipe silently ends a shader's loops after 65,535 iterations in total. These constants bound the iterations of a
+// dispatch: a round takes some hundred iterations, and a ray some thousand. Cryptomatte rays take more than feature
+// rays.
 constexpr std::uint32_t most_rounds = 256;
 constexpr std::uint32_t facts_rays_at_once = 2;
 constexpr std::uint32_t matte_rays_at_once = 1;
-constexpr int matte_slices = 16;  // cryptomatte.comp's
+constexpr int matte_slices = 16;  // as in cryptomatte.comp
 static_assert(fact_rays % facts_rays_at_once == 0);
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t most_samples = 1U << 31U;
 constexpr double nearly_done = 0.99;
-constexpr std::uint32_t view_depth = 5;  // inspect.comp's
+constexpr std::uint32_t view_depth = 5;  // as in inspect.comp
 
 using Clock = std::chrono::steady_clock;
 
-// A step through n things that meets each once and lands far from the last: near n times the golden section, coprime
-// to n.
+// Returns a stride through n items that visits each once and jumps far from the last: near n times the golden ratio,
+// coprime to n.
 std::size_t far_step(std::size_t n) {
   auto step = std::max<std::size_t>(1, static_cast<std::size_t>(0.618 * static_cast<double>(n)));
   while (std::gcd(step, n) != 1) ++step;
   return step;
 }
 
-// Surfaces may be others than when a picture was begun, and lamps: poses and the host's depth change.
+// Sets the parameters that may have changed since the picture was started: poses of surfaces, lights, and the host's
+// depth.
 void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   parameters.host_depth = {obstacles.size, obstacles.depth != 0 ? obstacles.layers : 0};
   if (obstacles.scene != nullptr) parameters.surfaces = obstacles.scene->tables();
   parameters.lamps.count = obstacles.lamps_met();
 }
 
-// How a layer goes to and fro.
+// Pixel transfer format of a layer.
 struct Transfer {
   GLenum format;
   GLenum type;
@@ -109,13 +110,13 @@ double Picture::progress() const {
   if (view_ != View::shaded) return box_.size.y > 0 ? double(view_row_) / box_.size.y : 0.0;
   const double wanted = expected_samples_ - static_cast<double>(samples_before_);
   const double part = wanted > 0.0 ? static_cast<double>(samples() - samples_before_) / wanted : 0.0;
-  // Of noise nobody knows when it will be low enough.
+  // It is not known when the noise will be low enough.
   return progress_before_ + (1.0 - progress_before_) * std::min(noise_target_ ? nearly_done : 1.0, part);
 }
 
 namespace {
 
-// The next count of samples a pixel at which a picture with a noise target is looked at.
+// Returns the next number of samples per pixel at which a picture with a noise target is measured.
 std::uint32_t look_after(std::uint32_t samples) {
   double count = Picture::first_measured;
   while (std::round(count) <= double(samples) && count < double(most_samples)) count *= std::numbers::sqrt2;
@@ -127,10 +128,10 @@ std::uint32_t look_after(std::uint32_t samples) {
 std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   std::uint32_t next = samples;
   if (samples == 0 && hasty_) {
-    next = 1;  // the first picture comes at once
+    next = 1;  // the first image is shown at once
   } else if (!noise_target_) {
-    // Twice as many each time: waiting for slow pixels at a pass's end costs little. Where all have lanes there need be
-    // no passes: some go on with their next samples while others are at their first.
+    // The pass size doubles, so that waiting for slow pixels at a pass's end costs little. If each pixel has a lane,
+    // there is one pass: some lanes start their next samples while others are at their first.
     next = has_lanes_for_all() ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
   } else if (samples < first_measured) {
     next = has_lanes_for_all() ? first_measured : std::max(1U, 2 * samples);
@@ -146,7 +147,8 @@ bool Picture::has_lanes_for_all() const {
 }
 
 bool Picture::measures() const {
-  // The last pass as well: whether more samples would have been enough must not depend on when they are asked for.
+  // The last pass is measured, too. Whether more samples would have been enough must not depend on when they are
+  // requested.
   return noise_target_ && pass_target_ >= first_measured && look_after(pass_target_ - 1) == pass_target_;
 }
 
@@ -168,9 +170,9 @@ void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) 
   target_samples_ = std::max(target_samples_, samples);
   const bool reached = noise_target_ && noise_ && *noise_ <= *noise_target_;
   if (done_ ? reached || (pass_target_ >= target_samples_ && !retargeted) : !more && !retargeted) return;
-  // What was enough for another target is not.
+  // The sampler's decisions were for another target.
   if (retargeted) allotment_.begin(box_.size);
-  // Lanes that are done for good begin again; so do the others' present samples, with the same result.
+  // Lanes that are finished start again. The current samples of others start again as well, with the same result.
   if (done_ || retargeted || (has_lanes_for_all() && !noise_target_)) {
     tile_ = 0;
     errors_.clear();
@@ -191,8 +193,8 @@ void Picture::go_on_from(const Accumulated& told, std::optional<std::uint32_t> p
   progress_before_ = 0.0;
   samples_before_ = 0;
   expected_samples_ = allotment_.expected(target_samples_);
-  // The pass that was under way, for its end is where the noise is looked at: the first that ends with no fewer samples
-  // than the pixel with the fewest has. Where all have as many as it ends with, its end may not have been looked at.
+  // Finds the pass in progress, because the noise is measured at its end: the first pass whose target is at least the
+  // minimum sample count. If all pixels have exactly that many samples, its end may not have been measured.
   pass_target_ = pass.value_or(pass_after(0));
   const auto is_over = [&] {
     return !pass && (pass_target_ < told.least || (pass_target_ == told.least && told.most > told.least));
@@ -206,13 +208,13 @@ void Picture::go_on_from(const Accumulated& told, std::optional<std::uint32_t> p
 }
 
 void Picture::begin_tile() {
-  // What is under way tells the tile it is of, and no one asks that one.
+  // In-flight dispatches update the blocks that they were sent for, which are not read any more.
   blocks_ = std::make_shared<Blocks>();
   squares_.clear();
   tile_errors_.reset();
   block_ = 0;
   const glm::uvec2 squares = tile_squares();
-  std::vector<std::uint32_t> pixels;  // of each square that is sampled
+  std::vector<std::uint32_t> pixels;  // of each sampled block
   for (std::uint32_t y = 0; y < squares.y; ++y) {
     for (std::uint32_t x = 0; x < squares.x; ++x) {
       const glm::uvec2 square = first_square() + glm::uvec2(x, y);
@@ -224,18 +226,18 @@ void Picture::begin_tile() {
   }
   constexpr std::size_t squares_a_block = block_lanes / CM_SQUARE_PIXELS;
   const std::size_t begun = std::min(squares_.size(), std::size_t{lanes_ / CM_SQUARE_PIXELS});
-  const bool more = begun < squares_.size();  // than lanes: each finds one
+  const bool more = begun < squares_.size();  // than lanes: each lane starts with a pixel
   for (std::size_t first = 0; first < begun; first += squares_a_block) {
     const std::size_t end = std::min(begun, first + squares_a_block);
     const auto lanes = more ? static_cast<std::uint32_t>((end - first) * CM_SQUARE_PIXELS)
                             : std::accumulate(pixels.begin() + static_cast<std::ptrdiff_t>(first),
                                               pixels.begin() + static_cast<std::ptrdiff_t>(end), 0U);
-    // Not known of a pass that begins with holes until its blocks tell.
+    // If pixels may be unsampled, all are assumed to be, until the blocks report.
     blocks_->push_back({.unfinished = lanes, .empty = holes_ ? lanes : 0});
   }
 }
 
-// Whether the tile, the pass, the picture end with what is known.
+// Ends the tile, the pass and the picture if the known results allow it.
 void Picture::end_tile() {
   if (done_ || view_ != View::shaded) return;
   std::uint64_t unfinished = 0;
@@ -249,7 +251,7 @@ void Picture::end_tile() {
   const bool all_begun = has_lanes_for_all();
   if (all_begun && empty <= rest) complete_ = true;
   holes_ = all_begun ? empty > 0 : hasty_ && pass_ < 2;
-  // The last few of a hasty first pass are left to the next.
+  // With PictureSettings::hasty, the first pass leaves its last few pixels to the second.
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
   if (measures()) {
@@ -273,13 +275,13 @@ void Picture::end_pass() {
   ErrorSums error;
   for (const SquareError& square : errors_)
     error += {square.squared[0] + square.squared[1], square.brightness, square.pixels};
-  // Not where a noise target came in the middle of the pass: of some tiles only.
+  // If a noise target was set within the pass, only some tiles have been measured.
   if (measures() && error.pixels == static_cast<double>(box_.area())) {
     noise_ = error.noise();
     progress_before_ = progress();
     samples_before_ = samples();
-    // Of noise that falls with the root of the samples; a little more, for it is only likely so. Unknown noise reaches
-    // no target.
+    // The noise falls with the root of the samples; 5 % are added because it is an estimate. If the noise is unknown,
+    // no target is reached.
     const double ratio = noise_.value_or(std::numeric_limits<double>::infinity()) / *noise_target_;
     const double needed = 1.05 * ratio * ratio * pass_target_;
     const double each = needed < target_samples_ ? pass_after(static_cast<std::uint32_t>(needed)) : target_samples_;
@@ -315,7 +317,7 @@ void Tracer::add_medium(const Picture& picture, std::vector<std::string>& define
 }
 
 void Tracer::add_march(const Picture& picture, std::vector<std::string>& defines) {
-  // There are few variants of what moves: they know of holes.
+  // To limit the number of variants, those for motion include holdouts.
   if (picture.volume_holdout_ || picture.motion_) defines.emplace_back(holdout_macro);
   add_groups(picture, defines);
 }
@@ -333,7 +335,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
     add_march(picture, more);
     return program(data.defines(picture.several_, picture.motion_), "trace_travel.comp", more);
   }
-  // With groups of lights there are few variants: they know of layers and lamps that are not there.
+  // To limit the number of variants, those for light groups include layers and lights even if there are none.
   const bool groups = picture.light_groups_ > 0;
   std::vector<std::string> more;
   if (picture.layered_ != Layered::no || (groups && !picture.equiangular_)) more.emplace_back("CM_LAYERS 1");
@@ -404,8 +406,8 @@ void Tracer::find_programs(const Picture& picture, const MarchData& data, const 
 
 unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                            const PictureSettings& settings) {
-  // A preview's volume is lit by sun and sky alone, as its surfaces are, so that it comes at once; by what the scene
-  // has where there is no other light.
+  // To appear at once, the volume of a preview is lit only by sun and sky, as its surfaces are. If there is no such
+  // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
   const PlacedModels* met = settings.view == View::shaded && !preview ? obstacles.met() : nullptr;
@@ -431,8 +433,9 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.volume_alone_ = shaded && settings.volume_alone;
   picture.light_groups_ = shaded ? settings.light_groups : 0;
   if (picture.light_groups_ > 0 && picture.traced_ > 0) picture.traced_ = 2;
-  // What the volume alone has is told by what a path first met, and such light may lie before a surface; a layer's
-  // colour waits in the place of such a look's light, and a hole has none.
+  // Equiangular sampling is off in these cases. The separate volume AOV depends on the first hit of a path, but such
+  // light may lie before a surface. The color of a surface layer is stored in the same field as the light of such an
+  // NEE sample. A holdout has no light.
   picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ && !picture.rich_ &&
                          !picture.volume_holdout_ && !picture.model_holdout_ &&
                          (picture.traced_ > 0 || picture.layered_ == Layered::no);
@@ -517,7 +520,7 @@ std::uint64_t Tracer::bytes() const {
 }
 
 void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const PictureSettings& settings) {
-  // The surface pass leaves any state it likes; what comes after it in the frame counts on the known one.
+  // The surface pass changes GL state; later code in the frame relies on the known state.
   struct Known {
     const gl::Functions& gl;
     explicit Known(const gl::Functions& functions) : gl(functions) {}
@@ -707,7 +710,7 @@ void Tracer::collect() {
 }
 
 bool Tracer::layers_ready(Deadline deadline) {
-  if (!gl_->dispatches_in_call) return true;  // the device puts them in order
+  if (!gl_->dispatches_in_call) return true;  // the device orders them
   for (collect(); !rasters_.empty(); collect()) {
     if (Clock::now() >= deadline) return false;
     pass_time();
@@ -749,7 +752,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
   film.bind(*gl_, core::CM_IMAGE_BACKGROUND, film_layers::background, GL_READ_WRITE);
   film.bind(*gl_, core::CM_IMAGE_MOMENTS, film_layers::moments, GL_READ_WRITE);
-  // What is bound shall fit the format, though nothing writes it: inspect.comp has the depth there.
+  // The image bound must match the format even if nothing writes it: inspect.comp has the depth there.
   film.bind(*gl_, core::CM_IMAGE_VOLUME_SUM, picture.volume_alone_ ? film_layers::volume : film_layers::depth,
             GL_READ_WRITE);
   if (picture.light_groups_ > 0)
@@ -766,7 +769,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   std::optional<StagePrograms> stages;
   if (picture.traced_ > 0) stages = stage_programs(picture, data);
   until_complete = until_complete && !picture.complete_;
-  // What another picture's paths have taken the place of begins anew.
+  // Blocks whose paths were overwritten by another picture's start again.
   const auto begun = [](const Block& block) { return !block.begins; };
   if (paths_of_.lock() != picture.blocks_ && std::ranges::any_of(*picture.blocks_, begun)) picture.begin_tile();
   const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
@@ -794,7 +797,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
         continue;
       }
     }
-    // What is under way lasts until the deadline, or there is no time for more.
+    // The dispatches in flight last until the deadline, or there is no time for more.
     if (flights_.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) break;
     pass_time();
     collect();
@@ -829,15 +832,15 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
   describe(obstacles, parameters);
-  parameters.surfaces.rich = picture.rich_ ? 1U : 0U;  // as its paths have room
+  parameters.surfaces.rich = picture.rich_ ? 1U : 0U;  // as there is memory for in the paths
   parameters.dispatch.tile_corner = picture.tile_corner();
   parameters.dispatch.tile_size = extent;
   parameters.dispatch.rounds = what.rounds;
   parameters.dispatch.samples = picture.pass_target_;
   parameters.dispatch.lanes = picture.lanes_;
   parameters.dispatch.places = static_cast<std::uint32_t>(CM_SQUARE_PIXELS * picture.squares_.size());
-  // Blocks are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
-  // costly ones.
+  // Blocks are permuted with a large stride. If a driver gives each core a run of work groups, each core gets a
+  // fraction of the expensive ones.
   const std::size_t count = what.blocks.size();
   picture.block_ = (what.blocks.back() + 1) % picture.blocks_->size();
   std::vector<std::uint32_t> dealt(count);
@@ -953,14 +956,14 @@ bool Picture::has_facts() const { return film_.has(film_layers::normal); }
 bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                         std::uint32_t rays, PixelFacts facts) {
   using namespace film_layers;
-  // A reading that failed may have left more to find.
+  // A failed read may have requested more buffers.
   if (obstacles.motion == nullptr && !picture.film_.has(motion)) picture.facts_ = PixelFacts::guides;
   if (picture.facts_ < facts) {
     picture.facts_ = facts;
     picture.facts_row_ = picture.facts_rays_ = 0;
   }
   if (picture.facts_rays_ >= rays && picture.film_.has(normal)) return true;
-  // Of motion, which is told once, no more rays than were looked along then.
+  // Motion vectors need Obstacles::motion. Without it only guides are refined.
   const PixelFacts found = obstacles.motion != nullptr ? picture.facts_ : PixelFacts::guides;
   std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
   if (found == PixelFacts::all) written.insert(written.end(), {velocity, motion});
@@ -1040,7 +1043,7 @@ void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Ob
   std::fill_n(values, std::size_t{2} * ranks * picture.size_.x * picture.size_.y, 0.0F);
   const PixelBox& box = picture.box_;
   if (box.area() == 0) return;
-  // Of each pixel there are more than are asked for, so it is a few rows at a time.
+  // Each pixel holds more ranks than are requested, so a few rows are processed at a time.
   constexpr std::uint32_t rows_at_once = 64;
   const glm::uvec2 size(box.size.x, std::min(box.size.y, rows_at_once));
   const gl::Object mattes =
@@ -1167,25 +1170,25 @@ void Tracer::read_volume(const Picture& picture, float* rgba) const { read_means
 
 namespace {
 
-/// What stands before the layers that were saved.
+/// Header in front of the saved layers.
 struct SavedHeader {
   std::uint32_t what = 0x41434d43;  // "CMCA"
   std::uint32_t format = 2;
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::uint32_t layers = 0;
-  std::array<std::uint16_t, 4> box{};  // x, y, width and height of the pixels that are made
+  std::array<std::uint16_t, 4> box{};  // x, y, width and height of the region's pixels
   std::uint32_t spare = 0;
   bool operator==(const SavedHeader&) const = default;
 };
 static_assert(sizeof(SavedHeader) == 32);
 
-/// Behind them, of an adaptive picture; then what its allotment has to be kept.
+/// Follows the layers of an adaptive picture, in front of Allotment::saved().
 struct SavedPass {
   std::uint32_t target = 0;
 };
 
-/// Throws Error(invalid_argument) for what is none of a picture of so many samples.
+/// Throws Error(invalid_argument) if the pass does not fit a picture with that many samples.
 std::uint32_t saved_pass(std::span<const std::byte> saved, std::uint32_t target_samples) {
   SavedPass pass;
   std::memcpy(&pass, saved.data(), sizeof pass);

@@ -20,14 +20,14 @@ struct Axes {
   glm::dvec3 up;
 };
 
-// Right-angled to a unit vector and to each other.
+// Returns two unit vectors that are perpendicular to a unit vector and to each other.
 Axes axes_about(const glm::dvec3& forward) {
   const glm::dvec3 aside = std::abs(forward.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0);
   const glm::dvec3 right = glm::normalize(glm::cross(forward, aside));
   return {right, glm::cross(right, forward)};
 }
 
-// How far a point is from the box of these, and from its farthest corner.
+// Returns the distance of a point from the bounding box of the corners, and from the box's farthest corner.
 glm::dvec2 distances(const glm::dvec3& point, const std::vector<glm::dvec3>& corners) {
   glm::dvec3 low(corners.front());
   glm::dvec3 high(corners.front());
@@ -85,8 +85,8 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
       high = glm::max(high, seen(corner));
     }
     const glm::dvec3 middle = 0.5 * (low + high);
-    // The outermost texels are of rays that pass all by: beyond the map, where they are repeated, all light comes
-    // through.
+    // Rays of the outermost texels miss all volumes. Beyond the map, where these texels are repeated, the transmittance
+    // is 1.
     const double margin = 1.0 + 2.0 / (size - 1.0);
     const double least = 1e-6 * glm::length(high - low);
     const glm::dvec3 half = glm::max(0.5 * (high - low) * glm::dvec3(margin, margin, 1.0), glm::dvec3(least));
@@ -110,7 +110,7 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
   next.parameters.dispatch.tile_size = glm::uvec2(size);
   next.made = make(gl_, size, request.slices);
   if (view.orthographic) {
-    // Rows of texels go down, slices have their middles from near to far.
+    // Rows of texels go down. Slices are at texel centers, from near to far.
     const glm::dvec3 u = view.right / glm::dot(view.right, view.right) * 0.5;
     const glm::dvec3 v = view.up / glm::dot(view.up, view.up) * -0.5;
     const double inner = (request.slices - 1.0) / request.slices;
@@ -164,7 +164,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     under_way_.reset();
     return;
   }
-  if (whole) coarser_ = 0;  // it rests
+  if (whole) coarser_ = 0;  // the scene rests
   if (under_way_ && under_way_->of != of) {
     under_way_.reset();
     if (request.size >> coarser_ > least_size) ++coarser_;
@@ -177,7 +177,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     try {
       begin(of, snapshot, scene);
     } catch (const Error&) {
-      failed_ = std::move(of);  // told once
+      failed_ = std::move(of);  // the error is thrown once
       throw;
     }
   }

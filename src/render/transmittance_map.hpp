@@ -15,7 +15,7 @@
 
 namespace cumulet::render {
 
-/// Whose light a map is of: parallel, from that direction (unit), or from a point.
+/// The light of a map: parallel light from a unit direction, or a point light.
 struct MapLight {
   enum class Kind { parallel, point };
   Kind kind = Kind::parallel;
@@ -24,7 +24,7 @@ struct MapLight {
   bool operator==(const MapLight&) const = default;
 };
 
-/// In the world.
+/// A map to make; positions are in world space.
 struct MapRequest {
   MapLight light;
   std::uint32_t size = 256;   ///< texels of width and height
@@ -32,25 +32,26 @@ struct MapRequest {
   bool operator==(const MapRequest&) const = default;
 };
 
-/// What of a light comes through all volumes of a scene to points about them, as a 3D texture (glsl/transmittance.comp)
-/// of 2 bytes a texel. Made row by row, the last whole one being there meanwhile; of a scene that changes before one is
-/// whole, the next is coarser, and of one that rests finer again. Calls but those that tell need the context current
-/// and a StateGuard around.
+/// Transmittance of all volumes of a scene between a light and points around them, as a 3D texture
+/// (glsl/transmittance.comp) of 2 bytes per texel. It is rendered row by row, while the last complete map stays
+/// available. If the scene changes before a map is complete, the next is coarser; once the scene rests, it becomes
+/// finer again. All calls except queries need a current context and an active StateGuard.
 class TransmittanceMap {
  public:
   TransmittanceMap(gl::FunctionsPtr gl, gl::ProgramsPtr programs);
-  /// Goes on with it until about the deadline. Throws Error(out_of_memory, gl); what there was stays.
+  /// Continues the map until about the deadline. Throws Error(out_of_memory, gl) and keeps the previous map.
   void advance(const MapRequest& request, const scene::Snapshot& snapshot, GpuScene& scene, Deadline deadline);
 
-  /// The newest whole one; before the first, one texel through which all light comes. Never 0 after advance().
+  /// The newest complete map; before the first, one texel of transmittance 1. Never 0 after advance().
   [[nodiscard]] GLuint texture() const { return shown_.texture.name(); }
   [[nodiscard]] std::uint32_t size() const { return shown_.size; }
   [[nodiscard]] std::uint32_t slices() const { return shown_.slices; }
-  /// Of that one, affine: world to texture coordinates; of a point, to the direction from it, in world units.
+  /// Affine transform of that map. Parallel light: world to texture coordinates. Point light: world to the vector from
+  /// the light, in world units.
   [[nodiscard]] const glm::dmat4& to_map() const { return shown_.to_map; }
-  /// Of a point: how far from it the first and the last slice are; both 0 of parallel light.
+  /// Point light: distances of the first and last slice from it. Parallel light: both are 0.
   [[nodiscard]] glm::dvec2 range() const { return shown_.range; }
-  /// Whether that is of what was asked for last, as the scene then was, and in full.
+  /// True if that map fits the last request and the scene at that time, and has the full size.
   [[nodiscard]] bool is_newest() const { return newest_; }
   [[nodiscard]] std::uint64_t bytes() const;
 
@@ -62,10 +63,10 @@ class TransmittanceMap {
     glm::dmat4 to_map{1.0};
     glm::dvec2 range{0.0};
   };
-  // All that it depends on.
+  // All inputs of a map.
   struct Of {
     MapRequest request;
-    glm::dvec3 origin{0.0};  // of the snapshot's places
+    glm::dvec3 origin{0.0};  // of the snapshot's coordinates
     std::vector<scene::Volume> volumes;
     Revision<MarchData> data;
     Revision<InstanceData> instances;
@@ -79,7 +80,7 @@ class TransmittanceMap {
     std::uint32_t row = 0;
   };
   void begin(Of of, const scene::Snapshot& snapshot, GpuScene& scene);
-  // One texel through which all light comes.
+  // Shows one texel of transmittance 1.
   void show_clear();
   void collect();
   static Made make(const gl::FunctionsPtr& gl, std::uint32_t size, std::uint32_t slices);
@@ -92,8 +93,8 @@ class TransmittanceMap {
   Made shown_;
   std::optional<Of> shown_of_;
   std::optional<UnderWay> under_way_;
-  std::optional<Of> failed_;  // what last could not be begun
-  unsigned coarser_ = 0;      // by this power of two
+  std::optional<Of> failed_;  // inputs that could not be started last
+  unsigned coarser_ = 0;      // log2 of the divisor of the size
   bool newest_ = false;
 };
 

@@ -16,14 +16,14 @@ namespace cumulet::render {
 
 using Deadline = std::chrono::steady_clock::time_point;
 
-/// The way of anything large to GL: steps of about a millisecond each, as many at a time as fit before a deadline.
-/// All calls but those that plan need the context current and a StateGuard around.
+/// A sequence of GL work steps of about a millisecond each. As many run per call as fit before a deadline. All calls
+/// except those that plan need a current context and an active StateGuard.
 class Upload {
  public:
-  /// What a step copies at most, but for rows of images that are longer.
+  /// Maximum size of a copying step, except if one image row is longer.
   static constexpr std::size_t piece_bytes = std::size_t{2} << 20U;
 
-  /// A part of a texture: of one level and, if it is an array, of one layer.
+  /// A part of a texture: in one level and, for an array texture, one layer.
   struct Rectangle {
     glm::uvec2 corner{0U};
     glm::uvec2 size{0U};
@@ -31,37 +31,38 @@ class Upload {
     std::optional<int> layer;
   };
 
-  /// what: of errors of GL's, "uploading the volume".
+  /// what: prefix of GL error messages, such as "uploading the volume".
   Upload(gl::FunctionsPtr gl, const char* what) : gl_(std::move(gl)), what_(what) {}
   Upload(const Upload&) = delete;
   Upload& operator=(const Upload&) = delete;
 
-  // To plan; what the steps look at has to live until the last was made.
+  // These plan steps. Data that the steps read must live until the last step is done.
   void add(std::function<void()> step) {
     add_until([step = std::move(step)] {
       step();
       return true;
     });
   }
-  /// What is not done before it returns true, which it is asked once a call.
+  /// Adds a step that is called once per advance() until it returns true; later steps wait for it.
   void add_until(std::function<bool()> step) { steps_.push_back(std::move(step)); }
-  /// A step for each piece of this many bytes: copy(first, count). Pieces are of whole units.
+  /// Adds a step copy(first, count) per piece of piece_bytes, in multiples of `unit` bytes.
   void add_pieces(std::size_t bytes, const std::function<void(std::size_t, std::size_t)>& copy, std::size_t unit = 1);
-  /// Into a buffer with GL_DYNAMIC_STORAGE_BIT, from `offset` on: asked for when it is there.
+  /// Adds steps that copy to a buffer with GL_DYNAMIC_STORAGE_BIT, from `offset` on. `to` is called by the steps, when
+  /// the buffer exists.
   struct Place {
     GLuint buffer = 0;
     std::size_t offset = 0;
   };
   void add_bytes(std::function<Place()> to, const void* bytes, std::size_t size);
-  /// A step for each so many of these items, once the driver has the program.
+  /// Adds dispatches of a_step items each. They wait until the program is linked.
   using DispatchItems = std::function<void(const gl::Program& program, std::uint32_t first, std::uint32_t end)>;
   void add_dispatches(const gl::ProgramsPtr& programs, const gl::ProgramKey& key, std::uint32_t items,
                       std::uint32_t a_step, const DispatchItems& dispatch);
-  /// Into an 8-bit RGBA texture, of rows from the top without gaps.
+  /// Adds steps that copy to an 8-bit RGBA texture. The rows are tightly packed, from the top.
   void add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba);
 
-  /// Works until the deadline, one step at least, or to one that has to wait. Returns whether all are done. Throws what
-  /// a step throws, and Error(out_of_memory, gl); then there is nothing to go on with.
+  /// Works until the deadline, but at least one step, or until a step has to wait. Returns whether all steps are done.
+  /// Throws the errors of steps, and Error(out_of_memory, gl); the upload cannot be continued then.
   bool advance(Deadline deadline);
   [[nodiscard]] bool done() const { return next_ == steps_.size(); }
   [[nodiscard]] double progress() const { return steps_.empty() ? 1.0 : double(next_) / double(steps_.size()); }

@@ -20,7 +20,7 @@ namespace {
 using volume::brick_size;
 using volume::brick_voxels;
 
-constexpr int longest_side = 1 << 20;  // as of all volumes
+constexpr int longest_side = 1 << 20;  // limit of all volumes
 constexpr std::uint64_t most_bricks = std::uint64_t{1} << 27U;
 constexpr const char* what_step = "copying a host's voxels";
 
@@ -37,17 +37,17 @@ std::size_t bytes_of(VoxelFormat format) {
   return format == VoxelFormat::floats ? 4 : format == VoxelFormat::bytes ? 1 : 2;
 }
 std::size_t brick_bytes(VoxelFormat format) { return brick_voxels * bytes_of(format); }
-/// Of one that stays in GL.
+/// Bytes of a GPU-resident brick.
 std::size_t kept_bytes(VoxelFormat format) { return volume::DeviceMemory::bytes_of(1, format == VoxelFormat::halves); }
 
-// Cells are split for density alone.
+// Cells are refined only by density.
 BrickSummaries::Field field_of(volume::Channel channel) {
   using Field = BrickSummaries::Field;
   if (channel == volume::Channel::density) return Field::cells;
   return channel >= volume::Channel::anisotropy ? Field::as_is : Field::not_negative;
 }
 
-// Bricks in which that may be other than before, by the fields that changed.
+// Returns the bricks of a product that the changed fields affect.
 std::vector<glm::ivec3> changed_for(const scene::Product& product, const std::vector<scene::StateInGl::Field>& fields) {
   const std::vector<volume::Channel> made_of = scene::fields_of(product);
   std::vector<glm::ivec3> changed;
@@ -61,7 +61,7 @@ std::vector<glm::ivec3> changed_for(const scene::Product& product, const std::ve
 
 glm::ivec3 bricks_of(glm::ivec3 size) { return (size - 1) / brick_size + 1; }
 
-/// The format whose bits hold what is fetched.
+/// Returns the format that holds fetched values exactly.
 VoxelFormat format_of(GLint internal) {
   switch (internal) {
     case GL_R8:
@@ -84,10 +84,11 @@ VoxelFormat format_of(GLint internal) {
   }
 }
 
-/// By whole numbers: a host may have set its threads to flush small floats to 0.
+/// Converts a half by integer operations. Floats in between are never denormal, because a host may have set its threads
+/// to flush denormals to 0.
 float float_of(std::uint16_t half) {
   constexpr std::uint32_t rebias = 112U << 23U;
-  constexpr auto least = std::bit_cast<float>(113U << 23U);  // the least half that is normal
+  constexpr auto least = std::bit_cast<float>(113U << 23U);  // smallest normal half
   const std::uint32_t bits = std::uint32_t{half} << 13U & 0x0fffe000U;
   const float small = std::bit_cast<float>(bits + rebias + (1U << 23U)) - least;
   const std::uint32_t normal = bits + rebias + (bits >= 0x7c00U << 13U ? rebias : 0U);
@@ -119,12 +120,12 @@ void unpack(VoxelFormat format, const std::byte* from, std::span<float, brick_vo
   }
 }
 
-// Of what is on its way, whose copies are bricks.
+// field: of a transfer, so its voxels are a BrickCopy.
 const glm::dmat4& index_to_world_of(const volume::FieldCopy& field) {
   return std::get<volume::BrickCopy>(field.voxels).index_to_world();
 }
 
-/// The bricks that boxes touch.
+/// Returns the bricks that the boxes touch.
 std::vector<std::uint32_t> touched(const std::vector<VoxelBox>& boxes, glm::ivec3 size) {
   const glm::ivec3 bricks = bricks_of(size);
   std::vector<bool> any(std::size_t(bricks.x) * std::size_t(bricks.y) * std::size_t(bricks.z));
@@ -159,16 +160,16 @@ void require_finite(const volume::DeviceBricks& bricks, volume::Channel channel,
 
 }  // namespace
 
-// Where glsl/pack_bricks.comp says that bricks are: of a piece with room for so many, the filled ones first.
+// Reads the list of bricks that glsl/pack_bricks.comp wrote: the filled ones come first.
 class VoxelTransfers::PackedPlaces {
  public:
-  /// Throws Error if there is no room for so many.
+  /// Throws Error if there are more filled bricks than `room`.
   PackedPlaces(const gl::ReadBack& words, std::uint32_t room, glm::ivec3 size, const std::string& name)
       : words_(words.data()), room_(room), bricks_(bricks_of(size)), filled_(word(0)) {
     if (filled_ > room) throw Error(ErrorCode::gl, one_line(name + ": the driver packed no bricks"));
   }
   [[nodiscard]] std::uint32_t filled() const { return filled_; }
-  /// With those that are empty.
+  /// Number of bricks including empty ones.
   [[nodiscard]] std::size_t all() const { return std::size_t{filled_} + word(1); }
   [[nodiscard]] glm::ivec3 origin(std::size_t i) const {
     const auto brick = static_cast<int>(word(2 + (i < filled_ ? i : room_ - 1 - (i - filled_))));
@@ -190,19 +191,19 @@ class VoxelTransfers::PackedPlaces {
 VoxelTransfers::VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits,
                                DeviceMemoriesPtr memories)
     : gl_(std::move(gl)), programs_(std::move(programs)), memories_(std::move(memories)) {
-  constexpr std::int64_t most = std::int64_t{1} << 31U;  // whose words are counted in 32 bits
+  constexpr std::int64_t most = std::int64_t{1} << 31U;  // word indices are 32-bit
   most_bytes_ = static_cast<std::uint64_t>(std::min(limits.storage_block_bytes, most));
   GLint alignment = 0;
   gl_->GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
   alignment_ = static_cast<std::uint64_t>(std::max(alignment, 4));
 }
 
-// ---- what a host names ----
+// ---- Checks of the host's objects ----
 
 VoxelTransfers::Source VoxelTransfers::open_texture(const VoxelTexture& texture, const std::string& what) const {
   const auto& gl = *gl_;
   const std::string name = what + ": texture " + std::to_string(texture.name);
-  // The target by way of a binding, as HostDepth asks for it.
+  // The target is checked by a binding, as in HostDepth.
   GLint bound = 0;
   if (gl.IsTexture(texture.name) != GL_FALSE) {
     gl.ActiveTexture(GL_TEXTURE0 + core::CM_UNIT_HOST_VOXELS);
@@ -265,7 +266,7 @@ VoxelTransfers::Source VoxelTransfers::open_buffer(const VoxelBuffer& buffer, co
   const auto there = static_cast<std::uint64_t>(bytes);
   if (source.offset % number != 0 || source.strides % number != glm::u64vec3(0))
     refuse(name, "has an offset or strides that are no multiples of a number's " + std::to_string(number) + " bytes");
-  // Those that overlap would be more than there is.
+  // Overlapping voxels could be more than the buffer holds; such strides are rejected.
   const bool more = size.x * size.y > there || size.x * size.y * size.z > there / number;
   const bool beyond = more || source.offset > there || glm::any(glm::greaterThan(source.strides, glm::u64vec3(there)));
   if (beyond || range_of(source, {0, bricks_of(source.size).z}).y > there)
@@ -292,7 +293,7 @@ glm::u64vec2 VoxelTransfers::range_of(const Source& source, glm::ivec2 layers) c
   return {begin / alignment_ * alignment_, (end + 3) / 4 * 4};
 }
 
-// ---- the device's part ----
+// ---- Packing on the device ----
 
 void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vector<std::uint32_t>* chosen,
                           const std::string& what) const {
@@ -306,7 +307,7 @@ void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vect
     const glm::u64vec2 range = range_of(source, layers);
     return range.y - range.x <= most_bytes_;
   };
-  // How many bricks lie before this layer.
+  // Returns the number of bricks before this layer.
   const auto before = [&](int z) {
     const std::uint64_t brick = layer * std::uint64_t(z);
     if (chosen == nullptr) return brick;
@@ -372,7 +373,7 @@ void VoxelTransfers::pack(const Transfer& transfer, const Piece& piece, GLuint c
   if (source.buffer != 0) {
     const glm::u64vec2 range = range_of(source, piece.layers);
     const std::uint64_t number = bytes_of(source.format);
-    // Modulo 2^32: voxel 0 may lie before the range, what is read of it does not.
+    // The offset is modulo 2^32: voxel 0 may lie before the range, but voxels that are read do not.
     const std::uint64_t first =
         source.offset < range.x ? 0 - (range.x - source.offset) / number : (source.offset - range.x) / number;
     const glm::uvec3 strides(source.strides / number);
@@ -428,19 +429,19 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
     const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
     piece.room = take_room(piece.count, piece.count * each);
     if (transfer.stays_in_gl()) continue;
-    // A plume grows little from state to state.
+    // A plume grows little from one state to the next.
     const std::size_t expected = piece.room.expected + piece.room.expected / 4;
     piece.copied = std::min<std::size_t>(expected, piece.count);
     make_room_back(piece.room, piece.copied * each);
   }
-  // The driver may be at it while bricks are packed.
+  // The driver can compile the programs while bricks are packed.
   if (transfer.stays_in_gl()) {
     for (const Piece& piece : transfer.pieces) programs_->ask(summaries_of(transfer, piece).program());
   }
   if (state.wait != nullptr) gl.WaitSync(state.wait, 0, GL_TIMEOUT_IGNORED);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) pack(transfer, piece, choices[piece.field].name());
-  // The images: what the host stores there next waits for what was read here.
+  // The image barrier makes later stores of the host wait for these reads.
   gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
                              GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) {
@@ -454,7 +455,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   transfer.fence = fence();
   gl::check(gl, what_step);
   if (transfer.whole) {
-    // Those that nobody will want, but for the first: it arrives however fast they come.
+    // Superseded transfers are dropped except for the first, so that states arrive however fast they come.
     const auto of_one = [&](const Transfer& other) { return other.whose == whose && !other.makes() && !other.back; };
     auto other = std::ranges::find_if(transfers_, of_one);
     if (other != transfers_.end()) ++other;
@@ -463,7 +464,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   transfers_.push_back(std::move(transfer));
 }
 
-// ---- main memory's part ----
+// ---- Processing in main memory ----
 
 std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* whose) const {
   const auto found = std::find_if(transfers_.rbegin(), transfers_.rend(),
@@ -537,7 +538,7 @@ void VoxelTransfers::make_products(const void* whose, std::string name, StayInGl
   transfer.name = std::move(name);
   transfer.arrival = std::move(stay);
   transfer.refuse = [] {};
-  transfer.counted = true;  // nothing is on its way
+  transfer.counted = true;  // there is nothing to transfer
   transfers_.push_back(std::move(transfer));
 }
 
@@ -639,7 +640,7 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
   staying.state = stay.join(staying.fields);
   if (!staying.state) {
     if (!stay.instead) return;
-    // What it goes on with came to main memory.
+    // The state that it updates is in main memory.
     auto state = std::make_shared<scene::StateInGl>();
     state->name = transfer.name;
     state->fields = std::move(staying.fields);
@@ -655,7 +656,7 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
     if (transfer.makes()) return;
     refuse(transfer.name, "the rest of it is in another viewer's context");
   }
-  // In main memory it is made by other ways.
+  // The products are computed in main memory then.
   if (stay.values_wanted && stay.values_wanted->asked()) return;
   for (scene::Product& product : staying.state->wanted(stay.wanted())) {
     const scene::ProductInGl* before = staying.state->product(product);
@@ -697,7 +698,7 @@ bool VoxelTransfers::arrive_in_gl(Transfer& transfer) {
   const StayInGl& stay = std::get<StayInGl>(transfer.arrival);
   Staying& staying = *transfer.staying;
   if (staying.failure && stay.values_wanted) stay.values_wanted->ask();
-  // Where nothing was made it is no other state.
+  // If no product was computed, the state has not changed.
   const bool arrives = staying.state && !(transfer.makes() && staying.making.empty());
   const std::exception_ptr failure = std::exchange(staying.failure, nullptr);
   if (arrives && !stay.arrive(made(staying)) && !transfer.makes()) {
@@ -775,12 +776,12 @@ bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
 void VoxelTransfers::recycle(Transfer& transfer) {
   for (Piece& piece : transfer.pieces) spare_.push_back(std::move(piece.room));
   most_pieces_ = std::max(most_pieces_, transfer.pieces.size());
-  // As many as two states use, one under way and one that waits.
+  // Enough for two states: one in flight and one that waits.
   while (spare_.size() > 2 * most_pieces_) spare_.pop_front();
 }
 
 VoxelTransfers::Transfers::iterator VoxelTransfers::drop(const Transfers::iterator& transfer) {
-  transfer->fence.order();  // another context of the group may have begun it
+  transfer->fence.order();  // another context of the group may have started it
   recycle(*transfer);
   return transfers_.erase(transfer);
 }
@@ -792,7 +793,7 @@ void VoxelTransfers::refuse_on_top(const Transfer& whole) {
       continue;
     }
     if (other->whole) break;
-    // What is made is of the state that stays.
+    // Product computations stay, because they use the GPU-resident state.
     other = other->makes() ? std::next(other) : drop(other);
   }
   whole.refuse();
@@ -829,7 +830,7 @@ void VoxelTransfers::follow(Deadline deadline) {
     transfers_.pop_front();
     recycle(done);
     if (failure) {
-      // That something was not made of it is no fault of the state.
+      // A state whose product failed is valid.
       if (done.whole && !(done.staying && done.staying->failure)) refuse_on_top(done);
       std::rethrow_exception(failure);
     }

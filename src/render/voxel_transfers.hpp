@@ -1,6 +1,6 @@
 #pragma once
 
-// Voxels that a host has in GL, on their way to main memory, or to where they stay in GL.
+// Reads voxels that a host has in GL textures or buffers, into main memory or into GPU-resident bricks.
 
 #include <array>
 #include <cstddef>
@@ -30,12 +30,12 @@ struct VoxelTexture {
   int component = 0;
 };
 
-/// Numbers in a buffer.
+/// Voxels in a buffer.
 struct VoxelBuffer {
   GLuint name = 0;
   VoxelFormat format = VoxelFormat::floats;
-  std::uint64_t offset = 0;                   ///< bytes to voxel 0
-  std::array<std::uint64_t, 3> strides = {};  ///< bytes along x, y and z; zeros: without gaps, x fastest
+  std::uint64_t offset = 0;                   ///< byte offset of voxel 0
+  std::array<std::uint64_t, 3> strides = {};  ///< bytes along x, y and z; all zero: tightly packed, x fastest
   glm::ivec3 size{0};
 };
 
@@ -52,67 +52,71 @@ struct VoxelBox {
 };
 
 struct GlState {
-  std::string name;  ///< begins every message
+  std::string name;  ///< prefix of every error message
   std::vector<GlVoxels> fields;
-  std::optional<std::vector<VoxelBox>> changed;  ///< none: all of it
-  GLsync wait = nullptr;                         ///< that the device waits for first
+  std::optional<std::vector<VoxelBox>> changed;  ///< nullopt: all of it
+  GLsync wait = nullptr;                         ///< the device waits for it first
 };
 
-/// Copies bricks that are not empty on the device at once, and takes them to main memory when they are there. Never
-/// waits. All calls but those that tell need the context current and a StateGuard around.
+/// Packs the nonempty bricks of a host's voxels on the device at once, and takes them to main memory when they have
+/// arrived. Never waits. All calls except the queries need a current context and an active StateGuard.
 class VoxelTransfers {
  public:
-  /// memories: where those go that stay in GL.
+  /// memories: for bricks that stay GPU-resident.
   VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, DeviceMemoriesPtr memories);
 
-  /// Given the fields, whose copies are bricks; of those that changed the empty ones, too, as zeros.
+  /// Receives the fields as copies of bricks. For an update, empty bricks are included as zeros.
   using Arrive = std::function<void(std::vector<volume::FieldCopy> fields)>;
-  /// Fields stay in GL.
+  /// The fields stay GPU-resident.
   struct StayInGl {
-    /// Given those that arrived, in their order: the state that they make, what was made of another that it goes on
-    /// with among it; none: there is none in GL to go on with. Of those that changed bricks are not tidy.
+    /// Combines the transferred fields, given in their order, into a new state, including the products of the state
+    /// that it updates. Returns nullopt if that state is no longer on the GPU. Bricks of an update are not yet sorted
+    /// and merged.
     std::function<std::optional<scene::StateInGl>(const std::vector<scene::StateInGl::Field>& fields)> join;
-    /// By which settings it is to be found what that gives off.
+    /// Returns the settings for which emission is needed.
     std::function<std::vector<scene::Emission>()> wanted;
-    /// The same with these, and no others. False: what it goes on with is another by now; it is joined again.
+    /// Receives the state with exactly the needed products. Returns false if the state that it updates has changed in
+    /// the meantime; the fields are joined again then.
     std::function<bool(scene::StateInGl state)> arrive;
-    /// What changed comes to main memory, as what it goes on with did; null: nothing does.
+    /// Receives an update in main memory if the state that it updates is there; null: the update is dropped.
     Arrive instead;
-    volume::ValuesWantedPtr values_wanted;  ///< of its bricks; null: nobody asks
+    volume::ValuesWantedPtr values_wanted;  ///< for the values of its bricks; null: they are never requested
   };
   using Arrival = std::variant<Arrive, StayInGl>;
-  /// A whole state does not arrive: something is wrong with it. Those on top of it that were on their way are gone.
+  /// Called if a complete state is invalid. Updates of it that were in flight are dropped.
   using Refuse = std::function<void()>;
-  /// whose: of one the oldest whole state that is on its way arrives, and of those behind it the newest. Fields'
-  /// channels and transforms are checked. Throws Error(invalid_argument) for what is no such object, Error(unsupported)
-  /// beyond the driver's limits, and what GL's allocations throw; then all is as it was.
+  /// Starts a transfer. whose: identifies the volume. If several complete states of one volume are in flight, the
+  /// oldest and the newest arrive; others are dropped. The caller must have checked channels and transforms. Throws
+  /// Error(invalid_argument) for invalid objects, Error(unsupported) beyond the driver's limits, and the errors of GL
+  /// allocations; then nothing has changed.
   void begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse);
-  /// What stays in GL comes to main memory after all: as a whole state, after those that are on their way, of what find
-  /// gives by then; null: it does not come. channels: what it has.
+  /// Transfers a GPU-resident state to main memory, as a complete state, after the transfers in flight. find: returns
+  /// the state at that time; null: nothing is transferred. channels: channels of the state.
   using Find = std::function<scene::StateInGlPtr()>;
   void bring_back(const void* whose, const std::vector<volume::Channel>& channels, Find find, Arrive arrive,
                   Refuse refuse);
-  /// Once those that are on their way are there: what else is wanted is made of the state that stay.join gives for
-  /// none. It does not arrive if that is nothing.
+  /// Computes missing products of the state that stay.join returns for no fields, after the transfers in flight.
+  /// Nothing arrives if no product is missing or there is no state.
   void make_products(const void* whose, std::string name, StayInGl stay);
-  /// Of whose newest whole state that is on its way.
+  /// The newest complete state of a volume in flight.
   struct Announced {
     std::vector<volume::Channel> channels;
     bool stays_in_gl = false;
-    glm::dmat4 index_to_world{1.0};  ///< of the first of them
+    glm::dmat4 index_to_world{1.0};  ///< of the first field
   };
-  /// None: there is none.
+  /// nullopt: there is none.
   [[nodiscard]] std::optional<Announced> announced(const void* whose) const;
-  /// Whether any is on its way.
+  /// True if any transfer is in flight.
   [[nodiscard]] bool busy() const { return !transfers_.empty(); }
-  /// Takes what is there, until about the deadline. Throws what arrivals throw, and Error(file) for voxels that are not
-  /// finite: that state is dropped, of a whole one what is on top of it as well, and the next call goes on.
+  /// Processes transfers that have arrived, until about the deadline. Throws the errors of the callbacks, and
+  /// Error(file) for voxels that are not finite. The state is then dropped, with its updates if it is a complete one.
+  /// The next call continues.
   void follow(Deadline deadline);
-  /// In GL.
+  /// GL memory.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  // An object of the host's, looked at.
+  // A texture or buffer of the host that has been checked.
   struct Source {
     GLuint texture = 0;
     int component = 0;
@@ -122,7 +126,7 @@ class VoxelTransfers {
     glm::ivec3 size{0};
     VoxelFormat format = VoxelFormat::floats;
   };
-  // Where so many bricks go, empty ones among them.
+  // Buffers for a number of packed bricks, empty ones included.
   struct Room {
     std::size_t bricks = 0;
     std::size_t bytes = 0;  // of values
@@ -131,8 +135,8 @@ class VoxelTransfers {
     gl::Object values;
     gl::ReadBack places_back;
     gl::ReadBack values_back;
-    std::size_t expected = 0;  // as many were filled last
-    std::size_t summed = 0;    // bricks that there is room for below
+    std::size_t expected = 0;  // bricks filled last time
+    std::size_t summed = 0;    // capacity of the summaries
     gl::Object summaries;
     gl::ReadBack summaries_back;
 
@@ -141,34 +145,34 @@ class VoxelTransfers {
     }
   };
   static std::size_t places_bytes(std::size_t bricks) { return (2 + bricks) * sizeof(std::uint32_t); }
-  // Layers of bricks of a field's, which one dispatch packs.
+  // Layers of bricks of a field that one dispatch packs.
   struct Piece {
     std::size_t field = 0;
-    std::uint32_t first = 0;  // brick, or of those that were chosen
+    std::uint32_t first = 0;  // first brick, or index in the list of chosen bricks
     std::uint32_t count = 0;
-    glm::ivec2 layers{0};  // from, to
+    glm::ivec2 layers{0};  // first, end
     Room room;
-    std::size_t copied = 0;                      // bricks that were copied back before their number was known
-    std::size_t taken = 0;                       // filled and emptied ones
-    std::shared_ptr<volume::DeviceMemory> kept;  // that stay in GL; null: there are none
-    std::uint32_t filled = 0;                    // of those
-    std::uint32_t summarized = 0;                // of those
+    std::size_t copied = 0;                      // bricks read back before their number was known
+    std::size_t taken = 0;                       // bricks processed, filled and emptied ones
+    std::shared_ptr<volume::DeviceMemory> kept;  // GPU-resident bricks; null: there are none
+    std::uint32_t filled = 0;                    // bricks in `kept`
+    std::uint32_t summarized = 0;                // bricks of these that have been summarized
   };
-  // What stayed in GL, on its way back.
+  // A GPU-resident state on its way to main memory.
   struct Return {
     Find find;
-    scene::StateInGlPtr state;                        // once it is known
-    std::vector<std::vector<gl::ReadBack>> memories;  // of each field
+    scene::StateInGlPtr state;                        // set by find
+    std::vector<std::vector<gl::ReadBack>> memories;  // per memory of each field
     std::size_t field = 0;
-    std::size_t taken = 0;  // of that
+    std::size_t taken = 0;  // bricks processed of that field
   };
-  // A state that stays, while is made of it what is wanted.
+  // A GPU-resident state whose products are being computed.
   struct Staying {
-    std::vector<scene::StateInGl::Field> fields;  // that arrived
+    std::vector<scene::StateInGl::Field> fields;  // the transferred fields
     std::optional<scene::StateInGl> state;
-    std::vector<scene::ProductInGl> kept;  // as they are
+    std::vector<scene::ProductInGl> kept;  // unchanged products
     std::deque<BrickProducts> making;
-    std::exception_ptr failure;  // of that; main memory has other ways
+    std::exception_ptr failure;  // error of a product; main memory computes it otherwise
   };
   struct Transfer {
     const void* whose = nullptr;
@@ -181,46 +185,46 @@ class VoxelTransfers {
     Arrival arrival;
     Refuse refuse;
     gl::Fence fence;
-    bool counted = false;   // what is filled is known, and was copied
-    gl::Object brick_tree;  // while it is summarized
+    bool counted = false;   // the number of filled bricks is known, and they have been copied
+    gl::Object brick_tree;  // only while it is summarized
     std::optional<Return> back;
-    std::optional<Staying> staying;  // once its fields are there
+    std::optional<Staying> staying;  // set when its fields have arrived
 
     [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
-    // Nothing but what is made of a state.
+    // True for make_products().
     [[nodiscard]] bool makes() const { return sources.empty() && !back; }
   };
 
-  // Which bricks of it were packed, and where to.
+  // Origins of the bricks that were packed.
   class PackedPlaces;
   static PackedPlaces places_of(const Transfer& transfer, const Piece& piece);
 
   [[nodiscard]] Source open(const GlVoxels& field, const std::string& what) const;
   [[nodiscard]] Source open_texture(const VoxelTexture& texture, const std::string& what) const;
   [[nodiscard]] Source open_buffer(const VoxelBuffer& buffer, const std::string& what) const;
-  // Of a buffer the bytes of these layers of bricks: from, to.
+  // Returns the byte range of these layers of bricks (first, end) in the buffer: begin, end.
   [[nodiscard]] glm::u64vec2 range_of(const Source& source, glm::ivec2 layers) const;
-  // chosen: null: all bricks.
+  // chosen: bricks to pack; null: all.
   void plan(Transfer& transfer, std::size_t field, const std::vector<std::uint32_t>* chosen,
             const std::string& what) const;
   [[nodiscard]] Room take_room(std::size_t bricks, std::size_t bytes);
   void make_room_back(Room& room, std::size_t bytes) const;
   void pack(const Transfer& transfer, const Piece& piece, GLuint chosen);
   [[nodiscard]] gl::Fence fence() const;
-  // Returns whether all of it was taken.
+  // Returns whether all of it has been processed.
   bool take(Transfer& transfer, Deadline deadline);
-  // Of what was in GL.
+  // Processes a GPU-resident state on its way to main memory.
   bool take_back(Transfer& transfer, Deadline deadline);
-  // Of what stays there.
+  // Processes a state that stays GPU-resident.
   bool take_in_gl(Transfer& transfer, Deadline deadline);
   void join(Transfer& transfer, std::vector<scene::StateInGl::Field> fields);
-  // With all that was made of it.
+  // Returns the state with all products that were computed.
   static scene::StateInGl made(Staying& staying);
-  // Returns whether it did, or never will; else it was joined again.
+  // Passes on the state. Returns false if the fields were joined again.
   bool arrive_in_gl(Transfer& transfer);
-  // What the driver had not copied by guess.
+  // Copies filled bricks beyond the expected number.
   void copy_rest(Transfer& transfer) const;
-  // Of what stays in GL: values where they stay, and what main memory is to know of them. Returns whether all is sent.
+  // Converts and summarizes GPU-resident bricks. Returns whether all dispatches have been sent.
   bool summarize(Transfer& transfer, Deadline deadline);
   void begin_summaries(Transfer& transfer);
   void summarize(const Transfer& transfer, const Piece& piece, std::uint32_t first, std::uint32_t end) const;
@@ -228,9 +232,9 @@ class VoxelTransfers {
   static std::vector<scene::StateInGl::Field> take_fields(Transfer& transfer);
   void recycle(Transfer& transfer);
   using Transfers = std::deque<Transfer>;
-  // Nobody waits for it any more. Returns the one after it.
+  // Removes a transfer that is not needed any more. Returns the next one.
   Transfers::iterator drop(const Transfers::iterator& transfer);
-  // Those that came after a whole one, which is refused.
+  // Drops the updates behind a complete state, and calls its refuse().
   void refuse_on_top(const Transfer& whole);
 
   gl::FunctionsPtr gl_;
@@ -239,11 +243,11 @@ class VoxelTransfers {
   std::uint64_t most_bytes_;
   std::uint64_t alignment_;
   gl::Object sampler_;
-  std::optional<light::BlackBody> body_;  // once anything glows; made in a millisecond
-  Transfers transfers_;                   // in the order in which they were begun
+  std::optional<light::BlackBody> body_;  // made when first needed, in about a millisecond
+  Transfers transfers_;                   // in the order of begin()
   std::deque<Room> spare_;
-  std::size_t most_pieces_ = 0;  // of a state, lately
-  int idle_ = 0;                 // calls of follow() since there was any
+  std::size_t most_pieces_ = 0;  // recent maximum per state
+  int idle_ = 0;                 // calls of follow() without transfers
 };
 
 }  // namespace cumulet::render

@@ -12,15 +12,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Twice as far apart each: of 32 pixels to each side, where the picture is that large.
+// Each level doubles the stride of the filter: together 32 pixels to each side, if the picture is that large.
 constexpr std::uint32_t most_levels = 5;
-// Of rows, the least that is sent.
+// Minimum rows per dispatch.
 constexpr std::uint32_t least_rows = 8;
 constexpr std::uint64_t bytes_a_pixel = 112;
-// Locations of the shaders' uniforms.
+// Uniform locations in the shaders.
 constexpr GLint rows_at = 0;
 constexpr GLint footprint_at = 2;
-constexpr GLint own_at = 3;        // surfaces, or the level's stride
+constexpr GLint own_at = 3;        // PictureGuides::surfaces, or the level's stride
 constexpr GLint box_at = 4;        // wavelet_input.comp
 constexpr GLint most_at = 3;       // wavelet_merge.comp
 constexpr GLint to_before_at = 3;  // wavelet_reproject.comp
@@ -29,16 +29,17 @@ constexpr GLint orthographic_at = 5;
 constexpr GLint footprint_before_at = 6;
 constexpr GLint surfaces_at = 7;
 constexpr GLint most_recalled_at = 8;
-// More would blur, for each picture is found in the one before it between its pixels, and hide what changes.
+// A larger maximum would blur, because each picture is resampled from the previous one between its pixels. It would
+// also hide changes.
 constexpr float most_samples = 32.0F;
-// Pictures of other wishes that a finer one outlasts.
+// A finer history is kept for this many requests before a coarser one replaces it.
 constexpr std::uint64_t most_wishes = 16;
 constexpr std::uint64_t history_bytes_a_pixel = 32;
 constexpr std::uint64_t recalled_bytes_a_pixel = 16;
 
 std::uint64_t area(glm::uvec2 size) { return std::uint64_t{size.x} * size.y; }
 
-// Takes points of a view, as the shader has them, to another's.
+// Transform of points from one view to another, in the shader's coordinates.
 struct Motion {
   glm::mat3 turn{1.0F};
   glm::vec3 shift{0.0F};
@@ -327,7 +328,7 @@ bool Wavelet::work(const PictureTextures& picture, Deadline deadline) {
       const auto ms = cost(stage_, rows);
       return ms && *ms <= left;
     };
-    // What nothing is known of is sent once at a time, measured.
+    // A stage of unknown cost is sent once at a time and measured.
     const bool known = cost(stage_, least_rows).has_value();
     if (!first && (known ? !fits(least_rows) : left <= 0.0 || !flights_.empty())) break;
     std::uint32_t rows = least_rows;

@@ -12,23 +12,26 @@
 
 namespace cumulet::render {
 
-/// A pixel's neighbours tell what its own samples do not yet: an edge-avoiding a-trous wavelet (Dammertz et al. 2010)
-/// whose edges are what differs by more than the noise does (variance-guided, Schied et al. 2017), and what facts of
-/// pixels tell apart without noise: surfaces by normal and depth, the volume by its transmittance and by the depth of
-/// its half opacity. What is filtered is light over what it is in proportion to, which is known without noise: a
-/// surface's albedo, and how much of a pixel the volume covers (sums of both, so that no small number divides). What is
-/// behind all is that of the pixel's own samples, in the filtered part that nothing covers. As samples come the noise's
-/// deviation goes to 0, and with it all that is filtered: the result becomes the mean of samples. Sooner where the
-/// filter is off by more than the noise, as what it took away about a pixel tells: there most is given unfiltered.
+/// Variance-guided edge-avoiding a-trous wavelet filter (Dammertz et al. 2010; Schied et al. 2017, SVGF) with temporal
+/// reprojection.
 ///
-/// Of pictures that have a view, what one knows is kept for the next: samples, their own and those that were kept
-/// before them, at most 32 a pixel, found again by depths (of what is solid; of the medium the mean one at which it
-/// scatters) where depth, normal and transmittance are alike, within what new samples about a pixel differ by, and for
-/// less where these are off from them by more than their noise. They count as a pixel's own, and fade as it gets 64 of
-/// these.
+/// Edges are differences beyond the noise, and differences of the noise-free feature buffers. These are normal and
+/// depth of surfaces, transmittance of the volume, and its depth at half opacity. Radiance is demodulated before
+/// filtering: it is divided by the surface's albedo and by the volume's coverage of the pixel. Both the radiance and
+/// the divisor are filtered as sums, so that no small number divides. The background is that of the pixel's own
+/// samples, weighted by the filtered uncovered fraction.
+/// As samples come in, the tolerance of edges goes to 0 with the noise's deviation, and the result converges to the
+/// mean of samples. If the filter's error exceeds the noise, as estimated from the difference that it makes around a
+/// pixel, most of the unfiltered radiance is kept.
 ///
-/// Takes 112 bytes a pixel while under way, and 80 more of pictures that have a view. All calls but those that tell
-/// need the context current and a StateGuard around.
+/// Temporal accumulation: pictures with a view keep a history of at most 32 samples per pixel, including earlier
+/// history, for the next picture. Pixels are reprojected by depth: of surfaces, or the mean scattering depth of the
+/// medium. History is accepted if depth, normal and transmittance match. It is clamped to the range of the new samples
+/// around the pixel. Its confidence is reduced if it differs from them by more than their noise. It counts as the
+/// pixel's own samples, and fades out as the pixel gets 64 new ones.
+///
+/// Memory: 112 bytes per pixel while denoising, and 80 more for pictures with a view. All calls except the queries need
+/// a current context and an active StateGuard.
 class Wavelet {
  public:
   using Deadline = std::chrono::steady_clock::time_point;
@@ -36,31 +39,31 @@ class Wavelet {
   Wavelet(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(std::move(gl)), programs_(std::move(programs)), flights_(gl_) {}
 
-  /// Whether the programs are there for such a picture: they are asked for; wait: waited for.
+  /// Requests the programs for such a picture, and returns whether they are usable. wait: waits until they are.
   bool able(const PictureTextures& picture, MeansBackground background, bool wait);
-  /// From now on of this picture, which has moments and guides. Throws Error(out_of_memory, gl). Returns why nothing is
-  /// known of pictures before it where there is no memory for that, once for each size.
+  /// Starts denoising this picture, which must have moments and guides. Throws Error(out_of_memory, gl). If there is no
+  /// memory for the history, returns the error, once per size, and denoises without history.
   std::optional<Error> begin(const PictureTextures& picture);
-  /// The picture that it is of, by PictureTextures::picture; nothing: none, all is given.
+  /// PictureTextures::picture of the current picture; nullopt: none, or it was given.
   [[nodiscard]] const std::optional<std::uint64_t>& of() const { return of_; }
-  /// Filters that picture until about the deadline, of steps that take milliseconds on slow devices; returns whether it
-  /// is done. Goes on in the next call.
+  /// Denoises the picture until about the deadline, in steps that take milliseconds on slow devices. Returns whether it
+  /// is done. The next call continues.
   bool work(const PictureTextures& picture, Deadline deadline);
-  /// Once that is done: writes it, as resolve.comp writes means, to rgba32f textures of the picture's size, that of the
-  /// background where it is apart.
+  /// Writes the denoised means, as resolve.comp writes means, to rgba32f textures of the picture's size. Call it once
+  /// after work() returned true. background_means: used with MeansBackground::apart.
   void give(const PictureTextures& picture, MeansBackground background, GLuint means, GLuint background_means);
-  /// Gives up what is under way.
+  /// Cancels the current picture.
   void drop() { of_.reset(); }
-  /// Milliseconds that what is left of such a picture takes at most; nothing while that is not known.
+  /// Estimated maximum time for the rest of a picture of this size, in milliseconds; nullopt while it is unknown.
   [[nodiscard]] std::optional<double> left_ms(glm::uvec2 size) const;
-  /// Gives its memory back, and forgets all pictures.
+  /// Frees all memory, including the history.
   void free();
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
   enum class Stage : std::uint8_t { input, reproject, merge, variance, level, blend };
   static constexpr std::size_t stages = 6;
-  /// What is kept of a picture: glsl/wavelet_history.glsl.
+  /// History of a picture: glsl/wavelet_history.glsl.
   struct History {
     gl::Object light;
     gl::Object guides;
@@ -69,19 +72,19 @@ class Wavelet {
     std::uint64_t picture = 0;
     std::uint64_t wish = 0;
     PictureView view;
-    bool surfaces = true;  // as its guides have them
+    bool surfaces = true;  // as PictureGuides::surfaces
     glm::vec2 footprint{0.0F};
   };
   [[nodiscard]] std::uint32_t levels() const;
   [[nodiscard]] gl::ProgramKey key(Stage stage, const PictureTextures& picture) const;
   [[nodiscard]] bool has(Stage stage) const;
-  // Which of the two histories this picture begins with, and where it will be kept.
+  // Chooses which of the two histories this picture reads, and sets up the one that it writes.
   void remember(const PictureTextures& picture);
   void make_history(glm::uvec2 size);
   void forget();
-  // What the temporal stages are told, and what they read and write.
+  // Sets the uniforms of the temporal stages, and binds their inputs and outputs.
   void bind_history(const PictureTextures& picture, const gl::Program& program);
-  // Binds what the stage under way reads and writes.
+  // Binds the inputs and outputs of the current stage.
   void bind(const PictureTextures& picture, const gl::Program& program);
   void dispatch(const gl::Program& program, std::uint32_t rows, bool measured);
   void collect();
@@ -94,20 +97,20 @@ class Wavelet {
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>(),
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>()};
   glm::uvec2 size_{0U};
-  // Of each two the first is read and the second written.
+  // In each pair, the first is read and the second written.
   std::array<gl::Object, 2> front_;
   std::array<gl::Object, 2> spread_;
   gl::Object guides_;
   gl::Object behind_;
   gl::Object unfiltered_;
-  History before_;  // of another picture
-  History kept_;    // of the one that is filtered, or was last
+  History before_;  // history of an earlier picture
+  History kept_;    // history of the current or last picture
   gl::Object recalled_;
-  bool keeps_ = false;                           // what is known of this picture
-  bool recalls_ = false;                         // what was known before
-  std::optional<glm::uvec2> no_memory_to_keep_;  // of this size
+  bool keeps_ = false;                           // this picture writes a history
+  bool recalls_ = false;                         // this picture reads a history
+  std::optional<glm::uvec2> no_memory_to_keep_;  // of pictures of this size
   std::optional<std::uint64_t> of_;
-  bool holes_ = false;  // as it began
+  bool holes_ = false;  // at begin()
   Stage stage_ = Stage::input;
   std::uint32_t level_ = 0;
   std::uint32_t row_ = 0;

@@ -28,7 +28,7 @@ using volume::ScalarVolume;
 
 using Values = volume::BrickValues::Brick;
 
-// Of the brick at this origin.
+// Reads the brick at this origin.
 void read(const ScalarVolume& field, const ivec3& origin, Values& values) {
   if (const float* brick = volume::find_brick(field, origin, values)) {
     if (brick != values.data()) std::copy(brick, brick + brick_voxels, values.begin());
@@ -43,10 +43,10 @@ void read(const ScalarVolume& field, const ivec3& origin, Values& values) {
   volume::fill_brick(field, origin, tiles, values.data());
 }
 
-// Bricks of fields, as whole numbers of them: what they have, and what their tiles and backgrounds fill.
+// Collects the brick origins of fields: the bricks they store, and those that their tiles and backgrounds fill.
 class BrickSet {
  public:
-  /// what: for messages.
+  /// what: name for error messages.
   explicit BrickSet(const char* what) : what_(what) {}
   void add(const ScalarVolume& field) {
     origins_.insert(origins_.end(), field.brick_origins.begin(), field.brick_origins.end());
@@ -83,7 +83,7 @@ class BrickSet {
   std::int64_t filled_ = 0;
 };
 
-// Far above all that is seen, and far enough below what floats hold for sums over a volume.
+// Far above any visible radiance, and low enough that float sums over a volume stay finite.
 constexpr double most_radiance = 1e12;
 
 glm::dvec3 flame_colour_of(const Emission& emission) {
@@ -95,7 +95,7 @@ class Glow {
  public:
   explicit Glow(const Emission& emission) : emission_(emission), flame_colour_(flame_colour_of(emission)) {}
 
-  /// Of what the fields have there.
+  /// Returns the emission for these field values.
   [[nodiscard]] vec3 operator()(float temperature_value, float flame_value) const {
     const float temperature = emission_.temperature_ramp(temperature_value);
     glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_colour_;
@@ -115,13 +115,13 @@ class Glow {
   light::BlackBody black_body_;
 };
 
-// What the ramp makes of a brick's density.
+// Reads the density of a brick and applies the ramp.
 void read_density(const volume::VolumeFrame& frame, const volume::Ramp& ramp, const ivec3& origin, Values& density) {
   read(frame.density, origin, density);
   for (float& value : density) value = ramp(value);
 }
 
-// What a frame has of a brick that scatters.
+// The fields of one brick that determine scattering.
 struct Scatters {
   Values density{};
   std::array<Values, 3> colour{};
@@ -135,7 +135,8 @@ struct Scatters {
   }
 };
 
-// Of so many components these bricks, without those that are 0: what value() makes of what read_brick() reads.
+// Makes `count` component fields on these bricks, leaving out bricks that are 0 in all components. value() computes the
+// components of a voxel from the data that read_brick() read.
 template <int count, class Read, class ReadBrick, class Value>
 std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, const std::vector<ivec3>& origins,
                                           const std::string& name, const Progress* progress,
@@ -280,7 +281,7 @@ std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const v
 
 namespace {
 
-// Of each of so many components.
+// Returns the voxelwise mean of each component.
 template <std::size_t count>
 std::optional<std::array<ScalarVolume, count>> means_of(const std::array<const ScalarVolume*, count>& a,
                                                         const std::array<const ScalarVolume*, count>& b,
@@ -341,7 +342,7 @@ double fastest_of(const volume::VolumeFrame& frame) {
   if (!frame.velocity) return 0.0;
   const std::array<ScalarVolume, 6>& parts = frame.velocity->parts;
   const glm::dmat3& to_index = frame.velocity->to_index;
-  glm::dvec3 most(0.0);  // along each axis of the lattice
+  glm::dvec3 most(0.0);  // along each lattice axis
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t first = 2 * static_cast<std::size_t>(axis);
     most += glm::abs(to_index[axis]) * double{std::max(parts[first].max_value, parts[first + 1].max_value)};
@@ -361,7 +362,7 @@ std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame
   try {
     set.add(frame.density);
   } catch (const Error& error) {
-    // No picture depends on it.
+    // A missing velocity only disables motion blur and motion vectors.
     log.warning(one_line("grid \"" + parts[0].name + "\": the velocity is left out: " + error.what()));
     return std::nullopt;
   }

@@ -10,7 +10,7 @@ namespace cumulet::scene {
 
 namespace {
 
-// In the frame, in units: a sixth of the determinant of the three edges at v0.
+// Returns the volume of a cell in its frame, in units: a sixth of the determinant of the three edges at v0.
 double frame_volume(std::uint32_t cell_class) {
   const auto vertex = [&](std::uint32_t i) { return glm::dvec3(core::cm_frame_vertex(cell_class, i)); };
   return std::abs(glm::dot(vertex(1), glm::cross(vertex(2), vertex(3)))) / 6.0;
@@ -36,7 +36,7 @@ GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, con
     table.power += power.back();
   }
   table.cells = std::move(cells);
-  if (!(table.power > 1e-30)) return {};  // a float has its inverse
+  if (!(table.power > 1e-30)) return {};  // its inverse must fit in a float
   table.length = std::cbrt(table.power / square * table.power);
   const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.power, progress);
   for (std::size_t i = 0; i < aliases.size(); ++i) table.cells[i].alias = aliases[i];

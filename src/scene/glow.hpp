@@ -1,6 +1,6 @@
 #pragma once
 
-// Cells that give off light, as lights: which there are, and how often the path tracer picks each. No GL.
+// Emissive cells as lights: which cells there are, and the alias table by which the path tracer samples them. No GL.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -12,26 +12,27 @@
 
 namespace cumulet::scene {
 
-/// A cell that gives off light, as the shaders read it (glsl/light.glsl).
+/// An emissive cell, as the shaders read it (glsl/light.glsl).
 struct GlowingCell {
-  light::Alias alias;  ///< of entries of the table
-  glm::uvec2 place;    ///< x and y of the cell's record: its v0 and shape
+  light::Alias alias;  ///< entry of the alias table; `other` indexes the same table
+  glm::uvec2 place;    ///< x and y of the cell record: its v0 and shape
   grid::EmissionRecord emission;
 };
 static_assert(sizeof(GlowingCell) == 32);
 
-/// What all cells of a grid give off.
+/// Total emission of the cells of a grid.
 struct GlowSum {
-  double power = 0.0;   ///< luminance that they give off a steradian: its integral over their volume in the world
-  double length = 0.0;  ///< world: the cube root of the volume that would give off as much, were it even
+  double power = 0.0;   ///< luminance emitted per steradian: the integral of L over the volume, in world units
+  double length = 0.0;  ///< world: cube root of power^2 / integral of L^2, the volume of a uniform emitter with the
+                        ///< same two integrals
 };
 
-/// Picks cells in proportion to the luminance of what they give off (light/alias_table.hpp).
+/// Samples cells in proportion to the luminance that they emit (light/alias_table.hpp).
 struct GlowTable : GlowSum {
   std::vector<GlowingCell> cells;
 };
 
-/// Of those of these cells that give off light; what they have for an alias does not count. O(n). Throws
+/// Keeps the emissive cells and builds their alias table; the aliases of the input are ignored. O(n). Throws
 /// Error(cancelled).
 GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, const Progress* progress = nullptr);
 GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress = nullptr);

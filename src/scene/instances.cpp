@@ -23,7 +23,7 @@ using core::CmInstanceNode;
 using glm::dvec3;
 using glm::vec3;
 
-// Of which shaders' products are finite.
+// Whether products of such values stay finite in shaders.
 bool is_sound(const vec3& v) { return core::cm_is_within(v, 1e15F); }
 
 bool is_sound(const core::CmSpace& s) {
@@ -33,10 +33,10 @@ bool is_sound(const core::CmSpace& s) {
 
 bool is_solid(const core::CmGrid& grid) { return glm::all(glm::lessThan(grid.box_min, grid.box_max)); }
 
-// Whether there is an axis along which they lie apart: those upright to two edges, of one or of both, suffice. Blocks
-// that touch are apart.
+// Separating-axis test. The axes normal to two edges, of the same block or of different ones, are sufficient. Blocks
+// that touch do not overlap.
 bool overlap(const Block& a, const Block& b) {
-  constexpr double inside = 1.0 - 1e-6;  // as far as floats tell
+  constexpr double inside = 1.0 - 1e-6;  // tolerance of float rounding
   const dvec3 between = b.middle - a.middle;
   const auto apart = [&](const dvec3& axis) {
     const double reach = a.reach(axis) + b.reach(axis);
@@ -52,14 +52,14 @@ bool overlap(const Block& a, const Block& b) {
   return true;
 }
 
-// Whether any other's box has points of this one's.
+// Whether the box of another instance overlaps this one.
 bool overlaps_another(const InstanceTable& table, const std::vector<Block>& blocks, const CmInstanceNode& leaf) {
   for (std::size_t i = 0; i < table.nodes.size();) {
     const CmInstanceNode& node = table.nodes[i];
     const bool near =
         glm::all(glm::lessThanEqual(node.low, leaf.high)) && glm::all(glm::lessThanEqual(leaf.low, node.high));
     if (near && node.instance != core::CM_INSTANCE_NONE && node.instance != leaf.instance) {
-      // Of what moves its way's box counts.
+      // For a moving instance, the test uses its swept bounding box.
       const std::uint32_t flags = table.records[node.instance].flags | table.records[leaf.instance].flags;
       if ((flags & core::CM_INSTANCE_MOVES) != 0 || overlap(blocks[node.instance], blocks[leaf.instance])) return true;
     }
@@ -68,16 +68,16 @@ bool overlaps_another(const InstanceTable& table, const std::vector<Block>& bloc
   return false;
 }
 
-// How likely looks are for the cells of each.
+// Sets the probability with which next-event estimation samples the emissive cells of each instance.
 void set_glow(InstanceTable& table, const std::vector<PlacedGlow>& glow) {
-  double square = 0.0;  // the integral of its square, as each has it: length^3 = power^2 / square
+  double square = 0.0;  // sum of the integrals of L^2 of the instances: length^3 = power^2 / square
   std::vector<double> power;
   for (const PlacedGlow& of : glow) {
     power.push_back(of.power);
     table.glow_power += of.power;
     if (of.power > 0.0) square += of.power / of.length * (of.power / of.length) / of.length;
   }
-  if (!(table.glow_power > 1e-30)) {  // a float has no inverse of it
+  if (!(table.glow_power > 1e-30)) {  // its inverse does not fit in a float
     table.glow_power = 0.0;
     return;
   }
@@ -105,8 +105,8 @@ dvec3 origin_of(std::span<const Instance> instances) {
     low = glm::min(low, block.middle - reach);
     high = glm::max(high, block.middle + reach);
   }
-  if (!(low.x <= high.x)) return dvec3(0.0);                // of nothing
-  return origin_near(low, high, glm::distance(low, high));  // as wide as the scene
+  if (!(low.x <= high.x)) return dvec3(0.0);                // no instance has a volume
+  return origin_near(low, high, glm::distance(low, high));  // the grid step is the size of the scene
 }
 
 InstanceTable make_instances(std::span<const Instance> instances, const dvec3& origin) {
@@ -140,7 +140,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     dvec3 low = block.middle - reach_of(block);
     dvec3 high = block.middle + reach_of(block);
     if (instance.ends) {
-      // Corners go straight: where they are in between is between where they are at the ends.
+      // Corners move on straight lines, so positions in between are within the bounds of both ends.
       const std::size_t at = table.records.size();
       for (const Block& end :
            {stand(instance.ends->open, table.ends[at]), stand(instance.ends->close, table.ends[count + at])}) {
@@ -151,7 +151,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     const dvec3 most = glm::max(glm::abs(low), glm::abs(high));
     const double size = std::max({most.x, most.y, most.z});
     if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the scene");
-    // A ray that its own box takes for inside is here, but for what rounding may be.
+    // Enlarged for rounding, so that it holds every ray point that the instance's own box counts as inside.
     boxes.push_back({vec3(low - 2e-6 * size), vec3(high + 2e-6 * size), is_solid(instance.grid)});
     table.records.push_back(record);
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// A scene's instances of volumes, as shaders are told of them: glsl/instance.glsl. No GL.
+// Table of the volume instances of a scene for shaders: glsl/instance.glsl. No GL.
 
 #include <glm/glm.hpp>
 #include <optional>
@@ -18,35 +18,37 @@ namespace cumulet::core {
 
 namespace cumulet::scene {
 
-/// One of them: a volume at a place, of a medium.
+/// A volume instance: a source, its transform and its medium.
 struct Instance {
   MarchSourcePtr source;  ///< not null
-  glm::dmat4 place{1.0};  ///< affine, from the world that the source was made in
-  core::CmGrid grid{};    ///< where the source's data are, and the box that holds them all
+  glm::dmat4 place{1.0};  ///< affine transform from the world space of the source
+  core::CmGrid grid{};    ///< where the source's data are, and the bounding box of all of them
   core::CmMedium medium{};
   bool hidden_from_camera = false;
-  std::optional<PlaceEnds> ends = {};  ///< as the place; nothing: it stands still
-  GlowSum glow{};                      ///< of the source's cells
+  std::optional<PlaceEnds> ends = {};  ///< transforms at shutter open and close; empty: it does not move
+  GlowSum glow{};                      ///< emission of the source's cells
 };
 
-/// All arrays go into buffers as they are; ends behind the records.
+/// The arrays are copied to buffers unchanged; `ends` follows `records`.
 struct InstanceTable {
   std::vector<core::CmInstance> records;  ///< in the order of the instances
-  /// Where all stand as the shutter opens, then as it closes: spaces alone. Empty where nothing moves.
+  /// Transforms of all instances at shutter open, then at shutter close; only the spaces are set. Empty if nothing
+  /// moves.
   std::vector<core::CmInstance> ends;
-  std::vector<core::CmInstanceNode> nodes;  ///< at least one; the first's box holds all there is
-  double glow_power = 0.0;                  ///< of all of them, as GlowSum has both
+  std::vector<core::CmInstanceNode> nodes;  ///< at least one; the box of the first contains all others
+  double glow_power = 0.0;                  ///< of all instances; see GlowSum for both
   double glow_length = 0.0;
 };
 
-/// Where the scene's frame begins, in the world: no farther from the middle of what is there than twice its size. Of
-/// the instances alone, whatever was there before, so that the same scene is the same picture to the last bit; and
-/// seldom another one while they move. Not finite where a place is not.
+/// Returns the origin of the scene's frame in world space, at most twice the scene size from its center. It depends
+/// only on the instances, not on earlier origins, so that the same scene renders bit-identically. It rarely changes
+/// while instances move. Not finite if a transform is not.
 glm::dvec3 origin_of(std::span<const Instance> instances);
 
-/// origin: a point of the world near the scene, where its frame begins. What is empty is never met. Throws
-/// Error(invalid_argument) for a place that is not finite or makes things flat or endless, Error(unsupported) for one
-/// 1e12 or more from the origin; the message counts instances from 0. O(n log n).
+/// Builds the table. origin: a world point near the scene, the origin of its frame. Rays never hit an instance with an
+/// empty box. Throws Error(invalid_argument) for a transform that is not finite, is singular or scales too far. Throws
+/// Error(unsupported) for an instance that reaches 1e12 or more from the origin. Messages count instances from 0. O(n
+/// log n).
 InstanceTable make_instances(std::span<const Instance> instances, const glm::dvec3& origin);
 
 }  // namespace cumulet::scene

@@ -15,11 +15,11 @@ namespace {
 
 using glm::ivec3;
 
-// Half of how a brick's values change while the shutter is open.
+// Half the change of a brick's values between shutter open and close.
 class BrickChange {
  public:
   BrickChange(const grid::DensityEnds* ends, float scale) : ends_(ends), scale_(0.5F * scale) {}
-  // The one at this corner. Whether it does.
+  // Looks up the brick at this corner. Returns whether its values change.
   bool look_up(const ivec3& corner) {
     if (ends_ == nullptr) return false;
     const std::array fields{&ends_->open.statistics(), &ends_->close.statistics()};
@@ -43,7 +43,7 @@ class BrickChange {
   std::array<volume::BrickValues::Brick, 2> rooms_{};
 };
 
-// Behind the others. values: null where all are the node's.
+// Appends a brick. values: null if all values are the node's uniform value.
 void add_brick(MarchSource& source, const grid::Statistics::Node& node, const float* values,
                const BrickChange* change) {
   const float scale = source.density_a_value();
@@ -54,7 +54,7 @@ void add_brick(MarchSource& source, const grid::Statistics::Node& node, const fl
   }
 }
 
-// The march has a voxel's place in 16 bits an axis, and a table of all bricks of the box.
+// Brick traversal stores voxel coordinates in 16 bits per axis, and a table of all bricks in the box.
 void require_table(const ivec3& end, const ivec3& bricks) {
   constexpr int most_voxels = 1 << 16;
   constexpr std::int64_t most_bricks = std::int64_t{1} << 28U;

@@ -35,7 +35,7 @@ using surface::AlphaMode;
 using surface::Material;
 using surface::TextureUse;
 
-constexpr std::uint32_t largest_layer = 16384;  // what any driver of GL 4.5 takes
+constexpr std::uint32_t largest_layer = 16384;  // supported by every driver of GL 4.5
 
 uvec4 bits(const vec4& v) { return glm::floatBitsToUint(v); }
 uvec4 bits(const vec3& v, float w) { return glm::floatBitsToUint(vec4(v, w)); }
@@ -90,10 +90,10 @@ void write_material(uvec4* to, const Material& m, bool double_sided) {
   write_use(to + core::CM_USE_ANISOTROPY, m.anisotropy_texture);
   write_use(to + core::CM_USE_IRIDESCENCE, m.iridescence_texture);
   write_use(to + core::CM_USE_FILM_THICKNESS, m.film_thickness_texture);
-  // Without a texture it is as thick as can be: by that mix, white is.
+  // Without a thickness texture, the film has its maximum thickness: the shader's mix with a white texel gives that.
   to[core::CM_MATERIAL_SHEEN] = bits(m.sheen_color, m.sheen_roughness);
   to[core::CM_MATERIAL_FILM] = bits(vec4(m.iridescence, m.film_ior, m.film_thinnest, m.film_thickest));
-  constexpr float mirror = 1e4F;  // for the index that is infinite, which glTF writes as 0
+  constexpr float mirror = 1e4F;  // represents an infinite index of refraction, which glTF writes as 0
   const float index = m.ior > 0.0F ? std::min(m.ior, mirror) : mirror;
   to[core::CM_MATERIAL_VOLUME] = bits(m.absorption, surface::bounds_volume(m) ? index : 0.0F);
   to[core::CM_MATERIAL_ANISOTROPY] =
@@ -102,7 +102,7 @@ void write_material(uvec4* to, const Material& m, bool double_sided) {
 
 std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
 
-// Where its nodes begin, and its records.
+// Returns the offsets of the nodes and of the records.
 std::pair<std::uint32_t, std::uint32_t> pack_tree(std::vector<uvec4>& words, const surface::Bvh& bvh,
                                                   const Progress* progress) {
   const auto nodes = std::as_bytes(bvh.nodes());
@@ -115,7 +115,7 @@ std::pair<std::uint32_t, std::uint32_t> pack_tree(std::vector<uvec4>& words, con
   return {first, second};
 }
 
-// Where they begin.
+// Returns the offset of the vertices.
 std::uint32_t pack_vertices(std::vector<uvec4>& words, const surface::Scene& scene,
                             const std::vector<surface::PosedVertex>& vertices, const Progress* progress) {
   const std::uint32_t first = size_of(words);
@@ -186,7 +186,7 @@ void pack_words(ModelSource& source, const Progress* progress) {
   source.rich = draws_rich(scene, source.pose);
 }
 
-// Triangles [first, first + count) of the scene.
+// The part of a per-triangle array (`each` elements per triangle) that belongs to the mesh.
 template <class T>
 std::span<const T> part_of(const std::vector<T>& all, const ModelMesh& mesh, std::size_t each) {
   return std::span(all).subspan(each * mesh.first_triangle, each * mesh.triangle_count);
@@ -198,7 +198,7 @@ void build(ModelSource& source, ModelMesh& mesh, const std::vector<std::uint32_t
   mesh.built_cost = mesh.bvh.cost();
 }
 
-// Draws [first, last), as they are in the indices.
+// Adds a mesh of the draws [first, last), which are contiguous in the indices.
 void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vector<glm::dmat4> placings,
               std::optional<std::size_t> prototype) {
   const surface::Scene& scene = *source.scene;
@@ -222,7 +222,8 @@ void find_meshes(ModelSource& source) {
   }
 }
 
-// Whether it is another at the other end. What is too far away for a tree at one of them stands still.
+// Whether the mesh differs between shutter open and close. A mesh with a vertex too far away for the tree at either end
+// counts as static.
 bool deforms(const surface::Scene& scene, const ModelMesh& mesh, const surface::PoseEnds& ends) {
   bool differs = false;
   for (const std::uint32_t i : part_of(scene.indices, mesh, 3)) {
@@ -271,7 +272,7 @@ void pack_ends(ModelSource& source, const surface::PoseEnds& ends, const Progres
   }
 }
 
-// Of what stands in other places at the ends, and is there at both.
+// Returns transforms at both ends for placings that change and exist at both ends; else an empty vector.
 std::vector<PlaceEnds> placing_ends(const std::vector<glm::dmat4>& now, const std::vector<glm::dmat4>& open,
                                     const std::vector<glm::dmat4>& close) {
   std::vector<PlaceEnds> ends;
@@ -296,7 +297,7 @@ std::pair<dvec3, dvec3> box_of(const surface::Bvh& bvh) {
   dvec3 low(std::numeric_limits<double>::max());
   dvec3 high(-low);
   for (const surface::Bvh::Node::Child& child : bvh.nodes().front().child) {
-    if (!core::cm_is_within(child.low, static_cast<float>(farthest))) continue;  // a child that is not there
+    if (!core::cm_is_within(child.low, static_cast<float>(farthest))) continue;  // an unused child
     low = glm::min(low, dvec3(child.low));
     high = glm::max(high, dvec3(child.high));
   }
@@ -330,8 +331,8 @@ ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Pr
   source->pose = std::move(pose);
   check(progress);
   find_meshes(*source);
-  // A node that turned inside out has other flags, as have other sides; what shows up or goes is another tree, as is
-  // one whose boxes have grown apart, which is slow.
+  // The BVH is refitted unless triangle flags have changed: a node was mirrored, a sidedness or a visibility changed.
+  // It is also rebuilt if refitting has made its boxes so large that traversal is slow.
   const std::vector<std::uint32_t> flags = surface::triangle_flags(*source->scene, source->pose);
   const bool other_flags = flags != surface::triangle_flags(*last.scene, last.pose);
   for (std::size_t i = 0; i < source->meshes.size(); ++i) {

@@ -17,11 +17,11 @@
 
 namespace cumulet::scene {
 
-/// How a mesh deforms while the shutter is open: its triangles, and the boxes of its tree, go straight from one end to
-/// the other. Words: of the model's.
+/// Deformation of a mesh while the shutter is open: its vertices and the boxes of its BVH move linearly from one end to
+/// the other. Offsets are in words of the model.
 struct MeshEnds {
   struct End {
-    std::uint32_t nodes = 0;  ///< where each of its tables begins: those of the mesh's own tree, fitted to this end
+    std::uint32_t nodes = 0;  ///< offset of each table: those of the mesh's own BVH, refitted to this end
     std::uint32_t records = 0;
     std::uint32_t vertices = 0;  ///< of the whole model
   };
@@ -31,50 +31,51 @@ struct MeshEnds {
   glm::dvec3 high{0.0};
 };
 
-/// Triangles that stand together, with a tree of their own: those that are posed in the model's own world, or a
-/// prototype's. Words: of the model's.
+/// Triangles with a common BVH: those posed in the model's own world space, or those of a prototype. Offsets are in
+/// words of the model.
 struct ModelMesh {
   std::uint32_t first_triangle = 0;
   std::uint32_t triangle_count = 0;
   surface::Bvh bvh;
-  double built_cost = 0.0;               ///< of the tree before it was refitted
-  std::vector<glm::dmat4> placings{1};   ///< to the model's own world
-  std::optional<std::size_t> prototype;  ///< of the scene; nothing: it counts from the pose's origin
-  std::uint32_t nodes = 0;               ///< where each of its tables begins
+  double built_cost = 0.0;               ///< cost of the BVH when it was built, before refits
+  std::vector<glm::dmat4> placings{1};   ///< transforms to the model's own world space
+  std::optional<std::size_t> prototype;  ///< index in the scene; empty: positions are relative to the pose's origin
+  std::uint32_t nodes = 0;               ///< offset of each table
   std::uint32_t records = 0;
   std::uint32_t triangles = 0;
   std::uint32_t emitters = 0;
   std::uint32_t emitter_count = 0;
-  double flux = 0.0;                    ///< as light::EmitterTable has it, in its own space
-  std::optional<MeshEnds> ends;         ///< nothing: it does not deform
-  std::vector<PlaceEnds> placing_ends;  ///< of each placing; empty: all stand still
+  double flux = 0.0;                    ///< as in light::EmitterTable, in the mesh's own space
+  std::optional<MeshEnds> ends;         ///< empty: it does not deform
+  std::vector<PlaceEnds> placing_ends;  ///< of each placing; empty: none moves
 };
 
-/// What is shown of one pose of a scene, in main memory: what paths read, and what the surface pass does. No GL.
+/// Everything that is rendered of one pose of a scene, in main memory: the tables for paths and for the surface pass.
+/// No GL.
 struct ModelSource {
   surface::ScenePtr scene;
   surface::Pose pose;
-  std::vector<ModelMesh> meshes;  ///< those that have triangles
+  std::vector<ModelMesh> meshes;  ///< meshes that have triangles
   std::vector<light::EmissiveTriangle> emissive;
-  std::vector<glm::uvec4> words;  ///< the tables of glsl/surface.glsl, but for textures
-  std::uint32_t vertices = 0;     ///< where those begin that all meshes share
+  std::vector<glm::uvec4> words;  ///< the tables of glsl/surface.glsl, except textures
+  std::uint32_t vertices = 0;     ///< offset of the vertices, which all meshes share
   std::uint32_t materials = 0;
-  bool rich = false;  ///< it shows materials that need CM_RICH (glsl/ggx.glsl)
+  bool rich = false;  ///< visible materials need the extended-material variant CM_RICH (glsl/ggx.glsl)
   std::shared_ptr<const TextureImages> images;
   std::shared_ptr<const RasterSource> raster;
-  std::vector<glm::vec3> centres;  ///< of the raster's blended triangles
+  std::vector<glm::vec3> centres;  ///< centers of the raster's blended triangles
 };
 
 using ModelSourcePtr = std::shared_ptr<const ModelSource>;
 
-/// The box that all triangles of a tree are in, low and high; empty, low above high, where there are none.
+/// Returns the bounding box of the tree's triangles as (low, high); low is above high if there are none.
 std::pair<glm::dvec3, glm::dvec3> box_of(const surface::Bvh& bvh);
 
-/// Builds the BVH and the tables. ends: of the shutter; nothing: it stands still. In between vertices and placings go
-/// straight; what is there, and all but that, is the pose's. Throws Error(cancelled).
+/// Builds the BVH and the tables. ends: the poses at shutter open and close; empty: nothing moves. In between, vertices
+/// and placings move linearly. Visibility and everything else come from `pose`. Throws Error(cancelled).
 ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends = std::nullopt);
-/// The same scene in another pose: refits and packs anew; images stay.
+/// Updates to another pose of the same scene: refits the BVH and packs the tables again; images are shared.
 ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends = std::nullopt);
 

@@ -20,7 +20,7 @@ using glm::dmat4;
 using glm::dvec3;
 using glm::vec3;
 
-constexpr float largest = 1e15F;  // of which shaders' products are finite
+constexpr float largest = 1e15F;  // products of such values stay finite in shaders
 
 bool is_sound(const CmModel& m) {
   const auto sound = [](const vec3& v) { return core::cm_is_within(v, largest); };
@@ -43,7 +43,7 @@ void place(CmModel& record, const dmat4& to_world) {
   if (volume < 0.0) record.flags |= core::CM_MODEL_MIRRORS;
 }
 
-// How likely looks for emissive triangles are for those of each record.
+// Sets the probability with which next-event estimation samples the emissive triangles of each record.
 void share_looks(ModelTable& table, const std::vector<double>& power) {
   double sum = 0.0;
   for (const double of : power) sum += of;
@@ -53,7 +53,7 @@ void share_looks(ModelTable& table, const std::vector<double>& power) {
   }
   table.lights.triangle_flux = sum;
   const std::vector<light::Alias> aliases = light::alias_table(power, sum);
-  // As the table's words give them.
+  // Computed from the quantized alias words, as shaders use them.
   std::vector<double> chance(power.size(), 0.0);
   for (std::size_t i = 0; i < power.size(); ++i) {
     table.records[i].alias = aliases[i].stays;
@@ -110,7 +110,7 @@ bool can_stand(const dmat4& to_world) {
 
 namespace {
 
-// But for where it stands, and its first triangle.
+// Fills all fields except the transform and the first triangle.
 CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& at) {
   CmModel record{};
   record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
@@ -128,18 +128,18 @@ CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& a
   return record;
 }
 
-// Of a mesh, that is placed so within the model.
+// Returns the shutter transforms of one placing of a mesh within the model.
 PlaceEnds ends_of(const Model& model, const ModelMesh& mesh, std::size_t placing) {
   const PlaceEnds of_model = model.ends.value_or(PlaceEnds{model.to_world, model.to_world});
   const dmat4& still = mesh.placings[placing];
   const PlaceEnds within = mesh.placing_ends.empty() ? PlaceEnds{still, still} : mesh.placing_ends[placing];
   const PlaceEnds ends{of_model.open * within.open, of_model.close * within.close};
-  // An animation is not refused for what turns too fast: that stands still.
+  // An animation that rotates too fast to interpolate is not an error: the mesh is then static.
   if (can_stand(ends.open) && can_stand(ends.close) && stays_solid(ends.open, ends.close)) return ends;
   return {model.to_world * still, model.to_world * still};
 }
 
-// A mesh that stands so at an end, and as it is then, if it deforms.
+// Returns the record of a mesh at one shutter end: its transform, and its tables if it deforms.
 CmModel record_of_end(const dmat4& to_world, const ModelMesh& mesh, MeshEnds::End MeshEnds::*end, std::uint32_t first) {
   CmModel record{};
   place(record, to_world);
@@ -151,7 +151,7 @@ CmModel record_of_end(const dmat4& to_world, const ModelMesh& mesh, MeshEnds::En
   return record;
 }
 
-// All that it ever is in, in its own space.
+// Returns the bounds of the mesh in its own space, including both shutter ends.
 std::pair<dvec3, dvec3> own_box(const ModelMesh& mesh) {
   auto [low, high] = box_of(mesh.bvh);
   if (!mesh.ends) return {low, high};
@@ -163,7 +163,7 @@ bool moves(const Model& model) {
   return model.ends || std::ranges::any_of(model.source->meshes, of_itself);
 }
 
-// World bounds of a box in all of these places, and of what goes straight between them; size: how far from the origin.
+// World bounds of a box under these transforms and the linear motion between them. size: largest absolute coordinate.
 struct Way {
   dvec3 low{std::numeric_limits<double>::max()};
   dvec3 high{-low};
@@ -211,7 +211,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
         CmModel record = record_of(model, mesh, at);
         place(record, to_world);
-        // What a file scales to nothing is not there.
+        // A mesh that a file scales to zero is left out.
         if (!is_sound(record)) continue;
         record.first = static_cast<std::uint32_t>(triangles);
         triangles += mesh.triangle_count;
@@ -227,7 +227,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         if (solid) {
           const Way way = way_of({to_world, ends.open, ends.close}, own_low, own_high);
           if (!(way.size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the world's origin");
-          // What rays meet in its own space is here, but for what rounding may be.
+          // Enlarged for rounding, so that it holds every hit in the mesh's own space.
           box.low = vec3(way.low - 2e-6 * way.size);
           box.high = vec3(way.high + 2e-6 * way.size);
           low = glm::min(low, way.low);

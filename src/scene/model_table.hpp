@@ -1,6 +1,6 @@
 #pragma once
 
-// The models of a scene, as shaders are told of them: glsl/model.glsl. No GL.
+// Table of the models of a scene for shaders: glsl/model.glsl. No GL.
 
 #include <cstdint>
 #include <functional>
@@ -20,42 +20,41 @@ namespace cumulet::core {
 
 namespace cumulet::scene {
 
-/// Where a source's tables are, in words of the page that they are in.
+/// Offsets of a source's tables, in words of their page.
 struct ModelWords {
   std::uint32_t first = 0;
   std::uint32_t textures = 0;
 };
 
-/// Which part of which model a record is of.
+/// The model, mesh and placing of a record.
 struct ModelPart {
   std::uint32_t model = 0;
   std::uint32_t mesh = 0;
-  std::uint32_t placing = 0;  // of that
+  std::uint32_t placing = 0;  // index within the mesh
 };
 
-/// Records and nodes go into buffers as they are; of a scene without triangles there is one record, which nothing
-/// meets.
+/// Records and nodes are copied to buffers unchanged. A scene without triangles has one record, which no ray hits.
 struct ModelTable {
-  std::vector<core::CmModel> records;  ///< one for each place of each mesh
-  /// Behind them: where all stand as the shutter opens, then as it closes, and the tables of those that deform as they
-  /// are then. Empty where nothing moves.
+  std::vector<core::CmModel> records;  ///< one for each placing of each mesh
+  /// Follow the records in the buffer: the transforms at shutter open, then at shutter close, and for deforming meshes
+  /// the tables at that end. Empty if nothing moves.
   std::vector<core::CmModel> ends;
   std::vector<core::CmInstanceNode> nodes;    ///< at least one
-  std::vector<ModelPart> parts;               ///< of the records
-  std::vector<surface::PunctualLight> lamps;  ///< of all models, where they stand
-  std::vector<std::uint32_t> lamp_groups;     ///< of these, each one's group of lights
+  std::vector<ModelPart> parts;               ///< of the records, in their order
+  std::vector<surface::PunctualLight> lamps;  ///< lights of all models, in world space
+  std::vector<std::uint32_t> lamp_groups;     ///< light group of each of them
   light::SceneLights lights;
-  glm::dvec3 low{0.0};  ///< of all triangles; of none both are 0
+  glm::dvec3 low{0.0};  ///< bounds of all triangles; both are 0 if there are none
   glm::dvec3 high{0.0};
 
-  /// The record that has a triangle of this number.
+  /// Returns the index of the record that contains this triangle number.
   [[nodiscard]] std::size_t record_of(std::uint32_t triangle) const;
 };
 
-/// A model's lamp, placed in the world. Its intensity stays. to_world: from where its position counts.
+/// Transforms a model's light to world space. Its intensity is unchanged. to_world: from the space of its position.
 surface::PunctualLight placed(surface::PunctualLight light, const glm::dmat4& to_world);
 
-/// World bounds of a model's triangles; nothing where it has none.
+/// World bounds of a model's triangles; `any` is false if it has none.
 struct ModelBounds {
   glm::dvec3 low{0.0};
   glm::dvec3 high{0.0};
@@ -63,12 +62,13 @@ struct ModelBounds {
 };
 ModelBounds bounds_of(const ModelSource& source, const glm::dmat4& to_world);
 
-/// Whether a model may have that place: affine, and neither flat nor endless as floats go.
+/// Whether the transform is usable for a model: finite, not singular, and within float range.
 bool can_stand(const glm::dmat4& to_world);
 
-/// words: of each source. Throws Error(invalid_argument) for a place that is not finite or makes things flat or
-/// endless, Error(unsupported) for one 1e12 or more from the origin of the world, and for more than 2^32 triangles,
-/// each counted wherever it stands; the message counts models from 0. O(n log n).
+/// Builds the table. words: returns the offsets of a source. Throws Error(invalid_argument) for a transform that is not
+/// finite, is singular or scales too far. Throws Error(unsupported) for a model that reaches 1e12 or more from the
+/// world origin. Also throws it for more than 2^32 triangles, counted once per placing. Messages count models from 0.
+/// O(n log n).
 ModelTable make_model_table(std::span<const Model> models, const std::function<ModelWords(const ModelSource&)>& words);
 
 }  // namespace cumulet::scene

@@ -6,7 +6,7 @@ namespace {
 
 using glm::dmat4;
 
-// From the world to what shaders take for a place in a view.
+// Returns the transform from world space to view space.
 dmat4 into(const Viewpoint& view) {
   const glm::dmat3 back = glm::inverse(glm::dmat3(view.right, view.up, view.forward));
   dmat4 map(back);
@@ -47,7 +47,7 @@ MotionTable make_motion(const Snapshot& snapshot, const dmat4& ray_to_world, std
   if (table == nullptr) return made;
   for (const ModelPart& part : table->parts) {
     const Model& model = models[part.model];
-    // A scene that shows other meshes then is as it is now.
+    // If the previous scene had other meshes, the current pose is used.
     const ModelSourcePtr& then_posed = model.previous_source;
     const bool alike = then_posed && then_posed->meshes.size() == model.source->meshes.size() &&
                        then_posed->meshes[part.mesh].placings.size() == model.source->meshes[part.mesh].placings.size();

@@ -1,6 +1,6 @@
 #pragma once
 
-// Where things of a scene were a frame ago, as shaders are told: glsl/motion.glsl. No GL.
+// Motion vectors: the transforms of a scene in the previous frame, for shaders (glsl/motion.glsl). No GL.
 
 #include <cstdint>
 #include <functional>
@@ -18,14 +18,14 @@ namespace cumulet::core {
 
 namespace cumulet::scene {
 
-/// Both go into a buffer as they are, one after the other.
+/// Both are copied to one buffer unchanged, `maps` after `frame`.
 struct MotionTable {
   core::CmMotionFrame frame{};
   std::vector<core::CmMotion> maps;
 };
 
-/// ray_to_world: of the space that rays are in; volumes: in the order of their table, or the only one; models: those of
-/// the table, and vertices_of: where the vertices of a source begin, in words. O(volumes + models).
+/// ray_to_world: from the space of rays. volumes: in the order of their table, or the only volume. models: those of the
+/// table. vertices_of: returns the offset of a source's vertices, in words. O(volumes + models).
 MotionTable make_motion(const Snapshot& snapshot, const glm::dmat4& ray_to_world, std::span<const Volume> volumes,
                         std::span<const Model> models, const ModelTable* table,
                         const std::function<std::uint32_t(const ModelSource&)>& vertices_of);

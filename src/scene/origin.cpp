@@ -11,14 +11,14 @@ namespace {
 
 using glm::dvec3;
 
-// How far a thing may be from the origin, in its own sizes: floats there are 2^-12 of its size apart, at least.
+// Maximum distance of an object from the origin, in sizes of the object: float spacing there is 2^-12 of its size.
 constexpr double farthest_widths = 4096.0;
 
 double largest(const dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 dvec3 middle_of(const Extent& thing) { return 0.5 * (thing.low + thing.high); }
 
-// The size at which it is seen: its own, or, from far away, that of the whole view.
+// Scale at which an object is seen: its own size, or its distance from the eye if that is larger.
 double scale_of(const Extent& thing, const dvec3& eye) {
   return std::max(glm::distance(thing.low, thing.high), glm::distance(eye, glm::clamp(eye, thing.low, thing.high)));
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// A scene counts from an origin of its own, so that floats hold its places wherever it is in the world. No GL.
+// A scene has its own origin, so that floats can represent its positions anywhere in the world. No GL.
 
 #include <glm/glm.hpp>
 #include <optional>
@@ -10,19 +10,19 @@
 
 namespace cumulet::scene {
 
-/// World bounds of one thing of a scene.
+/// World bounds of one object of a scene.
 struct Extent {
   glm::dvec3 low{0.0};
   glm::dvec3 high{0.0};
 };
 
-/// Where the scene counts from, in the world: a point near the middle of all, and exactly 0 for a scene that is within
-/// 256 times its own size of 0. It depends on the content, and so stays where it is while a camera moves. Where the
-/// content is so wide that this point is useless for a thing near the eye, it is a point near that thing. eye: nothing
-/// where nothing is seen. O(things).
+/// Returns the scene's origin in world space: a point near the center of everything, and exactly 0 if the scene is
+/// within 256 times its own size of 0. It depends on the content, so it does not change while a camera moves.
+/// Exception: if the content is so large that floats lack precision for an object near the eye, the origin is near that
+/// object. eye: empty if there is no view. O(things).
 glm::dvec3 origin_of_scene(std::span<const Extent> things, const std::optional<glm::dvec3>& eye);
 
-/// Things of the world, counted from that origin.
+/// Converts objects from world space to coordinates relative to the origin.
 Place counted_from(Place place, const glm::dvec3& origin);
 Volume counted_from(Volume volume, const glm::dvec3& origin);
 Model counted_from(Model model, const glm::dvec3& origin);

@@ -8,12 +8,12 @@ namespace cumulet::scene {
 
 namespace {
 
-constexpr double rounding = 1e-6;  // of a frame
+constexpr double rounding = 1e-6;  // tolerance, in frames
 
 double wrapped(double x, double period) {
   const double rest = std::fmod(x, period);
   const double above = rest < 0.0 ? rest + period : rest;
-  return above < period ? above : 0.0;  // of a tiny x below 0
+  return above < period ? above : 0.0;  // rounding of a tiny negative x
 }
 
 double at_whole(double x) {
@@ -60,7 +60,7 @@ std::vector<std::uint32_t> upcoming(const Playback& playback, const Moment& mome
     const std::int64_t by = from <= to ? 1 : -1;
     for (std::int64_t step = from; step != to + by; step += by) add(step);
   };
-  // From outside it goes on at the nearer end.
+  // A position outside the played range continues at the nearer end.
   const std::int64_t begin = std::clamp(now, first, last);
   if (now != begin) order.push_back(static_cast<std::uint32_t>(now));
   const bool ascending = moment.forward == forward;

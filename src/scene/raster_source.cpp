@@ -33,14 +33,14 @@ bool is_colour(std::size_t map) {
   return map == core::CM_MAP_BASE_COLOR || map == core::CM_MAP_EMISSION || map == core::CM_MAP_SPECULAR_COLOR;
 }
 
-// As roughness goes, of a lobe as wide as an anisotropic one is on average.
+// Returns the roughness of an isotropic lobe with the mean width of the anisotropic lobe.
 float mean_roughness(const surface::Material& m) {
   const float across = m.roughness * m.roughness;
   const float along = glm::mix(across, 1.0F, m.anisotropy * m.anisotropy);
   return std::sqrt(std::sqrt(across * along));
 }
 
-// Through a volume as thick as the material says.
+// Returns the transmitted tint for the material's thickness.
 glm::vec3 tint_of(const surface::Material& m) {
   if (!surface::bounds_volume(m)) return glm::vec3(1.0F);
   return glm::mix(glm::vec3(1.0F), glm::exp(-m.absorption * m.thickness), m.transmission);
@@ -67,7 +67,7 @@ CmMaterial block_of(const surface::Material& m) {
   return block;
 }
 
-// The number of a thing among those that were asked for so far.
+// Returns the index of a key, in order of first use.
 template <class Key>
 std::size_t number_of(std::map<Key, std::size_t>& numbers, const Key& key) {
   return numbers.try_emplace(key, numbers.size()).first->second;
@@ -145,7 +145,7 @@ void add_draws(RasterSource& source, const surface::Pose& pose, const Progress* 
   });
 }
 
-// Where a texel's middle falls among the larger level's: between which two, and how far from the first.
+// Position of a texel's center in the larger level: the two nearest texels, and the interpolation weight of the second.
 struct Between {
   std::uint32_t first, second;
   float part;

@@ -11,7 +11,7 @@ namespace {
 
 using glm::vec3;
 
-// No vector of length 1 is shorter after it: one over a bound of the inverse's norm.
+// Returns a lower bound of the length of a transformed unit vector: 1 / (upper bound of the inverse's norm).
 double least_stretch(const glm::dmat3& linear) {
   const glm::dmat3 inverse = glm::inverse(linear);
   const auto widest_column = [](const glm::dmat3& m) {
@@ -48,7 +48,7 @@ double max_extinction(double extent) {
 }
 
 bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
-  // The determinant is a cubic of the way; columns of the way's matrix in place of the first one's make its terms.
+  // The determinant is a cubic in t; its coefficients are sums of determinants with columns of the difference matrix.
   const glm::dmat3 from(open);
   const glm::dmat3 way = glm::dmat3(close) - from;
   const auto mixed = [](const glm::dmat3& base, const glm::dmat3& other) {
@@ -62,13 +62,13 @@ bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
   };
   const std::array<double, 4> c{glm::determinant(from), mixed(from, way), mixed(way, from), glm::determinant(way)};
   const auto volume = [&](double t) { return c[0] + t * (c[1] + t * (c[2] + t * c[3])); };
-  // Where it is least or most: at an end, or where its slope is none.
+  // The extrema: at the ends, or where the derivative is 0.
   std::array<double, 4> at{0.0, 1.0, 0.0, 1.0};
   const double root = std::sqrt(std::max(0.0, c[2] * c[2] - 3.0 * c[1] * c[3]));
   const double q = -(c[2] + std::copysign(root, c[2]));
   if (c[3] != 0.0) at[2] = std::clamp(q / (3.0 * c[3]), 0.0, 1.0);
   if (q != 0.0) at[3] = std::clamp(c[1] / q, 0.0, 1.0);
-  constexpr double least = 1e-6;  // of the smaller end's
+  constexpr double least = 1e-6;  // relative to the smaller end's volume
   const double bound = least * std::min(std::abs(volume(0.0)), std::abs(volume(1.0)));
   const double side = volume(0.0) < 0.0 ? -1.0 : 1.0;
   return std::ranges::all_of(at, [&](double t) { return side * volume(t) > bound; });

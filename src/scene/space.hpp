@@ -1,6 +1,6 @@
 #pragma once
 
-// Where a volume stands, as shaders are told. No GL.
+// Transforms of volumes for shaders. No GL.
 
 #include <glm/glm.hpp>
 
@@ -9,23 +9,24 @@
 
 namespace cumulet::scene {
 
-/// Of a cube of this place in the world, in which all there is to march through is inside low to high (cube space).
+/// Returns the space of a cube with this transform; everything to traverse is between low and high (cube space).
 core::CmSpace space_of(const glm::dmat4& cube_to_world, const glm::vec3& low, const glm::vec3& high);
 
-/// How much a length grows by it, on average: the cube root of how much a volume does.
+/// Returns the mean length scale of a transform: the cube root of its volume scale.
 double mean_stretch(const glm::dmat4& place);
 
-/// The most extinction that paths are traced with, where all volumes together have this extent: on average they go as
-/// far as floats resolve positions there. With more they would never leave. Infinite for an extent of 0.
+/// Returns the maximum extinction that paths are traced with, for the extent of all volumes together. At this
+/// extinction the mean free path equals the float resolution of positions; with more, paths would never leave. Infinite
+/// for an extent of 0.
 double max_extinction(double extent);
 
-/// Whether what goes straight from one affine place to the other is solid all the way: it is not where it turns halfway
-/// round, or is mirrored.
+/// Whether linear motion between two affine transforms stays non-singular. It does not if it rotates by half a turn or
+/// mirrors.
 bool stays_solid(const glm::dmat4& open, const glm::dmat4& close);
 
-/// A volume's own table, of it as it stands at that place: what it gives off, and how much of a ray that takes.
+/// The emissive-cell table of one volume instance: its emission, and the sampling parameters for shaders.
 struct PlacedGlow {
-  double power = 0.0;  ///< as GlowSum has both
+  double power = 0.0;  ///< see GlowSum for both
   double length = 0.0;
   core::CmGlow looks{};
 };

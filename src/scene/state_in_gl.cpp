@@ -38,7 +38,7 @@ struct FieldsOf {
 
 bool any(const volume::DeviceBricksPtr& bricks) { return bricks && !bricks->origins.empty(); }
 
-// Powers of two: what changes a little is in units of the same.
+// Powers of two, so that similar velocities are encoded in the same unit.
 float unit_above(double fastest) {
   constexpr double least = 1e-9;
   const double power = std::exp2(std::ceil(std::log2(std::max(fastest, least))));
@@ -51,7 +51,7 @@ std::vector<volume::ScalarVolume> volumes_of(const ProductInGl& product, const s
   const std::vector<glm::ivec3>& origins = product.components[0]->origins;
   for (const volume::DeviceBricksPtr& bricks : product.components) {
     volume::ScalarVolume& component = made.emplace_back(volume::volume_on_device(bricks, name, index_to_world));
-    // Whole bricks, as those of main memory.
+    // Bounds are whole bricks, as in main memory.
     if (origins.empty()) continue;
     component.bounds_min = glm::ivec3(std::numeric_limits<int>::max());
     component.bounds_max = glm::ivec3(std::numeric_limits<int>::min());

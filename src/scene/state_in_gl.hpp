@@ -15,85 +15,85 @@
 
 namespace cumulet::scene {
 
-/// What is made of a volume's fields, voxel by voxel, as the functions of these names make it in main memory
-/// (scene/channels.hpp): its light by these settings is an Emission, and there is scattering_of(), ...
+/// Voxelwise products of a volume's fields. They are the GL counterparts of the functions in scene/channels.hpp. An
+/// Emission is the product of emission_of() with these settings, Scattering that of scattering_of().
 struct Scattering {
   bool operator==(const Scattering&) const = default;
 };
-/// ... forward_of(), ...
+/// The product of forward_of().
 struct Forward {
-  bool coloured = false;  ///< of what has a colour
+  bool coloured = false;  ///< whether the volume has a color
   bool operator==(const Forward&) const = default;
 };
-/// ... and momentum_of().
+/// The product of momentum_of().
 struct Momentum {
-  float fastest = 0.0F;  ///< what it is in units of
+  float fastest = 0.0F;  ///< the speed that values are relative to
   bool operator==(const Momentum&) const = default;
 };
 using Product = std::variant<Emission, Scattering, Forward, Momentum>;
-/// Which fields it is made of. But for light the first is density, of whose bricks it is, and they are in the order
-/// that glsl/brick_products.comp has them in.
+/// Returns the fields that a product is made of. Except for emission, the first is density, whose bricks the product
+/// has. The order is that of glsl/brick_products.comp.
 std::vector<volume::Channel> fields_of(const Product& product);
 
-/// The same in GL, but for roundings.
+/// A product in GL; equal to the one in main memory except for rounding.
 struct ProductInGl {
   Product what;
-  /// One or three: the same bricks in the same order, of which none is 0 in all of them, as floats.
+  /// One or three components with the same bricks in the same order, as floats. No brick is 0 in all components.
   std::vector<volume::DeviceBricksPtr> components;
 };
 
-/// A volume whose bricks are in GL: density, which may be nothing, and what is beside it.
+/// A volume whose bricks are GPU-resident: density, which may be empty, and other fields.
 struct StateInGl {
   struct Field {
     volume::Channel channel;
     volume::DeviceBricksPtr bricks;
   };
   std::string name;
-  std::vector<Field> fields;  ///< one lattice has them all
+  std::vector<Field> fields;  ///< all on one lattice
   glm::dmat4 index_to_world{1.0};
-  std::vector<ProductInGl> products;  ///< those that were made
+  std::vector<ProductInGl> products;  ///< the products that have been made
 
-  /// Null: it has no such field.
+  /// Returns null if there is no such field.
   [[nodiscard]] volume::DeviceBricksPtr field(volume::Channel channel) const;
-  /// Null: it was not made.
+  /// Returns null if it was not made.
   [[nodiscard]] const ProductInGl* product(const Product& what) const;
-  /// All that volumes need of it where its light is wanted by these settings, as far as the fields tell. O(bricks of
+  /// Returns all products that volumes need of it for these emission settings, as far as the fields show. O(bricks of
   /// velocity).
   [[nodiscard]] std::vector<Product> wanted(const std::vector<Emission>& settings) const;
-  /// Whether it has all of that. O(1).
+  /// Whether all products of wanted() have been made. O(1).
   [[nodiscard]] bool has_wanted(const std::vector<Emission>& settings) const;
-  /// Light that was found of it, if any was: by which settings.
+  /// Returns the settings of one of its emission products, or null if there is none.
   [[nodiscard]] const Emission* some_emission() const;
-  /// All that is in GL.
+  /// Returns all bricks that are in GL.
   [[nodiscard]] std::vector<volume::DeviceBricksPtr*> all();
   [[nodiscard]] std::vector<const volume::DeviceBricks*> all() const;
-  /// Whether any of it went with its context.
+  /// Whether any of them was lost with its context.
   [[nodiscard]] bool gone() const;
-  /// Whether any of it gives off light by these settings, as far as they tell.
+  /// Whether it may emit with these settings, judged by the fields.
   [[nodiscard]] bool emits(const Emission& settings) const;
-  /// What volumes are made of; their voxels are not in main memory. Of what has a sign there is the magnitude.
+  /// Returns the volume fields; their voxels are not in main memory. For signed fields, only the magnitude is present.
   [[nodiscard]] volume::VolumeFrame frame() const;
-  // What was made, as channels have it; nothing where it was not.
+  // The products in the form of grid channels; nullopt if they were not made.
   [[nodiscard]] std::optional<grid::RgbField::Components> emission(const Emission& settings) const;
   [[nodiscard]] std::optional<grid::RgbField::Components> scattering() const;
   [[nodiscard]] std::optional<volume::ScalarVolume> forward() const;
   [[nodiscard]] std::optional<grid::MomentumField::Values> momentum() const;
 
  private:
-  // Of its density, where there is any.
+  // Kinds of scattering data; all false if there is no density.
   struct Scatters {
     bool coloured = false;
     bool anisotropic = false;
     bool moves = false;
   };
   [[nodiscard]] Scatters scatters() const;
-  // Of a kind of product that was made; null: none.
+  // Returns a product of this kind; null if there is none.
   template <class Kind>
   [[nodiscard]] const ProductInGl* made() const;
-  // Nothing: it has no such field.
+  // Returns nullopt if there is no such field.
   [[nodiscard]] std::optional<volume::ScalarVolume> volume_of(volume::Channel channel) const;
   [[nodiscard]] std::optional<volume::Velocity> velocity() const;
-  // Of its lattice, without a voxel.
+  // Returns a field on the lattice without voxels.
   [[nodiscard]] volume::ScalarVolume none() const;
 };
 using StateInGlPtr = std::shared_ptr<const StateInGl>;

@@ -11,11 +11,11 @@
 
 namespace cumulet::scene {
 
-/// A scene's images as they go into an atlas.
+/// A scene's images, prepared for an atlas.
 struct TextureImages {
   surface::ScenePtr scene;
   std::vector<glm::uvec2> sizes;
-  /// Of each, what is put there where that is not the image itself: encoded as it is, and smaller.
+  /// For each image, a reduced version with the same encoding; empty if the image itself is used.
   std::vector<std::vector<std::uint8_t>> smaller;
 
   [[nodiscard]] const std::vector<std::uint8_t>& rgba(std::size_t image) const {
@@ -24,26 +24,28 @@ struct TextureImages {
 };
 using TextureImagesPtr = std::shared_ptr<const TextureImages>;
 
-/// largest: the widest layer that any driver takes; images beyond it are halved until they fit. Throws
-/// Error(cancelled).
+/// Prepares a scene's images. largest: layer size that every driver supports; larger images are halved until they fit.
+/// Throws Error(cancelled).
 TextureImages texture_images(surface::ScenePtr scene, std::uint32_t largest, const Progress* progress = nullptr);
 
-/// Images packed into layers of one size, each placed once: glsl/surface.glsl wraps and filters by itself.
+/// Images packed into layers of one size, each stored once: glsl/surface.glsl does the wrapping and filtering.
 struct TextureAtlas {
   struct Place {
     glm::uvec2 corner{0U};
     glm::uvec2 size{0U};
     std::uint32_t layer = 0;
   };
-  std::uint32_t edge = 1;  // of a layer
+  std::uint32_t edge = 1;  // width and height of a layer
   std::uint32_t layers = 0;
-  std::vector<std::vector<Place>> places;  // of each scene's images
+  std::vector<std::vector<Place>> places;  // for each image of each scene
 };
 
-/// Shelves of falling height. The edge is that of the largest image at least. O(n log n).
+/// Packs images in rows of decreasing height (shelf packing). The layer edge is at least that of the largest image. O(n
+/// log n).
 TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes);
 
-/// A word of glsl/surface.glsl's table of textures: where its image is, and how it is looked up.
+/// Returns a word of glsl/surface.glsl's texture table: the image's position in the atlas, and its wrapping and
+/// filtering.
 glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Place& place);
 
 }  // namespace cumulet::scene

@@ -14,11 +14,11 @@ using glm::dvec3;
 using glm::vec3;
 using surface::Bvh;
 
-// The tree of boxes that triangles have, in the order that needs no stack.
+// Builds a triangle BVH over the boxes and writes it in depth-first order with skip links, which needs no stack.
 class Threaded {
  public:
   static std::vector<CmInstanceNode> nodes_of(std::span<const TreeBox> boxes) {
-    // Of two corners a triangle has the same box.
+    // A degenerate triangle of two opposite corners has the same bounding box.
     std::vector<surface::PosedVertex> corners;
     std::vector<std::uint32_t> indices;
     std::vector<std::uint32_t> left_out;
@@ -45,7 +45,7 @@ class Threaded {
   explicit Threaded(const Bvh& tree) : tree_(tree) {}
 
   static std::size_t first_of(const Bvh::Node::Child& leaf) { return leaf.link & 0x1fffffffU; }
-  // A tree of one leaf has no second child, one of nothing has none.
+  // A tree with one leaf has no second child; an empty tree has no children.
   [[nodiscard]] bool is_there(const Bvh::Node::Child& child) const {
     return child.link < Bvh::leaf_bit || first_of(child) < tree_.records().size();
   }
@@ -58,7 +58,7 @@ class Threaded {
     nodes_[at].skip = static_cast<std::uint32_t>(nodes_.size());
   }
 
-  // No deeper than Bvh::max_depth.
+  // Recursion depth is at most Bvh::max_depth.
   void add(const Bvh::Node::Child& child) {  // NOLINT(misc-no-recursion)
     if (child.link < Bvh::leaf_bit) {
       add_inner(child.low, child.high, [&] {

@@ -1,6 +1,6 @@
 #pragma once
 
-// What of lamps (cumulet_set_lamps) is refused that no range of one setting refuses.
+// Limits of lights (cumulet_set_lamps) beyond the range of each single setting.
 
 #include <cumulet/cumulet.h>
 
@@ -15,22 +15,22 @@
 namespace cumulet::settings {
 
 inline constexpr std::size_t most_lamps = 4096;
-inline constexpr double farthest_lamp = 1e30;    ///< a coordinate
-inline constexpr float brightest_lamp = 1e30F;   ///< times what one close by counts, it stays finite
+inline constexpr double farthest_lamp = 1e30;    ///< maximum absolute coordinate
+inline constexpr float brightest_lamp = 1e30F;   ///< stays finite when multiplied by the geometry term of a near point
 inline constexpr double widest_sun_lamp = 90.0;  ///< degrees
 
-/// Why there are not so many; "" if there may be.
+/// Returns why that many lights are rejected; "" if they are accepted.
 inline std::string lamp_count_refusal(std::uint64_t count) {
   if (count <= most_lamps) return "";
   return std::to_string(count) + " lamps are more than " + std::to_string(most_lamps);
 }
 
 struct LampRefusal {
-  const char* name;   // the field's, and its key's
-  std::string cause;  // in words that follow it
+  const char* name;   // of the field, and of its key in scene files
+  std::string cause;  // text that follows the name
 };
 
-/// Of a lamp whose settings are each in their ranges.
+/// Checks a light whose settings are each within their range.
 inline std::optional<LampRefusal> lamp_refusal(const cumulet_lamp_desc& lamp) {
   if (!std::all_of(std::begin(lamp.position), std::end(lamp.position),
                    [](double x) { return std::abs(x) <= farthest_lamp; }))

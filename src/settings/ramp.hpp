@@ -1,6 +1,6 @@
 #pragma once
 
-// Ramps over what grids hold (cumulet_set_ramp): what people are told of each, and which points make one.
+// Ramps (transfer functions) of grid values (cumulet_set_ramp): their texts for users, and checks of their points.
 
 #include <cumulet/cumulet.h>
 
@@ -16,15 +16,15 @@
 
 namespace cumulet::settings {
 
-/// A grid's value, and what it becomes.
+/// A grid value, and the value that it is mapped to.
 using RampPoint = std::array<float, 2>;
-/// None: values stay as they are.
+/// Empty: values are unchanged.
 using RampPoints = std::vector<RampPoint>;
 
-/// As cumulet_set_ramp takes them.
+/// Returns the points in the form that cumulet_set_ramp takes.
 inline const float* numbers_of(const RampPoints& points) { return points.empty() ? nullptr : points.front().data(); }
 
-/// All that is told of a ramp; as for Facts.
+/// The names and texts of a ramp; fields as in Facts.
 struct RampFacts {
   const char* name;
   const char* key;
@@ -32,10 +32,10 @@ struct RampFacts {
   const char* help;
   const char* label;
   const char* tip;
-  const char* point;  // in the demo: of its numbers
+  const char* point;  // label of a point's two numbers in the demo
 };
 
-/// As numbered in cumulet.h.
+/// Indexed by the ramp enum of cumulet.h.
 inline constexpr std::array ramps = {
     RampFacts{"density", "medium.density_ramp", "--density-ramp",
               "What densities become, straight between points: \"0:0,0.1:0,1:1\" takes thin smoke away; none (default)",
@@ -51,16 +51,16 @@ inline constexpr std::array ramps = {
 static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
 
 inline constexpr std::size_t most_ramp_points = 32;
-inline constexpr float most_ramp_value = 1e30F;  ///< of values and of what they become
+inline constexpr float most_ramp_value = 1e30F;  ///< maximum of values and of mapped values
 
-/// Why there are not so many points in a ramp; "" if there may be.
+/// Returns why that many points are rejected; "" if they are accepted.
 inline std::string ramp_count_refusal(std::uint64_t count) {
   if (count == 0 || (count >= 2 && count <= most_ramp_points)) return "";
   return "has " + std::to_string(count) + (count == 1 ? " point" : " points") + ", not none or 2 to " +
          std::to_string(most_ramp_points);
 }
 
-/// Why they make no ramp, in words that follow its name; "" if they do.
+/// Returns why the points are rejected, as text that follows the ramp's name; "" if they are accepted.
 inline std::string ramp_refusal(std::span<const RampPoint> points) {
   if (std::string why = ramp_count_refusal(points.size()); !why.empty()) return why;
   const auto text = [](const RampPoint& point) { return number_text(point[0]) + ":" + number_text(point[1]); };

@@ -1,6 +1,6 @@
 #pragma once
 
-// What is told of a setting, and what follows from its type alone. The table is settings.hpp.
+// The description of a setting, and functions that depend only on its type. The table is settings.hpp.
 
 #include <array>
 #include <charconv>
@@ -16,7 +16,7 @@
 
 namespace cumulet::settings {
 
-/// The shortest text that is read back as the number: 1e30, not 1e+30.
+/// Returns the shortest text that is read back as the same number: 1e30, not 1e+30.
 template <std::floating_point Number>
 std::string number_text(Number value) {
   std::array<char, 64> buffer{};
@@ -28,13 +28,13 @@ std::string number_text(Number value) {
 struct Range {
   double least = -std::numeric_limits<double>::max();
   double most = std::numeric_limits<double>::max();
-  bool open = false;  // the ends themselves are out
+  bool open = false;  // the ends themselves are excluded
 
-  /// False for what is not a number.
+  /// Returns false for NaN.
   [[nodiscard]] constexpr bool holds(double value) const {
     return open ? value > least && value < most : value >= least && value <= most;
   }
-  /// What to say of a number that it does not hold: "is not from 0 to 1".
+  /// Returns the error text for a number out of range: "is not from 0 to 1".
   [[nodiscard]] std::string refusal() const {
     const bool bounded = most < std::numeric_limits<double>::max();
     if (!bounded && least == -most) return "is not finite";
@@ -59,14 +59,14 @@ struct Choice {
   const char* tip;
 };
 
-/// How people are told of a value.
+/// How a value is presented to users.
 enum class Spelling {
   as_is,
-  complement,       // as 1 - value, since 1 is their default and 0 the struct's: the albedo
-  zero_is_negative  // 0 as -1, since 0 is the struct's default: the threshold
+  complement,       // as 1 - value, because users see a default of 1 and the struct has 0: the albedo
+  zero_is_negative  // 0 as -1, because 0 in the struct means the default: the threshold
 };
 
-/// A row of the demo's panel. Integers without a most are typed, not slid.
+/// A row of the demo's panel. Integers without a maximum have an input field instead of a slider.
 struct Row {
   const char* label = "";  // "": none
   const char* tip = "";
@@ -74,24 +74,24 @@ struct Row {
   double most = 0.0;
   const char* format = "%.3f";
   bool logarithmic = false;
-  const char* zero = "";  // how 0 reads; "": as a number
-  // Of a light, whose strength is the above:
+  const char* zero = "";  // text for the value 0; "": as a number
+  // For colored lights, whose strength is described above:
   const char* colour = "";
   const char* colour_tip = "";
-  std::array<float, 3> hue = {1.0F, 1.0F, 1.0F};  // of a light that was never on
+  std::array<float, 3> hue = {1.0F, 1.0F, 1.0F};  // initial color of a light that was off
 };
 
-/// All that is told of a setting. "" where there is none.
+/// All metadata of a setting. "" means none.
 struct Facts {
-  const char* name;                           // the field's, in C and C++
-  Range range = any_number;                   // what the C API takes
-  std::optional<Range> given = std::nullopt;  // what scene files and flags take, if that is another
-  double zero = 0.0;                          // what 0 stands for, of three numbers: all of them 0
+  const char* name;                           // of the field, in C and C++
+  Range range = any_number;                   // accepted by the C API
+  std::optional<Range> given = std::nullopt;  // accepted by scene files and flags, if different
+  double zero = 0.0;                          // the value that 0 means; for three numbers, if all are 0
   std::span<const Choice> choices = {};       // of an enum
   Spelling spelling = Spelling::as_is;
   const char* key = "";   // in scene files: "medium.anisotropy"
   const char* flag = "";  // "--anisotropy"
-  const char* type = "";  // what follows the flag, as help has it; enums tell their names
+  const char* type = "";  // placeholder after the flag in the help text; enums list their names
   const char* help = "";
   Row row = {};
 };
@@ -103,7 +103,7 @@ struct Setting : Facts {
 
   constexpr Setting(Value Desc::*at, const Facts& facts) : Facts(facts), field(at) {}
 
-  /// Whether it is this field.
+  /// Whether this setting is of that field.
   template <class Other>
   [[nodiscard]] constexpr bool is(Other Desc::*other) const {
     if constexpr (std::is_same_v<Other, Value>) {
@@ -112,11 +112,11 @@ struct Setting : Facts {
       return false;
     }
   }
-  /// What people may give.
+  /// Returns the range for users.
   [[nodiscard]] constexpr Range given_range() const { return given.value_or(range); }
 };
 
-// Kinds, by a field's type.
+// Kinds of settings, by the type of the field.
 template <class Value>
 concept Enumerated = std::is_enum_v<Value>;
 template <class Value>
@@ -128,7 +128,7 @@ concept Real = std::floating_point<Value>;
 template <class Value>
 concept Triple = std::is_array_v<Value> && std::extent_v<Value>
 == 3;
-/// x, y, width, height; a width or height of 0 reaches to the end.
+/// x, y, width, height; a width or height of 0 extends to the border.
 template <class Value>
 concept Rectangle = std::is_array_v<Value> && std::extent_v<Value>
 == 4;
@@ -139,7 +139,7 @@ template <class Three>
   return value[0] == 0 && value[1] == 0 && value[2] == 0;
 }
 
-/// rows: a tuple of a descriptor's settings; name: of its struct.
+/// rows: a tuple of the settings of a descriptor; name: of its struct.
 template <class Desc>
 struct Table;
 
@@ -149,7 +149,7 @@ constexpr void for_each(Visit&& visit) {
   std::apply([&](const auto&... setting) { (visit(setting), ...); }, Table<Desc>::rows);
 }
 
-/// Calls visit for one field's setting.
+/// Calls visit for the setting of one field.
 template <class Desc, class Value, class Visit>
 constexpr void with(Value Desc::*field, Visit&& visit) {
   for_each<Desc>([&](const auto& setting) {
@@ -159,7 +159,7 @@ constexpr void with(Value Desc::*field, Visit&& visit) {
   });
 }
 
-/// Whether two descriptors say the same.
+/// Whether all settings of two descriptors are equal.
 template <class Desc>
 [[nodiscard]] constexpr bool same(const Desc& a, const Desc& b) {
   bool all = true;
@@ -175,7 +175,7 @@ template <class Desc>
   return all;
 }
 
-/// Replaces zeros by what they stand for.
+/// Replaces zeros by the values that they mean.
 template <class Desc>
 constexpr void spell_out_zeros(Desc& desc) {
   for_each<Desc>([&](const auto& setting) {

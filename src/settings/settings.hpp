@@ -1,8 +1,8 @@
 #pragma once
 
-// The table of settings: one row says all there is to say of a setting but what it means to the picture, which is in
-// cumulet.h. From here come the checks and defaults of the C API, keys of scene files, flags with their help, whether
-// two descriptors are the same, and the rows of the demo's panel.
+// The table of settings. A row describes everything about a setting except its effect on the image, which is documented
+// in cumulet.h. The table defines the checks and defaults of the C API, scene-file keys, and flags with their help. It
+// also defines the comparison of descriptors and the rows of the demo's panel.
 
 #include <cumulet/cumulet.h>
 
@@ -88,7 +88,7 @@ inline constexpr std::array lamp_choices = {
     Choice{"rectangle", CUMULET_LAMP_RECTANGLE, "Rectangle", "An area that shines to one side."},
     Choice{"sun", CUMULET_LAMP_SUN, "Sun", "Far away: the same everywhere."}};
 
-/// Numbers of groups of lights.
+/// Valid light group numbers.
 inline constexpr Range group_range = {0.0, double{CUMULET_LIGHT_GROUPS} - 1.0};
 
 // One setting, one row.
@@ -254,7 +254,7 @@ struct Table<cumulet_light_desc> {
         .help = "Likewise, of the sky or the environment"})};
 };
 
-/// Of one lamp of many: keys are those of its object in a scene file's list.
+/// The settings of one light in a list: keys are those of its object in a scene file.
 template <>
 struct Table<cumulet_lamp_desc> {
   using Desc = cumulet_lamp_desc;
@@ -613,13 +613,14 @@ struct Table<cumulet_navigation_desc> {
 
 // clang-format on
 
-/// The criterion that a grid is made by: that of all zeros is not the one that 0 names.
+/// Returns the refinement criterion of a grid. A descriptor of zeros selects the default, not the criterion that has
+/// the value 0.
 [[nodiscard]] constexpr cumulet_criterion criterion_of(const cumulet_grid_desc& desc) {
   const bool zeros = desc.criterion == CUMULET_CRITERION_DEVIATION && desc.threshold == 0.0;
   return zeros ? CUMULET_CRITERION_TRANSMITTANCE : desc.criterion;
 }
 
-/// The threshold that 0 stands for, of criterion_of().
+/// Returns the threshold that 0 means, for a criterion from criterion_of().
 [[nodiscard]] constexpr double default_threshold(cumulet_criterion criterion) {
   switch (criterion) {
     case CUMULET_CRITERION_TRANSMITTANCE:
@@ -631,12 +632,12 @@ struct Table<cumulet_navigation_desc> {
   }
 }
 
-/// Of a description whose criterion was named: then zeros are what they say.
+/// For a descriptor whose criterion was set explicitly: sets the threshold so that a criterion of 0 is taken literally.
 constexpr void name_criterion(cumulet_grid_desc& desc) {
   if (criterion_of(desc) != desc.criterion) desc.threshold = default_threshold(desc.criterion);
 }
 
-/// The sun's angle that 0 stands for.
+/// Returns the angular diameter of the sun that 0 means, in degrees.
 [[nodiscard]] constexpr float default_sun_angle(cumulet_sky sky) { return sky == CUMULET_SKY_PHYSICAL ? 0.53F : 0.0F; }
 
 }  // namespace cumulet::settings

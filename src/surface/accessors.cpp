@@ -52,7 +52,7 @@ std::size_t size_of(int type) {
   return static_cast<std::size_t>(std::max(tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(type)), 0));
 }
 
-/// 0 for a type that is not an unsigned integer.
+/// Returns 0 for a type that is not an unsigned integer.
 std::size_t unsigned_size(int type) {
   const bool good = type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE || type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
                     type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
@@ -185,7 +185,7 @@ std::vector<float> Accessors::scalars(int accessor, const std::string& what) con
 
 std::vector<glm::mat4> Accessors::matrices(int accessor, const std::string& what) const {
   const std::size_t n = count(accessor, what);
-  // Columns of smaller components would be padded.
+  // Smaller component types have padded columns.
   if (at(accessor, what).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) malformed(what + " is not of floats");
   budget_.take(n, sizeof(glm::mat4), what);
   std::vector<glm::mat4> result(n);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: numbers out of accessors (glTF 2.0, 3.6.2), any component type, normalised, sparse.
+// Private to surface/: reads numbers from accessors (glTF 2.0, 3.6.2) of any component type, normalized or sparse.
 
 #include <glm/glm.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -13,13 +13,13 @@ class Accessors {
  public:
   Accessors(const GltfFile& file, Budget& budget) : file_(file), budget_(budget) {}
 
-  /// Elements in it. Throws if there is no such accessor, or if it reaches beyond its buffer view.
+  /// Number of elements. Throws if the accessor does not exist or exceeds its buffer view.
   [[nodiscard]] std::size_t count(int accessor, const std::string& what) const;
-  /// TINYGLTF_TYPE_VEC3 and so on.
+  /// A type constant of tinygltf, such as TINYGLTF_TYPE_VEC3.
   [[nodiscard]] int type(int accessor, const std::string& what) const { return at(accessor, what).type; }
 
-  /// Elements `which` (all, if null) as floats, integers normalised where the accessor says so. A type other than
-  /// VEC<N> is an error, but that VEC3 serves for VEC4: w is then `w`.
+  /// Returns the elements `which` (null: all) as floats; integers are normalized if the accessor says so. Throws for a
+  /// type other than VEC<N>, except that VEC3 is accepted for VEC4: w is then `w`.
   template <int N>
   std::vector<glm::vec<N, float>> vectors(int accessor, const std::string& what,
                                           const std::vector<std::uint32_t>* which = nullptr, float w = 1.0F) const {
@@ -38,7 +38,7 @@ class Accessors {
   }
   std::vector<float> scalars(int accessor, const std::string& what) const;
   std::vector<glm::mat4> matrices(int accessor, const std::string& what) const;
-  /// Unsigned integers of an accessor of `components` components that is not normalised.
+  /// Returns unsigned integers of an accessor with `components` components that is not normalized.
   std::vector<std::uint32_t> integers(int accessor, std::size_t components, const std::string& what,
                                       const std::vector<std::uint32_t>* which = nullptr) const;
 
@@ -46,7 +46,7 @@ class Accessors {
   struct Layout {
     const std::uint8_t* data = nullptr;  ///< null: zeros
     std::size_t stride = 0;
-    std::size_t size = 0;  ///< of an element
+    std::size_t size = 0;  ///< bytes per element
     std::size_t components = 0;
     const std::uint8_t* sparse_indices = nullptr;
     int sparse_index_type = 0;
@@ -58,10 +58,10 @@ class Accessors {
   [[nodiscard]] Layout layout(const tinygltf::Accessor& accessor, const std::string& what) const;
   [[nodiscard]] std::span<const std::uint8_t> view(int index, std::uint64_t offset, std::uint64_t size,
                                                    const std::string& what) const;
-  /// Components of the elements, `step` apart for an element each.
+  /// Writes the components of the elements; `step` is the distance between elements in floats.
   void read(int accessor, int expected_type, float* to, std::size_t step, const std::vector<std::uint32_t>* which,
             const std::string& what) const;
-  /// Calls visit(n, bytes): the n-th wanted element, with null for zeros.
+  /// Calls visit(n, bytes) for the n-th requested element; bytes is null for zeros.
   template <class Visit>
   void each(const tinygltf::Accessor& accessor, const std::vector<std::uint32_t>* which, const std::string& what,
             const Visit& visit) const;

@@ -20,7 +20,7 @@ namespace cumulet::surface {
 
 using glm::vec3;
 
-// Four lanes, so that compilers make one instruction of each loop; the fourth is always 0 or ignored.
+// Four lanes, so that compilers vectorize each loop; the fourth lane is always 0 or ignored.
 struct Bvh::Bounds {
   static constexpr float huge = 3.0e38F;
 
@@ -39,16 +39,16 @@ struct Bvh::Bounds {
       high[i] = point[i] > high[i] ? point[i] : high[i];
     }
   }
-  // Plus zero: minima and maxima of -0 and +0 would depend on the order.
+  // Adding zero turns -0 into +0: otherwise minima and maxima would depend on the order.
   void add(const vec3& p) { add(std::array<float, 4>{p.x + 0.0F, p.y + 0.0F, p.z + 0.0F, 0.0F}); }
   [[nodiscard]] bool empty() const { return low[0] > high[0]; }
-  // Twice the middle.
+  // Returns twice the center.
   [[nodiscard]] std::array<float, 4> centre() const {
     std::array<float, 4> sum{};
     for (unsigned i = 0; i < 4; ++i) sum[i] = low[i] + high[i];
     return sum;
   }
-  // Half the surface.
+  // Returns half the surface area.
   [[nodiscard]] float area() const {
     if (empty()) return 0.0F;
     const float x = high[0] - low[0];
@@ -60,12 +60,13 @@ struct Bvh::Bounds {
 
 namespace {
 
-constexpr float far_away = 3.0e38F;   // where the box of nothing is: no ray gets there
+constexpr float far_away = 3.0e38F;   // position of an empty box, which no ray reaches
 constexpr float most = 1.0e12F;       // beyond it the shader's products overflow
-constexpr std::size_t grain = 4096;   // triangles a task in flat loops
-constexpr std::size_t piece = 16384;  // triangles that one task builds the tree of; not by threads: the same everywhere
-constexpr std::uint32_t nothing = 0xffffffffU;  // the link of a child that is not there: a leaf beyond all records
-// Of a node, in tests of a triangle. From 1 to 4 rays are as fast; more makes fewer nodes.
+constexpr std::size_t grain = 4096;   // triangles per task in flat loops
+constexpr std::size_t piece = 16384;  // triangles whose subtree one task builds; independent of the number of threads,
+                                      // for deterministic results
+constexpr std::uint32_t nothing = 0xffffffffU;  // the link of an absent child: a leaf beyond all records
+// Cost of a node, in triangle tests. Values from 1 to 4 trace equally fast; a higher cost gives fewer nodes.
 constexpr float visit_cost = 2.0F;
 
 bool sound(const vec3& p) { return std::abs(p.x) <= most && std::abs(p.y) <= most && std::abs(p.z) <= most; }
@@ -74,7 +75,7 @@ std::uint32_t leaf_link(std::size_t first, std::size_t count) {
   return Bvh::leaf_bit | (static_cast<std::uint32_t>(count - 1) << 29U) | static_cast<std::uint32_t>(first);
 }
 
-// Triangles that fit under a node of this level (the root's is 0), or into a leaf at max_depth.
+// Number of triangles that fit under a node of this level (the root's is 0), or into a leaf at max_depth.
 std::size_t capacity(int level) { return std::size_t{Bvh::max_leaf} << static_cast<unsigned>(Bvh::max_depth - level); }
 
 }  // namespace
@@ -123,7 +124,8 @@ class Bvh::Builder {
     });
   }
 
-  // The corners of a record's triangle; of one that is not sound a point, spare 1 and no box.
+  // Sets the corners of a record's triangle. If a coordinate is not sound, all corners become 0, `spare` becomes 1 and
+  // the box is empty.
   static void place(Record& record, std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices) {
     const std::size_t first = std::size_t{record.triangle} * 3;
     record.v0 = vertices[indices[first]].position;
@@ -138,7 +140,7 @@ class Bvh::Builder {
     return {{box.low[0], box.low[1], box.low[2]}, link, {box.high[0], box.high[1], box.high[2]}, 0};
   }
 
-  // Throws unless every corner of every triangle is a vertex.
+  // Throws if a corner of any triangle is not a vertex.
   static void check_indices(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices) {
     std::atomic<bool> outside = false;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, indices.size(), 3 * grain), [&](const auto& range) {
@@ -160,8 +162,9 @@ class Bvh::Builder {
     int level = 0;
     Bounds box;
     Bounds centres;
-    std::vector<Node> nodes;                       // all of it, links from 0; or
-    std::array<std::unique_ptr<Piece>, 2> halves;  // one node and these; or a leaf
+    std::vector<Node> nodes;                       // the whole subtree, links from 0; or
+    std::array<std::unique_ptr<Piece>, 2> halves;  // the two halves of one node; if both members are empty the piece is
+                                                   // a leaf
     [[nodiscard]] std::size_t count() const { return end - begin; }
   };
   struct Item {
@@ -170,18 +173,19 @@ class Bvh::Builder {
   };
 
   static constexpr unsigned bin_count = 16;
-  static constexpr std::size_t sweep_most = 16;  // triangles whose splits are all tried, without bins
+  static constexpr std::size_t sweep_most = 16;  // maximum number of triangles for which all splits are tried, without
+                                                 // bins
   struct Bin {
     Bounds box;
     std::uint32_t count = 0;
   };
-  // Where the centres' box is cut into bins along each axis.
+  // Division of the centers' box into bins along each axis.
   struct Grid {
     explicit Grid(const Bounds& centres) {
       for (unsigned axis = 0; axis < 3; ++axis) {
         low[axis] = centres.low[axis];
         const float size = centres.high[axis] - centres.low[axis];
-        // Not where it would overflow or divide into nothing.
+        // The guard avoids overflow and division by zero.
         scale[axis] = size > 1.0e-30F ? (static_cast<float>(bin_count) * 0.99999F) / size : 0.0F;
       }
     }
@@ -244,7 +248,8 @@ class Bvh::Builder {
     });
   }
 
-  // The best of all bins' borders, by area times triangles; not one with a half that max_depth has no room for.
+  // Returns the split between bins with the lowest area times triangles. Splits with a half that exceeds the capacity
+  // below it are excluded.
   static Split best_split(const Bins& bins, std::size_t half_capacity) {
     Split best;
     float best_cost = std::numeric_limits<float>::infinity();
@@ -293,7 +298,7 @@ class Bvh::Builder {
     return axis;
   }
 
-  // A subtree: over many triangles a node and two pieces, else all of it.
+  // Builds a subtree: for many triangles one node and two pieces, else all of it.
   void grow(Piece& p) {
     check(progress_);
     if (p.count() <= piece) {
@@ -316,7 +321,7 @@ class Bvh::Builder {
     tbb::parallel_invoke([&] { grow_half(*p.halves[0]); }, [&] { grow_half(*p.halves[1]); });
   }
 
-  // Reorders ids_[begin, end), the first half first; each half keeps its order.
+  // Reorders ids_[begin, end), the first half first. The order within each half is kept.
   Split divide(const Piece& p) {
     const Grid grid(p.centres);
     const auto ids = tbb::blocked_range<std::size_t>(p.begin, p.end, grain);
@@ -376,7 +381,7 @@ class Bvh::Builder {
     return split;
   }
 
-  // Halves of equal size, by centre along the axis, then by number.
+  // Splits into halves of equal size, by center along the axis, then by index.
   template <class Iterator, class Key>
   static void median(Iterator begin, Iterator end, unsigned axis, Key key) {
     std::nth_element(begin, begin + (end - begin) / 2, end, [&](const auto& a, const auto& b) {
@@ -407,7 +412,7 @@ class Bvh::Builder {
     [[nodiscard]] std::size_t count() const { return end - begin; }
   };
 
-  // Few triangles, all splits between neighbours along each axis: reorders the items.
+  // For few triangles: tries all splits between neighbors along each axis. Reorders the items.
   static Split sweep(std::vector<Item>& items, const Small& s, std::size_t half_capacity) {
     std::array<std::array<std::uint8_t, sweep_most>, 3> order{};
     std::array<float, sweep_most> above{};
@@ -455,7 +460,7 @@ class Bvh::Builder {
     return best;
   }
 
-  // Many: bins, else the median.
+  // For many triangles: splits by bins, or at the median if there is no such split.
   static Split cut(std::vector<Item>& items, const Small& s, std::size_t half_capacity) {
     const Grid grid(s.centres);
     Bins bins;
@@ -477,7 +482,7 @@ class Bvh::Builder {
     return split;
   }
 
-  // Appends its nodes, the top one first, and returns the link to it.
+  // Appends the nodes of a subtree, its root first, and returns the link to it.
   static std::uint32_t subtree(std::vector<Node>& nodes, std::vector<Item>& items, std::size_t base, const Small& s) {
     if (s.count() == 1 || s.level == max_depth) return leaf_link(base + s.begin, s.count());
     const std::size_t half_capacity = capacity(s.level + 1);
@@ -502,12 +507,12 @@ class Bvh::Builder {
     return static_cast<std::uint32_t>(at);
   }
 
-  // The pieces, one after another.
+  // Concatenates the nodes of all pieces.
   static void join(const Piece& root, Bvh& out) {
     std::vector<std::pair<const Piece*, std::uint32_t>> parts;
     std::vector<Node> above;
     std::uint32_t next = 0;
-    // Where each node above the parts goes, told when all before it are counted.
+    // Nodes above the parts with their positions, known once all nodes before them are counted.
     std::vector<std::pair<std::uint32_t, Node>> placed;
     const std::function<std::uint32_t(const Piece&)> place_piece = [&](const Piece& p) {
       if (!p.nodes.empty()) {
@@ -545,7 +550,7 @@ class Bvh::Builder {
   std::span<const std::uint32_t> indices_;
   std::span<const std::uint32_t> flags_;
   const Progress* progress_;
-  std::vector<Bounds> boxes_;  // a triangle each
+  std::vector<Bounds> boxes_;  // one per triangle
   std::vector<std::uint32_t> ids_, scratch_;
 };
 
@@ -609,7 +614,7 @@ void Bvh::refit(std::span<const PosedVertex> vertices, std::span<const std::uint
     check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) Builder::place(records_[i], vertices, indices);
   });
-  // From the leaves up: children come after their parents.
+  // Bottom-up: children come after their parents.
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t p) {
     check(progress);
     for (std::uint32_t node = parts_[p].end; node > parts_[p].begin; --node) fit(node - 1);

@@ -1,6 +1,6 @@
 #pragma once
 
-// A tree of boxes over triangles, for the rays of glsl/bvh.glsl. No GL.
+// Bounding volume hierarchy over triangles, for the rays of glsl/bvh.glsl. Does not use GL.
 
 #include <array>
 #include <cstdint>
@@ -13,31 +13,36 @@
 
 namespace cumulet::surface {
 
-/// What a triangle is to rays, one word each: CM_TRIANGLE_* of glsl/bvh.glsl.
+/// Flags of a triangle for ray intersection, one word per triangle: CM_TRIANGLE_* of glsl/bvh.glsl.
 struct TriangleFlags {
-  static constexpr std::uint32_t ask = 0x80000000U;        ///< alpha: the shader's cm_hit_accept decides
-  static constexpr std::uint32_t one_sided = 0x40000000U;  ///< rays pass its back
-  static constexpr std::uint32_t clockwise = 0x20000000U;  ///< its front is where its vertices turn clockwise
+  static constexpr std::uint32_t ask = 0x80000000U;        ///< alpha or transmission: the shader's cm_hit_accept
+                                                           ///< accepts or rejects a hit
+  static constexpr std::uint32_t one_sided = 0x40000000U;  ///< rays pass through its back side
+  static constexpr std::uint32_t clockwise = 0x20000000U;  ///< its front is the side from which its vertices are in
+                                                           ///< clockwise order
   static constexpr std::uint32_t left_out = 0x10000000U;   ///< not in the tree
-  static constexpr std::uint32_t user = 0x0fffffffU;       ///< bits that come back with a hit as they are
+  static constexpr std::uint32_t user = 0x0fffffffU;       ///< user bits, returned with a hit
 };
 
-/// The flags of a scene's triangles in the order of Scene::indices: user bits the number of the Draw; ask for
-/// AlphaMode::mask and blend, and transmission; one_sided unless the material, or the pose, is double sided; clockwise
-/// where the pose is flipped; left_out where it hides the draw.
+/// Returns the flags of a scene's triangles, in the order of Scene::indices.
+///   - user bits: index of the Draw.
+///   - ask: AlphaMode::mask or blend, or transmission without a volume (bounds_volume()).
+///   - one_sided: neither the material nor the pose is double sided, and the material does not bound a volume.
+///   - clockwise: the pose flips the draw.
+///   - left_out: the pose hides the draw.
 std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose);
 
 /// A binary bounding volume hierarchy, built by binned surface area heuristic (Wald, "On fast Construction of SAH-based
-/// Bounding Volume Hierarchies", 2007) with leaves of 1 to 4 triangles. Both arrays go into texture buffers (RGBA32UI)
-/// as they are.
+/// Bounding Volume Hierarchies", 2007) with leaves of 1 to 4 triangles. Both arrays are uploaded unchanged to texture
+/// buffers (RGBA32UI).
 ///
-/// No path through it has more than max_depth nodes, whatever the triangles: where the heuristic would go deeper, it
-/// splits at the median. The same input gives the same bits, for any number of threads.
+/// No path has more than max_depth nodes: where the heuristic would go deeper, the builder splits at the median. The
+/// result is deterministic, for any number of threads.
 ///
-/// Triangles without area stay in the tree, for a later pose may give them one; no ray meets them. So do triangles with
-/// a coordinate that is not finite or beyond 1e12 in size, as if they had no area.
+/// Triangles without area stay in the tree, because a later pose may give them one; no ray hits them. Triangles with a
+/// coordinate that is not finite or beyond 1e12 in size are treated in the same way.
 ///
-/// Memory for n triangles: 48 n bytes of records and 20 n to 30 n of nodes; build() has 150 n in use at its most.
+/// Memory for n triangles: 48 n bytes of records and 20 n to 30 n of nodes; build() uses 150 n at its peak.
 class Bvh {
  public:
   static constexpr int max_depth = 24;
@@ -58,43 +63,45 @@ class Bvh {
   /// Three texels.
   struct Record {
     glm::vec3 v0;
-    std::uint32_t triangle;  ///< its number in the indices
+    std::uint32_t triangle;  ///< index of the triangle in the index array
     glm::vec3 v1;
     std::uint32_t flags;
     glm::vec3 v2;
-    std::uint32_t spare;  ///< 1: a coordinate is not finite or too large, the corners are put to 0
+    std::uint32_t spare;  ///< 1: a coordinate is not finite or too large; all corners are set to 0
   };
   static_assert(sizeof(Node) == 64 && sizeof(Record) == 48);
 
-  /// A tree that no ray hits.
+  /// Creates a tree that no ray hits.
   Bvh();
 
-  /// Triangle i has the corners indices[3 i .. 3 i + 2] and the word flags[i]; no flags: all 0. Throws
-  /// Error(invalid_argument) for sizes that do not match or an index out of range, Error(unsupported) for more than
-  /// max_triangles, Error(cancelled). O(n log n), on TBB's threads.
+  /// Builds a tree in which triangle i has the corners indices[3 i .. 3 i + 2] and the word flags[i]; without flags all
+  /// words are 0. Throws Error(invalid_argument) for sizes that do not match or an index out of range. Throws
+  /// Error(unsupported) for more than max_triangles, and Error(cancelled). O(n log n), on TBB's threads.
   static Bvh build(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices,
                    std::span<const std::uint32_t> flags = {}, const Progress* progress = nullptr);
 
-  /// The same tree over moved vertices: boxes grow and shrink with their triangles, so hits are right, if slower where
-  /// triangles have moved apart (see cost()). The indices and flags are those of build(). Throws
-  /// Error(invalid_argument) for another number of indices or one out of range; the tree is then as it was. Throws
-  /// Error(cancelled), and the tree is then of no use. O(n), on TBB's threads.
+  /// Updates the boxes for moved vertices and keeps the topology. Hits remain exact, but traversal is slower where
+  /// triangles have moved away from each other (see cost()). The indices and flags must be those of build(). Throws
+  /// Error(invalid_argument) for another number of indices or one out of range, and then leaves the tree unchanged.
+  /// Throws Error(cancelled), after which the tree is unusable. O(n), on TBB's threads.
   void refit(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices,
              const Progress* progress = nullptr);
 
-  /// The surface area heuristic's estimate for a ray that meets the root's box: nodes visited plus triangles tested,
+  /// Returns the surface area heuristic's estimate for a ray that hits the root's box: nodes visited plus triangles
+  /// tested,
   ///   1 + sum over child boxes c of A(c) / A(root) * (1 for a node, its triangles for a leaf).
-  /// 0 for an empty tree or one without area. To judge a refit: build anew when it has grown by half. O(n).
+  /// Returns 0 for an empty tree or one without area. Rebuild a refitted tree if the cost has grown by half. O(n).
   [[nodiscard]] double cost() const;
 
-  /// At least one node.
+  /// There is at least one node.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
   [[nodiscard]] std::span<const Record> records() const { return records_; }
-  /// Nodes on the longest path. O(n).
+  /// Number of nodes on the longest path. O(n).
   [[nodiscard]] int depth() const;
 
  private:
-  // Nodes [begin, end), children of each other and of records alone. The nodes between are above them.
+  // Nodes [begin, end) of a self-contained subtree: links inside it lead only to its own nodes and to records. Nodes
+  // between parts are ancestors of parts.
   struct Part {
     std::uint32_t begin;
     std::uint32_t end;
@@ -107,7 +114,7 @@ class Bvh {
 
   std::vector<Node> nodes_;      // depth first
   std::vector<Record> records_;  // in the order of the leaves
-  std::vector<Part> parts_;      // in order
+  std::vector<Part> parts_;      // in ascending order
   std::size_t triangles_ = 0;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// glsl/bvh.glsl as C++: the rays that shaders trace, over the same tree in memory.
+// Compiles glsl/bvh.glsl as C++, so that CPU code traces the same rays over the same tree.
 
 #include <cstring>
 
@@ -9,7 +9,8 @@
 
 namespace cumulet::core {
 
-/// cm_bvh_closest and the like over a tree, which must outlive it. Triangles flagged `ask` are hit as any other.
+/// cm_bvh_closest() and related functions over a tree, which must outlive this object. Triangles flagged `ask` are hit
+/// like any other.
 struct BvhRays {
   const surface::Bvh* bvh = nullptr;
 

@@ -18,7 +18,7 @@ struct DracoMesh::State {
 
 namespace {
 
-/// The number of triangles that the stream says it holds; the decoder would allocate for as many.
+/// Returns the number of triangles in the stream's header, which the decoder would allocate.
 std::uint64_t face_count(std::span<const std::uint8_t> bytes, const std::string& what) {
   const std::string broken = what + " cannot be decompressed (KHR_draco_mesh_compression)";
   draco::DecoderBuffer buffer;
@@ -65,7 +65,7 @@ double largest(draco::DataType type) {
 DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, Budget& budget)
     : state_(std::make_unique<State>()), budget_(budget) {
   const std::uint64_t faces = face_count(bytes, what);
-  // Far more than regular meshes compress to.
+  // This is far above the compression ratio of regular meshes.
   if (faces > bytes.size() * 1024) {
     malformed(what + ": " + std::to_string(bytes.size()) + " bytes cannot hold " + std::to_string(faces) +
               " triangles");
@@ -109,7 +109,7 @@ void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, 
     malformed(what + " has fewer elements than vertices");
   }
   if (attribute->num_components() < components) malformed(what + " has the wrong type of element");
-  // Draco's own flag may say something else than the accessor's.
+  // Draco's own flag may differ from the accessor's.
   attribute->set_normalized(false);
   const double divisor = normalized ? largest(attribute->data_type()) : 1.0;
   std::vector<float> element(attribute->num_components());

@@ -14,7 +14,8 @@ namespace cumulet::surface::detail {
 
 class DracoMesh {
  public:
-  /// Of bytes that `owner` keeps. Throws Error(file) if they are no mesh of Draco 2.2, or one too large for them.
+  /// Decodes bytes that `owner` keeps alive. Throws Error(file) if they are not a mesh of Draco 2.2, or if the mesh is
+  /// too large for their number.
   DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, Budget& budget);
   ~DracoMesh();
   DracoMesh(const DracoMesh&) = delete;
@@ -22,8 +23,9 @@ class DracoMesh {
 
   [[nodiscard]] std::size_t vertex_count() const;
   [[nodiscard]] std::vector<std::uint32_t> indices() const;
-  /// Components of the vertices `which` of the attribute with Draco's number `id`, `step` apart for a vertex each;
-  /// integers divided as glTF's normalised ones if `normalized`. Throws Error(file) if there are not so many.
+  /// Writes components of the vertices `which` of the attribute with Draco's number `id`. `step` is the distance
+  /// between vertices in floats. If `normalized`, integers are divided as glTF's normalized ones. Throws Error(file) if
+  /// the attribute has fewer components.
   void read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
             float* to, std::size_t step, const std::string& what) const;
 

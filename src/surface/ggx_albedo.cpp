@@ -55,16 +55,16 @@ GgxAlbedo::GgxAlbedo() : texels_(static_cast<std::size_t>(width() * height())) {
     const float roughness = static_cast<float>(row) / (size - 1);
     for (int column = 0; column < size; ++column) {
       const float root = static_cast<float>(column) / (size - 1);
-      // As halves, which is how shaders see it.
+      // Rounded to half precision, because shaders read halves.
       texels_[index(column, row)] = glm::unpackHalf2x16(glm::packHalf2x16(reflected(roughness, root * root)));
     }
-    // The integral of 2 c E(c) over the cosine c = x^2, E linear in x: 4 x^3 E a cell.
+    // The integral of 2 c E(c) over the cosine c = x^2, with E linear in x: 4 x^3 E per cell.
     glm::dvec2 sum(0.0);
     for (int column = 0; column + 1 < size; ++column) {
       const double a = static_cast<double>(column) / (size - 1);
       const double b = static_cast<double>(column + 1) / (size - 1);
-      const double all = std::pow(b, 4.0) - std::pow(a, 4.0);             // of 4 x^3
-      const double moment = 0.8 * (std::pow(b, 5.0) - std::pow(a, 5.0));  // of 4 x^4
+      const double all = std::pow(b, 4.0) - std::pow(a, 4.0);             // integral of 4 x^3
+      const double moment = 0.8 * (std::pow(b, 5.0) - std::pow(a, 5.0));  // integral of 4 x^4
       const double second = (moment - a * all) / (b - a);                 // weight of the cell's end
       sum += (all - second) * glm::dvec2(texels_[index(column, row)]) +
              second * glm::dvec2(texels_[index(column + 1, row)]);

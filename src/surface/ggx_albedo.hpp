@@ -6,27 +6,27 @@
 
 namespace cumulet::surface {
 
-/// What share of constant radiance from above a GGX lobe of glsl/ggx.glsl reflects: f0 x + f90 y, by the two sums of
-/// Karis, "Real Shading in Unreal Engine 4", SIGGRAPH 2013. One table for shaders and C++, linear between its entries.
+/// Directional albedo of a GGX lobe of glsl/ggx.glsl: f0 x + f90 y, from the two sums of Karis, "Real Shading in Unreal
+/// Engine 4", SIGGRAPH 2013. Shaders and C++ share one table, interpolated linearly.
 class GgxAlbedo {
  public:
-  /// Made at the first call; the same ever after. Any thread.
+  /// Returns the table, which the first call computes. Thread-safe.
   static const GgxAlbedo& table();
 
-  /// Towards a direction of this cosine to the normal.
+  /// cosine: between the outgoing direction and the normal.
   [[nodiscard]] glm::vec2 towards(float roughness, float cosine) const;
-  /// The mean over all directions, weighed by the cosine; of the table as it is interpolated.
+  /// Returns the cosine-weighted mean over all directions, of the interpolated table.
   [[nodiscard]] glm::vec2 average(float roughness) const;
 
-  /// Rows by roughness of `width` entries: by the cosine (cm_ggx_albedo_place), then the average.
+  /// Rows by roughness, each with `width` entries: by cosine (cm_ggx_albedo_place), then the average.
   [[nodiscard]] const std::vector<glm::vec2>& texels() const { return texels_; }
   static int width();
   static int height();
 
-  /// For texel buffers: rows of cells between the entries, each with its four corners as pairs of halves: {(i, j),
+  /// Table data for texel buffers: rows of interpolation cells, each with its four corners as pairs of halves: {(i, j),
   /// (i + 1, j), (i, j + 1), (i + 1, j + 1)}.
   [[nodiscard]] std::vector<glm::uvec4> cells() const;
-  /// The same of the averages: {j, j + 1, 0, 0}.
+  /// Averages for texel buffers, in the format of cells(): {j, j + 1, 0, 0}.
   [[nodiscard]] std::vector<glm::uvec4> average_cells() const;
 
  private:

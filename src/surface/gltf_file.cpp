@@ -65,7 +65,7 @@ void check_extensions(const json& root, const Log& log, const std::string& name)
   log.warning(name + ": drawn without " + one_line(list));
 }
 
-/// glTF 2.x: a minor version adds what an older reader may leave out.
+/// glTF 2.x: a minor version adds only features that an older reader may ignore.
 bool of_version_2(const std::string& version) {
   return version.size() > 2 && version.starts_with("2.") &&
          std::all_of(version.begin() + 2, version.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -92,7 +92,7 @@ std::uint32_t little_endian(std::span<const std::uint8_t> bytes, std::size_t at)
          std::uint32_t{bytes[at + 3]} << 24U;
 }
 
-/// The chunks of a .glb (glTF 2.0, 4.4), or all of a .gltf.
+/// Returns the chunks of a .glb (glTF 2.0, 4.4), or all of a .gltf.
 Container unpack(std::span<const std::uint8_t> bytes) {
   const auto text = [](std::span<const std::uint8_t> part) {
     return std::string_view(reinterpret_cast<const char*>(part.data()), part.size());
@@ -131,9 +131,9 @@ Container unpack(std::span<const std::uint8_t> bytes) {
   return container;
 }
 
-/// Takes what tinygltf must not see out of the JSON, whose types are checked: bytes, which are loaded here with checks,
-/// and what it takes for errors: channels that name no node, indices in no buffer view, skins without matrices,
-/// accessors of types that are none of glTF's. What it is to have back is returned.
+/// Removes from the JSON, whose types have been checked, everything that tinygltf must not see. This includes bytes,
+/// which this file loads with checks, and valid content that tinygltf rejects: channels without a node, indices without
+/// a buffer view, skins without matrices, and accessors of unknown types. The returned data is restored after parsing.
 struct SetAside {
   struct Indices {
     std::size_t mesh;
@@ -143,9 +143,9 @@ struct SetAside {
   json buffers = json::array();
   json images = json::array();
   std::vector<Indices> indices;
-  std::vector<std::size_t> untyped;  ///< accessors of a type that is none of glTF's
+  std::vector<std::size_t> untyped;  ///< accessors of types that glTF does not define
   std::vector<PointerChannel> pointers;
-  std::size_t channels = 0;  ///< that name neither a node nor a pointer
+  std::size_t channels = 0;  ///< channels with neither a node nor a pointer
 };
 
 json take_member(json& root, const char* name) {
@@ -156,7 +156,7 @@ json take_member(json& root, const char* name) {
   return value;
 }
 
-/// Indices whose accessor has no buffer view.
+/// Removes indices whose accessor has no buffer view.
 std::vector<SetAside::Indices> take_indices(json& root) {
   std::vector<SetAside::Indices> taken;
   if (!root.contains("meshes")) return taken;
@@ -182,7 +182,7 @@ std::vector<SetAside::Indices> take_indices(json& root) {
   return taken;
 }
 
-/// Gives accessors of unknown types a known one, and tells which.
+/// Gives accessors of unknown types a known one; returns their indices.
 std::vector<std::size_t> take_types(json& root) {
   constexpr std::array types = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
   std::vector<std::size_t> untyped;
@@ -197,7 +197,7 @@ std::vector<std::size_t> take_types(json& root) {
   return untyped;
 }
 
-/// Inverse bind matrices are optional in glTF, not in tinygltf.
+/// Inverse bind matrices are optional in glTF, but tinygltf requires them.
 void complete_skins(json& root) {
   if (!root.contains("skins")) return;
   json& skins = root["skins"];
@@ -207,7 +207,7 @@ void complete_skins(json& root) {
   }
 }
 
-/// Takes out channels that name no node.
+/// Removes channels without a node.
 void take_channels(json& root, SetAside& aside) {
   if (!root.contains("animations")) return;
   json& animations = root["animations"];
@@ -250,7 +250,7 @@ json parse_json(std::string_view text) {
   }
 }
 
-/// All but buffers and images.
+/// Parses everything except buffers and images.
 tinygltf::Model parse_model(const json& root) {
   const std::string text = root.dump();
   if (text.size() > std::numeric_limits<std::uint32_t>::max()) malformed("has more than 4 GiB of JSON");
@@ -259,7 +259,7 @@ tinygltf::Model parse_model(const json& root) {
   std::string warning;
   const bool good = tinygltf::TinyGLTF().LoadASCIIFromString(&model, &error, &warning, text.data(),
                                                              static_cast<unsigned>(text.size()), "");
-  // What it complains about it leaves out, even where it goes on.
+  // tinygltf leaves out content with errors, even if it continues.
   if (!good || !error.empty()) malformed(error.empty() ? "cannot be parsed" : one_line(error));
   return model;
 }
@@ -280,7 +280,7 @@ class Loader {
         try {
           bytes = file_.storage->emplace_back(resolve_uri(buffer["uri"].get<std::string>(), file_.folder, budget_));
         } catch (const Error& error) {
-          // An end of it for who reads it, if anybody does.
+          // This is an error only for a reader of the buffer.
           const std::string cause = numbered("buffer", i) + ": " + error.what();
           log_.warning(name_ + ": " + cause);
           buffers_.push_back({Missing{cause}, length});
@@ -289,7 +289,7 @@ class Loader {
       } else if (i == 0 && binary) {
         bytes = *binary;
       } else {
-        buffers_.push_back({NoData{}, length});  // as EXT_meshopt_compression's place-holders
+        buffers_.push_back({NoData{}, length});  // for example placeholder buffers of EXT_meshopt_compression
         continue;
       }
       if (bytes.size() < length) {
@@ -328,7 +328,7 @@ class Loader {
  private:
   struct Buffer {
     Data data;
-    std::uint64_t size = 0;  ///< as the file says
+    std::uint64_t size = 0;  ///< from the file
   };
 
   Data part(int buffer, std::uint64_t offset, std::uint64_t length, const std::string& what) {
@@ -394,7 +394,7 @@ std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& b
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) malformed("no such file");
-  // A device or a pipe may have no end.
+  // Devices and pipes may have no end.
   if (!std::filesystem::is_regular_file(status)) malformed("is not a file");
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) malformed("cannot be read");
@@ -428,7 +428,7 @@ std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::
   const std::string filter = text("filter", "NONE");
   const bool attributes = mode == "ATTRIBUTES";
   const bool triangles = mode == "TRIANGLES";
-  // The decoders assert all of this.
+  // The decoders assert all of these conditions.
   bool good = attributes ? stride > 0 && stride <= 256 && stride % 4 == 0
                          : (triangles || mode == "INDICES") && (stride == 2 || stride == 4) && filter == "NONE";
   if (triangles) good = good && count % 3 == 0;
@@ -440,7 +440,7 @@ std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::
     good = false;
   }
   if (!good) malformed(what + ": EXT_meshopt_compression is malformed");
-  // The format's best case is one byte for 64 (16 vertices a group, 4 groups' headers a byte).
+  // The format's best case is one byte for 64 (16 vertices per group, 4 group headers per byte).
   if (count > (from.size() * 128 + 65536) / stride) {
     malformed(what + ": " + std::to_string(from.size()) + " bytes cannot hold " + std::to_string(count) + " elements");
   }

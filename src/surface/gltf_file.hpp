@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: a glTF file as tinygltf sees it, with its bytes, before anything is made of them.
+// Private to surface/: a glTF file as parsed by tinygltf, with its bytes, before conversion to a scene.
 
 #include <tiny_gltf.h>
 
@@ -24,11 +24,11 @@
 
 namespace cumulet::surface::detail {
 
-/// Ends an import; import_gltf() puts the file's name in front. One line.
+/// Throws Error(file) with a one-line cause. import_gltf() prepends the file's name.
 [[noreturn]] void malformed(const std::string& cause);
-/// A text of the file's or a library's as a part of one line, not too long.
+/// Returns text from the file or a library on one line, shortened.
 inline std::string one_line(std::string_view text) { return cumulet::one_line(text, 200); }
-/// What `body` gives; an Error of its gets "what: " in front.
+/// Returns the result of `body`; prepends "what: " to any Error that it throws.
 template <class Body>
 auto naming(const std::string& what, const Body& body) {
   try {
@@ -37,26 +37,27 @@ auto naming(const std::string& what, const Body& body) {
     throw Error(error.code(), what + ": " + error.what());
   }
 }
-/// "node 3" and the like.
+/// Returns for example "node 3".
 inline std::string numbered(std::string_view what, std::size_t number) {
   return std::string(what) + " " + std::to_string(number);
 }
 
-/// What an import may still allocate. Counts in a file are checked against it before memory is asked for.
+/// Memory that an import may still allocate. Counts from a file are checked against it before allocation.
 class Budget {
  public:
   Budget(const GltfLimits& limits, const Progress* progress)
       : limits_(limits), left_(limits.memory), progress_(progress) {}
 
-  /// Throws if count * size bytes are too many, and Error(cancelled): what takes memory takes time.
+  /// Throws if count * size bytes exceed the budget. Throws Error(cancelled), because large allocations take time.
   void take(std::uint64_t count, std::uint64_t size, std::string_view what);
   [[nodiscard]] std::uint64_t left() const { return left_; }
   [[nodiscard]] const GltfLimits& limits() const { return limits_; }
-  /// For long loops: throws Error(cancelled) now and then.
+  /// For long loops: checks for cancellation every 16384 turns; throws Error(cancelled).
   void check(std::size_t turn) const {
     if (turn % 16384 == 0) cumulet::check(progress_);
   }
-  /// For a call of apart() that works on so many bytes: few are not worth a thread.
+  /// Returns the progress to pass to apart() for work on this many bytes; null for few bytes, which are not worth a
+  /// thread.
   [[nodiscard]] const Progress* progress_for(std::uint64_t bytes) const {
     constexpr std::uint64_t few = 65536;
     return bytes < few ? nullptr : progress_;
@@ -68,7 +69,7 @@ class Budget {
   const Progress* progress_;
 };
 
-/// Where an image's bytes are: in a buffer view, in a data URI or in a file beside the glTF file.
+/// Location of an image's bytes: a buffer view, a data URI or a file beside the glTF file.
 struct ImageSource {
   std::string name;
   std::string uri;
@@ -76,52 +77,53 @@ struct ImageSource {
 };
 
 using Bytes = std::span<const std::uint8_t>;
-/// Keeps bytes for whoever is left to work on them.
+/// Keeps bytes alive for detached threads that still use them.
 using Owner = std::shared_ptr<const void>;
-/// Of a buffer that names no data, which is legal (glTF 2.0, 3.6.1): it is for others to fill.
+/// Marks a buffer that names no data. This is legal (glTF 2.0, 3.6.1): extensions fill such buffers.
 struct NoData {};
-/// Why data that a file names cannot be had.
+/// Reason why data that a file refers to cannot be read.
 struct Missing {
   std::string cause;
 };
-/// A buffer, or a buffer view, decompressed. What is not there matters to who reads it.
+/// A buffer, or a decompressed buffer view. Missing data is an error only for a reader that needs it.
 using Data = std::variant<Bytes, NoData, Missing>;
 
 /// A channel of KHR_animation_pointer.
 struct PointerChannel {
   std::size_t animation = 0;
   int sampler = -1;
-  std::string pointer;  ///< JSON's
+  std::string pointer;  ///< JSON pointer
 };
 
 struct GltfFile {
-  /// All but buffers and images, which stay empty. An index in it is -1 or at least 0, but not checked further.
+  /// The file except for buffers and images, which stay empty. Indices are at least -1 and not checked further.
   tinygltf::Model model;
-  std::vector<Data> views;  ///< a buffer view each
+  std::vector<Data> views;  ///< one per buffer view
   std::vector<ImageSource> images;
-  std::vector<PointerChannel> pointers;         ///< channels that the model lacks
-  std::optional<std::filesystem::path> folder;  ///< where files that it refers to are; none: nowhere
+  std::vector<PointerChannel> pointers;         ///< channels that `model` lacks
+  std::optional<std::filesystem::path> folder;  ///< folder of referenced files; none: they are refused
 
   using Storage = std::deque<std::vector<std::uint8_t>>;
-  std::shared_ptr<Storage> storage = make_left<Storage>();  ///< what views point into
+  std::shared_ptr<Storage> storage = make_left<Storage>();  ///< memory that `views` points into
 
-  /// The bytes of a buffer view. Throws Error(file) if there is no such one, or if its buffer has no data.
+  /// Returns the bytes of a buffer view. Throws Error(file) if it does not exist, or if its buffer has no data.
   [[nodiscard]] Bytes view(std::int64_t index) const;
-  /// Whether an accessor, if there is such a one, lies in a buffer that names no data.
+  /// Returns true if the accessor exists and its buffer names no data.
   [[nodiscard]] bool without_data(int accessor) const;
-  /// Whether there is such an accessor, and its count is 0.
+  /// Returns true if the accessor exists and its count is 0.
   [[nodiscard]] bool without_elements(int accessor) const;
 };
 
-/// Reads a whole regular file. Throws Error(file) that names the cause only.
+/// Reads a whole regular file. Throws Error(file) with only the cause.
 std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& budget);
 
-/// Parses a .gltf or .glb, told apart by content, checks types of all JSON members that are read, loads buffers and
-/// checks views.
+/// Parses a .gltf or .glb, distinguished by content. Checks the types of all JSON members that are read, loads buffers
+/// and checks views.
 GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::filesystem::path>& folder, const Log& log,
                     const std::string& name, Budget& budget, Progress* progress);
 
-/// EXT_meshopt_compression, of one buffer view: its bytes in `from`, which `owner` keeps. Throws Error(file).
+/// Decompresses one buffer view of EXT_meshopt_compression. `owner` keeps the bytes in `from` alive. Throws
+/// Error(file).
 std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,
                                          const Owner& owner, const std::string& what, Budget& budget);
 

@@ -42,14 +42,14 @@ const char* name_of(Kind kind) {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// Of numbers that glTF bounds.
+/// Range of a number in glTF.
 struct Range {
   double least = -infinite;
   double most = infinite;
 };
 constexpr Range unit{0.0, 1.0};
 constexpr Range positive{0.0, infinite};
-constexpr Range cone{0.0, 1.5707963267948966 + 1e-6};  // float's half pi is more
+constexpr Range cone{0.0, 1.5707963267948966 + 1e-6};  // pi / 2 rounded to float is above pi / 2
 
 struct Leaf {
   const char* path;  ///< "[]": any element of an array; "*": any member of an object
@@ -57,7 +57,7 @@ struct Leaf {
   Range range{};
 };
 
-// Containers are known from their leaves. "{}" at the end: an object whose members are not looked at.
+// Containers are derived from their leaves. "{}" at the end: an object whose members are not checked.
 constexpr Leaf leaves[] = {
     {"asset.version", Kind::string},
     {"asset.minVersion", Kind::string},
@@ -238,7 +238,7 @@ class Schema {
   }
 
  private:
-  /// The leaf, and every container on the way to it.
+  /// Adds the leaf and all its containers.
   void add(std::string path, Kind kind) {
     if (path.ends_with("{}")) path.resize(path.size() - 2);
     kinds_[path] = kind;
@@ -248,7 +248,7 @@ class Schema {
     }
   }
 
-  /// `type` is the place as in the table, `where` as for people.
+  /// type: path in the table. where: path for error messages.
   void visit(json& value, const std::string& type, const std::string& where) {
     const auto found = kinds_.find(type);
     if (found != kinds_.end()) {
@@ -317,7 +317,7 @@ class Schema {
     }
   }
 
-  /// tinygltf keeps integers of extensions in an int.
+  /// Converts large integers to floating point: tinygltf stores integers of extensions in an int.
   static void soften(json& value) {
     if (!value.is_number_integer()) return;
     const double number = value.get<double>();

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: is every member that the importer reads of the type that glTF 2.0 says?
+// Private to surface/: checks that members read by the importer have the types that glTF 2.0 requires.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace cumulet::surface::detail {
 
-/// Throws Error(file) if brackets nest deeper than any glTF needs: what reads JSON later recurses.
+/// Throws Error(file) if brackets nest deeper than any glTF needs, because JSON readers recurse.
 void check_nesting(std::string_view text);
 
-/// Throws Error(file) that names the member. Drops `extras`, makes integers of integral numbers where integers belong,
-/// and numbers with a fraction of integers where tinygltf would cut them to 32 bits. The remark, if there is one, names
-/// the first of the numbers that are out of glTF's range, and counts the others: they are taken for the nearest that
-/// the importer knows what to do with.
+/// Checks member types and throws Error(file) with the name of the member. Drops `extras`. Converts integral numbers to
+/// integers where integers belong. Converts integers to floating point where tinygltf would truncate them to 32 bits.
+/// Returns a remark that names the first number out of glTF's range and counts the others, or "". The importer later
+/// clamps such numbers to the nearest usable value.
 std::string check_schema(nlohmann::json& root);
 
 }  // namespace cumulet::surface::detail

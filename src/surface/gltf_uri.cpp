@@ -42,7 +42,7 @@ std::string decode_percent(std::string_view uri, const Budget* budget = nullptr)
   return text;
 }
 
-/// The value of a digit, in either alphabet of RFC 4648.
+/// Returns the value of a digit, in either alphabet of RFC 4648.
 std::optional<std::uint32_t> base64_digit(char c) {
   if (c >= 'A' && c <= 'Z') return static_cast<std::uint32_t>(c - 'A');
   if (c >= 'a' && c <= 'z') return static_cast<std::uint32_t>(c - 'a') + 26;
@@ -52,7 +52,7 @@ std::optional<std::uint32_t> base64_digit(char c) {
   return std::nullopt;
 }
 
-/// Blanks and line breaks may be anywhere, "=" at the end.
+/// Ignores white space, and "=" at the end.
 std::vector<std::uint8_t> decode_base64(std::string_view text, const Budget& budget) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(text.size() / 4 * 3 + 3);
@@ -79,7 +79,7 @@ std::vector<std::uint8_t> decode_base64(std::string_view text, const Budget& bud
   return bytes;
 }
 
-/// "data:[type][;attribute=value][;base64],bytes", where a value may be in quotes.
+/// "data:[type][;attribute=value][;base64],bytes"; values may be in quotes.
 std::vector<std::uint8_t> decode_data_uri(std::string_view uri, Budget& budget) {
   std::size_t comma = 0;
   for (bool quoted = false; comma < uri.size() && (quoted || uri[comma] != ','); ++comma) {
@@ -103,7 +103,7 @@ std::vector<std::uint8_t> decode_data_uri(std::string_view uri, Budget& budget) 
   return {plain.begin(), plain.end()};
 }
 
-/// "http:" and the like (RFC 3986, 3.1).
+/// Returns true for URIs such as "http:..." (RFC 3986, 3.1).
 bool has_scheme(std::string_view uri) {
   const std::size_t colon = uri.find(':');
   return colon != std::string_view::npos && colon != 0 && std::isalpha(static_cast<unsigned char>(uri[0])) != 0 &&
@@ -130,7 +130,7 @@ std::vector<std::string> paths_of(std::string_view uri) {
     std::ranges::replace(slashes, '\\', '/');
     add(slashes);
   };
-  // A file whose name has "?" or "#" in it may be named without encoding.
+  // A file whose name contains "?" or "#" may be named without encoding.
   if (!has_scheme(uri)) {
     add_both(decode_percent(uri.substr(0, uri.find_first_of("?#"))));
     add_both(decode_percent(uri.substr(0, uri.find('#'))));

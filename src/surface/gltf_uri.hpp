@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: what URIs of a glTF file lead to.
+// Private to surface/: resolves the URIs of a glTF file.
 
 #include <cstdint>
 #include <filesystem>
@@ -13,14 +13,16 @@
 
 namespace cumulet::surface::detail {
 
-/// Whether it holds bytes itself (RFC 2397).
+/// Returns true if the URI itself holds bytes (RFC 2397).
 bool is_data_uri(std::string_view uri);
 
-/// Paths that a relative reference may mean, the likeliest first: its path by RFC 3986, without query and fragment and
-/// percent-decoded; the same with both; the text as it is; and each of these with slashes for backslashes.
+/// Returns the paths that a relative reference may mean, the likeliest first. They are: the path by RFC 3986,
+/// percent-decoded and without query and fragment; the path with both; the text unchanged; and each of these with
+/// slashes for backslashes.
 std::vector<std::string> paths_of(std::string_view uri);
 
-/// Bytes of a data URI, or of the first of paths_of() that is a file, relative to `folder`. Throws Error(file).
+/// Returns the bytes of a data URI, or of the first of paths_of() that is a file, relative to `folder`. Throws
+/// Error(file).
 std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optional<std::filesystem::path>& folder,
                                       Budget& budget);
 

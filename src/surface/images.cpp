@@ -13,11 +13,11 @@ namespace cumulet::surface::detail {
 
 namespace {
 
-/// What an image's header says.
+/// Contents of an image's header.
 struct Header {
   std::uint64_t width = 0;
   std::uint64_t height = 0;
-  std::uint64_t least_bytes = 0;  ///< that the file must have to hold so many pixels
+  std::uint64_t least_bytes = 0;  ///< minimum file size for so many pixels
 };
 
 std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t count) {
@@ -33,7 +33,7 @@ Header png_header(std::span<const std::uint8_t> bytes) {
   Header header;
   header.width = big_endian(bytes, 16, 4);
   header.height = big_endian(bytes, 20, 4);
-  // Deflate makes at most 1032 bytes of one; a pixel has at least one bit.
+  // Deflate expands a byte to at most 1032 bytes, and a pixel has at least one bit.
   header.least_bytes = header.width * header.height / 8 / 1032;
   return header;
 }
@@ -47,19 +47,19 @@ Header jpeg_header(Bytes bytes) {
     malformed("is a JPEG that cannot be read: " + one_line(report.error));
   }
   Header header{found.width, found.height, 0};
-  // By Huffman's codes a block of 8 x 8 has at least one bit, and a component at least one block of 32 x 32 pixels.
+  // With Huffman coding a block of 8 x 8 has at least one bit, and a component at least one block per 32 x 32 pixels.
   if (found.arithmetic == 0) header.least_bytes = header.width * header.height / 8192;
   return header;
 }
 
-/// Of RIFF, whose form is WEBP.
+/// RIFF container with the form type WEBP.
 bool is_webp(Bytes bytes) {
   constexpr std::size_t form = 8;
   return bytes.size() >= form + 4 && std::memcmp(bytes.data(), "RIFF", 4) == 0 &&
          std::memcmp(&bytes[form], "WEBP", 4) == 0;
 }
 
-/// An even picture takes a few bytes, of whatever size: only the budget bounds it.
+/// A uniform image takes a few bytes at any size, so only the budget limits it.
 Header webp_header(Bytes bytes) {
   WebPBitstreamFeatures features{};
   const VP8StatusCode status = WebPGetFeatures(bytes.data(), bytes.size(), &features);
@@ -109,7 +109,7 @@ DecodedImage decode_jpeg(Bytes bytes, const Header& header) {
   return result;
 }
 
-/// What is known to fit.
+/// Must be called only for images that fit the budget.
 Image decode_png(Bytes bytes) {
   tinygltf::Image image;
   std::string error;
@@ -139,7 +139,8 @@ Image decode_png(Bytes bytes) {
 }  // namespace
 
 DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
-  // The library reads more formats, and trusts sizes; this lets pass what glTF knows and memory holds.
+  // The libraries read more formats and trust the sizes in files. Only images that glTF allows and that fit in memory
+  // pass.
   const Header header = read_header(bytes);
   const std::string size = std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
   const std::uint32_t side = budget.limits().image_side;

@@ -24,10 +24,11 @@ namespace detail {
 
 namespace {
 
-/// Of the area of closed shapes. No modeller means any: what lies within another is not counted.
+/// Fraction of the area of closed shapes. Modelers produce inward faces only by mistake; shapes within others are
+/// ignored.
 constexpr double most_inward = 0.25;
 
-/// Meshes, nodes and all else, put together.
+/// Builds the scene from meshes, nodes and all other contents.
 class Assembler {
  public:
   Assembler(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress)
@@ -55,7 +56,7 @@ class Assembler {
   }
 
  private:
-  /// Which meshes the displayed nodes show. What is hidden for good costs nothing.
+  /// Finds the meshes of displayed nodes. Permanently hidden nodes are skipped.
   void plan() {
     used_.resize(file_.model.meshes.size(), false);
     std::vector<bool> displayed(scene_->rig.nodes.size(), false);
@@ -72,7 +73,7 @@ class Assembler {
     }
   }
 
-  /// Where EXT_mesh_gpu_instancing places the meshes of displayed nodes.
+  /// Reads the instance transforms (EXT_mesh_gpu_instancing) of displayed nodes.
   void instances() {
     const Accessors accessors(file_, budget_);
     for (const std::uint32_t node : scene_->rig.displayed) {
@@ -97,7 +98,7 @@ class Assembler {
     }
   }
 
-  /// A matrix an instance.
+  /// Returns one matrix per instance.
   std::vector<glm::dmat4> placings(const Accessors& accessors, std::uint32_t node, const tinygltf::Value& attributes) {
     const std::string what = numbered("node", node) + ", instances' ";
     std::optional<std::size_t> count;
@@ -110,12 +111,12 @@ class Assembler {
       count = here;
       if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") own_attributes_.insert(one_line(name));
     }
-    // Here, in a pose, and in the tables and trees of what is shown.
+    // Copies: here, in a pose, and in the tables and trees for rendering.
     budget_.take(*count, 4 * sizeof(glm::dmat4), what + "transforms");
     const auto read = [&]<int N>(const char* name, const glm::vec<N, float>& otherwise) {
       if (!attributes.Has(name)) return std::vector<glm::vec<N, float>>(*count, otherwise);
       const int accessor = attributes.Get(name).GetNumberAsInt();
-      // A VEC3 would serve for a VEC4.
+      // vectors() would accept a VEC3 for a VEC4.
       if (accessors.type(accessor, what + name) != N) malformed(what + name + " has the wrong type of element");
       auto values = accessors.vectors<N>(accessor, what + name);
       for (const glm::vec<N, float>& value : values) {
@@ -165,7 +166,7 @@ class Assembler {
     }
   }
 
-  /// A draw for every part under every node.
+  /// Adds a draw for every part under every node.
   void place() {
     std::uint64_t vertices = 0;
     std::uint64_t indices = 0;
@@ -178,13 +179,13 @@ class Assembler {
     for_each_part(count);
     budget_.take(vertices, sizeof(VertexAttributes) + sizeof(PosedVertex), "all vertices");
     budget_.take(indices, sizeof(std::uint32_t), "all indices");
-    // Of triangles alone there are as many draws.
+    // If all parts are single triangles, there are as many draws as triangles.
     budget_.take(draws, sizeof(Instance) + sizeof(Draw), "all instances");
     scene_->instances.reserve(draws);
     scene_->draws.reserve(draws);
     scene_->attributes.reserve(vertices);
     scene_->indices.reserve(indices);
-    // Prototypes come last, each of a node.
+    // Prototypes come last, each of one node.
     for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
       if (!placings_.contains(node)) place_part(node, part, place);
     });
@@ -257,7 +258,7 @@ class Assembler {
     }
   }
 
-  /// Whether closed shapes are seen from outside.
+  /// Logs closed shapes whose triangles face inward.
   void look_at_winding() {
     std::string some;
     std::size_t count = 0;
@@ -287,7 +288,7 @@ class Assembler {
                  "double_sided of the surface settings shows it");
   }
 
-  /// Whether floats hold the shapes of meshes, where their instances are, and where animations take them.
+  /// Checks the float precision of mesh positions, of instance transforms, and of animated translations.
   void look_at_precision() {
     PrecisionRemark remark;
     double largest = 0.0;
@@ -381,10 +382,10 @@ class Assembler {
   std::vector<std::vector<std::size_t>> parts_of_;
   MeshRemarks remarks_;
   std::size_t absent_joints_ = 0;
-  std::map<std::uint32_t, std::vector<glm::dmat4>> placings_;  ///< of nodes with EXT_mesh_gpu_instancing
+  std::map<std::uint32_t, std::vector<glm::dmat4>> placings_;  ///< by node, from EXT_mesh_gpu_instancing
   std::size_t skinned_instances_ = 0;
   std::size_t without_instances_ = 0;
-  std::set<std::string> own_attributes_;  ///< of instances, beside their transforms
+  std::set<std::string> own_attributes_;  ///< instance attributes other than transforms
 };
 
 }  // namespace
@@ -394,7 +395,7 @@ class Assembler {
 ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& label,
                      const std::optional<std::filesystem::path>& folder, const Log& log, Progress* progress,
                      const GltfLimits& limits) {
-  const std::string name = cumulet::one_line(label, 4096);  // as long as paths are
+  const std::string name = cumulet::one_line(label, 4096);  // the length limit of paths
   try {
     detail::Budget budget(limits, progress);
     const detail::GltfFile file = detail::parse_gltf(std::move(bytes), folder, log, name, budget, progress);

@@ -9,10 +9,10 @@
 /* Needs jpeglib.h. */
 #include <jerror.h>
 
-/* A legal progressive file may have a scan a coefficient and component. More would be there to take time. */
+/* A legal progressive file may have one scan per coefficient and component. More scans would only take time. */
 enum { most_scans = 64 * 4 };
 
-/* setjmp() is called in functions that only have a pointer to this, so that nothing of it is clobbered. */
+/* Functions that call setjmp() only have a pointer to this struct, so its members are not clobbered. */
 struct decoder {
   struct jpeg_decompress_struct info;
   struct jpeg_error_mgr errors;
@@ -27,7 +27,7 @@ static void fail(j_common_ptr info) {
   longjmp(decoder->failed, 1);
 }
 
-/* Whether pixels are missing or wrong, other than what surrounds them in the file. */
+/* Returns true for warnings about missing or wrong pixels; other warnings concern data around them. */
 static int is_damage(const struct decoder* decoder) {
   switch (decoder->errors.msg_code) {
     case JWRN_ARITH_BAD_CODE:
@@ -37,7 +37,7 @@ static int is_damage(const struct decoder* decoder) {
     case JWRN_MUST_RESYNC:
       return 1;
     case JWRN_JPEG_EOF:
-      /* Of an end that is missing after the only scan nothing is seen. */
+      /* A missing end after the only scan has no visible effect. */
       return decoder->info.progressive_mode || decoder->info.comps_in_scan < decoder->info.num_components;
     default:
       return 0;
@@ -74,7 +74,7 @@ static void begin(struct decoder* decoder, struct cumulet_jpeg_report* report) {
   decoder->progress.progress_monitor = count_scans;
 }
 
-/* Adobe's programs write the complement of inks, and their marker with it. */
+/* Adobe's programs write the complement of inks, with their own marker. */
 static void inks_to_rgba(uint8_t* row, uint32_t width, int complement) {
   for (uint32_t x = 0; x < width; ++x, row += 4) {
     const unsigned black = complement ? row[3] : 255U - row[3];
@@ -86,7 +86,7 @@ static void inks_to_rgba(uint8_t* row, uint32_t width, int complement) {
   }
 }
 
-/* Until the first scan. */
+/* Reads up to the first scan. */
 static void read_markers(struct decoder* decoder, const uint8_t* bytes, size_t size) {
   struct jpeg_decompress_struct* const info = &decoder->info;
   jpeg_create_decompress(info);

@@ -109,7 +109,7 @@ constexpr Factor factors[] = {
      [](MovableMaterial& m, Numbers v) { m.now.film_thickest = film_thickness(v[0]); }},
 };
 
-/// `to` of the slot's transform, and of the use's matrix.
+/// Applies `change` to the slot's transform and updates the matrix of the texture use.
 template <class Change>
 MaterialMember transform_member(std::size_t slot, std::size_t width, const Change& change) {
   return {width, [slot, change](MovableMaterial& m, Numbers v) {
@@ -128,7 +128,7 @@ glm::mat3x2 TextureTransform::matrix() const {
 }
 
 void fold_absorption(MovableMaterial& m) {
-  // Beer and Lambert: what is left of white after that distance is that colour.
+  // Beer-Lambert law: white light has the attenuation color after this distance.
   constexpr float darkest = 1e-30F;
   const float distance = m.attenuation_distance;
   for (int c = 0; c < 3; ++c) {
@@ -153,7 +153,7 @@ std::optional<MaterialMember> material_member(std::string_view path) {
     if (rest == "offset") {
       return transform_member(slot, 2, [](TextureTransform& t, Numbers v) { t.offset = {v[0], v[1]}; });
     }
-    // A mesh's tangents are made for the map as it rests.
+    // A mesh's tangents are computed for the map's transform at rest.
     if (slot == static_cast<std::size_t>(TextureSlot::normal)) return std::nullopt;
     if (rest == "rotation") {
       return transform_member(slot, 1, [](TextureTransform& t, Numbers v) { t.rotation = v[0]; });

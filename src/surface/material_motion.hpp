@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: materials and lights in glTF's own terms, as animations move them (KHR_animation_pointer).
+// Private to surface/: materials and lights in glTF's own parameters, which animations change (KHR_animation_pointer).
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,7 @@ struct TextureTransform {
   double rotation = 0.0;  ///< radians
   glm::dvec2 scale{1.0};
 
-  /// T * R * S, as the extension says it.
+  /// Returns T * R * S, as the extension defines.
   [[nodiscard]] glm::mat3x2 matrix() const;
 };
 
@@ -43,45 +43,45 @@ enum class TextureSlot : std::uint8_t {
 };
 constexpr std::size_t texture_slots = 15;
 
-/// A material's use of a texture.
+/// Returns a material's use of a texture.
 TextureUse& use_of(Material& material, TextureSlot slot);
 
-/// A material with what Material has folded into products.
+/// A material with the separate factors whose products Material stores.
 struct MovableMaterial {
   Material now;
   glm::vec3 emissive_factor{0.0F};
   float emissive_strength = 1.0F;
-  float attenuation_distance = 0.0F;  ///< metres; 0 and beyond what narrow() keeps: nothing is absorbed
+  float attenuation_distance = 0.0F;  ///< meters; 0, or beyond the limit of narrow(): no absorption
   glm::vec3 attenuation_color{1.0F};
   std::array<TextureTransform, texture_slots> transforms;
 };
 
-/// An index and a thickness (nanometres) of a film, in the range in which its phases are numbers.
+/// Clamp the index and the thickness (nanometers) of a film to the range in which its phases are finite.
 inline float film_ior(float ior) { return std::clamp(ior, 1.0F, 1e4F); }
 inline float film_thickness(float thickness) { return std::clamp(thickness, 0.0F, 1e9F); }
 
-/// Makes the absorption of what attenuates.
+/// Computes `now.absorption` from the attenuation.
 void fold_absorption(MovableMaterial& material);
 
-/// Likewise.
+/// A light with the separate factors whose product PunctualLight stores.
 struct MovableLight {
   PunctualLight now;
   glm::vec3 color{1.0F};
   float intensity = 1.0F;
 };
 
-/// A member of `width` numbers, and how it is given others; numbers out of glTF's range become the nearest in it.
+/// A member of `width` numbers and its setter. Numbers out of glTF's range are clamped.
 template <class Thing>
 struct Member {
   std::size_t width = 1;
   std::function<void(Thing&, std::span<const float>)> set;
 };
 
-/// What a JSON pointer below a material leads to; nothing for what animations do not move here: textures themselves,
-/// and what decides of a pass or of a mesh's tangents (transmission, thickness, clearcoat, the strength of anisotropy,
-/// a normal map's rotation and scale).
+/// Returns the member that a JSON pointer below a material names. Returns nullopt for members that animations do not
+/// change here: textures themselves, and members that select a pass or a mesh's tangents. These are transmission,
+/// thickness, clearcoat, anisotropy strength, and a normal map's rotation and scale.
 std::optional<Member<MovableMaterial>> material_member(std::string_view path);
-/// The same below a light.
+/// Returns the member that a JSON pointer below a light names.
 std::optional<Member<MovableLight>> light_member(std::string_view path);
 
 }  // namespace cumulet::surface::detail

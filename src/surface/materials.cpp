@@ -17,7 +17,7 @@ namespace cumulet::surface::detail {
 
 namespace {
 
-/// Members of an extension's object, whose types check_schema() has seen to.
+/// Members of an extension's object. check_schema() has checked their types.
 double number(const tinygltf::Value& object, const char* key, double otherwise) {
   return object.Has(key) ? object.Get(key).GetNumberAsDouble() : otherwise;
 }
@@ -45,7 +45,7 @@ glm::vec3 color(const std::vector<double>& values) {
   return {positive(values[0]), positive(values[1]), positive(values[2])};
 }
 
-/// One texture use as glTF writes it, in the core or in an extension.
+/// A texture use as glTF writes it, in the core or in an extension.
 struct Use {
   int index = -1;
   int uv_set = 0;
@@ -165,7 +165,7 @@ class Materials {
     }
   }
 
-  /// What only richer kernels draw.
+  /// Layers that only the extended-material variant renders.
   void layers(const tinygltf::ExtensionMap& from, const std::string& what, MovableMaterial& movable) {
     Material& to = movable.now;
     if (const auto* volume = find(from, "KHR_materials_volume")) {
@@ -201,7 +201,7 @@ class Materials {
     }
   }
 
-  /// In place of what the core's members say.
+  /// Replaces the core members by the conversion of specular-glossiness.
   void likeness(const SpecularGlossiness& factors, const Use& diffuse, const Use& specular, const std::string& what,
                 MovableMaterial& movable) {
     Material& to = movable.now;
@@ -209,7 +209,7 @@ class Materials {
     to.base_color = even.base_color;
     to.metallic = even.metallic;
     to.roughness = even.roughness;
-    // They become one in one place, where the diffuse one is.
+    // Both textures are combined into one, with the transform of the diffuse one.
     auto at = placed(TextureSlot::base_color, diffuse, what, movable);
     const auto other = placed(TextureSlot::metallic_roughness, specular, what, movable);
     if (!at) at = other;
@@ -231,7 +231,7 @@ class Materials {
     to.metallic_roughness_texture.texture = textures->second;
   }
 
-  /// The textures of a likeness: base colour, and metallic and roughness. Nothing if neither image can be had.
+  /// Returns the converted textures: base color, and metallic-roughness. Nullopt if neither image can be read.
   std::optional<std::pair<std::int32_t, std::int32_t>> converted(const SpecularGlossiness& f, const Use& diffuse,
                                                                  const Use& specular, const std::string& what) {
     const Conversion key{
@@ -264,7 +264,7 @@ class Materials {
     return made;
   }
 
-  /// The image of a texture, which is not kept in the scene.
+  /// Returns the image of a texture; it is not stored in the scene.
   std::optional<Image> picture(int texture) {
     if (texture < 0) return std::nullopt;
     const auto index = static_cast<std::size_t>(texture);
@@ -285,7 +285,7 @@ class Materials {
     use_of(movable.now, slot) = *to;
   }
 
-  /// A use of a texture that is yet to be found; nothing if there is none, or it cannot be read.
+  /// Returns a texture use with its transform, without the texture. Nullopt if there is none or it cannot be read.
   std::optional<TextureUse> placed(TextureSlot slot, const Use& from, const std::string& what,
                                    MovableMaterial& movable) {
     if (from.index < 0) return std::nullopt;
@@ -311,7 +311,7 @@ class Materials {
     return to;
   }
 
-  /// The place of a glTF texture in Scene::textures; -1 if its image cannot be had.
+  /// Returns the index of a glTF texture in Scene::textures; -1 if its image cannot be read.
   std::int32_t texture_of(std::size_t index) {
     const auto known = textures_.find(index);
     if (known != textures_.end()) return known->second;
@@ -319,7 +319,7 @@ class Materials {
     std::int32_t place = -1;
     const Sampler made = sampler(from.sampler, index);
     std::int64_t image = -1;
-    // The core's image is for who cannot read the extension's, or cannot have it.
+    // The core image is the fallback for the extension's.
     if (const auto* webp = find(from.extensions, "EXT_texture_webp")) {
       image = image_of(static_cast<int>(number(*webp, "source", -1)), index);
     }
@@ -333,17 +333,18 @@ class Materials {
     return place;
   }
 
-  /// KHR_texture_basisu and the like; what no extension names is white by right.
+  /// Logs textures with only an image of an unsupported extension, such as KHR_texture_basisu. A texture without any
+  /// image is white, as specified.
   void remark_on(const tinygltf::Texture& from, std::size_t index) {
     for (const auto& [extension, value] : from.extensions) {
-      if (extension == "EXT_texture_webp") continue;  // of which was told
+      if (extension == "EXT_texture_webp") continue;  // already logged
       log_.warning(name_ + ": " + numbered("texture", index) + " has only an image of " + one_line(extension) +
                    ", and is left out");
       return;
     }
   }
 
-  /// The place of a glTF image in Scene::images; -1 if there is none of this number below 0, or it cannot be had.
+  /// Returns the index of a glTF image in Scene::images; -1 if the number is negative or the image cannot be read.
   std::int64_t image_of(int number, std::size_t index) {
     if (number < 0) return -1;
     const auto known = images_.find(number);
@@ -357,7 +358,7 @@ class Materials {
     return place;
   }
 
-  /// A glTF image of a texture, decoded; one that cannot be had costs a warning.
+  /// Decodes the glTF image of a texture. An image that cannot be read is logged as a warning.
   std::optional<Image> read_image(int number, std::size_t index) {
     if (number < 0) return std::nullopt;
     const auto source = static_cast<std::size_t>(number);
@@ -441,7 +442,7 @@ class Materials {
   Scene& scene_;
   std::map<std::size_t, std::int32_t> textures_;
   std::map<int, std::int64_t> images_;
-  /// Textures and factors.
+  /// Key: textures and factors.
   using Conversion = std::pair<std::array<int, 2>, std::array<float, 8>>;
   std::map<Conversion, std::optional<std::pair<std::int32_t, std::int32_t>>> converted_;
   std::size_t approximated_ = 0;
@@ -450,7 +451,7 @@ class Materials {
 }  // namespace
 
 float narrow(double value) {
-  // Products of a few such still are floats.
+  // Products of a few such values are still finite floats.
   constexpr double most = 1e18;
   return static_cast<float>(std::clamp(value, -most, most));
 }

@@ -18,7 +18,7 @@ constexpr std::size_t max_influence_sets = 4;
 bool finite(const glm::vec2& v) { return std::isfinite(v.x) && std::isfinite(v.y); }
 bool finite(const glm::vec4& v) { return detail::finite(glm::vec3(v)) && std::isfinite(v.w); }
 
-/// What is not finite becomes zero. True if there was any.
+/// Replaces non-finite values by zero. Returns true if there was any.
 template <class V>
 bool replace_not_finite(std::vector<V>& values) {
   bool any = false;
@@ -36,7 +36,7 @@ bool replace_not_finite(std::vector<V>& values) {
   return any;
 }
 
-/// Renumbers indices to the vertices that they name; returns those.
+/// Renumbers indices to the referenced vertices; returns those vertices.
 std::vector<std::uint32_t> compact(std::vector<std::uint32_t>& indices, std::size_t count) {
   std::vector<std::uint32_t> used;
   if (count / 8 > indices.size()) {
@@ -73,7 +73,7 @@ class Primitive {
         remarks_(remarks),
         accessors_(file, budget) {}
 
-  /// Nothing if it draws no triangles.
+  /// Returns nullopt if the primitive draws no triangles.
   std::optional<MeshPart> import() {
     if (from_.mode < TINYGLTF_MODE_POINTS || from_.mode > TINYGLTF_MODE_TRIANGLE_FAN) {
       malformed(what_ + ": mode " + std::to_string(from_.mode) + " is none of glTF's");
@@ -86,7 +86,7 @@ class Primitive {
       ++remarks_.without_data;
       return std::nullopt;
     }
-    // What Draco has compressed has counts of its own.
+    // Draco-compressed primitives have their own counts.
     const bool counted = !from_.extensions.contains("KHR_draco_mesh_compression");
     if (counted && any_accessor([this](int accessor) { return file_.without_elements(accessor); })) {
       ++remarks_.without_elements;
@@ -103,7 +103,7 @@ class Primitive {
     read_attributes();
     read_skin();
     read_targets();
-    // What is not finite is replaced, but where it says where things are.
+    // Non-finite values are replaced, except in positions.
     if (not_finite_) ++remarks_.not_finite;
     return std::move(part_);
   }
@@ -138,7 +138,7 @@ class Primitive {
       if (name.starts_with('_')) continue;
       std::size_t count = 0;
       if (draco_ids_.contains(name)) {
-        // The accessor says how to take the numbers, and no more.
+        // The accessor only describes how to read the numbers.
         if (static_cast<std::size_t>(accessor) >= file_.model.accessors.size()) {
           malformed(label(one_line(name)) + ": there is no accessor " + std::to_string(accessor));
         }
@@ -228,7 +228,7 @@ class Primitive {
     replace_not_finite(uvs);
     for (glm::vec2& uv : uvs) uv = map->transform * glm::vec3(uv, 1.0F);
     std::vector<std::uint32_t> origins;
-    budget_.take(part_.indices.size(), 96, what_);  // of its tables
+    budget_.take(part_.indices.size(), 96, what_);  // of the tables of make_tangents()
     part_.tangents = make_tangents(part_.indices, part_.positions, part_.flat ? flat_normals() : part_.normals, uvs,
                                    origins, [this](std::size_t turn) { budget_.check(turn); });
     for (const std::uint32_t origin : origins) {
@@ -274,7 +274,7 @@ class Primitive {
     }
   }
 
-  /// Integers as they are: joints.
+  /// Reads integers without conversion: joints.
   std::vector<std::uint32_t> integers(const std::string& name) {
     const int accessor = from_.attributes.at(name);
     const auto id = draco_ids_.find(name);
@@ -322,21 +322,21 @@ class Primitive {
       float* weights = &part_.weights[i * part_.influences];
       float sum = 0.0F;
       for (std::size_t c = 0; c < part_.influences; ++c) sum += weights[c];
-      // Held by nothing: by the first joint, which keeps it in one place with the rest.
+      // A vertex without weights is bound to the first joint, which keeps it near the others.
       if (!(sum > 0.0F)) weights[0] = sum = 1.0F;
       for (std::size_t c = 0; c < part_.influences; ++c) weights[c] /= sum;
     }
   }
 
   [[nodiscard]] std::uint32_t known_material(int number) const {
-    // The last is the default one, which has no number.
+    // The last material is the default one, which has no number.
     if (number < 0 || static_cast<std::size_t>(number) + 1 >= materials_.size()) {
       malformed(what_ + ": there is no material " + std::to_string(number));
     }
     return static_cast<std::uint32_t>(number);
   }
 
-  /// KHR_materials_variants: what no mapping names keeps its material.
+  /// KHR_materials_variants: variants without a mapping keep the part's material.
   void read_variants() {
     budget_.take(variants_, sizeof(std::uint32_t), what_);
     part_.variants.assign(variants_, part_.material);
@@ -358,8 +358,8 @@ class Primitive {
     }
   }
 
-  /// The map along which tangents grow, of the material, else of the first variant's that has one: a part has one set
-  /// of tangents. Null: it needs none.
+  /// Returns the map that defines the tangents: that of the material, else of the first variant that has one. A part
+  /// has only one set of tangents. Null: it needs none.
   [[nodiscard]] const TextureUse* tangent_map() const {
     const TextureUse* map = tangent_map(materials_[part_.material]);
     for (std::size_t v = 0; map == nullptr && v < part_.variants.size(); ++v) {
@@ -368,7 +368,8 @@ class Primitive {
     return map;
   }
 
-  /// glTF has them of the normal map; anisotropy without one has its own, or the first set as it is.
+  /// glTF defines tangents by the normal map. Anisotropy without one uses its own texture's coordinates, or the
+  /// untransformed first set.
   static const TextureUse* tangent_map(const Material& material) {
     if (material.normal_texture.texture >= 0) return &material.normal_texture;
     return material.anisotropy > 0.0F ? &material.anisotropy_texture : nullptr;
@@ -410,7 +411,7 @@ class Primitive {
   std::unique_ptr<DracoMesh> draco_;
   std::map<std::string, std::uint32_t> draco_ids_;
   std::size_t count_ = 0;             ///< vertices in the file
-  std::vector<std::uint32_t> which_;  ///< of them, those that the part has, in its order
+  std::vector<std::uint32_t> which_;  ///< for each of the part's vertices: its index in the file
   bool not_finite_ = false;
 };
 
@@ -454,7 +455,7 @@ void make_unit(MeshPart& part) {
     some_missing |= !good;
   }
   if (!some_missing) return;
-  // Those of no length: the average of the triangles around.
+  // Zero-length normals become the average of the triangles around.
   std::vector<glm::vec3> sums(part.normals.size(), glm::vec3(0.0F));
   for (std::size_t i = 0; i < part.indices.size(); i += 3) {
     const std::uint32_t* v = &part.indices[i];

@@ -17,9 +17,9 @@ namespace cumulet::surface::detail {
 
 namespace {
 
-constexpr std::size_t most_bounded = std::size_t{1} << 22U;  // vertices of copies that are looked at one by one
+constexpr std::size_t most_bounded = std::size_t{1} << 22U;  // instanced vertices for which bounds are computed exactly
 
-/// Of the inverse transpose but for its length: det(M) * M^-T, which is finite for every M.
+/// The inverse transpose scaled by the determinant: det(M) * M^-T, which is finite for every M.
 glm::mat3 cofactors(const glm::mat3& m) {
   return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
 }
@@ -33,7 +33,7 @@ bool finite(const glm::dmat4& m) {
 
 bool mirrors(const glm::dmat4& m) { return glm::determinant(glm::dmat3(m)) < 0.0; }
 
-/// Unit; `otherwise` if it has no direction.
+/// Normalizes; returns `otherwise` if the vector has no direction.
 glm::vec3 direction(const glm::vec3& v, const glm::vec3& otherwise) {
   if (!detail::finite(v) || v == glm::vec3(0.0F)) return otherwise;
   const float largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
@@ -62,7 +62,7 @@ Shape morph(const MeshPart& part, const std::vector<float>& weights, float drift
   return shape;
 }
 
-// A moment of an animation, which begins anew past its end.
+// Wraps a time into an animation.
 double looped(double time, double duration) {
   if (!std::isfinite(time)) return 0.0;
   if (time >= 0.0 && time <= duration) return time;
@@ -84,7 +84,7 @@ class Box {
       add(glm::dvec3(to_world * glm::dvec4(corner, 1.0)));
   }
   [[nodiscard]] bool is_empty() const { return !(low_.x <= high_.x); }
-  /// A point near its middle, from which floats hold all of it; of nothing 0. size: that it has at least.
+  /// Returns an origin near the middle, for float precision; 0 if empty. size: minimum size of the contents.
   [[nodiscard]] glm::dvec3 origin(double size = 0.0) const {
     if (is_empty()) return glm::dvec3(0.0);
     size = std::max(size, glm::distance(low_, high_));
@@ -96,7 +96,8 @@ class Box {
   glm::dvec3 high_{-std::numeric_limits<double>::infinity()};
 };
 
-// Whether all is in the same place, as far as a picture would show. Both count from the same origin.
+// Returns true if both poses show the scene in the same position, within visible precision. Both must have the same
+// origin.
 bool alike(const Pose& a, const Pose& b) {
   const auto most = static_cast<float>(1e-4 * glm::length(a.high - a.low));
   for (std::size_t i = 0; i < a.vertices.size(); ++i) {
@@ -138,9 +139,9 @@ void PosableScene::add_instance(std::size_t part, std::uint32_t node, std::int32
 }
 
 void PosableScene::finish() {
-  // What the vertices hold now is the scene's; the parts keep what moves.
+  // The scene has the vertex attributes now; the parts keep the moving data.
   for (MeshPart& part : parts) part.attributes = {};
-  // Transforms may be of any size, each of them, and too large together.
+  // The product of transforms may be too large even if each factor is valid.
   const Stance rest = stance(rig, nullptr, 0.0);
   for (std::size_t i = 0; i < rest.to_world.size(); ++i) {
     for (int n = 0; n < 16; ++n) {
@@ -188,7 +189,7 @@ glm::dvec3 PosableScene::origin_of(const Stance& now) const {
       box.add(part, now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]));
   }
   if (!box.is_empty()) return box.origin();
-  // Only lights and bounds count from it then.
+  // Then only lights and bounds are relative to the origin.
   for (const PlacedLight& light : lights) box.add(glm::dvec3(now.to_world[light.node][3]));
   for (const Placings& of : placings) {
     for (const glm::dmat4& in_node : of.in_node) box.add(glm::dvec3((now.to_world[of.node] * in_node)[3]));
@@ -332,7 +333,7 @@ void PosableScene::bound(Pose& pose) const {
       for (const PosedVertex& vertex : vertices) add(vertex.position);
       continue;
     }
-    // Of many copies the corners of a box, of few each vertex.
+    // For many instances the corners of a box are used, for few each vertex.
     const auto prototype = std::ranges::upper_bound(prototypes, i, {}, &Prototype::first_draw) - prototypes.begin() - 1;
     const std::vector<glm::dmat4>& placed = pose.placings[static_cast<std::size_t>(prototype)];
     std::vector<glm::vec3> points;

@@ -18,7 +18,7 @@ std::string digits(double value) { return general_text(value, 3); }
 std::optional<Rounding> visible_rounding(float farthest, double size) {
   constexpr float infinite = std::numeric_limits<float>::infinity();
   const double error = 0.5 * (double{std::nextafter(farthest, infinite)} - double{farthest});
-  // A point may be one on purpose, but hardly where floats are a thousandth from each other.
+  // The object may be a single point on purpose, but hardly where floats are a thousandth from each other.
   constexpr double least_error = 5e-4;
   constexpr double visible = 1.0 / 4096.0;
   if (size > 0.0 ? error < visible * size : error < least_error) return std::nullopt;

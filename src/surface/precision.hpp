@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: files whose floats are too coarse for their contents.
+// Private to surface/: detects files whose float positions are too coarse for their contents.
 
 #include <glm/glm.hpp>
 #include <optional>
@@ -8,25 +8,25 @@
 
 namespace cumulet::surface::detail {
 
-/// How far floats round positions that are far from 0, and the size of the thing that has them.
+/// Rounding of float positions far from 0, relative to the size of their object.
 struct Rounding {
-  double farthest = 0.0;  ///< coordinate
-  double error = 0.0;     ///< half the distance of the floats there
+  double farthest = 0.0;  ///< largest coordinate
+  double error = 0.0;     ///< half the spacing of floats there
   double size = 0.0;
   [[nodiscard]] double part() const { return size > 0.0 ? error / size : 1.0; }
 };
 
-/// Where it can be seen: an error of 1 / 4096 of the size or more. Nothing else.
+/// Returns the rounding if it is visible: an error of 1 / 4096 of the size or more.
 std::optional<Rounding> visible_rounding(float farthest, double size);
 
-/// The worst of some, in a line.
+/// Reports the worst of several roundings in one line.
 class PrecisionRemark {
  public:
-  /// what: names the numbers.
+  /// what: names the positions in the report.
   void add(const std::string& what, const glm::vec3& low, const glm::vec3& high);
-  /// The same of offsets, up to that far, of something of that size.
+  /// Adds the rounding of offsets up to `farthest`, for an object of this size.
   void add(const std::string& what, double farthest, double size);
-  /// One line that begins with `name`; empty: all is well.
+  /// Returns one line that begins with `name`; empty if no rounding is visible.
   [[nodiscard]] std::string text(const std::string& name) const;
 
  private:

@@ -100,7 +100,7 @@ class Importer {
     return to;
   }
 
-  /// Parents, and an order in which they come first.
+  /// Finds parents, and an order in which parents come first.
   void link() {
     const std::size_t count = rig_.nodes.size();
     for (std::size_t i = 0; i < count; ++i) {
@@ -118,12 +118,12 @@ class Importer {
       if (rig_.nodes[i].parent < 0) descend(i, seen, rig_.order);
     }
     if (rig_.order.size() == count) return;
-    // With one parent each, what no root leads to goes round.
+    // Each node has at most one parent, so a node that no root reaches is in a cycle.
     const auto lost = std::find(seen.begin(), seen.end(), false) - seen.begin();
     malformed(numbered("node", static_cast<std::size_t>(lost)) + " descends from itself");
   }
 
-  /// Appends the nodes that a root leads to, parents first, but for those that were seen and what they lead to.
+  /// Appends the descendants of a root, parents first. Nodes already seen are skipped with their descendants.
   void descend(std::uint32_t root, std::vector<bool>& seen, std::vector<std::uint32_t>& to) const {
     std::vector<std::uint32_t> open = {root};
     while (!open.empty()) {
@@ -137,7 +137,7 @@ class Importer {
     }
   }
 
-  /// The nodes of the default scene, else of the first, else all.
+  /// Selects the nodes of the default scene, else of the first scene, else all.
   void display() {
     if (model_.scenes.empty()) {
       if (model_.defaultScene > 0) malformed("there is no scene " + std::to_string(model_.defaultScene));
@@ -151,7 +151,7 @@ class Importer {
       if (static_cast<std::size_t>(root) >= rig_.nodes.size()) {
         malformed(numbered("scene", index) + ": there is no node " + std::to_string(root));
       }
-      // A root that another root leads to, or is named twice, is not drawn twice.
+      // A root that descends from another root, or is named twice, is drawn once.
       descend(static_cast<std::uint32_t>(root), seen, rig_.displayed);
     }
   }
@@ -230,13 +230,13 @@ class Importer {
     rig_.tracks.push_back(std::move(track));
   }
 
-  /// Nothing if it moves nothing.
+  /// Returns nullopt if the channel changes nothing.
   std::optional<Channel> target_of(const tinygltf::AnimationChannel& from, const std::string& what) const {
     if (from.target_node < 0) return std::nullopt;
     return node_target(static_cast<std::size_t>(from.target_node), from.target_path, what);
   }
 
-  /// What a pointer of KHR_animation_pointer names; nothing if that is not followed.
+  /// Returns the target of a pointer of KHR_animation_pointer; nullopt if it is not supported.
   std::optional<Channel> target_of(std::string_view pointer, const std::string& what) const {
     std::size_t number = 0;
     std::string_view rest = pointer;
@@ -265,7 +265,7 @@ class Importer {
     return to;
   }
 
-  /// Whether `text` begins with `head`, a number and a slash: takes them off it.
+  /// Returns true if `text` begins with `head`, a number and a slash, and removes them.
   static bool below(std::string_view head, std::string_view& text, std::size_t& number) {
     if (!text.starts_with(head)) return false;
     std::string_view rest = text.substr(head.size());
@@ -295,12 +295,13 @@ class Importer {
       to.property = Property::visibility;
       to.width = 1;
     } else {
-      return std::nullopt;  // of an extension
+      return std::nullopt;  // target of an extension
     }
     return to;
   }
 
-  /// Whether an animation can move it: not what a matrix holds, nor weights of no targets.
+  /// Returns true if an animation can move the property. A node with a matrix cannot be moved, nor can weights without
+  /// targets.
   [[nodiscard]] bool moves(const Channel& channel) const {
     switch (channel.property) {
       case Property::translation:
@@ -314,7 +315,7 @@ class Importer {
     }
   }
 
-  /// Nothing if it moves nothing.
+  /// Returns nullopt if the channel changes nothing.
   std::optional<Channel> channel(const tinygltf::Animation& animation, int sampler_number, Channel to,
                                  const std::string& what) {
     if (sampler_number < 0 || static_cast<std::size_t>(sampler_number) >= animation.samplers.size()) {
@@ -431,7 +432,8 @@ void sample(const Channel& channel, double time, std::span<float> to) {
     return;
   }
   const std::size_t last = next - 1;
-  const double span = double{channel.times[next]} - double{channel.times[last]};  // more than 0: `after` is beyond time
+  const double span = double{channel.times[next]} - double{channel.times[last]};  // positive, because `after` is beyond
+                                                                                  // time
   const double u = (time - double{channel.times[last]}) / span;
   const float* v0 = value(last);
   const float* v1 = value(next);
@@ -443,13 +445,13 @@ void sample(const Channel& channel, double time, std::span<float> to) {
     }
     return;
   }
-  // Hermite: the out-tangent of the last key and the in-tangent of the next, a second.
+  // Hermite: the out-tangent of the last key and the in-tangent of the next, per second.
   const float* out = v0 + channel.width;
   const float* in = v1 - channel.width;
   const double u2 = u * u;
   const double u3 = u2 * u;
   for (std::size_t c = 0; c < channel.width; ++c) {
-    // Tangents that are numbers may lead to none.
+    // Finite tangents may still overflow.
     to[c] = narrow((2.0 * u3 - 3.0 * u2 + 1.0) * v0[c] + span * (u3 - 2.0 * u2 + u) * out[c] +
                    (-2.0 * u3 + 3.0 * u2) * v1[c] + span * (u3 - u2) * in[c]);
   }

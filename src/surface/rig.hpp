@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: what moves a scene: nodes, skins and animations.
+// Private to surface/: nodes, skins and animations of a scene.
 
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -14,17 +14,17 @@ namespace cumulet::surface::detail {
 
 struct Node {
   std::int32_t parent = -1;
-  std::optional<glm::dmat4> matrix;  ///< instead of the three that follow
+  std::optional<glm::dmat4> matrix;  ///< replaces translation, rotation and scale
   glm::dvec3 translation{0.0};
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
   glm::dvec3 scale{1.0};
-  std::vector<float> weights;  ///< of the morph targets of its mesh, as they rest
-  bool visible = true;         ///< as it rests; an invisible one hides what descends from it
+  std::vector<float> weights;  ///< of its mesh's morph targets, at rest
+  bool visible = true;         ///< at rest; an invisible node hides its descendants
 };
 
 struct Skin {
   std::vector<std::uint32_t> joints;
-  std::vector<glm::mat4> inverse_bind;  ///< as many
+  std::vector<glm::mat4> inverse_bind;  ///< one per joint
 };
 
 enum class Interpolation : std::uint8_t { linear, step, cubic_spline };
@@ -32,14 +32,14 @@ enum class Property : std::uint8_t { translation, rotation, scale, weights, visi
 
 /// glTF 2.0, 3.11 and appendix C.
 struct Channel {
-  std::uint32_t target = 0;  ///< the number of a node, of a material or of a light
+  std::uint32_t target = 0;  ///< index of a node, material or light
   Property property = Property::translation;
   Interpolation interpolation = Interpolation::linear;
-  std::size_t width = 3;  ///< numbers a key
+  std::size_t width = 3;  ///< numbers per key
   std::vector<float> times;
-  std::vector<float> values;            ///< a key: its value, or in-tangent, value and out-tangent
-  Member<MovableMaterial> of_material;  ///< of Property::material
-  Member<MovableLight> of_light;        ///< of Property::light
+  std::vector<float> values;            ///< per key: its value, or in-tangent, value and out-tangent
+  Member<MovableMaterial> of_material;  ///< for Property::material
+  Member<MovableLight> of_light;        ///< for Property::light
 };
 
 struct Track {
@@ -47,32 +47,32 @@ struct Track {
   std::vector<Channel> channels;
 };
 
-/// Values of a channel at a time, `width` numbers; before the first key and after the last one, theirs. A rotation is
-/// interpolated along the sphere and of unit length.
+/// Writes a channel's values at a time, `width` numbers. Before the first key and after the last one the values are
+/// constant. Rotations are interpolated spherically and have unit length.
 void sample(const Channel& channel, double time, std::span<float> to);
 
 struct Rig {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> order;      ///< of nodes, parents first
   std::vector<std::uint32_t> displayed;  ///< nodes of the file's scene, in its order
-  std::vector<bool> hidden;              ///< a node each: nothing shows it at any time, itself or what is above it
+  std::vector<bool> hidden;              ///< per node: never visible, because of itself or an ancestor
   std::vector<Skin> skins;
   std::vector<Track> tracks;
 };
 
-/// Nodes, skins and animations, checked: no cycles, no node with two parents. Fills scene.animations. Throws
+/// Imports nodes, skins and animations. Rejects cycles and nodes with two parents. Fills scene.animations. Throws
 /// Error(file).
 Rig import_rig(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
                Scene& scene);
 
-/// Of all nodes at a time.
+/// State of all nodes at one time.
 struct Stance {
   std::vector<glm::dmat4> to_world;
-  std::vector<bool> visible;  ///< with all that they descend from
+  std::vector<bool> visible;  ///< including the visibility of its ancestors
   std::vector<std::vector<float>> weights;
 };
 
-/// The scene `time` seconds into a track, or at rest without one.
+/// Returns the state `time` seconds into a track; without a track at rest.
 Stance stance(const Rig& rig, const Track* track, double time);
 
 }  // namespace cumulet::surface::detail

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a glTF 2.0 file holds, as the passes want it: plain arrays, checked once on import, so that nobody downstream
-// meets an index out of range, a NaN or a cycle. No GL.
+// The contents of a glTF 2.0 file as plain arrays. The import checks them once: there are no indices out of range, no
+// NaNs and no cycles. Does not use GL.
 
 #include <array>
 #include <cstdint>
@@ -18,7 +18,8 @@
 
 namespace cumulet::surface {
 
-/// Eight bits a channel, rows from the top, straight alpha. Whether it is sRGB depends on who reads it (glTF 2.0, 3.9).
+/// Eight bits per channel, rows from the top, straight alpha. The use of the image determines whether it is sRGB (glTF
+/// 2.0, 3.9).
 struct Image {
   std::string name;
   std::uint32_t width = 0;
@@ -53,7 +54,8 @@ struct TextureUse {
 
 enum class AlphaMode : std::uint8_t { opaque, mask, blend };
 
-/// Metallic-roughness (glTF 2.0, 3.9 and appendix B) with the extensions that Cumulet reads. Colours are linear.
+/// Metallic-roughness material (glTF 2.0, 3.9 and appendix B) with the extensions that Cumulet reads. Colors are
+/// linear.
 struct Material {
   std::string name;
   glm::vec4 base_color{1.0F};
@@ -82,56 +84,55 @@ struct Material {
   TextureUse clearcoat_roughness_texture;  ///< G
   float transmission = 0.0F;
   TextureUse transmission_texture;  ///< R
-  float thickness =
-      0.0F;  ///< metres; 0: a thin wall; else the triangles bound a volume, and previews are told how thick
-  glm::vec3 absorption{0.0F};  ///< of that volume, 1 / m of the world
-  float dispersion = 0.0F;     ///< 20 over Abbe's number, of that volume
+  float thickness = 0.0F;  ///< meters; 0: thin wall; else the triangles bound a volume, and previews use this thickness
+  glm::vec3 absorption{0.0F};  ///< of that volume, per meter in world space
+  float dispersion = 0.0F;     ///< 20 / Abbe number, of that volume
   glm::vec3 sheen_color{0.0F};
   TextureUse sheen_color_texture;
   float sheen_roughness = 0.0F;
   TextureUse sheen_roughness_texture;  ///< A
   float anisotropy = 0.0F;             ///< strength, along the tangent
-  float anisotropy_rotation = 0.0F;    ///< radians, from there to the bitangent
+  float anisotropy_rotation = 0.0F;    ///< radians, from the tangent to the bitangent
   TextureUse anisotropy_texture;       ///< RG direction, B strength
   float iridescence = 0.0F;
   TextureUse iridescence_texture;  ///< R
   float film_ior = 1.3F;
-  float film_thinnest = 100.0F;       ///< nanometres, where the texture is 0
-  float film_thickest = 400.0F;       ///< where it is 1, and without one
+  float film_thinnest = 100.0F;       ///< nanometers, where the texture is 0
+  float film_thickest = 400.0F;       ///< nanometers, where the texture is 1, or without one
   TextureUse film_thickness_texture;  ///< G
   bool operator==(const Material&) const = default;
 };
 
-/// Whether its triangles are the boundary of a volume, which light enters by transmission (KHR_materials_volume): both
-/// their sides count.
+/// Returns true if the triangles are the boundary of a volume that light enters by transmission (KHR_materials_volume).
+/// Both sides of such triangles are hit.
 inline bool bounds_volume(const Material& m) { return m.transmission > 0.0F && m.thickness > 0.0F && !m.unlit; }
-/// Whether it needs the path tracer's richer kernels (CM_RICH of glsl/ggx.glsl).
+/// Returns true if the path tracer needs its extended-material variant (CM_RICH of glsl/ggx.glsl).
 inline bool is_rich(const Material& m) {
   return !m.unlit &&
          (m.transmission > 0.0F || m.sheen_color != glm::vec3(0.0F) || m.anisotropy > 0.0F || m.iridescence > 0.0F);
 }
 
-/// KHR_lights_punctual, in the scene's units: candela for point and spot, lux for directional; Cumulet takes both as
-/// radiant (W/sr, W/m2).
+/// KHR_lights_punctual, in the scene's units: candela for point and spot lights, lux for directional ones. Cumulet
+/// interprets both as radiant quantities (W/sr, W/m2).
 struct PunctualLight {
   enum class Kind : std::uint8_t { directional, point, spot };
   Kind kind = Kind::point;
-  glm::vec3 intensity{1.0F};  ///< colour times intensity
+  glm::vec3 intensity{1.0F};  ///< color times intensity
   float range = 0.0F;         ///< 0: no limit
   float inner_cone = 0.0F;    ///< radians
   float outer_cone = 0.785398F;
-  glm::vec3 position{0.0F};       ///< world; of a pose, from its origin
-  glm::vec3 direction{0, 0, -1};  ///< world, where it shines, unit
+  glm::vec3 position{0.0F};       ///< world; in a pose, relative to its origin
+  glm::vec3 direction{0, 0, -1};  ///< world, in which it shines, unit
 };
 
 struct SceneCamera {
   std::string name;
   bool orthographic = false;
-  double vertical_fov = 0.8;  ///< radians; of perspective
-  double aspect = 0.0;        ///< 0: of the window
+  double vertical_fov = 0.8;  ///< radians; for perspective
+  double aspect = 0.0;        ///< 0: that of the window
   double near_plane = 0.1;
   double far_plane = 0.0;  ///< 0: infinite
-  double height = 2.0;     ///< world units, of orthographic
+  double height = 2.0;     ///< world units, for orthographic
   glm::dmat4 to_world{1.0};
 };
 
@@ -139,56 +140,56 @@ struct SceneCamera {
 struct Draw {
   std::uint32_t first_index = 0;
   std::uint32_t index_count = 0;  ///< a multiple of 3
-  std::uint32_t material = 0;     ///< where no variant is chosen
+  std::uint32_t material = 0;     ///< if no variant is chosen
   std::uint32_t node = 0;
 };
 
-/// Draws that a pose places together any number of times (EXT_mesh_gpu_instancing), of vertices in a space of their
-/// own. One after another in the draws and in the indices, as prototypes are.
+/// Draws that a pose shows any number of times with instance transforms (EXT_mesh_gpu_instancing). Their vertices are
+/// in their own space. They are consecutive in the draws and in the indices, in the order of the prototypes.
 struct Prototype {
   std::uint32_t first_draw = 0;
   std::uint32_t draw_count = 0;
-  std::uint32_t placings = 0;  ///< where it is shown
+  std::uint32_t placings = 0;  ///< number of instances
 };
 
-/// What does not move: shared by every pose.
+/// Vertex attributes that do not move; all poses share them.
 struct VertexAttributes {
   glm::vec2 uv[2] = {};
   glm::vec4 color{1.0F};  ///< linear
 };
 
-/// What moves, in world space, counted from the pose's origin, or in its prototype's space.
+/// Vertex attributes that move, in world space relative to the pose's origin, or in the prototype's space.
 struct PosedVertex {
   glm::vec3 position;
   glm::vec3 normal;         ///< unit
-  glm::vec4 tangent{0.0F};  ///< unit; w: sign of the bitangent; 0 where the material has no normal map
+  glm::vec4 tangent{0.0F};  ///< unit; w: sign of the bitangent; 0 if the material needs no tangents
 };
 
-/// The scene at one time. Triangles wind counter-clockwise seen from their front, but where `flipped` says otherwise.
-/// Everything in it is finite.
+/// The scene at one time. Triangles wind counter-clockwise seen from their front, unless `flipped` is set. All values
+/// are finite.
 struct Pose {
   double time = 0.0;
-  glm::dvec3 origin{0.0};             ///< world; vertices and lights count from it, so that floats hold them far away
+  glm::dvec3 origin{0.0};             ///< world; vertices and lights are relative to it, to keep float precision far
+                                      ///< from 0
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
-  std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
-  std::vector<std::uint8_t> hidden;   ///< a Draw each: 1 where it is not there at this time; empty: none
-  std::vector<std::vector<glm::dmat4>> placings;  ///< a Prototype each: to the world
-  std::vector<Material> materials;                ///< as they are at this time; empty: the scene's
-  std::vector<std::uint32_t>
-      chosen;                 ///< a Draw each: its material in the variant that is chosen; empty: the Draw's own
-  bool double_sided = false;  ///< all materials count as double sided, whatever they say
+  std::vector<std::uint8_t> flipped;  ///< per Draw: 1 if the node mirrors, so that the winding is clockwise
+  std::vector<std::uint8_t> hidden;   ///< per Draw: 1 if it is not visible at this time; empty: all are visible
+  std::vector<std::vector<glm::dmat4>> placings;  ///< per Prototype: transforms to world space
+  std::vector<Material> materials;                ///< at this time; empty: those of the scene
+  std::vector<std::uint32_t> chosen;  ///< per Draw: its material in the chosen variant; empty: the Draw's own
+  bool double_sided = false;          ///< treat all materials as double sided
   std::vector<PunctualLight> lights;
   std::vector<SceneCamera> cameras;
-  glm::dvec3 low{0.0};  ///< world bounds of all triangles that are there
+  glm::dvec3 low{0.0};  ///< world bounds of all visible triangles
   glm::dvec3 high{0.0};
 };
 
-/// A model's place, from the origin that its pose's vertices count from.
+/// Returns a model's transform, applied to positions relative to the pose's origin.
 inline glm::dmat4 from_origin(const glm::dmat4& to_world, const Pose& pose) {
   return to_world * glm::translate(glm::dmat4(1.0), pose.origin);
 }
 
-/// As the shutter opens, and as it closes.
+/// Poses at shutter open and shutter close.
 struct PoseEnds {
   Pose open;
   Pose close;
@@ -202,10 +203,10 @@ struct Animation {
 /// A choice of materials (KHR_materials_variants).
 struct Variant {
   std::string name;
-  std::vector<std::uint32_t> materials;  ///< a Draw each
+  std::vector<std::uint32_t> materials;  ///< one per Draw
 };
 
-/// A checked glTF scene. Immutable: any thread may pose it.
+/// A checked glTF scene. Immutable, so any thread may pose it.
 class Scene {
  public:
   virtual ~Scene() = default;
@@ -213,14 +214,14 @@ class Scene {
   std::vector<Image> images;
   std::vector<Texture> textures;
   std::vector<Material> materials;  ///< at least one
-  std::vector<Draw> draws;          ///< in the order of the file, but for those of prototypes, which come last
+  std::vector<Draw> draws;          ///< in the order of the file, except that those of prototypes come last
   std::vector<Prototype> prototypes;
   std::vector<std::uint32_t> indices;
   std::vector<VertexAttributes> attributes;
   std::vector<Animation> animations;
   std::vector<Variant> variants;
 
-  /// What the file has, shown or not.
+  /// Counts of the file's contents, visible or not.
   struct Counts {
     std::uint32_t meshes = 0;
     std::uint32_t primitives = 0;
@@ -228,27 +229,27 @@ class Scene {
     std::uint32_t textures = 0;
   };
   Counts counts;
-  std::string precision_remark;  ///< one line, on numbers that are too far from 0 for their floats; empty: none are
+  std::string precision_remark;  ///< one line about positions too far from 0 for float precision; empty: none
 
   [[nodiscard]] std::size_t triangle_count() const { return indices.size() / 3; }
-  /// Of a prototype's as many as it has placings.
+  /// Counts a prototype's triangles once per instance.
   [[nodiscard]] std::uint64_t shown_triangles() const;
-  /// The first that is a prototype's.
+  /// Index of the first draw of a prototype.
   [[nodiscard]] std::size_t first_prototype_draw() const {
     return prototypes.empty() ? draws.size() : prototypes.front().first_draw;
   }
 
-  /// The scene `time` seconds into animation `animation` (looped past its end); as it rests, if there is no such one.
-  /// Linear, step and cubic spline interpolation, skins and morph targets (glTF 2.0, 3.7.3, 3.7.2.2, 3.11).
-  /// Cancelled, throws Error(cancelled).
+  /// Returns the scene `time` seconds into animation `animation` (looped past its end). Without such an animation it
+  /// returns the scene at rest. Supports linear, step and cubic spline interpolation, skins and morph targets (glTF
+  /// 2.0, 3.7.3, 3.7.2.2, 3.11). Throws Error(cancelled).
   [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0, const Progress* progress = nullptr) const = 0;
 
-  /// Whether pose_ends() may be something.
+  /// Returns false if pose_ends() always returns nullopt.
   [[nodiscard]] virtual bool may_move(std::size_t /*animation*/) const { return false; }
-  /// Half of `seconds` before that moment of the animation, and half after it. Past its end it goes on at its beginning
-  /// where it is there as it was at the end, and else stops, so that nothing sweeps from the last pose to the first.
-  /// Nothing where it stands still. Both count from the origin of pose() at that moment. Cancelled, throws
-  /// Error(cancelled).
+  /// Returns the poses half of `seconds` before and after a time of the animation. Past its end the animation continues
+  /// from its beginning if both poses agree. Otherwise the interval is clamped, so that nothing sweeps from the last
+  /// pose to the first. Returns nullopt if the scene cannot move. Both poses are relative to the origin of pose() at
+  /// that time. Throws Error(cancelled).
   [[nodiscard]] virtual std::optional<PoseEnds> pose_ends(double /*time*/, std::size_t /*animation*/,
                                                           double /*seconds*/,
                                                           const Progress* /*progress*/ = nullptr) const {
@@ -266,22 +267,22 @@ inline std::uint64_t Scene::shown_triangles() const {
   return all;
 }
 
-/// As they are in a pose of the scene.
+/// Returns the materials in a pose of the scene.
 inline const std::vector<Material>& materials_of(const Scene& scene, const Pose& pose) {
   return pose.materials.empty() ? scene.materials : pose.materials;
 }
-/// The number of a draw's material.
+/// Returns the index of a draw's material.
 inline std::uint32_t material_of(const Scene& scene, const Pose& pose, std::size_t draw) {
   return pose.chosen.empty() ? scene.draws[draw].material : pose.chosen[draw];
 }
-/// Whether a draw is not there.
+/// Returns true if a draw is not visible in the pose.
 inline bool is_hidden(const Pose& pose, std::size_t draw) { return !pose.hidden.empty() && pose.hidden[draw] != 0; }
 
 using ScenePtr = std::shared_ptr<const Scene>;
 
-/// Reads a .gltf or .glb. Throws Error(file), one line that names the file and the cause, for what cannot be read or is
-/// malformed; Error(unsupported) by name for an extensionsRequired that is not known; logs a warning for
-/// extensionsUsed that are ignored. Checks `progress` (may be null) for cancellation.
+/// Reads a .gltf or .glb. Throws Error(file), one line with the file and the cause, if the file cannot be read or is
+/// malformed. Throws Error(unsupported) with the name of an unknown extension in extensionsRequired. Logs a warning for
+/// extensions in extensionsUsed that are ignored. Checks `progress` (may be null) for cancellation.
 ScenePtr import_gltf(const FilePath& path, const Log& log, Progress* progress = nullptr);
 
 }  // namespace cumulet::surface

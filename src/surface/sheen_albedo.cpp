@@ -17,12 +17,12 @@ constexpr int size = core::CM_GGX_ALBEDO_SIZE;
 
 float reflected(float roughness, float cosine) {
   constexpr int rings = 48;
-  constexpr int sectors = 24;  // of half a turn
+  constexpr int sectors = 24;  // per half turn
   const float z = std::max(cosine, 1e-4F);
   const glm::vec3 wo(std::sqrt(1.0F - z * z), 0.0F, z);
   double sum = 0.0;
   for (int i = 0; i < rings; ++i) {
-    // The cosine's root is even: most of it is at grazing angles.
+    // Stratified in the cosine's square root, because sheen is strongest at grazing angles.
     const float root = (static_cast<float>(i) + 0.5F) / rings;
     const float wi_z = root * root;
     const float sine = std::sqrt(1.0F - wi_z * wi_z);

@@ -5,17 +5,17 @@
 
 namespace cumulet::surface {
 
-/// Which share of constant radiance white sheen reflects (glsl/sheen.glsl), by its roughness, where GgxAlbedo has its
-/// own. Immutable.
+/// Directional albedo of white sheen (glsl/sheen.glsl) by roughness, for sheen as GgxAlbedo for GGX. Immutable.
 class SheenAlbedo {
  public:
   static const SheenAlbedo& table();
 
-  /// Towards a cosine, and on average over all of them, weighed by the cosine.
+  /// towards(): for one cosine. average(): the cosine-weighted mean over all cosines.
   [[nodiscard]] float towards(float roughness, float cosine) const;
   [[nodiscard]] float average(float roughness) const;
 
-  /// As glsl/surface.glsl reads it: the four corners of each cell, row by row; then both ends of each row's average.
+  /// Data in the layout of glsl/surface.glsl: the four corners of each cell, row by row; then both ends of each row's
+  /// average.
   [[nodiscard]] std::vector<glm::uvec4> words() const;
 
  private:

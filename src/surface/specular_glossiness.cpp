@@ -20,7 +20,7 @@ constexpr float tiny = 1e-6F;
 
 float brightness(const glm::vec3& c) { return std::sqrt(0.299F * c.r * c.r + 0.587F * c.g * c.g + 0.114F * c.b * c.b); }
 
-/// Of the mixture whose two colours are that bright.
+/// Returns the metallic value of the mixture that has both brightnesses.
 float metallic_of(float diffuse, float specular, float rest) {
   if (specular < dielectric) return 0.0F;
   const float a = dielectric;
@@ -34,7 +34,7 @@ std::uint8_t byte_of(float value) {
   return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
 }
 
-/// An image's texels, linear, as another of that size would have them.
+/// An image's linear texels, resampled to another size.
 class Texels {
  public:
   Texels(const std::optional<Image>& image, std::uint32_t width, std::uint32_t height)

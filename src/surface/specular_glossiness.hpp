@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: KHR_materials_pbrSpecularGlossiness as the metallic-roughness material that looks like it.
+// Private to surface/: converts KHR_materials_pbrSpecularGlossiness to a similar metallic-roughness material.
 
 #include <glm/glm.hpp>
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace cumulet::surface::detail {
 
-/// Linear values of one place.
+/// Linear values at one texel.
 struct SpecularGlossiness {
   glm::vec4 diffuse{1.0F};
   glm::vec3 specular{1.0F};
@@ -22,18 +22,20 @@ struct MetallicRoughness {
   float roughness = 1.0F;
 };
 
-/// As Khronos' example of a conversion has it ("Convert between workflows", in the extension's text): metallic so that
-/// a dielectric of 4 % and a metal together are as bright as both colours are; what no such mixture is comes near.
+/// Converts as in Khronos' example ("Convert between workflows", in the extension's text). Metallic is chosen so that a
+/// mixture of a 4 % dielectric and a metal is as bright as both colors. Colors that no such mixture has are
+/// approximated.
 MetallicRoughness convert(const SpecularGlossiness& from);
 
-/// What textures become: sRGB base colour with alpha, and linear roughness in G and metallic in B.
+/// Converted textures: sRGB base color with alpha; linear roughness in G and metallic in B.
 struct ConvertedImages {
   Image base_color;
   Image metallic_roughness;
 };
 
-/// Texel by texel, factors times texels, at the larger of the two sizes, the other one bilinearly; an image that is not
-/// there is 1 everywhere. At least one is. Takes its memory of the budget; throws Error(file), Error(cancelled).
+/// Converts texel by texel, factors times texels, at the larger of the two sizes. The smaller image is sampled
+/// bilinearly; an absent image is 1 everywhere. At least one image must be present. Uses the budget for its memory.
+/// Throws Error(file) and Error(cancelled).
 ConvertedImages convert(const SpecularGlossiness& factors, const std::optional<Image>& diffuse,
                         const std::optional<Image>& specular_glossiness, Budget& budget);
 

@@ -11,7 +11,7 @@ namespace cumulet::surface::detail {
 
 namespace {
 
-/// What makes two vertices one, and the side of their triangles.
+/// Vertices with equal members share a tangent. side: orientation of their triangles.
 struct Corner {
   glm::vec3 position;
   glm::vec3 normal;
@@ -28,7 +28,7 @@ std::size_t hash_of(const Corner& corner) {
   for (const float value : {corner.position.x, corner.position.y, corner.position.z, corner.normal.x, corner.normal.y,
                             corner.normal.z, corner.uv.x, corner.uv.y, corner.side}) {
     std::uint32_t bits = 0;
-    const float plain = value + 0.0F;  // -0 is 0
+    const float plain = value + 0.0F;  // turns -0 into 0
     std::memcpy(&bits, &plain, sizeof bits);
     hash = (hash ^ bits) * 0x100000001B3U;
     hash ^= hash >> 29U;
@@ -36,11 +36,11 @@ std::size_t hash_of(const Corner& corner) {
   return hash;
 }
 
-/// Vectors by corner. Its tables are as large from the beginning as they can become, and freed at once: a map of a node
-/// a corner takes a second to grow and to free, in which nobody can cancel.
+/// Vectors by corner. The hash table has its final size from the start and is freed at once. A node-based map takes a
+/// second to grow and to free, without a chance to cancel.
 class Sums {
  public:
-  /// For at most so many corners.
+  /// corners: maximum number of entries.
   explicit Sums(std::size_t corners) : slots_(std::bit_ceil(2 * corners + 1), none) {}
 
   glm::vec3& operator[](const Corner& corner) {
@@ -51,7 +51,7 @@ class Sums {
     }
     return entries_[slot].sum;
   }
-  /// Null if there is none.
+  /// Returns null if there is none.
   [[nodiscard]] const glm::vec3* find(const Corner& corner) const {
     const std::uint32_t slot = slots_[place(corner)];
     return slot == none ? nullptr : &entries_[slot].sum;
@@ -80,9 +80,9 @@ float angle_between(const glm::vec3& a, const glm::vec3& b) {
   return lengths > 0.0F ? std::acos(std::clamp(glm::dot(a, b) / lengths, -1.0F, 1.0F)) : 0.0F;
 }
 
-/// Where a triangle's texture goes to.
+/// Direction of a triangle's texture coordinates.
 struct Face {
-  glm::vec3 direction{0.0F};  ///< of growing u, times its area there
+  glm::vec3 direction{0.0F};  ///< direction of growing u, times the triangle's area
   float side = 0.0F;          ///< -1: mirrored; 0: no area in texture space
 };
 
@@ -98,15 +98,15 @@ std::vector<Face> texture_faces(const std::vector<std::uint32_t>& indices, const
     const glm::vec2 t2 = uvs[v[2]] - uvs[v[0]];
     const float area = t1.x * t2.y - t1.y * t2.x;
     if (area == 0.0F || !std::isfinite(area)) continue;
-    // Solves p = t.x dP/du + t.y dP/dv along two edges, but for the factor 1 / |area|.
+    // Solves p = t.x dP/du + t.y dP/dv along two edges, without the factor 1 / |area|.
     faces[f].side = area > 0.0F ? 1.0F : -1.0F;
     faces[f].direction = (t2.y * p1 - t1.y * p2) * faces[f].side;
   }
   return faces;
 }
 
-/// Gives vertices between triangles of both sides a copy for the second side: origins has what the copies are of.
-/// Returns each vertex' (first) side, 0 where its triangles have none.
+/// Vertices between triangles of both orientations get a copy for the second one. origins: receives the original of
+/// each copy. Returns each vertex's (first) orientation, 0 if its triangles have none.
 std::vector<float> part_sides(std::vector<std::uint32_t>& indices, const std::vector<Face>& faces, std::uint32_t count,
                               std::vector<std::uint32_t>& origins, const std::function<void(std::size_t turn)>& check) {
   std::vector<float> sides(count, 0.0F);
@@ -144,7 +144,7 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
                                      std::vector<std::uint32_t>& origins,
                                      const std::function<void(std::size_t turn)>& check) {
   const std::vector<Face> faces = texture_faces(indices, positions, uvs, check);
-  // Sums of what counts as one vertex, by side.
+  // Sums for all vertices that count as one, by orientation.
   Sums sums(std::min(2 * positions.size(), indices.size()));
   const auto corner = [&](std::uint32_t vertex, float side) {
     return Corner{positions[vertex], normals[vertex], uvs[vertex], side};
@@ -175,7 +175,7 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
     const glm::vec3* found = sums.find(corner(original, side));
     const float length = found == nullptr ? 0.0F : glm::length(*found);
     const glm::vec3 direction = length > 0.0F ? *found / length : any_perpendicular(normals[original]);
-    // glTF's v grows downwards in the image, its bitangent cross(n, t) * w upwards.
+    // glTF's v grows downward in the image, its bitangent cross(n, t) * w points upward.
     tangents[v] = glm::vec4(direction, -side);
   }
   return tangents;

@@ -14,7 +14,7 @@ namespace detail {
 
 namespace {
 
-// Of a host's array, counted and bounded by its span.
+// Reads a vector of a host's array.
 template <int N>
 glm::vec<N, float> vector_at(std::span<const float> values, std::size_t i) {
   glm::vec<N, float> v;

@@ -9,19 +9,19 @@
 
 namespace cumulet::surface {
 
-/// Triangles of one material, as a host has them in memory.
+/// Triangles of one material in a host's memory.
 struct TriangleMesh {
-  std::span<const float> positions;        ///< 3 a vertex
-  std::span<const float> normals;          ///< 3 a vertex, of any length; empty: the triangles' own
-  std::span<const float> colors;           ///< 4 a vertex, linear, times the material's; empty: white
-  std::span<const std::uint32_t> indices;  ///< 3 a triangle; empty: every three vertices are one
-  std::span<const float> velocities;       ///< 3 a vertex, a second; empty: it stands still
+  std::span<const float> positions;        ///< 3 per vertex
+  std::span<const float> normals;          ///< 3 per vertex, of any length; empty: computed per triangle
+  std::span<const float> colors;           ///< 4 per vertex, linear, multiplied with the material's; empty: white
+  std::span<const std::uint32_t> indices;  ///< 3 per triangle; empty: every three vertices form a triangle
+  std::span<const float> velocities;       ///< 3 per vertex, units per second; empty: no motion
   glm::dmat4 to_world{1.0};
   Material material;
 };
 
-/// A scene of meshes that move by their velocities alone, while a shutter is open, checked as a glTF file's. Copies all
-/// it needs. Throws Error(invalid_argument), one line that begins with `name`.
+/// Returns a scene of meshes that move only by their velocities while the shutter is open. Input is checked like a glTF
+/// file. All data is copied. Throws Error(invalid_argument), one line that begins with `name`.
 ScenePtr import_triangles(std::span<const TriangleMesh> meshes, const std::string& name);
 
 }  // namespace cumulet::surface

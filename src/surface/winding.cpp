@@ -15,12 +15,12 @@ namespace {
 
 using glm::dvec3;
 
-// What has less volume for its area (a ball has 0.094) is a sheet with two sides.
+// A shape with less volume relative to its area (a sphere has 0.094) is a two-sided sheet.
 constexpr double least_volume = 1e-6;
-// So many of the largest shapes are looked at for what lies in them.
+// Number of the largest shapes that are tested for shapes within them.
 constexpr std::size_t most_hulls = 64;
 
-/// Numbers vertices so that those at one place share one.
+/// Numbers vertices so that vertices at the same position share a number.
 std::vector<std::uint32_t> weld(std::span<const glm::vec3> positions) {
   std::vector<std::uint32_t> order(positions.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -34,7 +34,7 @@ std::vector<std::uint32_t> weld(std::span<const glm::vec3> positions) {
   return place;
 }
 
-/// Triangles that hang together, each wound as the first of its piece or against it.
+/// Union-find over connected triangles. Each triangle is wound like the root of its component or opposite to it.
 class Pieces {
  public:
   explicit Pieces(std::size_t triangles) : parent_(triangles), against_(triangles, 0), open_(triangles, 0) {
@@ -49,7 +49,7 @@ class Pieces {
     std::uint32_t root = triangle;
     bool against = false;
     for (; parent_[root] != root; root = parent_[root]) against ^= against_[root] != 0;
-    // Shortens the way for the next.
+    // Path compression.
     bool rest = against;
     while (parent_[triangle] != root && triangle != root) {
       const std::uint32_t next = parent_[triangle];
@@ -77,8 +77,8 @@ class Pieces {
 
  private:
   std::vector<std::uint32_t> parent_;
-  std::vector<std::uint8_t> against_;  // its parent
-  std::vector<std::uint8_t> open_;     // of roots
+  std::vector<std::uint8_t> against_;  // wound opposite to its parent
+  std::vector<std::uint8_t> open_;     // valid for roots
 };
 
 struct Edge {
@@ -89,8 +89,8 @@ struct Edge {
 };
 
 struct Shape {
-  double volume = 0.0;           // of the first triangle's winding
-  std::array<double, 2> area{};  // wound as the first, and against it
+  double volume = 0.0;           // by the winding of the component's root triangle
+  std::array<double, 2> area{};  // of triangles wound like the root, and opposite to it
   dvec3 low{std::numeric_limits<double>::max()};
   dvec3 high{std::numeric_limits<double>::lowest()};
   dvec3 origin{0.0};
@@ -141,12 +141,12 @@ Winding winding_of(std::span<const glm::vec3> positions, std::span<const std::ui
     if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) triangles.push_back(t);
   }
   Pieces pieces = pieces_of(triangles);
-  std::vector<Shape> shapes(triangles.size());  // of pieces, at their first triangles
+  std::vector<Shape> shapes(triangles.size());  // per component, at the index of its root triangle
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     const auto [piece, against] = pieces.find(t);
     if (pieces.is_open(piece)) continue;
     Shape& shape = shapes[piece];
-    if (shape.whole() == 0.0) shape.origin = positions[triangles[t][0]];  // near: so that nothing cancels
+    if (shape.whole() == 0.0) shape.origin = positions[triangles[t][0]];  // a nearby origin avoids cancellation
     std::array<dvec3, 3> p{};
     for (std::size_t k = 0; k < 3; ++k) {
       const dvec3 at = positions[triangles[t][k]];

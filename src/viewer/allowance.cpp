@@ -14,12 +14,12 @@ struct Allowance::Arena {
   explicit Arena(int count) : threads(count), arena(count) {}
   int threads;
   tbb::task_arena arena;
-  std::mutex alone;  // of one thread: a second job's would bring another with it
+  std::mutex alone;  // used with one thread: a second job's thread would be additional
 };
 
 void Allowance::set(unsigned threads, std::uint64_t memory_bytes) {
-  std::shared_ptr<Arena> arena;  // the one before ends after the lock
-  // More than there are would be told of on standard error.
+  std::shared_ptr<Arena> arena;  // the previous one is destroyed after the lock is released
+  // TBB would print a warning for more threads than cores.
   if (threads > 0)
     arena = std::make_shared<Arena>(std::min(static_cast<int>(threads), tbb::info::default_concurrency()));
   memory_bytes_ = memory_bytes;
@@ -48,8 +48,8 @@ void Allowance::run(const std::function<void()>& work) const {
   }
   std::unique_lock alone(arena->alone, std::defer_lock);
   if (arena->threads == 1) alone.lock();
-  // Isolated: a thread that waits inside of it for a part must not take up another's work meanwhile, which may wait for
-  // what this one holds.
+  // Isolated: a thread that waits inside `work` must not execute other work, which may wait for a lock that this thread
+  // holds.
   arena->arena.execute([&] { tbb::this_task_arena::isolate(work); });
 }
 

@@ -10,21 +10,24 @@
 
 namespace cumulet::viewer {
 
-/// What a viewer's work may take of the machine. All calls are safe from any thread.
+/// Resource limits of a viewer: threads, main memory and GPU memory. All calls are thread-safe.
 class Allowance {
  public:
   static constexpr std::uint64_t no_limit = std::numeric_limits<std::uint64_t>::max();
 
-  /// threads: that work at a time, of all that run() here; 0: as many as there are. Of what is begun from now on.
+  /// Applies to work started after this call. threads: maximum number of threads working at a time, in all run() calls
+  /// together; 0: all cores.
   void set(unsigned threads, std::uint64_t memory_bytes);
-  /// Of volumes and grids, in main memory.
+  /// Limit in bytes for volumes and grids in main memory.
   [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
-  /// Of GL memory, what there is for volumes: as many cells as fit are built. Of what is begun from now on.
+  /// Sets the GPU memory limit for volumes, in bytes. Grids are coarsened to fit. Applies to work started after this
+  /// call.
   void set_gl(std::uint64_t bytes) { gl_bytes_ = bytes; }
   [[nodiscard]] std::uint64_t gl_bytes() const { return gl_bytes_; }
-  /// Throws Error(out_of_memory) where that is less; what: takes it, begins the line.
+  /// Throws Error(out_of_memory) if `bytes` exceeds the main memory limit. what: the object that needs them; begins the
+  /// message.
   void require(std::uint64_t bytes, const std::string& what) const;
-  /// Does it on this thread, or one that works for it; waits until there is room.
+  /// Runs `work` on this thread, or on a worker thread that acts for it. Waits until a thread is available.
   void run(const std::function<void()>& work) const;
 
  private:

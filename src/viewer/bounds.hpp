@@ -13,7 +13,7 @@ struct Bounds {
   glm::dvec3 max{0.0};
 };
 
-/// Of the voxels from first to last, both inclusive.
+/// World bounds of the voxels from first to last, both inclusive.
 inline Bounds world_bounds(const glm::ivec3& first, const glm::ivec3& last, const glm::dmat4& index_to_world) {
   Bounds bounds{glm::dvec3(std::numeric_limits<double>::infinity()),
                 -glm::dvec3(std::numeric_limits<double>::infinity())};

@@ -14,7 +14,7 @@ namespace cumulet::viewer {
 
 namespace {
 
-// Grids that know of the medium's opacity serve until it differs by more.
+// Maximum ratio of opacities for which a grid refined by opacity can be reused.
 constexpr double most_opacity_ratio = 2.0;
 
 bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_opacity_ratio * a; }
@@ -34,7 +34,7 @@ bool suits(const BuildSettings& made, const BuildSettings& wanted) {
 }
 
 std::uint64_t Built::bytes() const {
-  // A march over voxels reads the volume's own.
+  // Voxel sources share the volume's data.
   const std::uint64_t read = source && source->volume && volume ? source->volume->bytes() : 0;
   const std::uint64_t statistics = source && source->statistics && volume ? source->statistics->bytes() : 0;
   const std::uint64_t channels = source && volume ? source->channels.bytes() : 0;
@@ -50,7 +50,7 @@ bool Built::serves(const BuildSettings& wanted) const {
 
 namespace {
 
-// What it is while the shutter is open; null where nothing moves.
+// Returns the volume for the shutter interval; null if nothing moves.
 VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& progress) {
   try {
     return volume->while_open(seconds, progress);
@@ -60,7 +60,7 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
   }
 }
 
-// Of values in a unit: no more than what paths are traced with.
+// Density scale for values in `unit`, limited to the maximum extinction of path tracing.
 double density_scale_in(double unit, const volume::ScalarVolume& voxels, const grid::Cube& cube, double scale) {
   const glm::dmat3 axes(cube.to_world);
   const double edge = cube.size() * std::max({glm::length(axes[0]), glm::length(axes[1]), glm::length(axes[2])});
@@ -233,7 +233,7 @@ void Builder::read(const VolumeFile& file, const std::shared_ptr<Load>& load, Pr
     loaded_ = loaded;
     load->open = false;
   }
-  // Closed: nobody else changes it now.
+  // load->open is false, so no other thread changes the settings now.
   if (!load->settings) return;
   if (loaded.density_scale) load->settings->refine.density_scale = *loaded.density_scale;
   build_of(loaded.volume, *load->settings, seconds, progress);
@@ -267,7 +267,7 @@ void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const
     stand_in.facts = std::make_shared<const VolumeFacts>(std::move(facts));
     stand_in.source = build_grid({}, volume, settings, *progress, *allowance_).source;
   } catch (...) {
-    // It is not worth a message: what is wrong is wrong with the whole as well.
+    // No message: the whole file has the same problem.
     loading.check();
     return;
   }
@@ -286,7 +286,7 @@ void Builder::drop_stand_in() {
 
 void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before) {
   const std::scoped_lock lock(mutex_);
-  load_.reset();  // in place of a load that waits
+  load_.reset();  // replaces a queued load
   worker_.post({"building the grid", Progress::Stage::refining,
                 [this, volume = std::move(volume), settings, before = std::move(before)](Progress& progress) {
                   build_of(volume, settings, 0.0, progress, before);
@@ -304,10 +304,10 @@ void Builder::cancel_loads() {
 void Builder::stop(const std::function<void()>& jobs) {
   {
     const std::scoped_lock lock(mutex_);
-    load_.reset();  // what it stops soon takes no other settings
+    load_.reset();  // a load that is being stopped accepts no other settings
   }
   jobs();
-  // Last: what is cancelled makes no other.
+  // Last: cancelled jobs make no new proxy.
   const std::scoped_lock lock(mutex_);
   drop_stand_in();
 }
@@ -351,7 +351,7 @@ std::optional<StandIn> Builder::take_stand_in() {
 }
 
 bool Builder::busy() const {
-  // In this order: what a job leaves is there before it ends.
+  // Check in this order: a job stores its result before it ends.
   return worker_.busy() || has_result();
 }
 
@@ -367,7 +367,7 @@ void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settin
   const std::scoped_lock lock(mutex_);
   progress.check();
   built_ = std::move(built);
-  stand_in_.reset();  // that nobody has seen yet
+  stand_in_.reset();  // not displayed yet
 }
 
 }  // namespace cumulet::viewer

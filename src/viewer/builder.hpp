@@ -21,46 +21,46 @@
 
 namespace cumulet::viewer {
 
-/// A file, what of it is shown, and where it stands.
+/// A volume file, the grids to show, and its transform.
 struct VolumeFile {
   FilePath path;
   volume::GridNames grids;
   glm::dmat4 to_world{1.0};              ///< affine, from the file's own world space
-  bool suggested_density_scale = false;  ///< the medium gets the one that is suggested for it
-  /// As VolumeFrame has it.
+  bool suggested_density_scale = false;  ///< the medium uses the density scale suggested for the volume
+  /// As VolumeFrame::temperature_scale.
   std::optional<double> temperature_scale = {};
-  /// Below which a file has no stand-in; tests have other ones.
+  /// Minimum number of bricks for which a low-resolution proxy is made; tests use other values.
   std::uint64_t least_stand_in_bricks = volume::worth_a_stand_in;
 
-  /// Throws what import_frame and VolumeAsset throw.
+  /// Throws the errors of import_frame() and of VolumeAsset's constructor.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
-  /// take_stand_in: as import_frame has it, of what stands there.
+  /// take_stand_in: receives the low-resolution proxy from import_frame(), transformed by to_world.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress,
                                     const std::function<void(volume::StandIn)>& take_stand_in) const;
 };
 
-/// What came of it.
+/// Result of loading a VolumeFile.
 struct LoadedVolume {
   VolumeAssetPtr volume;
-  std::optional<double> density_scale;  ///< of the medium, from now on
+  std::optional<double> density_scale;  ///< to be used for the medium
 };
 
-/// Who makes the cells of tetrahedra.
+/// Device that builds tetrahedral grids.
 enum class BuildOn { cpu = 0, gpu = 1 };
 
-/// What a march is made with.
+/// Inputs of a grid build (acceleration structure).
 struct BuildSettings {
   scene::March march = scene::March::tet;
   BuildOn on = BuildOn::cpu;
   grid::RefineSettings refine;
   volume::Ramp density_ramp;
   scene::Emission emission;
-  bool anisotropic = true;       ///< an anisotropy of the volume's stands in place of the medium's
-  double shutter_seconds = 0.0;  ///< of what moves by its velocity
+  bool anisotropic = true;       ///< the volume's anisotropy grid replaces the medium's anisotropy
+  double shutter_seconds = 0.0;  ///< for volumes with velocities
   bool operator==(const BuildSettings&) const = default;
 };
 
-/// Whether grids made with these suit a medium of those: of a factor of opacity between them.
+/// Returns true if a grid built with `made` can be used for `wanted`. Opacities may differ by a factor of 2.
 [[nodiscard]] bool suits(const BuildSettings& made, const BuildSettings& wanted);
 
 struct BuildSeconds {
@@ -71,96 +71,100 @@ struct BuildSeconds {
   double upload = 0.0;
 };
 
-/// A march's data in main memory, ready for any context.
+/// A built grid or voxel source in main memory, usable by any GL context.
 struct Built {
   VolumeAssetPtr volume;
   scene::MarchSourcePtr source;
   BuildSettings settings;
   std::uint64_t active_voxels = 0;
-  bool moves = false;  ///< while a shutter is open
-  // Of a grid that GL builds known once it is there.
+  bool moves = false;  ///< changes while a shutter is open
+  // For a grid built on the GPU: known once it has been built.
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;
-  std::uint64_t most_cells = 0;  ///< that it was allowed to have, if it is of tetrahedra
+  std::uint64_t most_cells = 0;  ///< limit that applied to a tetrahedral grid
   BuildSeconds seconds;
 
-  /// Main memory, with what others may hold as well.
+  /// Main memory in bytes, including data shared with others.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Whether it does for that of the same volume: what does not move is the same with any shutter.
+  /// Returns true if it can be used for these settings of the same volume. A volume that does not move is the same for
+  /// any shutter.
   [[nodiscard]] bool serves(const BuildSettings& wanted) const;
 };
 
-/// What is shown of a large file until it is read and built.
+/// Low-resolution proxy, shown for a large file until it is read and built.
 struct StandIn {
-  VolumeFactsPtr facts;  ///< bounds are the whole's
+  VolumeFactsPtr facts;  ///< with the bounds of the whole volume
   scene::MarchSourcePtr source;
-  std::optional<double> density_scale;  ///< that is suggested for it, where the medium is to get one
-  std::weak_ptr<const void> load;       ///< expires with the load's job
+  std::optional<double> density_scale;  ///< suggested for it, if the medium is to use the suggestion
+  std::weak_ptr<const void> load;       ///< expires with the job of the load
 };
 
-/// Of a grid whose refinement ended at so many cells: max_cells, or what memory takes of these.
+/// Logs that refinement ended at `most` cells: because of max_cells, or because of the memory limits.
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 
-/// Whether nothing can be built of it by these while its voxels are not in main memory.
+/// Returns true if building with these settings requires the voxels in main memory.
 [[nodiscard]] bool needs_values(const VolumeAsset& volume, const BuildSettings& settings);
 
-/// Of a volume, on this thread. Throws Error(cancelled), and what its parts throw.
-/// What GL builds is planned: the job is done once GL can begin. What moves while the shutter is open is built here,
-/// which the log is told. Cells are as coarse as the allowance's memory takes, main and GL's; where it does not do for
-/// the coarsest, Error(out_of_memory). before: of a camera in motion the plan that is shown, whose cells do not come
-/// and go without need.
+/// Builds a grid on this thread. Throws Error(cancelled), and everything that its steps throw.
+///
+/// A GPU build is only planned here; the GPU executes the plan. Volumes that move while the shutter is open are built
+/// on the CPU, and this is logged. Grids are coarsened to fit the main and GPU memory limits; if even the coarsest does
+/// not fit, Error(out_of_memory) is thrown.
+///
+/// before: for a moving camera, the plan that is shown now. Its cells are kept where possible to avoid popping. The
+/// result has no source if GPU-resident voxels are needed in main memory first.
 [[nodiscard]] Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings,
                                Progress& progress, const Allowance& allowance = {},
                                const scene::GridPlanPtr& before = nullptr);
 
-/// Loads volumes and builds what marches need on a thread of its own, one job at a time. The newest wish wins, and none
-/// starves: a build under way is finished first, and of loads under way at least every second, so that volumes and
-/// settings that change faster than they build are seen as often as they can be. What it holds is bounded: one job
-/// under way, one that waits, one result. All calls are safe from any thread.
+/// Loads volumes and builds their grids on a worker thread, one job at a time. Requests are coalesced: the latest wins.
+/// A running build is finished first. In a stream of loads at least every second one is finished, so intermediate
+/// results are displayed. Held at a time: one running job, one queued job and one result. All calls are thread-safe.
 class Builder {
  public:
-  /// notify: called on the worker after a job ended.
+  /// notify: called on the worker thread after a job ended.
   Builder(Log log, std::function<void()> notify, Trace trace = {},
           const AllowancePtr& allowance = std::make_shared<const Allowance>())
       : log_(std::move(log)), notify_(notify), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
 
-  /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()
-  /// does: another file is another subject, and files may take minutes. stand_in: how one is built, as long as settings
-  /// are not known, until a large file is there; null: there is none.
+  /// Reads a file, then builds its grid unless `settings` is empty. Replaces the running job, as Worker::replace(),
+  /// because files may take minutes. stand_in: settings for the low-resolution proxy while `settings` is empty; null:
+  /// no proxy.
   void load(const VolumeFile& file, std::optional<BuildSettings> settings,
             std::optional<BuildSettings> stand_in = std::nullopt);
-  /// Builds of this volume, after what is under way. before: as build_grid() has it.
+  /// Builds a grid for this volume, after the running job. before: as in build_grid().
   void build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before = nullptr);
-  /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
+  /// Changes the settings of a running load. Returns false if there is none; the caller must then take the loaded
+  /// volume and call build().
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();
-  /// Whether a file is being read, or waits to be.
+  /// True while a file is being read or queued.
   [[nodiscard]] bool loads() const;
-  /// Loads alone: another volume is there.
+  /// Cancels only loads, because another volume has been set.
   void cancel_loads();
-  /// Ends all, and nothing is known of it: neither what was read, nor how it ended.
+  /// Ends all jobs and drops their results and failures.
   void forget();
-  /// How the last job ended is old news.
+  /// Drops the failure of the last job.
   void forget_failure() { worker_.forget_failure(); }
 
-  /// The newest volume that was read, once.
+  /// Returns the newest volume that was read, once.
   std::optional<LoadedVolume> take_loaded();
-  /// The newest result, once.
+  /// Returns the newest result, once.
   std::optional<Built> take_built();
-  /// The stand-in of a load under way, once.
+  /// Returns the proxy of the running load, once.
   std::optional<StandIn> take_stand_in();
 
-  /// Whether there is work under way, or a result that nobody took.
+  /// True if a job is running or a result has not been taken.
   [[nodiscard]] bool busy() const;
-  /// Whether there is such a result.
+  /// True if a result has not been taken.
   [[nodiscard]] bool has_result() const;
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Until idle, at most until then. Returns whether it is.
+  /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  // What a load will build: open until the file is read.
+  // Settings for the build that follows a load. They may change while `open`, until the file is read.
   struct Load {
     std::optional<BuildSettings> settings;
     std::optional<BuildSettings> stand_in;
@@ -169,10 +173,10 @@ class Builder {
   void read(const VolumeFile& file, const std::shared_ptr<Load>& load, Progress& progress);
   void build_stand_in(const VolumeFile& file, volume::StandIn made, const std::shared_ptr<const Load>& load,
                       const Progress& loading);
-  // jobs: cancels those that are to be.
+  // jobs: cancels the jobs.
   void stop(const std::function<void()>& jobs);
-  // Also that which is being built, whose progress is its own: the load's tells how much of the whole is read. mutex_
-  // is held.
+  // Drops the proxy and cancels a proxy that is being built. Such a build has its own Progress, because the load's
+  // reports reading the whole file. mutex_ must be held.
   void drop_stand_in();
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress,
                 const scene::GridPlanPtr& before = nullptr);
@@ -182,7 +186,7 @@ class Builder {
   AllowancePtr allowance_;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;               // held by its job
-  std::weak_ptr<Progress> stand_in_load_;  // of the stand-in that is being built
+  std::weak_ptr<Progress> stand_in_load_;  // of the proxy that is being built
   std::optional<StandIn> stand_in_;
   std::optional<LoadedVolume> loaded_;
   std::optional<Built> built_;

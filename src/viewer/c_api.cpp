@@ -1,4 +1,4 @@
-// The C ABI's viewer: checks arguments, translates descriptors, keeps exceptions in.
+// The viewer of the C ABI: checks arguments, converts descriptors and catches exceptions.
 
 #include <array>
 #include <limits>
@@ -32,7 +32,7 @@ std::vector<cumulet::scene::Place> places_of(const double* to_world, uint32_t co
   return places;
 }
 
-// Of a texture of the viewer's own, where the host does not name one.
+// Default format of the viewer's own target texture.
 GLenum format_for(render::ColourEncoding encoding) {
   if (encoding == render::ColourEncoding::hdr) return GL_RGBA16F;
   return encoding == render::ColourEncoding::srgb_framebuffer ? GL_SRGB8_ALPHA8 : GL_RGBA8;
@@ -131,12 +131,7 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     if (out == nullptr) refuse("out is NULL");
     const cumulet_create_desc d = read_desc(desc, "cumulet_create_desc");
     require(number(d.gl_state) <= CUMULET_GL_STATE_HOST_RESETS, "cumulet_create_desc.gl_state is unknown");
-    cumulet::Log log;
-    if (d.log != nullptr) {
-      log = cumulet::Log([call = d.log, user = d.log_user](cumulet::LogLevel level, const char* message) {
-        call(user, static_cast<cumulet_log_level>(level), message);
-      });
-    }
+    cumulet::Log log = cumulet::c_abi::log_of(d.log, d.log_user);
     std::function<void()> update;
     if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
     auto viewer = std::make_unique<cumulet_viewer>();
@@ -400,7 +395,7 @@ void cumulet_cancel(cumulet_viewer* viewer) {
 cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* progress) {
   if (viewer == nullptr || viewer->process != getpid()) return CUMULET_ERROR_INVALID_ARGUMENT;
   const cumulet::HostCall host_call;
-  std::string unused;  // the last error belongs to the thread that renders
+  std::string unused;  // last_error belongs to the rendering thread
   return cumulet::c_abi::guarded(unused, [&] {
     const auto status = viewer->viewer->status();
     cumulet_progress p{};

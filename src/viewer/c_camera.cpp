@@ -1,4 +1,4 @@
-// The C ABI's camera handles. What each call does is in cumulet.h.
+// Camera handles of the C ABI. cumulet.h documents the calls.
 
 #include <glm/gtc/type_ptr.hpp>
 #include <memory>

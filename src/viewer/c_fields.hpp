@@ -1,6 +1,6 @@
 #pragma once
 
-// Where the fields of cumulet.h's structs end.
+// Field offsets of cumulet.h's structs, for struct_size checks.
 
 #include <array>
 #include <cstddef>
@@ -20,7 +20,7 @@ inline constexpr auto fields_of = nullptr;
 
 constexpr size_t aligned(size_t size, size_t alignment) { return (size + alignment - 1) / alignment * alignment; }
 
-/// Whether the fields are all that the struct has.
+/// Returns true if the fields cover the whole struct.
 template <class Desc>
 constexpr bool covers() {
   size_t end = 0;
@@ -32,8 +32,8 @@ constexpr bool covers() {
 }
 #include "struct_fields.inc"
 
-/// How many bytes of a struct of this size hold fields: the size is that of the struct as this header or an older one
-/// has it, and so ends with a field, or with the padding after one. 0 for any other.
+/// Returns the number of bytes that hold fields in a struct of this size. The size must be that of the struct in this
+/// header or an older one: it ends with a field, or with the padding after a field. Returns 0 for any other size.
 template <class Desc>
 size_t bytes_of_fields(size_t size) {
   size_t bytes = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the C ABI's handles are, apart from the viewer's.
+// Handle types of the C ABI, except cumulet_viewer.
 
 #include <atomic>
 #include <memory>
@@ -65,14 +65,14 @@ struct cumulet_camera {
 
 namespace cumulet::c_abi {
 
-/// A host's descriptors, checked.
+/// Convert and check a host's descriptors.
 volume::DenseVoxels to_dense(const cumulet_dense_desc* desc, const std::string& name);
 volume::SparseVoxels to_sparse(const cumulet_sparse_desc* desc, const std::string& name);
-/// name: that is told of it.
+/// name: appears in messages.
 viewer::VolumeAssetPtr asset_of(const std::string& name, volume::VolumeFrame frame);
 viewer::VolumeFile to_volume_file(const cumulet_volume_file_desc* desc);
 
-/// Runs a call on what a handle is of; what: that, for messages.
+/// Runs a call on a handle's object. what: kind of object, for messages.
 template <class Handle, class Call>
 cumulet_status on(Handle* handle, const char* what, Call&& call) noexcept {
   return guarded(nullptr, 0, [&] {
@@ -82,7 +82,7 @@ cumulet_status on(Handle* handle, const char* what, Call&& call) noexcept {
   });
 }
 
-// Counted handles, of an asset each.
+// Reference-counted handles of one asset each.
 
 template <class Handle>
 Handle* retain(Handle* handle) {
@@ -96,7 +96,7 @@ void release(Handle* handle) {
   if (handle != nullptr && handle->references.fetch_sub(1, std::memory_order_acq_rel) == 1) delete handle;
 }
 
-/// Hands the caller what make gives, or null and why not.
+/// Returns the handle of the asset that make() returns; on failure null and the cause.
 template <class Handle, class Make>
 cumulet_status make_handle(Handle** out, char* error, size_t error_size, Make&& make) noexcept {
   if (out != nullptr) *out = nullptr;
@@ -108,12 +108,12 @@ cumulet_status make_handle(Handle** out, char* error, size_t error_size, Make&& 
   });
 }
 
-/// The handle of what a viewer shows, once a host has had it: asked again, it is the same.
+/// Keeps the handle of a displayed object, so that repeated queries return the same handle.
 template <class Handle>
 class KeptHandle {
  public:
   void keep(Handle* handle) { handle_.reset(retain(handle)); }
-  /// Retained for the caller; null for no asset.
+  /// Returns a handle retained for the caller; null for no asset.
   template <class Asset>
   Handle* of(Asset asset) {
     if (!asset) return nullptr;

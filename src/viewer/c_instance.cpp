@@ -1,4 +1,4 @@
-// The C ABI's instances. What each call does is in cumulet.h.
+// Instances of the C ABI. cumulet.h documents the calls.
 
 #include <array>
 #include <memory>
@@ -15,7 +15,7 @@ using cumulet::viewer::Instance;
 using cumulet::viewer::InstanceSettings;
 using cumulet::viewer::Medium;
 
-// All but the ramps.
+// Everything except the ramps.
 InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   const cumulet_instance_desc d = read_desc(desc, "cumulet_instance_desc");
   require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
@@ -52,7 +52,7 @@ cumulet_status cumulet_instance_set(cumulet_instance* instance, const cumulet_in
     InstanceSettings settings = settings_of(desc);
     i.edit([&](InstanceSettings& old) {
       settings.ramps = std::move(old.ramps);
-      std::swap(old, settings);  // what the old one held ends after the lock
+      std::swap(old, settings);  // the old contents are destroyed after the lock is released
     });
   });
 }

@@ -11,13 +11,13 @@ namespace {
 
 using glm::dvec3;
 
-/// Unit, of a vector of any length above 0.
+/// Normalizes a vector of any length above 0.
 dvec3 unit(const dvec3& v) {
   const dvec3 size = glm::abs(v);
   return glm::normalize(v / std::max({size.x, size.y, size.z}));
 }
 
-/// Along a rectangle's width: upright to where it shines.
+/// Returns the tangent of a rectangle light along its width, perpendicular to its direction.
 dvec3 across_of(const dvec3& wanted, const dvec3& direction) {
   const dvec3 level = glm::cross(dvec3(0.0, 1.0, 0.0), direction);
   const dvec3 otherwise = glm::length(level) > 1e-6 ? level : dvec3(1.0, 0.0, 0.0);

@@ -1,13 +1,14 @@
 #pragma once
 
-// Lamps of the C ABI.
+// Lights of the C ABI.
 
 #include "light/lamps.hpp"
 #include "viewer/c_settings.hpp"
 
 namespace cumulet::c_abi {
 
-/// Dark ones are left out. Throws Error(invalid_argument) that names the lamp and the field.
+/// Converts light descriptors; lights without power are left out. Throws Error(invalid_argument) with the light and the
+/// field.
 light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count);
 
 }  // namespace cumulet::c_abi

@@ -1,4 +1,4 @@
-// The C ABI's live volumes. What each call does is in cumulet.h.
+// Dynamic volumes of the C ABI. cumulet.h documents the calls.
 
 #include <memory>
 #include <vector>
@@ -20,7 +20,7 @@ using cumulet::volume::MemoryField;
 static_assert(static_cast<unsigned>(Channel::velocity_z) == CUMULET_CHANNEL_VELOCITY_Z);
 static_assert(static_cast<unsigned>(render::VoxelFormat::bytes) == CUMULET_VOXEL_FORMAT_R8);
 
-// A host's memory, given back in the end.
+// Memory of a host; the destructor returns it.
 class HostMemory {
  public:
   HostMemory(cumulet_release_fn release, void* user) : release_(release), user_(user) {}
@@ -113,7 +113,7 @@ std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
   return std::make_shared<Live>(bounds, stays);
 }
 
-// As on(), for calls that tell why.
+// Like on(), for calls with an error buffer.
 template <class Call>
 cumulet_status on_live(cumulet_live* live, char* error, size_t error_size, Call&& call) noexcept {
   return guarded(error, error_size, [&] {

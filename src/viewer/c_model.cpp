@@ -1,4 +1,4 @@
-// The C ABI's models. What each call does is in cumulet.h.
+// Models of the C ABI. cumulet.h documents the calls.
 
 #include <memory>
 #include <utility>
@@ -14,7 +14,7 @@ using cumulet::viewer::ModelSettings;
 
 void require_time(double time) { require(std::isfinite(time), "cumulet_model_desc.time is not finite"); }
 
-// what: before the cause.
+// what: prefix of the message.
 glm::dmat4 place_of(std::span<const double, 16> to_world, const std::string& what = "") {
   const glm::dmat4 place = matrix_or_identity(to_world);
   require_place(place, what);
@@ -61,7 +61,8 @@ void cumulet_model_release(cumulet_model* model) { release(model); }
 cumulet_status cumulet_model_set(cumulet_model* model, const cumulet_model_desc* desc) {
   return on(model, "model", [&](ModelInstance& m) {
     ModelSettings settings = settings_of(desc);
-    m.edit([&](ModelSettings& old) { std::swap(old, settings); });  // what the old one held ends after the lock
+    m.edit([&](ModelSettings& old) { std::swap(old, settings); });  // the old contents are destroyed after the lock is
+                                                                    // released
   });
 }
 

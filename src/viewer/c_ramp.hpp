@@ -1,6 +1,6 @@
 #pragma once
 
-// A host's ramp.
+// A host's ramp (1-D transfer function).
 
 #include <array>
 #include <string>
@@ -19,7 +19,7 @@ struct PlacedRamp {
   volume::Ramp ramp;
 };
 
-/// Refuses what is none.
+/// Throws Error(invalid_argument) for an invalid ramp.
 inline PlacedRamp read_ramp(cumulet_ramp of, const float* points, std::uint64_t count) {
   constexpr std::array places = {&viewer::Ramps::density, &viewer::Ramps::temperature, &viewer::Ramps::flame};
   static_assert(places.size() == settings::ramps.size());

@@ -1,4 +1,4 @@
-// The C ABI's sequences. What each call does is in cumulet.h.
+// Sequences of the C ABI. cumulet.h documents the calls.
 
 #include <memory>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Descriptors of settings, checked by the table.
+// Settings descriptors, checked by the settings table.
 
 #include <algorithm>
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace cumulet::c_abi {
 
-/// Why a field cannot be set as the descriptor has it; "" if it can.
+/// Returns why the descriptor's value of a field is invalid; "" if it is valid.
 template <class Desc, class Value>
 std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& desc) {
   const auto& value = desc.*setting.field;
@@ -32,7 +32,8 @@ std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& d
   }
 }
 
-/// A host's descriptor with zeros as what they stand for. Throws Error(invalid_argument) that names the field.
+/// Reads a host's descriptor and replaces zeros by the defaults that they select. Throws Error(invalid_argument) with
+/// the name of the field.
 template <class Desc>
 Desc read_settings(const Desc* desc) {
   using Table = settings::Table<Desc>;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What every file of the C ABI needs: argument checks, descriptors, and walls that no exception passes.
+// Shared by all files of the C ABI: argument checks, descriptors, and conversion of exceptions to status codes.
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "base/library_thread.hpp"
+#include "base/log.hpp"
 #include "base/one_line.hpp"
 #include "cumulet/cumulet.h"
 #include "scene/snapshot.hpp"
@@ -24,6 +25,13 @@
 #include "viewer/c_fields.hpp"
 
 namespace cumulet::c_abi {
+
+/// Logs through a host's callback; drops every line if log is null.
+inline Log log_of(cumulet_log_fn log, void* user) {
+  if (log == nullptr) return {};
+  return Log(
+      [log, user](LogLevel level, const char* message) { log(user, static_cast<cumulet_log_level>(level), message); });
+}
 
 inline cumulet_status status_of(ErrorCode code) {
   switch (code) {
@@ -51,7 +59,7 @@ inline cumulet_status status_of(ErrorCode code) {
   return CUMULET_ERROR_INTERNAL;
 }
 
-/// Runs a call and turns whatever it throws into a status and a line.
+/// Runs a call and converts any exception to a status and a message of one line.
 template <class Call>
 cumulet_status guarded(std::string& message, Call&& call) noexcept {
   try {
@@ -73,11 +81,11 @@ cumulet_status guarded(std::string& message, Call&& call) noexcept {
       return CUMULET_ERROR_INTERNAL;
     }
   } catch (...) {
-    return CUMULET_ERROR_OUT_OF_MEMORY;  // not even the message could be kept
+    return CUMULET_ERROR_OUT_OF_MEMORY;  // the message could not be stored
   }
 }
 
-/// Copies text into a fixed buffer, cut to fit and zero-terminated.
+/// Copies text into a fixed buffer, truncated and zero-terminated.
 inline void copy_text(std::string_view text, char* to, size_t size) {
   if (to == nullptr || size == 0) return;
   const size_t length = std::min(text.size(), size - 1);
@@ -88,7 +96,8 @@ inline void copy_text(std::string_view text, char* to, size_t size) {
 inline constexpr const char* inside_callback = "called from inside a callback";
 inline constexpr const char* process_exits = "the process is exiting";
 
-/// The same for calls that tell their cause in the caller's buffer.
+/// Runs a call; writes the message to the caller's buffer. Refuses calls from inside a callback and while the process
+/// exits.
 template <class Call>
 cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
   if (CallbackScope::inside()) {
@@ -106,15 +115,15 @@ cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
   return status;
 }
 
-/// In one line, whatever a host calls its things.
+/// Throws Error(invalid_argument) with a one-line message, even if names from the host contain line breaks.
 [[noreturn]] inline void refuse(const std::string& why) { throw Error(ErrorCode::invalid_argument, one_line(why)); }
 
 inline void require(bool condition, const char* what) {
   if (!condition) refuse(what);
 }
 
-/// A host built against an older header passes a shorter struct: what it lacks is zero. A longer one is refused: nobody
-/// here knows whether what it asks for besides may be left undone.
+/// Reads a descriptor. A host built against an older header passes a shorter struct; missing fields are zero. A longer
+/// struct is refused, because its unknown fields may request something that must not be ignored.
 template <class Desc>
 Desc read_desc(const Desc* desc, const char* name) {
   if (desc == nullptr) refuse(std::string(name) + " is NULL");
@@ -127,7 +136,7 @@ Desc read_desc(const Desc* desc, const char* name) {
   return copy;
 }
 
-/// Fills as much of a caller's struct as its struct_size says it has.
+/// Writes as much of a caller's struct as its struct_size covers.
 template <class Desc>
 void write_desc(Desc* out, Desc value, const char* name) {
   read_desc(out, name);
@@ -135,8 +144,8 @@ void write_desc(Desc* out, Desc value, const char* name) {
   std::memcpy(out, &value, bytes_of_fields<Desc>(out->struct_size));
 }
 
-/// The number in an enum that a C host filled: reading it as the enum would be undefined where it is not one of its
-/// values.
+/// Returns the number in an enum filled by a C host. Reading it as the enum would be undefined for values that the enum
+/// does not have.
 template <class Enum>
 unsigned number(const Enum& value) {
   unsigned copy = 0;
@@ -166,7 +175,7 @@ inline glm::dmat4 matrix_or_identity(std::span<const double, 16> m) {
   return matrix;
 }
 
-/// Throws for one that is not affine, finite and invertible, as far as floats are. what: before the cause.
+/// Throws if the transform is not affine, finite and invertible in float precision. what: prefix of the message.
 inline void require_place(const glm::dmat4& m, const std::string& what = "") {
   constexpr double most = 1e15;
   const auto all = [](const glm::dmat4& matrix, auto holds) {
@@ -183,8 +192,9 @@ inline void require_place(const glm::dmat4& m, const std::string& what = "") {
     refuse(what + "to_world, or its inverse, has numbers above 1e15");
 }
 
-/// Where something is at both ends of the shutter's time; zeros: where it is at the frame's moment. Nothing where both
-/// are there. Throws as require_place, and for what would be flat in between. what: before the cause.
+/// Returns the transforms at shutter open and close; zeros select `place`, the transform at the frame time. Returns
+/// nullopt if both equal `place`. Throws as require_place(), and if an interpolated transform would be singular. what:
+/// prefix of the message.
 inline std::optional<scene::PlaceEnds> place_ends(std::span<const double, 16> open, std::span<const double, 16> close,
                                                   const glm::dmat4& place, const std::string& what = "") {
   const auto end = [&](std::span<const double, 16> m, const char* which) {
@@ -200,7 +210,7 @@ inline std::optional<scene::PlaceEnds> place_ends(std::span<const double, 16> op
   return ends;
 }
 
-/// A host's array of count x each values.
+/// Returns a host's array of count * each values.
 template <class T>
 std::span<const T> array_of(const T* values, uint64_t count, uint64_t each, const std::string& what) {
   if (count > std::numeric_limits<size_t>::max() / sizeof(T) / each) refuse(what + " are more than memory holds");
@@ -208,8 +218,8 @@ std::span<const T> array_of(const T* values, uint64_t count, uint64_t each, cons
   return {values, static_cast<size_t>(count * each)};
 }
 
-/// Calls visit with each of a host's array of descriptors and its number. A host built against an older header passes
-/// shorter ones: the first one's size is the distance between them. what: "clouds: mesh"
+/// Calls visit with each descriptor of a host's array and its label. A host built against an older header passes
+/// shorter descriptors, so the first one's struct_size is the stride. what: for example "clouds: mesh".
 template <class Desc, class Visit>
 void for_each_desc(const Desc* first, uint64_t count, const char* name, const std::string& what, Visit&& visit) {
   if (count == 0) return;

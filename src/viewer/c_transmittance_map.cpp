@@ -1,4 +1,4 @@
-// The C ABI's transmittance maps. What each call does is in cumulet.h.
+// Transmittance maps of the C ABI. cumulet.h documents the calls.
 
 #include <algorithm>
 
@@ -68,8 +68,8 @@ cumulet_status cumulet_drop_transmittance_map(cumulet_viewer* viewer, uint32_t s
   });
 }
 
-// Of a point, as glsl/transmittance.comp has directions: texels lie on the folds of the octahedron, and distances have
-// slices' middles at both ends.
+// GLSL lookup for a point. Directions are mapped as in glsl/transmittance.comp: texels lie on the folds of the
+// octahedron, and the first and last distances are at the centers of slices.
 const char* cumulet_transmittance_map_glsl(void) {
   return R"(float cumulet_transmittance(sampler3D map, mat4 to_map, vec2 range, vec3 world) {
   vec3 at = (to_map * vec4(world, 1.0)).xyz;

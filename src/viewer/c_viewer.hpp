@@ -1,6 +1,6 @@
 #pragma once
 
-// What the C ABI's viewer is, and the wall around calls on it.
+// The viewer handle of the C ABI, and the guard for calls on it.
 
 #include <unistd.h>
 
@@ -15,7 +15,7 @@
 struct cumulet_viewer {
   std::unique_ptr<cumulet::viewer::Viewer> viewer;
   std::string last_error;
-  pid_t process = getpid();  // a forked child has neither its threads nor its context
+  pid_t process = getpid();  // a forked child has neither the viewer's threads nor its context
   cumulet::c_abi::KeptHandle<cumulet_volume> volume;
   cumulet::c_abi::KeptHandle<cumulet_surfaces> surfaces;
   cumulet::c_abi::KeptHandle<cumulet_environment> environment;
@@ -23,10 +23,10 @@ struct cumulet_viewer {
 
 namespace cumulet::c_abi {
 
-/// As its namesakes, of a call that is given the viewer; what it throws is its last error.
+/// Runs a call on a viewer, with the checks of the other overloads. The message of an exception becomes its last error.
 template <class Call>
 cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
-  // Not even the message may be touched from inside a callback: another thread may be in a call.
+  // Inside a callback last_error must not be touched, because another thread may be in a call.
   if (viewer == nullptr || CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
   const HostCall host_call;
   return guarded(viewer->last_error, [&] {

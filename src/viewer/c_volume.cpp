@@ -77,7 +77,11 @@ cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumu
 
 cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out, char* error,
                                         size_t error_size) {
-  return make_handle(out, error, error_size, [&] { return to_volume_file(desc).read({}, nullptr); });
+  return make_handle(out, error, error_size, [&] {
+    const viewer::VolumeFile file = to_volume_file(desc);
+    const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
+    return file.read(log_of(d.log, d.log_user), nullptr);
+  });
 }
 
 cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet_volume** out, char* error,

@@ -23,10 +23,11 @@ using glm::dvec2;
 using glm::dvec3;
 using glm::dvec4;
 
-constexpr double pole_margin = 1e-4;  // radians: invisible, and far above what doubles round the direction by
+constexpr double pole_margin = 1e-4;  // radians: invisible, and far above the rounding of directions in double
+                                      // precision
 constexpr double farthest = 1e30;
-constexpr double fit_margin = 0.06;      // of the picture's shorter side
-constexpr double nearest_to_eye = 0.02;  // of the subject's depth
+constexpr double fit_margin = 0.06;      // fraction of the image's shorter side
+constexpr double nearest_to_eye = 0.02;  // fraction of the subject's depth
 
 struct Axes {
   dvec3 forward, right, up;
@@ -35,7 +36,7 @@ struct Axes {
 Axes axes_of(const CameraPose& pose) {
   const dvec3 forward = glm::normalize(pose.target - pose.eye);
   dvec3 right = glm::cross(forward, pose.up);
-  // Looking along up: any right will do.
+  // The view direction is parallel to up: any right axis is valid.
   if (glm::length(right) < 1e-9)
     right = glm::cross(forward, std::abs(forward.x) < 0.9 ? dvec3(1, 0, 0) : dvec3(0, 0, 1));
   right = glm::normalize(right);
@@ -56,7 +57,7 @@ bool in_range(const dvec3& v) { return glm::all(glm::lessThanEqual(glm::abs(v), 
 
 double nearest_distance(const dvec3& target) { return std::max(1e-12, 1e-9 * largest(target)); }
 
-/// The look of pose, turned by yaw about up and raised by pitch.
+/// Returns the view direction of a pose, rotated by yaw about up and raised by pitch.
 dvec3 turned(const CameraPose& pose, double yaw, double pitch) {
   const Axes axes = axes_of(pose);
   const dvec3 up = glm::normalize(pose.up);
@@ -68,14 +69,14 @@ dvec3 turned(const CameraPose& pose, double yaw, double pitch) {
   return ahead * std::cos(held) + up * std::sin(held);
 }
 
-/// How far an orthographic eye must be from the target so that no orbit brings the box behind its near plane.
+/// Minimum distance of an orthographic eye from the target at which no orbit brings the box behind the near plane.
 double orthographic_distance(const CameraPose& pose, const Bounds& box) {
   const dvec3 centre = 0.5 * (box.min + box.max);
   const double reach = glm::length(centre - pose.target) + 0.5 * glm::length(box.max - box.min);
   return 1.01 * reach + std::max(0.0, pose.near_plane);
 }
 
-/// The reach of a box along normals.
+/// Extent of a box along normals.
 std::vector<double> reach_of(const Bounds& box, std::span<const dvec3> normals) {
   const dvec3 centre = 0.5 * (box.min + box.max);
   const dvec3 half = 0.5 * (box.max - box.min);
@@ -84,15 +85,15 @@ std::vector<double> reach_of(const Bounds& box, std::span<const dvec3> normals) 
   return reach;
 }
 
-/// As near as keeps all of the subject in the picture, seen from back (unit), margin (of the picture's shorter side)
-/// away from its edges.
+/// Returns the nearest pose that keeps the whole subject in the image, seen from direction `back` (unit). margin: to
+/// the edges, as a fraction of the image's shorter side.
 CameraPose fitted(const CameraPose& from, const dvec3& back, const Subject& subject, double aspect, double margin) {
   CameraPose pose = from;
   pose.target = dvec3(0.0);
   pose.eye = back;
   const Axes axes = axes_of(pose);
   const bool orthographic = pose.orthographic_height > 0.0;
-  // The slopes of the planes that hold it: how far aside a point may be for each unit in front of the eye.
+  // Slopes of the frustum planes: maximum lateral offset of a point per unit of distance from the eye.
   const double tan_y = tan_half(pose);
   const double inset = 2.0 * margin * std::min(aspect, 1.0);
   const dvec2 tangent = tan_y * (dvec2(aspect, 1.0) - inset);
@@ -113,11 +114,11 @@ CameraPose fitted(const CameraPose& from, const dvec3& back, const Subject& subj
   const dvec2 size = 0.5 * width / tangent;
   double distance = std::max(size.x, size.y);
   if (!orthographic) {
-    // Wide angles hold a corner that points at the eye from where it is: not so near.
+    // With wide angles the side planes would allow an eye too close to a corner that points at it.
     distance = std::max(distance, reach[4] + nearest_to_eye * (reach[4] + reach[5])) - depth;
   }
   const double nearest = nearest_distance(pose.target);
-  if (!(distance > nearest)) {  // a point: as near as before
+  if (!(distance > nearest)) {  // a single point: keep the distance
     distance = from.eye == from.target ? 1.0 : std::max(nearest, distance_of(from));
   } else if (orthographic) {
     pose.orthographic_height = 2.0 * tan_y * distance;
@@ -127,7 +128,7 @@ CameraPose fitted(const CameraPose& from, const dvec3& back, const Subject& subj
   return pose;
 }
 
-/// Where a camera without bounds to fit looks from.
+/// Replaces a pose with eye == target by one that fits the subject, or by a default pose without a subject.
 CameraPose placed(const CameraPose& from, const std::optional<Subject>& subject, double aspect, double margin) {
   if (from.eye != from.target) return from;
   if (subject) return fitted(from, glm::normalize(dvec3(0.0, 0.2, 1.0)), *subject, aspect, margin);
@@ -150,11 +151,11 @@ Planes planes_of(const CameraPose& pose) {
   return {near, pose.far_plane > near ? pose.far_plane : std::numeric_limits<double>::infinity()};
 }
 
-/// Of the pose, whose eye is where z counts from, less `before`.
+/// Sets the lens parameters. before: offset of the frame's z origin in front of the eye.
 void set_lens(const CameraPose& pose, double before, ViewFrame& frame) {
   if (!(pose.lens_radius > 0.0)) return;
   const double focus = (pose.focus_distance > 0.0 ? pose.focus_distance : distance_of(pose)) - before;
-  // What is sharp cannot be behind the eye.
+  // The focus plane cannot be behind the eye.
   frame.focus = std::max(focus, 1e-6 * distance_of(pose));
   frame.lens_radius = pose.lens_radius;
 }
@@ -182,7 +183,8 @@ ViewFrame frame_of(const CameraPose& pose, double aspect) {
   frame.eye = pose.eye;
   frame.right = axes.right * tan_x;
   frame.up = axes.up * tan_y;
-  const double near_share = std::isinf(planes.far) ? 0.0 : planes.near / (planes.far - planes.near);  // far's: 1 + it
+  const double near_share =
+      std::isinf(planes.far) ? 0.0 : planes.near / (planes.far - planes.near);  // for the far plane: 1 + near_share
   frame.depth_a = reversed ? -near_share : 1.0 + near_share;
   frame.depth_b = planes.near * (reversed ? 1.0 + near_share : -(1.0 + near_share));
   return frame;
@@ -197,7 +199,7 @@ bool finite(const dmat4& m) {
   return true;
 }
 
-/// Refuses what is not a rotation and a translation, single precision's errors aside.
+/// Throws if the matrix is not a rotation and a translation within single precision.
 void check_view(const dmat4& view) {
   if (!finite(view)) refuse("the view matrix has entries that are not finite, or beyond 1e30");
   const dvec4 last = glm::row(view, 3);
@@ -213,7 +215,7 @@ void check_view(const dmat4& view) {
   if (glm::determinant(rotation) < 0.0) refuse("the view matrix mirrors: a rotation and a translation are needed");
 }
 
-/// Depth as d = a + b x, where normalised device depth is a + b x.
+/// Converts coefficients from normalized device depth a + b x to window depth.
 void to_window_depth(ClipDepth clip, double& a, double& b) {
   if (clip == ClipDepth::zero_to_one) return;
   a = 0.5 * a + 0.5;
@@ -252,7 +254,7 @@ ViewFrame frame_of(const dmat4& view, const dmat4& projection, ClipDepth clip) {
     frame.depth_a = at_near;
     frame.eye = frame.forward * near - dvec3(p[3][0] / p[0][0], p[3][1] / p[1][1], 0.0);
   } else {
-    // A translation before the projection, as stereo pairs have it, moves the eye.
+    // A translation before the projection, as in stereo pairs, moves the eye.
     const double behind = p[3][3] * side;
     frame.eye = -dvec3((p[3][0] - p[2][0] * behind) / p[0][0], (p[3][1] - p[2][1] * behind) / p[1][1], behind);
     frame.depth_a = side * p[2][2];
@@ -271,7 +273,8 @@ ViewFrame frame_of(const dmat4& view, const dmat4& projection, ClipDepth clip) {
   return frame;
 }
 
-/// The pose that sees most nearly what the frame does: the same in the picture's middle. before: what it does not tell.
+/// Returns the pose whose view is closest to the frame's and equal in the image's middle. before: supplies parameters
+/// that the frame lacks.
 CameraPose nearest_pose(const ViewFrame& frame, const CameraPose& before) {
   CameraPose pose;
   pose.lens_radius = before.lens_radius;
@@ -284,7 +287,7 @@ CameraPose nearest_pose(const ViewFrame& frame, const CameraPose& before) {
   if (frame.orthographic) {
     pose.orthographic_height = 2.0 * half_height;
     pose.fovy_degrees = before.fovy_degrees;
-    pose.eye = frame.eye;  // so near_plane is 0
+    pose.eye = frame.eye;  // therefore near_plane is 0
     pose.far_plane = 1.0 / std::abs(frame.depth_b);
   } else {
     const auto depth_at = [&](double depth) { return frame.depth_b / (depth - frame.depth_a); };
@@ -296,13 +299,13 @@ CameraPose nearest_pose(const ViewFrame& frame, const CameraPose& before) {
     pose.fovy_degrees = std::clamp(2.0 * std::atan(half_height / length) * 180.0 / std::numbers::pi, 0.01, 175.0);
   }
 
-  // As far as the old target is from here.
+  // The target is at the distance of the previous target from the new eye.
   const bool knows = before.eye != before.target;
   const double old_distance = knows ? distance_of(before) : (frame.orthographic ? pose.orthographic_height : 1.0);
   const double distance = knows ? glm::length(before.target - pose.eye) : 0.0;
   pose.target = pose.eye + forward * (distance > 1e-3 * old_distance ? distance : old_distance);
 
-  // A level picture keeps the axis that orbits turn about.
+  // A level image keeps the orbit axis.
   const dvec3 right = glm::normalize(frame.right);
   const dvec3 axis = glm::normalize(before.up);
   dvec3 up = glm::normalize(frame.up - forward * glm::dot(frame.up, forward));
@@ -557,7 +560,7 @@ void Camera::toggle_orthographic(const std::optional<Bounds>& bounds) {
   CameraPose pose = pose_;
   const bool was_orthographic = pose.orthographic_height > 0.0;
   if (waits_for_bounds()) {
-    pose_.orthographic_height = was_orthographic ? 0.0 : 1.0;  // its size comes with the bounds
+    pose_.orthographic_height = was_orthographic ? 0.0 : 1.0;  // its size is set with the bounds
     ++revision_;
     return;
   }
@@ -573,7 +576,8 @@ void Camera::toggle_orthographic(const std::optional<Bounds>& bounds) {
 ViewFrame Camera::view(double aspect, const std::optional<Subject>& subject) {
   const Edit edit(*this);
   if (matrices_) {
-    if (own_.eye == own_.target && subject) {  // matrices came first: the bounds tell what they look at
+    if (own_.eye == own_.target && subject) {  // matrices were set before any pose: take the target distance from the
+                                               // bounds
       const double distance = glm::length(0.5 * (subject->bounds.min + subject->bounds.max) - pose_.eye);
       if (distance > nearest_distance(pose_.eye)) {
         pose_.target = pose_.eye + axes_of(pose_).forward * distance;
@@ -581,14 +585,14 @@ ViewFrame Camera::view(double aspect, const std::optional<Subject>& subject) {
       }
     }
     ViewFrame frame = matrices_frame_;
-    set_lens(pose_, 0.0, frame);  // an orthographic pose of theirs has its eye in the near plane
+    set_lens(pose_, 0.0, frame);  // an orthographic pose derived from matrices has its eye in the near plane
     return frame;
   }
   if (!(aspect > 0.0 && std::isfinite(aspect)))
-    return frame_of(placed(pose_, std::nullopt, 1.0, 0.0), 1.0);  // no picture
+    return frame_of(placed(pose_, std::nullopt, 1.0, 0.0), 1.0);  // there is no image
   const CameraPose pose = placed(pose_, subject, aspect, fit_margin);
   if (subject && pose != pose_) {
-    // Where it is placed is where it is, not another move.
+    // Initial placement is not a motion, so the shutter poses stay valid.
     const bool held = shutter_holds();
     pose_ = pose;
     ++revision_;

@@ -17,7 +17,7 @@ enum class DepthConvention { standard = 0, reversed = 1 };
 enum class ClipDepth { negative_one_to_one = 0, zero_to_one = 1 };
 enum class AxisView { front, back, right, left, top, bottom };
 
-/// cumulet_camera_desc, defaults filled in.
+/// cumulet_camera_desc with its defaults filled in.
 struct CameraPose {
   glm::dvec3 eye{0.0};
   glm::dvec3 target{0.0};  // eye == target: fit the subject
@@ -32,72 +32,76 @@ struct CameraPose {
   bool operator==(const CameraPose&) const = default;
 };
 
-/// What one picture is seen through, and the host's depth: a depth buffer holds depth_a + depth_b / z, or + depth_b z
-/// where orthographic.
+/// The view of one image and the host's depth convention: a depth buffer holds depth_a + depth_b / z for perspective,
+/// or depth_a + depth_b z for orthographic.
 struct ViewFrame : scene::Viewpoint {
   double depth_a = 1.0;
   double depth_b = -0.1;
   bool operator==(const ViewFrame&) const = default;
 };
 
-/// A camera that viewers may share: every call locks. Operations as in cumulet.h; arguments are finite. An operation
-/// goes on from the host's matrices as from the nearest pose, and throws Error(invalid_argument), changing nothing,
-/// where it would lead out of what doubles tell apart. A camera that still waits for bounds to fit has nothing to turn
-/// about: operations but frame, fit and toggle_orthographic leave it waiting.
+/// A camera that viewers may share: every call locks. Operations are as in cumulet.h; arguments must be finite.
+///
+/// After set_matrices() an operation continues from the pose nearest to the matrices. An operation whose result exceeds
+/// double precision throws Error(invalid_argument) and changes nothing. While the camera waits for bounds to fit,
+/// operations other than frame, fit and toggle_orthographic have no effect.
 class Camera {
  public:
   explicit Camera(const CameraPose& pose = {}) : pose_(pose) {}
 
   void set(const CameraPose& pose);
   [[nodiscard]] CameraPose pose() const;
-  /// Throws Error(invalid_argument) for what is no view or no projection. An orthographic view looks along -z of eye
-  /// space; a perspective one to where w grows. Signs of the projection may mirror the picture.
+  /// Throws Error(invalid_argument) if the matrices are not a view and a projection. An orthographic view looks along
+  /// -z of eye space, a perspective view in the direction of growing w. Signs in the projection may mirror the image.
   void set_matrices(const glm::dmat4& view, const glm::dmat4& projection, ClipDepth clip);
-  /// The host's own matrices come back as they are, whatever the aspect ratio; but for their clip depth.
+  /// Matrices set by the host are returned unchanged for any aspect ratio, except for the clip depth range.
   void matrices(double aspect, ClipDepth clip, glm::dmat4& view, glm::dmat4& projection) const;
 
-  /// Where it is as the shutter opens, and as it closes; nothing: where it is. Until it changes.
+  /// Sets the poses at shutter open and shutter close; nullopt: the current pose. They apply until the camera changes.
   void set_shutter(const std::optional<CameraPose>& open, const std::optional<CameraPose>& close);
-  /// Likewise, of a picture of this aspect ratio; now: what view() told. Nothing where it stands still.
+  /// Returns the views at both ends of the shutter interval for this aspect ratio. now: the result of view(). Returns
+  /// nullopt if the camera does not move.
   [[nodiscard]] std::optional<scene::ViewEnds> ends(double aspect, const scene::Viewpoint& now) const;
 
-  /// Turns about the pose's up and stops just short of it. yaw: anticlockwise as seen from above (an eye on +Z moves
-  /// towards +X, a look along -Z turns towards -X); pitch: raises the eye, or the look.
+  /// Rotates about the pose's up axis and stops just short of it. Angles are in radians. yaw: counter-clockwise as seen
+  /// from above (an eye on +Z moves towards +X; a view along -Z turns towards -X). pitch: raises the eye (orbit) or the
+  /// view direction (look).
   void orbit(double yaw, double pitch);
   void look(double yaw, double pitch);
-  /// Leans clockwise, as seen from behind the camera; the picture turns anticlockwise.
+  /// Rolls the camera clockwise as seen from behind it; the image turns counter-clockwise.
   void roll(double angle);
   void pan(double right, double up);
-  /// factor > 0. The distance stays within 1e-12 (and what doubles resolve at the target) and 1e12, unless it was
-  /// outside; an orthographic height follows it.
+  /// factor > 0. The distance is kept within 1e-12 (and double resolution at the target) and 1e12, unless it was
+  /// outside before. An orthographic height follows the distance.
   void dolly(double factor);
-  /// As dolly, but an orthographic eye stays where it is: its near plane would come to cut the scene.
+  /// Like dolly(), but an orthographic eye does not move; otherwise its near plane would cut into the scene.
   void zoom(double factor);
   void fly(double right, double up, double forward);
-  /// Moves until the box just fills the picture; the direction is kept, or is the one of a camera that waited.
+  /// Moves the camera until the box just fills the image. The direction is kept; a waiting camera has a default
+  /// direction.
   void frame(const Bounds& box, double aspect);
-  /// Likewise, of what is seen of the subject, with a margin of 6 % of the picture's shorter side.
+  /// Moves the camera to fit the visible part of the subject, with a margin of 6 % of the image's shorter side.
   void fit(const Subject& subject, double aspect);
-  /// Looks at the target from one side, the distance kept; the axis nearest to up becomes up. Where that is +Y, front
-  /// is +Z and right +X; where +Z, front is -Y.
+  /// Looks at the target from one side at the same distance; the axis nearest to up becomes up. If it is +Y, front is
+  /// +Z and right is +X; if it is +Z, front is -Y.
   void look_from(AxisView side);
-  /// Perspective to orthographic of the same size at the target, or back. An orthographic eye moves back until the
-  /// bounds are in front of it from wherever it may orbit to.
+  /// Switches between perspective and orthographic with the same size at the target. An orthographic eye moves back
+  /// until the bounds are in front of it from any orbit position.
   void toggle_orthographic(const std::optional<Bounds>& bounds);
 
-  /// The frame for a picture of this aspect ratio. A pose that fits the subject (eye == target) is placed first, for
-  /// good, where there is one; without any it looks at the origin from +Z.
+  /// Returns the view for an image of this aspect ratio. A pose with eye == target is first replaced permanently by one
+  /// that fits the subject. Without a subject it looks at the origin from +Z.
   [[nodiscard]] ViewFrame view(double aspect, const std::optional<Subject>& subject);
-  /// Counts changes; setting what is set already is none.
+  /// Counts changes. Setting an equal value is not a change.
   [[nodiscard]] std::uint64_t revision() const;
-  /// Calls changed after every change, on the thread that made it, until the token is gone; then no call is under way
-  /// any more. It must not change a camera, nor throw.
+  /// Calls `changed` after every change, on the thread that made it, until the token is released. Its release waits for
+  /// a running call. `changed` must not change a camera and must not throw.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     return listeners_.listen(std::move(changed));
   }
 
  private:
-  /// Locks; on its end unlocks, and tells the listeners of a change.
+  /// Locks the camera; the destructor unlocks it and notifies the listeners of a change.
   class Edit {
    public:
     explicit Edit(Camera& camera) : camera_(camera), lock_(camera.mutex_), before_(camera.revision_) {}
@@ -125,16 +129,16 @@ class Camera {
   struct Shutter {
     std::optional<CameraPose> open;
     std::optional<CameraPose> close;
-    std::uint64_t revision = 0;  // with which it holds
+    std::uint64_t revision = 0;  // camera revision to which it applies
   };
 
   mutable std::mutex mutex_;
   std::optional<Shutter> shutter_;
   [[nodiscard]] bool shutter_holds() const { return shutter_ && shutter_->revision == revision_; }
-  CameraPose pose_;                   // with matrices_: the nearest to them
-  std::optional<Matrices> matrices_;  // the host's, until an operation
-  ViewFrame matrices_frame_;          // theirs
-  CameraPose own_;                    // the last pose that is not theirs: it knows the target
+  CameraPose pose_;                   // with matrices_: the pose nearest to them
+  std::optional<Matrices> matrices_;  // set by the host; reset by an operation
+  ViewFrame matrices_frame_;          // frame of matrices_
+  CameraPose own_;                    // the last pose not derived from matrices; it has the target
   std::uint64_t revision_ = 1;
   Listeners listeners_;
 };

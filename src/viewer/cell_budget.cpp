@@ -9,7 +9,7 @@ namespace cumulet::viewer {
 
 namespace {
 
-// With its node of the tree, and what glows of it.
+// Includes the cell's tree node and its entry in the emission table.
 std::uint64_t bytes_a_cell(const Carried& carried) {
   std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
   using grid::Channel;
@@ -22,7 +22,7 @@ std::uint64_t bytes_a_cell(const Carried& carried) {
   return bytes;
 }
 
-// A grid's tables, of whatever size it is.
+// Size of a grid's fixed tables.
 constexpr std::uint64_t tables = 4096;
 
 std::uint64_t left_of(std::uint64_t most, std::uint64_t held) { return most - std::min(most, held); }
@@ -32,7 +32,7 @@ std::uint64_t fit_in_memory(const Carried& carried, std::uint64_t held, const Al
 }
 
 std::uint64_t fit_in_gl(const Carried& carried, const Allowance& allowance) {
-  // What was there stays until all cells have come, and pictures may grow meanwhile.
+  // The old grid stays until the new one is uploaded, and images may grow meanwhile.
   return left_of(allowance.gl_bytes() / 5 * 2, tables) / bytes_a_cell(carried);
 }
 
@@ -55,13 +55,13 @@ std::uint64_t cells_that_fit(std::uint64_t max_cells, const Carried& carried, st
 std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, const Carried& carried,
                                                     const grid::Lattice& lattice, std::uint64_t held,
                                                     const Allowance& allowance) {
-  // Beside the cells there are the lattice, what it builds of, the grid before, a copy, and what is left of the heap's
-  // pages.
+  // Beside the cells this leaves room for the lattice, build buffers, the previous grid, a copy, and unused parts of
+  // heap pages.
   const std::uint64_t room = left_of(allowance.gl_bytes(), lattice.device_bytes() + tables);
   const std::uint64_t kept = 4 * bytes_a_cell(carried);
   const std::uint64_t in_gl = std::min(room / (kept + render::building_bytes_a_cell(carried.emission)),
                                        left_of(room, render::building_bytes_at_least()) / kept);
-  // Beside a small lattice it is two fifths of what the CPU's may have, and more.
+  // With a small lattice the result is at least two fifths of the CPU limit.
   if (in_gl < std::min(max_cells, fit_in_gl(carried, allowance) / 4)) return std::nullopt;
   return std::min({max_cells, fit_in_memory(carried, held, allowance), in_gl});
 }
@@ -74,8 +74,8 @@ bool has_cells_allowed(const Built& built, const Allowance& allowance) {
   const auto planned =
       source.plan ? planned_cells_that_fit(max_cells, carried, *source.plan->lattice, held, allowance) : std::nullopt;
   const std::uint64_t allowed = planned ? *planned : cells_that_fit(max_cells, carried, held, allowance);
-  if (allowed < fewest_cells) return true;  // there is nothing coarser
-  // How many a plan comes to only GL knows.
+  if (allowed < fewest_cells) return true;  // a coarser grid does not exist
+  // Only the GPU knows the number of cells of a planned grid.
   const std::uint64_t has = source.plan ? built.most_cells : built.cells;
   const bool wants_more = built.limited || source.plan;
   return has <= allowed && !(wants_more && built.most_cells < allowed);

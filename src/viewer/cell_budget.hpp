@@ -11,10 +11,10 @@
 
 namespace cumulet::viewer {
 
-/// Of any grid: those of the cube.
+/// Minimum number of cells of any grid: the roots of the cube.
 inline constexpr std::uint64_t fewest_cells = 24;
 
-/// What cells carry beside density.
+/// Channels that cells store beside density.
 struct Carried {
   bool emission = false;
   bool colour = false;
@@ -23,19 +23,21 @@ struct Carried {
   bool change = false;
 
   static Carried of(const grid::Channels& channels);
-  /// Of tetrahedra.
+  /// For a tetrahedral source.
   static Carried of(const scene::MarchSource& source);
 };
 
-/// How many cells a grid may have that the CPU builds: of max_cells what has room in GL memory, and in main memory
-/// beside so many bytes.
+/// Returns how many cells a CPU-built grid may have: at most max_cells, limited by GPU memory, and by main memory
+/// beside `held` bytes.
 [[nodiscard]] std::uint64_t cells_that_fit(std::uint64_t max_cells, const Carried& carried, std::uint64_t held,
                                            const Allowance& allowance);
-/// One that GL builds of that lattice. Nothing: the lattice leaves so little that the CPU's would be far finer.
+/// Returns how many cells a GPU-built grid of this lattice may have. Nullopt: the lattice leaves so little memory that
+/// a CPU-built grid would be far finer.
 [[nodiscard]] std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, const Carried& carried,
                                                                   const grid::Lattice& lattice, std::uint64_t held,
                                                                   const Allowance& allowance);
-/// Whether one of tetrahedra has as many cells as it may have. Else it would be another, built anew.
+/// Returns true if a tetrahedral grid has as many cells as the limits allow; else rebuilding would give a different
+/// grid.
 [[nodiscard]] bool has_cells_allowed(const Built& built, const Allowance& allowance);
 
 }  // namespace cumulet::viewer

@@ -12,7 +12,7 @@ namespace cumulet::viewer {
 
 namespace {
 
-// Of a frame's budget.
+// Fractions of a frame's budget.
 constexpr double most_of_drawing = 0.5;
 constexpr double part_to_filter = 0.4;
 
@@ -57,7 +57,7 @@ render::Deadline Context::deadline_of(const Frame& frame, render::Deadline begun
 
 void Context::upload(const Shot& shot, const UploadLimits& limits, render::Deadline deadline) {
   if (std::exchange(tried_, shot.settings) != shot.settings) programs_->try_again();
-  // What another context of the group has under way may read memory that is written now.
+  // In-flight dispatches of another context of the share group may read memory that is about to be written.
   progressive_.tracer().order();
   if (scene_.data() != nullptr && shot.scene->volumes.empty()) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
@@ -182,7 +182,7 @@ std::uint64_t Context::TargetKind::bytes() const {
 
 void Context::make_target_textures(const Shot& shot, const Frame& frame) {
   const TargetKind kind{frame.size, frame.format, frame.write_depth};
-  TargetKind with_depth = kind;  // serves those without as well
+  TargetKind with_depth = kind;  // also usable without depth
   with_depth.depth = true;
   if (!target_.wants(kind, shot.settings) || (target_ && target_.of() == with_depth)) return;
   target_.make(kind, shot.settings, [&] {
@@ -209,7 +209,7 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
     tracer.clear(empty_);
   tracer.set_background(empty_, scene_.lights(*shot.scene).sky_radiance);
   if (!able || frame.budget_ms < 0.0) return;
-  alone_failed_ = shot.settings;  // unless it succeeds
+  alone_failed_ = shot.settings;  // reset on success
   tracer.draw_layers(empty_, obstacles(shot),
                      render::Progressive::quick_layers(tracer, shot.size, frame.budget_ms, shot.view_rests));
   alone_failed_.reset();
@@ -241,7 +241,7 @@ render::PictureView Context::view_of(const render::Picture& picture) const {
   seen.right = view.right;
   seen.up = view.up;
   seen.orthographic = view.orthographic != 0U;
-  if (&picture == progressive_.shown()) seen.scene = progressive_.shown_scene();  // else a rehearsal's
+  if (&picture == progressive_.shown()) seen.scene = progressive_.shown_scene();  // else of the warm-up
   return seen;
 }
 

@@ -36,30 +36,30 @@ struct GlStrings {
   std::string version;
 };
 
-/// All that pictures are made of, frozen at one moment: settings change beside it.
+/// Everything that determines an image, captured at one time. Later changes of settings do not affect it.
 struct Shot {
   scene::SnapshotPtr scene;
-  glm::uvec2 size{0U};   // of the picture
-  double depth_a = 0.0;  // as ViewFrame's, where the scene has a view
+  glm::uvec2 size{0U};   // of the image
+  double depth_a = 0.0;  // as in ViewFrame, if the scene has a view
   double depth_b = 0.0;
-  bool view_rests = false;  // as it was in the last frame that traced
-  bool held = false;        // a hand is at the view
+  bool view_rests = false;  // the view equals that of the last traced frame
+  bool held = false;        // the user is dragging the view
   std::uint32_t max_bounces = 0;
   std::uint32_t sun_group = 0;
   std::uint32_t sky_group = 0;
   Sampling sampling;
   SurfaceSettings surfaces;
   DisplaySettings display;
-  std::uint64_t settings = 0;  // another after each change of one: what failed is tried again
+  std::uint64_t settings = 0;  // revision of all settings; failed work is retried when it changes
 
   [[nodiscard]] const std::optional<scene::Viewpoint>& view() const { return *scene->view; }
 };
 
-/// All that a viewer has in one GL context: shots in, pictures out. All calls but those that tell need the context
-/// current and a StateGuard around.
+/// All of a viewer's objects in one GL context: renders shots. All calls except simple queries need the context current
+/// and a StateGuard.
 class Context {
  public:
-  /// commons: with other viewers.
+  /// commons: resources shared with other viewers.
   Context(gl::FunctionsPtr gl, Commons commons);
 
   [[nodiscard]] const gl::FunctionsPtr& functions() const { return functions_; }
@@ -71,83 +71,85 @@ class Context {
   [[nodiscard]] render::Progressive& progressive() { return progressive_; }
   [[nodiscard]] render::VoxelTransfers& transfers() { return transfers_; }
   [[nodiscard]] render::DeviceMemories& memories() { return *memories_; }
-  /// Whether all of its bricks are here.
+  /// Returns true if all bricks of the state are in this share group.
   [[nodiscard]] bool has(const scene::StateInGl& state) const {
     return std::ranges::all_of(state.all(), [&](const auto* bricks) { return memories_->has(*bricks); });
   }
-  /// Before anything else, once.
+  /// Must be called once, before anything else.
   void find_out_dispatches();
 
-  // ---- a frame ----
+  // ---- frames ----
 
-  /// Whether the host's own work takes of the cores that ours runs on.
+  /// Returns true if GL executes on CPU cores that the host's own GL work is still using.
   [[nodiscard]] bool shares_cores() const;
-  /// When tracing ends of a call that was begun then: what drawing will take is the budget's, too.
+  /// Returns the deadline for tracing in a call that started at `begun`. The budget also covers the expected drawing
+  /// time.
   [[nodiscard]] render::Deadline deadline_of(const Frame& frame, render::Deadline begun, bool shares) const;
   struct UploadLimits {
-    std::int64_t page_texels = 0;  ///< as GpuScene's
-    std::uint64_t most_bytes = 0;  ///< of all GL memory: no volume is brought beyond that
+    std::int64_t page_texels = 0;  ///< as in GpuScene
+    std::uint64_t most_bytes = 0;  ///< limit of all GPU memory; no volume is uploaded beyond it
   };
   void upload(const Shot& shot, const UploadLimits& limits, render::Deadline deadline);
   void trace(const Shot& shot, const Frame& frame, render::Deadline deadline);
-  /// The surfaces need not wait for the volume.
+  /// Draws surfaces before the volume is ready.
   void draw_surfaces_alone(const Shot& shot, const Frame& frame);
   void draw(const Shot& shot, const Frame& frame, FrameResult& result);
-  /// Goes on with what a frame that draws will show.
+  /// Continues denoising for the next frame that draws.
   void denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown);
-  /// Of sequences, the frames that are drawn.
+  /// Displayed frames of sequences.
   [[nodiscard]] scene::SequenceFrames shown_frames() const { return progressive_.shown_frames(); }
-  /// Whether that frame, which was uploaded last, or is being uploaded, is still to be seen, and will be.
+  /// Returns true if this frame, which was uploaded last or is being uploaded, has not been displayed yet and will be.
   [[nodiscard]] bool owes(const scene::SequenceFrame& frame) const;
-  /// What is known after the frame.
+  /// Fills in the result after the frame.
   void tell(const Shot& shot, const Frame& frame, FrameResult& result);
-  /// Whether the frame's failure is to be told: what does not build fails in each until a setting changes.
+  /// Returns true if a failure should be reported. A program that fails to build fails in every frame until a setting
+  /// changes.
   [[nodiscard]] bool is_news(const Shot& shot, const Error& failure);
-  /// What it took, where the host shared the cores.
+  /// Updates the time-budget margin with the time taken, for frames in which the host shared the cores.
   void learn(const Frame& frame, double taken_ms) { reserve_.learn(frame.budget_ms, taken_ms); }
 
-  // ---- for the host's own drawing ----
+  // ---- transmittance maps for the host's own drawing ----
 
   [[nodiscard]] MapResult update_map(const Shot& shot, const MapRequest& request, render::Deadline deadline);
   void drop_map(std::uint32_t slot) { maps_.erase(slot); }
 
-  // ---- before the first ----
+  // ---- warm-up before the first frame ----
 
-  /// Compiles and uses once the programs that frames like this need, until about the deadline; all: compiles every
-  /// other, too, and throws what does not build in the end. waits: for what may need others still.
+  /// Compiles the programs that frames like this need and uses each once, until about the deadline. all: also compiles
+  /// all other programs, and finally throws the first build failure. waits: further programs may be needed later.
   WarmUp warm_up(const Shot& shot, const Frame& frame, bool all, bool waits, render::Deadline deadline);
 
-  // ---- reading back: waits for what is under way ----
+  // ---- read-back; waits for in-flight dispatches ----
 
-  /// What is read. Throws Error(invalid_argument) before the first.
+  /// Returns the image for read-back. Throws Error(invalid_argument) before the first one.
   render::Picture& readable();
   [[nodiscard]] Pick pick(const Shot& shot, double x, double y);
-  /// Throws Error(invalid_argument) for too few values, or what was not gathered.
+  /// Throws Error(invalid_argument) if `count` is too small or the data was not accumulated.
   void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
   void read_light_group(const DisplaySettings& settings, std::uint32_t group, float* rgb, std::size_t count);
-  /// id_of is asked for each volume's place, each model and the ground that are there, but for holes, and not told
-  /// tags.
+  /// Calls id_of for each volume instance, each model and the ground, except holdouts; tags are not filled in.
   void read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count);
   void read_linear(const DisplaySettings& settings, float* rgba, std::size_t count);
-  /// Whether read_denoised can give this picture.
+  /// Returns true if read_denoised() supports this image.
   [[nodiscard]] bool can_denoise(const render::Picture& picture) const;
-  /// The same denoised; only of shaded pictures whose surfaces are traced. Throws Error(unsupported) of others.
-  /// Without a network by the filter of frames.
+  /// Reads the denoised image; only for shaded images with traced surfaces. Throws Error(unsupported) for others.
+  /// Without a network it uses the real-time filter.
   void read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count);
-  /// Of what samples have come to. Throw Error(invalid_argument) of pictures with previews, and of debug views.
+  /// State of the accumulated samples. Both throw Error(invalid_argument) for images with previews and for debug views.
   [[nodiscard]] std::size_t accumulation_bytes();
   void read_accumulation(std::span<std::byte> bytes);
-  /// The picture goes on from there. Throws Error(invalid_argument), with the picture as it was, for what is not of it.
+  /// Continues the image from a saved accumulation. Throws Error(invalid_argument) for data of another image, and then
+  /// leaves the image unchanged.
   void restore_accumulation(std::span<const std::byte> bytes);
   [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
 
-  /// Of the context's life.
+  /// Totals since the context was attached.
   [[nodiscard]] render::PassSeconds pass_seconds() const;
-  /// All that it has there.
+  /// GPU memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  // All that drawing shows of a picture.
+  // State that determines the drawn image.
   struct DrawnAs {
     std::uint64_t revision = 0;
     bool done = false;
@@ -168,9 +170,9 @@ class Context {
     gl::Object depth;
   };
 
-  // Of what has been uploaded.
+  // Uploaded frames of sequences.
   [[nodiscard]] scene::SequenceFrames uploaded_frames() const;
-  // Whether there is a target of any size.
+  // Returns true if the frame draws to a target of non-zero size.
   [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
   [[nodiscard]] render::Obstacles obstacles(const Shot& shot);
   [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::Obstacles& obstacles) const;
@@ -178,43 +180,44 @@ class Context {
   [[nodiscard]] render::PictureWish wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const;
   [[nodiscard]] static render::Display display(const Shot& shot, const Frame& frame, const render::Picture& shown);
   [[nodiscard]] render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown) const;
-  // Whether all programs are warm.
+  // Warms up programs. Returns true once all are warm.
   bool rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
-  // Those of such a frame.
+  // Warms up the programs of such a frame.
   bool rehearse_frame(const Shot& shot, const Frame& frame, render::Deadline deadline);
-  // What part returns; true as well where it throws Error(gl), which is kept: others need not wait for what does not
-  // build.
+  // Returns the result of `part`. If it throws Error(gl), the error is stored and true is returned, because other
+  // programs need not wait for one that fails to build.
   template <class Part>
   bool done_or_failed(Part&& part);
   void rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
   void make_target_textures(const Shot& shot, const Frame& frame);
-  // What of a picture's film is drawn, and filtered where that is asked for.
+  // The pass that draws an image's film, with the filter's inputs if denoising is on.
   static render::Pass display_pass(const char* name, const render::PictureTextures& picture,
                                    const render::Display& display);
-  // The last pass, as Compositor::draw: of a film, whose textures these are.
+  // The last pass: Compositor::draw() of a film with these textures.
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
-  // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
+  // Computes feature buffers. Throws Error(invalid_argument) if the image is of another scene than the current one.
   void find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts,
                   std::uint32_t rays = render::fact_rays);
-  // As readable(), and throws where it is a debug view.
+  // Returns readable(); throws for debug views.
   render::Picture& readable_shaded();
-  // Throws where what is shown is not what the picture is of any more, or where not this as well.
+  // Throws if the displayed data differs from that of the image, or if `also` is false.
   void require_present(bool also) const;
-  // The picture denoised, which has its facts: row 0 the top.
+  // Returns the image denoised by the network, row 0 at the top. The image must have its feature buffers.
   gl::Object by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network);
   gl::Object filtered(const render::Picture& picture, bool with_background);
-  // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
+  // Reads mean radiance, with or without that of the background, and alpha, including surfaces drawn beneath a preview.
   void read_means(render::Picture& picture, bool with_background, float* rgba);
-  // The picture that its samples alone make; all that was sent off for it is there. Throws where there is none.
+  // Returns an image that consists only of samples, after all in-flight dispatches have completed. Throws if there is
+  // none.
   render::Picture& accumulating();
-  // What the compositor draws of it, as linear radiance.
+  // Reads the compositor's output as linear radiance.
   void read_composite(render::Picture& picture, bool transparent, float* rgba);
   [[nodiscard]] static render::PictureGuides guides_of(const render::Picture& picture);
   [[nodiscard]] render::PictureView view_of(const render::Picture& picture) const;
   [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
                                                     const render::Picture* before) const;
-  // Of the picture that is shown, or of the empty one.
+  // Textures of the displayed image, or of the empty image.
   [[nodiscard]] render::PictureTextures textures_to_draw(const render::Picture& picture) const;
 
   gl::FunctionsPtr functions_;
@@ -233,16 +236,17 @@ class Context {
   render::HostDepth host_depth_;
   render::VoxelTransfers transfers_;
   Revision<render::HostDepth> host_depth_revision_;
-  std::optional<std::pair<std::uint64_t, std::string>> told_;  // the last failure of OpenGL's, and at which settings
-  std::optional<DrawnAs> drawn_;                               // last; nothing where that was older than what there was
+  std::optional<std::pair<std::uint64_t, std::string>> told_;  // the last GL failure that was reported, and its
+                                                               // settings
+  std::optional<DrawnAs> drawn_;                               // state drawn last; nullopt if an older image was drawn
   render::Picture empty_;
-  std::optional<std::uint64_t> alone_failed_;  // settings at which the surfaces beneath it could not be drawn
+  std::optional<std::uint64_t> alone_failed_;  // settings at which drawing surfaces without a volume failed
   Slot<TargetTextures, TargetKind> target_;
   std::map<std::uint32_t, render::TransmittanceMap> maps_;  // by slot
-  std::unique_ptr<render::Rehearsal> rehearsal_;            // under way
-  double warm_ = 0.0;                                       // the part of it that was told
-  std::optional<Error> unbuilt_;                            // the first failure in it, to be told in the end
-  std::optional<std::uint64_t> tried_;                      // settings at which programs that do not build were tried
+  std::unique_ptr<render::Rehearsal> rehearsal_;            // in progress
+  double warm_ = 0.0;                                       // fraction of the warm-up that was reported
+  std::optional<Error> unbuilt_;                            // the first build failure of the warm-up, thrown at its end
+  std::optional<std::uint64_t> tried_;                      // settings at which failed programs were retried
   bool knows_dispatches_ = false;
 };
 

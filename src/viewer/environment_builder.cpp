@@ -27,7 +27,7 @@ void EnvironmentBuilder::make_sky(const light::Day& day) {
 }
 
 void EnvironmentBuilder::drop_loads() {
-  files_.forget_failure();  // of a load that what comes now replaces
+  files_.forget_failure();  // of a load that the new environment replaces
   files_.cancel();
   const std::scoped_lock lock(mutex_);
   environment_.reset();
@@ -44,7 +44,7 @@ std::optional<light::Daylight> EnvironmentBuilder::take_sky() {
 }
 
 bool EnvironmentBuilder::busy() const {
-  // In this order: what a job leaves is there before it ends.
+  // Check in this order: a job stores its result before it ends.
   if (files_.busy() || skies_.busy()) return true;
   const std::scoped_lock lock(mutex_);
   return environment_ || sky_;

@@ -15,36 +15,36 @@
 
 namespace cumulet::viewer {
 
-/// Reads environments and computes physical skies, on a thread each: neither waits for the other. The newest wish wins,
-/// and none starves, as Builder has it. All calls are safe from any thread.
+/// Reads environment maps and computes physical skies, on one worker thread each. Requests are coalesced as in Builder:
+/// the latest wins, and running jobs are not starved. All calls are thread-safe.
 class EnvironmentBuilder {
  public:
-  /// notify: called on a worker after a job ended.
+  /// notify: called on a worker thread after a job ended.
   explicit EnvironmentBuilder(const std::function<void()>& notify, Trace trace = {},
                               const AllowancePtr& allowance = nullptr)
       : files_(notify, trace, allowance), skies_(notify, trace, allowance) {}
 
-  /// Reads a file. Replaces what is under way, as Worker::replace() does.
+  /// Reads a file. Replaces the running load, as Worker::replace().
   void load(const FilePath& path);
-  /// After the sky under way, which is shown first.
+  /// Computes a sky, after the running one, which is displayed first.
   void make_sky(const light::Day& day);
-  /// Loads: skies are settings, and soon there. What was read, and nobody took, is dropped.
+  /// Cancels loads and drops an untaken result. Skies are not affected: they belong to the settings and are fast.
   void drop_loads();
-  /// How the last sky ended is reported no more.
+  /// Drops the failure of the last sky.
   void forget_sky_failure() { skies_.forget_failure(); }
-  /// Loads under way; what was read is still to be taken.
+  /// Cancels loads; an untaken result remains.
   void cancel() { files_.cancel(); }
 
-  /// The newest environment that was read, once.
+  /// Returns the newest environment that was read, once.
   std::optional<light::EnvironmentPtr> take_environment();
-  /// The newest sky, once.
+  /// Returns the newest sky, once.
   std::optional<light::Daylight> take_sky();
 
-  /// Whether there is work under way, or a result that nobody took.
+  /// True if a job is running or a result has not been taken.
   [[nodiscard]] bool busy() const;
-  /// Of loads; their failure, else that of skies.
+  /// Status of loads. The failure is that of loads, else that of skies.
   [[nodiscard]] Worker::Status status() const;
-  /// Until idle, at most until then. Returns whether it is.
+  /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const {
     return files_.wait(until) && skies_.wait(until);
   }
@@ -53,8 +53,8 @@ class EnvironmentBuilder {
   mutable std::mutex mutex_;
   std::optional<light::EnvironmentPtr> environment_;
   std::optional<light::Daylight> sky_;
-  std::optional<light::Daylight> last_sky_;  // of the one job at a time: whose air the next may keep
-  Worker files_;                             // these last: their threads use all of the above
+  std::optional<light::Daylight> last_sky_;  // used only by the running sky job; the next may reuse its atmosphere
+  Worker files_;                             // last: their threads use all of the above
   Worker skies_;
 };
 

@@ -20,7 +20,7 @@ struct Frame {
   Target target = Target::framebuffer;
   GLuint framebuffer = 0;
   glm::uvec2 size{0U};
-  glm::ivec4 viewport{0};  // never zero where size is not
+  glm::ivec4 viewport{0};  // not zero if `size` is not
   bool flip_y = false;
   GLenum format = GL_RGBA8;
   render::ColourEncoding encoding = render::ColourEncoding::srgb;
@@ -45,7 +45,7 @@ struct FrameResult {
   GLuint depth_texture = 0;
 };
 
-/// What cumulet_warm_up has come to.
+/// Progress of cumulet_warm_up.
 struct WarmUp {
   bool more = false;
   double progress = 0.0;
@@ -55,16 +55,16 @@ struct Pick {
   bool hit = false;
   glm::dvec3 position{0.0};
   double distance = 0.0;
-  std::optional<std::uint32_t> place;  // of a volume, where one is met
-  std::uint64_t volume = 0;            // that one's scene::Volume::id
-  std::uint64_t model = 0;             // where a surface is met: its scene::Model::id
-  std::uint64_t tag = 0;               // of an instance or a model
+  std::optional<std::uint32_t> place;  // if a volume was hit: index of its instance transform
+  std::uint64_t volume = 0;            // its scene::Volume::id
+  std::uint64_t model = 0;             // if a surface was hit: its scene::Model::id
+  std::uint64_t tag = 0;               // tag of the instance or model
   struct Surface {
-    glm::dvec3 normal{0.0};  // unit, towards where the ray comes from
+    glm::dvec3 normal{0.0};  // unit, towards the ray's origin
     std::uint32_t material = 0;
     std::string material_name;
   };
-  std::optional<Surface> surface;  // where one is met
+  std::optional<Surface> surface;  // if a surface was hit
 };
 
 /// cumulet_map_light.
@@ -74,14 +74,14 @@ enum class MapLight { sun = 0, direction = 1, point = 2 };
 struct MapRequest {
   std::uint32_t slot = 0;
   MapLight light = MapLight::sun;
-  glm::dvec3 towards{0.0};   // of a direction, not zero
-  glm::dvec3 position{0.0};  // of a point
+  glm::dvec3 towards{0.0};   // for a direction, not zero
+  glm::dvec3 position{0.0};  // for a point
   std::uint32_t size = 256;
   std::uint32_t slices = 32;
   double budget_ms = 2.0;
 };
 
-/// What cumulet_update_transmittance_map tells.
+/// Result of cumulet_update_transmittance_map.
 struct MapResult {
   GLuint texture = 0;
   std::uint32_t size = 0;
@@ -91,15 +91,15 @@ struct MapResult {
   glm::dvec2 range{0.0};
 };
 
-/// What a matte can be of: cumulet_object_kind, and the rest of what a cumulet_object_name_fn is told.
+/// An object with an ID matte: cumulet_object_kind and the other arguments of a cumulet_object_name_fn.
 struct MatteObject {
   enum class Kind { volume = 0, surfaces = 1, ground = 2 };
   Kind kind = Kind::volume;
-  std::uint64_t id = 0;  // of the viewer's instances and models; its own have 0
+  std::uint64_t id = 0;  // of the viewer's instances and models; its own objects have 0
   std::uint32_t place = 0;
-  std::uint64_t tag = 0;  // the host's
+  std::uint64_t tag = 0;  // set by the host
 };
-/// Its id in mattes; 0: it is in none.
+/// Returns the object's matte ID; 0: it is in no matte.
 using MatteIdOf = std::function<std::uint32_t(const MatteObject&)>;
 
 /// cumulet_aov.

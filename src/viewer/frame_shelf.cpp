@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* what = "building a sequence's frames";
 
-// The largest first: frames that are not there last.
+// Largest file first; missing files last.
 std::vector<std::uint32_t> by_size(const FrameFiles& files) {
   std::vector<std::pair<std::uintmax_t, std::uint32_t>> sized;
   for (std::uint32_t frame = 0; frame < files.count(); ++frame) {
@@ -39,14 +39,15 @@ FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, Allow
       worker_([this] { tell(); }, trace) {}
 
 void FrameShelf::wish(Wish wish) {
-  std::vector<Shelved> old;  // ends after the lock, as all that may be large
+  std::vector<Shelved> old;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
     const bool other_files = !is_wished(wish.files);
     const bool other_steps = other_files || wish.steps != wish_->steps;
     if (other_steps) {
       worker_.cancel();
-      stand_ins_.reserve(wish.steps.count(wish.files->count()));  // once there is a wish nothing throws
+      stand_ins_.reserve(wish.steps.count(wish.files->count()));  // so that nothing throws after the request has been
+                                                                  // replaced
     }
     if (other_files) {
       old = std::exchange(shelf_, std::vector<Shelved>(wish.steps.count(wish.files->count())));
@@ -91,7 +92,7 @@ void FrameShelf::rebuild() {
     shelved.failure.reset();
   }
   find_stand_ins();
-  // What is under way began before.
+  // The running job began before the call.
   worker_.cancel();
   if (judging_ == Judging::in_vain) judging_ = Judging::due;
   cancelled_ = false;
@@ -119,7 +120,7 @@ std::optional<FrameShelf::Ready> FrameShelf::nearest() const {
   const std::uint32_t target = wanted.value_or(wish_->order.front());
   const auto steps_there = static_cast<std::uint32_t>(shelf_.size());
   std::optional<std::uint32_t> found;
-  // Of two as far away the earlier.
+  // At equal distances the earlier step is preferred.
   for (std::uint32_t away = 0; !found && (away <= target || away < steps_there - target); ++away) {
     if (away <= target && shelf_[target - away].built) {
       found = target - away;
@@ -167,7 +168,7 @@ Worker::Status FrameShelf::status() const {
   if (is_judged() && !first()) {
     status.failure = own(wish_->steps.frame(wish_->order.front())).failure;
   } else if (work.failure && work.failure->code() != ErrorCode::cancelled) {
-    status.failure = work.failure;  // of no file's: what there was to build is not
+    status.failure = work.failure;  // not caused by a file; building failed
   }
   return status;
 }
@@ -182,13 +183,14 @@ bool FrameShelf::wait(std::optional<std::chrono::steady_clock::time_point> until
 
 void FrameShelf::tell() {
   {
-    const std::scoped_lock lock(mutex_);  // who waits has looked, or waits already
+    const std::scoped_lock lock(mutex_);  // so that a waiting thread has either not checked its condition yet, or is
+                                          // waiting
   }
   changed_.notify_all();
   notify_();
 }
 
-// ---- under the lock ----
+// ---- mutex_ is held ----
 
 void FrameShelf::start() {
   if (is_judged() && !next()) {
@@ -271,7 +273,7 @@ std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
     bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
   std::vector<Shelved> excess;
   if (bytes <= wish_->memory_bytes) return excess;
-  // The most needed first, but for the very first, which stays.
+  // Orders by need; the first needed step always stays.
   constexpr std::size_t not_needed = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> rank(shelf_.size(), not_needed);
   const std::vector<std::uint32_t> needed = kept();
@@ -300,7 +302,7 @@ std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
   return excess;
 }
 
-// ---- on the worker ----
+// ---- on the worker thread ----
 
 void FrameShelf::work(Progress& progress) {
   std::optional<Ends> ends;
@@ -320,7 +322,7 @@ void FrameShelf::work(Progress& progress) {
         return;
       }
     }
-    // Of each by itself: where threads are few, others have their turn between two.
+    // Limits apply to each step separately: with a thread limit, other jobs run between two steps.
     allowance_->run([&] {
       if (to_judge) {
         judge(to_judge, progress);
@@ -355,7 +357,7 @@ bool FrameShelf::fail(const Which& which, std::optional<std::uint32_t> frame, co
                       const Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
-    progress.check();  // who wants it anew asks under the lock, too
+    progress.check();  // cancellation for a rebuild also happens under the lock
     if (!is_wished(which)) return false;
     (frame ? own(*frame) : shelf_[which.step]).failure = failure;
     find_stand_ins();
@@ -413,7 +415,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
     end(Judging::due);
     throw;
   }
-  // Only now is it known whether another frame can be shown.
+  // Only now it is known whether another frame can be shown.
   say_failures(failures, judged.facts != nullptr);
   end(judged.facts ? Judging::done : Judging::in_vain);
 }
@@ -459,7 +461,7 @@ VolumeAssetPtr FrameShelf::read(const Which& which, std::optional<Ends>& ends, s
   const std::uint32_t frame = which.steps.frame(which.step);
   if (!which.steps.is_between(which.step)) return frame_there(frame);
   if (!ends || ends->files != which.files || ends->frame != frame) {
-    // One that was the end before is the beginning now.
+    // The end of the previous interval is the beginning of this one.
     VolumeAssetPtr before;
     if (ends && ends->files == which.files && ends->frame + 1 == frame) before = ends->after;
     ends.reset();
@@ -509,7 +511,7 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, std::o
     failure = caught(what);
   }
   const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
-  // First: nobody begins it again in between.
+  // Record the failure first, so that the step is not started again.
   if (failure && !cancelled && fail(which, reading, *failure, progress)) {
     const bool another = [&] {
       const std::scoped_lock lock(mutex_);

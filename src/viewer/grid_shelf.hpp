@@ -8,11 +8,11 @@ namespace cumulet::viewer {
 struct GridWish {
   VolumeAssetPtr volume;
   BuildSettings settings;
-  std::uint64_t gl_bytes = Allowance::no_limit;  ///< its part of what there is for volumes
+  std::uint64_t gl_bytes = Allowance::no_limit;  ///< its share of the GPU memory for volumes
   bool operator==(const GridWish&) const = default;
 };
 
-/// Grids of several volumes.
+/// Asynchronous cache of the grids of several volumes.
 class GridShelf : public Shelf<GridWish, Built> {
  public:
   GridShelf(const Log& log, std::function<void()> notify, Trace trace = {},

@@ -17,42 +17,42 @@
 
 namespace cumulet::viewer {
 
-/// A volume in scenes, as its host has it.
+/// Settings of a volume instance.
 struct InstanceSettings {
   VolumeAssetPtr volume;                    ///< null: none
-  std::shared_ptr<Sequence> sequence = {};  ///< in its place; null: none
-  std::shared_ptr<Live> live = {};          ///< likewise
+  std::shared_ptr<Sequence> sequence = {};  ///< replaces the volume; null: none
+  std::shared_ptr<Live> live = {};          ///< replaces the volume; null: none
   glm::dmat4 to_world{1.0};
-  std::optional<scene::PlaceEnds> ends = {};  ///< as the shutter opens, and as it closes; nothing: it stands still
+  std::optional<scene::PlaceEnds> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
   Medium medium = {};
   Ramps ramps = {};
   bool hidden = false;
-  std::uint64_t tag = 0;                      ///< the host's own
-  std::optional<scene::Place> previous = {};  ///< where it was a frame ago; none: where it is
+  std::uint64_t tag = 0;                      ///< for the host's own use
+  std::optional<scene::Place> previous = {};  ///< transform one frame ago; nullopt: unchanged
 };
 
-/// Surfaces in scenes, likewise.
+/// Settings of a model instance.
 struct ModelSettings {
-  SurfaceAssetPtr surfaces;  ///< null: nothing
+  SurfaceAssetPtr surfaces;  ///< null: none
   SurfaceChoice choice;
   glm::dmat4 to_world{1.0};
-  std::optional<scene::PlaceEnds> ends = {};  ///< likewise
+  std::optional<scene::PlaceEnds> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
   bool hidden = false;
   bool shadow_only = false;
   bool holdout = false;
-  std::uint32_t group = 0;                   ///< of lights
-  std::uint64_t tag = 0;                     ///< the host's own
-  std::optional<glm::dmat4> previous = {};   ///< where it was a frame ago; none: where it is
-  std::optional<double> previous_time = {};  ///< and at which moment; none: at this
+  std::uint32_t group = 0;                   ///< light group
+  std::uint64_t tag = 0;                     ///< for the host's own use
+  std::optional<glm::dmat4> previous = {};   ///< transform one frame ago; nullopt: unchanged
+  std::optional<double> previous_time = {};  ///< animation time one frame ago; nullopt: unchanged
 };
 
-/// What several viewers may show. All calls are safe from any thread.
+/// Settings that several viewers may share. All calls are thread-safe.
 template <class Settings>
 class Shared {
  public:
   explicit Shared(Settings settings) : settings_(std::move(settings)) {}
 
-  /// change is called under a lock, and must not throw.
+  /// Calls `change` under a lock; it must not throw.
   void edit(const std::function<void(Settings&)>& change) {
     {
       const std::scoped_lock lock(mutex_);
@@ -65,12 +65,12 @@ class Shared {
     const std::scoped_lock lock(mutex_);
     return settings_;
   }
-  /// Another after each change.
+  /// Changes after each edit.
   [[nodiscard]] std::uint64_t revision() const {
     const std::scoped_lock lock(mutex_);
     return revision_;
   }
-  /// Listeners::listen() to changes; must not change one.
+  /// Calls `changed` after each edit (Listeners::listen()); it must not edit.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     return listeners_.listen(std::move(changed));
   }

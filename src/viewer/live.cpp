@@ -25,7 +25,7 @@ bool has_tiles(const MemoryField& field) {
 
 }  // namespace
 
-// Not of what is in GL.
+// Must not be called for a GPU-resident state.
 std::vector<MemoryField> Live::Whole::view() const {
   if (const auto* held = std::get_if<std::vector<MemoryField>>(&fields)) return *held;
   std::vector<MemoryField> views;
@@ -136,15 +136,15 @@ bool Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& l
   InGl state;
   if (const auto* there = std::get_if<scene::StateInGlPtr>(&whole.fields)) state.state = *there;
   next.whole = std::move(whole);
-  // Last of what may fail: who is refused keeps the memory.
+  // Last step that may fail: if the state is refused, the host keeps its memory.
   if (lease) next.whole->lease = lease();
   {
     const std::scoped_lock lock(mutex_);
     if (on_top_of && (!in_gl_.state || in_gl_.number != *on_top_of)) return false;
-    // Updates of a state that was refused still have none to be on top of.
+    // If updates were refused, they are refused for this successor too.
     if (on_top_of && handed_.empty()) handed.clear();
     state.number = newest_ + 1;
-    std::swap(next_, next);  // what nobody read ends after the lock
+    std::swap(next_, next);  // unread data is destroyed after the lock is released
     std::swap(handed_, handed);
     std::swap(in_gl_, state);
     ++newest_;
@@ -237,7 +237,7 @@ void Live::take_next(std::optional<Whole>& old) {
   if (next.whole) old = std::exchange(base_, std::move(next.whole));
   if (!base_) return;
   auto* copies = std::get_if<std::vector<volume::FieldCopy>>(&base_->fields);
-  if (copies == nullptr) return;  // in GL, or held: none are handed over on top of that
+  if (copies == nullptr) return;  // GPU-resident, or the host's memory: such states have no changes
   for (const volume::Changes::Bricks& change : next.changes.fields) {
     const auto field = std::ranges::find(*copies, change.channel, &volume::FieldCopy::channel);
     field->put(change.bricks);
@@ -248,7 +248,7 @@ void Live::refuse_base(std::optional<Whole>& old) {
   old = std::exchange(base_, std::nullopt);
   Next next;
   const std::scoped_lock lock(mutex_);
-  // Updates that came meanwhile are of what was refused.
+  // Updates submitted meanwhile apply to the refused state.
   if (next_.whole) return;
   std::swap(next_, next);
   handed_.clear();
@@ -276,7 +276,7 @@ VolumeAssetPtr Live::read_base(Progress& progress) {
 
 Live::State Live::read(Progress& progress) {
   progress.begin(Progress::Stage::loading);
-  // What is held goes back after the lock: the host is called then.
+  // Leases are released after the lock, because this calls the host.
   std::optional<Whole> before;
   std::optional<Whole> after;
   const auto lock = patient_lock(reading_, progress);
@@ -289,10 +289,10 @@ Live::State Live::read(Progress& progress) {
     if (error.code() != ErrorCode::cancelled) refuse_base(after);
     throw;
   } catch (...) {
-    refuse_base(after);  // an update may be in it by half
+    refuse_base(after);  // an update may have been applied in part
     throw;
   }
-  // What is held goes back, and what is copied is what the next may change.
+  // Host memory is returned now. Copies are kept, because the next update changes them.
   if (base_->lease) after = std::exchange(base_, std::nullopt);
   return state_;
 }

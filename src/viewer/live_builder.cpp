@@ -14,7 +14,7 @@ constexpr const char* what = "building a live volume";
 }  // namespace
 
 void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings) {
-  std::optional<Ready> old;  // ends after the lock, as all that may be large
+  std::optional<Ready> old;  // destroyed after the lock is released, because its contents may be large
   const std::scoped_lock lock(mutex_);
   worker_.drop();
   job_.reset();
@@ -38,7 +38,7 @@ void LiveBuilder::look() noexcept {
     const std::scoped_lock lock(mutex_);
     begin();
   } catch (...) {
-    log_.warning(caught(what).what());  // who hands a state over has done so; the next look tries again
+    log_.warning(caught(what).what());  // the host's submission has succeeded; the next look() tries again
   }
 }
 
@@ -52,7 +52,7 @@ void LiveBuilder::cancel() {
   const std::scoped_lock lock(mutex_);
   worker_.cancel();
   job_.reset();
-  // As if it had been built: what comes is another state, or other settings.
+  // Marks the newest state as built, so that only another state or other settings start a build.
   if (is_due()) begun_ = Begun{live_->newest(), *settings_};
 }
 
@@ -80,7 +80,7 @@ void LiveBuilder::begin() {
                   while (!build(job, progress)) {
                   }
                 }});
-  job_ = job;  // not where there is no thread for it
+  job_ = job;  // not set if posting the job failed
 }
 
 void LiveBuilder::wish(Live& live, const std::optional<scene::Emission>& wanted) {
@@ -88,7 +88,7 @@ void LiveBuilder::wish(Live& live, const std::optional<scene::Emission>& wanted)
     const std::scoped_lock lock(mutex_);
     if (wanted && wish_ && *wish_ == *wanted) return;
   }
-  // Whoever listens is told without the lock.
+  // Listeners are called without the lock.
   Live::Wish wish = wanted ? live.want(*wanted) : nullptr;
   const std::scoped_lock lock(mutex_);
   if (live_.get() == &live) std::swap(wish_, wish);
@@ -99,7 +99,7 @@ std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeA
   const scene::StateInGlPtr& in_gl = state.in_gl();
   const scene::Emission wanted = state.emission_by(settings.emission);
   const bool made_there = in_gl && !needs_values(state, settings);
-  // Fire may come in another state.
+  // A later state may have fire.
   wish(live, made_there && (wanted.burns() || wanted.is_hot()) ? std::optional(wanted) : std::nullopt);
   if (!made_there || in_gl->gone() || in_gl->has_wanted({wanted})) return settings;
   const scene::Emission* found = in_gl->some_emission();
@@ -127,7 +127,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
     progress.check();
-    // They may have been taken back meanwhile; then the next wish begins anew.
+    // Volume or settings may have been removed meanwhile; then the next request starts a new job.
     if (job_ != job || !live_ || !settings_) {
       if (job_ == job) job_.reset();
       return true;
@@ -139,7 +139,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   Ready ready;
   std::optional<Error> failure;
   try {
-    // Of each by itself: where threads are few, others have their turn between two.
+    // Limits apply to each state separately: with a thread limit, other jobs run between two states.
     allowance_->run([&] {
       Stopwatch watch;
       const Live::State state = live->read(progress);
@@ -148,7 +148,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
       warn_of_huge(*state.volume);
       const std::optional<BuildSettings> settings = settings_for(*live, *state.volume, begun.settings);
       if (!settings) return;
-      // Else it needs voxels, which another state brings.
+      // Without a result the build needs voxels, which another state will bring.
       ready = {build_grid(log_, state.volume, *settings, progress, *allowance_), state.number};
       ready.built.seconds.load = load_seconds;
     });
@@ -166,11 +166,11 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   }
   const bool made = !failure && ready.built.source != nullptr;
   if (made) {
-    // It may be newer than what it was begun for.
+    // The state that was read may be newer than the one for which the build was started.
     if (begun_) begun_->number = std::max(begun_->number, ready.number);
     ready_ = std::move(ready);
   }
-  // What failed, or was refused elsewhere, is old news where there is another.
+  // A failure, or a state refused elsewhere, does not matter if there is a newer state.
   if (!made && is_due()) return false;
   job_.reset();
   if (failure) throw Error(*failure);

@@ -12,56 +12,56 @@
 
 namespace cumulet::viewer {
 
-/// Grids of a live volume's states, built on a thread of its own: of the newest, as soon as the one before was taken,
-/// so that each that is begun can be shown, and none is built that nobody will see. All calls are safe from any thread.
+/// Builds grids of a dynamic volume's states on a worker thread. It builds the newest state as soon as the previous
+/// grid was taken, so that every grid that is built can be displayed. All calls are thread-safe.
 class LiveBuilder {
  public:
-  /// notify: called on the worker after each state, and when a job ended.
+  /// notify: called on the worker thread after each state, and when a job ended.
   LiveBuilder(Log log, std::function<void()> notify, Trace trace = {},
               AllowancePtr allowance = std::make_shared<const Allowance>())
       : log_(std::move(log)), allowance_(std::move(allowance)), worker_(std::move(notify), trace) {}
 
-  /// Of this from now on; what there was goes. Null: of none.
+  /// Follows this volume instead of the previous one; null: none.
   void follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings);
-  /// Other settings; what is under way goes on. None: the next state waits for them.
+  /// Changes the settings; a running build continues. Nullopt: the next state waits for settings.
   void configure(std::optional<BuildSettings> settings);
-  /// Another state may be there.
+  /// Starts a build if there is a newer state.
   void look() noexcept;
-  /// The newest is built anew.
+  /// Rebuilds the newest state.
   void rebuild();
-  /// Ends what is under way until the next state or other settings.
+  /// Ends running work until the next state or other settings.
   void cancel();
 
   struct Ready {
     Built built;
     std::uint64_t number = 0;  ///< of the state
   };
-  /// What was built last, once; the next is begun.
+  /// Returns the newest result, once, and starts the next build.
   std::optional<Ready> take();
 
-  /// Whether the newest state is to be built, is under way or waits to be taken.
+  /// True if the newest state is due, is being built or has not been taken.
   [[nodiscard]] bool busy() const;
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Until nothing is under way, at most until then. Returns whether it is so.
+  /// Waits until no job is running, or until the given time. Returns true unless the time ran out.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  // The last that was, whatever came of it.
+  // State and settings of the last build, successful or not.
   struct Begun {
     std::uint64_t number = 0;
     BuildSettings settings;
   };
-  // All of these under the lock.
+  // mutex_ must be held for all of these.
   [[nodiscard]] bool is_due() const;
   void begin();
-  // What is wanted of states in GL from now on; none: nothing.
+  // Sets the emission requested of GPU-resident states; nullopt: none.
   void wish(Live& live, const std::optional<scene::Emission>& wanted);
-  // What a state in GL gives off may have been found by other settings: the same with these, until it is found by those
-  // that are wanted; none: something of it was not made yet.
+  // Returns the settings to build a state with. The emission of a GPU-resident state may exist for other settings;
+  // these are used until that for the requested ones exists. Nullopt: required data does not exist yet.
   std::optional<BuildSettings> settings_for(Live& live, const VolumeAsset& state, const BuildSettings& settings);
-  // Of the first state that has any.
+  // Logs a warning for the first state with values beyond 1e30.
   void warn_of_huge(const VolumeAsset& state);
-  // Returns whether the job is done: no newer state is there in place of one that failed.
+  // Returns true if the job is done, false to try again because a newer state followed a failed one.
   bool build(std::uint64_t job, Progress& progress);
 
   Log log_;
@@ -69,12 +69,12 @@ class LiveBuilder {
   mutable std::mutex mutex_;
   std::shared_ptr<Live> live_;
   std::optional<BuildSettings> settings_;
-  Live::Wish wish_;  // of a state in GL
+  Live::Wish wish_;  // emission request for GPU-resident states
   std::optional<Begun> begun_;
-  std::optional<std::uint64_t> job_;  // that is under way, or waits for the worker
+  std::optional<std::uint64_t> job_;  // running or queued
   std::uint64_t last_job_ = 0;
   std::optional<Ready> ready_;
-  bool huge_is_said_ = false;  // that some of live_'s voxels are huge
+  bool huge_is_said_ = false;  // the warning about values beyond 1e30 was logged
   Worker worker_;              // last: its thread uses all of the above
 };
 

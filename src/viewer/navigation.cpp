@@ -15,8 +15,8 @@ constexpr double pi = std::numbers::pi;
 constexpr double key_orbit = pi / 12.0;
 constexpr double key_pan = 0.05;
 constexpr double wheel_step = 1.15;
-constexpr double drag_dolly = 10.0;        // factor over the picture's height
-constexpr double flight_per_second = 0.5;  // of the bounds' diagonal, or of the distance to the target
+constexpr double drag_dolly = 10.0;        // factor for a drag over the image's height
+constexpr double flight_per_second = 0.5;  // fraction of the bounds' diagonal, or of the distance to the target
 constexpr double fast_flight = 4.0;
 constexpr std::string_view fly_keys = "DAEQWS";  // pairs: right and left, up and down, forward and back
 constexpr std::uint32_t none = 0;
@@ -24,7 +24,7 @@ constexpr std::uint32_t shift = CUMULET_MODIFIER_SHIFT;
 constexpr std::uint32_t ctrl = CUMULET_MODIFIER_CTRL;
 constexpr std::uint32_t alt = CUMULET_MODIFIER_ALT;
 
-/// 0 if the key is none of them.
+/// Returns 0 for other keys.
 std::uint32_t fly_key(int key) {
   for (std::size_t i = 0; i < fly_keys.size(); ++i) {
     if (fly_keys[i] == key) return 1U << i;
@@ -32,10 +32,10 @@ std::uint32_t fly_key(int key) {
   return 0;
 }
 
-/// Steps towards the scene; the exponent is held where the camera's own limits are long passed.
+/// Positive steps zoom in. The exponent is clamped far beyond the camera's own limits.
 void zoom(Camera& camera, double base, double steps) { camera.zoom(std::pow(base, -std::clamp(steps, -400.0, 400.0))); }
 
-/// Blender's; opposite: with ctrl.
+/// Blender's keypad views. opposite: ctrl is held.
 bool keypad_view(int digit, bool opposite, Camera& camera, const std::optional<Subject>& subject) {
   switch (digit) {
     case 1:
@@ -111,7 +111,7 @@ Navigation::Drag Navigation::drag_of(int button, std::uint32_t modifiers) const 
   return Drag::none;
 }
 
-/// dx, dy: parts of the picture's height, y down.
+/// dx, dy: fractions of the image's height, y down.
 void Navigation::drag_by(double dx, double dy, Camera& camera) const {
   const double right = dx * settings_.speed;
   const double down = dy * settings_.speed;
@@ -124,7 +124,7 @@ void Navigation::drag_by(double dx, double dy, Camera& camera) const {
     case Drag::pan:
       camera.pan(right, -down);
       break;
-    case Drag::dolly:  // Maya's goes in to the right as well
+    case Drag::dolly:  // Maya also dollies in for a drag to the right
       zoom(camera, drag_dolly, (settings_.style == NavigationStyle::maya ? right : 0.0) - down);
       break;
     case Drag::look:

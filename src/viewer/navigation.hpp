@@ -29,27 +29,28 @@ struct InputEvent {
   std::uint32_t modifiers = 0;
 };
 
-/// Turns a viewer's input into operations of its camera. Buttons and keys mean something only with exactly the
-/// modifiers that a style names; a drag goes on, whatever is pressed meanwhile, until its own button is up. With speed
-/// 1 a drag over the picture's height orbits by half a turn, looks by a quarter, pans by the height at the target, or
-/// dollies by a factor of 10; a wheel step dollies by 1.15.
+/// Converts a viewer's input into camera operations. Buttons and keys act only with exactly the modifiers of the style.
+/// A drag continues until its own button is released.
 ///
-/// Keys, in every style: F, Home, keypad '.': fit the subject; arrows: orbit by 15 degrees, with shift: pan by a
-/// twentieth; + (or =) and -: dolly as the wheel does. Blender's keypad besides: 1, 3, 7 (ctrl: the opposite), 5, and
-/// 2, 4, 6, 8 as arrows.
+/// With speed 1, a drag over the image's height orbits by half a turn or looks by a quarter turn. It pans by the height
+/// at the target, or dollies by a factor of 10. A wheel step dollies by 1.15.
+///
+/// Keys in every style: F, Home, keypad '.': fit the subject; arrows: orbit by 15 degrees, with shift: pan by a
+/// twentieth; + (or =) and -: dolly as the wheel does. Additional keypad keys of Blender: 1, 3, 7 (ctrl: the opposite
+/// view), 5, and 2, 4, 6, 8 as arrows.
 class Navigation {
  public:
-  /// Ends what is under way if style or fly changes.
+  /// Ends drags and held keys if style or fly changes.
   void set(const NavigationSettings& settings);
   [[nodiscard]] const NavigationSettings& settings() const { return settings_; }
-  /// width, height: of the picture, in pixels (0: not known yet). Returns whether the event meant something.
+  /// width, height: of the image, in pixels (0: not known yet). Returns true if the event was used.
   bool input(const InputEvent& event, Camera& camera, double width, double height,
              const std::optional<Subject>& subject);
-  /// Flies and turns for seconds that have gone by. Returns whether the camera moved.
+  /// Applies fly keys and turntable rotation for the elapsed seconds. Returns true if the camera moved.
   bool advance(double seconds, Camera& camera, const std::optional<Bounds>& bounds);
-  /// Whether advance has anything to do: frames are needed though nothing else changes.
+  /// True if advance() would move the camera, so that frames are needed without other changes.
   [[nodiscard]] bool moving() const;
-  /// Whether a button is down that moves the camera with the pointer.
+  /// True if the pointer is dragging the camera.
   [[nodiscard]] bool dragging() const { return drag_ != Drag::none; }
 
  private:
@@ -66,8 +67,8 @@ class Navigation {
   int drag_button_ = 0;
   double last_x_ = 0.0;
   double last_y_ = 0.0;
-  std::uint32_t keys_ = 0;  // fly keys held, by bit
-  bool fast_ = false;       // shift, as of the last event
+  std::uint32_t keys_ = 0;  // held fly keys, by bit
+  bool fast_ = false;       // shift was held at the last event
 };
 
 }  // namespace cumulet::viewer

@@ -8,7 +8,7 @@
 
 namespace cumulet::viewer {
 
-/// Locks a mutex that somebody may hold for seconds: who is cancelled does not wait for it. Throws Error(cancelled).
+/// Locks a mutex that may be held for seconds; the wait can be cancelled. Throws Error(cancelled).
 inline std::unique_lock<std::mutex> patient_lock(std::mutex& mutex, const Progress& progress) {
   std::unique_lock lock(mutex, std::try_to_lock);
   while (!lock.owns_lock()) {

@@ -11,7 +11,7 @@ struct PoseWish {
   bool operator==(const PoseWish&) const = default;
 };
 
-/// Poses of several models.
+/// Asynchronous cache of the poses of several models.
 class PoseShelf : public Shelf<PoseWish, scene::ModelSourcePtr> {
  public:
   explicit PoseShelf(std::function<void()> notify, Trace trace = {},

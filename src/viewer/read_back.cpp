@@ -1,4 +1,4 @@
-// What a context gives back of its pictures.
+// Read-back of a context's images.
 
 #include <algorithm>
 #include <cstring>
@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::uint64_t most_denoiser_bytes = std::uint64_t{512} << 20U;
 
-// Whether all of it, surfaces too, is of samples of light.
+// Returns true if the whole image, including surfaces, consists of light samples.
 bool is_traced(const render::Picture& picture) {
   return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath;
 }
@@ -54,13 +54,13 @@ std::optional<render::PixelFact> fact_of(Aov aov) {
   return std::nullopt;
 }
 
-// Of few samples more would take longer than more samples, and say less.
+// With few samples per pixel, more feature rays would take longer than more samples, for less benefit.
 std::uint32_t rays_to_denoise(const render::Picture& picture) {
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(2 * picture.samples_a_pixel(), render::fact_rays, render::most_fact_rays));
 }
 
-// How many floats a picture of four channels has. Throws Error(invalid_argument) where there is no room for them.
+// Returns the number of floats of a four-channel image. Throws Error(invalid_argument) if the array is too small.
 std::size_t require_room(const render::Picture& picture, const float* rgba, std::size_t count) {
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 4;
   if (rgba == nullptr || count < floats) {
@@ -69,7 +69,7 @@ std::size_t require_room(const render::Picture& picture, const float* rgba, std:
   return floats;
 }
 
-// Before the display's backdrop, where it has one; what is not made stays 0.
+// Composites over the display's backdrop, if any. Pixels outside the render region stay 0.
 void put_before(const render::Display& display, const render::Picture& picture, std::span<float> rgba) {
   if (display.transparent || !display.backdrop) return;
   for (std::size_t i = 0; i < rgba.size(); ++i) {
@@ -80,7 +80,7 @@ void put_before(const render::Display& display, const render::Picture& picture, 
   }
 }
 
-// Fills in the model that a ray has met at the pick's position, which counts from the snapshot's origin.
+// Fills in the model that the ray hit. pick.position is relative to the snapshot's origin.
 void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle, const dvec3& ray) {
   const scene::ModelTable& table = models.table();
   const std::size_t record = table.record_of(triangle);
@@ -92,7 +92,7 @@ void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle
   const glm::dmat3 to_world(dvec3(table.records[record].to_world_x), dvec3(table.records[record].to_world_y),
                             dvec3(table.records[record].to_world_z));
   const dvec3 origin(table.records[record].origin);
-  // Areas opposite to the corners are the weights of their normals.
+  // Barycentric weights: areas of the triangles opposite to the corners.
   std::array<dvec3, 3> from_here;
   for (std::size_t i = 0; i < 3; ++i)
     from_here[i] = to_world * dvec3(source.pose.vertices[scene.indices[index + i]].position) + origin - pick.position;
@@ -135,7 +135,7 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   if (picked.triangle) meet(pick, *scene_.models(), *picked.triangle, ray);
   pick.position += shot.scene->origin;
   if (!picked.place) return pick;
-  // The places of one volume lie together.
+  // Instances of one volume are consecutive.
   const std::vector<scene::Volume>& volumes = scene_.volumes();
   pick.volume = volumes.at(*picked.place).id;
   const auto first = std::ranges::find_if(volumes, [&](const scene::Volume& v) { return v.id == pick.volume; });
@@ -252,7 +252,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
   render::MatteIds ids;
   MatteObject object;
   for (const scene::Volume& volume : scene_.volumes()) {
-    // The places of one volume lie together.
+    // Instances of one volume are consecutive.
     object.place = !ids.volumes.empty() && object.id == volume.id ? object.place + 1 : 0;
     object.id = volume.id;
     ids.volumes.push_back((*volume.medium).holdout ? 0 : id_of(object));
@@ -269,7 +269,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
 }
 
 void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts, std::uint32_t rays) {
-  // Motion is told from now on.
+  // Motion vectors refer to the current scene.
   const bool of_now = facts != render::PixelFacts::all || progressive_.newest_is_seen_as(*shot.scene);
   require_present(of_now);
   render::Obstacles met = obstacles(shot);
@@ -328,7 +328,7 @@ gl::Object Context::by_network(const Shot& shot, const render::Picture& picture,
 gl::Object Context::filtered(const render::Picture& picture, bool with_background) {
   const auto background = with_background ? render::MeansBackground::added : render::MeansBackground::left_out;
   render::PictureTextures textures = textures_of(picture, nullptr);
-  textures.view.reset();  // what is read does not depend on what was shown before
+  textures.view.reset();  // read-back must not depend on previously displayed images
   const glm::ivec2 size(picture.size());
   gl::Object means = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the denoised picture");
   render::Wavelet wavelet(functions_, programs_);

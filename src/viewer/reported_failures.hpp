@@ -9,11 +9,11 @@
 
 namespace cumulet::viewer {
 
-/// What a viewer reads and builds, in the order in which failures are reported.
+/// Kinds of content that a viewer loads and builds, in the order in which failures are reported.
 enum class ContentKind { volume, instances, surfaces, models, environment };
 inline constexpr std::size_t content_kinds = 5;
 
-/// How the last work of each kind ended, if not well.
+/// Failure of the last work of each kind, if any.
 struct ContentFailures {
   std::array<std::optional<Error>, content_kinds> by_kind;
 
@@ -21,14 +21,14 @@ struct ContentFailures {
   const std::optional<Error>& operator[](ContentKind kind) const { return by_kind.at(static_cast<std::size_t>(kind)); }
 };
 
-/// Which failures have been reported, so that none sticks: a failure that was reported once is reported on until other
-/// work begins, and not after that. All calls are safe from any thread.
+/// Tracks which failures have been reported. A reported failure is reported again until other work begins, and not
+/// after that. All calls are thread-safe.
 class ReportedFailures {
  public:
   enum class Cancelled { reported, left_out };
-  /// The first failure that is to be reported, which then has been.
+  /// Returns the first failure to report and marks it as reported.
   std::optional<Error> report(const ContentFailures& failures, Cancelled cancelled);
-  /// Other work begins.
+  /// Must be called when other work begins.
   void retire();
 
  private:

@@ -4,7 +4,7 @@ namespace cumulet::viewer {
 
 namespace {
 
-// Whether it is another step, or others come next.
+// Updates the clock. Returns true if the step changed, or if other steps come next.
 bool go(SequenceState& state, const scene::Moment& to, bool forward) {
   const scene::Moment from = std::exchange(state.moment, to);
   const bool turned = std::exchange(state.forward, forward) != forward || from.forward != to.forward;

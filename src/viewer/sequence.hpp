@@ -15,10 +15,10 @@
 
 namespace cumulet::viewer {
 
-/// What frames are read from: files that are there or not.
+/// The files of a sequence's frames, which may or may not exist.
 struct FrameFiles {
-  std::vector<std::string> paths;  ///< one at least, relative to the folder that the path of `shown` is relative to
-  VolumeFile shown;                ///< of each
+  std::vector<std::string> paths;  ///< at least one, relative to the folder that the path of `shown` is relative to
+  VolumeFile shown;                ///< applies to each frame; its path is replaced
 
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(paths.size()); }
   [[nodiscard]] VolumeFile file(std::uint32_t frame) const {
@@ -30,43 +30,42 @@ struct FrameFiles {
 };
 using FrameFilesPtr = std::shared_ptr<const FrameFiles>;
 
-/// A sequence as it stands.
+/// Playback state of a sequence.
 struct SequenceState {
   scene::Playback playback;
-  std::uint64_t memory_bytes = 0;  ///< for frames that are ready
+  std::uint64_t memory_bytes = 0;  ///< memory limit for cached frames
   scene::Moment moment;
-  bool forward = true;  ///< the clock runs so
+  bool forward = true;  ///< direction of the clock
 };
 
-/// Volumes that follow each other, which several viewers may show, all at the same moment. All calls are safe from any
-/// thread.
+/// A sequence of volumes. Several viewers may show it, all at the same time of its clock. All calls are thread-safe.
 class Sequence {
  public:
   Sequence(FrameFilesPtr files, const SequenceState& state) : files_(std::move(files)), state_(state) {}
 
   [[nodiscard]] const FrameFilesPtr& files() const { return files_; }
-  /// It stays at the frame where it is.
+  /// The current frame is kept.
   void set_playback(const scene::Playback& playback);
   void set_time(double seconds);
-  /// 0 to the last frame's number, whether it is played or not.
+  /// From 0 to the last frame's number, inside or outside the played range.
   void set_position(double position);
   [[nodiscard]] SequenceState get() const;
-  /// Another after each change.
+  /// Changes after each change that viewers must process.
   [[nodiscard]] std::uint64_t revision() const;
-  /// Listeners::listen() to changes; must not change a sequence.
+  /// Calls `changed` after each change (Listeners::listen()); it must not change a sequence.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     return listeners_.listen(std::move(changed));
   }
 
  private:
-  // change returns whether viewers have to know.
+  // change: returns true if viewers must be notified.
   template <class Change>
   void edit(Change&& change);
 
   FrameFilesPtr files_;
   mutable std::mutex mutex_;
   SequenceState state_;
-  std::optional<double> seconds_;  // as they were set last
+  std::optional<double> seconds_;  // as set last
   std::uint64_t revision_ = 1;
   Listeners listeners_;
 };

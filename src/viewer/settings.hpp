@@ -1,6 +1,6 @@
 #pragma once
 
-// Settings as the viewer uses them, of descriptors that were checked (viewer/c_settings.hpp).
+// Settings as the viewer uses them, from checked descriptors (viewer/c_settings.hpp).
 
 #include <cumulet/cumulet.h>
 
@@ -21,14 +21,14 @@
 
 namespace cumulet::viewer {
 
-// As numbered in cumulet.h.
+// The enums have the numbers of cumulet.h.
 static_assert(static_cast<int>(grid::Criterion::range_mean) == CUMULET_CRITERION_RANGE_MEAN);
 static_assert(static_cast<int>(grid::Criterion::transmittance) == CUMULET_CRITERION_TRANSMITTANCE);
 
 static_assert(static_cast<int>(BuildOn::gpu) == CUMULET_BUILD_GPU);
 
 struct GridSettings {
-  BuildSettings build;  // refine.camera is filled from the viewer's
+  BuildSettings build;  // refine.camera is filled in from the viewer's camera
   bool camera_adaptive = false;
 
   static GridSettings of(const cumulet_grid_desc& d) {
@@ -53,8 +53,8 @@ struct Medium {
   scene::Phase phase;
   std::uint32_t max_bounces = 0;
   glm::vec3 emission{0.0F};
-  scene::Emission field_emission = {};  // of what its grids give off
-  std::uint32_t group = 0;              // of lights
+  scene::Emission field_emission = {};  // of its emission grids
+  std::uint32_t group = 0;              // light group
   bool holdout = false;
 
   static Medium of(const cumulet_medium_desc& d) {
@@ -81,7 +81,7 @@ struct Medium {
   }
 };
 
-/// Of what grids hold, before anything else is made of it.
+/// Ramps (1-D transfer functions) that are applied to grid values first.
 struct Ramps {
   volume::Ramp density = {};
   volume::Ramp temperature = {};
@@ -93,10 +93,10 @@ struct Light {
   float sun_elevation_degrees = 0.0F;
   glm::vec3 sun_irradiance{0.0F};
   glm::vec3 sky_radiance{0.0F};
-  std::optional<light::SkyModel> sky = std::nullopt;  ///< then neither of the two before is meant
+  std::optional<light::SkyModel> sky = std::nullopt;  ///< if set, it replaces the two members above
   float sun_angle_degrees = 0.0F;
-  std::uint32_t sun_group = 0;  ///< of lights
-  std::uint32_t sky_group = 0;  ///< of the sky, or the environment
+  std::uint32_t sun_group = 0;  ///< light group
+  std::uint32_t sky_group = 0;  ///< light group of the sky or the environment
 
   static Light of(const cumulet_light_desc& d) {
     Light light{d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
@@ -135,7 +135,7 @@ struct SurfaceSettings {
   SurfaceChoice choice;
   SurfaceLight light = SurfaceLight::full;
   float indirect_roughness = 0.0F;
-  std::uint32_t group = 0;  ///< of lights
+  std::uint32_t group = 0;  ///< light group
   bool holdout = false;
 
   static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
@@ -188,7 +188,7 @@ struct DisplaySettings {
     return settings;
   }
 
-  /// legend: of a debug view, which is over black.
+  /// legend: for a debug view, whose background is black.
   [[nodiscard]] render::Display shown(bool legend) const {
     render::Display display;
     display.exposure_stops = exposure_stops;

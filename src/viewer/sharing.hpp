@@ -10,20 +10,19 @@
 
 namespace cumulet::viewer {
 
-/// What viewers of one share group have in common.
+/// Resources shared by viewers of one share group.
 struct Commons {
   gl::ProgramsPtr programs;
   render::DeviceMemoriesPtr memories;
 };
 
-/// What viewers that share programs have in common: of each share group that one of them is attached to. Safe from any
-/// thread.
+/// Resources of viewers that share shader programs, per share group to which one of them is attached. Thread-safe.
 class Sharing {
  public:
   explicit Sharing(std::shared_ptr<gl::ProgramFiles> files = nullptr,
                    std::shared_ptr<gl::ShaderFolder> shaders = nullptr)
       : programs_(std::move(files), std::move(shaders)) {}
-  /// Of the current context's group. Throws on a GL error.
+  /// Returns the resources for the current context's share group. Throws on a GL error.
   Commons of_current(const gl::Functions& gl);
 
  private:

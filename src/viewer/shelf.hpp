@@ -13,16 +13,16 @@
 
 namespace cumulet::viewer {
 
-/// What several wishes are of, made one after another on a thread of its own, and kept as long as it is wished for. All
-/// calls are safe from any thread.
+/// Asynchronous cache: makes one value per request on a worker thread, one after another, and keeps it while it is
+/// requested. All calls are thread-safe.
 template <class WishOf, class Made>
 class Shelf {
  public:
   using Wish = WishOf;
   using Make = std::function<Made(const Wish&, Progress&)>;
 
-  /// what, stage: of the work, as failures and Worker::status() tell. notify: called on the worker after each, and when
-  /// a job ended.
+  /// what, stage: description of the work in failures and in Worker::status(). notify: called on the worker thread
+  /// after each value, and when a job ended.
   Shelf(const char* what, Progress::Stage stage, Make make, std::function<void()> notify, Trace trace = {},
         AllowancePtr allowance = std::make_shared<const Allowance>())
       : what_(what),
@@ -32,22 +32,22 @@ class Shelf {
         allowance_(std::move(allowance)),
         worker_(std::move(notify), trace) {}
 
-  /// In place of all wishes before. What is under way is finished, and is there until the next wishes, so that of
-  /// wishes that change faster than they are built every one that is begun can be seen. What failed is not tried again.
+  /// Replaces all requests. Running work is finished and its value kept until the next call, so that with fast-changing
+  /// requests every value that was begun can be displayed. Failed requests are not retried.
   void wish(std::vector<Wish> wishes);
-  /// What there is of a wish; none where it is not built yet, or could not be. O(wishes).
+  /// Returns the value of a request; nullopt if it is not made yet or failed. O(requests).
   [[nodiscard]] std::optional<Made> built(const Wish& wish) const;
   [[nodiscard]] bool is_under_way(const Wish& wish) const;
-  /// With the next wishes, what failed is tried again.
+  /// Failed requests are retried with the next call of wish().
   void forget_failures();
-  /// Another after each that was made.
+  /// Changes after each value that was made.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// Ends what is under way, and what waits, with ErrorCode::cancelled.
+  /// Ends running and queued work with ErrorCode::cancelled.
   void cancel() { worker_.cancel(); }
 
   [[nodiscard]] bool busy() const { return worker_.busy(); }
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Until idle, at most until then. Returns whether it is.
+  /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
@@ -55,7 +55,7 @@ class Shelf {
     Wish wish;
     std::optional<Made> built;
     std::optional<Error> failure;
-    bool wanted = true;  // else it was under way when it was last wished for
+    bool wanted = true;  // false: it was running when the requests were last replaced
     [[nodiscard]] bool is_missing() const { return wanted && !built && !failure; }
   };
   typename std::vector<Shelved>::iterator find(const Wish& wish);
@@ -69,7 +69,7 @@ class Shelf {
   std::vector<Shelved> shelf_;
   std::optional<Wish> under_way_;
   std::atomic<std::uint64_t> revision_ = 0;
-  AllowancePtr allowance_;  // of each by itself: where threads are few, others have their turn between two
+  AllowancePtr allowance_;  // applied to each value separately: with a thread limit, other jobs run between two values
   Worker worker_;           // last: its thread uses all of the above
 };
 
@@ -82,7 +82,7 @@ template <class Wish, class Made>
 void Shelf<Wish, Made>::wish(std::vector<Wish> wishes) {
   bool missing = false;
   bool failed = false;
-  std::vector<Shelved> before;  // ends after the lock: what it holds may be large
+  std::vector<Shelved> before;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
     before = std::exchange(shelf_, {});
@@ -126,7 +126,7 @@ void Shelf<Wish, Made>::forget_failures() {
 
 template <class Wish, class Made>
 void Shelf<Wish, Made>::build_missing(Progress& progress) {
-  // Nothing is under way however this ends.
+  // Must be called on every exit.
   const auto rest = [this] {
     const std::scoped_lock lock(mutex_);
     under_way_.reset();

@@ -6,7 +6,7 @@ namespace cumulet::viewer {
 
 class Stopwatch {
  public:
-  /// Seconds since the last lap, or since it was made.
+  /// Returns the seconds since the last lap, or since construction.
   double lap() {
     const auto now = std::chrono::steady_clock::now();
     const double seconds = std::chrono::duration<double>(now - start_).count();

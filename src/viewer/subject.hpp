@@ -9,15 +9,16 @@
 
 namespace cumulet::viewer {
 
-/// What a camera fits, all in world space.
+/// The objects that a camera is fitted to, in world space.
 struct Subject {
-  /// How far the points of a body reach along each of these normals: the greatest of their scalar products.
+  /// Returns the extent of the objects along each of these normals: the maximum of the dot products of their points.
   using Reach = std::function<std::vector<double>(const glm::dvec3& direction, std::span<const glm::dvec3> normals)>;
 
   Subject(const Bounds& all) : bounds(all) {}  // a box is a subject
 
-  Bounds bounds;  ///< of all there is
-  Reach reach;    ///< of what is seen along a direction (unit); none, or no answer: of the bounds
+  Bounds bounds;  ///< of all objects
+  Reach reach;    ///< extent of the visible parts for a view direction (unit); if it is empty or returns nothing,
+                  ///< `bounds` is used
 };
 
 }  // namespace cumulet::viewer

@@ -9,7 +9,7 @@ namespace cumulet::viewer {
 SurfaceAsset::Rest SurfaceAsset::rest() const {
   const std::scoped_lock lock(rest_mutex_);
   if (!rest_) {
-    // No scene has an animation of this number.
+    // No scene has an animation with this index, so the pose is at rest.
     const surface::Pose pose = scene_->pose(0.0, std::numeric_limits<std::size_t>::max());
     rest_ = Rest{pose.lights.size(), pose.cameras.size(), {pose.low, pose.high}};
   }

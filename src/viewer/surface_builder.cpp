@@ -32,7 +32,7 @@ void SurfaceBuilder::read(const FilePath& path, Load& load, Progress& progress) 
 void SurfaceBuilder::cancel() {
   {
     const std::scoped_lock lock(mutex_);
-    load_.reset();  // what it stops soon takes no other settings
+    load_.reset();  // a load that is being stopped accepts no other settings
   }
   worker_.cancel();
 }
@@ -59,7 +59,7 @@ void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceChoice choice) {
          PosedModel made{nullptr, asset->posed(choice, progress)};
          const std::scoped_lock lock(mutex_);
          progress.check();
-         // What a load read, and nobody has taken yet, stays what was read.
+         // An untaken result of a load keeps its asset.
          if (result_) made.asset = std::move(result_->asset);
          result_ = std::move(made);
        }});
@@ -71,7 +71,7 @@ std::optional<PosedModel> SurfaceBuilder::take() {
 }
 
 bool SurfaceBuilder::busy() const {
-  // In this order: what a job leaves is there before it ends.
+  // Check in this order: a job stores its result before it ends.
   if (worker_.busy()) return true;
   const std::scoped_lock lock(mutex_);
   return result_.has_value();

@@ -16,41 +16,42 @@
 
 namespace cumulet::viewer {
 
-/// What there is to show.
+/// Result of loading or posing surfaces.
 struct PosedModel {
-  SurfaceAssetPtr asset;  ///< if it was read from a file, which
+  SurfaceAssetPtr asset;  ///< if it was read from a file
   scene::ModelSourcePtr source;
 };
 
-/// Reads glTF scenes and poses them on a thread of its own. The newest wish wins, and none starves, as Builder has it.
-/// All calls are safe from any thread.
+/// Reads glTF scenes and poses them on a worker thread. Requests are coalesced as in Builder: the latest wins, and
+/// running jobs are not starved. All calls are thread-safe.
 class SurfaceBuilder {
  public:
-  /// notify: called on the worker after a job ended.
+  /// notify: called on the worker thread after a job ended.
   SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {}, AllowancePtr allowance = nullptr)
       : log_(std::move(log)), worker_(std::move(notify), trace, std::move(allowance)) {}
 
-  /// Reads a file, then poses it. Replaces what is under way, as Worker::replace() does.
+  /// Reads a file, then poses it. Replaces the running job, as Worker::replace().
   void load(const FilePath& path, SurfaceChoice choice);
-  /// Another choice for a load under way. Returns false if there is none: then take what it made, and call pose.
+  /// Changes the choice of a running load. Returns false if there is none; the caller must then take its result and
+  /// call pose().
   bool configure_load(SurfaceChoice choice);
-  /// Poses a scene, after the pose under way: a pose that takes long is shown before the next.
+  /// Poses a scene after the running pose, so that slow poses are displayed before the next.
   void pose(SurfaceAssetPtr asset, SurfaceChoice choice);
   void cancel();
-  /// Loads alone: other surfaces are there.
+  /// Cancels only loads, because other surfaces have been set.
   void cancel_loads();
-  /// How the last job ended is reported no more.
+  /// Drops the failure of the last job.
   void forget_failure() { worker_.forget_failure(); }
-  /// The newest result, once.
+  /// Returns the newest result, once.
   std::optional<PosedModel> take();
-  /// Whether there is work under way, or a result that nobody took.
+  /// True if a job is running or a result has not been taken.
   [[nodiscard]] bool busy() const;
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Until idle, at most until then. Returns whether it is.
+  /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  // What a load will be posed at: open until it is.
+  // The choice for the pose that follows a load. It may change while `open`, until the pose begins.
   struct Load {
     SurfaceChoice choice;
     bool open = true;

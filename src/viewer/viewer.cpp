@@ -26,16 +26,16 @@ namespace {
 using glm::dvec3;
 using Clock = std::chrono::steady_clock;
 
-// Volumes that cameras are fitted to by how they look, not by their boxes.
+// Maximum number of volume instances for which the camera fit uses their visible parts instead of their boxes.
 constexpr std::size_t most_looked_at = 8;
-// Triangles that they are fitted to one by one.
+// Maximum number of triangles that the camera fit visits individually.
 constexpr std::size_t most_vertices = std::size_t{1} << 24U;
 
 bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
 
 Bounds both(const Bounds& a, const Bounds& b) { return {glm::min(a.min, b.min), glm::max(a.max, b.max)}; }
 
-// Around all of these; nothing where there are none.
+// Box around all of these; nullopt if there are none.
 std::optional<Bounds> box_of(const std::vector<Bounds>& boxes) {
   if (boxes.empty()) return std::nullopt;
   return std::accumulate(boxes.begin() + 1, boxes.end(), boxes.front(), both);
@@ -52,7 +52,7 @@ scene::Medium shown_medium(const Medium& medium) {
   return {medium.density_scale, medium.albedo, medium.phase, medium.emission, medium.group, medium.holdout};
 }
 
-// Whether but for how much hides and from where it is seen the same is made.
+// Returns true if both differ only in opacity and in the view.
 bool same_but_view(BuildSettings a, const BuildSettings& b) {
   a.refine.density_scale = b.refine.density_scale;
   a.refine.anisotropy = b.refine.anisotropy;
@@ -60,7 +60,7 @@ bool same_but_view(BuildSettings a, const BuildSettings& b) {
   return a == b;
 }
 
-// As fine as either.
+// Makes `a` as fine as both.
 void join(BuildSettings& a, const BuildSettings& b) {
   a.refine.density_scale = std::max(a.refine.density_scale, b.refine.density_scale);
   a.refine.anisotropy = std::min(a.refine.anisotropy, b.refine.anisotropy);
@@ -75,13 +75,13 @@ bool apart_by_an_eighth(std::uint64_t a, std::uint64_t b) {
   return std::max(a, b) - std::min(a, b) > std::max(a, b) / 8;
 }
 
-// What was shown of a volume is shown on.
+// Keeps displaying the previous data of a volume.
 void stay_with(scene::Volume& volume, const scene::Volume& was) {
   volume.source = was.source;
   volume.frame = was.frame;
 }
 
-// Of what is anywhere in a box.
+// Metadata of a volume with unknown contents within a box.
 VolumeFactsPtr facts_of(const Bounds& bounds) {
   volume::ScalarVolume box;
   box.bounds_max = box.bounds_min;
@@ -96,7 +96,7 @@ VolumeFactsPtr facts_of(const Bounds& bounds) {
 
 using Add = std::function<void(const dvec3&)>;
 
-// Its vertices, or the corners of its box where that stands.
+// Adds the vertices of a mesh, or the corners of its box.
 void add_mesh(const scene::ModelSource& source, const scene::ModelMesh& mesh, const glm::dmat4& to_world, bool as_box,
               const Add& add) {
   if (as_box) {
@@ -149,10 +149,11 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 }
 
 Viewer::~Viewer() {
-  watched_.reset();  // what states tell is of the builder, which ends before
+  watched_.reset();  // its listener notifies the builder, which is destroyed first
   lives_in_gl_.clear();
-  cancel();  // all at once: where threads are few, jobs wait for each other
-  // Without a context nothing can be deleted, and in a stranger's the names are of other objects.
+  cancel();  // all workers at once: with a thread limit, jobs wait for each other
+  // Without the viewer's context its objects cannot be deleted, and in another context the names belong to other
+  // objects.
   if (gl_ && !gl_->group().is_current()) context_lost();
 }
 
@@ -169,7 +170,7 @@ void Viewer::touch() {
   notify();
 }
 
-// ---- volumes and building ----
+// ---- volumes and grid builds ----
 
 void Viewer::sync() {
   if (auto loaded = builder_.take_loaded()) {
@@ -182,7 +183,7 @@ void Viewer::sync() {
     }
   }
   if (auto built = builder_.take_built()) {
-    // A rebuild keeps what the load took.
+    // A rebuild keeps the timings of the load.
     if (built->volume == built_.volume) {
       if (built->seconds.load == 0.0) built->seconds.load = built_.seconds.load;
       if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
@@ -190,7 +191,7 @@ void Viewer::sync() {
     built_ = std::move(*built);
     cuts_own_ = false;
     wishes_due_ = true;
-    if (built_.volume == volume_) {  // else the volume before, of which a grid was asked for
+    if (built_.volume == volume_) {  // else it is the previous volume, for which a grid was requested
       drop_stand_in();
       take_suggestion();
     }
@@ -209,22 +210,22 @@ void Viewer::sync() {
   if (auto read = environment_builder_.take_environment()) show_environment(std::move(*read));
   if (auto sky = environment_builder_.take_sky()) {
     if (asked_day_ == sky->day) asked_day_.reset();
-    // One that was asked for before is shown where the newest is not there yet.
+    // A sky requested earlier is displayed until the newest is ready.
     if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
     surround();
   }
 }
 
 void Viewer::follow_stand_in() {
-  // A sequence, or a live volume, goes on until the volume is there; and what is read back without previews is of what
-  // is asked for alone.
+  // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
+  // read-back must only contain the requested volume.
   if (auto made = builder_.take_stand_in(); made && sampling_.preview && !followed_ && !watched_) {
     stand_in_ = std::move(made);
     show_medium();
   }
-  // In this order: what a job leaves is there before it ends.
+  // Check in this order: a job stores its result before it ends.
   if (!stand_in_ || !stand_in_->load.expired() || builder_.has_result()) return;
-  // The volume is there, and the next frame asks for its grid; or there is none to come.
+  // Either the volume was loaded and the next frame requests its grid, or the load failed.
   const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !builder_.status().failure;
   if (!waits) drop_stand_in();
 }
@@ -246,7 +247,7 @@ void Viewer::take_volume(VolumeAssetPtr volume) {
   facts_ = volume_ ? volume_->facts() : nullptr;
   built_for_.reset();
   remark_on_anisotropy();
-  wishes_due_ = true;  // of it, or no longer
+  wishes_due_ = true;  // instances may use its grid, or can no longer do so
 }
 
 bool Viewer::begin_anew(bool shows, bool showed) {
@@ -316,7 +317,7 @@ bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_r
 }
 
 std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
-  // However fast states come, one that was taken is seen.
+  // Each state that was taken is displayed, even if states arrive faster.
   w.waits = !unseen && !is_seen(w.state, w.is_rendered);
   if (w.waits) return std::nullopt;
   auto ready = builder.take();
@@ -405,7 +406,7 @@ void Viewer::tell_wish(Followed& f, FrameShelf& shelf) const {
 }
 
 std::optional<FrameShelf::Ready> Viewer::take(Followed& f, const FrameShelf& shelf) const {
-  // However fast frames come, one that was taken is seen.
+  // Each frame that was taken is displayed, even if frames arrive faster.
   if (!is_seen(f.frame, f.is_rendered)) return std::nullopt;
   f.take_due = false;
   auto ready = shelf.nearest();
@@ -443,7 +444,7 @@ Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameShelf& sh
   status.asked = scene::frame_of(f.state.playback, f.state.moment);
   const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
   status.asked_position = FrameShelf::Steps::of(f.state.playback).position(step);
-  // What was there before may be another's.
+  // The displayed frame may belong to another sequence.
   if (const auto shown = gl_ ? frame_of(*gl_, f.id) : std::nullopt)
     status.drawn = static_cast<double>(shown->number) + shown->part;
   status.frames = shelf.frames();
@@ -513,8 +514,8 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
     return;
   }
   if (followed_) {
-    if (!loads) builder_.forget_failure();  // of a load that was to end the sequence
-    // Each frame may have what the one that is shown has not.
+    if (!loads) builder_.forget_failure();  // of a load that would have replaced the sequence
+    // The `concerned` test is skipped, because other frames may have fields that the displayed one lacks.
     built_for_.reset();
     followed_->settings = settings;
     followed_->wish_due = true;
@@ -533,7 +534,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   take_medium();
   drop_stand_in();
   builder_.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
-  // A sequence, or a live volume, goes on until the volume is there.
+  // A sequence or a dynamic volume is shown until the new volume is ready.
   if (followed_ || watched_) {
     suggested_density_scale_ = suggested;
     take_medium();
@@ -545,11 +546,11 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   reported_failures_.retire();
   builder_.forget_failure();
   if (volume) {
-    builder_.cancel_loads();  // builds go on: a host may set volumes faster than they build
+    builder_.cancel_loads();  // builds continue: a host may set volumes faster than they build
   } else {
     builder_.cancel();
   }
-  builder_.take_loaded();  // what was read, and not shown yet, never is
+  builder_.take_loaded();  // drops a loaded volume that has not been shown
   drop_stand_in();
   sync();
   leave_sequence();
@@ -603,7 +604,7 @@ void Viewer::remove_instance(const Instance& instance) {
   reported_failures_.retire();
   shown_.erase(look_up(instance));
   wishes_due_ = true;
-  sync();  // what failed of it is forgotten
+  sync();  // drops its failures
   touch();
 }
 
@@ -621,7 +622,7 @@ void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
   shown.listener = model->listen([this] { notify(); });
   shown.model = std::move(model);
   shown_models_.push_back(std::move(shown));
-  sync();  // what it is of begins to be posed
+  sync();  // starts posing its surfaces
   touch();
 }
 
@@ -632,7 +633,7 @@ void Viewer::remove_model(const ModelInstance& model) {
   if (place == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the model");
   shown_models_.erase(place);
   poses_due_ = true;
-  sync();  // what failed of it is forgotten
+  sync();  // drops its failures
   touch();
 }
 
@@ -685,12 +686,12 @@ void Viewer::follow_poses() {
     const std::optional<PoseShelf::Wish> then = previous_pose(shown);
     if (then && std::ranges::find(wishes, *then) == wishes.end()) wishes.push_back(*then);
   }
-  // Before the wishes, with which what was begun for others goes.
+  // Take results before sending the requests, which may drop poses made for earlier ones.
   for (ShownModel& shown : shown_models_) {
     if (!shown.wish) continue;
     auto source = poses_.built(*shown.wish);
-    if (source) shown.begun.reset();  // what is older than that is not shown again
-    // Of wishes that change faster than they are posed, one that was begun.
+    if (source) shown.begun.reset();  // older poses are not shown again
+    // If requests change faster than poses are made, show one that was begun.
     if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
     if (source) shown.source = std::move(*source);
     const std::optional<PoseShelf::Wish> then = previous_pose(shown);
@@ -752,7 +753,7 @@ void Viewer::follow_instances() {
   const std::uint64_t built = shelf_.revision();
   if (built != shelved_) take_grids();
   shelved_ = built;
-  // One that was to serve for others may have failed.
+  // The viewer's own grid, which was to be reused, may have failed.
   if (waits_for_own_ && !builder_.busy()) wishes_due_ = true;
   if (!wishes_due_ || (grid_.camera_adaptive && !view_)) return;
   wishes_due_ = false;
@@ -797,7 +798,7 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
   std::vector<Wanted> all;
   for (Shown& shown : shown_) {
     if (!Player::source_of(shown.settings)) (shown.*place).reset();
-    // What a hidden one has is there when it is seen again.
+    // A hidden instance keeps its player for when it is shown again.
     if (!Player::source_of(shown.settings) || !shown.is_seen()) continue;
     std::optional<BuildSettings> settings;
     if (!grid_.camera_adaptive || view_) settings = settings_of(shown);
@@ -830,7 +831,7 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
     next.push_back(std::move(p));
   }
   const std::scoped_lock lock(played_mutex_);
-  players.swap(next);  // what nobody follows any more ends after the lock
+  players.swap(next);  // unused players are destroyed after the lock is released
 }
 
 void Viewer::wish_for_sequences() {
@@ -877,7 +878,7 @@ void Viewer::take_grids() {
   for (Shown& shown : shown_) {
     if (!shown.wish) continue;
     auto built = grid_of(*shown.wish);
-    // Of wishes that change faster than they are built, one that was begun.
+    // If requests change faster than grids are built, show one that was begun.
     if (!built && shown.begun) built = shelf_.built(*shown.begun);
     if (built) shown.built = std::move(built);
   }
@@ -922,7 +923,7 @@ void Viewer::reuse_grid(GridShelf::Wish& wish) const {
 }
 
 void Viewer::wish_for_grids() {
-  // One for all that can share it, as fine as the finest of them needs.
+  // One request for all instances that can share a grid, as fine as the finest of them needs.
   std::vector<GridShelf::Wish> wishes;
   std::vector<std::optional<std::size_t>> wish_of(shown_.size());
   for (std::size_t i = 0; i < shown_.size(); ++i) {
@@ -948,7 +949,7 @@ void Viewer::wish_for_grids() {
   const std::size_t grids = wishes.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
   const std::size_t before = std::exchange(grids_, std::max<std::size_t>(grids, 1));
   share_gl();
-  // What each frame leaves is never the same; an eighth is.
+  // The memory left by each frame always varies a little; only a change of an eighth matters.
   const bool limited = most_gl_bytes_ != Allowance::no_limit;
   if (limited && (grids_ != before || apart_by_an_eighth(part_of_gl_, allowance_->gl_bytes()))) share_gl_anew();
   for (GridShelf::Wish& wish : wishes) wish.gl_bytes = part_of_gl_;
@@ -971,14 +972,14 @@ void Viewer::wish_for_grids() {
     shown.wish = wishes[*wish_of[i]];
   }
   shelf_.wish(std::move(to_build));
-  fit_cells();  // the viewer's own has another part, perhaps
+  fit_cells();  // its share of GPU memory may have changed
 }
 
 void Viewer::rebuild() {
   reported_failures_.retire();
   for (Shown& shown : shown_) {
     shown.wish.reset();
-    if (shown.built) shown.built->volume = nullptr;  // shown until then, but serves no wish
+    if (shown.built) shown.built->volume = nullptr;  // stays displayed until replaced, but cannot be reused
   }
   shelf_.forget_failures();
   wishes_due_ = true;
@@ -995,7 +996,7 @@ void Viewer::rebuild() {
 
 void Viewer::share_gl() {
   const bool limited = most_gl_bytes_ != Allowance::no_limit;
-  // Pictures take some KiB more or less from frame to frame; cells are to be as many again.
+  // Images vary by some KiB from frame to frame. Rounding keeps the number of cells constant.
   constexpr std::uint64_t step = std::uint64_t{1} << 18U;
   const std::uint64_t beside = (gl_beside_volumes_.value_or(0) + step - 1) / step * step;
   const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, beside);
@@ -1018,8 +1019,8 @@ bool Viewer::makes_room(const Shown& shown) const {
 }
 
 void Viewer::set_limits(const Limits& limits) {
-  // Asked for here, and where there are more or fewer grids, not in frames: how many cells are allowed follows what the
-  // pictures of each frame leave.
+  // Grids are adapted here and when the number of grids changes, but not in every frame: the number of allowed cells
+  // depends on the memory that each frame's images leave.
   const bool others = limits.gl_bytes != most_gl_bytes_ || limits.memory_bytes != allowance_->memory_bytes();
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
@@ -1035,7 +1036,7 @@ void Viewer::set_limits(const Limits& limits) {
 }
 
 void Viewer::fit_cells() {
-  // What is under way was begun under other limits, perhaps, or another volume comes.
+  // The running job may have been started under other limits, or for another volume.
   if (!cells_due_ || builder_.busy()) return;
   cells_due_ = false;
   if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
@@ -1090,7 +1091,7 @@ void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
   reported_failures_.retire();
   surface_builder_.forget_failure();
   if (surfaces) {
-    surface_builder_.cancel_loads();  // poses go on: a host may set surfaces faster than they are posed
+    surface_builder_.cancel_loads();  // poses continue: a host may set surfaces faster than they are posed
   } else {
     surface_builder_.cancel();
   }
@@ -1127,7 +1128,7 @@ void Viewer::use_surface_camera(std::size_t index) {
   const dvec3 forward = -glm::normalize(dvec3(seen.to_world[2]));
   CameraPose pose = camera_->pose();
   pose.eye = eye;
-  // What it looks at, to orbit about: as far as the middle of the scene.
+  // The target for orbits is as far away as the middle of the scene.
   double distance = 1.0;
   if (const auto all = box()) {
     distance =
@@ -1151,13 +1152,13 @@ void Viewer::wait(double timeout_ms) {
            std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->shelf.wait(until); }) &&
            std::ranges::all_of(watching_, [&](const WatchingPtr& w) { return w->builder.wait(until); });
   };
-  // What comes of one may be work for another.
+  // One result may cause further work.
   do {
-    // What has stopped never becomes idle by itself.
+    // Stopped workers never become idle.
     if (process_is_ending()) throw Error(ErrorCode::cancelled, "the process is exiting");
     sync();
     if (!idle()) throw Error(ErrorCode::timeout, "not ready in time");
-    // The newest is waited for: what is newer than what was drawn is not kept back for that.
+    // The newest state is waited for, so it need not wait until the previous one has been displayed.
     follow_live(true);
     follow_watching(true);
     sync();
@@ -1373,7 +1374,7 @@ void Viewer::surround() {
     environment_builder_.make_sky(*wanted);
     asked_day_ = wanted;
   }
-  // Until it is there sun and sky stay as they were, but for what only turns them.
+  // Until the new sky is ready, sun and sky stay unchanged except for the azimuth.
   if (daylight_) {
     scene_.lights.set({to_sun(light_.sun_azimuth_degrees, daylight_->day.sun_elevation_degrees),
                        daylight_->sun_irradiance, light_.sky_radiance, light_.sun_angle_degrees});
@@ -1446,7 +1447,7 @@ bool Viewer::input(const InputEvent& event) {
 }
 
 void Viewer::frame_all() {
-  static_cast<void>(bounds());  // there is something to fit
+  static_cast<void>(bounds());  // throws if there is nothing to fit
   camera_->fit(*subject(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0);
 }
 
@@ -1515,7 +1516,7 @@ void Viewer::count_from(const dvec3& origin) {
     if (!is_nothing) {
       volume = scene::counted_from(std::move(volume), origin);
     } else if (origin != dvec3(0.0)) {
-      // The empty volume around surfaces moves to the origin, wherever it was made.
+      // The empty volume for surfaces is moved to the origin.
       volume.place = {glm::translate(glm::dmat4(1.0), -dvec3(empty_volume_->volume().index_to_world[3]))};
     }
   }
@@ -1528,13 +1529,13 @@ bool Viewer::shows_triangles() const {
 }
 
 std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
-  // One at a height is there whatever else is: a sequence's frame may be empty.
+  // A ground plane at a given height is also shown without other objects: a sequence's frame may be empty.
   if (ground_.place == GroundPlace::none || (ground_.place == GroundPlace::below && !all)) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
-  // Just below a model: many stand on a floor of their own.
+  // With models it is slightly below the bounds, because many models include a floor.
   if (ground_.place == GroundPlace::below)
     ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
-  // The horizon is then a ten-thousandth below where it is.
+  // Then the visible edge of the plane is at most 1e-4 radians below the true horizon.
   const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
   const double scene = all ? glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) : 0.0;
   ground.reach = 1e4 * (scene + eye);
@@ -1562,7 +1563,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   const auto add_volume = [&](const VolumeFacts& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
     const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
-    // Of many one does not stick out of the picture by much.
+    // With many volumes, one of them hardly extends the visible bounds.
     if (count > most_looked_at) {
       add_box();
       return;
@@ -1571,7 +1572,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     const double density_scale = medium.density_scale / glm::length(along);
     for (const dvec3& p : volume.coarse.visible(glm::normalize(along), density_scale))
       add(dvec3(to_world * glm::dvec4(p, 1.0)));
-    // What glows shows at any density.
+    // Emission is visible at any density.
     if (volume.may_emit) add_box();
   };
   std::size_t vertices = 0;
@@ -1584,7 +1585,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   for (const scene::Model& model : models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
       for (const glm::dmat4& placing : mesh.placings) {
-        // Of many copies what sticks out of one is their boxes'.
+        // For many instances the boxes are sufficient.
         vertices += mesh.triangle_count;
         add_mesh(*model.source, mesh, model.to_world * placing, vertices > most_vertices, add);
       }
@@ -1606,13 +1607,13 @@ grid::RefineCamera Viewer::refine_camera() const {
   refine.right = glm::normalize(view.right);
   refine.up = glm::normalize(view.up);
   refine.forward = glm::normalize(glm::cross(refine.up, refine.right));
-  // Off axis: the frustum about the axis that holds the picture's.
+  // Off-axis projection: use the symmetric frustum that contains the image's.
   refine.tan_half_x = glm::length(view.right) + std::abs(glm::dot(view.forward, refine.right));
   refine.tan_half_y = glm::length(view.up) + std::abs(glm::dot(view.forward, refine.up));
   refine.eye = view.eye;
   refine.pixels_per_radian = frame_size_.y / (2.0 * glm::length(view.up));
   if (view.orthographic) {
-    // A pinhole so far back that its rays are as good as parallel.
+    // Approximated by a pinhole camera so far back that its rays are nearly parallel.
     const double back = 1e4 * glm::length(view.up);
     refine.eye -= back * refine.forward;
     refine.tan_half_x /= back;
@@ -1629,7 +1630,7 @@ VolumeAssetPtr Viewer::empty_volume() {
     empty.bounds_max = glm::ivec3(0);
     const auto all = box();
     const dvec3 middle = all ? 0.5 * (all->min + all->max) : dvec3(0.0);
-    // Far away, count_from moves it to the scene's origin.
+    // If the scene is far away, count_from() moves the volume to the scene's origin.
     const bool near = !all || scene::origin_of_scene(std::array{scene::Extent{all->min, all->max}}, {}) == dvec3(0.0);
     empty.index_to_world[3] = glm::dvec4(near ? middle : dvec3(0.0), 1.0);
     empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));
@@ -1643,7 +1644,7 @@ bool Viewer::shows_instances() const {
 
 void Viewer::show_volumes() {
   std::vector<scene::Volume> volumes;
-  // What surfaces alone are in stands aside.
+  // The empty volume for surfaces is left out if instances are displayed.
   const scene::MarchSourcePtr& source = stand_in_ ? stand_in_->source : built_.source;
   if (source && (seen_facts() || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
@@ -1672,7 +1673,7 @@ void Viewer::show_volumes() {
 
 void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
   const bool building = builds();
-  // Until all are there, what there was; then what is asked for.
+  // While grids are being built, keep volumes that match the displayed ones; afterwards those that match the settings.
   const auto fits = [&](const scene::Volume& volume) {
     if (building && !scene_.volumes.empty()) return volume.source->goes_with(*scene_.volumes.front().source);
     return volume.source->march == grid_.build.march &&

@@ -1,4 +1,4 @@
-// What of a viewer needs its context: frames, and reading back.
+// The parts of Viewer that need the GL context: frames and read-back.
 
 #include <algorithm>
 #include <chrono>
@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Of a frame's parts.
+// Failures of the parts of a frame.
 struct Failures {
   std::optional<Error> first;
   std::vector<std::string> others;
@@ -35,7 +35,7 @@ struct Failures {
       first = error;
     }
   }
-  // Throws the first, if there is one; the log has the others.
+  // Logs all but the first failure; throws the first, if any.
   void tell(const Log& log) const {
     if (!first) return;
     for (const std::string& other : others) log.warning(other);
@@ -77,7 +77,7 @@ void Viewer::context_lost() {
   gl_->functions()->abandoned = true;
   const Commons commons = gl_->commons();
   gl_.reset();
-  // Others may be attached to another context of the group.
+  // Another viewer may be attached to another context of the share group.
   if (commons.memories.use_count() > 1) return;
   commons.programs->abandon();
   commons.memories->abandon();
@@ -90,7 +90,7 @@ void Viewer::with_gl(Body&& body) {
   try {
     gl::clear_errors(*functions);
     gl::check_reset(*functions);
-    g.group().require();  // before anything is begun that could not be undone
+    g.group().require();  // before anything that could not be undone
     gl::require_rendering(*functions);
     const gl::Programs::Turn turn(g.programs(), log_);
     const gl::StateGuard guard(*functions, restore_state_);
@@ -98,7 +98,7 @@ void Viewer::with_gl(Body&& body) {
     if constexpr (gl::reloads_shaders) g.programs()->refresh();
     body(g);
   } catch (const Error& error) {
-    // Whatever failed: in a lost context everything does.
+    // In a lost context every call may fail, so check for loss after any error.
     const bool lost = error.code() == ErrorCode::context_lost || gl::was_reset(*functions);
     if (lost) context_lost();
     if (lost && error.code() != ErrorCode::context_lost) throw Error(ErrorCode::context_lost, gl::reset_message);
@@ -117,12 +117,14 @@ void Viewer::prepare(const Frame& frame) {
   const auto box = this->box();
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
-  // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
+  // Without a scene the last image is dropped too. Models without triangles still count as a scene, lit by the sky
+  // only.
   const bool others = std::ranges::any_of(shown_, &Shown::is_there);
-  const bool watches = watched_ || !watching_.empty();  // what its states are of may not be known yet
+  const bool watches = watched_ || !watching_.empty();  // the contents of their states may not be known yet
   const bool scene = seen_facts() || shows_models() || others || watches;
   if (!scene) built_ = {};
-  // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
+  // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
+  // last job's status is kept.
   if (!facts_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
     Progress progress;
     built_ = build_grid(log_, empty_volume(), grid_.build, progress);
@@ -130,23 +132,23 @@ void Viewer::prepare(const Frame& frame) {
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   view_.reset();
-  // Without a scene the camera may wait for its bounds.
+  // Without a scene the camera may still wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
     view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
   previous_view_.reset();
   if (view_ && previous_camera_)
     previous_view_ = previous_camera_->view(double(frame_size_.x) / frame_size_.y, subject());
-  if (wishes_due_) follow_instances();  // they waited for a view
+  if (wishes_due_) follow_instances();  // they were waiting for a view
   if (frame.budget_ms < 0.0) return;
 
   last_view_ = std::exchange(traced_view_, view_);
   const bool places_rest = !std::exchange(places_changed_, false);
-  // A grid of the volume before would take the place of a file that waits to be read.
+  // A build of the previous volume would replace the queued load.
   const bool another_comes = builder_.loads();
   const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
   if ((seen_facts() || others || watches) && built_for_another() && !waits) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
-    // What GL builds follows a camera in motion, one grid after another, each of which is seen.
+    // GPU builds follow a moving camera, one grid after another, each of which is displayed.
     const bool follows =
         volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
         !builder_.busy() && gl_ && !gl_->scene().uploading_volumes() &&
@@ -185,7 +187,7 @@ void Viewer::take_cells(const Context& g) {
     built.cells = cells->count;
     built.levels = g.scene().data()->grid(*built.source)->levels;
     built.limited = cells->limited;
-    // A camera in motion asks for one after another.
+    // Not during camera motion, which requests many grids.
     if (cells->on_cpu && !built_in_motion_) {
       const std::string& name = built.volume ? built.volume->name() : built.source->volume->name;
       log_.info(name + ": its grid is built on the CPU: " + *cells->on_cpu);
@@ -241,10 +243,10 @@ FrameResult Viewer::render(const Frame& frame) {
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   Failures failures;
-  // Before anything new is seen, so that what comes later is told again.
+  // Reset before anything is read, so that later changes notify again.
   update_pending_ = false;
   with_gl([&](Context& g) {
-    // Each part does what it can: a failure is told once, after what there was has been drawn.
+    // A failure of one part does not prevent the others. It is thrown once, after drawing.
     const auto attempt = [&](const char* name, auto&& part) {
       const gl::DebugGroup group(*g.functions(), name);
       const Trace::Span span(trace_, name);
@@ -258,7 +260,7 @@ FrameResult Viewer::render(const Frame& frame) {
         gl::clear_errors(*g.functions());
       }
     };
-    // Asking the driver may take some of the budget: who wakes its threads may lose a core to them.
+    // This query counts against the budget: waking the driver's threads may cost the calling thread its core.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
     if (!lives_in_gl_.empty()) attempt("cumulet: voxels in GL", [&] { tend_voxels_in_gl(g); });
@@ -279,7 +281,7 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     remark_on_samples(g);
-    // Wishes before the first frame did not know what pictures take.
+    // Requests made before the first frame did not include the memory of images.
     if (!gl_beside_volumes_ && most_gl_bytes_ != Allowance::no_limit) wishes_due_ = wishes_due_ || !shown_.empty();
     gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
     share_gl();
@@ -318,11 +320,11 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   return result;
 }
 
-// ---- states in GL ----
+// ---- GPU-resident states ----
 
 namespace {
 
-// What may stay in GL, and where it then stands: density, and what is beside it, of one lattice.
+// Returns the common transform of a state that may stay GPU-resident: density, and other fields with the same lattice.
 std::optional<glm::dmat4> lattice_in_gl(const render::GlState& state) {
   bool has_density = false;
   for (const render::GlVoxels& field : state.fields) {
@@ -338,7 +340,7 @@ std::vector<volume::Channel> channels_of(const scene::StateInGl& state) {
   return channels;
 }
 
-// Of any state, what a live volume tells.
+// Requests of the dynamic volume that apply to any state.
 render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live) {
   render::VoxelTransfers::StayInGl stay;
   stay.values_wanted = live->values_wanted();
@@ -346,7 +348,7 @@ render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live) {
   return stay;
 }
 
-// A whole state.
+// For a complete state.
 render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
                                             const glm::dmat4& index_to_world) {
   render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
@@ -360,7 +362,7 @@ render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, c
   return stay;
 }
 
-// What of its fields can be checked without voxels. Returns their channels.
+// Checks the fields as far as possible without voxels. Returns their channels.
 std::vector<volume::Channel> check(const render::GlState& state) {
   std::vector<volume::MemoryField> fields;
   std::vector<volume::Channel> channels;
@@ -380,7 +382,7 @@ std::vector<volume::Channel> check(const render::GlState& state) {
   return channels;
 }
 
-// To main memory.
+// Transfer to main memory.
 render::VoxelTransfers::Arrive arrive(const std::shared_ptr<Live>& live, const std::string& name, bool boxes) {
   if (!boxes) return [live, name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
   return [live, name](std::vector<volume::FieldCopy> copies) {
@@ -391,7 +393,8 @@ render::VoxelTransfers::Arrive arrive(const std::shared_ptr<Live>& live, const s
   };
 }
 
-// Boxes, on top of what is the newest by then. gather: called before that is looked at.
+// For changed boxes, applied to the state that is the newest when they arrive. gather: called before that state is
+// read.
 render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
                                             const std::function<void()>& gather) {
   const auto below = std::make_shared<std::uint64_t>(0);
@@ -415,7 +418,7 @@ std::optional<glm::dmat4> Viewer::place_in_gl(Context& g, const std::shared_ptr<
   const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
   if (!lattice) return std::nullopt;
   if (!state.changed) return live->stays_in_gl() ? lattice : std::nullopt;
-  // Boxes go where the rest is.
+  // Changed boxes go to where the rest of the state is.
   const auto announced = g.transfers().announced(live.get());
   const scene::StateInGlPtr rest = live->in_gl().state;
   if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
@@ -426,7 +429,7 @@ std::optional<glm::dmat4> Viewer::place_in_gl(Context& g, const std::shared_ptr<
   return std::nullopt;
 }
 
-// live: a copy, for the log callback may release the host's last handle.
+// live: by value, because the log callback may release the host's last handle.
 void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
   const std::vector<volume::Channel> channels = check(state);
   with_gl([&](Context& g) {
@@ -496,7 +499,7 @@ void Viewer::gather(Context& g, Live& live) {
       *bricks = std::move(gathered);
       moved = true;
     } catch (const Error& error) {
-      // They serve as they are.
+      // The scattered bricks remain usable.
       if (error.code() == ErrorCode::context_lost) throw;
       gl::clear_errors(*g.functions());
     }
@@ -547,13 +550,13 @@ void Viewer::tend_voxels_in_gl(Context& g) {
 }
 
 void Viewer::follow_transfers(Context& g, double budget_ms) {
-  // They share a frame with all else.
+  // Transfers share the frame's budget with other work.
   constexpr double part = 0.5;
   constexpr double least_ms = 2.0;
   g.transfers().follow(deadline_after(std::max(part * budget_ms, least_ms)));
 }
 
-// ---- for the host's own drawing ----
+// ---- transmittance maps for the host's own drawing ----
 
 MapResult Viewer::update_map(const MapRequest& request) {
   MapResult result;
@@ -571,7 +574,7 @@ void Viewer::drop_map(std::uint32_t slot) {
   with_gl([&](Context& g) { g.drop_map(slot); });
 }
 
-// ---- reading back ----
+// ---- read-back ----
 
 Pick Viewer::pick(double x, double y) {
   Pick pick;
@@ -589,7 +592,7 @@ std::uint64_t Viewer::tag_of(std::uint64_t id) const {
 
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
   const auto of_tagged = [&](MatteObject object) {
-    // What surfaces alone are in is nothing.
+    // The empty volume for surfaces has no matte.
     if (object.kind == MatteObject::Kind::volume && object.id == 0 && !seen_facts()) return 0U;
     object.tag = tag_of(object.id);
     return id_of(object);
@@ -703,11 +706,11 @@ Stats Viewer::stats() {
     add_built(*shown.built);
   }
   if (gl_) {
-    // Of those that GL builds what is there.
+    // For GPU-built grids, count those that exist.
     std::set<scene::MarchSourcePtr> there;
     for (const scene::Volume& volume : gl_->scene().volumes()) {
       if (!volume.source->plan || !there.insert(volume.source).second) continue;
-      // An upload that failed may have taken it away.
+      // A failed upload may have removed it.
       const render::MarchData::Cells* cells = gl_->scene().cells(volume.source);
       if (cells != nullptr) add(cells->count, gl_->scene().data()->grid(*volume.source)->levels, cells->limited);
     }

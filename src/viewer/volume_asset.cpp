@@ -15,7 +15,7 @@ namespace cumulet::viewer {
 
 namespace {
 
-// Of voxels, inclusive.
+// Inclusive bounds in voxels.
 struct Box {
   glm::ivec3 low{std::numeric_limits<int>::max()};
   glm::ivec3 high{std::numeric_limits<int>::min()};
@@ -28,7 +28,7 @@ struct Box {
   [[nodiscard]] bool empty() const { return low.x > high.x; }
 };
 
-// With that of another frame; nothing where either has none.
+// Returns the mean with the momentum of another frame; nullopt if either has none.
 std::optional<grid::MomentumField::Values> mean_momentum(std::optional<grid::MomentumField::Values> momentum,
                                                          const volume::VolumeFrame& other, const volume::Ramp& ramp,
                                                          const Progress& progress, const Log& log) {
@@ -147,7 +147,7 @@ const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progres
     unit = volume::value_unit(std::max(open.max_value, close.max_value));
     open = volume::in_units_of(unit, std::move(open), &progress);
     close = volume::in_units_of(unit, std::move(close), &progress);
-    // Of fire alone there is none.
+    // Nullopt for fire without density.
     auto mean = scene::mean_of(&open, &close, "density", &progress);
     voxels = make_left<const volume::ScalarVolume>(mean ? std::move(*mean) : open);
     if (mean) ends = make_left<const grid::DensityEnds>(std::move(open), std::move(close), cube_, &progress);
@@ -196,14 +196,14 @@ std::shared_ptr<const VolumeAsset> VolumeAsset::while_open(double seconds, Progr
 
 grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Channels& channels,
                                       const grid::RefineSettings& refine, Progress& progress) const {
-  // The same for all views and budgets.
+  // Independent of the view and of the cell budget.
   const grid::RefineSettings any_view;
   grid::RefineSettings of = refine;
   of.camera.reset();
   of.pixel_size = any_view.pixel_size;
   of.max_cells = any_view.max_cells;
   if (of.criterion != grid::Criterion::transmittance) {
-    // No other knows of the medium.
+    // Other criteria do not use the medium.
     of.density_scale = any_view.density_scale;
     of.anisotropy = any_view.anisotropy;
   }
@@ -230,7 +230,7 @@ double VolumeAsset::scale_of(const volume::Ramp& temperature_ramp) const {
 scene::Emission VolumeAsset::emission_by(const scene::Emission& emission) const {
   scene::Emission given = emission;
   if (!given.temperature_scale && frame_->temperature) given.temperature_scale = scale_of(given.temperature_ramp);
-  // What has a temperature alone would be nothing.
+  // A volume with only a temperature would be invisible.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
   if (given.blackbody == 0.0 && alone) given.blackbody = 1.0;
   return given;
@@ -258,7 +258,7 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   const auto lock = patient_lock(computing_, progress);
   const volume::VolumeFrame* close = close_.get();
   if (!glowing_ || glowing_->settings != given) {
-    drop(latticed_);  // it holds them
+    drop(latticed_);  // it refers to the emission
     drop(glowing_);
     auto glow = in_gl_ ? in_gl_->emission(given) : scene::emission_of(*frame_, given, &progress);
     if (close != nullptr)

@@ -1,4 +1,4 @@
-// What of a viewer's context is done before the first frame.
+// The warm-up of a viewer's context before the first frame.
 
 #include <algorithm>
 #include <chrono>
@@ -25,7 +25,7 @@ WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool wai
     throw;
   }
   if (!result.more) rehearsal_.reset();
-  // Half of it is to compile them, but of those that are not used.
+  // Progress: compiling counts for half and first use for half. Programs that are not used count fully once compiled.
   const gl::Programs::Counts counts = programs_->counts();
   const std::size_t wanted = all ? std::max(counts.asked, gl::all_programs().size()) : counts.asked;
   const std::size_t done = 2 * counts.failed + counts.usable + (all ? counts.usable : counts.ready);
@@ -55,7 +55,7 @@ bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::D
   for (const gl::ProgramKey& key : gl::all_programs()) {
     const gl::Program::State before = programs_->state(key);
     there = done_or_failed([&] { return programs_->ask(key).usable(); }) && there;
-    // One at least in each call, however long the frame's own took.
+    // At least one program per call, even if the frame's own programs took all the time.
     if (programs_->state(key) != before && std::chrono::steady_clock::now() >= deadline) return false;
   }
   if (there && unbuilt_) throw Error(*unbuilt_);
@@ -88,7 +88,7 @@ bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadl
 void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
   const render::PictureTextures picture = textures_of(shown, nullptr);
   render::FrameTarget target = Context::target(shot, frame, shown);
-  target.region = {};  // its own is none
+  target.region = {};  // a warm-up image has no render region
   if (frame.target == Target::framebuffer) {
     rehearsal_->draw(picture, display(shot, frame, shown), target);
     return;

@@ -33,10 +33,10 @@ void Worker::stop() {
 }
 
 void Worker::take(Job job, bool replaces) {
-  std::optional<Job> old;  // ends after the lock: what it holds may be large
+  std::optional<Job> old;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
-    // Both may throw: before anything has changed.
+    // Both may throw, so they come before any change.
     if (stopping_) throw Error(ErrorCode::cancelled, "the process is exiting");
     if (!thread_) thread_.emplace([this] { run(); }, [this] { stop(); });
     if (replaces && current_ && !current_->spared) {
@@ -123,13 +123,13 @@ void Worker::run() {
       failure = failure_of(*job, allowance_, *progress);
     }
     job.reset();
-    // Whatever else went wrong meanwhile: nobody waits for its result any more.
+    // A cancelled job reports only its cancellation, because its result is no longer needed.
     if (failure && progress->cancelled()) failure = Error(ErrorCode::cancelled, "cancelled");
     lock.lock();
     last_was_replaced_ = current_->replaced;
     const bool dropped = current_->dropped;
     current_.reset();
-    // A newer wish makes how this one ended old news.
+    // If a newer job is queued, this job's failure is not reported.
     if (!next_ && !dropped) failure_ = std::move(failure);
     lock.unlock();
     keep_statics(StaticsOf::job);
@@ -137,7 +137,7 @@ void Worker::run() {
     notify_();
     lock.lock();
   }
-  // Who waits for a job that never begins does not wait for ever.
+  // The queued job will not run; threads waiting for it must return.
   std::optional<Job> never_begun = std::exchange(next_, std::nullopt);
   if (never_begun) failure_ = Error(ErrorCode::cancelled, "cancelled");
   lock.unlock();

@@ -16,69 +16,68 @@
 
 namespace cumulet::viewer {
 
-/// A thread that does one job at a time; of those that wait, the newest. It begins with the first job. All calls are
-/// safe from any thread, but for jobs, which may only look. When the process ends, jobs end as if they were cancelled,
-/// and others are refused with Error(cancelled).
+/// A thread that runs one job at a time. Only the newest queued job is kept. The thread starts with the first job. All
+/// calls are thread-safe; jobs may only call queries. When the process ends, jobs end as if cancelled, and new jobs are
+/// refused with Error(cancelled).
 class Worker {
  public:
   struct Job {
-    std::string what;  ///< begins the line when there is not enough memory
+    std::string what;  ///< prefix of the message if memory is exhausted
     Progress::Stage stage = Progress::Stage::loading;
-    /// Throws if it fails. Nobody sees how a job ended that a newer one replaced: what it hands over it should hand
-    /// over after a last progress.check(), under the lock that its owner holds around replace().
+    /// Throws if it fails. The failure of a job that was replaced is not reported. A job should publish its results
+    /// after a last progress.check(), under the lock that its owner holds around replace().
     std::function<void(Progress&)> work;
     bool load = false;  ///< reads a file: see cancel_loads()
   };
 
   struct Status {
-    Progress::Stage stage = Progress::Stage::idle;  ///< of the job that waits, else of the one under way
+    Progress::Stage stage = Progress::Stage::idle;  ///< of the queued job, else of the running one
     double fraction = 0.0;
-    std::optional<Error> failure;  ///< how the last job ended, if not well
+    std::optional<Error> failure;  ///< failure of the last job, if any
   };
 
-  /// notify: called on the thread after a job ended.
-  /// allowance: what jobs may take; null: whatever there is.
+  /// notify: called on the thread after a job ended. allowance: limits for jobs; null: none.
   explicit Worker(std::function<void()> notify, Trace trace = {}, AllowancePtr allowance = nullptr)
       : notify_(std::move(notify)), trace_(trace), allowance_(std::move(allowance)) {}
-  /// Cancels and waits.
+  /// Cancels the job and waits for it.
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// In place of a job that waits; the one under way goes on to its end. For jobs that each make a picture of their
-  /// own: however fast wishes come, what is under way is shown, and then the newest. None starves, and at most one
-  /// job's time is spent on what nobody wants any more.
+  /// Replaces the queued job; the running one is finished. Use it for jobs whose results are all worth displaying. With
+  /// fast requests the running job's result is displayed, then the newest. At most one job's time is spent on outdated
+  /// work.
   void post(Job job) { take(std::move(job), false); }
-  /// In place of a job that waits and of the one under way, which is cancelled, unless the job before it was so as
-  /// well: whoever chose wrongly need not wait, but of a stream of wishes at least every second is finished.
+  /// Replaces the queued job and cancels the running one, unless the job before it was cancelled in this way too. A
+  /// wrong choice does not delay the next one, but in a stream of requests at least every second job is finished.
   void replace(Job job) { take(std::move(job), true); }
-  /// Ends both, soon, with ErrorCode::cancelled.
+  /// Ends both jobs soon, with ErrorCode::cancelled.
   void cancel() { end_jobs(false); }
-  /// The same, and nobody is told how they ended, nor how the one before did.
+  /// Ends both jobs and drops their failures and that of the job before.
   void drop();
-  /// cancel() of those that read a file.
+  /// cancel() for jobs that read a file.
   void cancel_loads() { end_jobs(true); }
 
-  /// How the last job ended is told no more.
+  /// Drops the failure of the last job.
   void forget_failure();
 
-  /// Whether a job waits or is under way.
+  /// True if a job is queued or running.
   [[nodiscard]] bool busy() const;
   [[nodiscard]] Status status() const;
-  /// Until there is nothing to do, at most until then. Returns whether there is not.
+  /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
 
  private:
-  // A job under way, and why it ends.
+  // The running job and why it ends.
   struct Current {
     std::shared_ptr<Progress> progress;
     bool load = false;
-    bool spared = false;  // by replace(): the one before was cancelled for it
+    bool spared = false;  // not to be cancelled by replace(), because the job before it was cancelled for it
     bool replaced = false;
     bool dropped = false;
   };
   void take(Job job, bool replaces);
-  // The thread ends soon.
+  // Makes the thread end soon.
   void stop();
   void end_jobs(bool loads_only);
   void run();

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double longest_step = 2.0;  // voxels
 
-/// Fields of the same kinds, of nothing.
+/// Returns empty fields of the same kinds.
 VolumeFrame like(const VolumeFrame& frame) {
   VolumeFrame out;
   if (frame.temperature) out.temperature.emplace();
@@ -24,7 +24,7 @@ VolumeFrame like(const VolumeFrame& frame) {
   return out;
 }
 
-/// The frame's fields, and after these its velocity again, by which they go.
+/// Returns the frame's fields, followed by the parts of the velocity that advects them.
 std::vector<const ScalarVolume*> sources_of(const VolumeFrame& frame) {
   std::vector<const ScalarVolume*> sources = frame.fields();
   for (const ScalarVolume& part : frame.velocity->parts) sources.push_back(&part);
@@ -73,7 +73,7 @@ class Advection final : Gathering {
     return {glm::clamp(way.min, carried_.min, carried_.max), glm::clamp(way.max, carried_.min, carried_.max)};
   }
 
-  // By how much what is there moves in the whole time, in voxels.
+  // Returns the displacement at p over the whole time, in voxels.
   [[nodiscard]] glm::dvec3 movement(std::span<const Window> windows, const glm::dvec3& p) const {
     const glm::dvec3 known = glm::clamp(p, glm::dvec3(carried_.min), glm::dvec3(carried_.max));
     const auto part = [&](std::size_t i) { return windows[fields_ + i].at(known); };
@@ -81,7 +81,7 @@ class Advection final : Gathering {
     return glm::clamp(moves_ * velocity, least_, most_);
   }
 
-  // Where what comes to p was.
+  // Returns the departure point of the matter that arrives at p.
   [[nodiscard]] glm::dvec3 departure(std::span<const Window> windows, glm::dvec3 p) const {
     for (double left = 1.0; left > 0.0;) {
       const glm::dvec3 here = movement(windows, p);
@@ -93,7 +93,7 @@ class Advection final : Gathering {
     return p;
   }
 
-  // A field's value weighed by density, where there is any.
+  // Interpolates a field with density weights, or without weights where the density is 0.
   static double weighed(const Window& field, const Window& density, const glm::dvec3& p) {
     double weight = 0.0;
     double sum = 0.0;
@@ -119,10 +119,10 @@ class Advection final : Gathering {
   }
 
   std::size_t fields_;
-  std::size_t of_matter_;  // those of them that are so much a unit of volume, density first
-  glm::dmat3 moves_;       // voxels in the whole time, of a velocity as the frame has it
-  Box carried_;            // where there is a velocity
-  glm::dvec3 least_{0.0};  // along each axis
+  std::size_t of_matter_;  // number of fields that are amounts per unit volume, density first
+  glm::dmat3 moves_;       // displacement in voxels over the whole time = moves_ * velocity of the frame
+  Box carried_;            // bounds of the velocity voxels
+  glm::dvec3 least_{0.0};  // bounds of the displacement along each axis
   glm::dvec3 most_{0.0};
 };
 

@@ -5,24 +5,22 @@
 
 namespace cumulet::volume {
 
-/// What advect() moves anything by at most, along an axis.
+/// Maximum displacement by advect() along an axis, in voxels.
 constexpr double farthest_voxels = 64.0;
 
-/// The frame as it is so many seconds later, or before where they are negative: all its fields, carried along its
-/// velocity, which stays as it is meanwhile. Semi-Lagrangian (Stam, "Stable Fluids", 1999): what comes to a voxel's
-/// centre is followed back, by the midpoint rule in steps of two voxels at most, and is there the trilinear
-/// interpolation between voxel centres; of colour, anisotropy and velocity weighed by density, whose they are. What
-/// does not move stays to the bit. Mass is kept as far as that scheme does: in a smooth flow without sources to a per
-/// cent or so.
+/// Advects all fields of the frame along its velocity, which is constant meanwhile, by `seconds` (negative: backward in
+/// time). Semi-Lagrangian (Stam, "Stable Fluids", 1999): a voxel center is traced back by the midpoint rule in steps of
+/// at most two voxels. The field is interpolated there trilinearly between voxel centers; color, anisotropy and
+/// velocity are interpolated with density weights, because they are properties of matter. Voxels that do not move stay
+/// bit-identical. Mass is conserved as far as the scheme does: in a smooth flow without sources to about one percent.
 ///
-/// Where the frame has no velocity, it stands still; but beyond the box of the velocity's voxels the velocity is that
-/// of the box's nearest voxel, so that what is at the rim may leave it. Along an axis nothing moves by more than 64
-/// voxels: what would counts as that fast. A frame without velocity is returned as it is.
+/// Inside the velocity's bounds, voxels without velocity are at rest. Outside, the velocity is that of the nearest
+/// voxel in the bounds, so that matter at the border can leave them. Displacements are clamped to 64 voxels along each
+/// axis. A frame without velocity is returned unchanged.
 ///
-/// O(voxels of bricks that something moves through); in parallel, the same whatever the threads. Memory: the new
-/// fields' bricks, of floats, and no more than one field's a second time. Throws Error(cancelled), and Error(file)
-/// where that is more than 2^21 bricks; what messages say of the frame is for the caller to put in front. from, to: of
-/// the progress' fraction.
+/// O(voxels of bricks that matter moves through). Runs in parallel; the result does not depend on threads. Memory: the
+/// new fields' bricks as floats, plus at most one field a second time. Throws Error(cancelled), and Error(file) for
+/// more than 2^21 bricks; the caller must add the frame's name to messages. from, to: range of the progress fraction.
 VolumeFrame advect(const VolumeFrame& frame, double seconds, Progress* progress = nullptr, double from = 0.0,
                    double to = 1.0);
 

@@ -13,7 +13,7 @@ using namespace detail;
 
 namespace {
 
-/// Of each field that either frame has: the first one's, the second one's, and where what is made of them goes.
+/// For each field of either frame: the field in the first frame, in the second frame, and the result.
 struct Pairs {
   const ScalarVolume nothing = {};
   std::vector<const ScalarVolume*> first, second;
@@ -24,12 +24,12 @@ struct Pairs {
     second.push_back(b);
     out.push_back(&to);
   }
-  /// Of matter there is none where a frame has no such field.
+  /// Adds an amount of matter. In a frame without the field it is 0.
   void add_matter(const std::optional<ScalarVolume>& a, const std::optional<ScalarVolume>& b,
                   std::optional<ScalarVolume>& to) {
     if (a || b) add(a ? &*a : &nothing, b ? &*b : &nothing, to.emplace());
   }
-  /// What says of what kind it is, is as the other has it.
+  /// Adds a property of matter (color, anisotropy, velocity). A frame without the field uses that of the other frame.
   template <std::size_t Count>
   void add_kind(const std::optional<std::array<ScalarVolume, Count>>& a,
                 const std::optional<std::array<ScalarVolume, Count>>& b,
@@ -66,7 +66,7 @@ class Blending final : Gathering {
     return all;
   }
 
-  // value: of a source there.
+  // value(i): returns the value of source i at the voxel.
   template <class Value>
   [[nodiscard]] double mixed(std::size_t field, const Value& value) const {
     double of_first = 1.0 - part_;
@@ -104,7 +104,7 @@ class Blending final : Gathering {
   [[noreturn]] void too_large() const override { fail("is too large to be blended"); }
 
   std::size_t fields_;
-  std::size_t of_matter_;  // those of them that are so much a unit of volume, density first
+  std::size_t of_matter_;  // number of fields that are amounts per unit volume, density first
   double part_;
 };
 
@@ -127,7 +127,7 @@ Box box_of(const VolumeFrame& frame) {
   return box;
 }
 
-/// On another lattice.
+/// Resamples all fields to another lattice.
 VolumeFrame moved(const VolumeFrame& frame, const glm::dmat4& lattice, Progress* progress, Portion portion) {
   VolumeFrame out = frame;
   const glm::dmat4 to_lattice = glm::inverse(lattice) * frame.density.index_to_world;
@@ -172,7 +172,7 @@ VolumeFrame blend(const VolumeFrame& before, const VolumeFrame& after, double pa
     pairs.add_kind(before.anisotropy, after.anisotropy, out.anisotropy);
     if (before.velocity || after.velocity) {
       const Velocity& first = before.velocity ? *before.velocity : *after.velocity;
-      // Of other axes the first one's.
+      // If the velocities use different axes, the first one is used for both.
       const bool alike = after.velocity && same(first.to_index, after.velocity->to_index);
       out.velocity = Velocity{{}, first.to_index};
       pairs.add_kind(first.parts, alike ? after.velocity->parts : first.parts, out.velocity->parts);

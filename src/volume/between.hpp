@@ -5,17 +5,18 @@
 
 namespace cumulet::volume {
 
-/// Two frames mixed, by this part of the second, 0 to 1: fields of the first one's lattice, to which the second one's
-/// are resampled as import_frame does where theirs is another. Matter is linear in the part. What says of what kind it
-/// is, colour, anisotropy and velocity, is weighed by density, so that smoke keeps its colour where the other frame has
-/// none; what only one of both has is as it has it. Fields of which a voxel is alike in both stay to the bit.
+/// Blends two frames; `part` is the weight of the second, 0 to 1. The result has the lattice of the first; fields of
+/// the second are resampled to it as in import_frame if necessary. Density, temperature and flame are interpolated
+/// linearly. Color, anisotropy and velocity are weighted by density, so that smoke keeps its color where the other
+/// frame has none; if only one frame has such a field, it is used unchanged. Voxels that are equal in both frames stay
+/// bit-identical.
 ///
-/// O(bricks); in parallel, the same whatever the threads. Throws what import_frame does of fields that do not go
-/// together, Error(file), and Error(cancelled); what messages say of the frames is for the caller to put in front.
+/// O(bricks). Runs in parallel; the result does not depend on threads. Throws the errors of import_frame for
+/// incompatible fields, Error(file), and Error(cancelled). The caller must add the frames' names to messages.
 VolumeFrame blend(const VolumeFrame& before, const VolumeFrame& after, double part, Progress* progress = nullptr);
 
-/// What is between two frames that are so many seconds apart: both, advected to there (advection.hpp) and blended.
-/// Where one of them has no velocity, blended alone.
+/// Interpolates two frames with a time difference of `seconds`: advects both to the time in between (advection.hpp) and
+/// blends them. If one of them has no velocity, they are only blended.
 VolumeFrame between(const VolumeFrame& before, const VolumeFrame& after, double part, double seconds,
                     Progress* progress = nullptr);
 

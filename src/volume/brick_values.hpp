@@ -14,22 +14,22 @@ namespace cumulet::volume {
 inline constexpr int brick_size = 8;
 inline constexpr int brick_voxels = brick_size * brick_size * brick_size;
 
-/// The half float (IEEE 754 binary16) of exactly this value, which is finite and not negative; nothing if there is
-/// none.
+/// Returns the half float (IEEE 754 binary16) that is exactly equal to the value, or nullopt if there is none. value:
+/// finite and not negative.
 constexpr std::optional<std::uint16_t> exact_half(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   if (bits == 0) return std::uint16_t{0};
-  const std::uint32_t exponent = bits >> 23U;  // above -127; halves have -14 to 15, and fewer bits down to -24
+  const std::uint32_t exponent = bits >> 23U;  // biased by 127; halves have -14 to 15, and fewer bits down to -24
   if (exponent < 103 || exponent > 142) return std::nullopt;
-  const std::uint32_t dropped = exponent < 113 ? 126 - exponent : 13;  // bits of the mantissa
+  const std::uint32_t dropped = exponent < 113 ? 126 - exponent : 13;  // mantissa bits
   const std::uint32_t mantissa = (bits & 0x7fffffU) | 0x800000U;
   if ((mantissa & ((1U << dropped) - 1U)) != 0) return std::nullopt;
   const std::uint32_t kept = mantissa >> dropped;
   return static_cast<std::uint16_t>(exponent < 113 ? kept : kept + ((exponent - 113) << 10U));
 }
 
-/// Of a half that exact_half() gave. In whole numbers where it has few bits: a host may have set its threads to flush
-/// such floats to 0.
+/// Converts a half from exact_half() to float. Denormal halves use integer arithmetic, because a host may have set its
+/// threads to flush denormal floats to 0.
 constexpr float value_of(std::uint16_t half) {
   constexpr std::uint32_t rebias = 112U << 23U;
   const std::uint32_t bits = std::uint32_t{half} << 13U;
@@ -37,8 +37,8 @@ constexpr float value_of(std::uint16_t half) {
   return std::bit_cast<float>(bits + rebias);
 }
 
-/// The values of bricks, 512 each: floats, or halves where these are exactly the same. A file that keeps halves so
-/// takes half of the memory.
+/// The values of bricks, 512 each: as halves if all are exactly representable, else as floats. Data of files with
+/// halves thus takes half of the memory.
 class BrickValues {
  public:
   using Brick = std::array<float, brick_voxels>;
@@ -47,7 +47,7 @@ class BrickValues {
   BrickValues(std::vector<float> floats) : values_(std::move(floats)) {}
   BrickValues(std::vector<std::uint16_t> halves) : values_(std::move(halves)) {}
 
-  /// How many values there are.
+  /// Number of values.
   [[nodiscard]] std::size_t size() const {
     return std::visit([](const auto& values) { return values.size(); }, values_);
   }
@@ -58,14 +58,14 @@ class BrickValues {
     const auto* halves = std::get_if<std::vector<std::uint16_t>>(&values_);
     return halves != nullptr ? value_of((*halves)[i]) : std::get<std::vector<float>>(values_)[i];
   }
-  /// The 512 values of a brick: what is kept, or in `room`.
+  /// Returns the 512 values of a brick, either the stored array or `room`.
   [[nodiscard]] const float* brick(std::size_t i, Brick& room) const {
     if (const auto* floats = std::get_if<std::vector<float>>(&values_)) return floats->data() + i * brick_voxels;
     const std::uint16_t* halves = std::get<std::vector<std::uint16_t>>(values_).data() + i * brick_voxels;
     for (std::size_t v = 0; v < brick_voxels; ++v) room[v] = value_of(halves[v]);
     return room.data();
   }
-  /// All of them, to be changed: floats from now on.
+  /// Returns all values for modification; they are floats afterwards.
   std::vector<float>& as_floats() {
     if (are_halves()) {
       std::vector<float> floats(size());
@@ -74,7 +74,7 @@ class BrickValues {
     }
     return std::get<std::vector<float>>(values_);
   }
-  /// The same values, however they are kept.
+  /// Compares values, regardless of their storage.
   bool operator==(const BrickValues& other) const {
     if (size() != other.size()) return false;
     for (std::size_t i = 0; i < size(); ++i) {

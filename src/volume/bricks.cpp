@@ -8,7 +8,7 @@ namespace cumulet::volume {
 
 namespace {
 
-// Inclusive.
+// Both ends are inclusive.
 bool holds(const glm::ivec3& low, const glm::ivec3& high, const glm::ivec3& p) {
   return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
 }

@@ -14,17 +14,17 @@ namespace cumulet::volume::detail {
 
 namespace {
 
-constexpr int step = 4;               // voxels of the whole a coarse one, along an axis
-constexpr int coarse_brick_log2 = 5;  // voxels of the whole a coarse brick
+constexpr int step = 4;               // full-resolution voxels per coarse voxel, along an axis
+constexpr int coarse_brick_log2 = 5;  // log2 of full-resolution voxels per coarse brick, along an axis
 constexpr int step_log2 = 2;
 
-// One of 16: four of a coarse brick's 64, one in each layer of it along every axis.
+// Selects one leaf in 16: four of the 64 in a coarse brick, one in each layer along every axis.
 bool is_sampled(const glm::ivec3& origin) {
   const glm::ivec3 leaf = origin >> 3;
   return ((leaf.x + 4 * leaf.y + 7 * leaf.z) & 15) == 0;
 }
 
-/// How many are active of each of a leaf's eighths, which are coarse voxels; z fastest.
+/// Returns the number of active voxels in each octant of a leaf, which is one coarse voxel; z fastest.
 std::array<int, 8> active_eighths(const ActiveMask& mask) {
   std::array<int, 8> counts{};
   for (std::size_t x = 0; x < mask.size(); ++x) {
@@ -37,7 +37,7 @@ std::array<int, 8> active_eighths(const ActiveMask& mask) {
   return counts;
 }
 
-/// A tree's leaves and small tiles in bricks of coarse voxels.
+/// A tree's leaves and small tiles, as bricks of coarse voxels.
 class CoarseLeaves final : public HeldLeaves {
  public:
   CoarseLeaves(const LeafSource& leaves, float background, const std::vector<SourceTile>& tiles, double at,
@@ -96,16 +96,16 @@ class CoarseLeaves final : public HeldLeaves {
 
  private:
   struct Part {
-    glm::ivec3 origin;  ///< of 8^3 voxels of the whole
-    std::size_t part;   ///< a leaf, or behind those a tile
+    glm::ivec3 origin;  ///< of 8^3 full-resolution voxels
+    std::size_t part;   ///< index of a leaf or, after the leaves, of a tile
   };
   struct Brick {
-    glm::ivec3 place;                ///< in bricks
-    std::size_t first;               ///< of its parts
-    std::optional<float> mean = {};  ///< of active voxels; none: nothing was read of it
+    glm::ivec3 place;                ///< position in bricks
+    std::size_t first;               ///< index of its first part
+    std::optional<float> mean = {};  ///< of active voxels; empty: no leaf of it was read
   };
 
-  /// What was read of a brick and of those around it.
+  /// The means of a brick and its neighbors.
   class Around {
    public:
     Around(const CoarseLeaves& of, std::size_t brick) {
@@ -117,7 +117,7 @@ class CoarseLeaves final : public HeldLeaves {
         if (is_there) means_[static_cast<std::size_t>(i)] = found->mean;
       }
     }
-    /// At a voxel's centre, linearly between the bricks' own.
+    /// Interpolates the means of the bricks linearly at a voxel's center.
     [[nodiscard]] float mean(const glm::ivec3& voxel) const {
       const glm::vec3 at = (glm::vec3(voxel) + 0.5F) / float{brick_size} + 0.5F;
       const glm::ivec3 low(at);
@@ -156,7 +156,7 @@ class CoarseLeaves final : public HeldLeaves {
   }
 
   void take_means(double at, Progress* progress) {
-    // A brick of which the pattern meets nothing has its first leaf read.
+    // In a brick without a sampled leaf, the first leaf is read.
     std::vector<std::uint8_t> chosen(leaves_.count());
     for (std::size_t brick = 0; brick < bricks_.size(); ++brick) {
       bool any = false;
@@ -190,8 +190,8 @@ class CoarseLeaves final : public HeldLeaves {
 
   const LeafSource& leaves_;
   float background_;
-  std::vector<SourceTile> tiles_;  // of 8^3
-  std::vector<Part> parts_;        // by their bricks
+  std::vector<SourceTile> tiles_;  // of 8^3 voxels
+  std::vector<Part> parts_;        // sorted by their bricks
   std::vector<Brick> bricks_;      // sorted
 };
 
@@ -218,7 +218,7 @@ SourceGrid CoarseReader::read(std::size_t grid, Portion /*portion*/, const Log& 
     }
   }
   looked_.push_back({whole_.grids()[grid].name, box, whole.index_to_world});
-  // A coarse voxel's centre is that of the voxels that it is of.
+  // The center of a coarse voxel is that of the voxels it covers.
   coarse.index_to_world = whole.index_to_world *
                           glm::scale(glm::translate(glm::dmat4(1.0), glm::dvec3(0.5 * (step - 1))), glm::dvec3(step));
   coarse.background = whole.background;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: a file's grids as they look from afar.
+// Private to volume/: low-resolution proxies of a file's grids.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,10 +12,11 @@
 
 namespace cumulet::volume::detail {
 
-/// Reads of each grid of numbers what StandIn says, and keeps the tree of the first for the reader of the whole.
+/// Reads each scalar grid at the reduced resolution of StandIn. Keeps the tree of the first grid for the
+/// full-resolution reader.
 class CoarseReader final : public Reader {
  public:
-  /// Of a reader that streams. read() throws for a first grid that has fewer bricks.
+  /// whole: a reader with streams(). read() throws if the first grid has fewer bricks than least_bricks.
   CoarseReader(Reader& whole, std::uint64_t least_bricks, Progress* progress)
       : whole_(whole), least_bricks_(least_bricks), progress_(progress) {}
 
@@ -24,14 +25,14 @@ class CoarseReader final : public Reader {
   [[nodiscard]] const std::string& format() const override { return whole_.format(); }
   [[nodiscard]] double reading() const override { return 1.0; }
   SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) override;
-  /// There are none.
+  /// Always throws: vector grids are not supported.
   std::array<SourceGrid, 3> read_vector(std::size_t grid, Portion portion, const Log& log,
                                         const std::string& log_prefix) override;
 
-  /// Of the frame that was made of what read() gave.
+  /// Returns the extent of a frame that was made of grids from read().
   [[nodiscard]] std::optional<StandIn::Extent> extent(const VolumeFrame& frame) const;
 
-  /// The whole's own, which need not read the first grid's tree again.
+  /// The full-resolution reader, which reuses the tree of the first grid.
   class Rest final : public Reader {
    public:
     explicit Rest(CoarseReader& coarse) : coarse_(coarse) {}
@@ -62,9 +63,9 @@ class CoarseReader final : public Reader {
   Reader& whole_;
   std::uint64_t least_bricks_;
   Progress* progress_;
-  std::optional<std::size_t> first_;  // the grid that is kept
+  std::optional<std::size_t> first_;  // the grid whose tree is kept
   SourceGrid first_source_;
-  SourceGrid later_source_;  // what the last that was read is of
+  SourceGrid later_source_;  // source of the last grid that was read, except for the first
   std::vector<Looked> looked_;
 };
 

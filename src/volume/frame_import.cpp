@@ -26,11 +26,11 @@ constexpr std::array<std::string_view, 4> anisotropy_names = {"anisotropy", "sca
                                                               "phase_g"};
 constexpr const char* no_grid = "none";
 
-/// Places in the file's list of grids.
+/// The chosen grids, as indices into the file's list.
 struct Chosen {
   std::optional<std::size_t> density, temperature, flame, anisotropy;
-  std::vector<std::size_t> colour;    ///< none; one of vectors; or red, green and blue
-  std::vector<std::size_t> velocity;  ///< none; one of vectors; or along x, y and z
+  std::vector<std::size_t> colour;    ///< empty; one vector grid; or red, green and blue
+  std::vector<std::size_t> velocity;  ///< empty; one vector grid; or along x, y and z
 
   [[nodiscard]] std::vector<std::size_t> all() const {
     std::vector<std::size_t> out = colour;
@@ -44,7 +44,7 @@ struct Chosen {
 
 bool by_name(const std::string& name) { return name.empty(); }
 
-/// The grids of three channels of one name.
+/// Returns the three channel grids of this name.
 std::vector<std::size_t> channels(const std::vector<GridInfo>& grids, const std::string& name) {
   std::vector<std::size_t> found;
   for (const char* suffix : {"_r", "_g", "_b"}) {
@@ -56,19 +56,19 @@ std::vector<std::size_t> channels(const std::vector<GridInfo>& grids, const std:
   return found;
 }
 
-/// Why a grid holds no colours; empty if it may.
+/// Returns why a grid cannot hold colors; empty if it can.
 std::string colour_refusal(const GridInfo& grid) {
   if (grid.values != Values::lengths || grid.type == "vec3i") return "is of type " + grid.type + ", not vec3s or vec3d";
   if (grid.grid_class == "staggered") return "is staggered: velocities, not colours";
   return {};
 }
 
-/// Why a grid holds no velocities; empty if it may.
+/// Returns why a grid cannot hold velocities; empty if it can.
 std::string velocity_refusal(const GridInfo& grid) {
   return grid.values == Values::lengths ? std::string() : "is of type " + grid.type + ", not of vectors";
 }
 
-/// One of vectors that has this name, or else the three grids of numbers. parts: what those are called.
+/// Returns the vector grid of this name, or else the three scalar grids. parts: their suffixes.
 std::vector<std::size_t> choose_vectors(const std::vector<GridInfo>& grids, const std::string& name,
                                         std::string (*refusal)(const GridInfo&), std::vector<std::size_t> three,
                                         const std::array<const char*, 3>& parts) {
@@ -113,7 +113,7 @@ std::vector<std::size_t> choose_colour(const std::vector<GridInfo>& grids, const
 
 Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
   if (grids.empty()) fail("holds no grids");
-  // What is named for one field is not found for another.
+  // A grid that is named for one field is not chosen for another.
   std::vector<std::size_t> taken;
   const auto asked = [&](const std::string& name) -> std::optional<std::size_t> {
     if (by_name(name) || name == no_grid) return std::nullopt;
@@ -146,7 +146,7 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
 
 double voxel_size(const ScalarVolume& field) { return std::abs(glm::determinant(glm::dmat3(field.index_to_world))); }
 
-/// The field that the lattice is taken from where there is no density: of the smallest voxels, then of the most.
+/// Whether field a is preferred for the lattice if there is no density: smaller voxels, then more voxels.
 bool finer(const ScalarVolume& a, const ScalarVolume& b) {
   constexpr double alike = 1e-6;
   const double size_a = voxel_size(a);
@@ -159,8 +159,8 @@ bool apart(const ScalarVolume& a, const ScalarVolume& b) {
   return Box{a.bounds_min, a.bounds_max}.clipped({b.bounds_min, b.bounds_max}).empty();
 }
 
-/// What the values of a temperature are taken as where they are not what simulations have, 0 to 3. The same for all
-/// frames of a sequence.
+/// Returns a remark on a temperature whose values are not in the usual range of simulations, 0 to 3. The text is the
+/// same for all frames of a sequence.
 std::string remark_on_temperature(const ScalarVolume& field) {
   if (field.max_value > max_relative_temperature && field.negative_voxels > 0)
     return "reaches hundreds and has negative values, as degrees Celsius do: they are taken as kelvin, unless "
@@ -173,7 +173,7 @@ std::string remark_on_temperature(const ScalarVolume& field) {
   return {};
 }
 
-/// Whether vectors are of their grid's own index space: OpenVDB's metadata.
+/// Whether vectors are in their grid's own index space, by OpenVDB's metadata.
 bool is_local(const GridInfo& grid) {
   const auto says = [&](std::string_view name, std::string_view value) {
     return std::ranges::any_of(
@@ -214,7 +214,7 @@ class FrameImport {
   }
 
  private:
-  static constexpr double reading = 0.8;  // of what an import takes
+  static constexpr double reading = 0.8;  // fraction of an import's time
 
   VolumeFrame finish(bool has_density, Portion portion) {
     const auto any = [](const std::optional<ScalarVolume>& field) { return field && !field->empty(); };
@@ -274,7 +274,7 @@ class FrameImport {
     }
   }
 
-  /// Equal shares of a load's fraction.
+  /// Splits a range of the load's progress into equal parts.
   class Shares {
    public:
     Shares(Portion portion, std::size_t count) : portion_(portion), share_(1.0 / static_cast<double>(count)) {}
@@ -313,7 +313,7 @@ class FrameImport {
     try_velocity([&] { out_.velocity = read_velocity(reader, chosen.velocity, shares); });
   }
 
-  /// A picture needs none: one that nobody named is left out where it fails.
+  /// Images do not need a velocity: one that was not named explicitly is left out if it fails.
   template <class Work>
   void try_velocity(const Work& work) const {
     try {
@@ -341,7 +341,7 @@ class FrameImport {
     for (int axis = 0; axis < 3; ++axis) {
       for (std::size_t sign = 0; sign < 2; ++sign) {
         ScalarVolume& part = axes[static_cast<std::size_t>(axis)][sign];
-        // On the face that the voxel shares with the one before it.
+        // The component is on the face shared with the previous voxel.
         if (staggered) part.index_to_world[3] -= 0.5 * part.index_to_world[axis];
         velocity.parts[2 * static_cast<std::size_t>(axis) + sign] = std::move(part);
       }
@@ -363,7 +363,7 @@ class FrameImport {
     if (velocity) {
       try_velocity([&] {
         bring_to_index(*velocity);
-        // Elsewhere nothing moves that scatters.
+        // Velocity matters only where matter scatters.
         std::optional<Box> within;
         if (!out_.density.empty()) within = Box{out_.density.bounds_min - 1, out_.density.bounds_max + 1};
         const bool moves = std::ranges::any_of(velocity->parts, [](const auto& part) { return part.max_value > 0.0F; });
@@ -374,7 +374,7 @@ class FrameImport {
     }
   }
 
-  // How many voxels had more.
+  // Clamps values, and returns the number of voxels that were clamped.
   static std::uint64_t clamp_to(float most, std::span<ScalarVolume> parts) {
     std::uint64_t beyond = 0;
     const auto clamp = [&](float& value, std::uint64_t voxels) {
@@ -399,7 +399,7 @@ class FrameImport {
            std::to_string(beyond) + " voxels beyond -1 and 1 clamped to these");
   }
 
-  // to_index: from the file's world to the lattice, too; and nothing faster than a half float says of it.
+  // Converts to_index from the file's world to the lattice, and clamps speeds to the range of half floats.
   void bring_to_index(Velocity& velocity) const {
     velocity.to_index = Velocity::to_index_of(out_.density.index_to_world) * velocity.to_index;
     const std::uint64_t beyond = clamp_to(velocity.most(), velocity.parts);
@@ -418,7 +418,7 @@ class FrameImport {
       constexpr double sampling = 0.7;
       SourceGrid source = placed ? bricks_within(field, *within)
                                  : resample(field, lattice, within, progress_, portion.part(0.0, sampling));
-      // What there is to say of its values is said.
+      // Warnings about its values were already logged.
       ScalarVolume volume = assemble(std::move(source), {}, {}, progress_, portion.part(sampling, 1.0));
       volume.name = field.name;
       volume.negative_voxels = field.negative_voxels;
@@ -429,7 +429,7 @@ class FrameImport {
     field.index_to_world = lattice;
   }
 
-  /// Density has a remark of its own.
+  /// Density has its own remark: remark_on_choice().
   void remark_on_case(const std::vector<GridInfo>& grids, const Chosen& chosen, const GridNames& names) const {
     const std::vector<std::size_t> shown = chosen.all();
     const auto remark_on = [&](const char* field, const std::string& name, std::span<const std::size_t> found) {
@@ -458,12 +458,12 @@ class FrameImport {
     }
   }
 
-  /// Of a field's parts those that are empty say nothing, such as what is below 0 of an anisotropy that nowhere is.
+  /// Ignores empty parts of a field, such as the negative part of an anisotropy that is positive everywhere.
   void warn_if_apart(std::span<const ScalarVolume> parts) const {
     if (!std::ranges::all_of(parts, [](const ScalarVolume& part) { return part.empty(); })) warn_if_elsewhere(parts);
   }
 
-  /// Those that are empty count as elsewhere.
+  /// Empty parts count as not overlapping.
   void warn_if_elsewhere(std::span<const ScalarVolume> parts) const {
     const auto elsewhere = [&](const ScalarVolume& part) { return part.empty() || apart(part, out_.density); };
     if (out_.density.empty() || !std::ranges::all_of(parts, elsewhere)) return;
@@ -531,7 +531,7 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
   try {
     chosen = choose(grids, {});
   } catch (const std::runtime_error&) {
-    // None can be shown.
+    // No grid can be used as density.
   }
   for (const std::size_t grid : chosen.colour) channels[grid] = "color";
   const auto name = [&](const std::optional<std::size_t>& grid, const char* field) {
@@ -551,7 +551,7 @@ VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log
 
 namespace {
 
-// None where anything fails: that is told of the whole, if it fails there, too.
+// Returns nullopt on any failure. If the full-resolution import fails too, it reports the error.
 std::optional<StandIn> stand_in_of(CoarseReader& coarse, const std::string& file, GridNames names,
                                    const Progress* progress) {
   try {
@@ -566,7 +566,7 @@ std::optional<StandIn> stand_in_of(CoarseReader& coarse, const std::string& file
   }
 }
 
-// Less than a brick takes of any file: its mask, twice.
+// Lower bound of a brick's size in any file: two copies of its mask.
 constexpr std::uint64_t least_bytes_a_brick = 128;
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace cumulet::volume::detail {
 
 namespace {
 
-constexpr int told_depth = 3;  // progress is told of cubes of this depth
+constexpr int told_depth = 3;  // progress is reported for cubes of this depth
 
 std::uint64_t pieces(int depth) { return std::uint64_t{1} << (3 * std::max(told_depth - depth, 0)); }
 
@@ -26,7 +26,7 @@ Window::Window(const ScalarVolume& field, const Box& box, const Items& items)
       cells_[place(cell)].first = std::size_t{item} * brick_voxels;
       continue;
     }
-    // Within bounds a cell has one tile, or none.
+    // Within bounds, a cell is covered by at most one tile.
     const Tile& tile = field.tiles[item - field.brick_origins.size()];
     const glm::ivec3 min = glm::max((tile.min >> 3) - low_, 0);
     const glm::ivec3 max = glm::min((tile.max >> 3) - low_, size_ - 1);
@@ -76,7 +76,7 @@ double Window::at(const glm::dvec3& p) const {
 
 // ---- fields ----
 
-/// Those voxels are active that are not zero.
+/// The bricks of a field; voxels that are not 0 are active.
 class Gathering::Leaves final : public HeldLeaves {
  public:
   explicit Leaves(std::vector<std::deque<Placed>> bricks) : bricks_(std::move(bricks)) {
@@ -197,7 +197,7 @@ void assemble_in_place_of(std::span<const ScalarVolume* const> before, std::vect
     const auto share = [&](std::size_t place) { return static_cast<double>(place) / static_cast<double>(out.size()); };
     gathered[i].index_to_world = before[i]->index_to_world;
     *out[i] = assemble(std::move(gathered[i]), {}, {}, progress, portion.part(share(i), share(i + 1)));
-    // What there is to say of its values is said.
+    // Warnings about its values were already logged.
     out[i]->name = before[i]->name;
     out[i]->negative_voxels = before[i]->negative_voxels;
     out[i]->non_finite_voxels = before[i]->non_finite_voxels;

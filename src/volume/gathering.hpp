@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: fields on a lattice whose voxels are made of other fields' voxels nearby.
+// Private to volume/: computes fields on a lattice whose voxels depend on nearby voxels of other fields.
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -14,27 +14,27 @@
 
 namespace cumulet::volume::detail {
 
-/// Of a voxel: places that differ by rounding alone give a voxel's own value.
+/// In voxels: positions that differ from a voxel's center only by rounding use the voxel's own value.
 inline constexpr double alike = 1e-4;
 
-/// A field's bricks and tiles that meet a box of its voxels: places in brick_origins, then in tiles.
+/// The bricks and tiles of a field that overlap a box: indices into brick_origins, continued by indices into tiles.
 using Items = std::vector<std::uint32_t>;
 
-/// A field's values within a box, by cells of the bricks' size.
+/// A field's values within a box, in cells of the size of a brick.
 class Window {
  public:
-  /// items: those that meet the box.
+  /// items: the bricks and tiles that overlap the box.
   Window(const ScalarVolume& field, const Box& box, const Items& items);
 
   [[nodiscard]] double voxel(glm::ivec3 p) const;
-  /// The value all over a box within the window's, if cells alone tell it.
+  /// Returns the constant value of a box inside the window, if it can be derived from cells without their voxels.
   [[nodiscard]] std::optional<double> constant(const Box& box) const;
-  /// Trilinear between the centres of voxels.
+  /// Interpolates trilinearly between voxel centers.
   [[nodiscard]] double at(const glm::dvec3& p) const;
 
  private:
   struct Cell {
-    std::optional<std::size_t> first;  // place of its brick's values
+    std::optional<std::size_t> first;  // index of its brick's first value
     float constant;
   };
   [[nodiscard]] std::size_t place(glm::ivec3 cell) const;
@@ -44,7 +44,7 @@ class Window {
   std::vector<Cell> cells_;
 };
 
-/// f(voxel, weight) for those that a trilinear interpolation at p is made of.
+/// Calls f(voxel, weight) for the voxels of a trilinear interpolation at p.
 template <class F>
 void for_each_corner(glm::dvec3 p, F&& f) {
   const glm::dvec3 nearest = glm::round(p);
@@ -62,8 +62,8 @@ void for_each_corner(glm::dvec3 p, F&& f) {
   }
 }
 
-/// Makes fields of a lattice, cube by cube: what is made of one value all over is a tile, the rest bricks. In parallel,
-/// the same whatever the threads. O(voxels that become bricks).
+/// Computes fields on a lattice, cube by cube: regions with a constant value become tiles, all others bricks. Runs in
+/// parallel; the result does not depend on threads. O(voxels that become bricks).
 class Gathering {
  public:
   Gathering(const Gathering&) = delete;
@@ -72,25 +72,27 @@ class Gathering {
  protected:
   using Brick = std::array<float, brick_voxels>;
 
-  /// Of the sources the first `made` become fields, each of its own values; others have a part in that, too.
+  /// The first `made` sources become fields. Each field depends on its own source, and may depend on others.
   Gathering(std::vector<const ScalarVolume*> sources, std::size_t made, Progress* progress, Portion portion);
   virtual ~Gathering() = default;
 
-  /// The fields within a box of the lattice, beyond which stand whole bricks and tiles, or nothing.
+  /// Computes the fields within a box of the lattice. Outside of the box they may have parts of bricks and tiles.
   [[nodiscard]] std::vector<SourceGrid> gather(const Box& box);
   [[nodiscard]] const ScalarVolume& source(std::size_t i) const { return *sources_[i]; }
 
-  /// A source's voxels that a box of the lattice, of any size, is made of.
+  /// Returns the voxels of a source that determine a box of the lattice, of any size.
   [[nodiscard]] virtual Box support(std::size_t source, const Box& box) const = 0;
-  /// A field's value where each of its sources has one all over, or none that is known.
+  /// Returns a field's value in a region where sources are constant (nullopt: not known to be). Returns nullopt if the
+  /// result is not constant.
   [[nodiscard]] virtual std::optional<float> constant(std::size_t field,
                                                       std::span<const std::optional<float>> sources) const {
     return sources[field];
   }
-  /// The values of a brick of the lattice. windows: one a source. wanted: fields, for each of which a brick is filled.
+  /// Computes the values of a brick of the lattice. windows: one per source. wanted: the fields to compute. bricks: one
+  /// brick per wanted field.
   virtual void sample(const glm::ivec3& origin, std::span<const Window> windows, std::span<const std::size_t> wanted,
                       std::span<Brick> bricks) const = 0;
-  /// Throws for what is more than 2^21 bricks: 4 GiB of a field's values.
+  /// Throws for more than 2^21 bricks, which is 4 GiB of a field's values.
   [[noreturn]] virtual void too_large() const = 0;
   static constexpr std::uint64_t most_bricks = std::uint64_t{1} << 21U;
 
@@ -99,13 +101,13 @@ class Gathering {
     glm::ivec3 origin;
     Brick values;
   };
-  using Bricks = std::vector<std::deque<Placed>>;  // one of each field
+  using Bricks = std::vector<std::deque<Placed>>;  // one deque per field
   class Leaves;
 
   [[nodiscard]] Box box_of(std::size_t i, std::uint32_t item) const;
-  // The value all over a box of a source, if that is known without looking at voxels.
+  // Returns the constant value of a source in a box, if it is known without reading voxels.
   [[nodiscard]] std::optional<float> value_all_over(std::size_t i, const Box& box, const Items& items) const;
-  // A cube of the lattice, of the items of each source that may meet what it is made of.
+  // Processes a cube of the lattice. candidates: for each source, the items that may overlap its support.
   void refine(glm::ivec3 origin, int size, int depth, std::span<const Items> candidates);
   void make_brick(const glm::ivec3& origin, std::span<const Box> needed, std::span<const Items> items,
                   std::span<const std::size_t> wanted);
@@ -119,7 +121,7 @@ class Gathering {
   tbb::enumerable_thread_specific<std::vector<std::vector<SourceTile>>> tiles_;
 };
 
-/// From what was gathered to the contract of volumes, in the place and by the name of those that it was gathered from.
+/// Assembles the gathered fields to volumes, with the names and transforms of the fields that they were gathered from.
 void assemble_in_place_of(std::span<const ScalarVolume* const> before, std::vector<SourceGrid> gathered,
                           std::span<ScalarVolume* const> out, Progress* progress, Portion portion);
 

@@ -53,7 +53,7 @@ std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress
   if (status.type() == fs::file_type::directory) fail("is a directory");
   if (status.type() != fs::file_type::regular) fail("is not a regular file");
 
-  // By content: a wrong extension is no reason to refuse a good file.
+  // Recognized by content: a wrong file extension is no error.
   std::array<char, 8> magic{};
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
@@ -88,7 +88,7 @@ std::string detail::describe(const std::vector<GridInfo>& grids, std::span<const
 
 namespace {
 
-// What is shown as density of a file that has none, the first of these first.
+// Grids used as density of a file without density, in order of preference.
 constexpr std::array<std::string_view, 5> likely_names = {"flames", "flame", "fire", "temperature", "heat"};
 
 bool is_among(std::size_t grid, std::span<const std::size_t> some) {
@@ -116,7 +116,7 @@ std::vector<std::size_t> detail::called_so(const std::vector<GridInfo>& grids, s
 
 namespace {
 
-// Grids of numbers of this name with an axis' letter behind `join`, those in the name's own case first.
+// Returns scalar grids named `name`, `join` and an axis letter; those with exactly this case come first.
 std::array<std::vector<std::size_t>, 3> axes_called(const std::vector<GridInfo>& grids, std::string_view name,
                                                     std::string_view join) {
   std::array<std::vector<std::size_t>, 3> found;
@@ -193,7 +193,7 @@ std::vector<std::size_t> detail::named(const std::vector<GridInfo>& grids, const
     }
     return found;
   };
-  // "density[1]" picks one of several grids of the same name; an exact name comes first.
+  // "density[1]" selects one of several grids of the same name; an exact name has priority.
   std::vector<std::size_t> found = all_with(&GridInfo::name);
   return found.empty() ? all_with(&GridInfo::unique_name) : found;
 }
@@ -281,7 +281,7 @@ bool detail::HeldLeaves::sweep_chosen(const Choice& chosen, const Visit& visit, 
     }
     part.add(range.size());
   };
-  // In small parts, after each of which progress is told.
+  // In small chunks, so that progress is reported often.
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count(), 64), visit_some, tbb::simple_partitioner());
   return wanted;
 }
@@ -307,29 +307,29 @@ ActiveRegion detail::active_leaf_region(const LeafSource& leaves, ProgressPart& 
 
 namespace {
 
-/// Finite, and further from 0 than anything that is measured.
+/// Whether a value is finite and beyond largest_value, larger than any measured value.
 bool is_huge(float value) { return std::isfinite(value) && std::abs(value) > largest_value; }
 
-/// A voxel's value as the volume keeps it.
-float counted(float value) { return value > 0.0F && value <= largest_value ? value : 0.0F; }  // turns -0 into 0 too
+/// Returns the value that the volume stores for a voxel.
+float counted(float value) { return value > 0.0F && value <= largest_value ? value : 0.0F; }  // also turns -0 into 0
 
-/// What is found of a brick's voxels within bounds.
+/// Statistics of a brick's voxels within bounds.
 struct CleanBrick {
   std::uint32_t negative = 0;
   std::uint32_t non_finite = 0;
   std::uint32_t huge = 0;
   float max = 0.0F;
-  bool constant = true;  ///< all alike
-  float first = 0.0F;    ///< the first of them
+  bool constant = true;  ///< all values are equal
+  float first = 0.0F;    ///< the first value
 };
 
-/// Makes a leaf's values what the volume keeps. In whole numbers, which vectorize.
+/// Replaces a leaf's values by those that the volume stores. Integer arithmetic vectorizes.
 CleanBrick clean_inside(std::span<float, brick_voxels> values) {
   constexpr std::int32_t infinite = 0x7f800000;
   constexpr auto largest = std::bit_cast<std::int32_t>(largest_value);
   std::uint32_t negative = 0;
   std::uint32_t non_finite = 0;
-  std::uint32_t beyond = 0;  // huge, or not finite
+  std::uint32_t beyond = 0;  // huge or not finite
   std::int32_t most = 0;
   std::int32_t other = 0;
   const auto keep = [](std::int32_t bits) { return bits > 0 && bits <= largest ? bits : 0; };
@@ -349,7 +349,7 @@ CleanBrick clean_inside(std::span<float, brick_voxels> values) {
       negative, non_finite, beyond - non_finite, std::bit_cast<float>(most), other == 0, std::bit_cast<float>(first)};
 }
 
-/// The same of a leaf that reaches beyond the bounds, where it becomes 0.
+/// Same as clean_inside() for a leaf that extends beyond the bounds, where values become 0.
 CleanBrick clean_across(std::span<float, brick_voxels> values, const glm::ivec3& origin, const Box& bounds) {
   CleanBrick brick;
   std::optional<float> first;
@@ -381,13 +381,13 @@ CleanBrick clean(std::span<float, brick_voxels> values, const glm::ivec3& origin
                                                               : clean_across(values, origin, bounds);
 }
 
-/// Keeps a brick's values exactly; returns false where it cannot.
+/// Stores a brick's values exactly; returns false if that is not possible.
 bool keep(std::span<const float, brick_voxels> values, float* out) {
   std::ranges::copy(values, out);
   return true;
 }
 bool keep(std::span<const float, brick_voxels> values, std::uint16_t* out) {
-  // Nearly all are 0 or no small number, which vectorizes.
+  // Nearly all values are 0 or normal halves; this path vectorizes.
   bool plain = true;
   for (std::size_t i = 0; i < brick_voxels; ++i) {
     const auto bits = std::bit_cast<std::uint32_t>(values[i]);
@@ -417,17 +417,17 @@ struct BrickTotals {
   }
 };
 
-/// A grid's leaves that meet its bounds, one after another by origin, as a sweep finds them.
+/// A grid's leaves that overlap its bounds, sorted by origin, with the results of a sweep.
 struct Bricks {
-  std::vector<std::size_t> place;  ///< of each leaf; of one beyond the bounds the end
+  std::vector<std::size_t> place;  ///< for each leaf its index; the end for leaves outside of the bounds
   std::vector<glm::ivec3> origins;
-  std::vector<char> constant;  ///< 1: all of one value
-  std::vector<float> first;    ///< its first value
+  std::vector<char> constant;  ///< 1: all values are equal
+  std::vector<float> first;    ///< first value
   BrickTotals totals;
 };
 
-/// Fills the values of all that are not constant, at their places. Returns false where a T does not hold one of them
-/// exactly: what was found is then worth nothing.
+/// Fills the values of all bricks that are not constant. Returns false if a T cannot represent one of them exactly; the
+/// results are then invalid.
 template <class T>
 bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vector<T>& values, Progress* progress,
           Portion portion) {
@@ -448,7 +448,7 @@ bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vect
   return true;
 }
 
-/// Whether the first that are read can be kept as halves.
+/// Whether the first bricks read can be stored as halves.
 bool begins_with_halves(const LeafSource& leaves, const Box& bounds, const Bricks& bricks, double at) {
   constexpr int enough = 64;
   std::atomic<int> looked_at = 0;
@@ -464,7 +464,7 @@ bool begins_with_halves(const LeafSource& leaves, const Box& bounds, const Brick
   return halves;
 }
 
-/// Closes the gaps that constant bricks left.
+/// Removes the gaps of constant bricks.
 template <class T>
 void close_gaps(const Bricks& bricks, std::vector<T>& values, std::vector<glm::ivec3>& origins,
                 const Progress* progress) {
@@ -481,7 +481,7 @@ void close_gaps(const Bricks& bricks, std::vector<T>& values, std::vector<glm::i
   if (values.size() < all - all / 8) values.shrink_to_fit();
 }
 
-/// Leaf indices by origin; every origin a brick's, none twice.
+/// Returns leaf indices sorted by origin. Throws if an origin is not that of a brick or occurs twice.
 std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress* progress) {
   std::vector<std::size_t> order(leaves.count());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -507,7 +507,7 @@ void detail::check_transform(const glm::dmat4& m) {
       if (!std::isfinite(m[column][row])) fail("its transform is not finite");
     }
   }
-  // Relative to the axes' lengths, so that tiny voxels are no singular transform.
+  // Relative to the lengths of the axes, so that tiny voxels do not count as singular.
   const glm::dvec3 x(m[0]);
   const glm::dvec3 y(m[1]);
   const glm::dvec3 z(m[2]);
@@ -561,7 +561,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     bricks.constant.resize(order.size());
     bricks.first.resize(order.size());
   }
-  // Halves first, unless it shows at once, before there is room for all, that they do not do.
+  // Tries halves first, unless a quick check, before memory is allocated, shows that they are not exact.
   const auto sweep = [&](auto values, Portion part) {
     if (!fill(leaves, bounds, bricks, values, progress, part)) return false;
     close_gaps(bricks, values, out.brick_origins, progress);
@@ -598,14 +598,14 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     out.max_value = std::max(out.max_value, value);
     if (value != out.background) out.tiles.push_back({box.min, box.max, value});
   }
-  // What no brick and no tile covers has the background value.
+  // Voxels without a brick or tile have the background value.
   const std::uint64_t uncovered = bounds.voxels() - std::min(covered, bounds.voxels());
   if (uncovered > 0) {
     out.max_value = std::max(out.max_value, out.background);
     count_uncounted(source.background, uncovered);
   }
 
-  // A brick of one value says no more than a tile, in a seventieth of the memory.
+  // A constant brick becomes a tile, which takes a seventieth of the memory.
   for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
     if (bricks.constant[i] == 0 || bricks.first[i] == out.background) continue;
     const Box box = clipped(bricks.origins[i]);
@@ -629,7 +629,7 @@ std::vector<GridInfo> list_grids(const FilePath& file) {
 
 namespace {
 
-// What f makes of one grid of an open file: its name, and what messages call it.
+// Returns the result of f(name of the grid, prefix for messages) for one grid of an open file.
 template <class F>
 auto of_grid(Reader& reader, std::size_t grid, const std::string& file, F&& f) {
   const GridInfo& entry = reader.grids()[grid];
@@ -640,9 +640,9 @@ auto of_grid(Reader& reader, std::size_t grid, const std::string& file, F&& f) {
 bool is_empty(const ScalarVolume& volume) { return volume.empty(); }
 bool is_empty(const std::array<ScalarVolume, 2>& signs) { return signs[0].empty(); }
 
-constexpr double reading_vectors = 0.7;  // of what an import takes
+constexpr double reading_vectors = 0.7;  // fraction of an import's time
 
-// What make() makes of each component of a grid of vectors.
+// Calls make() for each component of a vector grid.
 template <class Axis, class Make>
 std::array<Axis, 3> of_axes(Reader& reader, std::size_t grid, const std::string& file, const Log& log, Portion portion,
                             const Make& make) {
@@ -652,7 +652,7 @@ std::array<Axis, 3> of_axes(Reader& reader, std::size_t grid, const std::string&
     double from = reading_vectors;
     for (int axis = 0; axis < 3; ++axis) {
       const double to = from + (1.0 - reading_vectors) / 3.0;
-      // They are empty together, which is said once.
+      // All components are empty together, which is logged once.
       const Log& heard = axis > 0 && is_empty(out[0]) ? Log() : log;
       out[axis] =
           make(std::move(sources[axis]), grid_name, heard, name + ", " + "xyz"[axis] + ": ", portion.part(from, to));
@@ -687,12 +687,12 @@ std::array<ScalarVolume, 3> detail::import_vector_grid(Reader& reader, std::size
 
 namespace {
 
-/// What is of one sign of another source's values.
+/// The values of another source with one sign.
 class OneSign final : public LeafSource {
  public:
   OneSign(std::shared_ptr<const LeafSource> leaves, float sign) : leaves_(std::move(leaves)), sign_(sign) {}
 
-  /// What is not finite or huge stays so.
+  /// Non-finite and huge values are kept.
   [[nodiscard]] float operator()(float value) const {
     const float own = sign_ * value;
     return std::isfinite(value) && !is_huge(value) && own < 0.0F ? 0.0F : own;
@@ -728,7 +728,7 @@ std::array<ScalarVolume, 2> detail::assemble_signed(SourceGrid whole, const std:
     volume.name = grid_name;
     return volume;
   };
-  // Both have the same voxels that are no numbers, or none at all: that is said once.
+  // Both parts have the same invalid voxels, or none; these are logged once.
   ScalarVolume above = part(1.0F, log, portion.part(0.0, 0.5));
   return {std::move(above), part(-1.0F, Log(), portion.part(0.5, 1.0))};
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: what file readers and memory hand to the shared half of the importer, and that half.
+// Private to volume/: the interface between file and memory readers and the shared part of the importer, and that part.
 
 #include <array>
 #include <cmath>
@@ -28,20 +28,20 @@
 
 namespace cumulet::volume::detail {
 
-/// Word x holds the 64 voxels of the slab x; bit y * 8 + z (both libraries' leaf masks).
+/// Word x holds the 64 voxels of slab x; bit y * 8 + z (the layout of leaf masks in OpenVDB and NanoVDB).
 using ActiveMask = std::array<std::uint64_t, brick_size>;
-/// Those of a brick's voxels that are not zero.
+/// Returns the mask of a brick's voxels that are not zero.
 ActiveMask not_zero(std::span<const float, brick_voxels> values);
 
-// Longer than any asset, short enough that every voxel count and index difference fits its integer.
+// Larger than any asset, and small enough that every voxel count and index difference fits its integer type.
 inline constexpr int max_extent = 1 << 20;
 inline constexpr int max_coordinate = 1 << 30;
 
-/// Whether a grid's values are numbers, halves too, and not vectors.
+/// Whether a grid's values are scalars (including halves), not vectors.
 template <typename Value>
 inline constexpr bool is_number = std::is_convertible_v<Value, float>;
 
-/// What is taken of a grid's values: numbers as they are, and of vectors the lengths.
+/// Converts a grid's values: scalars unchanged, vectors to their lengths.
 struct Lengths {
   template <typename Value>
   float operator()(const Value& value) const {
@@ -56,7 +56,7 @@ struct Lengths {
   }
 };
 
-/// Of vectors.
+/// Extracts a component of vectors.
 struct Component {
   int axis;
 
@@ -66,7 +66,7 @@ struct Component {
   }
 };
 
-/// A span of a load's fraction.
+/// A range of a load's progress fraction.
 struct Portion {
   double from = 0.0;
   double to = 1.0;
@@ -75,12 +75,12 @@ struct Portion {
   [[nodiscard]] Portion part(double a, double b) const { return {at(a), at(b)}; }
 };
 
-/// The leaves of one grid: where they are and what is active of them in memory, their values perhaps still in a file.
+/// The leaves of one grid: origins and active masks are in memory, but values may still be in a file.
 class LeafSource {
  public:
-  /// Of a leaf, all 512 values, active or not, z fastest; it may change them. False: no more are wanted.
+  /// Receives all 512 values of a leaf, active or not, z fastest; it may modify them. Returns false to stop the sweep.
   using Visit = std::function<bool(std::size_t leaf, std::span<float, brick_voxels> values)>;
-  /// Which of them are looked at; empty: all.
+  /// Selects leaves; empty: all.
   using Choice = std::function<bool(std::size_t leaf)>;
 
   LeafSource() = default;
@@ -88,37 +88,37 @@ class LeafSource {
   LeafSource& operator=(const LeafSource&) = delete;
   virtual ~LeafSource() = default;
 
-  // Safe to call from many threads.
+  // The following three are safe to call from several threads.
   [[nodiscard]] virtual std::size_t count() const = 0;
   [[nodiscard]] virtual glm::ivec3 origin(std::size_t leaf) const = 0;
   [[nodiscard]] virtual ActiveMask active(std::size_t leaf) const = 0;
-  /// Visits every leaf once, in any order and on many threads at a time; one sweep at a time. Returns whether all were
-  /// wanted.
+  /// Visits every leaf once, in any order and on several threads. Only one sweep may run at a time. Returns false if a
+  /// visit stopped it.
   bool sweep(const Visit& visit, Progress* progress, Portion portion) const {
     return sweep_chosen({}, visit, progress, portion);
   }
-  /// The same of those that are chosen, as any thread may ask; the others are passed over.
+  /// Like sweep(), but skips leaves that are not chosen. `chosen` may be called on any thread.
   virtual bool sweep_chosen(const Choice& chosen, const Visit& visit, Progress* progress, Portion portion) const = 0;
 };
 
-/// Those whose values are all in memory, if only their library's own.
+/// Leaves whose values are all in memory, possibly inside their library's tree.
 class HeldLeaves : public LeafSource {
  public:
-  /// Safe to call from many threads.
+  /// Safe to call from several threads.
   virtual void values(std::size_t leaf, float* out) const = 0;
   bool sweep_chosen(const Choice& chosen, const Visit& visit, Progress* progress, Portion portion) const override;
 };
 
-/// One grid as a file or a host has it.
+/// One grid as provided by a file or a host.
 struct SourceGrid {
   glm::dmat4 index_to_world{1.0};
   float background = 0.0F;
-  /// Every active tile, and every inactive one that differs from the background.
+  /// All active tiles, and all inactive ones that differ from the background.
   std::vector<SourceTile> tiles;
   std::unique_ptr<LeafSource> leaves;
 };
 
-/// One open file. Methods throw whatever their library throws; the caller words it.
+/// An open file. Methods throw the exceptions of their library; the caller converts them to Error.
 class Reader {
  public:
   Reader() = default;
@@ -127,62 +127,64 @@ class Reader {
   virtual ~Reader() = default;
 
   [[nodiscard]] virtual const std::vector<GridInfo>& grids() const = 0;
-  /// Of the file as a whole.
+  /// Metadata of the whole file.
   [[nodiscard]] virtual const std::vector<Metadata>& metadata() const = 0;
   /// "OpenVDB 224", "NanoVDB 32.3".
   [[nodiscard]] virtual const std::string& format() const = 0;
-  /// What a warning says of the file as a whole, such as a version that is newer than the known ones.
+  /// Warnings about the whole file, such as an unknown newer version.
   [[nodiscard]] virtual std::vector<std::string> remarks() const { return {}; }
-  /// What opening took of the load's fraction.
+  /// Fraction of the load's progress that opening took.
   [[nodiscard]] virtual double opened() const { return 0.0; }
-  /// What read() takes of a grid's import.
+  /// Fraction of a grid's import that read() takes.
   [[nodiscard]] virtual double reading() const = 0;
-  /// Whether the values of what read() gives stay in the file until they are swept, which can pass over some of them.
+  /// Whether the values of grids from read() stay in the file until they are swept, so that a sweep can skip some of
+  /// them.
   [[nodiscard]] virtual bool streams() const { return false; }
-  /// Reads the tree of the grid at this place of grids(), whose values are not none; they may be read from the file as
-  /// they are swept, which the reader has to outlive. log_prefix begins every warning.
+  /// Reads the tree of grids()[grid], whose `values` must not be `none`. Leaf values may be read from the file during a
+  /// sweep, so the reader must outlive it. log_prefix: prefix of every warning.
   virtual SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) = 0;
-  /// The components of one whose values are lengths.
+  /// Reads the components of a vector grid (Values::lengths).
   virtual std::array<SourceGrid, 3> read_vector(std::size_t grid, Portion portion, const Log& log,
                                                 const std::string& log_prefix) = 0;
 };
 
-/// By content, not by name.
+/// Opens a file; its format is recognized by content, not by name.
 std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress);
-/// Where import_volume looks for this name, or without one. Throws as import_volume does.
+/// Returns the grid that import_volume reads for this name, or without a name. Throws as import_volume does.
 std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name);
-/// The one of this name, or else unique name, that is not refused. Throws where there is none or are several.
+/// Returns the usable grid with this name, or else this unique name. Throws if there is none, or several.
 std::size_t choose_named(const std::vector<GridInfo>& grids, const std::string& name,
                          const std::function<std::string(const GridInfo&)>& refusal);
-/// All of this name, or else unique name.
+/// Returns all grids with this name, or else this unique name.
 std::vector<std::size_t> named(const std::vector<GridInfo>& grids, const std::string& name);
-/// Grids of this name that suit, in the file's order: first those whose name is the same, then those whose name differs
-/// in case.
+/// Returns suitable grids of this name, in the file's order: first those with exactly this name, then those that differ
+/// only in case.
 std::vector<std::size_t> called_so(const std::vector<GridInfo>& grids, std::string_view name,
                                    const std::function<bool(const GridInfo&)>& suits);
-/// The scalar fog grid whose name comes first among these; of several the first that called_so() finds. taken: grids
-/// that it is not.
+/// Returns the scalar fog grid that matches the earliest of these names; if several match, the first from called_so().
+/// taken: grids to exclude.
 std::optional<std::size_t> first_fog(const std::vector<GridInfo>& grids, std::span<const std::string_view> names,
                                      std::span<const std::size_t> taken = {});
-/// What is shown for want of a density: a flame or a temperature by its name, else the file's first that holds no
-/// velocities.
+/// Returns the grid that is used if there is no density: a flame or a temperature by name, else the first of the file
+/// that is not a velocity.
 std::optional<std::size_t> any_fog(const std::vector<GridInfo>& grids, std::span<const std::size_t> taken = {});
 inline constexpr std::array<std::string_view, 3> density_names = {"density", "smoke", "soot"};
-/// Grids that hold velocities: of vectors and called velocity, vel or v, in whatever case; staggered ones; and three of
-/// numbers that have these names with x, y and z behind them, or behind "_" or ".".
+/// Returns grids that hold velocities: vector grids named velocity, vel or v in any case; staggered grids; and triples
+/// of scalar grids with these names followed by x, y and z, or by "_" or "." and these letters.
 std::vector<std::size_t> velocities(const std::vector<GridInfo>& grids);
 inline constexpr std::array<std::string_view, 3> velocity_names = {"velocity", "vel", "v"};
-/// Three grids of numbers with this name and x, y and z behind it, or behind "_" or "."; none where one is missing.
+/// Returns three scalar grids with this name followed by x, y and z, or by "_" or "." and these letters; empty if one
+/// is missing.
 std::vector<std::size_t> along_axes(const std::vector<GridInfo>& grids, std::string_view name);
-/// What a message says of a grid that is shown though nobody named it; empty where it needs no word. shown: all that
-/// are, of whatever field.
+/// Returns the warning about a grid that was chosen without a name; empty if no warning is needed. shown: all grids in
+/// use, for any field.
 std::string remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,
                              std::span<const std::size_t> shown);
-/// What warnings say of grids that were found for a field by their names, where others differ in case or not at all.
-/// shown: all grids that are read, of any field.
+/// Returns warnings for grids that were chosen by default names, if other grids have the same name except for case.
+/// shown: all grids that are read, for any field.
 std::vector<std::string> remarks_on_case(const std::vector<GridInfo>& grids, const std::string& field,
                                          std::span<const std::size_t> chosen, std::span<const std::size_t> shown);
-/// what, followed by all grids.
+/// Throws; the message is `what`, followed by a list of all grids.
 [[noreturn]] void fail_without(const std::vector<GridInfo>& grids, const std::string& what);
 std::string describe(const std::vector<GridInfo>& grids, std::span<const std::size_t> which);
 std::string lower_case(std::string text);
@@ -190,30 +192,30 @@ std::string lower_case(std::string text);
 std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress);
 std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress* progress);
 
-/// The shared half: from the tree as its source has it to the volume's contract.
+/// The shared part of the importer: converts a source's tree to a valid ScalarVolume.
 ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,
                       Portion portion);
-/// One scalar grid of an open file, read and assembled.
+/// Reads and assembles one scalar grid of an open file.
 ScalarVolume import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log, Progress* progress,
                          Portion portion);
-/// The components of a grid of vectors.
+/// Reads and assembles the components of a vector grid.
 std::array<ScalarVolume, 3> import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                const Log& log, Progress* progress, Portion portion);
 
-/// Whether all are numbers. O(values).
+/// Whether all values are finite. O(values).
 bool all_finite(std::span<const float> values);
-/// The tree of a host's voxels, which it reads from. Throws runtime_error for bricks and tiles out of place.
+/// Returns the tree of a host's voxels, without copying them. Throws std::runtime_error for misplaced bricks and tiles.
 SourceGrid source_of(const MemoryField& field, Progress* progress, Portion portion);
-/// Throws for one that is not affine, finite and invertible.
+/// Throws unless the transform is finite and invertible.
 void check_transform(const glm::dmat4& m);
-/// A source in two: by how much its values are above 0, and by how much below.
+/// Splits a source into its positive and its negative part.
 std::array<ScalarVolume, 2> assemble_signed(SourceGrid whole, const std::string& name, const Log& log,
                                             const std::string& log_prefix, Progress* progress, Portion portion);
 
-/// One scalar grid in two: by how much its values are above 0, and by how much below.
+/// Reads one scalar grid, split into its positive and its negative part.
 std::array<ScalarVolume, 2> import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                const Log& log, Progress* progress, Portion portion);
-/// The components of a grid of vectors, each likewise.
+/// Reads the components of a vector grid, each split into its positive and its negative part.
 std::array<std::array<ScalarVolume, 2>, 3> import_signed_vector_grid(Reader& reader, std::size_t grid,
                                                                      const std::string& file, const Log& log,
                                                                      Progress* progress, Portion portion);
@@ -242,15 +244,15 @@ struct ActiveRegion {
   std::uint64_t voxels = 0;
 };
 
-/// Of the leaves alone.
+/// Returns the active region of the leaves, without tiles.
 ActiveRegion active_leaf_region(const LeafSource& leaves, ProgressPart& part);
 
-/// An error found by a reader itself; the caller puts the file's name in front.
+/// Throws an error that a reader detected; the caller adds the file's name.
 [[noreturn]] inline void fail(const std::string& cause) { throw std::runtime_error(cause); }
 inline constexpr const char* end_of_file = "the file is truncated or damaged: unexpected end of file";
 
-/// Runs f; whatever it throws leaves as one line that begins with the name of a file or of a host's voxels, but for an
-/// Error, which is worded already.
+/// Runs f. Exceptions are converted to an Error whose one-line message begins with the name of the file or of the
+/// host's voxels. An Error is passed on unchanged.
 template <typename Function>
 auto naming(const std::string& name, Function&& f) {
   try {
@@ -268,7 +270,7 @@ auto naming(const std::string& name, Function&& f) {
   }
 }
 
-/// Why a grid of this type and class is refused; empty if it is not.
+/// Returns why a grid of this type and class is not usable; empty if it is usable.
 std::string scalar_fog_refusal(std::string_view type, std::string_view grid_class, bool scalar);
 
 }  // namespace cumulet::volume::detail

@@ -17,7 +17,7 @@ using namespace detail;
 
 namespace {
 
-/// What of active values is told beside their histogram.
+/// Statistics of active values, without the histogram.
 struct Sums {
   float least = std::numeric_limits<float>::max();
   float most = std::numeric_limits<float>::lowest();
@@ -49,7 +49,7 @@ struct Sums {
 
 using Histogram = std::array<std::uint64_t, histogram_bins>;
 
-/// Calls what take_of(leaf) returns with the value of each of the leaf's active voxels, on many threads at a time.
+/// Calls the result of take_of(leaf) with the value of each active voxel of the leaf, on several threads.
 template <typename TakeOf>
 void for_active(const LeafSource& leaves, TakeOf&& take_of) {
   const auto visit = [&](std::size_t leaf, std::span<const float, brick_voxels> values) {
@@ -92,7 +92,7 @@ GridValues values_of(const SourceGrid& source) {
       leaves.count() * (brick_voxels * sizeof(float) + sizeof(glm::ivec3)) +
       static_cast<std::uint64_t>(std::ranges::count_if(source.tiles, &SourceTile::active)) * sizeof(Tile);
 
-  // A leaf's by itself: sums do not depend on who came first.
+  // Separate sums per leaf, so that results do not depend on the order of threads.
   std::vector<Sums> of_leaves(leaves.count());
   for_active(leaves, [&](std::size_t leaf) { return [&sums = of_leaves[leaf]](float value) { sums.add(value, 1); }; });
   Sums all;
@@ -149,7 +149,7 @@ Inspection::Inspection(const FilePath& file) : file_(file) {
   try {
     chosen_ = choose_grid(grids_, "");
   } catch (const std::runtime_error&) {
-    // None can be shown; each says why.
+    // No grid is usable; each grid's refusal gives the reason.
   }
 }
 
@@ -160,7 +160,7 @@ const GridFacts& Inspection::facts(std::size_t grid) {
   GridFacts found{.values = {}, .refusal = grids_[grid].refusal};
   if (grids_[grid].values != Values::none) {
     try {
-      // A reader of its own: one that fails leaves its stream in no state to go on from.
+      // Uses a new reader: a failed read would leave its stream in an undefined state.
       const std::unique_ptr<Reader> reader = open(file_.absolute(), nullptr);
       found.values = values_of(reader->read(grid, {}, {}, ""));
     } catch (const std::bad_alloc&) {

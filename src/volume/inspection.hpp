@@ -15,46 +15,46 @@ namespace cumulet::volume {
 
 inline constexpr std::size_t histogram_bins = 64;
 
-/// What a grid's active voxels hold; of vectors, their lengths.
+/// Statistics of a grid's active voxels; for vectors, of their lengths.
 struct GridValues {
   glm::dmat4 index_to_world{1.0};
   std::uint64_t active_voxels = 0;
-  glm::ivec3 bounds_min{0};  ///< inclusive; zero, as bounds_max, without active voxels
+  glm::ivec3 bounds_min{0};  ///< inclusive; both bounds are zero if there are no active voxels
   glm::ivec3 bounds_max{0};
-  // Of those that are finite; zero if none is.
+  // For finite values; zero if there are none.
   float min = 0.0F;
   float max = 0.0F;
   double mean = 0.0;
   std::uint64_t negative_voxels = 0;
   std::uint64_t non_finite_voxels = 0;
-  std::uint64_t memory_bytes = 0;  ///< what a ScalarVolume of it holds at most
-  /// Counts of the finite ones in equal steps from min to max; where those are equal, all are in the first.
+  std::uint64_t memory_bytes = 0;  ///< maximum size of a ScalarVolume of the grid
+  /// Counts of finite values in equal bins from min to max; if min equals max, all are in the first bin.
   std::array<std::uint64_t, histogram_bins> histogram{};
 };
 
-/// Counts of a volume's voxels above 0 in equal steps from 0 to max_value. O(voxels of bricks).
+/// Returns the counts of a volume's values > 0 in equal bins from 0 to max_value. O(voxels of bricks).
 std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume);
 
 struct GridFacts {
-  std::optional<GridValues> values;  ///< none if they cannot be read
-  std::string refusal;               ///< GridInfo's, or what is wrong with the voxels
+  std::optional<GridValues> values;  ///< empty if they cannot be read
+  std::string refusal;               ///< that of GridInfo, or the error in reading the voxels
 };
 
-/// What is in a .vdb or .nvdb file. Any thread.
+/// The contents of a .vdb or .nvdb file. Any thread.
 class Inspection {
  public:
-  /// Reads the directory. Throws Error(file).
+  /// Reads the file's directory. Throws Error(file).
   explicit Inspection(const FilePath& file);
 
   [[nodiscard]] const std::string& format() const { return format_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<Metadata>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<GridInfo>& grids() const { return grids_; }
-  /// As channels_by_name() has them.
+  /// The result of channels_by_name().
   [[nodiscard]] const std::vector<std::string>& channels() const { return channels_; }
   /// The grid that import_volume reads if it is given no name.
   [[nodiscard]] std::optional<std::size_t> chosen() const { return chosen_; }
-  /// Reads a grid's voxels, the first time. Throws Error(out_of_memory).
+  /// Reads a grid's voxels at the first call. Throws Error(out_of_memory).
   [[nodiscard]] const GridFacts& facts(std::size_t grid);
 
  private:

@@ -61,7 +61,7 @@ class DenseLeaves final : public HeldLeaves {
   std::vector<glm::ivec3> origins_;
 };
 
-/// Origins of the bricks that hold any voxel but zero.
+/// Returns the origins of the bricks that have a voxel other than zero.
 std::vector<glm::ivec3> dense_bricks(const DenseVoxels& voxels, Progress* progress, double from, double to) {
   const glm::ivec3 bricks = (voxels.size - 1) / brick_size + 1;
   const auto rows = static_cast<std::size_t>(bricks.y) * static_cast<std::size_t>(bricks.z);
@@ -123,7 +123,8 @@ bool meet(const Tile& a, const Tile& b) {
   return glm::all(glm::lessThanEqual(a.min, b.max)) && glm::all(glm::lessThanEqual(b.min, a.max));
 }
 
-/// Fails unless the tiles are disjoint and not over bricks. Cuts space between tiles until few are left on a side.
+/// Throws unless the tiles are disjoint and do not overlap bricks. Splits space between tiles until each side has only
+/// a few.
 class Disjointness {
  public:
   Disjointness(const SparseVoxels& voxels, const Progress* progress) : voxels_(&voxels), progress_(progress) {}
@@ -167,7 +168,7 @@ class Disjointness {
   };
   struct Plane {
     int axis;
-    int last;  ///< the last voxel below it
+    int last;  ///< the last voxel on the lower side
   };
 
   [[nodiscard]] const Tile& tile(std::uint32_t t) const { return voxels_->tiles[t].box; }
@@ -193,8 +194,8 @@ class Disjointness {
     fail("its tiles at " + to_string(a.min) + " and " + to_string(b.min) + " overlap");
   }
 
-  /// The plane at the middle one of the tiles' upper ends that leaves fewest tiles on its fuller side; where none
-  /// leaves fewer than there are, one between two of them.
+  /// Returns the plane, at the median of the tiles' upper ends along an axis, that minimizes the tiles on its fuller
+  /// side. If none of them reduces the number, returns a plane between two tiles.
   [[nodiscard]] Plane between(const Part& part) const {
     Plane best{0, 0};
     std::size_t fewest = part.tiles.size();
@@ -234,11 +235,11 @@ ScalarVolume finish(SourceGrid source, const std::string& name, const Log& log, 
   return volume;
 }
 
-constexpr double finding = 0.3;  // of what an import takes
+constexpr double finding = 0.3;  // fraction of an import's time
 
 void check_counts(const DenseVoxels& voxels, const std::string& name) {
   if (glm::any(glm::lessThanEqual(voxels.size, glm::ivec3(0)))) refuse(name, "its size is " + to_string(voxels.size));
-  // Divided, because the product may be too large for any integer.
+  // Divided, because the product may overflow.
   const glm::u64vec3 size(voxels.size);
   const std::uint64_t count = voxels.values.size();
   if (count % size.x != 0 || count / size.x % size.y != 0 || count / size.x / size.y != size.z) {
@@ -300,7 +301,7 @@ SourceGrid source_of_sparse(SparseVoxels voxels, Progress* progress) {
 
 std::string name_of_field(const std::string& name, Channel channel) { return name + ": " + name_of(channel); }
 
-/// The first of these that is not finite.
+/// Returns the index of the first value that is not finite.
 std::optional<std::size_t> first_not_finite(std::span<const float> values) {
   constexpr std::size_t piece = 1U << 16U;
   std::atomic<std::size_t> first = values.size();
@@ -346,7 +347,7 @@ void check_voxels(std::span<const MemoryField> fields, const std::string& name) 
 }  // namespace
 
 bool detail::all_finite(std::span<const float> values) {
-  // In whole numbers, without a branch: it vectorizes.
+  // Integer arithmetic without a branch vectorizes.
   constexpr std::uint32_t exponent = 0x7f800000U;
   std::uint32_t bad = 0;
   for (const float value : values) bad |= (std::bit_cast<std::uint32_t>(value) & exponent) == exponent ? 1U : 0U;

@@ -16,7 +16,7 @@ namespace {
 
 using nanovdb::io::Codec;
 
-// The last byte of the magic number is 0 up to NanoVDB 32.7, then 1 of grids and 2 of files.
+// The last character of the magic number is 0 up to NanoVDB 32.7; later it is 1 for grids and 2 for files.
 constexpr std::uint64_t magic_of_both = NANOVDB_MAGIC_NUMBER;  // "NanoVDB0"
 constexpr std::uint64_t magic_of_grids = 0x314244566f6e614e;   // "NanoVDB1"
 constexpr std::uint64_t magic_of_files = 0x324244566f6e614e;   // "NanoVDB2"
@@ -35,13 +35,13 @@ std::string text_of(const nanovdb::Version& version) {
          std::to_string(version.getPatch());
 }
 
-/// Other bytes than a version have any of 2048 major numbers.
+/// Whether the bytes are probably a version: other bytes would have any of 2048 major numbers.
 bool is_likely(const nanovdb::Version& version) {
   constexpr std::uint32_t last_likely_major = 99;
   return version.getMajor() > 0 && version.getMajor() <= last_likely_major;
 }
 
-// As NanoVDB 32.9 numbers and names them; those up to 19 as all versions of 32 do.
+// Numbers and names of NanoVDB 32.9; those up to 19 are valid for all versions of 32.
 std::string type_name(nanovdb::GridType type) {
   constexpr std::array<const char*, 27> names = {
       "unknown", "float",  "double",  "int16",     "int32",       "int64",      "Vec3f",   "Vec3d",   "Mask",
@@ -59,7 +59,7 @@ std::string class_name(nanovdb::GridClass grid_class) {
   return number < names.size() ? names[number] : names[0];
 }
 
-/// The bytes of a name up to its end, which may be missing.
+/// Returns a name up to its terminator, which may be missing.
 template <std::size_t Size>
 std::string bounded(const char (&name)[Size]) {
   return {name, std::find(name, name + Size, '\0')};
@@ -102,12 +102,12 @@ class DirectoryReader {
     return value;
   }
 
-  /// What begins here; none: bytes behind buffers of grids that belong to no grid.
+  /// Returns the kind of part that begins here; nullopt for trailing bytes after grid buffers.
   std::optional<Part> part_at(std::uint64_t position, bool after_grids) {
     if (after_grids && size_ - position < sizeof(std::uint64_t)) return std::nullopt;
     const auto magic = read_value<std::uint64_t>(position);
     if (is_known(magic)) {
-      // Some programs write files with the magic number of grids. What follows it tells the two apart.
+      // Some programs write files with the magic number of grids. The bytes after it distinguish the two.
       const Part likely = magic == magic_of_grids ? Part::grid : Part::segment;
       const Part other = likely == Part::grid ? Part::segment : Part::grid;
       return !looks_like(likely, position) && looks_like(other, position) ? other : likely;
@@ -119,7 +119,7 @@ class DirectoryReader {
     fail("has the magic number NanoVDB" + digit + "; this library knows NanoVDB0, NanoVDB1 and NanoVDB2");
   }
 
-  /// The version comes after a grid's checksum, but first in a segment.
+  /// Checks the version, which follows the checksum in a grid, but comes first in a segment.
   bool looks_like(Part part, std::uint64_t position) {
     if (part == Part::segment) {
       if (size_ - position < sizeof(nanovdb::io::Header)) return false;
@@ -160,7 +160,7 @@ class DirectoryReader {
     out_.grids.push_back(std::move(entry));
   }
 
-  /// The position behind these bytes.
+  /// Returns the position after these bytes.
   [[nodiscard]] std::uint64_t behind(std::uint64_t position, std::uint64_t bytes) const {
     if (bytes > size_ - position) {
       fail("the file is truncated: " + std::to_string(size_) + " bytes of at least " +
@@ -193,7 +193,7 @@ class DirectoryReader {
     return position;
   }
 
-  /// Lists the grid whose own bytes begin at this position. Returns the position of the next part.
+  /// Lists the grid whose buffer begins at this position. Returns the position of the next part.
   std::uint64_t read_grid(std::uint64_t position) {
     const auto grid = read_value<nanovdb::GridData>(position);
     take_version(grid.mVersion);
@@ -205,7 +205,7 @@ class DirectoryReader {
     return next;
   }
 
-  /// Names of more than 255 characters are in the grid's blind data, of which nothing is believed.
+  /// Names of more than 255 characters are in the grid's blind data, all of which is validated.
   std::optional<std::string> long_name(std::uint64_t position, const nanovdb::GridData& grid) {
     if ((grid.mFlags & static_cast<std::uint32_t>(nanovdb::GridFlags::HasLongGridName)) == 0) return std::nullopt;
     using Blind = nanovdb::GridBlindMetaData;
@@ -215,7 +215,7 @@ class DirectoryReader {
       if (at > bytes || sizeof(Blind) > bytes - at) return std::nullopt;
       const auto blind = read_value<Blind>(position + at);
       if (static_cast<std::uint32_t>(blind.mDataClass) != name_class) continue;
-      // From the entry itself, since buffers of grids are written at all.
+      // Relative to the entry itself, in all versions that write grid buffers.
       const std::uint64_t start = at + static_cast<std::uint64_t>(blind.mByteOffset);
       if (start > bytes || blind.mElementCount > bytes - start) return std::nullopt;
       std::string name(blind.mElementCount, '\0');
@@ -237,7 +237,7 @@ class DirectoryReader {
 
   SourceFile& stream_;
   std::uint64_t size_;
-  std::uint64_t expected_grids_ = 0;  // of a buffer that the file begins with
+  std::uint64_t expected_grids_ = 0;  // grid count of a buffer at the beginning of the file
   NanoDirectory out_;
 };
 
@@ -251,7 +251,7 @@ bool has_right_checksum(const nanovdb::GridData& grid, std::uint64_t root_bytes)
   constexpr std::uint32_t none = ~std::uint32_t{0};
   const auto stored = static_cast<std::uint32_t>(grid.mChecksum);
   if (stored == none || grid.mVersion.getMinor() > known_minor) return true;
-  // Up to 32.6.0 it covers the root, too.
+  // Up to 32.6.0 the checksum also covers the root.
   const bool with_root =
       grid.mVersion.getMinor() < 6 || (grid.mVersion.getMinor() == 6 && grid.mVersion.getPatch() == 0);
   const std::uint64_t end = head_bytes + (with_root ? root_bytes : 0);

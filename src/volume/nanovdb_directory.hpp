@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: which grids a NanoVDB file holds, and where.
+// Private to volume/: the grids in a NanoVDB file, and their positions.
 
 #include <nanovdb/NanoVDB.h>
 #include <nanovdb/util/IO.h>
@@ -14,7 +14,7 @@
 
 namespace cumulet::volume::detail {
 
-/// Where the bytes of one grid are.
+/// Location of the bytes of one grid.
 struct NanoPlace {
   std::uint64_t position;
   std::uint64_t file_bytes;
@@ -23,7 +23,7 @@ struct NanoPlace {
   nanovdb::GridType type;
 };
 
-/// Every size in it lies within the file. places[i] belongs to grids[i].
+/// All sizes are within the file. places[i] belongs to grids[i].
 struct NanoDirectory {
   std::string format;                ///< "NanoVDB 32.9"
   std::vector<std::string> remarks;  ///< one warning each
@@ -31,16 +31,16 @@ struct NanoDirectory {
   std::vector<GridInfo> grids;
 };
 
-/// Reads segments (magic numbers NanoVDB0 and NanoVDB2) and buffers of grids without any header (NanoVDB0 and
-/// NanoVDB1), one after another. Throws for other versions than 32.
+/// Reads segments (magic numbers NanoVDB0 and NanoVDB2) and grid buffers without a header (NanoVDB0 and NanoVDB1), one
+/// after another. Throws for versions other than 32.
 NanoDirectory read_nano_directory(SourceFile& stream);
 
-/// Whether the grid that begins with these bytes has a magic number of a grid.
+/// Whether the magic number of this grid is valid.
 bool is_nano_grid(const nanovdb::GridData& grid);
 
-/// Whether the checksum of a grid's head is right, by the rule of the version that wrote it. True where the grid has
-/// no checksum, and where the version is newer than the known ones. root_bytes: size of the root with its tiles, which
-/// follows the tree and lies within the grid.
+/// Whether the checksum of a grid's head is correct, by the rule of the version that wrote it. Returns true if the grid
+/// has no checksum or an unknown newer version. root_bytes: size of the root with its tiles. It follows the tree and is
+/// within the grid.
 bool has_right_checksum(const nanovdb::GridData& grid, std::uint64_t root_bytes);
 
 bool is_nano_scalar(nanovdb::GridType type);

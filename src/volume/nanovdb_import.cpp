@@ -56,7 +56,7 @@ class NanoLeaves final : public HeldLeaves {
   std::vector<glm::ivec3> origins_;
 };
 
-/// Walks a grid's buffer and believes none of its offsets: NanoVDB itself checks nothing.
+/// Traverses a grid's buffer and validates all offsets: NanoVDB itself does not check them.
 template <typename BuildT, typename Pick = Lengths>
 class NanoWalk {
  public:
@@ -83,7 +83,7 @@ class NanoWalk {
 
   [[noreturn]] static void damaged(const char* what) { fail(std::string("the file is damaged: ") + what); }
 
-  /// The object at this offset from another one, if it lies within the buffer.
+  /// Returns the object at this offset from another one. Throws unless it is within the buffer.
   template <typename T>
   const T* at(const void* from, std::int64_t offset, std::uint64_t bytes = sizeof(T)) const {
     const auto start = static_cast<const std::uint8_t*>(from) - begin_;
@@ -97,7 +97,7 @@ class NanoWalk {
     return reinterpret_cast<const T*>(begin_ + position);
   }
 
-  /// Every node belongs to one parent, so more visits than nodes fit the buffer mean a forged tree.
+  /// Every node has one parent, so visiting more nodes than fit the buffer means that the tree is invalid.
   void count(int level, std::uint64_t bytes) {
     node_bytes_ += bytes;
     if (++visited_[level] > declared_[level] || node_bytes_ > size_) damaged("its tree has more nodes than it says");
@@ -119,7 +119,7 @@ class NanoWalk {
     const std::uint64_t root_bytes = sizeof(RootT) + tiles * sizeof(typename RootT::DataType::Tile);
     at<RootT>(root, 0, root_bytes);
 
-    // The checksum is over bytes in one piece, which damage may have torn apart.
+    // The checksum covers contiguous bytes; in a damaged file the root may be elsewhere.
     if (root_offset == sizeof(TreeT) && !has_right_checksum(*grid->data(), root_bytes)) {
       log.warning(log_prefix + "its checksum does not match, it may be damaged");
     }
@@ -194,7 +194,7 @@ class NanoWalk {
   std::vector<std::pair<const LeafT*, glm::ivec3>> leaves_;
 };
 
-/// A .nvdb file, read without NanoVDB's own reader, which trusts every size.
+/// A .nvdb file. NanoVDB's own reader is not used: it does not validate sizes.
 class NanoReader final : public Reader {
  public:
   NanoReader(const std::filesystem::path& file, Progress* progress)
@@ -239,7 +239,7 @@ class NanoReader final : public Reader {
     const auto components = [&]<typename BuildT>() {
       std::array<SourceGrid, 3> out;
       for (int axis = 0; axis < 3; ++axis) {
-        // What is wrong with the grid is said once.
+        // Problems of the grid are logged once.
         const Log& heard = axis > 0 ? Log() : log;
         out[axis] = NanoWalk<BuildT, Component>::run(handle, heard, log_prefix, progress_, Component{axis});
       }
@@ -269,9 +269,9 @@ class NanoReader final : public Reader {
     return handle;
   }
 
-  /// Reads and decodes a grid, believing no size: NanoVDB's own reader does, and cannot be stopped.
+  /// Reads and decodes a grid, validating all sizes. NanoVDB's own reader does not, and cannot be cancelled.
   Handle load(const NanoPlace& place, Portion portion) {
-    // No codec packs tighter than zlib's 1032 to 1: a larger claim is no reason to allocate.
+    // No codec exceeds zlib's ratio of 1032 to 1: a larger size is rejected before memory is allocated.
     constexpr std::uint64_t most_expansion = 1040;
     if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(sizes_differ);
     if (place.codec == Codec::NONE && place.memory_bytes != place.file_bytes) fail(sizes_differ);
@@ -313,7 +313,7 @@ class NanoReader final : public Reader {
     return {std::move(buffer)};
   }
 
-  /// Decodes the zlib frame that the stream stands at.
+  /// Decodes the zlib frame at the stream's position.
   void inflate_frame(std::uint64_t frame, std::uint8_t* to, std::uint64_t bytes, ProgressPart& part) {
     z_stream zip{};
     if (inflateInit(&zip) != Z_OK) throw std::bad_alloc();
@@ -341,7 +341,7 @@ class NanoReader final : public Reader {
     if (done != bytes) fail(sizes_differ);
   }
 
-  /// Decodes the Blosc frame that the stream stands at.
+  /// Decodes the Blosc frame at the stream's position.
   void unpack_frame(std::uint64_t frame, std::uint8_t* to, std::uint64_t bytes, ProgressPart& part) {
     std::vector<char> packed;
     part.resize(packed, frame);
@@ -355,7 +355,7 @@ class NanoReader final : public Reader {
     blosc_cbuffer_sizes(packed.data(), &whole, &frame, &block);
     blosc_cbuffer_metainfo(packed.data(), &item, &flags);
     if (block == 0 || item == 0 || block % item != 0 || bytes % item != 0) fail(sizes_differ);
-    // Blocks are packed each for itself.
+    // Blocks are compressed independently.
     const std::uint64_t piece = std::max<std::uint64_t>(most_piece / block, 1) * block;
     tbb::parallel_for(std::uint64_t{0}, (bytes + piece - 1) / piece, [&](std::uint64_t i) {
       part.check();
@@ -369,13 +369,13 @@ class NanoReader final : public Reader {
 
   static constexpr const char* unreadable = "is of a type that cannot be read";
   static constexpr const char* sizes_differ = "the file is damaged: its sizes do not agree";
-  static constexpr std::uint64_t most_chunk = std::uint64_t{1} << 30U;  ///< that NanoVDB packs into one Blosc frame
-  static constexpr std::uint64_t most_piece = std::uint64_t{4} << 20U;  ///< decoded between looks at the cancel flag
+  static constexpr std::uint64_t most_chunk = std::uint64_t{1} << 30U;  ///< NanoVDB's maximum per Blosc frame
+  static constexpr std::uint64_t most_piece = std::uint64_t{4} << 20U;  ///< bytes between cancellation checks
 
   Progress* progress_;
   SourceFile stream_;
   std::uint64_t size_;
-  std::vector<Metadata> metadata_;  // the format has none
+  std::vector<Metadata> metadata_;  // always empty: the format has no metadata
   NanoDirectory directory_;
 };
 

@@ -22,13 +22,13 @@ constexpr int most_cells = 96;
 constexpr double wanted_depth = 8.0;
 constexpr double visible_share = 0.05;
 constexpr double extreme_share = 0.005;
-constexpr double visible_depth = 0.05129;  // an opacity of 5 %
+constexpr double visible_depth = 0.05129;  // optical depth of an opacity of 5 %
 constexpr int directions = 24;
 constexpr int rays_a_side = 64;
 constexpr int rays_a_side_of_view = 128;
-constexpr double most_density_scale = 1e60;  // that a setting may have
+constexpr double most_density_scale = 1e60;  // limit of the setting
 
-/// Directions spread evenly over a half of the sphere: a ray has no sense.
+/// Returns directions evenly distributed over a hemisphere; opposite directions are equivalent.
 glm::dvec3 direction_of(int i) {
   const double z = 1.0 - (i + 0.5) / directions;
   const double angle = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
@@ -36,10 +36,10 @@ glm::dvec3 direction_of(int i) {
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
 
-/// Voxels that two inclusive ranges share.
+/// Returns the number of voxels in the intersection of two inclusive ranges.
 int shared(int a0, int a1, int b0, int b1) { return std::max(0, std::min(a1, b1) - std::max(a0, b0) + 1); }
 
-/// A slab of coarse cells, across x.
+/// A slab of coarse cells, perpendicular to x.
 class Slab {
  public:
   Slab(const ScalarVolume& volume, int slab, int block, const glm::ivec3& size)
@@ -62,7 +62,7 @@ class Slab {
       sums_[cell] += std::max(0.0, voxels - covered_[cell]) * volume.background;
     });
   }
-  /// Of all voxels of a cell.
+  /// Returns the sum over all voxels of a cell.
   [[nodiscard]] double sum(int j, int k) const { return sums_[cell(j, k)]; }
 
  private:
@@ -86,7 +86,7 @@ class Slab {
   void add(const glm::ivec3& origin, const float* values, const glm::ivec3& high) {
     const glm::ivec3 from = glm::max(origin, glm::ivec3(x0_, low_.y, low_.z));
     const glm::ivec3 to = glm::min(origin + (brick_size - 1), glm::ivec3(x1_, high.y, high.z));
-    std::array<std::size_t, brick_size> columns;  // of z
+    std::array<std::size_t, brick_size> columns;  // cell index for each z
     for (int z = from.z; z <= to.z; ++z) columns[static_cast<std::size_t>(z & 7)] = cell(0, (z - low_.z) / block_);
     for (int x = from.x; x <= to.x; ++x) {
       for (int y = from.y; y <= to.y; ++y) {
@@ -120,7 +120,7 @@ class Slab {
   int block_;
   std::size_t cells_a_row_;
   std::vector<double> sums_;
-  std::vector<double> covered_;  // voxels of bricks and tiles
+  std::vector<double> covered_;  // number of voxels in bricks and tiles
 };
 
 }  // namespace
@@ -136,7 +136,7 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
   to_world_ = volume.index_to_world * glm::translate(glm::dmat4(1.0), glm::dvec3(low) - 0.5) *
               glm::scale(glm::dmat4(1.0), glm::dvec3(block));
 
-  // A slab of cells by one thread: the order of every sum is the volume's own.
+  // Each slab is processed by one thread, so that sums do not depend on threads.
   unit_ = value_unit(volume.max_value);
   const double whole = unit_ * block * block * block;
   tbb::parallel_for(0, size_.x, [&](int x) {
@@ -150,7 +150,7 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
 
 template <class Visit>
 void CoarseVolume::walk(const glm::dvec3& origin, const glm::dvec3& direction, Visit&& visit) const {
-  // Into the box of cells, then from wall to wall; t is world length.
+  // Enters the box of cells, then advances from cell wall to cell wall (DDA). t is in units of `direction`.
   double t = std::numeric_limits<double>::lowest();
   double end = std::numeric_limits<double>::max();
   for (int axis = 0; axis < 3; ++axis) {
@@ -273,7 +273,7 @@ std::optional<double> CoarseVolume::suggest_density_scale() const {
     visible_mass += ray.area * depth;
   }
   const double scale = wanted_depth * visible_area / visible_mass / unit_;
-  // What a person reads, and types again.
+  // Rounded, because users read and retype it.
   std::array<char, 32> digits{};
   const char* end =
       std::to_chars(digits.data(), digits.data() + digits.size(), scale, std::chars_format::scientific, 2).ptr;
@@ -298,7 +298,7 @@ std::vector<glm::dvec3> CoarseVolume::visible(const glm::dvec3& direction, doubl
       const glm::dvec3 origin(from_world * glm::dvec4(centre, 1.0));
       const double depth = depth_along(origin, along);
       if (!(depth >= least)) continue;
-      // Half of what is least from either end: what lies further out is too thin.
+      // The points at half of the minimum depth from either end: matter beyond them is too thin to be visible.
       std::array<double, 2> ends{};
       double sum = 0.0;
       walk(origin, along, [&](double t0, double t1, double mean) {

@@ -10,23 +10,23 @@
 
 namespace cumulet::volume {
 
-/// A volume in at most 96 cells an axis, of mean values: enough to judge how much light it lets through, and where.
+/// A volume reduced to mean values in at most 96 cells per axis, for estimates of its optical depth and visible extent.
 class CoarseVolume {
  public:
   /// O(voxels). Throws Error(cancelled) if progress is cancelled.
   explicit CoarseVolume(const ScalarVolume& volume, const Progress* progress = nullptr);
 
-  /// What extinction is to be, times the voxels' values, for a mean optical depth of 8: the mean over rays from all
-  /// directions through what is visibly occupied. A ray counts if its depth is at least a twentieth of the mean depth
-  /// that the medium itself sees (each ray weighted by its depth), so that haze does not; and no ray counts as deeper
-  /// than the densest two hundredth of all rays that meet anything, so that a few extreme voxels do not. Three
-  /// significant digits. Depends on the volume alone, and turning or scaling it changes the result by as little as it
-  /// must. Nothing for a volume without extinction.
+  /// Returns the factor from voxel values to extinction that gives a mean optical depth of 8: the mean over rays from
+  /// all directions through the visibly occupied region. A ray counts if its depth is at least a twentieth of the
+  /// depth-weighted mean depth, which excludes haze. Depths are clamped to that of the densest 0.5 % of all rays that
+  /// hit the volume, because of extreme voxels. The result is rounded to three significant digits. It depends only on
+  /// the volume: rotation hardly changes it, and scaling changes it in inverse proportion. Returns nullopt for a volume
+  /// without extinction.
   [[nodiscard]] std::optional<double> suggest_density_scale() const;
 
-  /// World-space points about what is seen of it along this direction (unit) at this density scale: of every ray whose
-  /// opacity is at least 5 %, what lies between the half of that from one end and from the other. The same against the
-  /// direction. Empty if there is no such ray.
+  /// Returns world-space points around the visible part for this view direction (unit) and density scale. Each ray with
+  /// an opacity of at least 5 % contributes the two points at which half of the corresponding optical depth is reached
+  /// from either end. The opposite direction gives the same points. Empty if there is no such ray.
   [[nodiscard]] std::vector<glm::dvec3> visible(const glm::dvec3& direction, double density_scale) const;
 
  private:
@@ -34,16 +34,16 @@ class CoarseVolume {
     double depth;
     double area;
   };
-  /// Cells, both inclusive.
+  /// Range of cells, both ends inclusive.
   struct Box {
     glm::ivec3 low;
     glm::ivec3 high;
   };
-  /// Parallel rays, one through the middle of each pixel of a plane through the origin.
+  /// Parallel rays, one through the center of each pixel of a plane through the origin.
   struct Sheet {
-    glm::dvec3 u;  ///< unit, as v; both at right angles to the rays
+    glm::dvec3 u;  ///< unit, like v; both are perpendicular to the rays
     glm::dvec3 v;
-    glm::dvec2 least;  ///< the first pixel's corner, along u and v
+    glm::dvec2 least;  ///< corner of the first pixel, along u and v
     glm::dvec2 pixel;
     [[nodiscard]] glm::dvec3 centre(int x, int y) const {
       return u * (least.x + (x + 0.5) * pixel.x) + v * (least.y + (y + 0.5) * pixel.y);
@@ -55,21 +55,21 @@ class CoarseVolume {
                static_cast<std::size_t>(size_.x) +
            static_cast<std::size_t>(cell.x);
   }
-  /// visit(from, to, mean) for each cell that the ray meets, near ones first; from and to are in the direction's
-  /// lengths.
+  /// Calls visit(from, to, mean) for each cell that the ray crosses, in order; from and to are in units of the
+  /// direction's length.
   template <class Visit>
   void walk(const glm::dvec3& origin, const glm::dvec3& direction, Visit&& visit) const;
   [[nodiscard]] double depth_along(const glm::dvec3& origin, const glm::dvec3& direction) const;
-  /// Of all that is not zero.
+  /// Returns the box of all non-zero cells.
   [[nodiscard]] std::optional<Box> occupied() const;
-  /// So many rays a side, over all of the box.
+  /// Returns a sheet of rays x rays rays that covers the box.
   [[nodiscard]] Sheet sheet(const Box& box, const glm::dvec3& direction, int rays) const;
   [[nodiscard]] std::vector<Ray> rays() const;
 
   glm::ivec3 size_{0};
-  double unit_ = 1.0;  ///< of the means
+  double unit_ = 1.0;  ///< unit of the means
   std::vector<float> means_;
-  glm::dmat4 to_world_{1.0};  ///< cell (i,j,k) is the box from (i,j,k) on
+  glm::dmat4 to_world_{1.0};  ///< cell (i,j,k) is the unit box that begins at (i,j,k)
 };
 
 }  // namespace cumulet::volume

@@ -8,18 +8,18 @@
 
 namespace cumulet::volume {
 
-/// A curve over a field's values: straight between points, level beyond the first and the last. Without points every
-/// value stays as it is. 0 always does: where a field has nothing, a ramp puts nothing.
+/// A piecewise linear curve (transfer function) for a field's values, constant beyond the first and the last point.
+/// Without points values are unchanged. 0 always maps to 0: a ramp adds nothing where a field is empty.
 class Ramp {
  public:
   Ramp() = default;
-  /// Of (value, what it becomes), at least two, values strictly ascending; all finite, what they become not negative.
+  /// points: pairs (value, result), at least two, with strictly ascending values; all finite, results not negative.
   explicit Ramp(std::vector<glm::vec2> points) : points_(std::move(points)) {}
 
-  /// Whether every value stays as it is.
+  /// Whether all values are unchanged.
   [[nodiscard]] bool empty() const { return points_.empty(); }
   [[nodiscard]] const std::vector<glm::vec2>& points() const { return points_; }
-  /// value: not negative. O(log points).
+  /// value: >= 0. O(log points).
   [[nodiscard]] float operator()(float value) const;
   bool operator==(const Ramp&) const = default;
 
@@ -27,7 +27,7 @@ class Ramp {
   std::vector<glm::vec2> points_;
 };
 
-/// Voxel by voxel. O(voxels of bricks) time and memory. Throws Error(cancelled).
+/// Applies a ramp to every voxel. O(voxels of bricks) time and memory. Throws Error(cancelled).
 ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress* progress = nullptr);
 
 }  // namespace cumulet::volume

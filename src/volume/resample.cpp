@@ -9,15 +9,15 @@ namespace cumulet::volume::detail {
 
 namespace {
 
-// Where the field's voxels are smaller by more than this, a voxel of the lattice is an average of samples.
+// If the field's voxels are smaller by more than this factor, a voxel of the lattice is the average of several samples.
 constexpr double much_finer = 1.5;
-constexpr double most_samples = 8.0;  // an axis
-// Farther than what any voxel is made of.
+constexpr double most_samples = 8.0;  // per axis
+// Beyond the coordinates of any voxel that is used.
 constexpr double far_off = double{max_coordinate} + max_extent;
-// Beyond that much finer, what a brick is made of fills memory.
+// Beyond this factor, the input of one brick would need too much memory.
 constexpr double most_finer = 64.0;
 
-/// Some of a field's own bricks.
+/// Some of a field's bricks.
 class OwnLeaves final : public HeldLeaves {
  public:
   OwnLeaves(const ScalarVolume& field, std::vector<std::size_t> bricks) : field_(field), bricks_(std::move(bricks)) {}
@@ -37,7 +37,7 @@ class OwnLeaves final : public HeldLeaves {
   std::vector<std::size_t> bricks_;
 };
 
-/// A box's image under an affine transform, the smallest box that holds it.
+/// The bounding box of a box under an affine transform.
 struct Span {
   glm::dvec3 min, max;
 };
@@ -62,14 +62,14 @@ class Resampling final : Gathering {
       if (!(step <= most_finer)) fail("has voxels too small for the lattice of the file's other fields");
       const double wanted = step > much_finer ? std::ceil(step - alike) : 1.0;
       samples_[axis] = static_cast<int>(std::min(wanted, most_samples));
-      // From a voxel's centre to its outermost sample.
+      // Distance from a voxel's center to its outermost sample.
       reach_[axis] = 0.5 * (1.0 - 1.0 / samples_[axis]);
     }
   }
 
   SourceGrid run() {
     const ScalarVolume& field = source(0);
-    // What is not zero reaches to the next centres around the field's voxels.
+    // Non-zero values extend to the neighboring centers around the field's voxels.
     const Span span =
         image(glm::inverse(to_field_), glm::dvec3(field.bounds_min) - 1.0, glm::dvec3(field.bounds_max) + 1.0);
     glm::dvec3 min = glm::floor(span.min - reach_);
@@ -84,7 +84,7 @@ class Resampling final : Gathering {
       fail("is too far off or too large for the lattice of the file's other fields");
     }
     const Box box{glm::ivec3(min), glm::ivec3(max)};
-    // Each of the field's bricks fills as many as it is larger by, all of them no more than there are.
+    // Each brick of the field fills as many bricks as its relative size, and all together at most those in the box.
     const double larger = 1.0 / std::abs(glm::determinant(glm::dmat3(to_field_)));
     const glm::dvec3 bricks((box.max >> 3) - (box.min >> 3) + 1);
     if (std::min(static_cast<double>(field.brick_origins.size()) * larger, bricks.x * bricks.y * bricks.z) >
@@ -101,7 +101,7 @@ class Resampling final : Gathering {
 
   [[nodiscard]] Box support(std::size_t /*source*/, const Box& box) const override {
     const Span span = image(to_field_, glm::dvec3(box.min) - reach_, glm::dvec3(box.max) + reach_);
-    // A cube of the lattice may be of any size.
+    // A cube of the lattice may be of any size, so coordinates are clamped.
     const auto voxel = [](const glm::dvec3& p) { return glm::ivec3(glm::clamp(p, -far_off, far_off)); };
     return {voxel(glm::floor(span.min - alike)), voxel(glm::ceil(span.max + alike))};
   }
@@ -140,7 +140,7 @@ class Resampling final : Gathering {
 
 bool same_places(const glm::dmat4& a, const glm::dmat4& b, const Box& voxels) {
   const glm::dmat4 to_a = glm::inverse(a) * b;
-  // An affine map is farthest off at a corner.
+  // The deviation of an affine map is largest at a corner.
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 upper(corner & 1, (corner >> 1) & 1, corner >> 2);
     const glm::dvec4 p(glm::mix(glm::dvec3(voxels.min), glm::dvec3(voxels.max), upper), 1.0);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: the file as both readers' libraries see it.
+// Private to volume/: the input stream for the libraries of both readers.
 
 #include <cstdint>
 #include <filesystem>
@@ -14,18 +14,18 @@
 
 namespace cumulet::volume::detail {
 
-/// A file as a stream that tells how much of it was read and, cancelled, throws Error(cancelled) out of the read,
-/// through whatever library is reading. Seeks within its buffer cost nothing: OpenVDB seeks at every leaf. After others
-/// it reads little ahead, and more with each read: heads of grids lie far apart, and shared storage pays for each byte.
+/// A file stream that reports read progress. On cancellation it throws Error(cancelled) from the read, through the
+/// library that is reading. Seeks within its buffer are free: OpenVDB seeks at every leaf. After other seeks it reads
+/// little ahead, and more with each read: grid headers are far from each other, and shared storage is slow per byte.
 class SourceFile final : public std::istream {
  public:
-  /// Throws std::runtime_error if it cannot be opened.
+  /// Throws std::runtime_error if the file cannot be opened.
   SourceFile(const std::filesystem::path& file, Progress* progress);
 
   [[nodiscard]] std::int64_t size() const { return buffer_.size(); }
-  /// From this place on, bytes of the file and whatever is added to the part count towards total.
+  /// Starts a progress range: bytes read from now on, and amounts added to the returned part, count towards `total`.
   ProgressPart& begin(double from, double to, std::uint64_t total) { return buffer_.begin(from, to, total); }
-  /// Holds cancellation off where a throw would lose memory; off it comes with the next read.
+  /// Defers cancellation while a throw would leak memory; after release the next read throws.
   void hold(bool held) { buffer_.hold(held); }
 
  private:
@@ -35,7 +35,7 @@ class SourceFile final : public std::istream {
     [[nodiscard]] std::int64_t size() const { return size_; }
     ProgressPart& begin(double from, double to, std::uint64_t total) {
       part_.emplace(progress_, from, to, total);
-      part_->add(static_cast<std::uint64_t>(egptr() - gptr()));  // read already
+      part_->add(static_cast<std::uint64_t>(egptr() - gptr()));  // bytes already read
       return *part_;
     }
     void hold(bool held) { held_ = held; }
@@ -55,7 +55,7 @@ class SourceFile final : public std::istream {
     std::vector<char> bytes_;
     std::size_t next_read_ = least_read;
     std::int64_t size_ = 0;
-    std::int64_t end_ = 0;  ///< place in the file of the buffer's end, and of file_
+    std::int64_t end_ = 0;  ///< file position of the buffer's end, and of file_
     Progress* progress_;
     std::optional<ProgressPart> part_;
     bool held_ = false;

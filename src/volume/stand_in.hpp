@@ -1,6 +1,6 @@
 #pragma once
 
-// What a large file looks like, long before it is read.
+// Low-resolution proxies of large files, shown while the files load.
 
 #include <cstdint>
 #include <functional>
@@ -11,33 +11,33 @@
 
 namespace cumulet::volume {
 
-/// A file's density, temperature and flame in voxels of 4^3. Where there is anything is known of each voxel, as the
-/// file's tree has it; how much there is, of a sixteenth of the bricks: a voxel is the mean of those that were read
-/// around it, times the active part of it. The means of the whole are so kept, and what is smaller than some 32 voxels
-/// is not seen.
+/// The density, temperature and flame of a file at a quarter of the resolution (voxels of 4^3). Occupancy is exact,
+/// because it comes from the file's tree. Values come from a sixteenth of the bricks: a voxel is the mean of the active
+/// voxels that were read around it, times its own active fraction. Overall means are thus preserved, but details
+/// smaller than about 32 voxels are lost.
 struct StandIn {
   VolumeFrame frame;
-  /// What the voxels that are seen of the whole reach over, as VolumeFacts has it.
+  /// The extent of the visible voxels at full resolution, as in VolumeFacts.
   struct Extent {
     glm::ivec3 low;
     glm::ivec3 high;  ///< both inclusive
     glm::dmat4 index_to_world;
   };
-  std::optional<Extent> extent;  ///< none: of fields on lattices of their own
+  std::optional<Extent> extent;  ///< empty if the fields have different lattices
 };
 
-/// A file with as many bricks takes a second of a processor until it is seen.
+/// A file with this many bricks takes about a second of one core to load.
 inline constexpr std::uint64_t worth_a_stand_in = 50'000;
 
 struct StandInWish {
-  /// Called on the import's thread, once at most, before the whole is read. What it throws leaves the import.
+  /// Called on the import's thread, at most once, before the full-resolution import. Its exceptions propagate.
   std::function<void(StandIn)> take;
-  std::uint64_t least_bricks = worth_a_stand_in;  ///< that the first field has; with fewer there is none
+  std::uint64_t least_bricks = worth_a_stand_in;  ///< minimum bricks of the first field; smaller files get no proxy
 };
 
-/// The same as the other import_frame, but that a .vdb file of many bricks has a stand-in first, which takes about a
-/// twentieth of the time. None of a file from before OpenVDB 3, nor where anything of it fails: what is wrong with a
-/// file is told of the whole.
+/// Like the other import_frame, but makes a proxy first for a .vdb file of many bricks, which takes about a twentieth
+/// of the time. There is no proxy for files from before OpenVDB 3, or if making it fails: errors of a file are reported
+/// by the full-resolution import.
 VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
                          const StandInWish& stand_in);
 

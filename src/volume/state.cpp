@@ -16,7 +16,7 @@ using namespace detail;
 
 namespace {
 
-// Copies, in pieces that stay in a cache until they were looked at. Whether all are finite.
+// Copies in pieces that are checked while still in the cache. Returns whether all values are finite.
 bool copy_finite(std::span<const float> from, std::span<float> to) {
   constexpr std::size_t piece = 1U << 14U;
   std::atomic<bool> finite = true;
@@ -30,7 +30,7 @@ bool copy_finite(std::span<const float> from, std::span<float> to) {
   return finite;
 }
 
-// For so many more, twice as much as there was.
+// Reserves space for `more` elements, at least doubling the size when it grows.
 template <class Vector>
 void make_room(Vector& vector, std::size_t more) {
   if (vector.capacity() - vector.size() < more) vector.reserve(std::max(vector.size() + more, 2 * vector.size()));
@@ -116,7 +116,7 @@ void BrickCopy::put(const BrickCopy& other) {
     const glm::ivec3 origin(other.origins_[3 * from], other.origins_[3 * from + 1], other.origins_[3 * from + 2]);
     auto place = places_.find(origin);
     if (place == places_.end()) {
-      // All that may fail before anything changes.
+      // Everything that may throw comes before the first change.
       make_room(origins_, 3);
       make_room(values_, brick_voxels);
       make_room(active_, brick_size);

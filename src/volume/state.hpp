@@ -1,6 +1,6 @@
 #pragma once
 
-// What a host hands over of a simulation, in memory that outlives the call.
+// Copies of a host's simulation fields, which outlive the call.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -15,7 +15,7 @@
 
 namespace cumulet::volume {
 
-/// Numbers that are filled by whoever makes them: a vector would fill them first, on one thread.
+/// An uninitialized array of floats: a vector would initialize them first, on one thread.
 class Floats {
  public:
   Floats() = default;
@@ -35,23 +35,23 @@ struct DenseCopy {
   glm::dmat4 index_to_world{1.0};
 };
 
-/// Bricks, of which some may be replaced.
+/// Bricks that can be replaced.
 class BrickCopy {
  public:
-  /// zeros: a brick without a mask has as active voxels those that are not 0, as a dense field has; else all.
+  /// zeros: in bricks without a mask, only voxels that are not 0 are active, as in a dense field; otherwise all are.
   explicit BrickCopy(const SparseVoxels& voxels, bool zeros = false);
-  /// Of voxels that are not 0.
+  /// The active voxels are those that are not 0.
   explicit BrickCopy(const DenseCopy& dense);
-  /// Of none yet.
+  /// Creates a field without bricks.
   explicit BrickCopy(const glm::dmat4& index_to_world) : index_to_world_(index_to_world) {}
 
   void reserve(std::size_t count);
-  /// One more, at a place where none is: active are those of its voxels that are not 0. Returns whether all are finite.
+  /// Adds a brick at a new origin; its voxels that are not 0 are active. Returns whether all values are finite.
   bool add(const glm::ivec3& origin, std::span<const float, brick_voxels> values);
 
-  /// What it reads from stays here.
+  /// Returns a view; it refers to this object.
   [[nodiscard]] SparseVoxels view() const;
-  /// Bricks of the other take the place of those here, or are added. O(bricks of the other), the first time of all.
+  /// Replaces or adds bricks. O(bricks of the other); the first call is O(all bricks).
   void put(const BrickCopy& other);
   [[nodiscard]] std::size_t count() const { return origins_.size() / 3; }
   [[nodiscard]] const glm::dmat4& index_to_world() const { return index_to_world_; }
@@ -69,28 +69,28 @@ class BrickCopy {
   std::vector<SourceTile> tiles_;
   float background_ = 0.0F;
   glm::dmat4 index_to_world_{1.0};
-  std::unordered_map<glm::ivec3, std::size_t, Hash> places_;  // of bricks; empty until one is put
+  std::unordered_map<glm::ivec3, std::size_t, Hash> places_;  // index of bricks by origin; empty until put() is called
 };
 
-/// A field in memory of its own.
+/// A field with its own memory.
 struct FieldCopy {
   Channel channel;
   std::variant<DenseCopy, BrickCopy> voxels;
 
-  /// A copy, in parallel. Throws what require_finite does.
+  /// Copies a field, in parallel. Throws like require_finite().
   static FieldCopy of(const MemoryField& field, const std::string& name);
   [[nodiscard]] MemoryField view() const;
   void put(const BrickCopy& bricks);
 };
 
-/// What changes of fields that are there.
+/// An update of existing fields.
 struct Changes {
   struct Bricks {
     Channel channel;
     BrickCopy bricks;
   };
   std::vector<Bricks> fields;
-  /// Newer ones on top of these.
+  /// Merges a newer update over this one.
   void put(Changes newer);
 };
 

@@ -37,7 +37,8 @@ bool is_packed(std::uint32_t compression) {
   return (compression & (openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ZIP)) != 0;
 }
 
-// As the file says it: negative, or 0, if they are as they are, for compression would not have made them fewer.
+// Checks the length in the file. It is negative or 0 if the values are not compressed, because compression would not
+// have made them smaller.
 std::int64_t check_length(std::int64_t length, std::size_t bytes) {
   const auto limit = static_cast<std::int64_t>(bytes);
   if (length > limit + BLOSC_MAX_OVERHEAD || (length <= 0 && length != -limit)) fail(damaged);

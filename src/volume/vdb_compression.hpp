@@ -1,6 +1,6 @@
 #pragma once
 
-// Before any other header of OpenVDB's: its trees read their values by what is specialised here.
+// Include this before any other OpenVDB header: it specializes the function by which OpenVDB's trees read their values.
 
 #include <openvdb/io/Compression.h>
 #include <openvdb/math/Vec3.h>
@@ -12,13 +12,13 @@
 
 namespace cumulet::volume::detail {
 
-/// Reads bytes that OpenVDB compressed, or skips them if data is null. What the file says of their length is checked
-/// before it is believed: OpenVDB writes past its buffer where a damaged length is negative, and allocates whatever a
-/// positive one says. Throws std::runtime_error.
+/// Reads bytes that OpenVDB compressed, or skips them if data is null. The length in the file is validated first:
+/// OpenVDB writes past its buffer for a damaged negative length, and allocates memory for any positive one. Throws
+/// std::runtime_error.
 void read_compressed(std::istream& in, char* data, std::size_t bytes, std::uint32_t compression);
-/// Appends what read_compressed would read, as the file has it. Throws the same of lengths.
+/// Appends the bytes that read_compressed() would read, still compressed. Throws the same errors for lengths.
 void copy_compressed(std::istream& in, std::vector<char>& to, std::size_t bytes, std::uint32_t compression);
-/// Appends these bytes.
+/// Appends `count` bytes.
 void copy_bytes(std::istream& in, std::vector<char>& to, std::size_t count);
 
 }  // namespace cumulet::volume::detail
@@ -27,7 +27,7 @@ namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME::io {
 
-// What values may be.
+// The value types.
 #define CUMULET_VDB_VALUES(OF) \
   OF(math::half)               \
   OF(float)                    \
@@ -36,7 +36,7 @@ namespace OPENVDB_VERSION_NAME::io {
   OF(std::int64_t)             \
   OF(math::Vec3<math::half>) OF(math::Vec3<float>) OF(math::Vec3<double>) OF(math::Vec3<std::int32_t>)
 
-// Defined once, in vdb_compression.cpp: linkers then prefer these to what other code makes of OpenVDB's template.
+// Defined once, in vdb_compression.cpp: linkers then prefer these to instances of OpenVDB's template in other code.
 #define CUMULET_READ_DATA(T)                                                                                  \
   template <>                                                                                                 \
   void readData<T>(std::istream & in, T * data, Index count, std::uint32_t compression, DelayedLoadMetadata*, \

@@ -43,11 +43,11 @@ std::string class_name(openvdb::GridClass grid_class) {
 
 using HalfGrid = openvdb::Grid<openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type>;
 
-// Its layout differs from that of 224 by nothing but grids of halves.
+// Differs from 224 only by grids of halves.
 constexpr std::uint32_t known_file_version = 225;
 
-/// OpenVDB 10, unlike 13, knows no grids of halves by their type's name, and to register them would change the OpenVDB
-/// of the whole process.
+/// Creates a grid. OpenVDB 10, unlike 13, does not register grids of halves, and registering them here would affect
+/// OpenVDB in the whole process.
 openvdb::GridBase::Ptr create_grid(const std::string& type) {
   return type == HalfGrid::gridType() ? HalfGrid::create() : openvdb::GridBase::createGrid(type);
 }
@@ -68,13 +68,13 @@ void collect_tiles(const NodeT& node, Pick pick, float background, std::vector<S
   }
 }
 
-/// All but the leaves.
+/// Returns everything except the leaves.
 template <typename GridT, typename Pick>
 SourceGrid take_grid(const openvdb::GridBase& grid, Pick pick) {
   const auto& root = static_cast<const GridT&>(grid).tree().root();
   SourceGrid out;
   const auto matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
-  // OpenVDB multiplies row vectors from the left: its rows are our columns.
+  // OpenVDB multiplies row vectors from the left: its rows are the columns here.
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) out.index_to_world[column][row] = matrix(column, row);
   }
@@ -83,13 +83,13 @@ SourceGrid take_grid(const openvdb::GridBase& grid, Pick pick) {
   return out;
 }
 
-/// The tree of a grid that own_tree() was called for.
+/// Returns the tree of a grid for which own_tree() was called.
 template <typename GridT>
 std::shared_ptr<OwningTree<typename GridT::TreeType>> tree_of(openvdb::GridBase& grid) {
   return std::static_pointer_cast<OwningTree<typename GridT::TreeType>>(static_cast<GridT&>(grid).treePtr());
 }
 
-/// Calls f<GridT>() for the grid's type, if its voxels can be read.
+/// Calls f<GridT>() for the grid's type if its voxels can be read.
 template <typename Call>
 void with_type(const openvdb::GridBase& grid, Call&& f) {
   const auto try_types = [&]<typename... GridT>() {
@@ -108,9 +108,9 @@ T read_value(SourceFile& stream) {
   return value;
 }
 
-/// The header of a file of version 222 or later, which the stream is then past, as this OpenVDB understands it: it
-/// prints a warning about versions that are newer than its own, and cannot read the blank identifier that later ones
-/// may write.
+/// Returns the header of a file of version 222 or later, in a form that this OpenVDB understands, and moves the stream
+/// past it. OpenVDB prints a warning for versions newer than its own, and cannot read the blank identifier that newer
+/// ones may write.
 std::vector<char> understood_header(SourceFile& stream) {
   constexpr std::size_t version_at = 8;
   constexpr std::size_t id_at = 8 + 3 * sizeof(std::uint32_t) + 1;
@@ -127,11 +127,11 @@ std::vector<char> understood_header(SourceFile& stream) {
   return header;
 }
 
-/// A .vdb file read through openvdb's archive.
+/// A .vdb file read through OpenVDB's archive.
 ///
-/// Not through openvdb::io::File: that one may copy the file, loads leaves lazily from a mapping
-/// that a shorter file turns into SIGBUS, and reads on past the end of a damaged one. Here every
-/// offset is checked against the file's size and the stream throws at its end.
+/// openvdb::io::File is not used: it may copy the file, and loads leaves lazily from a mapping that causes SIGBUS if
+/// the file becomes shorter. It also reads past the end of a damaged file. Here every offset is checked against the
+/// file's size, and the stream throws at its end.
 class VdbReader final : public Reader, private openvdb::io::Archive {
  public:
   VdbReader(const std::filesystem::path& file, Progress* progress) : stream_(file, progress), size_(stream_.size()) {
@@ -201,11 +201,12 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     for (std::uint32_t i = 0; i < count; ++i) {
       skip_string();  // name
       skip_string();  // type
-      skip_string();  // value, which has a length before it too
+      skip_string();  // value, which has a length prefix as well
     }
   }
 
-  /// Runs a walk over lengths that OpenVDB would allocate unseen, gigabytes from four damaged bytes; then rewinds.
+  /// Runs a check of lengths for which OpenVDB would allocate memory without validation (gigabytes from four damaged
+  /// bytes), then rewinds.
   template <typename Walk>
   void check_lengths(Walk&& walk) {
     const auto position = stream_.tellg();
@@ -270,7 +271,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
         grid = HalfGrid::create();
         grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
       }
-      // The offsets lead past a grid of another type that OpenVDB does not know.
+      // For a grid of an unknown type, the offsets lead past it.
       descriptor.setGridPos(read_value<std::int64_t>(stream_));
       descriptor.setBlockPos(read_value<std::int64_t>(stream_));
       descriptor.setEndPos(read_value<std::int64_t>(stream_));
@@ -304,7 +305,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
         grid->readMeta(stream_);
         grid->readTransform(stream_);
       } else {
-        // Written to a pipe: where the next grid begins is known only after reading this one.
+        // Written to a pipe: the next grid's position is known only after reading this one.
         check_grid_head();
         stream_.hold(!own_tree(*grid));
         readGrid(grid, descriptor, stream_);
@@ -338,7 +339,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     });
   }
 
-  /// Whether the grid is of a type that can be read here at all, and so cancelled.
+  /// Gives the grid an OwningTree. Returns false if its type is not supported; reading it can then not be cancelled.
   static bool own_tree(openvdb::GridBase& grid) {
     bool own = false;
     with_type(grid, [&]<typename GridT>() {
@@ -348,7 +349,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     return own;
   }
 
-  /// With the tree that it may share with another; its leaves' values are still in the file.
+  /// Reads a grid's tree, which may be shared with another grid; the leaves' values are still in the file.
   openvdb::GridBase::Ptr read_topology(std::size_t index, Portion portion) {
     openvdb::GridBase::Ptr grid = read_grid(descriptors_[index], portion);
     if (descriptors_[index].isInstance()) {
@@ -362,10 +363,10 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   }
 
   openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor, Portion portion) {
-    stream_.clear();  // a stand-in may have failed
+    stream_.clear();  // making a proxy may have failed
     stream_.hold(false);
     stream_.seekg(descriptor.getGridPos());
-    // An instance holds no tree. Without offsets a grid's end is unknown, and the file's the best guess.
+    // An instance has no tree. Without offsets the end of a grid is unknown, and the file's end is used.
     if (!descriptor.isInstance()) {
       const std::int64_t bytes =
           inputHasGridOffsets() ? descriptor.getEndPos() - descriptor.getGridPos() : size_ - descriptor.getGridPos();

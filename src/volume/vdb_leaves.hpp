@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: the leaves of OpenVDB's trees. After vdb_compression.hpp.
+// Private to volume/: the leaves of OpenVDB's trees. Include it after vdb_compression.hpp.
 
 #include <openvdb/io/io.h>
 #include <openvdb/openvdb.h>
@@ -33,7 +33,7 @@ ActiveMask active_of(const LeafT& leaf) {
   return mask;
 }
 
-/// Bytes as a stream, which throws at their end.
+/// A stream over bytes; it throws at their end.
 class MemoryStream final : public std::istream {
  public:
   explicit MemoryStream(std::vector<char>& bytes) : std::istream(nullptr), buffer_(bytes) {
@@ -63,14 +63,14 @@ class MemoryStream final : public std::istream {
   Buffer buffer_;
 };
 
-/// A file, and what it has for OpenVDB to know of it: the stream points to that.
+/// A file with the stream metadata of OpenVDB, to which the stream points.
 struct VdbStream {
   SourceFile& file;
   openvdb::io::StreamMetadata::Ptr& metadata;
 };
 
-/// The same tree, but one that leaves its leaves' values in the file, and frees what it has read when its stream
-/// throws: OpenVDB's own root forgets the child that it was reading, with all that is below.
+/// An OpenVDB tree that leaves its leaves' values in the file, and frees the nodes it has read if its stream throws:
+/// OpenVDB's own root leaks the child that it was reading, with all nodes below.
 template <typename TreeT>
 class OwningTree final : public TreeT {
  public:
@@ -82,15 +82,15 @@ class OwningTree final : public TreeT {
     using ChildT = typename RootT::ChildNodeType;
     const auto read = [&]<typename T>(T& value) { in.read(reinterpret_cast<char*>(&value), sizeof value); };
     this->clear();
-    std::int32_t buffers = 0;  // of a leaf, which says it again
+    std::int32_t buffers = 0;  // per leaf; each leaf repeats it
     read(buffers);
     RootT& root = this->root();
     ValueT background{};
     read(background);
     root.setBackground(background, false);
     openvdb::io::setGridBackgroundValuePtr(in, &root.background());
-    // A node that is not read to its end holds the background where children should be: it can be freed if those are
-    // null pointers. If not, it has to be read to its end, or is lost if the file ends before.
+    // A node that was read only in part holds the background where child pointers should be. It can be freed if these
+    // are null pointers. Otherwise it must be read completely, and is leaked if the file ends before.
     const bool frees = std::all_of(reinterpret_cast<const char*>(&background),
                                    reinterpret_cast<const char*>(&background + 1), [](char c) { return c == 0; });
     auto& file = dynamic_cast<SourceFile&>(in);
@@ -101,7 +101,7 @@ class OwningTree final : public TreeT {
     const auto read_key = [&] {
       std::array<std::int32_t, 3> key{};
       read(key);
-      // A damaged table could hold the same region twice under two keys.
+      // A damaged table could contain the same region twice under two keys.
       if (((key[0] | key[1] | key[2]) & static_cast<int>(ChildT::DIM - 1)) != 0) fail("damaged root node");
       return openvdb::Coord(key.data());
     };
@@ -127,16 +127,16 @@ class OwningTree final : public TreeT {
     }
   }
 
-  /// Notes where they are.
+  /// Records the position of the values instead of reading them.
   void readBuffers(std::istream& in, bool from_half) override {
     buffers_ = Buffers{in.tellg(), from_half, openvdb::io::StreamMetadata(*openvdb::io::getStreamMetadataPtr(in))};
-    // Its index of the file is not believed.
+    // The file's own index is not used, because it is not validated.
     buffers_->settings.gridMetadata().clearMetadata();
   }
-  /// Where the file has nothing more of the grid, or nothing at all: progress is told by it.
+  /// Sets the end of the grid in the file (or of the file), for progress.
   void ends_at(std::int64_t end) { end_ = end; }
 
-  /// Reads them in where they belong.
+  /// Reads all values into the leaves.
   void fill(const VdbStream& stream) {
     if (!buffers_) return;
     std::vector<LeafT*> leaves;
@@ -146,7 +146,7 @@ class OwningTree final : public TreeT {
       for (LeafT* leaf : leaves) leaf->readBuffers(stream.file, buffers_->from_half);
     });
   }
-  /// Takes the stream, which is where they are, past them.
+  /// Moves the stream, which is at the values, past them.
   void pass(const VdbStream& stream) const {
     if (!buffers_) return;
     std::vector<const LeafT*> leaves;
@@ -159,8 +159,8 @@ class OwningTree final : public TreeT {
       }
     });
   }
-  /// Calls take(place in leaves, leaf with its values) for each that is chosen of these, all that there are, on many
-  /// threads at a time until one returns false. Returns whether none did.
+  /// Calls take(index in leaves, leaf with values) for each chosen leaf, on several threads, until one call returns
+  /// false. leaves: all leaves of the tree. Returns whether no call returned false.
   template <class Take>
   bool sweep(const VdbStream& stream, const std::vector<const LeafT*>& leaves, const LeafSource::Choice& chosen,
              Portion portion, const Take& take) const {
@@ -176,13 +176,13 @@ class OwningTree final : public TreeT {
       });
       return wanted;
     }
-    // One thread reads what is packed, run by run; all unpack.
+    // One thread reads the compressed data run by run; all threads decompress.
     struct Run {
       std::vector<std::size_t> leaves;
       std::vector<char> bytes;
     };
     using RunPtr = std::shared_ptr<Run>;
-    // Short ones first: what is left early has then read little ahead.
+    // Short runs first: a sweep that stops early has then read little ahead.
     constexpr std::size_t most_leaves = 256;
     std::size_t leaves_a_run = 4;
     std::size_t next = 0;
@@ -229,7 +229,7 @@ class OwningTree final : public TreeT {
     openvdb::io::StreamMetadata settings;
   };
 
-  /// Whether a leaf's values are as copy() knows them.
+  /// Whether leaf values have the layout that copy() supports.
   [[nodiscard]] bool is_indexed() const {
     return buffers_->settings.fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
   }
@@ -245,7 +245,7 @@ class OwningTree final : public TreeT {
     work();
   }
 
-  /// Of a leaf without values, one with them; they are gone after the call.
+  /// Reads the values of a leaf into a temporary leaf and passes it to use().
   template <class Use>
   void read(std::istream& in, const LeafT& leaf, const Use& use) const {
     LeafT whole(openvdb::PartialCreate(), leaf.origin());
@@ -254,18 +254,18 @@ class OwningTree final : public TreeT {
     use(whole);
   }
 
-  /// Appends what LeafNode::readBuffers reads of a leaf, packed as it is.
+  /// Appends the bytes that LeafNode::readBuffers reads for a leaf, still compressed.
   void copy(std::istream& in, const LeafT& leaf, std::vector<char>& to) const {
     if (const auto bytes = copy_head(in, leaf, to)) copy_compressed(in, to, *bytes, buffers_->settings.compression());
   }
-  /// Takes the stream past that. head: room for what comes before its values.
+  /// Moves the stream past the values of a leaf. head: buffer for the data before the values.
   void pass_over(std::istream& in, const LeafT& leaf, std::vector<char>& head) const {
     head.clear();
     if (const auto bytes = copy_head(in, leaf, head))
       read_compressed(in, nullptr, *bytes, buffers_->settings.compression());
   }
-  /// Appends what comes before its values. Returns how many bytes these are once they are unpacked; none: the file has
-  /// nothing of them.
+  /// Appends the data before a leaf's values. Returns the uncompressed size of the values in bytes, or nullopt if the
+  /// file has none.
   std::optional<std::size_t> copy_head(std::istream& in, const LeafT& leaf, std::vector<char>& to) const {
     using namespace openvdb::io;
     using Half = RealToHalf<ValueT>;
@@ -289,7 +289,7 @@ class OwningTree final : public TreeT {
   std::int64_t end_ = 0;
 };
 
-/// Leaves of a tree that fill() was called for.
+/// Leaves of a tree after fill().
 template <typename TreeT, typename Pick>
 class VdbLeaves final : public HeldLeaves {
  public:
@@ -314,7 +314,7 @@ class VdbLeaves final : public HeldLeaves {
   std::vector<const LeafT*> leaves_;
 };
 
-/// Leaves whose values are in a file until they are swept. What it is made of has to outlive it.
+/// Leaves whose values stay in a file until they are swept. The tree and the stream must outlive it.
 template <typename TreeT, typename Pick>
 class StreamedLeaves final : public LeafSource {
  public:

@@ -1,5 +1,5 @@
 #include "volume/vdb_compression.hpp"
-// The line above comes first: see there.
+// The line above must come first; vdb_compression.hpp gives the reason.
 #include "volume/vdb_metadata.hpp"
 
 #include <openvdb/Metadata.h>
@@ -27,7 +27,7 @@ std::string text_of(const openvdb::math::Tuple<Size, T>& value) {
   return text + "]";
 }
 
-/// Rows in brackets, one a line, with six decimals.
+/// Formats rows in brackets, one per line, with six decimals.
 template <typename T>
 std::string text_of(const openvdb::math::Mat4<T>& value) {
   std::string text = "[";
@@ -48,7 +48,7 @@ std::optional<std::string> text_as(const openvdb::Metadata& metadata) {
   return text_of(static_cast<const Typed&>(metadata).value());
 }
 
-/// OpenVDB 13 has metadata of halves, which OpenVDB 10 keeps as bytes.
+/// OpenVDB 13 has metadata of type half, which OpenVDB 10 stores as bytes.
 std::optional<std::string> half_text(const openvdb::Metadata& metadata) {
   const auto* bytes = dynamic_cast<const openvdb::UnknownMetadata*>(&metadata);
   if (bytes == nullptr || bytes->typeName() != "half" || bytes->value().size() != 2) return std::nullopt;
@@ -71,7 +71,7 @@ std::string text_of(const openvdb::Metadata& metadata) {
 std::vector<Metadata> metadata_of(const openvdb::MetaMap& map) {
   std::vector<Metadata> entries;
   for (auto it = map.beginMeta(); it != map.endMeta(); ++it) {
-    // OpenVDB's own index into the file: bytes, and large.
+    // OpenVDB's own index of the file, which is binary and large.
     if (it->second->typeName() == "__delayedload") continue;
     constexpr std::size_t longest = 4096;
     entries.push_back({it->first, it->second->typeName(), text_of(*it->second).substr(0, longest)});

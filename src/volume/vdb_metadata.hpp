@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to volume/: metadata of OpenVDB's files as text. After vdb_compression.hpp.
+// Private to volume/: metadata of OpenVDB files as text. Include it after vdb_compression.hpp.
 
 #include <openvdb/MetaMap.h>
 
@@ -10,7 +10,8 @@
 
 namespace cumulet::volume::detail {
 
-/// Numbers as OpenVDB prints them in the classic locale, in every locale of the process. Long values are cut.
+/// Returns metadata as text. Numbers are formatted as OpenVDB does in the classic locale, in any locale of the process.
+/// Long values are truncated.
 std::vector<Metadata> metadata_of(const openvdb::MetaMap& map);
 
 }  // namespace cumulet::volume::detail

@@ -1,7 +1,8 @@
 #pragma once
 
-// Private to volume/: what only the virtual tables of OpenVDB's trees ask for is taken from libopenvdb, which has it
-// for each type that it registers. To instantiate it again is more than half of what compiling such a tree takes.
+// Private to volume/: functions that only the virtual tables of OpenVDB's trees need are taken from libopenvdb, which
+// has them for each type that it registers. Instantiating them again is more than half of the time to compile such a
+// tree.
 
 #include <openvdb/openvdb.h>
 

@@ -159,6 +159,15 @@ TEST_F(ExtremeFiles, FramesOfASequenceHaveOneScale) {
   EXPECT_LT(brightest, 10.0);
 }
 
+TEST_F(ExtremeFiles, NotesOfEveryVolumeOfASceneArePrinted) {
+  write("first.vdb", {smoke()});
+  write("second.vdb", {smoke(), heat(2250.0F)});
+  std::ofstream(path("scene.json"))
+      << R"({"cumulet_scene": 2, "volumes": [{"file": "first.vdb"}, {"file": "second.vdb"}]})";
+  const Done run = command("first.vdb", path("picture.pfm"), "--scene '" + path("scene.json") + "'");
+  EXPECT_TRUE(run.says("second.vdb") && run.says("as kelvin do")) << run.said;
+}
+
 TEST_F(ExtremeFiles, FillValuesAreCountedAndDrawnAsNothing) {
   for (const float fill : {9.97e36F, 1e31F, 3.4e38F, -9.97e36F}) {
     auto filled = smoke();

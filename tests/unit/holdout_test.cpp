@@ -130,6 +130,22 @@ TEST_P(Holdout, OfAWallShowsNoSkyWhereThereAreLamps) {
   EXPECT_NEAR(mean() / without, 1.0, 0.2);
 }
 
+// The noise-free light that a denoiser subtracts and adds again has no emission of a holdout volume.
+TEST_P(Holdout, AnEmissiveVolumeIsDenoisedToBlack) {
+  auto light = make_desc<cumulet_light_desc>();
+  for (float& value : light.sun_irradiance) value = 1e-20F;
+  for (float& value : light.sky_radiance) value = 0.0F;
+  light.sky = CUMULET_SKY_CONSTANT;
+  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
+  set_medium(0.2, true, 5.0F);
+  samples(8, 0, false);
+  make();
+  std::vector<float> rgba(count * 4);
+  const auto denoise = make_desc<cumulet_denoise_desc>();
+  ASSERT_EQ(cumulet_read_denoised(v_, &denoise, rgba.data(), rgba.size()), CUMULET_OK) << cumulet_last_error(v_);
+  for (std::size_t i = 0; i < count; ++i) EXPECT_LT(rgba[4 * i], 1e-6F) << i;
+}
+
 // What is not behind it has its shadow as before, bit for bit.
 TEST_P(Holdout, ThrowsItsShadow) {
   const SurfacesRef panes = make_panes(4.0F);

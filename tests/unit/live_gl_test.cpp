@@ -281,6 +281,26 @@ TEST_F(LiveGl, EveryFormatIsWhatItIsInMemory) {
   expect_same(newest(live_), alone(dense(odd, read)));
 }
 
+// Values that are far from 1 are scaled in main memory, even if the volume is resident in GL.
+TEST_F(LiveGl, ValuesFarFromOneArrive) {
+  for (const bool resident : {false, true}) {
+    const LiveRef live = make_live(resident);
+    ASSERT_EQ(cumulet_set_live(v_, live.get()), CUMULET_OK);
+    for (const float scale : {1e-30F, 1e25F, 1.0F}) {
+      SCOPED_TRACE(std::to_string(scale) + (resident ? " resident" : ""));
+      auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
+      for (float& value : values) value *= scale;
+      const Array array(CUMULET_VOXEL_FORMAT_R32F, values);
+      const auto fields =
+          std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], array))};
+      const cumulet_gl_state_desc desc = state_of(fields);
+      ASSERT_EQ(cumulet_live_set_gl(v_, live.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+      EXPECT_EQ(arrive(), 1U);
+      expect_same(newest(live), alone(dense(odd, array.values)));
+    }
+  }
+}
+
 // Every half there is, signs, denormals and zeros of both signs among them; and of floats those that flushing would
 // change.
 TEST_F(LiveGl, BitsStayWhatTheyAre) {

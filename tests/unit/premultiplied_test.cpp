@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "gl/state_guard.hpp"
-#include "glow.hpp"
 #include "image.hpp"
 #include "render/compositor.hpp"
+#include "straight_alpha.hpp"
 #include "support/flat_picture.hpp"
 #include "support/gl_state.hpp"
 
@@ -214,12 +214,13 @@ TEST(StraightDisplay, RisesWithRadiance) {
 TEST(StraightDisplay, ProgramsReportWhereItHidesMore) {
   std::vector<float> rgba;
   for (const glm::vec4& pixel : pixels) rgba.insert(rgba.end(), {pixel.x, pixel.y, pixel.z, pixel.a});
-  EXPECT_EQ(cumulet::demo::glowing_pixels(rgba, 0.0), 4U);
-  EXPECT_EQ(cumulet::demo::glowing_pixels(rgba, 1.0), 6U) << "brighter smoke glows, too; what is opaque does not";
-  EXPECT_EQ(cumulet::demo::glowing_pixels({}, 0.0), 0U);
-  EXPECT_EQ(cumulet::demo::glow_note("a.png", 0), "");
-  EXPECT_EQ(cumulet::demo::glow_note("a.png", 4).find("a.png: 4 pixels are brighter"), 0U);
-  EXPECT_EQ(cumulet::demo::glow_note("a.png", 1).find('\n'), std::string::npos);
+  EXPECT_EQ(cumulet::image::pixels_brighter_than_alpha(rgba, 0.0), 4U);
+  EXPECT_EQ(cumulet::image::pixels_brighter_than_alpha(rgba, 1.0), 6U)
+      << "brighter smoke glows, too; what is opaque does not";
+  EXPECT_EQ(cumulet::image::pixels_brighter_than_alpha({}, 0.0), 0U);
+  EXPECT_EQ(cumulet::image::raised_alpha_note("a.png", 0), "");
+  EXPECT_EQ(cumulet::image::raised_alpha_note("a.png", 4).find("a.png: 4 pixels are brighter"), 0U);
+  EXPECT_EQ(cumulet::image::raised_alpha_note("a.png", 1).find('\n'), std::string::npos);
 }
 
 }  // namespace

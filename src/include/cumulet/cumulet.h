@@ -559,6 +559,12 @@ typedef struct cumulet_volume_file_desc {
    * read.
    */
   const char* velocity_grid;
+  /**
+   * Receives the notes and warnings of cumulet_volume_open_file, on the calling thread, before it returns. NULL: they
+   * are dropped. Functions that load through a viewer log to the viewer's callback and ignore this one.
+   */
+  cumulet_log_fn log;
+  void* log_user;
 } cumulet_volume_file_desc;
 
 /**

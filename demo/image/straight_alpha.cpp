@@ -1,11 +1,11 @@
-#include "glow.hpp"
+#include "straight_alpha.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace cumulet::demo {
+namespace cumulet::image {
 
-std::size_t glowing_pixels(std::span<const float> rgba, double exposure_stops) {
+std::size_t pixels_brighter_than_alpha(std::span<const float> rgba, double exposure_stops) {
   constexpr float byte = 1.0F / 255.0F;
   const auto exposure = static_cast<float>(std::exp2(exposure_stops));
   std::size_t pixels = 0;
@@ -17,12 +17,11 @@ std::size_t glowing_pixels(std::span<const float> rgba, double exposure_stops) {
   return pixels;
 }
 
-std::string glow_note(const std::string& path, std::size_t pixels) {
+std::string raised_alpha_note(const std::string& path, std::size_t pixels) {
   if (pixels == 0) return {};
   return path + ": " + std::to_string(pixels) + (pixels == 1 ? " pixel is" : " pixels are") +
          " brighter than PNG's straight alpha can hold: alpha is raised there, and hides more of the background (.exr "
-         "keeps "
-         "color and alpha)";
+         "keeps color and alpha)";
 }
 
-}  // namespace cumulet::demo
+}  // namespace cumulet::image
