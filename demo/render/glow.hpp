@@ -6,11 +6,11 @@
 
 namespace cumulet::demo {
 
-/// How many pixels of premultiplied linear RGBA are brighter than their alpha once exposed, by more than a byte shows:
-/// straight alpha, as PNG has it, cannot hold them.
+/// Counts pixels of premultiplied linear RGBA whose exposed color exceeds their alpha by more than 1/255. Straight
+/// alpha, as in PNG, cannot represent them.
 [[nodiscard]] std::size_t glowing_pixels(std::span<const float> rgba, double exposure_stops);
 
-/// The line that says so of a file; "" where there are none.
+/// Returns a warning about these pixels for the file; "" if `pixels` is 0.
 [[nodiscard]] std::string glow_note(const std::string& path, std::size_t pixels);
 
 }  // namespace cumulet::demo
