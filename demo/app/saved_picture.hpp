@@ -8,14 +8,15 @@
 
 namespace cumulet::demo {
 
-/// Whether the picture that is shown has this size and is no preview: each of its pixels has a sample.
+/// Returns true if the displayed image has this size and is not a preview: each pixel has a sample.
 [[nodiscard]] bool is_whole(const cumulet_frame_result& shown, std::uint32_t width, std::uint32_t height);
 
-/// Writes the shown picture to a PNG file, as it is displayed. Throws std::runtime_error, one line.
+/// Writes the displayed image to a PNG file. Throws std::runtime_error, one line.
 void save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
               const std::string& path);
 
-/// The same in linear radiance with its layers, as docs/aovs.md says. Debug views have none. Throws likewise.
+/// Writes linear radiance and AOVs to an OpenEXR file, as described in docs/aovs.md. Debug views have no AOVs. Throws
+/// std::runtime_error, one line.
 void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
               const std::string& path);
 

@@ -795,7 +795,8 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
 
 void put_model(Writer& writer, std::size_t number, const SceneModel& model, const std::string& file) {
   const std::string of = "models[" + std::to_string(number) + "].";
-  // For the first model these keys are always written: otherwise the reader would take it for the scene's surfaces.
+  // For model 0 the name is always written, because without it the reader takes the model for the scene's surfaces.
+  // The other values of model 0 replace those of scene.surface, which were written at the same paths.
   if (!model.name.empty() || number == 0) writer.put(of + "name", model.name);
   writer.put(of + "file", file);
   if (model.to_world != Matrix{}) writer.put(of + "to_world", model.to_world);
