@@ -950,8 +950,8 @@ void App::write_report(const std::string& path) const {
   json["fly"] = model_.navigation.fly != 0;
   json["scene"] = Json::parse(scene_text(model_.scene, path, SceneFormat::first));
   const Json second = Json::parse(scene_text(model_.scene, path));
-  for (const char* key : {"volumes", "models", "lights"})
-    json[key] = second.value(key, Json::array());  // not in version 1
+  // Version 1 has no such sections.
+  for (const char* key : {"volumes", "models", "lights"}) json[key] = second.value(key, Json::array());
   image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

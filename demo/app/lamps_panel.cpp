@@ -54,8 +54,7 @@ void Panel::lamps(Model& model) {
     Desc& lamp = lamps[i];
     const std::string number = std::string(" ").append(std::to_string(i + 1));
     settings::for_each<Desc>([&](auto setting) {
-      if (*setting.row.label == '\0' || !has(setting, lamp.kind))
-        return;  // settings without a label exist only in scene files
+      if (*setting.row.label == '\0' || !has(setting, lamp.kind)) return;  // no label: only in scene files
       const std::string label = setting.row.label + number;
       setting.row.label = label.c_str();
       auto& value = lamp.*setting.field;

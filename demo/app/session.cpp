@@ -801,7 +801,7 @@ void Session::finish_load() {
   if (!fit_) return;
   scene_.camera = *std::exchange(fit_, std::nullopt);
   set_camera();
-  static_cast<void>(cumulet_frame_all(viewer_.get()));  // stays pending if there is nothing to fit yet
+  static_cast<void>(cumulet_frame_all(viewer_.get()));  // fails if there is nothing to fit; then fitted later
 }
 
 void Session::input(const ViewerInput& input) {

@@ -843,8 +843,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   for (const std::string& volume : plan.judged_by) {
     SceneOptions judged = options.scene;
     judged.volume = volume;
-    const std::string state =
-        cumulet::demo::volume_state(volume);  // read before loading, because the file may be replaced meanwhile
+    const std::string state = cumulet::demo::volume_state(volume);  // before: it may be replaced meanwhile
     try {
       studio->load(judged);
       static_cast<void>(ground_below(studio->viewer(), judged));  // throws if the volume is empty, to try the next one
@@ -944,8 +943,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
     picture.output = frame.output;
     picture.stats = frame.stats;
     picture.checkpoint = frame.checkpoint;
-    if (frame.next)
-      picture.scene.sequence.frame = frame.number;  // an interpolated frame is not identified by its files
+    if (frame.next) picture.scene.sequence.frame = frame.number;  // its files do not identify the frame
     render_frame_of(*studio, picture, frame, report, i);
   }
   if (studio) studio->write_trace(options);

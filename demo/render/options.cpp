@@ -630,8 +630,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
       throw UsageError(std::string(flag) + " and --sky-model exclude each other");
   }
   if (app.count("--criterion") > 0) {
-    if (app.count("--threshold") == 0)
-      scene.grid.threshold = 0.0;  // the scene's threshold belongs to the scene's criterion
+    if (app.count("--threshold") == 0) scene.grid.threshold = 0.0;  // the scene's is for its own criterion
     settings::name_criterion(scene.grid);
   }
   if (app.count("--sky") > 0) scene.light.sky = CUMULET_SKY_CONSTANT;

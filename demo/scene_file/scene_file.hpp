@@ -116,9 +116,8 @@ struct NamedCamera : SceneCamera {
 /// A scene, as all demo programs show it. The base class SceneVolume is the first volume, which the flags and the
 /// demo's panel edit; it may be empty.
 struct SceneOptions : SceneVolume, SceneCamera {
-  std::vector<SceneVolume>
-      others;            // further volumes; their max_bounces are 0, because the first volume's value applies to all
-  std::string surfaces;  // glTF file; "": none
+  std::vector<SceneVolume> others;   // max_bounces is 0: the first volume's value applies to all
+  std::string surfaces;              // glTF file; "": none
   std::string surface_variant;       // material variant, by name or number; "": none
   std::int32_t surface_camera = -1;  // index of a camera of the surfaces' file; negative: use `camera`
   std::vector<SceneModel> models;    // in addition to the surfaces, which have the transform of their file
