@@ -161,7 +161,7 @@ std::vector<float> mean(const std::vector<Part>& parts, const image::LayerName& 
 
 double luminance(std::span<const float> rgba) { return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]; }
 
-/// Returns the standard error of the mean luminance over all samples, combined from the parts' means and sums of
+/// Returns the standard error of the mean luminance over all samples. It is combined from the parts' means and sums of
 /// squared deviations (Chan, Golub and LeVeque, "Updating formulae and a pairwise algorithm for computing sample
 /// variances", 1979).
 std::vector<float> error_of(const std::vector<Part>& parts) {

@@ -25,9 +25,9 @@ class Models {
   void give(const std::string& file, SurfacesPtr surfaces);
   /// Returns a file's surfaces, or null if they were not given.
   [[nodiscard]] cumulet_surfaces* surfaces(const std::string& file) const;
-  /// Shows the given models and drops files that the scene no longer names. A model's tag is its index + 1. If a model
-  /// does not have the requested animation or variant, it is not shown, and std::runtime_error with the cause is thrown
-  /// after the others are shown.
+  /// Shows the given models and drops files that the scene no longer names. A model's tag is its index + 1. A model
+  /// without the requested animation or variant is not shown. After the others are shown, std::runtime_error with the
+  /// cause is thrown.
   void show(cumulet_viewer* viewer, const std::vector<SceneModel>& models);
 
  private:

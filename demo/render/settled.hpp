@@ -7,16 +7,16 @@
 
 namespace cumulet::demo {
 
-/// Sequence cache: the settings that all frames of a sequence share and that are derived from a volume (density scale
-/// and medium, ground, camera), stored in a file. Later runs need not read that volume.
+/// Sequence cache: a file with the settings that all frames of a sequence share. They are derived from a volume
+/// (density scale and medium, ground, camera). Later runs need not read that volume.
 
 /// Returns a line that identifies the state of a file: size in bytes, modification time in seconds, and name without
 /// folders.
 [[nodiscard]] std::string volume_state(const std::string& volume);
 
-/// Reads the settings from the file into the scene. Returns false and leaves the scene unchanged if the file does not
-/// exist, is damaged, belongs to another scene, image size or version, or was derived from a volume that is not in
-/// `volumes` in the same state. The settings must then be derived again.
+/// Reads the settings from the file into the scene. Returns false and leaves the scene unchanged if the file is missing
+/// or damaged, or belongs to another scene, image size or version. It also returns false if its volume is not in
+/// `volumes` or has changed. The settings must then be derived again.
 [[nodiscard]] bool read_settled(const std::string& file, SceneOptions& scene, std::span<const std::string> volumes);
 
 /// Writes the derived settings atomically. given: the scene as requested; found: with the derived settings; state:
