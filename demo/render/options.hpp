@@ -45,7 +45,7 @@ struct RenderOptions {
   std::string stats;           // empty: none
   std::string trace;           // empty: none
   std::string shader_cache;    // a folder; empty: none
-  std::vector<Moment> frames;  // frames of the sequence to render; empty: all, if the volume's name is a pattern
+  std::vector<Moment> frames;  // of the sequence; empty: the frame of the scene, else all
   bool overwrite = false;      // re-render frames whose output exists
   std::string settled;  // sequence cache: file with the settings shared by all frames; empty: derive them in each run
   bool info = false;    // print the content of the files, render nothing
