@@ -1,6 +1,6 @@
 #!/bin/bash
-# From a clone to pictures: installs the Debian packages that are missing, builds, writes the sample scenes and renders
-# them to cumulet.png and explosion.png without a display. What is done already is skipped. Arguments go to cumulet-render.
+# Installs missing Debian packages, builds, writes the sample scenes and renders them to cumulet.png and explosion.png
+# without a display. Completed steps are skipped. Arguments are passed to cumulet-render.
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
@@ -15,7 +15,7 @@ install_packages build
 build programs || die "the build failed"
 bin=build/programs/bin
 
-# The scene is deterministic: written again only after its generator changed.
+# The scene is deterministic, so it is only rewritten if its generator has changed.
 scene=build/sample
 if [ ! -f "$scene/.done" ] || [ "$bin/cumulet-scene" -nt "$scene/.done" ]; then
   say "writing the sample scenes to $scene"
@@ -25,7 +25,7 @@ fi
 
 # About a minute each on two cores without a GPU.
 [ $# -gt 0 ] || set -- --spp 16
-# Few samples are grainy: a filter takes the noise away, unless the flags say otherwise.
+# Few samples are noisy, so denoise with a filter unless the arguments contain --denoise.
 case " $* " in
   *" --denoise "* | *" --denoise="*) ;;
   *)

@@ -30,17 +30,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Milliseconds of tracing a picture. While things move, pictures are what counts: the library takes as few pixels as
-// fit. At rest, samples are.
+// Tracing budget per frame in milliseconds. During interaction the frame rate matters, and the library traces as few
+// pixels as fit. At rest the sample rate matters.
 constexpr double moving_budget = 16.0;
 constexpr double resting_budget = 60.0;
 
-constexpr double event_glow = 0.7;   // seconds of frames after an event: tooltips and highlights come late
-constexpr double motion_rest = 0.4;  // seconds without motion that end a step of undo
+constexpr double event_glow = 0.7;   // seconds of frames after an event, because tooltips and highlights appear late
+constexpr double motion_rest = 0.4;  // seconds without camera motion that end an undo step
 constexpr double replay_frame = 1.0 / 60.0;
-constexpr double least_frame = 1.0 / 60.0;  // seconds from one frame to the next
-constexpr double picture_frame = 0.15;      // that a window may wait for a picture that is under way
-constexpr double click_reach = 4.0;         // pixels at scale 1 that a hand may slip
+constexpr double least_frame = 1.0 / 60.0;  // minimum seconds between frames
+constexpr double picture_frame = 0.15;      // maximum seconds that the window waits for an image being rendered
+constexpr double click_reach = 4.0;         // pixels at scale 1 that the pointer may move during a click
 
 }  // namespace
 
@@ -69,7 +69,7 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
   renderer_ =
       std::make_unique<Renderer>(*gl_, context_.get(), Window::wake, options_.trace.empty() ? nullptr : &timeline_,
                                  options_.shader_cache, options_.shaders);
-  // Sizes in the scene are for pictures: here the window has its own.
+  // The scene's size is that of a rendered image. The window has its own size.
   model_.scene.width = 1280;
   model_.scene.height = 720;
   if (!options_.open.empty()) open(options_.open);
@@ -81,7 +81,7 @@ App::~App() = default;
 void App::run() {
   while (!quit_ && !window_->should_close()) {
     Window::wait(patience());
-    // Often enough for a hand, and no more: the rest of the time is the pictures'.
+    // Limits the frame rate: the remaining time is for rendering.
     const double early = now_ + least_frame - glfwGetTime();
     if (!stepped() && early > 0.0) {
       std::this_thread::sleep_for(std::chrono::duration<double>(early));
@@ -114,7 +114,7 @@ void App::frame() {
   if (scale != ui_scale_) Window::set_ui_scale(scale);
   ui_scale_ = scale;
   take();
-  // A picture that is to be saved is that of one moment.
+  // The clock stops while an image is being saved, so that it shows one point in time.
   if (model_.playing && model_.status.saving.empty()) advance_clock(stepped() ? replay_frame : now_ - before);
 
   order_ = {};
@@ -227,9 +227,9 @@ void App::handle_key(const Event& event) {
   if (event.down && !in_popup) {
     const bool escape = event.code == GLFW_KEY_ESCAPE;
     const auto command = command_of(event.code, event.modifiers, io.WantTextInput);
-    // Space is the control's where the keyboard is at one.
+    // Space activates the focused control during keyboard navigation.
     const bool presses = event.code == GLFW_KEY_SPACE && io.NavVisible;
-    // Flying has keys of its own.
+    // Fly mode uses the tool keys itself.
     const bool flies = command && command->action == Action::tool && model_.navigation.fly != 0;
     if (command && !presses && !flies && !(escape && ImGui::IsAnyItemActive())) {
       execute(*command);
@@ -419,7 +419,7 @@ void App::execute(const Command& command) {
       break;
     case Action::toggle_fly:
       navigation.fly = navigation.fly != 0 ? 0 : 1;
-      // Its keys are the picture's.
+      // Moves the keyboard focus from the panel to the image.
       ImGui::SetWindowFocus(nullptr);
       break;
     case Action::toggle_turntable:
@@ -455,7 +455,7 @@ void App::execute(const Command& command) {
       model_.scene.grid_name = command.text;
       break;
     case Action::choose_up:
-      // It stands elsewhere now.
+      // The volume moves with the up axis, so the camera must be fitted again.
       fit_next_ = model_.scene.up != static_cast<UpAxis>(command.value);
       model_.scene.up = static_cast<UpAxis>(command.value);
       break;
@@ -553,7 +553,7 @@ void App::advance_clock(double seconds) {
   model_.clock += seconds;
   const cumulet_playback_desc playback = playback_of(model_.scene.sequence, play->row);
   const double length = playback.frame_count / playback.frames_per_second;
-  // What is held at its end is at its end.
+  // With CUMULET_REPEAT_HOLD, playback stops at the last frame.
   if (playback.repeat == CUMULET_REPEAT_HOLD && model_.clock >= playback.offset_seconds + length) {
     model_.playing = false;
     go_to(playback.first_frame + playback.frame_count - 1);
@@ -568,7 +568,7 @@ void App::follow_playback() {
   const cumulet_playback_desc now = playback_of(model_.scene.sequence, play->row);
   const bool known = std::exchange(known_sequence_, play->sequence.get()) == play->sequence.get();
   if (known && settings::same(now, playback_of(wish_.scene.sequence, play->row))) return;
-  // The frame stays where the clock runs otherwise.
+  // After a change of the playback settings the clock is set so that the displayed frame stays.
   model_.clock = now.offset_seconds + (double(play->info.asked_frame) - now.first_frame) / now.frames_per_second;
 }
 
@@ -611,7 +611,7 @@ void App::open(const std::string& path) {
 
 void App::save_scene(const std::string& path) {
   SceneOptions scene = model_.scene;
-  // The same framing in cumulet-render.
+  // Saves the viewport size, so that cumulet-render gives the same framing.
   scene.width = static_cast<std::uint32_t>(std::clamp(viewport_.width, 1.0, 16384.0));
   scene.height = static_cast<std::uint32_t>(std::clamp(viewport_.height, 1.0, 16384.0));
   if (model_.status.play) {
@@ -648,7 +648,7 @@ void App::complain(const std::string& cause) {
 
 void App::follow_history() {
   SceneOptions scene = model_.scene;
-  // A turntable's motion is no change of the user's.
+  // Turntable motion is not an undo step.
   if (model_.navigation.turntable_degrees_per_second != 0.0) scene.camera = history_->current().camera;
   history_->offer(scene, held_ || waiting() || !settled());
 }
@@ -704,7 +704,7 @@ void App::accept(const Answer& answer) {
     end_shutter(model_.scene);
     end_shutter(wish_.scene);
   }
-  // What the user has changed since is newer.
+  // Ignores values of the viewer that the user has changed since.
   if (answer.camera_edit == wish_.camera_edit) model_.scene.camera = wish_.scene.camera = answer.camera;
   if (answer.volume_edit == wish_.volume_edit) {
     set_volume(model_.scene, answer.volume);
@@ -727,7 +727,7 @@ void App::accept(const Answer& answer) {
     model_.scene.medium = *look_;
   }
   if (answer.picked) model_.chosen = answer.picked->item;
-  // What the program begins with is no change of the user's.
+  // Changes during startup are not undo steps.
   if (starting_ && (answer.density_scale || answer.look)) history_.emplace(model_.scene);
   model_.status = answer.status;
   model_.grids = answer.grids;
@@ -785,7 +785,7 @@ bool App::draw() {
     const ImVec2 low(static_cast<float>(viewport_.x), static_cast<float>(viewport_.y));
     const ImVec2 high(low.x + static_cast<float>(viewport_.width), low.y + static_cast<float>(viewport_.height));
     ImDrawList& behind = *ImGui::GetBackgroundDrawList();
-    // It is opaque, and blending costs software drivers as much as all the rest of it.
+    // The image is opaque. Blending would cost as much as everything else on software drivers.
     const auto cover = [](const ImDrawList*, const ImDrawCmd* command) {
       static_cast<const GladGLContext*>(command->UserCallbackData)->Disable(GL_BLEND);
     };
@@ -799,8 +799,8 @@ bool App::draw() {
     const ImVec2 high(low.x + static_cast<float>(drawn->width), low.y + static_cast<float>(drawn->height));
     ImGui::GetForegroundDrawList()->AddRect(low, high, IM_COL32(255, 160, 40, 255), 0.0f, 0, ui_scale_);
   }
-  // A hand that drags moves sixty times a second, and on software drivers a window costs as much as a picture: what
-  // would look as before is not drawn, and what changes beside the picture that a hand is at waits for the next one.
+  // During a drag there may be 60 changes per second, and with software drivers drawing the window costs as much as an
+  // image. So an unchanged window is not drawn, and changes outside the image wait for the next image.
   const bool changed = window_->ui_changed();
   const bool waits = viewport_buttons_ != 0 && now_ - drawn_at_ < picture_frame;
   const bool draws = drawn_pictures_ != pictures_ || !order_.screenshot.empty() || (changed && !waits);
@@ -833,7 +833,8 @@ void App::take_frame_time(const std::vector<Event>& events, bool drawn, bool pic
 void App::take_thumbnail() {
   if (model_.status.thumbnail == thumbnail_) return;
   thumbnail_ = model_.status.thumbnail;
-  // Made before the last one goes: by its name the window sees that it is another.
+  // The new texture is created before the old one is deleted: its name then differs, by which the window detects the
+  // change.
   thumbnail_texture_ = thumbnail_ ? std::make_unique<ThumbnailTexture>(*gl_, *thumbnail_) : nullptr;
   model_.thumbnail_texture = thumbnail_ ? thumbnail_texture_->name() : 0;
 }
@@ -851,7 +852,7 @@ void App::take_statistics() {
   constexpr double rate_period = 0.5;
   const bool more = (status.frame.flags & CUMULET_RENDER_MORE) != 0;
   const double elapsed = now_ - rate_since_;
-  // Fewer than before: the picture began anew.
+  // A decreasing count means that the image was restarted.
   if (status.stats.samples < rate_samples_ || !more) {
     rate_samples_ = status.stats.samples;
     rate_since_ = now_;
@@ -949,7 +950,8 @@ void App::write_report(const std::string& path) const {
   json["fly"] = model_.navigation.fly != 0;
   json["scene"] = Json::parse(scene_text(model_.scene, path, SceneFormat::first));
   const Json second = Json::parse(scene_text(model_.scene, path));
-  for (const char* key : {"volumes", "models", "lights"}) json[key] = second.value(key, Json::array());  // not of that
+  // Version 1 has no such sections.
+  for (const char* key : {"volumes", "models", "lights"}) json[key] = second.value(key, Json::array());
   image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -25,33 +25,33 @@ namespace cumulet::demo {
 class Renderer;
 class ThumbnailTexture;
 
-/// cumulet-demo: the window, what it shows, and the loop that joins them.
+/// cumulet-demo: window, model, renderer and the main loop.
 class App {
  public:
-  /// Throws std::runtime_error, one line: no display, no OpenGL 4.5, no such replay file.
+  /// Throws std::runtime_error, one line, without display, OpenGL 4.5 or replay file.
   explicit App(DemoOptions options);
   App(const App&) = delete;
   App& operator=(const App&) = delete;
   ~App();
 
-  /// Until the window is closed, or the replay has ended. Throws what a replay that cannot go on says.
+  /// Runs until the window is closed or the replay has ended. Throws the error of a failed replay.
   void run();
 
  private:
   void frame();
   [[nodiscard]] double patience() const;
-  /// Whether a replay is at the wheel: each frame shows what it asked for, however long that takes.
+  /// Returns true if a replay controls the program. Each frame then waits for the image that it requested.
   [[nodiscard]] bool stepped() const { return player_ && order_.idle <= 0.0; }
 
   void handle(const std::vector<Event>& events);
   void handle_key(const Event& event);
   void to_viewer(const Event& event);
-  /// A button in the picture: a handle's, a click's or the camera's.
+  /// Handles a mouse button in the image: for a handle, a click or the camera.
   void press(const Event& event);
   void let_go(const Event& event);
   void choose_at(const glm::dvec2& pixel);
   [[nodiscard]] glm::dvec2 pointer() const { return {window_->input().x(), window_->input().y()}; }
-  /// How the picture sees the scene; nothing before the camera has a place.
+  /// Returns the projection of the scene to the window; nullopt while the camera has no position.
   [[nodiscard]] std::optional<Sight> sight() const;
   void drag_handle();
   void draw_handles();
@@ -62,31 +62,31 @@ class App {
   void save_scene(const std::string& path);
   void step_history(bool back);
   void cancel();
-  /// To a frame, by its place in the row.
+  /// Shows the frame with this index in the sequence.
   void go_to(std::uint32_t index);
   void play_row();
-  /// Or pauses; anew from the beginning at an end that is held.
+  /// Plays or pauses. At the end of a sequence that is not repeated it starts again at the beginning.
   void play_or_pause();
   void step(int frames);
-  /// Moves the clock, and what goes by it.
+  /// Advances the clock and the sequence.
   void advance_clock(double seconds);
   void follow_playback();
 
   void follow_history();
-  /// Sends what has changed to the renderer.
+  /// Sends changes to the renderer.
   void ask();
-  /// What has come back since, if anything.
+  /// Takes the renderer's answer, if there is one.
   void take();
   void accept(const Answer& answer);
   void remember_files(const Answer& answer);
-  /// Whether the newest wish is answered.
+  /// Returns true if the latest request is answered.
   [[nodiscard]] bool settled() const { return answered_ >= wish_.number; }
-  /// Whether a load is still to end, be it that the viewer has not heard of it yet.
+  /// Returns true if a load is pending, also if the viewer has not received it yet.
   [[nodiscard]] bool waiting() const;
-  /// Whether what the medium is came of no hand, no flag and no scene file.
+  /// Returns true if the medium was set neither by the user nor by a flag or scene file.
   [[nodiscard]] bool is_unsaid() const;
   void complain(const std::string& cause);
-  /// Whether there was anything to draw that the window does not show already.
+  /// Returns true if the window was drawn, and false if it would not have changed.
   bool draw();
   void take_frame_time(const std::vector<Event>& events, bool drawn, bool picture);
   void take_statistics();
@@ -102,9 +102,9 @@ class App {
   std::unique_ptr<Window> window_;
   Window::Context context_;
   std::unique_ptr<GladGLContext> gl_;
-  ThumbnailPtr thumbnail_;  // as it was uploaded
+  ThumbnailPtr thumbnail_;  // the uploaded one
   std::unique_ptr<ThumbnailTexture> thumbnail_texture_;
-  Timeline timeline_;  // with --trace
+  Timeline timeline_;  // used with --trace
   std::unique_ptr<Renderer> renderer_;
   std::optional<History> history_;
   std::optional<Player> player_;
@@ -114,49 +114,49 @@ class App {
   float ui_scale_ = 0.0f;
   Rectangle viewport_;
   RegionDrag region_drag_;
-  unsigned viewport_buttons_ = 0;  // pressed in the picture, a bit each
+  unsigned viewport_buttons_ = 0;  // buttons pressed in the image, as a bit mask
   Handles handles_;
-  std::optional<glm::dvec2> clicked_;  // where the left button went down, while that may be a click
-  bool held_ = false;                  // a change is still going on
+  std::optional<glm::dvec2> clicked_;  // position of the left button press, while it may become a click
+  bool held_ = false;                  // the user is still making a change
   bool quit_ = false;
-  bool reload_ = false;  // the volume, though it is the same
+  bool reload_ = false;  // reload the volume even if it is unchanged
   bool fit_next_ = false;
   bool suggest_next_ = false;
-  bool pick_next_ = false;  // a file that was opened without a grid's name is there next
+  bool pick_next_ = false;  // the volume being loaded was opened without a grid name
   bool answer_waits_ = false;
   bool camera_moved_ = false;
-  bool starting_ = true;  // until what the command line named is there, or is not
-  bool owes_ = false;     // a frame of what changed, as one that would have shown it was not drawn
+  bool starting_ = true;  // until the files of the command line are loaded or have failed
+  bool owes_ = false;     // a change is not drawn yet
   double now_ = 0.0;
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
   double rate_since_ = 0.0;
-  double device_seconds_ = 0.0;  // as they were told last
+  double device_seconds_ = 0.0;  // last value of the statistics
   std::uint64_t rate_samples_ = 0;
 
-  Wish wish_;  // sent last; its camera, volume and surfaces as they are known to the viewer
-  std::optional<cumulet_medium_desc> look_;  // that a volume got, nothing being said of its medium
+  Wish wish_;                                // last sent; camera, volume and surfaces as the viewer has them
+  std::optional<cumulet_medium_desc> look_;  // default medium that was set for a volume
   std::vector<ViewerInput> inputs_;
   std::vector<Request> requests_;
   std::uint64_t answered_ = 0;
-  std::uint64_t drawn_ = 0;  // the newest that a picture was drawn for
-  // The oldest change that no picture has followed yet.
+  std::uint64_t drawn_ = 0;  // latest request with a drawn image
+  // Time of the oldest change that no image shows yet.
   std::optional<double> changed_at_;
   std::uint64_t changed_number_ = 0;
-  std::uint64_t answered_volume_ = 0;  // edits that the last answer knew of
+  std::uint64_t answered_volume_ = 0;  // edit counter of the last answer
   std::uint64_t answered_surfaces_ = 0;
   std::uint64_t answered_environment_ = 0;
-  const cumulet_sequence* known_sequence_ = nullptr;  // that the clock is of
-  std::string opening_scene_;                         // a scene file whose parts are still to come
+  const cumulet_sequence* known_sequence_ = nullptr;  // sequence that the clock belongs to
+  std::string opening_scene_;                         // scene file whose files are still loading
   std::string opening_environment_;
-  std::uint64_t pictures_ = 0;  // that came to be shown
+  std::uint64_t pictures_ = 0;  // number of displayed images
   std::uint64_t drawn_pictures_ = 0;
   double drawn_at_ = -1.0;
   FrameTimes frame_times_;
-  std::string last_state_;  // the state line of the frame before this
-  std::string title_;       // the window's
+  std::string last_state_;  // state line of the previous frame
+  std::string title_;       // window title
   std::uint64_t frames_ = 0;
-  std::uint64_t drawn_frames_ = 0;  // the others would have looked as the one before
+  std::uint64_t drawn_frames_ = 0;  // frames that were drawn because they changed
 };
 
 }  // namespace cumulet::demo

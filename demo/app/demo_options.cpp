@@ -10,7 +10,7 @@ namespace cumulet::demo {
 
 std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments, std::ostream& out) {
   DemoOptions options;
-  // A picture that is looked at while it refines.
+  // More samples than for a file, because the image is viewed while it refines.
   options.scene.sampling.samples = 256;
   CLI::App app("Shows volumes in a window: path-traced, as they are turned and changed.", "cumulet-demo");
   app.footer(

@@ -10,19 +10,19 @@ namespace cumulet::demo {
 
 struct DemoOptions {
   SceneOptions scene;
-  bool unchosen_ground = false;  // a ground that the scene has is the default one
-  bool sized = false;            // --size was given: the window takes it, else the last run's size
-  std::string open;              // the file named without a flag: a volume or a scene
-  double ui_scale = 0.0;         // 0: as the screen asks
+  bool unchosen_ground = false;  // the scene's ground is the default
+  bool sized = false;            // --size was given; else the window has the size of the last run
+  std::string open;              // file without a flag: a volume, surfaces, an environment or a scene
+  double ui_scale = 0.0;         // 0: content scale of the screen
   std::string replay;
   std::string record;
   std::string trace;         // empty: none
-  std::string shader_cache;  // likewise: a folder
-  std::string shaders;       // likewise
+  std::string shader_cache;  // folder; empty: none
+  std::string shaders;       // folder; empty: none
 };
 
-/// cumulet-demo's arguments, without the program's name. Nothing if they asked for --help or --version, whose text
-/// goes to out. Throws UsageError, and what load_scene throws.
+/// Parses the arguments of cumulet-demo, without the program's name. Returns nullopt for --help and --version, whose
+/// text is written to `out`. Throws UsageError and the exceptions of load_scene.
 [[nodiscard]] std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments, std::ostream& out);
 
 }  // namespace cumulet::demo

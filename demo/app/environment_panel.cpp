@@ -1,4 +1,4 @@
-// The panel's environment: its picture, turned by hand.
+// The environment section of the panel, with a thumbnail that can be rotated by dragging.
 
 #include <algorithm>
 #include <cmath>

@@ -10,7 +10,8 @@
 namespace cumulet::demo {
 
 Thumbnail expose(std::span<const float> radiance) {
-  // An eye gets used to the geometric mean, which a sun does not move; what is black counts as dark.
+  // The exposure is based on the geometric mean, which a small bright sun hardly changes. Black pixels count as dark
+  // ones.
   constexpr double dark = 1e-6;
   constexpr double grey = 0.25;
   double sum = 0.0;

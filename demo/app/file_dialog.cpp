@@ -108,7 +108,7 @@ void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
 }
 
 void FileDialog::recent(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
-  // Those of the kind that the dialog opens: a volume is no environment.
+  // Only files of the kinds that this dialog opens.
   std::vector<std::string> files;
   std::ranges::copy_if(preferences.recent, std::back_inserter(files), [this](const auto& file) { return takes(file); });
   if (saving() || files.empty()) return;

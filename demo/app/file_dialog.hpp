@@ -8,13 +8,13 @@
 
 namespace cumulet::demo {
 
-/// A small modal window: a path to type, and a folder to walk through.
+/// A modal file dialog: a path field and a folder browser.
 class FileDialog {
  public:
-  /// done: the command that gets the path. endings: what is listed besides folders. A path to save to starts with
-  /// suggestion; to open, it is the folder to begin in.
+  /// done: the command that receives the path. endings: file extensions that are listed in addition to folders.
+  /// suggestion: for saving the initial path, for opening the initial folder.
   void open(const std::string& title, Action done, std::vector<std::string> endings, const std::string& suggestion);
-  /// Draws it, if it is open, and adds its command once the user has chosen.
+  /// Draws the dialog if it is open. Adds the command when the user has chosen a file.
   void draw(Ui& ui, const Preferences& preferences, std::vector<Command>& commands);
   [[nodiscard]] bool is_open() const { return open_; }
 
@@ -26,11 +26,11 @@ class FileDialog {
   [[nodiscard]] bool saving() const {
     return done_ == Action::save_png || done_ == Action::save_exr || done_ == Action::save_scene_as;
   }
-  /// Whether the file's name has one of the endings.
+  /// Returns true if the file name has one of the extensions.
   [[nodiscard]] bool takes(const std::string& file) const;
   [[nodiscard]] std::string endings_text() const;
   void enter(const std::string& folder);
-  /// Opens a folder, or takes the file.
+  /// Enters a folder, or accepts the file.
   void choose(std::vector<Command>& commands);
   void list(Ui& ui, std::vector<Command>& commands);
   void recent(Ui& ui, const Preferences& preferences, std::vector<Command>& commands);

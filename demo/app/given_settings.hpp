@@ -8,11 +8,11 @@
 
 namespace cumulet::demo {
 
-/// The groups of settings that a viewer was given last. The demo's defaults are not the library's: so a viewer is given
-/// each group once, even if it is the demo's default, and then only what has changed.
+/// The last settings that were passed to a viewer. The demo's defaults differ from the library's, so each descriptor is
+/// passed once in any case, and later only when it changes.
 class GivenSettings {
  public:
-  /// Whether the viewer is still to be given this. From now on it counts as given.
+  /// Returns true if the descriptor must be passed to the viewer, and records it as passed.
   template <class Desc>
   [[nodiscard]] bool take(const Desc& desc) {
     auto& last = std::get<std::optional<Desc>>(last_);

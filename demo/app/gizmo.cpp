@@ -19,20 +19,20 @@ using glm::dvec3;
 using glm::dvec4;
 
 constexpr double degree = std::numbers::pi / 180.0;
-// Parts of a handle's reach.
+// Fractions of a handle's reach.
 constexpr double plane_begins = 0.28;
 constexpr double plane_ends = 0.46;
 constexpr double outer_ring = 1.2;
 constexpr double free_radius = 0.09;
-// Of what is seen of an axis or a plane, from its end or edge: less is no handle.
+// Minimum projected extent of an axis or plane; a handle seen from its end or edge is hidden.
 constexpr double least_axis = 0.17;
 constexpr double least_plane = 0.2;
-constexpr double least_ring = 0.15;  // less is dragged along its tangent
+constexpr double least_ring = 0.15;  // rings seen more from the edge are dragged along their tangent
 constexpr double least_scale = 0.01;
-constexpr double behind = 0.3;  // of a ring's radius, as far as it is still shown
+constexpr double behind = 0.3;  // part of a ring behind the center that is still shown, in radii
 constexpr int ring_parts = 64;
 
-/// From the second on, of those across an axis, right-handed.
+/// Returns the next axis in right-handed order.
 int next(int axis) { return (axis + 1) % 3; }
 
 double distance_to(const dvec2& point, const dvec2& a, const dvec2& b) {
@@ -49,7 +49,7 @@ double distance_to(const dvec2& point, const std::vector<dvec2>& line, bool clos
   return least;
 }
 
-/// Of an outline that is convex.
+/// Point-in-polygon test for a convex outline.
 bool is_within(const dvec2& point, const std::vector<dvec2>& outline) {
   int left = 0;
   for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -83,7 +83,7 @@ std::vector<dvec2> square_of(const Gizmo& gizmo, int across, const Sight& sight)
   const dvec3& b = gizmo.axes[next(next(across))];
   const dvec3 normal = glm::cross(a, b);
   if (std::abs(glm::dot(normal, eye)) < least_plane * glm::length(normal)) return {};
-  // On the side of the eye, where it covers no axis of another.
+  // The square is on the eye's side, where it does not cover another axis.
   const double length = gizmo.reach * sight.pixel_at(gizmo.pivot);
   const dvec3 along_a = (glm::dot(a, eye) < 0.0 ? -length : length) * a;
   const dvec3 along_b = (glm::dot(b, eye) < 0.0 ? -length : length) * b;
@@ -97,7 +97,8 @@ std::vector<dvec2> square_of(const Gizmo& gizmo, int across, const Sight& sight)
   return outline;
 }
 
-/// As much of a ring as is on the side of the eye, or little behind: all of one that is seen from its axis.
+/// Returns the visible part of a ring: the side that faces the eye and a little more, or the full ring if seen along
+/// its axis.
 std::vector<dvec2> arc_of(const Gizmo& gizmo, int axis, const Sight& sight) {
   const dvec3 eye = sight.to_eye(gizmo.pivot);
   const dvec3& normal = gizmo.axes[axis];
@@ -129,7 +130,7 @@ std::string print(const char* format, Values... values) {
 }  // namespace
 
 std::optional<double> nearest_on_axis(const Ray& ray, const dvec3& point, const dvec3& axis) {
-  constexpr double least_sine_2 = 1e-4;  // half a degree
+  constexpr double least_sine_2 = 1e-4;  // 0.57 degrees
   const double cosine = glm::dot(ray.direction, axis);
   const double sine_2 = 1.0 - cosine * cosine;
   if (!(sine_2 > least_sine_2)) return std::nullopt;
@@ -193,7 +194,7 @@ std::optional<dvec2> Sight::project(const dvec3& point) const {
 std::optional<std::array<dvec2, 2>> Sight::project(const dvec3& a, const dvec3& b) const {
   dvec3 from = in_eye_space(a);
   dvec3 to = in_eye_space(b);
-  // A hair before what is not shown.
+  // Slightly in front of the near limit.
   const double nearest = perspective_ ? nearest_ * (1.0 + 1e-9) : nearest_;
   const bool from_seen = -from.z > nearest;
   const bool to_seen = -to.z > nearest;
@@ -254,7 +255,7 @@ std::optional<Handle> handle_at(const Gizmo& gizmo, const Sight& sight, const dv
   const bool turns = gizmo.tool == Tool::rotate;
   std::optional<Handle> nearest;
   double least = tolerance;
-  // What has an inside is at hand in all of it, the middle first, before lines that pass by.
+  // Filled shapes are tested first, with the center handle before the planes; they take precedence over lines.
   for (const Handle handle : {Handle::free, Handle::yz, Handle::zx, Handle::xy, Handle::x, Handle::y, Handle::z}) {
     const std::vector<dvec2> shape = shape_of(gizmo, handle, sight);
     const bool filled = !turns && is_closed(gizmo, handle);
@@ -282,7 +283,7 @@ Drag::Drag(const Gizmo& gizmo, Handle handle, const Sight& sight, const dvec2& f
   }
   const dvec3 eye = sight.to_eye(pivot);
   if (turns && std::abs(glm::dot(normal_, eye)) < least_ring) {
-    // The ring's nearest point goes along the tangent.
+    // The ring's nearest point is dragged along the tangent.
     const double radius = gizmo.reach * sight.pixel_at(pivot);
     const dvec3 along = glm::normalize(glm::cross(normal_, eye));
     const auto ends = sight.project(pivot - 0.5 * radius * along, pivot + 0.5 * radius * along);
@@ -315,10 +316,10 @@ void Drag::turn(const Sight& sight, const dvec2& pixel) {
     return;
   }
   const auto now = grasp(sight, pixel);
-  // At the pivot there is no direction.
+  // The direction is undefined at the pivot.
   const double least = sight.pixel_at(begun_.pivot);
   if (!now || glm::length(*now) < least) return;
-  // From where it was: more than a turn is no less than one.
+  // Angles are accumulated, so that rotations of more than a full turn are possible.
   if (grasp_ && glm::length(*grasp_) >= least) angle_ += angle_about(normal_, *grasp_, *now);
   grasp_ = now;
 }
@@ -344,7 +345,7 @@ void Drag::stretch(const Sight& sight, const dvec2& pixel) {
 
 dvec3 Drag::snapped_move() const {
   if (!snapped_) return move_;
-  // Steps are along the gizmo's axes, and only along those that the handle has.
+  // Steps are along the gizmo's axes, and only along the axes of the handle.
   const dvec3 steps = snap(glm::inverse(begun_.axes) * move_, step_);
   return begun_.axes * steps;
 }

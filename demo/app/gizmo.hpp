@@ -11,42 +11,43 @@
 
 #include "replay.hpp"
 
-// What the handles in the picture are made of, without a window: where they are in it, which one a pointer is at, and
-// what a drag of it makes of a thing's place. All in doubles; pixels have y down.
+// Geometry of the transform handles, without a window: their shapes, hit testing and the transform that a drag
+// produces. All values are doubles; pixels have y down.
 
 namespace cumulet::demo {
 
 struct Ray {
   glm::dvec3 origin;
-  glm::dvec3 direction;  // unit
+  glm::dvec3 direction;  // unit vector
 };
 
-/// Where along an axis (unit) from a point a ray passes nearest. Nothing where they run alike, or where that is not
-/// before the ray's origin.
+/// Returns the parameter of the point on an axis (unit vector through `point`) that is nearest to a ray. Returns
+/// nullopt if they are parallel, or if the point on the ray is behind its origin.
 [[nodiscard]] std::optional<double> nearest_on_axis(const Ray& ray, const glm::dvec3& point, const glm::dvec3& axis);
-/// Where a ray meets a plane; nothing where it grazes it, or where that is not before the ray's origin.
+/// Intersects a ray with a plane. Returns nullopt if the ray is parallel to it, or if the hit is behind the ray's
+/// origin.
 [[nodiscard]] std::optional<glm::dvec3> plane_hit(const Ray& ray, const glm::dvec3& point, const glm::dvec3& normal);
-/// The turn about an axis (unit) from one direction to another, as seen along the axis; radians, right-handed.
+/// Returns the signed angle about an axis (unit vector) between two directions; radians, right-handed.
 [[nodiscard]] double angle_about(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to);
-/// 1, 2 or 5 times a power of ten, the largest that is no more than this.
+/// Returns the largest 1, 2 or 5 times a power of ten that does not exceed `most`.
 [[nodiscard]] double round_step(double most);
 
-/// How a camera sees the world in a rectangle of the window.
+/// Projection of a camera to a rectangle of the window.
 class Sight {
  public:
-  /// Of a camera that is placed; the rectangle is not empty.
+  /// The camera must have a position, and the rectangle must not be empty.
   Sight(const cumulet_camera_desc& camera, const Rectangle& place);
 
-  /// Nothing behind the eye, or right before it.
+  /// Returns nullopt for points behind the near limit.
   [[nodiscard]] std::optional<glm::dvec2> project(const glm::dvec3& point) const;
-  /// As much of a segment as is before the eye.
+  /// Projects the part of a segment in front of the near limit; nullopt if there is none.
   [[nodiscard]] std::optional<std::array<glm::dvec2, 2>> project(const glm::dvec3& a, const glm::dvec3& b) const;
   [[nodiscard]] Ray ray(const glm::dvec2& pixel) const;
-  /// The length in the world that a pixel is there.
+  /// Returns the world-space size of a pixel at a point.
   [[nodiscard]] double pixel_at(const glm::dvec3& point) const;
-  /// Unit, from there to the eye.
+  /// Unit vector from a point to the eye.
   [[nodiscard]] glm::dvec3 to_eye(const glm::dvec3& point) const;
-  /// Unit, where the camera looks.
+  /// Unit vector of the viewing direction.
   [[nodiscard]] glm::dvec3 forward() const;
 
  private:
@@ -57,55 +58,57 @@ class Sight {
   glm::dmat4 to_world_{1.0};
   glm::dmat4 projection_{1.0};
   bool perspective_ = true;
-  double nearest_ = 0.0;  // depth that is still shown, of a perspective
+  double nearest_ = 0.0;  // near limit, a depth; for a perspective camera
   Rectangle place_;
 };
 
 enum class Tool { none, move, rotate, scale };
 enum class Axes { world, local };
-/// Those of an axis, those of the plane across it, and the one that is of no axis: it moves in the picture's plane,
-/// turns about the sight, or scales all alike.
+/// Three axes, three planes (perpendicular to an axis), and the free handle. The free handle moves in the image plane,
+/// rotates about the viewing direction, or scales uniformly.
 enum class Handle { x, y, z, yz, zx, xy, free };
 
 [[nodiscard]] constexpr bool is_axis(Handle handle) { return handle <= Handle::z; }
 [[nodiscard]] constexpr bool is_plane(Handle handle) { return Handle::yz <= handle && handle <= Handle::xy; }
-/// Its axis, or the one across its plane; not of the free one.
+/// Returns the handle's axis, or the normal of its plane. Not for the free handle.
 [[nodiscard]] constexpr int axis_of(Handle handle) { return static_cast<int>(handle) % 3; }
 
-/// Handles about a point. They are as large on the screen wherever it is.
+/// A set of handles around a point. Their size on the screen is constant.
 struct Gizmo {
   Tool tool = Tool::none;
   glm::dvec3 pivot{};
-  glm::dmat3 axes{1.0};  // unit
-  double reach = 0.0;    // of an axis, pixels
+  glm::dmat3 axes{1.0};  // unit vectors
+  double reach = 0.0;    // length of an axis in pixels
 };
 
-/// The handles of a thing that stands at a place, about a point of the world. Things are scaled along their own axes.
+/// Returns the handles for an object with the transform `place`, centered at a world-space point. Scaling always uses
+/// the object's own axes.
 [[nodiscard]] Gizmo gizmo_of(Tool tool, Axes axes, const glm::dmat4& place, const glm::dvec3& pivot, double reach);
 
-/// What there is of a handle to see and to grasp, in pixels: a line from the pivot, an outline of a square, an arc, or
-/// for the free one a circle. Empty where it is seen so much from its end or edge that a drag would say little.
+/// Returns the shape of a handle in pixels: a line from the pivot, the outline of a square, an arc, or a circle for the
+/// free handle. Returns an empty shape if the handle is seen so much from its end or edge that dragging would be
+/// imprecise.
 [[nodiscard]] std::vector<glm::dvec2> shape_of(const Gizmo& gizmo, Handle handle, const Sight& sight);
 [[nodiscard]] bool is_closed(const Gizmo& gizmo, Handle handle);
-/// The one that is at a pixel, or within so many of it.
+/// Returns the handle at a pixel, with a tolerance in pixels.
 [[nodiscard]] std::optional<Handle> handle_at(const Gizmo& gizmo, const Sight& sight, const glm::dvec2& pixel,
                                               double tolerance);
 
-/// A handle that is dragged.
+/// A drag of a handle.
 class Drag {
  public:
   Drag(const Gizmo& gizmo, Handle handle, const Sight& sight, const glm::dvec2& from);
 
-  /// What has become of the world about the thing since the drag began, affine and never flat. Where the pointer says
-  /// nothing (its ray misses the plane, or passes the axis behind the eye), that is what it was before. snapped: by
-  /// steps, of a round length about a tenth of a handle's, of 15 degrees, of a tenth.
+  /// Returns the world-space transform since the drag began; affine and invertible. If the pointer gives no position
+  /// (its ray misses the plane, or passes the axis behind the eye), returns the previous transform. snapped: in steps
+  /// of a round length (about a tenth of a handle), 15 degrees, or 0.1.
   glm::dmat4 to(const Sight& sight, const glm::dvec2& pixel, bool snapped);
-  /// What that is, in words: "X 1.25", "30.0°", "1.50 x".
+  /// Returns the transform as text: "X 1.25", "30.0°", "1.50 x".
   [[nodiscard]] std::string told() const;
   [[nodiscard]] Handle handle() const { return handle_; }
 
  private:
-  // Its place along the axis, or where it meets the handle's plane, from the pivot where the drag began.
+  // Returns the point on the axis or on the handle's plane, relative to the pivot at the start of the drag.
   [[nodiscard]] std::optional<glm::dvec3> grasp(const Sight& sight, const glm::dvec2& pixel) const;
   void follow(const Sight& sight, const glm::dvec2& pixel);
   void turn(const Sight& sight, const glm::dvec2& pixel);
@@ -116,12 +119,12 @@ class Drag {
   Gizmo begun_;
   Handle handle_;
   glm::dvec2 from_;
-  glm::dvec3 normal_{};                // of the plane that the pointer is on, or the axis that it turns about
-  std::optional<glm::dvec3> grasp_;    // from the pivot, where the drag began, or for a turn where it is now
-  std::optional<glm::dvec2> tangent_;  // of a ring that is seen from its edge: radians a pixel
-  double step_ = 0.0;                  // of moves that snap
+  glm::dvec3 normal_{};                // normal of the drag plane, which is the axis of a rotation
+  std::optional<glm::dvec3> grasp_;    // relative to the pivot: start point of the drag, or current point of a rotation
+  std::optional<glm::dvec2> tangent_;  // radians per pixel; set for a ring that is seen from its edge
+  double step_ = 0.0;                  // step of snapped moves
   bool snapped_ = false;
-  // What it came to; of these one is what the tool changes.
+  // Current result. The tool changes only one of these.
   glm::dvec3 move_{0.0};
   double angle_ = 0.0;
   glm::dvec3 stretch_{1.0};

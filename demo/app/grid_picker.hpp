@@ -14,27 +14,27 @@
 
 namespace cumulet::demo {
 
-/// A small modal window with the grids of a file, what is in each, and one to be chosen. The file is read in a thread
-/// of its own: what is known is shown.
+/// A modal window that lists the grids of a file with their properties, and lets the user choose one. A worker thread
+/// reads the file; grids are listed as they are read.
 class GridPicker {
  public:
-  /// wake is called from any thread when more is known.
+  /// wake: called from any thread when more grids are known.
   void open(const std::string& path, std::function<void()> wake);
-  /// Draws it, if it is open, and adds Action::choose_grid once the user has chosen.
+  /// Draws the window if it is open. Adds Action::choose_grid when the user has chosen a grid.
   void draw(Ui& ui, std::vector<Command>& commands);
   [[nodiscard]] bool is_open() const { return open_; }
 
  private:
   struct Grid {
     std::string name;
-    std::string type;     // "float, fog volume"
-    std::string refusal;  // "": can be shown
+    std::string type;     // for example "float, fog volume"
+    std::string refusal;  // reason why the grid cannot be shown; "": it can
     std::uint64_t voxels = 0;
     float least = 0.0f;
     float most = 0.0f;
-    std::vector<float> histogram;  // heights from 0 to 1
+    std::vector<float> histogram;  // heights, 0 to 1
   };
-  /// Reads one file.
+  /// Worker thread that reads one file.
   class Reader {
    public:
     Reader(std::string path, std::function<void()> wake);
@@ -56,12 +56,12 @@ class GridPicker {
     mutable std::mutex mutex_;
     Found found_;
     std::atomic<bool> stop_ = false;
-    std::thread thread_;  // last: it uses the above
+    std::thread thread_;  // last member: the thread uses those above
   };
 
   static bool draw_grid(Ui& ui, const Grid& grid);
 
-  std::vector<std::unique_ptr<Reader>> readers_;  // the last is shown; those before are coming to their end
+  std::vector<std::unique_ptr<Reader>> readers_;  // the last one is displayed; the others are stopping
   std::string path_;
   bool opening_ = false;
   bool open_ = false;

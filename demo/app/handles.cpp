@@ -16,7 +16,7 @@ using glm::dvec2;
 using glm::dvec3;
 using glm::dvec4;
 
-// Pixels, of a screen at scale 1.
+// Pixels at scale 1.
 constexpr double handle_reach = 92.0;
 constexpr double grasp_tolerance = 8.0;
 constexpr double mark_radius = 7.0;
@@ -25,7 +25,7 @@ constexpr float thin = 1.4f;
 constexpr float tip = 10.0f;
 
 constexpr std::array all_handles = {Handle::x, Handle::y, Handle::z, Handle::yz, Handle::zx, Handle::xy, Handle::free};
-constexpr std::array handle_names = {"X", "Y", "Z", "YZ", "ZX", "XY", "free"};  // as Handle numbers them
+constexpr std::array handle_names = {"X", "Y", "Z", "YZ", "ZX", "XY", "free"};  // indexed by Handle
 constexpr ImU32 shade = IM_COL32(0, 0, 0, 110);
 constexpr ImU32 chosen_colour = IM_COL32(255, 176, 64, 230);
 constexpr ImU32 lamp_colour = IM_COL32(255, 238, 170, 200);
@@ -44,7 +44,7 @@ ImU32 colour_of(Handle handle) {
   return handle == Handle::free ? IM_COL32(236, 236, 236, 235) : colours[static_cast<std::size_t>(axis_of(handle))];
 }
 
-/// A stroke of the list's, on a wider dark one: pictures are bright and dark.
+/// Draws strokes on a wider dark stroke, so that they are visible on bright and dark images.
 class Pen {
  public:
   Pen(ImDrawList& list, const Sight& sight, float scale) : list_(&list), sight_(&sight), scale_(scale) {}
@@ -71,7 +71,7 @@ class Pen {
     for (const dvec2& point : points) all.push_back(vec(point));
     list_->AddConvexPolyFilled(all.data(), static_cast<int>(all.size()), colour);
   }
-  /// The end of an axis: an arrow's, or a block's.
+  /// Draws the end of an axis: an arrowhead or a box.
   void end(const dvec2& from, const dvec2& to, bool arrow, ImU32 colour) const {
     const dvec2 along = glm::normalize(to - from) * static_cast<double>(tip * scale_);
     const dvec2 across(-0.45 * along.y, 0.45 * along.x);
@@ -112,7 +112,7 @@ void draw_box(const Pen& pen, const dmat4& place, const Box& box) {
       if ((i & bit) == 0) pen.line(corner(i), corner(i | bit), chosen_colour, thin);
 }
 
-/// What a lamp is like: how wide, and where it shines.
+/// Draws the outline of a light: its size and the direction of its emission.
 void draw_lamp(const Pen& pen, const cumulet_lamp_desc& lamp, const dmat4& place) {
   const auto at = [&](double x, double y, double z) { return dvec3(place * dvec4(x, y, z, 1.0)); };
   const double far = handle_reach * static_cast<double>(pen.scale()) * pen.sight().pixel_at(at(0.0, 0.0, 0.0));
@@ -125,7 +125,7 @@ void draw_lamp(const Pen& pen, const cumulet_lamp_desc& lamp, const dmat4& place
     for (int i = 0; i < parts; ++i) pen.line(point(i), point(i + 1), chosen_colour, thin);
   };
   if (lamp.kind == CUMULET_LAMP_SPOT) {
-    // As much of the cone as a screen shows.
+    // The cone is drawn with a constant size on the screen.
     const double half = std::min(0.5 * lamp.angle_degrees, 85.0) * std::numbers::pi / 180.0;
     const double radius = far * std::sin(half);
     const double depth = far * std::cos(half);
@@ -182,7 +182,7 @@ void Handles::drag(Model& model, const Sight& sight, const dvec2& pixel, bool sn
     held_.reset();
     return;
   }
-  // A hand that has only taken it changes nothing.
+  // A press without movement changes nothing.
   if (pixel == held_->pixel && snapped == held_->snapped) return;
   held_->pixel = pixel;
   held_->snapped = snapped;
@@ -256,12 +256,12 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
     hot = held_->drag.handle();
   else if (pixel)
     hot = handle_at(*gizmo, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
-  constexpr double back = 0.3;  // of those that are not held
+  constexpr double back = 0.3;  // opacity of the handles that are not dragged
   for (const Handle handle : all_handles)
     if (handle != hot) draw_handle(pen, *gizmo, handle, faded(colour_of(handle), held_ ? back : 1.0));
   if (!hot) return;
   if (held_ && is_axis(*hot) && gizmo->tool != Tool::rotate) {
-    // The way it goes.
+    // Draws the line along which the object moves.
     constexpr double long_way = 20.0;
     const dvec3 way = long_way * gizmo->reach * sight.pixel_at(gizmo->pivot) * gizmo->axes[axis_of(*hot)];
     pen.line(gizmo->pivot - way, gizmo->pivot + way, faded(colour_of(*hot), 0.6), 1.0f);

@@ -11,27 +11,28 @@
 
 namespace cumulet::demo {
 
-/// The handles of the chosen thing in the picture, before all that is in it: a hand drags them, and they are drawn on
-/// Dear ImGui's list. scale: of everything, as Ui has it; pixels: of the window.
+/// Transform handles of the selected object, drawn over the image with Dear ImGui and dragged with the mouse. scale:
+/// user interface scale, as in Ui. pixel: window coordinates.
 class Handles {
  public:
-  /// Whether a handle is there, which is held from now on.
+  /// Returns true if there is a handle at the pixel, and starts to drag it.
   bool press(const Model& model, const Sight& sight, const glm::dvec2& pixel, float scale);
-  /// Moves, turns or stretches what is held; snapped: by steps. Without a held handle it does nothing.
+  /// Moves, rotates or scales the object. snapped: in steps. Does nothing without a dragged handle.
   void drag(Model& model, const Sight& sight, const glm::dvec2& pixel, bool snapped);
-  /// What it came to stays.
+  /// Ends the drag and keeps the result.
   void release() { held_.reset(); }
-  /// It is as it was when the handle was taken.
+  /// Ends the drag and restores the original transform.
   void cancel(Model& model);
   [[nodiscard]] bool holds() const { return held_.has_value(); }
 
-  /// The lamp whose mark is there: what a picture does not show.
+  /// Returns the light whose icon is at the pixel. Lights are not part of the image, so a pick cannot find them.
   [[nodiscard]] static std::optional<Item> lamp_at(const Model& model, const Sight& sight, const glm::dvec2& pixel,
                                                    float scale);
-  /// Where to take a handle of the chosen thing, for replay files: "Handle X", "Handle YZ", "Handle free".
+  /// Returns the position of a handle by its label, for replay files: "Handle X", "Handle YZ", "Handle free".
   [[nodiscard]] static std::optional<Rectangle> find(const std::string& label, const Model& model, const Sight& sight,
                                                      float scale);
-  /// Lamps' marks, the outline of what is chosen and its handles. pixel: the pointer, where it is free to take one.
+  /// Draws the icons of lights, and the outline and handles of the selected object. pixel: the pointer, if it can grab
+  /// a handle.
   void draw(ImDrawList& list, const Model& model, const Sight& sight, const std::optional<glm::dvec2>& pixel,
             float scale) const;
 
@@ -40,8 +41,8 @@ class Handles {
     Drag drag;
     Item item;
     SceneOptions before;
-    glm::dmat4 place;  // there
-    glm::dvec2 pixel;  // the pointer's, that was followed last
+    glm::dmat4 place;  // transform at the start
+    glm::dvec2 pixel;  // last pointer position
     bool snapped = false;
   };
 

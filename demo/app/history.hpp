@@ -7,22 +7,22 @@
 
 namespace cumulet::demo {
 
-/// Undo and redo over whole scenes: settings, camera and volume.
+/// Undo and redo of complete scenes: settings, camera and volume.
 class History {
  public:
   explicit History(const SceneOptions& scene) : states_{scene} {}
 
-  /// The scene as it is now. While held (a control is dragged, the camera moves) it may still change: what it comes to
-  /// is one step. A camera that the library has placed by itself is no step.
+  /// Records the current scene. held: the user is still dragging a control or moving the camera; the whole change
+  /// becomes one step. The initial camera fit by the library is not a step.
   void offer(const SceneOptions& scene, bool held);
-  /// The scene before the last step, with whatever has changed since made a step first.
+  /// Returns the scene before the last step. Changes since then become a step first.
   [[nodiscard]] std::optional<SceneOptions> undo(const SceneOptions& scene);
   [[nodiscard]] std::optional<SceneOptions> redo(const SceneOptions& scene);
 
   [[nodiscard]] bool can_undo(const SceneOptions& scene) const;
   [[nodiscard]] bool can_redo() const { return now_ + 1 < states_.size(); }
   [[nodiscard]] const SceneOptions& current() const { return states_[now_]; }
-  /// Steps that can be undone.
+  /// Number of steps that can be undone.
   [[nodiscard]] std::size_t depth() const { return now_; }
 
  private:
@@ -31,7 +31,7 @@ class History {
   std::size_t now_ = 0;
 };
 
-/// Whether the library is still to place the camera.
+/// Returns true if the library still has to fit the camera.
 [[nodiscard]] bool is_unplaced(const cumulet_camera_desc& camera);
 
 }  // namespace cumulet::demo

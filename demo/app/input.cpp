@@ -68,7 +68,8 @@ bool is_modifier(int code) {
   }
 }
 
-/// Whether the key types a character, and does nothing else. (Space presses buttons.)
+/// Returns true if the key types a character and has no other function. Space is excluded because it activates
+/// controls.
 bool only_types(int code, unsigned modifiers) {
   return code > GLFW_KEY_SPACE && code < GLFW_KEY_ESCAPE && (modifiers & (modifier_ctrl | modifier_alt)) == 0;
 }
@@ -83,13 +84,13 @@ std::vector<Event> Input::take() {
   std::vector<Event> taken;
   std::bitset<buttons> changed_buttons;
   std::bitset<keys> changed_keys;
-  bool other_changed = false;  // than Ctrl, Shift, Alt
+  bool other_changed = false;  // a key other than Ctrl, Shift or Alt
   while (!queue_.empty()) {
     const Event& event = queue_.front();
     const auto code = static_cast<std::size_t>(event.code);
     switch (event.type) {
       case Event::Type::move:
-        // A button's change belongs to the place it happened at.
+        // A button event belongs to the position at which it happened.
         if (changed_buttons.any()) return taken;
         x_ = event.x;
         y_ = event.y;

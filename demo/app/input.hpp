@@ -9,26 +9,25 @@
 
 namespace cumulet::demo {
 
-/// One thing that happened to the window, from the window system or from a replay file.
+/// A window event, from the window system or from a replay file.
 struct Event {
   enum class Type { move, button, wheel, key, character, drop, resize, focus_lost };
 
   Type type = Type::move;
-  double x = 0.0;  // move: position in framebuffer pixels; resize: size in the same
-  double y = 0.0;  // likewise; wheel: steps
-  int code = 0;    // button: 0 left, 1 right, 2 middle (as GLFW has them); key: GLFW's; character: Unicode
+  double x = 0.0;  // move: position in framebuffer pixels; resize: width in framebuffer pixels
+  double y = 0.0;  // move: position; resize: height; wheel: steps
+  int code = 0;    // button: 0 left, 1 right, 2 middle (GLFW's numbers); key: GLFW key; character: Unicode
   bool down = false;
-  std::string path = {};   // drop
-  double time = 0.0;       // seconds, glfwGetTime's, at which it was heard of; 0: of a replay
-  unsigned modifiers = 0;  // Modifier bits held right after it; Input::take knows
+  std::string path = {};   // drop: the file
+  double time = 0.0;       // glfwGetTime() when the event was received; 0 in a replay
+  unsigned modifiers = 0;  // Modifier bits after the event; set by Input::take
 };
 
-enum Modifier : unsigned { modifier_shift = 1, modifier_ctrl = 2, modifier_alt = 4 };  // as in cumulet.h
+enum Modifier : unsigned { modifier_shift = 1, modifier_ctrl = 2, modifier_alt = 4 };  // same values as in cumulet.h
 
-/// Events wait here until a frame takes them. A frame sees a button or a key change once only, and no change of Ctrl,
-/// Shift or Alt after that of another key: a press and a release that came together are seen in two frames, for the
-/// user interface looks at states, not at events. Keys that only type are not looked at: any number of them comes at
-/// once.
+/// Queue of events. Dear ImGui polls states, so a frame gets at most one change of each button and key: a press and
+/// release that arrive together are split into two frames. A change of Ctrl, Shift or Alt after another key waits for
+/// the next frame too. Keys that only type characters are not limited.
 class Input {
  public:
   static constexpr int buttons = 3;
@@ -36,7 +35,7 @@ class Input {
 
   void push(Event event) { queue_.push_back(std::move(event)); }
   [[nodiscard]] bool pending() const { return !queue_.empty(); }
-  /// The next frame's events, which are then in the state below.
+  /// Returns the events of the next frame and updates the state below.
   [[nodiscard]] std::vector<Event> take();
 
   [[nodiscard]] double x() const { return x_; }
@@ -48,20 +47,20 @@ class Input {
 
  private:
   std::deque<Event> queue_;
-  double x_ = -1e9;  // nowhere yet
+  double x_ = -1e9;  // no position yet
   double y_ = -1e9;
   std::bitset<buttons> buttons_;
   std::bitset<keys> keys_;
 };
 
-/// "left", "right" and "middle", or -1.
+/// Parses "left", "right" or "middle"; -1 if it is none of them.
 [[nodiscard]] int button_of(const std::string& name);
 [[nodiscard]] std::string button_name(int code);
-/// A key as replay files and the help spell it: "a", "f1", "ctrl", "kp_5"; -1 if there is none.
+/// Parses a key name of replay files and the help: "a", "f1", "ctrl", "kp_5"; -1 if there is none.
 [[nodiscard]] int key_of(const std::string& name);
-/// "" if it has no name.
+/// Returns the name of a key; "" if it has none.
 [[nodiscard]] std::string key_name(int code);
-/// GLFW's key as cumulet.h numbers it, or CUMULET_KEY_NONE.
+/// Converts a GLFW key to the number in cumulet.h; CUMULET_KEY_NONE if there is none.
 [[nodiscard]] std::int32_t viewer_key(int code);
 
 }  // namespace cumulet::demo

@@ -1,4 +1,4 @@
-// The panel's list of all that stands in the scene.
+// The scene section of the panel: a list of all objects.
 
 #include <imgui.h>
 
@@ -41,7 +41,7 @@ void Panel::items(Model& model) {
   }
   const std::vector<Item> items = items_of(model.scene);
   if (items.empty()) return;
-  // A sky of a thousand clouds is no longer than this.
+  // Maximum height of the list in rows; longer lists scroll.
   constexpr std::size_t most_rows = 10;
   const float height = ImGui::GetTextLineHeightWithSpacing();
   const auto rows = static_cast<float>(std::min(items.size(), most_rows));

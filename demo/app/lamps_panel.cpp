@@ -1,4 +1,4 @@
-// The panel's lamps.
+// The lights section of the panel.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,8 @@ using Desc = cumulet_lamp_desc;
 
 constexpr double sun_at_noon = 4.0;  // W/m²
 
-/// Above what the camera looks at, and as bright there as the sun at noon, but for very large scenes.
+/// Returns a point light above the camera's target, with the irradiance of the noon sun there. In very large scenes its
+/// power is limited.
 Desc new_lamp(const cumulet_camera_desc& camera) {
   const double distance =
       std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
@@ -32,7 +33,7 @@ Desc new_lamp(const cumulet_camera_desc& camera) {
   return lamp;
 }
 
-/// Whether a kind of lamp has it.
+/// Returns true if lights of this kind have the setting.
 template <class Setting>
 bool has(const Setting& setting, cumulet_lamp_kind kind) {
   const bool area = kind == CUMULET_LAMP_DISC || kind == CUMULET_LAMP_RECTANGLE;
@@ -53,7 +54,7 @@ void Panel::lamps(Model& model) {
     Desc& lamp = lamps[i];
     const std::string number = std::string(" ").append(std::to_string(i + 1));
     settings::for_each<Desc>([&](auto setting) {
-      if (*setting.row.label == '\0' || !has(setting, lamp.kind)) return;  // Scene files alone know the untitled.
+      if (*setting.row.label == '\0' || !has(setting, lamp.kind)) return;  // no label: only in scene files
       const std::string label = setting.row.label + number;
       setting.row.label = label.c_str();
       auto& value = lamp.*setting.field;
@@ -61,7 +62,7 @@ void Panel::lamps(Model& model) {
         const double length = std::hypot(value[0], value[1], value[2]);
         ui_.numbers(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
       } else if (rows_.draw(setting, value) && setting.is(&Desc::kind)) {
-        // Neither watts nor a cone of no angle are what a lamp of another kind has.
+        // Changing the kind sets values that suit it: a sun's power is in W/m², and a spot needs a cone angle.
         if (lamp.kind == CUMULET_LAMP_SUN) lamp.power = static_cast<float>(sun_at_noon);
         if (lamp.kind == CUMULET_LAMP_SPOT && lamp.angle_degrees == 0.0) lamp.angle_degrees = 45.0;
       }

@@ -1,4 +1,4 @@
-// cumulet-demo: a window in which volumes are looked at.
+// cumulet-demo: an interactive viewer.
 
 #include <algorithm>
 #include <iostream>

@@ -171,7 +171,7 @@ void tell(Model& model, bool error, const std::string& text, double now) {
   const std::string line = one_line(text);
   std::erase_if(model.messages, [&](const Message& message) { return message.text == line; });
   if (model.messages.size() >= most) {
-    // What failed stays, while there is something else to leave out.
+    // Notices are removed before errors.
     const auto notice = std::ranges::find(model.messages, false, &Message::error);
     model.messages.erase(notice != model.messages.end() ? notice : model.messages.begin());
   }

@@ -20,27 +20,27 @@
 
 namespace cumulet::demo {
 
-/// What the user can ask for besides changing a setting.
+/// User commands other than changes of settings.
 enum class Action {
   open_dialog,
-  open,  // a file of any kind: text
+  open,  // text: a file of any kind
   add_volume_dialog,
-  add_volume,  // text
+  add_volume,  // text: the file
   add_model_dialog,
-  add_model,  // text
+  add_model,  // text: the file
   environment_dialog,
   clear_environment,
   save_scene,
   save_scene_dialog,
-  save_scene_as,  // text
+  save_scene_as,  // text: the file
   png_dialog,
-  save_png,  // text
+  save_png,  // text: the file
   exr_dialog,
-  save_exr,  // text
+  save_exr,  // text: the file
   undo,
   redo,
   frame_all,
-  cancel,  // what Escape does: the help, a message or a load goes away
+  cancel,  // Escape: closes the help, dismisses a message or cancels a load
   cancel_load,
   dismiss,
   toggle_panel,
@@ -48,24 +48,24 @@ enum class Action {
   toggle_help,
   toggle_fly,
   toggle_turntable,
-  tool,         // value: a Tool, of the handles
-  toggle_axes,  // of the world, or of the thing
+  tool,         // value: a Tool
+  toggle_axes,  // axes of the handles: world or local
   brighter,
   darker,
   next_march,
   view,  // value: a cumulet_view
   grids_dialog,
-  choose_grid,   // text
+  choose_grid,   // text: the grid's name
   choose_up,     // value: an UpAxis
-  auto_density,  // a density scale that suits the volume
-  play_row,      // the sequence that the volume's file is in
-  play,          // and pause
-  step,          // value: frames, on or back
-  go_to,         // value: a frame's place in the row
-  begin_here,    // the frame is the first that is played
+  auto_density,  // sets the suggested density scale
+  play_row,      // plays the sequence that the volume's file belongs to
+  play,          // play or pause
+  step,          // value: number of frames, negative for backwards
+  go_to,         // value: index of a frame in the sequence
+  begin_here,    // the displayed frame becomes the first played frame
   end_here,
-  draw_region,   // the next drag over the picture
-  clear_region,  // all of it is made
+  draw_region,   // the next drag over the image sets the render region
+  clear_region,  // removes the render region
   quit
 };
 
@@ -76,34 +76,35 @@ struct Command {
 };
 
 struct Shortcut {
-  int key;             // GLFW's
-  unsigned modifiers;  // exactly these
+  int key;             // GLFW key
+  unsigned modifiers;  // exact match
   Command command;
-  const char* keys;  // as the help spells it; "" if it is told elsewhere
+  const char* keys;  // keys as shown in the help; "" if another entry shows them
   const char* what;
 };
 
 [[nodiscard]] const std::vector<Shortcut>& shortcuts();
-/// The command of a key, if it has one. While a text is typed only those that a text field has no use for.
+/// Returns the command of a key; nullopt if there is none. typing: a text field has the focus, which uses the other
+/// keys itself.
 [[nodiscard]] std::optional<Command> command_of(int key, unsigned modifiers, bool typing);
 
 struct GridInfo {
   std::string name;
   std::string type;
-  std::string refusal;  // "": can be shown
+  std::string refusal;  // "": the grid can be shown
 };
 
-/// Of a scene, the first one's.
+/// Returns the file of a scene's first volume.
 [[nodiscard]] inline const VolumeFile& volume_of(const SceneVolume& scene) { return scene; }
 inline void set_volume(SceneOptions& scene, const VolumeFile& volume) { static_cast<VolumeFile&>(scene) = volume; }
 
 struct Message {
   bool error = false;
   std::string text;
-  double until = 0.0;  // seconds; errors stay until dismissed
+  double until = 0.0;  // in seconds; errors stay until they are dismissed
 };
 
-/// Values over time, the newest last.
+/// A series of values over time, oldest first.
 class Series {
  public:
   void add(float value);
@@ -116,97 +117,98 @@ class Series {
   std::vector<float> values_;
 };
 
-/// How long whoever watches a window waits: from one picture to the next while more are due, however often the window
-/// is drawn beside them; where none is, from what a hand did to the window that shows it. In seconds of one clock.
+/// Measures the latency that the user sees. While images are expected: the time between two images, even if the window
+/// is drawn more often. Otherwise: the time from an input event to the window that shows its effect. All times are in
+/// seconds of one clock.
 class FrameTimes {
  public:
-  /// A hand did something then.
+  /// Records an input event.
   void hand(double at);
-  /// The window was drawn then; picture: with a new one; due: another is to come. Returns how long that was waited for,
-  /// if it was.
+  /// Records that the window was drawn. picture: with a new image; due: another image is expected. Returns the measured
+  /// time, if there is one.
   std::optional<double> shown(double at, bool picture, bool due);
-  /// Nothing was drawn, and nothing is to come: what a hand did changes nothing.
+  /// Records that nothing was drawn and no image is expected: the input had no effect.
   void rest() { since_.reset(); }
 
  private:
   std::optional<double> since_;
 };
 
-/// What a grid of the volume holds.
+/// Values of a grid of the volume.
 struct FieldValues {
-  float most = 0.0f;           // 0: there is no such grid
-  std::vector<float> heights;  // of a histogram from 0 to that: from 0 to 1
+  float most = 0.0f;           // maximum; 0: there is no such grid
+  std::vector<float> heights;  // histogram from 0 to `most`; heights from 0 to 1
 };
 
-/// Heights of bars, from 0 to 1, of counts that differ by orders of magnitude.
+/// Converts counts to bar heights from 0 to 1, on a logarithmic scale.
 [[nodiscard]] std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]);
 
-/// A sequence that is shown.
+/// The displayed sequence.
 struct Play {
-  std::shared_ptr<cumulet_sequence> sequence;  // any thread moves it
+  std::shared_ptr<cumulet_sequence> sequence;  // playback functions may be called from any thread
   FrameRow row;
   cumulet_sequence_info info{};
-  std::vector<std::uint8_t> states;  // cumulet_frame_state, each
-  std::string failure;               // of the frame where it stands
+  std::vector<std::uint8_t> states;  // a cumulet_frame_state per frame
+  std::string failure;               // error of the current frame
 
   [[nodiscard]] Frame frame() const { return row.number(info.asked_frame); }
 };
 
-/// What the viewer has told last.
+/// State of the viewer in the last answer.
 struct Status {
   cumulet_frame_result frame{};
   cumulet_progress work{};
   cumulet_stats stats{};
   cumulet_surfaces_info surfaces{};
-  cumulet_animation_info animation{};  // that is set, of those
-  std::vector<std::string> variants;   // of their materials
-  std::optional<double> compiled;      // the part of the first scene's programs that is, until all are
-  bool busy = false;                   // a file is read, a grid is built, a sky computed or programs are compiled
-  std::string loading;                 // the file that is read, until what it shows is there
-  ThumbnailPtr thumbnail;              // of the environment that is shown; null: none, or not yet
+  cumulet_animation_info animation{};  // the selected animation of the surfaces
+  std::vector<std::string> variants;   // material variants of the surfaces
+  std::optional<double> compiled;      // fraction of the first scene's programs that are compiled; nullopt when all are
+  bool busy = false;                   // a file is read, a grid is built, a sky is computed or programs are compiled
+  std::string loading;                 // file that is being loaded
+  ThumbnailPtr thumbnail;              // of the displayed environment; null: no environment, or not ready
   bool has_volume = false;
-  bool has_content = false;                                // a volume, a model or an environment is shown
-  std::string saving;                                      // the file that waits for a whole picture; "": none
-  std::optional<Play> play;                                // where it is a sequence's
-  std::optional<FrameRow> neighbours;                      // where it is one of several that are numbered
-  std::string grid;                                        // of the file, that is shown
-  std::optional<double> noise;                             // relative standard error; nothing while it is unknown
-  std::array<FieldValues, settings::ramps.size()> fields;  // each ramp's
-  Boxes boxes;                                             // of the files that are there
+  bool has_content = false;                                // a volume, surfaces or an environment are shown
+  std::string saving;                                      // file that is saved when all pixels have a sample; "": none
+  std::optional<Play> play;                                // if the volume is a sequence
+  std::optional<FrameRow> neighbours;                      // numbered files that the volume's file belongs to
+  std::string grid;                                        // name of the displayed grid
+  std::optional<double> noise;                             // relative standard error; nullopt if it is unknown
+  std::array<FieldValues, settings::ramps.size()> fields;  // values of the grid of each ramp
+  Boxes boxes;                                             // bounding boxes of the loaded files
 };
 
-/// What of it is drawn over time.
+/// Statistics that are plotted over time.
 struct Charts {
-  Series frame_ms;    // FrameTimes
-  Series picture_ms;  // from a change to the window with the picture that was drawn next
+  Series frame_ms;    // from FrameTimes
+  Series picture_ms;  // time from a change to the window with the next drawn image
   Series samples_per_second;
   Series noise_percent;
-  Series compiled_percent;  // of the first scene's programs
-  Series device_ms;         // that the library's passes took, a frame of the window
+  Series compiled_percent;  // programs of the first scene
+  Series device_ms;         // GPU time of the library's passes per window frame
 };
 
-/// Of all passes.
+/// Returns the sum over all passes.
 double device_seconds(const cumulet_stats& stats);
 
-/// All that the user interface shows and changes.
+/// All data that the user interface shows and edits.
 struct Model {
-  SceneOptions scene;            // with no default left to the library but the camera's place
-  bool unchosen_ground = false;  // a ground below all is the default one
+  SceneOptions scene;            // defaults are replaced by their values, except for the camera's position
+  bool unchosen_ground = false;  // the ground below the scene is the default
   cumulet_navigation_desc navigation{};
   bool adaptive_resolution = true;
   bool panel = true;
   bool help = false;
-  Tool tool = Tool::move;      // none: no handles, outlines and lamps' marks in the picture
-  Axes axes = Axes::world;     // of handles
-  std::optional<Item> chosen;  // of the scene's
+  Tool tool = Tool::move;      // none: no handles, outlines or light icons in the image
+  Axes axes = Axes::world;     // axes of the handles
+  std::optional<Item> chosen;  // selected object
   bool playing = false;
-  double clock = 0.0;  // seconds, of the sequence and of the model's animation beside it
+  double clock = 0.0;  // seconds; the surfaces' animation uses it too if a sequence is shown
   bool can_undo = false;
   bool can_redo = false;
-  std::string scene_path;  // of the scene file last opened or saved
+  std::string scene_path;  // scene file that was opened or saved last
   std::vector<GridInfo> grids;
   Status status;
-  unsigned thumbnail_texture = 0;  // of the status' thumbnail, in the window's context; 0: none
+  unsigned thumbnail_texture = 0;  // OpenGL name of status.thumbnail in the window's context; 0: none
   Charts charts;
   std::vector<Message> messages;
   Preferences preferences;
@@ -214,39 +216,40 @@ struct Model {
   Model();
 };
 
-/// Shows the surfaces of a file, instead of those before and of the default ground: models bring their own.
+/// Opens the surfaces of a file. They replace the previous surfaces and the default ground, because models usually have
+/// their own.
 void open_surfaces(Model& model, const std::string& path);
 
-/// Once an environment lights the scene it needs no default daylight, whose sun would be a second one; once it is taken
-/// away it is day again where there is no other light.
+/// Removes the default daylight when an environment is opened, because that contains a sun. Sets it again when the
+/// environment is removed and there is no other sun or sky.
 void take_daylight(SceneOptions& scene);
 void give_daylight(SceneOptions& scene);
 
-/// Adds a line to the message bar, in place of an equal one. Errors stay, others go after a while.
+/// Adds a line to the message bar and replaces an equal one. Errors stay; notices disappear after a while.
 void tell(Model& model, bool error, const std::string& text, double now);
 
-/// Replaces the zeros that stand for a default by what they stand for (cumulet.h), so that controls can show them.
+/// Replaces zeros that mean a default by the default value (cumulet.h), so that controls can show it.
 void spell_out_defaults(SceneOptions& scene);
 
-/// What keeps the viewer busy: "Reading the file", "Refining the grid", ..., and the part of it that is done.
+/// The viewer's current work, such as "Reading the file" or "Refining the grid", and its completed fraction.
 struct Work {
   const char* name;
   double part;
-  bool stops;  // cumulet_cancel ends it
+  bool stops;  // cumulet_cancel stops it
 };
 [[nodiscard]] Work work_of(const Status& status);
 
-/// The file that a scene is called by: its volume's, or that of the first other thing in it.
+/// Returns the file that a scene is named after: the volume's, or the first other file in the scene.
 [[nodiscard]] std::string main_file(const SceneOptions& scene);
 
-/// Where a new file may go: the main file's name, a free number and the ending, in the folder used last.
+/// Suggests a path for a new file: the main file's name, a free number and the extension, in the last used folder.
 [[nodiscard]] std::string suggest_path(const Model& model, const std::string& ending);
 
-/// Whether a name ends so, whatever its case; with the dot.
+/// Returns true if the name has this extension, including the dot; case-insensitive.
 [[nodiscard]] bool has_ending(const std::string& path, const std::string& ending);
-/// Of a glTF model, by its ending.
+/// Returns true for the extension of a glTF file.
 [[nodiscard]] bool is_model(const std::string& path);
-/// Of an environment's picture, by its ending.
+/// Returns true for the extension of an environment map.
 [[nodiscard]] bool is_environment(const std::string& path);
 
 }  // namespace cumulet::demo

@@ -50,7 +50,7 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   if (model.panel) side(model, commands);
   if (model.status.play) timeline(model, commands);
   if (!model.status.has_content && !model.status.busy) hint();
-  // What is computed in the blink of an eye, as skies are while the sun is dragged, needs no bar.
+  // No progress bar for short work, such as the sky while the user drags the sun.
   const bool works = model.status.work.stage != CUMULET_STAGE_IDLE || model.status.compiled;
   if (model.status.busy && (works || !model.status.loading.empty())) loading(model, commands);
   state_.clear();
@@ -249,7 +249,7 @@ void Panel::surfaces(Model& model) {
   ImGui::BeginDisabled(info.animations == 0);
   settings::with(&Desc::time, [&](auto time) {
     time.row.most = std::max(model.status.animation.duration, 1e-3);
-    // Beside a sequence it goes by that one's clock.
+    // If a sequence is shown, the animation uses its clock.
     double clock = std::max(model.clock, 0.0);
     ImGui::BeginDisabled(model.status.play.has_value());
     rows_.draw(time, model.status.play ? clock : surface.time);
@@ -276,7 +276,7 @@ void Panel::variant(Model& model) {
   if (!ui_.choose("Variant", "Which of the model's variants of materials is shown.", choices, chosen)) return;
   const auto index = static_cast<std::size_t>(chosen - 1);
   wanted = chosen == 0 ? "" : names[index];
-  // Where names do not tell, the number does.
+  // If names are empty or ambiguous, the variant is stored by number.
   if (chosen > 0 && std::ranges::find(names, wanted) - names.begin() != chosen - 1) wanted = std::to_string(index);
   if (chosen > 0 && wanted.empty()) wanted = std::to_string(index);
 }
@@ -310,7 +310,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   ramps(model);
 }
 
-/// Absorption of a cloud is far below what a colour field can say.
+/// Draws a slider for the absorption. A cloud's absorption is far below the resolution of a color field.
 void Panel::absorption(float (&coalbedo)[3]) {
   float mean = (coalbedo[0] + coalbedo[1] + coalbedo[2]) / 3.0f;
   const float before = mean;
@@ -427,7 +427,7 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
         std::hypot(view.eye[0] - view.target[0], view.eye[1] - view.target[1], view.eye[2] - view.target[2]);
     const double half = std::tan(view.fovy_degrees * std::numbers::pi / 360.0);
     view.orthographic_height = orthographic ? std::max(2.0 * distance * half, 1e-6) : 0.0;
-    // Defaults that depend on the projection.
+    // Resets defaults that depend on the projection.
     view.near_plane = view.far_plane = 0.0;
     other = true;
   }
@@ -537,7 +537,7 @@ void Panel::messages(Model& model, std::vector<Command>& commands) {
     const ImU32 mark = message.error ? IM_COL32(230, 105, 85, 255) : IM_COL32(127, 180, 230, 255);
     ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ui_.px(12.0f));
     ImGui::AlignTextToFramePadding();
-    // A cause that is cut is no cause.
+    // Errors are wrapped, not truncated.
     ImGui::PushTextWrapPos(ImGui::GetWindowWidth() - button - ui_.px(18.0f));
     ImGui::TextUnformatted(message.text.c_str());
     ImGui::PopTextWrapPos();
@@ -562,7 +562,7 @@ void Panel::state_line(const Model& model) {
   const bool converged = (status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
   if (converged) text = print("%u samples", model.scene.sampling.samples);
   if (model.scene.sampling.noise_target_percent > 0.0f && status.frame.width > 0) {
-    // Then the samples are but the most.
+    // With a noise target, the number of samples is only a maximum.
     const double pixels = double(status.frame.width) * status.frame.height;
     text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / pixels));
     if (!converged) text += print(" (%.0f %%)", std::floor(100.0 * part));
@@ -586,7 +586,7 @@ void Panel::state_line(const Model& model) {
   ImGui::TextUnformatted(text.c_str());
   ImGui::End();
   ImGui::PopStyleVar();
-  // In whole pixels: less gives no frame another look.
+  // Rounded to whole pixels, because a smaller change would redraw the window without effect.
   ImGui::GetForegroundDrawList()->AddRectFilled(
       {0.0f, static_cast<float>(view_.height) - ui_.px(2.0f)},
       {static_cast<float>(std::floor(view_.width * part)), static_cast<float>(view_.height)},

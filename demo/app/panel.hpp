@@ -15,22 +15,22 @@
 
 namespace cumulet::demo {
 
-/// The user interface: changes the model's settings, and tells what else was asked for.
+/// The user interface. Edits the model's settings and collects commands.
 class Panel {
  public:
-  /// Between ImGui's new frame and its render.
+  /// Call between ImGui::NewFrame and ImGui::Render.
   void draw(Model& model, float scale, double time, std::vector<Command>& commands);
 
-  /// The part of a window of this size that the picture has.
+  /// Returns the part of a window of this size that shows the image.
   [[nodiscard]] static Rectangle viewport(const Model& model, double width, double height, float scale);
 
   void focus() { focus_ = true; }
   [[nodiscard]] FileDialog& dialog() { return dialog_; }
-  /// Whether one that stops all else is open.
+  /// Returns true if a modal dialog is open.
   [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open(); }
   [[nodiscard]] GridPicker& picker() { return picker_; }
   [[nodiscard]] Ui& ui() { return ui_; }
-  /// The line of text below the picture, as drawn last; "" if there is none.
+  /// Returns the last drawn text line below the image; "" if there is none.
   [[nodiscard]] const std::string& state() const { return state_; }
 
  private:
@@ -38,23 +38,23 @@ class Panel {
   void toolbar(Model& model, std::vector<Command>& commands);
   void file(Model& model, std::vector<Command>& commands);
   void camera(Model& model, std::vector<Command>& commands);
-  /// Those that the scene keeps.
+  /// Draws the saved cameras of the scene.
   void cameras(Model& model);
   void display(Model& model);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
-  /// All that stands in the scene, to be chosen, and what handles do to it.
+  /// Draws the list of the scene's objects and the settings of the handles.
   void items(Model& model);
   void volumes(Model& model, std::vector<Command>& commands);
-  /// Where a volume stands, of several places that which is chosen; number: what its controls' labels end with.
+  /// Draws the transform of a volume. place: the selected one of several transforms. number: suffix of the labels.
   void stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number);
   void models(Model& model, std::vector<Command>& commands);
-  // Rows of what is at `place`; another place, where they were moved.
+  // Draws the rows of the transform `place`. Returns the new transform if the user changed it.
   std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& place,
                                                  const std::string& number);
   void lamps(Model& model);
   void sequence(Model& model, std::vector<Command>& commands);
-  /// Below the picture: the frames, which of them are ready, and where it stands.
+  /// Draws the timeline below the image: the frames, their states and the current frame.
   void timeline(Model& model, std::vector<Command>& commands);
   void medium(Model& model, std::vector<Command>& commands);
   void ramps(Model& model);
@@ -84,10 +84,10 @@ class Panel {
   double time_ = 0.0;
   Rectangle view_;
   std::string state_;
-  std::map<std::size_t, std::string> names_;        // of volumes, as typed
-  std::map<std::size_t, std::string> model_names_;  // of models, likewise
-  std::string camera_name_;                         // as typed
-  std::string path_;                                // likewise
+  std::map<std::size_t, std::string> names_;        // names of volumes while they are typed
+  std::map<std::size_t, std::string> model_names_;  // names of models while they are typed
+  std::string camera_name_;                         // while it is typed
+  std::string path_;                                // while it is typed
   std::string path_of_;
 };
 

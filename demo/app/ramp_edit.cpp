@@ -18,11 +18,11 @@ float result_of(const RampPoint& point) { return point[1]; }
 }  // namespace
 
 void fit(RampView& view, const RampPoints& points, float most_value) {
-  // An undo may have taken points from under the mouse.
+  // An undo may have removed the dragged point.
   if (view.held && *view.held >= points.size()) view.held.reset();
   view.chosen = std::min(view.chosen, std::max<std::size_t>(points.size(), 1) - 1);
   if (view.held || points.empty()) return;
-  constexpr float room = 1.25f;  // to drag into
+  constexpr float room = 1.25f;  // space above the highest point for dragging
   view.most_value = std::max(most_value, value_of(points.back()));
   if (!(view.most_value > 0.0f)) view.most_value = 1.0f;
   const float highest = result_of(*std::ranges::max_element(points, {}, result_of));

@@ -6,22 +6,23 @@
 
 namespace cumulet::demo {
 
-/// What a curve editor shows of a ramp: values from 0 on, and what they become from 0 on; and what is done there.
+/// State of a curve editor for a ramp: the ranges of both axes, which begin at 0, and the edited points.
 struct RampView {
   float most_value = 1.0f;
   float most_result = 1.0f;
-  std::optional<std::size_t> held;  // by the mouse; meanwhile the two above stay
-  std::size_t chosen = 0;           // whose numbers can be typed
+  std::optional<std::size_t> held;  // point dragged by the mouse; the ranges stay constant meanwhile
+  std::size_t chosen = 0;           // point whose numbers can be typed
 };
 
-/// Shows all of the points, and of the grid's values up to this.
+/// Fits the ranges to the points and to the maximum grid value.
 void fit(RampView& view, const settings::RampPoints& points, float most_value);
 
-/// A new point, or, of a value that has one, that one moved: its place. None where there are as many as can be.
+/// Inserts a point, or moves the existing point with the same value. Returns its index; nullopt if the maximum number
+/// of points is reached.
 std::optional<std::size_t> add_point(settings::RampPoints& points, settings::RampPoint point);
-/// As far as it goes between the points beside it.
+/// Moves a point; its value is limited by the neighboring points.
 void move_point(settings::RampPoints& points, std::size_t place, settings::RampPoint to);
-/// False where two are left, which a ramp needs.
+/// Removes a point. Returns false if only two are left, the minimum for a ramp.
 bool remove_point(settings::RampPoints& points, std::size_t place);
 
 }  // namespace cumulet::demo

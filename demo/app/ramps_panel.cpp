@@ -1,4 +1,4 @@
-// The panel's ramps.
+// The ramps (transfer functions) of the panel.
 
 #include <algorithm>
 #include <array>

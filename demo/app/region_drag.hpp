@@ -9,24 +9,26 @@
 
 namespace cumulet::demo {
 
-/// A rectangle that a hand draws over the picture with the left button: the part of it that is made from then on.
+/// A rectangle that the user drags over the image with the left button. It becomes the render region.
 class RegionDrag {
  public:
-  /// The next press in the picture begins one.
+  /// Starts waiting for a press in the image.
   void arm() { state_ = Armed{}; }
-  /// Whether there was one to be given up.
+  /// Cancels. Returns true if a drag was pending.
   bool cancel();
-  /// Whether the event is for it. x, y: where the pointer is, in the window; over_picture: no panel is there.
+  /// Handles an event; returns true if it belongs to the drag. x, y: pointer position in the window. over_picture: the
+  /// pointer is not over a panel.
   bool take(const Event& event, double x, double y, bool over_picture);
-  /// In the window, while it is drawn.
+  /// Returns the rectangle in window coordinates during the drag.
   [[nodiscard]] std::optional<Rectangle> drawn() const;
-  /// Once the button is up, as cumulet_sampling_desc has it: zeros of one too small to be meant.
+  /// Returns the region after the button is released, as in cumulet_sampling_desc. All zeros (no region) if the
+  /// rectangle is too small.
   [[nodiscard]] std::optional<std::array<float, 4>> taken(const Rectangle& viewport);
 
  private:
   struct Armed {};
   struct Drawn {
-    double x = 0.0;  // where it began
+    double x = 0.0;  // start of the drag
     double y = 0.0;
     double to_x = 0.0;
     double to_y = 0.0;

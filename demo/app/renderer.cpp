@@ -9,8 +9,8 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr auto glance = std::chrono::milliseconds(100);  // how often progress is looked at
-constexpr GLuint64 patience = 10'000'000'000;            // nanoseconds for which a GPU may be busy
+constexpr auto glance = std::chrono::milliseconds(100);  // interval for polling the progress
+constexpr GLuint64 patience = 10'000'000'000;            // timeout for the GPU in nanoseconds
 
 }  // namespace
 
@@ -58,7 +58,7 @@ std::optional<Answer> Renderer::take() {
   const std::lock_guard lock(mutex_);
   if (failure_ != nullptr) std::rethrow_exception(failure_);
   if (ready_) {
-    // All that the window has drawn of it comes before.
+    // The fence follows all commands of the window that read the texture.
     slots_[shown_].read = window_gl_->FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     window_gl_->Flush();
     shown_ = *std::exchange(ready_, std::nullopt);
@@ -155,7 +155,7 @@ void Renderer::turn() {
     inputs = std::exchange(inputs_, {});
     requests = std::exchange(requests_, {});
   }
-  if (wish_.number == 0) {  // none yet
+  if (wish_.number == 0) {  // no request yet
     const std::lock_guard lock(mutex_);
     poked_ = false;
     return;
@@ -168,7 +168,7 @@ void Renderer::turn() {
   {
     const std::lock_guard lock(mutex_);
     while (free == shown_ || free == ready_) ++free;
-    poked_ = false;  // whatever it was about, this frame sees it
+    poked_ = false;  // this frame handles all updates so far
   }
   const bool sized = wish_.width > 0 && wish_.height > 0;
   if (sized && session_->cold()) {
@@ -178,7 +178,7 @@ void Renderer::turn() {
     return;
   }
   session_->work();
-  // What is under way is drawn once it is there, rather than the last picture once more.
+  // A new image is drawn when it is ready. The previous one is not drawn again.
   const bool draws = sized && session_->has_news();
   if (draws) {
     prepare(slots_[free], wish_.width, wish_.height);
@@ -187,7 +187,7 @@ void Renderer::turn() {
   publish(free, draws);
 }
 
-// The slot is this thread's alone here.
+// Only this thread accesses the slot here.
 void Renderer::prepare(Slot& slot, std::uint32_t width, std::uint32_t height) {
   const GladGLContext& gl = *gl_;
   if (slot.read != nullptr) {
@@ -227,7 +227,7 @@ void Renderer::publish(std::size_t slot, bool drawn) {
   {
     const std::lock_guard lock(mutex_);
     if (drawn) ready_ = slot;
-    if (answer_) {  // not taken yet
+    if (answer_) {  // the previous answer was not taken
       answer.camera_moved |= answer_->camera_moved;
       answer.drawn |= answer_->drawn;
       if (!answer.density_scale) answer.density_scale = answer_->density_scale;

@@ -20,53 +20,51 @@ struct GLFWwindow;
 
 namespace cumulet::demo {
 
-/// The viewer in a thread of its own, with a GL context of its own that shares objects with the window's: whoever draws
-/// the window sends wishes and takes answers and pictures, and never waits. All calls of the viewer are in that thread
-/// but for cancel's.
-///
-/// Pictures are drawn into three textures in turn: one is on the window, one may be ready, one is being drawn. A
-/// picture is told of once the GPU has finished it; a texture is drawn over once the GPU has finished reading it.
-///
+/// Runs the viewer in a thread with its own GL context, which shares objects with the window's. The thread that draws
+/// the window sends requests and takes answers and images without waiting. All viewer calls happen in the viewer's
+/// thread, except cancel().
+/// Images are drawn into three textures in rotation: one is displayed, one may be ready, one is being drawn. An image
+/// is published when the GPU has finished it. A texture is reused when the GPU has finished reading it.
 /// All calls from one thread, which has the window's context current.
 class Renderer {
  public:
-  /// gl: the window's. context shares objects with it, is current in no thread, and outlives the renderer. wake is
-  /// called from any thread when there is an answer to take. timeline, or null: is told of the viewer's work.
+  /// gl: the window's functions. context: shares objects with the window's, is current in no thread, and must outlive
+  /// the renderer. wake: called from any thread when there is an answer. timeline: receives trace events, or null.
   /// shader_cache, shaders: folders, or "". Throws std::runtime_error.
   Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline,
            std::string shader_cache, std::string shaders);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
-  /// Stops what is under way, soon.
+  /// Cancels running work and stops the thread.
   ~Renderer();
 
-  /// The newest wish counts; inputs and requests are all carried out, in their order.
+  /// Sends a request. Only the latest `wish` is processed; inputs and requests are all processed, in order.
   void ask(Wish wish, std::vector<ViewerInput> inputs, std::vector<Request> requests);
-  /// What came since the last time, with its picture; rethrows what ended the thread.
+  /// Returns the answer since the last call, and switches to its image. Rethrows the error that ended the thread.
   [[nodiscard]] std::optional<Answer> take();
-  /// Waits until there is an answer to the wish of this number.
+  /// Waits for the answer to the request with this number.
   void wait_for(std::uint64_t number);
-  /// Stops loading and building.
+  /// Cancels loading and building.
   void cancel();
 
-  /// A texture as OpenGL has pictures, the first row at the bottom.
+  /// A texture with the first row at the bottom, as in OpenGL.
   struct Picture {
-    unsigned texture = 0;  // 0: there is none yet
+    unsigned texture = 0;  // 0: no image yet
     std::uint32_t width = 0;
     std::uint32_t height = 0;
   };
-  /// Of the answer last taken; stays as it is until the next is.
+  /// Returns the image of the last taken answer. It stays valid until the next take().
   [[nodiscard]] Picture picture() const;
 
  private:
   struct Slot {
     Picture picture;
-    unsigned framebuffer = 0;  // of the thread's context
-    GLsync read = nullptr;     // passed once the window's drawing of it is done
+    unsigned framebuffer = 0;  // object of the viewer thread's context
+    GLsync read = nullptr;     // signaled when the window's drawing of the texture is done
   };
   void work(std::promise<void>& ready);
   void turn();
-  // Makes it a picture of that size, to be drawn over.
+  // Makes the slot an unused image of this size.
   void prepare(Slot& slot, std::uint32_t width, std::uint32_t height);
   void draw(const Slot& slot);
   void publish(std::size_t slot, bool drawn);
@@ -78,26 +76,26 @@ class Renderer {
   std::string shader_cache_;
   std::string shaders_;
 
-  // The thread's own.
+  // Used only by the viewer's thread.
   std::unique_ptr<GladGLContext> gl_;
   std::unique_ptr<Session> session_;
   Wish wish_;
 
-  mutable std::mutex mutex_;  // the rest
+  mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
   std::condition_variable answered_;
   std::optional<Wish> next_;
   std::vector<ViewerInput> inputs_;
   std::vector<Request> requests_;
-  bool poked_ = false;  // the viewer has something new
+  bool poked_ = false;  // the viewer has an update
   bool stop_ = false;
   std::optional<Answer> answer_;
   std::exception_ptr failure_;
   std::array<Slot, 3> slots_;
-  std::size_t shown_ = 0;             // on the window
-  std::optional<std::size_t> ready_;  // to be shown next
+  std::size_t shown_ = 0;             // slot that is displayed
+  std::optional<std::size_t> ready_;  // slot that is displayed next
 
-  std::thread thread_;  // last: it uses the above
+  std::thread thread_;  // last member: the thread uses those above
 };
 
 }  // namespace cumulet::demo

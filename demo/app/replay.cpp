@@ -12,10 +12,10 @@ namespace {
 
 constexpr int most_frames = 100000;
 constexpr int drag_moves = 8;
-constexpr int control_frames = 30;  // for a control to come into view
+constexpr int control_frames = 30;  // maximum number of frames to wait for a control
 constexpr auto patience = std::chrono::seconds(300);
 
-/// One line's words.
+/// Parser of the words of a line.
 class Line {
  public:
   Line(const std::string& text, std::string where) : words_(text), where_(std::move(where)) {
@@ -191,7 +191,7 @@ class Parser {
     step.from = step.to = place;
   }
 
-  /// "ctrl+shift+z": down in this order, up in the opposite one.
+  /// Adds the events of "ctrl+shift+z": keys go down in this order and up in reverse order.
   void chord(Line& line) {
     std::istringstream names(line.word());
     std::vector<int> keys;
@@ -227,7 +227,7 @@ std::string utf8(int code) {
   return text;
 }
 
-/// What is not valid UTF-8 is dropped.
+/// Decodes UTF-8; invalid bytes are dropped.
 std::vector<int> code_points(const std::string& text) {
   std::vector<int> codes;
   for (std::size_t i = 0; i < text.size();) {
@@ -289,7 +289,7 @@ std::optional<Rectangle> Player::locate(const ReplayHost& host, const Place& pla
 bool Player::wait_over(const ReplayHost& host) {
   const ReplayStep& step = steps_[at_];
   if (step.type == ReplayStep::Type::frames) return frames_ >= step.count;
-  // What was just asked for shows in the state after a frame or two.
+  // The state shows a requested change only after a frame or two.
   constexpr int settle = 3;
   const bool loaded = step.type == ReplayStep::Type::wait_loaded;
   if (frames_ > settle && !host.loading && (loaded || host.converged)) return true;

@@ -12,7 +12,7 @@
 
 namespace cumulet::demo {
 
-// Replay files: one command a line, one command a frame. docs/replay.md lists them.
+// Replay files contain one command per line. docs/replay.md lists the commands. One step is executed per frame.
 
 struct Rectangle {
   double x = 0.0;
@@ -21,12 +21,12 @@ struct Rectangle {
   double height = 0.0;
 };
 
-/// A place in the window, known once the command's turn has come.
+/// A position in the window, resolved when the command is executed.
 struct Place {
   enum class Of { window, viewport, control };
   Of of = Of::window;
-  std::string control;  // its label
-  double x = 0.0;       // framebuffer pixels, or parts of the viewport's or the control's size
+  std::string control;  // the control's label
+  double x = 0.0;       // framebuffer pixels, or fractions of the viewport's or the control's size
   double y = 0.0;
 };
 
@@ -34,60 +34,61 @@ struct ReplayStep {
   enum class Type { wait_loaded, wait_converged, frames, idle, move, event, text, screenshot, report, quit };
   int line = 0;
   Type type = Type::frames;
-  int count = 1;         // frames
-  double seconds = 0.0;  // idle
-  Place from;            // move: part of the way from one to the other
+  int count = 1;         // for frames
+  double seconds = 0.0;  // for idle
+  Place from;            // move: start and end; `part` is the fraction in between
   Place to;
   double part = 1.0;
   Event event;
-  std::string text;  // text; screenshot, report: the file
+  std::string text;  // text: the text; screenshot, report: the file
 };
 
-/// Throws std::runtime_error, "path:line: cause".
+/// Parses a replay file. Throws std::runtime_error, "path:line: cause".
 [[nodiscard]] std::vector<ReplayStep> parse_replay(const std::string& text, const std::string& path);
 
-/// What the player sees of the program, and does to it.
+/// Interface of the player to the program.
 struct ReplayHost {
   bool loading = false;
   bool converged = false;
   Rectangle viewport;
-  /// Where a control is; brings it into view if it is not, for the next frame.
+  /// Returns the rectangle of a control. If it is not in view, scrolls to it for the next frame.
   std::function<std::optional<Rectangle>(const std::string& label)> find;
 };
 
-/// Plays a file: one step each frame.
+/// Plays a replay file, one step per frame.
 class Player {
  public:
-  /// What is to be done once the frame is drawn.
+  /// Work for the program after the frame is drawn.
   struct Order {
-    std::string screenshot;  // of the window; "": none
+    std::string screenshot;  // screenshot file of the window; "": none
     std::string report;
-    double idle = 0.0;  // seconds for which the program may sleep as it does without a replay
+    double idle = 0.0;  // seconds that the program may sleep, as it does without a replay
     bool quit = false;
   };
 
   Player(std::vector<ReplayStep> steps, std::string path);
-  /// Throws std::runtime_error, "path:line: cause", when a control or the end of a wait does not come.
+  /// Executes a step. Throws std::runtime_error, "path:line: cause", if a control or the end of a wait does not come in
+  /// time.
   [[nodiscard]] Order next(const ReplayHost& host, Input& input);
-  /// Frames during the last idle, drawn or not.
+  /// Number of frames during the last idle, drawn or not.
   [[nodiscard]] int idle_frames() const { return idle_frames_; }
 
  private:
   using Clock = std::chrono::steady_clock;
   [[noreturn]] void fail(const std::string& cause) const;
   [[nodiscard]] std::optional<Rectangle> locate(const ReplayHost& host, const Place& place) const;
-  /// Whether a step that waits has waited for long enough; frames counts how often it was asked.
+  /// Returns true if a waiting step is done. frames_ counts the calls.
   [[nodiscard]] bool wait_over(const ReplayHost& host);
 
   std::vector<ReplayStep> steps_;
   std::string path_;
   std::size_t at_ = 0;
-  int frames_ = 0;  // that the step has had
+  int frames_ = 0;  // number of frames of the current step
   int idle_frames_ = 0;
   Clock::time_point since_;
 };
 
-/// Writes what happens as a replay file.
+/// Records events to a replay file.
 class Recorder {
  public:
   /// Throws std::runtime_error, one line, if the file cannot be written.
@@ -95,7 +96,7 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
   ~Recorder();
-  /// One frame; loading: whether a file or a grid is under way after it.
+  /// Records a frame. loading: a file is loading or a grid is being built after it.
   void frame(const std::vector<Event>& events, bool loading);
 
  private:

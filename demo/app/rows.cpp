@@ -13,7 +13,7 @@ ImGuiSliderFlags flags_of(const settings::Row& row) {
   return row.logarithmic ? ImGuiSliderFlags_Logarithmic : ImGuiSliderFlags_None;
 }
 
-/// least and most as the value's own type.
+/// Draws a slider with the range converted to the value's type.
 template <class Number>
 bool slide(Ui& ui, const settings::Row& row, Number& value, const char* format) {
   const bool zero = value == Number{} && *row.zero != '\0';
@@ -60,7 +60,7 @@ bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
   }
   if (*row.colour == '\0') {
     if (!ui_.colour(row.label, row.tip, value)) return false;
-    // 0 is the library's default.
+    // Black would be all zeros, which means the library's default.
     constexpr float dark = 1e-6f;
     if (facts.zero != 0.0) value[0] = std::max(value[0], dark);
     return true;
@@ -97,7 +97,7 @@ bool Rows::choose(const settings::Facts& facts, int& value) {
   if (!shown(facts.row)) return false;
   std::vector<Choice> choices;
   for (const settings::Choice& choice : facts.choices) choices.push_back({choice.label, choice.value, choice.tip});
-  std::ranges::sort(choices, {}, &Choice::value);  // the default first
+  std::ranges::sort(choices, {}, &Choice::value);  // default first
   return ui_.choose(facts.row.label, facts.row.tip, choices, value);
 }
 

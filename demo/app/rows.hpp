@@ -9,8 +9,8 @@
 
 namespace cumulet::demo {
 
-/// Rows of the panel, as the table of settings has them: each shows a value and is true once the user changed it.
-/// Settings without a row show nothing.
+/// Panel rows of settings, as described in the settings table. Each draw() shows a value and returns true if the user
+/// changed it. Settings without a row are not drawn.
 class Rows {
  public:
   explicit Rows(Ui& ui) : ui_(ui) {}
@@ -23,9 +23,9 @@ class Rows {
   bool draw(const settings::Facts& facts, std::uint64_t& value);
   bool draw(const settings::Facts& facts, float& value);
   bool draw(const settings::Facts& facts, double& value);
-  /// A light's colour and strength, the largest of the three; or a colour alone.
+  /// Draws a light's color and strength (the largest component), or only a color.
   bool draw(const settings::Facts& facts, float (&value)[3]);
-  /// A rectangle's numbers.
+  /// Draws the numbers of a rectangle.
   bool draw(const settings::Facts& facts, float (&value)[4]);
   template <settings::Enumerated Enum>
   bool draw(const settings::Facts& facts, Enum& value) {
@@ -39,7 +39,7 @@ class Rows {
   bool choose(const settings::Facts& facts, int& value);
 
   Ui& ui_;
-  std::map<std::string, std::array<float, 3>> hues_;  // of lights, which strength 0 does not lose
+  std::map<std::string, std::array<float, 3>> hues_;  // colors of lights, kept while their strength is 0
 };
 
 }  // namespace cumulet::demo

@@ -22,7 +22,7 @@ void require_picture(const cumulet_frame_result& shown) {
   if (shown.width == 0) throw std::runtime_error("there is no picture yet");
 }
 
-/// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
+/// Reads the displayed image as linear values that encode to the same bytes with the sRGB curve.
 image::Image read_display(cumulet_viewer* viewer, const cumulet_frame_result& shown) {
   image::Image picture{shown.width, shown.height, {}};
   std::vector<std::uint8_t> bytes(std::size_t{4} * picture.width * picture.height);
@@ -67,7 +67,7 @@ std::string save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cu
                      const std::string& path) {
   require_picture(shown);
   const std::vector<float> rgba = read_linear(viewer, shown);
-  // All but the volume alone, which would cost every frame something.
+  // All AOVs except the separate volume, which would slow down every frame.
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
                             CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
                             CUMULET_AOV_VELOCITY,      CUMULET_AOV_MOTION,        CUMULET_AOV_VOLUME_MOTION};

@@ -8,7 +8,7 @@
 
 namespace cumulet::demo {
 
-/// Whether the picture that is shown has this size and is no preview: each of its pixels has a sample.
+/// Returns true if the displayed image has this size and is not a preview: each pixel has a sample.
 [[nodiscard]] bool is_whole(const cumulet_frame_result& shown, std::uint32_t width, std::uint32_t height);
 
 /// Writes the shown picture to a PNG file, as it is displayed. Returns a note of one line if pixels are brighter than

@@ -14,7 +14,7 @@ using glm::dvec3;
 using glm::dvec4;
 using Numbers = std::array<double, 16>;
 
-/// A scene's, of one that it has.
+/// Returns a volume of the scene; index 0 is the first volume.
 template <class Scene>
 auto& volume_at(Scene& scene, std::size_t index) {
   using Volume = std::conditional_t<std::is_const_v<Scene>, const SceneVolume, SceneVolume>;
@@ -50,7 +50,7 @@ dmat4 place_of(const cumulet_lamp_desc& lamp) {
   dvec3 across = glm::make_vec3(lamp.across);
   across -= glm::dot(across, direction) * direction;
   constexpr double least = 1e-9;
-  // As cumulet_lamp_desc has it: level with the ground, or +X.
+  // Default of cumulet_lamp_desc: horizontal, or +X.
   if (!(glm::length(across) > least)) across = glm::cross(-down, direction);
   if (!(glm::length(across) > least)) across = dvec3(1.0, 0.0, 0.0);
   across = glm::normalize(across);
@@ -64,7 +64,7 @@ dmat4 place_of(const cumulet_lamp_desc& lamp) {
 void set_place(cumulet_lamp_desc& lamp, const dmat4& place) {
   const dmat4 before = place_of(lamp);
   std::copy_n(glm::value_ptr(place[3]), 3, lamp.position);
-  // What is as it was keeps its words.
+  // Unchanged directions keep their exact numbers.
   if (place[2] != before[2]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[2]))), 3, lamp.direction);
   if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, lamp.across);
   const auto stretched = [](double length, double by) {

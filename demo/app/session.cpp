@@ -23,7 +23,7 @@ namespace {
 
 using settings::same;
 
-constexpr double patience = 1.0;  // seconds without a picture, where there could be part of one
+constexpr double patience = 1.0;  // seconds to wait for the volume before surfaces are shown without it
 
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
@@ -38,7 +38,7 @@ Box box_of(const Info& info) {
   return {glm::make_vec3(info.bounds_min), glm::make_vec3(info.bounds_max)};
 }
 
-/// Of what is there.
+/// Returns the bounding box of an existing object.
 template <class Info, class Handle, class Get>
 std::optional<Box> box_of(Handle* handle, Get get) {
   Info info{};
@@ -49,7 +49,7 @@ std::optional<Box> box_of(Handle* handle, Get get) {
 
 std::optional<Item> item_of(const std::optional<Instances::Placed>& placed) {
   if (!placed) return std::nullopt;
-  return Item{Item::Kind::volume, placed->volume + 1, placed->place};  // the scene's first is the viewer's own
+  return Item{Item::Kind::volume, placed->volume + 1, placed->place};  // index 0 is the viewer's own volume
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ bool Session::check(cumulet_status status) {
 void Session::follow(const Wish& wish) {
   const bool first = !known_;
   Wish next = wish;
-  // What the user has not changed since is the viewer's.
+  // Values that the user has not changed since are those of the viewer.
   if (!first && wish.camera_edit == wish_.camera_edit) next.scene.camera = scene_.camera;
   if (!first && wish.number == wish_.number) next.scene.medium = scene_.medium;
   const bool load = !first && wish.volume_edit != wish_.volume_edit;
@@ -122,12 +122,12 @@ void Session::follow(const Wish& wish) {
   if (!first && wish.environment_edit == wish_.environment_edit) next.scene.environment = scene_.environment;
   wish_ = std::move(next);
   scene_.sampling.preview = wish_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
-  // What was given is known even if it was refused: the refusal is told once.
+  // Refused settings count as passed, so that the error is reported once.
   if (first) known_ = SceneOptions();
   if (first || load) {
     fit_.reset();
     if (is_unplaced(scene_.camera)) {
-      // Again when the density scale is known, which says what can be seen.
+      // Fitted again when the density scale is known, because that determines the visible extent.
       if (scene_.surface_camera < 0) fit_ = scene_.camera;
     } else if (wish_.fit) {
       fit_.emplace();
@@ -144,7 +144,7 @@ void Session::follow(const Wish& wish) {
   };
   give(&SceneOptions::medium, cumulet_set_medium);
   follow_ramps();
-  give(&SceneOptions::ground, cumulet_set_ground);  // before the light: a sky is computed for it
+  give(&SceneOptions::ground, cumulet_set_ground);  // before the light, because the sky is computed for the ground
   give(&SceneOptions::light, cumulet_set_light);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   follow_environment();
@@ -177,7 +177,7 @@ void Session::follow_visible() {
   }
 }
 
-// Tells that something was opened, also where that throws.
+// Sets a flag and wakes the viewer's thread when opening is done, also after an exception.
 struct Session::Opened {
   Shared* shared;
   bool Shared::*what;
@@ -197,7 +197,7 @@ void Session::follow_models() {
   } catch (const std::runtime_error& error) {
     tell(true, error.what());
   }
-  if (opening_model_.made.valid() || waiting_for_surfaces_) return;  // what waits may be the same file
+  if (opening_model_.made.valid() || waiting_for_surfaces_) return;  // the pending surfaces may be the same file
   const std::vector<std::string> missing = models_.missing(scene_.models);
   if (missing.empty()) return;
   opening_model_.file = missing.front();
@@ -237,7 +237,7 @@ void Session::follow_others() {
   } catch (const std::runtime_error& error) {
     tell(true, error.what());
   }
-  if (opening_.made.valid() || waiting_) return;  // what waits may be the same file
+  if (opening_.made.valid() || waiting_) return;  // the pending volume may be the same file
   const std::vector<VolumeFile> missing = others_.missing(scene_.others);
   if (missing.empty()) return;
   opening_.file = missing.front();
@@ -334,7 +334,7 @@ void Session::begin_thumbnail() {
 }
 
 void Session::drop_thumbnail() {
-  drawing_ = {};  // waits
+  drawing_ = {};  // waits for the thread
   const std::lock_guard lock(shared_->mutex);
   shared_->thumbnail.reset();
 }
@@ -362,7 +362,7 @@ void Session::follow_surfaces() {
 void Session::set_surfaces() {
   cumulet_surface_settings_desc settings = scene_.surface;
   try {
-    // Of surfaces that are still read it is found once they are there.
+    // The variant of surfaces that are still loading is resolved when they are loaded.
     if (known_->surfaces == scene_.surfaces && !waiting_for_surfaces_)
       settings.variant = variant_number(scene_.surfaces, scene_.surface_variant, status_.variants);
   } catch (const std::runtime_error& error) {
@@ -429,7 +429,7 @@ void Session::read_surfaces() {
 void Session::set_camera() {
   check(cumulet_camera_set(camera_.get(), &scene_.camera));
   known_->camera = scene_.camera;
-  // What the library makes of it may differ in the last digit: that is no movement.
+  // The library's rounding is not a camera movement.
   static_cast<void>(cumulet_camera_get(camera_.get(), &seen_));
   if (is_unplaced(scene_.camera) && !is_unplaced(seen_)) scene_.camera = known_->camera = seen_;
 }
@@ -490,7 +490,7 @@ void Session::see_sequence() {
   std::array<char, 512> cause{};
   static_cast<void>(cumulet_get_sequence_frame(viewer_.get(), play.info.asked_frame, cause.data(), cause.size()));
   play.failure = cause.data();
-  // The others share its clock.
+  // The other sequences use the same clock.
   const cumulet_playback_desc playback = playback_of(scene_.sequence, *row_);
   others_.go_to(playback.offset_seconds +
                 (play.info.asked_position - playback.first_frame) / playback.frames_per_second);
@@ -565,7 +565,8 @@ void Session::warm_up(unsigned framebuffer) {
   status_.compiled.reset();
   if (works && result.more != 0) status_.compiled = result.progress;
   see_work();
-  // Surfaces that are there are shown while a volume is read for long. After a load that failed the next is the first.
+  // If the volume takes long to load, loaded surfaces are shown before it. After a failed load the next scene counts as
+  // the first.
   const double now = glfwGetTime();
   if (!cold_since_) cold_since_ = now;
   const bool early =
@@ -593,7 +594,7 @@ void Session::see_work() {
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
-  tell_warnings();  // they happened before the end that they led to
+  tell_warnings();  // reported first, because they precede the result
   see_sequence();
   see_ends();
   finish_others();
@@ -613,7 +614,8 @@ void Session::see_work() {
   finish_saves();
 }
 
-// The library makes no picture of an empty scene. So an environment by itself is seen around a volume without density.
+// The library renders no image of an empty scene. An environment alone is therefore shown around a volume without
+// density.
 void Session::follow_backdrop() {
   const bool others =
       status_.has_volume || !shown_surfaces_.empty() || !status_.boxes.volumes.empty() || !status_.boxes.models.empty();
@@ -625,7 +627,7 @@ void Session::follow_backdrop() {
   const bool ends = backdrop_ && !wanted && (others || shown_environment_.empty()) && !waiting_;
   if (!ends) return;
   backdrop_.reset();
-  if (status_.has_volume) return;  // that took its place
+  if (status_.has_volume) return;  // the loaded volume has replaced it
   check(cumulet_set_volume(viewer_.get(), nullptr));
   if (others) check(cumulet_frame_all(viewer_.get()));
 }
@@ -652,7 +654,7 @@ void Session::tell_warnings() {
 void Session::see_ends() {
   const cumulet_progress& work = status_.work;
   if (!status_.busy) {
-    // What is built anew of what is shown may fail, too.
+    // Rebuilding displayed content can fail too.
     const auto tell_news = [this](cumulet_status status, const char* message, cumulet_status told) {
       if (status != told && status != CUMULET_OK && status != CUMULET_ERROR_CANCELLED) tell(true, message);
     };
@@ -699,7 +701,7 @@ void Session::see_camera() {
 }
 
 void Session::see_boxes() {
-  // A sequence's frames are as large as they are: what stands in its own place is told as it is now.
+  // The frames of a sequence differ in size. If the volume is not transformed, the current bounding box is known.
   if (sequence_ && scene_.places.empty() && status_.has_volume) shown_box_ = box_of(status_.stats);
   status_.boxes = {};
   if (shown_box_) status_.boxes.volumes.emplace_back(shown_volume_, *shown_box_);
@@ -786,7 +788,7 @@ void Session::finish_load() {
       status_.fields[i] = {values.max_value, heights(values.histogram)};
   }
   std::array<char, 512> error{};
-  // A sequence's first frame that can be read tells for all.
+  // For a sequence, the grids are those of the first readable frame.
   const auto file = [&](std::uint32_t i) { return row_ ? row_->file(i) : shown_volume_.volume; };
   cumulet_status listed = CUMULET_ERROR_FILE;
   for (std::uint32_t i = 0; listed != CUMULET_OK && i < (row_ ? row_->count() : 1); ++i)
@@ -799,7 +801,7 @@ void Session::finish_load() {
   if (!fit_) return;
   scene_.camera = *std::exchange(fit_, std::nullopt);
   set_camera();
-  static_cast<void>(cumulet_frame_all(viewer_.get()));  // waits on where there is nothing to fit
+  static_cast<void>(cumulet_frame_all(viewer_.get()));  // fails if there is nothing to fit; then fitted later
 }
 
 void Session::input(const ViewerInput& input) {
@@ -817,7 +819,7 @@ Session::VolumePtr Session::shown() {
 void Session::suggest_density() {
   const VolumePtr volume = shown();
   double scale = 0.0;
-  // What shows nothing at any scale keeps the one it has.
+  // A volume that shows nothing at any scale keeps its scale.
   if (sequence_) {
     see_sequence();
     if (status_.play) scale = status_.play->info.suggested_density_scale;
@@ -826,7 +828,7 @@ void Session::suggest_density() {
     return;
   }
   density_scale_ = scale;
-  // At once: what is fitted next depends on it.
+  // Set immediately, because the next camera fit depends on it.
   known_->medium.density_scale = scene_.medium.density_scale = scale;
   give_known_medium();
 }
@@ -835,7 +837,7 @@ void Session::pick(double x, double y) {
   cumulet_pick pick{};
   pick.struct_size = sizeof pick;
   picked_ = Picked{};
-  // Before the first picture nothing is met.
+  // Fails before the first image.
   if (cumulet_pick_at(viewer_.get(), x, y, &pick) != CUMULET_OK || pick.hit == 0) return;
   if (pick.met_surface != 0 && pick.tag > 0)
     picked_->item = Item{Item::Kind::model, static_cast<std::size_t>(pick.tag) - 1, 0};
@@ -898,14 +900,14 @@ void Session::execute(const Request& request) {
     saves_.clear();
     return;
   }
-  // A preview, or a picture of another size, is no picture to keep: see_work() saves the first whole one.
+  // Previews and images of another size are not saved: finish_saves() writes the first complete image.
   saves_.push_back(request);
 }
 
 void Session::finish_saves() {
   if (!saves_.empty() && is_whole(status_.frame, wish_.width, wish_.height)) {
     for (const Request& request : std::exchange(saves_, {})) save(request);
-    // The turntable goes on.
+    // Resumes the turntable.
     follow_navigation();
     shared_->wake();
   }
@@ -927,12 +929,12 @@ void Session::save(const Request& request) {
 
 void Session::follow_navigation() {
   cumulet_navigation_desc navigation = wish_.navigation;
-  // A camera that turns shows previews only.
+  // A rotating camera gives only previews.
   if (!saves_.empty()) navigation.turntable_degrees_per_second = 0.0;
   if (given_.take(navigation)) check(cumulet_set_navigation(viewer_.get(), &navigation));
 }
 
-// Each second while the picture refines.
+// Measures the noise once per second while the image refines.
 void Session::measure_noise() {
   constexpr double period = 1.0;
   const cumulet_frame_result& frame = status_.frame;
@@ -940,7 +942,7 @@ void Session::measure_noise() {
   const bool refining = (frame.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_CONVERGED)) != 0 && !wish_.held &&
                         !wish_.paused && frame.width > 0 && frame.progress > 0.0 &&
                         (frame.flags & CUMULET_RENDER_PREVIEW) == 0 && scene_.sampling.view == CUMULET_VIEW_SHADED;
-  // Fewer samples than when it was measured: another picture.
+  // A decreasing count means another image.
   if (samples < noise_samples_) {
     status_.noise.reset();
     noise_samples_ = 0;

@@ -21,68 +21,69 @@
 
 namespace cumulet::demo {
 
-/// An event of the picture, and GLFW's key for what the viewer has no use for.
+/// An event in the image. key: the GLFW key, for keys that the viewer does not handle.
 struct ViewerInput {
   cumulet_event event{};
   int key = 0;
 };
 
-/// What is asked for once, beside what is wished all the time.
+/// A one-time request, in addition to the state in Wish.
 struct Request {
   enum class Type { frame_all, save_png, save_exr, forget_saves, suggest_density, pick };
   Type type = Type::frame_all;
   std::string path = {};
-  double x = 0.0;  // pick: pixels of the picture
+  double x = 0.0;  // pick: position in image pixels
   double y = 0.0;
 };
 
-/// What was met where somebody clicked.
+/// Result of a pick.
 struct Picked {
-  std::optional<Item> item;  // nothing that can be chosen
+  std::optional<Item> item;  // nullopt: no item that can be selected
 };
 
-/// All that the window wants to see: a value, sent to the viewer's thread.
+/// The complete state that the window requests, as a value that is sent to the viewer's thread.
 struct Wish {
-  std::uint64_t number = 0;  // rises with each
+  std::uint64_t number = 0;  // increases with each request
   SceneOptions scene;
-  // What the viewer changes by itself is taken from the scene only where these say that the user has changed it since.
+  // The viewer itself changes the values counted here. They are taken from the scene only if the counter has changed,
+  // which means that the user has changed them.
   std::uint64_t camera_edit = 0;
-  std::uint64_t volume_edit = 0;  // the volume, its grid or its up axis; the same file may be wished anew
+  std::uint64_t volume_edit = 0;  // volume, grid or up axis; also incremented to reload the same file
   std::uint64_t surfaces_edit = 0;
   std::uint64_t environment_edit = 0;
-  bool fit = false;      // that volume is framed once it is there: its camera comes from no scene file
-  bool suggest = false;  // its density scale is told, too: none comes from a scene file
-  bool unsaid = false;   // nor is anything said of its medium: one that burns gets a look of fire
+  bool fit = false;      // fit the camera when the volume is loaded, because no scene file sets it
+  bool suggest = false;  // also compute a suggested density scale, because no scene file sets it
+  bool unsaid = false;   // the medium is not set; a burning volume gets the fire medium
   cumulet_navigation_desc navigation{};
   bool adaptive_resolution = true;
-  bool held = false;    // a control or the camera is: the grid's settings may wait for the worker
-  bool paused = false;  // nothing is traced
+  bool held = false;    // the user is dragging a control or the camera; grid settings may wait for the worker thread
+  bool paused = false;  // no tracing
   double budget_ms = 0.0;
-  std::uint32_t width = 0;  // of the picture, pixels
+  std::uint32_t width = 0;  // size of the image in pixels
   std::uint32_t height = 0;
   double scale = 1.0;
 };
 
-/// What the viewer makes of a wish.
+/// The viewer's state, as the answer to a request.
 struct Answer {
-  std::uint64_t wish = 0;  // the newest that was seen
+  std::uint64_t wish = 0;  // number of the latest request that was processed
   Status status;
   std::vector<GridInfo> grids;
-  bool waiting = false;  // something is still to come of itself: a load, or the camera's first place
+  bool waiting = false;  // a load or the first camera fit is pending
   cumulet_camera_desc camera{};
-  VolumeFile volume;  // shown, or being loaded
+  VolumeFile volume;  // displayed or loading
   std::string surfaces;
   std::string environment;
-  std::uint64_t camera_edit = 0;  // what these follow
+  std::uint64_t camera_edit = 0;  // counters of the request that these values belong to
   std::uint64_t volume_edit = 0;
   std::uint64_t surfaces_edit = 0;
   std::uint64_t environment_edit = 0;
-  // Since the last answer that was taken:
-  bool drawn = false;                       // there is another picture
-  bool camera_moved = false;                // by whatever
-  std::optional<double> density_scale;      // that suits the volume
-  std::optional<cumulet_medium_desc> look;  // a volume's that was wished with nothing said of its medium
-  std::optional<Picked> picked;             // by the last of such requests
+  // Events since the last answer that was taken:
+  bool drawn = false;                       // there is a new image
+  bool camera_moved = false;                // by input, turntable or camera fit
+  std::optional<double> density_scale;      // suggested density scale
+  std::optional<cumulet_medium_desc> look;  // default medium of a volume that was requested with `unsaid`
+  std::optional<Picked> picked;             // result of the last pick
   struct Notice {
     bool error = false;
     std::string text;
@@ -97,41 +98,42 @@ struct Answer {
 };
 
 [[nodiscard]] bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b);
-/// Whether they ask for the same, whatever their numbers.
+/// Returns true if both request the same state. The numbers are ignored.
 [[nodiscard]] bool same_wish(const Wish& a, const Wish& b);
 
-/// A cumulet viewer that follows wishes. All of it in the one thread that has its GL context.
+/// A Cumulet viewer that is controlled by requests. All calls from the thread that has its GL context.
 class Session {
  public:
-  /// wake is called from any thread when there is something new to draw. Throws std::runtime_error.
+  /// wake: called from any thread when there is something new to draw. Throws std::runtime_error.
   Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
           const std::string& shader_cache, const std::string& shaders);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session() = default;
 
-  /// Hands the viewer what has changed since the last wish; for the same again, what had to wait.
+  /// Passes the changes since the last request to the viewer. If the request is unchanged, passes changes that had to
+  /// wait.
   void follow(const Wish& wish);
   void input(const ViewerInput& input);
   void execute(const Request& request);
-  /// Whether the programs of the first scene are still to be compiled: warm_up, in place of work.
+  /// Returns true if the programs of the first scene are not compiled yet. Call warm_up instead of work.
   [[nodiscard]] bool cold() const;
-  /// Works on what the first picture needs, to be drawn into a framebuffer of its size.
+  /// Compiles what the first image needs. framebuffer: has the image's size.
   void warm_up(unsigned framebuffer);
-  /// Works on the last wish for its budget.
+  /// Traces for the budget of the last request.
   void work();
-  /// Whether draw would draw anything but what it drew last.
+  /// Returns true if draw would draw a different image than before.
   [[nodiscard]] bool has_news() const;
-  /// Draws what there is into a framebuffer of the picture's size.
+  /// Draws the current image into a framebuffer of the image's size.
   void draw(unsigned framebuffer);
-  /// Whether work has anything left to do.
+  /// Returns true if work is not finished.
   [[nodiscard]] bool more() const;
-  /// Whether a file is read or a grid is built, whose progress is worth a look now and then.
+  /// Returns true while a file is read or a grid is built, so that the progress should be polled.
   [[nodiscard]] bool busy() const { return status_.busy; }
-  /// What there is to tell; the notices and the files once.
+  /// Returns the current state. Notices and files are returned once.
   [[nodiscard]] Answer answer();
 
-  /// From any thread.
+  /// Any thread.
   void cancel() { cumulet_cancel(viewer_.get()); }
 
  private:
@@ -145,40 +147,40 @@ class Session {
     void operator()(cumulet_volume* volume) const { cumulet_volume_release(volume); }
   };
   using VolumePtr = std::unique_ptr<cumulet_volume, ReleaseVolume>;
-  struct Shared {  // with the callbacks, from any thread
+  struct Shared {  // shared with callbacks in any thread
     std::function<void()> wake;
     std::mutex mutex;
     std::vector<std::string> warnings;
-    std::optional<ThumbnailPtr> thumbnail;  // made, to be taken
-    bool opened = false;                    // one of the other volumes is, or is known not to
-    bool opened_model = false;              // likewise of the models
+    std::optional<ThumbnailPtr> thumbnail;  // finished thumbnail
+    bool opened = false;                    // opening one of the other volumes is done, or has failed
+    bool opened_model = false;              // opening one of the models is done, or has failed
   };
 
   static void on_log(void* user, cumulet_log_level level, const char* message);
   static void on_update(void* user);
 
   void tell(bool error, const std::string& text) { notices_.push_back({error, text}); }
-  /// Tells a failed call.
+  /// Reports the error of a failed call. Returns true on success.
   bool check(cumulet_status status);
   void follow_volume();
-  // Begins to read it, be it a file's or a sequence's.
+  // Starts loading the volume, a file or a sequence.
   bool begin_volume();
-  // After a load that failed: as it was before.
+  // Restores the previous volume after a failed load.
   void restore_volume();
   void follow_playback();
   void see_sequence();
-  // Hides the volume, or shows it again.
+  // Hides or shows the volume.
   void follow_visible();
   struct Opened;
-  // Shows the others that are there, and begins to open the next that is not.
+  // Shows the other volumes that are open, and starts opening the next missing one.
   void follow_others();
   void finish_others();
-  // Likewise of models.
+  // Shows the models that are open, and starts opening the next missing one.
   void follow_models();
   void finish_models();
   void follow_environment();
   void finish_environment();
-  // Begins a picture of the one that is shown, on a thread of its own.
+  // Starts a thread that creates a thumbnail of the displayed environment.
   void begin_thumbnail();
   void drop_thumbnail();
   [[nodiscard]] bool waits() const {
@@ -193,34 +195,34 @@ class Session {
   void remove_surfaces();
   void finish_surfaces();
   [[nodiscard]] cumulet_frame_desc frame() const;
-  // What has come of a call that works.
+  // Updates the status after work.
   void see_work();
   [[nodiscard]] bool has_surfaces() const;
-  // What the library says of those it shows.
+  // Reads the properties of the displayed surfaces.
   void read_surfaces();
   void finish_load();
   void set_camera();
-  /// Of loads and builds.
+  /// Handles finished loads and builds.
   void see_ends();
-  /// Told, if it did not succeed.
+  /// Returns true and reports the cause if the load did not succeed.
   bool load_failed(cumulet_status status, const char* message, const std::string& path);
   void see_camera();
-  // What files' volumes and models take up.
+  // Updates the bounding boxes of volumes and models.
   void see_boxes();
   void move_by_keys(int key);
   void measure_noise();
-  /// The viewer's volume, or none.
+  /// Returns the viewer's volume, or null.
   VolumePtr shown();
   void suggest_density();
   void pick(double x, double y);
-  // With it the medium, where nothing is said of that.
+  // Suggests the density scale, and the medium if it is not set.
   void suggest_look();
   void give_known_medium();
   void tell_warnings();
   void follow_backdrop();
   VolumePtr make_backdrop();
   void follow_navigation();
-  /// Saves what was asked for, once the picture is whole.
+  /// Writes the requested files when all pixels have a sample.
   void finish_saves();
   void save(const Request& request);
 
@@ -228,27 +230,27 @@ class Session {
   std::unique_ptr<cumulet_viewer, DestroyViewer> viewer_;
   std::unique_ptr<cumulet_camera, ReleaseCamera> camera_;
   Wish wish_;
-  SceneOptions& scene_ = wish_.scene;  // with what the viewer has made of it
-  std::optional<SceneOptions> known_;  // what the viewer was given last
+  SceneOptions& scene_ = wish_.scene;  // includes the viewer's changes
+  std::optional<SceneOptions> known_;  // state that was passed to the viewer
   GivenSettings given_;
-  std::vector<Request> saves_;  // that wait for a whole picture
-  cumulet_camera_desc seen_{};  // the viewer's camera
+  std::vector<Request> saves_;  // waiting for a complete image
+  cumulet_camera_desc seen_{};  // last camera of the viewer
   std::uint32_t drawn_width_ = 0;
   std::uint32_t drawn_height_ = 0;
   cumulet_display_desc drawn_display_{};
   VolumeFile shown_volume_;
-  std::optional<Box> shown_box_;  // of that, where it is known
+  std::optional<Box> shown_box_;  // bounding box of shown_volume_, if known
   std::string shown_surfaces_;
   std::string shown_environment_;
-  bool warm_ = false;                 // the first scene's programs are there
-  std::optional<double> cold_since_;  // seconds, when the first of them was asked for
+  bool warm_ = false;                 // the first scene's programs are compiled
+  std::optional<double> cold_since_;  // time in seconds of the first compile request
   bool waiting_for_surfaces_ = false;
   bool waiting_for_environment_ = false;
   bool waiting_ = false;
-  cumulet_status told_surfaces_ = CUMULET_OK;  // how the last job of each ended, as far as that was told
+  cumulet_status told_surfaces_ = CUMULET_OK;  // reported result of the last job of each kind
   cumulet_status told_volume_ = CUMULET_OK;
   cumulet_status told_environment_ = CUMULET_OK;
-  std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there
+  std::optional<cumulet_camera_desc> fit_;  // camera to fit when the volume is loaded
   bool suggest_ = false;
   std::optional<double> density_scale_;
   std::optional<cumulet_medium_desc> look_;
@@ -257,30 +259,30 @@ class Session {
   double last_noise_ = 0.0;
   std::uint64_t noise_samples_ = 0;
   Status status_;
-  VolumePtr backdrop_;                          // an empty volume, while an environment is all that is shown
-  VolumePtr hidden_;                            // the viewer's volume, while it is not to be seen
-  std::shared_ptr<cumulet_sequence> sequence_;  // in its place
-  std::optional<FrameRow> row_;                 // of that
+  VolumePtr backdrop_;                          // empty volume, used while only an environment is shown
+  VolumePtr hidden_;                            // the viewer's volume while it is hidden
+  std::shared_ptr<cumulet_sequence> sequence_;  // shown instead of a volume
+  std::optional<FrameRow> row_;                 // files of the sequence
   struct Before {
     std::shared_ptr<cumulet_sequence> sequence;
     std::optional<FrameRow> row;
-    VolumePtr volume;  // where there was no sequence
+    VolumePtr volume;  // if there was no sequence
   };
-  std::optional<Before> before_;  // what a sequence stands in place of, until the load has ended
+  std::optional<Before> before_;  // state to restore if loading the sequence fails
   Instances others_;
   struct Opening {
     VolumeFile file;
-    std::future<OpenVolume> made;  // while one is opened
+    std::future<OpenVolume> made;  // valid while a volume is being opened
   } opening_;
   Models models_;
   struct OpeningModel {
     std::string file;
-    std::future<SurfacesPtr> made;  // while one is opened
+    std::future<SurfacesPtr> made;  // valid while surfaces are being opened
   } opening_model_;
   std::vector<GridInfo> grids_;
   std::vector<Answer::Notice> notices_;
   std::vector<Answer::File> files_;
-  std::future<void> drawing_;  // of a thumbnail, until that is taken
+  std::future<void> drawing_;  // valid until the thumbnail is taken
 };
 
 }  // namespace cumulet::demo

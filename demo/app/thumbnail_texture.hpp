@@ -6,7 +6,7 @@
 
 namespace cumulet::demo {
 
-/// A thumbnail in the window's context, which is current: repeated sideways.
+/// Texture of a thumbnail in the window's context, which must be current. It repeats horizontally.
 class ThumbnailTexture {
  public:
   ThumbnailTexture(const GladGLContext& gl, const Thumbnail& thumbnail) : gl_(gl) {

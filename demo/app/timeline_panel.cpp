@@ -1,4 +1,4 @@
-// The sequence's controls, beside the picture and below it.
+// The sequence section of the panel, and the timeline below the image.
 
 #include <algorithm>
 #include <cmath>
@@ -65,7 +65,7 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
   ImGui::TextUnformatted(text.c_str());
   ui_.remember("Frame", play.failure.c_str());
 
-  // The frames, from left to right: which are ready, which are played, where it stands.
+  // Draws the frames from left to right: ready frames, played range and current frame.
   const ImVec2 room(ImGui::GetContentRegionAvail().x, std::max(ImGui::GetContentRegionAvail().y, ui_.px(8.0f)));
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   ImGui::InvisibleButton("##Playhead", {std::max(room.x, 1.0f), room.y});

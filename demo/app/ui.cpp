@@ -84,7 +84,7 @@ void Ui::remember(const char* label, const char* tip) {
   const ImVec2 least = ImGui::GetItemRectMin();
   const ImVec2 most = ImGui::GetItemRectMax();
   const ImVec2 centre((least.x + most.x) * 0.5f, (least.y + most.y) * 0.5f);
-  // In view: the middle can be clicked.
+  // A control is in view if its center can be clicked.
   Control& control = drawn_[label];
   control.place = {least.x, least.y, most.x - least.x, most.y - least.y};
   control.in_view = ImGui::GetCurrentWindow()->ClipRect.Contains(centre);
@@ -237,7 +237,7 @@ bool Ui::text(const char* label, const char* tip, const char* hint, std::string&
   const std::string id = std::string("##") + label;
   const ImVec2 padding = ImGui::GetStyle().FramePadding;
   const float room = ImGui::CalcItemWidth() - 2.0f * padding.x;
-  // Until it is edited, its end is shown.
+  // Shows the end of the text until it is edited.
   const bool idle = ImGui::GetActiveID() != ImGui::GetID(id.c_str()) && ImGui::CalcTextSize(value.c_str()).x > room;
   if (idle) ImGui::PushStyleColor(ImGuiCol_Text, 0U);
   const bool entered = ImGui::InputTextWithHint(
@@ -256,7 +256,7 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
   ImGuiContext& g = *ImGui::GetCurrentContext();
   ImGuiWindow* window = ImGui::GetCurrentWindow();
   const float radius = px(62.0f);
-  const float margin = px(16.0f);  // for the letters around it
+  const float margin = px(16.0f);  // for the labels around it
   const float side = 2.0f * (radius + margin);
   const ImVec2 corner(window->DC.CursorPos.x + std::max(0.0f, (ImGui::GetContentRegionAvail().x - side) * 0.5f),
                       window->DC.CursorPos.y);
@@ -269,7 +269,7 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
     return false;
   }
 
-  // As ImGui's own sliders: a drag by the mouse, or arrow keys between two presses of Space or Enter.
+  // Input as in ImGui's sliders: dragging with the mouse, or arrow keys between two presses of Space or Enter.
   SunAngles sun = {static_cast<double>(azimuth), static_cast<double>(elevation)};
   bool changed = false;
   const bool hovered = ImGui::ItemHoverable(box, id);
@@ -348,7 +348,7 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
   remember(label, tip);
   const ImVec2 end(corner.x + size.x, corner.y + size.y);
-  const float pad = px(6.0f);  // points at the rim are whole
+  const float pad = px(6.0f);  // so that points at the border are not clipped
   const ImVec2 low(corner.x + pad, end.y - pad);
   const ImVec2 high(end.x - pad, corner.y + pad);
   const auto place_of = [&](const settings::RampPoint& point) {
@@ -432,7 +432,7 @@ void Ui::plot(const char* label, const char* tip, const std::vector<float>& valu
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   ImGui::InvisibleButton((std::string("##") + label).c_str(), {width, height});
   remember(label, tip);
-  if (!ImGui::IsItemVisible()) return;  // what is not seen gives no frame another look
+  if (!ImGui::IsItemVisible()) return;  // an invisible plot must not change the frame
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const ImVec2 end(corner.x + width, corner.y + height);
   draw.AddRectFilled(corner, end, colour_of(ImGuiCol_FrameBg), px(4.0f));
@@ -530,7 +530,7 @@ void load_fonts(float scale) {
   constexpr std::array folders = {"/usr/share/fonts/truetype/dejavu/", "/usr/share/fonts/dejavu/",
                                   "/usr/share/fonts/dejavu-sans-fonts/", "/usr/share/fonts/TTF/",
                                   "/usr/local/share/fonts/dejavu/"};
-  // Latin, Greek and Cyrillic, for files' names; dashes, arrows, geometry.
+  // Latin, Greek and Cyrillic for file names; dashes, arrows and geometric shapes.
   static constexpr std::array<ImWchar, 13> glyphs = {0x0020, 0x024F, 0x0370, 0x052F, 0x2010, 0x2044, 0x2190,
                                                      0x21FF, 0x2200, 0x22FF, 0x25A0, 0x25FF, 0};
   ImFontAtlas& fonts = *ImGui::GetIO().Fonts;

@@ -16,21 +16,21 @@
 
 namespace cumulet::demo {
 
-/// One entry of a list to choose from.
+/// An entry of a choice.
 struct Choice {
   const char* text;
   int value;
   const char* tip;
 };
 
-/// The demo's controls on top of Dear ImGui: a label on the left, the control on the right, a tooltip for both, and
-/// the place of each remembered by its label, for replay files. Needs a current ImGui context.
+/// Controls of the demo, based on Dear ImGui. Each has a label on the left, the control on the right and a tooltip.
+/// Positions are stored by label, for replay files. Needs a current ImGui context.
 class Ui {
  public:
-  /// Between ImGui's new frame and the first control. scale: of everything; time: seconds.
+  /// Call between ImGui::NewFrame and the first control. scale: user interface scale; time: seconds.
   void begin(float scale, double time);
 
-  /// A length that looks the same on every screen.
+  /// Converts a length at scale 1 to pixels.
   [[nodiscard]] float px(float length) const { return length * scale_; }
 
   bool section(const char* label, bool open);
@@ -48,30 +48,32 @@ class Ui {
   bool slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
               const char* format, ImGuiSliderFlags flags = 0);
   bool integer(const char* label, const char* tip, std::uint32_t& value);
-  /// Dragged or typed; speed: a pixel.
+  /// Draws numbers that can be dragged or typed. speed: change per pixel.
   bool numbers(const char* label, const char* tip, std::span<double> values, float speed);
-  /// True once something else is chosen.
+  /// Returns true if the user chose another entry.
   bool choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value);
-  /// A linear colour, edited as it looks.
+  /// Edits a linear color. It is displayed in sRGB.
   bool colour(const char* label, const char* tip, float (&rgb)[3]);
-  /// True when Enter was pressed in it.
+  /// Returns true if the user pressed Enter.
   bool text(const char* label, const char* tip, const char* hint, std::string& value, float room_right = 0.0f);
-  /// The sun's direction: see sun_dial.hpp. camera_azimuth: where the camera stands, marked on the rim.
+  /// Edits the sun's direction: see sun_dial.hpp. camera_azimuth: direction of the camera, marked on the rim.
   bool sun_dial(const char* label, const char* tip, float& azimuth, float& elevation, float camera_azimuth);
-  /// An environment's picture, turned by dragging: see environment_view.hpp. ahead: where the camera looks, marked.
+  /// Shows an environment that can be rotated by dragging: see environment_view.hpp. ahead_degrees: viewing direction,
+  /// which is marked.
   bool environment(const char* label, const char* tip, unsigned texture, float& rotation_degrees, double ahead_degrees);
-  /// A ramp's curve over a histogram, whose bars have these heights, from 0 to 1, and take equal steps from 0 to reach.
+  /// Edits a ramp's curve over a histogram. heights: bars with heights from 0 to 1 and equal widths from 0 to `reach`.
   bool curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
              const std::vector<float>& heights, float reach);
-  /// A line of numbers over time, the newest on the right, with the last one and the unit in words.
+  /// Plots values over time, newest on the right. latest: the last value with its unit.
   void plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest);
-  /// A name and a value.
+  /// Shows a name and a value.
   void fact(const char* label, const std::string& value);
 
-  /// The last control was this one: remembers its place, shows its tooltip. For controls that ImGui draws directly.
+  /// Stores the position of the last control and shows its tooltip. Call it for controls that are drawn directly with
+  /// ImGui.
   void remember(const char* label, const char* tip);
 
-  /// One control of the frame under way.
+  /// A control of the current frame.
   struct Control {
     Rectangle place;
     bool in_view = false;
@@ -79,7 +81,7 @@ class Ui {
   };
   using Controls = std::map<std::string, Control, std::less<>>;
   [[nodiscard]] const Controls& controls() const { return drawn_; }
-  /// Where a control was drawn in the last frame, if it was in view.
+  /// Returns the rectangle of a control in the last frame, if it was in view.
   [[nodiscard]] std::optional<Rectangle> find(const std::string& label) const;
   /// Scrolls to the control when it is drawn next.
   void bring_into_view(const std::string& label) { wanted_ = label; }
@@ -100,14 +102,14 @@ class Ui {
   bool hovered_now_ = false;
 };
 
-/// A line, or as much of its end as fits the width: of a path, what tells it from others.
+/// Returns the text, or as much of its end as fits the width: the end of a path is the distinctive part.
 [[nodiscard]] std::string end_of(const std::string& text, float width);
 
-/// A quiet dark theme. Fonts: a system's DejaVu Sans if there is one, else ImGui's own, each at this scale.
+/// Sets a dark theme and loads fonts for the scale: the system's DejaVu Sans if it exists, else ImGui's default font.
 void apply_theme(float scale);
 void load_fonts(float scale);
 
-/// "1.24 M", three digits; "12.3 MB".
+/// Formats numbers with three digits: "1.24 M", "12.3 MB".
 [[nodiscard]] std::string short_count(double count);
 [[nodiscard]] std::string short_bytes(double bytes);
 

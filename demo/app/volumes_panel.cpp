@@ -1,4 +1,5 @@
-// The panel's volumes, the scene's first, which the rest of the panel is about, and those beside it; and its models.
+// The volumes section of the panel, with the scene's first volume (edited by the other sections) and the others, and
+// the models section.
 
 #include <imgui.h>
 
@@ -18,7 +19,7 @@ namespace {
 
 using Matrix = std::array<double, 16>;
 
-/// What of a place the panel can show: scaled alike in all directions, turned about the vertical, then moved.
+/// The transforms that the panel can edit: uniform scale, then rotation about the vertical axis, then translation.
 struct Stand {
   std::array<double, 3> position{};
   double turn_degrees = 0.0;
@@ -33,7 +34,7 @@ Matrix matrix_of(const Stand& stand) {
   return {c, 0.0, -s, 0.0, 0.0, stand.scale, 0.0, 0.0, s, 0.0, c, 0.0, p[0], p[1], p[2], 1.0};
 }
 
-/// Nothing for places that are sheared, tilted or stretched.
+/// Returns nullopt for transforms with shear, tilt or non-uniform scale.
 std::optional<Stand> stand_of(const Matrix& m) {
   Stand stand{{m[12], m[13], m[14]}, std::atan2(-m[2], m[0]) * 180.0 / std::numbers::pi, m[5]};
   if (!(stand.scale > 0.0)) return std::nullopt;
@@ -156,7 +157,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     ImGui::SameLine();
     if (ui_.button(("Remove volume" + number).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
   }
-  // The scene's first is none of these.
+  // Indices of `others` do not include the scene's first volume.
   if (copied) {
     others.insert(others.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneVolume(others[*copied]));
     model.chosen = Item{Item::Kind::volume, *copied + 2, 0};

@@ -24,7 +24,7 @@ std::string glfw_error() {
   return text == nullptr ? "unknown cause" : text;
 }
 
-// All that what is drawn depends on, but for the textures' texels.
+// Returns the data that determines the drawn image, except the contents of textures.
 std::vector<std::byte> bytes_of(const ImDrawData& data) {
   std::vector<std::byte> bytes;
   const auto add = [&](const auto* values, int count) {
@@ -70,7 +70,7 @@ Window::Window(int width, int height) {
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
   glfwWindowHint(GLFW_STENCIL_BITS, 0);
-  // As cumulet-demo.desktop has it, so that a desktop shows that file's name and icon.
+  // Same name as in cumulet-demo.desktop, so that the desktop shows its name and icon.
   glfwWindowHintString(GLFW_X11_CLASS_NAME, "cumulet-demo");
   glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "cumulet-demo");
   window_.reset(glfwCreateWindow(width, height, "Cumulet", nullptr, nullptr));
@@ -120,7 +120,7 @@ void Window::listen() {
     input_of(w).push(event);
   });
   glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
-    // ImGui repeats keys by itself.
+    // ImGui generates key repeats itself.
     if (key < 0 || key >= Input::keys || action == GLFW_REPEAT) return;
     Event event = make(Event::Type::key);
     event.code = key;
@@ -133,7 +133,7 @@ void Window::listen() {
     input_of(w).push(event);
   });
   glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
-    // One volume is shown at a time: the first.
+    // Only the first file is opened.
     if (count < 1) return;
     Event event = make(Event::Type::drop);
     event.path = paths[0];
@@ -227,7 +227,7 @@ void Window::begin_frame(const std::vector<Event>& events, double frame_seconds)
   if (!io.Fonts->IsBuilt() || io.Fonts->TexID == nullptr) ImGui_ImplOpenGL3_CreateFontsTexture();
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
-  // The backend asks the window system where the mouse is; replayed events are known to our own input alone.
+  // The backend polls the window system for the mouse position. Replayed positions are only in input_.
   const auto [width, height] = size();
   io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
   io.DisplayFramebufferScale = {1.0f, 1.0f};

@@ -13,8 +13,8 @@ struct ImGuiContext;
 
 namespace cumulet::demo {
 
-/// The one window: GLFW, an OpenGL 4.5 context current on this thread, and Dear ImGui in it. Everything is in
-/// framebuffer pixels.
+/// The program's window: GLFW, an OpenGL 4.5 context that is current on this thread, and Dear ImGui. All coordinates
+/// are in framebuffer pixels.
 class Window {
   struct DestroyWindow {
     void operator()(GLFWwindow* window) const;
@@ -23,7 +23,7 @@ class Window {
  public:
   using Context = std::unique_ptr<GLFWwindow, DestroyWindow>;
 
-  /// width and height in framebuffer pixels. Throws std::runtime_error, one line, without a display or OpenGL 4.5.
+  /// width, height: in framebuffer pixels. Throws std::runtime_error, one line, without a display or OpenGL 4.5.
   Window(int width, int height);
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
@@ -33,32 +33,32 @@ class Window {
   [[nodiscard]] std::pair<int, int> size() const;
   void resize(int width, int height);
   void set_title(const std::string& title);
-  /// How much larger than on an ordinary screen things are to be drawn.
+  /// Returns the user interface scale for this screen; 1 on an ordinary screen.
   [[nodiscard]] float content_scale() const;
 
-  /// Takes what has happened; sleeps until something happens, for at most so many seconds (infinity: for ever).
+  /// Processes events. Sleeps until the next event, but not longer than `seconds` (may be infinity).
   static void wait(double seconds);
-  /// Ends a wait. From any thread.
+  /// Ends a wait. Any thread.
   static void wake();
   [[nodiscard]] Input& input() { return input_; }
 
-  /// The theme and the fonts for this scale.
+  /// Sets theme and fonts for a scale.
   static void set_ui_scale(float scale);
-  /// Begins ImGui's frame with these events. frame_seconds: 0 for the time that has passed.
+  /// Starts ImGui's frame with these events. frame_seconds: time step; 0: real time.
   void begin_frame(const std::vector<Event>& events, double frame_seconds);
-  /// Ends ImGui's frame. Whether it would look other than the last that was drawn, or the window system has lost that:
-  /// textures are taken for what they were.
+  /// Ends ImGui's frame. Returns true if it differs from the last drawn one, or if the window system has lost the
+  /// window's content. Changes of texture contents are not detected.
   [[nodiscard]] bool ui_changed();
-  /// Draws what ImGui has, and remembers it.
+  /// Draws ImGui's frame and stores it for the comparison.
   void draw_ui();
   void swap();
 
-  /// Another context that shares objects with the window's, for another thread. Made, and let go, in this one, while
-  /// the window lives. Throws std::runtime_error, one line.
+  /// Creates a context for another thread that shares objects with the window's. Create and destroy it in this thread
+  /// during the window's lifetime. Throws std::runtime_error, one line.
   [[nodiscard]] Context make_shared_context() const;
-  /// Makes it current in the calling thread; null: none.
+  /// Makes a context current in the calling thread; null releases it.
   static void make_current(GLFWwindow* context);
-  /// Of a GL function, for cumulet.h and glad.
+  /// Returns the address of a GL function, for cumulet.h and glad.
   static void* get_proc(void* user, const char* name);
 
  private:
@@ -77,7 +77,7 @@ class Window {
   std::string title_;
   std::vector<std::byte> drawn_ui_;
   std::vector<std::byte> ui_;
-  bool damaged_ = true;  // what was drawn is not on the screen
+  bool damaged_ = true;  // the window's content is lost
 };
 
 }  // namespace cumulet::demo

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-// Without it eglplatform.h asks for the X11 headers.
+// Without this, eglplatform.h includes the X11 headers.
 #define EGL_NO_X11
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -38,9 +38,9 @@ constexpr unsigned gl_minor_version_enum = 0x821C;
 
 [[noreturn]] void fail(const std::string& message) { throw std::runtime_error(message); }
 
-/// The first of these shared libraries that is there. Never unloaded: drivers keep threads and thread-local
-/// destructors of their own, and crash at exit when their code is gone. Local, so that EGL's and OSMesa's GL entry
-/// points do not stand in for each other.
+/// Opens the first of these shared libraries that exists. It is never unloaded: drivers have threads and thread-local
+/// destructors, and crash at exit if their code is gone. RTLD_LOCAL keeps the GL entry points of EGL and OSMesa
+/// separate.
 void* open_library(std::initializer_list<const char*> names) {
   for (const char* name : names)
     if (void* handle = dlopen(name, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE)) return handle;
@@ -64,7 +64,7 @@ bool has_extension(const char* list, std::string_view wanted) {
   return false;
 }
 
-/// Some drivers hand out less than was asked for.
+/// Checks the version, because some drivers return a lower one than requested.
 void check_version(Context::Driver& driver) {
   const auto get_integer = reinterpret_cast<void (*)(unsigned, int*)>(driver.get_proc("glGetIntegerv"));
   if (get_integer == nullptr) fail("no glGetIntegerv");
@@ -78,7 +78,7 @@ void check_version(Context::Driver& driver) {
 
 // ---------------------------------------------------------------------------------------------------------- EGL
 
-/// libEGL's entry points that we use.
+/// Entry points of libEGL.
 struct Egl {
   void* library = open_library({"libEGL.so.1"});
   PFNEGLBINDAPIPROC BindAPI = nullptr;
@@ -94,7 +94,7 @@ struct Egl {
   PFNEGLINITIALIZEPROC Initialize = nullptr;
   PFNEGLMAKECURRENTPROC MakeCurrent = nullptr;
   PFNEGLQUERYSTRINGPROC QueryString = nullptr;
-  // Extensions: null where missing.
+  // Extension functions; null if not supported.
   PFNEGLGETPLATFORMDISPLAYEXTPROC GetPlatformDisplayEXT = nullptr;
   PFNEGLQUERYDEVICESEXTPROC QueryDevicesEXT = nullptr;
   PFNEGLQUERYDEVICESTRINGEXTPROC QueryDeviceStringEXT = nullptr;
@@ -123,7 +123,7 @@ struct Egl {
     function = reinterpret_cast<Function>(GetProcAddress(name));
   }
 
-  /// "eglWhatever: EGL_BAD_MATCH"
+  /// Throws an error such as "eglSomething failed: EGL_BAD_MATCH".
   [[noreturn]] void fail_with_error(const char* what) const {
     static constexpr std::array<const char*, 15> names = {
         "EGL_SUCCESS",       "EGL_NOT_INITIALIZED", "EGL_BAD_ACCESS",        "EGL_BAD_ALLOC",
@@ -141,8 +141,8 @@ class EglDriver final : public Context::Driver {
       : egl_(egl), display_(display), name_(name) {
     EGLint major = 0;
     EGLint minor = 0;
-    // A display is one per process, and initialising it twice is allowed. It is never terminated: that would take
-    // the contexts of everybody else who uses it.
+    // There is one display per process, and initializing it twice is allowed. It is never terminated, because that
+    // would destroy the contexts of all other users.
     if (egl_.Initialize(display_, &major, &minor) == EGL_FALSE) egl_.fail_with_error("eglInitialize");
     if (egl_.BindAPI(EGL_OPENGL_API) == EGL_FALSE) fail("no desktop OpenGL");
     const char* extensions = egl_.QueryString(display_, EGL_EXTENSIONS);
@@ -164,7 +164,7 @@ class EglDriver final : public Context::Driver {
         gl_minor,
         EGL_CONTEXT_OPENGL_PROFILE_MASK,
         profile == Profile::core ? EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT : EGL_CONTEXT_OPENGL_COMPATIBILITY_PROFILE_BIT};
-    // The extension's spelling: EGL 1.4 drivers know no other, and 1.5 ones list the extension too.
+    // The extension's enums work everywhere: EGL 1.4 drivers only have these, and 1.5 drivers list the extension too.
     if (debug) attributes.insert(attributes.end(), {EGL_CONTEXT_FLAGS_KHR, EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR});
     attributes.push_back(EGL_NONE);
     context_ = egl_.CreateContext(display_, config, EGL_NO_CONTEXT, attributes.data());
@@ -198,7 +198,7 @@ class EglDriver final : public Context::Driver {
 
  private:
   void release() noexcept {
-    egl_.BindAPI(EGL_OPENGL_API);  // the current API is the thread's own, and this may be another thread
+    egl_.BindAPI(EGL_OPENGL_API);  // the current API is per thread, and this may be another thread
     if (egl_.GetCurrentContext() == context_)
       egl_.MakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     if (surface_ != EGL_NO_SURFACE) egl_.DestroySurface(display_, surface_);
@@ -260,8 +260,8 @@ std::unique_ptr<Context::Driver> create_egl(bool debug, Profile profile) {
 
 // ------------------------------------------------------------------------------------------------------- OSMesa
 
-/// OSMesa's entry points, declared here because Mesa has dropped the library and its header: it is used where it is
-/// still there.
+/// Entry points of OSMesa, declared here because Mesa has dropped the library and its header. OSMesa is used if it is
+/// still installed.
 struct OsMesa {
   using Handle = struct osmesa_context*;
   static constexpr int format = 0x22;
@@ -338,7 +338,7 @@ class OsMesaDriver final : public Context::Driver {
 
   OsMesa osmesa_;
   OsMesa::Handle context_ = nullptr;
-  std::array<std::uint32_t, 1> pixel_{};  // OSMesa's default framebuffer: nobody draws to it, but it must exist
+  std::array<std::uint32_t, 1> pixel_{};  // OSMesa's default framebuffer, which must exist, but is not drawn to
 };
 
 std::unique_ptr<Context::Driver> create_driver(Backend backend, bool debug, Profile profile) {

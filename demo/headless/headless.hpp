@@ -8,16 +8,14 @@ enum class Backend { automatic, egl, osmesa };
 enum class Profile { core, compatibility };
 
 /// An OpenGL 4.5 context that needs no display and no window.
-///
 /// EGL is tried first: every device of the device platform (hardware before software), then Mesa's surfaceless
-/// platform, then the default display. OSMesa, a software driver, comes last and only when EGL gives no GL 4.5.
-///
-/// A context may be current on one thread at a time, as always in GL.
+/// platform, then the default display. OSMesa, a software driver, is tried last, only if EGL provides no GL 4.5.
+/// A context can be current on one thread at a time.
 class Context {
  public:
-  /// Makes a context and makes it current on this thread. With debug the driver is asked for a debug context
-  /// (OSMesa has none and ignores it). Throws std::runtime_error, one line, that says what was tried and why
-  /// each failed; whatever was current before may then no longer be.
+  /// Creates a context and makes it current on this thread. debug: requests a debug context; OSMesa ignores it. Throws
+  /// std::runtime_error, one line that lists all attempts and their errors; the previous context may then no longer be
+  /// current.
   [[nodiscard]] static Context create(Backend backend, bool debug = false, Profile profile = Profile::core);
 
   Context(Context&&) noexcept;
@@ -30,10 +28,10 @@ class Context {
   /// Throws std::runtime_error if the driver refuses.
   void make_current();
 
-  /// The address of a GL function, or null. user is the Context; fits cumulet_get_proc_fn.
+  /// Returns the address of a GL function, or null. user: the Context. Matches cumulet_get_proc_fn.
   static void* get_proc(void* user, const char* name);
 
-  /// How the context came about: "egl-device", "egl-surfaceless", "egl-default" or "osmesa".
+  /// Returns how the context was created: "egl-device", "egl-surfaceless", "egl-default" or "osmesa".
   [[nodiscard]] const char* name() const noexcept;
 
   class Driver;

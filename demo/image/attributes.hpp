@@ -5,8 +5,7 @@
 #include <string>
 #include <string_view>
 
-/// What attributes of a rendered picture's OpenEXR file are called that a program looks for; docs/aovs.md says what
-/// they hold.
+/// Names of the OpenEXR attributes that programs look up in rendered files. docs/aovs.md describes their values.
 namespace cumulet::image::attributes {
 
 inline constexpr std::string_view comments = "comments";
@@ -19,10 +18,10 @@ inline constexpr std::string_view first_sample = "cumulet:first_sample";
 inline constexpr std::string_view seed = "cumulet:seed";
 inline constexpr std::string_view noise = "cumulet:noise";
 
-/// Of the background attribute: what the pictures' luminance is of when errors count it.
+/// Value of the background attribute with which the luminance in the error estimate includes the sky.
 inline constexpr std::string_view sky_background = "sky";
 
-/// For people.
+/// Returns the text of the comments attribute, which describes the file to users.
 [[nodiscard]] inline std::string comments_text(const std::string& of_version, double a_pixel) {
   std::array<char, 32> number{};
   char* const end =

@@ -8,7 +8,7 @@
 
 namespace cumulet::image {
 
-/// The largest side of a picture, here and in cumulet.h: a header that says more is damaged or hostile.
+/// The maximum width and height of an image, here and in cumulet.h. A header with a larger size is damaged or hostile.
 inline constexpr std::int64_t max_side = 16384;
 
 [[noreturn]] inline void fail(const std::string& path, const std::string& cause) {
@@ -20,7 +20,7 @@ inline void check_size(const std::string& path, std::int64_t width, std::int64_t
     fail(path, "the picture's size " + std::to_string(width) + "x" + std::to_string(height) + " is not supported");
 }
 
-/// A picture whose pixels do not match its size is the caller's bug.
+/// Checks the size. A number of pixels that does not match the size is a bug of the caller (std::logic_error).
 inline void check_image(const std::string& path, const Image& image) {
   check_size(path, image.width, image.height);
   if (image.rgba.size() != std::size_t{4} * image.width * image.height)

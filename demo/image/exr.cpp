@@ -25,8 +25,8 @@
 namespace cumulet::image {
 namespace {
 
-/// OpenEXR writes its line table in a destructor, where a full disk passes unseen. So it writes to memory, and the
-/// file is written by replace_file, which looks.
+/// Writes to memory. OpenEXR writes its line table in a destructor, where write errors are lost; the file is written by
+/// replace_file, which checks them.
 class MemoryOutput final : public Imf::OStream {
  public:
   MemoryOutput() : OStream("memory") {}
@@ -51,7 +51,7 @@ std::string full_name(const LayerName& layer, std::size_t channel) {
   return name += layer.channels[channel];
 }
 
-constexpr std::size_t longest_name = 31;  // of an attribute
+constexpr std::size_t longest_name = 31;  // maximum length of an attribute name
 
 void insert(Imf::Header& header, const Attribute& attribute) {
   if (attribute.name.empty() || attribute.name.size() > longest_name)
@@ -75,7 +75,7 @@ void insert(Imf::Header& header, const Attribute& attribute) {
   std::visit(Insert{header, attribute.name}, attribute.value);
 }
 
-/// What there is of an attribute that write_exr could have written; nothing of another.
+/// Converts an attribute; nullopt if its type is not one that write_exr writes.
 std::optional<Attribute> read_attribute(const char* name, const Imf::Attribute& attribute) {
   if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute)) return Attribute{name, text->value()};
   if (const auto* number = dynamic_cast<const Imf::FloatAttribute*>(&attribute))
@@ -94,7 +94,7 @@ std::optional<Attribute> read_attribute(const char* name, const Imf::Attribute& 
   return std::nullopt;
 }
 
-/// Width and height of a file's picture. Throws where they are none of ours.
+/// Returns width and height of the data window. Throws if they are out of range.
 std::array<std::uint32_t, 2> size_of(const Imf::Header& header) {
   const Imath::Box2i& window = header.dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
@@ -104,7 +104,7 @@ std::array<std::uint32_t, 2> size_of(const Imf::Header& header) {
   return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
 }
 
-/// Throws where they are none that write_exr writes.
+/// Returns the windows. Throws if write_exr would not write such windows.
 Windows windows_of(const Imf::Header& header) {
   const auto [width, height] = size_of(header);
   const Imath::Box2i& data = header.dataWindow();
@@ -121,10 +121,10 @@ Windows windows_of(const Imf::Header& header) {
           number(whole.max.y - whole.min.y + 1)};
 }
 
-/// Calls read with the open file; gives what it gives. Throws, one line with the path.
+/// Opens the file, calls `read` with it and returns its result. Throws one line with the path.
 template <class Read>
 auto read_exr_file(const std::string& path, const Read& read) {
-  static_cast<void>(read_file(path));  // the system's own cause for a file that cannot be opened
+  static_cast<void>(read_file(path));  // fails with the system's error message if the file cannot be opened
   try {
     Imf::InputFile file(path.c_str());
     return read(file);
@@ -133,7 +133,7 @@ auto read_exr_file(const std::string& path, const Read& read) {
   }
 }
 
-/// fill: what stands for a channel that the file lacks, one each; none: it is an error.
+/// fill: value of each missing channel; empty: a missing channel is an error.
 Pixels read_layer(const std::string& path, const LayerName& layer, std::span<const float> fill) {
   return read_exr_file(path, [&](Imf::InputFile& file) {
     const auto [width, height] = size_of(file.header());
@@ -142,7 +142,7 @@ Pixels read_layer(const std::string& path, const LayerName& layer, std::span<con
     Pixels pixels{width, height, {}};
     pixels.values.resize(channels * pixels.width * pixels.height);
     const std::size_t stride = channels * sizeof(float);
-    // A slice's base is where pixel (0, 0) would be, which the data window may not contain.
+    // The base of a slice is the address of pixel (0, 0), which may lie outside the data window.
     const std::int64_t origin = (std::int64_t{window.min.y} * width + window.min.x) * static_cast<std::int64_t>(stride);
     char* base = reinterpret_cast<char*>(pixels.values.data()) - origin;
     Imf::FrameBuffer frame;
@@ -180,7 +180,7 @@ void write_exr(const std::string& path, const Windows& windows, std::span<const 
     if (layer.values.size() != channels * width * height)
       throw std::logic_error(path + ": the picture's size and the pixels of layer \"" + std::string(layer.name.name) +
                              "\" disagree");
-    // The library asks for a mutable pointer and only reads. Its base is where pixel (0, 0) would be.
+    // OpenEXR requires a mutable pointer, but only reads. The base is the address of pixel (0, 0).
     const std::size_t stride = channels * sizeof(float);
     const std::size_t origin = (windows.top * width + windows.left) * stride;
     char* base = const_cast<char*>(reinterpret_cast<const char*>(layer.values.data())) - origin;

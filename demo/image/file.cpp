@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
   fail(path, std::error_code(error, std::generic_category()).message());
 }
 
-/// A file descriptor; with a name that is removed again unless the file was renamed.
+/// A file descriptor, optionally with a temporary file that is deleted unless it is renamed.
 class Descriptor {
  public:
   explicit Descriptor(int descriptor, std::string temporary = {})
@@ -35,7 +35,7 @@ class Descriptor {
     if (!temporary_.empty()) ::unlink(temporary_.c_str());
   }
 
-  /// False and errno on failure.
+  /// Returns false and sets errno on failure.
   [[nodiscard]] bool write(std::string_view bytes) const {
     while (!bytes.empty()) {
       const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
@@ -48,7 +48,7 @@ class Descriptor {
     return true;
   }
   [[nodiscard]] bool close() { return ::close(std::exchange(descriptor_, -1)) == 0; }
-  /// Flushed first: a file system may put the name on the disk before the bytes, and delays "no space" until then.
+  /// Calls fsync first: a file system may store the new name before the data, and may report "no space" only then.
   [[nodiscard]] bool rename(const std::string& path) {
     if (::fsync(descriptor_) != 0 || !close() || ::rename(temporary_.c_str(), path.c_str()) != 0) return false;
     temporary_.clear();
@@ -60,7 +60,7 @@ class Descriptor {
   std::string temporary_;
 };
 
-/// Where a write would go: the end of a chain of links, and whether something other than a file is there.
+/// Destination of a write: the path after following links, and whether it is a device or pipe.
 struct Target {
   std::string path;
   bool special = false;
@@ -81,7 +81,7 @@ Target resolve(const std::string& path) {
     return target;
   }
   if (S_ISDIR(status.st_mode)) fail(path, EISDIR);
-  // A rename would get past the permissions of a file that its owner protects.
+  // Checked explicitly, because a rename ignores the write protection of the existing file.
   if (::access(target.path.c_str(), W_OK) != 0) fail(path, errno);
   target.special = !S_ISREG(status.st_mode);
   target.mode = status.st_mode & 0777;
@@ -89,7 +89,7 @@ Target resolve(const std::string& path) {
 }
 
 Descriptor open_sibling(const std::string& path, const Target& target) {
-  // mkstemp would make the file private; the user's umask has the say here.
+  // mkstemp would make the file private; here the user's umask applies.
   for (int attempt = 0;; ++attempt) {
     std::string name = target.path + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(attempt);
     const int descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, target.mode);

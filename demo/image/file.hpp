@@ -5,16 +5,16 @@
 
 namespace cumulet::image {
 
-/// Throws std::runtime_error, one line with the path and the cause, if replace_file could not write there. Leaves
-/// what is there untouched. To be asked before hours of work, not instead of the check while writing.
+/// Throws std::runtime_error, one line with the path and the cause, if replace_file could not write there. Does not
+/// change an existing file. Call it before a long render; replace_file checks again.
 void check_writable(const std::string& path);
 
-/// Makes the file hold exactly these bytes: they go to a temporary sibling, which then takes the file's name, so that
-/// a failure leaves the old file, never half a new one. Links are followed; devices and pipes are written directly.
-/// Throws std::runtime_error as check_writable does.
+/// Replaces the content of a file atomically: writes a temporary file in the same folder and renames it, so that on
+/// failure the old file remains. Follows links; writes directly to devices and pipes. Throws std::runtime_error as
+/// check_writable.
 void replace_file(const std::string& path, std::string_view bytes);
 
-/// All of a file. Throws likewise.
+/// Returns the content of a file. Throws as check_writable.
 [[nodiscard]] std::string read_file(const std::string& path);
 
 }  // namespace cumulet::image

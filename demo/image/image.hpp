@@ -8,7 +8,7 @@
 
 namespace cumulet::image {
 
-/// Linear RGBA, first pixel top left.
+/// Linear RGBA; the first pixel is at the top left.
 struct Image {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
@@ -16,43 +16,43 @@ struct Image {
 };
 
 enum class ToneMapping {
-  neutral,  // Khronos PBR Neutral, below
-  none      // clipped at 1: for pictures whose colours are a legend
+  neutral,  // Khronos PBR Neutral, see below
+  none      // clipped at 1, for debug views whose colors have a meaning
 };
 
 struct PngOptions {
   double exposure_stops = 0.0;  // radiance is multiplied by 2^stops before tone mapping
   ToneMapping tone_mapping = ToneMapping::neutral;
-  bool keep_alpha = false;  // else opaque
+  bool keep_alpha = false;  // false: write opaque alpha
 };
 
-/// Khronos PBR Neutral: https://github.com/KhronosGroup/ToneMapping. Leaves everything up to 0.8 as it is but for a
-/// small toe of 0.04, and rolls highlights off smoothly towards white, hue kept. So the white of a sunlit cloud
-/// stays white and soft, and the blue of its shadows stays the scene's blue, where the ACES fits add contrast and
-/// shift hues. Takes and gives linear RGB (Rec. 709); 0 for what is negative or not a number.
+/// Khronos PBR Neutral: https://github.com/KhronosGroup/ToneMapping. Keeps values up to 0.8 except for a small toe of
+/// 0.04, and compresses highlights smoothly towards white with constant hue. White sunlit clouds stay white and soft,
+/// and blue shadows keep their color; the ACES fits add contrast and shift hues. Input and output are linear RGB (Rec.
+/// 709); negative values and NaN become 0.
 [[nodiscard]] std::array<float, 3> tone_map_neutral(std::array<float, 3> rgb);
 
-/// The sRGB transfer curve, [0, 1] to [0, 1].
+/// sRGB transfer function, [0, 1] to [0, 1].
 [[nodiscard]] float srgb_encode(float linear);
 [[nodiscard]] float srgb_decode(float encoded);
 
-// All writers replace the file in one step (replace_file in file.hpp) and throw std::runtime_error, one line with
-// the path and the cause. The readers throw likewise.
+// All writers replace the file atomically (replace_file in file.hpp). Readers and writers throw std::runtime_error, one
+// line with the path and the cause.
 
-/// 8 bits a channel, sRGB, with chunks that say so (sRGB, gAMA and cHRM).
+/// Writes 8 bits per channel in sRGB, with the chunks sRGB, gAMA and cHRM.
 void write_png(const std::string& path, const Image& image, const PngOptions& options = {});
-/// The same from bytes, width x height x 4, first pixel top left, straight alpha.
+/// Writes bytes, width x height x 4, straight alpha; the first pixel is at the top left.
 void write_png(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba);
-/// OpenEXR: the one layer of channels R, G, B, A, as layers.hpp writes it; linear, untouched.
+/// Writes OpenEXR with the channels R, G, B, A as one unnamed layer (layers.hpp). Values stay linear and unchanged.
 void write_exr(const std::string& path, const Image& image);
-/// Portable float map: RGB (alpha is dropped), little-endian, bottom row first; linear, untouched.
+/// Writes a portable float map: RGB without alpha, little-endian, bottom row first. Values stay linear and unchanged.
 void write_pfm(const std::string& path, const Image& image);
 
-/// Back to linear by the sRGB curve alone: tone mapping is not undone.
+/// Decodes with the sRGB curve only: tone mapping is not inverted.
 [[nodiscard]] Image read_png(const std::string& path);
-/// Channels R, G, B (a missing one is 0) and A (missing: 1), whatever their type.
+/// Reads the channels R, G, B (missing: 0) and A (missing: 1) of any type.
 [[nodiscard]] Image read_exr(const std::string& path);
-/// PF or Pf (grey), either byte order; alpha is 1.
+/// Reads PF or Pf (gray) in either byte order; alpha is 1.
 [[nodiscard]] Image read_pfm(const std::string& path);
 
 }  // namespace cumulet::image

@@ -15,7 +15,7 @@ std::uint32_t swap_bytes(std::uint32_t v) {
   return (v >> 24) | ((v >> 8) & 0xff00u) | ((v << 8) & 0xff0000u) | (v << 24);
 }
 
-/// The next word of the header; one white-space character after it is eaten.
+/// Returns the next word of the header and skips one white-space character after it.
 std::string_view next_word(std::string_view& rest) {
   constexpr std::string_view space = " \t\r\n";
   const auto end = rest.find_first_of(space);

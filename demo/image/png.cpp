@@ -1,5 +1,5 @@
-// PNG by stb: built in (stb.c), so the portable package carries no libpng beside OpenEXR's own zlib, and the glTF
-// importer brings stb along anyway.
+// PNG with stb, which is compiled in (stb.c). The portable package then contains no libpng in addition to OpenEXR's
+// zlib, and the glTF importer needs stb anyway.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,7 +24,7 @@ std::uint8_t to_byte(float unit) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0f, 1.0f) * 255.0f));
 }
 
-/// A number that can be shown: not negative, and finite.
+/// Clamps a value to 0 and a large finite number; NaN becomes 0.
 float displayable(float value) {
   if (!(value > 0.0f)) return 0.0f;
   return std::min(value, 1e30f);
@@ -34,7 +34,7 @@ void append_big_endian(std::string& bytes, std::uint32_t value) {
   for (const unsigned shift : {24u, 16u, 8u, 0u}) bytes += static_cast<char>(value >> shift & 0xffu);
 }
 
-/// PNG 1.2, annex D.
+/// The CRC of PNG 1.2, annex D.
 std::uint32_t crc(std::string_view bytes) {
   std::uint32_t value = 0xffffffffu;
   for (const char byte : bytes) {
@@ -51,7 +51,8 @@ void append_chunk(std::string& file, const char* type, std::string_view data) {
   append_big_endian(file, crc(typed));
 }
 
-/// Chunks that say sRGB, and its gamma and Rec. 709 primaries to those that do not know it (PNG 1.2, 4.2.2.3).
+/// Returns the sRGB chunk, and gAMA and cHRM with the equivalent values for readers that do not support it (PNG 1.2,
+/// 4.2.2.3).
 std::string color_chunks() {
   constexpr std::uint32_t gamma = 45455;
   constexpr std::array<std::uint32_t, 8> white_and_primaries = {31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000};
@@ -76,7 +77,7 @@ void write_bytes(const std::string& path, std::uint32_t width, std::uint32_t hei
   if (stbi_write_png_to_func(append, &file, row, static_cast<int>(height), static_cast<int>(channels), bytes.data(),
                              row * static_cast<int>(channels)) == 0)
     fail(path, "the PNG encoder failed: the picture may be too large for it");
-  constexpr std::size_t after_header = 8 + 25;  // the signature and IHDR
+  constexpr std::size_t after_header = 8 + 25;  // signature and IHDR
   file.insert(after_header, color_chunks());
   replace_file(path, file);
 }

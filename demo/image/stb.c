@@ -1,4 +1,4 @@
-// stb's code, in a file of its own: it is not held to this project's warnings.
+// Compiles stb in a separate file, without this project's compiler warnings.
 #define STB_IMAGE_IMPLEMENTATION
 #define STBI_ONLY_PNG
 #define STBI_NO_STDIO

@@ -1,4 +1,4 @@
-// cumulet-merge: parts of a picture become the picture.
+// cumulet-merge: merges partial renders (sample ranges) into one image.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -22,7 +22,7 @@ struct Wanted {
   std::string output;
 };
 
-/// Nothing after --help or --version.
+/// Parses the arguments; nullopt after --help or --version.
 std::optional<Wanted> parse(std::vector<std::string> arguments) {
   Wanted wanted;
   CLI::App app(

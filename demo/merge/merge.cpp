@@ -30,7 +30,7 @@ std::optional<Value> find(const image::Contents& contents, std::string_view name
   return value != nullptr ? std::optional(*value) : std::nullopt;
 }
 
-/// A file and the samples of each pixel that it has.
+/// A file and its sample range.
 struct Part {
   std::string path;
   image::Contents contents;
@@ -65,7 +65,7 @@ Part open(const std::string& path) {
   return part;
 }
 
-/// Which ids the file's mattes have; nothing where it has none.
+/// Returns the Cryptomatte manifest; nullopt if there is none.
 std::string manifest_of(const Part& part) {
   const auto found = std::ranges::find_if(part.contents.attributes, [](const image::Attribute& attribute) {
     return attribute.name.starts_with("cryptomatte/") && attribute.name.ends_with("/manifest");
@@ -96,7 +96,7 @@ void check_together(const Part& a, const Part& b) {
   if (manifest_of(a) != manifest_of(b)) refuse(b.path, "has mattes of other names than " + a.path);
 }
 
-/// In the order of their samples.
+/// Opens all files and sorts them by sample range. Throws if they do not belong together.
 std::vector<Part> open_all(const std::vector<std::string>& paths) {
   if (paths.empty()) throw std::runtime_error("there is no part to merge");
   std::vector<Part> parts;
@@ -129,7 +129,7 @@ bool has(const image::Contents& contents, const image::LayerName& layer) {
   });
 }
 
-/// Calls visit with each layer whose name begins so, and whose channels include R.
+/// Calls visit with each layer whose name begins with `prefix` and that has a channel R.
 template <class Visit>
 void for_each_layer(const image::Contents& contents, std::string_view prefix, std::string_view channels,
                     Visit&& visit) {
@@ -143,7 +143,7 @@ std::size_t pixels_of(const Part& part) {
   return std::size_t{part.contents.windows.width} * part.contents.windows.height;
 }
 
-/// Means over all samples: those of the parts, weighed.
+/// Returns the mean over all samples: the parts' means, weighted by their numbers of samples.
 std::vector<float> mean(const std::vector<Part>& parts, const image::LayerName& layer) {
   std::vector<double> sums;
   double samples = 0.0;
@@ -161,8 +161,9 @@ std::vector<float> mean(const std::vector<Part>& parts, const image::LayerName& 
 
 double luminance(std::span<const float> rgba) { return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]; }
 
-/// The standard error of all samples' mean luminance, by the parts' means and squared deviations from them (Chan, Golub
-/// and LeVeque, "Updating formulae and a pairwise algorithm for computing sample variances", 1979).
+/// Returns the standard error of the mean luminance over all samples. It is combined from the parts' means and sums of
+/// squared deviations (Chan, Golub and LeVeque, "Updating formulae and a pairwise algorithm for computing sample
+/// variances", 1979).
 std::vector<float> error_of(const std::vector<Part>& parts) {
   struct Moments {
     double samples = 0.0;
@@ -192,7 +193,7 @@ std::vector<float> error_of(const std::vector<Part>& parts) {
   return errors;
 }
 
-/// As of docs/aovs.md; nothing where it is unknown.
+/// Returns the relative noise as defined in docs/aovs.md; nullopt if it is unknown.
 std::optional<double> noise_of(std::span<const float> rgba, std::span<const float> errors) {
   double squares = 0.0;
   double bright = 0.0;
@@ -237,7 +238,7 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   for (const image::LayerName& layer : {layers::transmittance, layers::depth, layers::volume_depth, layers::normal,
                                         layers::albedo, layers::velocity, layers::backward, layers::volume_backward})
     if (has(first, layer)) take_first(layer);
-  // Nor do mattes depend on samples, and there is no mean of ids.
+  // Cryptomatte does not depend on the samples either, and IDs cannot be averaged.
   for_each_layer(first, layers::cryptomatte_prefix, layers::cryptomatte_channels, take_first);
 
   std::vector<image::Attribute> said = first.attributes;

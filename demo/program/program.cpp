@@ -36,8 +36,8 @@ std::string user_folder(const char* variable, const std::string& in_home) {
 
 namespace {
 
-/// Command lines and files have the same numbers in every locale. The programs set none, but a library that is loaded
-/// with them may have done so.
+/// Sets the classic locale, so that command lines and files have the same number format everywhere. The programs do not
+/// set a locale, but a loaded library may have done so.
 void use_classic_locale() {
   static_cast<void>(std::setlocale(LC_NUMERIC, "C"));
   const std::locale& classic = std::locale::classic();

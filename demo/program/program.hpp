@@ -8,27 +8,27 @@
 
 namespace cumulet::demo {
 
-/// The command line is wrong; what() is one line. run_program prints it and gives 2.
+/// A command-line error; what() is one line. run_program prints it and returns 2.
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Line breaks become blanks, but for those at the end, which go.
+/// Replaces line breaks by blanks and removes those at the end.
 [[nodiscard]] std::string one_line(std::string text);
 
-/// Fowler, Noll and Vo's hash 1a of 64 bits.
+/// FNV-1a hash, 64 bits (Fowler, Noll and Vo).
 [[nodiscard]] std::uint64_t fnv1a(std::string_view bytes);
 
-/// A variable of the environment; empty if it is not set.
+/// Returns an environment variable; "" if it is not set.
 [[nodiscard]] std::string environment_variable(const char* name);
 
-/// Where a user's files of a kind are, by the XDG base directory specification: what the variable says, or a folder in
-/// the home; empty if there is neither.
+/// Returns a folder for user files, by the XDG base directory specification: the value of the environment variable, or
+/// a folder in the home directory; "" if neither exists.
 [[nodiscard]] std::string user_folder(const char* variable, const std::string& in_home);
 
-/// A main's whole body: calls it, and gives the exit status. What it throws, and a standard output that cannot be
-/// written, goes to standard error in one line after the program's name: 1; 2 for a UsageError.
+/// Runs the body of a main function and returns the exit status. For an exception, or if standard output cannot be
+/// written, it prints one line with the program's name to standard error. It then returns 1, or 2 for a UsageError.
 [[nodiscard]] int run_program(const char* name, const std::function<void()>& body);
 
 }  // namespace cumulet::demo

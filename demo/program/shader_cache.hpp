@@ -13,8 +13,8 @@ struct ReleasePrograms {
   void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
 };
 
-/// Programs that are kept in a folder, of the shaders of another; "": nowhere, and the library's own. Throws
-/// std::runtime_error.
+/// Creates the shader programs with a cache in `folder` ("": no cache) and the sources in `shaders` ("": those of the
+/// library). Throws std::runtime_error.
 inline std::unique_ptr<cumulet_programs, ReleasePrograms> make_programs(const std::string& folder,
                                                                         const std::string& shaders) {
   cumulet_programs_desc desc{};

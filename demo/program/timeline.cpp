@@ -25,7 +25,7 @@ std::string Timeline::json() const {
                     {"tid", event.thread},
                     {"ts", microseconds * event.begin},
                     {"dur", microseconds * (event.end - event.begin)}};
-    // A file's name may be in any encoding.
+    // A file name may have any encoding.
     text += separator + line.dump(-1, ' ', false, Json::error_handler_t::replace);
     separator = ",\n";
   }

@@ -6,18 +6,18 @@
 
 namespace cumulet::demo {
 
-/// What a viewer tells of its work, for chrome://tracing and Perfetto. Any thread.
+/// Collects the trace events of a viewer for chrome://tracing and Perfetto. Any thread.
 class Timeline {
  public:
-  /// Fits cumulet_trace_fn; user is the Timeline.
+  /// Matches cumulet_trace_fn. user: the Timeline.
   static void add(void* user, const char* name, double begin, double end);
-  /// Chrome's trace event format: JSON, a line an event.
+  /// Returns Chrome's trace event format: JSON, one line per event.
   [[nodiscard]] std::string json() const;
 
  private:
   struct Event {
     std::string name;
-    long thread;  // the system's number
+    long thread;  // thread ID of the operating system
     double begin;
     double end;
   };

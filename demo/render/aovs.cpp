@@ -41,7 +41,7 @@ image::LayerName layer_of(cumulet_aov aov) {
 
 namespace {
 
-constexpr std::uint32_t matte_ranks = 6;  // as most renderers have them
+constexpr std::uint32_t matte_ranks = 6;  // the usual number of ranks in other renderers
 constexpr std::uint32_t matte_layers = matte_ranks / 2;
 
 std::string matte_digits(std::string_view name) {
@@ -50,7 +50,7 @@ std::string matte_digits(std::string_view name) {
   return digits.data();
 }
 
-/// What is known of a viewer's mattes: their pixels, and the id of each name.
+/// Reads a viewer's Cryptomatte: the ID/coverage layers, and the ID of each object name.
 class Mattes {
  public:
   explicit Mattes(const ObjectName& name) : name_(name) {}
@@ -63,7 +63,7 @@ class Mattes {
     return status;
   }
   [[nodiscard]] const std::vector<float>& layer(std::size_t number) const { return layers_.at(number); }
-  /// The attributes that Cryptomatte's specification asks for.
+  /// Returns the attributes that the Cryptomatte specification requires.
   [[nodiscard]] std::vector<image::Attribute> attributes() const {
     const std::string of = "cryptomatte/" + matte_digits(image::layers::cryptomatte_prefix).substr(0, 7) + "/";
     nlohmann::json manifest = nlohmann::json::object();
@@ -83,11 +83,11 @@ class Mattes {
   }
 
   const ObjectName& name_;
-  std::map<std::string, std::string> ids_;  // names', in hexadecimal
+  std::map<std::string, std::string> ids_;  // object name -> ID as 8 hexadecimal digits
   std::array<std::vector<float>, matte_layers> layers_;
 };
 
-/// The region's pixels of a picture.
+/// Returns the pixels of the render region.
 std::vector<float> cut(const image::Windows& windows, std::span<const float> whole) {
   const std::size_t channels = whole.size() / (std::size_t{windows.whole_width} * windows.whole_height);
   std::vector<float> part;
@@ -124,7 +124,7 @@ void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Win
                std::span<const image::Attribute> attributes) {
   std::vector<std::vector<float>> values;
   std::vector<image::Layer> layers;
-  std::vector<std::string> names;  // of layers, whose own they are
+  std::vector<std::string> names;  // storage for layer names that are built here; `layers` refers to them
   std::vector<image::Attribute> said(attributes.begin(), attributes.end());
   values.reserve(2 + picture.light_groups.size() + aovs.size() + matte_layers);
   names.reserve(picture.light_groups.size() + matte_layers);

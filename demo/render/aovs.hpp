@@ -10,30 +10,30 @@
 
 namespace cumulet::demo {
 
-/// What an AOV is called in a file.
+/// Returns the layer name and channels of an AOV in an OpenEXR file.
 [[nodiscard]] image::LayerName layer_of(cumulet_aov aov);
 
-/// The name of what a viewer shows, of what a cumulet_object_name_fn is told; "": it is in no matte.
+/// Returns the Cryptomatte name of an object, as cumulet_object_name_fn. "": the object is in no matte.
 using ObjectName = std::function<std::string(cumulet_object_kind kind, std::uint64_t tag)>;
 
-/// A picture's pixels, 4 floats each; of a region as of the whole, which has the others as 0.
+/// Pixels of a rendered image, 4 floats each. The spans cover the full image; pixels outside the render region are 0.
 struct WrittenPicture {
   std::span<const float> beauty;
-  std::span<const float> denoised{};  ///< a layer beside it; empty: none
-  /// Names of groups of lights, a layer each; the viewer gathers as many.
+  std::span<const float> denoised{};  ///< written as a second layer; empty: none
+  /// Names of the light groups, one layer each. The viewer must accumulate the same number of groups.
   std::span<const std::string> light_groups{};
-  /// Mattes, by these names; empty: none.
+  /// Names for Cryptomatte; empty: no Cryptomatte layers.
   ObjectName object_name{};
 };
 
-/// The pixels of a region (cumulet_region_pixels) of a picture, whose sizes and region are good.
+/// Returns the pixel rectangle of a render region (cumulet_region_pixels). Region and size must be valid.
 [[nodiscard]] image::Windows windows_of(const float (&region)[4], std::uint32_t width, std::uint32_t height);
-/// What is not of the region is made transparent.
+/// Sets the pixels outside the render region to 0 (transparent).
 void clear_around(const image::Windows& windows, std::span<std::uint8_t> rgba);
 
-/// Writes an OpenEXR file of the picture that the viewer has, with a layer an AOV, Cryptomatte's layers and what these
-/// are of, and with the attributes; its data window is the region. Infinite depths become image::no_depth. Throws
-/// std::runtime_error, one line, for what the viewer refuses, and as image::write_exr.
+/// Writes the viewer's image as an OpenEXR file: the picture, one layer per AOV, Cryptomatte and the attributes. The
+/// data window is the render region. Infinite depths are written as image::no_depth. Throws std::runtime_error with one
+/// line if the viewer refuses a read, and as image::write_exr.
 void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Windows& windows,
                const WrittenPicture& picture, std::span<const cumulet_aov> aovs,
                std::span<const image::Attribute> attributes);

@@ -21,7 +21,7 @@ constexpr std::string_view driver_name = "driver";
   throw std::runtime_error(path + ": " + cause);
 }
 
-/// Against what is cut off or damaged, not against malice.
+/// Detects truncated or damaged files; it does not protect against manipulation.
 std::string checksum(std::string_view bytes) {
   const std::uint64_t hash = fnv1a(bytes);
   std::string text(sizeof hash, '\0');
@@ -29,7 +29,7 @@ std::string checksum(std::string_view bytes) {
   return text;
 }
 
-/// Cuts a line off; nothing where none ends.
+/// Removes the first line from `text` and returns it; nullopt if `text` contains no line end.
 std::optional<std::string_view> take_line(std::string_view& text) {
   const auto end = text.find('\n');
   if (end == std::string_view::npos) return std::nullopt;
@@ -38,7 +38,7 @@ std::optional<std::string_view> take_line(std::string_view& text) {
   return line;
 }
 
-/// What was written; nothing where that is not whole.
+/// Parses the content of a checkpoint file; nullopt if it is incomplete or damaged.
 std::optional<Checkpoint> parse(std::string_view text) {
   constexpr std::size_t sum = sizeof(std::uint64_t);
   if (text.size() < sum || checksum(text.substr(0, text.size() - sum)) != text.substr(text.size() - sum))

@@ -11,22 +11,24 @@
 
 namespace cumulet::demo {
 
-/// What a checkpoint is of, thing by thing: pictures that have all of it in common go on from each other's samples.
+/// Names and values of the settings that a checkpoint depends on. Images with equal lists can resume from each other's
+/// samples.
 using CheckpointOf = std::vector<std::pair<std::string, std::string>>;
 [[nodiscard]] CheckpointOf checkpoint_of(const RenderOptions& options);
 
-/// What the samples of a picture had come to, and what it is of.
+/// The accumulated samples of an image, and the settings that they belong to.
 struct Checkpoint {
   CheckpointOf of;
-  std::string driver;  ///< OpenGL's; with another the picture is as right, and not the same bits
+  std::string driver;  ///< OpenGL vendor, renderer and version. With another driver the result is correct, but not
+                       ///< bit-identical.
   std::vector<std::byte> accumulation;
 };
 
-/// Replaces the file in one step. Throws std::runtime_error, one line with the path and the cause.
+/// Replaces the file atomically. Throws std::runtime_error, one line with the path and the cause.
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 
-/// Nothing where there is no such file. Throws std::runtime_error, one line with the path and the cause, for one that
-/// is no checkpoint, damaged, or of something else than wanted.
+/// Returns nullopt if the file does not exist. Throws std::runtime_error, one line with the path and the cause, if the
+/// file is no checkpoint, is damaged, or belongs to other settings than `wanted`.
 [[nodiscard]] std::optional<Checkpoint> read_checkpoint(const std::string& path, const CheckpointOf& wanted);
 
 }  // namespace cumulet::demo

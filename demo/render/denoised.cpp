@@ -8,7 +8,7 @@ namespace cumulet::demo {
 
 namespace {
 
-// Albedo and normals without noise go with the picture, as ours are.
+// The network for HDR color with noise-free albedo and normals: the guides are rendered without noise.
 constexpr const char* network_name = "rt_hdr_calb_cnrm.tza";
 
 }  // namespace

@@ -8,15 +8,16 @@
 
 namespace cumulet::demo {
 
-/// Where networks are looked for that no flag names: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below $XDG_DATA_HOME,
-/// else below ~/.local/share; "" if there is none of these. scripts/install_oidn_weights.sh puts them there.
+/// Returns the default folder of the denoiser networks: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below $XDG_DATA_HOME,
+/// else below ~/.local/share; "" if none of these is set. scripts/install_oidn_weights.sh installs the networks there.
 [[nodiscard]] std::string denoiser_folder();
 
-/// The network in that folder; "": in denoiser_folder(). Throws std::runtime_error, one line, if it is not there.
+/// Returns the path of the network in `folder`; "": in denoiser_folder(). Throws std::runtime_error, one line, if the
+/// file does not exist.
 [[nodiscard]] std::string find_network(const std::string& folder);
 
-/// The viewer's picture of so many floats, denoised by that network; "": by the library's own filter. Throws
-/// std::runtime_error, one line, if it cannot be.
+/// Returns the viewer's image, denoised with the given network. "": with the library's own filter. `floats`: size of
+/// the image, 4 per pixel. Throws std::runtime_error, one line, on failure.
 [[nodiscard]] std::vector<float> denoised(cumulet_viewer* viewer, const std::string& network, std::size_t floats);
 
 }  // namespace cumulet::demo

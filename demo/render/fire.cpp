@@ -9,7 +9,7 @@ namespace cumulet::demo {
 
 namespace {
 
-// Of flames, in kelvin: temperatures of anything else are no reason to show a fire.
+// Range of flame temperatures in kelvin. Volumes with other temperatures are not shown as fire.
 constexpr double coldest_fire = 800.0;
 constexpr double hottest_fire = 6000.0;
 
@@ -22,7 +22,7 @@ double most_of(const cumulet_volume* volume, cumulet_ramp ramp) {
 cumulet_volume_info info_of(const cumulet_volume* volume) {
   cumulet_volume_info info{};
   info.struct_size = sizeof info;
-  // Of a volume that is there, with room for it.
+  // Cannot fail: the volume exists and struct_size is set.
   static_cast<void>(cumulet_volume_get_info(volume, &info));
   return info;
 }
@@ -56,12 +56,12 @@ std::optional<cumulet_medium_desc> medium_of_fire(const cumulet_volume* volume, 
                   .temperature = most_of(volume, CUMULET_RAMP_TEMPERATURE),
                   .size = size_of(info)};
   if (medium.temperature_scale == 0.0F) medium.temperature_scale = temperature_scale_of(volume).value_or(0.0F);
-  // Smoke may be warm, and a cloud has its kelvin.
+  // Warm smoke and clouds (about 270 K) also have temperatures, but do not burn.
   const double kelvin = double{medium.temperature_scale} * burning.temperature;
   if (!(kelvin >= coldest_fire && kelvin <= hottest_fire)) burning.temperature = 0.0;
   if (!(burning.flame + burning.temperature > 0.0) || !(burning.size > 0.0)) return std::nullopt;
   if (cumulet_volume_suggest_density_scale(volume, &medium.density_scale) != CUMULET_OK)
-    medium.density_scale = 0.0;  // a fire alone
+    medium.density_scale = 0.0;  // a flame without smoke
   apply(burning, medium);
   return medium;
 }

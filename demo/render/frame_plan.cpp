@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The volume's; nothing where one file is meant, whatever its name.
+/// Returns the pattern of the volume's file name; nullopt if the name means a single file.
 std::optional<FramePattern> volume_pattern(const RenderOptions& options) {
   const std::string& volume = options.scene.volume;
   if (options.frames.empty()) {
@@ -30,7 +30,7 @@ std::optional<FramePattern> volume_pattern(const RenderOptions& options) {
   throw UsageError("--frames: the name '" + volume + "' has neither a number nor a place for one, such as ####");
 }
 
-/// A file to write in each frame. All have the decimals that one of them needs: so they sort as they are played.
+/// Name of an output file per frame. All names have the same number of decimals, so that they sort in playback order.
 class Written {
  public:
   Written(const char* flag, const std::string& name, const std::vector<Moment>& moments) : name_(name) {
@@ -58,19 +58,19 @@ class Written {
   std::size_t decimals_ = 0;
 };
 
-/// Files that are so many frames apart, from the first that is there on.
+/// Frame numbers of a sequence, starting at the first existing file, with a constant step.
 struct Grid {
   Frame first;
   Frame step;
 
   explicit Grid(const std::vector<Frame>& there) : first(there.front()), step(step_of(there)) {}
-  /// The last file's number that is not behind a frame.
+  /// Returns the number of the last file at or before `frame`.
   [[nodiscard]] Frame before(Frame frame) const { return frame < first ? frame : frame - (frame - first) % step; }
 };
 
-/// Of what is between two files.
+/// Returns how to interpolate at `moment` between two files.
 PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, const Grid& grid) {
-  constexpr std::int64_t most_parts = 1000;  // the library's
+  constexpr std::int64_t most_parts = 1000;  // limit of the library
   const Frame before = grid.before(moment.frame);
   const std::int64_t way = moment.in_thousandths() - Moment(before).in_thousandths();
   const std::int64_t length = Moment(grid.step).in_thousandths();
@@ -82,7 +82,7 @@ PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, con
           static_cast<std::uint32_t>(length / common), static_cast<std::uint32_t>(grid.step)};
 }
 
-/// By the scene's clock.
+/// Returns the time of a frame on the scene's clock, in seconds.
 double seconds_of(const Moment& moment, const SceneSequence& sequence, const Grid& grid) {
   cumulet_playback_desc playback = sequence.playback;
   settings::spell_out_zeros(playback);
@@ -118,7 +118,8 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   for (const Moment& frame : frames) {
     PlannedFrame& planned = plan.frames.emplace_back();
     planned.number = frame;
-    // With moments in the list, whole numbers are such, too, where files are farther apart.
+    // If the list contains fractional frames and the files are more than one frame apart, whole numbers between two
+    // files are interpolated too.
     const Frame before = grid.before(frame.frame);
     const bool between = frame.is_between() || (moments && before != frame.frame);
     planned.volume = volume->file(between ? before : frame.frame);

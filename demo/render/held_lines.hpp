@@ -9,16 +9,16 @@
 
 namespace cumulet::demo {
 
-/// The library's messages as lines for standard error, which can be kept back until it is known how a frame ended. Any
-/// thread may call any of its functions.
+/// Formats the library's messages as lines for standard error. Lines can be held back until the result of a frame is
+/// known. All functions are thread-safe.
 class HeldLines {
  public:
-  /// Keeps the next ones back.
+  /// Holds back the messages that follow.
   void hold();
-  /// The line to print now; nothing while lines are kept back.
+  /// Returns the line to print now; nullopt while messages are held back.
   [[nodiscard]] std::optional<std::string> take(cumulet_log_level level, const std::string& message);
-  /// Ends that. Returns the lines in the order of their messages, without those whose message begins with failure: the
-  /// frame's own line says that. An empty failure is none.
+  /// Stops holding back. Returns the held lines in order, except messages that begin with `failure`, because the
+  /// frame's own status line reports that. An empty `failure` excludes none.
   [[nodiscard]] std::vector<std::string> release(const std::string& failure = {});
 
  private:

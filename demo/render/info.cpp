@@ -27,7 +27,7 @@ void check(cumulet_status status) {
   if (status != CUMULET_OK) throw std::runtime_error(cumulet_status_text(status));
 }
 
-/// What one of the library's openers makes of a file.
+/// Opens a file with one of the library's functions. Throws with the library's error text.
 template <class Handle>
 Owner<Handle> open(cumulet_status (*opener)(const char*, Handle**, char*, std::size_t), const std::string& path) {
   std::array<char, 1024> error{};
@@ -36,7 +36,7 @@ Owner<Handle> open(cumulet_status (*opener)(const char*, Handle**, char*, std::s
   return Owner<Handle>(handle);
 }
 
-/// What the library tells in a descriptor: of which thing, and which one of it.
+/// Calls a getter of the library that fills a descriptor. `which`: the object and, if needed, an index in it.
 template <class Desc, class Get, class... Which>
 Desc told(Get get, Which... which) {
   Desc desc{};
@@ -45,7 +45,7 @@ Desc told(Get get, Which... which) {
   return desc;
 }
 
-/// grid -1: of the file as a whole.
+/// grid -1: metadata of the file itself.
 Json metadata_of(const cumulet_inspection* inspection, std::int32_t grid, std::uint32_t count) {
   Json list = Json::array();
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -127,7 +127,7 @@ std::string text(const Json& value) {
                                     : value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-/// A line a fact, those of what is inside indented; long lists of numbers are for JSON alone.
+/// Writes one line per value, nested values indented. Histograms are written to JSON only.
 void write_lines(const Json& json, const std::string& indent, std::ostream& out) {
   for (const auto& [key, value] : json.items()) {
     if (key == "histogram") continue;
@@ -157,7 +157,7 @@ bool is_z_up(const std::string& volume_file) {
     if (entry["name"] == "creator" && entry["value"].get<std::string>().find("Blender") != std::string::npos)
       return true;
   }
-  // Mantaflow signs with its own entry in every grid. An entry past the last one is none.
+  // Mantaflow writes its own metadata entry into every grid. The loop ends at the index past the last entry.
   for (std::uint32_t grid = 0; grid < file.grid_count; ++grid) {
     cumulet_metadata entry{};
     entry.struct_size = sizeof entry;
@@ -188,7 +188,7 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
   }
   for (const NamedCamera& camera : scene.cameras) json["scene"]["cameras"].push_back({{"name", camera.name}});
   if (as_json) {
-    // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
+    // Names may have any encoding: invalid UTF-8 is replaced. Non-finite numbers become null.
     out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
     return;
   }

@@ -7,10 +7,11 @@
 
 namespace cumulet::demo {
 
-/// What is in the scene's files, as lines or as JSON. Throws std::runtime_error, one line that names the file.
+/// Writes a description of the scene's files, as lines or as JSON. Throws std::runtime_error, one line that names the
+/// file.
 void write_info(const SceneOptions& scene, bool as_json, std::ostream& out);
 
-/// A line for who shows with Y up what its metadata says is Blender's or Mantaflow's, whose up axis is Z.
+/// Returns a hint if the volume is shown with Y up and its metadata names Blender or Mantaflow, whose up axis is Z.
 [[nodiscard]] std::optional<std::string> up_hint(const SceneVolume& volume);
 
 }  // namespace cumulet::demo

@@ -17,7 +17,8 @@ void check(cumulet_status status, const char* cause) {
   if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
 }
 
-/// What the scene says of it, and where it leaves that to the volume, what suits that.
+/// Returns the scene's medium. If the scene does not set the density scale, it is taken from the volume, or the whole
+/// medium is that of a fire.
 cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) {
   cumulet_medium_desc medium = scene.medium;
   if (!scene.auto_density_scale || medium.density_scale > 0.0) return medium;
@@ -158,7 +159,7 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
         !same_place(shown.desc, desc))
       check(cumulet_instance_set(shown.instance.get(), &desc), "");
     shown.desc = desc;
-    shown.desc.medium = nullptr;  // it lives as long as the call; below is what it said
+    shown.desc.medium = nullptr;  // `medium` points to a local variable of the caller; a copy is stored below
     shown.volume = open.volume;
     shown.sequence = sequence;
     shown.medium = *desc.medium;

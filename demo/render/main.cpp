@@ -1,4 +1,4 @@
-// cumulet-render: a volume's picture, or those of a sequence of volumes.
+// cumulet-render: renders an image of a volume, or images of a sequence of volumes.
 
 #include <cumulet/cumulet.h>
 #include <sys/resource.h>
@@ -61,23 +61,23 @@ using cumulet::headless::Backend;
 using cumulet::headless::Context;
 using Json = nlohmann::ordered_json;
 
-// A signal handler can reach nothing but a global.
+// A signal handler can only access globals.
 volatile std::sig_atomic_t interrupted = 0;
 
 extern "C" void on_signal(int) { interrupted = 1; }
 
-/// The first Ctrl-C asks us to finish, the second ends us.
+/// The first Ctrl-C requests an orderly end, the second kills the process.
 void catch_signals() {
   struct sigaction action {};
   action.sa_handler = on_signal;
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   for (const int signal : {SIGINT, SIGTERM}) {
     struct sigaction old {};
-    // A shell's background job, or nohup's, ignores the signal: it shall stay ignored.
+    // A background job of a shell, or nohup, ignores the signal; keep it ignored.
     if (sigaction(signal, nullptr, &old) == 0 && old.sa_handler == SIG_IGN) continue;
     sigaction(signal, &action, nullptr);
   }
-  // A file that outgrows its limit is a failed write with a cause, not the end of the process.
+  // With SIGXFSZ ignored, exceeding the file size limit is a write error with a cause, and does not kill the process.
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
@@ -137,7 +137,7 @@ void show_camera(const Viewer& viewer, const SceneOptions& scene) {
   if (status != CUMULET_OK) throw std::runtime_error("the camera is not usable");
 }
 
-/// Until the library's worker is done. Throws its error.
+/// Waits until the library's worker thread is done. Throws its error.
 void wait(const Viewer& viewer, Progress& progress) {
   cumulet_progress state{};
   state.struct_size = sizeof state;
@@ -158,23 +158,23 @@ void tell(Progress& progress, const std::string& line) {
   std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
 
-/// The volume that is there, for as long as this lives.
+/// Returns the viewer's volume, with a reference.
 std::shared_ptr<cumulet_volume> volume_of(const Viewer& viewer) {
   cumulet_volume* volume = nullptr;
   check(viewer, cumulet_get_volume(viewer.get(), &volume));
   return {volume, cumulet_volume_release};
 }
 
-/// The medium that a volume that burns is first shown with, where nothing is said of it; nothing if it does not burn.
+/// Returns the default medium of a burning volume if the scene sets no medium; nullopt if the volume does not burn.
 std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
   if (!scene.is_shown() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
   return cumulet::demo::medium_of_fire(volume_of(viewer).get(), scene.medium);
 }
 
-/// The scale that suits the volume, whatever it is seen from: it was loaded with that.
+/// Logs the suggested density scale, which does not depend on the camera. The volume was loaded with it.
 void tell_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
   double scale = 0.0;
-  if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) return;  // nothing to see
+  if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) return;  // nothing visible
   std::array<char, 32> digits{};
   std::snprintf(digits.data(), digits.size(), "%g", scale);
   tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8" +
@@ -198,10 +198,10 @@ cumulet_stats stats_of(const Viewer& viewer) {
   return stats;
 }
 
-constexpr double draw_only_ms = -1.0;  // a frame's that traces nothing
-constexpr double budget_ms = 200.0;    // how often the bar moves, and how long Ctrl-C may take
+constexpr double draw_only_ms = -1.0;  // budget of a frame that traces no samples
+constexpr double budget_ms = 200.0;    // interval of progress updates, and the maximum delay of Ctrl-C
 
-/// Of the time limit, from when it is made on.
+/// The time limit. The clock starts at construction.
 class Limit {
  public:
   explicit Limit(const std::optional<double>& seconds) : seconds_(seconds) {}
@@ -209,7 +209,7 @@ class Limit {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
   [[nodiscard]] bool reached() const { return seconds_ && over() >= *seconds_; }
-  /// A frame's, so that it ends in time.
+  /// Returns the budget of the next frame in milliseconds, so that it ends in time.
   [[nodiscard]] double budget() const {
     return seconds_ ? std::clamp(1e3 * (*seconds_ - over()), least_ms, budget_ms) : budget_ms;
   }
@@ -246,7 +246,7 @@ cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& opt
   return result;
 }
 
-/// All that the samples need is there before the first of them, so that their times are theirs alone.
+/// Compiles shaders and builds grids before the first sample, so that the samples' times contain nothing else.
 void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
   const cumulet_frame_desc frame = frame_of(options);
   cumulet_warm_up_result result{};
@@ -254,14 +254,14 @@ void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progr
   do {
     progress.stage("compiling shaders", result.progress);
     check_frame(viewer, options, cumulet_warm_up(viewer.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
-    // A camera-adaptive grid is built once the size is known.
+    // A camera-adaptive grid is built when the image size is known.
     if (result.more != 0) wait(viewer, progress);
     check_not_interrupted();
   } while (result.more != 0);
   progress.stage("compiling shaders", 1.0);
 }
 
-/// The surfaces' settings, once it is known what they have.
+/// Returns the settings of the loaded surfaces: checks the animation and resolves the name of the material variant.
 cumulet_surface_settings_desc surface_settings(const Viewer& viewer, const SceneOptions& scene) {
   cumulet_surfaces* surfaces = nullptr;
   check(viewer, cumulet_get_surfaces(viewer.get(), &surfaces));
@@ -279,13 +279,13 @@ cumulet_surface_settings_desc surface_settings(const Viewer& viewer, const Scene
   return settings;
 }
 
-/// Better at once than after the samples.
+/// Fails before rendering instead of after it.
 void check_memory(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::check_memory(options, stats_of(viewer).gl_renderer, cumulet::demo::available_memory());
 }
 
-/// Empty where that is not asked for, or cannot be after all, which is told: hours of samples are worth a picture with
-/// noise.
+/// Returns an empty vector if denoising is off or fails. A failure is logged only: a noisy image is better than none
+/// after hours of rendering.
 std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, const std::string& network,
                            Progress& progress) {
   if (options.denoise == cumulet::demo::Denoise::off) return {};
@@ -298,7 +298,7 @@ std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, c
   }
 }
 
-/// Where a picture has light that its file cannot hold.
+/// Warns if the image has pixels that straight alpha in a PNG cannot represent.
 void warn_of_raised_alpha(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised,
                           std::size_t floats, Progress& progress) {
   const SceneOptions& scene = options.scene;
@@ -350,7 +350,7 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const cum
   }
 }
 
-/// The names and units are scripted against: keys are added, never renamed. What does not apply is left out.
+/// Scripts rely on these names and units: keys may be added, never renamed. Values that do not apply are omitted.
 void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend) {
   const bool tet = options.scene.grid.march == CUMULET_MARCH_TET;
   Json json;
@@ -392,7 +392,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   json["backend"] = backend;
   json["march"] = cumulet::demo::march_name(options.scene.grid.march);
   if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
-  // A driver's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
+  // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   cumulet::image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
@@ -400,13 +400,13 @@ enum class Traced { converged, late, stopped };
 
 using Clock = std::chrono::steady_clock;
 
-/// With its version: another's pictures may be of other bits.
+/// Returns vendor, renderer and version: other drivers may not give bit-identical images.
 std::string driver_of(const Viewer& viewer) {
   const cumulet_stats stats = stats_of(viewer);
   return std::string(stats.gl_vendor) + ", " + stats.gl_renderer + ", " + stats.gl_version;
 }
 
-/// Keeps what the samples have come to.
+/// Writes the accumulated samples to the checkpoint file.
 void keep(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::Checkpoint checkpoint{cumulet::demo::checkpoint_of(options), driver_of(viewer), {}};
   std::size_t size = 0;
@@ -416,13 +416,13 @@ void keep(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::write_checkpoint(options.checkpoint, checkpoint);
 }
 
-/// Of a picture that is written.
+/// Deletes the checkpoint of an image that has been written.
 void forget_checkpoint(const std::string& file) {
-  std::error_code ignored;  // it is in nobody's way
+  std::error_code ignored;  // a leftover file does no harm
   if (!file.empty()) std::filesystem::remove(file, ignored);
 }
 
-/// Where it cannot, the picture goes on: there may be room the next time.
+/// Writes a checkpoint. A failure is logged and rendering continues, because the disk may have space the next time.
 void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
   try {
     keep(viewer, options);
@@ -431,7 +431,7 @@ void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& p
   }
 }
 
-/// Begins the picture with the samples of the checkpoint.
+/// Starts the image with the samples of the checkpoint.
 void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint& from, Progress& progress) {
   constexpr double least_ms = 1.0;
   cumulet_frame_result frame{};
@@ -449,7 +449,7 @@ void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint
                                                   "): it will not be the same bits as of one alone"));
 }
 
-/// Until the picture has all it shall have, its time is up, or somebody stops it.
+/// Renders until the image has all samples, the time limit is reached, or a signal interrupts it.
 Traced trace(const Viewer& viewer, const RenderOptions& options, const std::optional<Checkpoint>& from,
              Progress& progress) {
   if (from) resume(viewer, options, *from, progress);
@@ -458,7 +458,7 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, const std::opti
   bool began = from.has_value();
   auto kept = Clock::now();
   while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
-    // A picture with holes is none: it goes on to each pixel's first sample.
+    // The time limit does not apply until each pixel has a sample.
     if (frame.width > 0 && limit.reached()) return Traced::late;
     frame = render_frame(viewer, options, limit.budget());
     if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
@@ -481,7 +481,7 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, const std::opti
 
 void tell_ending(const RenderOptions& options, Traced traced, double measured, double samples, Progress& progress) {
   using cumulet::demo::Ending;
-  // The library's sums are in single precision.
+  // The margin covers the library's single-precision sums.
   const double target = 0.01 * 1.0001 * options.scene.sampling.noise_target_percent;
   const auto noise = std::isfinite(measured) ? std::optional(measured) : std::nullopt;
   Ending ending = target > 0.0 && noise && *noise <= target ? Ending::noise : Ending::samples;
@@ -491,7 +491,7 @@ void tell_ending(const RenderOptions& options, Traced traced, double measured, d
                                                 options.time_limit));
 }
 
-/// The network to denoise by; "": none is asked for, or there is none, which is told.
+/// Returns the denoiser network; "": none is requested, or none exists, which is logged.
 std::string network_of(const RenderOptions& options, Progress& progress) {
   if (options.denoise != cumulet::demo::Denoise::high) return "";
   try {
@@ -502,7 +502,7 @@ std::string network_of(const RenderOptions& options, Progress& progress) {
   }
 }
 
-/// What pictures have in common: all of the scene but its volume, in a viewer.
+/// Viewer and scene shared by all images: everything except the volume.
 class Studio {
  public:
   explicit Studio(const RenderOptions& options)
@@ -518,8 +518,8 @@ class Studio {
   [[nodiscard]] Progress& progress() { return progress_; }
   [[nodiscard]] const Viewer& viewer() const { return viewer_; }
 
-  /// Until the scene's volume, and all else, is there. frame: of a sequence, the one that it is. Throws why it cannot
-  /// be.
+  /// Loads the scene's volume and everything else, and waits for it. frame: the frame of a sequence, or null. Throws
+  /// the cause of a failure.
   void load(const SceneOptions& scene, const PlannedFrame* frame = nullptr) {
     const auto next = frame != nullptr ? frame->next : std::nullopt;
     if (scene.is_shown()) {
@@ -539,10 +539,10 @@ class Studio {
     fire_ = medium_of_fire(viewer_, scene);
     if (fire_) check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
     wait(viewer_, progress_);
-    if (others_.plays()) cumulet_cancel(viewer_.get());  // frames that are ahead
+    if (others_.plays()) cumulet_cancel(viewer_.get());  // stops reading ahead in sequences
   }
 
-  /// What is to be said once, of a volume that is loaded.
+  /// Logs the hints about a loaded volume. Call once.
   void remark(const SceneOptions& scene) {
     if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress_, *hint);
     for (const cumulet::demo::SceneVolume& other : scene.others)
@@ -552,7 +552,7 @@ class Studio {
     if (fire_) tell_fire(*fire_, progress_);
   }
 
-  /// What can be asked for only of surfaces that are loaded.
+  /// Applies the settings that need the loaded surfaces: material variant and camera.
   void choose_in_surfaces(const RenderOptions& options) {
     const auto& scene = options.scene;
     if (!scene.surfaces.empty()) {
@@ -566,13 +566,13 @@ class Studio {
       check(viewer_, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
   }
 
-  /// From a checkpoint on, if there is one.
+  /// Renders all samples, resuming from a checkpoint if there is one.
   Traced trace(const RenderOptions& options, const std::optional<Checkpoint>& from) {
     warm_up(viewer_, options, progress_);
     return ::trace(viewer_, options, from, progress_);
   }
 
-  /// Of what is between two frames, that was traced: nothing stands in for it.
+  /// Throws unless the traced volume is the interpolated one. The library may substitute another frame.
   void require_drawn(const PlannedFrame::Next& next) const {
     cumulet_sequence_info info{};
     info.struct_size = sizeof info;
@@ -586,19 +586,19 @@ class Studio {
   void write(const RenderOptions& options) {
     const std::vector<float> denoised = denoise(viewer_, options, network_, progress_);
     progress_.stage("writing " + options.output);
-    // The picture last: where it is, all is.
+    // The image is written last: if it exists, the other files do too.
     if (!options.stats.empty()) {
-      double noise = 0.0;  // the statistics tell what was measured last
+      double noise = 0.0;  // stats.noise is the last measured value, so measure now
       check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
       write_stats(options, stats_of(viewer_), context_.name());
     }
     write_picture(viewer_, options, others_, denoised, progress_);
   }
 
-  /// For another run with a time limit.
+  /// Writes a checkpoint, so that another run can continue after the time limit.
   void keep_samples(const RenderOptions& options) { try_to_keep(viewer_, options, progress_); }
 
-  /// How the picture that is written ended. Throws if somebody stopped it.
+  /// Logs the result of the written image. Throws if rendering was interrupted.
   void tell_end(const RenderOptions& options, Traced traced) {
     const cumulet_stats stats = stats_of(viewer_);
     const cumulet_sampling_desc& sampling = options.scene.sampling;
@@ -644,8 +644,8 @@ class Studio {
     check(viewer_, cumulet_set_sequence(viewer_.get(), sequence.get()));
   }
 
-  /// What the library says of the two files comes after they are read: that another frame is shown instead of one that
-  /// cannot be is not so here.
+  /// Holds back the library's messages until both files are read: its warning that another frame is substituted does
+  /// not apply, because this program fails instead.
   void load_both(const SceneOptions& scene, const cumulet_volume_file_desc& file, const PlannedFrame::Next& next) {
     const auto print = [this](const std::string& failure) {
       for (const std::string& line : messages_.release(failure)) tell(progress_, line);
@@ -662,7 +662,7 @@ class Studio {
     print("");
   }
 
-  /// Nothing stands in for what is between two frames, nor comes after it.
+  /// Throws if one of the two frames cannot be read. Stops reading ahead first.
   void require_both() const {
     cumulet_cancel(viewer_.get());
     for (const std::uint32_t frame : {0U, 1U}) {
@@ -713,7 +713,7 @@ class Studio {
       check(viewer_, cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i),
                                       cumulet::settings::numbers_of(points), points.size()));
     }
-    // A sky is computed for the ground that there is.
+    // The ground is set first, because the sky is computed for it.
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_light(viewer_.get(), &scene.light));
     check(viewer_, cumulet_set_lamps(viewer_.get(), scene.lamps.data(), scene.lamps.size()));
@@ -727,7 +727,7 @@ class Studio {
     check(viewer_, cumulet_set_previous_camera(viewer_.get(), nullptr, 1.0 / (rate > 0.0 ? rate : usual_rate)));
     check(viewer_, cumulet_set_sampling(viewer_.get(), &sampling));
     cumulet_display_desc display = scene.display;
-    display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that
+    display.denoise = CUMULET_DENOISE_OFF;  // the image is read without denoising, and denoised separately
     check(viewer_, cumulet_set_display(viewer_.get(), &display));
     show_camera(viewer_, scene);
     if (!scene.models.empty()) check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
@@ -740,16 +740,17 @@ class Studio {
   Progress progress_;
   cumulet::demo::Messages messages_{progress_};
   Timeline timeline_;
-  // At once, not after hours of samples.
+  // Looked up first, so that an error is logged before rendering starts.
   std::string network_;
-  std::optional<cumulet_medium_desc> fire_;  // what was loaded burns, and nothing was said of that
+  std::optional<cumulet_medium_desc> fire_;  // set if the volume burns and the scene sets no medium
   Context context_;
   Viewer viewer_;
   cumulet::demo::Instances others_;
   cumulet::demo::Models models_;
 };
 
-/// That the picture goes on from. Throws where it is another's, or there could be none.
+/// Reads the checkpoint to resume from, if there is one. Throws if it belongs to another image or if the file cannot be
+/// written.
 std::optional<Checkpoint> checkpoint_for(const RenderOptions& options) {
   if (options.checkpoint.empty()) return std::nullopt;
   cumulet::image::check_writable(options.checkpoint);
@@ -781,15 +782,15 @@ void render(const RenderOptions& options) {
 
 bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
 
-/// Whether nothing that is the same for all frames of a sequence depends on a volume.
+/// Returns true if none of the settings shared by a sequence's frames has to be derived from a volume.
 bool is_settled(const SceneOptions& scene) {
   const bool placed = scene.surface_camera >= 0 || !fits(scene.camera);
   const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
   return placed && !heated && !scene.auto_density_scale && scene.ground.place != CUMULET_GROUND_BELOW;
 }
 
-/// A ground below all that is there: just below a model, for many stand on a floor of their own. Throws where there is
-/// nothing.
+/// Returns the height of a ground plane below all objects. With models it is slightly lower, because many models
+/// contain their own floor. Throws if the scene is empty.
 double ground_below(const Viewer& viewer, const SceneOptions& scene) {
   std::array<double, 3> least{};
   std::array<double, 3> most{};
@@ -798,8 +799,8 @@ double ground_below(const Viewer& viewer, const SceneOptions& scene) {
   return least[1] - (scene.surfaces.empty() && scene.models.empty() ? 0.0 : 1e-4 * size);
 }
 
-/// Takes that from the volume that is there: the density scale, how hot its temperatures are, how low the
-/// ground is, where the camera stands.
+/// Sets the settings that are derived from the loaded volume: density scale, temperature scale, ground height and
+/// camera.
 void settle(const Viewer& viewer, RenderOptions& options) {
   SceneOptions& scene = options.scene;
   const std::optional<cumulet_medium_desc> fire = medium_of_fire(viewer, scene);
@@ -808,7 +809,7 @@ void settle(const Viewer& viewer, RenderOptions& options) {
     if (fire) {
       scene.medium = *fire;
     } else if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) {
-      scale = 0.0;  // nothing to see at any
+      scale = 0.0;  // nothing is visible at any scale
     }
     check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   }
@@ -821,7 +822,7 @@ void settle(const Viewer& viewer, RenderOptions& options) {
     scene.ground.height = ground_below(viewer, scene);
     check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
   }
-  // A camera is placed by the first frame that is drawn.
+  // The first rendered frame fits the camera to the scene.
   static_cast<void>(render_frame(viewer, options, draw_only_ms));
   cumulet_camera* camera = nullptr;
   check(viewer, cumulet_get_camera(viewer.get(), &camera));
@@ -830,7 +831,7 @@ void settle(const Viewer& viewer, RenderOptions& options) {
   check(viewer, status);
 }
 
-/// A studio for the whole sequence; options become what it has in common.
+/// Creates a studio for the whole sequence, and sets the options shared by all frames.
 std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
   const SceneOptions given = options.scene;
   const bool kept = !options.settled.empty() && !is_settled(given);
@@ -843,13 +844,13 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   for (const std::string& volume : plan.judged_by) {
     SceneOptions judged = options.scene;
     judged.volume = volume;
-    const std::string state = cumulet::demo::volume_state(volume);  // before: it may be written anew meanwhile
+    const std::string state = cumulet::demo::volume_state(volume);  // before: it may be replaced meanwhile
     try {
       studio->load(judged);
-      static_cast<void>(ground_below(studio->viewer(), judged));  // an empty one tells nothing
+      static_cast<void>(ground_below(studio->viewer(), judged));  // throws if the volume is empty, to try the next one
     } catch (const std::runtime_error&) {
       check_not_interrupted();
-      continue;  // it is told where it is a frame's turn
+      continue;  // the error is reported when that frame is rendered
     }
     studio->remark(judged);
     settle(studio->viewer(), options);
@@ -859,7 +860,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   return studio;
 }
 
-/// Says in a line what became of a frame.
+/// Prints one status line per frame.
 class Report {
  public:
   explicit Report(const FramePlan& plan) : plan_(plan) {}
@@ -869,13 +870,13 @@ class Report {
     std::cout << cumulet::demo::frame_line(number, place + 1, plan_.frames.size(), state, what) << std::endl;
     if (state == FrameState::failed) failed_.push_back(number);
   }
-  /// From that one on.
+  /// Returns the text that the frames from `place` on have not been rendered.
   [[nodiscard]] std::string not_made(std::size_t place) const {
     std::vector<Moment> rest;
     for (std::size_t i = place; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
     return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not made";
   }
-  /// Throws if some failed.
+  /// Throws if any frame failed.
   void end() const {
     if (failed_.empty()) return;
     throw std::runtime_error(std::to_string(failed_.size()) + " of " + std::to_string(plan_.frames.size()) +
@@ -887,7 +888,7 @@ class Report {
   std::vector<Moment> failed_;
 };
 
-/// Makes a frame: loads its volume, traces, writes.
+/// Renders a frame: loads its volume, traces, writes.
 void render_frame_of(Studio& studio, const RenderOptions& picture, const PlannedFrame& frame, Report& report,
                      std::size_t place) {
   const auto start = Clock::now();
@@ -901,7 +902,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
     if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
     return report.say(place, FrameState::failed, error.what(), &studio.progress());
   }
-  // A picture of fewer samples would be kept as if it had all of them.
+  // Nothing is written: the next run would keep the incomplete image.
   if (traced == Traced::stopped) throw std::runtime_error("interrupted: " + report.not_made(place));
   try {
     studio.write(picture);
@@ -917,19 +918,19 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
   report.say(place, FrameState::done, picture.output + seconds.data(), &studio.progress());
 }
 
-/// The frames that are not there yet, one after the other. One whose volume is missing or corrupt does not keep the
-/// others; one that cannot be written does, for the next could not be, either.
+/// Renders the frames without output one after the other. A missing or corrupt volume fails only its own frame. A write
+/// error ends the run, because the next frames would fail too.
 void render_frames(RenderOptions options, const FramePlan& plan) {
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
   catch_signals();
-  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the lines may go: the frames are made
+  std::signal(SIGPIPE, SIG_IGN);  // rendering continues if the reader of the status lines exits
   if (!plan.passed_over.empty()) std::fprintf(stderr, "warning: %s\n", one_line(plan.passed_over).c_str());
   std::unique_ptr<Studio> studio;
   Report report(plan);
   for (std::size_t i = 0; i < plan.frames.size(); ++i) {
     const PlannedFrame& frame = plan.frames[i];
     if (!options.overwrite && cumulet::demo::is_made(frame.output)) {
-      forget_checkpoint(frame.checkpoint);  // of a run that was killed before it could
+      forget_checkpoint(frame.checkpoint);  // left over by a run that was killed
       report.say(i, FrameState::kept, frame.output, studio ? &studio->progress() : nullptr);
       continue;
     }
@@ -938,12 +939,12 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
     if (!studio) studio = open_studio(options, plan);
     studio->progress().of("frame " + frame.number.text());
     RenderOptions picture = options;
-    picture.scene.name = options.scene.label();  // that of the sequence, in each of its frames
+    picture.scene.name = options.scene.label();  // all frames have the name of the sequence
     picture.scene.volume = frame.volume;
     picture.output = frame.output;
     picture.stats = frame.stats;
     picture.checkpoint = frame.checkpoint;
-    if (frame.next) picture.scene.sequence.frame = frame.number;  // of its files alone nobody could tell which it is
+    if (frame.next) picture.scene.sequence.frame = frame.number;  // its files do not identify the frame
     render_frame_of(*studio, picture, frame, report, i);
   }
   if (studio) studio->write_trace(options);

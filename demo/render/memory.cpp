@@ -23,17 +23,17 @@ std::string gib(std::uint64_t bytes) {
 
 PictureMemory picture_memory(const RenderOptions& options) {
   const std::uint64_t pixels = std::uint64_t{options.scene.width} * options.scene.height;
-  // A sum of four floats and four counts a pixel. Surfaces without light between are layers beside it.
+  // Accumulated per pixel: four floats and four counters. Without light between surfaces, surfaces are separate layers.
   std::uint64_t gl = 32;
   if ((!options.scene.surfaces.empty() || !options.scene.models.empty()) &&
       options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
     gl += 24;
-  // Both of these are read back, to measure the noise as well.
+  // Both are read back, also for measuring the noise.
   std::uint64_t main = 32;
-  if (options.format == OutputFormat::png) main += 4 + 8;  // as displayed; filtered and packed
+  if (options.format == OutputFormat::png) main += 4 + 8;  // display bytes; filtered and packed
   if (options.format == OutputFormat::pfm) main += 12;
-  if (options.format == OutputFormat::exr) main += 16;  // the file
-  main += options.aovs.size() * 2 * 4 * sizeof(float);  // read, and in the file
+  if (options.format == OutputFormat::exr) main += 16;  // file buffer
+  main += options.aovs.size() * 2 * 4 * sizeof(float);  // read buffer and file buffer
   if (const std::uint64_t groups = options.scene.light_groups.size();
       groups > 0 && options.format == OutputFormat::exr) {
     gl += 16 * (groups + 2);
@@ -41,7 +41,7 @@ PictureMemory picture_memory(const RenderOptions& options) {
   }
   if (options.cryptomatte) {
     gl += 48;
-    main += std::uint64_t{3} * 48;  // read, in layers, and in the file
+    main += std::uint64_t{3} * 48;  // read buffer, layers, and file buffer
   }
   if (!options.aovs.empty()) {
     gl += 16 + 36;

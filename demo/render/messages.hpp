@@ -12,21 +12,22 @@
 
 namespace cumulet::demo {
 
-/// What the library logs, as lines on standard error: notes, warnings and errors. Any thread.
+/// Prints the library's log to standard error: notes, warnings and errors. Any thread.
 class Messages {
  public:
-  /// progress: is cleared before a line; it has to outlive this.
+  /// progress: cleared before each line; must outlive this object.
   explicit Messages(Progress& progress) : progress_(progress) {}
 
-  /// For cumulet_create_desc::log. user: one of these.
+  /// Callback for cumulet_create_desc::log. user: a Messages object.
   static void print(void* user, cumulet_log_level level, const char* message);
 
-  /// As HeldLines has them.
+  /// See HeldLines.
   void hold() { lines_.hold(); }
   [[nodiscard]] std::vector<std::string> release(const std::string& failure = {}) { return lines_.release(failure); }
 
  private:
-  // Whether the note is printed for the first time. Frames of a sequence have the same notes but for the file's name.
+  // Returns true if the note was not printed before. Notes are compared without the file name, so that the frames of a
+  // sequence do not repeat them.
   bool is_new(const std::string& note);
 
   Progress& progress_;

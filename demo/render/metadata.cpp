@@ -34,7 +34,7 @@ std::array<float, 16> floats(const Matrix& matrix) {
 
 std::array<double, 3> three(const double v[3]) { return {v[0], v[1], v[2]}; }
 
-/// As flags and scene files call it.
+/// Returns the name of a value in flags and scene files.
 template <class Choices, class Value>
 const char* name_of(const Choices& choices, Value value) {
   const auto* const found = std::ranges::find(choices, static_cast<int>(value), &settings::Choice::value);
@@ -50,13 +50,13 @@ std::vector<image::Attribute> camera_metadata(const double view[16], const doubl
   std::copy_n(view, 16, eye.begin());
   Matrix clip{};
   std::copy_n(projection, 16, clip.begin());
-  // OpenEXR's camera looks along +z, and its picture begins at the upper left.
+  // The OpenEXR camera looks along +z, and the image origin is the upper left corner.
   constexpr Matrix forward{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
   constexpr Matrix window{0.5, 0, 0, 0, 0, -0.5, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1};
   std::vector<image::Attribute> attributes{{"worldToCamera", floats(product(forward, eye))},
                                            {"worldToNDC", floats(product(window, product(clip, eye)))}};
   if (clip[15] == 0.0) {
-    // Of the picture a unit before the eye.
+    // Window of the image plane at distance 1 from the eye.
     attributes.push_back({"screenWindowWidth", static_cast<float>(2.0 / clip[0])});
     attributes.push_back({"screenWindowCenter",
                           std::array{static_cast<float>(clip[8] / clip[0]), static_cast<float>(clip[9] / clip[5])}});
@@ -95,7 +95,7 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   add(names::march, std::string(march_name(scene.grid.march)));
   add(names::background, std::string(name_of(settings::background_choices, scene.display.background)));
   add(names::samples, samples);
-  // No pixel has more than are asked for.
+  // True only if every pixel has all samples: no pixel has more than the requested number.
   if (shaded && samples == double(sampling.samples)) add(names::first_sample, double(sampling.first_sample));
   add(names::seed, double(sampling.seed));
   if (shaded && std::isfinite(stats.noise)) add(names::noise, stats.noise);

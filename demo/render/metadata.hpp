@@ -9,18 +9,18 @@
 
 namespace cumulet::demo {
 
-/// What an OpenEXR file says of the picture that the viewer has of this scene, width x height: how it was made, by
-/// which camera, and how much noise it has. docs/aovs.md names each. No date and no name of a machine: the same picture
-/// is the same file. Of a picture that was read back: the noise is as of then. Throws std::runtime_error, one line, for
-/// what the viewer refuses.
+/// Returns the OpenEXR attributes of the viewer's image of this scene, width x height: settings, camera and noise.
+/// docs/aovs.md describes each. They contain no date and no host name, so that equal images give equal files. Call
+/// after the image was read back: the noise is the last measured value. Throws std::runtime_error, one line, if the
+/// viewer refuses a read.
 [[nodiscard]] std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOptions& scene,
                                                         std::uint32_t width, std::uint32_t height);
 
-/// Of a camera, by its matrices as cumulet_camera_get_matrices gives them: worldToCamera, worldToNDC, and the window of
-/// one that is no orthographic one.
+/// Returns the attributes of a camera with the matrices of cumulet_camera_get_matrices: worldToCamera, worldToNDC, and
+/// for a perspective camera the screen window.
 [[nodiscard]] std::vector<image::Attribute> camera_metadata(const double view[16], const double projection[16]);
 
-/// As flags and scene files call it.
+/// Returns the name of the grid type in flags and scene files.
 [[nodiscard]] const char* march_name(cumulet_march march);
 
 }  // namespace cumulet::demo

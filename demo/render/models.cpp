@@ -14,7 +14,7 @@ void check(cumulet_status status, const char* cause) {
   if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
 }
 
-/// Throws where the surfaces have not what it asks for.
+/// Throws if the surfaces do not have the requested animation or material variant.
 cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, std::uint64_t tag) {
   cumulet_surfaces_info info{};
   info.struct_size = sizeof info;
@@ -82,7 +82,7 @@ void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models)
       ++count;
       continue;
     }
-    // One that is refused keeps none of the others from it.
+    // A refused model does not prevent the others from being shown.
     try {
       const cumulet_model_desc desc = desc_of(scene, given->surfaces.get(), i + 1);
       if (count == shown_.size()) {

@@ -11,22 +11,23 @@ namespace cumulet::demo {
 
 using SurfacesPtr = std::shared_ptr<cumulet_surfaces>;
 
-/// In any thread. Throws std::runtime_error with the library's cause.
+/// Any thread. Throws std::runtime_error with the library's error text.
 [[nodiscard]] SurfacesPtr open_surfaces(const std::string& file);
 
-/// A scene's models (SceneOptions::models) in a viewer. In the thread that has the viewer.
+/// A viewer's models (SceneOptions::models). Call from the viewer's thread.
 class Models {
  public:
-  /// The files of those to be shown that were not given yet, each once. One that the viewer shows itself is best given
-  /// those surfaces: they share triangles.
+  /// Returns the files of visible models that have not been given yet, each once. If the viewer itself shows a file,
+  /// pass those surfaces to give(): both then share triangles.
   [[nodiscard]] std::vector<std::string> missing(const std::vector<SceneModel>& models) const;
-  /// Null: they cannot be had, and are not asked for again while a scene names them.
+  /// Provides a file's surfaces. Null means that the file cannot be opened; it is not requested again while a scene
+  /// names it.
   void give(const std::string& file, SurfacesPtr surfaces);
-  /// A file's surfaces, if they were given.
+  /// Returns a file's surfaces, or null if they were not given.
   [[nodiscard]] cumulet_surfaces* surfaces(const std::string& file) const;
-  /// Shows those that were given, and forgets the files that are named no more. A model's tag is its number from 1 on.
-  /// Throws std::runtime_error with the cause, in the end, where one has not the animation or variant that it is to
-  /// show: it is then not there.
+  /// Shows the given models and drops files that the scene no longer names. A model's tag is its index + 1. A model
+  /// without the requested animation or variant is not shown. After the others are shown, std::runtime_error with the
+  /// cause is thrown.
   void show(cumulet_viewer* viewer, const std::vector<SceneModel>& models);
 
  private:

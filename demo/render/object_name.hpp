@@ -10,9 +10,9 @@
 
 namespace cumulet::demo {
 
-/// What an object of a scene is called in mattes, of what a cumulet_object_name_fn is told of it: the name of the
-/// volume or model, which all places of one share, else its file's; the ground's is "ground". others: the scene's
-/// further volumes, as the viewer shows them.
+/// Returns the Cryptomatte name of an object of the scene. kind, tag: as passed to cumulet_object_name_fn. It is the
+/// name of the volume or model, else its file name; "ground" for the ground. All transforms of a volume share one name.
+/// others: the further volumes, as shown by the viewer.
 [[nodiscard]] std::string object_name(const SceneOptions& scene, const Instances& others, cumulet_object_kind kind,
                                       std::uint64_t tag);
 

@@ -8,7 +8,7 @@
 namespace cumulet::demo {
 namespace {
 
-/// A field must not end the field or the line.
+/// Checks that the text contains no separator of fields or lines.
 std::string field(const std::string& text) {
   if (text.find_first_of("\t\n") != std::string::npos) throw std::logic_error("a tab or a new line in '" + text + "'");
   return text;
@@ -23,7 +23,7 @@ std::string option_table(const CLI::App& app) {
   for (std::string line; std::getline(footer, line);) table << "footer\t" << field(line) << '\n';
 
   for (const CLI::Option* option : app.get_options()) {
-    if (option->get_group().empty()) continue;  // hidden from --help, too
+    if (option->get_group().empty()) continue;  // options that --help also hides
     std::string spellings;
     const auto add = [&](const std::string& spelling) { spellings += (spellings.empty() ? "" : ",") + spelling; };
     for (const std::string& name : option->get_snames()) add("-" + name);

@@ -8,10 +8,11 @@ class App;
 
 namespace cumulet::demo {
 
-/// What --help says, for programs: cmake/manual.py makes manual pages and shell completions of it. A line each, its
-/// fields between tabs: "about" and a sentence; "footer" and a line of what --help ends with; "option" (or "argument",
-/// which has no dashes) with its group, its spellings between commas, the type of its value (empty: it takes none;
-/// "...": it takes several, or is given several times), "required" or nothing, and what it does.
+/// Returns the content of --help in a machine-readable form. cmake/manual.py generates manual pages and shell
+/// completions from it. One line per entry, fields separated by tabs: "about" and a sentence; "footer" and a line of
+/// the text below the options; "option", or "argument" without dashes, with its group, its spellings separated by
+/// commas, the type of its value, "required" or nothing, and its description. The type is empty for a flag without
+/// value; "..." marks an option that takes several values or can be repeated.
 [[nodiscard]] std::string option_table(const CLI::App& app);
 
 }  // namespace cumulet::demo

@@ -39,7 +39,7 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   }
 }
 
-/// The words of a value such as "0,0,1 0,0,0 40".
+/// Splits a value such as "0,0,1 0,0,0 40" at white space.
 std::vector<std::string_view> words(std::string_view text) {
   constexpr std::string_view white = " \t\n\v\f\r";
   std::vector<std::string_view> parts;
@@ -52,7 +52,7 @@ std::vector<std::string_view> words(std::string_view text) {
   return parts;
 }
 
-/// Three numbers of a range.
+/// Parses three numbers in a range.
 std::array<double, 3> parse_three(std::string_view text, const settings::Range& range) {
   const std::vector<double> values = parse_numbers(text, 3);
   for (const double value : values) {
@@ -68,14 +68,14 @@ void parse_light(std::string_view text, float (&rgb)[3]) {
   for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(values[i]);
 }
 
-/// A flag with a value; repeated, the last wins. A bad value is an error that names the flag.
+/// Adds a flag with a value. If it is repeated, the last one wins. A bad value is an error that names the flag.
 CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, const std::string& type,
                  std::function<void(const std::string&)> parse, const std::string& help) {
   const auto checked = [flag, parse = std::move(parse)](const std::string& text) {
     try {
       parse(text);
     } catch (const UsageError& error) {
-      // The long spelling is the one to be recognised in a script's log.
+      // The long spelling is easier to recognize in a script's log.
       throw CLI::ValidationError(flag.substr(flag.rfind("--")), error.what());
     }
   };
@@ -99,10 +99,10 @@ CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& fla
       help);
 }
 
-/// Whether a flag's text is a word that is dealt with and no value to parse.
+/// Returns true if the flag's text is a keyword that has been handled, so that it is not parsed as a value.
 using TakeWord = std::function<bool(std::string_view flag, const std::string& text)>;
 
-/// A number that the field can hold and that people may give.
+/// Parses a number in the range that users may set and that the field can represent.
 template <class Desc, class Value>
 Value parse_real(const settings::Setting<Desc, Value>& setting, const std::string& text) {
   const double number = parse_number(text);
@@ -113,7 +113,7 @@ Value parse_real(const settings::Setting<Desc, Value>& setting, const std::strin
   return negative ? Value{-1} : value;
 }
 
-/// A whole number that the field can hold and that people may give.
+/// Parses a whole number in the range that users may set and that the field can represent.
 template <class Desc, class Value>
 Value parse_count(const settings::Setting<Desc, Value>& setting, const std::string& text) {
   const settings::Range range = setting.given_range();
@@ -123,7 +123,7 @@ Value parse_count(const settings::Setting<Desc, Value>& setting, const std::stri
       range.most < most ? static_cast<std::uint64_t>(range.most) : std::uint64_t{std::numeric_limits<Value>::max()}));
 }
 
-/// Three numbers that the field can hold and that people may give.
+/// Parses three numbers in the range that users may set and that the field can represent.
 template <class Desc, class Value>
 void parse_triple(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
   const std::array<double, 3> given = parse_three(text, setting.given_range());
@@ -133,7 +133,7 @@ void parse_triple(const settings::Setting<Desc, Value>& setting, const std::stri
     value[i] = static_cast<std::remove_extent_t<Value>>(complement ? 1.0 - given[i] : given[i]);
 }
 
-/// x, y, width and height that the field can hold.
+/// Parses x, y, width and height.
 template <class Desc, class Value>
 void parse_rectangle(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
   const std::vector<double> given = parse_numbers(text, 4);
@@ -173,7 +173,7 @@ void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc,
   }
 }
 
-/// The flags of a descriptor's settings.
+/// Adds the flags of a descriptor's settings.
 template <class Desc>
 void add_settings(CLI::App& app, const char* group, Desc& desc, const TakeWord& take_word = {}) {
   settings::for_each<Desc>([&](const auto& setting) {
@@ -188,7 +188,7 @@ void parse_size(std::string_view text, SceneOptions& scene) {
   scene.height = static_cast<std::uint32_t>(parse_integer(sides[1], 1, 16384));
 }
 
-/// Where it stands; its lens is as it was.
+/// Sets eye, target and field of view; keeps the lens.
 void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
   const std::vector<std::string_view> parts = words(text);
   if (parts.size() != 3) throw UsageError(in_quotes(text) + " is not \"ex,ey,ez tx,ty,tz fovy\"");
@@ -254,7 +254,7 @@ std::vector<std::string> parse_light_groups(std::string_view text) {
   return names;
 }
 
-/// One key of a lamp, as scene files have it; returns whether there is such.
+/// Sets one field of a light by its scene file key. Returns false if there is no such key.
 bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::string& text) {
   bool known = false;
   settings::for_each<cumulet_lamp_desc>([&](const auto& setting) {
@@ -275,7 +275,7 @@ bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::str
   return known;
 }
 
-/// "point position=0,1,2 power=100": a kind, then keys of a scene file's lamps.
+/// Parses a light such as "point position=0,1,2 power=100": a kind, then keys and values as in scene files.
 cumulet_lamp_desc parse_lamp(std::string_view text) {
   const std::vector<std::string_view> parts = words(text);
   cumulet_lamp_desc lamp{};
@@ -307,7 +307,7 @@ cumulet_lamp_desc parse_lamp(std::string_view text) {
   return lamp;
 }
 
-/// Beside those that a scene file has; "none" takes away those before it.
+/// Adds --lamp: lights in addition to those of a scene file. "none" removes all lights before it.
 void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>& lamps) {
   const auto take = [&lamps](const std::vector<std::string>& texts) {
     try {
@@ -335,7 +335,7 @@ void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>&
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
-/// CLI11 takes "-.5" for a flag. Glued to the flag before it, it is a value.
+/// CLI11 takes "-.5" for a flag. Joined to the preceding flag with "=", it is a value.
 std::vector<std::string> glue_negative_fractions(std::vector<std::string> arguments) {
   std::vector<std::string> glued;
   for (std::string& argument : arguments) {
@@ -351,7 +351,7 @@ std::vector<std::string> glue_negative_fractions(std::vector<std::string> argume
   return glued;
 }
 
-/// In lower case, without the dot.
+/// Returns the file name extension in lower case, without the dot.
 std::string ending_of(const std::string& path) {
   const auto dot = path.find_last_of("./");
   std::string ending = dot == std::string::npos || path[dot] != '.' ? "" : path.substr(dot + 1);
@@ -368,7 +368,7 @@ OutputFormat format_of(const std::string& path) {
   throw UsageError(in_quotes(path) + " ends in none of .png, .exr, .pfm");
 }
 
-/// Help that fits a terminal of 100 columns: descriptions are broken between words.
+/// Formats help for a terminal of 100 columns, with line breaks between words.
 class HelpFormatter final : public CLI::Formatter {
  public:
   HelpFormatter() { column_width(44); }
@@ -376,7 +376,7 @@ class HelpFormatter final : public CLI::Formatter {
   std::string make_option(const CLI::Option* option, bool positional) const override {
     std::string text = "  " + make_option_name(option, positional) + make_option_opts(option);
     const std::size_t indent = get_column_width();
-    // A flag that reaches into the descriptions has a line of its own.
+    // A flag that is too long for its column gets a line of its own.
     const std::size_t used = text.size();
     if (used >= indent) text += '\n';
     text.append(used < indent ? indent - used : indent, ' ');
@@ -440,7 +440,7 @@ std::uint64_t parse_integer(std::string_view text, std::uint64_t least, std::uin
 
 void add_scene_options(CLI::App& app, SceneOptions& scene) {
   const char* group = "Scene";
-  // The first: flags take effect in the order they are added in, so that all others override what the file says.
+  // This flag must be added first: flags take effect in the order of addition, and all others override the file.
   add(
       app, group, "--scene", "FILE.json", [&](const std::string& text) { scene = load_scene(text); },
       "Scene file, as cumulet-demo saves it; the other flags override what it says");
@@ -573,7 +573,7 @@ namespace {
 
 enum class FileKind { volume, surfaces, scene };
 
-/// By its name's ending, else by its content.
+/// Detects the kind of a file by its extension, else by its content.
 FileKind kind_of(const std::string& path) {
   const std::string ending = ending_of(path);
   if (ending == "vdb" || ending == "nvdb") return FileKind::volume;
@@ -590,7 +590,7 @@ FileKind kind_of(const std::string& path) {
   throw UsageError(in_quotes(path) + " is no volume (.vdb, .nvdb), no glTF (.gltf, .glb) and no scene (.json)");
 }
 
-/// Files without a flag: one of a kind, a scene first.
+/// Adds the files without a flag: at most one of each kind. The scene is loaded first.
 void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
   const auto take = [&scene, &lit](const std::vector<std::string>& files) {
     try {
@@ -630,7 +630,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
       throw UsageError(std::string(flag) + " and --sky-model exclude each other");
   }
   if (app.count("--criterion") > 0) {
-    if (app.count("--threshold") == 0) scene.grid.threshold = 0.0;  // a scene's is that of its own criterion
+    if (app.count("--threshold") == 0) scene.grid.threshold = 0.0;  // the scene's is for its own criterion
     settings::name_criterion(scene.grid);
   }
   if (app.count("--sky") > 0) scene.light.sky = CUMULET_SKY_CONSTANT;
@@ -666,7 +666,7 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
   }
   try {
     std::vector<std::string> reversed = glue_negative_fractions(std::move(arguments));
-    std::reverse(reversed.begin(), reversed.end());  // as CLI11 wants them
+    std::reverse(reversed.begin(), reversed.end());  // CLI11 expects them in reverse order
     app.parse(std::move(reversed));
   } catch (const CLI::CallForHelp&) {
     out << app.help();
@@ -682,10 +682,10 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
 
 namespace {
 
-// A pixel, of a picture that stops by its noise or the time.
+// Samples per pixel of an image that stops at a noise target or time limit.
 constexpr std::uint32_t most_samples = 65536;
 
-// A part of a picture is what others can be merged with.
+// Checks that an image with --first-sample can be merged with others.
 void check_part(const RenderOptions& options, bool part) {
   if (!part) return;
   if (options.format != OutputFormat::exr) throw UsageError("--first-sample needs an .exr to write to");
@@ -697,7 +697,7 @@ void check_part(const RenderOptions& options, bool part) {
   if (last > std::uint64_t{1} << 32U) throw UsageError("--first-sample: the samples go beyond number 4294967295");
 }
 
-// What flags need of each other; part: of a picture.
+// Checks combinations of flags. part: --first-sample is given.
 void check_together(const RenderOptions& options, bool part) {
   if (is_empty(options.scene)) throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
   if (options.json && !options.info) throw UsageError("--json is for --info");
@@ -748,7 +748,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       "Ctrl-C writes the samples so far and exits 1; a second one stops at once.\n"
       "Of a sequence each frame is told in a line: frame 12 (3 of 20) done|kept|failed FILE...; those that\n"
       "cannot be read fail, the others are made, and it exits 1. Ctrl-C leaves the one under way unwritten.");
-  // Before the flags, which override what a scene says.
+  // Added before the flags, which override the scene.
   bool lit = false;
   add_files(app, options.scene, lit);
   add_scene_options(app, options.scene);
@@ -851,7 +851,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         if (!(options.checkpoint_every > 0.0)) throw UsageError(text + " is not above 0");
       },
       "How often (default: 300)");
-  // A scene's is of what windows show.
+  // The scene's own setting is for interactive windows.
   app.remove_option(app.get_option("--denoise"));
   add_choice(app, group, "--denoise",
              std::array{Name{"off", Denoise::off}, Name{"fast", Denoise::fast}, Name{"high", Denoise::high}},
@@ -879,14 +879,14 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});
-  // Else the samples of a picture that stops for no other reason would stop it first.
+  // Otherwise the default number of samples would end the image before the noise target or the time limit.
   const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr to write to");
   check_together(options, app.count("--first-sample") > 0);
-  // As all flags of the scene's: files of pictures that differ in it have another scene's hash.
+  // Like every scene setting, it changes the scene hash in the file.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;
   return options;
 }

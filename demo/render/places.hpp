@@ -6,9 +6,9 @@
 
 namespace cumulet::demo {
 
-/// Where the first volume stands, in that viewer, and how it moves.
+/// Sets the instance transforms and the shutter transforms of the viewer's first volume.
 [[nodiscard]] cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene);
-/// The scene's camera, and how it moves.
+/// Sets the scene's camera and its shutter poses.
 [[nodiscard]] cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene);
 
 }  // namespace cumulet::demo

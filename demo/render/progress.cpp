@@ -13,7 +13,7 @@ namespace {
 constexpr int bar_width = 24;
 constexpr double least_seconds = 0.3;
 
-/// "12.3 M": three digits, for reading only.
+/// Formats a count as "12.3 M": three digits, for display only.
 std::string format_count(double count) {
   const char* unit = "";
   for (const char* next : {"k", "M", "G", "T"}) {

@@ -6,25 +6,25 @@
 
 namespace cumulet::demo {
 
-/// One line on standard error that says how far we are; silent unless that is a terminal.
+/// A progress line on standard error; prints nothing unless that is a terminal.
 class Progress {
  public:
   Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  /// Wipes the line.
+  /// Clears the line.
   ~Progress();
 
-  /// What comes is of this: it stands before every line. Empty: nothing does.
+  /// Sets a prefix of all lines that follow; "": no prefix.
   void of(const std::string& what);
-  /// A stage whose length is not known.
+  /// Shows a stage of unknown length.
   void stage(const std::string& what);
-  /// One of which a part is done, 0 to 1.
+  /// Shows a stage with the completed fraction, 0 to 1.
   void stage(const std::string& what, double part);
-  /// Rendering, with part of what was asked for done, and so many samples. Rates are of what was done since the first
+  /// Shows the rendering stage. part: completed fraction; samples: total number so far. Rates count from the first
   /// call.
   void render(double part, double samples);
-  /// Wipes the line, so that something else can be printed.
+  /// Clears the line, so that something else can be printed.
   void clear();
 
  private:
@@ -40,23 +40,23 @@ class Progress {
   bool rendering_ = false;
 };
 
-/// What Progress::render shows: `part` is done, `gained` of it, and `samples`, in the last `seconds`. The rates are
-/// left out while so little was gained, or in so short a time, that they mean nothing.
+/// Returns the text of Progress::render. part: completed fraction; gained and samples: progress during the last
+/// `seconds`. The rates are omitted if the gain or the time is too small for a meaningful value.
 [[nodiscard]] std::string rendering_line(double part, double gained, double samples, double seconds);
 
-/// What is to be shown of a picture that ends at the first of two: part of its samples, or of the noise that is asked
-/// for, is done, and seconds of the limit are over, if there is one.
+/// Returns the completed fraction of an image that ends at the time limit or when `part` reaches 1, whichever is first.
+/// part: completed fraction of the samples or of the noise target; seconds: elapsed time.
 [[nodiscard]] double part_done(double part, double seconds, std::optional<double> limit);
 
-/// Why a picture ended.
+/// Reason why rendering ended.
 enum class Ending { samples, noise, time };
 
-/// How it went, for people: "noise 1.87 % (target 2 %) after 91 samples a pixel". noise is relative, and nothing where
-/// it is unknown; target_percent and limit as they were asked for, if they were. samples: a pixel.
+/// Returns a summary: "noise 1.87 % (target 2 %) after 91 samples a pixel". noise: relative, nullopt if unknown.
+/// target_percent, limit: as requested, 0 or nullopt if not. samples: per pixel.
 [[nodiscard]] std::string ending_line(Ending ending, std::optional<double> noise, double samples, double target_percent,
                                       std::optional<double> limit);
 
-/// "1:05", "2:01:40", "0:00".
+/// Formats a time as "1:05", "2:01:40" or "0:00".
 [[nodiscard]] std::string format_duration(double seconds);
 
 }  // namespace cumulet::demo

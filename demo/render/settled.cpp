@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view first_line = "Cumulet settled 2\n";
 
-/// What it was found for, a line; the volume's state and the scene come after it.
+/// Returns the first lines of the file: format, version, scene and image size. The volume's state and the scene follow.
 std::string head(const SceneOptions& given) {
   return std::string(first_line) + version_text() + ' ' + scene_hash(given) + ' ' + std::to_string(given.width) + 'x' +
          std::to_string(given.height) + '\n';
@@ -26,7 +26,7 @@ std::string volume_state(const std::string& volume) {
   std::error_code none;
   const std::uintmax_t size = std::filesystem::file_size(volume, none);
   const auto changed = std::filesystem::last_write_time(volume, none).time_since_epoch();
-  // Whole seconds: not all file systems have more, and nodes may see one by different ways.
+  // Whole seconds: some file systems have no finer resolution, and nodes may mount one file system differently.
   return std::to_string(size) + ' ' +
          std::to_string(std::chrono::duration_cast<std::chrono::seconds>(changed).count()) + ' ' +
          std::filesystem::path(volume).filename().string();
@@ -42,7 +42,7 @@ bool read_settled(const std::string& file, SceneOptions& scene, std::span<const 
   const std::string_view state = rest.substr(0, rest.find('\n'));
   if (state.size() == rest.size()) return false;
   const bool same = std::ranges::any_of(volumes, [&](const std::string& volume) {
-    // The name first: others need not be looked at.
+    // The name is compared first, so that other files are not accessed.
     return state.ends_with(' ' + std::filesystem::path(volume).filename().string()) && volume_state(volume) == state;
   });
   if (!same) return false;

@@ -12,8 +12,8 @@ namespace {
 
 using glm::vec3;
 
-// The skeleton: a few thermals side by side, each a stack of big lobes; lobes on lobes, smaller and smaller, outwards
-// and upwards.
+// Returns the lobes of the cloud: a few thermals side by side, each a stack of big lobes, with smaller lobes on their
+// outer and upper sides.
 std::vector<Sphere> make_lobes(std::uint32_t seed) {
   Random random(seed);
   std::vector<Sphere> lobes;
@@ -31,7 +31,7 @@ std::vector<Sphere> make_lobes(std::uint32_t seed) {
     const int floors = 3 + static_cast<int>(t.height / 14.0F);
     for (int i = 0; i < floors; ++i) {
       const float h = (static_cast<float>(i) + 0.35F) / static_cast<float>(floors);
-      // Widest at a third of the height, rounded on top.
+      // The tower narrows with height, which rounds the top.
       const float width = t.radius * (1.05F - 0.55F * h * h) * random.between(0.85F, 1.1F);
       const vec3 lean(random.between(-0.3F, 0.3F) * t.radius, 0.0F, random.between(-0.3F, 0.3F) * t.radius);
       lobes.push_back({t.foot + lean + vec3(0.0F, h * t.height, 0.0F), width});
@@ -62,7 +62,7 @@ std::vector<Sphere> make_lobes(std::uint32_t seed) {
 
 openvdb::FloatGrid::Ptr make_cumulus(const Settings& settings) {
   const Lobes field(make_lobes(settings.seed), 6.0F);
-  // The cloud fills about 92,000 cubic metres.
+  // The cloud fills about 92,000 cubic meters.
   const double voxel_size = std::cbrt(92000.0 / settings.voxels);
   const auto finest = static_cast<float>(2.2 * voxel_size);
   const std::uint32_t seed = settings.seed * 977U;
@@ -73,13 +73,13 @@ openvdb::FloatGrid::Ptr make_cumulus(const Settings& settings) {
   const auto value = [&](const vec3& p) -> float {
     const float rough = field(p);
     if (rough >= 4.6F) return 0.0F;
-    // Bend space a little, so that no lobe stays a ball.
+    // Distorts space slightly, so that lobes are not spherical.
     const vec3 q = p + 1.6F * vec3(perlin(p * 0.13F, seed), perlin(p * 0.13F, seed + 1), perlin(p * 0.13F, seed + 2)) +
                    0.55F * vec3(perlin(p * 0.42F, seed + 3), perlin(p * 0.42F, seed + 4), perlin(p * 0.42F, seed + 5));
     const float height = glm::clamp(p.y / 55.0F, 0.0F, 1.0F);
     float distance = -field(q);
     if (distance < 4.5F) {
-      // Near the border: bumps on the upper parts, wisps below.
+      // Near the boundary: bumps on the upper parts, wisps below.
       const float crisp = glm::smoothstep(0.02F, 0.25F, height);
       const float bumps = billows(q * 0.26F, finest * 0.26F, seed + 11);
       const float wisps = fbm(q * 0.34F, finest * 0.34F, seed + 7);
@@ -91,7 +91,7 @@ openvdb::FloatGrid::Ptr make_cumulus(const Settings& settings) {
     const float softness = glm::mix(1.9F, 0.55F, glm::smoothstep(0.0F, 0.35F, height));
     const float edge = glm::smoothstep(0.0F, softness, distance);
     if (edge <= 0.0F) return 0.0F;
-    // Liquid water grows with height above the base; the core varies a little.
+    // Liquid water increases with height above the base; the core varies a little.
     const float inside = 0.62F + 0.3F * height + 0.22F * fbm(p * 0.09F, std::max(finest * 0.09F, 0.12F), seed + 23);
     return edge * glm::clamp(inside, 0.2F, 1.0F);
   };

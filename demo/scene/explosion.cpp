@@ -14,12 +14,12 @@ using glm::vec3;
 
 constexpr float turn = 6.2831853F;
 
-// How far it has come, at `time` from 0 (the bang) to 1.
+// State of the explosion at `time`, from 0 (detonation) to 1.
 struct Moment {
   float time;
-  float spread;  // of what expands: a blast, then drifting
-  float height;  // of the ring's middle
-  float roll;    // radians that the ring has turned: up in the middle, down outside
+  float spread;  // size of the expanding parts: first a blast, then slow drift
+  float height;  // height of the ring's center
+  float roll;    // rotation of the ring in radians: upwards in the middle, downwards outside
   float heat;
 
   explicit Moment(float t)
@@ -30,7 +30,7 @@ struct Moment {
         heat(std::exp(-0.45F * t)) {}
 };
 
-/// Balls, each with a heat: how hot the gas in it is, 1 at most.
+/// Spheres with a gas temperature each, maximum 1.
 struct Billows {
   std::vector<Sphere> spheres;
   std::vector<float> heats;
@@ -45,12 +45,12 @@ struct Explosion {
   std::uint32_t seed;
   Moment now;
 
-  /// A ball of the ring that the fireball rolls up into, and the balls on it.
+  /// Adds the spheres of the ring that the fireball rolls up into, with their children.
   void ring(Billows& big, Billows& all) const {
     Random random(seed);
     constexpr int count = 34;
     for (int i = 0; i < count; ++i) {
-      const float theta = 2.3999632F * static_cast<float>(i);  // the golden angle: nowhere twice
+      const float theta = 2.3999632F * static_cast<float>(i);  // golden angle, so that positions do not repeat
       const float start = turn * random();
       const float phi = start - now.roll;
       const float out = random.between(0.55F, 1.0F);
@@ -64,7 +64,7 @@ struct Explosion {
       big.add(centre, radius, heat);
       children(random, centre, radius, heat, radial, phi, 0, all);
     }
-    // The dome, and what fills the middle.
+    // The dome, and the filling of the middle.
     for (int i = 0; i < 9; ++i) {
       const float theta = 2.3999632F * static_cast<float>(i);
       const float away = now.spread * 1.35F * std::sqrt(random());
@@ -96,7 +96,7 @@ struct Explosion {
     }
   }
 
-  /// What the ring draws up behind it, and the dust it pushes over the ground.
+  /// Adds the stem below the ring, and the dust that spreads over the ground.
   void stem(Billows& big, Billows& all) const {
     Random random(seed + 1);
     const vec3 x(1.0F, 0.0F, 0.0F);
@@ -123,7 +123,7 @@ struct Explosion {
     }
   }
 
-  /// Burning pieces that fly away, each on a parabola that the air brakes, and their smoke.
+  /// Adds burning debris on parabolas with air drag, and its smoke.
   void debris(Billows& big, Billows& all) const {
     Random random(seed + 2);
     const vec3 x(1.0F, 0.0F, 0.0F);
@@ -135,13 +135,13 @@ struct Explosion {
       const float size = random.between(0.13F, 0.28F);
       constexpr int puffs = 70;
       for (int k = 0; k <= puffs; ++k) {
-        const float then = static_cast<float>(k) / puffs;  // when the piece left it behind
+        const float then = static_cast<float>(k) / puffs;  // time at which the piece left the puff behind
         const float age = now.time - then;
         const vec3 drift(random.between(-1.0F, 1.0F), random.between(-0.3F, 1.3F), random.between(-1.0F, 1.0F));
         const float share = random.between(0.75F, 1.15F);
         const float along = range * (1.0F - std::exp(-3.6F * then));
         const vec3 centre = way * along + vec3(0.0F, 0.8F - 6.0F * then * then, 0.0F) + age * 0.7F * drift;
-        // What is within the fireball nobody sees.
+        // Puffs inside the fireball are invisible, so skip them.
         const bool hidden = glm::distance(centre, vec3(0.0F, now.height, 0.0F)) < 2.2F * now.spread;
         if (age < 0.0F || age > 0.8F * now.time || centre.y < 0.05F || hidden) continue;
         const float radius = size * (0.5F + 1.6F * std::sqrt(age)) * share;
@@ -160,7 +160,7 @@ std::vector<openvdb::FloatGrid::Ptr> make_explosion(const Settings& settings, in
   if (frame < 1 || frame > explosion_frames) throw std::runtime_error("the explosion has frames 1 to 20");
   const Explosion explosion{settings.seed * 131U + 5U, Moment(static_cast<float>(frame) / explosion_frames)};
   const Moment& now = explosion.now;
-  // The last frame fills about 560 cubic metres.
+  // The last frame fills about 560 cubic meters.
   const double voxel_size = std::cbrt(560.0 / settings.voxels);
   const auto finest = static_cast<float>(2.2 * voxel_size);
   const std::uint32_t seed = explosion.seed;
@@ -177,13 +177,13 @@ std::vector<openvdb::FloatGrid::Ptr> make_explosion(const Settings& settings, in
   };
   const auto values = [&](const vec3& p, float* out) {
     if (p.y < 0.0F) return;
-    // What rises takes its own detail with it, and draws it out as it expands.
+    // The detail moves with the rising gas and stretches as it expands.
     const vec3 own = (p - vec3(0.0F, now.height, 0.0F)) / (0.45F + 0.55F * now.spread) +
                      vec3(0.0F, 0.8F * now.time * std::exp(-0.2F * (p.x * p.x + p.z * p.z)), 0.0F);
     const vec3 bent =
         p + 0.22F * vec3(perlin(own * 0.8F, seed), perlin(own * 0.8F, seed + 1), perlin(own * 0.8F, seed + 2)) +
         0.09F * vec3(perlin(own * 2.3F, seed + 3), perlin(own * 2.3F, seed + 4), perlin(own * 2.3F, seed + 5));
-    // How deep below the big lobes, their seams filled: what sticks out of them has cooled.
+    // Depth below the big spheres with smoothed seams: gas that sticks out has cooled.
     float depth = -1e9F;
     float sum = 1e-12F;
     float heat = 0.0F;
@@ -197,7 +197,7 @@ std::vector<openvdb::FloatGrid::Ptr> make_explosion(const Settings& settings, in
     const float below = 0.2F * std::log(sum);
 
     float bump = 0.5F;
-    if (depth < 0.7F) {  // near the border
+    if (depth < 0.7F) {  // near the boundary
       depth = -fine(bent);
       if (depth < -0.35F) return;
       bump = billows(own * 1.5F, finest * 1.5F, seed + 11);
@@ -208,7 +208,7 @@ std::vector<openvdb::FloatGrid::Ptr> make_explosion(const Settings& settings, in
     const float patches = fbm(own * 0.55F, std::max(finest * 0.55F, 0.1F), seed + 23);
     const float crust = -0.25F + 0.95F * now.time;
     const float hot = glm::smoothstep(-0.55F, 0.75F, below - crust + 1.1F * patches - 1.2F * (bump - 0.5F)) * heat;
-    // In steps that nobody sees and that files keep small.
+    // Quantized in invisible steps, which compress better.
     const auto stepped = [](float value) { return std::round(value * 128.0F) / 128.0F; };
     out[0] = stepped(edge * (1.0F - 0.6F * glm::smoothstep(0.2F, 0.8F, hot)) *
                      glm::clamp(0.85F + 0.5F * patches, 0.4F, 1.0F));

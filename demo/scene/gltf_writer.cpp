@@ -162,7 +162,7 @@ void GltfWriter::attach_camera(int node, const glm::vec3& target, double vertica
 }
 
 void GltfWriter::spin(const std::string& name, int node, double seconds) {
-  // Thirds of a turn: between two of them the shortest way is the right one.
+  // Keys at thirds of a turn, so that the shortest rotation between two keys has the right direction.
   std::vector<float> times;
   std::vector<glm::vec4> turns;
   for (int i = 0; i <= 3; ++i) {

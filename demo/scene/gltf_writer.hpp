@@ -11,29 +11,29 @@
 
 namespace cumulet::scene {
 
-/// Puts a glTF scene together. Each adds something and gives its number in the file.
+/// Builds a glTF scene. Each function adds an element and returns its index in the file.
 class GltfWriter {
  public:
   GltfWriter();
 
-  /// RGB, `size` pixels an edge, repeated.
+  /// RGB, `size` x `size` pixels, repeated.
   int texture(const std::string& name, int size, const std::vector<std::uint8_t>& rgb);
   int material(const std::string& name, const glm::vec3& color, double metallic, double roughness);
-  /// Radiance, by KHR_materials_emissive_strength where it is above 1.
+  /// A material with emitted radiance; uses KHR_materials_emissive_strength for values above 1.
   int glowing(const std::string& name, const glm::vec3& color, const glm::vec3& radiance);
-  /// One primitive a material.
+  /// Adds a mesh with one primitive per material.
   int mesh(const std::string& name, const std::vector<std::pair<const Mesh*, int>>& parts);
 
-  /// parent, mesh: -1 for none.
+  /// parent, mesh: -1 means none.
   int node(const std::string& name, int parent, int mesh, const glm::vec3& at = glm::vec3(0.0F));
-  /// The node looks from its place at `target`.
+  /// Attaches a camera that looks from the node at `target`.
   void attach_camera(int node, const glm::vec3& target, double vertical_fov, double aspect);
-  /// Turns the node about +Y once in `seconds`, for ever: animations loop.
+  /// Rotates the node about +Y once per `seconds`, endlessly, because animations loop.
   void spin(const std::string& name, int node, double seconds);
 
   tinygltf::Material& at(int material) { return model_.materials[static_cast<std::size_t>(material)]; }
 
-  /// The .glb. Throws std::runtime_error.
+  /// Returns the content of a .glb file. Throws std::runtime_error.
   [[nodiscard]] std::string glb();
 
  private:

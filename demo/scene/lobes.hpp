@@ -1,7 +1,6 @@
 #pragma once
 
-// What billows are made of: balls on balls, smaller and smaller, sorted into a lattice so that those near a point are
-// found at once.
+// The shapes of clouds: spheres on spheres of decreasing size, stored in a uniform grid for fast lookup.
 
 #include <algorithm>
 #include <cstdint>
@@ -17,7 +16,7 @@ struct Sphere {
   float radius;
 };
 
-/// The same numbers on every machine.
+/// Random numbers that are the same on every machine.
 class Random {
  public:
   explicit Random(std::uint32_t seed) : state_(seed) {}
@@ -29,17 +28,17 @@ class Random {
   std::uint32_t count_ = 0;
 };
 
-/// The union of some spheres.
+/// The union of spheres.
 class Lobes {
  public:
-  /// reach: how far outside distances are told. At least one sphere.
+  /// reach: maximum distance outside that is computed. Requires at least one sphere.
   Lobes(std::vector<Sphere> spheres, float reach);
 
   [[nodiscard]] glm::vec3 low() const { return low_; }
   [[nodiscard]] glm::vec3 high() const { return high_; }
   [[nodiscard]] float reach() const { return reach_; }
 
-  /// Calls visit(index, signed distance) for each sphere within reach, and for some that are not.
+  /// Calls visit(index, signed distance) for each sphere within reach, and for some others.
   template <class Visit>
   void near(const glm::vec3& p, Visit&& visit) const {
     const glm::ivec3 c(glm::floor((p - low_) / cell_));
@@ -49,7 +48,7 @@ class Lobes {
     }
   }
 
-  /// Signed distance to the union, exact within reach of it, at most reach outside.
+  /// Returns the signed distance to the union; exact up to `reach` outside, otherwise `reach`.
   [[nodiscard]] float operator()(const glm::vec3& p) const {
     float nearest = reach_;
     near(p, [&](std::uint32_t /*index*/, float distance) { nearest = std::min(nearest, distance); });

@@ -1,4 +1,4 @@
-// cumulet-scene: writes the sample scene.
+// cumulet-scene: writes the sample scenes.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace {
 
 using std::filesystem::path;
 
-// Whole, or not at all.
+// Writes a file atomically.
 void replace(const path& file, const std::function<void(const path&)>& write) {
   const path unfinished = file.string() + ".part";
   write(unfinished);
@@ -57,7 +57,7 @@ void write_surfaces(const path& file, std::uint32_t seed) {
 }
 
 void save(const cumulet::demo::SceneOptions& scene, const path& file) {
-  // Version 1: programs that read scene files of Cumulet 0.1 read the samples, too.
+  // Version 1, so that programs for scene files of Cumulet 0.1 can read the samples too.
   cumulet::demo::save_scene(scene, file.string(), cumulet::demo::SceneFormat::first);
   std::printf("%s\n", file.string().c_str());
 }
@@ -70,12 +70,12 @@ void look(cumulet_camera_desc& camera, const cumulet::scene::View& view) {
   camera.fovy_degrees = view.fovy_degrees;
 }
 
-// Cumulus and mountains as README shows them.
+// Writes the cumulus and the mountains as shown in README.
 void write_scene(const path& folder) {
   cumulet::demo::SceneOptions scene;
   scene.volume = (folder / "cumulus.vdb").string();
   scene.surfaces = (folder / "mountains.glb").string();
-  scene.surface.indirect_roughness = 0.4F;  // or the sun in lake and windows makes specks
+  scene.surface.indirect_roughness = 0.4F;  // avoids fireflies from the sun's reflections in lake and windows
   look(scene.camera, {});
   scene.medium.density_scale = 0.7;
   scene.medium.max_bounces = 16;
@@ -97,7 +97,7 @@ path explosion_file(const path& folder, int frame) {
   return folder / name.data();
 }
 
-// The explosion in the evening; half burning, half soot at the frame that README shows.
+// Writes the explosion in evening light, at the frame shown in README: half fire, half soot.
 void write_explosion_scene(const path& folder, int frame) {
   cumulet::demo::SceneOptions scene;
   scene.volume = explosion_file(folder, frame).string();
@@ -120,13 +120,13 @@ void write_explosion_scene(const path& folder, int frame) {
 struct Wanted {
   std::string folder;
   std::string only;
-  double voxels = 0.0;  // 0: the setting's
-  int frame = 0;        // of the explosion; 0: all
+  double voxels = 0.0;  // 0: the default of Settings
+  int frame = 0;        // frame of the explosion; 0: all
   bool full = false;
   std::uint32_t seed = 1;
 };
 
-/// Nothing after --help or --version.
+/// Parses the arguments; nullopt after --help or --version.
 std::optional<Wanted> parse(std::vector<std::string> arguments) {
   Wanted wanted;
   CLI::App app(

@@ -48,7 +48,7 @@ void Mesh::bar(const vec3& from, const vec3& to, float half) {
 }
 
 void Mesh::turned(const vec3& foot, const std::vector<vec2>& profile, int sides) {
-  // Outwards is to the right of the way along the profile.
+  // The outward normal is to the right of the profile's direction.
   const auto outward = [&](std::size_t i) {
     const vec2 along = glm::normalize(profile[i + 1] - profile[i]);
     return vec2(along.y, -along.x);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Integer-hash noise: the same values on every machine and for any number of threads.
+// Noise from integer hashes: the same values on every machine and for any number of threads.
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace cumulet::scene {
 
-/// PCG-like mixing of a lattice point and a seed.
+/// Mixes a lattice point and a seed, similar to PCG.
 inline std::uint32_t hash(glm::ivec3 p, std::uint32_t seed) {
   std::uint32_t h = seed * 0x9e3779b9U + 0x85ebca6bU;
   for (const int c : {p.x, p.y, p.z}) {
@@ -21,7 +21,7 @@ inline std::uint32_t hash(glm::ivec3 p, std::uint32_t seed) {
   return h * 0x297a2d39U ^ (h >> 16U);
 }
 
-/// In [0, 1).
+/// Converts a hash to [0, 1).
 inline float unit(std::uint32_t h) { return static_cast<float>(h >> 8U) * (1.0F / 16777216.0F); }
 
 /// Perlin's gradient noise (2002), about -1 to 1, wavelength 1.
@@ -63,8 +63,8 @@ inline float worley(const glm::vec3& p, std::uint32_t seed) {
   return std::sqrt(nearest);
 }
 
-/// Octaves of Perlin noise from wavelength 1 down to `finest`, each half as strong; a part of an octave fades in, so
-/// detail grows with resolution without a jump.
+/// Sum of octaves of Perlin noise from wavelength 1 down to `finest`, each with half the amplitude. The last octave
+/// fades in, so that detail increases continuously with resolution.
 inline float fbm(const glm::vec3& p, float finest, std::uint32_t seed) {
   float sum = 0.0F;
   float frequency = 1.0F;
@@ -79,7 +79,7 @@ inline float fbm(const glm::vec3& p, float finest, std::uint32_t seed) {
   return sum;
 }
 
-/// Rounded bumps at several scales: octaves of 1 - Worley, 0 to about 1. The cauliflower of a cumulus.
+/// Rounded bumps at several scales: octaves of 1 - Worley, 0 to about 1. Gives the cauliflower shape of a cumulus.
 inline float billows(const glm::vec3& p, float finest, std::uint32_t seed) {
   float sum = 0.0F;
   float frequency = 1.0F;

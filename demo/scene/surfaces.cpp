@@ -16,7 +16,7 @@ namespace {
 
 constexpr float turn = 6.2831853F;
 
-// A part of each of the tower's materials. Metres, from the middle of its foot.
+// Meshes of the tower, one per material. In meters, relative to the center of its base.
 struct Tower {
   Mesh concrete, steel, copper, glass, lit, red, white, beacon;
 };
@@ -25,10 +25,10 @@ vec3 around(float angle, float radius, float height) {
   return {radius * std::cos(angle), height, radius * std::sin(angle)};
 }
 
-// The shaft's radius: a flared foot, then nearly straight.
+// Returns the shaft's radius: a flared foot, then nearly straight.
 float shaft_radius(float height) { return 2.3F + 3.0F * std::exp(-height / 11.0F); }
 
-// A window in a round wall.
+// Adds a window in a round wall.
 void pane(Mesh& mesh, float angle, float radius, float low, float high, float half_width) {
   const vec3 side = half_width * vec3(-std::sin(angle), 0.0F, std::cos(angle));
   const vec3 a = around(angle, radius, low);
@@ -43,7 +43,7 @@ void add_shaft(Tower& tower) {
     profile.emplace_back(shaft_radius(y), y);
   }
   tower.concrete.turned(vec3(0.0F), profile, 32);
-  // Fins, and between them columns of windows: a stair, so that some are lit.
+  // Fins, with columns of windows between them. Some windows of the staircase are lit.
   for (int fin = 0; fin < 8; ++fin) {
     const float angle = turn * (static_cast<float>(fin) + 0.5F) / 8.0F;
     for (int ring = 0; ring < 15; ++ring) {
@@ -60,7 +60,7 @@ void add_shaft(Tower& tower) {
   }
 }
 
-// A round storey of glass between a soffit and a roof: radius of the glass, floor and ceiling.
+// Adds a round storey of glass between a soffit and a roof: radius of the glass, heights of floor and ceiling.
 void add_storey(Tower& tower, float radius, float floor, float ceiling, int panes) {
   const float step = turn / static_cast<float>(panes);
   for (int i = 0; i < panes; ++i) {
@@ -76,7 +76,7 @@ void add_storey(Tower& tower, float radius, float floor, float ceiling, int pane
 }
 
 void add_head(Tower& tower) {
-  // The soffit, the main deck with its rail, and the copper roof.
+  // The soffit, the main deck with its railing, and the copper roof.
   tower.concrete.turned(vec3(0.0F),
                         {{2.3F, 43.0F}, {4.2F, 45.2F}, {8.6F, 47.6F}, {8.9F, 47.8F}, {8.9F, 48.3F}, {7.4F, 48.3F}}, 48);
   add_storey(tower, 7.4F, 48.3F, 51.4F, 36);
@@ -92,7 +92,7 @@ void add_head(Tower& tower) {
   }
 }
 
-// The lattice mast, in bands of red and white.
+// Adds the lattice mast in bands of red and white.
 void add_mast(Tower& tower) {
   constexpr int bays = 9;
   const auto corner = [](int bay, int leg) {
@@ -111,7 +111,7 @@ void add_mast(Tower& tower) {
                       {{0.0F, 0.0F}, {0.45F, 0.15F}, {0.55F, 0.55F}, {0.4F, 0.95F}, {0.0F, 1.1F}}, 16);
 }
 
-// The station at the foot: two gabled houses and a dome.
+// Adds the station at the foot: two gabled houses and a dome.
 void add_station(Tower& tower) {
   const auto house = [&](const vec3& at, const vec3& half, float roof) {
     tower.concrete.box(at + vec3(0.0F, half.y - 3.0F, 0.0F), {half.x, half.y + 3.0F, half.z});
@@ -153,7 +153,7 @@ void add_station(Tower& tower) {
   tower.steel.turned(dome, shell, 32);
 }
 
-// The turning head: two lenses, and an antenna under them. It looks along +X and -X.
+// Adds the rotating head: two lenses that face +X and -X, and an antenna below them.
 void add_lantern(Mesh& steel, Mesh& lamp) {
   steel.box({0.0F, -0.9F, 0.0F}, {0.25F, 0.6F, 2.6F});
   steel.box({0.0F, 0.1F, 0.0F}, {0.7F, 0.5F, 0.5F});

@@ -32,13 +32,14 @@ float ridged(const vec2& p, std::uint32_t seed) {
 
 float flat_fbm(const vec2& p, std::uint32_t seed) { return fbm(vec3(p.x, 0.71F, p.y), 0.03F, seed); }
 
-// Crest lines: x, z and height; w is how far the flanks reach.
+// A crest line: points with x, z and height. reach: width of the flanks.
 struct Crest {
   std::array<vec3, 6> points;
   float reach;
 };
 constexpr std::array<Crest, 5> crests{{
-    // The main ridge: out of the west, down to the saddle with the tower, up to the summit in the cloud, away east.
+    // The main ridge: from the west down to the saddle with the tower, up to the summit in the cloud, and on to the
+    // east.
     {{{{-330, -190, 62}, {-190, -120, 38}, {-100, -44, 20}, {-44, 0, -12}, {-4, -6, -8}, {36, -16, 33}}}, 22.0F},
     {{{{36, -16, 33}, {72, -46, 14}, {122, -84, 22}, {180, -130, 40}, {250, -190, 30}, {330, -230, 60}}}, 30.0F},
     // The horizon.
@@ -59,7 +60,7 @@ float relief(const vec2& p) {
       const float t = glm::clamp(glm::dot(p - a, b - a) / glm::dot(b - a, b - a), 0.0F, 1.0F);
       const float away = glm::distance(p, a + t * (b - a));
       const float top = glm::mix(crest.points[i].z, crest.points[i + 1].z, t) - valley;
-      // Steep at the crest, running out into the valley.
+      // Steep at the crest, flat towards the valley.
       here = std::max(here, top * std::exp(-away / crest.reach));
     }
     height = std::max(height, here) + 0.2F * std::min(height, here);
@@ -87,7 +88,7 @@ void Terrain::raise() {
       const vec2 bent = p + 20.0F * vec2(flat_fbm(p * 0.02F, seed_), flat_fbm(p * 0.02F, seed_ + 20)) +
                         6.0F * vec2(flat_fbm(p * 0.09F, seed_ + 40), flat_fbm(p * 0.09F, seed_ + 60));
       const float base = relief(bent);
-      // Spurs and couloirs on what is high, ripples in the valley.
+      // Spurs and couloirs at high altitude, ripples in the valley.
       const float spurs = 0.65F * ridged(bent * 0.017F, seed_ + 80) + 0.35F * ridged(bent * 0.043F, seed_ + 90) - 0.55F;
       const float rough = 0.10F + 0.90F * glm::smoothstep(4.0F, 45.0F, base);
       at(i, j) = valley + base * (1.0F + 0.25F * flat_fbm(p * 0.03F, seed_ + 110)) + rough * 40.0F * spurs +
@@ -96,8 +97,8 @@ void Terrain::raise() {
   }
 }
 
-// Rain, a drop at a time, that carries soil downhill as far as its speed and the slope allow (Beyer, "Implementation
-// of a method for hydraulic erosion", 2015). In units of the spacing.
+// Hydraulic erosion by rain drops, which carry as much soil downhill as their speed and the slope allow (Beyer,
+// "Implementation of a method for hydraulic erosion", 2015). Lengths are in units of the spacing.
 void Terrain::erode() {
   constexpr int drops = 90000;
   constexpr int lifetime = 56;
@@ -137,7 +138,7 @@ void Terrain::erode() {
       const float capacity = std::clamp(-drop_height, 0.01F, 0.8F) * speed * water * 0.5F;
       const glm::ivec2 c(p);
       if (soil > capacity || drop_height > 0.0F) {
-        // Fills the pit it ran into, or lets go of what it cannot carry.
+        // The drop fills the pit that it ran into, or deposits the soil that it cannot carry.
         const float amount = drop_height > 0.0F ? std::min(drop_height, soil) : 0.25F * (soil - capacity);
         soil -= amount;
         const vec2 f = p - vec2(c);
@@ -147,7 +148,7 @@ void Terrain::erode() {
         at(c.x + 1, c.y + 1) += amount * f.x * f.y;
       } else {
         const float amount = std::min(0.15F * (capacity - soil), -0.5F * drop_height);
-        // Spread over a disc: a point would dig holes. The weights of a cone of radius 2 about its middle.
+        // Erodes a disk with the weights of a cone, because erosion at a point would dig holes.
         for (int y = -radius; y <= radius; ++y) {
           for (int x = -radius; x <= radius; ++x) {
             const float weight = 2.2F - std::sqrt(static_cast<float>(x * x + y * y));
@@ -164,8 +165,8 @@ void Terrain::erode() {
   for (float& h : heights_) h *= spacing;
 }
 
-// Rock that stands too steep falls to the neighbours below it (Musgrave et al., "The synthesis and rendering of eroded
-// fractal terrains", 1989).
+// Thermal erosion: rock above the talus angle falls to the lower neighbors (Musgrave et al., "The synthesis and
+// rendering of eroded fractal terrains", 1989).
 void Terrain::crumble() {
   constexpr float talus = 1.35F * spacing;
   constexpr std::array<glm::ivec2, 4> neighbours{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
@@ -216,7 +217,7 @@ Mesh Terrain::ground() const {
       const vec3 n = normal(p.x, p.y);
       mesh.position.emplace_back(p.x, y, p.y);
       mesh.normal.push_back(n);
-      // Bent, so that the tiles do not line up.
+      // Distorted, so that tiles do not line up.
       mesh.uv.push_back(p / 17.0F + 0.4F * vec2(flat_fbm(p * 0.03F, seed_ + 200), flat_fbm(p * 0.03F, seed_ + 220)));
 
       const float blotch = flat_fbm(p * 0.06F, seed_ + 120);
@@ -225,7 +226,7 @@ Mesh Terrain::ground() const {
       vec3 color = glm::mix(vec3(0.34F, 0.29F, 0.245F), vec3(0.52F, 0.45F, 0.38F), strata);
       color *= 0.85F + 0.5F * fine;
       const float flat = n.y + 0.10F * fine + 0.06F * blotch;
-      // Scree below the cliffs, grass below it, snow on top where it holds.
+      // Scree below the cliffs, grass below the scree, snow on gentle slopes at the top.
       color = glm::mix(color, vec3(0.46F, 0.42F, 0.36F), glm::smoothstep(0.70F, 0.82F, flat));
       const float green = glm::smoothstep(0.60F, 0.80F, flat) * glm::smoothstep(8.0F, -8.0F, y + 12.0F * blotch);
       color = glm::mix(color, glm::mix(vec3(0.14F, 0.21F, 0.06F), vec3(0.30F, 0.29F, 0.10F), 0.5F + blotch), green);
@@ -262,7 +263,7 @@ Mesh Terrain::forest() const {
     if (y < lake_level + 1.2F || y > -9.0F + 14.0F * grove || n.y < 0.58F || random(2) > 0.40F + 2.2F * grove) continue;
     const float tall = glm::mix(2.2F, 4.6F, random(3));
     const std::size_t first = mesh.position.size();
-    // Two skirts of branches.
+    // Two cones of branches.
     const vec3 foot(p.x, y - 0.3F, p.y);
     mesh.turned(foot, {{0.30F * tall, 0.12F * tall}, {0.10F * tall, 0.62F * tall}}, sides);
     mesh.turned(foot, {{0.21F * tall, 0.50F * tall}, {0.0F, tall}}, sides);
@@ -275,7 +276,7 @@ Mesh Terrain::forest() const {
 
 Detail make_detail(std::uint32_t seed) {
   constexpr int size = 256;
-  // Perlin's noise on a lattice that wraps, by fading four shifted copies into each other.
+  // Noise that tiles, made by blending four shifted copies.
   const auto tile = [&](const vec2& p) {
     const auto rock = [&](const vec2& q) {
       return 0.6F * ridged(q * 5.0F, seed + 300) +
@@ -298,7 +299,7 @@ Detail make_detail(std::uint32_t seed) {
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       const float shade = 0.72F + 0.32F * at(x, y);
-      // +Y is up the picture, while rows go down it.
+      // +Y is up in the image, but rows go down.
       const vec3 n =
           glm::normalize(vec3(9.0F * (at(x - 1, y) - at(x + 1, y)), 9.0F * (at(x, y + 1) - at(x, y - 1)), 1));
       for (int k = 0; k < 3; ++k) {

@@ -9,27 +9,28 @@
 
 namespace cumulet::scene {
 
-/// The ground under the cumulus, in metres: ridges that rise into the cloud, a valley with a lake, cut by running
-/// water. Deterministic.
+/// The ground below the cumulus in meters: ridges that rise into the cloud and a valley with a lake, shaped by erosion.
+/// Deterministic.
 class Terrain {
  public:
   explicit Terrain(std::uint32_t seed);
 
-  /// Inside the terrain's square, clamped to it.
+  /// Returns the height; coordinates outside the terrain's square are clamped.
   [[nodiscard]] float height(float x, float z) const;
   [[nodiscard]] glm::vec3 normal(float x, float z) const;
 
-  /// Makes level ground at `height` around (x, z), with a slope down to what is there between the two radii.
+  /// Flattens the ground at `height` around (x, z) up to the radius `inner`, with a transition to the terrain at
+  /// `outer`.
   void level(const glm::vec2& centre, float height, float inner, float outer);
 
-  /// Snow, rock, scree and grass as vertex colours; uv in tiles of the detail texture.
+  /// Returns the ground with snow, rock, scree and grass as vertex colors. uv: in tiles of the detail texture.
   [[nodiscard]] Mesh ground() const;
-  /// Conifers where they would grow.
+  /// Returns conifers at suitable places.
   [[nodiscard]] Mesh forest() const;
 
   static constexpr float lake_level = -27.5F;
   static constexpr float spacing = 1.5F;
-  static constexpr int side = 400;  ///< vertices an edge
+  static constexpr int side = 400;  ///< vertices per edge
   static constexpr glm::vec2 low{-300.0F, -370.0F};
 
  private:
@@ -43,7 +44,7 @@ class Terrain {
   std::vector<float> heights_;
 };
 
-/// A tile of rock and scree: a factor of the colour (sRGB) and a normal map, RGB, `size` pixels an edge.
+/// A tile of rock and scree, `size` x `size` pixels RGB: a color factor (sRGB) and a normal map.
 struct Detail {
   int size = 0;
   std::vector<std::uint8_t> color;

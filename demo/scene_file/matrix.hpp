@@ -7,7 +7,7 @@ namespace cumulet::demo {
 
 using Matrix = std::array<double, 16>;  ///< 4x4, column by column
 
-/// First b, then a.
+/// Returns a * b: applies b, then a.
 [[nodiscard]] inline Matrix product(const Matrix& a, const Matrix& b) {
   Matrix c{};
   for (std::size_t column = 0; column < 4; ++column) {

@@ -8,7 +8,7 @@
 
 namespace cumulet::demo {
 
-/// How a value that is in no table of settings is spelled on the command line and in scene files.
+/// Spelling of a value on the command line and in scene files, for values that are not in a settings table.
 template <class Value>
 struct Name {
   const char* name;
@@ -24,9 +24,9 @@ inline constexpr std::array aov_names = {
     Name{"normal", CUMULET_AOV_NORMAL},       Name{"albedo", CUMULET_AOV_ALBEDO},
     Name{"error", CUMULET_AOV_ERROR},         Name{"velocity", CUMULET_AOV_VELOCITY},
     Name{"backward", CUMULET_AOV_MOTION},     Name{"volume_backward", CUMULET_AOV_VOLUME_MOTION}};
-/// Of layers that are no AOV of the library.
+/// Name of the Cryptomatte layers, which are not an AOV of the library.
 inline constexpr const char* cryptomatte_name = "cryptomatte";
-/// The names, for a message or a help text.
+/// Joins the names for an error message or a help text.
 template <class Names>
 [[nodiscard]] std::string list_names(const Names& names, const char* separator) {
   std::string text;

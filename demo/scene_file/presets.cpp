@@ -55,11 +55,11 @@ void apply(const Burning& burning, cumulet_medium_desc& medium) {
   const float temperature_scale = medium.temperature_scale;
   apply(smoke ? Preset::explosion : Preset::fire, medium);
   medium.temperature_scale = temperature_scale;
-  // Light a unit of length, over what a unit of length hides: the brightness of what is opaque.
+  // Emission per unit length divided by extinction per unit length gives the radiance of an opaque medium.
   const double hides = smoke ? medium.density_scale : 16.0 / burning.size;
   const auto strength = [](double value) { return static_cast<float>(std::clamp(value, 0.0, 1e6)); };
   medium.flame_strength = burning.flame > 0.0 ? strength(hides / burning.flame) : 1.0F;
-  // Radiance of a black body in Blender's unit, 1e-6 sigma / pi T^4.
+  // Black-body radiance in Blender's unit, 1e-6 sigma / pi T^4.
   const double kelvin = double{medium.temperature_scale} * burning.temperature;
   constexpr double hottest = 0.26;
   medium.blackbody = kelvin > 0.0 ? strength(hottest * hides / (1.805e-14 * std::pow(kelvin, 4.0))) : 0.0F;

@@ -20,23 +20,23 @@ inline constexpr std::array preset_choices = {
     settings::Choice{"ground-fog", static_cast<int>(Preset::ground_fog), "Ground fog",
                      "Small droplets: soft and pale."}};
 
-/// Sets all of the medium but the density scale, which is the volume's. What gives off light suits volumes of some ten
-/// world units.
+/// Sets all of the medium except the density scale, which belongs to the volume. The emission suits volumes of about
+/// ten world units.
 void apply(Preset preset, cumulet_medium_desc& medium);
 
-/// What of a volume gives off light.
+/// Properties of a burning volume that determine its emission.
 struct Burning {
-  double flame = 0.0;        ///< the most of its flame; 0: it has none
-  double temperature = 0.0;  ///< likewise
-  double size = 1.0;         ///< of its box, world
+  double flame = 0.0;        ///< maximum of the flame grid; 0: no flame grid
+  double temperature = 0.0;  ///< maximum of the temperature grid; 0: no temperature grid
+  double size = 1.0;         ///< diagonal of the bounding box, world units
 };
 
-/// Where nothing was said of the medium of a volume that burns: the preset "explosion" for the medium's density scale;
-/// with none, of fire alone, "fire". Its light is such that what burns most is as bright in its smoke as the preset's
-/// is in the sample explosion, however dense or large the volume is. temperature_scale stays; it must be set.
+/// Sets the default medium of a burning volume: the preset "explosion" with the medium's density scale, or "fire" if
+/// that scale is 0. The emission is scaled so that the hottest part is as bright as with the preset in the sample
+/// explosion, for any density and size. temperature_scale is kept and must be set.
 void apply(const Burning& burning, cumulet_medium_desc& medium);
 
-/// The preset that the medium is, whatever its density scale.
+/// Returns the preset that the medium equals, ignoring its density scale; nullopt if there is none.
 [[nodiscard]] std::optional<Preset> preset_of(const cumulet_medium_desc& medium);
 
 }  // namespace cumulet::demo

@@ -37,7 +37,7 @@ using settings::number_text;
 using settings::Range;
 using settings::Spelling;
 
-/// Where version 2 has what version 1 has under a name of its own.
+/// A section of version 1 and its path in version 2.
 struct Moved {
   std::string_view first;
   std::string_view second;
@@ -45,7 +45,7 @@ struct Moved {
 constexpr std::array moved = {Moved{"volume", "volumes[]"}, Moved{"medium", "volumes[].medium"},
                               Moved{"surfaces", "models[0]"}, Moved{"light", "environment"}};
 
-/// A setting's key, which is of version 1, as a version has it; what is a volume's, of that one.
+/// Translates a version 1 key to the key in `format`. volume: index of the volume that the key belongs to.
 std::string key_in(SceneFormat format, const std::string& key, std::size_t volume) {
   const std::string section = key.substr(0, key.find('.'));
   if (section == "sequence" && volume > 0) return "volumes[" + std::to_string(volume) + "]." + key;
@@ -58,21 +58,21 @@ std::string key_in(SceneFormat format, const std::string& key, std::size_t volum
 }
 
 constexpr double max_u32 = 4294967295.0;
-// JSON's numbers are exact integers up to here.
+// Largest integer up to which JSON numbers (doubles) are exact.
 constexpr double max_integer = 9007199254740992.0;
 
 [[noreturn]] void fail(const std::string& file, const std::string& cause) {
-  throw std::runtime_error(file + ": " + one_line(cause));  // a key may be of any text
+  throw std::runtime_error(file + ": " + one_line(cause));  // a key may contain any text
 }
 
-/// For a message.
+/// Lists names in quotes, for an error message.
 std::string list_quoted(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "\"" : ", \"") + name + "\"";
   return list.empty() ? "none" : list;
 }
 
-/// About an axis, x, y or z, counter-clockwise as seen against it.
+/// Returns a rotation about axis x, y or z (0 to 2), counter-clockwise when looking against the axis.
 Matrix rotation(std::size_t axis, double degrees) {
   const double angle = degrees * std::numbers::pi / 180.0;
   const std::size_t u = (axis + 1) % 3;
@@ -89,7 +89,7 @@ constexpr std::size_t most_volumes = 10'000;
 constexpr std::size_t most_models = 10'000;
 constexpr std::size_t most_cameras = 10'000;
 
-/// Scaled, then turned about x, y and z, then moved.
+/// A transform: scale, then rotations about x, y and z, then translation.
 struct PlaceParts {
   double translate[3] = {};
   double degrees[3] = {};
@@ -103,9 +103,9 @@ struct PlaceParts {
   }
 };
 
-/// A file's keys, each named by its path, such as "environment.sun.irradiance" or "lights[0].power", and taken out of
-/// it when it is read: what is left over is refused, since a misspelt key would go unnoticed. Those that moved are
-/// asked for as version 1 has them, and told as the file does.
+/// Reads a scene file. Keys are paths such as "environment.sun.irradiance" or "lights[0].power". Each key is removed
+/// when it is read, and leftover keys are an error, because a misspelled key would otherwise go unnoticed. Callers use
+/// the version 1 names of keys that moved; errors use the names of the file's version.
 class Reader {
  public:
   Reader(std::string file, Json json) : file_(std::move(file)), json_(std::move(json)) {
@@ -113,10 +113,10 @@ class Reader {
   }
 
   void set_format(SceneFormat format) { format_ = format; }
-  /// Which volume's keys are meant from now on.
+  /// Sets the volume that the following keys belong to.
   void of_volume(std::size_t volume) { volume_ = volume; }
 
-  /// How many objects a list has, at most that many; 0 where there is no list.
+  /// Returns the number of objects in a list; 0 if there is no list. More than `most` is an error.
   std::size_t list(const std::string& key, std::size_t most) {
     const auto found = json_.find(key);
     if (found == json_.end()) return 0;
@@ -140,7 +140,7 @@ class Reader {
     return value != nullptr && value->is_string();
   }
 
-  /// Whether the key's value is this word; takes nothing else.
+  /// Returns true and removes the key if its value is this word. Otherwise leaves it.
   bool word(const std::string& key, const char* word) {
     const Json* value = find(key).value;
     if (value == nullptr || !value->is_string() || value->get<std::string>() != word) return false;
@@ -169,7 +169,7 @@ class Reader {
     wrong(key, "'" + chosen + "' is none of " + list_names(names, ", "));
   }
 
-  /// Whether there is one. It holds for the number that is kept, too: a float may be less exact.
+  /// Returns true if the key exists. The range is also checked after conversion, because a float may be rounded.
   template <class Number>
   bool number(const std::string& key, Number& out, const Range& range) {
     const std::optional<Json> value = take(key);
@@ -201,7 +201,7 @@ class Reader {
     return true;
   }
 
-  /// A list of places, each 16 numbers, or an object of the parts of one.
+  /// Reads a list of transforms, each 16 numbers or an object with translate, rotate_degrees and scale.
   void places(const std::string& key, std::vector<Matrix>& out) {
     const std::optional<Json> value = take(key);
     if (!value) return;
@@ -275,13 +275,14 @@ class Reader {
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<Number>(checked(key, value[i], range));
   }
 
-  /// A value and the object that it is in; null where there is none.
+  /// A value and the object that contains it; both null if the key does not exist.
   struct Place {
     Json* value = nullptr;
     Json* object = nullptr;
   };
 
-  /// Remembers the objects and lists on the way, which may be there, be it empty.
+  /// Finds a value. Records the objects and lists on its path as known sections, which are valid even if they are
+  /// empty.
   Place find(const std::string& wanted) {
     const std::string key = key_in(format_, wanted, volume_);
     Json* at = &json_;
@@ -313,7 +314,7 @@ class Reader {
     const Place place = find(key);
     if (place.value == nullptr) return std::nullopt;
     Json taken = std::move(*place.value);
-    place.object->erase(key.substr(key.rfind('.') + 1));  // its last name is the same in all versions
+    place.object->erase(key.substr(key.rfind('.') + 1));  // the last part of a key is the same in all versions
     return taken;
   }
 
@@ -340,7 +341,7 @@ class Reader {
   std::set<std::string> sections_;
 };
 
-/// Keys that an object has twice, of which a parser keeps one without a word.
+/// Detects keys that occur twice in an object. The parser silently keeps only one of them.
 class Repeats {
  public:
   void see(Json::parse_event_t event, const Json& parsed) {
@@ -352,15 +353,15 @@ class Repeats {
     if (std::find(keys.begin(), keys.end() - 1, keys.back()) == keys.end() - 1 || !first_.empty()) return;
     for (const auto& object : objects_) first_ += (first_.empty() ? "" : ".") + object.back();
   }
-  /// Where the first one is, such as "picture.width"; "": there is none.
+  /// Returns the path of the first repeated key, such as "picture.width"; "" if there is none.
   [[nodiscard]] const std::string& first() const { return first_; }
 
  private:
-  std::vector<std::vector<std::string>> objects_;  // under way, each with its keys so far
+  std::vector<std::vector<std::string>> objects_;  // open objects, each with its keys so far
   std::string first_;
 };
 
-/// of: "camera." or "camera.open." Returns whether it says where the camera stands.
+/// Reads a camera pose. of: "camera." or "camera.open." Returns true if the eye is given.
 bool read_pose(Reader& reader, const std::string& of, bool is_end, cumulet_camera_desc& desc) {
   const bool eye = reader.three(of + "eye", desc.eye);
   const bool target = reader.three(of + "target", desc.target);
@@ -374,7 +375,7 @@ bool read_pose(Reader& reader, const std::string& of, bool is_end, cumulet_camer
   return eye;
 }
 
-/// of: "camera." or "cameras[0]." What an end says nothing of is as at the frame's moment.
+/// Reads a camera. of: "camera." or "cameras[0]." Values missing in the shutter poses are those of the camera itself.
 void read_camera(Reader& reader, SceneFormat format, const std::string& of, SceneCamera& out) {
   const bool placed = read_pose(reader, of, false, out.camera);
   reader.number(of + "lens_radius", out.camera.lens_radius, settings::not_negative);
@@ -442,7 +443,7 @@ void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting,
   }
 }
 
-/// where: "", or of one of a list "lights[0]."
+/// Reads the settings of a descriptor. where: key prefix, "" or for example "lights[0]."
 template <class Desc>
 void read_settings(Reader& reader, Desc& desc, const std::string& where = "") {
   settings::for_each<Desc>([&](const auto& setting) {
@@ -462,7 +463,7 @@ void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
   }
 }
 
-/// Where a volume or a model stands; of: "volume." or "models[0]."
+/// Reads the transform of a volume or model. of: "volume." or "models[0]."
 void read_place(Reader& reader, const std::string& of, Matrix& to_world) {
   const bool whole = reader.numbers(of + "to_world", std::span<double>(to_world), "16 numbers");
   PlaceParts place;
@@ -473,7 +474,7 @@ void read_place(Reader& reader, const std::string& of, Matrix& to_world) {
   if (parts) to_world = place.matrix();
 }
 
-/// How it moves while the shutter is open; of: likewise.
+/// Reads the transforms at shutter open and close. of: as in read_place.
 void read_shutter(Reader& reader, const std::string& of, SceneShutter& shutter) {
   const auto end = [&](const std::string& key, std::optional<Matrix>& out) {
     if (!reader.has(key)) return;
@@ -501,7 +502,7 @@ SceneFormat read_version(Reader& reader) {
   return static_cast<SceneFormat>(version);
 }
 
-/// All of a volume but the settings of its medium.
+/// Reads a volume except the settings of its medium.
 void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   reader.text("volume.file", volume.volume);
   reader.text("volume.grid", volume.grid_name);
@@ -521,7 +522,7 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   volume.visible = read_visible(reader, "volume.");
 }
 
-/// Of one beside the surfaces, of: "models[1]."
+/// Reads a model other than the scene's surfaces. of: "models[1]."
 SceneModel read_model(Reader& reader, const std::string& of) {
   SceneModel model;
   if (!reader.has(of + "file")) reader.wrong(of + "file", "is missing");
@@ -547,7 +548,8 @@ SceneModel read_model(Reader& reader, const std::string& of) {
   return model;
 }
 
-/// The first is the scene's surfaces where it stands as its file has it, and no more is said of it than version 1 can.
+/// Returns true if models[0] is a model with its own transform or name. Otherwise it is the scene's surfaces, which
+/// version 1 also supports.
 bool is_placed(Reader& reader, const std::string& of) {
   constexpr std::array keys{"name",    "to_world",    "translate", "rotate_degrees", "scale",
                             "visible", "shadow_only", "open",      "close"};
@@ -582,7 +584,7 @@ void read_sequence(Reader& reader, SceneSequence& sequence) {
     reader.wrong("sequence.last_frame", "comes before sequence.first_frame");
 }
 
-/// What the second version has and the first has not.
+/// Reads the sections that exist only in version 2.
 void read_second(Reader& reader, SceneOptions& scene) {
   reader.set_format(SceneFormat::second);
   const std::size_t volumes = reader.list("volumes", most_volumes);
@@ -628,7 +630,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   reader.finish();
 }
 
-/// The decimal number with the fewest digits that says the float: 0.1, not 0.10000000149011612.
+/// Returns the decimal number with the fewest digits that identifies the float: 0.1, not 0.10000000149011612.
 double shortest(float value) {
   std::array<char, 64> text{};
   const auto* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
@@ -637,7 +639,7 @@ double shortest(float value) {
   return number;
 }
 
-/// The albedo with the fewest digits that is read back as this coalbedo.
+/// Returns the albedo with the fewest digits that is read back as this coalbedo.
 double albedo_of(float coalbedo) {
   for (int digits = 1; digits < 17; ++digits) {
     std::array<char, 64> text{};
@@ -660,7 +662,7 @@ const char* name_of(const Names& names, Value value) {
   throw std::logic_error("a setting has no name");
 }
 
-/// Nothing for what is left to the library.
+/// Returns the JSON value of a setting; nullopt if it is left to the library's default.
 template <class Desc, class Value>
 std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const Value& value) {
   if constexpr (settings::Enumerated<Value>) {
@@ -694,12 +696,12 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
   }
 }
 
-/// A file's keys, each put where its version has it.
+/// Writes a scene's keys at the paths of the file's version.
 class Writer {
  public:
   explicit Writer(SceneFormat format) : format_(format) { json_["cumulet_scene"] = static_cast<int>(format); }
 
-  /// Which volume's keys are meant from now on.
+  /// Sets the volume that the following keys belong to.
   void of_volume(std::size_t volume) { volume_ = volume; }
   void put(const std::string& key, const Json& value) {
     std::string path = "/";
@@ -793,7 +795,8 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
 
 void put_model(Writer& writer, std::size_t number, const SceneModel& model, const std::string& file) {
   const std::string of = "models[" + std::to_string(number) + "].";
-  // What is said makes the first one of these, whatever it leaves to its file.
+  // For model 0 the name is always written, because without it the reader takes the model for the scene's surfaces.
+  // The other values of model 0 replace those of scene.surface, which were written at the same paths.
   if (!model.name.empty() || number == 0) writer.put(of + "name", model.name);
   writer.put(of + "file", file);
   if (model.to_world != Matrix{}) writer.put(of + "to_world", model.to_world);
@@ -822,7 +825,7 @@ void put_sequence(Writer& writer, const SceneSequence& sequence) {
   }
 }
 
-/// named: a file's name as it is to be written.
+/// named: function that returns a file name as it is to be written.
 template <class Named>
 Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) {
   Writer writer(format);
@@ -873,7 +876,8 @@ fs::path folder_of(const std::string& path) {
   return error ? fs::path(path).parent_path() : absolute.parent_path();
 }
 
-/// As it is written into the file at path: relative if it lies in that folder or below.
+/// Returns a file name as it is written into the scene file at `path`: relative if the file is in that folder or below
+/// it.
 std::string portable_file(const std::string& file, const std::string& path) {
   if (file.empty()) return file;
   std::error_code error;
@@ -904,7 +908,8 @@ cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow&
   const std::uint32_t last = sequence.last ? row.index_of(*sequence.last) : row.count() - 1;
   desc.first_frame = std::min(first, last);
   desc.frame_count = last - desc.first_frame + 1;
-  // From file to file is a frame of playback, whatever their numbers say; what moves has gone that far.
+  // One playback frame is the step from one file to the next, whatever the step of their numbers. Velocities are per
+  // number, so scale them by that step.
   if (row.count() > 1) {
     settings::spell_out_zeros(desc);
     desc.velocity_scale *= row.number(1) - row.number(0);
@@ -979,7 +984,7 @@ void end_shutter(SceneOptions& scene) {
 }
 
 std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {
-  if (wanted == 0 || wanted < animations) return {};  // 0: the default, of a file without any
+  if (wanted == 0 || wanted < animations) return {};  // 0 is the default, also for a file without animations
   return file + ": there is no animation " + std::to_string(wanted) + ": the file has " + std::to_string(animations);
 }
 
@@ -1029,7 +1034,7 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
       return true;
     });
   } catch (const Json::exception& error) {
-    // "[json.exception.parse_error.101] parse error at line 1, column 2: ...; last read: ..."
+    // Example: "[json.exception.parse_error.101] parse error at line 1, column 2: ...; last read: ..."
     std::string cause = error.what();
     if (const auto end = cause.find("] "); end != std::string::npos) cause.erase(0, end + 2);
     for (char& c : cause)
@@ -1062,7 +1067,7 @@ SceneOptions load_scene(const std::string& path) {
 }
 
 std::string scene_text(const SceneOptions& scene, const std::string& path, SceneFormat format) {
-  // A file's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
+  // A file name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   return to_json(scene, format, [&](const std::string& file) { return portable_file(file, path); })
              .dump(2, ' ', false, Json::error_handler_t::replace) +
          "\n";

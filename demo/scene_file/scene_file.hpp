@@ -15,30 +15,30 @@
 
 namespace cumulet::demo {
 
-/// Which way is up in a volume's file. Blender's and Mantaflow's is Z; pictures' is Y.
+/// Up axis of a volume file. Blender and Mantaflow use Z; images use Y.
 enum class UpAxis { y, z };
 
-/// Which volume is shown, and how it lies: one load.
+/// A volume file, its grids and its transform. Changing any of these requires loading it again.
 struct VolumeFile {
   std::string volume;
-  std::string grid_name = {};         // of density; "", here and below: by name
-  std::string temperature_grid = {};  // "none": without, here and below
+  std::string grid_name = {};         // density grid; "", here and below: selected by name
+  std::string temperature_grid = {};  // "none", here and below: not used
   std::string flame_grid = {};
   std::string color_grid = {};
   std::string anisotropy_grid = {};
   std::string velocity_grid = {};
-  UpAxis up = UpAxis::y;              // of the file
-  std::array<double, 16> to_world{};  // once it is upright; column by column; all 0: as its file has it
+  UpAxis up = UpAxis::y;              // up axis of the file
+  std::array<double, 16> to_world{};  // applied after the up-axis rotation; column-major; all 0: transform of the file
 
   bool operator==(const VolumeFile&) const = default;
 };
 
-/// How a volume plays, where its file's name has a place for a frame's number (demo/sequence).
+/// Playback of a volume whose file name is a frame pattern (demo/sequence).
 struct SceneSequence {
-  cumulet_playback_desc playback{};  // but for its frames, which are those from...
-  std::optional<Frame> first = {};   // ...this one's number on: else from the first that is there...
-  std::optional<Frame> last = {};    // ...to this one's: else to the last
-  std::optional<Moment> frame = {};  // where it stands, as long as no clock says
+  cumulet_playback_desc playback{};  // without the frame range, which the next fields set
+  std::optional<Frame> first = {};   // number of the first played frame; nullopt: the first file
+  std::optional<Frame> last = {};    // number of the last played frame; nullopt: the last file
+  std::optional<Moment> frame = {};  // displayed frame while no clock runs
 
   SceneSequence() { playback.struct_size = sizeof playback; }
   bool operator==(const SceneSequence& other) const {
@@ -47,10 +47,10 @@ struct SceneSequence {
   }
 };
 
-/// As the library takes it, of these files.
+/// Returns the library's playback descriptor for these files.
 [[nodiscard]] cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row);
-/// How far something is, as the shutter opens and as it closes, from where it stands in the world: 4x4, column by
-/// column; nothing: it is there.
+/// Transforms relative to the world transform of an object, at shutter open and close: 4x4, column-major; nullopt: no
+/// motion.
 struct SceneShutter {
   std::optional<std::array<double, 16>> open = {};
   std::optional<std::array<double, 16>> close = {};
@@ -58,91 +58,93 @@ struct SceneShutter {
   bool operator==(const SceneShutter&) const = default;
   [[nodiscard]] bool moves() const { return open || close; }
 };
-/// Into a descriptor's open_to_world and close_to_world, of what stands there; all 0: as its file has it.
+/// Fills a descriptor's open_to_world and close_to_world for an object with the transform to_world. All 0: transform of
+/// the file.
 void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], double (&open)[16], double (&close)[16]);
 
-/// A volume in a scene, as the library's own descriptors with struct_size set. Zero is the library's default, as there.
+/// A volume in a scene, stored as library descriptors with struct_size set. 0 means the library's default.
 struct SceneVolume : VolumeFile {
-  std::string name;  // "": its file's
+  std::string name;  // "": file name
   bool visible = true;
-  std::vector<std::array<double, 16>> places;  // where it then stands, once in each; none: there alone
-  SceneShutter shutter;                        // of all of these
+  std::vector<std::array<double, 16>> places;  // instance transforms, applied after to_world; empty: one instance
+  SceneShutter shutter;                        // for all instances
   cumulet_medium_desc medium{};
-  std::array<settings::RampPoints, settings::ramps.size()> ramps;  // as cumulet_ramp numbers them
-  SceneSequence sequence;                                          // where it is one
-  bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
+  std::array<settings::RampPoints, settings::ramps.size()> ramps;  // indexed by cumulet_ramp
+  SceneSequence sequence;                                          // for a volume that is a sequence
+  bool auto_density_scale = true;  // medium.density_scale is derived from the volume when it is loaded
 
   SceneVolume();
-  /// Its name, or its file's.
+  /// Returns the name, or the file name if there is none.
   [[nodiscard]] std::string label() const;
   [[nodiscard]] bool is_shown() const { return visible && !volume.empty(); }
 };
 
-/// A model in a scene, beside its surfaces.
+/// A model in a scene, in addition to its surfaces.
 struct SceneModel {
-  std::string file;                   // a glTF file
-  std::string name = {};              // "": its file's
-  std::array<double, 16> to_world{};  // where it stands, column by column; all 0: as its file has it
+  std::string file;                   // glTF file
+  std::string name = {};              // "": file name
+  std::array<double, 16> to_world{};  // column-major; all 0: transform of the file
   SceneShutter shutter = {};
   bool visible = true;
-  bool shadow_only = false;  // cameras do not see it
-  bool holdout = false;      // cameras see a hole
-  double time = 0.0;         // seconds into its animation
+  bool shadow_only = false;  // invisible to the camera
+  bool holdout = false;      // the camera sees a hole (alpha 0)
+  double time = 0.0;         // seconds, in its animation
   std::uint32_t animation = 0;
-  std::string variant = {};  // of its materials, by name or number; "": none
+  std::string variant = {};  // material variant, by name or number; "": none
   bool double_sided = false;
-  std::uint32_t group = 0;  // of lights
+  std::uint32_t group = 0;  // light group
 
   bool operator==(const SceneModel&) const = default;
-  /// Its name, or its file's.
+  /// Returns the name, or the file name if there is none.
   [[nodiscard]] std::string label() const;
 };
 
-/// What is looked through: where it stands, and where as the shutter opens and closes.
+/// A camera and its poses at shutter open and close.
 struct SceneCamera {
   cumulet_camera_desc camera{};
-  std::optional<cumulet_camera_desc> camera_open = {};   // nothing: as it is
-  std::optional<cumulet_camera_desc> camera_close = {};  // likewise
+  std::optional<cumulet_camera_desc> camera_open = {};   // nullopt: same as `camera`
+  std::optional<cumulet_camera_desc> camera_close = {};  // nullopt: same as `camera`
 
   SceneCamera() { camera.struct_size = sizeof camera; }
 };
 
-/// One of those that a scene keeps to look through.
+/// A saved camera of a scene.
 struct NamedCamera : SceneCamera {
-  std::string name;  // not empty, and no other's
+  std::string name;  // unique, not empty
 };
 
-/// What every demo program can show. Its first volume is what flags and the demo's panel set, and may be none.
+/// A scene, as all demo programs show it. The base class SceneVolume is the first volume, which the flags and the
+/// demo's panel edit; it may be empty.
 struct SceneOptions : SceneVolume, SceneCamera {
-  std::vector<SceneVolume> others;   // beside the first; their max_bounces are 0: the first one's counts
-  std::string surfaces;              // a glTF file; "": none
-  std::string surface_variant;       // of the surfaces' materials, by name or number; "": none
-  std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
-  std::vector<SceneModel> models;    // beside the surfaces, which stand as their file has them
+  std::vector<SceneVolume> others;   // max_bounces is 0: the first volume's value applies to all
+  std::string surfaces;              // glTF file; "": none
+  std::string surface_variant;       // material variant, by name or number; "": none
+  std::int32_t surface_camera = -1;  // index of a camera of the surfaces' file; negative: use `camera`
+  std::vector<SceneModel> models;    // in addition to the surfaces, which have the transform of their file
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
   cumulet_light_desc light{};
   std::vector<cumulet_lamp_desc> lamps;
-  std::string environment;  // a .hdr or .exr file; "": the light's sky
+  std::string environment;  // .hdr or .exr file; "": the sky of `light`
   cumulet_environment_settings_desc environment_settings{};
   cumulet_ground_desc ground{};
-  std::vector<NamedCamera> cameras;  // beside the one that is looked through
+  std::vector<NamedCamera> cameras;  // saved cameras, in addition to the current one
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
-  std::vector<std::string> light_groups;  // names of those that are kept apart, from group 0 on
+  std::vector<std::string> light_groups;  // names of the separate light groups, starting at group 0
 
   SceneOptions();
-  /// A clear day, what is lit when nothing says how: a sun from the right of a default camera, above and before it.
+  /// Sets a clear day, the light if none is given: a sun to the right of the default camera, above and in front of it.
   void set_daylight();
-  /// What scene files of version 1 mean that say nothing of light: the same sun, in a sky of one colour.
+  /// Sets the light of version 1 scene files without light: the same sun, with a constant sky color.
   void set_daylight_of_version_1();
-  /// Surrounds the scene by this file. Daylight, which nobody chose, goes.
+  /// Sets the environment map. Removes the default daylight, because the user did not choose it.
   void set_environment(const std::string& file);
 };
 
-/// Calls visit with each of a scene's groups of settings.
+/// Calls visit with each descriptor of a scene.
 template <class Scene, class Visit>
 void for_each_group(Scene& scene, Visit&& visit) {
   visit(scene.surface);
@@ -155,26 +157,25 @@ void for_each_group(Scene& scene, Visit&& visit) {
   visit(scene.display);
 }
 
-/// As the library takes it; the file must outlive it.
+/// Returns the library's descriptor. It refers to strings of `file`, which must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const VolumeFile& file);
-/// Looks through the one of its cameras that has this name. Throws std::runtime_error, a line that lists them, where
-/// there is none.
+/// Selects the saved camera with this name. Throws std::runtime_error, a line that lists the names, if there is none.
 void look_through(SceneOptions& scene, const std::string& name);
-/// The first of its cameras that is the same as what is looked through; null where none is.
+/// Returns the first saved camera that equals the current camera; null if there is none.
 [[nodiscard]] const NamedCamera* looked_through(const SceneOptions& scene);
-/// Its camera is another from now on, and stands still.
+/// Removes the camera's shutter poses: a camera that the user moves is static.
 void end_shutter(SceneOptions& scene);
 
-/// Whether there is anything to be seen.
+/// Returns true if the scene contains no volume and no surfaces.
 [[nodiscard]] inline bool is_empty(const SceneOptions& scene) {
   return scene.volume.empty() && scene.others.empty() && scene.surfaces.empty() && scene.models.empty();
 }
 
-/// Why a file with so many animations cannot be shown with this one; empty if it can. The library shows a scene at rest
-/// whose animation is not there: whoever named it meant another.
+/// Returns an error if a file with this number of animations cannot show animation `wanted`; else "". The library would
+/// show the rest pose, but a missing animation is a mistake of the user.
 [[nodiscard]] std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations);
 
-/// Names of the surfaces' variants of materials.
+/// Returns the names of the surfaces' material variants.
 [[nodiscard]] inline std::vector<std::string> variant_names(const cumulet_surfaces* surfaces) {
   std::vector<std::string> names;
   cumulet_variant_info info{};
@@ -184,43 +185,41 @@ void end_shutter(SceneOptions& scene);
   return names;
 }
 
-/// cumulet_surface_settings_desc::variant for a choice among a file's; 0 where there is none. Throws
-/// std::runtime_error, one line that lists them, where it is not among them.
+/// Returns cumulet_surface_settings_desc::variant for a variant given by name or number; 0 for "". Throws
+/// std::runtime_error, one line that lists the variants, if it does not exist.
 [[nodiscard]] std::uint32_t variant_number(const std::string& file, const std::string& wanted,
                                            const std::vector<std::string>& names);
 
-/// Why these cannot be the names of a scene's groups of lights, after what they are; empty if they can: layers of files
-/// are called so.
+/// Returns the cause if these cannot be the names of light groups, as the end of an error message; else "". The names
+/// become layer names in OpenEXR files.
 [[nodiscard]] std::string light_groups_refusal(const std::vector<std::string>& names);
 
-/// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
-/// volume is taken from its folder. What the text does not say is as in SceneOptions(), on a clear day; of version
-/// 1 in that version's daylight.
-/// Throws std::runtime_error, one line with the path, the key and the cause.
+/// Parses the text of a scene file (JSON: docs/scene_file.md). path: the file's name, for errors; relative file names
+/// are resolved against its folder. Missing settings are as in SceneOptions(); missing light is a clear day, or the
+/// daylight of version 1. Throws std::runtime_error, one line with the path, the key and the cause.
 [[nodiscard]] SceneOptions parse_scene(const std::string& text, const std::string& path);
-/// Reads a file. Throws likewise.
+/// Reads a scene file. Throws as parse_scene.
 [[nodiscard]] SceneOptions load_scene(const std::string& path);
 
-/// Versions of the format. The first knows one volume, without a place, and no lamps: what is written in it is without
-/// the rest.
+/// Versions of the file format. Version 1 has one volume without transform and no lights; saving in it drops the rest.
 enum class SceneFormat { first = 1, second = 2 };
 
-/// The text that parse_scene reads: every setting is spelled out but those left to the library. A volume in the
-/// file's folder, or below it, is named relative to it.
+/// Returns the text for parse_scene. All settings are written except those left to the library's default. Files in the
+/// scene file's folder or below it get relative names.
 [[nodiscard]] std::string scene_text(const SceneOptions& scene, const std::string& path,
                                      SceneFormat format = SceneFormat::second);
-/// Writes it in one step: a failure leaves the old file. Throws likewise.
+/// Writes the file atomically: on failure the old file remains. Throws as parse_scene.
 void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format = SceneFormat::second);
 
-/// Whether two scenes say the same.
+/// Returns true if both scenes have the same content. The displayed frame is ignored.
 [[nodiscard]] bool same_scene(const SceneOptions& a, const SceneOptions& b);
 
-/// The version of cumulet.h: major.minor.patch.
+/// Returns the version of cumulet.h: major.minor.patch.
 [[nodiscard]] std::string version_text();
 
-/// 16 hexadecimal digits that pictures share that show the same: of all settings but how long a picture takes (samples,
-/// noise target and how it is met, seed), and of the files' names, without folders, and sizes. FNV-1a: for telling
-/// pictures apart, not for proof.
+/// Returns 16 hexadecimal digits that are equal for scenes with the same content. They cover all settings except number
+/// of samples, noise target, adaptive sampling and seed, and the names and sizes of the files without folders. FNV-1a:
+/// it distinguishes images, but does not protect against manipulation.
 [[nodiscard]] std::string scene_hash(const SceneOptions& scene);
 
 }  // namespace cumulet::demo

@@ -16,7 +16,7 @@ constexpr std::size_t most_digits = 9;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Where the file's own name begins.
+/// Returns the position where the file name begins, after the folder.
 std::size_t name_begin(std::string_view path) {
   const auto slash = path.rfind('/');
   return slash == std::string_view::npos ? 0 : slash + 1;
@@ -34,7 +34,7 @@ struct Place {
   std::size_t digits;
 };
 
-/// The number at a place of the text; 0 for none, and more than most_digits for what is too much.
+/// Parses the digits at a position; 0 if there are none, more than most_digits on overflow.
 std::size_t number_at(std::string_view text, std::size_t at, std::size_t length) {
   std::size_t number = 0;
   const auto digits = text.substr(at, length);
@@ -42,7 +42,7 @@ std::size_t number_at(std::string_view text, std::size_t at, std::size_t length)
   return length > 0 && error != std::errc{} ? most_digits + 1 : number;
 }
 
-/// Something with digits between two words: "%" ... "d", "$F" ..., "<frame" ... ">".
+/// Matches digits between two strings: "%" ... "d", "$F" ..., "<frame" ... ">".
 std::optional<Place> worded(std::string_view path, std::size_t at, std::string_view before, std::string_view after) {
   if (path.substr(at, before.size()) != before) return std::nullopt;
   const std::size_t digits = run_of_digits(path, at + before.size());
@@ -81,7 +81,8 @@ std::optional<FramePattern> FramePattern::of_file(const std::string& path) {
   const std::size_t begin = name_begin(path);
   const auto dot = path.rfind('.');
   std::size_t end = dot == std::string::npos || dot <= begin ? path.size() : dot;
-  // Of several numbers the one that files differ in: k_1001_v2.vdb is a frame, not a version. The last if none tells.
+  // With several numbers in the name, the frame number is the one in which most files differ: in k_1001_v2.vdb it is
+  // 1001, not the version. The last one is used if there is no difference.
   std::optional<FramePattern> found;
   std::size_t most = 0;
   while (end > begin) {
@@ -159,7 +160,7 @@ std::optional<Frame> FramePattern::frame_of(std::string_view path) const {
   Frame frame = 0;
   const auto [end, error] = std::from_chars(number->data(), number->data() + number->size(), frame);
   if (error != std::errc{} || frame > last_frame || frame < first_frame) return std::nullopt;
-  // Zeros more or less, and it is no file of these.
+  // A file with another number of zeros does not belong to the sequence.
   return file(frame) == path ? std::optional(frame) : std::nullopt;
 }
 

@@ -10,7 +10,7 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr std::uint32_t most_played = 1'000'000;  // the library's
+constexpr std::uint32_t most_played = 1'000'000;  // limit of the library
 
 }  // namespace
 

@@ -10,28 +10,30 @@
 
 namespace cumulet::demo {
 
-/// How far files are apart: what divides all the ways from the first to another; 1 of a single one. there: not empty,
-/// ascending.
+/// Returns the step of a sequence: the greatest common divisor of the distances between files; 1 for a single file.
+/// there: not empty, ascending.
 [[nodiscard]] Frame step_of(const std::vector<Frame>& there);
 
-/// The largest file first; those that are not there last, in the order in which they were.
+/// Sorts files by size, largest first. Missing files come last, in their given order.
 [[nodiscard]] std::vector<std::string> by_size(const std::vector<std::string>& files);
 
-/// Numbered files as they play: a frame each, from the first that is there to the last, in equal steps. One that is not
-/// there is a gap, and takes its time.
+/// A sequence of numbered files: one frame per file, from the first existing file to the last, with a constant step. A
+/// missing file is a gap that takes the time of a frame.
 class FrameRow {
  public:
-  /// Of a name with a place for a number. Nothing for a name without, and for a file that is there by just that name.
-  /// Throws UsageError as FramePattern::parse, and std::runtime_error, one line, where no such file is there.
+  /// Returns the sequence of a file name pattern. Returns nullopt for a name without placeholder, or if a file with
+  /// exactly this name exists. Throws UsageError as FramePattern::parse, and std::runtime_error, one line, if no file
+  /// matches.
   [[nodiscard]] static std::optional<FrameRow> of_name(const std::string& name);
-  /// That this file is in; nothing where it is the only one.
+  /// Returns the sequence that this file belongs to; nullopt if there is no other file.
   [[nodiscard]] static std::optional<FrameRow> around(const std::string& file);
 
   [[nodiscard]] std::uint32_t count() const { return count_; }
   [[nodiscard]] Frame number(std::uint32_t index) const { return first_ + static_cast<Frame>(index) * step_; }
-  /// The nearest.
+  /// Returns the index of the nearest frame.
   [[nodiscard]] std::uint32_t index_of(Frame number) const;
-  /// Between its frames, too: the third of 40, 42, 44 and what follows is at 1, and 41 at 0.5.
+  /// Returns the possibly fractional index of a frame number: with files 40, 42, 44, number 42 is at 1 and number 41 at
+  /// 0.5.
   [[nodiscard]] double position_of(const Moment& moment) const;
   [[nodiscard]] std::string file(std::uint32_t index) const { return pattern_.file(number(index)); }
   [[nodiscard]] std::vector<std::string> files() const;

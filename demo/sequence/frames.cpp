@@ -30,7 +30,7 @@ std::int64_t parse_digits(std::string_view digits, std::string_view part, bool n
   return static_cast<std::int64_t>(number);
 }
 
-/// In thousandths.
+/// Parses a frame number with up to three decimals; returns thousandths.
 std::int64_t parse_moment(std::string_view text, std::string_view part) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -47,7 +47,8 @@ std::int64_t parse_moment(std::string_view text, std::string_view part) {
   return negative ? -moment : moment;
 }
 
-/// What stands before the character, and what behind it; all and nothing, where it is not. It is searched from there.
+/// Splits the text at the first occurrence of a character at or after `from`. If there is none, the second part is
+/// empty.
 std::pair<std::string_view, std::string_view> cut(std::string_view text, char at, std::size_t from = 0) {
   const auto place = text.find(at, from);
   if (place == std::string_view::npos) return {text, {}};
@@ -59,7 +60,7 @@ std::pair<std::string_view, std::string_view> cut(std::string_view text, char at
 std::string Moment::part_text(std::size_t decimals) const {
   const std::size_t shown = std::max(decimals, this->decimals());
   if (shown == 0) return "";
-  // Halfway from -2 to -1 is -1.5.
+  // -1.5 is stored as frame -2 and 500 thousandths.
   const std::int64_t part = is_negative() && is_between() ? whole - thousandths : thousandths;
   std::string digits = std::to_string(whole + part);
   digits.front() = '.';
@@ -96,7 +97,7 @@ std::vector<Moment> parse_frames(std::string_view text) {
 
     const bool steps = part.find('x') != std::string_view::npos;
     const auto [range, step_text] = cut(part, 'x');
-    // A minus in front is the first number's sign, and the next one is the range's.
+    // A leading minus is the sign of the first number; the next minus is the range operator.
     const std::size_t sign = range.starts_with('-') ? 1 : 0;
     const bool ranges = range.find('-', sign) != std::string_view::npos;
     const auto [first_text, last_text] = cut(range, '-', sign);

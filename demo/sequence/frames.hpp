@@ -8,14 +8,15 @@
 
 namespace cumulet::demo {
 
-/// A frame's number. Sequences may begin before 0.
+/// Frame number. It may be negative.
 using Frame = std::int32_t;
 
-/// The largest and the smallest number.
+/// Limits of frame numbers.
 inline constexpr Frame last_frame = 9'999'999;
 inline constexpr Frame first_frame = -last_frame;
 
-/// A frame, or what is so many thousandths of the way from it to the next: -1.5 is halfway from frame -2 to frame -1.
+/// A possibly fractional frame number: the frame and the thousandths of the way to the next one. -1.5 is halfway from
+/// frame -2 to frame -1.
 struct Moment {
   Frame frame = 0;
   std::uint32_t thousandths = 0;  // below 1000
@@ -30,22 +31,22 @@ struct Moment {
   [[nodiscard]] std::int64_t in_thousandths() const { return std::int64_t{1000} * frame + thousandths; }
   [[nodiscard]] bool is_between() const { return thousandths != 0; }
   [[nodiscard]] bool is_negative() const { return frame < 0; }
-  /// Its digits before the decimal point, without a sign: "1" of -1.5.
+  /// Returns the digits before the decimal point, without sign: "1" for -1.5.
   [[nodiscard]] std::string whole_text() const;
-  /// "5", "5.25", "-1.5".
+  /// Returns the number as text: "5", "5.25", "-1.5".
   [[nodiscard]] std::string text() const;
-  /// ".25"; "" of a frame. With so many decimals at least: ".250".
+  /// Returns the decimals, ".25", or "" for a whole number. decimals: minimum number of decimals, 3 gives ".250".
   [[nodiscard]] std::string part_text(std::size_t decimals = 0) const;
-  /// That it has: 0 to 3.
+  /// Returns the number of decimals, 0 to 3.
   [[nodiscard]] std::size_t decimals() const;
 };
 
-/// "5", "1-100", "1-100x2" (1, 3, 5, ... up to 100), "1-2x0.25" (1, 1.25, ... 2; three decimals at most), "-2-2" (from
-/// -2 to 2), "-4--2" (from -4 to -2) and several of them between commas, in the order they are named in, each once.
-/// Throws UsageError, which quotes what it cannot read.
+/// Parses a list of frames and ranges, separated by commas: "5", "1-100", "1-100x2" (1, 3, 5, ... up to 100),
+/// "1-2x0.25" (1, 1.25, ... 2; maximum three decimals), "-2-2" (from -2 to 2), "-4--2" (from -4 to -2). The order is
+/// kept; repeated frames are dropped. Throws UsageError, which quotes the invalid part.
 [[nodiscard]] std::vector<Moment> parse_frames(std::string_view text);
 
-/// The same in few words, of moments in any order: "1-3, 7, 10-20, 20.5".
+/// Formats a list of frames in any order as ranges: "1-3, 7, 10-20, 20.5".
 [[nodiscard]] std::string frames_text(const std::vector<Moment>& moments);
 
 }  // namespace cumulet::demo

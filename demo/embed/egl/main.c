@@ -1,7 +1,7 @@
 /*
- * Cumulet from C, with EGL alone: no window, no toolkit. Renders a volume into a framebuffer of its own.
+ * Cumulet from C with EGL only: no window and no toolkit. Renders a volume into a framebuffer.
  *
- *     cumulet-embed-egl --volume FILE [--test OUT_DIR]      writes OUT_DIR/egl.ppm, or egl.ppm here
+ *     cumulet-embed-egl --volume FILE [--test OUT_DIR]      writes egl.ppm to OUT_DIR or the current folder
  */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -18,7 +18,7 @@ static void fail(const char* cause) {
   exit(1);
 }
 
-/* An OpenGL 4.5 core context without a surface, on the first EGL device that has one. */
+/* Creates an OpenGL 4.5 core context without a surface on the first EGL device that supports it. */
 static void make_context(void) {
   PFNEGLQUERYDEVICESEXTPROC query_devices = (PFNEGLQUERYDEVICESEXTPROC)eglGetProcAddress("eglQueryDevicesEXT");
   EGLDeviceEXT devices[16];
@@ -38,7 +38,7 @@ static void make_context(void) {
 
 static void* get_proc(void* user, const char* name) {
   (void)user;
-  union { /* ISO C has no cast between the two */
+  union { /* ISO C has no cast from a function pointer to void* */
     __eglMustCastToProperFunctionPointerType function;
     void* pointer;
   } address = {eglGetProcAddress(name)};

@@ -1,9 +1,9 @@
-// Cumulet in a GLFW window: mouse and keys go to the viewer, frames are drawn while there is something new.
+// Cumulet in a GLFW window: mouse and keys are passed to the viewer, and frames are drawn while there is something new.
 //
 //     cumulet-embed-glfw --volume FILE [--test OUT_DIR]
 //
-// F frames all, Escape quits, P writes glfw-N.ppm (to OUT_DIR or here) once the picture has all its samples. --test:
-// a small window with few samples.
+// F frames all, Escape quits, P writes glfw-N.ppm (to OUT_DIR or the current folder) when the image has all samples.
+// --test: a small window with few samples.
 #include <cumulet/cumulet.hpp>
 
 #define GL_GLEXT_PROTOTYPES
@@ -63,7 +63,7 @@ cumulet::Key key_of(int key) {
   }
 }
 
-/// Adds the modifiers, and the pointer's position in physical pixels.
+/// Adds the modifiers and the pointer position in physical pixels.
 void feed(GLFWwindow* window, cumulet::Event event) {
   int width = 0, height = 0, pixels_x = 0, pixels_y = 0;
   double x = 0.0, y = 0.0;
@@ -141,7 +141,7 @@ void run(GLFWwindow* window, Host& host, const std::string& volume, bool test) {
     float scale = 1.0F;
     glfwGetFramebufferSize(window, &width, &height);
     glfwGetWindowContentScale(window, &scale, nullptr);
-    glDisable(GL_SCISSOR_TEST);  // GlState::host_resets: what we use, we set
+    glDisable(GL_SCISSOR_TEST);  // GlState::host_resets: the host sets all state that it uses
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClear(GL_COLOR_BUFFER_BIT);
@@ -161,7 +161,7 @@ void run(GLFWwindow* window, Host& host, const std::string& volume, bool test) {
       glfwWaitEvents();
     }
   }
-  host.viewer = {};  // while the context is there
+  host.viewer = {};  // destroyed while the context exists
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 /*
  * A GTK 4 host in C: a window with a Cumulet viewer in a GtkGLArea, an exposure slider and a status line.
  *
- * The first half is what to copy. The self-test at the end is what the tests run.
+ * Copy the first half. The self-test at the end is run by the tests.
  */
 #include <cumulet/cumulet.h>
 #include <epoxy/egl.h>
@@ -11,25 +11,25 @@
 #include <gtk/gtk.h>
 
 typedef struct Host {
-  cumulet_viewer* viewer; /* made detached; lives as long as the window, whatever contexts the area has */
+  cumulet_viewer* viewer; /* created detached; exists as long as the window, independent of the area's contexts */
   GtkWindow* window;
   GtkGLArea* area;
   GtkRange* exposure;
   GtkLabel* status;
   guint timer;
-  guint tick; /* asks for another frame; 0: none is wanted */
+  guint tick; /* tick callback that requests another frame; 0: none */
   cumulet_frame_result result;
-  double budget_ms; /* for a frame; 0: Cumulet's default */
+  double budget_ms; /* frame budget; 0: Cumulet's default */
   guint frames;
   guint contexts;
-  gint problems; /* atomic: warnings come from any thread */
+  gint problems; /* atomic, because warnings come from any thread */
   char* volume;
   char* test_folder;
 } Host;
 
 static gboolean self_test(gpointer user);
 
-/* Reports a call that failed. */
+/* Reports a failed call. */
 static gboolean ok(Host* host, cumulet_status status) {
   if (status == CUMULET_OK) return TRUE;
   g_atomic_int_inc(&host->problems);
@@ -40,12 +40,12 @@ static gboolean ok(Host* host, cumulet_status status) {
 
 /* ---- The viewer's callbacks ------------------------------------------------------------------------------------- */
 
-/* The area's context is an EGL or a GLX one: GTK decides. */
+/* GTK creates an EGL or a GLX context for the area. */
 static void* get_proc(void* user, const char* name) {
   (void)user;
   union {
     void (*function)(void);
-    void* address; /* ISO C has no cast from one to the other */
+    void* address; /* ISO C has no cast from a function pointer to void* */
   } proc;
   if (eglGetCurrentContext() != EGL_NO_CONTEXT)
     proc.function = eglGetProcAddress(name);
@@ -59,7 +59,8 @@ static gboolean draw_again(gpointer user) {
   return G_SOURCE_REMOVE;
 }
 
-/* From any thread: only g_idle_add may be called here, neither GTK nor Cumulet. on_destroy removes what is left. */
+/* Called from any thread. Only g_idle_add is allowed here; GTK and Cumulet must not be called. on_destroy removes
+ * pending sources. */
 static void on_update(void* user) { g_idle_add(draw_again, user); }
 
 static void on_log(void* user, cumulet_log_level level, const char* message) {
@@ -70,7 +71,7 @@ static void on_log(void* user, cumulet_log_level level, const char* message) {
 
 /* ---- The area's context and frames ------------------------------------------------------------------------------ */
 
-/* The area has a new context: at first, and whenever it comes into another window. */
+/* The area has a new context: at the start, and whenever it moves to another window. */
 static void on_realize(GtkWidget* widget, gpointer user) {
   Host* host = user;
   (void)widget;
@@ -86,7 +87,7 @@ static void on_realize(GtkWidget* widget, gpointer user) {
   ok(host, cumulet_attach(host->viewer, get_proc, NULL));
 }
 
-/* The context is about to go, and is current for the last time. Volume, settings and camera stay. */
+/* The context is destroyed after this call and is current for the last time. Volume, settings and camera are kept. */
 static void on_unrealize(GtkWidget* widget, gpointer user) {
   Host* host = user;
   if (host->tick) gtk_widget_remove_tick_callback(widget, host->tick);
@@ -107,8 +108,8 @@ static gboolean on_tick(GtkWidget* widget, GdkFrameClock* clock, gpointer user) 
 static gboolean on_render(GtkGLArea* area, GdkGLContext* context, gpointer user) {
   Host* host = user;
   (void)context;
-  /* GTK has bound a framebuffer of its own, never 0, with the size in physical pixels. Before there is a picture
-   * Cumulet draws nothing. */
+  /* GTK binds its own framebuffer, never 0, with the size in physical pixels. Cumulet draws nothing before the first
+   * image. */
   GLint framebuffer = 0;
   glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &framebuffer);
   glClearColor(0.12F, 0.12F, 0.13F, 1.0F);
@@ -130,7 +131,7 @@ static gboolean on_render(GtkGLArea* area, GdkGLContext* context, gpointer user)
     g_atomic_int_inc(&host->problems);
     g_printerr("cumulet-embed-gtk: OpenGL error 0x%04x after a frame\n", error);
   }
-  /* Not gtk_gl_area_queue_render: within a frame it is too early to ask for the next. */
+  /* gtk_gl_area_queue_render has no effect during a frame, so the next frame is requested by a tick callback. */
   if ((host->result.flags & CUMULET_RENDER_MORE) && !host->tick)
     host->tick = gtk_widget_add_tick_callback(widget, on_tick, host, NULL);
   return TRUE;
@@ -138,7 +139,7 @@ static gboolean on_render(GtkGLArea* area, GdkGLContext* context, gpointer user)
 
 /* ---- Input ------------------------------------------------------------------------------------------------------ */
 
-/* GTK's positions are logical pixels, Cumulet's are physical ones. */
+/* GTK's positions are in logical pixels, Cumulet's in physical pixels. */
 static cumulet_event event_at(Host* host, cumulet_event_type type, double x, double y, GdkModifierType state) {
   const int scale = gtk_widget_get_scale_factor(GTK_WIDGET(host->area));
   cumulet_event event = {.struct_size = sizeof event, .type = type, .x = x * scale, .y = y * scale};
@@ -181,7 +182,7 @@ static void send_button(GtkGestureSingle* click, cumulet_event_type type, double
 
 static void on_pressed(GtkGestureSingle* click, int count, double x, double y, gpointer user) {
   (void)count;
-  gtk_widget_grab_focus(GTK_WIDGET(((Host*)user)->area)); /* or it gets no keys */
+  gtk_widget_grab_focus(GTK_WIDGET(((Host*)user)->area)); /* otherwise the area gets no keys */
   send_button(click, CUMULET_EVENT_BUTTON_DOWN, x, y, user);
 }
 
@@ -200,7 +201,7 @@ static gboolean on_scroll(GtkEventController* controller, double dx, double dy, 
 
 static gboolean send_key(Host* host, cumulet_event_type type, guint keyval, GdkModifierType state) {
   cumulet_event event = event_at(host, type, 0.0, 0.0, state);
-  const guint upper = gdk_keyval_to_upper(keyval); /* of letters and digits: their ASCII code */
+  const guint upper = gdk_keyval_to_upper(keyval); /* for letters and digits: their ASCII code */
   if (upper >= GDK_KEY_KP_0 && upper <= GDK_KEY_KP_9)
     event.key = CUMULET_KEY_KEYPAD_0 + (int32_t)(upper - GDK_KEY_KP_0);
   else if (upper == GDK_KEY_KP_Decimal)
@@ -247,7 +248,7 @@ static void add_input(Host* host) {
   g_signal_connect(motion, "motion", G_CALLBACK(on_motion), host);
   gtk_widget_add_controller(widget, motion);
   GtkGesture* click = gtk_gesture_click_new();
-  gtk_gesture_single_set_button(GTK_GESTURE_SINGLE(click), 0); /* any */
+  gtk_gesture_single_set_button(GTK_GESTURE_SINGLE(click), 0); /* any button */
   g_signal_connect(click, "pressed", G_CALLBACK(on_pressed), host);
   g_signal_connect(click, "released", G_CALLBACK(on_released), host);
   gtk_widget_add_controller(widget, GTK_EVENT_CONTROLLER(click));
@@ -306,8 +307,8 @@ static gboolean on_timer(gpointer user) {
   return G_SOURCE_CONTINUE;
 }
 
-/* The window goes, and with it the area, which is unrealized by then: the viewer is detached and needs no context.
- * Once cumulet_destroy has returned, no callback is running. */
+/* The window is destroyed, and its area is unrealized by now: the viewer is detached and needs no context. After
+ * cumulet_destroy has returned, no callback is running. */
 static void on_destroy(GtkWidget* window, gpointer user) {
   Host* host = user;
   (void)window;
@@ -402,10 +403,10 @@ int main(int argc, char** argv) {
   return status != 0 || g_atomic_int_get(&host.problems) != 0;
 }
 
-/* ---- What the tests run ----------------------------------------------------------------------------------------- */
+/* ---- Self-test for the tests ------------------------------------------------------------------------------------- */
 
-/* Acts on the window as a user would, and writes pictures of what is on the X server's screen into a folder. Whether
- * the pictures are right is for the tests to say. */
+/* Acts on the window like a user, and writes screenshots of the X server's screen to a folder. The tests compare the
+ * images. */
 
 static gboolean fail(Host* host, const char* cause) {
   g_atomic_int_inc(&host->problems);
@@ -413,7 +414,7 @@ static gboolean fail(Host* host, const char* cause) {
   return FALSE;
 }
 
-/* Until a picture that was begun after now is finished. */
+/* Waits until an image that started after this call has converged. */
 static gboolean settle(Host* host) {
   const gint64 end = g_get_monotonic_time() + 600 * G_TIME_SPAN_SECOND;
   const guint frames = host->frames;
@@ -432,7 +433,7 @@ static gboolean settle(Host* host) {
   return TRUE;
 }
 
-/* A rectangle of a drawable that is on the screen. */
+/* Saves a rectangle of a drawable on the screen. */
 static gboolean save(Host* host, const char* name, Drawable drawable, int x, int y, int width, int height) {
   Display* display = gdk_x11_display_get_xdisplay(gtk_widget_get_display(GTK_WIDGET(host->window)));
   XImage* image = XGetImage(display, drawable, x, y, (unsigned)width, (unsigned)height, AllPlanes, ZPixmap);
@@ -460,7 +461,7 @@ static gboolean save(Host* host, const char* name, Drawable drawable, int x, int
   return written || fail(host, "a picture cannot be written");
 }
 
-/* Where the area is in its window, in physical pixels. */
+/* Returns the rectangle of the area in its window, in physical pixels. */
 static GdkRectangle place(Host* host) {
   GtkWidget* widget = GTK_WIDGET(host->area);
   GtkNative* native = gtk_widget_get_native(widget);
@@ -479,9 +480,9 @@ static Window xid(Host* host) {
   return gdk_x11_surface_get_xid(gtk_native_get_surface(gtk_widget_get_native(GTK_WIDGET(host->area))));
 }
 
-/* The screen, and the area. */
+/* Saves the screen and the area. */
 static gboolean shoot(Host* host, const char* name) {
-  /* Frames that are drawn reach the screen a little later. */
+  /* Drawn frames reach the screen with a delay. */
   const gint64 end = g_get_monotonic_time() + G_TIME_SPAN_SECOND / 5;
   while (g_get_monotonic_time() < end) g_main_context_iteration(NULL, TRUE);
   Display* display = gdk_x11_display_get_xdisplay(gtk_widget_get_display(GTK_WIDGET(host->window)));
@@ -493,7 +494,7 @@ static gboolean shoot(Host* host, const char* name) {
          save(host, name, xid(host), area.x, area.y, area.width, area.height);
 }
 
-/* Real X events. x and y are fractions of the area. */
+/* Sends real X events. x and y are fractions of the area. */
 static gboolean point(Host* host, double x, double y, const char* action) {
   const GdkRectangle area = place(host);
   char command[256];
@@ -502,7 +503,7 @@ static gboolean point(Host* host, double x, double y, const char* action) {
   int status = 0;
   if (!g_spawn_command_line_sync(command, NULL, NULL, &status, NULL) || !g_spawn_check_wait_status(status, NULL))
     return fail(host, "xdotool fails");
-  for (int i = 0; i < 10; ++i) { /* motion is told once a frame */
+  for (int i = 0; i < 10; ++i) { /* GTK delivers motion once per frame */
     g_usleep(10000);
     while (g_main_context_iteration(NULL, FALSE)) {
     }
@@ -510,7 +511,7 @@ static gboolean point(Host* host, double x, double y, const char* action) {
   return TRUE;
 }
 
-/* The area goes to another window's box, and to another context. */
+/* Moves the area to a box of another window, where it gets another context. */
 static void move(Host* host, GtkBox* box) {
   GtkWidget* area = GTK_WIDGET(host->area);
   g_object_ref(area);
@@ -524,7 +525,7 @@ static gboolean act(Host* host) {
   if (g_mkdir_with_parents(host->test_folder, 0777) != 0) return fail(host, "cannot make the folder for pictures");
   cumulet_sampling_desc sampling = {.struct_size = sizeof sampling, .samples = 4};
   if (!ok(host, cumulet_set_sampling(host->viewer, &sampling))) return FALSE;
-  host->budget_ms = 100.0; /* nobody waits for the mouse */
+  host->budget_ms = 100.0; /* there is no interaction, so frames may be long */
   if (!settle(host) || !shoot(host, "start")) return FALSE;
 
   gtk_window_set_default_size(host->window, 420, 240);
@@ -543,7 +544,7 @@ static gboolean act(Host* host) {
   if (!settle(host) || !shoot(host, "reparented")) return FALSE;
   if (host->contexts != 3) return fail(host, "re-parenting made no new context");
 
-  /* Exposure restarts nothing: the first frame after it is a finished one. */
+  /* A new exposure does not restart rendering: the next frame is converged. */
   const guint frames = host->frames;
   gtk_range_set_value(host->exposure, 2.0);
   while (host->frames == frames) g_main_context_iteration(NULL, TRUE);

@@ -1,9 +1,9 @@
-// Cumulet in Dear ImGui panels, two ways: as an image of its own, and composited into a scene that the host draws with
-// its own shaders and depth, on which the volume's shadow falls. Both viewers share one volume and one camera.
+// Cumulet in two Dear ImGui panels: as a separate image, and composited into a scene that the host draws with its own
+// shaders and depth buffer. The volume casts a shadow on the scene. Both viewers share one volume and one camera.
 //
 //     cumulet-embed-imgui --volume FILE [--test OUT_DIR]
 //
-// Escape quits, P writes imgui-N.ppm of the window (to OUT_DIR or here) once both pictures have all their samples.
+// Escape quits, P writes a screenshot imgui-N.ppm (to OUT_DIR or the current folder) when both images have all samples.
 // --test: a small window with few samples.
 #include <cumulet/cumulet.hpp>
 
@@ -68,7 +68,7 @@ void main() {
   gl_Position = to_clip * vec4(position, 1);
 })";
 
-// Between these stands cumulet_transmittance(), of cumulet::transmittance_map_glsl().
+// cumulet_transmittance() of cumulet::transmittance_map_glsl() is inserted between the next two strings.
 constexpr const char* fragment_version = "#version 450 core\n";
 constexpr const char* box_fragment = R"(
 uniform vec3 colour;
@@ -114,7 +114,7 @@ cumulet::Matrix multiply(const cumulet::Matrix& a, const cumulet::Matrix& b) {
   return product;
 }
 
-/// A framebuffer with colour and depth textures, made anew when the panel's size changes.
+/// A framebuffer with color and depth textures, recreated when the panel's size changes.
 struct SceneTarget {
   int width = 0, height = 0;
   GLuint framebuffer = 0, colour = 0, depth = 0;
@@ -138,10 +138,11 @@ struct SceneTarget {
   }
 };
 
-// Azimuth 60 degrees from +Z, elevation 40: as the viewers' sun.
+// Azimuth 60 degrees from +Z, elevation 40 degrees, same as the viewers' sun.
 constexpr std::array<float, 3> to_sun{0.6634F, 0.6428F, 0.3830F};
 
-/// Sky, a checkered ground below the volume's box, and three cubes: in front of it, half inside, behind.
+/// Draws the sky, a checkered ground below the volume's bounding box, and three cubes: in front of the volume, half
+/// inside, and behind.
 void draw_scene(const SceneTarget& target, GLuint program, GLuint vertex_array, const cumulet::Matrix& to_clip,
                 const cumulet::Bounds& bounds, const cumulet::TransmittanceMap& shadow) {
   glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
@@ -192,7 +193,7 @@ void draw_scene(const SceneTarget& target, GLuint program, GLuint vertex_array, 
 
 // ---- Panels -------------------------------------------------------------------------------------------------------
 
-/// Forwards what ImGui says of the mouse over the last item, and of keys while the panel has the focus.
+/// Forwards ImGui's mouse input over the last item, and keys while the panel has the focus.
 void forward_input(cumulet::Viewer& viewer, const ImVec2& origin, float scale) {
   const ImGuiIO& io = ImGui::GetIO();
   const auto modifiers = (io.KeyShift ? cumulet::Modifiers::shift : cumulet::Modifiers::none) |
@@ -222,10 +223,10 @@ void forward_input(cumulet::Viewer& viewer, const ImVec2& origin, float scale) {
   if (ImGui::IsKeyReleased(home)) feed({.type = cumulet::EventType::key_up, .key = cumulet::Key::home});
 }
 
-/// Lays out an image that fills the panel. Its texture is drawn in by show(), which may come after rendering.
+/// Lays out an image that fills the panel. show() draws its texture and may be called after rendering.
 struct Panel {
   ImVec2 low, high;
-  int width = 0, height = 0;  // physical pixels
+  int width = 0, height = 0;  // in physical pixels
 
   explicit Panel(cumulet::Viewer& viewer) {
     const float scale = ImGui::GetIO().DisplayFramebufferScale.x;
@@ -270,7 +271,7 @@ cumulet::Viewer make_viewer(cumulet::Background background, bool test) {
   return viewer;
 }
 
-/// What the user sees, frame by frame, until the window closes.
+/// Runs the frame loop until the window is closed.
 void run(GLFWwindow* window, const std::string& volume_path, const std::string& folder, bool test) {
   cumulet::Viewer image_viewer = make_viewer(cumulet::Background::sky, test);
   cumulet::Viewer scene_viewer = make_viewer(cumulet::Background::transparent, test);
@@ -296,7 +297,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     last_room = room;
     cumulet::FrameResult image, scene;
 
-    // The viewer as an image: it renders into a texture of its own.
+    // First panel: the viewer renders into its own texture.
     ImGui::SetNextWindowPos(ImVec2(room.x * 0.01F, room.y * 0.02F), place);
     ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), place);
     if (ImGui::Begin("Viewer")) {
@@ -312,13 +313,13 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     }
     ImGui::End();
 
-    if (!volume_shared) {  // once it is loaded
+    if (!volume_shared) {  // when it is loaded
       const cumulet::Volume volume = must(image_viewer.get_volume());
       if (volume) must(scene_viewer.set_volume(volume));
       volume_shared = static_cast<bool>(volume);
     }
 
-    // The viewer in the host's scene: the scene first, then the volume over it, cut off by the scene's depth.
+    // Second panel: the host draws its scene, then the viewer draws the volume over it, clipped by the scene's depth.
     ImGui::SetNextWindowPos(ImVec2(room.x * 0.51F, room.y * 0.02F), place);
     ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), place);
     if (ImGui::Begin("Scene") && volume_shared) {
@@ -333,7 +334,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
                                         .depth_source = cumulet::DepthSource::texture,
                                         .depth_name = target.depth}));
       panel.show(target.colour, false);
-      // Of what was uploaded in render, for the next frame's scene.
+      // The map contains the data uploaded by render(), and is used for the scene of the next frame.
       shadow = must(scene_viewer.update_transmittance_map({}));
     }
     ImGui::End();
@@ -386,7 +387,7 @@ int main(int argc, char** argv) {
   if (window == nullptr) fail("no window with OpenGL 4.5");
   glfwMakeContextCurrent(window);
   glfwSwapInterval(1);
-  glfwSetInputMode(window, GLFW_STICKY_KEYS, GLFW_TRUE);  // a press between two frames is seen too
+  glfwSetInputMode(window, GLFW_STICKY_KEYS, GLFW_TRUE);  // so that a press between two frames is detected
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;
   ImGui_ImplGlfw_InitForOpenGL(window, true);

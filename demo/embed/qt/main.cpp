@@ -1,7 +1,7 @@
 // A Qt 6 host: an editor window with two Cumulet viewers side by side and a dock with parameters.
 //
-// Viewer is what to copy: a QOpenGLWidget around a cumulet_viewer. Window is an editor as any other. self_test, at the
-// end, is what the tests run.
+// Copy the class Viewer: a QOpenGLWidget around a cumulet_viewer. Window is an ordinary editor window. SelfTest, at the
+// end, is run by the tests.
 
 #include <cumulet/cumulet.h>
 
@@ -34,7 +34,7 @@
 
 namespace {
 
-/// A descriptor: struct_size set, the rest zero.
+/// Creates a descriptor with struct_size set and all other fields zero.
 template <class T>
 T make() {
   T desc{};
@@ -42,9 +42,9 @@ T make() {
   return desc;
 }
 
-/// Shows one cumulet_viewer. The viewer is made detached and lives as long as the widget; the widget's context does
-/// not: Qt destroys it when the widget moves to another top-level window (a dock that is floated, say), and makes a new
-/// one.
+/// A widget that shows one cumulet_viewer. The viewer is created detached and exists as long as the widget. The
+/// widget's context does not: Qt destroys it when the widget moves to another top-level window, for example a floating
+/// dock, and creates a new one.
 class Viewer final : public QOpenGLWidget {
   Q_OBJECT
  public:
@@ -62,8 +62,8 @@ class Viewer final : public QOpenGLWidget {
     connect(this, &Viewer::changed, this, qOverload<>(&QWidget::update));
   }
 
-  // Here, not later: ~QOpenGLWidget would emit aboutToBeDestroyed to what is a Viewer no more. Once cumulet_destroy
-  // has returned no callback is running, and Qt drops those calls that still are in this object's queue.
+  // Disconnects here, because ~QOpenGLWidget would emit aboutToBeDestroyed to a partly destroyed Viewer. After
+  // cumulet_destroy has returned, no callback is running, and Qt drops queued calls to this object.
   ~Viewer() override {
     disconnect(context_);
     makeCurrent();
@@ -77,17 +77,17 @@ class Viewer final : public QOpenGLWidget {
   Viewer& operator=(Viewer&&) = delete;
 
   [[nodiscard]] cumulet_viewer* handle() const { return viewer_; }
-  /// Milliseconds a frame may take: an interface that two viewers draw in wants short ones.
+  /// Sets the frame budget in milliseconds. A user interface with two viewers needs short frames.
   void set_budget(double milliseconds) { budget_ms_ = milliseconds; }
-  /// Of the last frame.
+  /// Returns the result of the last frame.
   [[nodiscard]] const cumulet_frame_result& result() const { return result_; }
   [[nodiscard]] int frames() const { return frames_; }
-  /// How many contexts this widget has had.
+  /// Returns the number of contexts that this widget has had.
   [[nodiscard]] int contexts() const { return contexts_; }
-  /// Of the framebuffer, in physical pixels.
+  /// Returns the size of the framebuffer in physical pixels.
   [[nodiscard]] QSize pixels() const { return size() * devicePixelRatioF(); }
 
-  /// Reports a call of this viewer that failed.
+  /// Reports a failed call of this viewer.
   bool ok(cumulet_status status) {
     if (status != CUMULET_OK) emit problem(QString::fromUtf8(cumulet_last_error(viewer_)));
     return status == CUMULET_OK;
@@ -113,15 +113,15 @@ class Viewer final : public QOpenGLWidget {
   }
 
   void paintGL() override {
-    // Qt does not keep the framebuffer's contents, and before there is a picture Cumulet draws nothing.
+    // Qt does not keep the framebuffer's contents, and Cumulet draws nothing before the first image.
     QOpenGLFunctions* gl = context()->functions();
     gl->glClearColor(0.12F, 0.12F, 0.13F, 1.0F);
     gl->glClear(GL_COLOR_BUFFER_BIT);
-    if (!attached_) return;  // initializeGL has told why
+    if (!attached_) return;  // initializeGL has reported the error
 
     auto frame = make<cumulet_frame_desc>();
     frame.budget_ms = budget_ms_;
-    frame.framebuffer = defaultFramebufferObject();  // a texture of Qt's, never 0
+    frame.framebuffer = defaultFramebufferObject();  // Qt's own framebuffer, never 0
     frame.width = static_cast<uint32_t>(pixels().width());
     frame.height = static_cast<uint32_t>(pixels().height());
     frame.scale = devicePixelRatioF();
@@ -156,13 +156,13 @@ class Viewer final : public QOpenGLWidget {
     return reinterpret_cast<void*>(static_cast<QOpenGLContext*>(user)->getProcAddress(name));
   }
 
-  // Both come from any thread, and must not call Cumulet. Qt queues the signals that another thread emits.
+  // Both are called from any thread and must not call Cumulet. Qt queues signals that are emitted by another thread.
   static void on_update(void* user) { emit static_cast<Viewer*>(user)->changed(); }
   static void on_log(void* user, cumulet_log_level level, const char* message) {
     if (level >= CUMULET_LOG_WARNING) emit static_cast<Viewer*>(user)->problem(QString::fromUtf8(message));
   }
 
-  /// Qt's positions are logical pixels, Cumulet's are physical ones.
+  /// Qt's positions are in logical pixels, Cumulet's in physical pixels.
   [[nodiscard]] cumulet_event at(cumulet_event_type type, QPointF position, Qt::KeyboardModifiers modifiers) const {
     auto input = make<cumulet_event>();
     input.type = type;
@@ -203,7 +203,7 @@ class Viewer final : public QOpenGLWidget {
 
   void key(cumulet_event_type type, QKeyEvent& event) {
     cumulet_event input = at(type, {}, event.modifiers());
-    const int key = event.key();  // letters and digits are ASCII, as Cumulet has them
+    const int key = event.key();  // letters and digits are ASCII, as in Cumulet
     if (key >= Qt::Key_0 && key <= Qt::Key_9 && event.modifiers().testFlag(Qt::KeypadModifier)) {
       input.key = CUMULET_KEY_KEYPAD_0 + key - Qt::Key_0;
     } else if (key == Qt::Key_Period && event.modifiers().testFlag(Qt::KeypadModifier)) {
@@ -221,7 +221,7 @@ class Viewer final : public QOpenGLWidget {
     } else if (key < 128) {
       input.key = key;
     }
-    // What auto-repeat sends is no news to Cumulet, which knows what is held.
+    // Auto-repeat events are not sent, because Cumulet tracks held keys itself.
     event.setAccepted(input.key != CUMULET_KEY_NONE && !event.isAutoRepeat() && send(input));
   }
 
@@ -234,13 +234,13 @@ class Viewer final : public QOpenGLWidget {
   int contexts_ = 0;
 };
 
-/// The editor. Both viewers have the same settings, show one cumulet_volume and may look through one cumulet_camera.
+/// The editor window. Both viewers have the same settings, show one cumulet_volume and may share one cumulet_camera.
 class Window final : public QMainWindow {
   Q_OBJECT
  public:
   Window() {
     setWindowTitle("Cumulet in Qt 6");
-    setDockOptions(AllowNestedDocks | AllowTabbedDocks);  // not animated: each size is a picture of its own
+    setDockOptions(AllowNestedDocks | AllowTabbedDocks);  // not animated, because each size change restarts the image
     for (Viewer* viewer : {left, right}) connect(viewer, &Viewer::problem, this, &Window::report);
     splitDockWidget(left_dock, right_dock, Qt::Horizontal);
     add_dock("Parameters", make_parameters(), Qt::RightDockWidgetArea);
@@ -262,7 +262,7 @@ class Window final : public QMainWindow {
     timer_.start(50);
   }
 
-  // The viewers first: they still report to this.
+  // The viewers are deleted first, because they still report to this object.
   ~Window() override {
     delete left;
     delete right;
@@ -273,7 +273,7 @@ class Window final : public QMainWindow {
   Window(Window&&) = delete;
   Window& operator=(Window&&) = delete;
 
-  /// The left viewer loads; the right one is given the volume once it is read (watch).
+  /// Loads a volume in the left viewer. watch() passes it to the right one when it is read.
   void open(const QString& path) {
     opening_ = left->ok(cumulet_load_volume(left->handle(), path.toUtf8().constData(), nullptr));
     if (opening_) setWindowTitle(path + " - Cumulet in Qt 6");
@@ -285,14 +285,14 @@ class Window final : public QMainWindow {
     each(cumulet_set_sampling, desc);
   }
 
-  /// Whether the right viewer has still to be given what the left one loads.
+  /// Returns true until the right viewer has the volume that the left one loads.
   [[nodiscard]] bool opening() const { return opening_; }
 
   Viewer* left = new Viewer;
   Viewer* right = new Viewer;
   QDockWidget* left_dock = add_dock("Left", left, Qt::LeftDockWidgetArea);
   QDockWidget* right_dock = add_dock("Right", right, Qt::LeftDockWidgetArea);
-  // Logarithms to base 10, but for exposure (stops) and the angles (degrees).
+  // Values are base-10 logarithms, except exposure (stops) and angles (degrees).
   QDoubleSpinBox* density = nullptr;
   QDoubleSpinBox* exposure = nullptr;
   QDoubleSpinBox* azimuth = nullptr;
@@ -340,7 +340,7 @@ class Window final : public QMainWindow {
     return panel;
   }
 
-  /// A slider and a spin box that say the same.
+  /// Adds a slider and a spin box with the same value.
   static QDoubleSpinBox* add_slider(QFormLayout& form, const QString& name, double low, double high, double value,
                                     const std::function<void()>& changed) {
     auto* box = new QDoubleSpinBox;
@@ -394,7 +394,8 @@ class Window final : public QMainWindow {
     each(cumulet_set_grid, desc);
   }
 
-  /// The right viewer gets the left one's camera, or a copy of it. Viewers keep their cameras: ours are let go.
+  /// Gives the right viewer the left one's camera, or a copy of it. The viewers hold references, so the local one is
+  /// released.
   void share_camera(bool one) const {
     cumulet_camera* camera = nullptr;
     left->ok(cumulet_get_camera(left->handle(), &camera));
@@ -408,16 +409,16 @@ class Window final : public QMainWindow {
     cumulet_camera_release(camera);
   }
 
-  /// Passes a newly loaded volume on, and says how loading, building and tracing go.
+  /// Passes a newly loaded volume to the right viewer, and shows the progress of loading, building and tracing.
   void watch() {
     auto work = make<cumulet_progress>();
     left->ok(cumulet_get_progress(left->handle(), &work));
-    if (opening_ && work.stage != CUMULET_STAGE_LOADING) {  // it is read, though its grid may not be built yet
+    if (opening_ && work.stage != CUMULET_STAGE_LOADING) {  // read, but the grid may not be built yet
       opening_ = false;
       cumulet_volume* volume = nullptr;
       left->ok(cumulet_get_volume(left->handle(), &volume));
       if (work.status == CUMULET_OK) right->ok(cumulet_set_volume(right->handle(), volume));
-      cumulet_volume_release(volume);  // the viewers keep it
+      cumulet_volume_release(volume);  // the viewers hold references
     }
 
     constexpr std::array stages = {"Tracing", "Loading", "Voxel statistics", "Refining", "Records", "Uploading"};
@@ -427,7 +428,7 @@ class Window final : public QMainWindow {
     const double traced = std::min(left->result().progress, right->result().progress);
     progress_.setFormat(QString(stages.at(static_cast<size_t>(work.stage))) + " %p%");
     progress_.setValue(qRound(100.0 * (idle ? traced : work.fraction)));
-    if (work.message != work_message_) {  // a file that cannot be read, say
+    if (work.message != work_message_) {  // for example an unreadable file
       work_message_ = QString::fromUtf8(work.message);
       if (!work_message_.isEmpty()) report(work_message_);
     }
@@ -439,10 +440,10 @@ class Window final : public QMainWindow {
   QTimer timer_;
 };
 
-// ---- What the tests run ---------------------------------------------------------------------------------------------
+// ---- Self-test for the tests ----------------------------------------------------------------------------------------
 
-/// Acts on the window as a user would and writes pictures of what is on the screen into a folder. Throws if the host
-/// or a viewer fails; whether the pictures are right is for the tests to say.
+/// Acts on the window like a user and writes screenshots to a folder. Throws if the host or a viewer fails. The tests
+/// compare the images.
 class SelfTest {
  public:
   SelfTest(Window& window, const QString& folder) : window_(window), folder_(folder) {
@@ -451,7 +452,7 @@ class SelfTest {
 
   void run(const QString& volume) {
     window_.set_samples(4);
-    for (Viewer* viewer : {window_.left, window_.right}) viewer->set_budget(100.0);  // nobody waits for the mouse
+    for (Viewer* viewer : {window_.left, window_.right}) viewer->set_budget(100.0);  // no interaction
     window_.exposure->setValue(1.0);
     window_.resize(700, 420);
     window_.show();
@@ -466,7 +467,7 @@ class SelfTest {
     settle();
     shoot("resized");
 
-    // Into a window of its own and back: a context lost and made anew, each time.
+    // Floats the dock and docks it again: each time the context is destroyed and a new one is created.
     const QByteArray layout = window_.saveState();
     const int contexts = window_.right->contexts();
     window_.right_dock->setFloating(true);
@@ -474,7 +475,7 @@ class SelfTest {
     settle();
     if (window_.right->contexts() != contexts + 1) throw std::runtime_error("floating made no new context");
     shoot("floating");
-    // The viewer alone, into another dock: the one of the main window.
+    // Moves the viewer without its dock into the other dock, which is part of the main window.
     window_.left_dock->setWidget(window_.right);
     window_.right_dock->setWidget(window_.left);
     settle();
@@ -486,7 +487,7 @@ class SelfTest {
     if (window_.right->contexts() < contexts + 4) throw std::runtime_error("re-parenting made no new context");
     shoot("reparented");
 
-    // Exposure restarts nothing: the first frame after it is a finished one.
+    // A new exposure does not restart rendering: the next frame is converged.
     window_.exposure->setValue(2.0);
     const int frames = window_.left->frames();
     wait([&] { return window_.left->frames() > frames; }, "a new exposure draws no frame");
@@ -519,7 +520,7 @@ class SelfTest {
   }
 
  private:
-  /// Handles events until done.
+  /// Processes events until done() returns true.
   template <class Done>
   void wait(Done done, const char* failure) {
     QElapsedTimer clock;
@@ -531,7 +532,7 @@ class SelfTest {
     }
   }
 
-  /// Until both viewers have finished a picture that was begun after now.
+  /// Waits until both viewers have converged on an image that started after this call.
   void settle() {
     for (Viewer* viewer : {window_.left, window_.right}) {
       const int frames = viewer->frames();
@@ -542,7 +543,7 @@ class SelfTest {
     }
   }
 
-  /// Both viewers at the same size.
+  /// Gives both viewers the same size.
   void even_out() {
     const auto time = [clock = QElapsedTimer(), this]() mutable {
       if (!clock.isValid()) clock.start();
@@ -564,7 +565,7 @@ class SelfTest {
     send(QEvent::MouseButtonRelease, to, Qt::LeftButton, Qt::NoButton);
   }
 
-  /// The screen, and each viewer as it is there and as its framebuffer has it.
+  /// Saves the screen, and each viewer both as on the screen and from its framebuffer.
   void shoot(const QString& name) {
     const QPixmap screen = window_.screen()->grabWindow(0);
     save(name, screen.toImage());
@@ -588,7 +589,7 @@ class SelfTest {
 };
 
 int run(int argc, char** argv) {
-  // Before the first window: every context of the program is to be one that Cumulet can use.
+  // Set before the first window is created, so that all contexts of the program suit Cumulet.
   QSurfaceFormat format = QSurfaceFormat::defaultFormat();
   format.setVersion(4, 5);
   format.setProfile(QSurfaceFormat::CoreProfile);

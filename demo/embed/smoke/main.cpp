@@ -1,14 +1,14 @@
-// A live simulation: smoke that the mouse stirs, computed in the host's own context, handed over step by step in the
-// texture in which it is, and path traced as it moves.
+// A live simulation: smoke that the user stirs with the mouse. It is computed in the host's own context. Each step is
+// passed to Cumulet as a texture and path-traced while it moves.
 //
 //     cumulet-embed-smoke [--voxels N] [--build cpu|gpu] [--fire on|off] [--record FILE]
 //     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N] [--build cpu|gpu] [--fire on|off]
 //
-// --build gpu: the smoke stays on the GPU, where its grids are made. --fire on: it comes in hot, and glows until it has
-// cooled, in the evening.
-// Left button stirs, the others move the camera, as does the wheel; Escape quits. --record writes what the mouse does,
-// a line a change: frame, x, y (0 to 1, from the top left), pressed. --test plays that without a window, checks that
-// pictures follow the smoke and that no state starves, and writes OUT_DIR/smoke.ppm.
+// --build gpu: the smoke stays on the GPU, and its grids are built there. --fire on: the smoke is hot at its source and
+// emits light until it has cooled; the scene is in evening light.
+// The left button stirs; the other buttons and the wheel move the camera; Escape quits. --record writes the mouse
+// input, one line per change: frame, x, y (0 to 1, from the top left), pressed. --test plays such a file without a
+// window, checks that images follow the smoke and that states are drawn often enough, and writes OUT_DIR/smoke.ppm.
 #include <cumulet/cumulet.hpp>
 
 #define GL_GLEXT_PROTOTYPES
@@ -148,8 +148,8 @@ class Solver {
   }
 
   struct Stir {
-    Point at{};    ///< in parts of the cube
-    Point push{};  ///< voxels a second
+    Point at{};    ///< fraction of the cube
+    Point push{};  ///< voxels per second
   };
   void step(float dt, const Stir& stir) {
     for (const GLuint program : programs_) {
@@ -172,7 +172,7 @@ class Solver {
       std::swap((*numbers)[0], (*numbers)[1]);
     }
   }
-  /// After the last step: 3D textures of floats.
+  /// Return the 3D float textures of the last step.
   [[nodiscard]] GLuint smoke() const { return smoke_[0]; }
   [[nodiscard]] GLuint heat() const { return heat_[0]; }
 
@@ -209,7 +209,7 @@ class Solver {
 // ---- the host ----
 
 struct Mouse {
-  double x = 0.0;  // of the picture, 0 to 1, from its top left
+  double x = 0.0;  // position in the image, 0 to 1, from the top left
   double y = 0.0;
   bool stirs = false;
 };
@@ -247,7 +247,7 @@ class Host {
     must(viewer_.set_ground({.place = cumulet::Ground::below}));
     must(viewer_.set_display({.denoise = cumulet::Denoise::fast}));
     must(viewer_.set_sampling({.samples = test ? 8U : 64U}));
-    // The box is known, so that neither the camera nor the ground jumps as the smoke rises.
+    // The bounding box is fixed, so that neither the camera nor the ground moves while the smoke rises.
     live_ = must(cumulet::Live::create({.bounds_min = {-1.0, -1.0, -1.0},
                                         .bounds_max = {1.0, 1.0, 1.0},
                                         .stays_in_gl = options.build == cumulet::Build::gpu}));
@@ -257,7 +257,7 @@ class Host {
 
   [[nodiscard]] cumulet::Viewer& viewer() { return viewer_; }
 
-  /// A step of the simulation, handed over: what the next one does to its textures is no matter.
+  /// Simulates a step and passes its textures to the viewer. The next step may overwrite them.
   void advance(const Mouse& mouse, double aspect) {
     solver_.step(1.0F / 30.0F, stir(mouse, aspect));
     const double voxel = 2.0 / voxels_;
@@ -273,7 +273,7 @@ class Host {
     must(viewer_.live_set_gl(live_, {.fields = {fields.data(), fire_ ? 2U : 1U}, .name = "smoke"}));
   }
 
-  /// Where the smoke of the last step is, in the picture: 0 to 1, from its top left.
+  /// Returns the projected center of mass of the last step's smoke in the image, 0 to 1, from the top left.
   [[nodiscard]] std::array<double, 2> middle_of_smoke(double aspect) {
     const auto n = static_cast<std::size_t>(voxels_);
     std::vector<float> values(n * n * n);
@@ -299,7 +299,7 @@ class Host {
  private:
   struct Seen {
     cumulet::Matrix view{};
-    double half_width = 0.0;  // of the picture, at distance 1
+    double half_width = 0.0;  // of the image at distance 1
     double half_height = 0.0;
   };
   [[nodiscard]] Seen look(double aspect) {
@@ -307,7 +307,7 @@ class Host {
     return {matrices.view, 1.0 / matrices.projection[0], 1.0 / matrices.projection[5]};
   }
 
-  // Where the mouse is in the plane through the middle of the box that faces the camera, and how it moved there.
+  // Returns the mouse position on the plane through the box center that faces the camera, and its velocity there.
   Solver::Stir stir(const Mouse& mouse, double aspect) {
     const std::optional<Mouse> before = std::exchange(mouse_, mouse.stirs ? std::optional(mouse) : std::nullopt);
     if (!mouse.stirs) return {};
@@ -319,7 +319,7 @@ class Host {
       const double up = seen.view[4 * axis + 1] * seen.half_height * distance;
       stir.at[axis] = 0.5 + 0.5 * ((2.0 * mouse.x - 1.0) * right + (1.0 - 2.0 * mouse.y) * up);
       if (!before) continue;
-      constexpr double strength = 8.0;  // steps in a second, times how much is dragged along
+      constexpr double strength = 8.0;  // steps per second, times a drag factor
       const double moved = (mouse.x - before->x) * right - (mouse.y - before->y) * up;
       stir.push[axis] = strength * moved * voxels_;
     }
@@ -329,12 +329,12 @@ class Host {
   int voxels_;
   bool fire_;
   Solver solver_;
-  std::optional<Mouse> mouse_;  // of the last frame, while it stirs
+  std::optional<Mouse> mouse_;  // mouse state of the last frame while the button is pressed
   cumulet::Live live_;
   cumulet::Viewer viewer_;
 };
 
-// ---- without a window, by a record of the mouse ----
+// ---- playback of a mouse record without a window ----
 
 struct Moved {
   int frame = 0;
@@ -378,7 +378,8 @@ void write_ppm(const std::string& path, const std::vector<std::uint8_t>& rgba, s
   if (std::fclose(file) != 0) fail(path + ": cannot be written");
 }
 
-/// Each frame: a step, its state, and a picture within a budget. What may not happen ends it.
+/// Plays a record: each frame simulates a step, passes its state and renders within a budget. Ends the program if a
+/// check fails.
 void play(const std::string& record, const std::string& folder, const Options& options) {
   make_headless_context();
   const std::vector<Moved> moves = read_mouse(record);
@@ -404,7 +405,7 @@ void play(const std::string& record, const std::string& folder, const Options& o
     must(viewer.render(frame));
     follow();
   }
-  // Until nothing is on its way, and the newest is drawn.
+  // Returns true if no work is pending and the latest state is drawn.
   const auto rests = [&] {
     return must(viewer.render(frame)).has(cumulet::RenderFlags::converged) &&
            follow().drawn_state == follow().handed_state;
@@ -417,7 +418,7 @@ void play(const std::string& record, const std::string& folder, const Options& o
               static_cast<unsigned long long>(info.drawn_count));
   if (info.drawn_count * 20 < info.handed_state) fail("states starve");
 
-  // The picture is of the newest state: its smoke is where that has it.
+  // Checks that the image shows the latest state: the center of the smoke must agree.
   must(viewer.set_ground({}));
   must(viewer.set_sampling({.samples = 16, .preview = cumulet::Preview::off}));
   while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {
@@ -426,7 +427,7 @@ void play(const std::string& record, const std::string& folder, const Options& o
   must(viewer.read_linear(linear));
   double mass = 0.0, x = 0.0, y = 0.0;
   for (std::size_t i = 0; i < std::size_t{width} * height; ++i) {
-    // As the depth of what is in front of the sky, not its opacity: that is even where there is more.
+    // Uses the optical depth in front of the sky instead of the opacity, which saturates.
     const double depth = -std::log(1.0 - std::min(0.999, double{linear[4 * i + 3]}));
     mass += depth;
     x += depth * (double(i % width) + 0.5) / width;
@@ -468,7 +469,7 @@ Mouse mouse_of(GLFWwindow* window) {
   return mouse;
 }
 
-/// What moves the camera; orbiting is on the right button, as the left one stirs.
+/// Passes camera input to the viewer. The right button orbits, because the left one stirs.
 void feed(GLFWwindow* window, cumulet::Event event) {
   int width = 0, height = 0;
   glfwGetFramebufferSize(window, &width, &height);
