@@ -56,7 +56,7 @@ std::string one_line(std::string_view text, std::size_t longest) {
       const std::uint32_t byte = byte_at(bytes, 0);
       line.append("\\x").append(1, digits[byte / 16]).append(1, digits[byte % 16]);
     }
-    if (line.size() >= longest) {
+    if (line.size() >= longest && !text.empty()) {
       line.append(3, '.');
       break;
     }

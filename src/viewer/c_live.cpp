@@ -106,7 +106,8 @@ std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
   require(std::ranges::all_of(d.bounds_min, moderate) && std::ranges::all_of(d.bounds_max, moderate),
           "cumulet_live_desc's bounds are not within +-1e15");
   const cumulet::viewer::Bounds bounds{to_dvec3(d.bounds_min), to_dvec3(d.bounds_max)};
-  const bool stays = d.stays_in_gl != 0;
+  require(d.stays_in_gl == 0 || d.stays_in_gl == 1, "cumulet_live_desc.stays_in_gl is neither 0 nor 1");
+  const bool stays = d.stays_in_gl == 1;
   if (bounds.min == glm::dvec3(0.0) && bounds.max == glm::dvec3(0.0))
     return std::make_shared<Live>(std::nullopt, stays);
   require(glm::all(glm::lessThan(bounds.min, bounds.max)), "cumulet_live_desc.bounds_min is not below bounds_max");

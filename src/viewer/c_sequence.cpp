@@ -22,13 +22,17 @@ constexpr double most_seconds = 1e9;
 constexpr std::uint64_t most_steps = 1'000'000;
 
 Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
-  const cumulet_playback_desc d = read_settings(desc);
+  cumulet_playback_desc d = read_settings(desc);
   const auto there = [&](std::uint32_t from) { return std::to_string(from) + ": it has " + std::to_string(frames); };
   if (d.first_frame >= frames) refuse("the sequence has no frame " + there(d.first_frame));
   const std::uint32_t rest = frames - d.first_frame;
   if (d.frame_count > rest) refuse("the sequence has fewer frames from " + there(d.first_frame));
   const bool steps = d.between != CUMULET_BETWEEN_NONE;
   require(d.subframes <= most_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
+  // The default is lower for sequences so long that it would exceed the maximum.
+  if (read_desc(desc, "cumulet_playback_desc").subframes == 0)
+    d.subframes = std::min<std::uint32_t>(d.subframes,
+                                          static_cast<std::uint32_t>(std::max<std::uint64_t>(1, most_steps / frames)));
   if (steps && std::uint64_t{frames} * d.subframes > most_steps)
     refuse("cumulet_playback_desc.subframes makes more than 1000000 of " + std::to_string(frames) + " frames");
   return {.frames_per_second = d.frames_per_second,

@@ -156,6 +156,7 @@ cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* us
     require(path != nullptr && *path != '\0', "path is NULL or empty");
     require(fn != nullptr, "fn is NULL");
     for (const volume::GridInfo& grid : volume::list_grids(path)) {
+      const CallbackScope inside;
       fn(user, grid.unique_name.c_str(), grid.type.c_str(), grid.refusal.c_str());
     }
   });
@@ -164,9 +165,9 @@ cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* us
 // ---- inspection ----
 
 cumulet_status cumulet_inspect_volume_file(const char* path, cumulet_inspection** out, char* error, size_t error_size) {
+  if (out != nullptr) *out = nullptr;
   return guarded(error, error_size, [&] {
     require(out != nullptr, "out is NULL");
-    *out = nullptr;
     require(path != nullptr && *path != '\0', "path is NULL or empty");
     *out = new cumulet_inspection(path);
   });

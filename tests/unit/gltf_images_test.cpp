@@ -378,6 +378,7 @@ TEST(OneLine, HasNoRawBytes) {
   EXPECT_EQ(one_line("\xc0\xaf \xed\xa0\x80 \xf5"), "\\xc0\\xaf \\xed\\xa0\\x80 \\xf5");
   EXPECT_EQ(one_line("a\xc2\x9b\xe2\x80\xa8z"), "a z");
   EXPECT_EQ(one_line("abcdef", 3), "abc...");
+  EXPECT_EQ(one_line("abc", 3), "abc");
   EXPECT_EQ(one_line("a\xe2\x82\xac\xe2\x82\xac", 3), "a\xe2\x82\xac...");
 }
 

@@ -284,15 +284,16 @@ TEST_F(LiveGl, EveryFormatIsWhatItIsInMemory) {
 // Values that are far from 1 are scaled in main memory, even if the volume is resident in GL.
 TEST_F(LiveGl, ValuesFarFromOneArrive) {
   for (const bool resident : {false, true}) {
-    const LiveRef live = make_live(resident);
+    auto settings = make_desc<cumulet_live_desc>();
+    settings.stays_in_gl = resident ? 1 : 0;
+    const LiveRef live = make_live(settings);
     ASSERT_EQ(cumulet_set_live(v_, live.get()), CUMULET_OK);
     for (const float scale : {1e-30F, 1e25F, 1.0F}) {
       SCOPED_TRACE(std::to_string(scale) + (resident ? " resident" : ""));
       auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
       for (float& value : values) value *= scale;
       const Array array(CUMULET_VOXEL_FORMAT_R32F, values);
-      const auto fields =
-          std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], array))};
+      const auto fields = std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], array))};
       const cumulet_gl_state_desc desc = state_of(fields);
       ASSERT_EQ(cumulet_live_set_gl(v_, live.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
       EXPECT_EQ(arrive(), 1U);

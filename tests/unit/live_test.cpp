@@ -127,6 +127,10 @@ TEST_F(CLive, IsRefusedInOneLine) {
   }
   EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(error.data(), "cumulet_live_desc's bounds are not within +-1e15");
+  desc = make_desc<cumulet_live_desc>();
+  desc.stays_in_gl = 2;
+  EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_live_desc.stays_in_gl is neither 0 nor 1");
 
   const LiveRef live = make_live();
   const auto refused = [&](const State& state, const char* cause) {

@@ -672,6 +672,13 @@ TEST_F(OpenVdbVolume, ListsGrids) {
   // What a host throws goes no further than the call.
   const auto throwing = [](void*, const char*, const char*, const char*) { throw std::runtime_error("host's own"); };
   EXPECT_EQ(cumulet_list_grids(file.c_str(), throwing, nullptr, error, sizeof error), CUMULET_ERROR_INTERNAL);
+  // A callback may not open files, and gets NULL instead.
+  const auto nested = [](void* user, const char*, const char*, const char*) {
+    auto* inspection = static_cast<cumulet_inspection*>(user);
+    EXPECT_EQ(cumulet_inspect_volume_file("/nowhere/x.vdb", &inspection, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(inspection, nullptr);
+  };
+  EXPECT_EQ(cumulet_list_grids(file.c_str(), nested, &listed, error, sizeof error), CUMULET_OK);
 }
 
 TEST(VolumeHandle, NullIsHarmless) {

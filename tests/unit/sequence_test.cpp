@@ -151,6 +151,12 @@ TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
   refused("no number");
   playback.velocity_scale = 0.0;
   ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
+  // The default of subframes fits the longest sequence, too.
+  const SequenceRef longest = make_sequence(std::vector<std::string>(300'000, clip_.paths().front()));
+  playback.subframes = 0;
+  EXPECT_EQ(cumulet_sequence_set_playback(longest.get(), &playback), CUMULET_OK);
+  playback.subframes = 4;
+  EXPECT_EQ(cumulet_sequence_set_playback(longest.get(), &playback), CUMULET_ERROR_INVALID_ARGUMENT);
 
   const ViewerPtr viewer = make();
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
