@@ -193,7 +193,7 @@ TEST(Emitters, ArePickedByPower) {
   }
   EXPECT_NEAR(sum, 1.0, 1e-9);
   EXPECT_NEAR(table.flux / flux, 1.0, 1e-6);
-  // Those of one side emit as much again where the pose shows both.
+  // One-sided triangles emit twice the flux if the pose is double-sided.
   double one_sided = 0.0;
   for (const glm::uvec4& entry : table.entries) one_sided += entry.x / 2 % 4 == 1 ? area_of(*scene, entry.x) : 0.0;
   scene->rest.double_sided = true;
