@@ -14,6 +14,7 @@ namespace cumulet::test {
 
 /// A get_proc between the library and a context. It counts calls and objects, can make the n-th allocation fail, and
 /// can lose the context at the n-th call.
+///
 /// GL functions have no user pointer. Their wrappers use the fake that is current on their thread: the last one made
 /// current, or the last one asked for a function. A GL call on a thread without a current fake does nothing and is
 /// counted in strays(); no such call is allowed.
