@@ -173,7 +173,7 @@ TEST_F(Trial, SurfacesThatChangeFasterThanTheyArePosedAreSeen) {
                 [&](int i) {
                   cumulet_surfaces* cloth = cloths[static_cast<std::size_t>(i) % cloths.size()].get();
                   ASSERT_EQ(cumulet_set_surfaces(v_, cloth), CUMULET_OK);
-                  // What was set last, though another may be shown yet.
+                  // The surfaces set last, even if others are still displayed.
                   cumulet_surfaces* out = nullptr;
                   ASSERT_EQ(cumulet_get_surfaces(v_, &out), CUMULET_OK);
                   EXPECT_EQ(out, cloth);
