@@ -1,7 +1,7 @@
 """Drives cumulet-demo by replay files on its own virtual display (Xvfb), and checks its screenshots and reports.
 
-Usage: session.py DEMO RENDER XVFB SCENE_FOLDER OUT_FOLDER TEST Screenshots, reports and replay files stay in
-OUT_FOLDER/TEST.
+Usage: session.py DEMO RENDER XVFB SCENE_FOLDER OUT_FOLDER TEST
+Screenshots, reports and replay files stay in OUT_FOLDER/TEST.
 """
 
 import json

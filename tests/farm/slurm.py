@@ -61,7 +61,7 @@ def wait_for_work(slurm, node):
 
 
 def killed(farm, slurm, out):
-    """Kills a process, then a node with all its processes. No part is lost or made twice, and the frames are the same."""
+    """Kills a process, then a node with its processes. No part is lost or made twice, and the frames are the same."""
     whole = farm.whole(out / "whole", "12-15", SAMPLES)
     wanted = farm.merged(out / "wanted", "12-15", PARTS)
     assert len(wanted) == 4 and len(set(wanted.values())) == 4
