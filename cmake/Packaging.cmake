@@ -1,19 +1,20 @@
-# `cmake --install`: the library, its headers, a CMake package, a pkg-config file, the programs with their manual pages,
-# completions and desktop files, the documents and the licences.
-# `cpack -G TGZ`: the same and every shared library it needs in one portable .tar.gz (bundle.cmake).
-# `cpack -G DEB`: three Debian packages that need Debian's own libraries (debian.cmake): libcumulet0 is what a host's
-# package depends on, so it brings no program's needs (a window); libcumulet-dev has what compiling takes;
-# cumulet the programs.
+# `cmake --install` installs the library, its headers, a CMake package, a pkg-config file, the programs with their
+# manual pages, completions and desktop files, the documents and the licenses.
+# `cpack -G TGZ` adds every shared library that the programs need and packs one portable .tar.gz (bundle.cmake).
+# `cpack -G DEB` makes three Debian packages that depend on Debian's own libraries (debian.cmake). A host's package
+# depends on libcumulet0, which has none of the programs' dependencies (windowing). libcumulet-dev has the files for
+# compiling, and cumulet has the programs.
 include(CMakePackageConfigHelpers)
 
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc/cumulet)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Cumulet)
 
-# --- where a file finds its libraries --------------------------------------------------------------------------
-# Beside it: lib/. A portable tarball adds lib/host/N and lib/fallback, for what a GL driver loads too: bundle.cmake.
-# What is built has room for those, an install does not name them, and nothing names a folder of the build: $ORIGIN
-# keeps a tree that was moved working. It is DT_RPATH (--disable-new-dtags) since that, unlike DT_RUNPATH, also serves
-# the libraries of our libraries, so that those are bundled as they are.
+# --- library search paths ---------------------------------------------------------------------------------------
+# A file searches lib/ next to it. A portable tarball adds lib/host/N and lib/fallback for libraries that a GL driver
+# also loads (bundle.cmake). Built files reserve space for those paths; installed files do not name them. No file names
+# a folder of the build: with $ORIGIN a moved tree still works.
+# The path is DT_RPATH (--disable-new-dtags), because DT_RPATH, unlike DT_RUNPATH, also applies to the dependencies of
+# our libraries. The tarball can therefore bundle those unmodified.
 file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
 function(cumulet_rpath target lib)
   set_target_properties(${target} PROPERTIES INSTALL_RPATH ${lib}
@@ -39,7 +40,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet ${PROJECT_BINARY_DIR
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
         COMPONENT development)
 
-# A program's manual page and completions, of what it says of its own flags.
+# The manual page and the completions of each program, generated from its own table of options.
 set(manual_files)
 set(scripts)
 if(CUMULET_FARM_PROGRAM)
@@ -93,7 +94,7 @@ file(RELATIVE_PATH pc_to_prefix ${CMAKE_INSTALL_PREFIX}/${pkgconfig_dir} ${CMAKE
 configure_file(${CMAKE_CURRENT_LIST_DIR}/cumulet.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
 
-# The README's links hold there.
+# The README links to these files in the same folder.
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md DESTINATION ${doc_dir} COMPONENT programs)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/third_party_notes DESTINATION ${doc_dir}
         COMPONENT programs PATTERN man EXCLUDE)
@@ -131,7 +132,7 @@ if(PROJECT_IS_TOP_LEVEL)
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
-  set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")  # the ABI is not frozen before 1.0
+  set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")  # the ABI may change before 1.0
   set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "path-traced volumes inside an OpenGL context - library
 Cumulet path-traces OpenVDB and NanoVDB volumes, and glTF surfaces in them,
 inside an OpenGL 4.5 context that its host has made. Volumes become adaptive
@@ -149,7 +150,8 @@ and a pkg-config file.")
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SECTION graphics)
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
-  # Which dpkg-shlibdeps cannot see: EGL and a font, loaded by name, and cumulet-farm's interpreter. The driver is whatever the machine has.
+  # Dependencies that dpkg-shlibdeps cannot see: EGL and a font, which are loaded by name, and the Python interpreter of
+  # cumulet-farm. The machine provides the GL driver.
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "${same_version}, libegl1, fonts-dejavu-core, python3:any")
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS libgl1-mesa-dri)
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS "libosmesa6, slurm-client")
@@ -158,11 +160,11 @@ cumulet-demo shows OpenVDB and NanoVDB volumes and glTF models in a window,
 path-traced as they are turned and changed. cumulet-render makes pictures of
 them without a display, cumulet-merge one of parts, cumulet-farm makes them
 on many machines. cumulet-scene writes a sample scene.")
-  set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # or it would come before those
+  set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # otherwise it precedes these descriptions
   include(CPack)
 endif()
 
-# --- their tests -----------------------------------------------------------------------------------------------
+# --- tests of the packages --------------------------------------------------------------------------------------
 if(CUMULET_BUILD_TESTS AND CUMULET_BUILD_APPS AND PROJECT_IS_TOP_LEVEL AND NOT CUMULET_SANITIZE)
   add_subdirectory(tests/package)
 endif()

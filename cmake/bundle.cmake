@@ -1,5 +1,5 @@
-# Run by cpack on the staged tree before it is archived: adds every shared library that the programs and libcumulet
-# need, but for the C library's family and OpenGL's, with the licences of those libraries.
+# cpack runs this on the staged tree before it makes the archive. Adds every shared library that the programs and
+# libcumulet need, except those of the C library and of OpenGL, and the licenses of the added libraries.
 cmake_minimum_required(VERSION 3.25)
 if(NOT CPACK_GENERATOR STREQUAL "TGZ")
   return()
@@ -9,14 +9,16 @@ set(stage ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
 set(lib_dir ${stage}/${CPACK_CUMULET_LIBDIR})
 set(licence_dir ${stage}/${CPACK_CUMULET_DOCDIR}/licences)
 
-# The system's, always: the C library must match its loader, and GL, EGL and windowing must match its driver.
+# Always taken from the system: the C library must match its loader, and GL, EGL and windowing must match the driver.
 set(system_libraries
     "^ld-linux" "^linux-vdso" "^lib(c|m|pthread|dl|rt|util|resolv|anl|mvec|nsl)\\.so"
     "^lib(GL|GLX|GLdispatch|OpenGL|EGL|GLES[^.]*|OSMesa|gbm|drm[^.]*|glapi)\\.so"
     "^lib(X|xcb|xshmfence|wayland|xkbcommon)")
-# The driver's too: Mesa needs LLVM, and LLVM these, perhaps newer ones than ours, and a process has one of each. So
-# the host's come first, by links in lib/host/N that dangle where it keeps none, and ours, in lib/fallback, last.
-# (Its folders themselves are not searched: that would override a developer's LD_LIBRARY_PATH to another driver.)
+# The driver uses these too: Mesa needs LLVM, and LLVM needs these, perhaps newer versions than ours. A process loads
+# one copy of each. The host's copies therefore come first, through links in lib/host/N, which dangle if the host has no
+# copy there. Our copies in lib/fallback come last.
+# (The host's library folders themselves are not searched, because that would override a developer's LD_LIBRARY_PATH to
+# another driver.)
 set(fallback_libraries "^lib(stdc\\+\\+|gcc_s|z|zstd|lzma)\\.so")
 set(host_dirs /usr/lib/x86_64-linux-gnu /usr/lib64 /usr/lib)
 
@@ -30,7 +32,7 @@ file(GET_RUNTIME_DEPENDENCIES
 if(unresolved)
   message(FATAL_ERROR "Cannot bundle, not found on this system: ${unresolved}")
 endif()
-# A library found both in the staged tree and on the system is ours, already in place.
+# If a library is both in the staged tree and on the system, the staged one is ours and is already in place.
 foreach(name ${conflicting_FILENAMES})
   if(NOT name MATCHES "^libcumulet\\.so")
     list(GET conflicting_${name} 0 first)
@@ -58,21 +60,21 @@ foreach(library ${resolved})
       endforeach()
     endif()
   endforeach()
-  # The file itself, under the name that the loader asks for.
+  # Copies the file itself, under the name that the loader requests.
   get_filename_component(real ${library} REALPATH)
   file(MAKE_DIRECTORY ${destination})
   file(COPY_FILE ${real} ${destination}/${name})
   file(CHMOD ${destination}/${name} PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
                                                 WORLD_READ WORLD_EXECUTE)
   math(EXPR count "${count} + 1")
-  # A search path of its own would hide ours from the libraries that it needs.
+  # A DT_RUNPATH would hide our search path from the library's own dependencies.
   file(READ_ELF ${destination}/${name} RUNPATH runpath)
   if(runpath)
     message(FATAL_ERROR "Cannot bundle ${library}: it has a DT_RUNPATH (${runpath}). Remove that with patchelf.")
   endif()
   if(dpkg_query)
     execute_process(COMMAND ${dpkg_query} -S ${real} OUTPUT_VARIABLE owner ERROR_QUIET)
-    if(NOT owner)  # merged /usr: dpkg may know it under /lib
+    if(NOT owner)  # merged /usr: dpkg may list the file under /lib
       string(REGEX REPLACE "^/usr" "" unmerged ${real})
       execute_process(COMMAND ${dpkg_query} -S ${unmerged} OUTPUT_VARIABLE owner ERROR_QUIET)
     endif()
@@ -85,7 +87,7 @@ foreach(library ${resolved})
   endif()
 endforeach()
 
-# Debian's copyright files point at the common texts; bring along those that they name.
+# Debian's copyright files refer to common license texts. Copies the texts that they name.
 list(REMOVE_DUPLICATES packages)
 foreach(package ${packages})
   get_filename_component(copyright /usr/share/doc/${package}/copyright REALPATH)
@@ -104,7 +106,7 @@ foreach(package ${packages})
 endforeach()
 message(STATUS "Bundled ${count} shared libraries")
 
-# Ours look there, in this order.
+# The search path of our programs and libraries, in this order.
 foreach(file ${programs} ${libraries})
   if(NOT IS_SYMLINK ${file})
     file(READ_ELF ${file} RPATH installed)

@@ -1,4 +1,5 @@
-"""What generators read of cumulet.h: its structs and enums, without comments. The header's style is all that is understood."""
+"""Reads the structs and enums of cumulet.h, without comments, for the generators. It understands only that header's
+style."""
 import re
 
 
@@ -8,5 +9,5 @@ def read(path):
 
 
 def types(kind, text):
-    """Name and body of each `typedef struct` or `typedef enum`, in order."""
+    """Returns the name and the body of each `typedef struct` or `typedef enum`, in order."""
     return re.findall(rf"typedef {kind} (\w+) \{{(.*?)\}} \1;", text, flags=re.S)

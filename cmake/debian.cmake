@@ -1,5 +1,6 @@
-# Run by cpack on the staged trees of the Debian packages, a folder a component: what Debian wants and an install
-# elsewhere does not. Its libraries are where the loader looks anyway, so nothing names a folder to search.
+# cpack runs this on the staged trees of the Debian packages, one folder per component. Applies Debian's requirements,
+# which an installation elsewhere does not have. Debian's loader searches the library folder anyway, so no file gets a
+# search path.
 cmake_minimum_required(VERSION 3.25)
 if(NOT CPACK_GENERATOR STREQUAL "DEB")
   return()

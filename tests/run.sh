@@ -1,12 +1,12 @@
 #!/bin/bash
-# Every test: installs the Debian packages that are missing, builds, and runs the tests, the unit tests again under
-# AddressSanitizer and UndefinedBehaviorSanitizer, and the checks of format, scripts and (clang-tidy) code.
+# Runs every test. Installs the missing Debian packages, builds, and runs the tests. Runs the unit tests again under
+# AddressSanitizer and UndefinedBehaviorSanitizer, and checks format, scripts and code (clang-tidy).
 # The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed.
-# --quick: the release build's tests alone, without those labelled slow. --long: everything, clang-tidy with the static
-# analyzer, then the tests of threads under ThreadSanitizer, the soak, most behind OSMesa's door, all drivers' pictures
-# and a minute of each fuzzer (an hour and a half more).
-# --minutes N: of what comes after the release build's tests nothing begins later than that; what did not is counted as
-# skipped. For machines that end the script, and lose its findings, after a time.
+# --quick: only the release build's tests, without those labelled slow. --long: everything, clang-tidy with the static
+# analyzer, then the tests of threads under ThreadSanitizer, the soak test, most tests through OSMesa, the images of all
+# drivers and a minute of each fuzzer (an hour and a half more).
+# --minutes N: after N minutes, starts no further step that follows the release build's tests. Such steps count as
+# skipped. For machines that end the script after a time limit and discard its output.
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
@@ -34,27 +34,27 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-# In seconds; below one there is none.
+# Remaining time in seconds; less than 1 means none.
 time_left() { echo $((60 * minutes - SECONDS + script_started)); }
 
-launcher=() # of ctest
+launcher=() # command in front of ctest
 passed=0 failed=0 skipped=0
 count() { # PASSED FAILED SKIPPED
   passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + $3))
 }
 
-failures=() # said again at the end, where those who see the end of a long log alone find them
-fail() { # WHAT: counts as one test
+failures=() # printed again at the end, for readers who see only the end of a long log
+fail() { # WHAT: records a failure, which counts as one test
   count 0 1 0
   failures+=("$1")
 }
 
-left_out() { # WHAT: for want of time; counts as one test that was skipped
+left_out() { # WHAT: records a check skipped for lack of time, which counts as one test
   count 0 0 1
   say "left out for time: $1"
 }
 
-# What tests that were killed leave behind goes with this folder.
+# Files that killed tests leave behind are deleted with this folder.
 TMPDIR=$(mktemp -d)
 export TMPDIR
 
@@ -71,11 +71,11 @@ finish() {
   [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
   exit
 }
-# Whatever ends the script, the closing line tells of it.
+# Prints the closing line even if the script ends early.
 trap 'fail "$(basename "$0") ended early"; finish' EXIT
 trap 'exit 130' INT TERM
 
-check() { # NAME COMMAND...: one check that counts as one test
+check() { # NAME COMMAND...: runs one check, which counts as one test
   local name=$1 since=$SECONDS
   shift
   say "$name"
@@ -88,7 +88,7 @@ check() { # NAME COMMAND...: one check that counts as one test
   fi
 }
 
-run_ctest() { # NAME FOLDER CTEST_OPTION...: its tests, each counted
+run_ctest() { # NAME FOLDER CTEST_OPTION...: runs the tests of a build; each counts
   local name=$1 folder=$2 since=$SECONDS report total bad skips
   shift 2
   report=$root/build/$name.junit.xml
@@ -108,7 +108,7 @@ run_ctest() { # NAME FOLDER CTEST_OPTION...: its tests, each counted
   say "$name: $bad of $total failed, in $(elapsed "$since")"
 }
 
-# failed_tests NAME FILE: of a report of ctest's, each with the end of what it printed.
+# failed_tests NAME FILE: prints the failed tests of a ctest report, each with the end of its output.
 failed_tests() {
   python3 - "$@" <<'EOF'
 import sys
@@ -121,7 +121,7 @@ for case in xml.parse(sys.argv[2]).iter("testcase"):
 EOF
 }
 
-junit() { # ATTRIBUTE FILE: of the test suite; 0 if there is none
+junit() { # ATTRIBUTE FILE: prints an attribute of the test suite, or 0 if it is absent
   local value
   value=$(sed -n "/<testsuite/,/>/s/.*[[:space:]]$1=\"\([0-9]*\)\".*/\1/p" "$2" 2>/dev/null | sed -n 1p || true)
   echo "${value:-0}"
@@ -141,7 +141,7 @@ script_check() {
 tidy_one() { # STAMP SOURCE
   local log
   [ "$(date +%s)" -lt "$tidy_until" ] || { : >"$1.left"; echo "  left    $2"; return; }
-  # A tenth of the analyzer's default budget a function, where it runs.
+  # A tenth of the analyzer's default budget per function, if the analyzer runs.
   if log=$(clang-tidy --quiet -p build/release --checks="$tidy_checks" --extra-arg=-Wno-unknown-warning-option \
     --extra-arg=-Xclang --extra-arg=-analyzer-config --extra-arg=-Xclang --extra-arg=max-nodes=22500 "$2" 2>&1); then
     : >"$1"
@@ -151,14 +151,14 @@ tidy_one() { # STAMP SOURCE
   fi
 }
 export -f tidy_one
-# The static analyzer, a third of the time, is for the long tier: sanitizers look for the same at each run.
+# Only the long tier runs the static analyzer, which takes a third of the time. Sanitizers find such errors in each run.
 tidy_checks=
 [ "$tier" = long ] || tidy_checks='-clang-analyzer-*'
 export tidy_checks
 
-# clang-tidy of src/ and demo/, but for the files that include OpenVDB (a minute each and more). Each file is a check;
-# one that passed is not looked at again until it, a header of its own or the rules change: what passed is kept where
-# ccache keeps what it has, for other clones as well.
+# Runs clang-tidy on src/ and demo/, except for files that include OpenVDB, which take more than a minute each. Each
+# file is a check. A file that passed is checked again only when the file, one of our headers that it includes or the
+# rules have changed. The results are stored next to the ccache, for other clones as well.
 tidy() {
   local stamps=${XDG_CACHE_HOME:-${HOME:-$root/build}/.cache}/cumulet/tidy since=$SECONDS
   local rules source includes sources=() keys=() todo=() files
@@ -166,7 +166,7 @@ tidy() {
   find "$stamps" -type f -mtime +30 -delete
   say "clang-tidy"
   rules=$({ cat .clang-tidy; echo "$tidy_checks"; clang-tidy --version; } | sha256sum)
-  # What ninja knows of the includes of every object file: of those without OpenVDB, a source and all of ours.
+  # ninja's list of the includes of each object file. Prints the source and our headers for the files without OpenVDB.
   while read -r -a includes; do
     source=${includes[0]}
     sources+=("$source")
@@ -212,9 +212,9 @@ tidy() {
   say "clang-tidy: $((files - good - left)) of $files failed, $left left out for time, in $(elapsed "$since")"
 }
 
-# No display and no session: what a test finds must not depend on them.
+# The tests run without display and session, so that their results do not depend on them.
 unset DISPLAY WAYLAND_DISPLAY XDG_RUNTIME_DIR
-# What Mesa makes of shaders is kept from test to test, wherever there is a home or none.
+# Tests share Mesa's cache of compiled shaders, in the build folder even if there is no home folder.
 export MESA_SHADER_CACHE_DIR=$root/build/mesa MESA_SHADER_CACHE_MAX_SIZE=4G
 mkdir -p "$MESA_SHADER_CACHE_DIR"
 export CTEST_OUTPUT_ON_FAILURE=1
@@ -232,7 +232,7 @@ build_and_test() {
   fi
 }
 
-# Under sanitizers, some programs at a time, as long as there is time.
+# Runs the tests of the sanitizer build in groups of programs, as long as time remains.
 sanitized_tests() {
   local folder=build/sanitize/tests/unit group=16 names=() first status=0 some
   if [ "$(time_left)" -lt 1 ]; then
@@ -266,8 +266,9 @@ fi
 build_and_test release "" . --label-exclude long
 check "clang-format" format_check
 check "shellcheck" script_check
-# Leaks inside the software GL driver and TBB are theirs. GCC 12 takes what lies before a block of dynamic TLS for a
-# header of glibc 2.19 and now and then crashes at exit on what it reads there: such blocks are found from the heap too.
+# Ignores leaks inside the software GL driver and TBB. intercept_tls_get_addr=0: the leak checker of GCC 12 mistakes the
+# bytes before a block of dynamic TLS for a header of glibc 2.19 and sometimes crashes at exit. Such blocks are also
+# found from the heap.
 export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
 export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
@@ -276,8 +277,8 @@ if [ "$tier" = all ]; then
 else
   build_and_test sanitize tests/unit/all tests/unit
   run_ctest release-long build/release --label-regex long
-  # What TSan cannot see into is left out. TBB has one thread (of one core), or its own ways of waiting would count as
-  # races; the library's threads stay many.
+  # Ignores races in modules without ThreadSanitizer instrumentation. One core limits TBB to one thread, because its way
+  # of waiting would be reported as races. The library itself still has several threads.
   export TSAN_OPTIONS=ignore_noninstrumented_modules=1:history_size=7:suppressions=$root/tests/threads.supp
   export LP_NUM_THREADS=0
   launcher=(taskset --cpu-list "$(taskset --cpu-list --pid $$ | sed 's/.*: \([0-9]*\).*/\1/')")
@@ -285,6 +286,6 @@ else
   launcher=()
   build_and_test fuzz cumulet_fuzzers tests/fuzz
 fi
-# Last, where time may not do for all.
+# Last, because the time may not suffice for all files.
 tidy
 finish

@@ -1,4 +1,4 @@
-// The triangle tree against Embree's over the same triangles: build, refit, rays. Prints a table of ratios.
+// Compares the BVH with Embree's over the same triangles: build, refit, rays. Prints a table of ratios.
 
 #include <tbb/task_arena.h>
 
@@ -26,7 +26,7 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
 }
 
-// A picture's rays, then rays from what they hit into the hemisphere.
+// Camera rays of an image, then rays from their hit points into the hemisphere.
 struct Rays {
   std::vector<GlRay> camera;
   std::vector<GlRay> scattered;
@@ -43,7 +43,7 @@ Rays rays_for(const Mesh& mesh, const surface::Bvh& bvh, int size) {
   std::mt19937 engine(1);
   std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
   core::BvhRays trace{&bvh};
-  // In tiles of 8 x 8, as a shader's work groups are.
+  // In tiles of 8 x 8, like a shader's work groups.
   for (int i = 0; i < size * size; ++i) {
     const int tile = i / 64;
     const int x = tile % (size / 8) * 8 + i % 8;
@@ -99,7 +99,7 @@ void compare(const bench::TreeMesh& tree, const test::GlRays& gl, int size, int 
   embree.build(mesh, false);
   const Rays rays = rays_for(mesh, bvh, size);
   const double count = double(rays.camera.size()) / 1e6;
-  std::atomic<std::size_t> sum = 0;  // so that nothing is left out
+  std::atomic<std::size_t> sum = 0;  // prevents the compiler from removing the work
   const auto cpu = [&](const std::vector<GlRay>& all, bool any) {
     bench::parallel(all.size(), [&](std::size_t i) {
       core::BvhRays trace{&bvh};
@@ -132,7 +132,7 @@ void compare(const bench::TreeMesh& tree, const test::GlRays& gl, int size, int 
 }  // namespace
 
 int main(int argc, char** argv) {
-  // --quick: small meshes, to see that it runs. --large: ten million triangles built, for time and memory.
+  // --quick: small meshes, to check that it runs. --large: builds ten million triangles, for time and memory.
   const std::string mode = argc > 1 ? argv[1] : "";
   const bool quick = mode == "--quick";
   try {

@@ -35,7 +35,7 @@ std::vector<TreeMesh> tree_meshes(std::size_t triangles) {
   std::vector<TreeMesh> meshes;
   meshes.push_back({"terrain", test::terrain(static_cast<int>(std::lround(std::sqrt(0.5 * count))))});
   meshes.push_back({"sphere", test::icosphere(static_cast<int>(std::lround(std::log(count / 20.0) / std::log(4.0))))});
-  // As wide as overlaps as much at any number of them.
+  // The triangle size keeps the amount of overlap constant for any count.
   meshes.push_back({"soup", test::soup(triangles, static_cast<float>(1.0 / std::cbrt(count)), 1)});
   return meshes;
 }

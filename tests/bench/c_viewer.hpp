@@ -4,7 +4,7 @@
 
 #include "support/c_host.hpp"
 
-/// Viewers of benchmarks that are hosts by cumulet.h alone.
+/// Viewers for benchmarks that are hosts using only cumulet.h.
 namespace cumulet::bench {
 
 /// Throws std::runtime_error.
@@ -20,7 +20,7 @@ inline cumulet_light_desc daylight() {
   return light;
 }
 
-/// By daylight, with the library's defaults.
+/// A viewer in daylight with the library's defaults.
 inline test::ViewerPtr make_viewer(headless::Context& context) {
   auto create = test::make_desc<cumulet_create_desc>();
   create.get_proc = headless::Context::get_proc;

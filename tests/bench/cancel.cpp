@@ -1,10 +1,10 @@
-// How long a host that lets go of a loading viewer waits: each file's load is ended at many moments, spread evenly over
-// the time that it takes, as cumulet_destroy ends it. Prints what that took, and when it took longest. By hand:
+// Measures how long a host waits that destroys a loading viewer. Each file's load is cancelled at many times, spread
+// evenly over its duration, as cumulet_destroy does. Prints the delays and the time of the longest. Run by hand:
 //
 //     cumulet-bench-cancel [--moments N] FILE...
 //
-// Files made for it, of the size N: fog:N, N^3 voxels; picture:N, N^2 pixels of a PNG; mesh:N, draco:N, meshopt:N, 2
-// N^2 triangles.
+// Generated files of size N: fog:N, N^3 voxels; picture:N, N^2 pixels of a PNG; mesh:N, draco:N, meshopt:N, 2 N^2
+// triangles.
 #include <openvdb/io/File.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace {
 using namespace cumulet;
 using Clock = std::chrono::steady_clock;
 
-/// One load, by a worker of its own.
+/// One load with a worker thread of its own.
 class Load {
  public:
   explicit Load(const std::string& file) {
@@ -73,7 +73,7 @@ void write_fog(const std::string& file, int size) {
   out.write({grid});
 }
 
-/// Of a KIND:SIZE the path of a file made for it; others are paths.
+/// Generates a file for a KIND:SIZE argument and returns its path. Other arguments are paths.
 std::string made(const std::string& argument, const test::Folder& folder) {
   const std::size_t colon = argument.find(':');
   if (colon == std::string::npos) return argument;
@@ -98,7 +98,7 @@ std::string made(const std::string& argument, const test::Folder& folder) {
   return file;
 }
 
-/// Until what was left to end by itself has ended, so that it takes no time from what is measured next.
+/// Waits until detached work has ended, so that it does not affect the next measurement.
 void settle() {
   for (;;) {
     const std::clock_t before = std::clock();

@@ -25,14 +25,14 @@ namespace {
 using glm::dvec3;
 using glm::vec3;
 
-/// A row of a table: a scene with a viewer of its own, so that rows take turns without building anything anew.
+/// A row of a table: a scene with its own viewer, so that rows can take turns without rebuilding.
 struct Row {
   std::string name;
   std::unique_ptr<test::Still> still;
   std::vector<Run> runs = {};
 };
 
-/// Renders all rows in turn, and tells of each.
+/// Renders all rows in turn. Returns the cost of each.
 std::vector<Cost> take_turns(std::vector<Row>& rows, const Options& options) {
   for (Row& row : rows) {
     trace(*row.still, {options.size, options.size, 1, 999});  // compiles, builds, uploads
@@ -68,7 +68,7 @@ void print_costs(const char* title, std::vector<Row>& rows, const Options& optio
 
 enum class Burns { no, temperature, flame, both };
 
-/// As the preset "explosion" of the demo, which is for an extinction of 9 a unit.
+/// The demo's preset "explosion", which is designed for an extinction of 9 per unit.
 viewer::Medium medium_of(double density_scale, Burns burns) {
   viewer::Medium medium;
   medium.density_scale = density_scale;
@@ -130,7 +130,7 @@ viewer::VolumeAssetPtr read(const Input& input, const std::string& colour) {
       volume::import_frame(input.file, {.density = input.grid, .colour = colour}, Log()));
 }
 
-/// Where lamps are: above and aside, facing the middle.
+/// Position of the lights: above and to the side, directed at the center.
 struct Place {
   dvec3 at;
   dvec3 direction;
@@ -153,28 +153,30 @@ scene::ModelSourcePtr emitter_at(const Place& place, double side, float radiance
   return test::source_of(scene);
 }
 
-// What flights take up on their way, and where they collide alone: as much as is given off there, by the extinction.
+// Disables the emission that scattered rays accumulate along their path, and adds it only at collisions (emission
+// divided by extinction).
 constexpr Edit no_way = {"flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n", ""};
 constexpr Edit where_they_collide = {
     "flight.glsl", "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
     "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
     "    if (way < left) emitted += emission.mean * (there / max(mix(e_0, e_1, way / max(span, 1e-30f)), 1e-30f));\n"};
-// Looks for cells: none where there is no other light, and none among others.
+// Disables NEE of emissive cells: if there is no other light, or among other lights.
 constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
                                  "arrived && cm.lights.any != 0u && cm.lights.cell_chance < 1.0f;"};
 constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance,",
                            "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
 constexpr Edit flights_have_all = {"flight.glsl", "cm.lights.cell_chance * cm_look_chance(", "0.0f * cm_look_chance("};
-// None left out by roulette.
+// Disables Russian roulette of shadow rays.
 constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
                             "  if (p.steps >= 0u) return 1.0f;\n"};
 
-// Lamps, each as likely as the others.
+// Samples all lights with equal probability.
 constexpr Edit any_lamp = {"light.glsl", "  if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;\n", ""};
 constexpr Edit all_alike = {"light.glsl", "  light.density = lamp.chance;\n",
                             "  light.density = 1.0f / float(max(cm.lamps.count, 1u));\n"};
 
-/// As a set has them: a key lamp beside it, one of a tenth opposite, and fourteen like the key far away.
+/// Lights as on a film set: a key light at the side, one with a tenth of its power opposite, and fourteen like the key
+/// light far away.
 light::Lamps sixteen_lamps(const viewer::Bounds& bounds, const Place& place, float power) {
   light::Lamps lamps;
   const auto add = [&](const dvec3& at, float share) {
@@ -193,7 +195,7 @@ light::Lamps sixteen_lamps(const viewer::Bounds& bounds, const Place& place, flo
   return lamps;
 }
 
-/// A hot core in a ball of smoke, which looks are for.
+/// A hot core in a ball of smoke, for which NEE of cells is designed.
 viewer::VolumeAssetPtr small_fire() {
   constexpr int side = 48;
   const auto field = [](const std::function<float(float)>& value) {
@@ -227,7 +229,7 @@ viewer::VolumeAssetPtr small_fire() {
 void measure_costs(headless::Context& context, const Input& input, const Options& options) {
   const Asset asset = load_asset(input, true);
   const double density_scale = asset.density_scale(options.optical_depth);
-  const bool made = input.file.empty();  // "@noise": of density alone
+  const bool made = input.file.empty();  // "@noise": has only density
   const viewer::VolumeAssetPtr plain = made ? asset.volume : read(input, "none");
   const viewer::Light daylight = light_of(1.0F, 1.0F);
   {
@@ -347,7 +349,7 @@ void measure_equal_error(headless::Context& context, const Input& input, const O
   const double mean = 0.5 * (mean_of(dense.halves[0]) + mean_of(dense.halves[1]));
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const Cost& cost = costs[i];
-    // Products of two independent halves: noise does not enter their mean.
+    // Products of two independent halves, so that noise does not bias their mean.
     std::vector<double> products;
     std::vector<double> squares;
     for (std::size_t k = 0; k < dense.halves[0].size(); ++k) {
@@ -371,7 +373,7 @@ void measure_equal_error(headless::Context& context, const Input& input, const O
       std::printf(" below %.1f |", 100.0 * std::sqrt(std::max(square, 0.0) + 2.0 * deviation));
     }
     for (const double target : options.targets) {
-      // Samples until the variance is what the grid's error leaves of the target's square.
+      // The number of samples for which variance and squared grid error add up to the squared target.
       const double left = target * target - std::max(square, 0.0);
       if (!(left > 0.0)) {
         std::printf(" never | never | never |");

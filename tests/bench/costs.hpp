@@ -6,12 +6,12 @@
 
 namespace cumulet::bench {
 
-/// What channels and kinds of light cost on one volume and how noisy they are: tables in Markdown, as ratios to their
-/// first rows.
+/// Measures the cost and the noise of channels and kinds of light on one volume. Prints Markdown tables with ratios to
+/// their first rows.
 void measure_costs(headless::Context& context, const Input& input, const Options& options);
 
-/// What each march takes until a fire's picture has the same error, of its grid and its noise together: a table in
-/// Markdown. The tetrahedra's grids are Options::thresholds.
+/// Measures the time per grid type until a fire's image reaches the same error, including grid error and noise. Prints
+/// a Markdown table. The tetrahedral grids use Options::thresholds.
 void measure_equal_error(headless::Context& context, const Input& input, const Options& options);
 
 }  // namespace cumulet::bench

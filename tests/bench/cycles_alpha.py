@@ -1,7 +1,9 @@
-"""Run in Blender before cycles.py: what that leaves out of a glTF's matte materials, put in as the picture is begun.
+"""Run in Blender before cycles.py, which ignores coverage. Adds the coverage of a glTF's matte materials when the
+rendering starts.
 
-Coverage (alphaMode BLEND and MASK) is a transparent shader, which ends no path; the colours of images are not multiplied
-by their alpha, which Cycles does for an opaque material."""
+Coverage (alphaMode BLEND and MASK) becomes a transparent shader, which does not count as a bounce. Cycles multiplies
+the colors of images by their alpha even in opaque materials; this script prevents that.
+"""
 
 import bpy
 
@@ -17,7 +19,7 @@ def complete(scene, *_):
             if material.blend_method == "OPAQUE" or not (alpha.links or alpha.default_value < 1):
                 continue
             surface = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL" and n.inputs["Surface"].links).inputs["Surface"]
-            # Less than the cutoff, for MASK; less than a chance otherwise.
+            # For MASK: alpha is less than the cutoff. Otherwise: alpha is less than a random number.
             clear = tree.nodes.new("ShaderNodeMath")
             mask = material.blend_method == "CLIP"
             clear.operation = "LESS_THAN" if mask else "SUBTRACT"

@@ -1,12 +1,14 @@
-"""Renders glTF models with cumulet-render and with Blender's Cycles, all materials made matte, and compares the pictures:
-one row of a Markdown table a model, and MODEL.png (ours, Cycles', eight times the difference) in the folder --out.
+"""Renders glTF models with cumulet-render and with Blender's Cycles, all materials made matte, and compares the images.
+Prints one row of a Markdown table per model and writes MODEL.png (ours, Cycles', eight times the difference) to the
+folder --out.
 
-Both see the same file. What the two do not both show is taken out of it first, and the row says what: animations, lights,
-transmission, that a material is unlit, images that are neither PNG nor JPEG. Triangles without a material get a white one.
-Cycles knows no single-sided surfaces, so ours are all double-sided.
+Both renderers read the same file. First, features that only one of them supports are removed, and the row lists them:
+animations, lights, transmission, unlit materials, images that are neither PNG nor JPEG. Triangles without a material
+get a white one. Cycles has no single-sided surfaces, so all surfaces are made double-sided.
 
-The peer is cycles.py, with lambert.py beside it; it needs Blender 3.4 and, in its Python, numpy. README.md here has what
-came out."""
+The peer renderer runs cycles.py, with lambert.py next to it. It needs Blender 3.4 and, in Blender's Python, numpy.
+README.md in this folder lists the results.
+"""
 
 import argparse
 import base64
@@ -36,11 +38,11 @@ PEER_PATH = "/usr/bin:" + os.environ["PATH"]
 
 
 class Unusable(Exception):
-    """A model that one of the two cannot show; says why."""
+    """A model that one of the two renderers cannot show. The message gives the reason."""
 
 
 def read_model(path):
-    """The JSON of a .gltf or .glb, and its binary chunk."""
+    """Returns the JSON of a .gltf or .glb and its binary chunk."""
     data = path.read_bytes()
     if data[:4] != b"glTF":
         return json.loads(data), b""
@@ -49,7 +51,7 @@ def read_model(path):
 
 
 def pack(model, binary, folder):
-    """Everything that the model refers to as one binary chunk."""
+    """Returns one binary chunk with all data that the model refers to, and points the model to it."""
     def resolve(uri):
         if uri.startswith("data:"):
             return base64.b64decode(uri.split(",", 1)[1])
@@ -78,7 +80,7 @@ def pack(model, binary, folder):
 
 
 def simplify(model, animation=None):
-    """Takes out what the two do not both show, and all animations but the one of that number; says what that was."""
+    """Removes features that only one renderer supports, and all animations but the given one. Returns their names."""
     changes = []
     animations = model.pop("animations", [])
     if animation is not None:
@@ -138,7 +140,7 @@ def write_glb(path, model, chunk):
 
 
 def run(command, **arguments):
-    """Standard output of a program that may fail: then its last words."""
+    """Returns the standard output of a program. If the program fails, raises an error with its last line of output."""
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, **arguments)
     if done.returncode:
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
@@ -147,7 +149,7 @@ def run(command, **arguments):
 
 
 def fitted_camera(low, high, aspect):
-    """Where cumulet puts a camera that fits bounds: from +Z and a little above."""
+    """Returns the camera with which cumulet fits bounds: from +Z and slightly above."""
     target = [(a + b) / 2 for a, b in zip(low, high)]
     back = numpy.array([0, 0.2, 1]) / math.hypot(0.2, 1)
     right = numpy.array([1.0, 0, 0])
@@ -170,7 +172,7 @@ def read_pfm(path):
 
 
 def write_png(path, image):
-    """Rows from the bottom up, linear."""
+    """Writes linear rows, bottom row first, as an sRGB PNG."""
     level = numpy.clip(image[::-1], 0, 1)
     level = numpy.where(level > 0.0031308, 1.055 * level ** (1 / 2.4) - 0.055, 12.92 * level)
     rows = (level * 255 + 0.5).astype(numpy.uint8)
@@ -189,7 +191,8 @@ def blocks_of(image):
 
 
 def compare(ours, theirs):
-    """Of two seeds each: differences relative to ours, over the blocks that show more than sky, and their noise."""
+    """Compares two images each, of two seeds: differences relative to ours, over the blocks with more than sky, and
+    their noise."""
     weights = numpy.array([0.2126, 0.7152, 0.0722])
     a1, a2, b1, b2 = (image @ weights for image in (*ours, *theirs))
     sky = numpy.array(SKY["radiance"]) @ weights
@@ -202,7 +205,7 @@ def compare(ours, theirs):
     a = blocks_of((a1 + a2) / 2)[shown]
     b = blocks_of((b1 + b2) / 2)[shown]
     variance = blocks_of(((a1 - a2) ** 2 + (b1 - b2) ** 2) / 4)[shown]
-    least = 0.01 * a.mean()  # what is nearly black has no relative difference
+    least = 0.01 * a.mean()  # a relative difference is meaningless where the image is nearly black
     difference = (b - a) / numpy.maximum(a, least)
     noise = numpy.sqrt(variance) / numpy.maximum(a, least)
     square = (difference ** 2).mean() - (noise ** 2).mean()
@@ -215,7 +218,8 @@ def compare(ours, theirs):
 
 
 def render(model_file, options, out):
-    """Two seeds of each renderer, what was taken out of the model, its triangles, and both renderers' seconds."""
+    """Renders two seeds with each renderer. Returns the images, the removed features, the triangle count and both
+    render times in seconds."""
     if not json.loads(run([options.render, "--info", "--json", model_file]))["surfaces"]["triangles"]:
         raise Unusable("no triangles")
     try:
@@ -244,7 +248,7 @@ def render(model_file, options, out):
              "--stats", stats])
         seconds[0] += json.loads(stats.read_text())["trace_seconds"]
         stats.unlink()
-    # Cycles counts light's ways between surfaces, we count surfaces.
+    # Cycles counts path segments between surfaces, cumulet counts surface hits.
     description["medium"]["max_bounces"] -= 1
     peer_scene.write_text(json.dumps(description))
     environment = dict(os.environ, LAMBERT="1", PATH=PEER_PATH)
@@ -261,7 +265,7 @@ def render(model_file, options, out):
 
 
 def models_of(paths):
-    """(file, name) of each glTF in the files and folders."""
+    """Yields (file, name) of each glTF in the files and folders."""
     for path in paths:
         files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.suffix in (".gltf", ".glb"))
         for file in files:

@@ -1,12 +1,14 @@
-"""Run in Blender before cycles.py: the volumes and models of a scene, each in its place, which that does not know.
+"""Run in Blender before cycles.py: adds the volumes and models of a scene with their transforms, which cycles.py does
+not support.
 
 The scene's "volumes" are {"file", "grid", "places": [16 numbers, column by column, ...], "medium": {"density_scale",
-"albedo", "anisotropy"}}, its "models" {"file", "to_world"}. They are there before cycles.py goes on, which makes models'
-materials matte (LAMBERT=1). Extinction is density_scale times the grid, albedo the part of it that scatters.
+"albedo", "anisotropy"}}, its "models" {"file", "to_world"}. They exist before cycles.py continues and makes the models'
+materials matte (LAMBERT=1). Extinction is density_scale times the grid; albedo is the scattered fraction of it.
 
-With "shutter_seconds" there is motion blur: "open" and "close" of a volume, a model and the camera are {"translate": three
-numbers}, how far it is then from where it stands, and of the camera {"eye", "target"}; a volume's "velocity" is a grid of its
-file. A frame is a second."""
+With "shutter_seconds" there is motion blur. "open" and "close" of a volume or model are {"translate": three numbers}:
+its offset from its transform at that moment. Those of the camera are {"eye", "target"}. A volume's "velocity" names a
+grid of its file. A frame lasts a second.
+"""
 
 import json
 import math
@@ -24,7 +26,8 @@ def matrix(numbers):
 
 
 def origin_of(scene, one, name):
-    """An object in the world's origin, which moves as that volume or model does, and all whose parent it is."""
+    """Returns an object at the world's origin that moves like this volume or model. It is the parent of the volume's or
+    model's objects."""
     mover = bpy.data.objects.new(name, None)
     bpy.context.collection.objects.link(mover)
     for end, at in (("open", -0.5), ("close", 0.5)):
@@ -35,7 +38,8 @@ def origin_of(scene, one, name):
 
 
 def key(moved, properties, scene, at):
-    """Where it is now it is at that part of the shutter's time from the frame's moment; from there it goes evenly."""
+    """Sets a keyframe with the present values, at the fraction `at` of the shutter time after the frame time.
+    Interpolates linearly."""
     for name in properties:
         moved.keyframe_insert(name, frame=1 + at * scene["shutter_seconds"])
     for curve in moved.animation_data.action.fcurves:
@@ -45,7 +49,7 @@ def key(moved, properties, scene, at):
 
 
 def open_shutter(description):
-    """As the picture is begun, when there is a camera."""
+    """Runs when the rendering starts, when the camera exists."""
     @bpy.app.handlers.persistent
     def begin(scene, *_):
         render = scene.render
@@ -67,7 +71,8 @@ def open_shutter(description):
 
 
 def set_clock(actions, time):
-    """The frame's moment is so many seconds into them, which were imported at a frame a second."""
+    """Shifts and scales animations so that the frame time is so many seconds after their start. They were imported at 1
+    frame per second."""
     for curve in (curve for action in actions for curve in action.fcurves):
         for point in curve.keyframe_points:
             for end in (point.co, point.handle_left, point.handle_right):
@@ -105,28 +110,28 @@ def place_all(*_):
         origin = origin_of(scene, one, f"origin of volume {number}")
         volume = bpy.data.volumes.new(f"volume {number}")
         volume.filepath = os.path.join(folder, one["file"])
-        volume.render.space = "WORLD"  # what is stretched is as dense as before
+        volume.render.space = "WORLD"  # stretching does not change the density
         if moves:
             volume.velocity_grid, volume.velocity_unit = one.get("velocity", ""), "SECOND"
         volume.materials.append(medium(f"medium {number}", one["grid"], one["medium"]))
-        # Cycles has voxels half a voxel further along each axis than OpenVDB.
+        # Cycles places voxels half a voxel further along each axis than OpenVDB.
         volume.grids.load()
         to_object = next(grid for grid in volume.grids if grid.name == one["grid"]).matrix_object
         shift = to_object @ Matrix.Translation((-0.5, -0.5, -0.5)) @ to_object.inverted()
         for place in one["places"]:
             instance = bpy.data.objects.new(volume.name, volume)
             bpy.context.collection.objects.link(instance)
-            # An object's own place is never sheared, what stands before it may be.
+            # An object's own transform cannot contain shear, but its parent inverse matrix can.
             instance.parent = origin
             instance.matrix_parent_inverse = matrix(place) @ shift
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
-    bpy.context.scene.render.fps = 1  # of keys that are imported
+    bpy.context.scene.render.fps = 1  # frame rate of imported keyframes
     for number, one in enumerate(scene.get("models", [])):
         origin = origin_of(scene, one, f"origin of model {number}")
         before, actions_before = set(bpy.data.objects), set(bpy.data.actions)
         bpy.ops.import_scene.gltf(filepath=os.path.join(folder, one["file"]))
         new = [o for o in bpy.data.objects if o not in before]
-        # Blender has turned it to Z-up.
+        # Blender's importer has rotated the model to Z-up; this rotates it back.
         turned = matrix(one["to_world"]) @ Matrix.Rotation(-math.pi / 2, 4, "X")
         for root in [o for o in new if o.parent is None]:
             root.parent = origin

@@ -1,10 +1,12 @@
-"""Renders a scene of three volumes that overlap and two models, which stand in them, with cumulet-render and with Blender's
-Cycles: all materials matte, two seeds each, one run. Prints a row of a Markdown table, which README.md here has, and writes
-scene.png (ours, Cycles', eight times the difference) into the folder --out. With --moving some of them and the camera move
-while the shutter is open; with --flow there is a Mantaflow file alone, which moves by its velocity, and with --deform a model
-alone, which moves by an animation.
+"""Renders a scene of three overlapping volumes and two models inside them with cumulet-render and with Blender's
+Cycles. All materials are matte; each renderer renders two seeds. Prints a row of a Markdown table for README.md in this
+folder and writes scene.png (ours, Cycles', eight times the difference) to the folder --out. With --moving some objects
+and the camera move while the shutter is open. With --flow the scene is only a Mantaflow file with motion blur from its
+velocity grid. With --deform it is only a model with motion blur from its animation.
 
-The peer is cycles.py, with cycles_objects.py before it for what it does not know; it needs Blender 3.4 and numpy."""
+The peer renderer runs cycles.py, after cycles_objects.py adds the features that cycles.py lacks. It needs Blender 3.4
+and numpy.
+"""
 
 import argparse
 import json
@@ -23,19 +25,19 @@ CAMERA = {"eye": [8, 40, 128], "target": [5, 27, 0], "fovy_degrees": 40}
 
 
 def place(translate, degrees=0.0, scale=(1, 1, 1)):
-    """Scaled, turned about the vertical, moved; column by column."""
+    """Returns a matrix, column by column: scale, then rotation about the vertical axis, then translation."""
     s, c = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
     x, y, z = scale
     return [c * x, 0, -s * x, 0, 0, y, 0, 0, s * z, 0, c * z, 0, *translate, 1]
 
 
 def aside(x, y, z):
-    """From there to the other side of where it stands while the shutter is open."""
+    """Returns a motion from -(x, y, z) to (x, y, z) around the object's transform while the shutter is open."""
     return {"open": {"translate": [-x, -y, -z]}, "close": {"translate": [x, y, z]}}
 
 
 def moving(camera, shown, models):
-    """All of these with some motion in them: of the camera, two of three volumes and both models."""
+    """Adds motion to the scene: to the camera, two of three volumes and both models."""
     def seen(x):
         return {"eye": [camera["eye"][0] + x, *camera["eye"][1:]], "target": [camera["target"][0] + 0.7 * x, *camera["target"][1:]]}
 
@@ -45,13 +47,14 @@ def moving(camera, shown, models):
 
 
 def flow(file):
-    """Upright, 88 wide, dark before the sky."""
+    """Returns the volume of a Mantaflow file: upright, 88 wide, dark in front of the sky."""
     return [{"file": file, "grid": "density", "velocity": "velocity", "places": [[45, 0, 0, 0, 0, 0, -45, 0, 0, 45, 0, 0, -40, -14, 46, 1]],
              "medium": {"density_scale": 1, "albedo": [0.5, 0.5, 0.5], "anisotropy": 0.3}}]
 
 
 def volumes(cloud, other):
-    """A cloud, the same once more, stretched, sheared by what it stands across, coloured, and a third of another file."""
+    """Returns a cloud, a stretched, sheared and colored second instance of it across the first, and a volume of another
+    file."""
     sheared = place([34, 2, 12], 40, (0.9, 0.7, 0.6))
     sheared[4] = 0.25
     return [
@@ -64,7 +67,7 @@ def volumes(cloud, other):
 
 
 def matte(model_file, out, options):
-    """The model as both show it, in one file, and its bounds."""
+    """Returns the model with the features that both renderers support, in one file, and its bounds."""
     model, binary = cycles_gltf.read_model(model_file)
     chunk = cycles_gltf.pack(model, binary, model_file.parent)
     cycles_gltf.simplify(model, options.deform)
@@ -78,7 +81,7 @@ def matte(model_file, out, options):
 
 
 def standing(bounds, middle, size, degrees):
-    """Where a model is so large, with its middle there."""
+    """Returns the transform that scales a model to this size and moves its center to this point."""
     low, high = bounds
     scale = size / max(b - a for a, b in zip(low, high))
     at = place([0, 0, 0], degrees, (scale,) * 3)

@@ -7,10 +7,10 @@
 
 namespace cumulet::bench {
 
-/// How far the pictures of grids by default are from the voxels', and how much faster: rows of a table, in Markdown.
+/// Measures the image error of default grids relative to voxels, and their speedup. Returns Markdown table rows.
 std::string measure_defaults(headless::Context& context, const Asset& asset, const Options& options);
 
-/// The head of that table.
+/// The header of that table.
 std::string defaults_head();
 
 }  // namespace cumulet::bench

@@ -29,19 +29,19 @@ constexpr std::array method_names{"raw", "fast", "high"};
 constexpr std::uint32_t judged_samples_most = 64;
 constexpr std::uint32_t pictured_samples = 16;
 
-/// The error of each method with so many samples.
+/// Error of a method per sample count.
 struct Curve {
-  std::map<std::uint32_t, std::vector<double>> relative;  // relMSE without specks, one a seed
-  std::map<std::uint32_t, std::vector<double>> specks;    // their part of it
+  std::map<std::uint32_t, std::vector<double>> relative;  // relMSE without fireflies, one per seed
+  std::map<std::uint32_t, std::vector<double>> specks;    // fraction of the error in fireflies
   std::map<std::uint32_t, std::vector<double>> flip;
 };
 
 struct Judgement {
   std::string name;
-  std::array<Curve, 3> curves;  // by Method
+  std::array<Curve, 3> curves;  // indexed by Method
   double floor = 0.0;           // FLIP of the reference's halves
   std::array<std::optional<double>, 3> flicker;
-  std::array<std::vector<double>, 3> seconds;  // of a sample a pixel; of a pass
+  std::array<std::vector<double>, 3> seconds;  // per sample and pixel; per denoising pass
 };
 
 std::vector<std::uint32_t> counts_of(const Options& options) {
@@ -51,13 +51,13 @@ std::vector<std::uint32_t> counts_of(const Options& options) {
   return counts;
 }
 
-/// The scene's picture by a method; the viewer has its samples.
+/// Images of the scene by each method. The viewer already has the samples.
 class Pictures {
  public:
   Pictures(Stage& stage, std::string network) : stage_(stage), network_(std::move(network)) {}
 
   [[nodiscard]] bool has(Method method) const { return method != Method::high || !network_.empty(); }
-  /// seconds: if not null, gets what denoising took.
+  /// seconds: receives the time for denoising, unless null.
   std::vector<float> take(Method method, std::vector<double>* seconds = nullptr) {
     if (method == Method::raw) return stage_.linear();
     const auto start = std::chrono::steady_clock::now();
@@ -75,7 +75,7 @@ class Pictures {
 constexpr std::array methods{Method::raw, Method::fast, Method::high};
 std::size_t index(Method method) { return static_cast<std::size_t>(method); }
 
-/// Pictures beside each other, in rows.
+/// Writes images side by side, in rows.
 void write_sheet(const std::filesystem::path& file, const std::vector<std::vector<Bytes>>& rows, std::uint32_t size) {
   std::size_t across = 0;
   for (const std::vector<Bytes>& row : rows) across = std::max(across, row.size());
@@ -105,7 +105,7 @@ void judge_stills(Stage& stage, Pictures& pictures, const Options& options, Judg
   std::vector<std::vector<Bytes>> rows;
   for (std::uint32_t part = 0; part < options.error_parts; ++part) {
     for (const std::uint32_t count : counts_of(options)) {
-      if (part > 0 && count > judged_samples_most) break;  // most of the time, least of the noise
+      if (part > 0 && count > judged_samples_most) break;  // skips the most expensive counts
       stage.sample(count, 1000 + part);
       const double traced = stage.converge_undrawn();
       if (count == judged_samples_most) judgement.seconds[0].push_back(traced / count);
@@ -127,7 +127,7 @@ void judge_stills(Stage& stage, Pictures& pictures, const Options& options, Judg
   write_sheet(options.out / ("denoise-" + judgement.name + ".png"), rows, options.size);
 }
 
-// Of luminance as displayed, the pictures of an orbit.
+// Displayed luminance of the images of an orbit.
 using Film = std::vector<std::vector<double>>;
 
 constexpr double orbit_step_degrees = 0.5;
@@ -149,7 +149,7 @@ std::vector<double> change(const Film& film, std::size_t frame) {
   return result;
 }
 
-/// RMS over frames and pixels of a change that the converged pictures do not have.
+/// RMS over frames and pixels of the change that converged images do not have.
 double flicker_of(const Film& film, const std::array<Film, 2>& converged) {
   double square = 0.0;
   for (std::size_t frame = 0; frame + 1 < film.size(); ++frame) {
@@ -168,7 +168,7 @@ void judge_flicker(Stage& stage, Pictures& pictures, const Options& options, Jud
       return stage.displayed(stage.linear());
     });
   }
-  // What a host shows while the camera moves is what frames draw; a network is for pictures that are read.
+  // While the camera moves, hosts display drawn frames. Networks are only applied to images that are read back.
   for (const Method method : methods) {
     if (!pictures.has(method)) continue;
     stage.filter(method == Method::fast ? CUMULET_DENOISE_FAST : CUMULET_DENOISE_OFF);
@@ -272,7 +272,7 @@ void plot(const Judgement& judgement, const Options& options) {
              line_plot(judgement.name + ": FLIP", "samples a pixel", "FLIP", flips));
 }
 
-/// All scenes in one picture: what raw would have to be.
+/// All scenes in one plot: the number of samples that noisy images would need.
 void plot_all(const std::vector<Judgement>& judgements, const Options& options) {
   std::vector<BarGroup> groups;
   for (const Judgement& judgement : judgements) {
@@ -287,7 +287,7 @@ void plot_all(const std::vector<Judgement>& judgements, const Options& options) 
   write_file(options.out / "denoise.svg", bar_plot("16 samples a pixel, raw and denoised", "FLIP", bars, groups));
 }
 
-/// "" where there is none, which is told.
+/// The network's path; "" after a message if there is none.
 std::string network_of(const Options& options) {
   try {
     return demo::find_network(options.oidn_weights);
@@ -316,7 +316,8 @@ void measure_denoise(headless::Context& context, const Options& options) {
     plot(judgement, options);
     judgements.push_back(std::move(judgement));
     plot_all(judgements, options);
-    std::fprintf(stderr, "%s", quality_rows(judgements.back()).c_str());  // what is done is not lost
+    std::fprintf(stderr, "%s",
+                 quality_rows(judgements.back()).c_str());  // prints completed results in case of a later failure
   }
   print(judgements, options);
   for (const std::string& line : skipped) std::printf("\nSkipped: %s\n", line.c_str());

@@ -6,12 +6,12 @@
 
 namespace cumulet::bench {
 
-/// How good pictures of few samples are, raw and denoised, what raw ones would take to be as good, how much they
-/// flicker, and what each pass takes: tables in Markdown, plots and pictures into Options::out.
+/// Measures the quality of images with few samples, noisy and denoised, the sample count at which noisy images are as
+/// good, flicker, and the time per pass. Prints Markdown tables, and writes plots and images into Options::out.
 void measure_denoise(headless::Context& context, const Options& options);
 
-/// How far what is drawn is from the converged picture as a function of the time since a change, as a host sees it:
-/// likewise.
+/// Measures the difference of displayed images to the converged image as a function of the time since a change. Prints
+/// Markdown tables, and writes plots and images into Options::out.
 void measure_settle(headless::Context& context, const Options& options);
 
 }  // namespace cumulet::bench

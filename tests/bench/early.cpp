@@ -1,10 +1,10 @@
-// How soon a large file is seen: by its stand-in, and whole. By hand:
+// Measures when a large file is first displayed as a coarse proxy, and when as a whole. Run by hand:
 //
 //     cumulet-bench-early [--without] FILE.vdb [OUT_FOLDER]
 //
-// Seconds by the clock, and of the process' processors, from cumulet_load_volume_file to the end of the frame that has
-// something of it; the host rests in between. With a folder it traces what it sees meanwhile, and early.png,
-// as far as it came, and whole.png are what it saw. --without: previews are off, so that there is no stand-in.
+// Prints seconds of wall time and of CPU time of the process, from cumulet_load_volume_file to the end of the frame
+// that shows it; the host idles in between. With a folder it path traces the proxy meanwhile, and writes early.png (as
+// far as it converged) and whole.png. --without: previews are off, so that there is no proxy.
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -28,7 +28,7 @@ using cumulet::test::make_desc;
 constexpr std::uint32_t size = 256;
 constexpr std::uint32_t samples = 8;
 
-/// Since the last was made.
+/// Time since the construction.
 class Watch {
  public:
   void print(const char* what) const {
@@ -58,7 +58,7 @@ class Bench {
     file.suggested_density_scale = 1;
     const Watch watch;
     must(viewer_.get(), cumulet_load_volume_file(viewer_.get(), &file));
-    // The camera waits for bounds: that is when there is something to see.
+    // The camera waits for bounds, which are set when the volume can be displayed.
     std::array<double, 6> box{};
     while (frame().width == 0 || cumulet_get_bounds(viewer_.get(), box.data(), box.data() + 3) != CUMULET_OK)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -66,7 +66,7 @@ class Bench {
     if (early) {
       watch.print("stand-in");
       if (!folder.empty()) {
-        // As far as it comes.
+        // Refines it until the load ends.
         write(folder + "/early.png");
         while (is_loading() && frame_progress_ < 1.0) {
           frame();
@@ -110,7 +110,7 @@ class Bench {
   Context context_ = Context::create(cumulet::headless::Backend::automatic);
   cumulet::test::ViewerPtr viewer_ = cumulet::bench::make_viewer(context_);
   double frame_progress_ = 0.0;
-  std::uint32_t width_ = 0;  // of the picture: less than the frame's in a preview
+  std::uint32_t width_ = 0;  // of the image: smaller than the frame's in a preview
   std::uint32_t height_ = 0;
 };
 

@@ -9,18 +9,18 @@
 
 namespace cumulet::bench {
 
-/// A text of a shader, and what stands there instead.
+/// A text in a shader and its replacement.
 struct Edit {
   const char* file;
   const char* text;
   const char* instead;
 };
 
-/// Programs of glsl/ with a few texts changed: so are techniques measured that the library has no switch for. For as
-/// long as programs are made.
+/// Shader programs of glsl/ with a few replaced texts, for measuring variants without a switch in the library. The
+/// object must live until all programs are compiled.
 class EditedShaders {
  public:
-  /// files: stand beside those of glsl/. Throws std::runtime_error where a text is not there, or more than once, and
+  /// files: added beside those of glsl/. Throws std::runtime_error if a text is missing or not unique, and
   /// std::filesystem::filesystem_error.
   explicit EditedShaders(std::span<const Edit> edits, std::span<const std::filesystem::path> files = {});
 

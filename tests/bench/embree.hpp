@@ -27,7 +27,7 @@ void parallel(std::size_t count, const Visit& visit) {
   });
 }
 
-/// Embree, or nothing where it was not found at build time.
+/// Embree; empty if it was not found at build time.
 class Embree {
  public:
 #ifdef CUMULET_HAVE_EMBREE

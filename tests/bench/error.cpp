@@ -29,7 +29,7 @@ ImageReference::ImageReference(Subject& voxels, std::uint32_t samples, std::uint
     alpha.resize(parts_[0].size());
     for (std::size_t i = 0; i < alpha.size(); ++i) alpha[i] += run.rgba[4 * i + 3];
   }
-  // Fire without density covers nothing, but is brighter than the even sky behind it.
+  // Fire without density has no alpha, but is brighter than the uniform sky behind it.
   const bool covers = *std::ranges::max_element(alpha) > 0.0F;
   const float darkest = *std::ranges::min_element(parts_[0]);
   for (std::size_t i = 0; i < alpha.size(); ++i) {

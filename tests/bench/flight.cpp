@@ -1,13 +1,14 @@
-// What it brings to fit the grid to the view: errors at equal time on a flight into a volume. By hand:
+// Measures the benefit of fitting the grid to the view: errors at equal time during a flight into a volume. Run by
+// hand:
 //
 //     cumulet-bench-flight [--views N] [--to DISTANCE] [--size P] [--samples S] [--threshold T] [--max-cells N]
 //     [--optical-depth D] FILE
 //
-// The camera comes nearer by the same factor from view to view. Each view is traced through the voxels (the brick
-// march), and through three grids of at most as many cells by the same threshold: fitted to each view by compute
-// shaders while one waits, of the first view alone, and of no view. All with the same random numbers, twice: the
-// product of two independent differences to the voxels is, but for chance, the square of what is wrong with a grid, the
-// difference of the two pictures its noise. Time is the process's, of all cores.
+// The camera distance decreases by the same factor per view. Each view is rendered with the voxels (the brick grid) and
+// with three grids of the same threshold and cell limit: refitted to each view on the GPU, fitted to the first view
+// only, and fitted to no view. All use the same random numbers, twice. The product of two independent differences to
+// the voxels estimates the squared error of a grid, and the difference of the two images its noise. Time is CPU time of
+// the process.
 
 #include <algorithm>
 #include <array>
@@ -29,13 +30,13 @@ namespace {
 using namespace cumulet;
 
 constexpr std::size_t parts = 2;
-constexpr std::array<double, 2> times{4.0, 64.0};  // a view, in seconds
+constexpr std::array<double, 2> times{4.0, 64.0};  // per view, in seconds
 constexpr double first_distance = 2.4;             // of half the diagonal of the bounds
 
 struct FlightOptions {
   int views = 5;
   std::uint32_t size = 96;
-  std::uint32_t samples = 48;  // a pixel, each time
+  std::uint32_t samples = 48;  // per pixel, each time
   double last_distance = 0.6;  // of half the diagonal
   double threshold = 0.02;
   std::uint64_t max_cells = 300'000;
@@ -83,7 +84,7 @@ const char* name_of(Fit fit) {
   return "a grid of no view";
 }
 
-/// Of one view.
+/// Images of one view.
 struct Pictures {
   double refit_seconds = 0.0;
   double seconds = 0.0;  ///< of all parts
@@ -112,7 +113,7 @@ class Flyer {
     settings.camera_adaptive = fit == Fit::each_view;
     if (fit == Fit::each_view) settings.build.on = viewer::BuildOn::gpu;
     still_.set_grid(settings);
-    // What is paid once: drivers compile, and a lattice is made.
+    // Costs paid only once: drivers compile, and the lattice is made.
     fly_to(pose_at(*asset.volume, 1.1 * first_distance));
     bench::trace(still_, image(1, 0));
   }
@@ -153,8 +154,8 @@ class Flyer {
 
 /// Root mean squares, relative to the mean of the pixels that show the medium.
 struct Errors {
-  double wrong = 0.0;  ///< however many samples
-  double noise = 0.0;  ///< of one sample a pixel
+  double wrong = 0.0;  ///< independent of the number of samples
+  double noise = 0.0;  ///< of one sample per pixel
 };
 
 Errors errors_of(const Pictures& pictures, const Pictures& voxels, std::uint32_t samples) {
@@ -186,7 +187,7 @@ void print_head() {
 void print_row(double distance, const Flyer& flyer, const Pictures& voxels, const FlightOptions& options) {
   const Pictures& pictures = flyer.pictures();
   const Errors errors = errors_of(pictures, voxels, options.samples);
-  const double rate = static_cast<double>(parts) * options.samples / pictures.seconds;  // samples a pixel
+  const double rate = static_cast<double>(parts) * options.samples / pictures.seconds;  // samples per pixel
   const double refit = flyer.fit() == Fit::each_view ? pictures.refit_seconds : 0.0;
   std::printf("| %.2f | %s | %llu | %.2f | %.2f | %.2f | %.2f |", distance, name_of(flyer.fit()),
               static_cast<unsigned long long>(pictures.cells), refit, rate, errors.noise, 100.0 * errors.wrong);

@@ -1,13 +1,15 @@
-// Flights and looks through a NanoVDB grid by null collisions (Woodcock et al. 1965; Galtier et al. 2013; Novak et al.,
-// "Monte Carlo Methods for Volumetric Light Transport Simulation", EG 2018), below the majorants of march_hdda.glsl: in
-// the place of flight.glsl's cm_fly, of one volume with no light of its own, no triangles and no points looked back at.
+// Scattered rays and shadow rays through a NanoVDB grid by null collisions (Woodcock et al. 1965; Galtier et al. 2013;
+// Novak et al., "Monte Carlo Methods for Volumetric Light Transport Simulation", EG 2018), with the majorants of
+// march_hdda.glsl. It replaces flight.glsl's cm_fly for one volume without emission, triangles and equiangular
+// sampling.
 //
-// Flights are delta tracking: a collision is real by the chance of density over majorant. With CM_RATIO looks are ratio
-// tracking: each collision leaves the share that is not real, down to the weight below which flight.glsl, too, goes over
-// to roulette; delta tracking goes on from there. Without CM_RATIO looks are delta tracking as well. As no transmittance
-// is known, looks and flights that may find the same sky weigh each other without.
+// Scattered rays use delta tracking: a collision is real with the probability density / majorant. With CM_RATIO, shadow
+// rays use ratio tracking: each collision keeps the fraction that is not real, down to the weight at which flight.glsl
+// switches to Russian roulette; from there on they use delta tracking. Without CM_RATIO, shadow rays use delta tracking
+// throughout. Because no transmittance is known, MIS weights between shadow rays and scattered rays that may reach the
+// same sky omit it.
 //
-// p.depth is what is left of an optical depth below the majorant; p.depth_0 of a look, what it has let pass.
+// p.depth is the remaining optical depth of the majorant. p.depth_0 of a shadow ray is its transmittance so far.
 #ifndef CM_FLIGHT_HDDA_GLSL
 #define CM_FLIGHT_HDDA_GLSL
 

@@ -6,7 +6,7 @@
 
 namespace cumulet::bench {
 
-/// As std::printf: at most 1023 bytes.
+/// Formats like std::printf; at most 1023 bytes.
 template <class... Values>
 std::string format(const char* pattern, Values... values) {
   std::array<char, 1024> buffer{};

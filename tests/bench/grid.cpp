@@ -1,16 +1,16 @@
-// How long grids take, on the CPU and by compute shaders: from a volume's statistics, and again for another view. By
-// hand:
+// Measures the time for building grids on the CPU and on the GPU: from a volume's statistics, and again for another
+// view. Run by hand:
 //
 //     cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] [--blackbody B] [--once] [--block-bytes N]
 //     FILE...
 //
-// --once: a grid of no camera alone, and once: of many cells. --block-bytes: what storage blocks are taken to hold, not
-// what the driver says; llvmpipe's 128 MiB are not where they end.
+// --once: builds only a grid without a camera, and only once, for grids of many cells. --block-bytes: assumed storage
+// block size instead of the driver's; llvmpipe's real limit is above the 128 MiB that it reports.
 //
-// With all that cells carry. The views are those of --camera-adaptive, on a circle about the volume from far to within
-// it, 1280 x 720; refits are of as many small steps on it, in calls of a budget, of which the longest are told. Seconds
-// of GL are until a fence after all passes has passed, on whatever driver there is; on Mesa's llvmpipe they are of the
-// same cores. Bytes are what passes read and write at least, each word once a pass that needs it.
+// All channels are included. The views are those of --camera-adaptive, on a circle about the volume from far away to
+// inside, 1280 x 720. Refits are for as many small steps on the circle, in calls with a budget; the longest call is
+// printed. GPU seconds are until a fence after all passes; with Mesa's llvmpipe they run on the same cores. Bytes are
+// the minimum that passes read and write: each word once per pass that needs it.
 
 #include <algorithm>
 #include <cstdio>
@@ -138,7 +138,8 @@ class Gpu {
     built.ms = since(start);
     return built;
   }
-  // Cells whose links or places are others than the CPU's, and by how much coefficients are, of the largest density.
+  // Cells whose links or positions differ from the CPU's, and the largest coefficient difference relative to the
+  // largest density.
   struct Differences {
     std::size_t cells = 0;
     double coefficients = 0.0;
@@ -159,7 +160,7 @@ class Gpu {
     }
     return found;
   }
-  // As frames do: in calls of a budget.
+  // Timing of calls with a budget, as in frames.
   struct Refit {
     double ms = 0.0, longest_ms = 0.0;
   };
@@ -200,15 +201,16 @@ void print_refits(std::vector<Gpu::Refit> all) {
               all.size(), budget_ms, ms, late->longest_ms);
 }
 
-// What passes read and write: of the lattice, and of a cell.
+// Prints the bytes that passes read and write, for the lattice and per cell.
 void print_bytes(const grid::Lattice& lattice, std::size_t cells) {
-  // Cleared, raised (its own priorities read), closed (read once, and its parents), counted twice.
+  // Per point: cleared, raised (reads its own priorities), closed (read once, with its parents), counted twice.
   const double points = static_cast<double>(lattice.blocks.size()) * CM_BLOCK_POINTS * 4.0;
   const double splits = 4.0 * points + static_cast<double>(lattice.own.bytes());
-  // Of a node of the tree (two a cell): marking reads 8 and the priority, writes 4 and its place in the list, a leaf 4
-  // more. Of a parent (one a cell) children read the list, 8 + 16, 12 of two neighbours and 8 of two others, write 24 a
-  // child; leaves read the list and 8, write 4; order the list and 12, writes 4 and 8 a child. The record reads the
-  // list, 16 + 16, four neighbours' 12, writes 32. Clear cones read half of a record twice, and write 4.
+  // Per node of the tree (two per cell): marking reads 8 and the priority, and writes 4 and its position in the list; a
+  // leaf writes 4 more. Per parent (one per cell): children read the list, 8 + 16, 12 of two neighbors and 8 of two
+  // others, and write 24 per child. Leaves read the list and 8, and write 4. Order reads the list and 12, and writes 4
+  // and 8 per child. The record reads the list, 16 + 16 and four neighbors' 12, and writes 32. Clear cones read half of
+  // a record twice, and write 4.
   const double cell = 2.0 * (8.0 + 4.0 + 4.0 + 4.0) + 4.0 + (4.0 + 24.0 + 24.0 + 16.0 + 48.0) + (4.0 + 8.0 + 4.0) +
                       (4.0 + 12.0 + 4.0 + 16.0) + (4.0 + 32.0 + 48.0 + 32.0) + 36.0;
   std::printf("  bytes moved: %.1f MB to decide, %.0f a cell; of a cell %.0f in all\n", splits * 1e-6, cell,
@@ -234,7 +236,7 @@ void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings, c
               lattice_ms, static_cast<double>(lattice->bytes()) * 1e-6, lattice->blocks.size(), upload_ms,
               static_cast<double>(gpu.data().bytes()) * 1e-6);
   const auto compare = [&](const char* what) {
-    // In turn; of each the fastest, as others may have the cores.
+    // CPU and GPU in turn. The fastest run of each counts, because other programs may use the cores.
     const OnCpu on_cpu = build_on_cpu(density, channels, settings);
     Times cpu = on_cpu.times;
     Gpu::Built built = gpu.build(settings);

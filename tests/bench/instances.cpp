@@ -1,7 +1,6 @@
-// What a sky of many instances of one cloud costs: to make and build, to upload, to trace, and to move one of them.
-// They stand in a layer as far apart however many there are, each turned and stretched in its own way, some of them
-// into each other. The camera is at the layer's edge and sees all of it; then it sees one cloud, and the rest is behind
-// it. By hand:
+// Measures the cost of many instances of one cloud: creating and building, uploading, tracing, and moving one of them.
+// The instances form a layer of constant density, each rotated and scaled differently; some overlap. The camera at the
+// layer's edge sees all of it. Then it sees one cloud, with the rest behind it. Run by hand:
 //
 //     cumulet-bench-instances CLOUD.vdb OUT_FOLDER [COUNT]...
 #include <algorithm>
@@ -33,7 +32,8 @@ constexpr std::uint32_t width = 240;
 constexpr std::uint32_t height = 135;
 constexpr std::uint32_t samples = 2;
 
-/// Of all of the process' threads, which are what the driver runs shaders on, too: a busy machine changes little of it.
+/// CPU time of all threads of the process, including the driver's shader threads. It depends little on the machine's
+/// load.
 double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 double milliseconds_since(double start) { return 1e3 * (processor_seconds() - start); }
 
@@ -41,14 +41,14 @@ void check(cumulet_status status, const char* cause) {
   if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
 }
 
-/// Of a cloud that is `size` wide: a square of them from the origin away from the camera, to -Z.
+/// Transforms for a cloud of width `size`: a square from the origin away from the camera, towards -Z.
 std::vector<Place> layer(int count, double size) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   const int side = static_cast<int>(std::ceil(std::sqrt(count)));
   std::vector<Place> places;
   for (int i = 0; i < count; ++i) {
-    // The nearest first, from the middle to the sides.
+    // The nearest first, from the center to the sides.
     const int row = i / side;
     const int column = i % side;
     const int beside = (column % 2 == 0 ? 1 : -1) * ((column + 1) / 2);
@@ -88,8 +88,8 @@ class Bench {
   }
 
   struct Cost {
-    double add = 0.0, build = 0.0, upload = 0.0, move = 0.0;  // milliseconds of processors
-    double rate = 0.0, steps = 0.0;                           // samples a second of one; steps a sample
+    double add = 0.0, build = 0.0, upload = 0.0, move = 0.0;  // milliseconds of CPU time
+    double rate = 0.0, steps = 0.0;                           // samples per second of CPU time; steps per sample
     double rate_of_one = 0.0;
     cumulet_stats stats = make_desc<cumulet_stats>();
   };
@@ -116,7 +116,7 @@ class Bench {
     cost.steps = static_cast<double>(cost.stats.steps) / static_cast<double>(cost.stats.samples);
     if (!picture.empty()) write(picture);
     cost.move = move(instances.front().get(), places.front());
-    // Away from the layer, at one that stands alone.
+    // Looks at a single instance, away from the layer.
     const Place alone{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 8.0 * size_, 1};
     check(cumulet_instance_set_to_world(instances.front().get(), alone.data()), "");
     look({0.0, 0.3 * size_, 6.2 * size_}, {0.0, 0.3 * size_, 8.0 * size_});
@@ -183,20 +183,20 @@ class Bench {
     return result;
   }
 
-  /// Samples a processor second.
+  /// Samples per second of CPU time.
   double rate() {
-    light_.sun_azimuth_degrees += 0.25F;  // a picture from its beginning
+    light_.sun_azimuth_degrees += 0.25F;  // restarts the image
     must(viewer_.get(), cumulet_set_light(viewer_.get(), &light_));
     must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
     const double begun = processor_seconds();
     while ((render(1000.0).flags & CUMULET_RENDER_CONVERGED) == 0) continue;
     const double seconds = processor_seconds() - begun;
-    double noise = 0.0;  // what is read back with it is told by the statistics
+    double noise = 0.0;  // also updates the statistics
     must(viewer_.get(), cumulet_measure_noise(viewer_.get(), &noise));
     return static_cast<double>(width) * height * samples / seconds;
   }
 
-  /// What a call takes longer in which one has moved. It traces next to nothing.
+  /// Additional time of a call after one instance has moved. The call traces almost nothing.
   double move(cumulet_instance* instance, Place place) {
     constexpr double least_budget = 0.01;
     constexpr int times = 7;
@@ -252,7 +252,7 @@ int main(int argc, char** argv) {
     std::printf(
         "| Instances | Added, ms | Built, ms | Uploaded, ms | Moved, ms | Cells | GL, MB | Steps a sample | Samples/s "
         "| of one, the others behind |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
-    // Programs are compiled for one, and for several.
+    // Compiles the programs for one instance and for several.
     static_cast<void>(bench.measure(1, ""));
     static_cast<void>(bench.measure(2, ""));
     for (const int count : counts) {

@@ -22,7 +22,7 @@ struct View {
   double fovy_degrees;
 };
 
-/// All of a scene but its files.
+/// Settings of a scene except its files.
 struct Looks {
   cumulet_medium_desc medium = make_desc<cumulet_medium_desc>();
   cumulet_light_desc light = make_desc<cumulet_light_desc>();
@@ -34,7 +34,7 @@ struct Looks {
 
 void set(float (&rgb)[3], float r, float g, float b) { std::copy_n(std::array{r, g, b}.begin(), 3, rgb); }
 
-// As cumulet-scene's sample.json.
+// As in cumulet-scene's sample.json.
 Looks cumulus_looks() {
   Looks looks;
   looks.medium.density_scale = 0.7;
@@ -47,7 +47,7 @@ Looks cumulus_looks() {
   return looks;
 }
 
-// As its sample_explosion.json.
+// As in its sample_explosion.json.
 Looks explosion_looks() {
   Looks looks;
   looks.medium.density_scale = 9.0;
@@ -62,7 +62,7 @@ Looks explosion_looks() {
   return looks;
 }
 
-// At night: all light is its own.
+// At night: the fire is the only light.
 Looks fire_looks() {
   Looks looks;
   looks.medium.density_scale = 3.0;
@@ -125,7 +125,7 @@ constexpr std::array recipes{Recipe{"cloud", cumulus_looks}, Recipe{"full", cumu
                              Recipe{"model", model_looks},   Recipe{"terrain", terrain_looks},
                              Recipe{"fog", fog_looks},       Recipe{"lamp", lamp_looks}};
 
-/// Voxels of a cube from -1 to 1.
+/// A volume of a cube from -1 to 1.
 template <class Density>
 test::VolumeRef make_cube(int side, Density&& density) {
   std::vector<float> values;
@@ -151,7 +151,7 @@ test::VolumeRef make_cube(int side, Density&& density) {
   return test::VolumeRef(out);
 }
 
-/// A column of smoke that frays.
+/// A column of smoke with frayed edges.
 float smoke(const vec3& p) {
   float noise = 0.0F;
   float weight = 0.5F;
@@ -162,7 +162,7 @@ float smoke(const vec3& p) {
   return std::clamp(2.0F * (0.55F - radius + 0.45F * noise), 0.0F, 1.0F);
 }
 
-/// Quadrilaterals of one colour.
+/// Quadrilaterals of one color.
 struct Quads {
   vec3 colour{0.73F};
   float radiance = 0.0F;
@@ -171,7 +171,7 @@ struct Quads {
   void add(const vec3& a, const vec3& b, const vec3& c, const vec3& d) {
     for (const vec3& p : {a, b, c, a, c, d}) positions.insert(positions.end(), {p.x, p.y, p.z});
   }
-  /// A box that stands on the floor, turned.
+  /// A rotated box on the floor.
   void add_box(const vec3& foot, const vec3& half, float degrees) {
     const float s = std::sin(glm::radians(degrees));
     const float c = std::cos(glm::radians(degrees));
@@ -187,7 +187,7 @@ struct Quads {
   }
 };
 
-/// The Cornell box from -1 to 1, open to +Z, with its two boxes and a lamp in the ceiling.
+/// The Cornell box from -1 to 1, open to +Z, with its two boxes and a light in the ceiling.
 test::SurfacesRef cornell_box() {
   Quads white;
   white.add({-1, -1, 1}, {1, -1, 1}, {1, -1, -1}, {-1, -1, -1});
@@ -293,7 +293,7 @@ Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t
   }
   must(cumulet_camera_set(camera, &stand));
   if (!looks.view) {
-    // What fits depends on the picture's shape, which a frame tells.
+    // Fitting depends on the aspect ratio, which is set by a frame.
     sample(1, 0);
     converge_undrawn();
     must(cumulet_frame_all(viewer()));
@@ -312,7 +312,7 @@ void Stage::load(const JudgedScene& scene) {
     file.path = scene.volume.c_str();
     must(cumulet_load_volume_file(viewer(), &file));
   } else if (scene.name == "fog") {
-    // Within the walls: what lies on them is not worth a cell.
+    // Inside the walls: fog on the walls would only cost cells.
     const test::VolumeRef fog = make_cube(32, [](const vec3& p) { return 0.6F - 0.4F * p.y; });
     must(cumulet_set_volume(viewer(), fog.get()));
   } else if (scene.name == "lamp") {
@@ -416,7 +416,7 @@ std::vector<std::uint8_t> Stage::drawn() const {
 std::array<std::vector<float>, 2> Stage::reference(std::uint32_t samples) {
   std::array<std::vector<float>, 2> halves;
   for (std::uint32_t half = 0; half < 2; ++half) {
-    sample(std::max(1U, samples / 2), 70001 + half);  // seeds that nothing judged has
+    sample(std::max(1U, samples / 2), 70001 + half);  // seeds that no evaluated image uses
     converge_undrawn();
     halves.at(half) = linear();
   }

@@ -13,59 +13,59 @@
 
 namespace cumulet::bench {
 
-/// A scene that pictures under way are judged on: cloud, full (the cloud at its full setting), fire, explosion, model
-/// (in the cloud), terrain, fog (in the Cornell box), lamp (in smoke).
+/// A scene for evaluating images: cloud, full (the cloud at its full setting), fire, explosion, model (in the cloud),
+/// terrain, fog (in the Cornell box), lamp (in smoke).
 struct JudgedScene {
   std::string name;
-  std::filesystem::path volume;    ///< a file; empty: none, or one that is made here
-  std::filesystem::path surfaces;  ///< likewise
+  std::filesystem::path volume;    ///< a file; empty: none, or generated
+  std::filesystem::path surfaces;  ///< a file; empty: none, or generated
 };
 
-/// The names of all of them.
+/// The names of all scenes.
 const std::vector<std::string>& judged_names();
 
-/// Those that are asked for and whose files are there; skipped: a line for each other one.
+/// The requested scenes whose files exist. skipped: receives a line for each other one.
 std::vector<JudgedScene> judged_scenes(const Options& options, std::vector<std::string>& skipped);
 
-/// Such a scene in a viewer of its own, by the library's public calls alone. The context must be current, now and until
-/// the end. Throws std::runtime_error.
+/// A scene in its own viewer, using only the public API. The context must be current until the destruction. Throws
+/// std::runtime_error.
 class Stage {
  public:
-  /// programs: its own, where not null.
+  /// programs: if null, the viewer uses its own.
   Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size, cumulet_programs* programs = nullptr);
 
   [[nodiscard]] cumulet_viewer* viewer() { return viewer_.get(); }
-  /// Starts anew, but with the same seed and more samples, which goes on.
+  /// Restarts sampling, unless only the number of samples grows.
   void sample(std::uint32_t samples, std::uint32_t seed, cumulet_preview preview = CUMULET_PREVIEW_OFF);
-  /// Until the noise is no more than that, a part of the mean.
+  /// Samples until the noise is below this fraction of the mean.
   void sample_to(double noise_target, bool adaptive, std::uint32_t seed);
   void filter(cumulet_denoise denoise);
-  /// About the middle of what is seen.
+  /// Orbits about the center of the visible part.
   void orbit(double degrees);
-  /// Turns the sun about the zenith. False: the scene has none.
+  /// Rotates the sun about the zenith. Returns false if the scene has none.
   bool turn_sun(float degrees);
 
-  /// One frame into the target. Waits until it is drawn; the seconds that it took.
+  /// Renders one frame into the target and waits for it. Returns the seconds that it took.
   double frame(double budget_ms, bool& more);
-  /// Frames until the picture has its samples and is drawn as it should be.
+  /// Renders until the image has its samples and is drawn completely.
   void converge();
-  /// The same without drawing anything: the seconds that tracing took, as the library counts them.
+  /// Renders all samples without drawing. Returns the seconds of tracing that the library reports.
   double converge_undrawn();
 
-  /// What the last frame drew: 4 sRGB bytes a pixel, first pixel top left, as of displayed().
+  /// The image of the last frame: 4 sRGB bytes per pixel, top left first, as displayed().
   [[nodiscard]] std::vector<std::uint8_t> drawn() const;
-  /// Radiance as read_linear and read_denoised give it.
+  /// Radiance as returned by read_linear and read_denoised.
   [[nodiscard]] std::vector<float> linear();
-  /// Each pixel's standard error, as the library estimates it.
+  /// Each pixel's standard error as the library estimates it.
   [[nodiscard]] std::vector<float> errors();
-  /// Samples that the picture has.
+  /// Number of samples of the image.
   [[nodiscard]] std::uint64_t samples_taken();
-  /// That of so many samples in two halves, which have seeds of their own. Leaves the viewer with the second.
+  /// Two half references with this number of samples in total and different seeds. The viewer keeps the second.
   std::array<std::vector<float>, 2> reference(std::uint32_t samples);
-  /// As it is displayed.
+  /// Applies the display transform.
   [[nodiscard]] std::vector<std::uint8_t> displayed(const std::vector<float>& linear);
   [[nodiscard]] std::size_t floats() const { return std::size_t{4} * size_ * size_; }
-  /// By what radiance is multiplied to be displayed.
+  /// Factor of radiance in the display transform.
   [[nodiscard]] double exposure() const { return std::exp2(display_.exposure_stops); }
 
  private:
@@ -81,7 +81,7 @@ class Stage {
   cumulet_display_desc display_;
 };
 
-/// Pixel by pixel.
+/// Mean per pixel.
 std::vector<float> mean_of(const std::array<std::vector<float>, 2>& halves);
 
 }  // namespace cumulet::bench

@@ -11,7 +11,7 @@
 
 namespace cumulet::bench {
 
-/// Several estimates of one number, of independent seeds.
+/// The mean of several estimates from independent seeds.
 struct Estimate {
   double mean = 0.0;
   double standard_error = 0.0;
@@ -28,12 +28,12 @@ inline Estimate estimate_of(const std::vector<double>& values) {
   return result;
 }
 
-/// relMSE: the mean over pixels and colours of (x - r)^2 / (r^2 + 0.01), of radiance as it is exposed (Rousselle et al.
-/// 2011). The reference comes in two independent halves: (x - a)(x - b) has the square of x's distance from the truth
-/// as its mean, so that the reference's own noise does not enter.
+/// relMSE: the mean over pixels and colors of (x - r)^2 / (r^2 + 0.01), of exposed radiance (Rousselle et al. 2011).
+/// The reference has two independent halves a and b: the mean of (x - a)(x - b) is the squared distance of x from the
+/// truth, so that the reference's own noise adds no bias.
 struct RelativeSquareError {
-  double most = 0.0;    ///< of all pixels but the worst 0.5 %: specks, single paths that found a light by chance
-  double specks = 0.0;  ///< the part of all pixels' sum that those have
+  double most = 0.0;    ///< of all pixels except the worst 0.5 %, which contain fireflies
+  double specks = 0.0;  ///< fraction of the total error in the worst 0.5 %
 };
 
 inline RelativeSquareError relative_square_error(const std::vector<float>& rgba,
@@ -57,7 +57,7 @@ inline RelativeSquareError relative_square_error(const std::vector<float>& rgba,
   return result;
 }
 
-/// Luminance of what is displayed, 0 to 1.
+/// Displayed luminance, 0 to 1.
 inline std::vector<double> display_luminances(const std::vector<std::uint8_t>& rgba) {
   std::vector<double> result(rgba.size() / 4);
   for (std::size_t i = 0; i < result.size(); ++i) {
@@ -66,15 +66,15 @@ inline std::vector<double> display_luminances(const std::vector<std::uint8_t>& r
   return result;
 }
 
-/// Root of the mean of (x - a)(x - b), likewise.
+/// Root of the mean of (x - a)(x - b).
 inline double root_error(const std::vector<double>& x, const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - a[i]) * (x[i] - b[i]);
   return std::sqrt(std::max(0.0, sum / static_cast<double>(std::max<std::size_t>(1, x.size()))));
 }
 
-/// Where a falling curve through these points (count, error), straight between logarithms, has that error. Nothing
-/// where all its errors are larger.
+/// The count at which a falling curve through these points (count, error) has this error, interpolated linearly between
+/// logarithms. nullopt if all its errors are larger.
 inline std::optional<double> count_as_good(const std::vector<std::pair<double, double>>& curve, double error) {
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const auto [count, here] = curve[i];

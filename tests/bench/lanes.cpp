@@ -1,11 +1,12 @@
-// What vectors of lanes make of paths: how many of their lanes do something, by how paths are given to them. By hand:
+// Simulates SIMD utilization: how many lanes of a vector are active, depending on how paths are assigned to lanes. Run
+// by hand:
 //
 //     cumulet-bench-lanes [--threshold T] [--optical-depth D] [--size PIXELS] [--samples N] FILE...
 //
-// Paths record their stages and steps (recording.hpp). A vector of lanes runs trace.comp's rounds: what any of its
-// lanes does takes all of them its instructions, and which these are was counted of RDNA 2's code, or, of events, is
-// what explains how much slower an NVIDIA H200 was with other lengths of rounds. As many vectors as the device has room
-// for run at once, each as fast as any; the next begins where one ends.
+// Paths record their stages and steps (recording.hpp). A vector of lanes runs trace.comp's rounds: work of any lane
+// costs all lanes its instructions. Instruction counts are from RDNA 2 code; that of events is fitted to the slowdown
+// of an NVIDIA H200 with other round lengths. As many vectors as the device can hold run at once at equal speed. The
+// next one starts when one ends.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -83,13 +84,13 @@ class Vector {
   [[nodiscard]] bool done() const {
     return std::ranges::all_of(lanes_, [](const Lane& lane) { return lane.done(); });
   }
-  /// Those that are done take the next.
+  /// Lanes that are done fetch the next pixel.
   void fill(const std::vector<const Paths*>& pixels, std::size_t& next) {
     for (Lane& lane : lanes_) {
       if (lane.done() && next < pixels.size()) lane = {pixels[next++]};
     }
   }
-  /// glsl/run.glsl's.
+  /// As in glsl/run.glsl.
   void round(int chunk, int events, Sums& sums) {
     const double before = time;
     time += turn_cost;
@@ -125,7 +126,7 @@ class Vector {
     return std::ranges::any_of(lanes_,
                                [](const Lane& lane) { return lane.is_at(Work::event) || lane.is_at(Work::step); });
   }
-  // Returns how many lanes did it.
+  // Returns the number of active lanes.
   double work(Work work) {
     double count = 0.0;
     for (Lane& lane : lanes_) {
@@ -142,7 +143,7 @@ class Vector {
 
 struct Policy {
   std::size_t lanes = 32;
-  bool takes_next = true;  // a lane, once its pixel is done; else once all of the vector's are
+  bool takes_next = true;  // per lane, once its pixel is done; else per vector, once all its lanes are
   int chunk = 8;
   int events = 8;
 };

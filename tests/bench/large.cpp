@@ -1,15 +1,15 @@
-// How long large volumes take to be read and built, and how much memory. By hand, a process a file, as peaks are of
-// processes:
+// Measures time and memory for reading and building large volumes. Run by hand; one process per file, because peaks are
+// per process:
 //
 //     cumulet-bench-large --enlarge N IN.vdb OUT.vdb
 //     cumulet-bench-large [--threshold T] [--max-cells N] [--gl] [--plots FOLDER] FILE...
 //
-// --enlarge: the first grid of a file with N voxels for each along each axis: interpolated, and with detail of some
-// voxels, for such a file has none of its own. Halves, compressed by Blosc, as productions keep them.
+// --enlarge: upsamples the first grid of a file by N along each axis. It interpolates, and adds detail of a few voxels,
+// because the file has none at that scale. It writes halves compressed with Blosc, as productions do.
 //
-// Else a line a file, as in the table of README.md; --plots: large-time.svg and large-memory.svg of them, too. Each
-// file has a process of its own. Seconds are of the processors, of all threads, and by the clock in brackets: others
-// may have the cores. The peak is that of the process (VmHWM) after each stage.
+// Otherwise it prints one line per file, as in the table of README.md. --plots: also writes large-time.svg and
+// large-memory.svg. Each file has its own process. Seconds are CPU time of all threads, with wall time in brackets,
+// because other programs may use the cores. The peak is that of the process (VmHWM) after each stage.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <sys/resource.h>
@@ -51,7 +51,7 @@ float hashed(int x, int y, int z) {
   return static_cast<float>((h ^ (h >> 15U)) & 0xffffU) / 65535.0F;
 }
 
-// From 0 to 1, with a value of its own every three voxels.
+// Noise from 0 to 1 with a random value every three voxels.
 float noise(const glm::ivec3& voxel) {
   const glm::vec3 p = glm::vec3(voxel) / 3.0F;
   const glm::vec3 low = glm::floor(p);
@@ -115,7 +115,7 @@ void enlarge(int times, const std::string& in, const std::string& out) {
 
 struct Stage {
   double processor, clock;  // seconds
-  std::uint64_t peak;       // bytes, by its end
+  std::uint64_t peak;       // bytes, at the end of the stage
 };
 
 class Stages {
@@ -177,7 +177,7 @@ Measured measure(const std::string& file, viewer::BuildSettings settings) {
   return measured;
 }
 
-// By another process, for peaks are of processes.
+// Measures in another process, because peaks are per process.
 Measured measure_apart(const std::string& file, const viewer::BuildSettings& settings) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) throw std::runtime_error("no pipe");

@@ -1,8 +1,8 @@
-// How long it takes from a state's hand-over to its picture, and where that goes: of a plume in a dense array of so
-// many voxels a side, which is copied or held, of its bricks, of a tenth of its bricks, and of textures: handed over as
-// they are, or read back by the host through a pixel buffer and held. A picture is there when a
-// frame draws it, coarse where the budget makes it so. Fire has a temperature beside its density, and what is coloured
-// and moves has a colour and a velocity. By hand:
+// Measures the time from the submission of a live state to its image, by stage. The state is a plume in a dense array
+// with SIDE voxels per side, copied or held, as bricks, as a tenth of its bricks, or as textures. Textures are passed
+// directly, or read back by the host through a pixel buffer and held. An image counts when a frame draws it, possibly
+// coarse because of the budget. Fire has a temperature in addition to density; colored and moving states have color and
+// velocity. Run by hand:
 //
 //     cumulet-bench-live [SIDE [STATES]]...
 #include <algorithm>
@@ -71,12 +71,12 @@ struct Spent {
   double copy = 0.0, read = 0.0, statistics = 0.0, refine = 0.0, records = 0.0, upload = 0.0, rest = 0.0, all = 0.0;
 };
 
-// A busy machine makes all of them longer, none shorter.
+// The minimum, because a busy machine only increases times.
 double least(const std::vector<Spent>& spent, double Spent::*part) {
   return (*std::ranges::min_element(spent, {}, part)).*part;
 }
 
-// A simulation's texture, the states that it takes in turn, and a pixel buffer of the host's.
+// A simulation's texture, the states that it alternates between, and a pixel buffer of the host.
 class Textures {
  public:
   Textures(const GladGLContext& gl, int side, GLenum format, const std::vector<float> (&values)[2])
@@ -122,7 +122,7 @@ class Textures {
     std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), field.index_to_world);
     return field;
   }
-  // About the middle of the height.
+  // A tenth of the volume, around the middle of its height.
   [[nodiscard]] cumulet_voxel_box tenth() const {
     return {{0, side_ / 2 - side_ / 20, 0}, {side_ - 1, side_ / 2 + side_ / 20, side_ - 1}};
   }
@@ -145,7 +145,7 @@ class Bench {
     medium.blackbody = 1.0F;
     must(viewer_.get(), cumulet_set_medium(viewer_.get(), &medium));
     auto sampling = make_desc<cumulet_sampling_desc>();
-    sampling.samples = 1;  // so that nothing else is under way when the next comes
+    sampling.samples = 1;  // so that no other work is pending when the next state arrives
     must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
     auto grid = make_desc<cumulet_grid_desc>();
     grid.build = build;
@@ -172,7 +172,7 @@ class Bench {
   Spent show(const State& state, decltype(cumulet_live_set)* how, bool held) {
     return show([&] { hand_over(state, how, held); });
   }
-  // hand_over: how a state comes, or begins to; meanwhile: what the host does between frames.
+  // hand_over: submits a state, or starts to; meanwhile: work of the host between frames.
   Spent show(
       const std::function<void()>& hand_over, const std::function<void()>& meanwhile = [] {}) {
     auto before = make_desc<cumulet_live_info>();
@@ -204,8 +204,8 @@ class Bench {
   }
   [[nodiscard]] std::uint64_t cells() const { return cells_; }
 
-  // Of a texture, to which voxels are copied on the device first, as a simulation's step would write them. channels:
-  // all that it is.
+  // Submits a texture after copying voxels into it on the GPU, as a simulation step would. channels: all channels of
+  // the state.
   Spent show(const Textures& textures, int i, bool changed,
              const std::vector<cumulet_channel>& channels = {CUMULET_CHANNEL_DENSITY}) {
     textures.step(i);
@@ -223,7 +223,7 @@ class Bench {
       must(viewer_.get(), cumulet_live_set_gl(viewer_.get(), live_.get(), &desc));
     });
   }
-  // The way of a host that reads back itself, and waits for nothing.
+  // A host that reads back the texture itself without waiting.
   Spent show_read_back(const Textures& textures, int i) {
     textures.step(i);
     GLsync read = nullptr;
@@ -298,7 +298,7 @@ void measure(int side, int count) {
   const auto bricks = [&](int i) { return State::bricks(size, values[i]); };
   const State states[] = {sparse(values[0], bricks(0)), sparse(values[1], bricks(1))};
   row("bricks", states, cumulet_live_set, false);
-  // Those about the middle of the height.
+  // Bricks around the middle of the height.
   std::vector<Sides> tenth = bricks(0);
   std::erase_if(tenth, [&](const Sides& origin) { return std::abs(origin[1] - side / 2) > side / 20; });
   const State parts[] = {sparse(values[1], tenth), sparse(values[0], tenth)};
@@ -322,7 +322,7 @@ void measure(int side, int count) {
           CUMULET_CHANNEL_VELOCITY_X, CUMULET_CHANNEL_VELOCITY_Y, CUMULET_CHANNEL_VELOCITY_Z}}};
     for (const auto& [what, channels] : kinds) {
       try {
-        built_there.show(there, 0, false, channels);  // what it gives off is asked for first
+        built_there.show(there, 0, false, channels);  // the emission is requested first
         rows_of(built_there, name(what).c_str(), [&](int i) { return built_there.show(there, i, false, channels); });
         rows_of(built_there, name((std::string(what) + ", a tenth of it").c_str()).c_str(),
                 [&](int i) { return built_there.show(there, i, true, channels); });

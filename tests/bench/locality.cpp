@@ -1,10 +1,11 @@
-// Which order of cell records would serve a GPU's caches best, and what coarse ancestors could save. By hand:
+// Simulates which order of cell records would suit a GPU's caches best, and how much coarse ancestors could save. Run
+// by hand:
 //
 //     cumulet-bench-locality [--threshold T] [--optical-depth D] [--size PIXELS] [--samples N] FILE...
 //
-// Paths record the cells that they march through (recording.hpp). Waves of 8 x 8 pixels march in step, 16 of them in
-// turn on each of four compute units, each with a first-level cache, all with one second-level cache; both are 16 ways
-// wide and forget what is least recently used. Orders are permutations of the same records.
+// Paths record the cells that they traverse (recording.hpp). Waves of 8 x 8 pixels run in lockstep, 16 of them in turn
+// on each of four compute units. Each unit has a first-level cache, and all share a second-level cache. Both are 16-way
+// LRU caches. Orders are permutations of the same records.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -23,7 +24,7 @@
 namespace {
 
 using namespace cumulet;
-using Order = std::vector<std::uint32_t>;  // where each cell is
+using Order = std::vector<std::uint32_t>;  // position of each cell
 
 constexpr std::uint32_t wave_side = 8;
 constexpr std::size_t units = 4;
@@ -32,13 +33,13 @@ constexpr std::size_t ways = 16;
 
 using Options = bench::RecordingOptions;
 
-/// Of one pixel's paths, one after the other.
+/// The cells of one pixel's paths, in order.
 using Visits = std::vector<std::uint32_t>;
 
 class Cache {
  public:
   Cache(std::size_t bytes, std::size_t line) : sets_(std::max<std::size_t>(1, bytes / line / ways)) {}
-  /// Whether the line was there.
+  /// Returns whether the line was cached.
   bool touch(std::uint64_t line) {
     std::vector<std::uint64_t>& set = sets_[line % sets_.size()];
     const auto found = std::ranges::find(set, line);
@@ -54,10 +55,10 @@ class Cache {
 };
 
 struct Traffic {
-  double lines = 0.0, first_misses = 0.0, second_misses = 0.0;  // a step of a path
+  double lines = 0.0, first_misses = 0.0, second_misses = 0.0;  // per step of a path
 };
 
-/// A wave on its way.
+/// A wave in progress.
 struct Wave {
   const std::vector<Visits>* lanes = nullptr;
   std::size_t step = 0;
@@ -132,13 +133,13 @@ std::uint64_t spread_bits(std::uint64_t x) {
   return spread;
 }
 
-/// Eighths of a voxel.
+/// In eighths of a voxel.
 glm::uvec3 middle_of(const grid::CellRecord& record) {
   const auto v = vertices_of(record);
   return glm::uvec3(8.0F * 0.25F * (v[0] + v[1] + v[2] + v[3]));
 }
 
-/// The first bits of x first.
+/// Interleaves bits, those of x first.
 std::uint64_t interleaved(const glm::uvec3& p) {
   return spread_bits(p.x) << 2U | spread_bits(p.y) << 1U | spread_bits(p.z);
 }
@@ -176,9 +177,9 @@ Order hilbert(const grid::TetGrid& grid) {
   return by_key(keys);
 }
 
-/// Depth first as Sierpinski's curve has it: the child first at whose end of the split edge the curve comes in. Of a
-/// cell that it goes through backwards that is the other one; of two children it goes through the second one backwards.
-/// So it leaves the first where it enters the second, if their own edges meet there.
+/// Depth first along a Sierpinski curve: first the child at the end of the split edge where the curve enters. In a cell
+/// traversed backwards it is the other child. Of two children, the second is traversed backwards. So the curve leaves
+/// the first child where it enters the second, if their own edges meet there.
 class ThereAndBack {
  public:
   explicit ThereAndBack(const grid::TetGrid& grid) : order(grid.cells.size()), grid_(grid) {
@@ -207,7 +208,7 @@ class ThereAndBack {
   std::uint32_t next_ = 0;
 };
 
-/// All of a level together, in each as today.
+/// Sorted by level; inside a level in the current order.
 Order by_level(const grid::TetGrid& grid) {
   std::vector<std::uint64_t> keys;
   for (const grid::CellRecord& record : grid.cells) {
@@ -227,7 +228,8 @@ Order shuffled(std::size_t count) {
   return order;
 }
 
-/// Cells that these very paths visit one after the other most often are in one line: what no order can know.
+/// Groups cells into lines by how often these paths visit them in succession. This needs the paths in advance, so it is
+/// a bound that no order reaches.
 Order foreseen(const std::vector<std::vector<Visits>>& waves, std::size_t count, std::size_t in_line) {
   std::unordered_map<std::uint64_t, std::uint32_t> often;
   for (const auto& wave : waves) {
@@ -255,7 +257,7 @@ Order foreseen(const std::vector<std::vector<Visits>>& waves, std::size_t count,
     members[a].insert(members[a].end(), members[b].begin(), members[b].end());
     members[b].clear();
   }
-  // Whole groups first, so that lines hold no parts of others.
+  // Full groups first, so that lines contain no parts of others.
   std::vector<std::uint64_t> keys(count);
   for (std::uint32_t cell = 0; cell < count; ++cell) {
     const std::uint64_t missing = in_line - members[group[cell]].size();
@@ -264,7 +266,7 @@ Order foreseen(const std::vector<std::vector<Visits>>& waves, std::size_t count,
   return by_key(keys);
 }
 
-/// The largest ancestors within which density differs by no more than a part of the volume's maximum.
+/// The largest ancestors inside which density varies by at most a fraction of the volume's maximum.
 class Ancestors {
  public:
   Ancestors(const core::Recording& recording, float most) : grid_(*recording.grid), most_(most) {

@@ -1,4 +1,4 @@
-// cumulet-bench: the tetrahedral march against its opponents, one run, ratios.
+// cumulet-bench: compares the tetrahedral grid with other grid types in one run, as ratios.
 
 #include <cstdio>
 #include <exception>
@@ -34,7 +34,7 @@ bench::Machine machine_of(headless::Context& context) {
 }
 
 void run(const bench::Options& options) {
-  // What cannot be written should not fail after minutes of measuring.
+  // Checks paths before minutes of measurements.
   if (!options.readme.empty() && !std::ifstream(options.readme)) {
     throw std::runtime_error(options.readme.string() + ": cannot be read");
   }
@@ -84,7 +84,7 @@ void run(const bench::Options& options) {
       continue;
     }
     results.push_back(bench::measure(context, bench::load_asset(input), options));
-    bench::write_report(machine, options, results, {}, skipped);  // what is done is not lost
+    bench::write_report(machine, options, results, {}, skipped);  // writes completed results in case of a later failure
   }
   if (!all) return;
   bench::progress("triangle trees");

@@ -1,10 +1,10 @@
-// The strongest opponent, which a user would pick instead: a NanoVDB grid, read by PNanoVDB.h, with null collisions below
-// the majorants of its nodes (flight_hdda.glsl), by a hierarchical DDA (Museth, "NanoVDB: A GPU-Friendly and Portable
-// VDB Data Structure", SIGGRAPH Talks 2021). The benchmark puts it into the place of march_voxel.glsl (peer_shaders.cpp);
-// the grid's index space is cube space, its values are relative to the volume's maximum.
+// The strongest competitor, which a user would choose instead: a NanoVDB grid, read by PNanoVDB.h, with null collisions
+// with the majorants of its nodes (flight_hdda.glsl), by a hierarchical DDA (Museth, "NanoVDB: A GPU-Friendly and
+// Portable VDB Data Structure", SIGGRAPH Talks 2021). The benchmark substitutes it for march_voxel.glsl
+// (peer_shaders.cpp). The grid's index space is cube space, and its values are relative to the volume's maximum.
 //
-// A cell is a region that has one majorant: the address of its node or its tile, its corner in bricks with its kind, and
-// the lower node that it is in, CM_NONE if that is not known.
+// A cell is a region with one majorant: the address of its node or tile, its corner in bricks with its kind, and the
+// lower node that contains it, CM_NONE if unknown.
 #ifndef CM_MARCH_HDDA_GLSL
 #define CM_MARCH_HDDA_GLSL
 
@@ -15,13 +15,13 @@ layout(std430, binding = CM_STORAGE_MODEL_NODES) readonly buffer CmNanoGrid { ui
 // CM_NANO_TYPE is PNANOVDB_GRID_TYPE_FLOAT or PNANOVDB_GRID_TYPE_FP16.
 
 #define CM_LEAF 0u        // 8 voxels wide, as is
-#define CM_LEAF_TILE 1u   // what a lower node has in a leaf's place
+#define CM_LEAF_TILE 1u   // a tile of a lower node in place of a leaf
 #define CM_LOWER_TILE 2u  // 128
 #define CM_UPPER_TILE 3u  // 4096
-#define CM_LOWER 4u       // a lower node as a whole: 128
+#define CM_LOWER 4u       // a whole lower node: 128
 
-// A lower node is one region where a ray right through it has so few collisions below its maximum, by optical depth: with
-// more it is cheaper to step from leaf to leaf.
+// A lower node is one region if a ray through it has at most this number of expected collisions with its maximum, as
+// optical depth. With more, stepping from leaf to leaf is cheaper.
 #define CM_FEW_COLLISIONS 4.0
 
 const pnanovdb_buf_t cm_nano = pnanovdb_buf_t(0u);
@@ -61,7 +61,7 @@ float cm_nano_leaf_max(uint leaf) {
 #if CM_NANO_TYPE == PNANOVDB_GRID_TYPE_FLOAT
   return pnanovdb_read_float(cm_nano, at);
 #else
-  // The high half of a word: of the leaf's own unit.
+  // The high half of a word, in units of the leaf.
   uint most = pnanovdb_read_uint32(cm_nano, pnanovdb_address_mask_inv(at, 3u)) >> 16;
   pnanovdb_address_t table = pnanovdb_leaf_get_table_address(CM_NANO_TYPE, cm_nano, node, 0u);
   float least = pnanovdb_read_float(cm_nano, pnanovdb_address_offset_neg(table, PNANOVDB_LEAF_TABLE_NEG_OFF_MINIMUM));
@@ -81,7 +81,7 @@ float cm_nano_leaf_value(uint leaf, ivec3 voxel) {
 #endif
 }
 
-// What a lower node has of the brick that holds a voxel.
+// The child or tile of a lower node that contains a voxel.
 uvec3 cm_nano_in_lower(uint lower, ivec3 voxel) {
   pnanovdb_lower_handle_t node;
   node.address = cm_nano_at(lower);
@@ -92,7 +92,7 @@ uvec3 cm_nano_in_lower(uint lower, ivec3 voxel) {
   return cm_nano_cell(leaf ? CM_LEAF : CM_LEAF_TILE, address, voxel, lower);
 }
 
-// The region that holds a voxel. lower: the lower node that it is in, if that is known not to be a region itself.
+// The region that contains a voxel. lower: the lower node that contains it, if that is known not to be a region itself.
 uvec3 cm_nano_find(ivec3 voxel, uint lower) {
   if (lower != CM_NONE) return cm_nano_in_lower(lower, voxel);
   pnanovdb_root_handle_t root;
@@ -121,7 +121,7 @@ float cm_nano_majorant(uvec3 cell) {
   return pnanovdb_read_float(cm_nano, cm_nano_at(cell.x));
 }
 
-// The density of a voxel of the region, whose majorant is known.
+// The density of a voxel of the region, given the region's majorant.
 float cm_nano_density(uvec3 cell, ivec3 voxel, float majorant) {
   if (cm_nano_kind(cell) == CM_LOWER) cell = cm_nano_in_lower(cell.x, voxel);
   uint kind = cm_nano_kind(cell);
@@ -135,10 +135,10 @@ uvec3 cm_march_enter(vec3 p) {
   return cm_nano_find(clamp(ivec3(floor(p)), low, high), CM_NONE);
 }
 
-// Where a ray leaves the region, behind t, and the region that it comes to.
+// Where a ray leaves the region after t, and the region that it enters.
 void cm_nano_exit(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, out float t_1, out ivec3 axis) {
   ivec3 low = cm_nano_corner(cell);
-  // The plane that the ray meets on each axis, from the integer, so that both sides agree.
+  // The plane that the ray hits on each axis, computed from integers so that both sides agree.
   vec3 plane = vec3(low) + float(cm_nano_size(cell)) * vec3(greaterThan(d, vec3(0.0)));
   vec3 at = mix((plane - o) * inv_d, vec3(3.0e38), equal(d, vec3(0.0)));
   float t_exit = min(at.x, min(at.y, at.z));

@@ -15,7 +15,7 @@ namespace cumulet::bench {
 namespace {
 
 constexpr double first_deviation = 1.6;
-constexpr double first_range_mean = 1048576.0;  // near 0 beside a few voxels, max / mean is large
+constexpr double first_range_mean = 1048576.0;  // for sparse volumes with a few large voxels, max / mean is large
 constexpr double finest_error = 0.007;
 constexpr double image_to_depth_error = 1.5;  // where the search for an image error begins
 
@@ -25,7 +25,7 @@ std::string text(const char* format, double a, double b = 0.0, double c = 0.0) {
   return buffer.data();
 }
 
-// Linux: the high-water mark of resident memory, and its reset. Where /proc lacks it, 0.
+// Linux: the high-water mark of resident memory, and its reset. 0 if /proc does not have it.
 void reset_peak() {
   malloc_trim(0);
   std::ofstream("/proc/self/clear_refs") << "5";
@@ -46,7 +46,7 @@ double peak_bytes() {
 
 BuildRow measure_build(headless::Context& context, const Asset& asset, const Options& options, double density_scale) {
   reset_peak();
-  // A copy, whose statistics nobody has computed yet.
+  // A copy whose statistics are not computed yet.
   const auto volume = std::make_shared<const viewer::VolumeAsset>(asset.volume->volume());
   Subject subject(context, volume, Kind::tet_linear, options, density_scale);
   subject.refine(grid::Criterion::deviation, 1e-6, options.build_cells);
@@ -87,7 +87,7 @@ SweepCurve sweep(Subject& subject, grid::Criterion criterion, const DepthReferen
   return curve;
 }
 
-/// y at x, for a straight line in logarithms through (x_0, y_0) and (x_1, y_1).
+/// y at x on a straight line in logarithms through (x_0, y_0) and (x_1, y_1).
 double log_between(double x_0, double x_1, double x, double y_0, double y_1) {
   const double part = std::log(x_0 / x) / std::log(x_0 / x_1);
   return std::isfinite(part) ? y_0 * std::pow(y_1 / y_0, part) : y_1;
@@ -98,7 +98,8 @@ struct Match {
   ImageError error;
 };
 
-/// The threshold whose image error is the target: a secant search in logarithms, kept inside what brackets the target.
+/// The threshold whose image error is the target: a secant search in logarithms, kept inside the interval that brackets
+/// the target.
 Match match(Subject& subject, const ImageReference& reference, double target, double guess, const Options& options) {
   struct Point {
     double threshold, error;
@@ -133,7 +134,7 @@ Match match(Subject& subject, const ImageReference& reference, double target, do
   return best;
 }
 
-/// Runs of each subject, in turn, until all have their repeats.
+/// Runs the subjects in turn until all have their repeats.
 template <class Measure>
 std::vector<std::vector<Run>> take_turns(std::size_t subjects, int repeats, Measure measure_one) {
   std::vector<std::vector<Run>> runs(subjects);
@@ -151,7 +152,7 @@ double density_scale_of(const Asset& asset, const Options& options) {
   return options.optical_depth / std::max(asset.mean_optical_depth, 1e-30);
 }
 
-/// Samples a pixel that take about as long as a run shall, where one takes so many seconds.
+/// The number of samples per pixel for the intended duration of a run, if one sample takes this many seconds.
 std::uint32_t samples_within(const Options& options, double seconds) {
   const double samples = options.seconds_a_run / std::max(seconds, 1e-3);
   return static_cast<std::uint32_t>(std::clamp(samples, static_cast<double>(options.fewest_samples), 16.0));
@@ -163,7 +164,7 @@ std::vector<double> rates(const std::vector<Run>& runs) {
   return result;
 }
 
-/// What surfaces cost: a grid of that threshold, as `alone` has it, with them, in turn with the volume alone.
+/// Cost of surfaces: a grid with the threshold of `alone`, with surfaces, in turn with the volume only.
 SurfaceResult measure_surfaces(headless::Context& context, const Asset& asset, const Options& options, Subject& alone,
                                double threshold, double density_scale) {
   const scene::ModelSourcePtr surfaces = surfaces_in(asset.volume->bounds());

@@ -8,16 +8,16 @@
 
 namespace cumulet::bench {
 
-/// A line on standard error, with the time since the start.
+/// Prints a line on standard error with the time since the start.
 void progress(const std::string& line);
 
-/// Everything about one asset.
+/// Measures everything about one asset.
 AssetResult measure(headless::Context& context, const Asset& asset, const Options& options);
 
-/// What surfaces cost alone, on a linear grid of Options::surfaces_threshold: printed.
+/// Measures and prints only the cost of surfaces, on a linear grid of Options::surfaces_threshold.
 void measure_surfaces_alone(headless::Context& context, const Asset& asset, const Options& options);
 
-/// The triangle tree over each of its meshes.
+/// Measures the BVH of each mesh.
 std::vector<TreeTimes> measure_trees(const Options& options);
 
 }  // namespace cumulet::bench

@@ -19,7 +19,7 @@ Input parse_input(const std::string& text) {
   input.name = text.substr(0, equals);
   for (char& c : input.name) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
-    if (!plain) c = '_';  // it names files
+    if (!plain) c = '_';  // used in file names
   }
   std::string rest = text.substr(equals + 1);
   const std::string noise = "@noise:";

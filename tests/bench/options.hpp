@@ -8,13 +8,13 @@
 
 namespace cumulet::bench {
 
-/// A volume to measure: a file, or a noise ball of our own.
+/// A volume to measure: a file, or a generated noise ball.
 struct Input {
   std::string name;
   std::filesystem::path file;
   std::string grid;
-  int noise_size = 0;     ///< not 0: a synthetic volume of this many voxels a side
-  bool optional = false;  ///< a default that may be absent
+  int noise_size = 0;     ///< not 0: a synthetic volume with this number of voxels per side
+  bool optional = false;  ///< a default that may be missing
 };
 
 struct Options {
@@ -30,7 +30,7 @@ struct Options {
   float albedo = 1.0F;
   int repeats = 5;
   double seconds_a_run = 10.0;
-  std::uint32_t fewest_samples = 8;  ///< a pixel, in a timed run: with fewer, waiting for the longest path weighs most
+  std::uint32_t fewest_samples = 8;  ///< per pixel in a timed run; with fewer, waiting for the longest path dominates
   std::uint32_t error_samples = 24;
   std::uint32_t error_parts = 2;
   std::uint32_t max_bounces = 0;  ///< 0: no limit
@@ -41,34 +41,34 @@ struct Options {
   std::uint64_t build_cells = 5'000'000;
   std::size_t tree_triangles = 1'000'000;
   bool quick = false;
-  bool defaults = false;              ///< only how good grids by default are
+  bool defaults = false;              ///< only the quality of default grids
   std::vector<double> thresholds;     ///< of those, by transmittance; empty: the default one
   std::vector<double> deviations;     ///< and by deviation
-  bool costs = false;                 ///< only what channels and lights cost
-  bool peers = false;                 ///< only what marches through NanoVDB grids take beside ours
-  std::uint64_t block_bytes = 0;      ///< that they may take of a storage block; 0: what the driver says
-  bool by_clock = false;              ///< they by the clock, not by processors' time
-  bool equal_error = false;           ///< only what marches take to an error of a fire's picture
+  bool costs = false;                 ///< only the cost of channels and lights
+  bool peers = false;                 ///< only NanoVDB grids compared with ours
+  std::uint64_t block_bytes = 0;      ///< limit of a storage block for those; 0: the driver's
+  bool by_clock = false;              ///< those by wall time instead of CPU time
+  bool equal_error = false;           ///< only the time to an error of a fire's image
   std::string color_grid;             ///< of the volume whose channels are measured; empty: none
-  std::filesystem::path environment;  ///< to measure too; empty: none
-  bool denoise = false;               ///< only how good pictures of few samples are, raw and denoised
-  bool settle = false;                ///< only how soon what is drawn is good after a change
-  bool adaptive = false;              ///< only what adaptive sampling takes to a noise target
-  bool techniques = false;            ///< only whether each technique, off, leaves means as they are
-  std::vector<std::string> scenes;    ///< of those that these are judged on; empty: all
-  std::filesystem::path sample_dir;   ///< what cumulet-scene --full wrote
-  std::filesystem::path usual_dir;    ///< what it wrote without
+  std::filesystem::path environment;  ///< measured in addition; empty: none
+  bool denoise = false;               ///< only the quality of images of few samples, noisy and denoised
+  bool settle = false;                ///< only the convergence of displayed images after a change
+  bool adaptive = false;              ///< only adaptive sampling to a noise target
+  bool techniques = false;            ///< only the effect of disabled techniques on means
+  std::vector<std::string> scenes;    ///< names of the scenes for those; empty: all
+  std::filesystem::path sample_dir;   ///< written by cumulet-scene --full
+  std::filesystem::path usual_dir;    ///< written by cumulet-scene without --full
   std::string oidn_weights;           ///< folder of networks; empty: where cumulet-render looks for them
   std::uint32_t reference_samples = 8192;
-  std::uint32_t raw_samples = 256;    ///< up to which the raw picture is judged, at least 64
+  std::uint32_t raw_samples = 256;    ///< largest sample count of noisy images, at least 64
   std::uint32_t frames = 30;          ///< of an orbit; 0: none
   std::uint32_t flicker_samples = 4;  ///< of each of them
   std::uint32_t flicker_reference_samples = 256;
-  double budget_ms = 10.0;          ///< a frame's, where what is drawn settles
-  double surfaces_threshold = 0.0;  ///< above 0: only what surfaces cost is measured, on a grid of that threshold
+  double budget_ms = 10.0;          ///< per frame, for convergence after a change
+  double surfaces_threshold = 0.0;  ///< above 0: only the cost of surfaces is measured, on a grid of this threshold
 };
 
-/// The options, or the exit status that wrong usage (or --help) means; explains itself.
+/// The options, or the exit status for wrong usage or --help. The parser prints the explanation.
 struct ParseResult {
   Options options;
   int status = -1;  ///< not negative: exit with it

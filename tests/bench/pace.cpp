@@ -1,7 +1,7 @@
-// How well cumulet_render keeps its budget: what a call takes over 5, 10 and 16 ms, at rest and while the sun is
-// dragged, alone and beside a host that queues GPU work of its own; what the system alone makes of a call that only
-// looks at the clock until its budget is over, on two cores as the tracer of a software driver; and the loop of
-// README's host, until it converges. By hand:
+// Measures how well cumulet_render keeps its budget: durations of calls with budgets of 5, 10 and 16 ms, at rest and
+// while the sun is dragged, without other load and beside a host that queues GPU work. As a control: a call that only
+// polls the clock until its budget is over, on two cores like the tracer of a software driver. Also the loop of
+// README's host until it converges. Run by hand:
 //
 //     cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK]
 #include <algorithm>
@@ -34,7 +34,7 @@ struct Scenario {
   bool busy;
 };
 
-/// A call that keeps two cores until so long after now.
+/// Keeps two cores busy for this time.
 void control(double budget_ms) {
   const auto until = Clock::now() + std::chrono::duration<double, std::milli>(budget_ms);
   const auto spin = [until] {
@@ -112,7 +112,7 @@ class Bench {
   }
 
  private:
-  // Of calls in as many frames, sorted; prepare(frame) gives the call.
+  // Durations of calls, one per frame, sorted; prepare(frame) returns the call.
   template <class Prepare>
   std::vector<double> times(bool busy, Prepare&& prepare) {
     std::vector<double> taken;
@@ -122,7 +122,7 @@ class Bench {
       const auto start = Clock::now();
       call();
       if (i >= 0) taken.push_back(ms_since(start));
-      gl_.Finish();  // as a swap of buffers might
+      gl_.Finish();  // as a buffer swap might
     }
     std::ranges::sort(taken);
     return taken;

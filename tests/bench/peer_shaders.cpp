@@ -28,7 +28,7 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
       Edit{"march.glsl", march, with_type.c_str()},
       Edit{"flight.glsl", fly_begins, with_flight.c_str()},
       Edit{"flight.glsl", fly_ends, after_flight.c_str()},
-      // No transmittance is known: a look's is in its light, and depths are below majorants.
+      // No transmittance is known: that of a shadow ray is in its radiance, and depths are those of majorants.
       Edit{"path.glsl", "  float depth = p.depth_0 - p.depth;\n", "  float depth = 0.0f;\n"},
       Edit{"path_vertex.glsl", "#define CM_SHADOW_DEPTH 2.0f", "#define CM_SHADOW_DEPTH 0.0f"},
       Edit{"path.glsl", "  p.depth = p.depth_0;\n  float ground = ",

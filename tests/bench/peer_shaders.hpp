@@ -7,23 +7,23 @@
 
 namespace cumulet::bench {
 
-/// How looks for light find what passes through a NanoVDB grid.
+/// How shadow rays estimate the transmittance of a NanoVDB grid.
 enum class Look {
-  delta,  ///< by delta tracking: all or nothing
+  delta,  ///< by delta tracking: 0 or 1
   ratio,  ///< by ratio tracking
 };
 
-/// Programs whose dense march is one through a NanoVDB grid instead (march_hdda.glsl, flight_hdda.glsl). For as long as
-/// programs are made. type: not fpn.
+/// Programs whose dense grid traversal is replaced by that of a NanoVDB grid (march_hdda.glsl, flight_hdda.glsl). The
+/// object must live until all programs are compiled. type: not fpn.
 std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look);
 
-/// A grid's words where such programs look for them, from now on: as a host binds what is its own.
+/// Binds a grid's words where such programs read them, as a host binds its own objects.
 class BoundGrid {
  public:
-  /// block_bytes: what a storage block is taken to hold; 0: what the driver says. Throws std::runtime_error that names
-  /// the limit that does not suffice.
+  /// block_bytes: assumed storage block size; 0: the driver's. Throws std::runtime_error that names the limit that does
+  /// not suffice.
   BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words, std::uint64_t block_bytes = 0);
-  /// Again, after another.
+  /// Binds it again after another grid.
   void bind() const;
 
  private:

@@ -22,15 +22,15 @@ namespace {
 constexpr std::array usual_thresholds{2.4, 1.2, 0.6, 0.3, 0.15};  // by transmittance, coarse to fine
 constexpr double megabyte = 1e6;
 
-/// A march of the table.
+/// A grid type in the table.
 struct Entry {
   std::string name;
-  std::unique_ptr<EditedShaders> shaders;  ///< of others than ours
-  std::unique_ptr<BoundGrid> grid;         ///< that one
+  std::unique_ptr<EditedShaders> shaders;  ///< only for NanoVDB and edited shaders
+  std::unique_ptr<BoundGrid> grid;         ///< the NanoVDB grid
   std::unique_ptr<Subject> subject;
   double bytes = 0.0;
   double threshold = 0.0;           ///< of its refinement
-  std::optional<ImageError> error;  ///< what is not exact
+  std::optional<ImageError> error;  ///< nullopt for exact ones
   std::vector<Run> runs;
 };
 
@@ -56,7 +56,7 @@ Entry peer(headless::Context& context, const Asset& asset, NanoType type, Look l
   return entry;
 }
 
-/// The same cells, through which rays go on where nothing is met any more: what clear cones save.
+/// The same cells without clear cones: rays continue to the bounds, which measures the savings by clear cones.
 Entry to_the_box(headless::Context& context, const Asset& asset, const Entry& tets, const Options& options,
                  double density_scale) {
   const std::array edits{Edit{"march_tet.glsl", "cm_record_is_clear(data, ray.cone) ? CM_NONE : link", "link"}};
@@ -69,7 +69,8 @@ Entry to_the_box(headless::Context& context, const Asset& asset, const Entry& te
   return entry;
 }
 
-/// Of ours, the coarsest grid within the target of the voxels' picture; else the finest.
+/// Refines the tetrahedral grid until its image error is within the target, from coarse to fine. Keeps the finest if
+/// none is.
 void fit(Entry& tets, const ImageReference& reference, const Options& options) {
   std::vector<double> thresholds = options.thresholds;
   if (thresholds.empty()) thresholds.assign(usual_thresholds.begin(), usual_thresholds.end());

@@ -6,7 +6,7 @@
 
 namespace cumulet::bench {
 
-/// What marches take to equal variance, those through NanoVDB grids among them: a table on standard output.
+/// Measures the time of grid types, including NanoVDB grids, to equal variance. Prints a table on standard output.
 void measure_peers(headless::Context& context, const Asset& asset, const Options& options);
 
 }  // namespace cumulet::bench

@@ -1,4 +1,4 @@
-// The march through NanoVDB grids, against quadrature and against the dense march.
+// Traversal of NanoVDB grids compared with quadrature and with the dense grid.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ constexpr int seeds = 24;
 constexpr double sun_irradiance = 3.0;
 constexpr double deviations = 4.0;
 
-/// Noise in half of the bricks, and some that are even.
+/// Noise in half of the bricks; some of the others are constant.
 volume::ScalarVolume broken_volume() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> unit;
@@ -51,7 +51,7 @@ volume::ScalarVolume broken_volume() {
   return v;
 }
 
-/// Double precision, of its own.
+/// Reference in double precision with its own code.
 class Truth {
  public:
   Truth(const volume::ScalarVolume& volume, double extinction)
@@ -64,7 +64,7 @@ class Truth {
     }
   }
 
-  /// Calls use(t_0, t_1, extinction) of each voxel on the way.
+  /// Calls use(t_0, t_1, extinction) for each voxel on the ray.
   template <class Use>
   void walk(const dvec3& o, const dvec3& d, const Use& use) const {
     const dvec3 a = (dvec3(-0.5) - o) / d;
@@ -125,7 +125,7 @@ viewer::Light light(bool sky) {
   return light;
 }
 
-/// Of a picture: the mean of what the medium covers, and of its radiance.
+/// Means of the alpha and the radiance of an image.
 struct Shown {
   Mean alpha, radiance;
 };
@@ -170,7 +170,7 @@ class Shows {
   test::Still still_;
 };
 
-/// Single scattering of the sun, over the picture.
+/// Expected single scattering of the sun, over the image.
 struct Expected {
   double alpha = 0.0, radiance = 0.0;
 };
@@ -229,7 +229,7 @@ TEST_P(PeersTest, ScattersLikeTheVoxels) {
   const Truth truth(volume->volume(), c.density_scale);
   const Expected single = expected(truth);
   const Shown shown = nano.show(c.density_scale, 1, false, c.samples);
-  // The quadrature's own error: of rays at the middles of their squares.
+  // The quadrature's own error, because it uses rays through pixel centers only.
   EXPECT_NEAR(shown.alpha.value, single.alpha, deviations * shown.alpha.error + 0.001 * single.alpha);
   EXPECT_NEAR(shown.radiance.value, single.radiance, deviations * shown.radiance.error + 0.001 * single.radiance);
   EXPECT_LT(shown.radiance.error, 0.01 * single.radiance) << "tells too little";
@@ -247,7 +247,7 @@ TEST_P(PeersTest, ScattersLikeTheVoxels) {
 INSTANTIATE_TEST_SUITE_P(Kinds, PeersTest,
                          testing::Values(Case{bench::NanoType::float32, bench::Look::delta, 0.3, 64},
                                          Case{bench::NanoType::float32, bench::Look::ratio, 0.3, 256},
-                                         // A lower node is one region of so thin a medium.
+                                         // In such a thin medium, a lower node is one region.
                                          Case{bench::NanoType::float32, bench::Look::ratio, 0.012, 256},
                                          Case{bench::NanoType::fp16, bench::Look::ratio, 0.3, 64}));
 

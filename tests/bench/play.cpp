@@ -1,7 +1,7 @@
-// Whether a sequence plays at its rate: of the frames that the clock asked for, how many were drawn before it asked for
-// the next, while they are read and built and once they are ready; and what calls took. The clock is that of a host
-// which draws sixty times a second: each call is a sixtieth, however long it took, so that a busy machine is no slower
-// one. By hand:
+// Measures whether a sequence plays at its rate: the fraction of frames that are drawn before the next one is
+// requested, while frames are read and built and once they are ready; and durations of calls. The simulated clock is
+// that of a host with sixty frames per second: each call advances it by a sixtieth, so that a busy machine does not
+// change results. Run by hand:
 //
 //     cumulet-bench-play FRAMES_PER_SECOND BUDGET_MS SECONDS y|z FILE...
 #include <algorithm>
@@ -72,7 +72,7 @@ class Bench {
   void wait_for_all() {
     while (info().ready_frames + info().failed_frames < info().frames)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    // Frames of other channels need other programs, which are compiled when the first of them is drawn.
+    // Frames with other channels need other programs, which are compiled when the first of them is drawn.
     for (std::uint32_t frame = 0; frame < info().frames; ++frame) {
       cumulet_sequence_set_frame(sequence_.get(), frame);
       warm_up();
@@ -81,7 +81,7 @@ class Bench {
 
   void play(const char* name, double seconds) {
     std::vector<double> calls;
-    std::vector<double> waited;  // calls from what asked for a frame to what drew it
+    std::vector<double> waited;  // calls from the request of a frame to its drawing
     int since = 0;
     std::int64_t asked = -1;
     std::int64_t hit = 0;

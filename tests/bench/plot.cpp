@@ -40,7 +40,7 @@ std::string text_at(double x, double y, const char* anchor, const std::string& t
   return format("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" %s>", x, y, anchor, more) + escaped(text) + "</text>\n";
 }
 
-/// The head, with the colours of both schemes: Okabe and Ito's, which the colour-blind tell apart.
+/// The header with the colors of both schemes, after Okabe and Ito, which are distinct for color-blind readers.
 std::string head(double height, const std::string& title) {
   std::string svg = format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" viewBox=\"0 0 %.0f %.0f\" "
@@ -69,7 +69,7 @@ struct LogAxis {
   [[nodiscard]] double place(double value) const {
     return from + (to - from) * std::log(value / low) / std::log(high / low);
   }
-  /// 1, 2, 5 times powers of ten, or powers alone where they would crowd.
+  /// 1, 2, 5 times powers of ten, or only the powers if there would be too many.
   [[nodiscard]] std::vector<double> ticks() const {
     const bool crowded = std::log10(high / low) > 2.6;
     std::vector<double> result;
@@ -131,7 +131,7 @@ std::string line_plot(const std::string& title, const std::string& x_label, cons
   svg += text_at(0.5 * (x.from + x.to), height - 16.0, "middle", x_label);
   svg += format("<g transform=\"translate(24 %.1f) rotate(-90)\">", 0.5 * (y.from + y.to));
   svg += text_at(0.0, 0.0, "middle", y_label) + "</g>\n";
-  // Where lines that rise, or fall, leave room.
+  // Where rising or falling lines leave space.
   const bool rises =
       std::ranges::count_if(
           series,

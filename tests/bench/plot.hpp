@@ -16,13 +16,13 @@ struct Series {
   std::vector<std::pair<double, double>> points;
 };
 
-/// An SVG with logarithmic axes. Light or dark as the reader's system is; points that are not positive are left out.
+/// An SVG with logarithmic axes, light or dark as the reader's system. Points that are not positive are left out.
 std::string line_plot(const std::string& title, const std::string& x_label, const std::string& y_label,
                       const std::vector<Series>& series);
 
 struct BarGroup {
   std::string label;
-  std::vector<double> values;  ///< one a bar
+  std::vector<double> values;  ///< one per bar
 };
 
 /// Horizontal bars from zero, in groups.

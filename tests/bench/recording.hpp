@@ -1,7 +1,7 @@
 #pragma once
 
-// Paths of the shaders' own source on the CPU (tests/unit/support/cpu_tracer.hpp's way) through the grid that a viewer
-// shows, which tell what they do.
+// Paths of the shaders' own source on the CPU (as tests/unit/support/cpu_tracer.hpp) through a viewer's grid, which
+// record their work.
 
 #include <cstdint>
 #include <filesystem>
@@ -58,11 +58,11 @@ struct RecordingOptions {
   std::vector<std::filesystem::path> files;
 };
 
-/// What records paths of a file's grid.
+/// A function that receives the recording of a file's grid.
 using UseRecording =
     std::function<void(core::Recording&, const std::filesystem::path& file, const RecordingOptions& options)>;
 
-/// The whole of a program that does this for each file of its arguments: its exit status.
+/// Runs `use` for each file of the arguments. Returns the exit status of the program.
 int record_files(int argc, char** argv, const char* program, const UseRecording& use);
 
 }  // namespace cumulet::bench

@@ -25,7 +25,7 @@ std::string percent(double part) { return format("%.3g %%", 100.0 * part); }
 
 std::string megabytes(double bytes) { return format("%.3g", bytes / 1e6); }
 
-/// 3 significant digits at least, never an exponent.
+/// At least 3 significant digits, never an exponent.
 std::string number(double value) {
   if (value >= 1e6) return format("%.2fM", value / 1e6);
   if (value >= 1e4) return format("%.1fk", value / 1e3);

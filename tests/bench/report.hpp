@@ -14,8 +14,8 @@ struct Machine {
   unsigned threads = 0;
 };
 
-/// report.md, results.csv and the plots, into options.out; the README's part, if asked for. Throws std::runtime_error
-/// that names the file.
+/// Writes report.md, results.csv and the plots into options.out, and the README's part if requested. Throws
+/// std::runtime_error that names the file.
 void write_report(const Machine& machine, const Options& options, const std::vector<AssetResult>& assets,
                   const std::vector<TreeTimes>& trees, const std::vector<std::string>& skipped);
 

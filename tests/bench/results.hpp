@@ -12,7 +12,7 @@
 
 namespace cumulet::bench {
 
-/// One march at one target error.
+/// One grid type at one target error.
 struct TraceRow {
   Kind kind = Kind::dense;
   std::uint64_t cells = 0;
@@ -25,9 +25,9 @@ struct TraceRow {
   double steps_per_path = 0.0;
   Spread samples_per_second;
   Spread steps_per_second;
-  Spread to_dense;  ///< samples/s over the dense march's
+  Spread to_dense;  ///< samples/s relative to the dense grid's
   Spread to_brick;
-  // Camera rays right through, no scattering.
+  // Camera rays straight through, without scattering.
   Spread rays_per_second;
   double steps_per_ray = 0.0;
   Spread ray_to_dense;
@@ -36,7 +36,7 @@ struct TraceRow {
 
 struct TargetResult {
   double target = 0.0;
-  std::uint32_t samples = 0;  ///< a pixel, in each timed run
+  std::uint32_t samples = 0;  ///< per pixel, in each timed run
   std::array<TraceRow, 4> rows;
 };
 
@@ -45,12 +45,12 @@ struct SurfaceRow {
   viewer::SurfaceLight light = viewer::SurfaceLight::full;
   double steps_per_path = 0.0;  ///< in the volume
   Spread samples_per_second;
-  Spread to_alone;  ///< samples/s over those of the volume alone
+  Spread to_alone;  ///< samples/s relative to those of the volume only
 };
 
 struct SurfaceResult {
   std::size_t triangles = 0;
-  std::uint32_t samples = 0;  ///< a pixel, in each timed run
+  std::uint32_t samples = 0;  ///< per pixel, in each timed run
   Spread alone;               ///< samples/s
   std::array<SurfaceRow, surface_lights.size()> rows;
 };
@@ -66,9 +66,9 @@ struct SweepCurve {
   grid::Criterion criterion = grid::Criterion::deviation;
   Kind kind = Kind::tet_linear;
   std::vector<SweepPoint> points;  ///< coarse to fine
-  /// Cells at a depth error, log-log between points; none outside them.
+  /// Number of cells at a depth error, interpolated log-log between points; nullopt outside of them.
   [[nodiscard]] std::optional<double> cells_at(double error) const;
-  /// The threshold likewise; the nearest end's outside.
+  /// The threshold at a depth error, interpolated log-log; outside, that of the nearest point.
   [[nodiscard]] double threshold_at(double error) const;
 };
 
@@ -88,7 +88,7 @@ struct AssetResult {
   std::array<int, 3> voxels{};
   std::uint64_t active_voxels = 0;
   double density_scale = 1.0;
-  double coverage = 0.0;  ///< part of the pixels that shows the medium
+  double coverage = 0.0;  ///< fraction of pixels that show the medium
   std::vector<TargetResult> targets;
   SurfaceResult surfaces;  ///< at the first target
   std::vector<SweepCurve> curves;

@@ -41,11 +41,11 @@ std::vector<JudgedScene> scenes_of(const Options& options) {
   return scenes;
 }
 
-/// Of pictures of several seeds.
+/// Measurements of images of several seeds.
 struct Taken {
   std::vector<double> seconds;
-  std::vector<double> samples;  ///< a pixel
-  std::vector<double> squared;  ///< mean square of the difference to the reference, over its mean's
+  std::vector<double> samples;  ///< per pixel
+  std::vector<double> squared;  ///< mean squared difference to the reference, relative to the squared mean
   std::vector<double> means;
 };
 
@@ -59,7 +59,7 @@ void add(Stage& stage, const std::array<std::vector<double>, 2>& halves, Taken& 
   taken.means.push_back(mean_of(bright) / mean);
 }
 
-/// A picture's luminances and their squared errors.
+/// An image's luminances and their squared errors.
 struct Measured {
   std::vector<double> bright;
   std::vector<double> squared;
@@ -73,7 +73,7 @@ Measured measured(Stage& stage, std::uint32_t samples, std::uint32_t seed) {
   return result;
 }
 
-/// How many standard errors the sums over a square of pixels are apart.
+/// The difference of the sums over a block of pixels, in standard errors.
 double apart(const Measured& a, const Measured& b, std::uint32_t size, glm::uvec2 first, glm::uvec2 last) {
   double difference = 0.0;
   double squared = 0.0;
@@ -89,7 +89,7 @@ double apart(const Measured& a, const Measured& b, std::uint32_t size, glm::uvec
 
 constexpr std::uint32_t square_edge = 8;
 
-/// Root of the mean over squares of those, 1 where there is only chance.
+/// The root mean square of those over all blocks; 1 if differences are only noise.
 double apart_by_squares(const Measured& a, const Measured& b, std::uint32_t size) {
   double sum = 0.0;
   double count = 0.0;

@@ -6,12 +6,12 @@
 
 namespace cumulet::bench {
 
-/// What pictures take to Options::targets of noise, and how far they are from the reference, with adaptive sampling
-/// over without: a table in Markdown, of the judged scenes.
+/// Measures time and error of images at Options::targets of noise, with adaptive sampling relative to without. Prints a
+/// Markdown table of the scenes.
 void measure_adaptive(headless::Context& context, const Options& options);
 
-/// Whether pictures of Options::reference_samples have the same means with each technique off (by an edited shader): a
-/// table in Markdown, of the judged scenes.
+/// Measures whether images of Options::reference_samples keep their means with each technique disabled by an edited
+/// shader. Prints a Markdown table of the scenes.
 void measure_techniques(headless::Context& context, const Options& options);
 
 }  // namespace cumulet::bench

@@ -16,12 +16,12 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr int steps = 20;  // of one degree, a frame each: then all rests
+constexpr int steps = 20;  // of one degree, one frame each; then everything is at rest
 constexpr double rest_seconds = 2.0;
 
 struct Change {
   const char* name;
-  std::function<bool(Stage&, double)> turn;  // by so many degrees; false: the scene has nothing to turn
+  std::function<bool(Stage&, double)> turn;  // by this many degrees; returns false if the scene has nothing to rotate
 };
 std::vector<Change> changes() {
   return {{"orbit",
@@ -32,14 +32,14 @@ std::vector<Change> changes() {
           {"sun", [](Stage& stage, double degrees) { return stage.turn_sun(static_cast<float>(degrees)); }}};
 }
 
-/// What is looked at, in seconds since the last step began: each 1.5 times as late as the one before.
+/// Times of the evaluations, in seconds since the last step began, each 1.5 times the previous one.
 std::vector<double> moments(double seconds) {
   std::vector<double> result;
   for (double at = 0.02; at < 1.001 * seconds; at *= 1.5) result.push_back(at);
   return result;
 }
 
-/// What is on the screen at each of the moments. The clock stands still while pictures are read.
+/// The displayed image at each of the times. The clock is paused while images are read.
 struct Watched {
   std::vector<Bytes> pictures;
   std::vector<double> frames;  // seconds each
@@ -52,11 +52,11 @@ Watched watch(Stage& stage, const Change& change, const std::vector<double>& at,
   Watched watched;
   for (int step = 0; step < steps; ++step) {
     change.turn(stage, 1.0);
-    // Of the last step the frame is the first to be looked at.
+    // The frame of the last step is the first one to be evaluated.
     if (step + 1 < steps) stage.frame(budget_ms, more);
   }
   Bytes shown = stage.drawn();
-  Bytes next = shown;  // since the clock's time
+  Bytes next = shown;  // drawn after the current clock time
   double clock = 0.0;
   more = true;
   for (const double moment : at) {
@@ -77,13 +77,13 @@ struct Course {
   std::string change;
   std::string denoise;
   std::vector<double> at;
-  std::vector<std::vector<double>> root;  // one a repeat
+  std::vector<std::vector<double>> root;  // one per repeat
   std::vector<std::vector<double>> flip;
   std::vector<double> frames;
 };
 
 struct Goal {
-  std::array<std::vector<double>, 2> halves;  // luminance as displayed
+  std::array<std::vector<double>, 2> halves;  // displayed luminance
   Bytes picture;
 };
 
@@ -110,7 +110,7 @@ void look(Stage& stage, const Change& change, const Goal& goal, const Options& o
   course.frames.insert(course.frames.end(), watched.frames.begin(), watched.frames.end());
 }
 
-/// One without and one with the filter, in turn, so that both see the same machine.
+/// Runs without and with the filter in turn, so that both have the same machine load.
 std::vector<Course> courses_of(headless::Context& context, const JudgedScene& scene, const Change& change,
                                const Goal& goal, const Options& options) {
   std::vector<Course> courses;
@@ -138,7 +138,7 @@ double median_at(const std::vector<std::vector<double>>& repeats, std::size_t mo
   return spread_of(values).median;
 }
 
-/// The moments that the table has.
+/// Indices of the times in the table.
 std::vector<std::size_t> told(const std::vector<double>& at) {
   std::vector<std::size_t> result;
   for (std::size_t i = 0; i < at.size(); i += 3) result.push_back(i);

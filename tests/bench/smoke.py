@@ -1,4 +1,5 @@
-"""Runs cumulet-bench on a tiny volume and checks that what it writes exists and parses. Usage: smoke.py PROGRAM FOLDER SCENE_PROGRAM"""
+"""Runs cumulet-bench on a tiny volume and checks that its output files exist and parse. Usage: smoke.py PROGRAM FOLDER
+SCENE_PROGRAM"""
 
 import csv
 import pathlib
@@ -34,7 +35,7 @@ def main():
         found = {row["quantity"]: float(row["value"]) for row in rows if (row["asset"], row["march"]) == (mesh, "bvh")}
         assert 500 < found["triangles"] < 8000, found
         assert found["build_seconds_a_million"] > 0 and found["refit_seconds_a_million"] > 0, found
-        # Where Embree is found, the ratios are there, and in the report.
+        # If Embree is installed, the ratios to it are measured and in the report.
         assert ("build_to_embree" in found) == ("refit_to_embree" in found), found
     for row in rows:
         value = float(row["value"])
@@ -74,7 +75,8 @@ def main():
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     tables = [[line.split("|") for line in table.splitlines() if line.startswith("|")] for table in done.stdout.split("\n\n")]
     stills, passes, settled = [table for table in tables if table]
-    for table, rows in (stills, 3 * 3), (passes, 3), (settled, 3 * 2):  # of three scenes whose sun cannot be turned
+    # three scenes have a sun that cannot be rotated
+    for table, rows in (stills, 3 * 3), (passes, 3), (settled, 3 * 2):
         assert len(table) == 2 + rows and len({len(line) for line in table}) == 1, done.stdout
     assert "nan" not in done.stdout and "inf" not in done.stdout, done.stdout
     assert "Skipped: full, there is no " in done.stdout and "no network: " in done.stderr, done

@@ -20,7 +20,7 @@ inline Spread spread_of(std::vector<double> values) {
   return {0.5 * (values[(n - 1) / 2] + values[n / 2]), values.front(), values.back()};
 }
 
-/// Element by element: repeats are interleaved, so neighbours saw the same machine noise.
+/// Ratios element by element: repeats are interleaved, so neighbors had the same machine load.
 inline Spread ratio_of(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> ratios;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) ratios.push_back(a[i] / b[i]);

@@ -14,14 +14,14 @@ enum class Kind { tet_constant = 0, tet_linear = 1, dense = 2, brick = 3 };
 inline constexpr std::array<Kind, 4> all_kinds{Kind::tet_constant, Kind::tet_linear, Kind::dense, Kind::brick};
 const char* name_of(Kind kind);
 
-/// The settings of surfaces that are measured.
+/// The surface lighting modes that are measured.
 inline constexpr std::array surface_lights{viewer::SurfaceLight::full, viewer::SurfaceLight::shadows,
                                            viewer::SurfaceLight::none};
 const char* name_of(viewer::SurfaceLight light);
 
-/// A picture and what it cost.
+/// An image and its cost.
 struct Run {
-  double seconds = 0.0;            ///< tracing alone: not compiling, building, reading back
+  double seconds = 0.0;            ///< only tracing: no compiling, building or reading back
   double processor_seconds = 0.0;  ///< of the process, while it traced
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
@@ -30,22 +30,22 @@ struct Run {
   [[nodiscard]] double steps_per_sample() const { return static_cast<double>(steps) / static_cast<double>(samples); }
 };
 
-/// One march of one asset: a viewer of its own, so that marches can take turns without rebuilding anything.
+/// One grid type of one asset with its own viewer, so that grid types can take turns without rebuilding.
 class Subject {
  public:
-  /// density_scale: of the shaded picture. programs: others than the library's. The context must be current, now and
-  /// until the end.
+  /// density_scale: of the shaded image. programs: replace the library's. The context must be current until the
+  /// destruction.
   Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
           double density_scale, std::shared_ptr<viewer::Sharing> programs = nullptr);
 
-  /// Makes the tetrahedral grid anew; not for dense and brick.
+  /// Rebuilds the tetrahedral grid; not for dense and brick.
   void refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells);
-  /// Surfaces in the picture from now on.
+  /// Adds surfaces to the scene.
   void show(scene::ModelSourcePtr surfaces);
   void light_surfaces(viewer::SurfaceLight light);
-  /// Traces samples a pixel.
+  /// Traces this number of samples per pixel.
   Run shaded(std::uint32_t samples, std::uint32_t seed);
-  /// One ray a pixel right through the medium: alpha is 1 - exp(-density_scale x depth).
+  /// Traces one ray per pixel straight through the medium: alpha is 1 - exp(-density_scale x depth).
   Run primary(double density_scale);
 
   [[nodiscard]] Kind kind() const { return kind_; }
@@ -62,7 +62,7 @@ class Subject {
   test::Still still_;
 };
 
-/// A picture of what the viewer has.
+/// Renders an image of the viewer's scene.
 Run trace(test::Still& still, const test::Image& image);
 
 /// The light of every measurement.

@@ -9,7 +9,7 @@ namespace cumulet::bench {
 
 namespace {
 
-constexpr double noisiest = 0.005;  // part of the pixels: single paths that found a small light by chance
+constexpr double noisiest = 0.005;  // fraction of pixels that is ignored, because of fireflies
 
 double luminance_of(const Run& run, std::size_t pixel) {
   const float* rgba = &run.rgba[4 * pixel];

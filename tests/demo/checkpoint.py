@@ -1,4 +1,5 @@
-"""A picture that is stopped, or killed, and goes on from its checkpoint: the same file as of one that is left alone.
+"""Stops or kills a rendering and continues it from its checkpoint. The file must equal that of an uninterrupted
+rendering.
 
 Usage: checkpoint.py RENDER VOLUME OUT_FOLDER
 """
@@ -25,7 +26,7 @@ class Picture:
         return done.returncode, done.stderr
 
     def stop_once_kept(self, number):
-        """As stop(), when it has written a checkpoint, or another than there was."""
+        """Like stop(), but waits until the run has written a new checkpoint."""
         before = self.checkpoint.stat().st_mtime_ns if self.checkpoint.exists() else 0
         process = subprocess.Popen(self.kept + ["--checkpoint-every", "0.05"], stderr=subprocess.PIPE, text=True)
         while process.poll() is None:
@@ -39,7 +40,7 @@ class Picture:
         return process, process.communicate(timeout=120)[1]
 
     def stop(self, seconds, number):
-        """Its exit status and what it says when the signal comes after so long."""
+        """Sends the signal after so many seconds. Returns the exit status and the standard error."""
         process = subprocess.Popen(self.kept, stderr=subprocess.PIPE, text=True)
         time.sleep(seconds)
         process.send_signal(number)
@@ -47,7 +48,7 @@ class Picture:
 
 
 def stopped(render, volume, out):
-    """SIGTERM: no picture, a checkpoint, and the same picture in the end."""
+    """SIGTERM writes a checkpoint and no image. A second run writes the same image as an uninterrupted run."""
     whole = Picture(render, volume, out / "whole", "--spp", "300", "--aovs", "volume,error")
     status, error = whole.run(whole.command)
     assert status == 0, error
@@ -73,7 +74,7 @@ def stopped(render, volume, out):
 
 
 def killed(render, volume, out):
-    """kill -9: the last checkpoint is whole, and the picture the same."""
+    """After kill -9 the last checkpoint is complete, and the image is the same."""
     whole = Picture(render, volume, out / "alone", "--spp", "200")
     began = time.monotonic()
     assert whole.run(whole.command)[0] == 0
@@ -92,7 +93,7 @@ def killed(render, volume, out):
 
 
 def refused(render, volume, out):
-    """A checkpoint of another picture, or none at all, in a line."""
+    """A checkpoint of another rendering and a damaged one are refused with one line."""
     picture = Picture(render, volume, out / "refused", "--spp", "1000000")
     for seconds in (1.0, 3.0, 10.0, 30.0):
         picture.stop(seconds, signal.SIGINT)

@@ -54,7 +54,7 @@ TEST(RampEdit, AddsMovesAndTakesAway) {
   EXPECT_EQ(points, (Points{{0.75f, 0.5f}, {2.0f, 3.0f}}));
 }
 
-// Whatever is done to it, it is a ramp.
+// After any edit it is a valid ramp.
 TEST(RampEdit, StaysARamp) {
   Points points = {{0.0f, 0.0f}, {1.0f, 1.0f}};
   for (int i = 0; i < 40; ++i) static_cast<void>(add_point(points, {0.01f * static_cast<float>(i * 7 % 40), 0.5f}));
@@ -186,7 +186,7 @@ Event key_change(int code, bool down) {
   return event;
 }
 
-// However the two keys are let go, and whatever part of it a frame finds in the queue.
+// Tests each order of releasing the two keys, and each part of the events in one frame.
 TEST(Input, AChordThatIsOverInAFrameIsStillAChord) {
   const std::vector<std::vector<Event>> chords = {
       {key_change(GLFW_KEY_LEFT_CONTROL, true), key_change(GLFW_KEY_O, true), key_change(GLFW_KEY_O, false),
@@ -204,7 +204,7 @@ TEST(Input, AChordThatIsOverInAFrameIsStillAChord) {
                                      ? command_of(event.code, event.modifiers, false)
                                      : std::nullopt;
             if (command && command->action == Action::open_dialog) ++opened;
-            // Dear ImGui looks at the state: the frame that brings O still holds Ctrl.
+            // Dear ImGui reads the current state: in the frame with O, Ctrl must still be held.
             if (event.code == GLFW_KEY_O && event.down) {
               EXPECT_EQ(input.modifiers(), modifier_ctrl);
             }
@@ -320,7 +320,7 @@ TEST(Replay, ErrorsNameTheLine) {
 TEST(FrameTimes, AreThoseBetweenPicturesNotTheWindows) {
   FrameTimes times;
   std::vector<double> waited;
-  // A hand drags for two seconds, the window is drawn every 1/64 s, and every 16th time with a picture.
+  // A two-second drag: the window is drawn every 1/64 s, and every 16th time with a new image.
   constexpr double frame = 1.0 / 64.0;
   constexpr int pictures = 8;
   for (int i = 0; i <= 16 * pictures; ++i) {
@@ -339,19 +339,19 @@ TEST(FrameTimes, AtRestAreFromAnEventToTheWindow) {
   times.hand(3.5);  // of the same frame
   EXPECT_EQ(times.shown(3.75, false, false), 0.75);
   EXPECT_FALSE(times.shown(4.0, false, false)) << "a rest is no frame";
-  // A change that a picture answers, the window being drawn before it.
+  // A change followed by a new image; the window is drawn once before it.
   times.hand(5.0);
   EXPECT_FALSE(times.shown(5.25, false, true));
   EXPECT_EQ(times.shown(6.0, true, true), 1.0);
   EXPECT_EQ(times.shown(6.5, true, false), 0.5);
-  // A hand that moves over nothing, and half a minute later comes to a button.
+  // The pointer moves over nothing, and half a minute later over a button.
   times.hand(7.0);
   times.rest();
   times.hand(37.0);
   EXPECT_EQ(times.shown(37.25, false, false), 0.25);
 }
 
-/// The events that a file comes to, all frames' together.
+/// All events that a replay file generates, in all frames.
 std::vector<Event> play(const std::string& text, const ReplayHost& host, std::vector<Player::Order>* orders = nullptr) {
   Player player(parse_replay(text, "r"), "r");
   Input input;
@@ -466,7 +466,7 @@ TEST(SunDial, PointsAndAnglesAgree) {
 }
 
 TEST(EnvironmentView, FollowsThePointer) {
-  // What of the picture is under a place of the view.
+  // The image coordinate below a position in the view.
   const auto under = [](double rotation, double place) {
     const double u = left_edge(rotation) + place;
     return u - std::floor(u);
@@ -480,7 +480,7 @@ TEST(EnvironmentView, FollowsThePointer) {
       EXPECT_NEAR(off, std::round(off), 1e-9) << rotation << " " << width;
     }
   }
-  // As cumulet.h has it: +Z in the middle, +X left of it; a rotation takes the picture's middle from +Z towards +X.
+  // As in cumulet.h: +Z in the center, +X left of it. A rotation moves the image's center from +Z towards +X.
   EXPECT_NEAR(place_of(0.0), 0.5, 1e-12);
   EXPECT_NEAR(place_of(90.0), 0.25, 1e-12);
   EXPECT_NEAR(place_of(-90.0), 0.75, 1e-12);
@@ -606,7 +606,7 @@ TEST(Model, DefaultsAreSpelledOut) {
   EXPECT_TRUE(same_scene(scene, twice));
 }
 
-/// Another value of a setting.
+/// Changes a setting to another value.
 template <class Value>
 void change(Value& value) {
   if constexpr (std::is_array_v<Value>)
@@ -617,7 +617,7 @@ void change(Value& value) {
     value += 1;
 }
 
-// The demo's defaults are not the library's: one that both start with has not been given yet.
+// The demo's defaults differ from the library's, so every group must be passed once.
 TEST(GivenSettings, EachGroupIsGivenAtFirstAndThenEachChange) {
   std::ostringstream out;
   SceneOptions first = parse_demo_options({}, out)->scene;
@@ -684,7 +684,7 @@ TEST(Model, TypingKeepsItsKeys) {
   EXPECT_FALSE(command_of(GLFW_KEY_F, modifier_ctrl, false).has_value());
 }
 
-/// The panel without a window: ImGui lays it out, nothing draws it.
+/// The panel without a window: ImGui computes the layout, and nothing is drawn.
 class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
  public:
   PanelTest(const PanelTest&) = delete;
@@ -753,7 +753,7 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
     for (const auto& [other, control_b] : controls) {
       const Rectangle& b = control_b.place;
       const bool apart = a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
-      // The toolbar stands still, what scrolls passes below it.
+      // The toolbar is fixed; scrolled controls pass below it.
       if (name < other && control.in_view && control_b.in_view) {
         EXPECT_TRUE(apart) << name << " and " << other;
       }
@@ -788,7 +788,7 @@ TEST_P(PanelTest, AnEnvironmentIsTurnedByItsPicture) {
   EXPECT_EQ(rotation, 0.0f);
   frame(at(0.6));
   EXPECT_NEAR(rotation, -36.0f, 1.0f);
-  frame(at(-0.15));  // beyond the edge, and held
+  frame(at(-0.15));  // dragged beyond the edge
   EXPECT_NEAR(rotation, 360.0f * 0.65f - 360.0f, 1.0f);
   io.MouseDown[0] = false;
   frame(at(0.2));

@@ -1,4 +1,4 @@
-// What a picture's OpenEXR file says of it, as OpenEXR's own library reads it.
+// Metadata of an image's OpenEXR file, read with OpenEXR's own library.
 
 #include <ImfArray.h>
 #include <ImfChannelList.h>
@@ -39,7 +39,7 @@ using cumulet::headless::Context;
 
 constexpr std::uint32_t width = 96;
 constexpr std::uint32_t height = 64;
-// Where the only voxel is.
+// Position of the only voxel.
 constexpr std::array<double, 3> place{3.0, -1.0, 2.0};
 
 struct Destroy {
@@ -120,7 +120,7 @@ class Exr : public testing::TestWithParam<Backend> {
     return file;
   }
 
-  // The mean place of alpha, as OpenEXR's NDC has it.
+  // The alpha-weighted mean position in OpenEXR's NDC.
   static Imath::V2d middle(Imf::InputFile& file) {
     std::vector<float> alpha(std::size_t{width} * height);
     Imf::FrameBuffer pixels;
@@ -188,7 +188,7 @@ TEST_P(Exr, SaysHowThePictureWasMade) {
   EXPECT_FALSE(Imf::hasCapDate(header)) << "the same picture is the same file";
   EXPECT_FALSE(Imf::hasOwner(header));
 
-  // Samples and seed are how well the scene is shown; the rest is what is shown.
+  // Samples and seed do not affect the scene's hash; all other settings do.
   const std::string hash = text("cumulet:scene");
   EXPECT_EQ(hash.size(), 16U);
   SceneOptions other = scene_;
@@ -199,7 +199,7 @@ TEST_P(Exr, SaysHowThePictureWasMade) {
   EXPECT_NE(cumulet::demo::scene_hash(other), hash);
 }
 
-// Against the renderer itself, as merge_test is against samples.
+// Compared with the renderer's own image. (merge_test compares with samples.)
 TEST_P(Exr, SevenMergedPartsAreTheWhole) {
   scene_.sampling.volume_alone = 1;
   aovs_ = {CUMULET_AOV_VOLUME, CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_VOLUME_DEPTH, CUMULET_AOV_VELOCITY,
@@ -230,7 +230,7 @@ TEST_P(Exr, SevenMergedPartsAreTheWhole) {
   expect_alike(layers::volume, 1e-6);
   expect_alike(layers::transmittance, 0.0);
   expect_alike(layers::volume_depth, 0.0);
-  // The renderer's own is by differences of moments in single precision.
+  // The renderer's own error is computed from moments in single precision.
   expect_alike(layers::error, 1e-3);
   const auto said = [](const std::string& file) { return cumulet::image::read_contents(file); };
   EXPECT_EQ(said(merged).channels, said(whole).channels);
@@ -245,7 +245,7 @@ TEST_P(Exr, SevenMergedPartsAreTheWhole) {
       EXPECT_EQ(ours[i].value, its[i].value) << ours[i].name;
     }
   }
-  // Other samples than 0 to 4 of another scene.
+  // Samples other than 0 to 4, of another scene.
   scene_.sampling = SceneOptions().sampling;
   scene_.sampling.preview = CUMULET_PREVIEW_OFF;
   scene_.sampling.samples = 3;
@@ -281,7 +281,7 @@ TEST_P(Exr, GroupsOfLightsAreLayersWhoseSumIsThePicture) {
   }
 }
 
-// As Cryptomatte's specification has it, by OpenEXR's library and a parser of JSON.
+// As Cryptomatte's specification requires, read with OpenEXR's library and a JSON parser.
 TEST_P(Exr, HasMattesByName) {
   scene_.name = "a \"cloud\" of \xc3\xa4ther";
   scene_.ground.place = CUMULET_GROUND_AT_HEIGHT;
@@ -326,7 +326,7 @@ TEST_P(Exr, HasMattesByName) {
   EXPECT_GT(sums[cumulet_cryptomatte_id("ground")], 100.0);
   EXPECT_GT(sums[cumulet_cryptomatte_id(scene_.name.c_str())], 4.0);
 
-  // Parts have the same, and so has what is merged of them.
+  // Partial renders have the same metadata, and so has their merged image.
   scene_.sampling.first_sample = scene_.sampling.samples;
   render();
   const std::string merged = (folder_ / "merged.exr").string();
@@ -359,7 +359,7 @@ TEST(ObjectName, IsThatOfTheSceneOrTheFile) {
   EXPECT_EQ(name(CUMULET_OBJECT_VOLUME, 0), "steam");
 }
 
-// Of a region the pixels are those of the whole, where they are in it; and its parts are merged.
+// Pixels of a render region equal those of the whole image, and its partial renders can be merged.
 TEST_P(Exr, OfARegionIsThatWindowOfTheWhole) {
   namespace layers = cumulet::image::layers;
   aovs_ = {CUMULET_AOV_VOLUME_DEPTH};
@@ -410,7 +410,7 @@ TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {
     EXPECT_NEAR(ndc.x, seen.x, 0.02) << orthographic;
     EXPECT_NEAR(ndc.y, seen.y, 0.02) << orthographic;
     EXPECT_GT(std::abs(seen.x - 0.5) + std::abs(seen.y - 0.5), 0.1) << "a mirrored picture would pass";
-    // The camera's own space has the eye at its origin, the target ahead, and what is right at the right.
+    // In camera space the eye is at the origin, the target ahead, and objects on the right are on the right.
     const Imath::V3d eye = Imath::V3d(1.0, 0.0, 14.0) * to_camera;
     EXPECT_NEAR(eye.length(), 0.0, 1e-5);
     const Imath::V3d target = Imath::V3d(2.0, 0.0, 0.0) * to_camera;
@@ -420,7 +420,7 @@ TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {
     EXPECT_EQ(volume.x > 0.0, seen.x > 0.5);
     EXPECT_EQ(volume.y > 0.0, seen.y < 0.5);
     if (orthographic) continue;
-    // The picture's upper right corner, a unit before the eye, is where the window says.
+    // The image's upper right corner, at unit distance, projects to the corner of the window.
     const Imath::V2f center = file.header().screenWindowCenter();
     const double side = file.header().screenWindowWidth();
     const Imath::V3d corner(center.x + 0.5 * side, center.y + 0.5 * side * height / width, 1.0);

@@ -1,4 +1,4 @@
-// What cumulet-render makes of files whose values are no ordinary ones: temperatures in kelvin, and fill values.
+// cumulet-render with files of unusual values: temperatures in kelvin, and fill values.
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -42,7 +42,7 @@ class ExtremeFiles : public testing::Test {
   void write(const std::string& name, const openvdb::GridPtrVec& grids) const {
     openvdb::io::File(path(name)).write(grids);
   }
-  // A picture of few pixels, with these flags more.
+  // Renders a small image with additional flags.
   [[nodiscard]] Done render(const std::string& name, const std::string& more = "") const {
     const std::string picture = path("picture.pfm");
     Done run = command(name, picture, more);
@@ -75,7 +75,7 @@ class ExtremeFiles : public testing::Test {
   cumulet::test::Folder folder_;
 };
 
-// A ball of 20^3 voxels: 1 in its middle, 0 at its rim.
+// A ball of 20^3 voxels: 1 in its center, 0 at its edge.
 openvdb::FloatGrid::Ptr ball(const std::string& name, const std::function<float(float)>& value, int size = 20,
                              double voxel = 1.0) {
   auto grid = openvdb::FloatGrid::create(0.0F);
@@ -119,7 +119,7 @@ TEST_F(ExtremeFiles, KelvinBurnAsRelativeTemperaturesDo) {
   EXPECT_FALSE(relative.says("kelvin")) << relative.said;
   EXPECT_TRUE(kelvin.says("it burns") && relative.says("it burns")) << kelvin.said;
   expect_same_picture(kelvin, relative);
-  // What is said decides.
+  // Explicit settings override the detection.
   EXPECT_GT(render("kelvin.vdb", "--temperature-scale 3 --blackbody 1").mean(),
             3.0 * render("kelvin.vdb", "--temperature-scale 1 --blackbody 1").mean());
 }
@@ -139,7 +139,7 @@ TEST_F(ExtremeFiles, ACoarserTemperatureBurns) {
 
 TEST_F(ExtremeFiles, WarmAirDoesNotGlow) {
   write("warm.vdb", {smoke(), ball("temperature", [](float) { return 293.0F; })});
-  // Its light is left out, the cells stay: noise is the same.
+  // Its emission is omitted, but the cells stay: the noise is the same.
   for (const std::string more : {"", "--blackbody 1"}) {
     const Done warm = render("warm.vdb", more);
     EXPECT_FALSE(warm.says("it burns")) << warm.said;
@@ -147,7 +147,7 @@ TEST_F(ExtremeFiles, WarmAirDoesNotGlow) {
   }
 }
 
-// As a fire goes out, its last frames have but few kelvin.
+// When a fire goes out, its last frames have only a few kelvin.
 TEST_F(ExtremeFiles, FramesOfASequenceHaveOneScale) {
   write("fire.0001.vdb", {smoke(), heat(2250.0F)});
   write("fire.0002.vdb", {ball("density", [](float middle) { return middle > 0.5F ? 1.0F : 0.0F; }), heat(15.0F, 6)});

@@ -1,5 +1,5 @@
-"""The first picture that cumulet-render makes of a cloud, with nothing set: neither black nor burnt, thin or thick. And
-of an explosion: flames in dark smoke.
+"""The first image of cumulet-render with default settings. A cloud is neither black nor overexposed, at any density. An
+explosion shows flames in dark smoke.
 
 Usage: first_picture.py RENDER CLOUD EXPLOSION OUT_FOLDER
 """
@@ -13,7 +13,7 @@ from png import Picture
 
 
 def luminances(picture):
-    """As they are displayed, from 0 to 1."""
+    """Returns displayed luminances, from 0 to 1."""
     n = picture.channels
     return [(0.2126 * row[x] + 0.7152 * row[x + 1] + 0.0722 * row[x + 2]) / 255
             for row in picture.rows for x in range(0, n * picture.width, n)]
@@ -28,7 +28,7 @@ def main():
                        timeout=90)
         return luminances(Picture(out / f"{name}.png"))
 
-    # As the file is, and as others write theirs: a mist, and stone.
+    # Tests the file as it is, much thinner and much denser, because other programs use such densities.
     looks = {"default": [], "thin": ["--density-scale", "0.04"], "thick": ["--density-scale", "8"]}
     for name, more in looks.items():
         values = shown(name, *more)
@@ -37,7 +37,7 @@ def main():
         print(f"{name}: mean {mean:.3f}, clipped {100 * clipped:.2f} %, black {100 * black:.2f} %")
         assert 0.35 < mean < 0.7, (name, mean)
         assert clipped < 0.02 and black < 0.02, (name, clipped, black)
-        # The cloud itself stands in the middle: it, too, has light and shade.
+        # The cloud fills the center; it must show light and shade.
         middle = [v for y in range(14, 28) for v in values[64 * y + 22:64 * y + 42]]
         assert 0.35 < sum(middle) / len(middle) < 0.95, (name, sum(middle) / len(middle))
         assert max(values) - min(values) > 0.3, (name, min(values), max(values))

@@ -1,4 +1,4 @@
-// Handles in the picture: their geometry against closed forms, and what drags make of places.
+// Manipulator handles in the image: their geometry compared with closed forms, and transforms that result from drags.
 
 #include "gizmo.hpp"
 
@@ -55,7 +55,7 @@ TEST(Gizmo, ARayPassesAnAxisWhereItIsNearest) {
     const Ray ray{vector(), glm::normalize(vector())};
     const dvec3 point = vector();
     const dvec3 axis = glm::normalize(vector());
-    // A search that knows nothing of formulas.
+    // A numerical search without the formulas.
     const auto distance = [&](double t) {
       const dvec3 at = point + t * axis - ray.origin;
       return glm::length(at - glm::dot(at, ray.direction) * ray.direction);
@@ -116,7 +116,7 @@ TEST(Sight, PixelsAndRaysAreEachOthersInverse) {
       EXPECT_LE(glm::length(glm::cross(point - ray.origin, ray.direction)), 1e-9);
       EXPECT_GT(glm::dot(point - ray.origin, ray.direction), 0.0);
       expect_near(sight.to_eye(point), -ray.direction, 1e-9);
-      // Ten pixels to the side are as long as it says.
+      // Ten pixels to the side have the returned length.
       const dvec3 right = glm::normalize(glm::cross(sight.forward(), dvec3(0.0, 1.0, 0.0)));
       const auto beside = sight.project(point + 10.0 * sight.pixel_at(point) * right);
       ASSERT_TRUE(beside);
@@ -158,7 +158,7 @@ TEST(Drag, MovesAsFarAsTheHandDoes) {
       const dmat4 moved = drag.to(sight, at(sight, pivot + 1.25 * way), false);
       EXPECT_EQ(glm::dmat3(moved), glm::dmat3(1.0));
       expect_near(dvec3(moved[3]), way, 1e-9);
-      // There and back is nowhere.
+      // Dragging back restores the start.
       expect_near(dvec3(drag.to(sight, at(sight, pivot + 0.25 * way), false)[3]), dvec3(0.0), 1e-9);
     }
   }
@@ -183,7 +183,7 @@ TEST(Drag, SnapsToRoundSteps) {
   Drag drag(gizmo, Handle::xy, sight, at(sight, dvec3(0.0)));
   const dvec3 moved(drag.to(sight, at(sight, {10.4 * step, -3.6 * step, 0.0}), true)[3]);
   expect_near(moved, {10.0 * step, -4.0 * step, 0.0}, 1e-9);
-  // Let go of Ctrl, and it is as before.
+  // Releasing Ctrl ends the snapping.
   expect_near(dvec3(drag.to(sight, at(sight, {10.4 * step, -3.6 * step, 0.0}), false)[3]),
               {10.4 * step, -3.6 * step, 0.0}, 1e-9);
 }
@@ -218,7 +218,7 @@ TEST(Drag, TurnsWithTheHand) {
   }
 }
 
-// Its plane says nothing then: the hand goes along the tangent, a handle's length is a radian.
+// If the ring is seen edge-on, its plane is useless: the drag follows the tangent, and one handle length is one radian.
 TEST(Drag, TurnsARingThatIsSeenFromItsEdge) {
   for (const double height : {0.0, 12.0}) {
     const Sight sight(camera({0.0, 0.0, 9.0}, height), window);
@@ -226,7 +226,7 @@ TEST(Drag, TurnsARingThatIsSeenFromItsEdge) {
     const dvec2 from = at(sight, dvec3(0.0));
     Drag drag(gizmo, Handle::y, sight, from);
     const dmat4 turned = drag.to(sight, from + dvec2(reach, 0.0), false);
-    // What is nearest to the eye goes to the right with the hand.
+    // The part nearest to the eye moves to the right with the pointer.
     const dvec3 front(turned * dvec4(0.0, 0.0, 1.0, 1.0));
     expect_near(front, {std::sin(1.0), 0.0, std::cos(1.0)}, 1e-3);
     Drag other(gizmo, Handle::x, sight, from);
@@ -253,7 +253,7 @@ TEST(Drag, StretchesAlongTheThingsOwnAxes) {
         const dmat4 want = place * glm::scale(dmat4(1.0), scale);
         for (int column = 0; column < 4; ++column) expect_near(dvec3(changed[column]), dvec3(want[column]), 1e-9);
         EXPECT_EQ(drag.told(), "1.75 x");
-        // Through the middle and beyond it stays what it is, but small.
+        // Dragging through the center and beyond only makes it small; it is not mirrored.
         const dmat4 small = drag.to(sight, at(sight, pivot - 0.5 * axis), false) * place;
         EXPECT_NEAR(glm::length(dvec3(small[i])), 0.01 * glm::length(dvec3(place[i])), 1e-9);
         EXPECT_GT(glm::determinant(small), 0.0);
@@ -268,13 +268,13 @@ TEST(Drag, StretchesAlongTheThingsOwnAxes) {
   }
 }
 
-// Whatever a hand does, all over the screen and beyond it: what comes of it is finite, upright, and not far out.
+// For any drag on the screen and beyond, the transform is finite, not mirrored, and not far away.
 TEST(Drag, NothingBadComesFromBehindTheEye) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> anywhere(-3000.0, 4000.0);
   const dmat4 place = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0)));
   std::vector<Sight> all_of = sights();
-  // Its axis runs past the eye.
+  // Its axis passes close to the eye.
   all_of.emplace_back(camera({0.2, 0.1, 3.0}), window);
   for (const Sight& sight : all_of) {
     for (const Tool tool : {Tool::move, Tool::rotate, Tool::scale}) {
@@ -296,14 +296,14 @@ TEST(Drag, NothingBadComesFromBehindTheEye) {
   }
 }
 
-// An axis that comes towards the eye is dragged past it: it stays where it was last.
+// An axis that points towards the eye is dragged past it: the object stays at its last position.
 TEST(Drag, StaysWhereTheRayPassesTheAxisBehindTheEye) {
   const Sight sight(camera({0.6, 0.4, 5.0}), window);
   const Gizmo gizmo = gizmo_of(Tool::move, Axes::world, dmat4(1.0), dvec3(0.0), reach);
   Drag drag(gizmo, Handle::z, sight, at(sight, {0.0, 0.0, 0.5}));
   const dmat4 last = drag.to(sight, at(sight, {0.0, 0.0, 2.5}), false);
   expect_near(dvec3(last[3]), {0.0, 0.0, 2.0}, 1e-9);
-  // On the other side of the point where the axis vanishes.
+  // Beyond the axis' vanishing point.
   const dvec2 vanishes = at(sight, {0.0, 0.0, -1e7});
   const dvec2 beyond = vanishes + 3.0 * (vanishes - at(sight, dvec3(0.0)));
   EXPECT_EQ(drag.to(sight, beyond, false), last);
@@ -323,7 +323,7 @@ TEST(Handles, AreFoundWhereTheyAre) {
         if (tool != Tool::rotate && is_axis(handle))
           grasp = glm::mix(shape[0], shape[1], 0.9);
         else if (tool == Tool::rotate)
-          grasp = shape[1];  // where no other crosses it
+          grasp = shape[1];  // where no other handle crosses it
         else
           for (const dvec2& point : shape) grasp += point / static_cast<double>(shape.size());
         EXPECT_EQ(handle_at(gizmo, sight, grasp, 8.0), handle) << static_cast<int>(handle);
@@ -393,7 +393,7 @@ TEST(Items, StandWhereTheyArePut) {
     const dmat4 place = change * place_of(scene, item).value();
     set_place(scene, item, place);
     const dmat4 now = place_of(scene, item).value();
-    // A point shines alike in all directions.
+    // A point light has no orientation.
     for (int column = item == Item{Item::Kind::lamp, 2, 0} ? 3 : 0; column < 4; ++column)
       expect_near(dvec3(now[column]), dvec3(place[column]), 1e-12);
     for (const Item& other : items_of(before)) {

@@ -1,5 +1,5 @@
 #!/bin/bash
-# What --help says fits a terminal of 100 columns, without blanks at a line's end. Usage: help_test.sh PROGRAM...
+# The output of --help fits a terminal of 100 columns and has no trailing blanks. Usage: help_test.sh PROGRAM...
 set -euo pipefail
 for program in "$@"; do
   help=$("$program" --help)

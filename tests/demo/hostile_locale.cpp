@@ -1,4 +1,4 @@
-// Loaded before a program: its locales group digits and have a decimal comma when its main begins.
+// Preloaded library that sets locales with grouped digits and a decimal comma before a program's main begins.
 
 #include <clocale>
 #include <cstdlib>
@@ -19,7 +19,7 @@ class Grouping final : public std::numpunct<char> {
   const std::locale hostile(std::locale::classic(), new Grouping);
   std::locale::global(hostile);
   for (std::ostream* stream : {&std::cout, &std::cerr, &std::clog}) stream->imbue(hostile);
-  // Of C, where the system has one: LOCPATH says where.
+  // The C locale, if the system has one; LOCPATH is searched.
   for (const char* name : {"cumulet_DE", "de_DE.UTF-8", "fr_FR.UTF-8"}) {
     if (std::setlocale(LC_ALL, name) != nullptr) break;
   }

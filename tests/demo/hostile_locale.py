@@ -1,4 +1,4 @@
-"""A program whose process has hostile locales reads and writes the same as one without.
+"""A program in a process with unusual locales reads and writes the same text as one without.
 
 Usage: hostile_locale.py RENDER VOLUME MODEL HOSTILE_LIBRARY LOCPATH OUT_FOLDER
 """
@@ -18,7 +18,7 @@ def run(command, environment):
 
 
 def outputs(render, volume, model, folder, environment):
-    """Texts and bytes by their names."""
+    """Returns outputs and file contents by name."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     found = {"--info": run([render, "--info", volume, "--gltf", model], environment),

@@ -1,4 +1,4 @@
-// cumulet-render --info, as lines and as JSON, and the hint of which axis is up.
+// cumulet-render --info, as lines and as JSON, and its hint about the up axis.
 
 #include "info.hpp"
 
@@ -135,7 +135,7 @@ TEST_F(Info, OfAScenesCameras) {
 }
 
 TEST_F(Info, OfAModel) {
-  // Two meshes, one of two primitives; the first is placed twice, the other one not at all.
+  // Two meshes, one of two primitives. The first is used twice, the other one not at all.
   std::ofstream(path("model.gltf")) << R"({
     "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
     "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [5, 0, 0]}],

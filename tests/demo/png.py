@@ -1,4 +1,4 @@
-"""Reads 8-bit RGB or RGBA PNG files, which is all that the programs write, with nothing but Python's own library."""
+"""Reads 8-bit RGB or RGBA PNG files, the only kinds that the programs write, with Python's standard library only."""
 
 import struct
 import zlib
@@ -46,7 +46,7 @@ class Picture:
         return rows
 
     def blocks(self, area, size=16):
-        """Mean colours of the blocks of an area (x, y, width, height)."""
+        """Returns mean colors of the blocks of an area (x, y, width, height)."""
         x0, y0, width, height = (int(v) for v in area)
         assert x0 + width <= self.width and y0 + height <= self.height, "the area is not in the picture"
         means = []
@@ -65,7 +65,7 @@ class Picture:
 
 
 def difference(a, b, area, other=None):
-    """Mean and largest difference of block means, of 255."""
+    """Returns mean and maximum difference of block means, on a scale of 255."""
     pairs = list(zip(a.blocks(area), b.blocks(other or area), strict=True))
     each = [max(abs(p - q) for p, q in zip(x, y)) for x, y in pairs]
     return sum(each) / len(each), max(each)

@@ -1,5 +1,6 @@
 #!/bin/bash
-# What cumulet-render can refuse only once a model is loaded: one line that names file and cause, and no picture.
+# Tests errors that cumulet-render can detect only after loading a model. It must print one line that names file and
+# cause, and write no image.
 # Usage: refused_test.sh RENDER MODEL
 set -euo pipefail
 render=$1 model=$2

@@ -1,4 +1,4 @@
-"""What cumulet-render shows on a terminal: its shaders compile before the first sample, and why a picture ended.
+"""cumulet-render's terminal output: its shaders compile before the first sample, and it prints why a rendering ended.
 
 Usage: render_progress.py RENDER VOLUME MODEL OUT_FOLDER
 """
@@ -12,7 +12,7 @@ import sys
 
 
 def shown(arguments, folder):
-    """Its lines on a terminal."""
+    """Returns the lines that a command prints on a terminal."""
     ours, its = pty.openpty()
     process = subprocess.Popen(arguments, stderr=its, cwd=folder)
     os.close(its)
@@ -20,7 +20,7 @@ def shown(arguments, folder):
     try:
         while part := os.read(ours, 4096):
             text += part
-    except OSError:  # its end is closed
+    except OSError:  # the program has closed its end
         pass
     assert process.wait(timeout=60) == 0, text
     return re.split(r"[\r\n]+", text.decode().replace("\x1b[K", ""))
@@ -41,7 +41,7 @@ def main():
 
 
 def ending(lines):
-    """Of the last line: noise and samples a pixel."""
+    """Parses the last line: noise and samples per pixel."""
     last = [line for line in lines if line][-1]
     match = re.match(r"stopped.png: noise ([\d.]+) %.* after ([\d.]+) samples a pixel", last)
     assert match, last
@@ -55,7 +55,7 @@ def stops_by_noise(render, volume, folder):
     assert noise <= 12.0 and 16 <= samples < 4096 and "(target 12 %)" in last, last
     parts = [int(re.search(r"(\d+) %", line).group(1)) for line in lines if line.startswith("rendering")]
     assert parts == sorted(parts), lines
-    # Where that takes more than it may have, it says so.
+    # If the noise limit needs more samples than the maximum, the output says so.
     _, samples, last = ending(shown(picture + ["--spp", "3"], folder))
     assert samples == 3 and last.endswith("the most that one may have"), last
 

@@ -1,4 +1,4 @@
-"""What cumulet-render --trace writes: frames, their passes and the workers' jobs.
+"""The file that cumulet-render --trace writes: frames, their passes and the workers' jobs.
 
 Usage: render_trace.py RENDER VOLUME MODEL OUT_FOLDER
 """

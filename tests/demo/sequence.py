@@ -1,4 +1,5 @@
-"""cumulet-render over the frames of a sequence: what it says, what it keeps, and what is there when it is killed.
+"""cumulet-render on the frames of a sequence: its output, the files that it keeps, and the files left after it is
+killed.
 
 Usage: sequence.py RENDER SCENE OUT_FOLDER
 """
@@ -25,7 +26,7 @@ class Sequence:
         return [self.render, str(self.folder / "explosion_####.vdb"), *LOOK, "-o", str(output), *more]
 
     def run(self, output, *more):
-        """Its exit status, its frames' (number, state, rest), and what it says on standard error."""
+        """Returns the exit status, the frames' (number, state, rest) and the standard error."""
         done = subprocess.run(self.command(output, *more), capture_output=True, text=True, timeout=600)
         matches = [LINE.fullmatch(line) for line in done.stdout.splitlines()]
         assert all(matches), done.stdout
@@ -35,7 +36,7 @@ class Sequence:
 
 
 def files(folder):
-    """Name and bytes of all that is there."""
+    """Returns name and content of all files in the folder."""
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
@@ -46,7 +47,7 @@ def empty(folder):
 
 
 def bad_frames(sequence, out):
-    """Missing, cut off, without bytes: each is named, and the others are made."""
+    """Missing, truncated and empty files are named in the output, and the other frames are rendered."""
     broken = Sequence(sequence.render, empty(out / "broken"))
     for path in sequence.folder.glob("explosion_*.vdb"):
         shutil.copy(path, broken.folder)
@@ -63,7 +64,7 @@ def bad_frames(sequence, out):
         assert state == "failed" or re.fullmatch(rf"\S*p\.{number:04}\.exr in [\d.]+ s", rest), rest
     assert status == 1 and error.splitlines()[-1] == "cumulet-render: 3 of 5 frames failed: 13-15", (status, error)
     assert sorted(files(pictures)) == ["p.0012.exr", "p.0016.exr"]
-    # What is mended is made, what was there is kept.
+    # A repaired frame is rendered, and existing frames are kept.
     shutil.copy(sequence.folder / "explosion_0014.vdb", broken.folder)
     before = files(pictures)
     status, frames, _ = broken.run(pictures / "p.####.exr", "--frames", "12,14,16")
@@ -73,8 +74,8 @@ def bad_frames(sequence, out):
 
 
 def alone_as_among_others(sequence, out):
-    """A frame's picture does not depend on which others are made: the density scale, the camera and the ground are the
-    sequence's."""
+    """A frame's image does not depend on which other frames are rendered. Density scale, camera and ground are
+    determined for the whole sequence."""
     all_of_them, one = empty(out / "all"), empty(out / "one")
     status, frames, error = sequence.run(all_of_them / "p.####.exr", "--frames", "12-16x2")
     assert status == 0 and [n for n, _, _ in frames] == [12, 14, 16], (frames, error)
@@ -82,17 +83,18 @@ def alone_as_among_others(sequence, out):
     status, _, _ = sequence.run(one / "p.####.exr", "--frames", "14")
     assert status == 0
     assert files(one)["p.0014.exr"] == files(all_of_them)["p.0014.exr"]
-    # And it is not the same picture over and over.
+    # The frames' images differ.
     assert len(set(files(all_of_them).values())) == 3
-    # One that is there is made again where that is asked for: other samples, another file.
+    # --overwrite renders an existing frame again: with other samples the file changes.
     status, frames, _ = sequence.run(one / "p.####.exr", "--frames", "14", "--overwrite", "--seed", "5")
     assert status == 0 and frames[0][1] == "done"
     assert files(one)["p.0014.exr"] != files(all_of_them)["p.0014.exr"]
 
 
 def settled(sequence, out):
-    """What frames have in common is found once and kept: the same pictures, to the bit, and the volume that it was taken
-    from is not read again. That of another scene, or a damaged one, is found anew."""
+    """Settings common to all frames are computed once and stored (--settled). The images are the same to the bit, and
+    the volume that the settings came from is not read again. A stored file that is damaged or of another scene is
+    computed again."""
     wanted, pictures = empty(out / "unsettled"), empty(out / "settled")
     status, _, _ = sequence.run(wanted / "p.####.exr", "--frames", "12-16x2")
     assert status == 0
@@ -112,15 +114,16 @@ def settled(sequence, out):
     assert run(16)[0] == 0
     made = files(pictures)
     assert {name: made[name] for name in files(wanted)} == files(wanted)
-    # Simulated anew, under the same name: it is judged by what is there now, and here that is another volume.
+    # The largest file is replaced under the same name. The settings are computed again from the new content, which is
+    # another volume.
     os.utime(largest, (was.st_atime, was.st_mtime + 5))
     assert run(12, "--overwrite")[0] == 0 and kept.read_bytes() != before
     largest.write_bytes(voxels)
     os.utime(largest, (was.st_atime, was.st_mtime))
-    kept.unlink()  # or it would stay: the one that it was taken from then is as it was
+    kept.unlink()  # otherwise it would stay valid, because the largest file is restored
     assert run(12, "--overwrite")[0] == 0 and kept.read_bytes() == before
     assert files(pictures)["p.0012.exr"] == made["p.0012.exr"]
-    # Of another scene, and cut off.
+    # A stored file of another scene, and a truncated one.
     assert run(12, "--anisotropy", "0.3", "--overwrite")[0] == 0 and kept.read_bytes() != before
     assert files(pictures)["p.0012.exr"] != made["p.0012.exr"]
     kept.write_bytes(before[: len(before) // 2])
@@ -131,8 +134,8 @@ def settled(sequence, out):
 
 
 def begins_empty(sequence, out):
-    """Before a fire is lit there is nothing: what all frames have in common is taken from one that shows something, though
-    the empty one is the first, and the largest file."""
+    """A fire has empty frames before it starts. The common settings come from a frame that is not empty, even if the
+    empty frame is the first one and the largest file."""
     begun = Sequence(sequence.render, empty(out / "begun"))
     wanted, pictures = empty(out / "without_empty"), empty(out / "with_empty")
     for path in sequence.folder.glob("explosion_001[2-6].vdb"):
@@ -152,7 +155,8 @@ def begins_empty(sequence, out):
 
 
 def negative(sequence, out):
-    """Frames before 0, as C, Houdini and ffmpeg pad them and as Blender does; what is padded otherwise is named."""
+    """Negative frame numbers, padded as C, Houdini and ffmpeg do and as Blender does. Files with any other padding are
+    named in an error."""
     names = {"c": "{:04d}".format, "b": lambda n: f"-{-n:04d}" if n < 0 else f"{n:04d}"}
     for style, name in names.items():
         there = empty(out / f"negative_{style}")
@@ -183,7 +187,7 @@ def negative(sequence, out):
 
 
 def gap(sequence, out):
-    """Between two files nothing stands in for one that is not there: its failure is said once, by its own line."""
+    """A missing file is not replaced by its neighbors. Its failure is printed once, on its own line."""
     there = empty(out / "gap")
     for n in (12, 13, 15):
         shutil.copy(sequence.folder / f"explosion_00{n}.vdb", there)
@@ -199,7 +203,7 @@ def gap(sequence, out):
 
 
 def refused(sequence, out):
-    """Before anything is made."""
+    """Wrong arguments are refused before any file is written."""
     def said(output, *more):
         done = subprocess.run(sequence.command(output, *more), capture_output=True, text=True, timeout=60)
         assert done.stdout == "" and done.stderr.count("\n") == 1, (done.stdout, done.stderr)
@@ -214,11 +218,11 @@ def refused(sequence, out):
 
 
 def interrupted(sequence, out):
-    """Ctrl-C: no picture of fewer samples takes the place of one that has all."""
+    """After Ctrl-C, no image with fewer samples replaces one with all samples."""
     pictures = empty(out / "interrupted")
     process = subprocess.Popen(sequence.command(pictures / "p.####.exr", "--frames", "12-14", "--spp", "1000000"),
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(4)  # among the samples, or before them on a busy machine
+    time.sleep(4)  # during the samples, or before them on a busy machine
     process.send_signal(signal.SIGINT)
     _, error = process.communicate(timeout=120)
     assert process.returncode == 1, error
@@ -228,7 +232,7 @@ def interrupted(sequence, out):
 
 
 def killed(sequence, out, runs):
-    """kill -9 at random moments: no frame that is lost, none that is torn, none of another picture."""
+    """After kill -9 at random times, no frame is lost, truncated or of another image."""
     whole = empty(out / "whole")
     began = time.monotonic()
     status, _, _ = sequence.run(whole / "p.####.exr", "--frames", "10-17")

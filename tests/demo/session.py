@@ -1,7 +1,7 @@
-"""Drives cumulet-demo by replay files on a display of its own (Xvfb), and judges its screenshots and reports.
+"""Drives cumulet-demo by replay files on its own virtual display (Xvfb), and checks its screenshots and reports.
 
 Usage: session.py DEMO RENDER XVFB SCENE_FOLDER OUT_FOLDER TEST
-Pictures, reports and replay files stay in OUT_FOLDER/TEST.
+Screenshots, reports and replay files stay in OUT_FOLDER/TEST.
 """
 
 import json
@@ -19,12 +19,12 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import spans
 from png import Picture, difference
 
-ALIKE = (3.0, 16.0)  # mean and largest difference of blocks that noise alone makes, of 255
+ALIKE = (3.0, 16.0)  # maximum mean and maximum difference of blocks that noise causes, on a scale of 255
 SIZE = ["--size", "640x304"]
 
 
 class Screen:
-    """Xvfb's framebuffer as it is now: no client is asked, and next to nothing is read."""
+    """The current framebuffer of Xvfb, read from its file: fast, and without asking an X client."""
 
     def __init__(self, file):
         with file.open("rb") as f:
@@ -33,7 +33,7 @@ class Screen:
         self.start, self.bytes, self.line = header[0] + 12 * header[19], header[11] // 8, header[12]
 
     def row(self, x, y, width):
-        """Bytes of a row of pixels."""
+        """Returns the bytes of a row of pixels."""
         begin = self.start + y * self.line + x * self.bytes
         return self.data[begin: begin + width * self.bytes]
 
@@ -51,18 +51,20 @@ class Session:
     def play(self, name, replay, *arguments, size=SIZE):
         (self.out / f"{name}.replay").write_text("\n".join(replay) + "\n")
         samples = [] if "--spp" in arguments else ["--spp", "6"]
-        # Samples are judged, not what is made of them.
+        # Tests compare the samples, not the denoised image.
         samples += [] if "--denoise" in arguments else ["--denoise", "off"]
-        # What the pictures were judged by, before there was a scale that follows the volume.
+        # The tests' thresholds were chosen before density scales adapted to the volume.
         scale = [] if "--scene" in arguments or "--density-scale" in arguments else ["--density-scale", "1"]
-        # Light that scatters more often would take half of the time. (A look that nobody chose stays one.)
+        # With more bounces the tests take twice as long. A scene file and an automatic default look keep their own
+        # value.
         if not {"--scene", "--max-bounces", "auto"} & set(arguments):
             scale += ["--max-bounces", "8"]
         done = self.start([*size, *samples, *scale, *arguments, "--replay", f"{name}.replay"])
         assert done.returncode == 0, f"{name}: {done.returncode}: {done.stderr}"
 
     def play_live(self, name, replay, hand, *arguments, size=SIZE):
-        """Plays a replay that idles, with hand() at mouse and keyboard as soon as it has written live.json."""
+        """Plays a replay that idles. Calls hand(), which uses mouse and keyboard, as soon as the replay has written
+        live.json."""
         (self.out / f"{name}.replay").write_text("\n".join(replay) + "\n")
         denoise = [] if "--denoise" in arguments else ["--denoise", "off"]
         demo = subprocess.Popen([self.demo, *size, *arguments, *denoise, "--replay", f"{name}.replay"], cwd=self.out,
@@ -79,11 +81,11 @@ class Session:
         return errors
 
     def hand(self, *arguments):
-        """xdotool: events of the X server, as from a person."""
+        """Runs xdotool, which sends X events as a user would."""
         subprocess.run(["xdotool", *map(str, arguments)], env=self.environment, check=True, timeout=300)
 
     def screen(self, x, y, width, height):
-        """Rows of bytes of the display."""
+        """Returns rows of bytes of the display."""
         display = Screen(self.out / "Xvfb_screen0")
         return [display.row(x, row, width) for row in range(y, y + height)]
 
@@ -99,7 +101,7 @@ def shot(name):
 
 
 def look(s, name):
-    """A screenshot and its report, with the picture's place in it."""
+    """Returns a screenshot, its report and the position of the rendered image in it."""
     report, picture = s.report(name), s.picture(name)
     # The line of text at the bottom changes all the time.
     x, y, width, height = report["viewport"]
@@ -160,7 +162,7 @@ def test_region(s):
     assert report["scene"]["camera"] == s.report("whole")["scene"]["camera"], "the drag is not the camera's"
     samples = report["samples"] / s.report("whole")["samples"]
     assert 0.2 < samples < 0.3, samples
-    # Of the whole viewport, which the line of text is a part of.
+    # The whole viewport, which includes the line of text.
     left, top, across, down = report["viewport"]
     inside = (left + across // 4 + 8, top + down // 4 + 8, across // 2 - 16, down // 2 - 16)
     assert_alike(whole, part, inside)
@@ -203,13 +205,13 @@ def test_change(s):
 
 
 def write_environment(path, bright):
-    """A Radiance picture: blue, and orange where a column of the 64 is bright."""
+    """Writes a Radiance image with 64 columns: blue, and orange where bright(column)."""
     rows = b"".join(b"\xc0\x60\x20\x83" if bright(x) else b"\x20\x40\x80\x80" for _ in range(32) for x in range(64))
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n" + rows)
 
 
 def test_volumes(s):
-    """Volumes beside the first come and go, and what is done to them is undone."""
+    """Volumes other than the first are hidden, removed, copied and added, and undo reverts each change."""
     far = {"places": [{"translate": [60, 0, 0]}]}
     medium = {"medium": {"density_scale": 1, "albedo": [0.8, 0.8, 0.8]}}  # dark, so that paths are short
     camera = {"eye": [20, 30, 170], "target": [20, 20, 0]}
@@ -237,7 +239,8 @@ def test_volumes(s):
 
 
 def test_handles(s):
-    """Things are chosen by a click and in the list; handles move, turn and scale them, a drag a step of undo."""
+    """Objects are selected by a click or in the list. Handles move, rotate and scale them, and each drag is one undo
+    step."""
     model = "triangle.gltf"
     corners = struct.pack("<9f", 0, 0, 0, 30, 0, 0, 0, 30, 0)
     (s.out / "corners.bin").write_bytes(corners)
@@ -258,7 +261,7 @@ def test_handles(s):
            [*there, *shot("first"), "click viewport 0.5 0.45", "move viewport 0.05 0.8", *there, *shot("clicked"),
             'drag "Handle X" to viewport 0.75 0.5', *there, *shot("moved"),
             "key ctrl+z", "move viewport 0.05 0.8", *there, *shot("undone"), "key ctrl+shift+z", *tell("redone"), "key ctrl+z", *there,
-            # Escape in the midst of a drag: as if it had not been.
+            # Escape during a drag reverts it.
             'move "Handle Y"', "down", "move viewport 0.5 0.1", "frames 2", *shot("held"), "key escape", "frames 2", "up",
             *tell("let_go"),
             "key e", "frames 2", *shot("rings"), 'drag "Handle Y" to viewport 0.45 0.7', *tell("turned"),
@@ -275,7 +278,7 @@ def test_handles(s):
     assert report("first")["chosen"] is None and steps("first") == 0
     assert report("clicked")["chosen"] == "Volume 1" and steps("clicked") == 0, "choosing is no change"
     area = look(s, "first")[2]
-    # An outline is thin.
+    # Compares the maximum block difference, because an outline is thin.
     outlined = lambda name: difference(look(s, "first")[0], look(s, name)[0], area)[1] > 2 * ALIKE[1]
     assert outlined("clicked")
     (moved,) = places("moved", 0)
@@ -285,16 +288,16 @@ def test_handles(s):
     assert_alike(look(s, "clicked")[0], look(s, "undone")[0], area)
     assert places("redone", 0) == places("moved", 0) and steps("redone") == 1
     assert places("held", 0) != [] and places("let_go", 0) == [] and steps("let_go") == 0, "Escape takes it back"
-    # About the vertical, and the middle of it stays.
+    # A rotation about the vertical axis; the object's center does not move.
     (turned,) = places("turned", 0)
     assert abs(turned[5] - 1) < 1e-9 and abs(turned[0] - turned[10]) < 1e-9 and 0.1 < abs(turned[8]) < 1, turned
     assert steps("turned") == 1
-    # By steps of a tenth, along its own axes.
+    # Scales in steps of 0.1, along the object's own axes.
     (scaled,) = places("scaled", 0)
     size = [sum(scaled[4 * i + k] ** 2 for k in range(3)) ** 0.5 for i in range(3)]
     assert size[0] > 1.05 and abs(10 * size[0] - round(10 * size[0])) < 1e-6 and max(size) - min(size) < 1e-6, size
     assert abs(scaled[8] / size[2] - turned[8]) < 1e-6 and steps("scaled") == 2, scaled
-    # The one of two places that was chosen.
+    # Moves only the selected one of two instances.
     assert report("place")["chosen"] == "Volume 2, place 2" and steps("place") == 2
     assert places("place_moved", 1)[0] == places("place", 1)[0] != places("place_moved", 1)[1], places("place_moved", 1)
     (model_before,), (model_moved,) = (report(name)["models"] for name in ("model", "model_moved"))
@@ -310,10 +313,11 @@ def test_handles(s):
 
 
 def test_timeline(s):
-    """A numbered file is one frame until it is asked to play; then it is stepped, played, scrubbed, cut and saved."""
+    """A numbered file is a single frame until the user makes it a sequence. The sequence is stepped, played, scrubbed,
+    trimmed and saved."""
     frames = [f"fire_{number:02}.vdb" for number in range(3, 9)]
     for number, name in enumerate(frames):
-        # Frame 3 is the explosion, 4 missing, 5 the cloud, 6 corrupt, 7 the explosion, 8 the cloud.
+        # Frame 3 is the explosion, 4 is missing, 5 the cloud, 6 corrupt, 7 the explosion, 8 the cloud.
         if name == "fire_06.vdb":
             (s.out / name).write_bytes(b"no volume")
         elif name != "fire_04.vdb":
@@ -351,7 +355,7 @@ def test_timeline(s):
     assert scrubbed["frame"] == scrubbed["drawn"] == 8 and not scrubbed["playing"], scrubbed
     assert_differ(look(s, "missing")[0], look(s, "scrubbed")[0], look(s, "scrubbed")[2])
     assert s.report("again")["sequence"]["frame"] >= 4, "from outside it plays the range"
-    # As it was saved, in both programs.
+    # Both programs show the saved scene.
     scene = json.loads((s.out / "played.json").read_text())
     assert scene["volumes"][0]["file"] == "fire_##.vdb" and scene["sequence"]["frame"] == 8, scene
     assert scene["sequence"]["first_frame"] == 4 and scene["sequence"]["repeat"] == "loop", scene["sequence"]
@@ -365,7 +369,8 @@ def test_timeline(s):
     run = subprocess.run([s.renderer, "--scene", "played.json", "--frames", "5,7", "--spp", "4", "--size", "64x48", "-o",
                           "other.#.png"], cwd=s.out, env=s.environment, capture_output=True, text=True, check=False)
     assert run.returncode == 0 and (s.out / "other.5.png").exists() and (s.out / "other.7.png").exists(), run.stderr
-    # What cannot be read leaves what plays; at an end that is held it plays from the beginning.
+    # A file that cannot be read does not replace the playing sequence. If playback has stopped at the end, it restarts
+    # at the beginning.
     (s.out / "cut.vdb").write_bytes(b"no volume")
     for number in (1, 2):
         (s.out / f"cut_{number}.vdb").write_bytes(b"no volume")
@@ -386,7 +391,8 @@ def test_timeline(s):
 
 
 def test_environment(s):
-    """Dropped, turned by its picture, turned back, lost to a bad file, undone."""
+    """An environment is dropped, rotated by dragging its thumbnail and rotated back. A corrupt file does not replace
+    it, and undo works."""
     write_environment(s.out / "left.hdr", lambda x: x < 16)
     write_environment(s.out / "middle.hdr", lambda x: 24 <= x < 40)
     (s.out / "bad.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n")
@@ -413,7 +419,7 @@ def test_environment(s):
     assert abs(environment("turned")["rotation_degrees"] + 90.0) < 4.0, environment("turned")
     assert report["undo_steps"] == 2, "a drag is one step"
     assert_differ(left, turned, area)
-    # What was there stays, in the picture and in the scene, and in the history.
+    # The environment stays in the image, in the scene and in the undo history.
     for name, cause in (("bad", "bad.hdr: a Radiance picture that is cut short"),
                         ("none", "none.exr: No such file or directory")):
         bad, report, _ = look(s, name)
@@ -425,7 +431,7 @@ def test_environment(s):
     assert_differ(turned, s.picture("middle"), (area[0], area[1], area[2], area[3] - 90))
     assert environment("undone") == environment("turned")
     assert environment("back")["rotation_degrees"] == 0.0 and s.report("back")["undo_steps"] == 3
-    # Two turns of most of the way around: no end is met.
+    # Two drags of almost a full turn each: the angle has no limit.
     assert abs(abs(environment("around")["rotation_degrees"]) - 98.0) < 30.0, environment("around")
     removed = s.report("removed")["scene"]
     assert "environment" not in removed or not removed["environment"].get("file"), removed
@@ -433,7 +439,7 @@ def test_environment(s):
     again = environment("again")
     assert again["file"].endswith("left.hdr") and again["rotation_degrees"] == environment("around")["rotation_degrees"]
     assert environment("strong")["strength"] > 2.0
-    # Its picture is in the panel, three quarters of it blue.
+    # The panel shows its thumbnail, which is three quarters blue.
     def blue(name):
         picture = s.picture(name)
         n, left = picture.channels, s.report(name)["viewport"][2]
@@ -444,9 +450,9 @@ def test_environment(s):
 
 
 def test_lamps(s):
-    """A lamp is added, made a spot, dimmed and taken away; each is a step, undone and done again."""
+    """A light is added, made a spot light, dimmed and removed. Each is a step that can be undone and redone."""
     there = ["frames 3", "wait loaded", "frames 2"]
-    # Without handles and marks: the pictures are judged.
+    # Hides handles and icons, because the images are compared.
     s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add lamp"', *SETTLE, *shot("point"), 'click "Lamp 1"', "frames 2",
                       'click "Lamp 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
                       *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
@@ -479,7 +485,8 @@ def test_lamps(s):
 
 
 def test_sky_and_ground(s):
-    """The physical sky's haze and the sky of one colour, the ground's colour, height and none: by the panel, undone, redone."""
+    """The physical sky's haze, the uniform sky, the ground's color and height, and no ground: set in the panel, undone
+    and redone."""
     drag = lambda row, x: f'drag "{row}" 0.5 0.5 to "{row}" {x} 0.5'
     choose = lambda row, entry: [f'click "{row}"', "frames 2", f'click "{row}/{entry}"']
     there = ["frames 3", "wait loaded", "frames 2"]
@@ -549,7 +556,8 @@ def test_preset(s):
 
 
 def test_fire(s):
-    """What burns looks like fire with nothing said, opened by hand or by the command line, as in cumulet-render."""
+    """A burning volume looks like fire by default, whether opened in the window or by the command line, as in
+    cumulet-render."""
     plain, dropped = ["--density-scale", "auto"], f'drop "{s.explosion}"'
     s.play("replay", [*SETTLE, *shot("cloud"), dropped, *SETTLE, *shot("dropped"), "key ctrl+z", *SETTLE, *shot("undone"),
                       "key ctrl+shift+z", *SETTLE, *shot("redone"), f'drop "{s.cumulus}"', *SETTLE, *shot("cloud_again")],
@@ -579,7 +587,8 @@ def test_fire(s):
 
 
 def test_ramps(s):
-    """A ramp as the grid has it changes nothing; points are dragged, added by clicks and taken away by right clicks."""
+    """A ramp with the grid's own values changes nothing. Points are dragged, added by clicks and removed by right
+    clicks."""
     curve = '"Temperature ramp curve"'
     s.play("replay", [*SETTLE, *shot("plain"), 'click "Temperature ramp"', *SETTLE, *shot("same"),
                       'move "Temperature point"', f"drag {curve} 0.02 0.95 to {curve} 0.6 0.97", *SETTLE, *shot("dragged"),
@@ -628,7 +637,7 @@ def test_surfaces(s):
 
 
 def roughness(picture, area):
-    """Mean difference between a pixel and the next in its row: noise has much of it."""
+    """Returns the mean difference between neighboring pixels of a row, a measure of noise."""
     x, y, width, height = (int(v) for v in area)
     n = picture.channels
     total = 0
@@ -639,7 +648,7 @@ def roughness(picture, area):
 
 
 def test_first_start(s):
-    """What the panel says is so from the first picture on: Denoise is Fast, and the picture has no noise."""
+    """The panel's settings apply from the first image on: Denoise is Fast, and the image has no noise."""
     choose = lambda name: ['click "Denoise"', "frames 2", f'click "Denoise/{name}"', "frames 3", "wait converged", "frames 20"]
     s.play("replay", ["wait loaded", "wait converged", "frames 20", *shot("first"), *choose("Off"), *shot("off"), *choose("Fast"),
                       *shot("again")], "--volume", s.cumulus, "--spp", "4", "--denoise", "fast")
@@ -652,7 +661,7 @@ def test_first_start(s):
 
 
 def window(path):
-    """Size of an OpenEXR file's data window."""
+    """Returns the size of an OpenEXR file's data window."""
     header = path.read_bytes()[:4096]
     at = header.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
     left, top, right, bottom = struct.unpack("<4i", header[at: at + 16])
@@ -664,7 +673,7 @@ def save_as(key, name):
 
 
 def test_alone(s):
-    """A model or an environment by itself is a scene: with a title, a state, a place in the list and a picture to save."""
+    """A single model or environment is a scene: it has a title, a state, an entry in the list and an image to save."""
     mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
     write_environment(s.out / "sky.hdr", lambda x: x < 8)
     for name, file in (("model", mountains), ("environment", s.out / "sky.hdr")):
@@ -684,8 +693,8 @@ def test_alone(s):
 
 
 def test_save_whole(s):
-    """What is saved while previews are shown is the first whole picture after them. It says so meanwhile."""
-    # The view changes right before the dialog opens, and nothing is traced while that is open.
+    """Saving during a preview saves the first full-resolution image after it. The status line says so meanwhile."""
+    # The view changes right before the dialog opens, and no samples are traced while the dialog is open.
     view = lambda x: ["move viewport 0.3 0.5", "down left", f"move viewport {x} 0.5", "up left"]
     s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("f12", "early.png"), 'report "early.json"', "frames 1",
                       "wait converged", "key escape", "frames 2", *shot("rest"),
@@ -712,7 +721,7 @@ def test_save_whole(s):
 
 
 def test_negative_frames(s):
-    """A sequence that begins before 0 plays from there."""
+    """A sequence with negative frame numbers plays from its first frame."""
     for number in (-2, -1, 0, 1):
         shutil.copy(s.explosion if number < 0 else s.cumulus, s.out / f"fire.{'%04d' % number}.vdb")
     there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
@@ -738,7 +747,7 @@ def test_exposure(s):
 
 
 def test_scene_file(s):
-    # A view is kept, left and looked through again.
+    # A camera is saved, left and selected again.
     view = ['click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
             "frames 3", 'click "Look through"', "frames 2", 'click "Look through/near"', "frames 3"]
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
@@ -832,7 +841,7 @@ def test_idle(s):
 
 
 def test_unchanged(s):
-    """A frame that would look as the one before is not drawn; what changes in it is, though no picture does."""
+    """A frame that looks like the one before is not drawn. A change in the panel is drawn even without a new image."""
     s.play("replay", ["wait loaded", "wait converged", "frames 60", 'report "before.json"', "frames 60",
                       'report "after.json"', "key f1", "frames 5", 'report "help.json"'], "--volume", s.cumulus)
     before, after = s.report("before"), s.report("after")
@@ -844,7 +853,8 @@ def test_unchanged(s):
 def test_record(s):
     steps = ["wait loaded", "drag viewport 0.4 0.5 to viewport 0.6 0.6", "frames 5", "key ]", 'click "View"', "frames 3",
              'click "View/Steps"', "frames 3", "key ctrl+o", "frames 3", f'text "{s.explosion}"', "key enter", "wait loaded"]
-    # As high as shows View: a click by name scrolls to it, and no hand has scrolled that could be recorded.
+    # The window is high enough to show View. A click by name scrolls the panel, but the recorder records only a user's
+    # scrolling.
     high = ["--size", "640x500"]
     s.play("replay", [*steps, *shot("played")], "--volume", s.cumulus, "--record", "recorded.replay", size=high)
     recorded = (s.out / "recorded.replay").read_text().splitlines()
@@ -856,7 +866,7 @@ def test_record(s):
 
 
 def test_looks(s):
-    """Pictures to be looked at, at 1x and 2x; here only that something is drawn everywhere."""
+    """Takes screenshots for inspection, at 1x and 2x. Checks only that the panels are drawn."""
     for name, scale, size in (("1x", "1", "1440x900"), ("2x", "2", "1680x1040"), ("small", "1", "640x400")):
         parts = [*shot(f"{name}_top"), 'move "Pixel size"', "frames 60", *shot(f"{name}_grid"), 'move "Renderer"',
                  "frames 3", *shot(f"{name}_statistics"), 'drop "/nowhere/cloud.vdb"', "frames 3", "key f1", "frames 3",
@@ -870,7 +880,7 @@ def test_looks(s):
 
 
 def test_status(s):
-    """What scripts rely on: one line on standard error, and the exit status."""
+    """The interface for scripts: one line on standard error, and the exit status."""
     (s.out / "bad.replay").write_text("frames 1\nclick nowhere\n")
     (s.out / "gone.replay").write_text('click "No such control"\n')
     (s.out / "bad.json").write_text("{")
@@ -891,8 +901,8 @@ def test_status(s):
 
 
 def test_timers(s):
-    """The graph of the device's time is what the statistics grow by; and --trace tells of the same session."""
-    # So few frames that the graph has all of them.
+    """The graph of GPU time adds up to the growth of the statistics, and --trace writes the same session."""
+    # So few frames that the graph still has all of them.
     s.play("replay", ["wait loaded", "frames 20", *shot("early"), "key 2", "frames 20", *shot("late")],
            "--volume", s.cumulus, "--trace", "trace.json")
     for name in ("early", "late"):
@@ -903,7 +913,7 @@ def test_timers(s):
         assert sum(graph) < 1.0001 * 1000 * sum(passes.values()), (sum(graph), passes)
         assert passes["trace"] > 0 and passes["display"] > 0, passes
     early, late = s.report("early"), s.report("late")
-    # A frame that is reported comes into the graph with the next.
+    # The graph shows the time of a reported frame only with the next frame.
     known, total = len(early["device_ms"]), 1000 * sum(early["pass_seconds"].values())
     assert late["device_ms"][:known] == early["device_ms"], "what is drawn stays"
     sums = [sum(late["device_ms"][:count]) for count in (known, known + 1)]
@@ -913,11 +923,11 @@ def test_timers(s):
     spans.check(s.out / "trace.json", ["computing the sky", "cumulus.vdb"], 4)
 
 
-REFINING = ["--spp", "60000", "--volume"]  # never at rest
+REFINING = ["--spp", "60000", "--volume"]  # the rendering never finishes
 
 
 def test_typing(s):
-    """57 characters typed at 40 ms each while a picture refines; when is the last of them on the screen?"""
+    """Types 57 characters at 40 ms each while the image refines. Measures when the last one is on the screen."""
     text = "clouds_over_the_mountains_at_dusk_with_a_lantern_0042_vdb"
     assert len(text) == 57
     seen = []
@@ -936,7 +946,7 @@ def test_typing(s):
     def differing(a, b):
         return sum(p != q for row, other in zip(a, b) for p, q in zip(row, other))
 
-    # The blinking cursor is a line; a character that is missing moves all the others.
+    # The blinking cursor is a line, but a missing character moves all the others.
     last = seen[-1][1]
     latency = next(t for i, (t, rows) in enumerate(seen) if all(differing(r, last) < 200 for _, r in seen[i:]))
     report = s.report("typed")
@@ -946,7 +956,8 @@ def test_typing(s):
 
 
 def test_chord(s):
-    """Ctrl+O, let go at once, while a picture refines: always the dialog; and with it open, nothing is traced."""
+    """Ctrl+O, released at once, while the image refines, always opens the dialog. While it is open, no samples are
+    traced."""
     def hand():
         time.sleep(1)
         s.hand("key", "--delay", "0", "ctrl+o")
@@ -960,7 +971,7 @@ def test_chord(s):
 
 
 def test_drag(s):
-    """A drag by the mouse in the sample scene, 60 moves a second: how often is there a new picture?"""
+    """Drags the mouse in the sample scene, 60 moves per second. Measures how often there is a new image."""
     def hand():
         s.hand("mousemove", 300, 300, "mousedown", 1)
         for i in range(120):
@@ -973,9 +984,9 @@ def test_drag(s):
     assert before["scene"]["camera"]["eye"] != after["scene"]["camera"]["eye"]
     assert after["pictures"] - before["pictures"] > 10, "pictures follow the hand"
     assert after["undo_steps"] == before["undo_steps"] + 1
-    # The window is drawn as often as a hand moves: its own frames are none of those that are told.
+    # The window redraws at each mouse move, but frame_ms counts only frames with a new image.
     added = len(after["frame_ms"]) - len(before["frame_ms"])
-    # One more: a report is of before its own frame's.
+    # One more is allowed, because a report does not include its own frame.
     assert 0 < added <= after["pictures"] - before["pictures"] + 1, (added, after["pictures"], before["pictures"])
     times = sorted(after["frame_ms"])
     print(f"{after['pictures'] - before['pictures']} pictures in 8 s; from one to the next: median "
@@ -983,8 +994,8 @@ def test_drag(s):
 
 
 def fineness(rows):
-    """Of rows of pixels: how much a pixel differs from the next, to what it does from the next but one. The coarser what
-    was enlarged, the closer to 0.5: the land of the sample scene has 0.55 at half resolution, 0.64 at full."""
+    """Returns the mean difference of adjacent pixels, divided by that of pixels two apart. Upscaled images are closer
+    to 0.5: the land of the sample scene has 0.55 at half resolution and 0.64 at full resolution."""
     near = far = 0
     for row in rows:
         green = row[1::4]
@@ -994,8 +1005,9 @@ def fineness(rows):
 
 
 def test_feel(s):
-    """A drag in the sample scene, the pointer above the land: what is on the screen, and when. Surfaces are at half
-    resolution or better while it lasts; once the hand has let go, nothing blurred is shown but what is done already."""
+    """Drags in the sample scene with the pointer above the land, and records the screen over time. During the drag,
+    surfaces have at least half resolution. After it, no blurred image appears except the one that was already in
+    progress."""
     seen, marks = [], {}
     height, width, rows = 900, 1440, range(420, 860, 20)
 
@@ -1012,7 +1024,7 @@ def test_feel(s):
         watcher = threading.Thread(target=watch, args=(s.out / "Xvfb_screen0", lambda: end[0]))
         watcher.start()
         time.sleep(1)
-        # One process: the hand takes no core from what it drags.
+        # One xdotool process for all moves, so that it takes no CPU time from the demo.
         moves = [word for i in range(120) for word in ("mousemove", 300 + 2 * i, 300, "sleep", 0.0166)]
         marks["down"] = time.monotonic()
         s.hand("mousemove", 300, 300, "mousedown", 1, *moves)
@@ -1039,7 +1051,7 @@ def test_feel(s):
 
 
 def test_convergence(s):
-    """The line below the picture says what is true when nothing moves any more."""
+    """The line below the image gives the correct state when the rendering has finished."""
     s.play("replay", ["wait loaded", "idle 25", *shot("rest")], "--volume", s.cumulus, "--spp", "4",
            size=["--size", "400x240"])
     report = s.report("rest")
@@ -1048,7 +1060,8 @@ def test_convergence(s):
 
 
 def test_failures(s):
-    """What the command line names and cannot be shown is told on standard error, too, and is not recent."""
+    """Files of the command line that cannot be shown cause a message on standard error, too, and are not added to the
+    recent files."""
     (s.out / "cut.vdb").write_bytes(pathlib.Path(s.cumulus).read_bytes()[:5000])
     (s.out / "bad.json").write_text("{")
     for name in ("missing.vdb", "cut.vdb", "bad.json", "missing.glb"):
@@ -1069,7 +1082,7 @@ def test_failures(s):
     s.play("later", ["wait loaded", f'drop "{s.out}/cut.vdb"', "frames 3", "wait loaded", *shot("later")], "--volume",
            s.cumulus)
     assert s.report("later")["recent"] == [s.cumulus], s.report("later")["recent"]
-    # One fails, the other is there; and a failure that takes long is one line, too.
+    # One file fails and the other is loaded. A slow failure is also one line.
     text = b'{"asset": {"version": "2.0"}, "x": "' + b"a" * 40_000_000 + b'"'
     text += b" " * (-len(text) % 4)
     (s.out / "late.glb").write_bytes(struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text)
@@ -1086,7 +1099,7 @@ def test_failures(s):
 
 
 def test_grids(s):
-    """What is in a file, a grid of it, and a density scale that suits either."""
+    """The panel lists a file's grids and shows each of them, with a suitable density scale."""
     s.play("replay", ["wait loaded", *shot("opened"), 'click "Look into the grids"', "frames 2", "idle 3", *shot("picker"),
                       'click "Grids/temperature"', "frames 3", "wait loaded", *shot("temperature"),
                       'drag "Density scale" 0.5 0.5 to "Density scale" 0.9 0.5', "frames 3", *shot("dense"),
@@ -1106,12 +1119,13 @@ def test_grids(s):
 
 
 def test_unnamed_grids(s):
-    """A file of several grids, none of them called density, asks which: one is shown until another is chosen."""
+    """A file with several grids and none called density opens a dialog. One grid is shown until the user selects
+    another."""
     bytes_of = pathlib.Path(s.explosion).read_bytes()
     unknown = bytes_of.replace(b"density", b"mystery").replace(b"temperature", b"warmthiness").replace(b"flame", b"other")
     (s.out / "unknown.vdb").write_bytes(unknown)
     (s.out / "fire.vdb").write_bytes(bytes_of.replace(b"density", b"mystery"))
-    # What is at first, and what is chosen instead of it.
+    # The grid shown at first, and the grid selected instead.
     for file, first, second in (("unknown", "mystery", "warmthiness"), ("fire", "flame", "mystery")):
         s.play(file, ["frames 3", f'drop "{s.out}/{file}.vdb"', "frames 3", "wait loaded", "frames 2", "idle 3",
                       *shot("asked"), f'click "Grids/{second}"', "frames 3", "wait loaded", *shot("chosen"), "key ctrl+z",
@@ -1121,13 +1135,13 @@ def test_unnamed_grids(s):
         assert not chosen["dialog"] and chosen["grid"] == second, (chosen["dialog"], chosen["grid"])
         assert chosen["scene"]["volume"]["grid"] == second
         assert back["grid"] == first and "grid" not in back["scene"]["volume"], back["scene"]["volume"]
-    # One that has a density does not ask.
+    # A file with a density grid opens no dialog.
     s.play("named", ["frames 3", f'drop "{s.explosion}"', "frames 3", "wait loaded", "frames 2", "idle 1", *shot("named")])
     assert not s.report("named")["dialog"] and s.report("named")["grid"] == "density"
 
 
 def test_up_axis(s):
-    """Chosen, seen, saved, undone; as cumulet-render shows it."""
+    """The up axis is selected, displayed, saved and undone; cumulet-render shows the same image."""
     s.play("replay", ["wait loaded", "wait converged", *shot("y"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
                       "wait loaded", "wait converged", *shot("z"), "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"',
                       "key enter", "frames 3", "key escape", "frames 2", "key ctrl+z", "frames 3", "wait loaded",

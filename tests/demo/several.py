@@ -1,4 +1,4 @@
-"""Scene files of several volumes: cumulet-render shows what they say.
+"""Scene files of several volumes: cumulet-render shows them as the files say.
 
 several.py CUMULET_RENDER CLOUD_VDB FIRE_VDB FOLDER
 """
@@ -16,7 +16,8 @@ folder.mkdir(parents=True)
 
 
 def run(name, volumes, *flags, **keys):
-    """A run's process; the picture, if it makes one, is folder/name.pfm. keys: of the scene."""
+    """Runs the program and returns the process. An image is written to folder/name.pfm. keys: further keys of the
+    scene."""
     scene = folder / f"{name}.json"
     camera = {"eye": [0, 20, 130], "target": [0, 15, 0]}
     picture = {"width": 64, "height": 48, "samples": 64}
@@ -27,7 +28,7 @@ def run(name, volumes, *flags, **keys):
 
 
 def render(name, volumes, *flags, **keys):
-    """A picture's bytes."""
+    """Returns the content of the image file."""
     done = run(name, volumes, *flags, **keys)
     assert done.returncode == 0, (name, done.stderr)
     return (folder / f"{name}.pfm").read_bytes()
@@ -58,22 +59,22 @@ halves = render("halves", [volume(cloud, 0.4), volume(cloud, 0.4)])
 assert near(mean(halves), mean(whole), 0.01), (mean(halves), mean(whole))
 assert cells("halves") <= 1.02 * cells("whole"), "one grid for both"
 
-# What is not to be seen changes no bit, and need not even be there.
+# A hidden volume changes no bit of the image, and its file need not exist.
 assert render("hidden", [volume(cloud, 0.8), volume("/nowhere.vdb", 1, **hidden)]) == whole
-# Whichever comes first, and the same through a further volume alone.
+# The order of the volumes does not matter, and a cloud as the second volume gives the same image.
 other = render("other", [volume(fire, 1, **hidden), volume(cloud, 0.8)])
 assert near(mean(other), mean(whole), 0.01), (mean(other), mean(whole))
 two = render("two", [volume(cloud, 0.8), volume(fire, 2, **moved)])
 again = render("again", [volume(fire, 2, **moved), volume(cloud, 0.8)])
 assert near(mean(again), mean(two), 0.01), (mean(again), mean(two))
 assert not near(mean(two), mean(whole), 0.01), "the second is to be seen"
-# Places of a further volume are as those of the first.
+# Instance transforms of a second volume have the same effect as those of the first.
 places = {"places": [{"translate": [-25, 0, 0]}, {"translate": [25, 0, 0]}]}
 first = render("first_places", [volume(cloud, 0.8, **places)])
 second = render("second_places", [volume(fire, 1, **hidden), volume(cloud, 0.8, **places)])
 assert near(mean(second), mean(first), 0.01), (mean(second), mean(first))
 
-# What is looked through is one of the scene's cameras, or another.
+# The camera is one of the scene's cameras, by name.
 cameras = [{"name": "front", "eye": [0, 20, 130], "target": [0, 15, 0]},
            {"name": "above", "eye": [0, 200, 1], "target": [0, 15, 0]}]
 assert render("front", [volume(cloud, 0.8)], camera="front", cameras=cameras) == whole

@@ -1,4 +1,4 @@
-"""What a trace file (--trace) has to be: JSON of Chrome's trace event format, whose spans lie in each other."""
+"""Checks a trace file (--trace): JSON of Chrome's trace event format with nested spans."""
 
 import collections
 import json
@@ -8,12 +8,12 @@ PASSES = ("cumulet: upload", "cumulet: trace", "cumulet: surfaces alone", "cumul
 
 
 def read(path):
-    """Its spans by thread, in the order in which they ended."""
+    """Returns the spans by thread, in the order of their ends."""
     file = json.loads(path.read_text())
     assert list(file) == ["traceEvents"], list(file)
     threads = collections.defaultdict(list)
     for event in file["traceEvents"]:
-        # A whole span, so that no end can lack its begin.
+        # Complete events only, so that every begin has an end.
         assert set(event) == {"name", "ph", "pid", "tid", "ts", "dur"} and event["ph"] == "X", event
         assert event["name"] and event["dur"] >= 0 and event["ts"] > 0, event
         threads[event["tid"]].append((event["ts"], event["ts"] + event["dur"], event["name"]))
@@ -22,7 +22,7 @@ def read(path):
 
 
 def assert_nested(spans):
-    """A thread does one thing at a time: a span ends before the next one begins, or holds it whole."""
+    """Spans of a thread are nested: a span ends before the next one begins, or contains it."""
     ends = [end for _, end, _ in spans]
     assert ends == sorted(ends), "not in the order in which they ended"
     open_until = []
@@ -34,7 +34,7 @@ def assert_nested(spans):
 
 
 def check(path, jobs, frames):
-    """At least so many frames, each with its passes, on one thread; these jobs on others."""
+    """Checks that one thread has at least so many frames with their passes, and that other threads have these jobs."""
     threads = read(path)
     for spans in threads.values():
         assert_nested(spans)

@@ -1,5 +1,5 @@
-// A host with a context of the compatibility profile, by cumulet.h alone: legacy state does not change pictures, and
-// what makes a call impossible is refused by its name. That all state comes back is scramble.cpp's.
+// A host with a compatibility profile context that uses only cumulet.h. Legacy state does not change images, and state
+// that prevents a call returns an error that names it. scramble.cpp tests that all state is restored.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace legacy = cumulet::test::legacy;
 
 constexpr int side = 24;
 
-/// A wall behind the volume, with a texture of stripes that gets mipmaps.
+/// A wall behind the volume with a striped texture that needs mipmaps.
 SurfacesRef make_wall() {
   using cumulet::test::json;
   constexpr std::uint32_t texels = 64;
@@ -59,7 +59,8 @@ SurfacesRef make_wall() {
   return cumulet::test::read_surfaces(model.glb());
 }
 
-/// What a host sees of a scene: frames of traced and of rasterized surfaces, with depth, and what is read back.
+/// A host's images of a scene: frames of path traced and of rasterized surfaces, with depth, and images that are read
+/// back.
 struct Pictures {
   std::vector<float> drawn, depths, linear, rasterized;
   bool operator==(const Pictures&) const = default;
@@ -79,7 +80,7 @@ ViewerPtr viewer_of(Context& context, cumulet_programs* programs, cumulet_gl_sta
   EXPECT_EQ(cumulet_set_display(viewer.get(), &display), CUMULET_OK);
   auto light = make_desc<cumulet_light_desc>();
   light.sun_elevation_degrees = 40.0F;
-  for (float& value : light.sun_irradiance) value = 40.0F;  // radiance beyond 1, which clamps would change
+  for (float& value : light.sun_irradiance) value = 40.0F;  // radiance above 1, which clamping would change
   for (float& value : light.sky_radiance) value = 0.5F;
   EXPECT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
   return viewer;
@@ -95,7 +96,8 @@ void render(cumulet_viewer* viewer, const HostTarget& target) {
   ASSERT_EQ(cumulet_render(viewer, &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer);
 }
 
-/// By a new viewer. before and after: around all calls of the viewer, but not around the host's own reading.
+/// Renders with a new viewer. before and after: called around each call of the viewer, but not around the host's own
+/// reads.
 Pictures pictures_of(Context& context, const GladGLContext& gl, const Scene& scene, cumulet_programs* programs,
                      const std::function<void()>& before, const std::function<void()>& after,
                      cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE) {
@@ -140,10 +142,10 @@ class Compatibility : public testing::Test {
     return pictures;
   }
 
-  /// With this set around all calls of the viewer.
+  /// Expects the same images with this state set around each call of the viewer.
   void expect_pictures(const Pictures& expected, const Case& one, cumulet_gl_state gl_state) {
     SCOPED_TRACE(one.name);
-    // The calls come within the host's glPushAttrib.
+    // The library is called inside the host's glPushAttrib.
     const Pictures is = pictures_of(
         context_, gl_, scene_, programs_.get(),
         [&] {
@@ -164,7 +166,7 @@ class Compatibility : public testing::Test {
     EXPECT_TRUE(is.rasterized == expected.rasterized);
   }
 
-  /// Each [GL] call is an error that says this, and leaves GL as it was.
+  /// Expects that each [GL] call returns an error with this text and leaves GL unchanged.
   void expect_refused(const std::string& text, const std::string& not_text = "no such text") {
     auto frame = target_.frame();
     auto pick = make_desc<cumulet_pick>();
@@ -335,7 +337,7 @@ TEST_F(Compatibility, AnOpenDisplayListIsRefusedByName) {
     expect_refused(std::string("display list ").append(std::to_string(list)).append(" is open"));
     legacy_.EndList();
     expect_healed();
-    // It has recorded nothing.
+    // The display list has recorded nothing.
     const GLuint program = gl_.CreateProgram();
     GLint before = -1;
     gl_.GetIntegerv(GL_VERTEX_ARRAY_BINDING, &before);
@@ -391,13 +393,13 @@ TEST_F(Compatibility, BetweenBeginAndEndIsRefusedByName) {
   EXPECT_EQ(cumulet_detach(viewer_.get()), CUMULET_ERROR_GL);
   EXPECT_NE(std::string(cumulet_last_error(viewer_.get())).find("between glBegin and glEnd"), std::string::npos);
   legacy_.End();
-  // GL keeps the error of each question between the two, and nobody may take it there.
+  // Between glBegin and glEnd, each query sets a GL error that cannot be read there.
   while (gl_.GetError() != GL_NO_ERROR) {
   }
   expect_healed();
 }
 
-// A host's callback need not know the window system.
+// A host's get_proc may not return functions of the window system.
 TEST_F(Compatibility, WithoutTheWindowSystemBothCausesAreNamed) {
   const ViewerPtr viewer =
       viewer_of(context_, nullptr, CUMULET_GL_STATE_RESTORE, [](void* user, const char* name) -> void* {

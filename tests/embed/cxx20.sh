@@ -1,10 +1,10 @@
 #!/bin/sh
-# cxx20.sh COMPILER INCLUDE...: cumulet.hpp compiles as C++20, and as anything older is one error that says so. MSVC has
-# its standard in a macro of its own.
+# cxx20.sh COMPILER INCLUDE...: cumulet.hpp compiles as C++20. With an older standard it causes a single error that says
+# so. MSVC has a macro of its own for the standard.
 set -eu
 compiler=$1
 shift
-# The first error, and how many there are.
+# Prints the compiler's error lines.
 errors() {
   printf '#include <cumulet/cumulet.hpp>\n' | LC_ALL=C "$compiler" "$@" -fsyntax-only -x c++ - 2>&1 | grep ': error: ' || true
 }

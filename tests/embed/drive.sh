@@ -1,9 +1,9 @@
 #!/bin/bash
-# Drives a windowed host as a user would, under Xvfb, and judges its pictures.
+# Drives a windowed host as a user would, under Xvfb, and checks its images.
 #     drive.sh HOST JUDGE VOLUME OUT_DIR NAME
-# HOST --volume VOLUME --test OUT_DIR writes OUT_DIR/NAME-N.ppm at each press of P once the picture has all its samples,
-# and ends at Escape. Pictures: 1 as it opens, 2 after a drag, 3 after a wheel turn, 4 in a larger window.
-# Rules for each picture come from standard input: lines "N RULE...", as the judge takes them.
+# HOST --volume VOLUME --test OUT_DIR writes OUT_DIR/NAME-N.ppm at each press of P once the image has all its samples,
+# and exits at Escape. Images: 1 after the start, 2 after a drag, 3 after a wheel turn, 4 in a larger window.
+# The rules for each image come from standard input: lines "N RULE...", in the format of cumulet-judge.
 set -euo pipefail
 if [ -z "${DRIVE_INSIDE:-}" ]; then
   export DRIVE_INSIDE=yes
@@ -33,10 +33,10 @@ xdotool windowmove "$window" 0 0 windowfocus --sync "$window"
 pictures=0
 picture() {
   pictures=$((pictures + 1))
-  local file=$out/$name-$pictures.ppm until=$((SECONDS + 300)) # beside other tests on few cores
+  local file=$out/$name-$pictures.ppm until=$((SECONDS + 300)) # allows for other tests that run on few cores
   xdotool key p
   while [ "$SECONDS" -lt "$until" ]; do
-    # Written whole, if its size stays.
+    # The file is complete when its size no longer changes.
     if [ -s "$file" ]; then
       local size
       size=$(stat -c %s "$file")
@@ -49,7 +49,7 @@ picture() {
   fail "$name wrote no picture $pictures"
 }
 
-# Where the pointer goes: a quarter into the window is inside every host's (first) view.
+# The pointer goes to a quarter of the window's width, which is inside the first view of every host.
 eval "$(xdotool getwindowgeometry --shell "$window")"
 x=$((WIDTH / 4)) y=$((HEIGHT / 2))
 xdotool mousemove $x $y

@@ -1,11 +1,11 @@
-// Judges a host's screenshot by simple measures, and writes it as PNG beside it, for eyes.
+// Checks a host's screenshot with simple measures, and writes a PNG beside it for visual inspection.
 //
 //     cumulet-judge PICTURE.ppm|.png RULE...
 //
-// A rule is AREA:MEASURE:LOW..HIGH. AREA: "all", or x0,y0,x1,y1 in parts of the picture from its top left. MEASURE: the
-// mean of r, g, b or luma (sRGB-encoded, 0 to 1), "spread" (standard deviation of luma), "edge" (mean difference of
-// luma between neighbours), or "differs=OTHER" (mean absolute difference from another picture of the same size).
-// Exit status: 0 all hold; 1 some do not, each told in a line.
+// A rule is AREA:MEASURE:LOW..HIGH. AREA: "all", or x0,y0,x1,y1 as fractions of the image from its top left. MEASURE:
+// the mean of r, g, b or luma (sRGB-encoded, 0 to 1), "spread" (standard deviation of luma), "edge" (mean difference of
+// luma between neighbors), or "differs=OTHER" (mean absolute difference from another image of the same size). Exit
+// status: 0 if all rules hold; 1 if some do not, with a line for each.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,7 +23,7 @@ namespace {
 
 using cumulet::image::Image;
 
-/// Of encoded values, whatever the file.
+/// Encoded values for both file types.
 Image read(const std::string& path) {
   Image image;
   if (path.ends_with(".png")) {

@@ -1,5 +1,6 @@
 // A host with its own depth: reversed-Z with an infinite far plane (glClipControl) and a multisampled framebuffer,
-// against the same scene with OpenGL's defaults. An opaque cube is half inside the cloud, one behind it, one beside it.
+// compared with the same scene with OpenGL's defaults. One opaque cube is half inside the cloud, one behind it, one
+// beside it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -115,7 +116,7 @@ class HostScene {
     gl_.DeleteTextures(1, &depth_);
   }
 
-  /// The scene with these cubes; with or without the cloud over it. Resolved, bottom row first.
+  /// The scene with these cubes, with or without the cloud over it. Resolved, bottom row first.
   Bytes draw(const std::vector<Cube>& cubes, bool cloud, bool write_depth = false) {
     draw_cubes(cubes);
     if (cloud) {
@@ -125,7 +126,7 @@ class HostScene {
       frame.width = frame.height = side;
       frame.depth_source = convention_.source;
       frame.depth_name = convention_.source == CUMULET_DEPTH_SOURCE_FRAMEBUFFER ? framebuffer_ : depth_;
-      // All samples first, for a cloud drawn twice would be twice as dense.
+      // Renders all samples first, because a cloud drawn twice would be twice as dense.
       frame.target = CUMULET_TARGET_NONE;
       frame.write_depth = write_depth ? 1 : 0;
       cumulet::test::converge(viewer_.get(), frame);
@@ -167,7 +168,7 @@ class HostScene {
     }
     EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
   }
-  /// Further drawing goes over what is there.
+  /// Later draws do not clear the target.
   void keep() { keep_ = true; }
 
   [[nodiscard]] Bytes resolved() const {
@@ -215,7 +216,7 @@ void write(const std::string& name, const Bytes& bytes) {
   cumulet::image::write_png(name, image, {.tone_mapping = cumulet::image::ToneMapping::none});
 }
 
-/// The pixels well inside the cube's front face.
+/// Pixels well inside the cube's front face.
 struct Square {
   int x0, y0, x1, y1;
 };
@@ -248,10 +249,10 @@ void expect_untouched(const Bytes& before, const Bytes& after, const Square& s) 
 const std::vector<Cube> cubes{half_inside, behind, beside};
 
 void check_scene(const Bytes& plain, const Bytes& bare_cloud, const Bytes& scene) {
-  // In front of the cloud, and beside it: what the host drew.
+  // In front of the cloud and beside it, the host's pixels are unchanged.
   expect_untouched(plain, scene, front_face(half_inside));
   expect_untouched(plain, scene, front_face(beside));
-  // Behind: hidden. The cube is pure red, the cloud is white.
+  // Behind the cloud, the cube is hidden. The cube is pure red, the cloud is white.
   const Square hidden = front_face(behind);
   const auto red = mean(plain, hidden);
   EXPECT_GT(red[0], 200.0);
@@ -272,7 +273,7 @@ Bytes check_convention(const Convention& convention, const std::string& name) {
   return scene;
 }
 
-/// Blocks of 8 x 8 pixels agree, but for those that an edge of a cube runs through.
+/// Blocks of 8 x 8 pixels agree, except where a cube's edge crosses them.
 void expect_same_but_edges(const Bytes& a, const Bytes& b, const Bytes& plain) {
   constexpr int block = 8;
   int compared = 0;
@@ -313,7 +314,7 @@ TEST(ReversedZ, DepthMayComeFromTheTargetFramebufferItself) {
   expect_same_but_edges(standard, multisampled, plain);
 }
 
-// The other way round: the viewer writes its depth, and what the host draws later is cut off by the cloud.
+// The reverse: the viewer writes depth, and later host geometry is hidden by the cloud.
 TEST(ReversedZ, HostGeometryDrawnAfterwardsIsHiddenByWrittenDepth) {
   for (const Convention& convention :
        {Convention{}, Convention{.reversed = true},

@@ -1,4 +1,4 @@
-// A host that sets every state to something unusual before every [GL] call of the ABI, and compares all of it after.
+// A host that sets all state to unusual values before each [GL] call of the API, and compares all of it afterwards.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ constexpr int side = 24;
 
 class Scramble : public GlTest {
  protected:
-  /// Scrambles, calls, and compares; an error of the host's own may be pending before.
+  /// Scrambles, calls and compares. A GL error of the host may be pending before.
   void expect_kept(ScramblingHost& host, std::uint32_t seed, const std::string& what,
                    const std::function<cumulet_status()>& call) {
     SCOPED_TRACE(what + ", seed " + std::to_string(seed));
@@ -70,7 +70,7 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
     }
   };
   render("nothing", target.frame());
-  // Every march and view: their uploads, their first frames, and frames that draw only.
+  // Each grid type and view mode: their uploads, their first frames, and frames that only draw.
   for (const cumulet_march march : {CUMULET_MARCH_TET, CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK}) {
     auto grid = make_desc<cumulet_grid_desc>();
     grid.march = march;
@@ -113,7 +113,7 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
   frame.width = 0;
   render("of no size", frame);
 
-  // The host's depth, in each way.
+  // The host's depth from each kind of source.
   frame = target.frame();
   frame.write_depth = 1;
   frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
@@ -157,8 +157,8 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
   gl_->DeleteTextures(1, &multisampled);
 }
 
-// With surfaces, in everything that a viewer can do with them: textures, blended ones, lamps and emitters; each light,
-// rays and raster, previews, the host's depth of each kind, targets, read-backs and AOVs.
+// With surfaces in all variants: textures, blended ones, lights and emitters; each lighting mode, path traced and
+// rasterized, previews, each kind of host depth, targets, read-backs and AOVs.
 TEST_P(Scramble, EveryCallWithSurfacesToo) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
@@ -181,7 +181,7 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
   gl_->CreateTextures(GL_TEXTURE_2D_MULTISAMPLE, 1, &multisampled);
   gl_->TextureStorage2DMultisample(multisampled, 4, GL_DEPTH_COMPONENT32F, side, side, GL_TRUE);
 
-  // Alone, before there is a volume; then with one.
+  // Surfaces without a volume; then with one.
   ASSERT_EQ(cumulet_set_surfaces(v, surfaces.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
   render("surfaces alone", target.frame());
@@ -248,7 +248,7 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
   gl_->DeleteTextures(1, &multisampled);
 }
 
-// With an environment and with a physical sky: their uploads, what previews draw of them, and taking them away.
+// With an environment and with a physical sky: their uploads, previews, and removal.
 TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
@@ -313,7 +313,7 @@ TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
   });
 }
 
-// A failing call is a call as well.
+// Failing calls preserve the state too.
 TEST_P(Scramble, FailuresLeaveTheStateToo) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
@@ -337,7 +337,7 @@ TEST_P(Scramble, FailuresLeaveTheStateToo) {
   fails(102, [&] { return cumulet_read_linear(viewer.get(), &one, 1); });
 }
 
-// What is drawn does not depend on the state either.
+// The drawn image does not depend on the state either.
 TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
@@ -360,7 +360,7 @@ TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
     target.clear({}, 1.0F);
     host.scramble(seed);
     draw();
-    // Read with everything as the host needs it.
+    // Sets the pack state that the host needs for reading.
     for (const GLenum name : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_PIXELS, GL_PACK_SKIP_ROWS, GL_PACK_SWAP_BYTES,
                               GL_PACK_LSB_FIRST, GL_PACK_IMAGE_HEIGHT, GL_PACK_SKIP_IMAGES})
       gl_->PixelStorei(name, 0);
@@ -374,7 +374,7 @@ TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
   }
 }
 
-// The host's errors from before are dropped, its debug callback and its filters stay.
+// Pending errors of the host are cleared. Its debug callback and filters stay.
 TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   const HostTarget target(*gl_, side, side);
   const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
@@ -386,7 +386,7 @@ TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   gl_->Enable(GL_DEBUG_OUTPUT);
   gl_->DebugMessageCallback(callback, &told);
   ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
-  gl_->Enable(GL_FLOAT);  // no capability
+  gl_->Enable(GL_FLOAT);  // not a capability
   converge(viewer.get(), target.frame());
   EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
   void* function = nullptr;
@@ -396,11 +396,11 @@ TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   const GLDEBUGPROC expected = callback;
   EXPECT_EQ(function, reinterpret_cast<void*>(expected));
   EXPECT_EQ(user, &told);
-  EXPECT_LE(told, 1);  // the host's own error; none of ours
+  EXPECT_LE(told, 1);  // the host's own error, none of the library's
   gl_->DebugMessageCallback(nullptr, nullptr);
 }
 
-/// A program whose vertices transform feedback captures.
+/// A program with a varying that transform feedback captures.
 GLuint make_capturing_program(const GladGLContext& gl) {
   const char* source = "#version 450\nout float captured;\nvoid main() { captured = 1.0; gl_Position = vec4(0); }\n";
   const GLuint shader = gl.CreateShader(GL_VERTEX_SHADER);
@@ -443,7 +443,7 @@ TEST_P(Scramble, QueriesAndPausedTransformFeedbackGoOn) {
   gl_->DrawArrays(GL_POINTS, 0, 3);
 
   gl_->PauseTransformFeedback();
-  const auto the_same = cumulet::test::make_ball(12);  // is uploaded and traced again
+  const auto the_same = cumulet::test::make_ball(12);  // uploaded and traced again
   EXPECT_TRUE(cumulet::test::picture_of(v, the_same.get(), target) == expected);
   EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
   GLint current = 0;

@@ -1,5 +1,6 @@
-// What saving and restoring the GL state costs a frame: CUMULET_GL_STATE_RESTORE against HOST_RESETS, frames that only
-// draw, interleaved; and how many questions to GL (glGet*, glIs*) a frame that draws and one that traces ask. By hand:
+// Measures the cost of saving and restoring GL state per frame: CUMULET_GL_STATE_RESTORE against HOST_RESETS in frames
+// that only draw, interleaved. Also counts the GL queries (glGet*, glIs*) of a frame that draws and one that traces.
+// Run by hand:
 //
 //     cumulet-state-cost [FRAMES]
 #include <algorithm>
@@ -34,7 +35,7 @@ void measure(int frames, int side) {
   const auto restoring = viewer(CUMULET_GL_STATE_RESTORE);
   const auto resetting = viewer(CUMULET_GL_STATE_HOST_RESETS);
   cumulet_frame_desc frame = target.frame();
-  frame.budget_ms = -1.0;  // draws what there is
+  frame.budget_ms = -1.0;  // draws the current image
   const auto once = [&](cumulet_viewer* v) {
     const auto begin = std::chrono::steady_clock::now();
     if (cumulet_render(v, &frame, nullptr) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(v));
@@ -44,7 +45,7 @@ void measure(int frames, int side) {
   };
   std::vector<double> with, without, difference;
   for (int i = 0; i < frames + 20; ++i) {
-    // Each comes first in turn.
+    // The two take turns in being first.
     const double first = once(i % 2 == 0 ? restoring.get() : resetting.get());
     const double second = once(i % 2 == 0 ? resetting.get() : restoring.get());
     if (i < 20) continue;

@@ -1,5 +1,5 @@
-// Hosts that ask too much: volumes and surfaces faster than they are built, frames without a context, calls from inside
-// callbacks.
+// Demanding hosts: volumes and surfaces that change faster than they are built, calls without a context, and calls from
+// inside callbacks.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -34,7 +34,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int side = 16;
 
-/// What a stream waits for at most: on any machine of ours many times what it takes.
+/// Timeout of a stream; much longer than needed on any test machine.
 constexpr auto patience = 60s;
 
 class Trial : public testing::Test {
@@ -51,7 +51,7 @@ class Trial : public testing::Test {
     frame.budget_ms = budget_ms;
     ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
   }
-  /// Wishes every few milliseconds until so many different answers were seen. Returns how many were.
+  /// Makes a request every few milliseconds until this number of different answers was seen. Returns the number.
   template <class Wish, class Answer>
   std::size_t stream(std::chrono::milliseconds pause, std::size_t enough, Wish&& wish, Answer&& answer) const {
     std::set<double> seen;
@@ -72,7 +72,7 @@ class Trial : public testing::Test {
   cumulet_viewer* v_ = viewer_.get();
 };
 
-/// To the voxel: takes many times as long as a wish comes after the other.
+/// A grid refined to the voxels: building takes many times the interval of requests.
 cumulet_grid_desc slow_grid() {
   auto grid = make_desc<cumulet_grid_desc>();
   grid.threshold = -1.0;
@@ -86,7 +86,7 @@ TEST_F(Trial, VolumesThatChangeFasterThanTheyBuildAreSeen) {
   ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
   std::vector<VolumeRef> volumes;
   for (int i = 0; i < 8; ++i) volumes.push_back(make_ball(32 + 2 * i));
-  // What is in GL tells which of them it is.
+  // The GL memory identifies the displayed volume.
   EXPECT_GE(stream(
                 10ms, 3,
                 [&](int i) {
@@ -95,7 +95,7 @@ TEST_F(Trial, VolumesThatChangeFasterThanTheyBuildAreSeen) {
                 },
                 [&] { return static_cast<double>(stats().cell_bytes); }),
             3U);
-  // The newest is what remains.
+  // The newest volume is displayed in the end.
   ASSERT_EQ(cumulet_set_volume(v_, volumes[1].get()), CUMULET_OK);
   converge(v_, target_.frame());
   const std::uint64_t last = stats().cell_bytes;
@@ -117,7 +117,7 @@ TEST_F(Trial, AThresholdThatChangesFasterThanItBuildsIsSeen) {
             3U);
 }
 
-// A grid that is built in one frame's time, and takes many to upload.
+// A grid that is built within one frame, but takes many frames to upload.
 TEST_F(Trial, VolumesThatChangeFasterThanTheyUploadAreSeen) {
   const cumulet_grid_desc grid = slow_grid();
   ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
@@ -136,7 +136,7 @@ TEST_F(Trial, VolumesThatChangeFasterThanTheyUploadAreSeen) {
   EXPECT_GT(stats().cell_bytes, 0U);
 }
 
-/// A cloth of n x n squares, as wide as a number says.
+/// A cloth of n x n squares with this width.
 SurfacesRef make_cloth(int n, float width) {
   std::vector<float> positions;
   std::vector<std::uint32_t> indices;
@@ -173,7 +173,7 @@ TEST_F(Trial, SurfacesThatChangeFasterThanTheyArePosedAreSeen) {
                 [&](int i) {
                   cumulet_surfaces* cloth = cloths[static_cast<std::size_t>(i) % cloths.size()].get();
                   ASSERT_EQ(cumulet_set_surfaces(v_, cloth), CUMULET_OK);
-                  // What was set last, though another may be shown yet.
+                  // The surfaces set last, even if others are still displayed.
                   cumulet_surfaces* out = nullptr;
                   ASSERT_EQ(cumulet_get_surfaces(v_, &out), CUMULET_OK);
                   EXPECT_EQ(out, cloth);
@@ -189,7 +189,7 @@ class NoContext : public Trial {
  protected:
   NoContext() { first_ = picture_of(v_, volume_.get(), target_); }
 
-  /// Every [GL] call, each time.
+  /// Each [GL] call fails, each time.
   void expect_refused() {
     auto frame = target_.frame();
     frame.target = CUMULET_TARGET_NONE;
@@ -263,7 +263,7 @@ TEST_F(NoContext, TheFirstFrameOfAllMayLackIt) {
 TEST_F(NoContext, AStrangersContextIsNone) {
   const EglContext stranger;
   stranger.make_current();
-  // Objects of the stranger's own, whose names are like the viewer's.
+  // Objects of the other context with the same names as the viewer's.
   std::vector<GLuint> textures(64), buffers(64);
   gl_.CreateTextures(GL_TEXTURE_2D, 64, textures.data());
   gl_.CreateBuffers(64, buffers.data());
@@ -272,7 +272,7 @@ TEST_F(NoContext, AStrangersContextIsNone) {
   for (const GLuint buffer : buffers) EXPECT_EQ(gl_.IsBuffer(buffer), GL_TRUE) << buffer;
   context_.make_current();
   expect_healed();
-  // Destroyed in the wrong place, it deletes nothing there.
+  // Destroying the viewer in the wrong context deletes nothing there.
   stranger.make_current();
   viewer_.reset();
   for (const GLuint texture : textures) EXPECT_EQ(gl_.IsTexture(texture), GL_TRUE) << texture;
@@ -283,7 +283,7 @@ TEST_F(NoContext, AStrangersContextIsNone) {
 
 // ---- callbacks ----
 
-/// Calls every function of the ABI from inside a callback, and keeps what they answered.
+/// Calls every function of the API from inside a callback and keeps the results.
 struct Caller {
   cumulet_viewer* viewer = nullptr;
   cumulet_viewer* other = nullptr;
@@ -384,7 +384,7 @@ void Caller::call_all() {
   std::array<float, 3> rgb{};
   const auto object_name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
 
-  // The exceptions.
+  // The functions that are allowed.
   for (cumulet_viewer* v : {viewer, other}) {
     answer("cumulet_get_progress", cumulet_get_progress(v, &progress), CUMULET_OK);
     cumulet_cancel(v);
@@ -414,7 +414,7 @@ void Caller::call_all() {
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
   if (cumulet_cryptomatte_id("hello") != 0x248bfa47U) wrong.push_back("id");
   if (cumulet_transmittance_map_glsl() == nullptr) wrong.push_back("glsl");
-  // Refused without a status.
+  // Rejected, but these have no status.
   cumulet_destroy(viewer);
   cumulet_destroy(other);
   if (std::string(cumulet_last_error(viewer)).empty()) wrong.push_back("cumulet_last_error");
@@ -552,7 +552,7 @@ void Caller::call_all() {
   }
 }
 
-/// Runs it on a thread of its own, and ends the program if it never comes back.
+/// Runs the call on another thread, and ends the program if it never returns.
 void expect_returns(const std::string& what, const std::function<void()>& call) {
   auto done = std::async(std::launch::async, call);
   if (done.wait_for(patience) == std::future_status::ready) return;
@@ -577,7 +577,7 @@ TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
   caller.volume = volume.get();
   caller.surfaces = surfaces.get();
 
-  // Updates are told once a frame: each trigger has a viewer of its own that has told none yet.
+  // Updates are notified once per frame, so each trigger has a new viewer without a pending notification.
   int rounds = 0;
   const auto trigger = [&](const std::string& what, const std::function<void()>& call) {
     caller.armed = true;
@@ -590,8 +590,7 @@ TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
     ViewerPtr made = make_viewer({.log = Caller::on_log, .log_user = &caller, .samples = 1});
     return made;
   };
-  // By a camera's change, on the thread that makes it. (make_viewer has told an update; a frame makes way for the
-  // next.)
+  // A camera change notifies on the calling thread. (make_viewer has notified an update; a frame re-enables the next.)
   const EglContext context;
   expect_returns("a frame", [&] {
     context.make_current();
@@ -602,7 +601,7 @@ TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
     context.release();
   });
   trigger("camera", [&] { EXPECT_EQ(cumulet_camera_orbit(camera.get(), 0.2, 0.1), CUMULET_OK); });
-  // By a setting, and by a job that ends on the worker.
+  // A setting notifies, and a job that ends on the worker thread.
   const auto make_way = [&] {
     context.make_current();
     auto frame = make_desc<cumulet_frame_desc>();
@@ -619,7 +618,7 @@ TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
     EXPECT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
     EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
   });
-  // A log line comes from the worker, too: the grid is ended by max_cells.
+  // Log lines come from the worker thread too: the grid is limited by max_cells.
   const ViewerPtr logging = fresh();
   caller.viewer = logging.get();
   trigger("log", [&] {
@@ -631,7 +630,7 @@ TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
   });
   EXPECT_EQ(caller.wrong, std::vector<std::string>{});
 
-  // None was forgotten.
+  // No function of the header was forgotten.
   std::ifstream file(CUMULET_HEADER);
   std::stringstream header;
   header << file.rdbuf();
@@ -642,7 +641,7 @@ TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
   EXPECT_GT(all.size(), 50U);
   EXPECT_EQ(caller.names, all);
 
-  // Outside, all is as before.
+  // Outside of callbacks, everything works as before.
   EXPECT_EQ(cumulet_camera_orbit(camera.get(), 0.1, 0.0), CUMULET_OK);
   expect_returns("detach", [&] {
     context.make_current();

@@ -1,5 +1,5 @@
-// Viewers side by side: in two threads, two contexts, one context, and share groups. What they draw must be, bit for
-// bit, what a viewer alone draws.
+// Several viewers: in two threads, two contexts, one context, and share groups. Their images must be bit-identical to
+// those of a single viewer.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ constexpr int side = 48;
 ViewerPtr viewer_here() { return make_viewer({.get_proc = EglContext::get_proc}); }
 GladGLContext gl_here() { return cumulet::test::load_gl(EglContext::get_proc, nullptr); }
 
-/// All of a viewer's life on this thread, in a context of its own.
+/// Creates, uses and destroys a viewer on this thread, in a context of its own.
 Picture alone(cumulet_volume* volume) {
   const EglContext context;
   context.make_current();
@@ -39,7 +39,7 @@ Picture alone(cumulet_volume* volume) {
 class Together : public testing::Test {
  protected:
   void SetUp() override {
-    // A black picture would equal anything that fails to draw.
+    // A black image would equal any image that fails to draw.
     ASSERT_GT(std::ranges::max(lone_), 100);
     ASSERT_NE(lone_, lone_other_);
   }
@@ -114,7 +114,7 @@ TEST_F(Together, MadeOnOneThreadRenderedOnAnother) {
   viewer.reset();
 }
 
-// What a viewer makes for one context only (framebuffers, vertex arrays) must not outlive a call.
+// Objects that are not shared between contexts (framebuffers, vertex arrays) must not outlive a call.
 TEST_F(Together, AttachedInOneContextRenderedInAnotherThatShares) {
   const EglContext a;
   const EglContext b(&a);
@@ -125,13 +125,13 @@ TEST_F(Together, AttachedInOneContextRenderedInAnotherThatShares) {
     const HostTarget target(gl, side, side);
     EXPECT_EQ(picture_of(viewer.get(), volume_.get(), target), lone_);
   }
-  gl.Finish();  // what a did is b's to see
+  gl.Finish();  // makes changes in a visible in b
   b.make_current();
   {
     const HostTarget target(gl, side, side);
     converge(viewer.get(), target.frame());
     EXPECT_EQ(target.pixels(), lone_);
-    // And anew, so that everything is used in b.
+    // Renders again, so that everything is used in b.
     EXPECT_EQ(picture_of(viewer.get(), other_.get(), target), lone_other_);
   }
   gl.Finish();

@@ -1,4 +1,4 @@
-"""A script that ends while its viewer works: ctypes_host.py LIBRARY WORK MILLISECONDS FOLDER"""
+"""A script that exits while its viewer works: ctypes_host.py LIBRARY WORK MILLISECONDS FOLDER"""
 
 import ctypes
 import sys
@@ -25,7 +25,7 @@ def main():
             library.cumulet_load_surfaces(viewer, model)
         else:
             library.cumulet_load_volume(viewer, volume, None)
-        # At the end there is work under way, and the script forgets the viewer.
+        # At the end, work is in progress, and the script does not destroy the viewer.
         if time.monotonic() >= end:
             break
         library.cumulet_wait(viewer, ctypes.c_double(5.0))

@@ -1,6 +1,6 @@
-"""Ends processes while viewers work, at random moments: exits.py HOST LOADING_HOST LIBRARY VOLUME FOLDER
+"""Ends processes while viewers work, at random times: exits.py HOST LOADING_HOST LIBRARY VOLUME FOLDER
 
-Each must end with the status that its host chose, in time, and without a word on standard error.
+Each must exit in time with the status that its host chose, without output on standard error.
 """
 
 import base64
@@ -23,7 +23,7 @@ WAYS = ["exit", "return", "thread", "callback", "static", "fork", "unload"]
 
 
 def write_model(path, side=64):
-    """A sheet of 2 x side x side triangles that turns."""
+    """Writes an animated model: a rotating sheet of 2 x side x side triangles."""
     points = [(x / side, 0.1 * math.sin(9 * x / side), z / side) for z in range(side + 1) for x in range(side + 1)]
     indices = []
     for z in range(side):
@@ -81,10 +81,10 @@ def write_files():
 
 
 def commands(moments):
-    """Each kind of work, left in each way; then scripts, and frames."""
+    """Tests each kind of work with each way to exit; then scripts, and frames."""
 
     def moment():
-        # Half of them among the first jobs, which create the statics of other libraries.
+        # Half of the times fall into the first jobs, which create the statics of other libraries.
         return str(moments.choice([moments.randrange(0, 12), moments.randrange(0, 120)]))
 
     for work in WORK:

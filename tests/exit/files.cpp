@@ -1,4 +1,4 @@
-// Writes the volume that exits.py has its hosts read: files.cpp OUT.vdb
+// Writes the volume that the hosts of exits.py read: files.cpp OUT.vdb
 #include <openvdb/openvdb.h>
 
 #include <cmath>

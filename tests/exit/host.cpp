@@ -1,12 +1,12 @@
-// A host that leaves while its viewer works.
+// A host that exits while its viewer works.
 //
 //   host WORK WAY MILLISECONDS FOLDER
 //
-// WORK: load, build, pose, sequence, live or frames, begun again and again. WAY: how the process ends after so many
-// milliseconds: exit, return, thread (a second thread calls exit), callback (the trace callback calls exit), static
-// (a static object destroys the viewer), fork (a child leaves, and returns). Compiled with CUMULET_EXIT_LOADS the host
-// loads the library, and WAY may be unload (dlclose, then return). FOLDER has the files of exits.py.
-// The exit status is 7 if all went well.
+// WORK: load, build, pose, sequence, live or frames, restarted continuously. WAY: how the process ends after this time:
+// exit, return, thread (a second thread calls exit), callback (the trace callback calls exit), static (a static object
+// destroys the viewer), fork (a child exits, and the parent returns). Compiled with CUMULET_EXIT_LOADS, the host loads
+// the library, and WAY may be unload (dlclose, then return). FOLDER has the files of exits.py. The exit status is 7 on
+// success.
 #include <dlfcn.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -37,7 +37,7 @@ using std::chrono::milliseconds;
 constexpr int left_well = 7;
 constexpr int failed = 1;
 
-// The functions of the library: its own, or those of the file that was loaded.
+// The functions of the library: linked, or those of the loaded file.
 struct Library {
 #define CUMULET_FUNCTIONS(each)                                                                                 \
   each(cumulet_create) each(cumulet_destroy) each(cumulet_last_error) each(cumulet_wait) each(cumulet_set_grid) \
@@ -72,7 +72,7 @@ Desc make_desc() {
   return desc;
 }
 
-// What a host keeps in a static object that is created by its first use, on whichever thread that is.
+// A static object of the host that is created by its first use, on any thread.
 class Journal {
  public:
   Journal() = default;
@@ -103,13 +103,13 @@ void log(void* /*user*/, cumulet_log_level /*level*/, const char* /*message*/) {
 
 void update(void* /*user*/) { journal().note(); }
 
-// When a job ends, on its thread; in a frame, within the call.
+// Called when a job ends, on its thread; in a frame, inside the call.
 void trace(void* /*user*/, const char* /*name*/, double /*begin*/, double /*end*/) {
   journal().note();
   if (leave_in_callback.exchange(false)) std::exit(left_well);
 }
 
-// A viewer that is made to work.
+// A viewer with continuous work.
 class Host {
  public:
   Host(std::string work, std::string folder) : work_(std::move(work)), folder_(std::move(folder)) {
@@ -129,7 +129,7 @@ class Host {
     begin();
   }
 
-  // Does something that makes workers work.
+  // Starts work for the worker threads.
   void step() {
     ++steps_;
     if (work_ == "load") {
@@ -239,8 +239,8 @@ class Host {
 #endif
 };
 
-// Destroys the viewer while the process exits, after the library's threads have ended. A forked child goes no further:
-// log4cplus, which Debian's OpenVDB links, waits for threads of its own that the child does not have either.
+// Destroys the viewer during the exit, after the library's threads have ended. A forked child ends here: log4cplus,
+// which Debian's OpenVDB links, waits for threads that the child does not have.
 struct Owner {
   Owner() = default;
   Owner(const Owner&) = delete;
@@ -259,11 +259,11 @@ int unload(Host& host) {
     std::fputs("the library was not unloaded\n", stderr);
     return failed;
   }
-  std::this_thread::sleep_for(milliseconds(20));  // a thread that was left behind would run into nothing
+  std::this_thread::sleep_for(milliseconds(20));  // a thread that was still running would crash
   return left_well;
 }
 
-// Works on until the child has ended; it must not wait for threads that it does not have.
+// Continues working until the child has ended. The child must not wait for threads that it does not have.
 int wait_for_child(Host& host, pid_t child) {
   const auto until = Clock::now() + std::chrono::seconds(20);
   int status = 0;
@@ -284,7 +284,7 @@ int main(int argc, char** argv) {
   if (argc != 5) return 2;
   const std::string way = argv[2];
   static Owner owner;
-  auto* const host = new Host(argv[1], argv[4]);  // a host that forgets its viewer
+  auto* const host = new Host(argv[1], argv[4]);  // a host that never destroys its viewer
   const auto moment = Clock::now() + milliseconds(std::atoi(argv[3]));
   if (way == "static") owner.host = host;
   if (way == "thread") {

@@ -1,4 +1,4 @@
-"""What the farm's tests share: a small sequence, what its frames must be, and cumulet-farm."""
+"""Shared code of the farm's tests: a small sequence, its expected frames, and calls of cumulet-farm."""
 
 import os
 import pathlib
@@ -13,7 +13,8 @@ def empty(folder):
 
 
 def files(folder):
-    """Name and bytes of all pictures that are whole, or claim to be; of a job's parts, wherever they are in it."""
+    """Returns name and content of all images that are complete or have a final name. For a job's parts, it searches all
+    folders of the job."""
     paths = folder.rglob("*.exr") if folder.name == "parts" else folder.glob("*.exr")
     return {path.name: path.read_bytes() for path in sorted(paths)}
 
@@ -35,13 +36,13 @@ class Farm:
         return [str(self.volumes / "explosion_####.vdb"), *self.look]
 
     def whole(self, folder, frames, samples):
-        """By one process."""
+        """Renders the frames with one process."""
         subprocess.run([self.render, *self.arguments(), "--frames", frames, "--spp", str(samples), "-o",
                         empty(folder) / "p.####.exr"], check=True, timeout=900, capture_output=True)
         return files(folder)
 
     def merged(self, folder, frames, ranges):
-        """By one process a part, one after the other, and cumulet-merge."""
+        """Renders each part with its own process, one after the other, and merges them with cumulet-merge."""
         parts = empty(folder / "parts")
         for k, (first, count) in enumerate(ranges):
             subprocess.run([self.render, *self.arguments(), "--frames", frames, "--spp", str(count), "--first-sample",
@@ -61,7 +62,7 @@ class Farm:
                               timeout=1200, env=self.environment)
 
     def equal_but_for_rounding(self, a, b):
-        """The programs' own comparison, at what sums in another order differ by."""
+        """Compares with cumulet-compare, within the error of a different order of summation."""
         done = subprocess.run([self.programs / "cumulet-compare", a, b, "--tolerance", "1e-5", "--bias", "1e-6"],
                               capture_output=True, text=True, timeout=60)
         assert done.returncode == 0, done.stdout

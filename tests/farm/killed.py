@@ -1,5 +1,5 @@
-"""kill -9 at random moments of a farm: of cumulet-farm, or of what it runs. No frame is lost, none is torn, none is
-another, and nothing goes on unseen.
+"""Kills a farm with kill -9 at random times: cumulet-farm, or a program that it runs. No frame is lost, truncated or
+different, and no process survives.
 
 Usage: killed.py PROGRAMS_FOLDER OUT_FOLDER RUNS
 """
@@ -23,7 +23,7 @@ OPTIONS = ["--frames", FRAMES, "--samples", "11", "--parts", "2", "--processes",
 
 
 def check(made, wanted, parts):
-    """All that claims to be there is whole."""
+    """Checks that all files with final names are complete."""
     for name, content in files(made).items():
         assert content == wanted[name], f"{name} is torn"
     for name, content in files(made / "p.farm" / "parts").items():
@@ -61,7 +61,7 @@ def main():
             process.kill()
             hit["farm"] += 1
         if process.poll() is None and hit["farm"] + hit["task"] > 0 and dice.random() < 0.5:
-            process.kill()  # and soon after all of it
+            process.kill()  # and all other processes soon after
         text, _ = process.communicate(timeout=300)
         assert process.returncode in (0, -signal.SIGKILL), (process.returncode, text)
         end = time.monotonic() + 60

@@ -1,4 +1,4 @@
-"""cumulet-farm on this machine: what it describes, runs, keeps, tries again and refuses.
+"""cumulet-farm on this machine: job descriptions, runs, kept files, retries and refused arguments.
 
 Usage: local.py PROGRAMS_FOLDER OUT_FOLDER
 """
@@ -26,7 +26,8 @@ def lines(text):
 
 
 def parts(farm, out):
-    """Parts are merged into what cumulet-merge makes of the same parts, and one process but for rounding; then all is kept."""
+    """The merged parts equal cumulet-merge's result of the same parts and, except for rounding, the image of one
+    process. A second run keeps all."""
     whole = farm.whole(out / "whole", "12,14", 7)
     wanted = farm.merged(out / "wanted", "12,14", [(0, 2), (2, 2), (4, 3)])
     made = empty(out / "parts")
@@ -37,7 +38,8 @@ def parts(farm, out):
     for name in whole:
         farm.equal_but_for_rounding(made / name, out / "whole" / name)
     assert not files(made / "p.farm" / "parts") and not unfinished(made)
-    # Nothing twice: not the parts of frames that are there, either. One that is gone is made again, of its parts alone.
+    # Nothing runs twice, not even the parts of existing frames. A deleted frame is made again, but only from its own
+    # parts.
     done = farm.do("run", made, *options)
     assert done.returncode == 0 and set(lines(done.stdout).values()) == {"kept"}, done
     (made / "p.0014.exr").unlink()
@@ -46,7 +48,7 @@ def parts(farm, out):
     assert done.returncode == 0 and {name for name, state in states.items() if state == "done"} == {
         "part0.1", "part1.1", "part2.1", "merge.1"}, done
     assert files(made) == wanted
-    # More frames of the same are welcome, other samples are not, or all is begun anew.
+    # Adding frames to a job is allowed. Other sample counts are refused, unless --overwrite restarts the job.
     done = farm.do("describe", made, *[{"12,14": "12,14,16"}.get(word, word) for word in options])
     assert done.returncode == 0 and "12 tasks" in done.stdout, done
     other = [{"7": "9"}.get(word, word) for word in options]
@@ -59,8 +61,8 @@ def parts(farm, out):
 
 
 def described(farm, out):
-    """By the description alone, and what docs/farm.md says of it, another queue makes the same: here one that knows no
-    more than argument lists, what they depend on, and which files they make."""
+    """Another queue can make the same images from the job description and docs/farm.md only. This one uses just the
+    argument lists, their dependencies and their output files."""
     wanted = farm.merged(out / "wanted", "12,14", [(0, 2), (2, 2), (4, 3)])
     made = empty(out / "described")
     done = farm.do("describe", made, "--frames", "12,14", "--samples", "7", "--parts", "3", "--cpus", "2", "--memory", "900",
@@ -80,7 +82,7 @@ def described(farm, out):
         for name in task["outputs"]:
             assert os.path.getsize(os.path.join(job["folder"], name)) > 0
         done_tasks.add(task["id"])
-    assert list((made / "p.farm" / "shaders").iterdir())  # later starts are shorter
+    assert list((made / "p.farm" / "shaders").iterdir())  # shortens later starts
     volumes = {os.path.basename(name) for task in job["tasks"] if task["layer"] == "part0" for name in task["inputs"]}
     assert volumes == {"explosion_0012.vdb", "explosion_0014.vdb"}, volumes
     assert files(made) == wanted
@@ -88,7 +90,7 @@ def described(farm, out):
 
 
 def scene_files(farm, out):
-    """One picture, without numbers, of a scene file; what that names is told."""
+    """A single image, without a frame number, of a scene file. The job lists the files that the scene names."""
     folder = empty(out / "scene")
     scene = folder / "one.json"
     scene.write_text(json.dumps({"cumulet_scene": 1, "volume": {"file": "../volumes/explosion_0012.vdb"}}))
@@ -105,7 +107,8 @@ def scene_files(farm, out):
 
 
 def failing(farm, out):
-    """What fails is tried as often as asked, told, and keeps no other frame; what depends on it is not begun."""
+    """A failing task is tried as often as requested and reported, and does not stop other frames. Tasks that depend on
+    it do not start."""
     made = empty(out / "failing")
     options = ["--frames", "98,12", "--samples", "4", "--parts", "2", "--attempts", "2", "--wait", "0"]
     done = farm.do("run", made, *options)
@@ -118,7 +121,7 @@ def failing(farm, out):
     assert log.count(" begins") == 2 and "explosion_0098.vdb" in log, log
     status = farm.do("status", made, arguments=False)
     assert status.returncode == 1 and "merge: 1 of 2 done; not frames 98" in status.stdout, status
-    # A wrong command is wrong each time.
+    # A wrong command is not tried again, because it would always fail.
     wrong = empty(out / "wrong")
     farm.look = [*farm.look, "--no-such-flag"]
     done = farm.do("run", wrong, "--frames", "12", "--wait", "0")
@@ -127,7 +130,7 @@ def failing(farm, out):
 
 
 def stopped(farm, out):
-    """SIGTERM: what samples have come to is kept, nothing goes on unseen, and the same command goes on from there."""
+    """After SIGTERM, the finished samples are kept, no process survives, and the same command continues from there."""
     wanted = farm.whole(out / "stopped_wanted", "12", 2000)
     made = empty(out / "stopped")
     command = farm.command("run", made, "--frames", "12", "--samples", "2000", "--checkpoint-every", "0.1")
@@ -155,12 +158,12 @@ def stopped(farm, out):
 
 
 def apart(farm, out):
-    """Pictures of other names, settled things of other volumes, and what a queue still has."""
+    """Images with other names, kept settings of other volumes, and jobs that are still in a queue."""
     made = empty(out / "apart")
     folder = made / "p.farm"
     done = farm.do("run", made, "--frames", "12", "--samples", "2")
     assert done.returncode == 0 and (folder / "settled").exists(), done
-    # The same names, otherwise written, and others that want the same folder.
+    # The same names in another notation are accepted; other names in the same folder are refused.
     command = [str(farm.programs / "cumulet-farm"), "describe", "--samples", "2", "--frames"]
     for name, frame, status in (("p.%04d.exr", "14", 0), ("p.####.png", "12", 1), ("p_####.exr", "12", 1)):
         done = subprocess.run([*command, frame, "-o", str(made / name), "--", *farm.arguments()], capture_output=True, text=True,
@@ -168,7 +171,7 @@ def apart(farm, out):
         assert done.returncode == status and done.stderr.count("\n") == status, done
         assert status == 0 or f"makes {made / 'p.%04d.exr'}" in done.stderr, done
     assert "p.%04d.exr" in (folder / "job.json").read_text()
-    # Slurm's answer decides, and no answer is none.
+    # Slurm's answer decides. If Slurm cannot be reached, the job may still be running.
     tools = empty(out / "tools")
     environment = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}"}
     def answered(script, *more):
@@ -187,7 +190,7 @@ def apart(farm, out):
     done = answered("exit 0", "--overwrite")
     assert done.returncode == 0 and not (made / "p.0012.exr").exists(), done
     assert not (folder / "settled").exists() and not (folder / "slurm.json").exists() and (folder / "shaders").exists()
-    # One's own files, as one word or two.
+    # The user's own files for the flags, as one word or two.
     for words in ([f"--settled={made / 'mine'}", f"--shader-cache={made / 'own'}"],
                   ["--settled", str(made / "mine"), "--shader-cache", str(made / "own")]):
         done = subprocess.run([*farm.command("describe", made, "--frames", "12", "--overwrite"), *words],
@@ -197,7 +200,7 @@ def apart(farm, out):
 
 
 def sent_again(farm, out):
-    """A preempted task goes on, however few its attempts are; for ever it does not."""
+    """A preempted task continues even if its attempts are few, but at most 100 times."""
     made = empty(out / "sent_again")
     assert farm.do("describe", made, "--frames", "12", "--samples", "2", "--attempts", "2").returncode == 0
     command = farm.command("work", made, "--task", "render.0", arguments=False)
@@ -208,7 +211,8 @@ def sent_again(farm, out):
 
 
 def slurm_flags(farm, out):
-    """What sbatch is given, by one that writes it down: a folder's % is no pattern of Slurm's."""
+    """Checks the arguments of sbatch with a script that records them. A % in a folder's name is escaped, because it is
+    a pattern for Slurm."""
     made = empty(out / "50% %A")
     tools = empty(out / "tools")
     for name, script in (("scontrol", "echo 'MaxArraySize = 1001'"),
@@ -223,7 +227,7 @@ def slurm_flags(farm, out):
 
 
 def refused(farm, out):
-    """Before anything is made, in a line."""
+    """Wrong arguments are refused with one line before any file is written."""
     made = out / "refused"
     wrong = (["--frames", "9-1"], ["--frames", "a"], ["--frames", "1-4", "--parts", "2"], ["--parts", "0"],
              ["--frames", "1", "--samples", "1", "--parts", "2"], ["--nothing"], ["--frames", "1", "--samples", "x"], [])
@@ -240,7 +244,7 @@ def refused(farm, out):
         done = subprocess.run([program, *words], capture_output=True, text=True, timeout=60, cwd=out)
         assert done.returncode == 2 and done.stderr.count("\n") == 1 and done.stdout == "", (words, done)
     assert not made.exists() and not list(out.glob("*.farm"))
-    # Descriptions of others.
+    # Job descriptions that are invalid.
     folder = empty(out / "bad.farm")
     good = {"format": "cumulet-farm", "version": 1, "name": "x", "folder": str(out), "layers": ["a"],
             "retry": {"attempts": 1, "wait_seconds": 0, "permanent_statuses": []}, "resources": {}, "tasks": []}
@@ -253,7 +257,7 @@ def refused(farm, out):
         (folder / "job.json").write_text(text)
         done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
         assert done.returncode == 1 and done.stderr.count("\n") == 1 and "bad.farm/job.json" in done.stderr, (text, done)
-    # Commands that end well and make nothing, or a file of no bytes, have not made it.
+    # Commands that succeed without writing their output, or that write an empty file, fail.
     for command in (["true"], ["touch", "x"]):
         (folder / "job.json").write_text(json.dumps({**good, "tasks": [{**task, "commands": [command]}]}))
         done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
@@ -261,7 +265,7 @@ def refused(farm, out):
 
 
 def negative(farm, out):
-    """Frames before 0 are tasks like others, whichever way their files' numbers are padded."""
+    """Negative frame numbers are tasks like others, with either way of padding."""
     for style, name in (("c", "{:04d}".format), ("b", lambda n: f"-{-n:04d}" if n < 0 else f"{n:04d}")):
         there = empty(out / f"negative_{style}")
         for n in range(-2, 2):

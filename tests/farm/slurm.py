@@ -20,7 +20,7 @@ PARTS = [(0, 300), (300, 300)]
 
 
 def renders(slurm, node):
-    """Processes of cumulet-render that run there."""
+    """Returns the processes of cumulet-render that run on this node."""
     found = []
     for step in slurm.steps(node):
         found += [p for p in slurm_machine.tree_of(step) if slurm_machine.command_of(p)[0].endswith(b"cumulet-render")]
@@ -28,7 +28,7 @@ def renders(slurm, node):
 
 
 def drained(slurm):
-    """Whether the queue is empty. What is sent again need not wait its two minutes."""
+    """Returns whether the queue is empty. Starts requeued jobs without their delay of two minutes."""
     rows = [line.split("|") for line in slurm.ask("squeue", "-h", "-r", "-o", "%i|%T|%r").stdout.splitlines()]
     for job, state, reason in rows:
         if state == "PENDING" and reason == "BeginTime":
@@ -37,7 +37,7 @@ def drained(slurm):
 
 
 def at_work(slurm, node):
-    """A process of cumulet-render there, of which a checkpoint is kept."""
+    """Returns a process of cumulet-render on this node that has written a checkpoint."""
     for process in renders(slurm, node):
         words = slurm_machine.command_of(process)
         frame = words[words.index(b"--frames") + 1].decode().zfill(4)
@@ -61,7 +61,7 @@ def wait_for_work(slurm, node):
 
 
 def killed(farm, slurm, out):
-    """A process, then a node with all that runs there: nothing is lost, nothing is made twice, the frames are the same."""
+    """Kills a process, then a node with its processes. No part is lost or made twice, and the frames are the same."""
     whole = farm.whole(out / "whole", "12-15", SAMPLES)
     wanted = farm.merged(out / "wanted", "12-15", PARTS)
     assert len(wanted) == 4 and len(set(wanted.values())) == 4
@@ -84,7 +84,7 @@ def killed(farm, slurm, out):
     assert files(made) == wanted, text
     for name in wanted:
         farm.equal_but_for_rounding(made / name, out / "whole" / name)
-    # Each part once: two began anew, and went on from where they were.
+    # Each part ran once. Two were restarted and continued from their checkpoints.
     assert len(logs) == 12, sorted(logs)
     rendered = re.findall(r"^frame (\d+) \(1 of 1\) (\w+) (\S+)", text, re.MULTILINE)
     assert len(rendered) == 8 and all(state == "done" for _, state, _ in rendered), rendered
@@ -92,7 +92,7 @@ def killed(farm, slurm, out):
     assert len(re.findall(r"^task \S+ done", text, re.MULTILINE)) == 12, text
     assert len(re.findall(r"^task \S+ begins", text, re.MULTILINE)) == 14, text
     assert text.count("killed by SIGKILL") == 1 and text.count("goes on from") == 2, text
-    # What was made for frames alone is gone with what killed processes left.
+    # The parts' files and the files of killed processes are deleted.
     assert not unfinished(made) and not files(made / "p.farm" / "parts") and not list(made.rglob("*.ck"))
     assert farm.do("status", made, arguments=False).returncode == 0
     last = farm.do("submit", made, *options)
@@ -100,7 +100,8 @@ def killed(farm, slurm, out):
 
 
 def failed(farm, slurm, out):
-    """A frame whose volume is missing: it is tried again, told, and does not keep others. Mended, it alone is made."""
+    """A frame whose volume is missing is tried again and reported, and does not stop others. After the repair, only
+    that frame is made."""
     made = empty(out / "failed")
     options = ["--frames", "11,99", "--samples", "4", "--parts", "2", "--attempts", "2", "--wait", "0"]
     slurm.wait("node0 is back", lambda: slurm.states()["node0"] == "idle")
@@ -125,7 +126,7 @@ def failed(farm, slurm, out):
 
 
 def split(farm, slurm, out):
-    """More frames than an array holds, several of a task, one part: and a wrong command, which is not tried again."""
+    """More frames than an array can hold, several frames per task, one part. A wrong command is not tried again."""
     made = empty(out / "split")
     done = farm.do("submit", made, "--frames", "3-19x2", "--samples", "2", "--frames-per-task", "2", "--limit", "1",
                    "--sbatch=--nice=5")
@@ -149,7 +150,7 @@ def main():
         sys.exit(77)
     empty(out)
     farm = Farm(programs, out, ["--size", "64x48"])
-    # A short name: sockets' must be.
+    # A short name, because the paths of sockets have a length limit.
     with tempfile.TemporaryDirectory(prefix="slurm-", ignore_cleanup_errors=True) as folder:
         with slurm_machine.SlurmMachine(folder, nodes=2, max_array=4, node_timeout=20) as slurm:
             farm.environment = slurm.environment

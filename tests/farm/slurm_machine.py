@@ -1,6 +1,5 @@
-"""A Slurm of this one machine, for a test: munged, slurmctld and several slurmd, each a node, in a folder of their own, by
-their own configuration and ports; no service of the system is asked or changed. No accounting, no cgroups.
-"""
+"""Starts a Slurm on this machine for a test: munged, slurmctld and several slurmd, one per node. They use a folder,
+configuration and ports of their own. No service of the system is used or changed. No accounting, no cgroups."""
 
 import contextlib
 import ctypes
@@ -57,7 +56,7 @@ PartitionName=farm Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 
 
 def free_ports(count):
-    """Ports that nobody has now."""
+    """Returns ports that are free now."""
     with contextlib.ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
         for each in sockets:
@@ -74,7 +73,7 @@ def find(name):
 
 
 def tree_of(root):
-    """Processes below that one, and itself, the deepest last."""
+    """Returns the process and all its descendants, the deepest last."""
     children = {}
     for entry in pathlib.Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -95,7 +94,7 @@ def command_of(process):
 
 
 def end_with_test():
-    """A test that is killed leaves no daemon."""
+    """The daemons die with the test, even if it is killed."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
@@ -116,7 +115,7 @@ class SlurmMachine:
         self.config.write_text(CONFIG.format(folder=self.folder, host=host, controller_port=ports[0],
                                              user=pwd.getpwuid(os.getuid()).pw_name, nodes=lines, max_array=max_array,
                                              node_timeout=node_timeout))
-        # No cgroup is looked for, whatever /etc has.
+        # Disables the search for cgroups, even if /etc configures them.
         (self.folder / "cgroup.conf").write_text(f"CgroupPlugin=cgroup/v1\nCgroupMountpoint={self.folder}/cgroup\n")
         self.environment = {**os.environ, "SLURM_CONF": str(self.config)}
 
@@ -140,7 +139,7 @@ class SlurmMachine:
         return self
 
     def __exit__(self, *_):
-        """All that it started is gone, jobs and all."""
+        """Stops all daemons and jobs that this Slurm started."""
         for name, daemon in reversed(self.daemons.items()):
             if name != "munged":
                 self.kill(daemon)
@@ -166,7 +165,7 @@ class SlurmMachine:
         daemon.wait()
 
     def steps(self, node=None):
-        """Processes of slurmstepd of this Slurm (they outlive slurmd), of that node, or of all."""
+        """Returns this Slurm's slurmstepd processes (they outlive slurmd), of one node or of all."""
         found = []
         for entry in pathlib.Path("/proc").iterdir():
             if entry.name.isdigit() and command_of(entry.name)[:1] and b"slurmstepd" in command_of(entry.name)[0]:
@@ -179,7 +178,8 @@ class SlurmMachine:
         return found
 
     def node_of(self, step):
-        """The node of a step: its own process does not say, those that it began do."""
+        """Returns the node of a step. The environment of the step's own process does not name it, but that of its
+        children does."""
         for process in tree_of(int(step))[1:]:
             with contextlib.suppress(OSError):
                 for line in pathlib.Path(f"/proc/{process}/environ").read_bytes().split(b"\0"):
@@ -193,7 +193,7 @@ class SlurmMachine:
                 os.kill(each, signal.SIGKILL)
 
     def kill_node(self, node):
-        """As if its power had gone: slurmd and all that ran there."""
+        """Kills slurmd and all processes of the node, like a power failure."""
         steps = self.steps(node)
         self.kill(self.daemons.pop(node))
         for step in steps:

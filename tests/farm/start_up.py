@@ -1,8 +1,10 @@
-"""What a task of a farm costs beside its samples: time to the first sample, bytes read of and written to a shared folder, and
-what it asks of that folder's server (open, stat, rename, ...). docs/farm.md has the numbers, and what they come to.
+"""Measures the overhead of a farm task: time to the first sample, bytes read from and written to a shared folder, and
+operations on that folder's server (open, stat, rename, ...). docs/farm.md has the numbers and conclusions.
 
-Usage: start_up.py PROGRAMS_FOLDER VOLUMES_FOLDER OUT_FOLDER [--check]. VOLUMES_FOLDER is of cumulet-scene --only explosion.
---check: fails where a task asks more of the shared folder than docs/farm.md says. 77: strace does not run here.
+Usage: start_up.py PROGRAMS_FOLDER VOLUMES_FOLDER OUT_FOLDER [--check]. VOLUMES_FOLDER is of cumulet-scene --only
+explosion.
+--check: fails if a task needs more operations on the shared folder than docs/farm.md says. 77: strace does not run
+here.
 """
 
 import collections
@@ -24,7 +26,7 @@ METADATA = {"open", "openat", "stat", "lstat", "newfstatat", "statx", "access", 
 
 class Costs:
     def __init__(self, text, roots):
-        """Of strace's output: what is below one of the folders."""
+        """Parses strace's output and counts the operations below one of the folders."""
         self.calls, self.missed = collections.Counter(), 0
         self.read, self.written = collections.Counter(), 0
         for line in text.splitlines():
@@ -51,14 +53,14 @@ class Costs:
 
 
 def traced(command, log):
-    """What strace says of it, or nothing where it may not look."""
+    """Returns strace's output, or None if tracing is not permitted."""
     done = subprocess.run(["strace", "-f", "-y", "-s", "0", "-o", log, "-e", "trace=%file,%desc", *command],
                           capture_output=True, text=True, timeout=600)
     return log.read_text(errors="replace") if done.returncode == 0 else None
 
 
 def timeline(command, out):
-    """Milliseconds from exec on: (what, begin, length) of its trace, and the whole run."""
+    """Returns (what, begin, length) of the trace and the whole run time, in milliseconds since exec."""
     began = time.monotonic()
     subprocess.run([*command, "--trace", out / "trace.json"], check=True, capture_output=True, timeout=600)
     whole = time.monotonic() - began
@@ -122,7 +124,8 @@ def main():
     if check:
         assert costs["a frame, settled"].asked() <= 60 and costs["a part, settled"].asked() <= 80, costs
         assert costs["two frames, settled"].asked() - costs["a frame, settled"].asked() <= 30, costs
-        # Its own volume, and the largest for what is the sequence's: once, but for seeks that read a buffer's length again.
+        # A task reads its own volume and, for the settings of the sequence, the largest one. It reads each once, except
+        # for seeks that read a buffer again.
         again = 2**20
         assert costs["a frame, settled"].read[".vdb"] <= 1.2 * sizes[0] + again, costs["a frame, settled"].read
         assert costs["a frame"].read[".vdb"] <= 1.2 * (sizes[0] + sizes[2]) + 3 * again, costs["a frame"].read

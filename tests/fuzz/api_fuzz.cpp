@@ -1,5 +1,5 @@
-// libFuzzer over cumulet.h: a program of calls with descriptors of whatever numbers. No call may crash, hang, leak or
-// fail without one line that says why. Pointers and counts are right: C cannot check those. See README.md.
+// libFuzzer over cumulet.h: a program of calls with descriptors of arbitrary numbers. No call may crash, hang, leak or
+// fail without a one-line error message. Pointers and counts are valid, because C cannot check those. See README.md.
 
 #include <fuzzer/FuzzedDataProvider.h>
 
@@ -79,7 +79,7 @@ class Program {
   }
 
  private:
-  /// Numbers of all kinds at each place of 8 bytes, most of them harmless: else all would be refused at once.
+  /// Fills each 8 bytes with numbers of all kinds. Most are harmless, otherwise all calls would be rejected at once.
   template <class Desc>
   Desc described() {
     Desc desc{};
@@ -87,7 +87,7 @@ class Program {
     for (std::uint64_t& word : words) word = number();
     std::memcpy(static_cast<void*>(&desc), words.data(), sizeof words);
     desc.struct_size = data_.ConsumeIntegralInRange(0, 15) == 0 ? data_.ConsumeIntegral<std::uint16_t>() : sizeof desc;
-    // No more than there is: what the library writes must have room.
+    // Not larger than the struct and the space after it, because the library writes there.
     if (desc.struct_size > sizeof desc) desc.struct_size = sizeof desc + 8;
     return desc;
   }
@@ -133,7 +133,7 @@ class Program {
     return out;
   }
 
-  /// A viewer's call.
+  /// Checks the status of a viewer's call.
   void told(cumulet_status status) {
     const char* line = cumulet_last_error(viewer_.get());
     if (status != CUMULET_OK) check_line(line);
@@ -155,7 +155,7 @@ class Program {
     programs_.reset(programs);
   }
 
-  /// Whose values are kept there.
+  /// values: keeps the voxels that the descriptor refers to.
   cumulet_dense_desc dense(std::vector<float>& values) {
     auto desc = described<cumulet_dense_desc>();
     const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 600);
@@ -188,7 +188,7 @@ class Program {
     std::vector<cumulet_tile> tiles;
   };
 
-  /// Whose bricks and tiles are kept there.
+  /// kept: owns the bricks and tiles that the descriptor refers to.
   cumulet_sparse_desc sparse(Sparse& kept) {
     auto desc = described<cumulet_sparse_desc>();
     const std::size_t bricks = data_.ConsumeIntegralInRange<std::size_t>(0, 3);
@@ -260,7 +260,7 @@ class Program {
     if (surfaces != nullptr) surfaces_.reset(surfaces);
   }
 
-  /// A matrix, most often one that a place may have; at times as it was.
+  /// Writes a matrix, usually a valid transform; sometimes leaves it unchanged.
   void put_place(double* to_world) {
     const int kind = data_.ConsumeIntegralInRange(0, 7);
     if (kind == 0) return;
@@ -357,7 +357,7 @@ class Program {
     }
   }
 
-  /// A state of some fields, which are kept until nobody wants them.
+  /// A state of some fields, kept until it is no longer needed.
   struct State {
     std::array<std::vector<float>, 3> dense_values;
     std::array<Sparse, 3> sparse_values;
@@ -376,7 +376,7 @@ class Program {
       field.struct_size = sizeof field;
       field.channel = static_cast<cumulet_channel>(data_.ConsumeIntegralInRange(0, 10));
       const int kind = data_.ConsumeIntegralInRange(0, 7);
-      // Nearly always one of the two.
+      // Usually one of the two.
       if (kind < 4 || kind == 7) {
         state->dense[i] = dense(state->dense_values[i]);
         field.dense = &state->dense[i];
@@ -398,7 +398,7 @@ class Program {
   void set_live() {
     auto state = make_state();
     if (data_.ConsumeBool()) {
-      // Read later, where it is: that it is let go of once and no more is the sanitizer's to see.
+      // Read later and in place. The sanitizer checks that it is released exactly once.
       state->desc.release = [](void* user) { delete static_cast<State*>(user); };
       state->desc.release_user = state.get();
     }
@@ -407,10 +407,10 @@ class Program {
     if (cumulet_live_set(live_.get(), &desc, error.data(), error.size()) != CUMULET_OK)
       check_line(error.data());
     else if (desc.release != nullptr)
-      static_cast<void>(state.release());  // now the library's, or gone
+      static_cast<void>(state.release());  // owned by the library, or already released
   }
 
-  /// Of names that are none of the context's but by chance: the library's own among them.
+  /// Names that are usually not objects of the context, but may be the library's own by chance.
   void set_live_gl() {
     std::array<cumulet_gl_field, 2> fields{described<cumulet_gl_field>(), described<cumulet_gl_field>()};
     if (data_.ConsumeBool()) {
@@ -480,7 +480,7 @@ class Program {
     }
   }
 
-  /// A camera that is right but for its lens, and at times that too.
+  /// A valid camera except for its lens, which sometimes is valid too.
   void focus() {
     cumulet_camera* raw = nullptr;
     told(cumulet_get_camera(viewer_.get(), &raw));
@@ -531,7 +531,7 @@ class Program {
         std::array<char, 64> cause{};
         told(cumulet_get_sequence_frame(viewer_.get(), data_.ConsumeIntegralInRange(0U, 4U), cause.data(),
                                         cause.size()));
-        if (cause.front() != '\0') check_line(cause.data());  // it failed, as far as that is known
+        if (cause.front() != '\0') check_line(cause.data());  // it failed, if a message was written
         return;
       }
       default: {
@@ -582,7 +582,7 @@ class Program {
   }
   template <class Out, class Get>
   void get(Get function) {
-    std::array<Out, 2> out{};  // struct_size may be a bit more than there is
+    std::array<Out, 2> out{};  // struct_size may be slightly too large
     out[0] = described<Out>();
     told(function(viewer_.get(), out.data()));
   }
@@ -700,7 +700,7 @@ class Program {
         cumulet_camera_frame(camera.get(), view.data(), projection.data(), a);
         break;
     }
-    // Whatever became of it, it can be told and set again.
+    // In any state, it can be read and set again.
     auto told_desc = cumulet::test::make_desc<cumulet_camera_desc>();
     if (cumulet_camera_get(camera.get(), &told_desc) != CUMULET_OK) fail("a camera that cannot be told");
     for (const double value : told_desc.eye) {
@@ -708,7 +708,7 @@ class Program {
     }
   }
 
-  /// Safe at any time, so it leaves the last error alone.
+  /// May be called at any time, and does not change the last error.
   void look_at_progress() {
     std::array<cumulet_progress, 2> progress{};
     progress[0] = described<cumulet_progress>();

@@ -1,4 +1,4 @@
-// Writes the seeds of api_fuzz into a folder: programs of random bytes, from which libFuzzer goes on.
+// Writes the seeds of api_fuzz into a folder: programs of random bytes for libFuzzer to start from.
 
 #include <random>
 

@@ -1,4 +1,4 @@
-"""Chooses of a fuzzer's corpus the inputs that reach most a byte, until they are so many bytes together.
+"""Selects from a fuzzer's corpus the inputs with the most coverage per byte, up to a total size in bytes.
 
 Usage: corpus.py FUZZER CORPUS BYTES OUT_FOLDER
 """
@@ -11,11 +11,11 @@ import tempfile
 
 
 def features(fuzzer, corpus):
-    """What each input reaches, as libFuzzer's merge tells."""
+    """Returns each input's coverage features, from libFuzzer's merge."""
     with tempfile.TemporaryDirectory() as folder:
         control, merged = pathlib.Path(folder) / "control", pathlib.Path(folder) / "merged"
         merged.mkdir()
-        # As fuzz.sh has it: what is only too large for this process is no find.
+        # The options of fuzz.sh: a failed large allocation is not an error.
         environment = dict(os.environ, ASAN_OPTIONS="detect_leaks=0:detect_odr_violation=0:alloc_dealloc_mismatch=0:"
                                                     "allocator_may_return_null=1")
         subprocess.run([fuzzer, "-merge=1", f"-merge_control_file={control}", merged, corpus], check=True, cwd=folder,

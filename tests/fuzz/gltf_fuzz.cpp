@@ -1,4 +1,5 @@
-// libFuzzer over the glTF importer: whatever the bytes, a scene that keeps its promises or one line. See README.md.
+// libFuzzer over the glTF importer: for any bytes, a scene that satisfies scene.hpp, or a one-line error. See
+// README.md.
 
 #include <cstdio>
 #include <cstdlib>
@@ -47,8 +48,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   return 0;
 }
 
-// A .glb is changed in one of its two chunks, and put together again with lengths that agree: else hardly a change
-// would pass the container's checks.
+// Mutates one of the two chunks of a .glb and updates the lengths. Otherwise almost every mutation would fail the
+// container's checks.
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
                                                unsigned seed) {
   const bool glb = size >= 20 && std::memcmp(data, "glTF", 4) == 0 && word(data + 12) <= size - 20;

@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
         nanovdb::io::Codec::ZIP);
   write("fp8.nvdb", nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::Fp8>(*grid),
         nanovdb::io::Codec::ZIP);
-  // Buffers without a file's header, of two grids, and as OpenVDB 13 writes them.
+  // Buffers without a file header: of two grids, and as OpenVDB 13 writes them.
   const auto handle = nanovdb::openToNanoVDB(*grid);
   const std::string buffer(reinterpret_cast<const char*>(handle.data()), handle.size());
   folder.write("buffers.nvdb", buffer + buffer);

@@ -1,4 +1,4 @@
-// A fuzzer's inputs of a folder, once each, without libFuzzer: what broke something once is a test of every build.
+// Runs a fuzzer's inputs of a folder once each, without libFuzzer, so that earlier failures are tested in every build.
 
 #include <algorithm>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* /*data*/, std::size_t /*size*/, std::size_t /*max_size*/) {
-  std::abort();  // what mutates asks for it: nothing is mutated here
+  std::abort();  // required by custom mutators; nothing is mutated here
 }
 
 int main(int argc, char** argv) {
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   std::ranges::sort(files);
   for (const std::filesystem::path& path : files) {
     std::printf("%s\n", path.c_str());
-    std::fflush(stdout);  // the last line is the one that broke it
+    std::fflush(stdout);  // the last line is the input that failed
     std::ifstream file(path, std::ios::binary);
     const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
     LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());

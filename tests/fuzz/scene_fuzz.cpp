@@ -1,5 +1,5 @@
-// libFuzzer over scene files: whatever the text, a scene that is the same once written and read again, or one line. See
-// README.md.
+// libFuzzer over scene files: for any text, a scene that is unchanged after writing and reading it, or a one-line
+// error. See README.md.
 
 #include <cstdint>
 #include <cstdio>
@@ -17,7 +17,7 @@ namespace {
   std::abort();
 }
 
-/// Names are written in normal form: a//b is a/b.
+/// Paths are written in normal form: a//b is a/b.
 cumulet::demo::SceneOptions with_normal_names(cumulet::demo::SceneOptions scene) {
   for (std::string* file : {&scene.volume, &scene.surfaces}) {
     *file = std::filesystem::path(*file).lexically_normal().string();

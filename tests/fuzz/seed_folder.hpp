@@ -8,7 +8,7 @@
 
 namespace cumulet::test {
 
-/// The folder that a program of seeds has as its only argument; made if it is not there.
+/// The output folder of a seed program, its only argument. Created if missing.
 class SeedFolder {
  public:
   SeedFolder(int argc, char** argv) {

@@ -4,9 +4,9 @@
 
 namespace cumulet::test {
 
-/// Small, with all that a tree can hold: leaves, tiles, voxels that are off. Its background is 0: with another OpenVDB
-/// forgets the nodes of a file that ends early (volume/vdb_import.cpp, OwningTree), and fuzzing would run out of
-/// memory.
+/// A small grid with everything that a tree can hold: leaves, tiles, inactive voxels. Its background is 0, because with
+/// another one OpenVDB leaks the nodes of a truncated file (volume/vdb_import.cpp, OwningTree), and fuzzing would run
+/// out of memory.
 inline openvdb::FloatGrid::Ptr seed_grid() {
   openvdb::initialize();
   auto grid = openvdb::FloatGrid::create();

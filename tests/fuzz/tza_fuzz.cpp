@@ -1,4 +1,4 @@
-// libFuzzer over tensor archives and the networks of them: whatever the bytes, a network or one line. See README.md.
+// libFuzzer over tensor archives and their networks: for any bytes, a network or a one-line error. See README.md.
 
 #include <cstdint>
 #include <cstdio>

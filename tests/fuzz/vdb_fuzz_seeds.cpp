@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   write("zip.vdb", openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK, {grid, vectors});
   write("blosc.vdb", openvdb::io::COMPRESS_BLOSC, {half});
   write("shared.vdb", openvdb::io::COMPRESS_NONE, {grid, grid->copyGrid()});
-  // As OpenVDB 13 writes them: of a later version, and with a grid of halves.
+  // As OpenVDB 13 writes them: a later version, with a grid of halves.
   using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
   const auto halves = openvdb::Grid<HalfTree>::create();
   halves->setName("density");

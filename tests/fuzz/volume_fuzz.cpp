@@ -1,5 +1,5 @@
-// libFuzzer over the importers, vdb_fuzz and nanovdb_fuzz by their seeds: whatever the bytes, a volume that keeps its
-// promises or one line. See README.md.
+// libFuzzer over the volume importers (vdb_fuzz and nanovdb_fuzz, by their seeds): for any bytes, a valid volume or a
+// one-line error. See README.md.
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -23,7 +23,7 @@ namespace {
   std::abort();
 }
 
-/// Bytes in memory that have a file's name.
+/// Bytes in memory with a file name.
 class MemoryFile {
  public:
   MemoryFile(const std::uint8_t* data, std::size_t size) : descriptor_(memfd_create("fuzzed", 0)) {
@@ -52,8 +52,8 @@ void check_volume(const cumulet::volume::ScalarVolume& volume) {
 
 }  // namespace
 
-// OpenVDB allocates what a damaged length says. Under AddressSanitizer that ends the process, elsewhere it is the
-// exception of a machine that has less.
+// OpenVDB allocates the size that a damaged length declares. Under AddressSanitizer that ends the process. Otherwise it
+// throws, as on a machine with less memory.
 void* operator new(std::size_t size) {
   constexpr std::size_t most = std::size_t{1} << 30U;
   void* memory = size <= most ? std::malloc(size) : nullptr;
@@ -73,7 +73,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check_volume(cumulet::volume::import_volume(path, "", {}));
   } catch (const cumulet::Error& error) {
     check_line(error.what(), path);
-  } catch (const std::bad_alloc&) {  // told by the caller
+  } catch (const std::bad_alloc&) {  // thrown by operator new above
   }
   try {
     cumulet::volume::VolumeFrame frame = cumulet::volume::import_frame(path, {}, {});
@@ -81,7 +81,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const auto* field : frame.beside_density()) check_volume(*field);
   } catch (const cumulet::Error& error) {
     check_line(error.what(), path);
-  } catch (const std::bad_alloc&) {  // told by the caller
+  } catch (const std::bad_alloc&) {  // thrown by operator new above
   }
   try {
     cumulet::volume::Inspection inspection(path);

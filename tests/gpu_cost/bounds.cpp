@@ -11,7 +11,7 @@ namespace cumulet::gpu_cost {
 namespace {
 
 constexpr std::uint32_t register_room = 4;
-constexpr std::uint32_t share_of_room = 20;  // of code, spills and scratch memory, one in so many
+constexpr std::uint32_t share_of_room = 20;  // room for code, spills and scratch memory: one part in this number
 
 std::uint32_t with_room(std::uint32_t value) { return value + value / share_of_room; }
 

@@ -10,22 +10,22 @@
 
 namespace cumulet::gpu_cost {
 
-/// What kernels may cost at most (of waves: at least), by family and kernel.
+/// Maximum cost of kernels (for waves: the minimum), by family and kernel.
 class Bounds {
  public:
-  /// The compiler that they hold for; empty: any.
+  /// The compiler version that they apply to; empty: any.
   std::string driver;
 
   Bounds() = default;
-  /// Throws std::runtime_error that names the line that cannot be read. No file: no bounds.
+  /// Throws std::runtime_error that names the invalid line. A missing file gives no bounds.
   static Bounds read(const std::string& path);
   void write(const std::string& path) const;
-  /// Today's cost, with a little room.
+  /// Sets bounds to the current cost with a small margin.
   void set(const std::string& family, const std::string& kernel, const Cost& cost);
   void erase(const std::string& family);
-  /// One line for all in which the kernel is over its bound; empty if nothing. A kernel without a bound is over it.
+  /// A line with all bounds that the kernel exceeds; empty if there are none. A kernel without a bound exceeds it.
   [[nodiscard]] std::string complaint(const std::string& family, const std::string& kernel, const Cost& cost) const;
-  /// Of this family, bounds of kernels that are not among these.
+  /// Names of kernels of this family that have bounds but are not in the list.
   [[nodiscard]] std::vector<std::string> stale(const std::string& family, const std::vector<Kernel>& kernels) const;
 
  private:

@@ -4,14 +4,14 @@
 
 namespace cumulet::gpu_cost {
 
-/// What a kernel's machine code takes of a GPU. Of programs of two stages: the fragment shader's.
+/// Resources that a kernel's machine code uses on a GPU. Of two-stage programs, the fragment shader's.
 struct Cost {
-  std::uint32_t registers = 0;        // vector ones a lane
-  std::uint32_t spilled = 0;          // of them, kept in memory
-  std::uint32_t spilled_scalars = 0;  // kept in vector registers
-  std::uint32_t scratch_bytes = 0;    // a wave's
-  std::uint32_t shared_bytes = 0;     // a work group's
-  std::uint32_t waves = 0;            // at once on a SIMD
+  std::uint32_t registers = 0;        // vector registers per lane
+  std::uint32_t spilled = 0;          // vector registers spilled to memory
+  std::uint32_t spilled_scalars = 0;  // scalar registers spilled to vector registers
+  std::uint32_t scratch_bytes = 0;    // per wave
+  std::uint32_t shared_bytes = 0;     // per work group
+  std::uint32_t waves = 0;            // concurrent waves per SIMD
   std::uint32_t code_bytes = 0;
 };
 

@@ -1,4 +1,4 @@
-// The bounds of kernels, and that the program goes by them.
+// Reading and writing kernel bounds, and their check by the program.
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -100,7 +100,7 @@ TEST(Bounds, AreReadAsWritten) {
   Cost more = cost;
   more.code_bytes = 42001;
   EXPECT_EQ(back.complaint("navi21", "trace.comp PAGES=1", more), "42001 bytes of code (at most 42000)");
-  // However wide they are.
+  // Numbers of any width.
   constexpr Cost wide{.registers = 1234567,
                       .spilled = 1234567,
                       .spilled_scalars = 1234567,
@@ -116,7 +116,7 @@ TEST(Bounds, AreReadAsWritten) {
   std::remove(path.c_str());
 }
 
-// Of the smallest kernel, as the tests gpu_cost.* run it.
+// Result of the program for the smallest kernel, run as by the tests gpu_cost.*.
 struct Outcome {
   int status;
   std::string text;

@@ -13,7 +13,7 @@ namespace cumulet::gpu_cost {
 
 namespace {
 
-using Variant = std::map<std::string, std::string>;  // macro to value; those that are not defined are not there
+using Variant = std::map<std::string, std::string>;  // macro to value; undefined macros are missing
 using Value = std::pair<std::string, std::string>;
 using Pair = std::pair<Value, Value>;
 
@@ -23,7 +23,7 @@ std::vector<std::string> ends(const gl::ShaderMacro& macro) {
   return values;
 }
 
-// The product of the macros' values, the first the slowest.
+// The Cartesian product of the macros' values; the first macro varies slowest.
 std::vector<Variant> expand(std::span<const gl::ShaderMacro> macros) {
   std::vector<Variant> variants(1);
   for (const gl::ShaderMacro& macro : macros) {
@@ -98,7 +98,7 @@ std::string source_of(const gl::Shader& shader, const std::filesystem::path& fol
 std::vector<Kernel> kernels(const std::filesystem::path& folder) {
   std::vector<Kernel> all;
   for (const gl::Shader& shader : gl::shaders()) {
-    if (shader.name.ends_with(".vert")) continue;  // goes with a fragment shader
+    if (shader.name.ends_with(".vert")) continue;  // compiled with its fragment shader
     for (const Variant& variant : covering(shader)) {
       Kernel kernel{std::string(shader.name), {}, {}, {}};
       std::vector<std::string> defines;

@@ -15,9 +15,9 @@ struct Kernel {
   std::string compute;
 };
 
-/// Of each shader so many variants that each two values of two macros that occur together do so in one of these, ranges
-/// by their ends. A new macro or value is thus among them by itself. folder: their sources are read there; empty: as
-/// the library has them. Throws Error(file).
+/// Selects variants of each shader such that each pair of values of two macros that can occur together is covered.
+/// Ranges are covered by their ends. New macros and values are included automatically. folder: reads the sources there;
+/// empty: the library's own. Throws Error(file).
 std::vector<Kernel> kernels(const std::filesystem::path& folder = {});
 
 }  // namespace cumulet::gpu_cost

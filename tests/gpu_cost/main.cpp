@@ -1,4 +1,4 @@
-// What each kernel of the library costs on AMD's GPUs, by Mesa's compiler: README.md.
+// Reports the cost of each kernel of the library on AMD GPUs, by Mesa's compiler: see README.md.
 
 #include <cstdio>
 #include <exception>

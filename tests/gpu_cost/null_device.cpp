@@ -26,7 +26,7 @@ void check(VkResult result, const char* what) {
   if (result != VK_SUCCESS) throw std::runtime_error(std::string(what) + ": Vulkan error " + std::to_string(result));
 }
 
-// Ends what was made, whatever happens.
+// Destroys the created objects in all cases.
 struct Cleaner {
   std::vector<std::function<void()>> steps;
   ~Cleaner() {
@@ -85,7 +85,7 @@ VkPipeline make_compute(VkDevice device, const Kernel& kernel, Cleaner& cleaner)
   return pipeline;
 }
 
-// Triangles into as many float targets as the fragment shader has outputs, and a depth.
+// A pipeline of triangles with a float target per output of the fragment shader, and a depth attachment.
 VkPipeline make_graphics(VkDevice device, const Kernel& kernel, Cleaner& cleaner) {
   const Module vertex = compile(kernel.vertex, "vert");
   const Module fragment = compile(kernel.fragment, "frag");

@@ -10,17 +10,17 @@
 
 namespace cumulet::gpu_cost {
 
-/// Mesa's RADV without a GPU: it compiles for one of AMD's and can do nothing else. At most one at a time.
+/// Mesa's RADV without a GPU: it can only compile for an AMD GPU. At most one at a time.
 class NullDevice {
  public:
-  /// family: as RADV_FORCE_FAMILY takes it. Null where this driver is not installed.
+  /// family: a value of RADV_FORCE_FAMILY. Returns null if this driver is not installed.
   static std::unique_ptr<NullDevice> open(const std::string& family);
   ~NullDevice();
   NullDevice(const NullDevice&) = delete;
   NullDevice& operator=(const NullDevice&) = delete;
   /// Throws std::runtime_error if the kernel cannot be compiled.
   Cost cost(const Kernel& kernel);
-  /// "Mesa 22.3.6": another version's compiler makes other code.
+  /// "Mesa 22.3.6". Other versions generate other code.
   [[nodiscard]] const std::string& version() const { return version_; }
 
  private:

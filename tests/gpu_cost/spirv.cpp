@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of SPIR-V 1.5, section 3: what this file asks for.
+// From SPIR-V 1.5, section 3: the opcodes that this file uses.
 enum Op : std::uint32_t {
   op_type_image = 25,
   op_type_sampled_image = 27,
@@ -26,7 +26,7 @@ enum Op : std::uint32_t {
 enum Decoration : std::uint32_t { buffer_block = 3, location = 30, binding = 33 };
 enum Storage : std::uint32_t { uniform_constant = 0, input = 1, uniform = 2, output = 3, storage_buffer = 12 };
 constexpr std::uint32_t dim_buffer = 5;
-constexpr std::uint32_t storage_image = 2;  // an image type's word "sampled"
+constexpr std::uint32_t storage_image = 2;  // value of the "sampled" word of an image type
 
 class Reflection {
  public:
@@ -105,7 +105,7 @@ class Reflection {
   std::vector<const std::uint32_t*> variables_;
 };
 
-// A folder of its own, gone in the end.
+// A temporary folder, removed by the destructor.
 class Folder {
  public:
   Folder() {
@@ -133,7 +133,8 @@ Module compile(const std::string& source, const std::string& extension) {
   const std::string to = folder.file("shader.spv");
   const std::string log = folder.file("log");
   std::ofstream(from) << source;
-  // -R: uniforms outside of blocks, and gl_VertexID. OpenGL numbers units, images and both kinds of buffers apart.
+  // -R: allows uniforms outside of blocks, and gl_VertexID. OpenGL numbers units, images and both kinds of buffers
+  // separately.
   const std::string command =
       std::string("'") + CUMULET_GLSLANG_VALIDATOR +
       "' -V -R --target-env vulkan1.2 --auto-map-bindings --auto-map-locations --shift-image-binding 100 "

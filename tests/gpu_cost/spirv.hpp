@@ -14,7 +14,7 @@ struct Descriptor {
   std::uint32_t count;
 };
 
-/// A stage as Vulkan takes it, and what a pipeline's layout must know of it.
+/// A shader stage for Vulkan, and the data that a pipeline layout needs.
 struct Module {
   std::vector<std::uint32_t> words;
   std::map<std::uint32_t, Descriptor> bindings;  // of set 0
@@ -22,7 +22,8 @@ struct Module {
   std::vector<std::uint32_t> outputs;
 };
 
-/// OpenGL's GLSL by glslangValidator. extension: comp, vert or frag. Throws std::runtime_error with its messages.
+/// Compiles OpenGL's GLSL with glslangValidator. extension: comp, vert or frag. Throws std::runtime_error with its
+/// messages.
 Module compile(const std::string& source, const std::string& extension);
 
 }  // namespace cumulet::gpu_cost

@@ -1,8 +1,8 @@
-// compare A B [--tolerance T] [--bias T]: noise-aware comparison of two linear pictures (.exr or .pfm), after OSPRay's
-// test tools: signed errors are averaged over blocks, where noise cancels and a real difference stays.
+// compare A B [--tolerance T] [--bias T]: noise-aware comparison of two linear images (.exr or .pfm), after OSPRay's
+// test tools. Signed errors are averaged over blocks, where noise cancels and a real difference remains.
 //
 // Passes if the mean of every 8 x 8 block differs by at most T (default 0.1) of the larger of the block's and the
-// picture's mean, and the mean of the picture by at most the bias (default 0.01) of it. Exit status: 0 alike, 1 not, 2
+// image's mean, and the mean of the image by at most the bias (default 0.01) of it. Exit status: 0 equal, 1 not, 2
 // usage.
 
 #include <algorithm>

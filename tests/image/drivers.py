@@ -1,8 +1,9 @@
-"""The image tests' scenes on each driver, of many samples, beside how far pictures of two seeds are apart.
+"""Renders the image tests' scenes with each driver and many samples, and compares the differences between drivers with
+those between two seeds.
 
 Usage: drivers.py RENDER OUT_FOLDER ZINK_ICD SAMPLES NAME=FLAG|FLAG|... ...
-A path depends on seed, pixel and index alone, so drivers differ by rounding: by less than the noise. SAMPLES is what a
-pixel has; a scene NAME/8 has an eighth of that. Pictures stay in OUT_FOLDER.
+A path depends only on seed, pixel and sample index, so drivers differ only by rounding: by less than the noise.
+SAMPLES: samples per pixel; a scene NAME/8 has an eighth of them. The images stay in OUT_FOLDER.
 """
 
 import array
@@ -18,7 +19,7 @@ NEAR_BLACK = 0.01  # of relMSE: (x - r)^2 / (r^2 + 0.01)
 
 
 def read_pfm(path):
-    """RGB, rows in whatever order."""
+    """Returns the RGB values, with rows in the file's order."""
     with path.open("rb") as file:
         kind, size, scale = (file.readline().decode().strip() for _ in range(3))
         assert kind == "PF" and float(scale) < 0, f"{path}: {kind} {scale}"
@@ -31,9 +32,9 @@ def read_pfm(path):
 
 
 def apart(a, b):
-    """How far b's mean is from a's, of a's; the standard error of that if all that differs is noise; relMSE."""
+    """Returns b's mean minus a's, relative to a's; the standard error of it if only noise differs; and relMSE."""
     mean = sum(a) / len(a)
-    # Of a pixel's colours together, which the same paths bring.
+    # Sums a pixel's channels, because the same paths contribute to all three.
     squares = sum((sum(a[i:i + 3]) - sum(b[i:i + 3])) ** 2 for i in range(0, len(a), 3))
     relative = sum((x - y) ** 2 / ((0.5 * (x + y)) ** 2 + NEAR_BLACK) for x, y in zip(a, b)) / len(a)
     return (sum(b) / len(b) - mean) / mean, math.sqrt(squares) / len(a) / mean, relative
@@ -58,7 +59,7 @@ class Renderer:
 
 
 def without(flags, name):
-    """Flags but for this one and its value."""
+    """Returns the flags without this one and its value."""
     at = flags.index(name) if name in flags else len(flags)
     return flags[:at] + flags[at + 2:]
 

@@ -1,8 +1,8 @@
-# One image test: renders RENDER_A, and RENDER_B or the golden, and compares. Called by ctest with -P.
-#   RENDER, COMPARE  programs     NAME  of the test     OUT  folder for pictures     FLAGS_A, FLAGS_B  `|`-separated
-#   GOLDEN  picture in the source tree (BLESS in the environment: writes it)     EXACT  the pictures must be equal
-#   NEEDS  a file without which the test is skipped     LIMITS  flags of compare
-#   DRIVER  how the name of A's OpenGL renderer must begin; such a picture blesses no golden
+# One image test: renders RENDER_A, and RENDER_B or the golden, and compares. ctest calls it with -P.
+#   RENDER, COMPARE  programs     NAME  of the test     OUT  folder for images     FLAGS_A, FLAGS_B  `|`-separated
+#   GOLDEN  image in the source tree (BLESS in the environment: writes it)     EXACT  the images must be equal
+#   NEEDS  a file; without it, the test is skipped     LIMITS  flags of compare
+#   DRIVER  required prefix of the name of A's OpenGL renderer; with DRIVER, the image is never written as a golden
 foreach(list FLAGS_A FLAGS_B LIMITS)
   string(REPLACE "|" ";" ${list} "${${list}}")
 endforeach()

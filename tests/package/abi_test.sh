@@ -1,6 +1,6 @@
 #!/bin/bash
-# The C ABI (functions, structs, enums and their values) is as tests/package/cumulet.abi has it, and cumulet.hpp
-# covers all of it. After a change that is meant, CUMULET_BLESS=1 writes cumulet.abi anew.
+# The C ABI (functions, structs, enums and their values) equals tests/package/cumulet.abi, and cumulet.hpp covers all of
+# it. After an intended change, CUMULET_BLESS=1 writes a new cumulet.abi.
 # Usage: abi_test.sh INCLUDE_DIR
 set -euo pipefail
 include=$1
@@ -14,9 +14,10 @@ if ! command -v abidw >/dev/null || [ "$(uname -m)" != x86_64 ]; then
   exit 77
 fi
 
-# The header's types are the ABI's, and the compiler holds the library to them. So a library of stubs, one for every
-# prototype, is described instead of libcumulet, which then needs no debug information. -ffreestanding: the integer
-# types are the compiler's own, not the C library's. Enums of flags, which no prototype names, are kept by their use.
+# The header's types define the ABI, and the compiler checks the library against them. The test therefore describes a
+# library of stubs, one for each prototype, so that libcumulet needs no debug information. -ffreestanding makes the
+# integer types the compiler's own, not the C library's. Enums of flags, which no prototype names, are included because
+# the stubs use them.
 header=$include/cumulet/cumulet.h
 {
   echo "#include <cumulet/cumulet.h>"
@@ -44,7 +45,7 @@ if [ -n "$difference" ] || [ "$status" -ne 0 ]; then
   exit 1
 fi
 
-# Whatever has a name in the ABI is named in cumulet.hpp, or in what it takes from cumulet.h.
+# Each name in the ABI occurs in cumulet.hpp or in the part that is derived from cumulet.h.
 python3 "$here/../../cmake/descriptors.py" --out "$work/descriptors.hpp" "$header"
 missing=$(sed -nE "s/.*<(elf-symbol|enumerator|var-decl) name='([^']*)'.*/\2/p" "$committed" | LC_ALL=C sort -u |
   LC_ALL=C comm -23 - <(grep -oE '[A-Za-z_][A-Za-z0-9_]*' "$include/cumulet/cumulet.hpp" "$work/descriptors.hpp" -h |

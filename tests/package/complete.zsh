@@ -1,4 +1,4 @@
-# Prints the line after a Tab in an interactive zsh. Usage: complete.zsh FUNCTIONS_DIR TEXT
+# Prints the command line after a Tab in an interactive zsh. Usage: complete.zsh FUNCTIONS_DIR TEXT
 zmodload zsh/zpty
 zpty -b shell zsh -f -i
 zpty -w shell "PS1= ; unset zle_bracketed_paste; fpath=($1 \$fpath); autoload -U compinit; compinit -D -u"

@@ -1,6 +1,6 @@
 #!/bin/bash
-# Programs build against an install tree that was moved, by find_package and by pkg-config: C, C++, and C++ with its
-# own OpenVDB, found in OPENVDB_MODULE_PATH. Usage: consumer_test.sh BUILD_DIR VERSION OPENVDB_MODULE_PATH
+# Programs build against a moved install tree, with find_package and with pkg-config: C, C++, and C++ with its own
+# OpenVDB, found in OPENVDB_MODULE_PATH. Usage: consumer_test.sh BUILD_DIR VERSION OPENVDB_MODULE_PATH
 set -euo pipefail
 build=$1 version=$2 openvdb_module_path=$3
 here=$(cd "$(dirname "$0")" && pwd)
@@ -11,7 +11,7 @@ cmake --install "$build" --prefix "$work/first" >"$work/install.log" || { cat "$
 mv "$work/first" "$work/moved"
 prefix=$work/moved
 
-expect_version() { # PROGRAM: it runs and prints the version
+expect_version() { # PROGRAM: checks that it runs and prints the version
   local said
   said=$("$1")
   [ "$said" = "$version" ] || { echo "consumer_test: $1 printed '$said', not '$version'" >&2; exit 1; }
@@ -29,7 +29,7 @@ export PKG_CONFIG_PATH=$config
 [ "$(pkg-config --modversion cumulet)" = "$version" ]
 library_dir=$(pkg-config --variable=libdir cumulet)
 read -ra flags <<<"$(pkg-config --cflags --libs cumulet)"
-build_by_pkg_config() { # COMPILER STANDARD LANGUAGE SOURCE: it builds without a warning, and runs
+build_by_pkg_config() { # COMPILER STANDARD LANGUAGE SOURCE: builds it without warnings and runs it
   "$1" "-std=$2" -pedantic -Wall -Wextra -Werror -x "$3" "$here/consumer/$4" -x none -o "$work/pc" "${flags[@]}" \
     "-Wl,-rpath,$library_dir"
   expect_version "$work/pc"

@@ -1,6 +1,7 @@
 #!/bin/bash
-# By hand, as root and with a network: apt installs the Debian packages in a new Debian 12, where they run, and removes
-# them without a trace. (Tests run deb_test.sh, which needs neither.) Usage: deb_fresh.sh BUILD_DIR
+# Run by hand, as root and with a network: apt installs the Debian packages in a new Debian 12, the programs run there,
+# and apt removes them completely. (The tests run deb_test.sh, which needs neither root nor network.) Usage:
+# deb_fresh.sh BUILD_DIR
 # shellcheck source=tests/package/root.sh
 . "$(dirname "$0")/root.sh"
 [ "$(id -u)" = 0 ] || fail "it needs to be root"

@@ -1,7 +1,7 @@
 #!/bin/bash
-# The Debian packages bundle nothing, and what they depend on is all they need: they are unpacked in a root folder that
-# holds the files of those Debian packages alone, and run there. tests/package/deb_fresh.sh has apt install them in a
-# new Debian. Usage: deb_test.sh BUILD_DIR VERSION
+# The Debian packages bundle no libraries, and their dependencies are complete. The test unpacks them in a root folder
+# that contains only the files of those dependencies, and runs the programs there. tests/package/deb_fresh.sh installs
+# them with apt in a new Debian. Usage: deb_test.sh BUILD_DIR VERSION
 # shellcheck source=tests/package/root.sh
 . "$(dirname "$0")/root.sh"
 version=$2
@@ -23,7 +23,7 @@ for deb in "${debs[@]}"; do
   dpkg-deb -x "$deb" "$work/unpacked"
   if find "$work/unpacked" -name '*.so*' ! -name 'libcumulet.so*' | grep .; then fail "$(basename "$deb") bundles that"; fi
   if rpaths "$work/unpacked" | grep .; then fail "$(basename "$deb") has a search path of its own"; fi
-  # As apt unpacks them, beside each other: no file is in two of them.
+  # apt unpacks all packages into the same root, so no file may be in two of them.
   (cd "$work/unpacked" && find . ! -type d) | while read -r file; do
     [ ! -e "$root/$file" ] || fail "two packages have $file"
   done
@@ -37,7 +37,7 @@ done
 apt-get --simulate --no-download --no-install-recommends install "${debs[@]}" >"$work/apt.log" 2>&1 ||
   { cat "$work/apt.log"; fail "apt cannot install them here"; }
 
-# --- what they depend on, as it is installed here, with what that depends on --------------------------------------------
+# --- copies the installed files of the dependencies, and of their dependencies ----------------------------------------
 names=()
 for deb in "${debs[@]}"; do
   names+=("$(dpkg-deb -f "$deb" Depends)," "$(dpkg-deb -f "$deb" Recommends),")
@@ -76,7 +76,7 @@ xargs dpkg-query -L <"$work/packages" | grep -vE '^/usr/share/(doc|man|locale|in
 tar -C / --create --file - --no-recursion --files-from "$work/files" |
   tar -C "$root" --extract --file - --keep-directory-symlink
 
-# --- they run ---------------------------------------------------------------------------------------------------------
+# --- runs the programs ------------------------------------------------------------------------------------------------
 in_root "$root" /usr/bin/cumulet-scene --only cumulus --voxels 20000 /tmp/scene || fail "cumulet-scene did not run"
 in_root "$root" /usr/bin/cumulet-render --volume /tmp/scene/cumulus.vdb --size 32x32 --spp 1 -o /tmp/egl.png ||
   fail "cumulet-render made no picture"
@@ -88,7 +88,7 @@ in_root "$root" /usr/bin/cumulet-farm run --samples 2 --parts 2 -o /tmp/farm.exr
   fail "cumulet-farm made no picture"
 [ -s "$root/tmp/farm.exr" ] || fail "cumulet-farm wrote no picture"
 
-# --- and a host builds against them --------------------------------------------------------------------------------------
+# --- builds a host against the packages -------------------------------------------------------------------------------
 export PKG_CONFIG_SYSROOT_DIR=$root
 PKG_CONFIG_PATH=$(find "$root/usr/lib" -name cumulet.pc -printf %h)
 export PKG_CONFIG_PATH

@@ -1,5 +1,5 @@
 #!/bin/bash
-# demo/run.sh builds what it runs and no more, and needs none of the packages that packages.txt marks as the tests'.
+# demo/run.sh builds only the programs that it runs, and does not need the packages marked `test:` in packages.txt.
 # Usage: demo_run_test.sh SOURCE_DIR
 set -euo pipefail
 cd "$1"
@@ -8,7 +8,7 @@ trap 'rm -rf "$work"' EXIT
 fail() { echo "demo_run_test: $*" >&2; exit 1; }
 
 read -r _ preset _ <<<"$(grep '^build ' demo/run.sh)"
-# As if the tests' packages were not there: whoever asks CMake or pkg-config for one of them is told so.
+# Simulates that the tests' packages are not installed: searches for them by CMake or pkg-config fail.
 absent=()
 for package in GTest embree Qt6 Qt6Core; do absent+=("-DCMAKE_DISABLE_FIND_PACKAGE_$package=ON"); done
 mkdir "$work/bin"

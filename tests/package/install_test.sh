@@ -1,7 +1,7 @@
 #!/bin/bash
-# An installed tree is whole and knows nothing of the folders it was built in: no file names them, programs look for
-# libraries beside themselves alone. Manual pages and completions have every flag that --help has, and no other; the
-# desktop files are valid, and files are known by them. Usage: install_test.sh BUILD_DIR SOURCE_DIR
+# An installed tree is complete and independent of the folders it was built in. No file names these, and programs search
+# for libraries only next to themselves. Manual pages and completions list exactly the flags of --help. The desktop
+# files are valid, and file types are recognized. Usage: install_test.sh BUILD_DIR SOURCE_DIR
 set -euo pipefail
 build=$1 source=$2
 here=$(cd "$(dirname "$0")" && pwd)
@@ -15,7 +15,7 @@ done
 cmake --install "$build" --prefix "$work/tree" --strip >"$work/log" || { cat "$work/log"; fail "cmake --install failed"; }
 tree=$work/tree share=$work/tree/share
 
-# --- nothing of the build ---------------------------------------------------------------------------------------------
+# --- no file names a folder of the build ------------------------------------------------------------------------------
 if found=$(grep -rlF -e "$(realpath "$build")" -e "$(realpath "$source")" "$tree"); then
   fail "folders of the build are named in $found"
 fi
@@ -29,13 +29,13 @@ while read -r file; do
   esac
 done < <(find "$tree" -type f \( -path '*/bin/*' -o -name '*.so*' \))
 
-# --- documents: the README's links lead to something --------------------------------------------------------------------
+# --- documents: each link of the README leads to an installed file ----------------------------------------------------
 while read -r link; do
   [ -e "$share/doc/cumulet/$link" ] || fail "the README's $link is not installed"
 done < <(grep -oE '\bdocs/[a-z_]+\.[a-z]+' "$source/README.md" | sort -u)
 
-# --- manual pages and completions ---------------------------------------------------------------------------------------
-complete_bash() { # PROGRAM WORD...: what its completion offers for the last word
+# --- manual pages and completions -------------------------------------------------------------------------------------
+complete_bash() { # PROGRAM WORD...: prints the completions of the last word
   (
     cd "$work/files"
     # shellcheck disable=SC1090
@@ -45,7 +45,7 @@ complete_bash() { # PROGRAM WORD...: what its completion offers for the last wor
     printf '%s\n' "${COMPREPLY[@]}" | LC_ALL=C sort | tr '\n' ' '
   )
 }
-complete_zsh() { # PROGRAM TEXT: what is on a terminal's line after its completion
+complete_zsh() { # PROGRAM TEXT: prints a terminal's command line after its completion
   (cd "$work/files" && zsh -f "$here/complete.zsh" "$share/zsh/site-functions" "$@")
 }
 expect() { # WANTED SAID WHAT
@@ -56,7 +56,7 @@ mkdir -p "$work/files/folder"
 touch "$work"/files/{cloud.vdb,smoke.nvdb,notes.txt,model.glb,scene.json}
 for program in "$tree"/bin/*; do
   program=$(basename "$program")
-  # From what people read: the first column.
+  # The flags that users see in --help: the first column.
   flags=$("$tree/bin/$program" --help | grep -oE '^  (-[a-z],)?--[a-z-]+|^  -[a-z]\b' | tr -d ' ' | tr ',' '\n' | LC_ALL=C sort)
   [ -n "$flags" ] || fail "$program --help names no flag"
 
@@ -66,7 +66,7 @@ for program in "$tree"/bin/*; do
   in_page=$(groff -man -Tascii -P-cbou "$page" | grep -oE '^ {7}(-[a-z], )?--?[a-z-]+' | tr -d ' ' | tr ',' '\n' | LC_ALL=C sort)
   expect "$flags" "$in_page" "flags in the manual page of $program"
   if grep -qE '@[a-z_]+@' "$page"; then fail "$program.1 has a gap"; fi
-  # Examples, too: of the page, and of the README.
+  # Examples in the manual page and in the README use only existing flags.
   { groff -man -Tascii -P-cbou "$page" && cat "$source/README.md"; } |
     awk -v program="$program" 'more || $1 == program { sub(/ -- .*/, " "); print; more = /\\$/ }' |
     { grep -oE -- '--[a-z][a-z-]*' || true; } | LC_ALL=C sort -u | LC_ALL=C comm -23 - <(echo "$flags") >"$work/unknown"
@@ -91,13 +91,13 @@ expect "cumulet-demo --replay=" "$(complete_zsh "cumulet-demo --rep")" "zsh: --r
 expect "cumulet-render --lamp point --lamp=" "$(complete_zsh "cumulet-render --lamp point --la")" "zsh: --lamp again"
 expect "cumulet-scene folder/" "$(complete_zsh "cumulet-scene f")" "zsh: cumulet-scene f"
 
-# --- the desktop ----------------------------------------------------------------------------------------------------------
+# --- the desktop files ------------------------------------------------------------------------------------------------
 desktop-file-validate "$share/applications/cumulet-demo.desktop"
 icon=$(sed -n 's/^Icon=//p' "$share/applications/cumulet-demo.desktop")
 [ -s "$share/icons/hicolor/scalable/apps/$icon.svg" ] || fail "no icon '$icon'"
 run=$(sed -n 's/^Exec=\([^ ]*\).*/\1/p' "$share/applications/cumulet-demo.desktop")
 [ -x "$tree/bin/$run" ] || fail "no program '$run'"
-# The system's types stay known beside ours.
+# The system's file types must remain defined next to ours.
 mkdir -p "$share/mime/packages"
 cp /usr/share/mime/packages/freedesktop.org.xml "$share/mime/packages"
 export XDG_DATA_HOME=$work/none XDG_DATA_DIRS=$share
@@ -108,7 +108,7 @@ type_of() { # FILE
 }
 printf ' BDV\0\0\0\0' >"$work/files/unnamed_openvdb"
 printf 'NanoVDB0' >"$work/files/unnamed_nanovdb"
-printf '\1\2\3' | tee "$work/files/cloud.vdb" >"$work/files/smoke.nvdb" # known by their names
+printf '\1\2\3' | tee "$work/files/cloud.vdb" >"$work/files/smoke.nvdb" # recognized by their names
 expect application/x-openvdb "$(type_of "$work/files/cloud.vdb")" "type of cloud.vdb"
 expect application/x-openvdb "$(type_of "$work/files/unnamed_openvdb")" "type of an OpenVDB file without a name"
 expect application/x-nanovdb "$(type_of "$work/files/smoke.nvdb")" "type of smoke.nvdb"

@@ -1,6 +1,6 @@
 #!/bin/bash
-# The portable tarball runs where none of our libraries is: in a root folder with the C library alone, then in one
-# with Mesa added. Usage: portable_test.sh BUILD_DIR
+# The portable tarball runs on a system without our libraries: in a root folder that contains only the C library, then
+# in one that also contains Mesa. Usage: portable_test.sh BUILD_DIR
 # shellcheck source=tests/package/root.sh
 . "$(dirname "$0")/root.sh"
 
@@ -9,7 +9,7 @@ tarball=$(find "$work/pack" -maxdepth 1 -name 'cumulet-*.tar.gz')
 [ -n "$tarball" ] || fail "cpack wrote no tarball"
 echo "$(basename "$tarball"): $(($(stat -c %s "$tarball") / 1048576)) MiB"
 
-# Neither too much nor too little is in it.
+# The tarball contains the right set of libraries.
 tar -tzf "$tarball" >"$work/list"
 if grep -E '/lib(c|m|pthread|dl|rt|GL|GLX|EGL|OSMesa|X11|xcb|gbm|drm)(-[0-9.]+)?\.so|/ld-linux' "$work/list"; then
   fail "the tarball holds libraries that must be the system's"
@@ -21,13 +21,13 @@ for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/
   grep -q "/$wanted\$" "$work/list" || fail "the tarball lacks $wanted"
 done
 
-# copy_file FILE ROOT: the file under the name asked for, as a link where possible.
+# copy_file FILE ROOT: copies the file under the given name, as a hard link where possible.
 copy_file() {
   mkdir -p "$2$(dirname "$1")"
   [ -e "$2$1" ] || cp -lL "$1" "$2$1" 2>/dev/null || cp -L "$1" "$2$1"
 }
 
-new_root() { # ROOT: the C library, the loader, /tmp, /dev/null and the unpacked tarball in /opt
+new_root() { # ROOT: adds the C library, the loader, /tmp, /dev/null and the unpacked tarball in /opt
   mkdir -p "$1/opt" "$1/tmp" "$1/dev" "$1/proc/self" "$1/usr/lib" "$1/usr/lib64"
   ln -s usr/lib usr/lib64 "$1"
   : >"$1/dev/null"
@@ -40,11 +40,11 @@ new_root() { # ROOT: the C library, the loader, /tmp, /dev/null and the unpacked
   tar -xzf "$tarball" -C "$1/opt" --strip-components=1
 }
 
-ldconfig_path() { # SONAME: where this system has it
+ldconfig_path() { # SONAME: prints the library's path on this system
   ldconfig -p | awk -v name="$1" '$1 == name && /x86-64/ && !n++ {print $NF}'
 }
 
-copy_closure() { # ROOT FILE...: files and the libraries that they need
+copy_closure() { # ROOT FILE...: copies files and the libraries that they need
   local root=$1 file library
   shift
   for file in "$@"; do
@@ -55,11 +55,11 @@ copy_closure() { # ROOT FILE...: files and the libraries that they need
   done
 }
 
-# 1. Only the C library: what needs no OpenGL runs, on the bundled C++ runtime.
+# 1. Only the C library. Programs that need no OpenGL run, with the bundled C++ runtime.
 bare=$work/bare
 new_root "$bare"
 
-# Ours look in folders of the tree alone, and in none that is not there.
+# Our files search only folders of the tree, and all of these exist.
 while IFS=$'\t' read -r file path; do
   for folder in ${path//:/ }; do
     # shellcheck disable=SC2016 # $ORIGIN is the loader's

@@ -1,5 +1,6 @@
 #!/bin/bash
-# Writes the first C block of the README to a file. It must keep to 20 lines. Usage: readme_extract.sh README.md OUT.c
+# Writes the first C block of the README to a file. The block must not exceed 20 lines. Usage: readme_extract.sh
+# README.md OUT.c
 set -euo pipefail
 block=$(awk '/^```c$/ { on = 1; next } on && /^```$/ { exit } on' "$1")
 lines=$(grep -c '' <<<"$block")

@@ -1,5 +1,5 @@
-// A host for the README's panel, which is C and compiled as it stands there: framebuffer and all in a headless context.
-// Usage: readme_host VOLUME. Status 0: the panel showed it.
+// A host for the README's C example, which is compiled unchanged: a framebuffer in a headless context. Usage:
+// readme_host VOLUME. Status 0: the volume was displayed.
 #include <glad/gl.h>
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 #!/bin/bash
-# The README's panel shows the sample cloud. Usage: readme_test.sh README_HOST CUMULET-SCENE
+# The panel of the README's example shows the sample cloud. Usage: readme_test.sh README_HOST CUMULET-SCENE
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -1,5 +1,5 @@
 #!/bin/bash
-# libcumulet exports the C ABI, as cumulet.abi has it, all of it and nothing else. Usage: symbols_test.sh LIBCUMULET.so
+# libcumulet exports exactly the C ABI that cumulet.abi lists. Usage: symbols_test.sh LIBCUMULET.so
 set -euo pipefail
 library=$1
 here=$(cd "$(dirname "$0")" && pwd)

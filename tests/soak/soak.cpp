@@ -1,8 +1,9 @@
-// The same days of a host's life again and again: viewers come and go, load, change, turn, resize, save. What the
-// library holds must not grow. Usage: soak [SECONDS].
+// Simulates a host's days repeatedly: viewers are created and destroyed, load, change settings, orbit, resize, save.
+// The library's memory must not grow. Usage: soak [SECONDS].
 //
-// The days are of a few kinds, each always the same work by its own random numbers, so that what was held after one
-// of a kind can be set beside what was held after the last. One viewer stays, and ends each day with the same picture.
+// Days are of a few kinds. Each kind always does the same work by its own random numbers, so that memory after an early
+// day can be compared with memory after a late day of the same kind. One viewer persists, and ends each day with the
+// same image.
 
 #include <malloc.h>
 #include <unistd.h>
@@ -42,7 +43,7 @@ void expect(bool holds, const std::string& what) {
   ++failures;
 }
 
-/// Of main memory, without what malloc keeps to give out again.
+/// Resident memory without free memory that malloc keeps.
 double resident_megabytes() {
   malloc_trim(0);
   std::ifstream statm("/proc/self/statm");
@@ -68,7 +69,7 @@ void write_volume(const std::string& path, float radius) {
   openvdb::io::File(path).write({grid});
 }
 
-/// What loads read.
+/// Files for loading.
 struct Files {
   Folder folder;
   std::string small = (folder.path() / "small.vdb").string();
@@ -85,8 +86,8 @@ struct Files {
 };
 
 struct Held {
-  std::size_t objects = 0;  ///< of GL, without programs: there are more with each variant that was asked for
-  std::uint64_t bytes = 0;  ///< of GL, as the viewer that stays tells
+  std::size_t objects = 0;  ///< GL objects without programs, because each new variant adds programs
+  std::uint64_t bytes = 0;  ///< GL bytes, as reported by the persistent viewer
   double resident = 0.0;
 };
 
@@ -106,7 +107,7 @@ class Host {
     std::mt19937 random(kind);
     const std::size_t before = objects();
     {
-      // One kind has programs of its own, which go with it.
+      // One kind has programs of its own, which are destroyed with its viewer.
       const ViewerPtr guest = viewer(kind == 0 ? nullptr : programs_.get());
       for (int step = 0; step < 12; ++step) act(guest.get(), random);
     }
@@ -116,7 +117,7 @@ class Host {
     return rest();
   }
 
-  /// All is gone.
+  /// Destroys everything.
   void end() {
     stays_.reset();
     programs_.reset();
@@ -159,7 +160,7 @@ class Host {
     for (int i = 0; i < count; ++i) ok(viewer, cumulet_render(viewer, &frame, nullptr));
   }
 
-  /// Something that a host does, and a few frames after it.
+  /// A random action of a host, and a few frames after it.
   void act(cumulet_viewer* viewer, std::mt19937& random) {
     const auto one_of = [&](unsigned count) { return static_cast<unsigned>(random() % count); };
     switch (one_of(16)) {
@@ -220,7 +221,7 @@ class Host {
     frames(viewer, 1 + static_cast<int>(one_of(5)));
   }
 
-  /// What was cancelled is told as such.
+  /// Cancelled work may return CUMULET_ERROR_CANCELLED.
   static void wait(cumulet_viewer* viewer) {
     const cumulet_status status = cumulet_wait(viewer, -1.0);
     if (status != CUMULET_ERROR_CANCELLED) ok(viewer, status);
@@ -242,7 +243,7 @@ class Host {
     ok(viewer, cumulet_set_lamps(viewer, lamps.data(), lamps.size()));
   }
 
-  /// Where there is a picture: the samples to go on with, which it does, and bytes for a file.
+  /// If there is an image: saves its samples, restores them, and saves a file.
   static void save(cumulet_viewer* viewer) {
     std::size_t size = 0;
     if (cumulet_read_accumulation(viewer, nullptr, &size) != CUMULET_OK) return;
@@ -251,7 +252,7 @@ class Host {
     ok(viewer, cumulet_restore_accumulation(viewer, bytes.data(), size));
   }
 
-  /// The viewer that stays shows what it showed at the end of every day.
+  /// The persistent viewer shows the same scene as at the end of every day.
   Held rest() {
     cumulet_viewer* viewer = stays_.get();
     size_ = {64, 48};
@@ -294,7 +295,7 @@ class Host {
   std::array<std::uint32_t, 2> size_{64, 48};
 };
 
-/// Of these days: what grows by itself is in each of them, what waits to be used again is not.
+/// The minimum over these days: a leak is in each of them, memory kept for reuse is not.
 double least(const std::vector<Held>& days, std::size_t from, std::size_t to, double (*what)(const Held&)) {
   double result = what(days.at(from));
   for (std::size_t i = from; i < to; ++i) result = std::min(result, what(days.at(i)));
@@ -320,7 +321,7 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
     }
     host.end();
-    // By the middle third all that is made once is there.
+    // One-time allocations are complete before the middle third.
     const std::size_t third = days.size() / 3;
     const std::size_t last = days.size() - third;
     const auto compare = [&](const char* name, double slack, double (*what)(const Held&)) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// What glTF 2.0's appendix B and KHR_materials_clearcoat reflect, in double precision, from their formulas and from
-// nothing of glsl/: D and V of GGX with alpha = roughness^2, Schlick's Fresnel term. Only what is below an interface is
-// coupled to it as bsdf.glsl says, by directional albedos that are integrated here.
+// Reference BRDF of glTF 2.0's appendix B and KHR_materials_clearcoat in double precision. It is written from their
+// formulas and uses nothing of glsl/: D and V of GGX with alpha = roughness^2, and Schlick's Fresnel term. Only the
+// coupling of layers below an interface follows bsdf.glsl, with directional albedos that are integrated here.
 
 #include <algorithm>
 #include <cmath>
@@ -28,8 +28,8 @@ struct RoughInterface {
         0.5 / (i.z * std::sqrt(o.z * o.z * (1.0 - a2) + a2) + o.z * std::sqrt(i.z * i.z * (1.0 - a2) + a2));
     return density(glm::normalize(o + i).z) * v;
   }
-  /// The share of constant radiance that comes back towards a cosine: by microfacets, over their normals, as they are
-  /// distributed.
+  /// Directional albedo: the fraction of constant radiance reflected towards this cosine, integrated over the
+  /// distribution of microfacet normals.
   [[nodiscard]] double albedo(double cosine) const {
     constexpr int n = 100;
     const double a2 = std::pow(roughness, 4.0);
@@ -40,7 +40,7 @@ struct RoughInterface {
         const double u = (j + 0.5) / n;
         const double z = std::sqrt((1.0 - u) / (1.0 + (a2 - 1.0) * u));
         const double r = std::sqrt(1.0 - z * z);
-        const double angle = std::numbers::pi * (k + 0.5) / n;  // both halves are alike
+        const double angle = std::numbers::pi * (k + 0.5) / n;  // both halves are equal by symmetry
         const glm::dvec3 h(r * std::cos(angle), r * std::sin(angle), z);
         const double oh = glm::dot(o, h);
         const glm::dvec3 i = 2.0 * oh * h - o;
@@ -51,14 +51,14 @@ struct RoughInterface {
   }
 };
 
-/// What is left of constant radiance below an interface: on the way out, on the way in, and on average.
+/// The transmitted fraction of constant radiance below an interface: on the way out, on the way in, and on average.
 struct Below {
   double out_of = 1.0;
   double into = 1.0;
   double average = 1.0;
 };
 
-/// The average of `weight`'s share of an interface's directional albedo.
+/// 1 - weight * the cosine-weighted average of the interface's directional albedo.
 inline double average_below(const RoughInterface& interface, double weight) {
   constexpr int n = 24;
   double sum = 0.0;
@@ -76,7 +76,7 @@ struct AppendixB {
   double clearcoat = 0.0;
   RoughInterface coat;
 
-  /// Light from i that goes to o, times i's cosine.
+  /// The BRDF for light from i scattered towards o, times the cosine of i.
   [[nodiscard]] glm::dvec3 operator()(glm::dvec3 o, glm::dvec3 i, Below dielectric_, Below coat_) const {
     const double vh = glm::dot(o, glm::normalize(o + i));
     const glm::dvec3 conducted = base + (1.0 - base) * std::pow(1.0 - vh, 5.0);

@@ -1,7 +1,8 @@
 #pragma once
 
-// Open Image Denoise's networks after what is written of them (training/model.py, color.py and the API's documentation
-// there), in plain loops and doubles: what the denoiser's kernels are held against. Knows the reader of archives alone.
+// Reference implementation of Open Image Denoise's networks, for tests of the denoiser's kernels. It follows OIDN's
+// training/model.py, color.py and API documentation in plain loops and doubles. Of the library it uses only the archive
+// reader.
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +55,7 @@ class DenoiseReference {
     return count > 0 ? 0.18 / std::exp2(sum / count) : 1.0;
   }
 
-  /// The picture denoised. albedo and normal: none for networks of colour alone.
+  /// Returns the denoised image. albedo and normal are empty for networks that use only color.
   [[nodiscard]] std::vector<glm::dvec3> denoise(const std::vector<glm::vec4>& colour,
                                                 const std::vector<glm::vec4>& albedo,
                                                 const std::vector<glm::vec4>& normal, glm::ivec2 size) const {
@@ -84,7 +85,7 @@ class DenoiseReference {
   }
 
  private:
-  static constexpr int rim = 16;  // of the picture, mirrored, around it
+  static constexpr int rim = 16;  // pixels of mirrored border around the image
   static int mirrored(int i, int count) {
     if (i < 0) i = -1 - i;
     if (i >= count) i = 2 * count - 1 - i;
@@ -146,7 +147,7 @@ class DenoiseReference {
     return to;
   }
 
-  // The first at twice its size, then the second.
+  // Concatenates the channels of `coarse`, upsampled to twice its size, and of `fine`.
   static Channels join(const Channels& coarse, const Channels& fine) {
     Channels to(fine.width, fine.height, coarse.count + fine.count);
     for (int c = 0; c < to.count; ++c) {

@@ -1,8 +1,8 @@
 #pragma once
 
-// LDR-FLIP, by what is written of it: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom and Fairchild, "FLIP: A
-// Difference Evaluator for Alternating Images", HPG 2020. How different two pictures look to somebody who sees one
-// after the other in the same place.
+// LDR-FLIP as published: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom and Fairchild, "FLIP: A Difference
+// Evaluator for Alternating Images", HPG 2020. It estimates the visible difference when a viewer alternates between two
+// images.
 
 #include <algorithm>
 #include <array>
@@ -18,14 +18,13 @@ namespace cumulet::test {
 
 class Flip {
  public:
-  /// Of what the paper's observer sees: a screen 0.7 m wide with 3840 pixels, from 0.7 m.
+  /// The paper's viewing conditions: a screen 0.7 m wide with 3840 pixels, seen from 0.7 m.
   static constexpr double usual_pixels_per_degree = 0.7 * (3840.0 / 0.7) * std::numbers::pi / 180.0;
 
   Flip(int width, int height, double pixels_per_degree = usual_pixels_per_degree)
       : width_(width), height_(height), degrees_(pixels_per_degree) {}
 
-  /// The difference of each pixel, from 0 to 1. Pictures: 4 sRGB-encoded bytes a pixel, of which alpha is not looked
-  /// at.
+  /// The difference of each pixel, from 0 to 1. Images have 4 sRGB-encoded bytes per pixel; alpha is ignored.
   [[nodiscard]] std::vector<double> map(const std::vector<std::uint8_t>& reference,
                                         const std::vector<std::uint8_t>& other) const {
     const Opponent a = opponent(reference);
@@ -43,7 +42,7 @@ class Flip {
     }
     return differences;
   }
-  /// The mean of that.
+  /// The mean of map().
   [[nodiscard]] double mean(const std::vector<std::uint8_t>& reference, const std::vector<std::uint8_t>& other) const {
     double sum = 0.0;
     const std::vector<double> differences = map(reference, other);
@@ -71,7 +70,7 @@ class Flip {
     const double value = byte / 255.0;
     return value > 0.04045 ? std::pow((value + 0.055) / 1.055, 2.4) : value / 12.92;
   }
-  // Rec. 709 with D65, over the white's own.
+  // Rec. 709 with D65, divided by the white point.
   static glm::dmat3 xyz_of_rgb() {
     const glm::dmat3 rows(0.4124564, 0.3575761, 0.1804375, 0.2126729, 0.7151522, 0.0721750, 0.0193339, 0.1191920,
                           0.9503041);
@@ -94,7 +93,7 @@ class Flip {
     return result;
   }
 
-  // Edges go on beyond the picture.
+  // Pixels at the edge are repeated beyond the image.
   [[nodiscard]] Plane filtered(const Plane& from, const Kernel& along_x, const Kernel& along_y) const {
     const auto half_x = static_cast<int>(along_x.size() / 2);
     const auto half_y = static_cast<int>(along_y.size() / 2);
@@ -135,7 +134,7 @@ class Flip {
     return sum;
   }
 
-  // What the eye can tell apart of one channel: a sum of Gaussians a sqrt(pi / b) exp(-(pi r)^2 / b) of degrees r.
+  // Contrast sensitivity of one channel: a sum of Gaussians a sqrt(pi / b) exp(-(pi r)^2 / b), r in degrees.
   struct Gaussian {
     double a, b;
   };
@@ -163,7 +162,7 @@ class Flip {
     constexpr double delta = 6.0 / 29.0;
     return t > delta * delta * delta ? std::cbrt(t) : t / (3.0 * delta * delta) + 4.0 / 29.0;
   }
-  // CIELAB of a linear colour, its chroma by Hunt's effect the less the darker it is.
+  // CIELAB of a linear color. Its chroma is reduced with the lightness (Hunt effect).
   static glm::dvec3 hunted(const glm::dvec3& xyz) {
     const double fy = cube_root(xyz.y);
     const double lightness = 116.0 * fy - 16.0;
@@ -187,7 +186,8 @@ class Flip {
   static double hyab(const glm::dvec3& a, const glm::dvec3& b) {
     return std::abs(a.x - b.x) + std::hypot(a.y - b.y, a.z - b.z);
   }
-  // To [0, 1], where the largest differences, up to that of green and blue, share the last twentieth.
+  // Maps a difference to [0, 1]. Differences above 0.4 of the maximum (that of green and blue) map to the last
+  // twentieth.
   static double redistributed(double difference) {
     constexpr double power = 0.7;
     constexpr double knee = 0.4;
@@ -201,7 +201,7 @@ class Flip {
     return value_at_knee + (raised - knee * most) / (most - knee * most) * (1.0 - value_at_knee);
   }
 
-  // How strong edges and points are, of lightness from 0 to 1, by first and second derivatives of a Gaussian.
+  // Strength of edges and points in the lightness (0 to 1), from first and second derivatives of a Gaussian.
   [[nodiscard]] Features features(const Plane& opponent_y) const {
     constexpr double feature_degrees = 0.082;
     const double deviation = 0.5 * feature_degrees * degrees_;
@@ -223,7 +223,7 @@ class Flip {
     };
     return {magnitude(first), magnitude(second)};
   }
-  // What is positive sums up to 1, what is negative to -1.
+  // Scales positive values to the sum 1 and negative values to the sum -1.
   static Kernel balanced(Kernel values) {
     double positive = 0.0;
     double negative = 0.0;

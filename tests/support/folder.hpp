@@ -9,7 +9,7 @@
 
 namespace cumulet::test {
 
-/// An empty folder that nothing else has and that goes with its owner: tests run beside each other.
+/// A new empty folder, removed by the destructor. Its name is unique, because tests run in parallel.
 class Folder {
  public:
   Folder() {

@@ -10,7 +10,7 @@
 
 namespace cumulet::test {
 
-/// The text of glsl/NAME and what it includes, for shaders that tests write around it.
+/// The text of glsl/NAME with its includes expanded, for shaders that tests write around it.
 inline std::string glsl_file(const std::string& name) {
   constexpr std::string_view include = "#include \"";
   std::ifstream in(std::string(CUMULET_GLSL_DIR) + "/" + name);
@@ -22,7 +22,7 @@ inline std::string glsl_file(const std::string& name) {
   return text;
 }
 
-/// A compute program of this text. Throws the driver's log.
+/// Compiles a compute program. Throws with the driver's log.
 inline gl::Object compute_program(const gl::FunctionsPtr& gl, const std::string& text) {
   const gl::Object shader(gl, gl::Object::Kind::shader, gl->CreateShader(GL_COMPUTE_SHADER));
   gl::Object program(gl, gl::Object::Kind::program, gl->CreateProgram());

@@ -29,7 +29,7 @@ struct GlHit {
 };
 static_assert(sizeof(GlRay) == 32 && sizeof(GlHit) == 32);
 
-/// glsl/bvh.glsl in a compute shader. GL errors throw.
+/// Runs glsl/bvh.glsl in a compute shader. Throws after GL errors.
 class GlRays {
  public:
   /// accept: the body of cm_hit_accept, "" for none. The context is current.
@@ -72,7 +72,7 @@ void main() {
     program_ = compute_program(gl_, text);
   }
 
-  /// What run() works on.
+  /// Input and output buffers of run().
   struct Scene {
     std::array<gl::Object, 6> objects;  // nodes, records, their textures, rays, hits
     std::size_t rays = 0;
@@ -93,7 +93,8 @@ void main() {
     scene.rays = rays.size();
     return scene;
   }
-  /// Any hit sets only `occluded`, nearest ones only the rest. Waits for the end.
+  /// any: true finds any hit and sets only `occluded`; false finds the nearest hit and sets the other members. Waits
+  /// for completion.
   void run(const Scene& scene, bool any) const {
     gl_->UseProgram(program_.name());
     gl_->ProgramUniform1ui(program_.name(), 0, any ? 1 : 0);
@@ -105,7 +106,7 @@ void main() {
     gl_->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
     gl_->Finish();
   }
-  /// Both.
+  /// Finds the nearest hit and any hit of each ray.
   [[nodiscard]] std::vector<GlHit> trace(const surface::Bvh& bvh, std::span<const GlRay> rays) const {
     const Scene scene = upload(bvh, rays);
     run(scene, false);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What src/surface/scene.hpp promises of every scene and pose, whatever the file was.
+// Checks what src/surface/scene.hpp guarantees for every scene and pose, whatever the file contained.
 
 #include <cmath>
 #include <string>
@@ -12,7 +12,7 @@ namespace cumulet::test {
 inline bool finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 inline bool unit(const glm::vec3& v) { return finite(v) && std::abs(glm::length(v) - 1.0F) < 1e-3F; }
 
-/// Empty, or what is broken.
+/// Returns a description of the first violation, "" if there is none.
 inline std::string broken(const surface::Scene& scene, const surface::Material& m) {
   for (const surface::TextureUse* use :
        {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture,

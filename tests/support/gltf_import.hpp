@@ -1,6 +1,6 @@
 #pragma once
 
-// Imports small glTF files of tests, and says what of them is wrong.
+// Imports small glTF files of tests and collects the importer's messages.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 
 namespace cumulet::test {
 
-/// What an import says.
+/// Messages that an import logs.
 struct Lines {
   std::vector<std::string> infos;
   std::vector<std::string> warnings;
@@ -34,7 +34,7 @@ inline surface::ScenePtr imported(const Bytes& file, const Log& log = {}, const 
 }
 inline surface::ScenePtr imported(const GltfModel& model, const Log& log = {}) { return imported(model.gltf(), log); }
 
-/// The line with which a file is refused.
+/// Returns the error message of an import that must fail.
 inline std::string refused(const Bytes& file, ErrorCode code = ErrorCode::file,
                            const surface::GltfLimits& limits = {}) {
   try {
@@ -60,7 +60,7 @@ inline void near(const glm::vec3& a, const glm::vec3& b, float within = 1e-5F) {
                                         << b.z;
 }
 
-/// Where the corners of the first triangle are.
+/// Positions of the vertices of a triangle (default: the first).
 inline std::array<glm::vec3, 3> corners(const surface::Scene& scene, const surface::Pose& pose,
                                         std::size_t triangle = 0) {
   std::array<glm::vec3, 3> result{};

@@ -1,6 +1,6 @@
 #pragma once
 
-// Writes small glTF files for tests: accessors over one buffer, and JSON members as the test likes them.
+// Writes small glTF files for tests: accessors over one buffer, and any JSON members that a test adds.
 
 #include <array>
 #include <cstdint>
@@ -39,7 +39,7 @@ class GltfModel {
  public:
   json root = {{"asset", {{"version", "2.0"}}}};
 
-  /// The number of a new buffer view of these bytes.
+  /// Adds a buffer view of these bytes and returns its index.
   int view(const Bytes& bytes, const json& more = json::object()) {
     while (data_.size() % 4 != 0) data_.push_back(0);
     json made = {{"buffer", 0}, {"byteOffset", data_.size()}, {"byteLength", bytes.size()}};
@@ -48,7 +48,7 @@ class GltfModel {
     return add("bufferViews", made);
   }
 
-  /// The number of a new accessor; `components` numbers an element.
+  /// Adds an accessor and returns its index. `components` is the count of numbers per element.
   template <class T>
   int accessor(const char* type, std::size_t components, const std::vector<T>& values,
                const json& more = json::object()) {
@@ -68,19 +68,19 @@ class GltfModel {
     return static_cast<int>(root[list].size()) - 1;
   }
 
-  /// A mesh of one primitive under a new node; the node's number.
+  /// Adds a mesh of one primitive under a new node and returns the node's index.
   int show(const json& primitive, const json& node = json::object()) {
     json made = node;
     made["mesh"] = add("meshes", {{"primitives", json::array({primitive})}});
     return add("nodes", made);
   }
 
-  /// Three vertices at the origin, at x = 1 and at y = 1: the accessor of their positions.
+  /// Three vertices at the origin, at x = 1 and at y = 1. Returns the accessor of their positions.
   int triangle() { return vec3({0, 0, 0, 1, 0, 0, 0, 1, 0}); }
 
   [[nodiscard]] const Bytes& data() const { return data_; }
 
-  /// With the buffer as a data URI. Buffers of the test's own come after it.
+  /// The file as .gltf with the buffer as a data URI. Buffers that the test adds come after it.
   [[nodiscard]] Bytes gltf() const {
     json whole = root;
     if (!data_.empty()) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// glTF files that between them use all that the importer reads: for round trips, mutations and fuzzing.
+// glTF files that together use all features the importer reads: for round trips, mutations and fuzzing.
 
 #include <draco/compression/encode.h>
 #include <draco/mesh/triangle_soup_mesh_builder.h>
@@ -16,7 +16,7 @@
 
 namespace cumulet::test {
 
-/// A PNG of these rows (without filter bytes); colour type 0 grey, 2 RGB, 6 RGBA.
+/// A PNG of these rows (without filter bytes); color type 0 gray, 2 RGB, 6 RGBA.
 inline Bytes png(std::uint32_t width, std::uint32_t height, std::uint8_t depth, std::uint8_t color_type,
                  const Bytes& rows) {
   Bytes file = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
@@ -70,7 +70,7 @@ inline std::string jpeg_base64() {
          "Tl5ufo6ery8/T19vf4+fr/2gAMAwEAAhEDEQA/AORoooqT9XP/2Q==";
 }
 
-/// A lossless WebP of these rows of RGBA; with a quality (0 to 100) a lossy one.
+/// A lossless WebP of these rows of RGBA. With a quality (0 to 100), a lossy one.
 inline Bytes webp(std::uint32_t width, std::uint32_t height, const Bytes& rgba,
                   std::optional<float> quality = std::nullopt) {
   std::uint8_t* packed = nullptr;
@@ -83,7 +83,7 @@ inline Bytes webp(std::uint32_t width, std::uint32_t height, const Bytes& rgba,
   return file;
 }
 
-/// Materials with everything, textures, samplers, two cameras and three lights, on one triangle.
+/// A triangle with materials that use every property, textures, samplers, two cameras and three lights.
 inline GltfModel seed_materials() {
   GltfModel model;
   json& root = model.root;
@@ -262,7 +262,7 @@ inline GltfModel seed_animated() {
   return model;
 }
 
-/// An animation of one key a second by KHR_animation_pointer.
+/// An animation with one key per second, targeted by KHR_animation_pointer.
 struct Pointing {
   std::string pointer;
   std::size_t width;
@@ -289,7 +289,7 @@ inline void animate(GltfModel& model, const std::vector<Pointing>& pointings) {
   model.add("animations", animation);
 }
 
-/// seed_materials() in motion.
+/// seed_materials() with animated properties.
 inline GltfModel seed_pointers() {
   GltfModel model = seed_materials();
   const std::string first = "/materials/0/";
@@ -304,7 +304,7 @@ inline GltfModel seed_pointers() {
   return model;
 }
 
-/// A triangle in three places.
+/// A triangle with three instance transforms.
 inline GltfModel seed_instances() {
   GltfModel model;
   model.root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
@@ -339,7 +339,7 @@ struct Grid {
   }
 };
 
-/// One mesh of 2 n^2 triangles, without tangents under a normal map: the longest that a mesh is worked upon.
+/// One mesh of 2 n^2 triangles with a normal map and without tangents. Such a mesh takes the longest to import.
 inline GltfModel seed_tangents(std::uint32_t n) {
   const Grid grid(n);
   std::vector<float> positions, normals, uvs;
@@ -361,7 +361,7 @@ inline GltfModel seed_tangents(std::uint32_t n) {
   return model;
 }
 
-/// A square picture of so many pixels a side, on one triangle that glows with it.
+/// A square image with `side` pixels per side, used as the emissive texture of one triangle.
 inline GltfModel seed_picture(std::uint32_t side) {
   Bytes rows(std::size_t{side} * side * 3);
   std::uint32_t noise = 1;
@@ -379,7 +379,7 @@ inline GltfModel seed_picture(std::uint32_t side) {
   return model;
 }
 
-/// A texture of an image of EXT_texture_webp, and of another for who cannot read it, on a triangle.
+/// A triangle with an EXT_texture_webp texture, and a fallback image for readers without WebP.
 inline GltfModel seed_webp(const Bytes& picture, const std::optional<Bytes>& fallback = std::nullopt) {
   GltfModel model;
   model.root["extensionsUsed"] = {"EXT_texture_webp"};
@@ -395,7 +395,7 @@ inline GltfModel seed_webp(const Bytes& picture, const std::optional<Bytes>& fal
   return model;
 }
 
-/// The grid's triangles through Draco, positions of 14 bits.
+/// The grid's triangles, compressed with Draco, positions with 14 bits.
 inline GltfModel seed_draco(std::uint32_t n = 4, int speed = 3) {
   const Grid grid(n);
   draco::TriangleSoupMeshBuilder builder;
@@ -432,8 +432,8 @@ inline GltfModel seed_draco(std::uint32_t n = 4, int speed = 3) {
   return model;
 }
 
-/// The grid's triangles through meshoptimizer, its normals through the octahedral filter, with a fallback buffer that
-/// has no bytes.
+/// The grid's triangles, compressed with meshoptimizer, normals with the octahedral filter. The fallback buffer has no
+/// bytes.
 inline GltfModel seed_meshopt(std::uint32_t n = 4) {
   const Grid grid(n);
   const std::size_t vertices = grid.positions.size() / 3;

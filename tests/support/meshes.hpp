@@ -11,7 +11,7 @@
 
 namespace cumulet::test {
 
-/// Triangles to throw rays at.
+/// Triangles for ray intersection tests.
 struct Mesh {
   std::vector<surface::PosedVertex> vertices;
   std::vector<std::uint32_t> indices;
@@ -59,7 +59,7 @@ inline Mesh soup(std::size_t triangles, float size, unsigned seed) {
   return mesh;
 }
 
-/// Needles: one edge up to a million times longer than the height over it.
+/// Needles: one edge is up to a million times longer than the height over it.
 inline Mesh slivers(std::size_t triangles, unsigned seed) {
   Mesh mesh = soup(triangles, 1.0F, seed);
   std::mt19937 engine(seed);
@@ -74,7 +74,7 @@ inline Mesh slivers(std::size_t triangles, unsigned seed) {
   return mesh;
 }
 
-/// A closed unit sphere, outwards, of 20 * 4^level triangles; vertices on the axes at level 1 and up.
+/// A closed unit sphere of 20 * 4^level triangles that face outwards. From level 1 on, there are vertices on the axes.
 inline Mesh icosphere(int level) {
   const float g = 0.5F + std::sqrt(1.25F);
   std::vector<glm::vec3> points{{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
@@ -108,7 +108,8 @@ inline Mesh icosphere(int level) {
   return mesh;
 }
 
-/// A closed cube [-1, 1]^3, outwards, each side of 2 n^2 triangles; vertices are shared by position, not by number.
+/// A closed cube [-1, 1]^3 that faces outwards, with 2 n^2 triangles per side. Adjacent sides have equal vertex
+/// positions but separate vertices.
 inline Mesh cube(int n) {
   Mesh mesh;
   for (int side = 0; side < 6; ++side) {
@@ -133,7 +134,7 @@ inline Mesh cube(int n) {
   return mesh;
 }
 
-/// Hills over the unit square of x and z, upwards, 2 n^2 triangles.
+/// Hills over the unit square of x and z that face upwards, 2 n^2 triangles.
 inline Mesh terrain(int n) {
   Mesh mesh;
   for (int j = 0; j <= n; ++j) {

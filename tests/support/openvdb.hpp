@@ -1,6 +1,7 @@
 #pragma once
 
-// OpenVDB for tests that write files: its grids are compiled once, in openvdb.cpp, not in each test for half a minute.
+// OpenVDB for tests that write files. Its grids are instantiated once in openvdb.cpp, because that takes half a minute
+// per test otherwise.
 
 #include <openvdb/openvdb.h>
 

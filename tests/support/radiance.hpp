@@ -5,7 +5,7 @@
 
 namespace cumulet::test {
 
-/// A Radiance (.hdr) file's bytes: bright on its left eighth, of another colour elsewhere, in no runs.
+/// The bytes of an uncompressed Radiance (.hdr) file: bright in its left eighth, another color elsewhere.
 inline std::string radiance_file(std::uint32_t width, std::uint32_t height) {
   std::string file =
       "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y " + std::to_string(height) + " +X " + std::to_string(width) + "\n";

@@ -9,7 +9,7 @@
 
 namespace cumulet::test {
 
-/// The line in which a call refuses a file; empty if it does not.
+/// The error message with which a call rejects a file; "" if it does not.
 inline std::string refusal(const std::function<void()>& call) {
   try {
     call();

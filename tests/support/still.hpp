@@ -10,7 +10,7 @@
 
 namespace cumulet::test {
 
-/// One picture's size and sampling.
+/// Size and sampling of one image.
 struct Image {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
@@ -20,7 +20,7 @@ struct Image {
   double shutter_seconds = 0.0;
 };
 
-/// A viewer that makes still pictures in memory, waiting for each step: for tests and benchmarks.
+/// A viewer that renders still images in memory and waits for each step, for tests and benchmarks.
 class Still {
  public:
   explicit Still(headless::Context& context, viewer::Viewer::GetProc get_proc = headless::Context::get_proc,
@@ -52,11 +52,11 @@ class Still {
     viewer_->set_sampling(sampling);
   }
 
-  /// Builds and uploads what the settings need. Throws what fails.
+  /// Builds and uploads everything that the settings need. Throws on failure.
   void build() {
     viewer_->wait(-1.0);
     if (adaptive_) {
-      viewer_->render(frame(1e-3));  // tells the size
+      viewer_->render(frame(1e-3));  // passes the image size
       viewer_->wait(-1.0);
     }
     viewer::Frame nothing;
@@ -64,7 +64,7 @@ class Still {
     nothing.budget_ms = 1e6;
     viewer_->render(nothing);
   }
-  /// Whether every pixel has its samples.
+  /// Renders for this time. Returns whether every pixel has its samples.
   bool render(double budget_ms) { return viewer_->render(frame(budget_ms)).converged; }
   std::vector<float> read() {
     std::vector<float> rgba(std::size_t{4} * image_.width * image_.height);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Surfaces made by hand.
+// Surface scenes built in code.
 
 #include <cmath>
 #include <memory>
@@ -11,10 +11,10 @@
 
 namespace cumulet::test {
 
-/// A scene whose images are made by hand too.
+/// A scene whose images are built in code too.
 class TexturedScene : public surface::Scene {
  public:
-  /// The texture's number.
+  /// Adds a texture and returns its index.
   std::int32_t add_texture(std::uint32_t width, std::uint32_t height, std::vector<std::uint8_t> rgba,
                            surface::Sampler sampler = {}) {
     images.push_back({"by hand", width, height, std::move(rgba)});
@@ -38,7 +38,7 @@ class StillScene : public TexturedScene {
     materials.push_back(material);
     return static_cast<std::uint32_t>(materials.size() - 1);
   }
-  /// A quadrilateral, counter-clockwise from its front; uv 0,0 1,0 1,1 0,1.
+  /// Adds a quadrilateral, counter-clockwise seen from its front; uv 0,0 1,0 1,1 0,1.
   void add_quad(std::array<glm::vec3, 4> corners, std::uint32_t material) {
     const auto first = static_cast<std::uint32_t>(attributes.size());
     const glm::vec3 n = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
@@ -51,7 +51,7 @@ class StillScene : public TexturedScene {
     for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) indices.push_back(first + i);
     end_draw();
   }
-  /// A sphere of latitudes and longitudes.
+  /// Adds a sphere of latitudes and longitudes.
   void add_sphere(glm::vec3 centre, float radius, std::uint32_t material, std::uint32_t rings = 24) {
     const auto first = static_cast<std::uint32_t>(attributes.size());
     const float pi = std::numbers::pi_v<float>;
@@ -74,7 +74,7 @@ class StillScene : public TexturedScene {
     }
     end_draw();
   }
-  /// Any triangles; a vertex's normal is the mean of its triangles', by area.
+  /// Adds triangles. The normal of a vertex is the area-weighted mean of its triangles' normals.
   void add_mesh(const Mesh& mesh, std::uint32_t material) {
     const auto first = static_cast<std::uint32_t>(attributes.size());
     std::vector<glm::vec3> normals(mesh.vertices.size(), glm::vec3(0.0F));
@@ -111,7 +111,7 @@ class StillScene : public TexturedScene {
   }
 };
 
-/// Reflects `albedo`, the same to all sides, and nothing else.
+/// A Lambertian material with this albedo.
 inline surface::Material diffuse(glm::vec3 albedo) {
   surface::Material m;
   m.base_color = glm::vec4(albedo, 1.0F);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Tensor archives and networks that tests make.
+// Tensor archives and networks that tests generate.
 
 #include <array>
 #include <cmath>
@@ -18,7 +18,7 @@
 
 namespace cumulet::test {
 
-/// Little-endian bytes, one after the other.
+/// Writes little-endian bytes.
 class TzaBytes {
  public:
   TzaBytes& number(std::uint64_t value, unsigned size) {
@@ -51,7 +51,7 @@ class TzaBytes {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// A file of these tensors, of one type.
+/// A file of these tensors, all of one type.
 inline std::vector<std::uint8_t> tza_file(const denoise::TensorArchive& archive, char type = 'h') {
   const std::uint64_t value_bytes = type == 'h' ? 2 : 4;
   std::uint64_t end = 12;
@@ -68,12 +68,12 @@ inline std::vector<std::uint8_t> tza_file(const denoise::TensorArchive& archive,
   return file.bytes();
 }
 
-/// Outputs of a network's convolutions, in their order.
+/// Output channels of a network's convolutions, in their order.
 using NetworkWidths = std::array<std::uint32_t, denoise::Network::convolution_count>;
 inline constexpr NetworkWidths base_widths{32, 32, 48, 64, 80, 96, 96, 112, 112, 96, 96, 64, 64, 64, 32, 3};
 inline constexpr NetworkWidths small_widths{32, 32, 32, 32, 32, 32, 32, 64, 64, 64, 64, 64, 32, 32, 32, 3};
 
-/// A network of random weights, halves all, whose results neither vanish nor grow.
+/// A network of random weights that are exact as half floats. Its activations neither vanish nor grow.
 inline denoise::TensorArchive random_archive(const NetworkWidths& widths, std::uint32_t inputs, unsigned seed = 1) {
   static constexpr std::array<const char*, denoise::Network::convolution_count> names{
       "enc_conv0",  "enc_conv1",  "enc_conv2",  "enc_conv3",  "enc_conv4",  "enc_conv5a", "enc_conv5b", "dec_conv4a",
@@ -93,13 +93,13 @@ inline denoise::TensorArchive random_archive(const NetworkWidths& widths, std::u
   for (std::size_t i = 0; i < names.size(); ++i) {
     denoise::Tensor weights{{widths[i], from[i], 3, 3}, "oihw", {}};
     weights.values.resize(std::size_t{widths[i]} * from[i] * 9);
-    // As He et al. draw them: of what is cut off at 0 the mean square is half.
+    // He initialization: ReLU halves the mean square.
     const float scale = std::sqrt(2.0F / static_cast<float>(9 * from[i]));
     for (float& value : weights.values) value = half(scale * normal(random));
     denoise::Tensor biases{{widths[i]}, "x", {}};
     biases.values.resize(widths[i]);
     for (float& value : biases.values) value = half(0.1F * normal(random));
-    // The result is a colour: not all of it below 0.
+    // A bias of 0.5 keeps a part of the output color positive.
     if (i + 1 == names.size()) biases.values.assign(widths[i], 0.5F);
     archive.emplace(std::string(names[i]) + ".weight", std::move(weights));
     archive.emplace(std::string(names[i]) + ".bias", std::move(biases));
@@ -107,14 +107,14 @@ inline denoise::TensorArchive random_archive(const NetworkWidths& widths, std::u
   return archive;
 }
 
-/// A network all of whose weights are 0.
+/// A network whose weights are all 0.
 inline denoise::TensorArchive dark_archive(const NetworkWidths& widths, std::uint32_t inputs) {
   denoise::TensorArchive archive = random_archive(widths, inputs);
   for (auto& [name, tensor] : archive) tensor.values.assign(tensor.values.size(), 0.0F);
   return archive;
 }
 
-/// A network that hands on what colours it sees.
+/// A network that returns its input colors.
 inline denoise::TensorArchive clear_archive(const NetworkWidths& widths, std::uint32_t inputs) {
   denoise::TensorArchive archive = dark_archive(widths, inputs);
   const auto hand_on = [&](const char* name, std::uint32_t first) {

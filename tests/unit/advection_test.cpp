@@ -1,4 +1,4 @@
-// Frames carried along their velocity, against closed forms.
+// Advection of frames along their velocity, compared with closed forms.
 
 #include "volume/advection.hpp"
 
@@ -30,7 +30,7 @@ constexpr ivec3 size(40, 36, 33);
 constexpr ivec3 low(-7, 3, 5);
 const dvec3 centre = dvec3(low) + 0.5 * dvec3(size - 1);
 
-/// Voxels a second.
+/// Velocity in voxels per second.
 template <class Function>
 volume::Velocity velocity(const ivec3& within, const ivec3& from, Function of) {
   volume::Velocity made;
@@ -59,7 +59,7 @@ double mass(const ScalarVolume& field) {
   return sum;
 }
 
-/// The farthest from what a function gives, within a box.
+/// Largest deviation of the field from a function within a box.
 template <class Function>
 double farthest_off(const ScalarVolume& field, const ivec3& from, const ivec3& to, Function of) {
   double most = 0.0;
@@ -101,7 +101,7 @@ TEST(Advection, PartsOfVoxelsAreTrilinear) {
     const VolumeFrame after = advect(frame, seconds);
     const double off = farthest_off(after.density, low + 4, low + size - 5,
                                     [&](const dvec3& p) { return linear(p - seconds * dvec3(-3.0, 1.0, 5.0)); });
-    EXPECT_LT(off, 2e-3) << seconds;  // a ten-thousandth of a voxel counts as a centre
+    EXPECT_LT(off, 2e-3) << seconds;  // a position within 1e-4 voxels of a center counts as the center
   }
 }
 
@@ -115,14 +115,14 @@ TEST(Advection, ABlobTurnsAsASolid) {
     const dvec3 r = p - centre;
     return omega * dvec3(-r.y, r.x, 0.0);
   });
-  // A quarter of a turn at once: steps of two voxels, each of the second order.
+  // A quarter turn in one call: second-order steps of two voxels.
   const VolumeFrame after = advect(frame, 1.0);
   const dvec3 there = centre + dvec3(0.0, 8.0, 0.0);
-  // Interpolation alone takes 3 h^2 / (8 width^2) of the top.
+  // Interpolation alone lowers the peak by 3 h^2 / (8 width^2).
   EXPECT_LT(farthest_off(after.density, low, low + size - 1, [&](const dvec3& p) { return gauss(p, there, width); }),
             0.06);
   EXPECT_NEAR(mass(after.density) / mass(frame.density), 1.0, 0.005);
-  // Back again, by the same velocity: what was carried along points elsewhere.
+  // Advects back with the original velocity, because the advected velocity points elsewhere.
   const VolumeFrame turned{.density = after.density, .velocity = frame.velocity};
   const VolumeFrame back = advect(turned, -1.0);
   EXPECT_LT(farthest_off(back.density, low, low + size - 1, [&](const dvec3& p) { return gauss(p, middle, width); }),
@@ -140,7 +140,7 @@ TEST(Advection, AFlowWithoutSourcesKeepsMass) {
   });
   double before = mass(frame.density);
   for (int step = 0; step < 4; ++step) {
-    // The flow stays; a velocity that was carried along has sources.
+    // Keeps the original velocity, because an advected velocity has divergence.
     frame.density = advect(frame, 1.0 / 24.0).density;
     EXPECT_NEAR(mass(frame.density) / before, 1.0, 0.01) << step;
   }
@@ -148,7 +148,7 @@ TEST(Advection, AFlowWithoutSourcesKeepsMass) {
 
 TEST(Advection, StaggeredAndCentredVelocitiesAreTheSameFlow) {
   openvdb::initialize();
-  const double grows = 0.5;  // a second: what stands at x goes to x e^(grows t)
+  const double grows = 0.5;  // per second; matter at x moves to x e^(grows t)
   const double width = 4.0;
   const test::Folder folder;
   for (const bool staggered : {false, true}) {
@@ -179,7 +179,7 @@ TEST(Advection, StaggeredAndCentredVelocitiesAreTheSameFlow) {
 }
 
 TEST(Advection, WhatIsOfDensityKeepsItsValueAtTheRim) {
-  // Red all over the smoke, and nothing beside it.
+  // Red wherever there is smoke, 0 elsewhere.
   VolumeFrame frame{.density =
                         filled([](const dvec3& p) { return std::max(0.0, 1.0 - glm::length(p - centre) / 9.0); })};
   const auto where_smoke_is = [](double value) {
@@ -230,7 +230,7 @@ TEST(Advection, InsideATileNothingIsSampled) {
     frame.velocity->parts[i].max_value = frame.velocity->parts[i].tiles[0].value = i == 0 ? 2.5F : 0.0F;
   }
   const VolumeFrame after = advect(frame, 1.0);
-  // Its sides alone: 6 x 64 x 64 bricks, twice at most.
+  // Only its surface: 6 x 64 x 64 bricks, counted at most twice.
   EXPECT_LT(after.density.brick_origins.size(), std::size_t{50'000});
   EXPECT_EQ(value_at(after.density, {256, 256, 256}), 0.5F);
   EXPECT_EQ(value_at(after.density, {2, 256, 256}), 0.25F);

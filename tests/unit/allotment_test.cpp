@@ -1,4 +1,4 @@
-// Which pixels are sampled on: against Neyman's allocation in closed form.
+// Adaptive sampling: which pixels get more samples, compared with Neyman allocation in closed form.
 
 #include "render/allotment.hpp"
 
@@ -15,15 +15,15 @@ using namespace cumulet;
 using render::Allotment;
 using render::SquareError;
 
-constexpr unsigned rows = 4;  // of a half, of 32 pixels
+constexpr unsigned rows = 4;  // rows of a half-block of 32 pixels
 
-// Squares in a row, each with a deviation of its own; pixels are as bright as 1.
+// Adaptive-sampling blocks in a row, each with its own standard deviation. Pixels have brightness 1.
 class Row {
  public:
   explicit Row(std::vector<double> deviations) : deviations_(std::move(deviations)), samples_(deviations_.size(), 0.0) {
     allotment_.begin({8 * deviations_.size(), 8U});
   }
-  // Until the noise is down to the target; returns all samples.
+  // Samples until the noise reaches the target. Returns the total number of samples.
   double run(double target) {
     double count = 16.0;
     do {
@@ -57,7 +57,7 @@ class Row {
   }
 
  private:
-  static constexpr double growth_ = 1.05;  // finer than pictures': nearer the closed form
+  static constexpr double growth_ = 1.05;  // finer than for images: nearer the closed form
   std::vector<double> deviations_;
   std::vector<double> samples_;
   Allotment allotment_;
@@ -68,7 +68,8 @@ TEST(Allotment, HasNeymansSamplesInClosedForm) {
   const double target = 0.1;
   Row row(deviations);
   const double all = row.run(target);
-  // Each n = s sum(s) / V with V of all squares; where that is less than the 16 that it has, these, and the rest of V.
+  // Each block has n = s sum(s) / V, with V of all blocks. Blocks whose n is below 16 keep their 16 samples, and the
+  // others share the rest of V.
   double left = target * target * double(deviations.size());
   double sum = 0.0;
   for (const double s : deviations) sum += s;
@@ -82,7 +83,7 @@ TEST(Allotment, HasNeymansSamplesInClosedForm) {
   EXPECT_LE(row.noise(), target);
   EXPECT_GE(row.noise(), 0.96 * target);
   EXPECT_NEAR(all, best, 0.05 * best);
-  // Even samples take sum(s^2) / V each.
+  // Uniform sampling takes sum(s^2) / V samples per block.
   double even = 0.0;
   for (const double s : deviations) even += s * s / left;
   EXPECT_LT(all, 0.7 * 64.0 * double(deviations.size()) * even);
@@ -100,7 +101,7 @@ TEST(Allotment, TellsHowManySamplesItTakes) {
 TEST(Allotment, AHalfIsDecidedByTheOther) {
   Allotment allotment;
   allotment.begin({16U, 8U});
-  // Even rows of the first square show noise, and none of the second do.
+  // The even rows of the first block are noisy, the odd rows and the second block are not.
   const std::array<SquareError, 2> errors{SquareError{{32.0, 0.0}, 64.0, 64.0}, SquareError{{0.0, 0.0}, 64.0, 64.0}};
   allotment.decide(errors, 0.4, 16);
   EXPECT_EQ(allotment.live({0U, 0U}), 2U);
@@ -110,7 +111,7 @@ TEST(Allotment, AHalfIsDecidedByTheOther) {
 }
 
 TEST(Allotment, SomethingGoesOnWhereTheTargetIsNotReached) {
-  // The half that shows noise has its share by the other's samples; the target is not reached all the same.
+  // The noisy half already has its allotted samples by the other half's estimate, but the target is not reached.
   Allotment allotment;
   allotment.begin({8U, 8U});
   allotment.decide(std::array{SquareError{{32.0, 0.0}, 64.0, 64.0}}, 0.5, 16);
@@ -127,13 +128,13 @@ TEST(Allotment, CountsPixelsAtTheEdges) {
   EXPECT_EQ(allotment.live_pixels({1U, 0U}), 8U);
   EXPECT_EQ(allotment.live_pixels({0U, 1U}), 24U);
   EXPECT_EQ(allotment.live_pixels({1U, 1U}), 3U);
-  // A single row is decided by itself.
+  // A single row is decided by its own noise.
   allotment.begin({8U, 1U});
   allotment.decide(std::array{SquareError{{32.0, 0.0}, 8.0, 8.0}}, 0.5, 16);
   EXPECT_EQ(allotment.live({0U, 0U}), 1U);
 }
 
-// A last row that is alone goes by the square above it.
+// A last row without a second half is decided together with the block above it.
 TEST(Allotment, ALastRowDoesNotDecideAboutItself) {
   Allotment allotment;
   allotment.begin({8U, 9U});
@@ -142,7 +143,7 @@ TEST(Allotment, ALastRowDoesNotDecideAboutItself) {
   EXPECT_EQ(allotment.live({0U, 1U}), 1U);
 }
 
-// Pixels that are 1/p by chance p, else 0: the mean of all is 1, whether they are adaptive or not.
+// Pixels are 1/p with probability p, else 0. The expected mean is 1 with and without adaptive sampling.
 TEST(Allotment, RareLightIsNotLost) {
   constexpr unsigned squares = 32;
   constexpr double target = 0.5;

@@ -1,4 +1,4 @@
-// Work that nobody waits for, and calls that cannot be interrupted.
+// apart() and leave(): calls on detached threads, which cannot be interrupted.
 
 #include "base/apart.hpp"
 
@@ -43,7 +43,7 @@ TEST(Apart, WhoIsCancelledDoesNotWait) {
   });
   bool cancelled = false;
   try {
-    // The call goes on until the caller has gone: one that waited for it would never be.
+    // The call ends only after apart() has returned. If apart() waited for it, the test would hang.
     apart(&progress, [&begun, &seen, owned = std::shared_ptr<int>(new int(0), [&freed](const int* last) {
                                        delete last;
                                        freed = true;
@@ -56,7 +56,7 @@ TEST(Apart, WhoIsCancelledDoesNotWait) {
     cancelled = error.code() == ErrorCode::cancelled;
   }
   EXPECT_TRUE(cancelled);
-  EXPECT_FALSE(freed);  // what a call that goes on owns
+  EXPECT_FALSE(freed);  // owned by the call, which is still running
   seen.count_down();
   while (!freed) std::this_thread::yield();
   canceller.join();
@@ -109,7 +109,7 @@ TEST(Apart, OfVeryManySomeAreDoneAtOnce) {
   while (done < left) std::this_thread::yield();
 }
 
-// What was left leaves something in its turn, while the process ends.
+// The detached work starts more detached work while the process exits.
 TEST(ApartDeathTest, ExitWaitsForWhatWasLeftByWhatWasLeft) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   const auto left_and_exit = [] {

@@ -1,4 +1,4 @@
-// Arguments that mean nothing, NULL and NaN, are one line each; and the debug groups of a host whose stack is full.
+// NULL and NaN arguments return one-line errors. Debug groups of a host whose stack is full.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -68,7 +68,7 @@ TEST_F(Arguments, ReadingToNullSaysSo) {
   expect_refused("encode", cumulet_encode_display(v_, nullptr, bytes.data(), 4), "linear or rgba is NULL");
   std::array<double, 3> box{};
   expect_refused("bounds", cumulet_get_bounds(v_, box.data(), nullptr), "box_min or box_max is NULL");
-  // Too few is another matter.
+  // A buffer that is too small has a different error.
   std::vector<float> few(4);
   expect_refused("few", cumulet_read_linear(v_, few.data(), few.size()), "the picture needs 1024 floats");
 }
@@ -125,7 +125,7 @@ TEST_F(Arguments, PositionsAndTimesAreNumbers) {
   EXPECT_STREQ(error.data(), "path is NULL or empty");
 }
 
-// The driver refuses a group more than it has room for; ending it would end one of the host's.
+// The driver rejects a debug group beyond its limit. Popping it would pop one of the host's groups.
 TEST_F(Arguments, AFullStackOfDebugGroupsStaysTheHosts) {
   picture_of(v_, volume_.get(), target_);
   GLint most = 0;
@@ -138,7 +138,7 @@ TEST_F(Arguments, AFullStackOfDebugGroupsStaysTheHosts) {
     gl_.GetIntegerv(GL_DEBUG_GROUP_STACK_DEPTH, &now);
     return now;
   };
-  // From two free places, as many as the library takes, to none.
+  // From two free entries, the most that the library uses, down to none.
   while (depth() < most - 2) gl_.PushDebugGroup(GL_DEBUG_SOURCE_APPLICATION, 0, -1, "host");
   for (GLint free = 2; free >= 0; --free) {
     SCOPED_TRACE(free);

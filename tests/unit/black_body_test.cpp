@@ -1,4 +1,4 @@
-// The colours of black bodies against published ones, and how bright they are.
+// Colors of black bodies compared with published ones, and their brightness.
 
 #include "light/black_body.hpp"
 
@@ -28,7 +28,7 @@ glm::dvec2 uv_of(const glm::dvec3& c) {
   return glm::dvec2(4.0 * x, 9.0 * y) / (x + 15.0 * y + 3.0 * z);
 }
 
-// Chromaticities of the Planckian locus as they are published.
+// Published chromaticities of the Planckian locus.
 struct Published {
   double kelvin;
   double x;
@@ -51,7 +51,7 @@ TEST(BlackBody, ColoursHaveLuminanceOne) {
   }
 }
 
-// Of 1500 K, at x = 0.58568, y = 0.39323, blue is negative: it goes, and the ratio of red to green stays.
+// At 1500 K (x = 0.58568, y = 0.39323) blue is negative. It is clipped to 0, and the ratio of red to green stays.
 TEST(BlackBody, WhatRec709CannotMixIsClipped) {
   EXPECT_GT(black_body_colour(1930.0).b, 0.0);
   EXPECT_EQ(black_body_colour(1800.0).b, 0.0);

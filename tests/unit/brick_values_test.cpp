@@ -1,4 +1,4 @@
-// What a file keeps as halves is kept as halves: half of the memory, and the same pictures to the bit.
+// Values that a file stores as half floats stay half floats in memory: half the memory and bit-identical images.
 
 #include "volume/brick_values.hpp"
 
@@ -28,7 +28,7 @@ TEST(BrickValues, EveryHalfIsOneAndStaysWhatItIs) {
     const float value = glm::unpackHalf1x16(half);
     ASSERT_EQ(volume::value_of(half), value) << bits;
     ASSERT_EQ(volume::exact_half(value), half) << bits;
-    // Its neighbours among floats are none.
+    // The neighboring float is not a half.
     if (bits > 0) {
       ASSERT_FALSE(volume::exact_half(std::nextafter(value, 0.0F))) << bits;
     }

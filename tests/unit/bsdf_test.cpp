@@ -1,4 +1,4 @@
-// What surfaces reflect: the BSDF that shaders and C++ share, by quadrature and by sampling.
+// The BSDF that shaders and C++ share, tested by quadrature and by sampling.
 
 #include <gtest/gtest.h>
 
@@ -56,7 +56,7 @@ std::vector<CmSurface> all_surfaces() {
   return result;
 }
 
-/// A direction and its weight; whether it carries any light.
+/// Samples a direction and its weight. Returns whether the sample carries any light.
 bool sample(const CmSurface& s, vec3 wo, float u0, float u1, float u2, vec3& wi, vec3& weight) {
   wi = cm_bsdf_sample(s, wo, u0, u1, u2);
   const float pdf = cm_bsdf_pdf(s, wo, wi);
@@ -64,7 +64,7 @@ bool sample(const CmSurface& s, vec3 wo, float u0, float u1, float u2, vec3& wi,
   return weight.x + weight.y + weight.z > 0.0F;
 }
 
-/// Unit vector at a cosine and an angle about the surface's normal.
+/// Unit vector with this cosine to, and angle about, the surface's normal.
 vec3 direction(const CmSurface& s, double cosine, double angle) {
   vec3 u;
   vec3 v;
@@ -87,8 +87,8 @@ void integrate(const CmSurface& s, int cosines, int angles, F&& f) {
   }
 }
 
-/// The share of constant radiance that comes back, by samples: at grazing angles smooth lobes are too narrow for a
-/// quadrature. Its error is below 0.002 where most samples weigh about 1.
+/// The reflected fraction of constant radiance, estimated by sampling, because smooth lobes at grazing angles are too
+/// narrow for the quadrature. Its error is below 0.002 where most samples have a weight of about 1.
 double reflected_share(const CmSurface& s, vec3 wo) {
   constexpr int strata = 100;
   std::mt19937 random(17);
@@ -181,7 +181,7 @@ TEST(Bsdf, SamplesFollowTheDensity) {
     int bins = 0;
     for (std::size_t i = 0; i < expected.size(); ++i) {
       if (expected[i] < 10.0) continue;
-      // The quadrature's own error is some 0.3 % of a bin.
+      // The quadrature's own error is about 0.3 % per bin.
       const double variance = expected[i] + std::pow(0.003 * expected[i], 2);
       chi2 += std::pow(counted[i] - expected[i], 2) / variance;
       ++bins;
@@ -257,7 +257,7 @@ TEST(Bsdf, IsAppendixBInDoublePrecision) {
   using cumulet::test::Below;
   constexpr std::array<double, 4> out{0.95, 0.6, 0.25, 0.08};
   constexpr std::array<double, 4> in{0.9, 0.5, 0.2, 0.05};
-  // Below an interface, by the places in `out` and `in`.
+  // Indexed by the positions in `out` and `in`.
   const auto all_below = [&](const cumulet::test::RoughInterface& interface, double weight) {
     std::array<std::array<Below, 4>, 4> result{};
     const double average = average_below(interface, weight);
@@ -304,7 +304,8 @@ TEST(Bsdf, IsAppendixBInDoublePrecision) {
   }
 }
 
-// The furnace: a white dielectric, of any roughness and index, bare or under a coat, is as bright as what is around it.
+// White furnace test: a white dielectric of any roughness and index, with or without a coat, is as bright as its
+// environment.
 TEST(Bsdf, WhiteVanishesInAFurnaceFromEveryAngle) {
   for (const float clearcoat : {0.0F, 1.0F}) {
     for (const float ior : {1.0F, 1.5F, 2.5F}) {
@@ -315,7 +316,7 @@ TEST(Bsdf, WhiteVanishesInAFurnaceFromEveryAngle) {
         s.clearcoat_roughness = 0.3F;
         for (const double cosine : {1.0, 0.8, 0.5, 0.3, 0.15, 0.05, 0.02}) {
           const vec3 wo = direction(s, cosine, 0.3);
-          // Under a coat, what the lobes share out is not exact.
+          // Under a coat, the coupling of the lobes is approximate.
           EXPECT_NEAR(reflected_share(s, wo), 1.0, clearcoat > 0.0F ? 0.02 : 0.005)
               << clearcoat << ' ' << ior << ' ' << roughness << ' ' << cosine;
         }
@@ -348,7 +349,7 @@ TEST(Bsdf, BentNormalsMirrorAboveTheSurface) {
     EXPECT_GT(dot(bent, wo), 0.0F);
     EXPECT_GT(dot(bent, g), 0.0F);
     EXPECT_GE(dot(reflect(-wo, bent), g), std::min(0.01F, 0.9F * dot(wo, g)) - 1e-4F);
-    // No further than needed: a valid one stays.
+    // The normal is bent only as far as needed; a valid one is unchanged.
     if (dot(reflect(-wo, n), g) > 0.01F) {
       EXPECT_EQ(bent, n);
     } else {
@@ -407,7 +408,7 @@ TEST(Bsdf, TheTerminatorOfMappedNormalsIsSoft) {
     CmSurface flat = s;
     flat.matte_normal = flat.smooth_normal = s.normal;
     const vec3 from = tilt < 1.5 ? wo : s.normal;
-    // Light that rises over the smooth surface, on the side to which the normal leans.
+    // Light that rises over the smooth surface on the side to which the normal leans.
     for (int i = -50; i < 300; ++i) {
       const double angle = i * 0.005;
       const vec3 wi(static_cast<float>(std::cos(angle)), 0.0F, static_cast<float>(std::sin(angle)));

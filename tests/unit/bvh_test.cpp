@@ -1,4 +1,4 @@
-// The triangle tree and its rays against brute force in double precision, adversarial rays, and itself on the GPU.
+// The BVH compared with brute force in double precision, with adversarial rays, and on the GPU with the CPU.
 
 #include "surface/bvh.hpp"
 
@@ -53,7 +53,7 @@ using test::Mesh;
 
 Bvh build(const Mesh& mesh) { return Bvh::build(mesh.vertices, mesh.indices); }
 
-// A triangle's hit, in double; margin: the least weight, negative outside.
+// A hit in double precision. margin: the smallest barycentric coordinate, negative outside.
 struct Exact {
   double t = 0.0;
   double margin = -1.0;
@@ -78,7 +78,7 @@ struct Ray {
   float t_max = 1e30F;
 };
 
-// Rays from all around, through the mesh's box.
+// Rays from all directions through the mesh's bounds.
 std::vector<Ray> rays_at(const Mesh& mesh, std::size_t count, unsigned seed) {
   std::mt19937 engine(seed);
   std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
@@ -93,20 +93,20 @@ std::vector<Ray> rays_at(const Mesh& mesh, std::size_t count, unsigned seed) {
   for (std::size_t i = 0; i < count; ++i) {
     rays[i].o = point(3.0F);
     rays[i].d = (point(1.0F) - rays[i].o) * std::exp2(6.0F * uniform(engine) - 3.0F);
-    // Every third along an axis, both ways.
+    // Every third ray is parallel to an axis.
     if (i % 3 == 0) {
       const vec3 to = rays[i].d;
       rays[i].d = vec3(0.0F);
       rays[i].d[static_cast<int>(i / 3 % 3)] = (i / 9 % 2) == 0 ? 1.0F : -2.0F;
       rays[i].o = rays[i].o + to - rays[i].d * glm::length(high - low) * 2.0F;
     }
-    // Some end before the mesh does.
+    // Some rays end before they have passed the mesh.
     if (i % 5 == 0) rays[i].t_max = 3.0F * uniform(engine);
   }
   return rays;
 }
 
-// Every hit and miss is right but where a ray grazes an edge closer than floats can tell.
+// Expects that every hit and miss is right, except where a ray grazes an edge within float precision.
 void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed, double most_doubtful = 0.01) {
   const Bvh bvh = build(mesh);
   BvhRays rays{&bvh};
@@ -125,7 +125,7 @@ void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed,
       if (exact->margin >= 0.0 && exact->t > 0.0) nearest = std::min(nearest, exact->t);
     }
     for (const auto& [i, exact] : all) {
-      // Edges, ends of the ray.
+      // Near an edge, or near an end of the ray.
       unsure = unsure || (std::abs(exact.margin) < 1e-4 && exact.t <= nearest) || std::abs(exact.t) < 1e-5 ||
                std::abs(exact.t - ray.t_max) < 1e-5 * ray.t_max;
     }
@@ -168,7 +168,7 @@ TEST(Bvh, MeshesAreHitWhereBruteForceSays) {
 
 TEST(Bvh, SliversAreHitWhereBruteForceSays) { expect_like_brute_force(test::slivers(1500, 8), 4000, 8, 0.7); }
 
-// Rays from inside a closed mesh at what is hardest.
+// Rays from inside a closed mesh towards difficult targets (vertices, edges).
 std::vector<Ray> rays_out_of(const Mesh& mesh, std::size_t count, unsigned seed) {
   const auto [low, high] = mesh.bounds();
   const vec3 middle = 0.5F * (low + high);
@@ -182,7 +182,7 @@ std::vector<Ray> rays_out_of(const Mesh& mesh, std::size_t count, unsigned seed)
     vec3 o = middle;
     if (i % 4 != 0) {
       for (int axis = 0; axis < 3; ++axis) {
-        // Often in a plane of symmetry.
+        // Half of the origins lie in a plane of symmetry.
         if (engine() % 2 == 0) o[axis] += 0.25F * (high - low)[axis] * (2.0F * uniform(engine) - 1.0F);
       }
     }
@@ -192,7 +192,7 @@ std::vector<Ray> rays_out_of(const Mesh& mesh, std::size_t count, unsigned seed)
     if (i % 5 == 3) target = a + (b - a) * 1e-6F * uniform(engine);
     vec3 d = target - o;
     if (i % 7 == 0) {
-      // Along axes and diagonals.
+      // Directions along axes and diagonals.
       d = vec3(float(engine() % 3) - 1.0F, float(engine() % 3) - 1.0F, float(engine() % 3) - 1.0F);
       if (d == vec3(0.0F)) d.x = 1.0F;
     }
@@ -224,7 +224,7 @@ TEST(Bvh, NoRaySlipsOutOfAClosedMesh) {
   EXPECT_EQ(slips(test::icosphere(4), 300000, 1), 0U);
   EXPECT_EQ(slips(test::cube(1), 200000, 2), 0U);
   EXPECT_EQ(slips(test::cube(7), 200000, 3), 0U);
-  // Far off the origin, large, small, and thin.
+  // Meshes that are far from the origin, large, small or thin.
   EXPECT_EQ(slips(test::moved(test::icosphere(3), vec3(1.0F), vec3(1000.0F, -300.0F, 77.0F)), 100000, 4), 0U);
   EXPECT_EQ(slips(test::moved(test::icosphere(3), vec3(1e6F), vec3(0.0F)), 50000, 5), 0U);
   EXPECT_EQ(slips(test::moved(test::icosphere(3), vec3(1e-6F), vec3(0.0F)), 50000, 6), 0U);
@@ -265,7 +265,7 @@ TEST(Bvh, RefitHitsWhatARebuildHits) {
       ASSERT_TRUE(!met || same_hit(a, b));
     }
     EXPECT_GT(hits, 5000U);
-    // Worse than anew, and by little where little moved.
+    // The refitted tree costs more than a rebuilt one, and little more if little moved.
     EXPECT_GE(bvh.cost(), 0.97 * anew.cost());
     EXPECT_LT(bvh.cost(), (twist < 1.0F ? 1.2 : 6.0) * anew.cost());
   }
@@ -274,11 +274,11 @@ TEST(Bvh, RefitHitsWhatARebuildHits) {
 }
 
 TEST(Bvh, CostIsNearWhatRaysPay) {
-  // Of a plane of n triangles a good tree costs about log2(n) nodes, whereas halves by number cost far more.
+  // For a plane of n triangles, a good tree costs about log2(n) nodes. Splits at the median count cost far more.
   const Mesh plane = test::terrain(100);
   EXPECT_LT(build(plane).cost(), 60.0);
   EXPECT_GT(build(plane).cost(), 10.0);
-  // Two far clusters: the first split parts them.
+  // Two distant clusters: the first split separates them.
   Mesh two = test::icosphere(3);
   two.append(test::moved(test::icosphere(3), vec3(1.0F), vec3(100.0F, 0.0F, 0.0F)));
   const Bvh bvh = build(two);
@@ -353,7 +353,7 @@ TEST(Bvh, HostileTrianglesEndInASoundTree) {
   for (auto& v : one_point.vertices) v.position = vec3(0.25F, -3.0F, 7.0F);
   Mesh duplicates;
   for (int i = 0; i < 40000; ++i) duplicates.append(test::soup(1, 1.0F, 9));
-  // Each triangle a tenth of the last: every split by area cuts off one.
+  // 60 groups of triangles, each half the size of the previous one: every SAH split cuts off one group.
   Mesh shrinking;
   for (int i = 0; i < 60; ++i) {
     const float s = std::pow(0.5F, float(i));
@@ -394,7 +394,7 @@ TEST(Bvh, HostileTrianglesEndInASoundTree) {
       }
     }
   }
-  // What has no area is not hit, until a pose gives it some.
+  // Triangles without area are not hit until a pose gives them some.
   Bvh bvh = build(one_point);
   BvhRays rays{&bvh};
   Hit hit{};
@@ -447,7 +447,7 @@ TEST(Bvh, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(Bvh, FlagsSayWhatIsHit) {
-  // Four sheets at z = 1 to 4 that face -z, the ray.
+  // Four sheets at z = 1 to 4 that face -z, against the ray.
   Mesh sheets;
   for (int i = 1; i <= 4; ++i) {
     const auto z = float(i);
@@ -467,7 +467,7 @@ TEST(Bvh, FlagsSayWhatIsHit) {
   EXPECT_TRUE(first(vec3(0.0F), z).front);
   EXPECT_FALSE(first(5.0F * z, -z).front);
   EXPECT_EQ(first(2.5F * z, z).triangle, 3U);
-  EXPECT_EQ(first(2.0F * z, z).triangle, 3U);  // not where it starts
+  EXPECT_EQ(first(2.0F * z, z).triangle, 3U);  // not at the surface where it starts
   flags[0] = TriangleFlags::clockwise;
   EXPECT_FALSE(first(vec3(0.0F), z).front);
   EXPECT_TRUE(first(1.5F * z, -z).front);
@@ -499,7 +499,7 @@ TEST(Bvh, SceneTellsTheFlags) {
 }
 
 TEST(Bvh, IncludersDecideOnHitsOfFlaggedTriangles) {
-  // A hole where the weight of v1 is small: seen through it, the triangle behind.
+  // cm_hit_accept rejects hits with a small barycentric coordinate of v1, so that rays reach the triangle behind.
   Mesh sheets = test::soup(0, 0.0F, 0);
   for (const float z : {1.0F, 2.0F}) sheets.append_triangle({-1.0F, -1.0F, z}, {0.0F, 2.0F, z}, {1.0F, -1.0F, z});
   const std::vector<std::uint32_t> flags{TriangleFlags::ask, 0};
@@ -516,7 +516,7 @@ TEST(Bvh, IncludersDecideOnHitsOfFlaggedTriangles) {
 }
 
 TEST(Bvh, OriginsLeaveTheirSurface) {
-  // A ray that goes on from where another ended does not meet the same flat mesh again.
+  // A ray that starts at another ray's hit point does not hit the same flat mesh again.
   std::mt19937 engine(5);
   std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
   for (const float scale : {0.01F, 1.0F, 100.0F}) {
@@ -567,7 +567,7 @@ TEST_P(BvhGl, ShadersHitWhatTheCpuHits) {
       const bool expected = rays.cm_bvh_closest(all[i].o, all[i].d, 0.0F, all[i].t_max, hit);
       met += expected ? 1 : 0;
       ASSERT_EQ(hits[i].triangle != CM_BVH_NONE, hits[i].occluded != 0) << i;
-      // Division may round otherwise there: a hit at an edge, a needle or the ray's end may differ.
+      // GPU division may round differently. Hits at an edge, a needle or the ray's end may differ.
       if (hits[i].triangle != hit.triangle) {
         ++different;
         continue;
@@ -584,7 +584,7 @@ TEST_P(BvhGl, ShadersHitWhatTheCpuHits) {
 }
 
 TEST_P(BvhGl, NoRaySlipsOutOfAClosedMesh) {
-  // Whatever the driver contracts into fused operations.
+  // Holds for every contraction into fused operations that the driver chooses.
   const test::GlRays gl(*context_, "");
   for (const Mesh& mesh : {test::icosphere(4), test::cube(5),
                            test::moved(test::icosphere(3), vec3(1.0F), vec3(1000.0F, -300.0F, 77.0F))}) {

@@ -185,7 +185,7 @@ TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   frame.budget_ms = std::nan("");
   EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   frame.budget_ms = 1.0;
-  EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_OK);  // nothing is loaded: nothing is shown
+  EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_OK);  // nothing is loaded, so nothing is shown
   float pixels[64];
   EXPECT_EQ(cumulet_read_linear(viewer_, pixels, 64), CUMULET_ERROR_INVALID_ARGUMENT);
 }
@@ -215,7 +215,7 @@ TEST_F(CApi, MissingFileNamesIt) {
 
 TEST(CApiVersion, IsTheHeaders) { EXPECT_EQ(cumulet_version(), 200U); }
 
-/// One triangle, 2 wide and 2 high, that moves 5 to the right in 2 seconds, and a camera, in a file of its own.
+/// A triangle 2 wide and 2 high that moves 5 to the right in 2 seconds, and a camera, in one file.
 class CApiSurfaces : public CApi {
  protected:
   void SetUp() override {
@@ -236,7 +236,7 @@ class CApiSurfaces : public CApi {
         {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [2]},
         {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}]})";
   }
-  /// What the viewer shows; the caller releases it.
+  /// The surfaces that the viewer shows. The caller releases them.
   [[nodiscard]] cumulet_surfaces* shown() const {
     cumulet_surfaces* surfaces = nullptr;
     EXPECT_EQ(cumulet_get_surfaces(viewer_, &surfaces), CUMULET_OK) << error();
@@ -247,7 +247,7 @@ class CApiSurfaces : public CApi {
     EXPECT_EQ(cumulet_surfaces_get_info(surfaces, &info), CUMULET_OK);
     return info;
   }
-  /// An orthographic picture of x and y from -2 to 2, from the front or from behind, without a background.
+  /// An orthographic view of x and y from -2 to 2, from the front or from behind, without a background.
   static void look(cumulet_viewer* viewer, double from = 10.0) {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = 32;
@@ -263,7 +263,7 @@ class CApiSurfaces : public CApi {
     EXPECT_EQ(cumulet_camera_set(camera, &desc), CUMULET_OK);
     cumulet_camera_release(camera);
   }
-  /// Until converged: 16 x 16 pixels.
+  /// Renders 16 x 16 pixels until converged.
   static std::vector<float> picture(cumulet_viewer* viewer) {
     auto frame = make_desc<cumulet_frame_desc>();
     frame.target = CUMULET_TARGET_NONE;
@@ -278,7 +278,7 @@ class CApiSurfaces : public CApi {
     EXPECT_EQ(cumulet_read_linear(viewer, rgba.data(), rgba.size()), CUMULET_OK) << cumulet_last_error(viewer);
     return rgba;
   }
-  /// Whether not even an older picture is left.
+  /// Whether reading fails and a frame draws nothing, not even an older image.
   static bool shows_nothing(cumulet_viewer* viewer) {
     auto frame = make_desc<cumulet_frame_desc>();
     frame.target = CUMULET_TARGET_NONE;
@@ -287,7 +287,7 @@ class CApiSurfaces : public CApi {
     EXPECT_EQ(cumulet_render(viewer, &frame, &result), CUMULET_OK) << cumulet_last_error(viewer);
     return result.width == 0 && result.flags == 0;
   }
-  /// The mean alpha of a picture.
+  /// The mean alpha of an image.
   static double coverage(cumulet_viewer* viewer) {
     const std::vector<float> rgba = picture(viewer);
     double sum = 0.0;
@@ -326,7 +326,7 @@ TEST_F(CApiSurfaces, LoadPoseLookAndRemove) {
   EXPECT_EQ(cumulet_use_surface_camera(viewer_, 1), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_NE(error().find("camera 1"), std::string::npos);
   ASSERT_EQ(cumulet_use_surface_camera(viewer_, 0), CUMULET_OK) << error();
-  // The triangle's area over that of the picture's plane.
+  // The triangle's area divided by the area that the image covers.
   const double side = 2.0 * 10.0 * std::tan(0.25);
   EXPECT_NEAR(coverage(viewer_), 2.0 / (side * side), 0.01);
 
@@ -356,7 +356,7 @@ TEST_F(CApiSurfaces, LoadPoseLookAndRemove) {
   EXPECT_EQ(cumulet_get_bounds(viewer_, low, high), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-// Khronos' glTF-Validator's models: each one that it finds no error in ends in a picture.
+// Models of Khronos' glTF-Validator: each model without validation errors must converge.
 TEST_F(CApiSurfaces, EveryValidModelOfTheValidatorConverges) {
   const std::filesystem::path suite = std::filesystem::path(CUMULET_SHARED_DATA) / "gltf" / "khronos_validator";
   if (!std::filesystem::exists(suite)) GTEST_SKIP() << "no shared data";
@@ -383,7 +383,7 @@ TEST_F(CApiSurfaces, EveryValidModelOfTheValidatorConverges) {
   EXPECT_GE(pictures, 129U);
 }
 
-// Materials of one side, seen from behind: not there, unless the viewer shows both sides. Traced and drawn.
+// One-sided materials are invisible from behind unless the viewer shows both sides. Path traced and rasterized.
 TEST_F(CApiSurfaces, DoubleSidedShowsBacksThatGlow) {
   std::ifstream file(path_);
   std::string text(std::istreambuf_iterator<char>(file), {});
@@ -448,12 +448,12 @@ TEST_F(CApiSurfaces, ABadFileLosesNothing) {
   cumulet_surfaces* kept = shown();
   EXPECT_EQ(info_of(kept).triangles, 1U);
   cumulet_surfaces_release(kept);
-  // A good one then clears the failure.
+  // A successful load clears the failure.
   ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
 }
 
-/// A square of side 1 in the plane z = 0, its front towards +Z.
+/// A square of side 1 in the plane z = 0 that faces +Z.
 struct Square {
   float positions[12] = {-0.5F, -0.5F, 0, 0.5F, -0.5F, 0, 0.5F, 0.5F, 0, -0.5F, 0.5F, 0};
   float normals[12] = {0, 0, 2, 0, 0, 1, 0, 0, 1, 0, 0, 1};
@@ -581,7 +581,7 @@ TEST_F(CApiSurfaces, ABinaryFileInMemoryNeedsNoFolder) {
   ASSERT_EQ(cumulet_surfaces_from_memory(bytes.data(), bytes.size(), nullptr, nullptr, &surfaces, error, 512),
             CUMULET_OK)
       << error;
-  bytes.assign(bytes.size(), '?');  // not used any more
+  bytes.assign(bytes.size(), '?');  // the library has its own copy
   EXPECT_DOUBLE_EQ(info_of(surfaces).bounds_max[0], 3.0);
   cumulet_surfaces_release(surfaces);
 }
@@ -591,15 +591,15 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
   cumulet_mesh_desc left = square.mesh(-1.0, 1.0);  // red, indexed, with normals
   left.normals = square.normals;
   left.emission[0] = 3.0F;
-  cumulet_mesh_desc right = square.mesh(1.0, -1.0);  // green, three vertices a triangle, one triangle only
+  cumulet_mesh_desc right = square.mesh(1.0, -1.0);  // green, three vertices per triangle, one triangle only
   right.indices = nullptr;
   right.index_count = 0;
   right.vertex_count = 3;
   right.emission[1] = 0.5F;
-  cumulet_mesh_desc back = square.mesh(1.0, 1.0);  // turned away: about the vertical axis
+  cumulet_mesh_desc back = square.mesh(1.0, 1.0);  // rotated about the vertical axis, so that it faces away
   back.to_world[0] = back.to_world[10] = -1.0;
   back.emission[2] = 1.0F;
-  cumulet_mesh_desc thin = square.mesh(-1.0, -1.0);  // a quarter covers
+  cumulet_mesh_desc thin = square.mesh(-1.0, -1.0);  // alpha 0.25
   const float colors[16] = {1, 1, 1, 0.5F, 1, 1, 1, 0.5F, 1, 1, 1, 0.5F, 1, 1, 1, 0.5F};
   thin.colors = colors;
   thin.base_color[3] = 0.5F;
@@ -615,10 +615,10 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
 
   look(viewer_);
   ASSERT_EQ(cumulet_set_surfaces(viewer_, surfaces), CUMULET_OK) << error();
-  cumulet_surfaces_release(surfaces);  // the viewer keeps it
+  cumulet_surfaces_release(surfaces);  // the viewer keeps a reference
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
   const std::vector<float> rgba = picture(viewer_);
-  // A pixel is a quarter of a unit; the squares are 4 x 4 of them, exactly.
+  // A pixel is a quarter of a unit; each square covers exactly 4 x 4 pixels.
   const auto expect = [&rgba](int x, int y, float red, float green, float alpha) {
     const float* pixel = &rgba[static_cast<std::size_t>(4 * (16 * y + x))];
     EXPECT_NEAR(pixel[0], red, 1e-4) << x << ", " << y;
@@ -629,7 +629,7 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
   for (int y = 0; y < 8; ++y) {
     for (int x = 0; x < 16; ++x) {
       const bool inside = x >= 2 && x < 6 && y >= 2 && y < 6;
-      expect(x, y, inside ? 3.0F : 0.0F, 0.0F, inside ? 1.0F : 0.0F);  // and nothing of the one turned away
+      expect(x, y, inside ? 3.0F : 0.0F, 0.0F, inside ? 1.0F : 0.0F);  // the square that faces away is invisible
     }
   }
   expect(13, 13, 0.0F, 0.5F, 1.0F);  // the triangle is the square's half below the diagonal
@@ -640,7 +640,7 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
   }
   EXPECT_NEAR(covered, 0.25, 0.08);  // 512 samples: five standard errors are 0.1
 
-  // From behind: the one that was turned away, and whatever has two sides.
+  // Seen from behind: the square that faced away, and double-sided ones.
   look(viewer_, -10.0);
   EXPECT_NEAR(coverage(viewer_), 16.0 / 256.0, 1e-4);
   left.double_sided = 1;
@@ -651,7 +651,7 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
   EXPECT_NEAR(coverage(viewer_), 16.0 / 256.0, 1e-4);
 }
 
-// base_color, and light on it: under a white sky alone the picture's channels are in the colour's order.
+// base_color under a white sky: the image's channels are ordered as those of the color.
 TEST_F(CApiSurfaces, TrianglesOfAHostAreLit) {
   const Square square;
   cumulet_mesh_desc mesh = square.mesh(0.0, 0.0);
@@ -674,7 +674,7 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreLit) {
       for (int c = 0; c < 3; ++c) mean[c] += rgba[static_cast<std::size_t>(4 * (16 * y + x) + c)] / 16.0;
     }
   }
-  // What is reflected without colour, some per cent, and the colour's part of the rest.
+  // Blue is only the colorless specular reflection, a few percent. The base color scales the diffuse rest.
   EXPECT_GT(mean[2], 0.01);
   EXPECT_LT(mean[2], 0.12);
   EXPECT_NEAR(mean[0] - mean[2], 2.0 * (mean[1] - mean[2]), 0.03);
@@ -763,7 +763,7 @@ TEST_F(CApiSurfaces, BadTrianglesAreRefusedInOneLine) {
   EXPECT_EQ(cumulet_surfaces_from_triangles(&desc, &surfaces, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
   desc.mesh_count = 1;
   EXPECT_EQ(cumulet_surfaces_from_triangles(&desc, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
-  // No mesh is no error: a host's scene may be empty for a while.
+  // A list without meshes is legal: a host's scene may be empty for a while.
   ASSERT_EQ(make_triangles({}, &surfaces, &message), CUMULET_OK) << message;
   EXPECT_EQ(info_of(surfaces).triangles, 0U);
   ASSERT_EQ(cumulet_set_surfaces(viewer_, surfaces), CUMULET_OK);
@@ -773,7 +773,7 @@ TEST_F(CApiSurfaces, BadTrianglesAreRefusedInOneLine) {
   EXPECT_EQ(coverage(viewer_), 0.0);
 }
 
-// A scene without triangles is an empty picture, not one that a host waits for.
+// A scene without triangles gives an empty converged image; the host does not wait for it.
 TEST_F(CApiSurfaces, WithoutTrianglesThePictureConvergesAndIsEmpty) {
   const auto without_mesh = folder_ / "camera.gltf";
   std::ofstream(without_mesh) << R"({"asset": {"version": "2.0"},
@@ -794,13 +794,13 @@ TEST_F(CApiSurfaces, WithoutTrianglesThePictureConvergesAndIsEmpty) {
     const std::vector<float> rgba = picture(viewer_);
     for (std::size_t i = 0; i < rgba.size(); ++i) EXPECT_EQ(rgba[i], i % 4 == 0 ? 0.25F : 0.0F) << i;
   }
-  // Its camera needs nothing to look at.
+  // Its camera can be used without geometry.
   EXPECT_EQ(cumulet_use_surface_camera(viewer_, 0), CUMULET_OK) << error();
   EXPECT_EQ(coverage(viewer_), 0.0);
   std::vector<float> depth(256);
   EXPECT_EQ(cumulet_read_aov(viewer_, CUMULET_AOV_SURFACE_DEPTH, depth.data(), depth.size()), CUMULET_OK) << error();
   EXPECT_TRUE(std::isinf(depth[0]));
-  // Then something to see, and nothing again.
+  // Loads geometry, then a file without any again.
   ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
   EXPECT_GT(coverage(viewer_), 0.01);
@@ -808,7 +808,7 @@ TEST_F(CApiSurfaces, WithoutTrianglesThePictureConvergesAndIsEmpty) {
   EXPECT_TRUE(shows_nothing(viewer_));
 }
 
-// An array of a struct from an older header, which ended before emission.
+// An array of an older header's struct, which ended before `emission`.
 TEST_F(CApiSurfaces, ShorterMeshesAreReadByTheirOwnSize) {
   struct Older {
     alignas(cumulet_mesh_desc) unsigned char bytes[offsetof(cumulet_mesh_desc, emission) / 8 * 8];
@@ -845,7 +845,7 @@ TEST_F(CApiSurfaces, TwoViewersShareAHandleThatOutlivesThem) {
     ASSERT_EQ(cumulet_set_surfaces(viewer, surfaces), CUMULET_OK);
     cumulet_surfaces* got = nullptr;
     ASSERT_EQ(cumulet_get_surfaces(viewer, &got), CUMULET_OK);
-    EXPECT_EQ(got, surfaces);  // at once, the same
+    EXPECT_EQ(got, surfaces);  // available at once, the same object
     cumulet_surfaces_release(got);
   }
   for (cumulet_viewer* viewer : {viewer_, other}) {
@@ -856,7 +856,7 @@ TEST_F(CApiSurfaces, TwoViewersShareAHandleThatOutlivesThem) {
   EXPECT_EQ(info_of(surfaces).triangles, 2U);
   ASSERT_EQ(cumulet_set_surfaces(viewer_, nullptr), CUMULET_OK);
   EXPECT_TRUE(shows_nothing(viewer_));
-  // They outlive the host's share in a viewer.
+  // The viewer's reference keeps them alive after the host's release.
   ASSERT_EQ(cumulet_set_surfaces(viewer_, surfaces), CUMULET_OK);
   cumulet_surfaces_release(surfaces);
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();

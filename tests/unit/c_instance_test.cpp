@@ -1,4 +1,4 @@
-// Instances, as hosts have them: what is refused, who shares what, and calls from any thread.
+// Volume instances in the C API: rejected arguments, sharing between viewers, and calls from any thread.
 
 #include <gtest/gtest.h>
 
@@ -69,7 +69,7 @@ TEST_F(CInstance, IsRefusedInOneLine) {
   refused([](auto& d) { d.to_world[0] = NAN; }, "cumulet_instance_desc.to_world is not finite");
   refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_instance_desc.to_world flattens space");
   refused([](auto& d) { d.close_to_world[0] = NAN; }, "cumulet_instance_desc.close_to_world is not finite");
-  // Halfway round: flat in between.
+  // Rotated by 180 degrees: the interpolated transform is singular.
   refused(
       [](auto& d) {
         d.close_to_world[0] = d.close_to_world[5] = -1.0;
@@ -113,7 +113,7 @@ TEST_F(CInstance, IsSeenByAllItsViewersAsItChanges) {
   const auto back = at(6.0, 0.0, 0.0);
   ASSERT_EQ(cumulet_instance_set_to_world(one.get(), back.data()), CUMULET_OK);
   EXPECT_EQ(difference(picture(second.get()), small_alone), "");
-  // The viewer has its share.
+  // The viewer keeps a reference.
   cumulet_instance* const name = one.get();
   cumulet_instance_retain(name);
   one.reset();
@@ -124,7 +124,7 @@ TEST_F(CInstance, IsSeenByAllItsViewersAsItChanges) {
   EXPECT_EQ(difference(picture(second.get()), small_alone), "");
 }
 
-// Among several, a table; of one, nothing.
+// With several volumes only the instance table is uploaded again.
 TEST_F(CInstance, MovesWithoutItsGrid) {
   const ViewerPtr shows = make();
   ASSERT_EQ(cumulet_set_volume(shows.get(), ball_.get()), CUMULET_OK);
@@ -188,7 +188,7 @@ TEST_F(CInstance, AVolumesPlacesMoveTillTheyAreSet) {
   EXPECT_EQ(difference(picture(shows.get()), sharp), "");
 }
 
-// To the last bit: nothing is left of where it was.
+// Images are bit-identical: nothing remains of earlier transforms.
 TEST_F(CInstance, AreWhereTheyAreHoweverTheyCame) {
   const InstanceRef one = make_instance(small_.get());
   const InstanceRef other = make_instance(ball_.get());
@@ -242,7 +242,7 @@ TEST_F(CInstance, ChangesInAnyThread) {
   }
   ends = true;
   for (std::thread& thread : threads) thread.join();
-  // In the end it is as they left it.
+  // In the end the state is the one that the threads set last.
   for (std::size_t i = 0; i < 4; ++i) {
     auto desc = make_desc<cumulet_instance_desc>();
     desc.volume = small_.get();

@@ -1,4 +1,4 @@
-// Models, as hosts have them: what is refused, who shares what, what is picked, and calls from any thread.
+// Models in the C API: rejected arguments, sharing between viewers, picking, and calls from any thread.
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ using Matrix = std::array<double, 16>;
 // Sheared, stretched and mirrored.
 constexpr Matrix askew{-1.5, 0.2, 0, 0, 0.4, 0.8, 0, 0, 0.3, -0.2, 1.2, 0, 5, 1, -2, 1};
 
-// A box of six sides, 4 wide, each of four vertices of its own; rows of tiny triangles besides, to be many.
+// A box of six sides, 4 wide, with four vertices per side. Rows of tiny triangles are added for a large triangle count.
 struct Box {
   std::vector<float> positions;
   std::vector<std::uint32_t> indices;
@@ -175,7 +175,7 @@ TEST_F(CModel, IsSeenByAllItsViewersAsItChanges) {
   EXPECT_NE(picture(second.get()), one_alone);
   ASSERT_EQ(cumulet_model_set_to_world(one.get(), at(6.0, 0.0, 0.0).data()), CUMULET_OK);
   EXPECT_EQ(difference(picture(second.get()), one_alone), "");
-  // The viewer has its share.
+  // The viewer keeps a reference.
   cumulet_model* const name = one.get();
   cumulet_model_retain(name);
   one.reset();
@@ -183,14 +183,14 @@ TEST_F(CModel, IsSeenByAllItsViewersAsItChanges) {
   const ModelRef again(name);
   ASSERT_EQ(cumulet_remove_model(first.get(), name), CUMULET_OK);
   EXPECT_EQ(difference(picture(first.get()), alone), "");
-  // Nothing of anything is nothing, and no error.
+  // A model without surfaces is legal and shows nothing.
   auto nothing = make_desc<cumulet_model_desc>();
   ASSERT_EQ(cumulet_model_set(name, &nothing), CUMULET_OK);
   auto frame = target_.frame();
   EXPECT_EQ(cumulet_render(second.get(), &frame, nullptr), CUMULET_OK);
 }
 
-// Two places of one mesh are what two meshes are, sheared, stretched and mirrored, lit by sun and sky and each other.
+// Two instances of one mesh look like two meshes: sheared, stretched and mirrored, lit by sun, sky and each other.
 TEST_F(CModel, AreWhatOneOfBothWouldBe) {
   for (const float emission : {0.0F, 0.7F}) {
     const SurfacesRef one = surfaces_of({at(0, 0, 0)}, Box(), emission);
@@ -231,7 +231,7 @@ TEST_F(CModel, MovesWithoutItsTriangles) {
   const std::uint64_t of_a_medium = uploads();
   ASSERT_EQ(cumulet_model_set_to_world(models[1].get(), askew.data()), CUMULET_OK);
   EXPECT_LT(uploads(), of_a_medium + 4096);
-  // Nor does another of the same, or one less.
+  // Adding another model of the same surfaces, or removing one, uploads no triangles either.
   const ModelRef more = make_model(many.get(), at(0.0, 5.0, 0.0));
   ASSERT_EQ(cumulet_add_model(shows.get(), more.get()), CUMULET_OK);
   EXPECT_LT(uploads(), of_a_medium + 4096);
@@ -282,7 +282,7 @@ TEST_F(CModel, IsPickedByItsTag) {
   EXPECT_NEAR(found.position[2], 2.0, 1e-4);
   EXPECT_NEAR(found.distance, 10.0, 0.1);
   EXPECT_NEAR(found.normal[2], 1.0, 1e-6);
-  // Another of the same, mirrored and closer: in front of that its own tag, and a normal towards the eye.
+  // Another model of the same surfaces, mirrored and closer. The pick returns its own tag and a normal towards the eye.
   const Matrix near{-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -100, 3, 1};
   const ModelRef nearer = make_model(two.get(), near, false, 78);
   ASSERT_EQ(cumulet_add_model(shows.get(), nearer.get()), CUMULET_OK);
@@ -307,11 +307,11 @@ TEST_F(CModel, OfShadowsAloneIsNotSeenButShades) {
   std::size_t darker = 0;
   for (std::size_t i = 0; i < lit.size(); i += 4) darker += int{lit[i]} - int{shaded[i]} > 40 ? 1U : 0U;
   EXPECT_GT(darker, 6U);
-  // Nothing stands where it does.
+  // A shadow-only model is not picked.
   const cumulet_pick found = pick(shows.get(), 16, 12);
   EXPECT_EQ(found.tag, before.tag);
   EXPECT_EQ(found.distance, before.distance);
-  // Where it is seen, it is.
+  // Once it is visible to cameras, it is picked.
   auto desc = make_desc<cumulet_model_desc>();
   desc.surfaces = box_.get();
   desc.tag = 2;
@@ -321,7 +321,7 @@ TEST_F(CModel, OfShadowsAloneIsNotSeenButShades) {
   EXPECT_EQ(pick(shows.get(), 16, 12).tag, 2U);
 }
 
-// What previews raster stands where paths meet it: layers are all there is of it.
+// Rasterized previews show models where the path tracer does. The image is only the rasterized layers.
 TEST_F(CModel, AreDrawnWherePathsMeetThem) {
   const SurfacesRef own = surfaces_of({at(0, 0, 0)}, Box(), 1.0F);
   const auto silhouette = [&](cumulet_surface_light light) {
@@ -378,7 +378,7 @@ TEST_F(CModel, ChangesInAnyThread) {
   }
   ends = true;
   for (std::thread& thread : threads) thread.join();
-  // In the end it is as they left it.
+  // In the end the state is the one that the threads set last.
   for (std::size_t i = 0; i < 4; ++i) {
     auto desc = make_desc<cumulet_model_desc>();
     desc.surfaces = box_.get();

@@ -1,4 +1,4 @@
-// The camera: what its matrices, rays and depths say of each other, its operations, and the habits of the mouse.
+// The camera: consistency of its matrices, rays and depths, its operations, and the mouse navigation styles.
 
 #include "viewer/camera.hpp"
 
@@ -86,7 +86,7 @@ void expect_near(const dvec3& a, const dvec3& b, double tolerance) {
       << a.x << " " << a.y << " " << a.z << " against " << b.x << " " << b.y << " " << b.z;
 }
 
-/// Picture coordinates (-1 to 1) and window depth of a world point, by the matrices.
+/// Projects a world point with the matrices to image coordinates (-1 to 1) and window depth.
 dvec3 project(const Camera& camera, const dvec3& p, double aspect, ClipDepth clip = ClipDepth::zero_to_one) {
   dmat4 view;
   dmat4 projection;
@@ -96,7 +96,8 @@ dvec3 project(const Camera& camera, const dvec3& p, double aspect, ClipDepth cli
   return {c.x / c.w, c.y / c.w, clip == ClipDepth::zero_to_one ? depth : 0.5 * depth + 0.5};
 }
 
-/// Points all over the view volume, found by the inverse of the matrices, lie on the frame's rays at the frame's depth.
+/// Unprojects points of the whole view volume with the inverse matrices. They lie on the frame's rays at the frame's
+/// depth.
 void expect_frame_agrees(Camera& camera, double aspect, Random& random, double tolerance = 1e-9) {
   const ViewFrame frame = camera.view(aspect, std::nullopt);
   for (const ClipDepth clip : both_clips) {
@@ -167,9 +168,9 @@ TEST(Camera, DepthIsTheHeadersFormula) {
     for (const ClipDepth clip : both_clips) {
       EXPECT_NEAR(project(Camera(pose), {0.3, 0.2, 3}, 1.0, clip).z, reversed ? 1.0 - expected : expected, 1e-12);
     }
-    pose.near_plane = pose.far_plane = 0.0;  // 0.1 and infinite
+    pose.near_plane = pose.far_plane = 0.0;  // defaults: 0.1 and infinite
     EXPECT_NEAR(project(Camera(pose), {0, 0, 3}, 1.0).z, reversed ? 0.1 / z : 1.0 - 0.1 / z, 1e-12);
-    pose.orthographic_height = 2.0;  // 0 and 2000
+    pose.orthographic_height = 2.0;  // defaults: 0 and 2000
     EXPECT_NEAR(project(Camera(pose), {0, 0, 3}, 1.0).z, reversed ? 1.0 - z / 2000.0 : z / 2000.0, 1e-12);
   }
 }
@@ -178,7 +179,7 @@ TEST(Camera, ANearPlaneBeyondEverythingBreaksNothing) {
   for (const double height : {0.0, 4.0}) {
     CameraPose pose = pose_at({0, 0, 0.01});
     pose.orthographic_height = height;
-    pose.near_plane = 1e6;  // beyond the default far plane of the orthographic one
+    pose.near_plane = 1e6;  // beyond the default far plane of an orthographic camera
     Camera camera(pose);
     Random random;
     expect_frame_agrees(camera, 1.3, random, 1e-7);
@@ -188,7 +189,7 @@ TEST(Camera, ANearPlaneBeyondEverythingBreaksNothing) {
     EXPECT_LE(std::abs(project(camera, {1, 1, 1}, 1.0).x), 1.0);
   }
   CameraPose pose = pose_at({0, 0, 10});
-  pose.near_plane = -3.0;  // an orthographic near plane, become a perspective's
+  pose.near_plane = -3.0;  // the near plane of an orthographic camera, now perspective
   EXPECT_NEAR(project(Camera(pose), {0, 0, 9}, 1.0).z, 0.9, 1e-12);
 }
 
@@ -204,7 +205,7 @@ std::vector<HostProjection> host_projections() {
   const auto no = ClipDepth::negative_one_to_one;
   const auto zo = ClipDepth::zero_to_one;
   const dmat4 stereo = glm::translate(dmat4(1.0), dvec3(0.03, -0.02, -0.4));
-  dmat4 reversed_infinite(0.0);  // as engines have it
+  dmat4 reversed_infinite(0.0);  // as engines use it
   reversed_infinite[0][0] = 1.2;
   reversed_infinite[1][1] = 1.7;
   reversed_infinite[2][3] = -1.0;
@@ -272,7 +273,7 @@ TEST(CameraMatrices, OfAnyPoseAreAcceptedAndSeeTheSame) {
     expect_near(after.up, before.up, 1e-9 * glm::length(before.up));
     EXPECT_NEAR(after.depth_a, before.depth_a, 1e-12);
     EXPECT_NEAR(after.depth_b, before.depth_b, 1e-12);
-    // And the nearest pose is the one they came of.
+    // The nearest pose is the one that the matrices were made from.
     const CameraPose again = camera.pose();
     expect_near(again.eye, pose.eye, 1e-6);
     expect_near(again.target, pose.target, 1e-6);
@@ -285,7 +286,7 @@ TEST(CameraMatrices, OfAnyPoseAreAcceptedAndSeeTheSame) {
 
 TEST(CameraMatrices, NearestPoseKeepsPlanesMiddleAndLevel) {
   Camera camera(pose_at({0, 0, 10}, {0, 1, 0}));
-  // Single precision, off axis: the point in the picture's middle stays there when operations take over.
+  // Single precision, off axis: when an operation switches to a pose, the point in the image's center stays there.
   const glm::mat4 view = glm::lookAt(glm::vec3(6, 5, 4), glm::vec3(0, 1, 0), glm::vec3(0, 1, 0));
   camera.set_matrices(dmat4(view), glm::frustumRH_NO(-0.05, 0.2, -0.11, 0.07, 0.1, 50.0),
                       ClipDepth::negative_one_to_one);
@@ -294,7 +295,7 @@ TEST(CameraMatrices, NearestPoseKeepsPlanesMiddleAndLevel) {
   EXPECT_LT(angle(forward(pose), off_axis.forward), 1e-6);
   EXPECT_NEAR(pose.near_plane, 0.1, 1e-9);
   EXPECT_NEAR(pose.far_plane, 50.0, 1e-6);
-  // Level: orbits go on about +Y, at the old target's distance.
+  // A level view: orbits continue about +Y at the old target's distance.
   camera.set_matrices(dmat4(view), glm::infinitePerspective(0.8, 1.4, 0.3), ClipDepth::negative_one_to_one);
   EXPECT_EQ(camera.pose().up, dvec3(0, 1, 0));
   EXPECT_NEAR(camera.pose().near_plane, 0.3, 1e-9);
@@ -303,12 +304,12 @@ TEST(CameraMatrices, NearestPoseKeepsPlanesMiddleAndLevel) {
   camera.orbit(0.5, 0.0);
   EXPECT_NEAR(camera.pose().eye.y, 5.0, 1e-5);
   EXPECT_NEAR(distance(camera.pose()), glm::length(dvec3(6, 4, 4)), 1e-5);
-  // A rolled view gives its own up.
+  // A rolled view sets its own up vector.
   const dmat4 rolled = glm::rotate(dmat4(1.0), 0.3, dvec3(0, 0, 1)) * dmat4(view);
   camera.set_matrices(rolled, glm::infinitePerspective(0.8, 1.4, 0.3), ClipDepth::negative_one_to_one);
   const CameraPose leaning = camera.pose();
   expect_near(leaning.up, glm::normalize(dvec3(glm::transpose(rolled)[1])), 1e-5);
-  // A mirrored one keeps the side of up that it had.
+  // A mirrored projection keeps the sign of the up vector.
   dmat4 flipped = glm::perspective(0.8, 1.4, 0.1, 50.0);
   flipped[1][1] = -flipped[1][1];
   camera.set_matrices(rolled, flipped, ClipDepth::negative_one_to_one);
@@ -319,7 +320,7 @@ TEST(CameraMatrices, KeepTheTargetInMindWhileTheHostLooksAround) {
   Camera camera(pose_at({0, 0, 10}, {0, 0, 1}));
   const dmat4 projection = glm::infinitePerspective(0.8, 1.4, 0.3);
   const dvec3 target(0, 0, 1);
-  const std::pair<dvec3, dvec3> views[] = {// eye, and what it looks at
+  const std::pair<dvec3, dvec3> views[] = {// eye and target
                                            {{0, 0, 10}, {9, 0, 10}},
                                            {{5, 0, 10}, {5, 3, 90}},
                                            {{-5, 2, -10}, {-9, 2, -10}},
@@ -417,8 +418,7 @@ double widest(const Camera& camera, const Bounds& box, double aspect) {
   return wide;
 }
 
-/// How far inside the picture's edges the box is, as fractions of the picture's shorter side: left, right, below,
-/// above.
+/// Distances of the box from the image's edges as fractions of the image's shorter side: left, right, below, above.
 std::array<double, 4> margins(const Camera& camera, const Bounds& box, double aspect) {
   dvec2 least(infinity);
   dvec2 most(-infinity);
@@ -461,7 +461,7 @@ TEST(CameraFit, LeavesTheSameMarginOnBothOfTheTighterSides) {
 }
 
 TEST(CameraFit, IsOfWhatIsSeen) {
-  // A ball in a box: its reach is its own.
+  // A ball in a larger box. `reach` is the ball's support function.
   const dvec3 centre(3, -2, 5);
   const double radius = 2.0;
   Subject subject(Bounds{dvec3(-20), dvec3(20)});
@@ -487,7 +487,7 @@ TEST(CameraFit, IsOfWhatIsSeen) {
     const double reach = i % 2 == 1 ? radius / (0.5 * fitted.orthographic_height)
                                     : std::tan(std::asin(radius / distance(fitted))) / half;
     EXPECT_NEAR(reach, 0.88 * std::min(aspect, 1.0), 1e-9);
-    // Of nothing seen: the bounds.
+    // If nothing is visible (empty reach), the camera fits the bounds.
     Subject unseen(subject.bounds);
     unseen.reach = [](const dvec3&, std::span<const dvec3>) { return std::vector<double>(); };
     camera.fit(unseen, aspect);
@@ -540,7 +540,7 @@ TEST(CameraFit, IsForGoodAndCountsAsAChange) {
   EXPECT_EQ(waiting.forward, dvec3(0, 0, -1));
   EXPECT_GT(waiting.eye.z, 0.0);
   EXPECT_EQ(camera.revision(), 1U);
-  // No picture yet.
+  // Invalid aspect ratios: the camera is not fitted yet.
   for (const double bad : {0.0, -1.0, static_cast<double>(NAN), infinity}) static_cast<void>(camera.view(bad, box));
   EXPECT_EQ(camera.revision(), 1U);
   const ViewFrame frame = camera.view(1.0, box);
@@ -584,7 +584,7 @@ TEST(CameraFrame, FillsThePictureFromTheDirectionItHad) {
     Camera camera(pose);
     camera.frame(box, aspect);
     EXPECT_LT(angle(forward(camera.pose()), forward(pose)), 1e-9);
-    // As deep in the picture as the box's middle.
+    // The target's depth in the image is that of the box's center.
     EXPECT_NEAR(glm::dot(camera.pose().target - 0.5 * (box.min + box.max), forward(pose)), 0.0, 1e-9);
     EXPECT_EQ(camera.pose().orthographic_height > 0.0, i % 2 == 1);
     double wide = 0.0;
@@ -600,12 +600,13 @@ TEST(CameraFrame, FillsThePictureFromTheDirectionItHad) {
       EXPECT_TRUE(i % 2 == 0 || at.z >= 0.0);
     }
     EXPECT_LT(wide, 1.0 + 1e-9);
-    // But for wide angles on a corner: not nearer than a fiftieth of its depth.
+    // The eye's distance from the nearest corner is at least 0.02 of the box's depth. It matters only for wide angles
+    // close to a corner.
     const double least = 0.02 * (farthest - nearest);
     EXPECT_TRUE(i % 2 == 1 || nearest > (1.0 - 1e-9) * least);
     EXPECT_TRUE(nearest <= (1.0 + 1e-9) * least || std::abs(wide - 1.0) < 1e-9) << wide;
   }
-  // A point: as near as before, and never upon it.
+  // A single point: the distance stays, so the eye is never at the point.
   for (const double height : {0.0, 3.0}) {
     CameraPose pose = pose_at({0, 0, 10});
     pose.orthographic_height = height;
@@ -650,13 +651,13 @@ TEST(CameraOperations, OrbitStopsShortOfThePolesAndDoesNotJitter) {
     EXPECT_LT(angle(before.right, after.right), 1e-6);
     EXPECT_LT(angle(before.forward, after.forward), 1e-9);
     EXPECT_NEAR(distance(camera.pose()), 10.0, 1e-9);
-    // Yaw spins the picture, as it does anywhere; pitch leaves the pole on the side it came from.
+    // Yaw rotates the image, as elsewhere. Pitch leaves the pole on the side it came from.
     camera.orbit(0.5, 0.0);
     EXPECT_NEAR(angle(camera.view(1.0, std::nullopt).right, before.right), 0.5, 1e-6);
     camera.orbit(-0.5, -side * pi / 2);
     expect_near(camera.pose().eye, dvec3(1000, 0, 1000) + 10.0 * dvec3(std::sin(0.3), 0, std::cos(0.3)), 1e-2);
   }
-  // A pose that looks right along up is left the way its picture stands.
+  // A pose that looks exactly along `up` is left in the direction of the image's vertical axis.
   Camera down(pose_at({0, 10, 0}));
   const dvec3 right = down.view(1.0, std::nullopt).right;
   down.orbit(0.0, -0.3);
@@ -712,7 +713,7 @@ TEST(CameraOperations, PanMovesTheSceneByPartsOfThePicturesHeight) {
     if (i % 2 == 1) pose.orthographic_height = random(0.1, 50.0);
     Camera camera(pose);
     const double aspect = random(0.5, 2.0);
-    // Any point as far as the target: where it was seen at x, y it is seen moved by a quarter of the height.
+    // Any point at the target's depth: it moves by a quarter of the image height.
     const ViewFrame frame = camera.view(aspect, std::nullopt);
     const double far = i % 2 == 1 ? 1.0 : distance(pose);
     const dvec3 p = pose.target + far * (random(-0.9, 0.9) * frame.right + random(-0.9, 0.9) * frame.up);
@@ -742,12 +743,12 @@ TEST(CameraOperations, DollyMultipliesAndStaysSensible) {
   camera.dolly(infinity);
   camera.dolly(0.0);
   EXPECT_GT(distance(camera.pose()), 1e-13);
-  // Far from the origin doubles end sooner.
+  // Far from the origin, the minimum distance is larger (double precision).
   Camera far(pose_at({1e9, 0, 10}, {1e9, 0, 0}));
   for (int i = 0; i < 2000; ++i) far.dolly(0.5);
   EXPECT_NE(far.pose().eye, far.pose().target);
   EXPECT_LT(angle(forward(far.pose()), {0, 0, -1}), 1e-6);
-  // One outside the limits stays there, and may come back.
+  // A distance below the limit stays there, and may increase again.
   Camera tiny(pose_at({0, 0, 1e-20}));
   tiny.dolly(0.5);
   EXPECT_EQ(distance(tiny.pose()), 1e-20);
@@ -759,7 +760,7 @@ TEST(CameraOperations, DollyMultipliesAndStaysSensible) {
   flat.dolly(0.5);
   EXPECT_EQ(flat.pose().orthographic_height, 2.0);
   expect_near(flat.pose().eye, {0, 0, 5}, 1e-12);
-  flat.zoom(0.5);  // the near plane, at the eye, comes no nearer
+  flat.zoom(0.5);  // the eye does not move, because the near plane is at the eye
   EXPECT_EQ(flat.pose().orthographic_height, 1.0);
   expect_near(flat.pose().eye, {0, 0, 5}, 1e-12);
   for (int i = 0; i < 2000; ++i) flat.zoom(0.1);
@@ -817,7 +818,7 @@ TEST(CameraOperations, LookFromTheSides) {
     EXPECT_LT(angle(frame.right, c.right), 1e-6);
     EXPECT_NEAR(distance(camera.pose()), distance(pose), 1e-9);
     EXPECT_EQ(camera.pose().target, pose.target);
-    camera.orbit(0.0, c.side == AxisView::top ? -0.1 : 0.1);  // the poles too can be left
+    camera.orbit(0.0, c.side == AxisView::top ? -0.1 : 0.1);  // orbiting away from the poles works too
     EXPECT_GT(angle(-camera.view(1.0, std::nullopt).forward, c.back), 0.09);
   }
 }
@@ -845,7 +846,7 @@ TEST(CameraOperations, OrthographicShowsTheSameAtTheTargetAndNeverCutsTheScene) 
   camera.toggle_orthographic(box);
   EXPECT_EQ(camera.pose().orthographic_height, 0.0);
   expect_near(camera.pose().eye, before.eye, 1e-12);
-  // At the target's depth nothing moves in the picture.
+  // At the target's depth nothing moves in the image.
   Camera flat(pose_at({0, 0, 10}));
   const dvec3 there = project(flat, p, 1.3);
   flat.toggle_orthographic(std::nullopt);
@@ -868,7 +869,7 @@ TEST(CameraOperations, RevisionCountsWhatChangesAndNothingElse) {
   const dmat4 projection = glm::perspective(0.8, 1.4, 0.1, 50.0);
   for (int i = 0; i < 3; ++i) camera.set_matrices(view, projection, ClipDepth::negative_one_to_one);
   EXPECT_EQ(camera.revision(), 3U);
-  camera.set(camera.pose());  // ends the matrices
+  camera.set(camera.pose());  // replaces the matrices
   EXPECT_EQ(camera.revision(), 4U);
   camera.orbit(0.1, 0);
   EXPECT_EQ(camera.revision(), 5U);
@@ -878,7 +879,7 @@ TEST(CameraOperations, ListenersHearOfEveryChangeAndNothingElse) {
   auto camera = std::make_unique<Camera>();
   int heard = 0;
   int other = 0;
-  auto token = camera->listen([&] { heard += camera->revision() > 1 ? 1 : 1000; });  // nothing is locked
+  auto token = camera->listen([&] { heard += camera->revision() > 1 ? 1 : 1000; });  // no lock is held in listeners
   auto second = camera->listen([&] { ++other; });
   camera->orbit(1.0, 0.0);  // waits for bounds
   static_cast<void>(camera->view(1.0, std::nullopt));
@@ -894,7 +895,7 @@ TEST(CameraOperations, ListenersHearOfEveryChangeAndNothingElse) {
   camera->set_matrices(dmat4(1.0), glm::perspective(0.8, 1.4, 0.1, 50.0), ClipDepth::negative_one_to_one);
   EXPECT_EQ(heard, 2);
   EXPECT_EQ(other, 3);
-  camera.reset();  // before its listener
+  camera.reset();  // destroyed before its listener
   second.reset();
 }
 
@@ -962,7 +963,7 @@ TEST(CameraAbi, DefaultsAndRoundTrip) {
   EXPECT_EQ(again.near_plane, -2.0);
   EXPECT_EQ(again.far_plane, 50.0);
   EXPECT_EQ(again.depth, CUMULET_DEPTH_REVERSED);
-  // A host of an older header gets what its struct has room for.
+  // A host of an older header gets the members that its struct has.
   again = {};
   again.struct_size = offsetof(cumulet_camera_desc, up);
   ASSERT_EQ(cumulet_camera_get(camera.get(), &again), CUMULET_OK);
@@ -1006,7 +1007,7 @@ TEST(CameraAbi, RefusesBadDescriptors) {
   cumulet_camera_desc got = camera_desc({});
   ASSERT_EQ(cumulet_camera_get(camera.get(), &got), CUMULET_OK);
   EXPECT_EQ(got.eye[2], 10.0);
-  got.far_plane = infinity;  // perspective may say so
+  got.far_plane = infinity;  // allowed for perspective
   EXPECT_EQ(cumulet_camera_set(camera.get(), &got), CUMULET_OK);
 }
 
@@ -1119,7 +1120,7 @@ constexpr std::uint32_t alt = CUMULET_MODIFIER_ALT;
 constexpr double width = 800.0;
 constexpr double height = 400.0;
 
-/// A picture of 800 x 400 pixels, a box of 4 x 4 x 2 in it, seen from +Z at a distance of 10.
+/// An image of 800 x 400 pixels with a box of 4 x 4 x 2, seen from +Z at a distance of 10.
 struct Session {
   explicit Session(NavigationStyle style = NavigationStyle::simple, bool fly = false) {
     NavigationSettings settings;
@@ -1156,7 +1157,7 @@ struct Session {
 
 enum class Motion { none, orbit, pan, dolly, look };
 
-/// What a short drag with this button and these modifiers did.
+/// The camera motion caused by a short drag with this button and these modifiers.
 Motion motion_of(NavigationStyle style, bool fly, int button, std::uint32_t modifiers) {
   Session session(style, fly);
   const bool began = session.down(button, 400, 200, modifiers);
@@ -1201,28 +1202,28 @@ TEST(Navigation, ButtonsMeanWhatEachStyleSays) {
 TEST(Navigation, DragsTurnTheSceneWithThePointer) {
   Session session;
   session.down(CUMULET_BUTTON_LEFT, 100, 200);
-  session.move(300, 200);  // half the height to the right: the scene's front goes right, the eye left
+  session.move(300, 200);  // right by half the height: the scene's front goes right, the eye left
   expect_near(session.eye(), {-10, 0, 0}, 1e-9);
   session.move(300, 200 + height / 6);  // down: the eye rises
   EXPECT_NEAR(elevation(session.camera.pose()), pi / 6, 1e-9);
-  session.up(CUMULET_BUTTON_LEFT, 100, 200 + height / 6);  // where the button goes up counts too
+  session.up(CUMULET_BUTTON_LEFT, 100, 200 + height / 6);  // the position of the button release counts too
   EXPECT_NEAR(session.eye().x, 0.0, 1e-9);
   EXPECT_NEAR(session.eye().z, 10 * std::cos(pi / 6), 1e-9);
 
   Session in_two;
   in_two.down(CUMULET_BUTTON_RIGHT, 400, 300);
   in_two.move(400, 250);
-  in_two.move(400, 100);  // up by half the height: nearer by the root of 10
+  in_two.move(400, 100);  // up by half the height: nearer by a factor of the square root of 10
   EXPECT_NEAR(distance(in_two.camera.pose()), 10.0 / std::sqrt(10.0), 1e-9);
 
   Session maya(NavigationStyle::maya);
   maya.down(CUMULET_BUTTON_RIGHT, 400, 300, alt);
-  maya.move(500, 300, alt);  // to the right goes in as well
+  maya.move(500, 300, alt);  // right dollies in as well
   EXPECT_LT(distance(maya.camera.pose()), 9.0);
 
   Session fly(NavigationStyle::simple, true);
   fly.down(CUMULET_BUTTON_LEFT, 400, 200);
-  fly.move(600, 200);  // to the right: the look follows
+  fly.move(600, 200);  // right: the view direction follows
   EXPECT_GT(fly.target().x, 1.0);
   fly.move(600, 100);  // up
   EXPECT_GT(fly.target().y, 1.0);
@@ -1256,19 +1257,19 @@ TEST(Navigation, ADragLastsUntilItsOwnButtonIsUp) {
   EXPECT_TRUE(session.down(CUMULET_BUTTON_LEFT, 100, 100));
   EXPECT_FALSE(session.down(CUMULET_BUTTON_RIGHT, 120, 100));
   EXPECT_FALSE(session.down(CUMULET_BUTTON_MIDDLE, 120, 100));
-  EXPECT_TRUE(session.move(150, 100, shift));  // still an orbit, whatever is held meanwhile
+  EXPECT_TRUE(session.move(150, 100, shift));  // still an orbit, whichever buttons and keys are held
   EXPECT_FALSE(session.up(CUMULET_BUTTON_RIGHT, 150, 100));
   EXPECT_TRUE(session.move(200, 100));
   expect_near(session.eye(), {-10 * std::sin(pi / 4), 0, 10 * std::cos(pi / 4)}, 1e-9);
   EXPECT_TRUE(session.up(CUMULET_BUTTON_LEFT, 200, 100));
   EXPECT_FALSE(session.move(300, 300));
   EXPECT_FALSE(session.up(CUMULET_BUTTON_MIDDLE, 300, 300));
-  // In Maya's style alt may be let go of first.
+  // In Maya's style alt may be released first.
   Session maya(NavigationStyle::maya);
   maya.down(CUMULET_BUTTON_LEFT, 100, 100, alt);
   EXPECT_TRUE(maya.move(120, 100));
   EXPECT_TRUE(maya.up(CUMULET_BUTTON_LEFT, 120, 100));
-  // A button that comes down anew (its up got lost) begins anew, without a jump.
+  // A second press of the button (its release was lost) starts a new drag without a jump.
   maya.down(CUMULET_BUTTON_LEFT, 100, 100, alt);
   const dvec3 eye = maya.eye();
   EXPECT_TRUE(maya.down(CUMULET_BUTTON_LEFT, 700, 100, alt));
@@ -1298,7 +1299,7 @@ TEST(Navigation, OtherHabitsEndWhatIsUnderWay) {
   session.down(CUMULET_BUTTON_LEFT, 100, 100);
   NavigationSettings settings = session.navigation.settings();
   settings.speed = 2.0;
-  session.navigation.set(settings);  // speed alone: goes on
+  session.navigation.set(settings);  // only the speed changed: the drag continues
   EXPECT_TRUE(session.navigation.moving());
   EXPECT_TRUE(session.move(110, 100));
   settings.fly = false;
@@ -1444,7 +1445,7 @@ TEST(Navigation, KeypadIsBlenders) {
   EXPECT_FALSE(session.press(key(0)));
   EXPECT_FALSE(session.press(key(5), ctrl));
   EXPECT_FALSE(session.press(key(1), alt));
-  // Out of the top view an orbit goes on about +Y.
+  // From the top view, an orbit continues about +Y.
   EXPECT_TRUE(session.press(key(7)));
   session.down(CUMULET_BUTTON_MIDDLE, 0, 0);
   session.up(CUMULET_BUTTON_MIDDLE, 0, -height / 2);
@@ -1484,14 +1485,14 @@ TEST(Navigation, FlyKeysMoveAlongTheCamerasAxes) {
     EXPECT_TRUE(session.press(key));
     session.advance(1.0);
     expect_near(session.eye(), dvec3(0, 0, 10) + 3.0 * way, 1e-9);
-    // Shift, though it comes with another event, is faster.
+    // Shift is faster, even if it arrives with another event.
     session.move(5, 5, shift);
     session.advance(0.25);
     expect_near(session.eye(), dvec3(0, 0, 10) + 6.0 * way, 1e-9);
     session.move(5, 5);
     session.advance(1.0);
     expect_near(session.eye(), dvec3(0, 0, 10) + 9.0 * way, 1e-9);
-    // Its ctrl is the host's; so is the key where nothing flies.
+    // Keys with ctrl are the host's; so are all keys if fly mode is off.
     Session plain;
     EXPECT_FALSE(plain.press(key));
     EXPECT_FALSE(plain.advance(1.0));
@@ -1505,11 +1506,11 @@ TEST(Navigation, FlyKeysMoveAlongTheCamerasAxes) {
   EXPECT_FALSE(both.navigation.moving());
   both.lift('S');
   EXPECT_TRUE(both.navigation.moving());
-  // Without bounds the distance to the target says how fast.
+  // Without bounds the speed depends on the distance to the target.
   both.bounds.reset();
   both.advance(1.0);
   expect_near(both.eye(), {0, 0, 5}, 1e-9);
-  both.advance(1.0);  // which does not shrink
+  both.advance(1.0);  // the distance does not shrink
   expect_near(both.eye(), {0, 0, 0}, 1e-9);
 }
 
@@ -1518,7 +1519,7 @@ TEST(Navigation, TurntableTurnsByTheClock) {
     Session session;
     NavigationSettings settings;
     settings.turntable_degrees_per_second = 45.0;
-    settings.speed = 7.0;  // of the hand
+    settings.speed = 7.0;  // speed of mouse motion
     session.navigation.set(settings);
     EXPECT_TRUE(session.navigation.moving());
     for (int i = 0; i < frames; ++i) EXPECT_TRUE(session.advance(2.0 / frames));

@@ -1,4 +1,4 @@
-// Progress and cancel through everything that a worker does with a volume before GL sees it.
+// Progress and cancellation of all work that a worker thread does with a volume before its upload.
 
 #define NANOVDB_USE_ZIP
 #define NANOVDB_USE_BLOSC
@@ -39,7 +39,7 @@ namespace fs = std::filesystem;
 using namespace cumulet;
 using Work = std::function<void(Progress&)>;
 
-/// The places at which the fraction stood, as far as another thread saw them.
+/// Progress fractions that another thread observed.
 std::vector<double> fractions_of(const Work& work) {
   Progress progress;
   std::atomic<bool> done = false;
@@ -57,10 +57,10 @@ std::vector<double> fractions_of(const Work& work) {
   return seen;
 }
 
-/// The fraction never falls, stays within [0, 1], arrives at 1, and stands at many places on the way.
+/// Expects that the fraction never decreases, stays within [0, 1], reaches 1, and takes at least `places` values.
 void expect_steady_progress(const Work& work, std::size_t places = 5) {
   std::vector<double> all;
-  // On a busy machine who watches may sleep through most of it.
+  // On a busy machine the watching thread may miss most values.
   for (int attempt = 0; attempt < 20 && all.size() < places; ++attempt) {
     const std::vector<double> seen = fractions_of(work);
     EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
@@ -75,7 +75,7 @@ void expect_steady_progress(const Work& work, std::size_t places = 5) {
 
 double processor_milliseconds() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// Half of the delays from asking to stopping, in milliseconds, are short, and none is longer than most.
+/// Expects that the median delay from cancel to stop is short and that none exceeds `most`. Milliseconds.
 void expect_soon(std::vector<double> delays, double most) {
   ASSERT_FALSE(delays.empty());
   std::sort(delays.begin(), delays.end());
@@ -83,7 +83,7 @@ void expect_soon(std::vector<double> delays, double most) {
   for (const double delay : delays) list += std::to_string(delay).substr(0, 5) + " ";
   testing::Test::RecordProperty("milliseconds_to_stop", list);
 #if !defined(__SANITIZE_ADDRESS__)
-  // In processor time of all threads, which a busy machine does not change much.
+  // Measured in CPU time of all threads, which depends little on the load of the machine.
   EXPECT_LT(delays[delays.size() / 2], 30.0) << list;
   EXPECT_LT(delays.back(), most) << list;
 #else
@@ -91,7 +91,7 @@ void expect_soon(std::vector<double> delays, double most) {
 #endif
 }
 
-/// Cancels at many fractions, and between them: the work stops soon, by Error(cancelled) and nothing else.
+/// Cancels at many fractions and between them. Expects that the work stops soon with Error(cancelled) only.
 void expect_cancels(const Work& work) {
   constexpr int moments = 16;
   std::vector<double> delays;
@@ -127,7 +127,7 @@ void expect_cancels(const Work& work) {
   expect_soon(delays, 250.0);
 }
 
-/// The same at many moments, spread evenly over the time that the work takes: where fractions tell little.
+/// Cancels at many times, spread evenly over the duration of the work, for work whose fraction changes rarely.
 void expect_stops(const Work& work) {
   constexpr int moments = 20;
   using Clock = std::chrono::steady_clock;
@@ -161,7 +161,7 @@ void expect_both(const Work& work, std::size_t places = 5) {
   expect_cancels(work);
 }
 
-/// About 7 million voxels, no two bricks alike.
+/// About 7 million voxels, no two bricks equal.
 float density(const glm::ivec3& p) {
   const glm::vec3 x = glm::vec3(p) / 40.0F;
   return std::max(0.0F, std::sin(x.x) * std::sin(1.3F * x.y) * std::sin(0.7F * x.z) +
@@ -196,7 +196,7 @@ TEST(Cancel, Statistics) {
 }
 
 TEST(Cancel, DiamondsAndBisection) {
-  for (const double threshold : {0.001, 0.05}) {  // ended by max_cells and not
+  for (const double threshold : {0.001, 0.05}) {  // limited by max_cells, and not limited
     grid::RefineSettings settings = built().settings;
     settings.threshold = threshold;
     expect_both([&](Progress& progress) {
@@ -212,7 +212,7 @@ TEST(Cancel, Records) {
   grid::GridBuilder builder(built().statistics, built().diamonds);
   builder.bisect();
   grid::TetGrid last;
-  // A cancelled call leaves the builder as it was: the next one succeeds.
+  // A cancelled call leaves the builder unchanged: the next one succeeds.
   expect_both([&](Progress& progress) {
     progress.begin(Progress::Stage::records);
     last = builder.records(grid::CellKind::linear, large_volume().max_value, &progress);
@@ -248,12 +248,12 @@ TEST(Cancel, SparseVoxels) {
                               .tiles = {},
                               .background = 0.0F,
                               .index_to_world = glm::dmat4(1.0)};
-  // Tiles beside the bricks, enough to be looked at for a while.
+  // Tiles in addition to the bricks, enough to take some time.
   for (int i = 0; i < 20000; ++i) {
     const glm::ivec3 low(1000 + 9 * (i % 100), 9 * (i / 100 % 100), 9 * (i / 10000));
     voxels.tiles.push_back({{low, low + 7, 1.0F}, true});
   }
-  // Most of it is the tiles, which are looked at in one go.
+  // Most of the time goes into the tiles, which are processed without progress steps.
   expect_both([&](Progress& progress) { (void)volume::import_sparse(voxels, "sparse", {}, &progress); }, 3);
 }
 
@@ -300,7 +300,7 @@ TEST_F(CancelImport, VdbOfEveryCompression) {
 }
 
 TEST_F(CancelImport, VdbWithABackground) {
-  // Its nodes cannot be freed half read.
+  // Nodes of such a file cannot be freed when they are read only in part.
   expect_import(write(openvdb::io::COMPRESS_NONE, {make(0.25F)}));
 }
 
@@ -326,7 +326,8 @@ TEST_F(CancelImport, NanoVdbOfEveryCodec) {
 }
 
 TEST_F(CancelImport, ADestroyedViewerTakesASmallPartOfItsLoad) {
-  // In processor time of all threads, and beside that of a whole load in the same run: a busy machine changes neither.
+  // Measured in CPU time of all threads and compared with a whole load of the same run, so that a busy machine does not
+  // matter.
   const std::string file = write(openvdb::io::COMPRESS_ZIP, {grid_}).string();
   const auto loading = [&] {
     test::ViewerPtr viewer = test::make_viewer({});
@@ -353,7 +354,7 @@ TEST_F(CancelImport, ADestroyedViewerTakesASmallPartOfItsLoad) {
   std::ranges::sort(delays);
   RecordProperty("milliseconds_of_a_load", std::to_string(whole));
   RecordProperty("longest_to_destroy", std::to_string(delays.back()));
-#if !defined(__SANITIZE_ADDRESS__)  // which slows what is freed more than what is read
+#if !defined(__SANITIZE_ADDRESS__)  // AddressSanitizer slows deallocation more than reading
   EXPECT_LT(delays[delays.size() / 2], 0.1 * whole);
   EXPECT_LT(delays.back(), 0.25 * whole);
 #endif
@@ -420,7 +421,7 @@ TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {
   const viewer::VolumeAsset asset(large_volume());
   double seconds = 0.0;
   expect_cancels([&](Progress& progress) {
-    // A fresh asset each time would leave nothing to compute again.
+    // A new asset for each run, because an asset caches its statistics.
     const viewer::VolumeAsset other(test::make_volume({64, 64, 64}, {0, 0, 0}, density));
     double s = 0.0;
     (void)other.density({}, progress, s).statistics;
@@ -457,10 +458,10 @@ TEST(VolumeAsset, CallersWaitForOneAnotherUnlessCancelled) {
   second.cancel();
   double seconds = 0.0;
   EXPECT_THROW((void)asset.density({}, second, seconds).statistics, Error);
-  EXPECT_LT(first.fraction(), 1.0);  // it did not wait
+  EXPECT_LT(first.fraction(), 1.0);  // returned without waiting for the first
   Progress third;
   const auto statistics = asset.density({}, third, seconds).statistics;
-  EXPECT_EQ(seconds, 0.0);  // it did
+  EXPECT_EQ(seconds, 0.0);  // waited for the first, computed nothing itself
   EXPECT_NE(statistics, nullptr);
   computing.join();
 }

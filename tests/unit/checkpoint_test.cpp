@@ -1,4 +1,4 @@
-// Checkpoints: what is kept is read again, and nothing else is.
+// Checkpoints: a saved file is read back exactly, and other files are rejected.
 
 #include "checkpoint.hpp"
 
@@ -20,7 +20,7 @@ class Kept : public ::testing::Test {
  protected:
   Kept() {
     options_.scene.volume = "cloud.vdb";
-    // Whatever bytes: lines, and what looks like an end, too.
+    // Arbitrary bytes, including line breaks and end markers.
     for (int i = 0; i < 1000; ++i) checkpoint_.accumulation.push_back(static_cast<std::byte>(i * 7 % 256));
     checkpoint_.of = checkpoint_of(options_);
     checkpoint_.driver = "llvmpipe (LLVM 15.0.6, 256 bits)";

@@ -35,7 +35,7 @@ class Rays {
     for (std::uint32_t i = 0; i < 4; ++i) p += share[i] / sum * core::cm_cell_vertex(v0, shape, i);
     return p;
   }
-  /// At times along its edges.
+  /// A random direction in the cone; sometimes on its edges.
   [[nodiscard]] vec3 within_cone(std::uint32_t cone) {
     vec3 d;
     const auto longest = static_cast<int>(cone / 8);
@@ -45,7 +45,7 @@ class Rays {
                 (axis == longest ? 1.0F : some());
     return d;
   }
-  /// Whether a ray comes to a cell that has density, now or at another time of the shutter's, or gives off light.
+  /// Whether a ray reaches a cell that has density (at any time of the shutter interval) or emits light.
   [[nodiscard]] bool meets(std::uint32_t cell, const vec3& o, const vec3& d) const {
     while (cell != CM_NONE) {
       const glm::uvec4& data = grid_.cells[cell].data;
@@ -117,7 +117,7 @@ TEST(ClearCones, NorOfAVolumeThatIsWide) {
   EXPECT_GT(found.clear, 0U);
 }
 
-// From a cell outside of a ball no ray that goes away from its middle comes back to it.
+// From a cell outside of a ball, no ray that goes away from the ball's center reaches it.
 TEST(ClearCones, AreFoundAllAroundABall) {
   const float radius = 40.0F;
   const vec3 middle(50.0F);
@@ -143,13 +143,13 @@ TEST(ClearCones, AreFoundAllAroundABall) {
   EXPECT_GT(clear, cells * 8 / 10) << "of " << cells;
 }
 
-// What is dark may glow, and what has no density in the middle of the shutter's time may have some before or after.
+// Cells without density may emit light. Cells without density at mid-shutter may have some before or after.
 TEST(ClearCones, WhatGlowsOrIsThereAtTimesIsMet) {
   const volume::ScalarVolume volume = test::puffs({60, 45, 50}, ivec3(0));
   grid::RefineSettings settings;
   settings.threshold = 0.05;
   const grid::TetGrid before = grid_of(volume, settings);
-  // In the middle there is nothing yet.
+  // At the start the center is still empty.
   const std::uint32_t middle =
       grid::locate(before, 0.5F * (before.content_min + before.content_max) + vec3(0.0F, 9.0F, 0.0F));
   ASSERT_EQ(before.cells[middle].data.z, 0U);

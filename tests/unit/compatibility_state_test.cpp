@@ -1,5 +1,5 @@
-// What a compatibility context has beside a core one, with functions that stand for drivers that are not here: those
-// with GL_ARB_imaging, and those that lack functions.
+// State that only compatibility contexts have. Fake functions replace drivers that are not available: drivers with
+// GL_ARB_imaging and drivers that lack functions.
 
 #include "gl/compatibility_state.hpp"
 
@@ -26,7 +26,7 @@ namespace gl = cumulet::gl;
 constexpr GLenum color_matrix_mode = 0x1800;
 constexpr GLenum modelview = 0x1700;
 
-/// The legacy state of a driver that has GL_ARB_imaging, and how often it was set.
+/// The legacy state of a driver with GL_ARB_imaging, and counts of its changes.
 struct Driver {
   GLint profile = GL_CONTEXT_COMPATIBILITY_PROFILE_BIT;
   GLint flags = 0;
@@ -43,7 +43,7 @@ class ImagingDriver : public testing::Test {
  protected:
   ImagingDriver() {
     driver() = {};
-    // As a driver begins.
+    // Initial values of a driver.
     for (const GLenum scale : scales) driver().values[scale] = 1.0F;
     driver().matrices[color_matrix_mode] = identity;
     gl_.GetIntegerv = [](GLenum name, GLint* value) {
@@ -103,19 +103,19 @@ class ImagingDriver : public testing::Test {
     return nullptr;
   }
   void load() { gl_.compatibility = gl::load_compatibility(gl_, get_proc, nullptr); }
-  /// What a host may have set: every transfer parameter, every step, and a matrix.
+  /// Sets everything that a host may have set: each transfer parameter, each step and a matrix.
   static void set_all() {
     float value = 0.0F;
     for (GLenum name = 0x0D10; name <= 0x0D1F; ++name) driver().values[name] = value += 0.5F;
     for (GLenum name = 0x801C; name <= 0x8023; ++name) driver().values[name] = value += 0.5F;
     for (GLenum name = 0x80B4; name <= 0x80BB; ++name) driver().values[name] = value += 0.5F;
-    driver().values.erase(0x0D16);  // GL_ZOOM_X and GL_ZOOM_Y are not of transfers
+    driver().values.erase(0x0D16);  // GL_ZOOM_X and GL_ZOOM_Y are not transfer parameters
     driver().values.erase(0x0D17);
     driver().enabled = {steps.begin(), steps.end()};
     driver().enabled.insert(GL_BLEND);
     driver().matrices[color_matrix_mode][5] = 3.0F;
   }
-  /// known: the values of transfers that are not 0.
+  /// known: the transfer parameters whose default is not 0.
   static void expect_core(const std::map<GLenum, GLfloat>& known) {
     for (const auto& [name, is] : driver().values) EXPECT_EQ(is, known.contains(name) ? 1.0F : 0.0F) << name;
     EXPECT_EQ(driver().enabled, std::set<GLenum>{GL_BLEND});
@@ -194,7 +194,7 @@ TEST_F(ImagingDriver, MissingFunctionsAreNamed) {
     driver().missing = name;
     EXPECT_NE(refusal().find(name), std::string::npos) << name << ": " << refusal();
   }
-  // Those of the imaging subset only where there is one.
+  // Functions of the imaging subset are only required if the driver has it.
   driver().has_imaging = false;
   EXPECT_EQ(refusal(), "");
 }

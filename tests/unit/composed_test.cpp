@@ -1,4 +1,4 @@
-// A picture that is drawn again: copied where nothing of it changed, and by rows where some did.
+// Drawing an image again: copied if nothing changed, composed only in the rows that changed.
 
 #include "render/composed.hpp"
 
@@ -45,7 +45,7 @@ TEST(RowRevisions, KnowsWhatChangedSince) {
   EXPECT_EQ(rows.since(5), (std::vector<RowRange>{{16, 32}, {64, 70}}));
   EXPECT_EQ(rows.since(5, 1), (std::vector<RowRange>{{15, 33}, {63, 70}}));
   EXPECT_TRUE(rows.since(6).empty());
-  // A tile that begins within a band, and one of whose second word there is a bit.
+  // One tile that begins inside a band, and one given by a bit of the second word.
   rows.change_all(2048, 7);
   rows.expect();
   rows.change(1000, 1U, 1U, 8);
@@ -109,7 +109,7 @@ class ComposedPicture : public cumulet::test::GlTest {
     gl_->GetTextureImage(target_.color.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(got.size() * 16), got.data());
     return got;
   }
-  /// What a compositor draws that has drawn nothing before, into a clear target.
+  /// Draws with a new compositor into a cleared target.
   std::vector<glm::vec4> fresh(glm::vec4 before = glm::vec4(0.0F)) {
     render::Compositor other(gl_, programs_);
     clear(before);
@@ -136,7 +136,7 @@ CUMULET_ON_BACKENDS(ComposedPicture);
 TEST_P(ComposedPicture, IsCopiedWhereNothingChanged) {
   const auto first = again();
   EXPECT_EQ(composed(), 64U);
-  // What nobody announced is not seen: it is the copy that is drawn.
+  // A change without a new revision is not noticed: the copy is drawn.
   picture_->set(*gl_, colors(0.9F));
   EXPECT_EQ(again(), first);
   EXPECT_EQ(composed(), 0U);
@@ -153,13 +153,13 @@ TEST_P(ComposedPicture, IsComposedByTheRowsThatChanged) {
   const auto some = again();
   EXPECT_EQ(composed(), 16U);
   for (int y = 0; y < 64; ++y) {
-    const int row = 63 - y;  // of the picture
+    const int row = 63 - y;  // of the image
     for (int x = 0; x < 40; ++x) {
       const auto i = static_cast<std::size_t>(y * 60 + x);
       ASSERT_EQ(some[i], row >= 32 && row < 48 ? all[i] : first[i]) << x << ' ' << row;
     }
   }
-  // Where it is not known which, all.
+  // If the changed rows are unknown, all are composed.
   rows_.expect();
   ++revision_;
   PictureTextures unknown = textures();
@@ -192,7 +192,7 @@ TEST_P(ComposedPicture, RowsOfAnotherSizeReachAsFarAsFiltering) {
   }
 }
 
-// Whatever decides the picture: once it is another, what is drawn is as if nothing had been drawn before.
+// Settings that affect the image. After each change, the result equals a first draw.
 TEST_P(ComposedPicture, IsAnotherWhereASettingIs) {
   using Change = std::function<void()>;
   const std::vector<std::pair<std::string, Change>> changes{
@@ -238,7 +238,7 @@ TEST_P(ComposedPicture, IsAnotherWhereASettingIs) {
   }
 }
 
-// The host's own picture, and its depth, are others in each frame.
+// The host's image and depth differ in each frame.
 TEST_P(ComposedPicture, IsBlendedOverWhatTheTargetHolds) {
   target_ = make_target(GL_RGBA32F);
   frame_.write_depth = true;
@@ -260,7 +260,8 @@ TEST_P(ComposedPicture, IsBlendedOverWhatTheTargetHolds) {
   }
 }
 
-// A device that has dispatches under way composes as fast as it copies: only what does not change is kept there.
+// If the device runs dispatches asynchronously, composing is as fast as copying: only an image that does not change is
+// cached.
 TEST_P(ComposedPicture, IsKeptByOtherDriversOnceItRests) {
   gl_->dispatches_in_call = false;
   const auto first = again();
@@ -276,9 +277,9 @@ TEST_P(ComposedPicture, IsKeptByOtherDriversOnceItRests) {
   EXPECT_EQ(compositor_->bytes(), with - std::uint64_t{40} * 64 * 4);
 }
 
-// ---- a viewer's pictures
+// ---- a viewer's images
 
-// Drawn in each frame while samples come, by the rows that they are in, the picture ends as one that is drawn once.
+// An image drawn in each frame while samples arrive, by changed rows, ends equal to one that is drawn once.
 TEST(ComposedFrames, EndWithAllOfTheirSamples) {
   cumulet::headless::Context context = cumulet::headless::Context::create(cumulet::headless::Backend::automatic);
   const GladGLContext host = cumulet::test::load_gl(cumulet::headless::Context::get_proc, &context);

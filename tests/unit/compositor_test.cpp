@@ -1,4 +1,4 @@
-// What a picture looks like in the host's framebuffer, pixel by pixel against a CPU evaluation.
+// Display of an image in the host's framebuffer, compared pixel by pixel with a CPU evaluation.
 
 #include "render/compositor.hpp"
 
@@ -72,7 +72,7 @@ TEST(Display, CurvesRiseFromBlackToWhite) {
     }
     EXPECT_NEAR(last, 1.0F, 1e-3F) << curve;
   }
-  // Narkowicz's own formula at a point.
+  // Narkowicz's formula at one point.
   EXPECT_NEAR(core::cm_display(glm::vec3(0.5F), 1.0F, CM_TONE_MAP_FILMIC, false).x,
               0.5 * (2.51 * 0.5 + 0.03) / (0.5 * (2.43 * 0.5 + 0.59) + 0.14), 1e-6);
 }
@@ -94,20 +94,20 @@ TEST(Display, BytesOfAReadback) {
   Display display;
   display.tone_map = ToneMap::clip;
   display.exposure_stops = 1.0F;
-  display.encoding = ColourEncoding::hdr;  // does not count
+  display.encoding = ColourEncoding::hdr;  // ignored
   render::to_display(linear, display, bytes);
   EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.4F)));
   EXPECT_EQ(bytes[1], byte(image::srgb_encode(0.2F)));
   EXPECT_EQ(bytes[3], 255);
   EXPECT_EQ(bytes[7], 255);
   EXPECT_EQ(bytes[8], 255);
-  display.transparent = true;  // straight: 0.2 / 0.5
+  display.transparent = true;  // straight alpha: 0.2 / 0.5
   render::to_display(linear, display, bytes);
   EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.8F)));
   EXPECT_EQ(bytes[3], 128);
   EXPECT_EQ(bytes[4], 0);
   EXPECT_EQ(bytes[7], 0);
-  display.transparent = false;  // a legend's colours are what they are
+  display.transparent = false;  // a legend's colors are not changed
   display.legend = true;
   render::to_display(linear, display, bytes);
   EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.2F)));
@@ -161,7 +161,7 @@ struct Picture {
     p = glm::clamp(p, glm::ivec2(0), size - 1);
     return static_cast<std::size_t>(p.y * size.x + p.x);
   }
-  /// Of a pixel with samples, or without any around: in front of the background, and all of it.
+  /// Mean of a pixel's samples, 0 without samples; with_background adds the background's radiance.
   [[nodiscard]] glm::dvec4 mean(glm::ivec2 p, bool with_background) const {
     const std::size_t i = index(p);
     glm::dvec4 mean(0.0);
@@ -190,7 +190,7 @@ struct Picture {
   }
 };
 
-/// What is written at a pixel of the viewport, before GL blends and encodes; row 0 is the picture's top.
+/// The value written at a pixel of the viewport, before GL blending and encoding. Row 0 is the image's top.
 glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 pixel, glm::ivec2 viewport) {
   glm::dvec4 value;
   if (picture.size == viewport) {
@@ -216,7 +216,7 @@ glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 p
     c = glm::clamp(c, 0.0, 1.0);
   }
   if (display.encoding != ColourEncoding::srgb) return {c, value.a};
-  // The alpha that is right over white for the least of the three.
+  // The alpha that is exact over white for the smallest channel.
   const double least = std::min({c.x, c.y, c.z});
   const double white = image::srgb_encode(float(std::min(least + 1.0 - value.a, 1.0)));
   const double alpha = std::clamp(1.0 - (white - image::srgb_encode(float(least))), 0.0, 1.0);
@@ -233,7 +233,8 @@ class Compositing : public cumulet::test::GlTest {
     if (gl_) compositor_.emplace(gl_, programs_);
   }
 
-  /// A framebuffer with a colour of that format (samples 0: a plain texture) and depth, cleared to known values.
+  /// A framebuffer with a color attachment of this format (samples 0: not multisampled) and depth, cleared to known
+  /// values.
   struct Target {
     Object colour, depth, framebuffer;
   };
@@ -253,7 +254,7 @@ class Compositing : public cumulet::test::GlTest {
     gl_->ClearNamedFramebufferfv(target.framebuffer.name(), GL_DEPTH, 0, &depth);
     return target;
   }
-  /// As stored: neither decoded nor clamped. Multisampled targets are resolved first.
+  /// The stored values, neither decoded nor clamped. Multisampled targets are resolved first.
   [[nodiscard]] std::vector<glm::vec4> read(const Target& target, GLenum format, int samples) const {
     GLuint texture = target.colour.name();
     Target resolved;
@@ -280,8 +281,8 @@ class Compositing : public cumulet::test::GlTest {
     return depths;
   }
 
-  /// Draws, and compares every pixel of the target, inside the viewport and out. Bytes must be the nearest to the exact
-  /// value, but where that lies within slack of a half.
+  /// Draws and compares every pixel of the target, inside and outside of the viewport. Bytes must be the nearest to the
+  /// exact value, unless that is within `slack` of a half.
   void check(const Picture& picture, const Display& display, const FrameTarget& wanted, GLenum format, int samples) {
     const Target made = make_target(format, samples);
     const std::vector<glm::vec4> untouched = read(made, format, samples);
@@ -320,7 +321,7 @@ class Compositing : public cumulet::test::GlTest {
         }
         for (int k = 0; k < 4; ++k) {
           const double want = bytes ? 255.0 * std::min(expected[k], 1.0) : expected[k];
-          // llvmpipe blends bytes as bytes: source, alpha and product are rounded. NVIDIA's powers are a little off.
+          // llvmpipe blends in bytes: it rounds source, alpha and product. NVIDIA's pow() is slightly inexact.
           const double byte_slack = target.blend_over && expected.a < 1.0 ? 1.6 : 0.6;
           const double slack = bytes ? (srgb_target ? 0.85 : byte_slack) : 4e-5 * std::max(1.0, expected[k]);
           ASSERT_NEAR(got[i][k], want, slack) << "pixel " << x << ',' << y << " channel " << k;
@@ -476,7 +477,7 @@ TEST_P(Compositing, DepthIsWrittenByTheConvention) {
     for (const bool flip : {false, true}) {
       SCOPED_TRACE(testing::Message() << "reversed " << reversed << " orthographic " << orthographic << " flip "
                                       << flip);
-      // The host's surface stands at z = 8.
+      // The host's surface is at z = 8.
       const auto surface = static_cast<float>(orthographic ? a + b * 8.0 : a + b / 8.0);
       const Target made = make_target(GL_RGBA32F, 0, surface);
       FrameTarget target;
@@ -491,7 +492,7 @@ TEST_P(Compositing, DepthIsWrittenByTheConvention) {
       {
         const StateGuard guard(*gl_);
         compositor_->draw(picture.textures(), {}, target);
-        // What comes after starts from the same state.
+        // The next draw starts from the same state.
         EXPECT_EQ(gl_->IsEnabled(GL_DEPTH_TEST), GL_FALSE);
       }
       const std::vector<float> depths = read_depth(made);
@@ -542,7 +543,7 @@ TEST_P(Compositing, DepthOutsideItsRangeIsClamped) {
   }
 }
 
-// Rows whose first paths are still under way, more than neighbours can fill.
+// The upper rows have no samples yet, more rows than neighbors can fill.
 TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
   const auto flat = [&](int side, const glm::vec4& colour, int empty_rows) {
     Picture picture(gl_, side, side, false);
@@ -583,15 +584,15 @@ TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
     const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
     for (int row = 0; row < 16; ++row) {
       const glm::vec4 value = got[static_cast<std::size_t>((15 - row) * size.x + 5)];
-      EXPECT_EQ(value.x > 0.0F, row >= 7) << row;  // one row takes after its neighbours
+      EXPECT_EQ(value.x > 0.0F, row >= 7) << row;  // one empty row is filled from its neighbors
       EXPECT_EQ(value.y > 0.0F, row < 7 && has_before) << row;
-      EXPECT_EQ(value.z > 0.0F, row < 7 && !has_before) << row;  // the background alone
+      EXPECT_EQ(value.z > 0.0F, row < 7 && !has_before) << row;  // only the background
     }
   }
 }
 
-// As many pictures as may wait for a busy device do, and none of them is like the next: that one is drawn as they are,
-// by programs that are there.
+// Draws as many images as may be in flight, alternating between two displays. Each is drawn as requested, with programs
+// that are already compiled.
 TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
   gl::find_out_dispatches(gl_, *programs_);
   const Picture picture(gl_, 21, 13, false);
@@ -611,7 +612,7 @@ TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
   }
   const std::size_t programs = programs_->counts().asked;
   bool busy = false;
-  // A machine with more to do than this may be through with it by then.
+  // On a busy machine, the GPU work may have finished by then; try again with more.
   for (double ms = 500.0; !busy && ms <= 8000.0; ms *= 4.0) {
     const cumulet::test::BusyHost host(*gl_, ms);
     host.queue();
@@ -630,7 +631,8 @@ TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
   EXPECT_EQ(read(made, GL_RGBA32F, 0), got);
 }
 
-// What is beneath a picture is drawn as fine as it is, and enlarged as it is displayed: each of its pixels once.
+// Surface layers beneath the image have their own resolution and are enlarged after the display transform, each pixel
+// once.
 TEST_P(Compositing, SurfacesOfAnotherSizeAreEnlargedAsDisplayed) {
   const glm::ivec2 coarse(9, 7);
   render::SurfaceLayers layers;
@@ -685,7 +687,7 @@ TEST_P(Compositing, SurfacesOfAnotherSizeAreEnlargedAsDisplayed) {
               glm::mix(glm::mix(shown(low), shown(low + glm::ivec2(1, 0)), part.x),
                        glm::mix(shown(low + glm::ivec2(0, 1)), shown(low + glm::ivec2(1, 1)), part.x), part.y);
           const auto i = static_cast<std::size_t>((y + viewport.y) * size.x + x + viewport.x);
-          // Drivers filter by weights of eight bits.
+          // Drivers filter with 8-bit weights.
           for (int k = 0; k < 4; ++k) ASSERT_NEAR(got[i][k], expected[k], 0.01) << x << ' ' << y << ' ' << k;
         }
       }

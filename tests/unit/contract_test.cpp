@@ -1,5 +1,5 @@
-// The embedding contract of docs/architecture.md: one test a point, by cumulet.h and cumulet.hpp alone. What needs more
-// than a test (every state, every allocation, threads, windows) is in robust_test.cpp and tests/embed.
+// The embedding contract of docs/architecture.md, one test per point, using only cumulet.h and cumulet.hpp. Points that
+// need more than one test (all state, all allocations, threads, windows) are in robust_test.cpp and tests/embed.
 #include <gtest/gtest.h>
 
 #include <sys/wait.h>
@@ -100,8 +100,8 @@ TEST_F(Contract, Contract01OpaqueHandlesAndAThinLayerOverThem) {
   EXPECT_EQ(difference(target_.pixels(), by_c), "");
 }
 
-/// Each descriptor: its call takes a whole one and any that ends where a member begins, and refuses one that cuts a
-/// member, or is longer.
+/// Checks struct_size of a descriptor: the call accepts the whole struct and any size that ends where a member begins.
+/// It rejects sizes that cut a member or are too large.
 template <class Desc>
 void check_sizes(const char* name, Desc desc, const std::function<cumulet_status(const Desc*)>& call,
                  std::size_t least = sizeof(std::size_t)) {
@@ -114,7 +114,7 @@ void check_sizes(const char* name, Desc desc, const std::function<cumulet_status
   const auto& fields = cumulet::c_abi::fields_of<Desc>;
   for (std::size_t shorter = 1; shorter < sizeof(Desc); ++shorter) {
     const bool whole = std::ranges::any_of(fields, [&](const auto& field) { return field.offset == shorter; });
-    // But an older header's struct may have padding where a member begins by now.
+    // An older header's struct may have padding where a member begins now.
     const bool padded = shorter % alignof(Desc) == 0 && std::ranges::any_of(fields, [&](const auto& field) {
                           const std::size_t end = field.offset + field.size;
                           return end <= shorter && shorter < end + alignof(Desc);
@@ -123,7 +123,7 @@ void check_sizes(const char* name, Desc desc, const std::function<cumulet_status
       return field.offset < shorter && shorter < field.offset + field.size;
     });
     if (!cut && (!whole || shorter < least)) continue;
-    // Only as many bytes as it says are there.
+    // Allocates only the bytes that struct_size declares.
     std::vector<unsigned char> bytes(std::max(shorter, sizeof(std::size_t)));
     desc.struct_size = shorter;
     std::memcpy(bytes.data(), &desc, bytes.size());
@@ -133,7 +133,7 @@ void check_sizes(const char* name, Desc desc, const std::function<cumulet_status
   EXPECT_EQ(call(nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-/// An enum member takes no value but its own.
+/// An enum member accepts only its enumerators.
 template <class Desc, class Enum>
 void check_enum(const char* name, Enum Desc::*member, int values,
                 const std::function<cumulet_status(const Desc*)>& call, Desc desc = make_desc<Desc>()) {
@@ -206,7 +206,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   check_sizes("dense", dense_desc, dense, offsetof(cumulet_dense_desc, index_to_world));
   check_sizes("sparse", sparse_desc, sparse, offsetof(cumulet_sparse_desc, tiles));
 
-  // What the library fills: no more than the caller has.
+  // Output structs: the library writes no more bytes than the caller's size.
   const auto filled = [&](auto desc, const auto& call) {
     using Desc = decltype(desc);
     EXPECT_EQ(call(&desc), CUMULET_OK);
@@ -319,7 +319,7 @@ TEST_F(Contract, Contract04CreationSaysWhatIsMissing) {
 }
 
 TEST(ContractDetached, Contract05NoWindowAndNoContextAreMade) {
-  // No context is current, and none comes: yet files are read and grids are built.
+  // No context is current, and none is made, but files are read and grids are built.
   const ViewerPtr viewer = cumulet::test::make_viewer({});
   const VolumeRef volume = make_ball(16);
   ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
@@ -333,7 +333,7 @@ TEST(ContractDetached, Contract05NoWindowAndNoContextAreMade) {
   EXPECT_EQ(FakeGl::strays(), 0U);
 }
 
-// All of the state, from all calls: tests/embed/scramble.cpp. Here, that the two modes differ as they say.
+// All state of all calls: tests/embed/scramble.cpp. This test checks the difference between the two modes.
 TEST_F(Contract, Contract06StateIsRestoredOrTheHostResetsIt) {
   GLuint buffer = 0;
   gl_.CreateBuffers(1, &buffer);
@@ -378,8 +378,7 @@ TEST_F(Contract, Contract06StateIsRestoredOrTheHostResetsIt) {
   gl_.DeleteBuffers(1, &buffer);
 }
 
-// Scrambling is tests/embed/scramble.cpp's. Here: objects of the host keep what is theirs.
-// What a frame does not use is neither asked for nor set.
+// All state: tests/embed/scramble.cpp. This test checks that state a frame does not use is neither queried nor set.
 TEST_F(Contract, Contract06bStateIsSavedAsItIsUsed) {
   picture_of(v_, volume_.get(), target_);
   const auto of_frame = [&](const cumulet_frame_desc& frame) {
@@ -388,13 +387,13 @@ TEST_F(Contract, Contract06bStateIsSavedAsItIsUsed) {
     return fake_.questions() - before;
   };
   cumulet_frame_desc frame = target_.frame();
-  frame.budget_ms = -1.0;  // draws what there is
+  frame.budget_ms = -1.0;  // draws the current image
   const std::uint64_t stores = fake_.calls("PixelStorei");
   const std::uint64_t images = fake_.calls("BindImageTexture");
   const std::uint64_t ranges = fake_.calls("BindBufferBase") + fake_.calls("BindBufferRange");
   const std::uint64_t drawn = of_frame(frame);
   EXPECT_GT(drawn, 20U);
-  EXPECT_LT(drawn, 80U);  // 350 once
+  EXPECT_LT(drawn, 80U);  // it was 350 once
   EXPECT_EQ(fake_.calls("PixelStorei"), stores);
   EXPECT_EQ(fake_.calls("BindImageTexture"), images);
   EXPECT_EQ(fake_.calls("BindBufferBase") + fake_.calls("BindBufferRange"), ranges);
@@ -402,12 +401,12 @@ TEST_F(Contract, Contract06bStateIsSavedAsItIsUsed) {
 
   const std::uint64_t enabled = fake_.calls("Enable") + fake_.calls("Disable") + fake_.calls("ColorMaski");
   frame.target = CUMULET_TARGET_NONE;
-  // One of them is how many debug groups the host has left room for.
+  // One query is for the free entries of the debug group stack.
   EXPECT_LE(of_frame(frame), 3U) << "a frame that does nothing";
   EXPECT_EQ(fake_.calls("Enable") + fake_.calls("Disable") + fake_.calls("ColorMaski"), enabled);
 
-  // Where the host resets, a frame queries three things: whether the target is a framebuffer, its draw buffer 0, and
-  // the depth of the debug group stack.
+  // With CUMULET_GL_STATE_HOST_RESETS, a frame queries three things: whether the target is a framebuffer, its draw
+  // buffer 0, and the depth of the debug group stack.
   const ViewerPtr resetting = viewer({.gl_state = CUMULET_GL_STATE_HOST_RESETS});
   picture_of(resetting.get(), volume_.get(), target_);
   frame = target_.frame();
@@ -465,7 +464,7 @@ TEST_F(Contract, ObjectsAndPassesHaveNames) {
     return std::string(text.data());
   };
   constexpr GLuint most = 300;
-  // The host's own have no names.
+  // The host's own objects have no names.
   const auto unnamed = [&] {
     std::array<int, 3> counts{};
     for (GLuint name = 1; name < most; ++name) {
@@ -497,7 +496,7 @@ TEST_F(Contract, PassesAreTimedWithoutWaiting) {
   EXPECT_EQ(seconds().pass_seconds_trace, 0.0);
   const auto begun = std::chrono::steady_clock::now();
   picture_of(v_, volume_.get(), target_);
-  // What is under way is known some frames later.
+  // Timings of in-flight work arrive some frames later.
   for (int i = 0; i < 5; ++i) {
     gl_.Finish();
     auto frame = target_.frame();
@@ -546,7 +545,7 @@ TEST_F(Contract, FramesPassesAndJobsAreToldAsTheyEnd) {
   viewer.reset();
   for (const char* name : {"frame", "cumulet: upload", "cumulet: trace", "cumulet: draw", "building the grid"})
     EXPECT_FALSE(told.pieces[name].empty()) << name;
-  // Passes lie in their frame.
+  // Passes are nested in their frame.
   const auto [begin, end] = told.pieces["cumulet: draw"].back();
   EXPECT_LE(begin, end);
   EXPECT_TRUE(
@@ -561,7 +560,7 @@ TEST_F(Contract, Contract09TheTargetIsGivenWithEveryFrame) {
   const HostTarget wide(gl_, 2 * side, side, GL_RGBA16F);
   converge(v_, wide.frame());
   const auto wide_pixels = wide.floats();
-  // Its own camera's picture, not a stretched one: the middle column's colours are the same.
+  // The image is rendered for the new size, not stretched: the colors of the middle column are the same.
   converge(v_, target_.frame());
   EXPECT_EQ(difference(target_.pixels(), picture), "") << "the first target's again";
   EXPECT_GT(std::ranges::max(wide_pixels), 0.3F);
@@ -571,7 +570,7 @@ TEST_F(Contract, Contract10FramebufferZeroIsNotAssumed) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, 0);
   picture_of(v_, volume_.get(), target_);
   EXPECT_GT(std::ranges::max(target_.pixels()), 60);
-  // An incomplete or foreign framebuffer is an error, not a picture somewhere else.
+  // An incomplete or foreign framebuffer is an error; nothing is drawn elsewhere.
   GLuint empty = 0;
   gl_.CreateFramebuffers(1, &empty);
   auto frame = target_.frame();
@@ -666,7 +665,7 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
             CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, nullptr, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, values.data(), 3), CUMULET_ERROR_INVALID_ARGUMENT);
-  // Without surfaces the volume alone is the picture; what does not pass is its alpha.
+  // Without surfaces the beauty layer is the volume, and its alpha is 1 - transmittance.
   std::vector<float> beauty(values.size());
   std::vector<float> passes(values.size() / 4);
   ASSERT_EQ(cumulet_read_aov(v_, CUMULET_AOV_BEAUTY, beauty.data(), beauty.size()), CUMULET_OK);
@@ -676,12 +675,12 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   double difference = 0.0;
   for (std::size_t i = 0; i < passes.size(); ++i) difference += (1.0 - passes[i] - values[4 * i + 3]) / (side * side);
   EXPECT_NEAR(difference, 0.0, 0.02);
-  // A frame of no size forgets the view, not the picture.
+  // A frame of size 0 discards the view but keeps the image.
   auto frame = target_.frame();
   frame.width = frame.height = 0;
   ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_SURFACE_DEPTH, passes.data(), passes.size()), CUMULET_OK);
-  // A picture of another march's data is not looked at with this one's.
+  // AOVs of an image are not read with another grid type's data.
   auto grid = make_desc<cumulet_grid_desc>();
   grid.march = CUMULET_MARCH_DENSE;
   ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
@@ -707,7 +706,7 @@ TEST_F(Contract, AnAccumulationGoesOnInAnotherViewer) {
     EXPECT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
     auto frame = target_.frame();
     frame.budget_ms = budget_ms;
-    // The first frames bring the grid to GL and wait for the driver's compiler, and no more.
+    // The first frames upload the grid and wait for the driver's compiler. Stop there.
     std::size_t size = 0;
     for (int i = 0; i < 60000; ++i) {
       EXPECT_EQ(cumulet_render(own.get(), &frame, nullptr), CUMULET_OK);
@@ -764,7 +763,7 @@ TEST_F(Contract, Contract13HostDepthHidesWhatIsBehindIt) {
     auto frame = target_.frame();
     frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
     frame.depth_name = target_.depth_texture();
-    // Nothing of the host's; then something just before the eye.
+    // First without host geometry, then with some directly in front of the eye.
     for (const bool near : {false, true}) {
       frame.target = CUMULET_TARGET_NONE;
       target_.clear({}, near != reversed ? 0.0F : 1.0F);
@@ -802,7 +801,7 @@ TEST_F(Contract, Contract14PremultipliedAlphaAndDepthOut) {
   }
   EXPECT_GT(partly, 10);
 
-  // Its depth, where it is half opaque, is where the pick says; nowhere else.
+  // The written depth equals the pick's where the image is half opaque. Elsewhere it is not written.
   const auto depths = black.depths();
   auto pick = make_desc<cumulet_pick>();
   ASSERT_EQ(cumulet_pick_at(v_, side / 2.0, side / 2.0, &pick), CUMULET_OK);
@@ -833,7 +832,7 @@ TEST_F(Contract, Contract15Colours) {
     auto frame = target.frame();
     frame.colour = colour;
     converge(v_, frame);
-    return target.floats();  // decoded, where the format is sRGB
+    return target.floats();  // decoded if the format is sRGB
   };
   const auto decode = [](float e) { return e <= 0.04045F ? e / 12.92F : std::pow((e + 0.055F) / 1.055F, 2.4F); };
   const auto linear = draw(CUMULET_COLOUR_LINEAR, GL_RGBA32F);
@@ -843,12 +842,12 @@ TEST_F(Contract, Contract15Colours) {
   for (std::size_t i = 0; i < linear.size(); ++i) {
     if (i % 4 == 3) continue;
     ASSERT_NEAR(decode(encoded[i]), linear[i], 1e-4F);
-    // Of the 8 bits a stored colour has. (What reads it back may decode it or not.)
+    // Half a step of the 8 bits of a stored color. (Reading back may decode it or not.)
     const float half_a_step = 0.5F / 255.0F + 1e-3F;
     ASSERT_TRUE(std::abs(by_gl[i] - encoded[i]) < half_a_step || std::abs(decode(encoded[i]) - by_gl[i]) < 0.005F);
   }
   EXPECT_LE(std::ranges::max(linear), 1.0F);
-  // Exposure doubles what is not tone-mapped, and restarts nothing.
+  // Exposure doubles values without a tone map and does not restart sampling.
   auto display = make_desc<cumulet_display_desc>();
   display.exposure_stops = 1.0F;
   auto stats = make_desc<cumulet_stats>();
@@ -883,7 +882,7 @@ TEST_F(Contract, Contract16SizesArePhysicalAndMayBeZero) {
   EXPECT_EQ(difference(target_.pixels(), picture), "");
 }
 
-// Coalescing and refusals: UpdateCallback in robust_test.cpp.
+// Coalescing and errors: UpdateCallback in robust_test.cpp.
 TEST_F(Contract, Contract17TheUpdateCallbackTellsOfWhatTheWorkerMade) {
   std::atomic<int> updates = 0;
   const ViewerPtr told =
@@ -922,7 +921,7 @@ TEST_F(Contract, Contract18ProgressiveWithinItsBudget) {
   }
   EXPECT_LT(progress, 0.9);
   std::ranges::sort(spent);
-  // A busy machine's medians, and no watchdog's second: a dispatch is bounded.
+  // Bounds for a busy machine: the median, and less than a watchdog's second, because dispatches are bounded.
   EXPECT_LT(spent[15], 150.0);
   EXPECT_LT(spent[28], 1000.0);
   // A negative budget traces nothing.
@@ -950,7 +949,7 @@ TEST_F(Contract, Contract19FlagsTellWhatIsToCome) {
   EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED});
   EXPECT_EQ(result.progress, 1.0);
   EXPECT_EQ(result.width, unsigned{side});
-  // What is made unseen is there to be drawn until it is.
+  // An image made without a target stays flagged until it is drawn.
   auto unseen = frame;
   unseen.target = CUMULET_TARGET_NONE;
   ASSERT_EQ(cumulet_render(v_, &unseen, &result), CUMULET_OK);
@@ -1021,7 +1020,7 @@ TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
     ASSERT_EQ(cumulet_get_environment(v_, &raw), CUMULET_OK);
     EXPECT_EQ(EnvironmentRef(raw), shown) << "the same handle each time";
   };
-  // Goes on from what a load that failed left.
+  // Continues from the state that the failed load left.
   const auto pixels = [&] {
     const ViewerPtr other = viewer();
     cumulet_environment* raw = nullptr;
@@ -1061,7 +1060,7 @@ TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
   expect_shown(nullptr);
   EXPECT_EQ(difference(seen(), sky), "");
 
-  // A large one on its way: what was there stays until then, and can be drawn.
+  // While a large file loads, the previous environment stays and can be drawn.
   ASSERT_EQ(cumulet_load_environment(v_, large.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_get_progress(v_, &progress), CUMULET_OK);
   EXPECT_EQ(progress.stage, CUMULET_STAGE_LOADING);
@@ -1075,7 +1074,7 @@ TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
   expect_shown(nullptr);
   EXPECT_EQ(difference(seen(), sky), "");
 
-  // The newest wins, and clears how the one before it ended.
+  // The newest request wins and clears the previous result.
   ASSERT_EQ(cumulet_load_environment(v_, large.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_load_environment(v_, small.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK) << cumulet_last_error(v_);
@@ -1088,14 +1087,14 @@ TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
   expect_shown(small.c_str());
   EXPECT_EQ(difference(seen(), lit), "");
 
-  // What is set is there at once, and nothing comes after it.
+  // cumulet_set_environment takes effect at once and cancels the load.
   ASSERT_EQ(cumulet_load_environment(v_, large.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_set_environment(v_, nullptr), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_CANCELLED);
   expect_shown(nullptr);
   EXPECT_EQ(difference(seen(), sky), "");
 
-  // A load that failed is forgotten with what is set in its place.
+  // Setting an environment clears the error of a failed load.
   ASSERT_EQ(cumulet_load_environment(v_, "no such sky.hdr"), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_FILE);
   ASSERT_EQ(cumulet_set_environment(v_, nullptr), CUMULET_OK);
@@ -1160,7 +1159,7 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   at(v_, 20.0F);
   EXPECT_NE(difference(picture_of(v_, volume_.get(), target_), alone), "");
 
-  // Dragged: the newest is what is there in the end.
+  // While dragging: the newest sky is displayed in the end.
   at(raw, 15.0F);
   ASSERT_EQ(cumulet_set_volume(raw, volume_.get()), CUMULET_OK);
   auto frame = target_.frame();
@@ -1171,11 +1170,11 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
     ASSERT_EQ(cumulet_render(raw, &frame, nullptr), CUMULET_OK);
   }
   EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
-  // There and back: one that was overtaken does not come last.
+  // To another sky and back: a superseded sky is not displayed last.
   at(raw, 80.0F);
   at(raw, 45.0F);
   EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
-  // A light of one colour between two skies, and a sky that has to wait for nothing but itself.
+  // A constant sky between two physical skies. cumulet_cancel and cumulet_wait do not affect physical skies.
   auto constant = make_desc<cumulet_light_desc>();
   constant.sky_radiance[0] = 1.0F;
   ASSERT_EQ(cumulet_set_light(raw, &constant), CUMULET_OK);
@@ -1191,7 +1190,7 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   EXPECT_EQ(std::ranges::count(told.threads, std::this_thread::get_id()), 0);
 }
 
-// At every call: ContextLossAt in robust_test.cpp.
+// Context loss at each call: ContextLossAt in robust_test.cpp.
 TEST_F(Contract, Contract21AContextGoesAndAnotherComes) {
   const Picture picture = picture_of(v_, volume_.get(), target_);
   for (const bool lost : {false, true}) {
@@ -1245,7 +1244,7 @@ TEST_F(Contract, Contract22bTwoViewersInOneEnvironment) {
   EXPECT_NE(difference(picture_of(second.get(), volume_.get(), target_), alone), "") << "turned otherwise";
   turn(second.get(), 120.0F);
   EXPECT_EQ(difference(picture_of(second.get(), volume_.get(), target_), alone), "");
-  // What one takes away, and what it then loads, is none of the other's.
+  // Removing or loading an environment in one viewer does not affect the other.
   ASSERT_EQ(cumulet_set_environment(second.get(), nullptr), CUMULET_OK);
   EXPECT_EQ(difference(picture_of(second.get(), volume_.get(), target_), sky), "");
   ASSERT_EQ(cumulet_load_environment(second.get(), "none.hdr"), CUMULET_OK);
@@ -1284,12 +1283,12 @@ TEST_F(Contract, Contract23EventsMoveTheCameraAndMatricesSetIt) {
   ASSERT_EQ(cumulet_camera_set_matrices(camera, view.data(), projection.data(), CUMULET_CLIP_ZERO_TO_ONE), CUMULET_OK);
   target_.clear({});
   converge(v_, target_.frame());
-  // Noise apart, for a matrix's last bits may differ.
+  // Compares the mean, because the last bits of a matrix may change the noise.
   double sum = 0.0;
   const Picture back = target_.pixels();
   for (std::size_t i = 0; i < back.size(); ++i) sum += std::abs(back[i] - picture[i]);
   EXPECT_LT(sum / double(back.size()), 4.0);
-  // A host that had no event to forward feeds nonsense, and is told.
+  // Invalid events return an error.
   auto event = make_desc<cumulet_event>();
   event.x = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(cumulet_input(v_, &event, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
@@ -1312,7 +1311,7 @@ TEST_F(Contract, Contract24LogsErrorsAndNoExceptions) {
   EXPECT_EQ(error.find('\n'), std::string::npos);
   EXPECT_EQ(cumulet_set_volume(v, volume_.get()), CUMULET_OK);
   EXPECT_STREQ(cumulet_last_error(v), "") << "of the last call";
-  // Nothing comes of what would throw inside: sizes that no memory holds, wrong pointers' NULLs, bad numbers.
+  // Arguments that would cause exceptions inside return errors: huge sizes, NULLs and bad numbers.
   auto dense = make_desc<cumulet_dense_desc>();
   const float one = 1.0F;
   dense.values = &one;
@@ -1328,7 +1327,7 @@ TEST_F(Contract, Contract24LogsErrorsAndNoExceptions) {
     EXPECT_NE(std::string(cumulet_status_text(status)), "");
 }
 
-/// Until all is warm: the progress that was told.
+/// Calls cumulet_warm_up until it is complete. Returns the reported progress.
 std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& frame,
                             cumulet_warm_up_scope scope = CUMULET_WARM_UP_SCENE) {
   std::vector<double> told;
@@ -1400,7 +1399,7 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
     EXPECT_EQ(compiled(), programs);
     EXPECT_EQ(fake_.first_uses(), uses);
     EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
-    // Once more has nothing to do.
+    // A second warm-up compiles nothing.
     warm_up(own.get(), frame);
     EXPECT_EQ(compiled(), programs);
   }
@@ -1412,7 +1411,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   const ViewerPtr own = viewer();
   const auto frame = target_.frame();
   auto result = make_desc<cumulet_frame_result>();
-  // Without a warm-up the first waits, for programs that draw: there is nothing to show instead.
+  // Without a warm-up, the first frame waits for programs that draw, because there is no image to show instead.
   ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);
   EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
   EXPECT_GT(fake_.waits(), 0U);
@@ -1442,7 +1441,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   EXPECT_EQ(difference(target_.pixels(), volume_alone), "") << "the last picture shows until then";
   converge(own.get(), frame);
   EXPECT_NE(difference(target_.pixels(), volume_alone), "");
-  // Another tone map: the old one serves.
+  // Another tone map: meanwhile, the old program is used.
   auto display = make_desc<cumulet_display_desc>();
   display.tone_map = CUMULET_TONE_MAP_CLIP;
   ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
@@ -1451,7 +1450,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   display.denoise = CUMULET_DENOISE_FAST;
   ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
   stalls("the filter");
-  // Another encoding is for another target: nothing serves but its own, which is waited for.
+  // Another encoding is for another target: only its own program fits, and the frame waits for it.
   converge(own.get(), frame);
   target_.clear({0.2F, 0.4F, 0.6F, 1.0F});
   const Picture cleared = target_.pixels();
@@ -1461,7 +1460,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   ASSERT_EQ(cumulet_render(own.get(), &linear, &result), CUMULET_OK);
   EXPECT_NE(difference(target_.pixels(), cleared), "");
   fake_.finish_compiling(true);
-  // A warm-up does not wait either, and ends when the driver does.
+  // A warm-up does not wait either, and ends when the driver is done.
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.view = CUMULET_VIEW_STEPS;
   ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
@@ -1507,7 +1506,7 @@ TEST_F(Contract, Contract26cReadingBackWaitsForTheDriver) {
   EXPECT_EQ(first, later);
 }
 
-// On GPUs each call's question about the depth is open when it ends.
+// On GPUs, the depth query of each call is still pending when the call returns.
 TEST_F(Contract, Contract26dAWarmUpWithTheHostsDepthEnds) {
   const HostTarget large(gl_, 2048, 2048);
   const ViewerPtr own = viewer();
@@ -1525,10 +1524,11 @@ TEST_F(Contract, Contract26dAWarmUpWithTheHostsDepthEnds) {
   EXPECT_EQ(result.more, 0);
 }
 
-// Whatever the frame's own part takes of the budget; and one that does not build keeps none of the others from it.
-// One test, as all programs are built once: a minute and gigabytes where the driver has not kept them.
+// Checks that the warm-up proceeds under any budget, and that a program that does not build does not stop the others.
+// One test, because it builds all programs: a minute and gigabytes if the driver has not cached them.
 TEST_F(Contract, Contract26eAWarmUpOfAllEndsAndIsForEveryScene) {
-  // Of the hundreds of kernels the scenes below use a few, and others take a driver many minutes: in the long tier.
+  // The scenes below use only a few of the hundreds of kernels. The others take a driver many minutes, so they are
+  // compiled only in the long tier.
   if (std::getenv("CUMULET_WHOLE_KERNELS") == nullptr) {
     fake_.hollow_kernels({"#define CM_CHANNELS 1", "#define CM_ENVIRONMENT 1", "#define CM_EQUIANGULAR 1",
                           "#define CM_GROUPS 1", "#define CM_HOLDOUT 1", "#define CM_INSTANCES 1", "#define CM_LAMPS 1",
@@ -1573,7 +1573,7 @@ TEST_F(Contract, Contract26eAWarmUpOfAllEndsAndIsForEveryScene) {
   EXPECT_NE(std::string(cumulet_last_error(own.get())).find("does not build"), std::string::npos);
   EXPECT_GT(result.progress, 0.9);
   EXPECT_TRUE(std::ranges::is_sorted(told));
-  // Again it is told, and not built; a setting gives it another chance.
+  // The error is returned again without another build. A changed setting allows one.
   const auto before = linked();
   EXPECT_EQ(run(5.0), CUMULET_ERROR_GL);
   EXPECT_EQ(linked(), before);
@@ -1633,8 +1633,7 @@ TEST_F(Contract, Contract26fAFrameThatCannotBeDrawnIsToldOnceAndNotBuiltEachTime
   EXPECT_NE(difference(target_.pixels(), before), "");
 }
 
-// What another scene needs is there then, and nothing of it is built twice.
-// Every example host runs in tests/embed; here the smallest, if it is built.
+// tests/embed runs all example hosts. This test runs the smallest one, if it is built.
 TEST(ContractHosts, Contract25TheSmallestHostRuns) {
   namespace fs = std::filesystem;
   const fs::path host = fs::read_symlink("/proc/self/exe").parent_path() / "cumulet-embed-egl";

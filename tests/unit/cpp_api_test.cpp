@@ -1,4 +1,4 @@
-// cumulet.hpp: that it passes everything through, and nothing gets lost between owners.
+// cumulet.hpp: it passes all values through, and ownership transfers lose nothing.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -40,7 +40,7 @@ Volume ball_volume() {
   return Volume::from_dense({.values = values, .size = {16, 16, 16}, .name = "ball"}).value();
 }
 
-// The ball as grid "density" of a file that goes with this object; corner is one more voxel's value, if not zero.
+// A temporary file with the ball as grid "density". corner: value of one more voxel, unless 0.
 class BallFile {
  public:
   explicit BallFile(float corner = 0.0F) {
@@ -390,7 +390,7 @@ TEST(CppCamera, IsSetAndMoved) {
   const CameraMatrices matrices = camera.get_matrices(1.0, Clip::zero_to_one).value();
   EXPECT_NEAR(matrices.view[14], -10.0, 1e-12);
 
-  // Each moves what it says.
+  // Each method moves the camera as documented.
   camera.dolly(0.5).value();
   EXPECT_NEAR(camera.get()->eye[2], 5.0, 1e-12);
   camera.fly(1.0, 0.0, 0.0).value();
@@ -560,7 +560,7 @@ TEST_F(CppViewer, TellsWhyACallFailed) {
 
 TEST_F(CppViewer, CallsBackWhereverItIsMoved) {
   std::atomic<int> updates = 0;
-  std::vector<std::string> warnings;  // written while wait() has this thread wait
+  std::vector<std::string> warnings;  // written while this thread is in wait()
   auto holder = std::make_unique<Viewer>(Viewer::create({.log =
                                                              [&](LogLevel level, std::string_view message) {
                                                                if (level == LogLevel::warning)
@@ -570,7 +570,7 @@ TEST_F(CppViewer, CallsBackWhereverItIsMoved) {
                                              .value());
   Viewer viewer = std::move(*holder);
   holder.reset();
-  const BallFile file(-1.0F);  // worth a warning
+  const BallFile file(-1.0F);  // triggers a warning
   viewer.load_volume(file.path()).value();
   viewer.wait().value();
   EXPECT_GT(updates, 0);
@@ -600,10 +600,10 @@ TEST_F(CppViewer, LoadsAVolumeWithTheDensityScaleThatSuitsIt) {
   EXPECT_EQ(suits.get_stats()->cells, same.get_stats()->cells);
   EXPECT_EQ(picture(suits), picture(same));
   EXPECT_NE(picture(suits), picture(denser));
-  // Nothing is left to build.
+  // The grid is already built for this density scale.
   suits.set_medium({.density_scale = scale, .coalbedo = {1, 1, 1}}).value();
   EXPECT_EQ(suits.get_progress()->stage, Stage::idle);
-  // What is set between the load's end and the next frame is of the volume that was loaded, or of none.
+  // A medium set between the end of the load and the next frame applies either to the loaded volume or to none.
   const auto loading = [&] {
     Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
     viewer.set_sampling({.samples = 1, .preview = Preview::off}).value();
@@ -632,7 +632,7 @@ TEST_F(CppViewer, LoadsAVolumeWithTheDensityScaleThatSuitsIt) {
   EXPECT_EQ(cumulet_load_volume_file(suits.handle(), &neither), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-// Its worker may be in one when the viewer is replaced.
+// A worker thread may be in a callback while the viewer is replaced.
 TEST_F(CppViewer, OutlivesNoCallback) {
   struct Captured {
     std::atomic<bool>& gone;
@@ -684,7 +684,7 @@ TEST_F(CppViewer, LooksThroughACamera) {
   Camera camera = Camera::create({.eye = {8, 8, 50}, .target = {8, 8, 8}}).value();
   viewer.set_camera(camera).value();
   EXPECT_EQ(viewer.get_camera()->get()->eye, (Vector{8, 8, 50}));
-  camera = Camera();  // the viewer keeps it
+  camera = Camera();  // the viewer keeps a reference
   viewer.set_navigation({.style = NavigationStyle::maya}).value();
   (void)converge(viewer, 32, 32);
 
@@ -865,7 +865,7 @@ TEST_F(CppViewer, ShowsModels) {
   EXPECT_EQ(viewer.get_bounds()->max, (Vector{1, 1, 2}));
   model.set({.surfaces = surfaces, .to_world = place, .shadow_only = true}).value();
   EXPECT_FALSE(picked().hit) << "cameras do not see it";
-  // The viewer's share is its own.
+  // The viewer keeps its own reference.
   model = Model();
   EXPECT_TRUE(viewer.get_bounds());
 }

@@ -1,4 +1,4 @@
-// The tracer against its own source on the CPU.
+// The GPU path tracer compared with the same source on the CPU.
 
 #include "support/cpu_tracer.hpp"
 #include "support/grid_reference.hpp"
@@ -51,7 +51,7 @@ void show(test::Still& in, const volume::ScalarVolume& volume, double density_sc
   in.set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
 }
 
-/// The share of pixels that are the twin's.
+/// The fraction of pixels that equal the CPU tracer's.
 template <class Twin>
 double same_pixels(Twin& twin, const test::Picture& gpu) {
   std::size_t same = 0;
@@ -70,7 +70,7 @@ TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
   show(*viewer, volume, 0.3);
   const test::Image image{24, 24, 1, 5, render::View::shaded};
 
-  // Where a logarithm or a cosine rounds the other way, a path may part from its twin.
+  // If a logarithm or cosine rounds differently, a path may diverge from its CPU counterpart.
   viewer->set_grid(settings_of(March::tet));
   const test::Picture tet = test::render(*viewer, image);
   const grid::TetGrid grid = grid_of(volume, settings_of(March::tet));
@@ -87,7 +87,7 @@ TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
   EXPECT_GT(same_pixels(cpu_dense, dense), 0.99);
 }
 
-// What lies behind an empty cell's clear cones is nothing.
+// Clear cones of empty cells end paths early. The result is bit-identical with fewer steps.
 TEST_P(CpuTracer, WhereNothingIsMetAnyMorePathsEndAndTheSameBitsStay) {
   const auto volume = test::puffs({40, 36, 30}, ivec3(0));
   const auto viewer = make();
@@ -114,7 +114,7 @@ TEST_P(CpuTracer, WhereNothingIsMetAnyMorePathsEndAndTheSameBitsStay) {
   EXPECT_LT(static_cast<double>(steps), 0.9 * static_cast<double>(most_steps));
 }
 
-/// A room around a volume: a textured floor, a coated ball, a veil, and a lamp that shines in.
+/// A room around a volume: a textured floor, a coated ball, a semi-transparent pane, and a light from the scene.
 std::shared_ptr<StillScene> room() {
   auto scene = std::make_shared<StillScene>();
   std::mt19937 random(3);
@@ -144,7 +144,7 @@ std::shared_ptr<StillScene> room() {
   return scene;
 }
 
-/// And what glows: a triangle mesh in the air.
+/// The room with an emissive triangle mesh in the air.
 std::shared_ptr<StillScene> room_with_emitters() {
   auto scene = room();
   Material glow = test::diffuse(vec3(0.2F));
@@ -153,7 +153,7 @@ std::shared_ptr<StillScene> room_with_emitters() {
   return scene;
 }
 
-// One in thirty million did so, of a lamp in smoke: its pixel was no number.
+// About one ray in thirty million touched the bounds this way (a light in smoke), and its pixel became NaN.
 TEST(PassedLine, HasAShareWhereItOnlyTouchesTheBox) {
   core::CpuTetPassing twin;
   twin.cm.space.to_cube_x = {1.0F, 0.0F, 0.0F};
@@ -166,7 +166,7 @@ TEST(PassedLine, HasAShareWhereItOnlyTouchesTheBox) {
   EXPECT_EQ(twin.cm_passing_share(density, 3.0F), 1.0F);
 }
 
-// A chance of 0 times a density that is no number would be none.
+// The pdf must be finite: a probability of 0 times an infinite or NaN pdf would be NaN.
 TEST(GlowingBox, HasADensityFromAnywhere) {
   core::CpuTetSurfaces twin;
   core::CmSpace& space = twin.cm.space;
@@ -212,7 +212,7 @@ class CpuTracerSurfaces : public CpuTracer {
     twin.cm.dispatch.samples = image.samples;
     return same_pixels(twin, picture);
   }
-  /// With one sample a pixel.
+  /// Compares images of one sample per pixel.
   template <class Twin>
   void expect_same(Twin& twin, const std::shared_ptr<StillScene>& scene, const viewer::GridSettings& settings) {
     for (const std::uint32_t seed : {1U, 2U}) {
@@ -239,7 +239,7 @@ TEST_P(CpuTracerSurfaces, PathsAmongEmittersAreTheSame) {
   core::CpuTetEmitters twin;
   twin.grid = &grid;
   expect_same(twin, room_with_emitters(), tet);
-  // Every sample counts, not the first alone.
+  // With several samples per pixel, all samples must be equal.
   EXPECT_GT(same(twin, room_with_emitters(), tet, {32, 32, 4, 3, render::View::shaded}), 0.98);
 
   core::CpuDenseEmitters dense;

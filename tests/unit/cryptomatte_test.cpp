@@ -1,4 +1,4 @@
-// Mattes by name: ids, and coverages of what is known in closed form.
+// Cryptomatte: ids, and coverages compared with closed forms.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ constexpr std::uint32_t side = 16;
 constexpr std::size_t count = std::size_t{side} * side;
 constexpr std::size_t middle = count / 2 + side / 2;
 
-// Of the algorithm's own test vectors, and of files of other renderers.
+// From the algorithm's own test vectors and from files of other renderers.
 TEST(CryptomatteId, IsMurmurHash3) {
   EXPECT_EQ(cumulet::murmur_hash_3(""), 0U);
   EXPECT_EQ(cumulet::murmur_hash_3("a"), 0x3c2569b2U);
@@ -60,7 +60,7 @@ struct Told {
   bool operator==(const Told&) const = default;
 };
 
-// A rectangle at z = 0 between these x, farther up and down than is seen.
+// A rectangle at z = 0 between these x, taller than the view.
 SurfacesRef make_wall(float from, float to, float coverage = 1.0F) {
   constexpr float far = 400.0F;
   const std::array<float, 18> corners{from, -far, 0, to, -far, 0, to, far, 0, from, -far, 0, to, far, 0, from, far, 0};
@@ -73,7 +73,7 @@ SurfacesRef make_wall(float from, float to, float coverage = 1.0F) {
   return make_surfaces({&mesh, 1});
 }
 
-// 8 x 8 x 8 voxels of 1 about the origin.
+// 8 x 8 x 8 voxels of value 1 around the origin.
 VolumeRef make_block() {
   const std::vector<float> values(512, 1.0F);
   auto desc = make_desc<cumulet_dense_desc>();
@@ -85,7 +85,7 @@ VolumeRef make_block() {
   return make_dense(desc);
 }
 
-// A pixel is a unit, the middle between the pixels 7 and 8, and +x is to the right.
+// One pixel per unit. The origin is between pixels 7 and 8, and +x is to the right.
 class Cryptomatte : public CViewerTest {
  protected:
   Cryptomatte() : CViewerTest(side, side) {}
@@ -132,7 +132,7 @@ class Cryptomatte : public CViewerTest {
     ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
   }
 
-  /// Pairs of an id and a coverage, by names_.
+  /// Pairs of an id and a coverage; names_ gives the names.
   std::vector<std::pair<std::uint32_t, float>> read(std::uint32_t ranks) {
     asked_.clear();
     const auto name = [](void* user, cumulet_object_kind kind, std::uint64_t tag, std::uint32_t place) {
@@ -151,7 +151,7 @@ class Cryptomatte : public CViewerTest {
       pairs.emplace_back(std::bit_cast<std::uint32_t>(values[i]), values[i + 1]);
     return pairs;
   }
-  /// That of each pixel.
+  /// Coverage of this name at each pixel.
   std::vector<float> coverage(const char* name) {
     std::vector<float> coverages(count, 0.0F);
     const auto pairs = read(6);
@@ -182,7 +182,7 @@ TEST_P(Cryptomatte, OfAWallThatCoversHalf) {
       EXPECT_NEAR(covered[i], x < 8 ? 1.0F : 0.0F, 1e-5F) << i;
     }
   }
-  // In part, by chance.
+  // Coverage by stochastic alpha.
   const SurfacesRef veil = make_wall(-400.0F, 400.0F, 0.5F);
   ASSERT_EQ(cumulet_set_surfaces(v_, veil.get()), CUMULET_OK);
   make();
@@ -191,7 +191,7 @@ TEST_P(Cryptomatte, OfAWallThatCoversHalf) {
   EXPECT_NEAR(mean, 0.5, 0.02);
 }
 
-// One before, both, the other behind, then a wall.
+// Along the ray: the other volume, both, the first volume, then a wall.
 TEST_P(Cryptomatte, OfVolumesThatOverlap) {
   constexpr double one = 0.1;
   constexpr double other = 0.3;
@@ -228,7 +228,7 @@ TEST_P(Cryptomatte, OfVolumesThatOverlap) {
   EXPECT_EQ(asked_.size(), 3U);
 }
 
-// Alpha is what samples find of the same.
+// The coverages add up to the sampled alpha.
 TEST_P(Cryptomatte, AddsUpToAlpha) {
   const VolumeRef ball = make_ball(16, 0.3F);
   ASSERT_EQ(cumulet_set_volume(v_, ball.get()), CUMULET_OK);
@@ -267,7 +267,7 @@ TEST_P(Cryptomatte, AddsUpToAlpha) {
   EXPECT_EQ(sums.size(), 5U) << "these, none, and how far the sum is off";
 }
 
-// Instances of one name are one matte; what is hidden is not there, and a hole hides without a matte.
+// Instances with one name share one matte. Hidden objects are excluded. A holdout occludes and has no matte.
 TEST_P(Cryptomatte, GoesByNames) {
   const VolumeRef block = make_block();
   constexpr double extinction = 0.05;
@@ -300,7 +300,7 @@ TEST_P(Cryptomatte, GoesByNames) {
   make();
   EXPECT_NEAR(coverage("smoke")[middle], 1.0 - std::exp(-8.0 * extinction), 2e-5);
   EXPECT_EQ(asked_.size(), 1U);
-  // Models: a hole, one that cameras do not see, and one without a name.
+  // Models: a holdout, one that is invisible to cameras, and one without a name.
   const SurfacesRef wall = make_wall(-400.0F, 400.0F);
   for (const bool holdout : {true, false}) {
     auto model = make_desc<cumulet_model_desc>();
@@ -339,7 +339,7 @@ TEST_P(Cryptomatte, TellsPlacesOfTheVolume) {
 
 std::string strip_name(std::uint64_t width) { return std::string("strip ").append(std::to_string(width)); }
 
-// A pixel with strips as wide as 1, 2, ... 8: the smallest are left out, and all that there is is known.
+// A pixel with strips of widths 1, 2, ... 8: the smallest are dropped, and the rest is exact.
 TEST_P(Cryptomatte, KeepsTheLargest) {
   look(side * 36.0);
   std::vector<SurfacesRef> strips;
@@ -374,7 +374,7 @@ TEST_P(Cryptomatte, KeepsTheLargest) {
   EXPECT_EQ(pixel[8], std::pair(0U, 0.0F));
 }
 
-// An edge that goes over eight pixels while the shutter is open covers each for its part of that time.
+// An edge that moves over eight pixels during the shutter interval covers each for its fraction of that time.
 TEST_P(Cryptomatte, IsOfTheTimeThatTheShutterIsOpen) {
   const SurfacesRef wall = make_wall(-400.0F, 0.0F);
   auto desc = make_desc<cumulet_model_desc>();

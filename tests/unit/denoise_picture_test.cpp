@@ -1,4 +1,4 @@
-// Pictures that a viewer denoises, through the C API.
+// Denoised images of a viewer, through the C API.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ using cumulet::test::VolumeRef;
 constexpr int side = 40;
 constexpr std::size_t floats = std::size_t{side} * side * 4;
 
-// Squared, of colours.
+// Sum of squared color differences.
 double distance(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < floats; ++i) sum += i % 4 == 3 ? 0.0 : std::pow(double(a[i]) - double(b[i]), 2.0);
@@ -75,7 +75,7 @@ class DenoisedPicture : public testing::Test {
     return rgba;
   }
 
-  // As it is displayed, in the rows of what is drawn.
+  // The displayed (filtered) image, with rows ordered as in the framebuffer.
   [[nodiscard]] std::vector<std::uint8_t> shown() const {
     std::vector<std::uint8_t> rgba(floats);
     EXPECT_EQ(cumulet_read_display(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
@@ -138,7 +138,7 @@ TEST_F(DenoisedPicture, WhatCannotBeIsOneLine) {
   EXPECT_EQ(error(), other + ": no tensor archive (.tza) of Open Image Denoise");
 }
 
-// Measured: raw is 14 times farther from many samples than what is filtered.
+// Measured: the error of the noisy image is 14 times that of the filtered one, relative to 1024 samples.
 TEST_F(DenoisedPicture, TheFilterNeedsNoNetwork) {
   const std::vector<float> few = picture();
   const auto desc = make_desc<cumulet_denoise_desc>();
@@ -162,7 +162,7 @@ TEST_F(DenoisedPicture, FramesAreFilteredWhereThatIsSetAndWhatIsReadIsNot) {
   const std::vector<std::uint8_t> filtered = target_.pixels();
   EXPECT_NE(filtered, raw);
   EXPECT_EQ(linear(), values);
-  // The same that is read back, but for the rays that facts are of.
+  // Equal to the image read back, except for the number of feature rays.
   EXPECT_LT(off_by(shown(), filtered), 4.0);
   display.denoise = CUMULET_DENOISE_OFF;
   ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
@@ -170,7 +170,7 @@ TEST_F(DenoisedPicture, FramesAreFilteredWhereThatIsSetAndWhatIsReadIsNot) {
   EXPECT_EQ(target_.pixels(), raw);
 }
 
-// The more samples there are, the more rays are facts of.
+// With more samples, the displayed image uses as many feature rays as the one read back.
 TEST_F(DenoisedPicture, OfManySamplesWhatIsDrawnIsWhatIsRead) {
   auto display = make_desc<cumulet_display_desc>();
   display.denoise = CUMULET_DENOISE_FAST;
@@ -180,7 +180,7 @@ TEST_F(DenoisedPicture, OfManySamplesWhatIsDrawnIsWhatIsRead) {
   EXPECT_EQ(off_by(drawn, shown()), 0.0);
 }
 
-// Hosts may work in frames that draw nothing, and draw in others, without a budget, what there is.
+// Hosts may filter in frames with CUMULET_TARGET_NONE and draw the result in frames without a budget.
 TEST_F(DenoisedPicture, FramesThatDrawNothingFilterToo) {
   const std::vector<std::uint8_t> raw = cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
   auto display = make_desc<cumulet_display_desc>();
@@ -206,7 +206,7 @@ TEST_F(DenoisedPicture, FramesThatDrawNothingFilterToo) {
   EXPECT_EQ(target_.pixels(), filtered);
 }
 
-// What was begun in frames that draw nothing is given up there, too: none waits for it.
+// Filtering that began in frames with CUMULET_TARGET_NONE is abandoned there when it is switched off.
 TEST_F(DenoisedPicture, SwitchedOffInSuchFramesNothingIsLeftToDo) {
   cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
   const auto bytes = [&] {
@@ -246,7 +246,7 @@ TEST_F(DenoisedPicture, DebugViewsAreNotDenoised) {
   EXPECT_EQ(denoise(file_, rgba), CUMULET_ERROR_UNSUPPORTED);
 }
 
-// What the ground covers is no less covered for being filtered.
+// Filtering does not reduce the alpha of the ground plane.
 TEST_F(DenoisedPicture, TheGroundIsNoHole) {
   auto ground = make_desc<cumulet_ground_desc>();
   ground.place = CUMULET_GROUND_AT_HEIGHT;
@@ -267,7 +267,7 @@ TEST_F(DenoisedPicture, TheGroundIsNoHole) {
   }
 }
 
-// The sun in the zenith over a floor, and a lath between, whose shadow is three pixels wide.
+// The sun at the zenith above a floor, and a lath between whose shadow is three pixels wide.
 class LathPicture : public DenoisedPicture {
  protected:
   static cumulet::test::SurfacesRef level(float half, float y) {
@@ -285,7 +285,7 @@ class LathPicture : public DenoisedPicture {
     ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
   }
 
-  // One sample a pixel. floor, lath: what there is to say of them beside what they are.
+  // Renders one sample per pixel. floor, lath: settings of the two.
   void render(cumulet_surface_settings_desc floor = make_desc<cumulet_surface_settings_desc>(),
               cumulet_model_desc lath = make_desc<cumulet_model_desc>()) const {
     ASSERT_NO_FATAL_FAILURE(shine(0.3F));
@@ -312,7 +312,7 @@ class LathPicture : public DenoisedPicture {
     cumulet::test::converge(viewer_.get(), frame);
   }
 
-  // What is known: a network that leaves nothing of the rest shows it.
+  // The noise-free component: a network that outputs 0 leaves only that.
   [[nodiscard]] std::vector<float> known() const {
     write_network(cumulet::test::dark_archive(cumulet::test::small_widths, 9));
     std::vector<float> rgba(floats);
@@ -320,8 +320,8 @@ class LathPicture : public DenoisedPicture {
     return rgba;
   }
 
-  // Of the floor by the sun: an irradiance of 3 on a grey of 0.5, of which the glossy part of 0.04 at least is not
-  // known.
+  // Radiance of the floor lit by the sun: irradiance 3, albedo 0.5. The specular part (at least 0.04) is not in the
+  // noise-free component.
   static constexpr double sunlit = 0.96 * 3.0 * 0.5 / std::numbers::pi;
   static void expect_known(const std::vector<float>& rgba, double lit) {
     int wrong = 0;
@@ -331,7 +331,7 @@ class LathPicture : public DenoisedPicture {
     EXPECT_LT(wrong, near_edge / 50);
   }
 
-  // Calls visit(red, shadowed) for the floor about the shadow, but not at its edges. Returns how many pixels that is.
+  // Calls visit(red, shadowed) for floor pixels near the shadow, except at its edges. Returns their number.
   template <class Visit>
   static int for_each_near_shadow(const std::vector<float>& picture, Visit&& visit) {
     const double length = std::hypot(height, away);
@@ -352,7 +352,7 @@ class LathPicture : public DenoisedPicture {
     return count;
   }
 
-  static constexpr double height = 6.0;  // of the eye, and how far it is from the middle
+  static constexpr double height = 6.0;  // of the eye; `away` is its horizontal distance from the center
   static constexpr double away = 14.0;
   static constexpr double fovy = 40.0;
 };
@@ -389,7 +389,7 @@ TEST_F(LathPicture, OfHoldoutsNoLightIsKnown) {
   expect_known(known(), 0.0);
 }
 
-// It may come through that, by ways that are not straight.
+// Sunlight may pass through glass on refracted paths.
 TEST_F(LathPicture, WhereThereIsGlassNoLightOfTheSunIsKnown) {
   cumulet::test::GltfModel model;
   model.root["extensionsUsed"] = {"KHR_materials_transmission"};
@@ -403,7 +403,7 @@ TEST_F(LathPicture, WhereThereIsGlassNoLightOfTheSunIsKnown) {
   expect_known(known(), 0.0);
 }
 
-// At edges samples are brighter than what is known and darker.
+// At edges, samples are brighter or darker than the noise-free component.
 TEST_F(LathPicture, ANetworkThatLeavesAllLeavesThePicture) {
   ASSERT_NO_FATAL_FAILURE(render());
   write_network(cumulet::test::clear_archive(cumulet::test::small_widths, 9));
@@ -413,8 +413,8 @@ TEST_F(LathPicture, ANetworkThatLeavesAllLeavesThePicture) {
   for (std::size_t i = 0; i < floats; ++i) EXPECT_NEAR(denoised[i], raw[i], 0.01 * raw[i] + 1e-3) << i;
 }
 
-// A shadow across a medium that light goes deep into. Measured: 0.19, and 0.27 where each ray asks for the sun at the
-// mean place at which it scatters.
+// A shadow across a medium of large penetration depth. Measured: 0.19, and 0.27 if each ray tests the sun only at its
+// mean scattering position.
 TEST_F(LathPicture, ShadowsAreSoftInAMedium) {
   ASSERT_NO_FATAL_FAILURE(shine(1e-3F));
   const cumulet::test::SurfacesRef roof = level(3.0F, 40.0F);
@@ -440,7 +440,7 @@ TEST_F(LathPicture, ShadowsAreSoftInAMedium) {
 
 // ---- Frames of a camera that moves ----
 
-// Squared and relative, of colours.
+// Relative squared error of colors.
 double relative_error(const std::vector<float>& values, const std::vector<float>& truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -459,14 +459,14 @@ std::vector<float> apart(const std::vector<float>& a, const std::vector<float>& 
 class MovingPicture : public DenoisedPicture {
  protected:
   MovingPicture() {
-    // A card that stands in the cloud, and shows beside it.
+    // A card that is partly inside the cloud.
     surfaces_ =
         cumulet::test::make_quad({-4.0F, -9.0F, 3.0F, 13.0F, -9.0F, 3.0F, 13.0F, 2.0F, 6.0F, -4.0F, 2.0F, 6.0F});
     EXPECT_EQ(cumulet_set_volume(viewer_.get(), volume_.get()), CUMULET_OK);
     EXPECT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces_.get()), CUMULET_OK);
   }
 
-  // Frames follow each other where there are previews.
+  // Temporal history needs previews.
   void sample(std::uint32_t samples) const {
     DenoisedPicture::sample(samples, CUMULET_VIEW_SHADED, CUMULET_PREVIEW_AUTO);
   }
@@ -486,15 +486,15 @@ class MovingPicture : public DenoisedPicture {
     display.denoise = on ? CUMULET_DENOISE_FAST : CUMULET_DENOISE_OFF;
     ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
   }
-  // What a frame shows once it has all its samples.
+  // The displayed image once it has all its samples.
   [[nodiscard]] std::vector<float> frame() const {
     auto desc = hdr_.frame();
     desc.colour = CUMULET_COLOUR_HDR;
-    desc.budget_ms = 1000.0;  // there is time for all of it at once, none of it coarse
+    desc.budget_ms = 1000.0;  // enough for all samples at once, none of them at reduced resolution
     cumulet::test::converge(viewer_.get(), desc);
     return hdr_.floats();
   }
-  // What was shown before is forgotten.
+  // Discards the temporal history.
   void forget() const {
     filter(false);
     auto desc = hdr_.frame();
@@ -515,7 +515,7 @@ class MovingPicture : public DenoisedPicture {
   cumulet::test::SurfacesRef surfaces_;
 };
 
-// Measured: error of what is followed 0.0075, alone 0.0174; flicker 0.205 and 0.498.
+// Measured: error with history 0.0075, without 0.0174; flicker 0.205 and 0.498.
 TEST_F(MovingPicture, WhatWasSeenBeforeTakesErrorAndFlickerAway) {
   constexpr int frames = 8;
   std::vector<std::vector<float>> truth;
@@ -589,7 +589,7 @@ TEST_F(MovingPicture, WhatIsReadDoesNotDependOnWhatWasShown) {
   EXPECT_EQ(read(), moved);
 }
 
-// With as many samples as take what was before for nothing.
+// With enough samples, the history has no weight.
 TEST_F(MovingPicture, AtRestItIsAsIfNothingHadBeenShown) {
   filter(true);
   sample(1);

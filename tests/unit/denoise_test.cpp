@@ -1,4 +1,5 @@
-// The denoiser's kernels against the same network in plain loops and doubles, and what pictures they may not spoil.
+// The denoiser's kernels compared with the same network in plain loops and doubles, and images that denoising must
+// preserve.
 #include "denoise/denoiser.hpp"
 
 #include <gtest/gtest.h>
@@ -38,9 +39,9 @@ using test::small_widths;
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t plenty = std::uint64_t{512} << 20U;
-constexpr double whole = 1e18;  // multiplications a step: all work groups of a stage
+constexpr double whole = 1e18;  // multiplications per step: all work groups of a stage
 
-// A bright ball before a dark wall, under noise; what there is of it without light.
+// A bright ball in front of a dark wall with noise, and its albedo and normals.
 struct Scene {
   ivec2 size;
   std::vector<vec4> colour, albedo, normal;
@@ -63,7 +64,7 @@ struct Scene {
   }
 };
 
-// Of random weights, which make more of a difference than those that were learned do.
+// Error bounds for random weights, which amplify errors more than learned weights.
 constexpr double random_mean = 5e-4;
 constexpr double random_most = 3e-3;
 
@@ -90,7 +91,7 @@ class Denoise : public test::GlTest {
     while (!denoiser.step(step)) {
       ++steps_;
       EXPECT_LE(denoiser.progress() - before, std::max(step / denoiser.multiply_adds(), 0.05) + 0.5);
-      EXPECT_GE(denoiser.progress(), before);  // as before while the driver compiles
+      EXPECT_GE(denoiser.progress(), before);  // unchanged while the driver compiles
       before = denoiser.progress();
     }
     EXPECT_DOUBLE_EQ(denoiser.progress(), 1.0);
@@ -101,7 +102,7 @@ class Denoise : public test::GlTest {
     return read;
   }
 
-  // By what the network gives: encoded, where halves are as exact everywhere.
+  // Compares encoded values, in which half floats are equally exact everywhere.
   void expect_reference(const TensorArchive& archive, const Scene& scene, const char* what, double mean_bound,
                         double most_bound) const {
     const std::vector<vec4> ours = denoised(make_network(archive, what), scene);
@@ -129,7 +130,7 @@ class Denoise : public test::GlTest {
 };
 CUMULET_ON_BACKENDS(Denoise);
 
-// What takes longer, on one driver.
+// Longer tests, on one driver only.
 class DenoiseMore : public Denoise {};
 INSTANTIATE_TEST_SUITE_P(Gl, DenoiseMore, testing::Values(test::Door{headless::Backend::egl}),
                          [](const auto&) { return "egl"; });
@@ -148,7 +149,7 @@ TEST_P(DenoiseMore, PublishedNetworksAreThoseOfPlainLoops) {
   }
 }
 
-// Mean square, encoded: dark and bright count alike.
+// Mean squared error of encoded values, so that dark and bright pixels count alike.
 double error_of(const std::vector<vec4>& picture, const Scene& truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < picture.size(); ++i) {
@@ -169,7 +170,7 @@ TEST_P(DenoiseMore, PublishedNetworksTakeNoiseAwayAndKeepWhatIsClean) {
     const NetworkPtr network = make_network(read_tza((data / name).string()), name);
     EXPECT_LT(error_of(denoised(network, noisy), clean), 0.1 * error_of(noisy.colour, clean)) << name;
     EXPECT_LT(error_of(denoised(network, clean), clean), 1e-4) << name;
-    // A constant stays one, at any exposure.
+    // A constant image stays constant at any exposure.
     for (const float value : {1e-4F, 3000.0F}) {
       Scene constant({64, 64});
       std::ranges::fill(constant.colour, vec4(value, value, value, 1.0F));
@@ -235,7 +236,7 @@ TEST_P(Denoise, WhatIsNotFiniteStaysInItsPixel) {
       EXPECT_EQ(result[i], expected[i]) << i;
     }
   }
-  // Guides neither.
+  // The same holds for non-finite guides.
   broken = black;
   broken.albedo[7] = vec4(nan);
   broken.normal[8] = vec4(infinite);
@@ -301,7 +302,8 @@ TEST(DenoisePlan, NothingIsOverWrittenThatIsStillRead) {
   fill(memory.input, denoise::input_blocks(*network) * size.x * size.y, of_input);
   for (std::size_t i = 0; i < network->convolutions.size(); ++i) {
     const denoise::Convolution& convolution = network->convolutions.at(i);
-    // The result of the last is the picture; others are written before what they read is free.
+    // The result of the last layer is the image. Each other result is written while the layer's inputs are still in
+    // use.
     if (i + 1 < network->convolutions.size()) fill(memory.results.at(i), extent(i), static_cast<std::uint32_t>(i));
     for (const denoise::Source& source : convolution.sources) {
       const std::uint32_t at = source.convolution ? memory.results.at(*source.convolution) : memory.input;

@@ -1,4 +1,4 @@
-// Tensor archives of Open Image Denoise, and the networks that they describe.
+// Tensor archives of Open Image Denoise and the networks that they describe.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ std::string network_refusal(const TensorArchive& archive) {
   return refusal([&] { static_cast<void>(make_network(archive, "x.tza")); });
 }
 
-// One record over eight halves, its table at 28.
+// A file with one record of eight halves; its table is at offset 28.
 Bytes one(const std::string& name, const std::vector<std::uint32_t>& shape, char type, std::uint64_t offset,
           std::uint32_t count = 1) {
   TzaBytes file;
@@ -122,7 +122,7 @@ TEST(Tza, FilesAreReadByTheirPath) {
   EXPECT_EQ(read_tza(path).at("a").values, (std::vector<float>{1.0F, 2.0F}));
 }
 
-// Damaged as a disk or a sender of files may: whatever the bytes, tensors as large as they say or one line.
+// Damaged files: for any bytes, the reader returns tensors of the declared sizes or a one-line error.
 TEST(Tza, DamagedFilesAreOneLineOrWhole) {
   cumulet::test::NetworkWidths narrow;
   narrow.fill(1);
@@ -149,7 +149,7 @@ TEST(Tza, DamagedFilesAreOneLineOrWhole) {
     Bytes bytes = whole;
     const int changes = 1 + static_cast<int>(random() % 4);
     for (int j = 0; j < changes; ++j) {
-      // In the table mostly, where everything has a meaning.
+      // Mostly in the table, where each byte matters.
       const std::size_t from = i % 4 == 0 ? 0 : bytes.size() / 2;
       const std::uint8_t odd[] = {0, 1, 0x7F, 0x80, 0xFF, static_cast<std::uint8_t>(random())};
       bytes[from + random() % (bytes.size() - from)] = odd[random() % 6];
@@ -170,7 +170,7 @@ TEST(Network, HasTheConvolutionsOfItsTensors) {
     EXPECT_EQ(convolutions[7].inputs, 160U);
     EXPECT_EQ(convolutions[7].level, 3U);
     EXPECT_EQ(convolutions[15].biases.size(), 3U);
-    // What it says of its reach: radii at all levels, and the places in blocks that were pooled.
+    // Upper bound of the receptive radius: filter radii at all levels and the offsets inside pooled blocks.
     unsigned reach = (1U << 4U) - 1;
     for (const auto& convolution : convolutions) reach += 1U << convolution.level;
     EXPECT_LE(reach, cumulet::denoise::Network::reach);

@@ -1,4 +1,4 @@
-// What cells give off by themselves: fields into radiance, its grid, and pictures against closed forms.
+// Emission of the medium: fields converted to radiance, the grid, and images compared with closed forms.
 
 #include "scene/channels.hpp"
 
@@ -25,7 +25,7 @@ using scene::March;
 using volume::ScalarVolume;
 using volume::VolumeFrame;
 
-// ---- Fields into radiance
+// ---- Fields converted to radiance
 
 ScalarVolume nothing() {
   ScalarVolume empty;
@@ -106,7 +106,7 @@ TEST(Emission, TilesAndBackgroundsGlow) {
   EXPECT_THROW(scene::emission_of(frame, {}), Error) << "more bricks than anything without detail is worth";
 }
 
-// ---- Colours
+// ---- Colors
 
 std::array<ScalarVolume, 3> colours(const ivec3& size, const ivec3& low, vec3 (*colour)(const ivec3&)) {
   std::array<ScalarVolume, 3> fields;
@@ -115,7 +115,7 @@ std::array<ScalarVolume, 3> colours(const ivec3& size, const ivec3& low, vec3 (*
   return fields;
 }
 
-// Constant colours and densities have no bricks, only tiles and backgrounds, and may be large.
+// Constant colors and densities have no bricks, only tiles and backgrounds, and may be large.
 TEST(Colour, MayBeConstantOverALargeBox) {
   VolumeFrame frame{.density = field(ivec3(16), ivec3(0), 1.0F)};
   frame.colour = colours(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return vec3(2.0F, 0.5F, 0.0F); });
@@ -146,7 +146,7 @@ TEST(Colour, OfACellIsThatOfItsDensity) {
   builder.bisect();
   const grid::TetGrid grid = builder.records(grid::CellKind::constant, 1.0F, channels);
   ASSERT_EQ(grid.colour.size(), grid.cells.size());
-  // What all of them scatter.
+  // Density-weighted color of all cells.
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     const double volume = 16.0 * 16.0 * 16.0 / 24.0;
@@ -162,7 +162,7 @@ TEST(Colour, OfACellIsThatOfItsDensity) {
 
 // ---- Anisotropy
 
-// The mean cosines that a function gives, above 0 and below.
+// The mean cosines given by a function, positive and negative parts separately.
 template <class Function>
 std::array<ScalarVolume, 2> anisotropy(const ivec3& size, const ivec3& low, Function of) {
   return {test::make_volume(size, low, [=](const ivec3& p) { return std::max(of(p), 0.0F); }),
@@ -196,7 +196,7 @@ float stored_anisotropy(const grid::TetGrid& grid, std::size_t cell) {
   return core::cm_cell_anisotropy(word(even) | (word(even + 1) << 16U), static_cast<std::uint32_t>(cell));
 }
 
-// Against sums over the sixths of voxels that a cell is made of.
+// Compared with sums over the sixths of voxels that make up a cell.
 TEST(Anisotropy, OfACellIsTheMeanOfWhatScattersInIt) {
   constexpr int size = 16;
   VolumeFrame frame{.density = test::noise_volume(ivec3(size), ivec3(0), 5)};
@@ -263,7 +263,7 @@ TEST(Anisotropy, CellsAreSplitWhereItVaries) {
   }
 }
 
-// ---- Pictures
+// ---- Images
 
 class EmissionPicture : public test::ViewerTest {
  protected:
@@ -301,7 +301,7 @@ TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
   }
 }
 
-// Thin smoke beside a tall flame, and a flame alone: the whole of it is in the picture.
+// frame_all() shows a whole tall flame, with thin smoke and without density.
 TEST_P(EmissionPicture, AFlameIsFramed) {
   const auto viewer = make();
   for (const bool smoke : {false, true}) {
@@ -322,7 +322,7 @@ TEST_P(EmissionPicture, AFlameIsFramed) {
   }
 }
 
-// A file with a temperature and nothing else is fire, too.
+// A file with only a temperature emits light too.
 TEST_P(EmissionPicture, ATemperatureAloneShines) {
   const auto viewer = make();
   viewer->set_light({});
@@ -352,7 +352,7 @@ TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
       const test::Picture picture = look(*viewer);
       const double through = 8.0 * sigma;
       const double mean = (1.0 - std::exp(-through)) / sigma;
-      // Of min(free path, 8).
+      // The mean square of min(free path, 8).
       const double square = 2.0 / (sigma * sigma) * (1.0 - std::exp(-through) * (1.0 + through));
       const double error = std::sqrt((square - mean * mean) / (256.0 * 64.0));
       EXPECT_NEAR(picture.mean().x, mean, 4.0 * error) << sigma;
@@ -360,7 +360,7 @@ TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
   }
 }
 
-// How much of a voxel is within a sphere.
+// The fraction of a voxel that is inside a sphere.
 float share_within(const ivec3& p, const glm::dvec3& middle, double radius) {
   constexpr int n = 6;
   int within = 0;
@@ -371,7 +371,7 @@ float share_within(const ivec3& p, const glm::dvec3& middle, double radius) {
   return static_cast<float>(within) / (n * n * n);
 }
 
-// All that a sphere sends one way, and what comes along chords of it.
+// The total emission of a sphere in one direction, and the radiance along its chords.
 TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
   constexpr double radius = 27.0;
   constexpr double strength = 0.5;
@@ -387,7 +387,7 @@ TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
   viewer->set_camera(camera);
   for (const test::MarchKind& kind : test::march_kinds) {
     viewer->set_grid(test::settings_of(kind));
-    // Its rim is a voxel wide, and shines more the less is seen through it.
+    // The sphere's rim is a voxel wide. Its error matters more, the more opaque the sphere is.
     for (const auto& [sigma, rim] : {std::pair(0.01, 2e-3), std::pair(0.1, 5e-3), std::pair(0.5, 2e-2)}) {
       SCOPED_TRACE(testing::Message() << "march " << static_cast<int>(kind.march) << ", extinction " << sigma);
       viewer::Medium medium;
@@ -397,7 +397,7 @@ TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
       viewer->set_medium(medium);
       const test::Picture one = test::render(*viewer, {32, 32, 64, 1, render::View::shaded});
       const test::Picture two = test::render(*viewer, {32, 32, 64, 2, render::View::shaded});
-      // Sums over pixels of 2 x 2 units: of all, and of rings of chords within 0.9 of the radius.
+      // Sums over pixels of 2 x 2 units: the whole image, and rings of chords within 0.9 of the radius.
       constexpr int rings = 3;
       std::array<double, rings + 1> sum{};
       std::array<double, rings + 1> square{};  // of the error
@@ -436,7 +436,7 @@ TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
   }
 }
 
-// What gives off as much as it takes from a sky of radiance 1 cannot be told from it.
+// A medium that emits as much as it absorbs from a sky of radiance 1 is invisible.
 TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
   const auto viewer = make();
   const ScalarVolume noise = test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3);
@@ -451,7 +451,7 @@ TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
   medium.field_emission.flame_strength = 0.5 * 0.25;
   viewer->set_medium(medium);
   for (const test::MarchKind& kind : test::march_kinds) {
-    // Where cells average, density and emission still go together.
+    // Averaging in cells keeps the ratio of density and emission.
     viewer->set_grid(test::settings_of(kind, kind.march == March::tet ? 0.05 : -1.0));
     const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
     double square = 0.0;
@@ -460,7 +460,7 @@ TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
   }
 }
 
-// A front that is hot and thin, in smoke that does not vary: cells are split for what it gives off.
+// A hot thin front in homogeneous smoke: emission causes refinement.
 TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
   const auto viewer = make();
   VolumeFrame frame{.density = field(ivec3(64), ivec3(0), 1.0F)};
@@ -492,7 +492,7 @@ TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
   EXPECT_LT(std::sqrt(square / all), 0.03);
 }
 
-// Rays end at triangles before what is behind them adds to the picture, whatever stands where.
+// Rays end at triangles before the emission behind them is added, in any arrangement.
 TEST_P(EmissionPicture, EndsAtSurfaces) {
   const auto viewer = make();
   VolumeFrame frame{.density = nothing()};
@@ -531,7 +531,7 @@ TEST_P(EmissionPicture, AColourIsAnAlbedo) {
   }
 }
 
-// Red on one side, green on the other, and what is collided with once.
+// The medium is red on one side and green on the other. Only single scattering.
 TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
   const auto viewer = make();
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
@@ -547,7 +547,7 @@ TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
     for (const double x : {7.5, 23.5}) {
       viewer->set_camera(test::camera_at({x, 15.5, 500.0}, {x, 15.5, 0.0}, 0.5));
       const glm::dvec4 mean = test::render(*viewer, {8, 8, 16, 1, render::View::shaded}).mean();
-      // Once in a half-space: (1 - ln 2) / 2.
+      // Single scattering in a half-space: (1 - ln 2) / 2.
       EXPECT_NEAR(x < 16.0 ? mean.x : mean.y, 0.1534, 0.02);
       EXPECT_EQ(x < 16.0 ? mean.y : mean.x, 0.0);
     }
@@ -579,7 +579,7 @@ TEST_P(EmissionPicture, AnAnisotropyIsTheMediums) {
   }
 }
 
-// Two slabs side by side, each with the light that a first scattering sends up.
+// Two slabs side by side; single scattering is compared with the closed form.
 TEST_P(EmissionPicture, AnAnisotropyIsThatOfItsPlace) {
   const auto viewer = make();
   const double height = std::asin(0.6);
@@ -606,7 +606,7 @@ TEST_P(EmissionPicture, AnAnisotropyIsThatOfItsPlace) {
   }
 }
 
-// Triangles bring other kernels: their medium scatters alike.
+// Triangles use other kernels. The medium must scatter equally in them.
 TEST_P(EmissionPicture, AnAnisotropyHoldsAmongSurfaces) {
   const auto viewer = make();
   viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
@@ -642,7 +642,7 @@ TEST_P(EmissionPicture, MieKeepsItsOwnAnisotropy) {
   frame.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& p) { return p.x < 21 ? -0.5F : 0.5F; });
   show(*viewer, std::move(frame));
   EXPECT_EQ(look(*viewer, 500.0, 4).pixels, without.pixels);
-  // What is not shown costs no cells, and they no bytes; what is shown again does.
+  // A field that is not displayed takes no cells and no bytes; it does when it is displayed again.
   EXPECT_EQ(viewer->viewer().stats().cells, plain.cells);
   EXPECT_EQ(viewer->viewer().stats().cell_bytes, plain.cell_bytes);
   viewer::Medium varied = medium;
@@ -655,7 +655,7 @@ TEST_P(EmissionPicture, MieKeepsItsOwnAnisotropy) {
   EXPECT_EQ(viewer->viewer().stats().cells, plain.cells);
 }
 
-// Frames of a sequence have the same grid.
+// Frames of a sequence share one warning.
 TEST(Anisotropy, ThatIsNotShownIsToldOnce) {
   std::vector<std::string> told;
   viewer::Viewer viewer(Log([&](LogLevel, const char* message) { told.emplace_back(message); }), nullptr, true);
@@ -679,7 +679,8 @@ TEST(Anisotropy, ThatIsNotShownIsToldOnce) {
   EXPECT_EQ(told.size(), 2U);
 }
 
-// A small fire in thick smoke, seen by what it lights: flights alone come to it seldom, looks as often as they like.
+// A small fire in thick smoke that is seen by the light it scatters. Scattered rays reach it rarely, NEE reaches it
+// always.
 TEST_P(EmissionPicture, LooksFindAHotCore) {
   const auto viewer = make();
   VolumeFrame frame{.density = field(ivec3(48), ivec3(0), 1.0F)};
@@ -697,7 +698,7 @@ TEST_P(EmissionPicture, LooksFindAHotCore) {
                  floor.add(test::diffuse(vec3(0.7F))));
   struct Case {
     const char* name;
-    float quieter;  // its variance by the other's, at most
+    float quieter;  // largest ratio of the variances
     float daylight = 0.0F;
     bool ground = false;
     float lamp = 0.0F;  // watts
@@ -748,8 +749,8 @@ TEST_P(EmissionPicture, LooksFindAHotCore) {
   }
 }
 
-// A floor right below a wide slab that glows: what comes from each direction is its way through the slab, 8 / cosine,
-// as far as the slab goes.
+// A floor just below a wide emissive slab. Radiance from each direction is the path length in the slab: 8 / cosine, as
+// far as the slab extends.
 TEST_P(EmissionPicture, LightsAFloor) {
   const auto viewer = make();
   VolumeFrame frame{.density = nothing()};

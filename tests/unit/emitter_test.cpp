@@ -1,4 +1,5 @@
-// Emissive triangles as lights: the table, and pictures against quadrature and against the same emitters met by chance.
+// Emissive triangles as lights: the sampling table, and images compared with quadrature and with equal emitters that
+// only scattered rays hit.
 
 #include <gtest/gtest.h>
 
@@ -38,7 +39,7 @@ Material emitter(const vec3& radiance, const vec3& albedo = vec3(0.0F)) {
   return m;
 }
 
-/// What is seen alike, and met by chance alone.
+/// Looks the same, but is not in the light table: only scattered rays hit it.
 Material unlit(const vec3& radiance) {
   Material m;
   m.base_color = glm::vec4(radiance, 1.0F);
@@ -46,7 +47,7 @@ Material unlit(const vec3& radiance) {
   return m;
 }
 
-/// A horizontal square about (32, y, 32), its front down or up.
+/// A horizontal square centered on (32, y, 32) that faces down or up.
 std::array<vec3, 4> square(float y, float half, bool down) {
   std::array<vec3, 4> c{
       {{32 - half, y, 32 + half}, {32 + half, y, 32 + half}, {32 + half, y, 32 - half}, {32 - half, y, 32 - half}}};
@@ -76,7 +77,7 @@ viewer::SurfaceSettings surface_light(SurfaceLight light) {
   return s;
 }
 
-/// The sum over the patch's points p of f(p) dA, at the centres of a fine grid.
+/// The sum over the patch's points p of f(p) dA, at the centers of a fine grid.
 double over_patch(double half, const std::function<double(const dvec3&)>& f) {
   constexpr int n = 112;
   double sum = 0.0;
@@ -90,7 +91,7 @@ double over_patch(double half, const std::function<double(const dvec3&)>& f) {
   return sum * (2.0 * half / n) * (2.0 * half / n);
 }
 
-/// Irradiance of the floor's middle below a patch that emits radiance(p), through the slab.
+/// Irradiance at the floor's center below a patch that emits radiance(p), through the slab.
 double irradiance(double sigma, double half, const std::function<double(const dvec3&)>& radiance) {
   return over_patch(half, [&](const dvec3& p) {
     const dvec3 way = p - dvec3(32.0, floor_y, 32.0);
@@ -100,7 +101,7 @@ double irradiance(double sigma, double half, const std::function<double(const dv
   });
 }
 
-/// The mean of pixels that all estimate the same, and four of its standard errors.
+/// The mean of pixels that all estimate the same value, and four standard errors of it.
 struct Estimate {
   dvec3 mean{0.0};
   double error = 0.0;  // of the first channel
@@ -140,7 +141,7 @@ surface::Image stripes() {
 
 // ---- the table ----
 
-/// The chance of each triangle, as the shader draws them.
+/// The probability of each triangle, as the shader samples them.
 std::map<std::uint32_t, double> chances(const EmitterTable& table) {
   std::map<std::uint32_t, double> chance;
   const double n = static_cast<double>(table.entries.size());
@@ -192,7 +193,7 @@ TEST(Emitters, ArePickedByPower) {
   }
   EXPECT_NEAR(sum, 1.0, 1e-9);
   EXPECT_NEAR(table.flux / flux, 1.0, 1e-6);
-  // Those of one side emit as much again where the pose shows both.
+  // One-sided triangles emit twice the flux if the pose is double-sided.
   double one_sided = 0.0;
   for (const glm::uvec4& entry : table.entries) one_sided += entry.x / 2 % 4 == 1 ? area_of(*scene, entry.x) : 0.0;
   scene->rest.double_sided = true;
@@ -234,7 +235,7 @@ TEST(Emitters, TexturesSayWhichTrianglesShine) {
   ASSERT_EQ(emissive.size(), 4U);
   EXPECT_NEAR(emissive[0].luminance, 0.503, 0.001);
   EXPECT_NEAR(emissive[1].luminance, 0.503, 0.001);
-  EXPECT_GT(emissive[2].luminance, 0.0F);  // a look may miss what shines
+  EXPECT_GT(emissive[2].luminance, 0.0F);  // a point sampled by NEE may miss the bright texels
   EXPECT_LT(emissive[2].luminance, 0.05F);
   EXPECT_EQ(emissive[2].luminance, emissive[3].luminance);
 }
@@ -252,7 +253,7 @@ TEST(Emitters, AnotherPoseHasAnotherTable) {
   EXPECT_NEAR(density * 1200.0, 1.0, 1e-5);
 }
 
-// ---- pictures ----
+// ---- images ----
 
 class EmitterTrace : public test::ViewerTest {
  protected:
@@ -289,7 +290,7 @@ TEST_P(EmitterTrace, APatchLightsAFloorThroughASlab) {
   }
 }
 
-// The floor's own light comes and goes with the patch's side; a mirrored node turns it.
+// The floor is lit only if the patch's front faces it. A mirrored node flips the front.
 TEST_P(EmitterTrace, OneSidedTrianglesEmitFromTheirFront) {
   for (const SurfaceLight mode : {SurfaceLight::full, SurfaceLight::shadows}) {
     for (const bool down : {false, true}) {
@@ -301,7 +302,7 @@ TEST_P(EmitterTrace, OneSidedTrianglesEmitFromTheirFront) {
           scene->rest.flipped[1] = flipped ? 1 : 0;
           const auto viewer = dark(scene);
           viewer->viewer().set_surface_settings(surface_light(mode));
-          // Under the patch: whatever of it faces up is not in the way.
+          // The camera is below the patch, so that the patch does not hide the floor.
           viewer->set_camera(camera_at({32.0, 5.0, 72.0}, {32.0, floor_y, 32.0}, 0.05));
           const Picture picture = test::render(*viewer, {8, 8, 64, 1, render::View::shaded});
           if (double_sided || down != flipped) {
@@ -322,10 +323,10 @@ TEST_P(EmitterTrace, ATextureEmitsWhereItShines) {
   scene->images.push_back(stripes());
   scene->textures.push_back({0, {}});
   scene->textures[0].sampler.magnify = surface::Filter::nearest;
-  // Uv 0.5 to 1 of the square, and of that twice the image: a quarter shines.
+  // The transform maps uv 0.5 to 1 of the square to twice the image: a quarter emits.
   scene->materials[1].emission_texture.transform = glm::mat3x2(2.0F, 0.0F, 0.0F, 1.0F, 0.25F, 0.0F);
   const auto viewer = dark(scene);
-  // Along z: u runs against it on the lower side.
+  // Along z: u decreases with z on the lower side.
   const double expected = 0.5 / pi * irradiance(0.0, patch_half, [](const dvec3& p) {
                             const double u = 0.5 + (32.0 - p.z) / (2.0 * patch_half);
                             return 2.0 * u + 0.25 - std::floor(2.0 * u + 0.25) < 0.5 ? 3.0 * 0.5029 : 0.0;
@@ -366,8 +367,8 @@ TEST_P(EmitterTrace, APatchLightsAVolume) {
   }
 }
 
-// Walls that emit E and reflect a of it: E / (1 - a) everywhere, whatever scatters between. Direct light alone: E + a
-// E.
+// Walls that emit E and reflect the fraction a: radiance E / (1 - a) everywhere, for any scattering medium. With direct
+// light only: E + a E.
 TEST_P(EmitterTrace, AGlowingBoxIsInBalance) {
   auto scene = std::make_shared<StillScene>();
   scene->add(emitter(vec3(1.0F), vec3(0.5F)));
@@ -389,7 +390,7 @@ TEST_P(EmitterTrace, AGlowingBoxIsInBalance) {
   expect_mean(test::render(*viewer, {16, 16, 64, 1, render::View::shaded}), 1.5, 0.03, "shadows");
 }
 
-// An unlit surface is seen as an emissive one is, and never looked for: the truth without next-event estimation.
+// Reference without NEE: an unlit surface looks like an emissive one and is not in the light table.
 struct Kind {
   const char* name;
   surface::AlphaMode alpha;
@@ -412,7 +413,7 @@ std::shared_ptr<StillScene> gallery(const Kind& kind, bool by_chance) {
     scene->textures[1].image = 1;
     shine.base_color_texture.texture = by_chance ? 0 : 1;
     shine.emission_texture.texture = by_chance ? -1 : 0;
-    // Where the image is dark it is clear as well.
+    // The image is transparent where it is dark.
   }
   Material metal;
   metal.base_color = glm::vec4(0.9F, 0.7F, 0.5F, 1.0F);
@@ -473,7 +474,7 @@ TEST_P(EmitterTrace, AgreesWithWhatChanceMeets) {
   }
 }
 
-// 100,000 triangles, of which few carry most of the light.
+// 100,000 triangles, of which few emit most of the light.
 TEST_P(EmitterTrace, ManyLightsAreAsOne) {
   auto scene = std::make_shared<StillScene>();
   scene->add(test::diffuse(vec3(0.5F)));
@@ -500,7 +501,7 @@ TEST_P(EmitterTrace, ManyLightsAreAsOne) {
   expect_mean(picture, expected, 0.05, "many");
 }
 
-// A small lamp in a room: what a sample is worth.
+// A small emissive square in a room: noise with and without NEE.
 TEST_P(EmitterTrace, LookingForALampTakesFewerSamples) {
   for (const double sigma : {1e-6, 0.02}) {
     std::array<double, 2> noise{};
@@ -518,7 +519,7 @@ TEST_P(EmitterTrace, LookingForALampTakesFewerSamples) {
       scene->add_quad({{{62, floor_y, 2}, {62, floor_y, 62}, {62, 50, 62}, {62, 50, 2}}}, 0);
       const auto viewer = dark(scene);
       viewer->set_medium(medium(sigma, 0.9F));
-      // Without the lamp in the picture: its rim is as noisy either way.
+      // The emitter is outside of the image, because its edges are equally noisy in both cases.
       viewer->set_camera(camera_at({32.0, 20.0, 140.0}, {32.0, 8.0, 32.0}, 18.0));
       test::render(*viewer, {32, 32, 64, 3, render::View::shaded});
       noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise().value();

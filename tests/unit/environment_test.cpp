@@ -1,4 +1,4 @@
-// Environments: what is read, how they are sampled, and that they light as other lights do that are known.
+// Environments: reading, sampling, and images compared with equivalent lights.
 
 #include "light/environment.hpp"
 
@@ -26,7 +26,7 @@
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
-// Marches share one signature; each leaves some of it unused. So do kinds of light.
+// Traversals of all grid types share one signature, so each leaves some parameters unused. Kinds of light do too.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
@@ -34,7 +34,7 @@ namespace cumulet::core {
 #include "ggx.glsl"
 #include "gloss.glsl"
 
-/// The shaders' path tracer over voxels, as C++, in an environment.
+/// The shaders' path tracer over voxels with an environment, compiled as C++.
 struct CpuEnvironment {
   CmParameters cm{};
   const volume::ScalarVolume* volume = nullptr;
@@ -101,7 +101,7 @@ TEST(Environment, TheMiddleIsAtZAndTheLeftIsTowardsXAndTurnsFromZToX) {
   EXPECT_GT(at({0.0F, 0.0F, -1.0F}, 90.0F).x, 0.4F);
 }
 
-// Of random texels, a few of them very bright.
+// Random texels, a few of them very bright.
 light::EnvironmentPtr uneven() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
@@ -162,7 +162,7 @@ core::CmHarmonics block_of(const light::Harmonics& h) {
   return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
 }
 
-// Irradiance over pi, by harmonics and by quadrature, for normals all around.
+// Compares irradiance / pi from spherical harmonics and from quadrature, for normals in all directions.
 void expect_irradiance(const light::Environment& environment, double share) {
   core::CpuEnvironment cpu = twin(environment);
   const core::CmHarmonics harmonics = block_of(environment.harmonics);
@@ -182,7 +182,7 @@ void expect_irradiance(const light::Environment& environment, double share) {
   }
 }
 
-// Above warm, below cold, and the right half brighter than the left.
+// Warm above, cold below, and the left half twice as bright as the right.
 vec3 two_colours(std::uint32_t x, std::uint32_t y) {
   return (y < 32 ? vec3(1.0F, 0.6F, 0.2F) : vec3(0.1F, 0.3F, 0.9F)) * (x < 64 ? 1.0F : 0.5F);
 }
@@ -190,13 +190,13 @@ vec3 two_colours(std::uint32_t x, std::uint32_t y) {
 TEST(Environment, HarmonicsHaveTheIrradiance) {
   expect_irradiance(*made(128, 64, [](auto, auto) { return vec3(0.3F, 2.0F, 7.0F); }), 1e-3);
   expect_irradiance(*made(128, 64, two_colours), 0.01);
-  // Smooth, of all orders up to the second: exact but for the texels.
+  // A smooth function of all orders up to the second: exact except for the texels.
   const auto smooth = made(128, 64, [](std::uint32_t x, std::uint32_t y) {
     const vec3 w = direction(2.0 * pi * (0.5 - (x + 0.5) / 128.0), pi * (y + 0.5) / 64.0);
     return vec3(2.0F + w.x - 0.5F * w.y, 1.5F + w.x * w.z + w.z, 2.0F + w.y * w.y - w.x * w.x + w.y * w.z + w.x * w.y);
   });
   expect_irradiance(*smooth, 2e-3);
-  // The worst: light from one direction alone, which has 4 times its mean where it is met.
+  // The worst case: light from a single direction. At its peak the irradiance is 4 times its mean.
   expect_irradiance(*made(128, 64, [](auto x, auto y) { return vec3(x == 20 && y == 25 ? 5000.0F : 0.0F); }), 0.35);
 }
 
@@ -239,13 +239,13 @@ TEST(Environment, PixelsOfAnotherSizeAreMeansOfThoseInTheirPlace) {
   EXPECT_EQ(larger.at(16 * 5 - 1), vec3(7.0F, 3.0F, 1.0F));
 }
 
-// Of a texel of a level, with the mean.
+// Prefiltered value of a texel, with the mean added.
 double gloss_at(const light::Environment& environment, int level, int x, int y) {
   const auto i = std::size_t(level * core::CM_GLOSS_HEIGHT + y) * core::CM_GLOSS_WIDTH + std::size_t(x);
   return environment.mean.y + environment.gloss->at(i).y;
 }
 
-// Beside the poles, where a texel's row tells little of how large it is.
+// Near the poles a texel's solid angle varies strongly inside its row.
 TEST(EnvironmentGloss, ASmallLightNearAPoleCountsAsMuchAsItIsLarge) {
   constexpr std::uint32_t columns = 512;
   constexpr std::uint32_t rows = 256;
@@ -283,7 +283,7 @@ TEST(EnvironmentGloss, ASmallLightNearAPoleCountsAsMuchAsItIsLarge) {
   }
 }
 
-// By the sizes of their cells, of pictures of any number of texels.
+// Weighted by the solid angle of the cells, for images of any size.
 TEST(EnvironmentGloss, WhatTheSmoothestSeeHasTheEnvironmentsMean) {
   for (const auto& [columns, rows] : {std::pair(100U, 37U), std::pair(256U, 128U), std::pair(5U, 3U)}) {
     std::mt19937 random(3);
@@ -392,7 +392,7 @@ class Surrounded : public test::ViewerTest {
     dvec3 mean{0.0};
     dvec3 error{0.0};  // of the mean
   };
-  // Of two seeds.
+  // Renders two seeds, to estimate the error of the mean.
   static Seen see(test::Still& still, std::uint32_t samples) {
     Seen seen;
     std::vector<test::Picture> pictures;
@@ -428,7 +428,7 @@ TEST_P(Surrounded, ByOneColourAsByASkyOfIt) {
   const auto still = ball(0.6F, vec3(0.9F, 0.8F, 1.0F));
   still->set_light({30.0F, 20.0F, vec3(0.5F), colour});
   const Seen sky = see(*still, 32);
-  still->set_light({30.0F, 20.0F, vec3(0.5F), vec3(7.0F)});  // of which nothing is seen
+  still->set_light({30.0F, 20.0F, vec3(0.5F), vec3(7.0F)});  // hidden by the environment
   still->viewer().set_environment(made(16, 8, [&](std::uint32_t, std::uint32_t) { return 0.5F * colour; }));
   still->viewer().set_environment_settings({40.0F, 2.0F});
   expect_same(see(*still, 32), sky, 1e-3);
@@ -446,7 +446,7 @@ TEST_P(Surrounded, AFurnaceIsOfOneColour) {
   EXPECT_LT(seen.error.x, 2e-3);
 }
 
-// Shading without shadows is exact for what is convex.
+// Shading without shadows is exact for convex objects.
 TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
   const auto still = make();
   still->set_volume(test::make_volume(ivec3(4), ivec3(-2, -2, -20), [](const ivec3&) { return 1.0F; }));
@@ -459,7 +459,7 @@ TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
   still->viewer().set_environment_settings({30.0F, 1.5F});
   struct Kind {
     surface::Material material;
-    double most;  // difference, of the brightest
+    double most;  // largest difference, relative to the brightest
   };
   surface::Material plastic = test::diffuse(vec3(0.5F));
   plastic.specular = 1.0F;
@@ -498,7 +498,7 @@ TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
   }
 }
 
-// Glossy surfaces show the environment that there is now, whatever was there before.
+// Rasterized glossy surfaces show the current environment, independent of the previous one.
 TEST_P(Surrounded, RasterisedGlossIsOfTheLastEnvironment) {
   const auto glossy = [&] {
     auto still = make();
@@ -556,21 +556,21 @@ TEST_P(Surrounded, ABrightTexelIsASun) {
   EXPECT_LT(texel.error.x, 3.0 * sun.error.x);  // no fireflies
 }
 
-// A patch as bright as a low sun behind haze beside a sky: flights find it, too.
+// A patch as bright as a low sun behind haze, beside a sky. Scattered rays hit it often enough to matter.
 vec3 patch(std::uint32_t x, std::uint32_t y) {
   if (x >= 40 && x < 46 && y >= 14 && y < 18) return {60.0F, 50.0F, 30.0F};
   return y < 32 ? vec3(0.4F, 0.6F, 1.0F) : vec3(0.2F, 0.15F, 0.1F);
 }
 
-// By looks and flights, by fewer looks, and by flights alone: in a medium, of one event and of many, and on a matte
-// ground.
+// Compares NEE with MIS, NEE with lower probability, and scattered rays only. Media with one and with many scattering
+// events, and a matte ground plane.
 TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
   const light::EnvironmentPtr environment = made(128, 64, patch);
   const volume::ScalarVolume volume = test::make_volume(ivec3(20), ivec3(0), [](const ivec3&) { return 1.0F; });
   struct Case {
     const char* name;
     float g;
-    std::uint32_t bounces;  // 0: all
+    std::uint32_t bounces;  // 0: no limit
     bool ground;
   };
   for (const Case& of : {Case{"one event", 0.0F, 1, false}, Case{"one event, forward", 0.6F, 1, false},
@@ -583,7 +583,7 @@ TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
     still->set_grid(grid);
     still->set_medium({of.ground ? 0.05 : 0.15, vec3(0.9F), {of.g}, of.bounces});
     still->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -2.0});
-    // All pixels see the same: the box's middle, or the ground's before it.
+    // All pixels see one point: the box's center, or the ground in front of it.
     still->set_camera(of.ground ? test::camera_at({9.5, 30.0, 60.0}, {9.5, -2.0, 24.0}, 0.01)
                                 : test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 0.01));
     still->set_light({});
@@ -610,7 +610,7 @@ TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
     const Seen kernels = of_pixels([&](std::uint32_t i) { return picture.pixels[i]; });
     std::array<Seen, 3> seen;
     constexpr std::array chances = {1.0F, 0.0F, 0.5F};
-    // In between at one: paths on the CPU are slow.
+    // The middle probability is tested in one case only, because paths on the CPU are slow.
     for (std::size_t k = 0; k < (of.ground ? 3 : 2); ++k) {
       cpu.cm.lights.environment_chance = chances.at(k);
       seen.at(k) = of_pixels([&](std::uint32_t i) {
@@ -625,8 +625,8 @@ TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
   }
 }
 
-// A sun as spiaggia_di_mondello_1k.hdr has it, 72,704 in a texel or two of a sky of 0.5: what pixels differ by between
-// seeds is noise as of their neighbours, never one sample's stray.
+// A sun as in spiaggia_di_mondello_1k.hdr: 72,704 in one or two texels of a sky of 0.5. A pixel's differences between
+// seeds must be in the range of its neighbors' noise, without single outliers.
 TEST_P(Surrounded, ASunInAPictureLeavesNoFireflies) {
   const light::EnvironmentPtr environment = made(1024, 512, [](std::uint32_t x, std::uint32_t y) {
     if (x == 300 && (y == 120 || y == 121)) return vec3(72704.0F, 68000.0F, 60000.0F);
@@ -666,12 +666,12 @@ TEST_P(Surrounded, ASunInAPictureLeavesNoFireflies) {
         for (const test::Picture& picture : pictures) strays.push_back(std::abs(picture.pixels[at].y - mean));
       }
       std::ranges::sort(strays);
-      // Of a normal distribution the median stray is 0.674 of the deviation.
+      // In a normal distribution, the median absolute deviation is 0.674 standard deviations.
       const double deviation = strays[strays.size() / 2] / 0.674;
       if (deviation > 0.0) worst = std::max(worst, strays.back() / deviation);
     }
     RecordProperty(of.name, std::to_string(worst));
-    EXPECT_LT(worst, 40.0);  // without looks 1e5
+    EXPECT_LT(worst, 40.0);  // 1e5 without NEE
     EXPECT_GT(worst, 2.0) << "there is noise";
   }
 }

@@ -1,8 +1,8 @@
-// Looks for lamps from points that flights have passed (glsl/equiangular.glsl): the same light as without, of whatever
-// else there is, and less noise. lamp_test has closed forms.
+// Equiangular sampling of lights along rays (glsl/equiangular.glsl): the same mean as without it, together with all
+// other lights, and less noise. lamp_test has closed forms.
 //
-// Whether kernels make such looks follows from the lamps and the medium's depth: beside a lamp outside of a medium that
-// is not thin they do as soon as there is another within, which here is so faint that it changes nothing.
+// Kernels use it depending on the lights and the medium's optical depth. If the only light is outside of a medium that
+// is not thin, they use it once another light is inside. Here that light is so faint that it changes nothing else.
 
 #include <gtest/gtest.h>
 
@@ -81,7 +81,7 @@ class Equiangular : public test::ViewerTest {
     set_medium(0.06);
   }
 
-  // Of densities, colours and anisotropies from place to place.
+  // A frame with varying density, color and anisotropy.
   static volume::VolumeFrame frame() {
     volume::VolumeFrame made{.density = test::make_volume(size, ivec3(0), [](const ivec3& p) {
                                return 0.25F + float((p.x / 8 + p.y / 8 + p.z / 8) % 2);
@@ -108,7 +108,7 @@ class Equiangular : public test::ViewerTest {
     still_->set_grid(grid);
   }
 
-  // extra: lamps beside the one outside.
+  // extra: lights in addition to the one outside.
   Seen see(const light::Lamps& extra, std::uint32_t samples = 128) {
     light::Lamps lamps{lamp_at(outside, 1e5F)};
     lamps.insert(lamps.end(), extra.begin(), extra.end());
@@ -126,7 +126,7 @@ class Equiangular : public test::ViewerTest {
     seen.error = glm::sqrt(0.5 * variance / double(a.pixels.size()));
     return seen;
   }
-  // The same with such looks and without.
+  // Expects the same mean with equiangular sampling and without.
   void expect_the_same(const char* what) {
     const Seen without = see({});
     const Seen with = see({lamp_at(inside, 1e-4F)});
@@ -173,7 +173,7 @@ TEST_P(Equiangular, LooksBringTheSameLightAmongSurfaces) {
   auto scene = std::make_shared<test::StillScene>();
   scene->add(test::diffuse(vec3(0.7F)));
   scene->add_quad({{{-20, 6, 50}, {50, 6, 50}, {50, 6, -20}, {-20, 6, -20}}}, 0);  // through the medium
-  scene->add_quad({{{22, 0, 34}, {22, 24, 34}, {22, 24, 10}, {22, 0, 10}}}, 0);    // in the lamp's way
+  scene->add_quad({{{22, 0, 34}, {22, 24, 34}, {22, 24, 10}, {22, 0, 10}}}, 0);    // between the light and the medium
   still_->viewer().show_surfaces(test::source_of(scene));
   set_march(March::tet);
   expect_the_same("surfaces");
@@ -200,7 +200,7 @@ TEST_P(Equiangular, LooksBringTheSameLightInSeveralVolumesThatOverlap) {
 
 TEST_P(Equiangular, LooksHaveLessNoiseInThinSmoke) {
   set_march(March::tet);
-  // As thin as that a lamp outside is enough, and a little less thin.
+  // Thin enough that a light outside enables equiangular sampling, and slightly too dense for it.
   set_medium(0.006);
   const Seen with = see({});
   set_medium(0.015);

@@ -1,4 +1,4 @@
-// OpenEXR files as environments: what their headers say of their pixels.
+// OpenEXR files as environments: interpretation of pixels as declared in their headers.
 
 #include <ImfChannelList.h>
 #include <ImfDeepFrameBuffer.h>
@@ -38,7 +38,7 @@ using light::EnvironmentPixels;
 
 constexpr double pi = std::numbers::pi;
 
-/// Colors of pixels of a window, whose numbers may be negative.
+/// Colors of the pixels of a window. Coordinates may be negative.
 using Colors = std::function<vec3(int x, int y)>;
 
 vec3 smooth(int x, int y) {
@@ -53,7 +53,7 @@ struct Channel {
   int step = 1;
 };
 
-/// The values of a header's data window, as a frame buffer of what they are written as.
+/// The values of a header's data window, as a frame buffer of the types in which they are written.
 class Samples {
  public:
   Samples(Imf::Header& header, const std::vector<Channel>& channels) {
@@ -138,8 +138,8 @@ class ExrEnvironment : public ::testing::Test {
 };
 
 TEST_F(ExrEnvironment, LuminanceAndSubsampledChromaAreColors) {
-  // They vary by a few hundredths a pixel: chroma has half of the resolution, and linear interpolation follows that.
-  // The last edges are even: beyond them there is no sample to interpolate with.
+  // Values change by a few hundredths per pixel: chroma has half of the resolution, and linear interpolation follows
+  // that. The last columns and rows are constant, because no sample lies beyond them.
   const Colors colors = [](int x, int y) {
     const auto wave = [](double at) { return static_cast<float>(1.0 + 0.8 * std::sin(at)); };
     const int i = std::min(x, width - 6);
@@ -195,7 +195,7 @@ TEST_F(ExrEnvironment, ChromaHasAnySamplingAndTheFilesPrimaries) {
     const vec3 weights(0.22897F, 0.69174F, 0.07929F);
     const auto part = [=](int c) {
       return [=](int x, int y) {
-        // Slow enough for samples that are far apart.
+        // Smooth enough for samples that are far from each other.
         const vec3 color(to_p3 * glm::dvec3(smooth(x / 8, y / 8)));
         const float luminance = glm::dot(color, weights);
         if (c == 0) return luminance;
@@ -247,7 +247,7 @@ TEST_F(ExrEnvironment, ACubeIsResampledByTheConventionOfOpenExr) {
   Imf::addEnvmap(header, Imf::ENVMAP_CUBE);
   const Imath::Box2i window = header.dataWindow();
   const auto colors = [&](int x, int y) {
-    // The library has no inverse of pixelPosition().
+    // OpenEXR has no inverse of pixelPosition().
     vec3 color(-1.0F);
     for (int i = 0; i < side * side && color.x < 0.0F; ++i) {
       const auto face = static_cast<Imf::CubeMapFace>(y / side);
@@ -281,7 +281,7 @@ TEST_F(ExrEnvironment, ACubeIsResampledByTheConventionOfOpenExr) {
   expect_remark(written(Imf::Header(4, 24), rgb(smooth)), "shape of a cube map");
 }
 
-// By the published matrices of each space, with Bradford's adaptation.
+// Compared with the published matrices of each color space, with Bradford adaptation.
 TEST(Primaries, AreConvertedToRec709) {
   struct Case {
     light::Primaries primaries;
@@ -324,11 +324,11 @@ TEST_F(ExrEnvironment, ChromaticitiesAreConverted) {
   EnvironmentPixels got = written(header, rgb(in_ap0));
   expect_near(got, smooth, 1e-4F);
   expect_remark(got, "converted from ACES AP0 primaries to linear Rec. 709");
-  // White is white, also where the neutral color is another than that of the primaries.
+  // White stays white, even if the adopted neutral differs from the white point of the primaries.
   Imf::addAdoptedNeutral(header, {0.3457F, 0.3585F});
   const auto white = [](int, int) { return vec3(2.0F); };
   expect_near(written(header, rgb(white)), white, 1e-4F);
-  // What is saturated beyond Rec. 709 is told.
+  // Colors outside of the Rec. 709 gamut are reported.
   got = written(header, rgb([](int x, int) { return x == 3 ? vec3(0.0F, 1.0F, 0.0F) : vec3(1.0F); }));
   expect_remark(got, "32 pixels lose saturation");
   for (const vec3& value : got.values) EXPECT_GE(std::min({value.x, value.y, value.z}), 0.0F);
@@ -477,7 +477,7 @@ TEST_F(ExrEnvironment, TheSharedTrialsLightAsTheyShould) {
   for (const char* name : {"yc.exr", "yc_full.exr"}) {
     const EnvironmentPixels got = of(name);
     ASSERT_EQ(got.values.size(), plain.values.size());
-    // Edges of colors lie between samples of chroma.
+    // Pixels at edges of colors lie between samples of chroma and may differ.
     std::size_t wrong = 0;
     glm::dvec3 all(0.0);
     glm::dvec3 expected(0.0);

@@ -1,4 +1,4 @@
-// Volumes whose values are far from 1, and media that are far from thin: cells, pictures and what is said of them.
+// Volumes whose values are far from 1 and media of extreme optical depth: cells, images and log messages.
 
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ ScalarVolume times(ScalarVolume volume, double factor) {
   return volume;
 }
 
-// Of the noise times this; coloured: with colours that move, and a cosine.
+// Noise multiplied by `factor`. coloured: with moving colors and an anisotropy field.
 viewer::VolumeAssetPtr noise_times(double factor, bool coloured) {
   const glm::ivec3 size(40);
   volume::VolumeFrame frame{.density = times(test::noise_volume(size, glm::ivec3(0), 3), factor)};
@@ -90,7 +90,7 @@ void expect_same_grid(const grid::TetGrid& a, const grid::TetGrid& b) {
   EXPECT_TRUE(same_bits(a.velocity, b.velocity));
 }
 
-// Powers of two change no digit, so that they change no cell.
+// A factor that is a power of two changes no mantissa, so it changes no cell.
 TEST(ExtremeValues, HaveTheCellsOfOrdinaryOnes) {
   Progress progress;
   for (const bool coloured : {false, true}) {
@@ -123,7 +123,7 @@ TEST(ExtremeValues, AreRefinedForGlAsOrdinaryOnes) {
   }
 }
 
-// What is less than floats hold whole has cells all the same.
+// Values in the denormal range are refined too.
 TEST(ExtremeValues, AreRefinedBelowWhatFloatsHoldWhole) {
   Progress progress;
   const auto cells = [&](double factor) {
@@ -151,7 +151,7 @@ TEST(ExtremeValues, SuggestTheScaleThatSuitsThem) {
     EXPECT_NEAR(scale(factor) * factor / scale(1.0), 1.0, 0.02) << factor;
 }
 
-// Paths could tell no more of it: cells are not split for what a medium hides that is not traced.
+// A larger density scale would not change the image, so refinement does not become coarser for it.
 TEST(ExtremeValues, MayHaveAnyDensityScale) {
   Progress progress;
   const auto asset = noise_times(1.0, false);
@@ -179,7 +179,7 @@ TEST(ExtremeValues, FillValuesCountAsZeroAndAreCounted) {
   for (const float fill : {9.97e36F, 1.1e30F, largest_float, -9.97e36F, -largest_float}) {
     SCOPED_TRACE(fill);
     Filled field;
-    // In a whole brick, and in one that reaches beyond the bounds.
+    // In a whole brick, and in one that extends beyond the bounds.
     for (const std::size_t i : {0U, 1U, 2U, 19U, 4000U, 5119U}) field.values[i] = fill;
     Messages messages;
     const ScalarVolume volume = volume::import_dense({field.values, field.size}, "sea", messages.log);
@@ -256,7 +256,7 @@ TEST(Kelvin, WhatIsSaidWins) {
   const auto hot = with_temperature(2000.0F);
   EXPECT_EQ(hot->emission_by({.blackbody = 1.0}).temperature_scale, 1.0);
   EXPECT_EQ(hot->emission_by({.temperature_scale = 700.0, .blackbody = 1.0}).temperature_scale, 700.0);
-  // A ramp decides what the values are.
+  // With a ramp, values are not detected as kelvin.
   const volume::Ramp to_relative({{0.0F, 0.0F}, {2000.0F, 1.3F}});
   EXPECT_EQ(hot->emission_by({.blackbody = 1.0, .temperature_ramp = to_relative}).temperature_scale, 1500.0);
 }
@@ -268,15 +268,15 @@ TEST(Kelvin, GlowAsRelativeTemperaturesDo) {
     return channels.emission->max_value();
   };
   EXPECT_NEAR(light(1800.0F) / light(1.2F), 1.0, 1e-4);
-  // At room temperature next to nothing.
+  // At room temperature the emission is negligible.
   EXPECT_LT(light(293.0F), 2e-3F * light(1800.0F));
 }
 
-// ---- Pictures
+// ---- Images
 
 class ExtremePicture : public test::ViewerTest {
  protected:
-  // Of a white medium in a white sky: nothing is seen of it, however dense it is.
+  // White furnace test: a white medium under a white sky is invisible at any density.
   static test::Picture furnace(test::Still& still, double density_scale) {
     still.set_light({0.0F, 0.0F, glm::vec3(0.0F), glm::vec3(1.0F)});
     still.set_medium({density_scale, glm::vec3(1.0F), {}, 0});

@@ -1,4 +1,4 @@
-// What is found along rays without chance, however much these come through and whoever asks first.
+// Feature buffers (AOVs without noise): exact for any ray length, and independent of which pass requests them first.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using cumulet::headless::Context;
 constexpr std::uint32_t side = 8;
 constexpr std::size_t count = std::size_t{side} * side;
 
-// Voxels of 0.5 and 1.5 in turn, all the way along z, down from z = 0.
+// Voxels of 0.5 and 1.5 in turn along z, down from z = 0.
 VolumeRef make_column(int length) {
   constexpr int width = 8;
   std::vector<float> values;
@@ -35,7 +35,7 @@ VolumeRef make_column(int length) {
   return make_dense(desc);
 }
 
-// A pixel is a unit; looking down z at the origin.
+// Looks down z at the origin, one pixel per unit.
 class Facts : public CViewerTest {
  protected:
   Facts() : CViewerTest(side, side) {}
@@ -50,7 +50,7 @@ class Facts : public CViewerTest {
 };
 CUMULET_ON_BACKENDS(Facts);
 
-// llvmpipe ends the loops of a shader, and says nothing, where it has gone around 65,535 times in all of them together.
+// llvmpipe silently ends the loops of a shader after 65,535 iterations in total.
 TEST_P(Facts, OfRaysThroughThousandsOfVoxels) {
   constexpr int length = 1024;
   constexpr double depth = 1.5;
@@ -79,7 +79,7 @@ TEST_P(Facts, OfRaysThroughThousandsOfVoxels) {
   }
 }
 
-// Motion is told once; a denoiser asks for more rays before and after.
+// The velocity AOV is computed once. The denoiser requests more feature rays before and after.
 TEST_P(Facts, OfMotionAreTheSameAmongThoseOfADenoiser) {
   const VolumeRef ball = make_ball(8);
   ASSERT_EQ(cumulet_set_volume(v_, ball.get()), CUMULET_OK);

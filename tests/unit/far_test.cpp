@@ -1,5 +1,5 @@
-// Pictures of scenes far from the world's origin are those of the same scenes at it; and light that is not finite never
-// gets into a picture.
+// Scenes far from the world's origin give the same images as at the origin, and non-finite light does not get into
+// images.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ constexpr std::uint32_t edge = 24;
 
 dmat4 moved(const dvec3& by) { return glm::translate(dmat4(1.0), by); }
 
-// A tetrahedron of size 3, by its faces.
+// A tetrahedron of size 3.
 viewer::SurfaceAssetPtr spike(const dmat4& to_world) {
   const std::vector<float> positions{0, 0, 0, 3, 0, 0, 0, 3, 0, 0, 0, 3};
   const std::vector<std::uint32_t> indices{0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
@@ -45,15 +45,15 @@ viewer::SurfaceAssetPtr spike(const dmat4& to_world) {
 struct Kind {
   const char* name;
   bool volume = false;
-  bool own_surfaces = false;  // with their place in the file
-  bool model = false;         // with its place in the scene
+  bool own_surfaces = false;  // with the position in the file
+  bool model = false;         // with the position in the model's transform
   bool instance = false;
   bool rasterised = false;
 };
 
 class Far : public test::ViewerTest {
  protected:
-  // The scene of a kind, all of it moved.
+  // Makes a scene of this kind, translated by `at`.
   std::unique_ptr<test::Still> show(const Kind& kind, const dvec3& at) const {
     auto still = std::make_unique<test::Still>(*context_, headless::Context::get_proc, sharing_);
     viewer::Viewer& viewer = still->viewer();
@@ -97,11 +97,11 @@ class Far : public test::ViewerTest {
     return still;
   }
   mutable std::shared_ptr<viewer::ModelInstance> model_;                            // of the last scene
-  std::shared_ptr<viewer::Sharing> sharing_ = std::make_shared<viewer::Sharing>();  // programs are compiled once
+  std::shared_ptr<viewer::Sharing> sharing_ = std::make_shared<viewer::Sharing>();  // shares compiled programs
 };
 CUMULET_ON_BACKENDS(Far);
 
-// With the same random numbers nearly all pixels are the same, but where rounding turns a path.
+// With the same random numbers nearly all pixels are equal, except where rounding changes a path.
 void expect_alike(const test::Picture& far, const test::Picture& near, const std::string& what) {
   ASSERT_EQ(far.pixels.size(), near.pixels.size());
   std::size_t same = 0;
@@ -136,7 +136,7 @@ TEST_P(Far, ScenesLookAsTheyDoAtTheOrigin) {
     const auto at_origin = show(kind, dvec3(0.0));
     const test::Picture near = test::render(*at_origin, image);
     EXPECT_GT(near.mean().x, 0.05) << kind.name;
-    // Two of the places each, of all kinds all of them.
+    // Each kind is tested at two positions; together the kinds cover all positions.
     for (int i = 0; i < 2; ++i) {
       const dvec3 at = places[turn++ % places.size()];
       const auto far = show(kind, at);
@@ -157,7 +157,7 @@ TEST_P(Far, AllMarchesMeetWhatIsFar) {
   }
 }
 
-// A scene of a marker at the origin and a house far away is as wide as the way between them. The house near the camera
+// A scene with a marker at the origin and a house far away spans the distance between them. The house near the camera
 // is exact.
 TEST_P(Far, WideScenesAreExactWhereTheCameraIs) {
   const Kind house{.name = "house", .model = true};
@@ -168,7 +168,7 @@ TEST_P(Far, WideScenesAreExactWhereTheCameraIs) {
   expect_alike(test::render(*far, image), test::render(*near, image), "house");
 }
 
-// A scene moves far away and back: its picture is the same in both places.
+// A scene moves far away and back: its image is the same in both positions.
 TEST_P(Far, ScenesMayLeaveAndComeBack) {
   const Kind kind{.name = "model", .model = true};
   const auto still = show(kind, dvec3(0.0));
@@ -267,7 +267,7 @@ TEST_P(Far, MapsOfTransmittanceAreOfTheWorld) {
   }
 }
 
-// While the shutter is open, too.
+// Motion blur is the same far away.
 TEST_P(Far, WhatMovesIsBlurredAsItIsNearby) {
   const Kind kind{.name = "both", .volume = true, .model = true};
   const auto blurred = [&](const dvec3& at) {
@@ -288,7 +288,7 @@ TEST_P(Far, WhatMovesIsBlurredAsItIsNearby) {
 
 // ---- light that is not finite ----
 
-// A floor that gives off more than pictures hold, over half of the view.
+// A floor over half of the view whose emission exceeds the range of images.
 std::shared_ptr<test::StillScene> blinding(float emission) {
   auto scene = std::make_shared<test::StillScene>();
   surface::Material material = test::diffuse(vec3(0.5F));
@@ -335,7 +335,7 @@ TEST_P(Far, LightThatIsNotFiniteIsBlackAndCounted) {
   expect_counted(0, 0);
   viewer.show_surfaces(test::source_of(blinding(3e38F)));
   expect_counted(all / 4, all * 3 / 4);
-  // Without triangles paths are run by another kernel.
+  // Scenes without triangles use another kernel.
   viewer.set_surfaces(nullptr);
   viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(test::slab()));
   viewer::Medium glowing;

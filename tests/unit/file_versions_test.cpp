@@ -1,4 +1,4 @@
-// Files of later OpenVDB and NanoVDB than those that this library is built with, made by changing what these write.
+// Files of newer OpenVDB and NanoVDB versions than those in this build, made by patching files of the current versions.
 
 #define NANOVDB_USE_ZIP
 #define NANOVDB_USE_BLOSC
@@ -38,7 +38,7 @@ using openvdb::Coord;
 using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
 using HalfGrid = openvdb::Grid<openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type>;
 
-/// Voxels of halves that are no constants, and a tile.
+/// Voxels of halves that are not constant, and a tile.
 template <class GridT>
 typename GridT::Ptr cloud(const std::string& name) {
   auto grid = GridT::create();
@@ -81,7 +81,7 @@ void append(std::string& bytes, const T& value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-/// The grid's bytes as this version has them, with the checksum of its head as that version computes it.
+/// The grid's bytes as this version stores them, with the checksum of its head as that version computes it.
 std::string grid_bytes(const Handle& handle, const NanoVersion& version, std::uint32_t index = 0,
                        std::uint32_t count = 1) {
   std::string bytes(reinterpret_cast<const char*>(handle.data()), handle.size());
@@ -91,7 +91,7 @@ std::string grid_bytes(const Handle& handle, const NanoVersion& version, std::ui
   grid.mGridIndex = index;
   grid.mGridCount = count;
   const auto& tree = *reinterpret_cast<const nanovdb::TreeData<>*>(bytes.data() + sizeof grid);
-  // Of 32.6.0 and before with the root, which the first upper node follows.
+  // Up to 32.6.0, the checksum also covers the root. The first upper node follows the root.
   const bool old = grid.mVersion <= nanovdb::Version(32, 6, 0);
   const std::uint64_t end = sizeof grid + (old ? tree.mNodeOffset[2] : sizeof tree);
   const auto head = crc32(0, reinterpret_cast<const Bytef*>(bytes.data()) + 16, static_cast<uInt>(end - 16));
@@ -165,7 +165,7 @@ class FileVersions : public ::testing::Test {
   static std::string refusal(const fs::path& file) {
     return cumulet::test::refusal(file, [&] { (void)import_volume(file, "", {}); });
   }
-  /// Reads it without a warning.
+  /// Reads it and expects no warning.
   static ScalarVolume read(const fs::path& file, const std::string& grid = {}) {
     Messages messages;
     ScalarVolume volume = import_volume(file, grid, messages.log);
@@ -256,11 +256,11 @@ TEST_F(FileVersions, NanoVdbBuffersOfOneOrMoreGrids) {
     EXPECT_EQ(list_grids(file)[1].type, "Float16");
     expect_same(read(file, "density"), wanted);
     EXPECT_NEAR(read(file, "flame").max_value, 9.0F, 1e-3F);
-    // What a buffer has room for beyond its grids.
+    // Unused space of a buffer after its grids.
     EXPECT_EQ(list_grids(write(both + std::string(4096, '\0'), "room.nvdb")).size(), 2U);
-    // One of several grids, written by itself.
+    // One of several grids, written separately.
     EXPECT_EQ(read(write(grid_bytes(density, version, 1, 2), "second.nvdb")).max_value, wanted.max_value);
-    // And a file behind it, as `cat` makes of two.
+    // A segment after the grids, as `cat` of two files gives.
     EXPECT_EQ(list_grids(write(both + segment({grid_bytes(density, version)}, version, Codec::ZIP), "cat.nvdb")).size(),
               3U);
 
@@ -289,7 +289,7 @@ TEST_F(FileVersions, NanoVdbLongNamesOfBuffers) {
   append(bytes, blind);
   bytes.append(name).append(20, '\0');
   EXPECT_EQ(list_grids(write(bytes, "long.nvdb")).at(0).name, name);
-  // An entry that leads out of the grid leaves what the grid itself has of the name.
+  // If the entry points outside of the grid, the reader falls back to the name in the grid itself.
   reinterpret_cast<nanovdb::GridBlindMetaData*>(bytes.data() + handle.size())->mByteOffset = 1 << 30;
   EXPECT_EQ(list_grids(write(bytes, "bad.nvdb")).at(0).name, name.substr(0, 256));
 }
@@ -308,7 +308,7 @@ TEST_F(FileVersions, NanoVdbChecksumsAreThoseOfTheVersion) {
     ASSERT_EQ(warnings(version, in_the_name).size(), 1U) << version.minor;
     EXPECT_HAS(warnings(version, in_the_name)[0], "checksum");
   }
-  // Of a later version nobody knows what they cover: that version is told, once.
+  // For a newer version the checksum's range is unknown. The log warns once about the version instead.
   const std::vector<std::string> later = warnings({'2', '1', 11, 4}, in_the_name);
   ASSERT_EQ(later.size(), 1U);
   EXPECT_HAS(later[0], "flipped.nvdb: was written by NanoVDB 32.11.4, which is newer than the known 32.9");
@@ -337,7 +337,7 @@ TEST_F(FileVersions, NanoVdbRefusalsNameVersionAndCause) {
     EXPECT_HAS(refusal(write(digit + std::string("BDVonaN") + std::string(800, '\0'), "big.nvdb")), "big-endian");
   }
   EXPECT_HAS(refusal(write(std::string("\0\0\0\0VDB ", 8) + std::string(800, '\0'), "big.vdb")), "big-endian");
-  // Types that came after NanoVDB 32.4.
+  // Types that were added after NanoVDB 32.4.
   const std::vector<std::pair<std::uint32_t, std::string>> types = {
       {20, "OnIndex"}, {23, "PointIndex"}, {24, "Vec3u8"}, {26, "uint8"}, {41, "unknown type 41"}};
   for (const auto& [type, name] : types) {
@@ -378,7 +378,7 @@ TEST_F(FileVersions, VdbIsNeverRefusedForItsNumber) {
   std::string bytes = vdb({grid});
   const ScalarVolume wanted = read(write(bytes, "224.vdb"));
   patch(bytes, 225);
-  // OpenVDB 13 leaves the identifier blank where it cannot make one.
+  // OpenVDB 13 leaves the identifier blank if it cannot make one.
   std::string blank = bytes;
   std::fill_n(blank.begin() + 21, 36, '\0');
   for (const std::string& file : {bytes, blank}) {
@@ -397,7 +397,7 @@ TEST_F(FileVersions, VdbIsNeverRefusedForItsNumber) {
     (void)import_frame(file, {}, messages.log);
     EXPECT_EQ(messages.warnings.size(), 1U);
   }
-  // What fails in a later format says which one that is.
+  // Errors in a file of a newer format name its version.
   patch(bytes, 231);
   EXPECT_HAS(refusal(write(bytes.substr(0, 90), "cut.vdb")), "231, which is newer than the known 225");
   patch(bytes, 215);
@@ -433,7 +433,7 @@ TEST_F(FileVersions, VdbGridsOfHalvesAreRead) {
       expect_same(read(later, "flame"), wanted);
     }
   }
-  // Written to a pipe, without offsets: the second grid is behind the first.
+  // Written to a pipe, without offsets: the second grid follows the first.
   std::ofstream(folder_ / "pipe.vdb", std::ios::binary).close();
   {
     std::ofstream out(folder_ / "pipe.vdb", std::ios::binary);

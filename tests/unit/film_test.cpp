@@ -21,7 +21,8 @@ using cumulet::render::Pass;
 namespace layers = cumulet::render::film_layers;
 using Deadline = std::chrono::steady_clock::time_point;
 
-// A layer that no picture of the library has: all that one takes (docs/architecture.md counts it).
+// A layer that the library does not have. This is the whole declaration of a layer (docs/architecture.md counts the
+// lines).
 constexpr FilmLayer history{"history", GL_RGBA32F, 16};
 
 class Films : public cumulet::test::GlTest {
@@ -38,7 +39,7 @@ class Films : public cumulet::test::GlTest {
               return true;
             }};
   }
-  // As a denoiser over time would keep what was.
+  // A pass that keeps the last radiance, as a temporal denoiser does.
   Pass remember() {
     return {"remember", {layers::radiance}, {history}, [this](const Film& film, Deadline) {
               gl_->CopyImageSubData(film.texture(layers::radiance), GL_TEXTURE_2D, 0, 0, 0, 0, film.texture(history),
@@ -99,9 +100,9 @@ TEST_P(Films, APassWhoseInputIsMissingIsRefused) {
   };
   const std::string words = "the pass remember reads the layer radiance, which nothing has written";
   EXPECT_EQ(why(), words);
-  EXPECT_EQ(film_.texture(history), 0U);  // nothing was made for it
+  EXPECT_EQ(film_.texture(history), 0U);  // not allocated
   ASSERT_TRUE(run(fill(layers::radiance, 1.0F)));
-  film_.begin(film_.size());  // of another picture
+  film_.begin(film_.size());  // begins another image
   EXPECT_EQ(why(), words);
 }
 

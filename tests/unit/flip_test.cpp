@@ -24,7 +24,7 @@ Bytes noise(unsigned seed) {
   return picture;
 }
 
-// Left of x black, right of it white.
+// Black left of x, white right of it.
 Bytes step(int x) {
   Bytes picture;
   for (int i = 0; i < side * side; ++i) {
@@ -41,18 +41,18 @@ TEST(Flip, IdenticalPicturesDoNotDiffer) {
     EXPECT_EQ(mean(picture, picture), 0.0);
 }
 
-// By hand, from the paper's definitions: of even colours neither filter nor feature tells anything. Black and white are
-// 100 of lightness apart: 100^0.7 = 25.119, the most is that of green and blue, 203.30^0.7 = 41.277, and
-// 0.95 + 0.05 (25.119 - 0.4 x 41.277) / (0.6 x 41.277) = 0.96738.
+// Computed by hand from the paper's definitions. For uniform colors, filters and features have no effect. Black and
+// white differ by a lightness of 100: 100^0.7 = 25.119. The maximum is that of green and blue, 203.30^0.7 = 41.277. The
+// result is 0.95 + 0.05 (25.119 - 0.4 x 41.277) / (0.6 x 41.277) = 0.96738.
 TEST(Flip, EvenColoursDifferByTheirDistanceAlone) {
   EXPECT_NEAR(mean(filled(0, 0, 0), filled(255, 255, 255)), 0.96738, 2e-5);
   EXPECT_NEAR(mean(filled(0, 255, 0), filled(0, 0, 255)), 1.0, 1e-9);
-  // Greys of lightness 53.585 and 53.977, 0.3916 apart: 0.95 x 0.3916^0.7 / (0.4 x 41.277).
+  // Grays of lightness 53.585 and 53.977, difference 0.3916: 0.95 x 0.3916^0.7 / (0.4 x 41.277).
   EXPECT_NEAR(mean(filled(128, 128, 128), filled(129, 129, 129)), 0.02988, 2e-4);
 }
 
-// What a program of its own makes of the same definitions, in Python, with two-dimensional kernels and the rounded
-// matrices of the authors' documentation.
+// Reference value of an independent Python program with two-dimensional kernels and the rounded matrices of the
+// authors' documentation.
 TEST(Flip, APictureWithDetailDiffersAsAnotherProgramSays) {
   constexpr int width = 24;
   constexpr int height = 20;
@@ -76,7 +76,7 @@ TEST(Flip, ItIsTheSameBothWays) {
   EXPECT_NEAR(mean(noise(1), filled(90, 90, 90)), mean(filled(90, 90, 90), noise(1)), 1e-12);
 }
 
-// An edge that is in one picture alone is seen, and it is seen as much down as across.
+// An edge that only one image has counts, equally in both directions.
 TEST(Flip, FeaturesCountMoreThanTheirColours) {
   const Bytes other = step(20);
   const std::vector<double> differences = Flip(side, side).map(filled(0, 0, 0), other);
@@ -95,7 +95,7 @@ TEST(Flip, FeaturesCountMoreThanTheirColours) {
   EXPECT_NEAR(mean(filled(0, 0, 0), other), mean(filled(0, 0, 0), turned), 1e-12);
 }
 
-// Who sits far away does not see a checkerboard: it is grey to them.
+// From far away a checkerboard looks gray.
 TEST(Flip, FineDetailIsBlurredByDistance) {
   Bytes checks;
   for (int i = 0; i < side * side; ++i) {

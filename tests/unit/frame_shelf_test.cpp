@@ -1,4 +1,5 @@
-// Frames of a sequence, read and built ahead: in the order of need, as many as fit, and around those that are broken.
+// The frame cache of a sequence: it reads and builds ahead in the order of need, keeps as many frames as fit, and skips
+// broken ones.
 
 #include "viewer/frame_shelf.hpp"
 
@@ -41,14 +42,14 @@ class Shelf : public testing::Test {
     files.shown.suggested_density_scale = suggested;
     return std::make_shared<const FrameFiles>(files);
   }
-  // From this frame on, and those before it last.
+  // All frames, starting with `first`; earlier frames come last.
   static Frames from(std::uint32_t first) {
     Frames order(count);
     std::iota(order.begin(), order.end(), 0U);
     std::ranges::rotate(order, order.begin() + first);
     return order;
   }
-  // Until it is true, which it will be, however busy the machine is; false after a minute.
+  // Polls until the condition is true. Returns false after a minute.
   template <class Condition>
   static bool comes(Condition&& condition) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -77,7 +78,7 @@ class Shelf : public testing::Test {
                     [this] { ++told_; }};
 };
 
-// Cells, point location and channels, to the last bit.
+// Compares cells, point location and channels bit by bit.
 void expect_same_grid(const cumulet::viewer::Built& a, const cumulet::viewer::Built& b) {
   const auto bytes = [](const auto& values) {
     return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof values[0]);
@@ -113,7 +114,7 @@ TEST_F(Shelf, BuildsAheadWhatOneAloneWouldBe) {
   EXPECT_EQ(shelf_.revision(), revision);  // nothing was built twice
 }
 
-// A fire that goes out: its last frames have but few kelvin.
+// A fire that goes out: its last frames have only a few kelvin.
 TEST_F(Shelf, FramesHaveTheTemperatureScaleOfTheLargest) {
   const auto heat = [](int frame, float times) {
     auto grid = cumulet::test::clip_ball(frame, "temperature");
@@ -123,7 +124,7 @@ TEST_F(Shelf, FramesHaveTheTemperatureScaleOfTheLargest) {
   const auto write = [&](int frame, float times) {
     cumulet::test::write_frame(clip_.path(frame), {cumulet::test::clip_ball(frame), heat(frame, times)});
   };
-  write(4, 1000.0F);  // of the largest balls
+  write(4, 1000.0F);  // among the largest balls, so it is the largest file
   write(1, 5.0F);
   const FrameFilesPtr all = files();
   BuildSettings glowing;
@@ -159,11 +160,11 @@ TEST_F(Shelf, KeepsWhatIsNeededSoonestWithinItsMemory) {
     return bytes;
   };
   EXPECT_LE(takes(), room);
-  // It moves on: what was given up is read anew.
+  // Playback moves on: frames that were evicted are read again.
   shelf_.wish({all, from(6), BuildSettings{}, room});
   ASSERT_TRUE(comes([&] { return ready(6) && ready(7) && ready(0); }));
   EXPECT_LE(takes(), room);
-  // With no room at all there is one.
+  // With a limit of 0 bytes, exactly one frame is kept.
   shelf_.wish({all, from(4), BuildSettings{}, 0});
   ASSERT_TRUE(shelf_.wait(std::nullopt));
   EXPECT_EQ(shelf_.nearest()->frame, 4U);
@@ -188,7 +189,7 @@ TEST_F(Shelf, PlaysOverWhatIsMissingOrCorrupt) {
   }
   EXPECT_FALSE(shelf_.status().failure);
   EXPECT_FALSE(shelf_.failure_of(2));
-  ASSERT_EQ(warnings().size(), 3U);  // each once
+  ASSERT_EQ(warnings().size(), 3U);  // one per broken frame
   for (const int broken : {0, 3, 4}) {
     ASSERT_TRUE(shelf_.failure_of(static_cast<std::uint32_t>(broken)));
     EXPECT_EQ(std::string(shelf_.failure_of(static_cast<std::uint32_t>(broken))->what()).rfind(clip_.path(broken), 0),
@@ -198,7 +199,7 @@ TEST_F(Shelf, PlaysOverWhatIsMissingOrCorrupt) {
   }
   for (const std::string& line : warnings())
     EXPECT_TRUE(line.ends_with(": another frame of the sequence is shown instead")) << line;
-  // Once it is there it is shown.
+  // Once the file exists, the frame is displayed.
   cumulet::test::write_frame(clip_.path(3), {cumulet::test::clip_ball(3)});
   shelf_.rebuild();
   ASSERT_TRUE(comes([&] { return number(State::ready) == 6 && number(State::failed) == 2; }));
@@ -226,7 +227,7 @@ TEST_F(Shelf, IsJudgedByTheLargestFile) {
   std::vector<std::uintmax_t> sizes;
   for (const std::string& path : clip_.paths()) sizes.push_back(std::filesystem::file_size(path));
   auto largest = static_cast<std::uint32_t>(std::ranges::max_element(sizes) - sizes.begin());
-  clip_.corrupt(static_cast<int>(largest));  // the next
+  clip_.corrupt(static_cast<int>(largest));  // so the next largest file is used
   sizes[largest] = 0;
   largest = static_cast<std::uint32_t>(std::ranges::max_element(sizes) - sizes.begin());
   const FrameFilesPtr all = files(true);
@@ -275,7 +276,7 @@ TEST_F(Shelf, OtherFilesLeaveNothing) {
   EXPECT_FALSE(shelf_.take_judged());
 }
 
-// As by a host that mends the file as soon as it is told: what was found before does not count.
+// A host repairs the file as soon as the warning is logged. The earlier failure does not count.
 TEST_F(Shelf, ReadsAnewWhatIsMendedWhileItIsJudged) {
   const Clip other(1);
   other.remove(0);
@@ -325,7 +326,7 @@ TEST_F(Shelf, StopsUntilTheNextWish) {
   ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
 }
 
-// However wishes change, and from whatever thread; in the end it is as the last has it.
+// Requests change continuously and from several threads. The final state is that of the last request.
 TEST_F(Shelf, WishesMayChangeAllTheTime) {
   clip_.corrupt(2);
   const FrameFilesPtr all = files();
@@ -357,7 +358,7 @@ TEST_F(Shelf, WishesMayChangeAllTheTime) {
   EXPECT_EQ(shelf_.nearest()->built.settings, BuildSettings{});
 }
 
-// Every fourth of a frame, from this step on, and those before last.
+// Quarter-frame steps, starting with `first`; earlier steps come last.
 Frames steps_from(std::uint32_t first, std::uint32_t last) {
   Frames order(last + 1);
   std::iota(order.begin(), order.end(), 0U);
@@ -393,14 +394,14 @@ TEST_F(Shelf, BetweenFramesIsWhatBothMake) {
     }
     ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
   }
-  // Other steps keep what is files' own.
+  // A request with other steps keeps the whole frames.
   const std::uint64_t revision = shelf_.revision();
   shelf_.wish({all, from(3), BuildSettings{}, plenty});
   EXPECT_EQ(number(State::ready), static_cast<std::size_t>(count));
   ASSERT_TRUE(shelf_.wait(std::nullopt));
   EXPECT_EQ(shelf_.nearest()->frame, 3U);
   EXPECT_TRUE(shelf_.nearest()->wanted);
-  EXPECT_LE(shelf_.revision(), revision + 1);  // one may have been under way
+  EXPECT_LE(shelf_.revision(), revision + 1);  // one step may have been in progress
 }
 
 TEST_F(Shelf, BesideWhatIsBrokenNothingIsBetween) {
@@ -427,7 +428,7 @@ TEST_F(Shelf, BesideWhatIsBrokenNothingIsBetween) {
     EXPECT_EQ(ready->frame, one.frame);
     EXPECT_EQ(ready->part, one.part);
   }
-  EXPECT_EQ(warnings().size(), 2U);  // of files alone
+  EXPECT_EQ(warnings().size(), 2U);  // only for files, not for steps between them
 }
 
 TEST_F(Shelf, StepsKeepToTheMemory) {
@@ -443,7 +444,7 @@ TEST_F(Shelf, StepsKeepToTheMemory) {
   shelf_.wish({all, steps_from(20, last), BuildSettings{}, room, steps});
   ASSERT_TRUE(comes([&] { return shelf_.nearest()->frame == 2 && !shelf_.busy(); }));
   EXPECT_LE(shelf_.frames().bytes, room);
-  // What is under way ends, and nothing follows.
+  // The build in progress ends, and none follows.
   shelf_.wish({all, steps_from(40, last), BuildSettings{}, plenty, steps});
   shelf_.cancel();
   ASSERT_TRUE(shelf_.wait(std::nullopt));

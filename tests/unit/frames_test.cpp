@@ -1,4 +1,4 @@
-// Sequences: frames by their ranges and by the names of files.
+// Sequences: frames by ranges and by file names.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using Frames = std::vector<Frame>;
 using Moments = std::vector<Moment>;
 using cumulet::test::Folder;
 
-/// What is said of something that is refused; "" where it is not.
+/// The error message of a rejected call, "" if it succeeds.
 template <class Call>
 std::string refusal(Call&& call) {
   try {
@@ -156,7 +156,7 @@ TEST(FramePattern, AFileKnowsItsNeighbours) {
   EXPECT_EQ(neighbour("neg.-2.vdb", -10), "neg.-10.vdb");
 }
 
-// The sign counts as a digit in C, Houdini and ffmpeg. In Blender it does not.
+// In C, Houdini and ffmpeg the sign counts as a digit. In Blender it does not.
 TEST(FramePattern, PadsNegativeNumbersAsThoseThatAreThere) {
   EXPECT_EQ(file("out.####.exr", -2), "out.-002.exr");
   EXPECT_EQ(file("out.%04d.exr", -12345), "out.-12345.exr");
@@ -196,7 +196,7 @@ TEST(FramePattern, NamesTheFilesThatItPassesOver) {
   EXPECT_TRUE(pattern->passed_over().ends_with("f.11.vdb, f.12.vdb and 8 more")) << pattern->passed_over();
 }
 
-// In k_1001_v2.vdb the version is the last number. The frame is the one that files differ in.
+// In k_1001_v2.vdb the version is the last number. The frame number is the one that differs between files.
 TEST(FramePattern, TheNumberThatFilesDifferInIsTheFrames) {
   const Folder folder;
   for (const char* name : {"k_1001_v2.vdb", "k_1002_v2.vdb", "k_1003_v2.vdb", "k_1003_v1.vdb"})
@@ -253,7 +253,7 @@ TEST_F(Plan, APatternIsAllThatIsThere) {
   EXPECT_EQ(plan->frames[2].volume, folder / "f.0003.vdb");
   EXPECT_EQ(plan->frames[2].output, "out.0003.exr");
   EXPECT_EQ(plan->frames[2].stats, "s.3.json");
-  // The largest, of equals the first: whatever is asked for.
+  // Ordered by size, largest first; equal sizes in frame order. Independent of the requested frames.
   const std::vector<std::string> judged{folder / "f.0001.vdb", folder / "f.0002.vdb", folder / "f.0003.vdb"};
   EXPECT_EQ(plan->judged_by, judged);
   options.frames = {3, 9};

@@ -1,4 +1,4 @@
-// Glass and other rich materials in pictures, against closed forms.
+// Images of glass and other extended materials, compared with closed forms.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ Material thin_wall(const vec3& colour) {
   return m;
 }
 
-/// A closed box, its faces outwards.
+/// A closed box whose faces point outwards.
 void add_box(StillScene& scene, const vec3& a, const vec3& b, std::uint32_t material) {
   const auto at = [&](int corner) {
     return vec3((corner & 1) != 0 ? b.x : a.x, (corner & 2) != 0 ? b.y : a.y, (corner & 4) != 0 ? b.z : a.z);
@@ -60,8 +60,8 @@ viewer::Light sky(float radiance) {
 
 double schlick(double f0, double cosine) { return f0 + (1.0 - f0) * std::pow(1.0 - cosine, 5.0); }
 
-// A slab seen from above under an even sky: what it mirrors outside, and what comes through after any number of turns
-// within, each a way of absorption longer.
+// A slab seen from above under a uniform sky: the outer reflection, and the light transmitted after any number of
+// internal reflections. Each pass adds one path length of absorption.
 TEST_P(Glass, ASlabAbsorbsByBeerAndLambertOverAllItsWays) {
   const auto viewer = make();
   viewer->set_camera(test::looking_down());
@@ -81,7 +81,7 @@ TEST_P(Glass, ASlabAbsorbsByBeerAndLambertOverAllItsWays) {
   }
 }
 
-// A camera within sees the same absorption on its way out.
+// A camera inside the glass sees the same absorption on the way out.
 TEST_P(Glass, ACameraWithinIsWithin) {
   const auto viewer = make();
   viewer->set_light(sky(1.0F));
@@ -94,13 +94,13 @@ TEST_P(Glass, ACameraWithinIsWithin) {
   const test::Picture picture = test::render(*viewer, {8, 8, 64, 1, render::View::shaded});
   for (int c = 0; c < 3; ++c) {
     const double s = m.absorption[c];
-    // Up 4, then out, or down 10 and up 10 as often as it is mirrored.
+    // Up 4 and out, or down 10 and up 10 for each internal reflection.
     const double expected = 0.96 * std::exp(-4.0 * s) / (1.0 - 0.04 * std::exp(-10.0 * s));
     EXPECT_NEAR(picture.mean()[c], expected, 8e-3) << c;
   }
 }
 
-// Nothing absorbs: balls of glass, of what disperses, in another and with one in them, thin walls and smoke about them
+// White furnace test without absorption: glass balls, dispersive glass, nested balls, thin walls and smoke around them
 // are as bright as the sky.
 TEST_P(Glass, AFurnaceOfGlassIsOne) {
   const auto viewer = make();
@@ -133,7 +133,8 @@ TEST_P(Glass, AFurnaceOfGlassIsOne) {
   }
 }
 
-// A clear thin wall mirrors and lets through by Fresnel and its colour, and lights below it see through it straight.
+// A clear thin wall reflects and transmits by Fresnel and its color. Light passes straight through it to surfaces
+// below.
 TEST_P(Glass, AThinWallTintsWhatIsBehindAndTheSunThroughIt) {
   const auto viewer = make();
   const vec3 colour(1.0F, 0.5F, 0.25F);
@@ -165,15 +166,15 @@ TEST_P(Glass, AThinWallTintsWhatIsBehindAndTheSunThroughIt) {
   for (int c = 0; c < 3; ++c) {
     const double tint = double{colour[c]};
     const double in = tint * (1.0 - schlick(0.04, cosine));
-    // Light that the wall mirrors back to the floor, all about, comes again: as much of it as it mirrors of even light.
+    // Light that the wall reflects back to the floor arrives again: the hemispherical albedo of the wall.
     const double first = 0.5 * 3.0 * cosine / pi * in * 0.96 * tint;
     EXPECT_GT(lit.mean()[c], first * 0.98) << c;
     EXPECT_LT(lit.mean()[c], first * (1.0 + 0.5 * 0.13)) << c;
   }
 }
 
-// A prism throws each wavelength to where Snell has it: a bright wall that begins where 549 nm arrive is lit by all of
-// red, which is bent less, by none of blue, and by half of green.
+// A prism refracts each wavelength by Snell's law. A bright wall begins where 549 nm arrives. All of red (refracted
+// less) hits it, none of blue, and half of green.
 TEST_P(Glass, APrismPartsColoursByCauchysIndex) {
   const auto viewer = make();
   constexpr double bend = 30.0 * pi / 180.0;
@@ -182,7 +183,7 @@ TEST_P(Glass, APrismPartsColoursByCauchysIndex) {
   Material m = glass(1.5F);
   m.dispersion = 5.0F;
   const std::uint32_t prism = scene->add(m);
-  // Looked at along -z through the face z = 0; the other one is turned about y, and lies at z = -20 where x = 0.
+  // The camera looks along -z through the face z = 0. The other face is rotated about y and is at z = -20 for x = 0.
   const float s = static_cast<float>(std::tan(bend));
   const auto back = [&](float x, float y) { return vec3(x, y, -20.0F + s * x); };
   scene->add_quad({{{-10, -10, 0}, {10, -10, 0}, {10, 10, 0}, {-10, 10, 0}}}, prism);
@@ -191,7 +192,8 @@ TEST_P(Glass, APrismPartsColoursByCauchysIndex) {
   scene->add_quad({{vec3(10, -10, 0), back(10, -10), back(10, 10), vec3(10, 10, 0)}}, prism);
   scene->add_quad({{vec3(-10, 10, 0), vec3(10, 10, 0), back(10, 10), back(-10, 10)}}, prism);
   scene->add_quad({{vec3(-10, -10, 0), back(-10, -10), back(10, -10), vec3(10, -10, 0)}}, prism);
-  // The outward normal of that face is (sin, 0, -cos); a ray along -z leaves it at asin(n sin) to it, towards +x less.
+  // The outward normal of that face is (sin, 0, -cos). A ray along -z leaves at the angle asin(n sin) to it, deflected
+  // towards -x.
   const double n = 1.5 + 0.5 * 5.0 / 20.0 * (523655.0 / (549.0 * 549.0) - 1.5168);
   const double turned = std::asin(n * std::sin(bend)) - bend;
   const auto edge = static_cast<float>(-way * std::tan(turned));
@@ -214,7 +216,7 @@ TEST_P(Glass, APrismPartsColoursByCauchysIndex) {
   EXPECT_LT(picture.mean().z, 0.02);
 }
 
-// What textures say is what factors would have said.
+// Textures give the same result as equal factors.
 TEST_P(Glass, TexturesTakeThePlaceOfFactors) {
   const auto viewer = make();
   viewer::Light light = sky(0.5F);
@@ -222,7 +224,7 @@ TEST_P(Glass, TexturesTakeThePlaceOfFactors) {
   light.sun_irradiance = vec3(3.0F);
   viewer->set_light(light);
   viewer->set_camera(test::camera_at({3.0, 6.0, 9.0}, {0.0, 0.0, 0.0}, 12.0));
-  // By two sets of coordinates and a transform that lead to the second texel.
+  // Two uv sets and a transform that all select the second texel.
   const auto shown = [&](bool textured) {
     auto scene = std::make_shared<StillScene>();
     Material m;
@@ -241,7 +243,7 @@ TEST_P(Glass, TexturesTakeThePlaceOfFactors) {
     constexpr float a_quarter = quarter / 255.0F;
     const float a_colour = std::pow((a_quarter + 0.055F) / 1.055F, 2.4F);
     if (textured) {
-      // Left a texel that would show; right: everything a quarter, or a direction of (-1, 1), turned by 135 degrees.
+      // Left: a texel that would be noticed. Right: 0.25 everywhere, or the direction (-1, 1), rotated by 135 degrees.
       const auto even = scene->add_texture(2, 1, {255, 255, 255, 255, quarter, quarter, quarter, quarter});
       const auto turned = scene->add_texture(2, 1, {255, 128, 255, 255, 0, 255, quarter, 255});
       const auto use = [](std::int32_t texture, bool second) {

@@ -1,4 +1,5 @@
-// Extensions of glTF that say what is shown, when and of which material, by small files made here.
+// glTF extensions for visibility, animation pointers, material variants and materials, tested with small files made
+// here.
 
 #include <gtest/gtest.h>
 
@@ -39,7 +40,7 @@ TEST(GltfVisibility, HiddenNodesAndWhatDescendsFromThemAreNotThere) {
   model.add("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.6}, {"znear", 0.5}}}});
   json light = {{"KHR_lights_punctual", {{"light", 0}}}};
   model.show(shape, {{"name", "shown"}, {"extensions", visible(true)}});
-  // An invisible node hides its child, though that is visible; with their light, not with their camera.
+  // An invisible node hides its descendants, even visible ones, with their lights but not their cameras.
   const int child = model.show(shape, {{"translation", {0, 0, 50}}, {"extensions", visible(true)}});
   const int lamp = model.add("nodes", {{"extensions", light}, {"camera", 0}});
   model.show(shape,
@@ -123,12 +124,12 @@ TEST(GltfWebp, HostileFilesCostOneLine) {
   Bytes broken = good;
   broken[12] = 'X';
   EXPECT_FALSE(line(broken).empty());
-  // VP8X with the animation's bit, 2 x 2, and nothing in it.
+  // VP8X with the animation bit, 2 x 2, without frames.
   EXPECT_TRUE(has(line({'R', 'I', 'F', 'F', 22, 0, 0, 0, 'W', 'E', 'B', 'P', 'V', 'P', '8',
                         'X', 10,  0,   0,   0,  2, 0, 0, 0,   1,   0,   0,   1,   0,   0}),
                   "is an animated WebP"));
 
-  // Few bytes, many pixels: what decoding would take is asked for first.
+  // Few bytes, many pixels: the memory for decoding is checked first.
   const Bytes large = test::webp(2048, 2048, Bytes(std::size_t{4} * 2048 * 2048, 9));
   EXPECT_LT(large.size(), 4096U);
   GltfLimits limits;
@@ -142,7 +143,7 @@ TEST(GltfWebp, HostileFilesCostOneLine) {
   EXPECT_TRUE(has(refused(no_image), "texture 0: there is no image 9"));
 }
 
-/// A triangle with texture coordinates, of a material with a texture, under a node; and a light under another.
+/// A textured triangle with texture coordinates under one node, and a light under another.
 GltfModel moving_model(const json& material = json::object()) {
   GltfModel model;
   model.root["extensionsUsed"] = {"KHR_lights_punctual"};
@@ -169,7 +170,7 @@ TEST(GltfPointers, NodesMoveAsByPathsOfTheirOwn) {
   const ScenePtr scene = imported(model);
   ASSERT_EQ(scene->animations.size(), 1U);
   EXPECT_EQ(scene->animations[0].duration, 1.0);
-  // At the end itself, which is not looped.
+  // The end of the animation itself is not wrapped to its start.
   const auto at = test::corners(*scene, scene->pose(1.0));
   test::near(at[0], {10, 0, 3});
   test::near(at[1], {10, 3, 3});
@@ -181,7 +182,7 @@ TEST(GltfPointers, VisibilityComesAndGoesWithAllThatIsMadeOfIt) {
   const json second = model.root["meshes"][0]["primitives"][0];
   const int far = model.show(second, {{"translation", {50, 0, 0}}});
   const int parent =
-      model.add("nodes", {{"children", json::array({far, 1})}, {"extensions", visible(false)}});  // and the light
+      model.add("nodes", {{"children", json::array({far, 1})}, {"extensions", visible(false)}});  // with the light
   animate(model,
           {{"/nodes/" + std::to_string(parent) + "/extensions/KHR_node_visibility/visible", 1, {0, 1, 0}, "STEP"}});
   const ScenePtr scene = imported(model);
@@ -195,7 +196,7 @@ TEST(GltfPointers, VisibilityComesAndGoesWithAllThatIsMadeOfIt) {
   EXPECT_TRUE(without.lights.empty());
   EXPECT_EQ(with.lights.size(), 1U);
   EXPECT_EQ(scene->pose(0.0, 7).hidden, without.hidden);  // at rest
-  EXPECT_EQ(scene->pose(2.0).hidden, without.hidden);     // as by the last key
+  EXPECT_EQ(scene->pose(2.0).hidden, without.hidden);     // the last key's value
 
   Progress progress;
   const scene::ModelSourcePtr first = scene::make_model_source(scene, without, &progress);
@@ -218,7 +219,7 @@ TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
   const std::string transform = of + "emissiveTexture/extensions/KHR_texture_transform/";
   animate(model, {{of + "pbrMetallicRoughness/baseColorFactor", 4, {0, 0, 0, 0, 1, 0.5F, 0.25F, 1}},
                   {of + "pbrMetallicRoughness/metallicFactor", 1, {0, 1}},
-                  {of + "pbrMetallicRoughness/roughnessFactor", 1, {1, 3}},  // more than there is
+                  {of + "pbrMetallicRoughness/roughnessFactor", 1, {1, 3}},  // beyond the valid range
                   {of + "alphaCutoff", 1, {0.2F, 0.4F}},
                   {of + "emissiveFactor", 3, {0, 0, 0, 1, 0.5F, 0}},
                   {of + "extensions/KHR_materials_emissive_strength/emissiveStrength", 1, {4, 8}},
@@ -229,7 +230,7 @@ TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
   Lines lines;
   const ScenePtr scene = imported(model.gltf(), lines.log);
   EXPECT_TRUE(lines.warnings.empty());
-  // The same from a file that says so itself.
+  // Compared with a file that has these values without animation.
   const json still_transform = {{"offset", {0.5, 1}}, {"scale", {2, 0}}, {"rotation", 0.5}};
   const json still = {
       {"pbrMetallicRoughness",
@@ -258,7 +259,7 @@ TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
   EXPECT_FLOAT_EQ(got.ior, wanted.ior);
   EXPECT_EQ(got.emission_texture.texture, wanted.emission_texture.texture);
   EXPECT_EQ(materials_of(*scene, scene->pose(0.0, 7))[0], scene->materials[0]);  // at rest
-  // At its beginning it is dark, and no light.
+  // At the beginning the material is dark, so the triangle is not a light.
   Progress progress;
   const scene::ModelSourcePtr dark = scene::make_model_source(scene, scene->pose(0.0), &progress);
   EXPECT_TRUE(dark->emissive.empty());
@@ -294,7 +295,7 @@ TEST(GltfPointers, LightsAreThoseOfTheMoment) {
   ASSERT_EQ(pose.lights.size(), 1U);
   EXPECT_EQ(pose.lights[0].intensity, glm::vec3(2, 1, 0));
   EXPECT_FLOAT_EQ(pose.lights[0].outer_cone, 0.3F);
-  EXPECT_FLOAT_EQ(pose.lights[0].inner_cone, 0.3F);  // never the wider
+  EXPECT_FLOAT_EQ(pose.lights[0].inner_cone, 0.3F);  // at most the outer angle
   EXPECT_EQ(scene->pose(0.0, 7).lights[0].intensity, glm::vec3(4, 2, 1));
 }
 
@@ -317,7 +318,7 @@ TEST(GltfPointers, SplinesThatLeadBeyondAllNumbersStayNumbers) {
                   spline(of + "emissiveFactor", 3), spline(transform + "offset", 2), spline(transform + "scale", 2),
                   spline(transform + "rotation", 1), spline("/extensions/KHR_lights_punctual/lights/0/intensity", 1),
                   spline("/nodes/0/translation", 3), spline("/nodes/0/rotation", 4)});
-  // Tangents are a second, and each is bounded: a long time makes more of them than a float holds.
+  // Tangents are per second. Each is bounded, but multiplied by a long time they exceed a float's range.
   constexpr float last = 1e25F;
   for (auto& accessor : model.root["animations"][0]["samplers"]) accessor["input"] = model.scalars({0, last});
   const ScenePtr scene = imported(model);
@@ -358,7 +359,7 @@ TEST(GltfPointers, HostileOnesAreRefusedInALine) {
     return refused(model);
   };
   EXPECT_TRUE(has(line({"/nodes/9/translation", 3, {0, 0, 0}}), "there is no node 9"));
-  // The number after the file's last is the default material's, which no file names.
+  // The index after the file's last is the default material's, which files cannot name.
   EXPECT_TRUE(has(line({"/materials/1/alphaCutoff", 1, {0}}), "there is no material 1"));
   EXPECT_TRUE(has(line({"/extensions/KHR_lights_punctual/lights/1/intensity", 1, {0}}), "there is no light 1"));
   EXPECT_TRUE(has(line({"/nodes/0/extensions/KHR_node_visibility/visible", 1, {0, 1}}), "by STEP alone"));
@@ -390,7 +391,7 @@ TEST(GltfLayers, WhatIsNotSaidIsAsTheExtensionsHaveIt) {
   Material expected;
   EXPECT_EQ(scene->materials[0], expected);
   EXPECT_FALSE(is_rich(scene->materials[0]));
-  // And what is endless, or of no length, absorbs nothing.
+  // An infinite or zero attenuation distance means no absorption.
   for (const char* distance : {"null", "0"}) {
     json volume = {{"thicknessFactor", 1}, {"attenuationColor", {0, 0.5, 1}}};
     if (std::string_view(distance) == "0") volume["attenuationDistance"] = 0;
@@ -407,7 +408,7 @@ TEST(GltfLayers, VolumesAreBoundedByBothSidesOfWhatTransmits) {
   EXPECT_EQ(triangle_flags(*wall, wall->pose(0.0))[0] & (TriangleFlags::ask | TriangleFlags::one_sided),
             TriangleFlags::ask | TriangleFlags::one_sided);
   const ScenePtr solid = imported(layered_model({{"KHR_materials_volume", volume}}));
-  EXPECT_FALSE(bounds_volume(solid->materials[0]));  // what does not transmit
+  EXPECT_FALSE(bounds_volume(solid->materials[0]));  // it does not transmit
   const ScenePtr glass =
       imported(layered_model({{"KHR_materials_volume", volume}, {"KHR_materials_transmission", through}}));
   EXPECT_TRUE(bounds_volume(glass->materials[0]));
@@ -434,13 +435,13 @@ TEST(GltfLayers, OnlyWhatIsSeenMakesPathsDearer) {
 
 TEST(GltfLayers, AnisotropyHasTangentsWithoutANormalMap) {
   GltfModel model = layered_model({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}}}});
-  // u grows along +y of the triangle.
+  // u increases along +y of the triangle.
   model.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = model.vec2({0, 0, 0, 1, 1, 0});
   const ScenePtr scene = imported(model);
   const Pose pose = scene->pose(0.0);
   EXPECT_EQ(test::broken(*scene, pose), "");
   test::near(glm::vec3(pose.vertices[0].tangent), {0, 1, 0});
-  // Nor without coordinates.
+  // A valid tangent exists even without texture coordinates.
   const ScenePtr bare = imported(layered_model({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}}}}));
   EXPECT_EQ(test::broken(*bare, bare->pose(0.0)), "");
 }
@@ -522,14 +523,15 @@ TEST(GltfLayers, FactorsMoveByPointers) {
   EXPECT_FLOAT_EQ(m.anisotropy_rotation, 2.0F);
   EXPECT_FLOAT_EQ(m.film_ior, 1.5F);
   EXPECT_FLOAT_EQ(m.film_thickest, 300.0F);
-  // What decides of tangents and of sides stays.
+  // Properties that affect tangents or sidedness are not animated.
   animate(model, {{of + "volume/thicknessFactor", 1, {0, 1}}, {of + "anisotropy/anisotropyStrength", 1, {0, 1}}});
   const ScenePtr stays = imported(model, lines.log);
   ASSERT_EQ(lines.warnings.size(), 1U);
   EXPECT_TRUE(has(lines.warnings[0], "not followed")) << lines.warnings[0];
 }
 
-/// Two triangles; the first is red, or green and then blue in variants "day" and "night". Green glows and cuts out.
+/// Two triangles. The first is red, or green and then blue in variants "day" and "night". Green is emissive and
+/// alpha-tested.
 GltfModel variant_model() {
   GltfModel model;
   model.root["extensionsUsed"] = {"KHR_materials_variants"};
@@ -569,7 +571,7 @@ TEST(GltfVariants, MaterialsAreThoseThatAreChosen) {
   EXPECT_EQ(scene->variants[1].name, "night");
   EXPECT_EQ(scene->variants[1].materials, (std::vector<std::uint32_t>{2, 0}));
   EXPECT_EQ(scene->draws[0].material, 0U);
-  // Tangents are there for the variant that has a normal map.
+  // Tangents exist because one variant has a normal map.
   EXPECT_EQ(glm::length(glm::vec3(scene->pose(0.0).vertices[0].tangent)), 1.0F);
 
   const viewer::SurfaceAsset asset(scene, "made");
@@ -587,13 +589,13 @@ TEST(GltfVariants, MaterialsAreThoseThatAreChosen) {
   EXPECT_EQ(triangle_flags(*scene, none->pose)[0], static_cast<std::uint32_t>(TriangleFlags::one_sided));
   EXPECT_EQ(day->words[day->meshes.at(0).triangles].w, 1U);
   EXPECT_EQ(day->words[day->meshes.at(0).triangles + 1].w, 0U);
-  // As made at once, and back again.
+  // Equal to a source made directly, and switching back restores the first.
   Pose pose = scene->pose(0.0);
   pose.chosen = scene->variants[0].materials;
   EXPECT_EQ(day->words, scene::make_model_source(scene, pose, &progress)->words);
   EXPECT_EQ(shown(2)->words[none->meshes.at(0).triangles].w, 2U);
   EXPECT_EQ(shown(0)->words, none->words);
-  EXPECT_EQ(shown(3)->words, none->words);  // one that is not there
+  EXPECT_EQ(shown(3)->words, none->words);  // an index out of range
 }
 
 TEST(GltfVariants, HostileMappingsAreRefusedInALine) {
@@ -623,7 +625,7 @@ GltfModel glossy_model(const json& glossiness) {
   return model;
 }
 
-/// Colours that a mixture of metal and dielectric has, in specular-glossiness terms: what conversion takes apart.
+/// The specular-glossiness form of a mixture of metal and dielectric, which the conversion has to separate.
 detail::SpecularGlossiness mixture(const glm::vec3& colour, float metallic) {
   const glm::vec3 specular = glm::mix(glm::vec3(0.04F), colour, metallic);
   const float rest = 1.0F - std::max({specular.r, specular.g, specular.b});
@@ -631,10 +633,10 @@ detail::SpecularGlossiness mixture(const glm::vec3& colour, float metallic) {
 }
 
 TEST(GltfGlossiness, ConversionTakesApartWhatMixingMakes) {
-  // Grey ones are found again exactly; of coloured ones metals and dielectrics.
+  // For gray mixtures, the conversion is exact. For colored ones, it is exact only for pure metals and dielectrics.
   for (const float metallic : {0.0F, 0.25F, 0.5F, 0.9F, 1.0F}) {
     for (const float grey : {0.2F, 0.5F, 0.8F}) {
-      if (grey < 0.25F && metallic > 0.0F && metallic < 1.0F) continue;  // two mixtures look like that
+      if (grey < 0.25F && metallic > 0.0F && metallic < 1.0F) continue;  // ambiguous: two mixtures have these values
       const detail::MetallicRoughness made = detail::convert(mixture(glm::vec3(grey), metallic));
       EXPECT_NEAR(made.metallic, metallic, 2e-3F) << grey;
       EXPECT_FLOAT_EQ(made.roughness, 0.75F);
@@ -659,8 +661,8 @@ TEST(GltfGlossiness, FactorsAlone) {
   EXPECT_EQ(m.base_color.a, 0.5F);
   EXPECT_NEAR(m.metallic, 0.0F, 1e-5F);
   EXPECT_FLOAT_EQ(m.roughness, 0.25F);
-  EXPECT_EQ(m.base_color_texture.texture, -1);  // nor the core's
-  // As it is where nothing is said: a mirror.
+  EXPECT_EQ(m.base_color_texture.texture, -1);  // the core material's texture is ignored too
+  // The defaults give a mirror.
   const Material mirror = imported(glossy_model(json::object()))->materials[0];
   EXPECT_NEAR(mirror.metallic, 1.0F, 1e-6F);
   EXPECT_EQ(mirror.roughness, 0.0F);
@@ -679,14 +681,14 @@ TEST(GltfGlossiness, TexelsBecomeOthers) {
   EXPECT_EQ(m.roughness, 1.0F);
   EXPECT_EQ(m.base_color_texture.transform[2], glm::vec2(0.5F, 0.25F));
   EXPECT_EQ(m.metallic_roughness_texture.transform, m.base_color_texture.transform);
-  ASSERT_EQ(scene->images.size(), 2U);  // and not those that they were made of
+  ASSERT_EQ(scene->images.size(), 2U);  // the source images are dropped
   const auto image = [&](const TextureUse& use) -> const Image& {
     return scene->images[scene->textures.at(static_cast<std::size_t>(use.texture)).image];
   };
   EXPECT_EQ(image(m.base_color_texture).rgba, (std::vector<std::uint8_t>{255, 0, 0, 255, 60, 60, 60, 128}));
   EXPECT_EQ(image(m.metallic_roughness_texture).rgba, (std::vector<std::uint8_t>{0, 204, 0, 255, 0, 204, 0, 255}));
 
-  // A metal by its texture: black diffuse, its colour the specular one.
+  // A metal by its texture: black diffuse, the specular color is the base color.
   const ScenePtr metal =
       imported(glossy_model({{"diffuseFactor", {0, 0, 0, 1}}, {"specularGlossinessTexture", {{"index", 0}}}}));
   const Material& red = metal->materials[0];
@@ -742,7 +744,7 @@ GltfModel instanced_model(const std::function<json(GltfModel&)>& attributes, con
   return model;
 }
 
-/// The triangle's, in the world, where that instance stands.
+/// World positions of the triangle's vertices in this instance.
 std::array<glm::vec3, 3> placed_corners(const Scene& scene, const Pose& pose, std::size_t instance) {
   std::array<glm::vec3, 3> corners{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -757,7 +759,7 @@ TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
       [](GltfModel& m) {
         return json{
             {"TRANSLATION", m.vec3({0, 0, 0, 10, 0, 0, 0, 0, 5})},
-            // None, a quarter about z, and none; of normalised integers.
+            // Identity, 90 degrees about z, identity, as normalized integers.
             {"ROTATION", m.accessor<std::int16_t>("VEC4", 4, {0, 0, 0, 32767, 0, 0, 23170, 23170, 0, 0, 0, 32767},
                                                   {{"normalized", true}})},
             {"SCALE", m.vec3({1, 1, 1, 2, 3, 1, -1, 1, 1})}};
@@ -767,14 +769,14 @@ TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
   const ScenePtr scene = imported(model, lines.log);
   EXPECT_TRUE(lines.warnings.empty());
   EXPECT_EQ(scene->shown_triangles(), 3U);
-  ASSERT_EQ(scene->triangle_count(), 1U);  // in memory once
+  ASSERT_EQ(scene->triangle_count(), 1U);  // stored once
   ASSERT_EQ(scene->prototypes.size(), 1U);
   const Pose pose = scene->pose(0.0);
   test::near(placed_corners(*scene, pose, 0)[1], {102, 0, 0});
   const auto turned = placed_corners(*scene, pose, 1);
   test::near(turned[0], {120, 0, 0}, 1e-3F);
-  test::near(turned[1], {120, 4, 0}, 1e-3F);  // x, twice and twice as long, is y
-  test::near(turned[2], {114, 0, 0}, 1e-3F);  // y is -x
+  test::near(turned[1], {120, 4, 0}, 1e-3F);  // x, doubled twice, becomes y
+  test::near(turned[2], {114, 0, 0}, 1e-3F);  // y becomes -x
   test::near(placed_corners(*scene, pose, 2)[1], {98, 0, 10});
   EXPECT_LT(glm::determinant(glm::dmat3(pose.placings[0][2])), 0.0);
   EXPECT_EQ(pose.low.x, 98.0);
@@ -792,10 +794,10 @@ TEST(GltfInstances, WhatIsNotReadIsTold) {
   Lines lines;
   GltfModel model = instanced_model([](GltfModel& m) { return json{{"_COLOR", m.vec3({1, 0, 0, 0, 1, 0})}}; });
   const ScenePtr scene = imported(model, lines.log);
-  EXPECT_EQ(scene->shown_triangles(), 2U);  // both in one place
+  EXPECT_EQ(scene->shown_triangles(), 2U);  // both at the same position
   ASSERT_EQ(lines.warnings.size(), 1U);
   EXPECT_TRUE(has(lines.warnings[0], "instances are drawn without _COLOR")) << lines.warnings[0];
-  // Of no attribute it is a mesh as any other, of no instance it is none.
+  // Without attributes, the node shows one ordinary mesh.
   EXPECT_EQ(imported(instanced_model([](GltfModel&) { return json::object(); }))->triangle_count(), 1U);
 }
 
@@ -817,7 +819,7 @@ TEST(GltfInstances, HostileOnesAreRefusedInALine) {
            })
         .gltf();
   };
-  // Each takes a place of its own.
+  // Each instance needs memory for its transform.
   GltfLimits small;
   small.memory = 400U << 10U;
   EXPECT_EQ(imported(many(100), {}, small)->shown_triangles(), 100U);

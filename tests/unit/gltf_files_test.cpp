@@ -1,4 +1,4 @@
-// Every model of the shared data: it is imported and is what scene.hpp says, or it is refused by one line.
+// Every model of the shared data is imported and satisfies scene.hpp, or is rejected with a one-line error.
 
 #include <gtest/gtest.h>
 
@@ -19,9 +19,9 @@ namespace {
 const std::filesystem::path models = std::filesystem::path(CUMULET_SHARED_DATA) / "gltf";
 constexpr const char* validator = "khronos_validator";
 
-/// Those that must be refused, and what the line must say.
+/// Files that must be rejected, and a part of the error message.
 const std::map<std::string, std::string> refused = {
-    // an extension that is required and known to nobody
+    // a required extension that the importer does not support
     {"assimp_glTF2/BoxTextured-glTF-techniqueWebGL/BoxTextured.gltf", "KHR_technique_webgl"},
     // members of the wrong JSON type
     {"assimp_glTF2/SchemaFailures/sceneWrongType.gltf", "scene is not an index"},
@@ -40,11 +40,11 @@ const std::map<std::string, std::string> refused = {
     {"assimp_glTF2/BoxWithInfinites-glTF-Binary/BoxWithInfinites.glb", "POSITION is not finite"},
     // a node that is its own ancestor
     {"assimp_glTF2/RecursiveNodes/RecursiveNodes.gltf", "node 0 descends from itself"},
-    // a buffer that is not there
+    // a missing buffer file
     {"assimp_glTF2/MissingBin/BoxTextured.gltf", "BoxTextured0.bin: no such file"},
 };
 
-/// Triangles of models whose counts are known from their accessors.
+/// Triangle counts of models, known from their accessors.
 const std::map<std::string, std::size_t> triangles = {
     {"bevy/FlightHelmet/FlightHelmet.gltf", 94722},
     {"bevy/animated/Fox.glb", 576},
@@ -71,7 +71,7 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".gltf" && extension != ".glb") continue;
     const std::string name = entry.path().lexically_relative(models).string();
-    if (name.starts_with(validator)) continue;  // below
+    if (name.starts_with(validator)) continue;  // tested below
     SCOPED_TRACE(name);
     seen.insert(name);
     const auto expected = refused.find(name);
@@ -102,7 +102,7 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
   EXPECT_GT(seen.size(), 70U);
 }
 
-// Khronos' glTF-Validator: its own test models, with its report of each.
+// Test models of Khronos' glTF-Validator with its report for each.
 TEST(GltfFiles, WhatTheValidatorCallsValidLoadsAndTheRestIsTold) {
   const auto suite = models / validator;
   if (!std::filesystem::exists(suite)) GTEST_SKIP() << "no shared data";
@@ -127,7 +127,7 @@ TEST(GltfFiles, WhatTheValidatorCallsValidLoadsAndTheRestIsTold) {
       const ScenePtr scene = import_gltf(file, lines.log);
       EXPECT_EQ(test::broken(*scene), "");
       EXPECT_EQ(test::broken(*scene, scene->pose(0.5)), "");
-      // Most show nothing at all, and are told of for that.
+      // An invalid model that is imported must cause a warning. Most show nothing at all.
       EXPECT_TRUE(good || !lines.warnings.empty()) << "told of none:" << causes;
     } catch (const Error& error) {
       EXPECT_FALSE(good) << error.what();
@@ -158,7 +158,7 @@ TEST(GltfFiles, ImagesThatCannotBeHadCostAWarningEach) {
   EXPECT_EQ(scene->images.size(), 1U);
   std::size_t ktx2 = 0;
   for (const std::string& line : lines.warnings) ktx2 += line.find("KTX2") != std::string::npos ? 1 : 0;
-  EXPECT_EQ(ktx2, 3U);  // normals, anisotropy, and what is rough
+  EXPECT_EQ(ktx2, 3U);  // normals, anisotropy and roughness
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ struct Coding {
   int sampling = 2;
 };
 
-/// side x side pixels of one color, but for a dark square in the lower right quarter.
+/// side x side pixels of one color, with a dark square in the lower right quarter.
 Bytes jpeg(std::uint32_t side, const std::vector<std::uint8_t>& color, const Coding& coding = {}) {
   jpeg_compress_struct info{};
   jpeg_error_mgr errors{};
@@ -79,7 +79,7 @@ Bytes jpeg(std::uint32_t side, const std::vector<std::uint8_t>& color, const Cod
   return file;
 }
 
-/// Bytes before the last `back` ones of a file, which end with the end marker.
+/// Inserts bytes before the last `back` bytes of a file, which end with the end marker.
 Bytes with_tail(Bytes file, const Bytes& bytes, std::ptrdiff_t back = 2) {
   file.insert(file.end() - back, bytes.begin(), bytes.end());
   return file;
@@ -130,7 +130,7 @@ TEST(GltfJpeg, WhatLibjpegReadsIsRead) {
     Bytes after = whole;
     after.insert(after.end(), 300, 0x55);
     std::vector<Bytes> files = {whole, padded, restart, temporary, after};
-    // The last bytes of arithmetic coding may be left out, so what is in their place would be data.
+    // Arithmetic coding may omit the last bytes, so inserted bytes would be read as data.
     if (!coding.arithmetic) {
       for (const Bytes& tail :
            {Bytes{0xFF, 0xFF, 0xFF}, Bytes{0xFF, 0xD0}, Bytes{0xFF, 0x00}, Bytes{1, 2, 3, 4, 5, 6, 7}, Bytes(16, 0)}) {
@@ -148,7 +148,7 @@ TEST(GltfJpeg, WhatLibjpegReadsIsRead) {
 
 TEST(GltfJpeg, GrayAndInksAreColors) {
   expect_color(read(jpeg(32, {120}, {.from = JCS_GRAYSCALE})), 3, 3, 120, 120, 120);
-  // Adobe's programs write complements.
+  // Adobe's programs store complements.
   for (const J_COLOR_SPACE space : {JCS_CMYK, JCS_YCCK}) {
     expect_color(read(jpeg(32, {200, 40, 90, 255}, {.from = JCS_CMYK, .to = space, .sampling = 1})), 3, 3, 200, 40, 90);
     expect_color(read(jpeg(32, {200, 40, 90, 128}, {.from = JCS_CMYK, .to = space, .sampling = 1})), 3, 3, 100, 20, 45);
@@ -160,14 +160,14 @@ TEST(GltfJpeg, GrayAndInksAreColors) {
 TEST(GltfJpeg, DamageIsToldAndTheRestIsShown) {
   for (const Coding& coding : {Coding{}, Coding{.progressive = true}}) {
     const Bytes whole = jpeg(64, {200, 40, 90}, coding);
-    // Without its end marker alone all pixels are there.
+    // If only the end marker is missing, all pixels are read.
     const Read endless = read(Bytes(whole.begin(), whole.end() - 2));
     expect_color(endless, 5, 5, 200, 40, 90);
     EXPECT_EQ(endless.warnings.size(), coding.progressive ? 1U : 0U);
     bool damaged = false;
     for (std::size_t size = 0; size < whole.size() - 2; size += size < 40 ? 1 : 13) {
       const Read got = read(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)));
-      if (got.image && got.warnings.empty()) continue;  // of blocks that end with it
+      if (got.image && got.warnings.empty()) continue;  // the cut is after the last needed block
       ASSERT_EQ(got.warnings.size(), 1U) << size;
       EXPECT_TRUE(has(got.warnings[0],
                       got.image ? "image 0 is damaged, and shown as far as it can be: " : "image 0 is left out: "))
@@ -233,7 +233,7 @@ class GltfFolder : public ::testing::Test {
     std::ofstream(folder_ / name, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
-  /// The red of the texture's first pixel; none: it is left out.
+  /// The red value of the texture's first pixel; nullopt if the texture is left out.
   std::optional<int> red(const std::string& uri) {
     lines_.warnings.clear();
     const ScenePtr scene = import_gltf(textured({{"uri", uri}}).gltf(), "made.gltf", folder_.path(), lines_.log);

@@ -1,4 +1,4 @@
-// The glTF importer, by small files made here, against numbers worked out by hand.
+// The glTF importer with small files made here, compared with numbers computed by hand.
 
 #include <gtest/gtest.h>
 
@@ -104,11 +104,11 @@ TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
   EXPECT_TRUE(has(line(save(whole)), "has 10 bytes, not 36"));
 }
 
-// What Khronos' validator calls valid, and an importer might not.
+// Files that Khronos' validator accepts, with buffers that have no data. They matter only where something reads them.
 TEST(Gltf, WhatIsNotThereMattersToWhoReadsIt) {
   const auto with = [](const std::function<void(json&)>& change) {
     GltfModel model = triangle_model();
-    // Buffers of the test's own: its numbers come after the model's.
+    // These buffers are added after the model's own.
     change(model.root);
     return model;
   };
@@ -122,7 +122,7 @@ TEST(Gltf, WhatIsNotThereMattersToWhoReadsIt) {
     const char* what;
     json buffer;
     std::size_t warnings;
-    const char* cause;  ///< once something reads it; none: it is not drawn
+    const char* cause;  ///< the warning once something reads the buffer; null: it is not drawn
   };
   for (const Case& c :
        {Case{"no data", {{"byteLength", 36}}, 0, nullptr},
@@ -148,7 +148,7 @@ TEST(Gltf, WhatIsNotThereMattersToWhoReadsIt) {
     EXPECT_TRUE(has(lines.warnings[0], "1 primitives are not drawn: their buffer has no data"));
     EXPECT_TRUE(has(lines.warnings[1], "has no triangles"));
   }
-  // Nor do skins, animations and targets read it; what is compressed in it is not there either.
+  // Skins, animations and morph targets cannot read it either. Compressed data in it is missing too.
   GltfModel animated = with([&](json& root) {
     add_view(root, {{"byteLength", 36}});
     root["bufferViews"].push_back({{"buffer", 0}, {"byteLength", 36}});
@@ -168,7 +168,7 @@ TEST(Gltf, WhatIsNotThereMattersToWhoReadsIt) {
   ASSERT_EQ(lines.warnings.size(), 2U);
   EXPECT_TRUE(has(lines.warnings[0], "2 skins and animation channels are as at rest: their buffer has no data"));
   EXPECT_TRUE(has(lines.warnings[1], "1 primitives are not drawn"));
-  // A view must fit into what a buffer without data would have.
+  // A view must fit into the declared length of a buffer without data.
   EXPECT_TRUE(has(refused(with([&](json& root) {
                     add_view(root, {{"byteLength", 35}});
                   })),
@@ -257,7 +257,7 @@ TEST(Gltf, SkinsAndWeightsThatDoNothingAreTold) {
 }
 
 TEST(Gltf, NodesOfTranslationRotationScaleAndMatrix) {
-  // A child, twice as large, under a parent turned by 90 degrees about z and moved.
+  // A child scaled by (2, 3, 4) under a parent that is rotated by 90 degrees about z and translated.
   GltfModel model;
   model.show({{"attributes", {{"POSITION", model.triangle()}}}},
              {{"scale", {2, 3, 4}}, {"translation", {0, 0, 5}}, {"name", "child"}});
@@ -268,12 +268,12 @@ TEST(Gltf, NodesOfTranslationRotationScaleAndMatrix) {
   const Pose pose = scene->pose(0.0);
   const auto at = corners(*scene, pose);
   near(at[0], {10, 0, 5});
-  near(at[1], {10, 2, 5});  // x, doubled, is y
-  near(at[2], {7, 0, 5});   // y, tripled, is -x
+  near(at[1], {10, 2, 5});  // x, doubled, becomes y
+  near(at[2], {7, 0, 5});   // y, tripled, becomes -x
   near(pose.vertices[0].normal, {0, 0, 1});
   EXPECT_EQ(scene->draws[0].node, 0U);
 
-  // The same as a matrix, column by column.
+  // The same transform as a matrix, in column order.
   GltfModel other;
   other.show({{"attributes", {{"POSITION", other.triangle()}}}},
              {{"matrix", {0, 2, 0, 0, -3, 0, 0, 0, 0, 0, 4, 0, 10, 0, 5, 1}}});
@@ -313,7 +313,7 @@ TEST(Gltf, MirroredNodesAreFlippedAndKeepTheirSides) {
   for (const std::size_t v : {0U, 3U, 6U}) near(pose.vertices[v].normal, {0, 0, 1});
   near(glm::vec3(pose.vertices[0].tangent), {1, 0, 0});
   near(glm::vec3(pose.vertices[3].tangent), {-1, 0, 0});
-  // The bitangent, cross(n, t) * w, is +y before; mirrored in x it stays +y, turned it is -y.
+  // The bitangent cross(n, t) * w is +y at first. Mirrored in x it stays +y, rotated it is -y.
   const auto bitangent = [&](std::size_t v) {
     return glm::cross(pose.vertices[v].normal, glm::vec3(pose.vertices[v].tangent)) * pose.vertices[v].tangent.w;
   };
@@ -338,7 +338,7 @@ TEST(Gltf, ListsStripsAndFansWithAndWithoutIndices) {
     model.show(primitive);
     const ScenePtr scene = imported(model);
     const Pose pose = scene->pose(0.0);
-    std::vector<int> vertices;  // numbers in the file, by place
+    std::vector<int> vertices;  // vertex indices in the order of drawing
     for (const std::uint32_t index : scene->indices) {
       for (std::size_t v = 0; v < 5; ++v) {
         const glm::vec3 place(five[3 * v], five[3 * v + 1], five[3 * v + 2]);
@@ -354,7 +354,7 @@ TEST(Gltf, ListsStripsAndFansWithAndWithoutIndices) {
   EXPECT_EQ(drawn(5, {4, 3, 2, 1}), (List{4, 3, 2, 3, 1, 2}));
   EXPECT_EQ(drawn(6, {}), (List{1, 2, 0, 2, 3, 0, 3, 4, 0}));
   EXPECT_EQ(drawn(6, {1, 3, 4, 2}), (List{3, 4, 1, 4, 2, 1}));
-  EXPECT_EQ(drawn(4, {0, 1, 1, 0, 1, 2}), (List{0, 1, 2}));  // one names a vertex twice
+  EXPECT_EQ(drawn(4, {0, 1, 1, 0, 1, 2}), (List{0, 1, 2}));  // one triangle is degenerate
 }
 
 TEST(Gltf, PointsAndLinesAreSkippedWithOneLine) {
@@ -411,7 +411,7 @@ TEST(Gltf, IndicesOfEverySize) {
 
 TEST(Gltf, InterleavedAttributes) {
   GltfModel model;
-  // Position, then colour, padded to 20 bytes.
+  // Position, then color, padded to 20 bytes.
   Bytes bytes;
   const float places[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   for (std::size_t v = 0; v < 3; ++v) {
@@ -458,8 +458,8 @@ TEST(Gltf, VerticesThatNothingNamesAreLeftOut) {
 TEST(Gltf, SparseAccessors) {
   const Bytes bytes = test::seed_animated().gltf();
   const ScenePtr scene = imported(bytes);
-  const Pose pose = scene->pose(0.0, 99);  // at rest: first target by one half
-  // Vertex 3 is (2, 2, 0) instead of (1, 1, 0); the target, of zeros, has (0, 0, 1) and (0, 0, 2) at 1 and 3.
+  const Pose pose = scene->pose(0.0, 99);  // at rest: first target with weight 0.5
+  // Vertex 3 is (2, 2, 0) instead of (1, 1, 0). The sparse target over zeros has (0, 0, 1) and (0, 0, 2) at 1 and 3.
   ASSERT_EQ(pose.vertices.size(), 4U);
   near(pose.vertices[0].position, {0, 0, 0});
   near(pose.vertices[1].position, {1, 0, 0.5F});
@@ -476,8 +476,9 @@ TEST(Gltf, AnimationsStepLinearAndCubic) {
   EXPECT_EQ(scene->animations[0].name, "all");
   EXPECT_EQ(scene->animations[0].duration, 2.0);
 
-  // Joint 0: scaled by steps. Joint 1, its child: moved by a cubic spline and turned about z by 0, 90 and 180 degrees.
-  // Its inverse bind matrix takes (0, 1, 0) off. The node of the mesh, at (100, 100, 100), must not count.
+  // Joint 0: scaled in steps. Joint 1, its child: moved along a cubic spline and rotated about z by 0, 90 and 180
+  // degrees. Its inverse bind matrix subtracts (0, 1, 0). The mesh node's translation (100, 100, 100) must have no
+  // effect.
   const auto check = [&](double time, double from) {
     const Pose pose = scene->pose(time);
     const double u = from;
@@ -492,7 +493,7 @@ TEST(Gltf, AnimationsStepLinearAndCubic) {
       moved = glm::dvec3(1.0 + (-2 * s * s * s + 3 * s * s), 1.0, 0.0);
     }
     const double angle = u * 1.5707963267948966;
-    // Vertex 1, (1, 0, 0) and morphed along z by the weights: half of it is joint 0's, half joint 1's.
+    // Vertex 1, (1, 0, 0) and morphed along z by the weights, has weight 0.5 for each joint.
     const double w0 = u <= 1.0 ? u : 2.0 - u;
     const double w1 = u <= 1.0 ? 0.0 : u - 1.0;
     const glm::dvec3 shape(1.0, 0.0, w0 * 1.0 + w1 * 1.0);
@@ -511,13 +512,13 @@ TEST(Gltf, AnimationsStepLinearAndCubic) {
   check(-0.5, 1.5);
   EXPECT_EQ(scene->pose(2.5).time, 0.5);
 
-  // The second animation moves joint 0 alone, linearly.
+  // The second animation moves only joint 0, linearly.
   near(scene->pose(0.5, 1).vertices[0].position, {1.5F, 1.5F, 1.5F});
 }
 
 TEST(Gltf, RotationsTakeTheShorterWay) {
   GltfModel model = triangle_model();
-  // No turn, and 90 degrees about z with the sign of the quaternion reversed: half-way are 45 degrees.
+  // The identity, and 90 degrees about z with the sign of the quaternion reversed: halfway is 45 degrees.
   const int turns = model.accessor<float>("VEC4", 4, {0, 0, 0, 1, 0, 0, -0.70710678F, -0.70710678F});
   model.add("animations",
             {{"samplers", json::array({{{"input", model.scalars({1, 3})}, {"output", turns}}})},
@@ -554,7 +555,7 @@ TEST(Gltf, AShutterStopsAtAnAnimationsEndsUnlessTheyAreAlike) {
   const ScenePtr again = moved_by({0, 0, 0, 4, 0, 0, 0, 0, 0});
   expect_ends(*again, 0.25, 1.0, 1.0F, 3.0F);
   expect_ends(*again, 1.75, 1.0, 3.0F, 1.0F);
-  expect_ends(*again, 1.0, 4.0, 0.0F, 0.0F);  // more than all of it
+  expect_ends(*again, 1.0, 4.0, 0.0F, 0.0F);  // more than the whole animation
 }
 
 TEST(Gltf, MorphedFlatTrianglesTurnTheirNormals) {
@@ -581,7 +582,7 @@ GltfModel mapped_quad(const std::vector<float>& uvs, const std::vector<std::uint
 
 TEST(Gltf, MissingTangentsFollowTheTexture) {
   for (const bool normals : {true, false}) {
-    // u to the right, v down, as the image lies: the tangent is +x, the bitangent +y, up in the image.
+    // u to the right and v down, as in the image: the tangent is +x, the bitangent +y (up in the image).
     const ScenePtr upright = imported(mapped_quad({0, 1, 1, 1, 1, 0, 0, 0}, {0, 1, 2, 0, 2, 3}, normals));
     for (const PosedVertex& v : upright->pose(0.0).vertices) {
       near(glm::vec3(v.tangent), {1, 0, 0});
@@ -593,20 +594,20 @@ TEST(Gltf, MissingTangentsFollowTheTexture) {
       near(glm::vec3(v.tangent), {-1, 0, 0});
       EXPECT_EQ(v.tangent.w, -1.0F);
     }
-    // The image turned by 90 degrees: u up.
+    // The image rotated by 90 degrees: u up.
     const ScenePtr turned = imported(mapped_quad({0, 0, 0, 1, 1, 1, 1, 0}, {0, 1, 2, 0, 2, 3}, normals));
     for (const PosedVertex& v : turned->pose(0.0).vertices) {
       near(glm::vec3(v.tangent), {0, 1, 0});
       EXPECT_EQ(v.tangent.w, 1.0F);
     }
-    // No area in the texture: some tangent.
+    // No area in texture space: any valid tangent.
     const ScenePtr point = imported(mapped_quad({0, 0, 0, 0, 0, 0, 0, 0}, {0, 1, 2, 0, 2, 3}, normals));
     EXPECT_EQ(point->triangle_count(), 2U);
   }
 }
 
 TEST(Gltf, VerticesOnASeamOfMirroredTexturesAreSplit) {
-  // The diagonal's ends have triangles of both sides: (0,1,2) with v down, (0,2,3) mirrored.
+  // The diagonal's ends belong to triangles of both orientations: (0,1,2) with v down, (0,2,3) mirrored.
   GltfModel model = mapped_quad({0, 1, 1, 1, 1, 0, 1, 1}, {0, 1, 2, 0, 2, 3}, true);
   const ScenePtr scene = imported(model);
   const Pose pose = scene->pose(0.0);
@@ -676,7 +677,7 @@ TEST(Gltf, MaterialsAreReadWhole) {
         &m.anisotropy_texture, &m.iridescence_texture, &m.film_thickness_texture}) {
     EXPECT_GE(use->texture, 0);
   }
-  // KHR_texture_transform at uv = (1, 0) and (0, 1): scaled, turned by 0.5, moved.
+  // KHR_texture_transform at uv = (1, 0) and (0, 1): scaled, rotated by 0.5, translated.
   const TextureUse& turned = m.base_color_texture;
   EXPECT_EQ(turned.uv_set, 1U);
   const float c = std::cos(0.5F);
@@ -690,7 +691,7 @@ TEST(Gltf, MaterialsAreReadWhole) {
   EXPECT_EQ(blend.alpha_mode, AlphaMode::blend);
   EXPECT_TRUE(blend.unlit);
 
-  // KHR_materials_pbrSpecularGlossiness, by its likeness: gltf_extensions_test.
+  // KHR_materials_pbrSpecularGlossiness is converted: see gltf_extensions_test.
   const Material& glossy = scene->materials[2];
   EXPECT_EQ(glossy.base_color, glm::vec4(1.0F));
   EXPECT_EQ(glossy.metallic, 1.0F);
@@ -702,7 +703,7 @@ TEST(Gltf, MaterialsAreReadWhole) {
   ASSERT_EQ(lines.warnings.size(), 1U);
   EXPECT_TRUE(has(lines.warnings[0], "KHR_materials_pbrSpecularGlossiness")) << lines.warnings[0];
 
-  // The default one.
+  // The default material.
   EXPECT_EQ(scene->materials[3].base_color, glm::vec4(1.0F));
   EXPECT_EQ(scene->materials[3].metallic, 1.0F);
 
@@ -714,7 +715,7 @@ TEST(Gltf, MaterialsAreReadWhole) {
   EXPECT_EQ(sampler.wrap_s, Wrap::clamp);
   EXPECT_EQ(sampler.wrap_t, Wrap::mirrored);
 
-  // Vertices: two sets of coordinates and a colour.
+  // Vertices: two uv sets and a color.
   const VertexAttributes& v = scene->attributes[0];
   EXPECT_EQ(v.uv[0], glm::vec2(0, 1));
   EXPECT_EQ(v.uv[1], glm::vec2(0, 1));
@@ -742,7 +743,7 @@ TEST(Gltf, ImagesOfEightAndSixteenBitsAndJpeg) {
     EXPECT_NEAR(jpeg.rgba[4 * i + 2], 90, 4);
     EXPECT_EQ(jpeg.rgba[4 * i + 3], 255);
   }
-  EXPECT_EQ(scene->images.size(), 5U);  // however often they are used; two of them a likeness
+  EXPECT_EQ(scene->images.size(), 5U);  // independent of the number of uses; two are converted images
 }
 
 TEST(Gltf, CamerasAndLightsStandWhereTheirNodesAre) {
@@ -772,7 +773,7 @@ TEST(Gltf, CamerasAndLightsStandWhereTheirNodesAre) {
   EXPECT_EQ(spot.kind, PunctualLight::Kind::spot);
   EXPECT_FLOAT_EQ(spot.inner_cone, 0.1F);
   EXPECT_FLOAT_EQ(spot.outer_cone, 0.2F);
-  near(spot.direction, {0, 0, -1});  // its node's scale does not stretch it
+  near(spot.direction, {0, 0, -1});  // the node's scale does not change it
   const PunctualLight& bulb = pose.lights[2];
   EXPECT_EQ(bulb.kind, PunctualLight::Kind::point);
   EXPECT_EQ(bulb.range, 7.0F);
@@ -795,7 +796,7 @@ TEST(Gltf, OnlyTheDefaultSceneIsShown) {
 }
 
 TEST(Gltf, Draco) {
-  for (const int speed : {0, 3, 10}) {  // Edgebreaker in two ways, and sequential
+  for (const int speed : {0, 3, 10}) {  // Edgebreaker with two speeds, and sequential
     SCOPED_TRACE(speed);
     const GltfModel model = test::seed_draco(4, speed);
     const ScenePtr scene = imported(model.glb());
@@ -814,7 +815,7 @@ TEST(Gltf, Draco) {
 
 TEST(Gltf, Meshopt) {
   const ScenePtr scene = imported(test::seed_meshopt().gltf());
-  EXPECT_EQ(scene->triangle_count(), 64U);  // once by triangles, once by a list of indices
+  EXPECT_EQ(scene->triangle_count(), 64U);  // once as triangles, once as a list of indices
   const Pose pose = scene->pose(0.0);
   double area = 0.0;
   for (std::size_t t = 0; t < 64; ++t) {
@@ -867,7 +868,7 @@ TEST(Gltf, MeshoptExponentialAndQuaternionFilters) {
        {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
                                  {{"sampler", 1}, {"target", {{"node", 0}, {"path", "rotation"}}}}})}});
   const ScenePtr scene = imported(model);
-  near(corners(*scene, scene->pose(1.0))[1], {4, 3, -8}, 1e-2F);  // (1, 0, 0), turned to y and moved
+  near(corners(*scene, scene->pose(1.0))[1], {4, 3, -8}, 1e-2F);  // (1, 0, 0), rotated to y and translated
 }
 
 TEST(Gltf, ExtensionsRequiredAreKnownOrRefusedByName) {
@@ -918,11 +919,11 @@ TEST(Gltf, TexturesThatCannotBeHadAreLeftOutWithALine) {
   cut.resize(50);
   EXPECT_TRUE(has(line(embedded(cut)), "cannot be decoded"));
   EXPECT_TRUE(has(line(embedded({0xFF, 0xD8, 0xFF, 0xE0, 0, 16})), "is a JPEG that cannot be read"));
-  // Set 2 of coordinates.
+  // uv set 2.
   GltfModel far = embedded(test::png(1, 1, 8, 2, {1, 2, 3}));
   far.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 2;
   EXPECT_TRUE(has(line(far), "TEXCOORD_2"));
-  // What is out of range is malformed.
+  // An index out of range is an error.
   far.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 1;
   EXPECT_TRUE(has(refused(far), "there is no texture 1"));
   EXPECT_TRUE(has(refused(with({{"source", 3}}, nullptr)), "there is no image 3"));
@@ -1103,7 +1104,7 @@ TEST(Gltf, HostileContainersEndInOneLine) {
     refused(cut);
   }
   Bytes lengths = whole;
-  lengths[12] = 0xFF;  // the length of the chunk of JSON
+  lengths[12] = 0xFF;  // length of the JSON chunk
   lengths[15] = 0xFF;
   EXPECT_TRUE(has(refused(lengths), "ends within chunk 0"));
   Bytes swapped = whole;
@@ -1112,7 +1113,7 @@ TEST(Gltf, HostileContainersEndInOneLine) {
   Bytes old = whole;
   old[4] = 1;
   EXPECT_TRUE(has(refused(old, ErrorCode::unsupported), "binary glTF 1"));
-  // A byte order mark is nobody's fault.
+  // A byte order mark is accepted.
   Bytes marked = {0xEF, 0xBB, 0xBF};
   const Bytes plain = triangle_model().gltf();
   marked.insert(marked.end(), plain.begin(), plain.end());
@@ -1141,7 +1142,7 @@ TEST(Gltf, DracoAttributesThatAreNotThereAreRefused) {
 }
 
 TEST(Gltf, AnimationsBeyondFloatStayFinite) {
-  // Two nodes, each scaled by 1e18 and more, over an animated and skinned triangle, and a camera and a light.
+  // Two nodes, each scaled by 1e18 and more, above an animated and skinned triangle, a camera and a light.
   GltfModel model = test::seed_animated();
   const int huge = model.vec3({1, 1, 1, 1e30F, 1e30F, 1e30F, 1e18F, -1e18F, 1e18F});
   json& samplers = model.root["animations"][0]["samplers"];
@@ -1159,7 +1160,7 @@ TEST(Gltf, AnimationsBeyondFloatStayFinite) {
 }
 
 TEST(Gltf, RootsThatLeadToEachOtherAreShownOnce) {
-  // A chain of 100000 nodes, all of which are roots of the scene, the deepest first.
+  // A chain of 100000 nodes. All are roots of the scene, the deepest first.
   GltfModel model = triangle_model();
   json roots = json::array({0});
   for (int i = 1; i < 100000; ++i) roots.push_back(model.add("nodes", {{"children", json::array({i - 1})}}));
@@ -1194,7 +1195,7 @@ TEST(Gltf, CancelledImportsEnd) {
 
 // --- mutations -------------------------------------------------------------------------------------------------------
 
-/// Changes a file in one to four places: bits, bytes, ranges, and numbers in its JSON.
+/// Changes a file in one to four positions: bits, bytes, ranges, and numbers in its JSON.
 Bytes mutated(const Bytes& from, std::mt19937& random) {
   constexpr const char* words[] = {"-1",   "0",    "1",     "2",     "255",  "65535", "4294967295", "9007199254740991",
                                    "1e38", "1e18", "-1e38", "0.5",   "null", "true",  "\"\"",       "[]",
@@ -1214,7 +1215,7 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
       case 2:
         bytes.resize(static_cast<std::size_t>(at));
         break;
-      case 3: {  // a range is overwritten by another
+      case 3: {  // overwrites a range with another
         const std::size_t length = 1 + below(16);
         const std::size_t source = below(bytes.size());
         for (std::size_t k = 0; k < length; ++k) {
@@ -1224,7 +1225,7 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
         }
         break;
       }
-      default: {  // the next number becomes another of the same length, filled up with blanks
+      default: {  // replaces the next number by another of the same length, padded with blanks
         auto digit = std::find_if(bytes.begin() + at, bytes.end(), [](std::uint8_t c) { return c >= '0' && c <= '9'; });
         auto end = std::find_if(digit, bytes.end(), [](std::uint8_t c) { return c < '0' || c > '9'; });
         const std::string word = words[below(std::size(words))];
@@ -1236,7 +1237,7 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
                 static_cast<std::size_t>(k) < word.size() ? static_cast<std::uint8_t>(word[static_cast<std::size_t>(k)])
                                                           : ' ';
           }
-        } else if (bytes[0] == '{') {  // where no length is written down, it may grow
+        } else if (bytes[0] == '{') {  // text files may grow, because they store no length
           bytes.erase(digit, end);
           bytes.insert(bytes.begin() + place, word.begin(), word.end());
         }
@@ -1277,7 +1278,7 @@ TEST(Gltf, MutatedFilesAreImportedOrRefusedByOneLine) {
       }
     }
   }
-  // Neither all nor none: else the mutations look at nothing but the first check.
+  // Neither all nor none are valid. Otherwise the mutations would reach only the first check.
   EXPECT_GT(good, 1000U);
   EXPECT_GT(bad, 4000U);
 }

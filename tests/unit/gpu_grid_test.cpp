@@ -1,4 +1,4 @@
-// Viewers whose grids GL builds show what those show whose grids the CPU builds.
+// Viewers whose grids are built on the GPU show the same images as viewers whose grids are built on the CPU.
 
 #include <gtest/gtest.h>
 
@@ -48,7 +48,7 @@ class GpuGrid : public test::StillTest {
 };
 CUMULET_ON_BACKENDS(GpuGrid);
 
-// Of all values, beside their mean.
+// Root mean square of the differences, relative to the mean.
 double difference(const test::Picture& a, const test::Picture& b) {
   double square = 0.0;
   double mean = 0.0;
@@ -62,7 +62,8 @@ double difference(const test::Picture& a, const test::Picture& b) {
   return std::sqrt(square / values) / (mean / values);
 }
 
-// The same cells, and the same paths but where what was rounded otherwise decides. a, b: of both by this image.
+// Expects the same cells, and nearly the same paths: rounding may change a few. a, b: images of `gl` and `cpu` with
+// these image settings.
 void expect_same_paths(test::Still& gl, const test::Picture& a, test::Still& cpu, const test::Picture& b,
                        test::Image image) {
   EXPECT_EQ(gl.viewer().stats().cells, cpu.viewer().stats().cells);
@@ -104,7 +105,7 @@ TEST_P(GpuGrid, BudgetsEndTheRefinementThere) {
   EXPECT_GT(viewer().stats().cells, 1500U);
 }
 
-// While a camera moves there is always a picture, of the grid before until the next is whole.
+// While a camera moves, there is always an image: the old grid's until the next grid is complete.
 TEST_P(GpuGrid, TheGridBeforeIsShownUntilTheNextIsWhole) {
   still_->set_grid(settings_on(BuildOn::gpu, true));
   test::render(*still_, {40, 30, 1, 0, render::View::shaded});
@@ -118,7 +119,7 @@ TEST_P(GpuGrid, TheGridBeforeIsShownUntilTheNextIsWhole) {
       ASSERT_GT(viewer().stats().cell_bytes, 0U);
       if (viewer().stats().cells == before) ++kept;
       if (result.converged) break;
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // the worker's turn
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));  // gives the worker thread time
     }
     if (viewer().stats().cells != before) ++others;
     before = viewer().stats().cells;
@@ -137,7 +138,7 @@ volume::VolumeFrame fire() {
   return frame;
 }
 
-// What burns and has a colour: the same paths, and the same cells that they look for.
+// A fire with colors: the same paths, and the same emissive cells for NEE.
 TEST_P(GpuGrid, FiresAreThoseOfTheCpusGrid) {
   const test::Image image{32, 32, 32, 5, render::View::shaded};
   const auto other = make();
@@ -175,12 +176,12 @@ TEST(GpuGridBuild, OfAFireIsPlanned) {
   EXPECT_TRUE(built.source->emits());
   EXPECT_TRUE(built.source->coloured());
   EXPECT_TRUE(lines.empty());
-  // Another light is another lattice.
+  // Different emission needs a different lattice.
   settings.emission.flame_strength = 3.0;
   EXPECT_NE(viewer::build_grid(log, asset, settings, progress).source->plan->lattice, built.source->plan->lattice);
 }
 
-// Whether a medium is denser matters where what hides is told apart, and nowhere else.
+// Density scale and anisotropy of the medium affect the lattice only with the transmittance criterion.
 TEST(GpuGridBuild, MediaShareALatticeWhereNoneCounts) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({30, 30, 30}, glm::ivec3(0), 1));
   Progress progress;
@@ -197,7 +198,7 @@ TEST(GpuGridBuild, MediaShareALatticeWhereNoneCounts) {
   }
 }
 
-// How much there is is told while a lattice is made.
+// bytes() does not block while a lattice is being made.
 TEST(GpuGridBuild, NobodyWaitsToBeToldHowMuchThereIs) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({120, 110, 100}, glm::ivec3(0), 1));
   int told = 0;
@@ -222,7 +223,7 @@ TEST(GpuGridBuild, NobodyWaitsToBeToldHowMuchThereIs) {
   EXPECT_GT(told, 0);
 }
 
-// What a view does not change is computed once.
+// Data that does not depend on the view is computed once.
 TEST(GpuGridBuild, ViewsShareALattice) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({30, 30, 30}, glm::ivec3(0), 1));
   Progress progress;

@@ -1,5 +1,5 @@
-// Grids that GL builds are those that the processor builds: cells, links, order and tree bit for bit, coefficients but
-// for a rounding, for volumes of every kind and whoever looks at them.
+// Grids built on the GPU equal those built on the CPU: cells, links, order and tree bit by bit, coefficients except for
+// rounding. Tested with all kinds of volumes and cameras.
 
 #include "render/grid_build.hpp"
 
@@ -59,11 +59,11 @@ class GridBuilds : public test::GlTest {
     }
     return work.take();
   }
-  // between: after each call that the deadline stopped.
+  // between: called after each call that the deadline stopped.
   render::BuiltGrid build(const render::LatticeDataPtr& data, const grid::RefineSettings& settings,
                           const std::function<void()>& between = {}) const {
     const grid::Lattice& lattice = data->lattice();
-    // Linked, so that no step waits for it.
+    // Links the programs first, so that no step waits for them.
     for (const gl::ProgramKey& key : gl::all_programs()) {
       if (key.name.starts_with("grid_")) programs_->get(key);
     }
@@ -102,8 +102,8 @@ struct Rounding {
 
 float ulp_of(float value) { return std::exp2(std::floor(std::log2(std::max(std::abs(value), 6.2e-5F))) - 10.0F); }
 
-// Of the same number rounded to halves. What is next to nothing beside density 1 is what the processor's
-// sums about a brick's mean lose in floats.
+// Both are the same number rounded to half precision. The tolerance covers the float cancellation in the CPU's sums,
+// which are relative to a brick's mean.
 void expect_within_a_rounding(float a, float b, bool gradient, Rounding& rounding) {
   const float ulp = ulp_of(std::max(std::abs(a), std::abs(b)));
   ASSERT_LE(std::abs(a - b), ulp + (gradient ? 6e-5F : 1e-6F));
@@ -116,7 +116,8 @@ void expect_within_a_rounding(const glm::uvec4& a, const glm::uvec4& b, Rounding
   for (int k = 0; k < 4; ++k) ASSERT_NO_FATAL_FAILURE(expect_within_a_rounding(one[k], other[k], k > 0, rounding)) << k;
 }
 
-// Those that the processor finds of the same records: cells of next to nothing may be empty for one of the two alone.
+// Compares with the clear cones that the CPU finds in the same cells. Comparing across builders would fail, because
+// nearly empty cells may be empty in only one of them.
 void expect_clear_cones(const render::BuiltGrid& built, const Read& read, const grid::Cube& cube) {
   grid::TetGrid grid;
   grid.cube = cube;
@@ -175,13 +176,14 @@ TEST_P(GridBuilds, AreTheProcessorsForEveryVolumeAndTwoHundredCameras) {
   }
   EXPECT_GE(seen, 200U);
   EXPECT_GE(limited, 10U) << "budgets that end the refinement";
-  // Both round the same number, most often alike; of gradients next to nothing what floats lose is more than a unit.
+  // Both round the same number, mostly to the same value. For gradients near 0, the float error exceeds a unit in the
+  // last place.
   EXPECT_LT(static_cast<double>(rounding.others), 0.03 * static_cast<double>(rounding.coefficients));
   RecordProperty("rounded_otherwise", std::to_string(rounding.others));
   RecordProperty("coefficients", std::to_string(rounding.coefficients));
 }
 
-// In cubes so wide that cells have other records, too.
+// In cubes so wide that cells use another record layout, too.
 TEST_P(GridBuilds, AreTheProcessorsHoweverWide) {
   const gl::StateGuard guard(*gl_);
   test::Cameras cameras(3);
@@ -207,7 +209,7 @@ TEST_P(GridBuilds, AreTheProcessorsHoweverWide) {
   EXPECT_LT(static_cast<double>(rounding.others), 0.03 * static_cast<double>(rounding.coefficients));
 }
 
-// The least-squares fit of a cell's sixths of voxels in double precision, nowhere negative: mean, then gradient.
+// The least-squares fit to a cell's sixths of voxels in double precision, nowhere negative: mean, then gradient.
 struct Fit {
   double mean = 0.0;
   glm::dvec3 gradient{0.0};
@@ -250,7 +252,7 @@ Fit fit_of(const volume::ScalarVolume& volume, const grid::Cube& cube, const glm
   return fit;
 }
 
-// Density, and channels of which each is a function of the voxel.
+// Density, and channels that are functions of the voxel position.
 struct Carrying {
   static constexpr float fastest = 30.0F;
   volume::ScalarVolume density;
@@ -269,7 +271,7 @@ struct Carrying {
         glm::vec3(0.0F), glm::vec3(1.0F));
   }
   static float cosine(const glm::ivec3& p) { return glm::simplex(0.09F * glm::vec3(p)); }
-  // In parts of the fastest.
+  // As fractions of `fastest`.
   static glm::vec3 velocity(const glm::ivec3& p) {
     const glm::vec3 x(p);
     return glm::clamp(glm::vec3(0.01F * (x.y - 30.0F), 0.8F * std::sin(0.1F * x.x), 1e-4F), -1.0F, 1.0F);
@@ -321,7 +323,7 @@ std::vector<glm::ivec3> sixths_of(const glm::vec3& v0, std::uint32_t shape) {
   return voxels;
 }
 
-// Of what these voxels have in the mean, in double precision: what each channel's record is.
+// Compares each channel's record with the mean over these voxels in double precision.
 void expect_means(const Carrying& of, const glm::vec3& v0, std::uint32_t shape, const glm::vec3& emission,
                   std::uint32_t colour, std::int16_t anisotropy, const glm::uvec2& velocity) {
   glm::dvec3 light(0.0);
@@ -379,7 +381,7 @@ TEST_P(GridBuilds, CarryWhatTheirVoxelsDo) {
     const auto velocity = records<glm::uvec2>(built, grid::Channel::velocity);
     for (std::size_t c = 0; c < built.count; ++c) {
       const glm::uvec4& words = read.cells[c].data;
-      // The processor's sums about a brick's mean lose what is thin beside the brightest, which is 200.
+      // The CPU's sums, relative to a brick's mean, lose small values beside the brightest, which is 200.
       for (int k = 0; k < 3; ++k)
         ASSERT_NEAR(emission[c].mean[k], expected.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F) << c;
       if (emission[c].mean.x > 1.0F) {
@@ -391,7 +393,7 @@ TEST_P(GridBuilds, CarryWhatTheirVoxelsDo) {
         const glm::uvec4 wanted(glm::floatBitsToUint(expected.emission[c].mean), expected.emission[c].gradient);
         ASSERT_LT(glm::length(core::cm_emission_gradient(light) - core::cm_emission_gradient(wanted)), 0.015F) << c;
       }
-      // Those above bricks are the processor's.
+      // Cells larger than a brick are averaged on the CPU.
       const std::uint32_t shape = core::cm_record_shape(words);
       const std::uint32_t size = core::cm_shape_cube_size(shape);
       if (size > 3 || c % 7 != 0) continue;
@@ -399,7 +401,7 @@ TEST_P(GridBuilds, CarryWhatTheirVoxelsDo) {
           expect_means(of, core::cm_record_v0(words), shape, emission[c].mean, colour[c], anisotropy[c], velocity[c]))
           << i << ' ' << c;
     }
-    // The same lights in the same order.
+    // The same emissive cells in the same order.
     const scene::GlowTable wanted = scene::glow_table(expected);
     ASSERT_EQ(built.glow.cells.size(), wanted.cells.size()) << i;
     EXPECT_NEAR(built.glow.power, wanted.power, 1e-5 * wanted.power);
@@ -413,7 +415,7 @@ TEST_P(GridBuilds, CarryWhatTheirVoxelsDo) {
   RecordProperty("records", std::to_string(glowing));
 }
 
-// Without any density a fire is one all the same.
+// A fire without any density emits light too.
 TEST_P(GridBuilds, OfFireAloneAreLight) {
   const gl::StateGuard guard(*gl_);
   const Carrying of(false);
@@ -430,7 +432,7 @@ TEST_P(GridBuilds, OfFireAloneAreLight) {
   EXPECT_FALSE(built.channels[static_cast<std::size_t>(grid::Channel::colour)]);
 }
 
-// Half a unit in the last place of a half float, and what floats lose in between.
+// Tolerance: half a unit in the last place of a half float, plus the float error.
 TEST_P(GridBuilds, CoefficientsAreLeastSquaresWithinHalfAUnitInTheLastPlace) {
   const gl::StateGuard guard(*gl_);
   const GridReference reference(test::noise_volume({60, 45, 50}, {-3, 2, 5}, 1));
@@ -471,7 +473,7 @@ TEST_P(GridBuilds, ConstantCellsHaveNoGradient) {
   }
 }
 
-// What a file has as halves is halves here, and no other numbers.
+// Values that are halves in a file are used as exactly those halves.
 TEST_P(GridBuilds, HalvesOfAFileAreTakenAsTheyAre) {
   const gl::StateGuard guard(*gl_);
   volume::ScalarVolume volume = test::noise_volume({60, 45, 50}, glm::ivec3(0), 1);
@@ -492,7 +494,7 @@ TEST_P(GridBuilds, HalvesOfAFileAreTakenAsTheyAre) {
   expect_same(reference.grid(settings), built, read(built), rounding);
 }
 
-// A frame may stop after every dispatch, and another build begin on the same lattice after one that nobody ended.
+// A frame may stop after any dispatch. Another build may begin on the same lattice after an unfinished one.
 TEST_P(GridBuilds, StopAfterEveryStepAndBeginAnew) {
   const gl::StateGuard guard(*gl_);
   const GridReference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
@@ -522,7 +524,7 @@ TEST_P(GridBuilds, StopAfterEveryStepAndBeginAnew) {
   }
 }
 
-// Of a view, as viewers have it.
+// A planned source for these settings, as viewers make it.
 scene::MarchSourcePtr planned(const GridReference& reference, const grid::LatticePtr& lattice,
                               const grid::RefineSettings& settings) {
   scene::GridPlan plan{lattice, lattice->own.levels(grid::ViewLevels(lattice->cube, settings)), settings.max_cells};
@@ -530,7 +532,7 @@ scene::MarchSourcePtr planned(const GridReference& reference, const grid::Lattic
       scene::make_planned_source(std::move(plan), reference.volume, reference.statistics, {}));
 }
 
-// A volume's plan, and what the CPU makes of it.
+// A volume's plan, and the grid that the CPU builds.
 struct Planned {
   explicit Planned(volume::ScalarVolume v) : reference(std::move(v)) {}
   GridReference reference;
@@ -580,7 +582,7 @@ TEST_P(GridBuilds, WhatGlHasNoRoomForTheCpuBuilds) {
     wait_for(builds, plan.source, c.most);
     ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(builds.built().at(plan.source), plan.expected, c.why));
     EXPECT_LE(builds.bytes(), held) << "nothing but a lattice is left";
-    // Left before it is done, it ends by itself.
+    // A build that is cleared before it is done ends without waiting.
     builds.clear();
     builds.advance({plan.source}, {plan.source}, c.most, Deadline::max());
   }
@@ -589,7 +591,7 @@ TEST_P(GridBuilds, WhatGlHasNoRoomForTheCpuBuilds) {
   EXPECT_FALSE(builds.built().at(plan.source).grid);
 }
 
-// Whatever cannot be made is no end of it: nothing of it stays, and the CPU builds the grid.
+// After any failed allocation, all objects are freed and the CPU builds the grid.
 TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
   const gl::StateGuard guard(*gl_);
   const Planned plan(test::noise_volume({16, 16, 12}, glm::ivec3(0), 1));
@@ -608,7 +610,7 @@ TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
       if (!built.grid) break;
       ++failed;
       ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(built, plan.expected, ""));
-      // The next is GL's again.
+      // The next build runs on the GPU again.
       builds.clear();
       wait_for(builds, plan.source);
       ASSERT_FALSE(builds.built().at(plan.source).grid);
@@ -618,7 +620,7 @@ TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
   EXPECT_GT(failed, 20) << "buffers, and storage for each";
 }
 
-// A camera on its way: what a grid takes it gives back. CUMULET_REFITS: how many instead of a hundred.
+// Refits for a moving camera: each grid frees its memory. CUMULET_REFITS: number of refits (default: 100).
 TEST_P(GridBuilds, RefitsDoNotGrow) {
   const gl::StateGuard guard(*gl_);
   const GridReference reference(test::noise_volume({40, 35, 30}, glm::ivec3(0), 1));
@@ -663,11 +665,11 @@ TEST_P(GridBuilds, SayWhichLimitDoesNotSuffice) {
   }
 }
 
-// A host of 60 frames a second, which sees only at the next frame that a batch is over, and has work of its own.
+// A host with 60 frames per second and GPU work of its own. It notices the end of a batch only at the next frame.
 TEST(GridPace, ABusyHostDoesNotStarveIt) {
   using render::GridPace;
   const gl::ProgramKey key{"grid_cells.comp", {"CM_STAGE 1"}};
-  for (const double guess : {1.0, 0.2, 5.0}) {  // of the truth
+  for (const double guess : {1.0, 0.2, 5.0}) {  // relative to the true cost
     for (const double other_ms : {0.0, 17.0}) {
       SCOPED_TRACE(testing::Message() << guess << " " << other_ms);
       GridPace pace;
@@ -697,7 +699,7 @@ TEST(GridPace, ABusyHostDoesNotStarveIt) {
       EXPECT_LT(longest, 6.0);
     }
   }
-  // Measured alone it comes to the truth, and stays.
+  // With exact measurements, the estimate converges to the true cost and stays there.
   GridPace pace;
   for (int i = 0; i < 40; ++i) {
     const GridPace::Sent sent{key, 1e-6, 1e5};

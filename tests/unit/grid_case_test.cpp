@@ -1,4 +1,4 @@
-// Files with grids whose names differ in case or not at all: which of them a field is read from, and that this is told.
+// Files with grids whose names are equal or differ only in case: which grid is read, and which warning is logged.
 
 #include <gtest/gtest.h>
 
@@ -56,7 +56,7 @@ TEST_F(GridCase, DensityInItsOwnCaseComesFirst) {
       EXPECT_HAS(warning, "\"DENSITY\"");
     }
   }
-  // A soot in its own case is still behind a density in any.
+  // Any spelling of "density" comes before an exact "soot".
   EXPECT_EQ(import_volume(write({dot("soot", 1.0F), dot("Density", 2.0F)}), "", {}).name, "Density");
 }
 
@@ -68,7 +68,7 @@ TEST_F(GridCase, AChoiceByCaseIsTold) {
   EXPECT_EQ(messages.warnings[0],
             file.string() +
                 ": shows its grid \"DENSITY\" (float, fog volume); there is also \"Density\" (float, fog volume)");
-  // There is no choice of one.
+  // With one candidate there is no warning.
   messages.warnings.clear();
   (void)import_frame(write({dot("Density", 1.0F), dot("Temperature", 2.0F), dot("dust", 1.0F)}), {}, messages.log);
   EXPECT_TRUE(messages.warnings.empty()) << messages.warnings[0];
@@ -93,7 +93,7 @@ TEST_F(GridCase, OtherFieldsAreChosenAlike) {
   EXPECT_HAS(all, ": reads its grid \"phase_g\" (float, fog volume) as anisotropy; there is also \"Phase_G\"");
   EXPECT_HAS(all, ": reads its grid \"cd\" (vec3s, unknown) as color; there is also \"Cd\"");
   EXPECT_HAS(all, ": reads its grid \"vel\" (vec3s, unknown) as velocity; there is also \"Vel\"");
-  // Listings say the same of it.
+  // list_grids and channels_by_name choose the same grids.
   const auto grids = list_grids(file);
   const std::vector<std::string> channels = channels_by_name(grids);
   for (std::size_t i = 0; i < grids.size(); ++i) {
@@ -104,7 +104,7 @@ TEST_F(GridCase, OtherFieldsAreChosenAlike) {
       EXPECT_EQ(channels[i], "") << grids[i].name;
     }
   }
-  // A grid that is named is no choice by case.
+  // An explicitly named grid causes no warning.
   messages.warnings.clear();
   GridNames names;
   names.temperature = "Temperature";

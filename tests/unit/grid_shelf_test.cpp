@@ -1,4 +1,4 @@
-// Grids of several volumes: built one after another, kept as long as they are wished for.
+// The grid cache of several volumes: grids are built one after another and kept while they are requested.
 
 #include <gtest/gtest.h>
 
@@ -43,14 +43,14 @@ TEST_F(Shelf, KeepsWhatIsStillWishedFor) {
   EXPECT_GE(told_, 2);
 }
 
-// What is begun is seen, however fast wishes change.
+// A build in progress is finished and delivered, even if requests change meanwhile.
 TEST_F(Shelf, HandsOverWhatWasUnderWay) {
   const viewer::GridShelf::Wish slow{asset(96, 1), {}};
   const viewer::GridShelf::Wish next{asset(16, 2), {}};
   shelf_.wish({slow});
   while (!shelf_.is_under_way(slow) && !shelf_.built(slow)) std::this_thread::yield();
   shelf_.wish({next});
-  const bool under_way = shelf_.is_under_way(slow);  // else it was there before
+  const bool under_way = shelf_.is_under_way(slow);  // else it was already built
   ASSERT_TRUE(shelf_.wait(std::nullopt));
   EXPECT_EQ(shelf_.built(slow).has_value(), under_way);
   EXPECT_TRUE(shelf_.built(next));

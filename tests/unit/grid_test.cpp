@@ -28,7 +28,7 @@ struct Built {
   grid::TetGrid grid;
 };
 
-// Of cells that are as fine as what differs, and constant.
+// Settings of a grid with constant cells that is refined wherever voxels differ.
 grid::RefineSettings voxel_by_voxel() {
   grid::RefineSettings settings;
   settings.threshold = -1.0;
@@ -73,7 +73,8 @@ Face face_of(const grid::CellRecord& cell, unsigned face, bool wide) {
   return f;
 }
 
-// Every interior face is shared by exactly two cells that link to each other across it; volumes add up to the cube.
+// Expects that every interior face is shared by exactly two cells that link to each other, and that the volumes add up
+// to the cube.
 void expect_conforming(const grid::TetGrid& grid) {
   double volume = 0.0;
   std::size_t wrong = 0;
@@ -111,7 +112,7 @@ void expect_conforming(const grid::TetGrid& grid) {
   EXPECT_NEAR(volume / std::pow(double(size), 3.0), 1.0, 1e-9);
 }
 
-// Walks a bisection by brute force down to voxel sixths and sums them: slow, independent of bricks and octrees.
+// Sums the voxel sixths inside a cell by recursive bisection: slow, independent of bricks and octrees.
 grid::Moments brute_moments(const volume::ScalarVolume& volume, const grid::Cube& cube, const vec3& v0,
                             std::uint32_t shape) {
   grid::Moments m;
@@ -279,7 +280,7 @@ TEST(Statistics, GrowWithTheActiveNodesNotWithTheBox) {
       1.0F);
 }
 
-// The records of every cell that bisection comes to, whatever the cube: from the roots down to sixths of voxels.
+// Records hold every cell that bisection can reach in cubes of all sizes, from the roots down to sixths of voxels.
 TEST(WideRecords, HoldEveryCell) {
   test::Random random(5);
   for (const int log2_size : {15, 16, 17, 18}) {
@@ -306,7 +307,7 @@ TEST(WideRecords, HoldEveryCell) {
   }
 }
 
-// A cloud far out in a wide box has the cells that it has by itself, voxel by voxel.
+// A cloud far away in a wide box has the same cells, voxel by voxel, as without the rest.
 TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
   const grid::RefineSettings settings = voxel_by_voxel();
@@ -337,7 +338,8 @@ TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
   }
 }
 
-// What rays that start far out meet there is what those meet that start nearby: differences of what is large are exact.
+// Rays that start far from the origin hit the same cells as rays near it, because differences of large coordinates are
+// exact.
 TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
   const grid::RefineSettings settings = voxel_by_voxel();
@@ -365,7 +367,7 @@ TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
   std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
   double sum = 0.0;
   for (int i = 0; i < 20000; ++i) {
-    // On what floats have out there, and in no cell's face.
+    // Coordinates that are exact floats far away, and not on a face of a cell.
     const vec3 o = vec3(random() % 30, random() % 28, random() % 25) + vec3(21.0F, 29.0F, 39.0F) / 64.0F;
     const vec3 d(uniform(random), uniform(random), uniform(random));
     const double depth = depth_of(near.grid, o, d);
@@ -486,7 +488,7 @@ TEST(Grid, TransmittanceIsOfTheSixWaysOut) {
   EXPECT_EQ(transmittance.blocks(ivec3(cube.size() - 8)), nullptr);
 }
 
-// Noise in a ball, seen and hidden.
+// A ball of noise, transparent and opaque.
 TEST(Grid, TransmittanceLeavesOpaqueCoresCoarse) {
   const auto noise = test::noise_volume({64, 64, 64}, ivec3(0), 4);
   const auto ball = test::make_volume({64, 64, 64}, ivec3(0), [&](const ivec3& p) {
@@ -503,9 +505,9 @@ TEST(Grid, TransmittanceLeavesOpaqueCoresCoarse) {
     });
   };
   using enum grid::Criterion;
-  // Thin, it is the deviation.
+  // For a thin medium, the criterion equals the deviation.
   EXPECT_EQ(cells_of(transmittance, 1e-9, 0.03, 1e9F), cells_of(deviation, 1.0, 0.03, 1e9F));
-  // What is deep in the dark is coarse, by a grid whose rest is no coarser.
+  // The dark core of a dense medium is coarser, although the grid as a whole is not.
   const auto all = cells_of(transmittance, 2.0, 0.3, 1e9F);
   const auto core = cells_of(transmittance, 2.0, 0.3, 16.0F);
   EXPECT_GE(all, cells_of(deviation, 2.0, 0.03, 1e9F));
@@ -525,7 +527,7 @@ TEST(Grid, ConformsForASingleVoxelAnywhere) {
     volume.max_value = 1.0F;
     const Built built = build(volume, voxel_by_voxel());
     expect_conforming(built.grid);
-    // The voxel itself is resolved, exactly.
+    // The voxel itself is resolved exactly.
     const std::uint32_t cell = grid::locate(built.grid, vec3(p) + vec3(0.4F, 0.5F, 0.6F));
     EXPECT_EQ(glm::unpackHalf2x16(built.grid.cells[cell].data.z).x, 1.0F);
     EXPECT_LT(built.grid.cells.size(), 4000U);
@@ -548,8 +550,8 @@ TEST(Grid, FullyRefinedConstantCellsAreTheVoxels) {
   }
 }
 
-// What a deviation does to the luminance counts: the same noise is seen more in the green of a red fire than in the red
-// of a green one.
+// The error is weighted by luminance: equal noise is more visible in the green channel of a red fire than in the red
+// channel of a green one.
 TEST(Grid, ARedFireIsSplitForItsGreen) {
   const ivec3 size(32);
   const auto even = test::make_volume(size, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
@@ -599,7 +601,7 @@ TEST(Grid, LinearCellsReproduceALinearField) {
   grid::RefineSettings settings;
   settings.threshold = 0.0005;
   const Built built = build(volume, settings);
-  // Voxels are steps around the plane, so a cell of many voxels has it and a few big cells serve.
+  // Voxels are constant steps around the linear field, so cells of many voxels fit it and a few large cells suffice.
   EXPECT_LT(built.grid.cells.size(), 20000U);
   test::Random random(4);
   std::uniform_real_distribution<float> uniform(4.0F, 60.0F);
@@ -673,7 +675,7 @@ TEST(Grid, CameraStopsSplitsOutsideTheFrustumAndUnderAPixel) {
   const std::size_t everywhere = build(volume, settings).grid.cells.size();
   grid::RefineCamera camera;
   camera.eye = {60.0, 60.0, 400.0};
-  camera.tan_half_x = camera.tan_half_y = 0.05;  // sees the middle only
+  camera.tan_half_x = camera.tan_half_y = 0.05;  // sees only the middle
   camera.pixels_per_radian = 100000.0;
   settings.camera = camera;
   const Built narrow = build(volume, settings);
@@ -691,7 +693,7 @@ TEST(Grid, CameraStopsSplitsOutsideTheFrustumAndUnderAPixel) {
   EXPECT_LT(far.grid.cells.size(), everywhere / 20);
 }
 
-// A million rays: axis-aligned, in faces, along edges, through vertices. None stuck, none wrong.
+// A million rays: parallel to axes, in faces, along edges, through vertices. None gets stuck, and all depths are right.
 TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
   const auto volume = test::noise_volume({60, 45, 50}, ivec3(0), 1);
   grid::RefineSettings settings;
@@ -749,7 +751,7 @@ TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
           core::cm_face_distances(core::cm_cell_frame(core::cm_record_v0(data), shape, o, d), shape);
       const float t_exit = core::cm_nearest_face(faces);
       const float t_next = std::max(t, t_exit);
-      // The middle of every segment lies in its cell.
+      // The middle of every segment is inside its cell.
       if (ray % 97 == 0 && t_next - t > 1e-3F * std::abs(t_next)) {
         const vec3 middle = o + 0.5F * (t + t_next) * d;
         const auto w = vertices_of(cells[cell]);
@@ -767,7 +769,7 @@ TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
       ++steps;
     }
     if (steps >= limit) ++stuck;
-    // It left where the ray leaves the cube.
+    // The traversal ends where the ray leaves the cube.
     float t_cube = 3.0e38F;
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] > 0.0F) t_cube = std::min(t_cube, (size - o[axis]) / d[axis]);

@@ -1,4 +1,4 @@
-// The ground: a plane that paths meet without a triangle, against closed forms, and against triangles.
+// The ground plane, compared with closed forms and with triangles.
 
 #include <gtest/gtest.h>
 
@@ -40,8 +40,8 @@ viewer::Light sun_at(float elevation_degrees, float irradiance, float sky) {
   return light;
 }
 
-// As of AFloorUnderASlabIsLitAndSeenThroughIt (surface_trace_test): albedo / pi * E cos * exp(-tau / cos) on the way
-// in, exp(-tau) out. Beneath the slab, and as far up in it as half.
+// Same expectation as AFloorUnderASlabIsLitAndSeenThroughIt (surface_trace_test): albedo / pi * E cos * exp(-tau / cos)
+// on the way in, exp(-tau) out. The plane is below the slab, or halfway up in it.
 TEST_P(Ground, UnderASlabIsLitAndSeenThroughIt) {
   const auto still = make();
   still->set_volume(test::slab());
@@ -71,7 +71,7 @@ TEST_P(Ground, UnderASlabIsLitAndSeenThroughIt) {
   }
 }
 
-// Of a sequence whose smoke has not begun: albedo / pi * E cos.
+// The volume of a sequence before the smoke begins: albedo / pi * E cos.
 TEST_P(Ground, AtAHeightIsThereWhereAVolumeIsEmpty) {
   const auto still = make();
   still->set_volume(test::make_volume({8, 8, 8}, ivec3(0), [](const ivec3&) { return 0.0F; }));
@@ -88,7 +88,7 @@ TEST_P(Ground, AtAHeightIsThereWhereAVolumeIsEmpty) {
   }
 }
 
-// Nothing absorbs: all is as bright as the sky.
+// White furnace test: without absorption everything is as bright as the sky.
 TEST_P(Ground, InAFurnaceIsOne) {
   const auto still = make();
   still->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
@@ -100,7 +100,7 @@ TEST_P(Ground, InAFurnaceIsOne) {
   EXPECT_NEAR(picture.mean().x, 1.0, 0.01);
 }
 
-// With a model and without, under sky and lamps, the same as two triangles of its albedo.
+// With and without a model, under sky and lights, the plane equals two triangles of the same albedo.
 TEST_P(Ground, IsAsTwoTriangles) {
   const auto cloud = test::make_volume({24, 16, 24}, ivec3(0), [](const ivec3& p) {
     return glm::length(vec3(p) - vec3(12.0F, 8.0F, 12.0F)) < 8.0F ? 1.0F : 0.0F;

@@ -27,7 +27,7 @@ Function get(Context& context, const char* name) {
   return reinterpret_cast<Function>(Context::get_proc(&context, name));
 }
 
-/// Through what the driver computes, not only what it says: a buffer is written and read back.
+/// Checks that the driver computes, not only what it reports: writes a buffer and reads it back.
 void expect_works(Context& context) {
   const auto get_integer = get<void (*)(unsigned, int*)>(context, "glGetIntegerv");
   const auto get_string = get<const unsigned char* (*)(unsigned)>(context, "glGetString");
@@ -121,7 +121,7 @@ TEST(Headless, TwoContextsOfOneBackendAtOnce) {
       second.make_current();
       expect_works(second);
     }
-    // The second's end must not take the display from the first.
+    // Destroying the second must not terminate the display of the first.
     first.make_current();
     expect_works(first);
   }
@@ -160,8 +160,8 @@ TEST(Headless, GetProcSurvivesNonsense) {
   EXPECT_EQ(Context::get_proc(&context, nullptr), nullptr);
 }
 
-// They end by _Exit: at exit a leak checker would count the driver's own leaks against them.
-// Mesa reads its variables when a driver starts, so a driver that is not there is played in a process of its own.
+// Each case runs in a process of its own, because Mesa reads its environment variables when a driver starts. The
+// processes end with _Exit: at a normal exit a leak checker would report the driver's own leaks.
 TEST(HeadlessDeathTest, MissingEglIsOneLine) {
   ::testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_EXIT(
@@ -192,7 +192,7 @@ TEST(HeadlessDeathTest, BothFailingNamesBoth) {
   EXPECT_EXIT(
       {
         setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json", 1);
-        setenv("MESA_GL_VERSION_OVERRIDE", "3.3", 1);  // OSMesa then gives no 4.5
+        setenv("MESA_GL_VERSION_OVERRIDE", "3.3", 1);  // OSMesa then offers no 4.5
         const std::string error = creation_error(Backend::automatic);
         std::fprintf(stderr, "error: %s\n", error.c_str());
         const bool good = error.find("EGL (") != std::string::npos && error.find("OSMesa (") != std::string::npos &&

@@ -1,4 +1,4 @@
-// Holes that cameras see in place of models and volumes.
+// Models and volumes as holdouts.
 
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ class Holdout : public CViewerTest {
 };
 CUMULET_ON_BACKENDS(Holdout);
 
-// Across z = 0, through the ball and all that is seen.
+// A wall across z = 0, through the ball and larger than the view.
 SurfacesRef make_wall(float emission) {
   constexpr float far = 400.0F;
   const std::array<float, 18> corners{-far, -far, 0, far, -far, 0, far,  far, 0,
@@ -65,7 +65,7 @@ SurfacesRef make_wall(float emission) {
   return make_surfaces({&mesh, 1});
 }
 
-// What is left is the volume before it, sample by sample.
+// A holdout wall leaves the part of the volume in front of it, equal sample by sample.
 TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
   const SurfacesRef wall = make_wall(3.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
@@ -88,7 +88,7 @@ TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
   EXPECT_GT(red, 1.0) << "it is lit by the wall still";
   EXPECT_GT(alpha, 0.1);
   EXPECT_LT(alpha, 0.9);
-  // As a model, and of those that are beside it, alone.
+  // As a model the result is the same.
   ASSERT_EQ(cumulet_set_surfaces(v_, nullptr), CUMULET_OK);
   auto desc = make_desc<cumulet_model_desc>();
   desc.surfaces = wall.get();
@@ -103,7 +103,7 @@ TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
   EXPECT_EQ(cumulet_model_set(made, &desc), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-// A lamp in a thin medium is looked for along the way, too; the sky behind the hole comes back by none of that.
+// In a thin medium, lights also use equiangular sampling. It must not add the sky behind the holdout.
 TEST_P(Holdout, OfAWallShowsNoSkyWhereThereAreLamps) {
   const SurfacesRef wall = make_wall(0.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
@@ -146,7 +146,7 @@ TEST_P(Holdout, AnEmissiveVolumeIsDenoisedToBlack) {
   for (std::size_t i = 0; i < count; ++i) EXPECT_LT(rgba[4 * i], 1e-6F) << i;
 }
 
-// What is not behind it has its shadow as before, bit for bit.
+// Pixels beside the holdout keep its shadow, bit by bit.
 TEST_P(Holdout, ThrowsItsShadow) {
   const SurfacesRef panes = make_panes(4.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, panes.get()), CUMULET_OK);
@@ -165,7 +165,7 @@ TEST_P(Holdout, ThrowsItsShadow) {
   int aside = 0;
   int shaded = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    // None of 16 fixed rays meets them, and so, but for slivers at silhouettes, does no other.
+    // None of the 16 feature rays hits the panes here. Except for slivers at silhouettes, no sample does either.
     bool near = false;
     for (std::size_t j = 0; j < count; ++j) {
       const bool met = normal[3 * j] != 0.0F || normal[3 * j + 1] != 0.0F || normal[3 * j + 2] != 0.0F;
@@ -181,7 +181,7 @@ TEST_P(Holdout, ThrowsItsShadow) {
   EXPECT_GT(shaded, 2) << "they do shade it";
 }
 
-// The background comes through as far as the medium lets it, and nothing else.
+// Only the background remains, attenuated by the medium.
 TEST_P(Holdout, OfAVolumeLeavesWhatComesThrough) {
   std::vector<float> clear(count);
   auto light = make_desc<cumulet_light_desc>();
@@ -201,7 +201,7 @@ TEST_P(Holdout, OfAVolumeLeavesWhatComesThrough) {
   }
 }
 
-// Before it there is what there is, and behind it nothing.
+// A holdout volume keeps the volume in front of it and hides the one behind it.
 TEST_P(Holdout, OfOneVolumeAmongOthers) {
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 0.2;
@@ -216,7 +216,7 @@ TEST_P(Holdout, OfOneVolumeAmongOthers) {
     const auto place = at(0.0, 0.0, z);
     ASSERT_EQ(cumulet_instance_set_to_world(made, place.data()), CUMULET_OK);
   };
-  // Opaque, it hides all of the one behind it: but for light, which that one throws on nothing that is seen.
+  // If opaque, it hides the volume behind it completely. Light from that volume reaches nothing visible.
   set_medium(1e4, true);
   put(-40.0);
   make();

@@ -1,4 +1,5 @@
-// The host's depth as view depth: a known scene, drawn by plain GL, against its analytic depth.
+// Conversion of the host's depth buffer to view depth: a known scene, drawn with plain GL, compared with its analytic
+// depth.
 
 #include "render/host_depth.hpp"
 
@@ -50,7 +51,7 @@ struct Camera {
     return reversed ? -standard : standard;
   }
   [[nodiscard]] glm::mat4 projection() const {
-    // Clip-space depth is d w, or (2 d - 1) w; w = z, or 1 where orthographic; z = -eye z.
+    // Clip-space depth is d w, or (2 d - 1) w; w = z, or 1 if orthographic; z = -eye z.
     const double scale = clip == GL_ZERO_TO_ONE ? 1.0 : 2.0;
     const double shift = clip == GL_ZERO_TO_ONE ? 0.0 : -1.0;
     glm::dmat4 m(0.0);
@@ -80,13 +81,13 @@ const std::array<Camera, 8> cameras{{{"standard", false, true, false},
                                      {"orthographic", false, true, true},
                                      {"orthographic reversed", true, true, true, GL_ZERO_TO_ONE}}};
 
-// The scene: a wall that leans (z = 6 + 0.5 x + 0.25 y) over the left part of the picture, a box's face (z = 3) in
-// front of it, nothing on the right.
+// The scene: a slanted wall (z = 6 + 0.5 x + 0.25 y) over the left part of the image, a box's face (z = 3) in front of
+// it, nothing on the right.
 constexpr double wall_end = 0.55;  // in normalised device x
 constexpr double box_x[2] = {-0.5, 0.1};
 constexpr double box_y[2] = {-0.4, 0.3};
 
-/// The view depth z at a point of the picture, x and y from -1 to 1, y up.
+/// The view depth z at a point of the image, x and y from -1 to 1, y up.
 double scene_z(const Camera& camera, double x, double y) {
   if (x > box_x[0] && x < box_x[1] && y > box_y[0] && y < box_y[1]) return 3.0;
   if (x > wall_end) return infinite;
@@ -97,7 +98,7 @@ double scene_z(const Camera& camera, double x, double y) {
   return 6.0 / (1.0 - 0.5 * x * Camera::tangent * Camera::aspect - 0.25 * y * Camera::tangent);
 }
 
-/// The scene in one context, and what is read of it.
+/// The scene in one context, and the depth read from it.
 class DepthScene {
  public:
   static constexpr glm::ivec2 size{48, 32};
@@ -132,7 +133,7 @@ class DepthScene {
     functions_->DrawArrays(GL_TRIANGLES, 0, 6);
   }
 
-  /// The scene into a framebuffer, over the viewport.
+  /// Draws the scene into a framebuffer's viewport.
   void draw_scene(const Camera& camera, GLuint framebuffer, glm::ivec4 viewport) const {
     const StateGuard guard(*functions_);
     functions_->BindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
@@ -218,7 +219,7 @@ class DepthScene {
     return z;
   }
 
-  /// Every z against the scene's, but within a pixel of its edges. step: of the depth format.
+  /// Compares every z with the scene's, except within a pixel of its edges. step: resolution of the depth format.
   void expect_scene(const Camera& camera, glm::ivec4 viewport, bool flip, unsigned layers, double step) {
     ASSERT_EQ(depth_->size(), glm::uvec2(viewport.z, viewport.w));
     ASSERT_EQ(depth_->layers(), layers);
@@ -254,7 +255,7 @@ class DepthScene {
             continue;
           }
           ++surfaces;
-          // What one step of the format is in z, and single precision of the host's own transform.
+          // The tolerance is one step of the format in z, plus the single precision of the host's transform.
           const double slope =
               camera.orthographic ? 1.0 / std::abs(camera.b()) : expected * expected / std::abs(camera.b());
           ASSERT_NEAR(got, expected, 1.25 * (step * slope + 2e-5 * expected))
@@ -357,7 +358,7 @@ TEST_P(HostDepths, SubRectangles) {
       }
     }
   }
-  // A depth of the viewport's own size begins at its corner.
+  // A depth texture of the viewport's size starts at the viewport's corner.
   const DepthScene::Host own = scene_->make_host(GL_DEPTH_COMPONENT32F, 0, false, {33, 24});
   scene_->draw_scene(camera, own.framebuffer.name(), {0, 0, 33, 24});
   scene_->update(DepthScene::input_of(camera, DepthSource::texture, own.depth.name(), viewport));
@@ -401,7 +402,7 @@ TEST_P(HostDepths, MutableTextures) {
   GLuint name = 0;
   gl_->GenTextures(1, &name);
   const Object texture(gl_, Object::Kind::texture, name);
-  gl_->BindTexture(GL_TEXTURE_2D, name);  // not complete: its filters want mipmaps, and depth is unsized
+  gl_->BindTexture(GL_TEXTURE_2D, name);  // incomplete: its filters need mipmaps, and the depth format is unsized
   gl_->TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT, size.x, size.y, 0, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT,
                   nullptr);
   gl_->BindTexture(GL_TEXTURE_2D, 0);
@@ -435,7 +436,7 @@ TEST_P(HostDepths, NumbersOfAnR32F) {
   EXPECT_FLOAT_EQ(z[1], 1.0F);
   EXPECT_NEAR(z[2], 500.0F, 0.05F);
   for (std::size_t i = 3; i < 7; ++i) EXPECT_EQ(z[i], infinite) << i;
-  EXPECT_FALSE(scene_->update(input));  // NaN too is equal to itself by then
+  EXPECT_FALSE(scene_->update(input));  // the converted values compare equal, even where the input is NaN
   input.depth_a = 0.0;                  // reversed: z = 0.5 / d
   input.depth_b = 0.5;
   EXPECT_TRUE(scene_->update(input));
@@ -448,7 +449,7 @@ TEST_P(HostDepths, NumbersOfAnR32F) {
 }
 
 TEST_P(HostDepths, FarSurfacesKeepTheirPrecision) {
-  // Depths within a few roundings of a: what a loses as a float would be a large part of z.
+  // Depths within a few roundings of `a`: the error of `a` as a float would be a large part of z.
   const std::vector<float> depths{1.0F - 0x1p-24F, 1.0F - 0x1p-22F, 1.0F - 0x1p-20F, 0.999F};
   const Object texture = gl::make_texture_2d(gl_, GL_R32F, 4, 1, "depth");
   gl_->TextureSubImage2D(texture.name(), 0, 0, 0, 4, 1, GL_RED, GL_FLOAT, depths.data());
@@ -478,8 +479,8 @@ TEST_P(HostDepths, ChangesAreFound) {
   EXPECT_TRUE(scene_->update(input));
   EXPECT_FALSE(scene_->update(input));
   scene_->draw_scene(camera, host.framebuffer.name(), viewport);
-  EXPECT_FALSE(scene_->update(input));  // the same again
-  // One pixel.
+  EXPECT_FALSE(scene_->update(input));  // unchanged
+  // Changes one pixel.
   gl_->BindFramebuffer(GL_DRAW_FRAMEBUFFER, host.framebuffer.name());
   gl_->Enable(GL_SCISSOR_TEST);
   gl_->Scissor(17, 11, 1, 1);
@@ -487,12 +488,12 @@ TEST_P(HostDepths, ChangesAreFound) {
   gl_->Clear(GL_DEPTH_BUFFER_BIT);
   gl_->Disable(GL_SCISSOR_TEST);
   gl_->BindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
-  input.unchanged = true;  // says the host
+  input.unchanged = true;  // the host declares it unchanged
   EXPECT_FALSE(scene_->update(input));
   input.unchanged = false;
   EXPECT_TRUE(scene_->update(input));
   EXPECT_FALSE(scene_->update(input));
-  // What the numbers mean, or where they are taken from.
+  // A change of the depth convention or of the source is a change, whatever `unchanged` says.
   input.unchanged = true;
   input.depth_b *= 2.0;
   EXPECT_TRUE(scene_->update(input));
@@ -508,7 +509,7 @@ TEST_P(HostDepths, ChangesAreFound) {
   EXPECT_EQ(scene_->depth_->layers(), 0U);
   EXPECT_FALSE(scene_->update(input));
   input.source = DepthSource::texture_multisample;
-  input.viewport.z = 0;  // nothing to see
+  input.viewport.z = 0;  // an empty viewport
   EXPECT_FALSE(scene_->update(input));
 }
 
@@ -560,7 +561,7 @@ TEST_P(HostDepths, BadNamesAreToldAndLoseNothing) {
   EXPECT_EQ(cause(DepthSource::texture, name, {0, 0, 48, 33}), text("texture", name, small));
   EXPECT_EQ(cause(DepthSource::framebuffer, framebuffer, {0, 0, 48, 33}), text("framebuffer", framebuffer, small));
   EXPECT_NE(cause(DepthSource::texture, name, {-1, 0, 20, 20}), "");
-  EXPECT_FALSE(scene_->update(good));  // what was there still is
+  EXPECT_FALSE(scene_->update(good));  // the previous depth is kept
   scene_->expect_scene(camera, viewport, false, 1, 2.5e-7);
 }
 
@@ -579,8 +580,8 @@ TEST_P(HostDepths, LeavesTheHostsFramebufferAlone) {
   EXPECT_EQ(scene_->read(), first);
 }
 
-/// OSMesa's buffer in main memory (the library stays loaded, so that leaks in it keep its name): a context whose
-/// default framebuffer has a size and depth.
+/// A context of OSMesa in main memory whose default framebuffer has a size and depth. The library stays loaded, so that
+/// leak reports contain its name.
 struct DefaultFramebuffer {
   void* library = dlopen("libOSMesa.so.8", RTLD_NOW);
   void* context = nullptr;

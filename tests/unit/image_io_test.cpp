@@ -34,7 +34,7 @@ using namespace cumulet::image;
 class ImageIo : public ::testing::Test {
  protected:
   [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
-  /// Every name in the folder: temporary files that were left behind show up here.
+  /// Number of files in the folder, including temporary files that were left behind.
   [[nodiscard]] std::size_t count() const {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
   }
@@ -75,7 +75,7 @@ TEST_F(ImageIo, ExrRoundTripIsExact) {
   EXPECT_EQ(count(), 1u);
 }
 
-/// Every layer of a rendered picture, each with values of its own, some of them hard to keep.
+/// Every layer of a rendered image, each with values of its own. Some are hard to store exactly.
 struct Rendered {
   static constexpr std::uint32_t width = 13;
   static constexpr std::uint32_t height = 7;
@@ -107,7 +107,7 @@ TEST_F(ImageIo, ExrLayersRoundTripIsExact) {
     EXPECT_TRUE(std::equal(back.values.begin(), back.values.end(), layer.values.begin(), layer.values.end()))
         << layer.name.name;
   }
-  // What reads a plain picture reads the beauty and nothing else.
+  // Readers of plain images read only the beauty layer.
   EXPECT_EQ(read_exr(path("a.exr")).rgba, rendered.values[0]);
   EXPECT_EQ(count(), 1u);
 }
@@ -119,7 +119,7 @@ TEST_F(ImageIo, PicturesSayTheirPrimaries) {
   EXPECT_EQ(Imf::chromaticities(file.header()), Imf::Chromaticities());
   write_png(path("a.png"), gradient(8, 4));
   const std::string png = read_file(path("a.png"));
-  // Between IHDR and the pixels, each with its length before its type and its sum after its data.
+  // Between IHDR and the pixels. Each chunk has its length before its type, and its checksum after its data.
   const std::string srgb("\0\0\0\1sRGB\0\xae\xce\x1c\xe9", 13);
   const std::string gama("\0\0\0\4gAMA\0\0\xb1\x8f\x0b\xfc\x61\x05", 16);
   const std::string chrm(
@@ -159,7 +159,7 @@ TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
     EXPECT_EQ(i.channel().xSampling, 1);
     EXPECT_EQ(i.channel().ySampling, 1);
   }
-  // The names that docs/aovs.md promises.
+  // The names that docs/aovs.md specifies.
   EXPECT_EQ(names, (std::set<std::string>{"R",
                                           "G",
                                           "B",
@@ -189,12 +189,12 @@ TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
   EXPECT_EQ(header.displayWindow(), header.dataWindow());
   EXPECT_EQ(header.pixelAspectRatio(), 1.0f);
   EXPECT_EQ(header.compression(), Imf::ZIP_COMPRESSION);
-  EXPECT_FALSE(header.hasName());  // a single part: Blender would prefix its name to every layer's
+  EXPECT_FALSE(header.hasName());  // a single part: Blender would add its name to every layer's
   ASSERT_TRUE(Imf::hasChromaticities(header));
   EXPECT_EQ(Imf::chromaticities(header).red, Imath::V2f(0.64f, 0.33f));
   EXPECT_EQ(Imf::chromaticities(header).white, Imath::V2f(0.3127f, 0.3290f));
 
-  // Not by our own reader, whose mistakes could undo the writer's.
+  // Read with OpenEXR and not with this library's reader, whose mistakes could cancel the writer's.
   std::vector<float> z(std::size_t{Rendered::width} * Rendered::height);
   Imf::FrameBuffer frame;
   frame.insert("normal.Z", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(z.data()), sizeof(float),
@@ -303,14 +303,14 @@ TEST_F(ImageIo, DamagedFilesGiveOneLineThatNamesThem) {
 }
 
 TEST(ToneMapping, NeutralIsKhronosPbrNeutral) {
-  // Below the shoulder: the toe's offset and nothing else.
+  // Below the shoulder only the toe's offset applies.
   const auto grey = tone_map_neutral({0.5f, 0.5f, 0.5f});
   for (const float c : grey) EXPECT_NEAR(c, 0.46f, 1e-6f);
   // Dark: x - (x - 6.25 x^2) for the smallest channel.
   EXPECT_NEAR(tone_map_neutral({0.04f, 0.04f, 0.04f})[0], 6.25f * 0.04f * 0.04f, 1e-6f);
   // White of 1: peak 0.96, 1 - 0.24^2 / (0.96 + 0.24 - 0.76).
   EXPECT_NEAR(tone_map_neutral({1.0f, 1.0f, 1.0f})[1], 1.0f - 0.0576f / 0.44f, 1e-6f);
-  // Bright colours lose saturation, never their order, and never pass 1.
+  // Bright colors lose saturation but keep their order, and stay below 1.
   const auto bright = tone_map_neutral({20.0f, 10.0f, 5.0f});
   EXPECT_LT(bright[0], 1.0f);
   EXPECT_GT(bright[0], bright[1]);
@@ -350,7 +350,7 @@ TEST_F(ImageIo, PngHoldsTheToneCurve) {
   const auto expected = [](float display) { return std::lround(srgb_encode(display) * 255.0f); };
   EXPECT_EQ(byte({}, 0.0f), 0);
   EXPECT_EQ(byte({}, 0.5f), expected(0.46f));
-  EXPECT_EQ(byte({1.0}, 0.25f), expected(0.46f));  // a stop is a doubling
+  EXPECT_EQ(byte({1.0}, 0.25f), expected(0.46f));  // a stop is a factor of 2
   EXPECT_EQ(byte({-1.0}, 1.0f), expected(0.46f));
   EXPECT_EQ(byte({}, 1.0f), expected(1.0f - 0.0576f / 0.44f));
   EXPECT_EQ(byte({}, 1e9f), 255);
@@ -381,7 +381,7 @@ TEST_F(ImageIo, PngIsTopDown) {
 
 TEST_F(ImageIo, FailedWriteLeavesTheOldFile) {
   put(path("a.png"), "old");
-  // A full disk, played by the limit on a file's size: writing stops in the middle. The child is a fork, so it must not
+  // Simulates a full disk with a file size limit, so that writing stops in the middle. The child is a fork and must not
   // run exit handlers: those of linked libraries wait for threads that a fork does not have.
   EXPECT_EXIT(
       {

@@ -1,5 +1,5 @@
-// Which instances of volumes rays come to, in which order, against brute force; what is told of them; and the same on
-// the GPU.
+// Ray traversal of volume instances in order, compared with brute force; the table's other data; and the same on the
+// GPU.
 
 #include "scene/instances.hpp"
 
@@ -83,7 +83,7 @@ Instance instance_of(const dmat4& place, const vec3& low = vec3(0.0F), const vec
   source->cube.to_world = glm::scale(glm::translate(dmat4(1.0), origin), dvec3(0.5));
   Instance instance;
   instance.source = std::move(source);
-  // About the origin, not about the world's.
+  // The transform applies about the scene's origin, not the world's.
   instance.place = glm::translate(dmat4(1.0), origin) * place * glm::translate(dmat4(1.0), -origin);
   instance.grid.box_min = low;
   instance.grid.box_max = high;
@@ -99,7 +99,7 @@ dmat4 any_place(Random& random, double wide) {
   return place;
 }
 
-// Rotated, sheared, mirrored, of boxes somewhere in their cubes.
+// Random instances: rotated, sheared, mirrored, with boxes anywhere in their cubes.
 std::vector<Instance> any_instances(std::size_t count, unsigned seed, double wide = 25.0) {
   Random random(seed);
   std::vector<Instance> instances;
@@ -112,7 +112,7 @@ std::vector<Instance> any_instances(std::size_t count, unsigned seed, double wid
   return instances;
 }
 
-// Cubes of 8 that fill one of 32 without a gap, upright, at numbers that floats have.
+// Axis-aligned cubes of 8 that fill one of 32 without gaps, at coordinates that are exact floats.
 std::vector<Instance> tiles() {
   std::vector<Instance> instances;
   for (int i = 0; i < 64; ++i)
@@ -127,7 +127,7 @@ std::vector<Instance> coincident() {
   return instances;
 }
 
-// Every other one is empty: as thick as nothing along one axis, or inside out.
+// Every second instance is empty: of no thickness along one axis, or inverted.
 std::vector<Instance> flat() {
   std::vector<Instance> instances = any_instances(60, 7);
   for (std::size_t i = 0; i < instances.size(); i += 2) {
@@ -181,7 +181,7 @@ Visits visits_of(core::InstanceRays& rays, const Ray& ray) {
   return visits;
 }
 
-// The same without a tree: every leaf for itself.
+// The same instances as a flat list, without the tree.
 InstanceTable flattened(const InstanceTable& table) {
   InstanceTable list = table;
   list.nodes = {table.nodes[0]};
@@ -194,7 +194,7 @@ InstanceTable flattened(const InstanceTable& table) {
   return list;
 }
 
-// Every one that a ray meets, sorted.
+// All instances that a ray hits, sorted.
 Visits sorted_visits(core::InstanceRays& rays, const Ray& ray) {
   Visits visits;
   for (const CmInstanceNode& node : rays.cm_instance_nodes) {
@@ -212,7 +212,7 @@ Visits sorted_visits(core::InstanceRays& rays, const Ray& ray) {
   return visits;
 }
 
-// Where a ray is in an instance's box, in double.
+// The interval of a ray inside an instance's box, in double precision.
 struct Span {
   double first = 0.0;
   double last = std::numeric_limits<double>::infinity();
@@ -242,7 +242,7 @@ struct Counts {
   std::size_t rays_with_ties = 0;
 };
 
-// Against the sort, bit for bit, and against double precision but for what floats cannot tell.
+// Compares with the sorted list bit by bit, and with double precision except where floats cannot decide.
 Counts expect_like_brute_force(const std::vector<Instance>& instances, std::size_t count, unsigned seed) {
   const InstanceTable table = scene::make_instances(instances, origin);
   core::InstanceRays rays = rays_of(table);
@@ -314,7 +314,7 @@ TEST(Instances, ThatAreEmptyAreNeverVisitedNorByRaysThatAreNoNumbers) {
   EXPECT_EQ(none.nodes.size(), 1U);
 }
 
-// What a frame is told from: of the scene alone, near it, and seldom another one while something moves.
+// The origin of the scene's frame depends only on the scene, is near it, and rarely changes while something moves.
 TEST(Instances, BeginTheirFrameNearThemselves) {
   EXPECT_EQ(scene::origin_of({}), dvec3(0.0));
   const auto all = any_instances(20, 21);
@@ -358,7 +358,7 @@ TEST(Instances, AreVisitedAlikeWithATreeAndWithout) {
   }
 }
 
-// Coordinates at which a float's steps are as wide as a box: what rounding does, the tree does not change.
+// At coordinates where a float's steps are as wide as a box, results with and without the tree are still equal.
 TEST(Instances, FarFromTheOriginAreVisitedAlikeWithATreeAndWithout) {
   std::vector<Instance> instances = any_instances(100, 12);
   for (Instance& instance : instances)
@@ -390,7 +390,7 @@ TEST(Instances, OfSharedFacesHaveEachRayOnce) {
           vec3 d(0.0F);
           d[axis] = to;
           const Visits visits = visits_of(rays, {o, 3e38F, d, 0});
-          // Along the far face of all there is nothing.
+          // Rays along the upper outer faces hit nothing.
           ASSERT_EQ(visits.size(), i == 8 || j == 8 ? 0U : 4U) << axis << ' ' << i << ' ' << j;
           for (std::size_t k = 0; k < visits.size(); ++k)
             ASSERT_EQ(visits[k].entry, (to > 0.0F ? 50.0F : 18.0F) + 8.0F * static_cast<float>(k));
@@ -398,7 +398,7 @@ TEST(Instances, OfSharedFacesHaveEachRayOnce) {
       }
     }
   }
-  // From a corner that eight share, along their edges and away from them: one of them each.
+  // From a vertex shared by eight cubes, along their edges and away from them: each ray hits two cubes in succession.
   for (int way = 0; way < 27; ++way) {
     const vec3 d(way % 3 - 1, way / 3 % 3 - 1, way / 9 - 1);
     if (d == vec3(0.0F)) continue;
@@ -409,10 +409,10 @@ TEST(Instances, OfSharedFacesHaveEachRayOnce) {
   }
 }
 
-// ---- what is told of them ----
+// ---- the table's data ----
 
-// The middle of what two boxes have in common, from the corners of that: points on three of their twelve faces that are
-// behind none. How far inside of both it is; negative: there is none.
+// Finds a point inside the intersection of two boxes: the mean of the vertices where three of the twelve faces meet.
+// Returns how deep it is inside both boxes, negative if there is no intersection.
 double common_margin(const Instance& a, const Instance& b) {
   struct Face {
     dvec3 normal;
@@ -509,7 +509,7 @@ TEST(Instances, AreToldAsTheyAre) {
   }
 }
 
-// Its source gives off so much.
+// Sets the emitted power of the instance's source.
 void make_glow(Instance& instance, double power, double length) { instance.glow = {.power = power, .length = length}; }
 
 TEST(Instances, ArePickedByWhatTheyGiveOff) {
@@ -555,7 +555,7 @@ TEST(Instances, GiveOffAsMuchAsTheyAreLarge) {
   EXPECT_NEAR(table_of({one}).glow_length, 7.0 * std::cbrt(24.0), 1e-9);
   EXPECT_NEAR(table_of({one}).records[0].glow.extent, 7.0 * std::cbrt(24.0), 1e-5);
   EXPECT_EQ(table_of({one}).records[0].alias, 0xffffffffU);
-  // Two give off as much as one of twice the volume, however dark a third is.
+  // Two instances emit as much as one of twice the volume. A dark third one changes nothing.
   Instance dark = one;
   make_glow(dark, 0.0, 0.0);
   EXPECT_NEAR(table_of({one, dark, one}).glow_power, 2.0 * 5.0 * 24.0, 1e-9);
@@ -598,7 +598,7 @@ CUMULET_ON_BACKENDS(GlInstances);
 
 constexpr std::size_t most_visits = 32;
 
-// GPUs divide within two and a half units in the last place.
+// GPU division is accurate to two and a half units in the last place.
 bool is_alike(const Visit& a, const Visit& b) {
   return a.instance == b.instance && std::abs(a.entry - b.entry) <= 4e-6F * std::max(1.0F, std::abs(b.entry));
 }

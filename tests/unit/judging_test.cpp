@@ -1,4 +1,4 @@
-// What the benchmark's judgements of denoisers rest on.
+// Error metrics of the denoiser benchmark.
 #include "bench/judging.hpp"
 
 #include <gtest/gtest.h>

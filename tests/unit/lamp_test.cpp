@@ -1,4 +1,4 @@
-// The host's lamps, against closed forms and quadrature.
+// Lights of the host, compared with closed forms and quadrature.
 
 #include <gtest/gtest.h>
 
@@ -46,7 +46,7 @@ class Lamps : public test::ViewerTest {
     still_ = make();
     still_->set_light({});
   }
-  // Of the lamp and of a quad that is far from it.
+  // A model with a light and a quad far from it.
   void show_model_with_lamp(const vec3& position, float intensity) {
     surface::PunctualLight of_model;
     of_model.intensity = vec3(intensity);
@@ -71,7 +71,7 @@ class Lamps : public test::ViewerTest {
     grid.build.refine.threshold = -1.0;
     still_->set_grid(grid);
   }
-  // Straight down on a white floor below a slab of next to no density.
+  // Looks straight down at a white floor below a slab of nearly no density.
   void set_floor(const std::vector<surface::PunctualLight>& lights = {}) {
     still_->set_volume(test::slab());
     set_medium(1e-6, 0.0F);
@@ -88,7 +88,7 @@ class Lamps : public test::ViewerTest {
     scene->rest.lights = lights;
     still_->viewer().show_surfaces(test::source_of(scene));
   }
-  // What arrives at the floor's middle.
+  // Irradiance at the floor's center.
   double irradiance(std::uint32_t samples = 256) {
     const test::Picture picture = test::render(*still_, {16, 16, samples, 1, render::View::shaded});
     return picture.mean().x * pi;
@@ -101,7 +101,7 @@ CUMULET_ON_BACKENDS(Lamps);
 constexpr double above = 20.0;  // of the floor
 const dvec3 place(32.0, floor_y + above, 32.0);
 
-// The irradiance below its corner by a level rectangle of radiance 1 and sides a and b at that height.
+// Irradiance below a corner of a horizontal rectangle of radiance 1, with sides a and b, at height h.
 double quarter(double a, double b, double h) {
   const double x = std::hypot(a, h);
   const double y = std::hypot(b, h);
@@ -145,7 +145,7 @@ TEST_P(Lamps, LightAFloorByTheirFormFactors) {
   rectangle.height = 8.0;
   const double radiance = 1000.0 / (4.0 * 240.0);
   expect(rectangle, 4.0 * radiance * quarter(15.0, 4.0, above), "rectangle");
-  // Beside its middle along its width: half of it is above, to one side.
+  // The point is below the rectangle's edge: half of it is above, to one side.
   rectangle.position[2] += 15.0;
   rectangle.across[2] = -3.0;
   rectangle.across[1] = 100.0;
@@ -169,11 +169,11 @@ TEST_P(Lamps, LightAFloorByTheirFormFactors) {
   }
 }
 
-// Looks go by what arrives; nothing is lost of those that send little.
+// Lights are sampled by their contribution, and weak ones are still unbiased.
 TEST_P(Lamps, CountHoweverDimBesideBrighterOnes) {
   set_floor();
   std::vector<cumulet_lamp_desc> lamps{lamp(CUMULET_LAMP_POINT, place, 1.0F)};
-  auto away = lamp(CUMULET_LAMP_SPOT, place, 1e6F);  // shines up
+  auto away = lamp(CUMULET_LAMP_SPOT, place, 1e6F);  // faces up
   away.direction[1] = 1.0;
   lamps.push_back(away);
   set_lamps(lamps);
@@ -220,7 +220,7 @@ TEST_P(Lamps, LightWhatIsRasterised) {
   EXPECT_NEAR(irradiance(4), 3.0, 0.01) << "as bright as it says, however wide";
 }
 
-// Where paths do not meet the model its lamps are not looked for, and the host's are as they would be without it.
+// If the model is only rasterized, its lights are not sampled, and the host's lights are unaffected.
 TEST_P(Lamps, OfAModelThatIsNotMetChangeNothing) {
   still_->set_volume(test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
   set_medium(0.1, 1.0F, 1);
@@ -238,7 +238,7 @@ TEST_P(Lamps, OfAModelThatIsNotMetChangeNothing) {
   EXPECT_NEAR(mean(), alone, 0.01 * alone);
 }
 
-// A model's lamps light the volume of a preview as they light its picture, whether the host has one or not.
+// A model's lights light the volume in previews as in the final image, with and without lights of the host.
 TEST_P(Lamps, OfAModelLightTheVolumeOfPreviewsToo) {
   still_->set_volume(test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
   set_medium(0.1, 1.0F, 1);
@@ -268,7 +268,7 @@ TEST_P(Lamps, OfAnyBrightnessLeaveNumbers) {
   still_->set_volume(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
   set_medium(2.0, 1.0F);
   still_->set_camera(test::camera_at({8.0, 8.0, 60.0}, {8.0, 8.0, 8.0}, 20.0));
-  // In the medium, so that paths scatter close by, and of no size.
+  // Of size 0 and inside the medium, so that paths scatter close to them.
   auto spot = lamp(CUMULET_LAMP_SPOT, {8.0, 8.0, 8.0}, 9e29F);
   auto disc = lamp(CUMULET_LAMP_DISC, {8.0, 8.0, 12.0}, 9e29F);
   auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 9e29F);
@@ -284,7 +284,7 @@ TEST_P(Lamps, OfAnyBrightnessLeaveNumbers) {
 
 constexpr ivec3 box_size(24, 16, 24);
 
-// How far the segment from a to b lies in the box of voxels.
+// Length of the part of the segment from a to b that is inside the box of voxels.
 double inside(const dvec3& a, const dvec3& b) {
   double t_0 = 0.0;
   double t_1 = 1.0;
@@ -299,8 +299,8 @@ double inside(const dvec3& a, const dvec3& b) {
   return std::max(0.0, t_1 - t_0) * glm::length(b - a);
 }
 
-// Light scattered once, isotropically, into the ray through the box's middle along -z, of a lamp that sends
-// intensity(way to here) from points of its own, their mean.
+// Single isotropic scattering into the ray through the box's center along -z. The light emits intensity(vector from the
+// point) at sample points; the result is the mean over them.
 double scattered(double sigma, const std::vector<dvec3>& points, const std::function<double(const dvec3&)>& intensity) {
   constexpr int n = 2000;
   const double step = double(box_size.z) / n;
@@ -342,7 +342,7 @@ TEST_P(Lamps, ScatterOnceInAMediumAsByQuadrature) {
   auto wide = lamp(CUMULET_LAMP_RECTANGLE, beyond, float(power));
   wide.width = 40.0;
   wide.height = 10.0;
-  // Of the thin one all are looked for from points of flights, too; of the other those within.
+  // In the thin medium, equiangular sampling is used for all lights; in the other one, only for lights inside.
   for (const double sigma : {0.08, 0.004}) {
     set_medium(sigma, 1.0F, 1);
     for (const March march : {March::tet, March::dense, March::brick}) {
@@ -408,7 +408,7 @@ TEST(LampDescs, ZeroIsTheDefault) {
   EXPECT_EQ(made.power, vec3(2.0F));
   EXPECT_EQ(made.width, 1.0);
   EXPECT_EQ(made.height, 1.0);
-  // A direction of any length, and across that is not upright to it.
+  // A direction of any length, and a tangent that is not perpendicular to it.
   d.direction[2] = -1e-200;
   d.across[0] = 1.0;
   d.across[2] = 5.0;

@@ -1,5 +1,5 @@
-// Which lane traces a pixel, and how its path is cut into dispatches, does not show: there are more pixels than lanes,
-// and lanes that are done leave their places to others.
+// Persistent threads: the image does not depend on which lane traces a pixel or how a path is split over dispatches.
+// There are more pixels than lanes, and lanes that are done fetch new pixels.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ class Lanes : public CViewerTest {
  protected:
   Lanes() : CViewerTest(width, height) {}
 
-  /// With so much time a frame; frames: how many it took.
+  /// Renders with this budget per frame. frames: receives the number of frames.
   std::vector<float> picture(double budget_ms, bool surfaces, int& frames) {
     viewer_ = make_viewer({.get_proc = cumulet::headless::Context::get_proc, .user = context_.get(), .samples = 3});
     v_ = viewer_.get();

@@ -1,5 +1,5 @@
-// What a view does not change of a grid, kept: priorities that give the same splits as the criterion evaluated anew,
-// and coefficients that are the records'.
+// The lattice, which caches the view-independent data of a grid: priorities that give the same splits as evaluating the
+// criterion, and coefficients that equal the cell data.
 
 #include "grid/lattice.hpp"
 
@@ -31,7 +31,7 @@ grid::TetGrid grid_of(const grid::Statistics& statistics, const grid::DiamondSet
 }
 
 TEST(ViewLevels, AreThoseWhoseLongestEdgeCoversThePixels) {
-  // Edges counted by hand: a lattice sheared and stretched, seen from far.
+  // Edge lengths computed by hand: a sheared and stretched lattice, seen from far away.
   volume::ScalarVolume volume = test::noise_volume({60, 45, 50}, ivec3(0), 1);
   volume.index_to_world = glm::dmat4(1.0);
   volume.index_to_world[0] = {0.5, 0.0, 0.0, 0.0};
@@ -45,7 +45,7 @@ TEST(ViewLevels, AreThoseWhoseLongestEdgeCoversThePixels) {
   camera.eye = {16.0, 24.0, 5000.0};
   camera.tan_half_x = camera.tan_half_y = 1.0;
   for (const double pixel_length : {0.1, 0.5, 1.0, 1.9, 2.7, 3.9, 4.2, 9.0, 17.0, 35.0, 1000.0}) {
-    // About 5000 away, less the ball about the brick.
+    // At a distance of about 5000, minus the radius of the brick's bounding sphere.
     camera.pixels_per_radian = 1.0;
     settings.pixel_size = pixel_length / 5000.0;
     settings.camera = camera;
@@ -106,7 +106,7 @@ TEST(OwnPriorities, GiveTheSplitsThatEvaluatingAnewGives) {
   }
 }
 
-// A camera that trembles changes cells where each view has its own, and none where those that there were may stay.
+// A shaking camera changes many cells if each view is refined separately, and few if hysteresis keeps existing cells.
 TEST(OwnPriorities, InMotionKeepWhatMayStay) {
   const auto volume = test::noise_volume({120, 100, 110}, ivec3(0), 1);
   const grid::Statistics statistics(volume, grid::fit_cube(volume));
@@ -138,7 +138,7 @@ TEST(OwnPriorities, InMotionKeepWhatMayStay) {
   EXPECT_LT(kept_others, others / 10);
 }
 
-// Each place of the 42 is of one cell; what it has is what records have.
+// Each of the 42 coefficient entries belongs to one cell and equals that cell's record.
 TEST(Lattice, CoarseCellsHaveTheirRecords) {
   for (const test::SmallVolume& small : test::small_volumes()) {
     const grid::Statistics statistics(small.volume, grid::fit_cube(small.volume));
@@ -155,7 +155,7 @@ TEST(Lattice, CoarseCellsHaveTheirRecords) {
       const grid::Statistics::Node& node = statistics.node_at(corner, size);
       if (node.is_uniform()) return;
       ASSERT_EQ(node.log2_size, size);
-      // From the top down, as kernels do.
+      // Descends from the top, as kernels do.
       const ivec3 centre = corner + (1 << (size - 1));
       const auto scale = static_cast<std::uint32_t>((size - 1) / 3);
       std::uint32_t block = CM_TOP_BLOCK;
@@ -181,7 +181,7 @@ TEST(Lattice, CoarseCellsHaveTheirRecords) {
     if (small.volume.max_value == 0.0F) continue;
     EXPECT_GT(found, 20U) << small.name;
   }
-  // All places of a cube, each once.
+  // All entries of a cube, each once.
   std::set<std::uint32_t> places;
   for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
     const ivec3 corner(16, 48, 32);
@@ -225,7 +225,7 @@ TEST(Lattice, EdgesOfBricksAreThoseOfAllTheirCells) {
 }
 
 TEST(Lattice, PartsOfCellsFillThem) {
-  // In units of sixths of voxels each shape has half of the one before; middles balance about the centroid.
+  // In sixths of voxels, each shape has half of the previous one. The parts' centers balance about the centroid.
   const grid::CellParts& parts = grid::cell_parts();
   for (unsigned level = 0; level <= grid::brick_levels; ++level) {
     unsigned sixths = 0;

@@ -1,4 +1,4 @@
-// Depth of field, against closed forms of a thin lens.
+// Depth of field, compared with closed forms of a thin lens.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ using cumulet::test::VolumeRef;
 
 constexpr int side = 64;
 
-/// A square that glows, of that half edge, about a point of the axis.
+/// An emissive square centered on the axis at z, with this half edge.
 SurfacesRef make_glowing(float z, float half) {
   const std::array<float, 18> positions{-half, -half, z, half, -half, z, half,  half, z,
                                         -half, -half, z, half, half,  z, -half, half, z};
@@ -39,7 +39,7 @@ SurfacesRef make_glowing(float z, float half) {
   return cumulet::test::make_surfaces({&mesh, 1});
 }
 
-/// A dense box of one value, no larger than a point of it: voxels of that edge, in the middle of the axis at z.
+/// A single dense voxel with this edge length on the axis at z.
 VolumeRef make_speck(double z, double edge) {
   const std::array<float, 1> value{1.0F};
   auto desc = make_desc<cumulet_dense_desc>();
@@ -66,7 +66,7 @@ class Lens : public testing::Test {
     cumulet_camera* camera = nullptr;
     EXPECT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
     camera_.reset(camera);
-    desc_.eye[2] = 10.0;  // looks along -z, sharp at the origin
+    desc_.eye[2] = 10.0;  // looks along -z, in focus at the origin
     desc_.fovy_degrees = 2.0 * std::atan(0.4) * 180.0 / std::numbers::pi;
   }
   std::vector<float> picture() {
@@ -80,7 +80,7 @@ class Lens : public testing::Test {
   }
   struct Spot {
     double sum = 0.0;
-    double radius = 0.0;  // of an even disc of this second moment, in the plane that is sharp
+    double radius = 0.0;  // of a uniform disc with this second moment, in the focal plane
     double highest = 0.0;
   };
   /// channel: 0 red, 3 alpha.
@@ -110,7 +110,7 @@ class Lens : public testing::Test {
   cumulet_camera_desc desc_ = make_desc<cumulet_camera_desc>();
 };
 
-// A point at z is a disc of R |z - f| / z in the plane that is sharp, as bright as it was.
+// A point at z becomes a disc of radius R |z - f| / z in the focal plane, with the same total brightness.
 TEST_F(Lens, BlursSurfacesAsAThinLensDoes) {
   for (const float z : {-8.0F, 4.0F}) {
     SCOPED_TRACE(z);
@@ -139,7 +139,7 @@ TEST_F(Lens, HasSharpWhatIsInFocus) {
   const Spot focused = spot(picture(), 0, 13.0);
   EXPECT_NEAR(focused.radius, sharp.radius, 0.003 * sharp.radius);
   EXPECT_NEAR(focused.sum, sharp.sum, 0.003 * sharp.sum);
-  // Farther and nearer by the same in dioptres: the same blur.
+  // The same offset in diopters, farther and nearer, gives the same blur.
   desc_.focus_distance = 1.0 / (1.0 / 13.0 + 0.01);
   const double nearer = spot(picture(), 0, 13.0).radius;
   desc_.focus_distance = 1.0 / (1.0 / 13.0 - 0.01);
@@ -163,7 +163,7 @@ TEST_F(Lens, BlursVolumesInEveryMarch) {
     const Spot blurred = spot(picture(), 3, 10.0);
     EXPECT_NEAR(std::sqrt(blurred.radius * blurred.radius - sharp.radius * sharp.radius), 0.5, 0.02);
     EXPECT_NEAR(blurred.sum, sharp.sum, 0.05 * sharp.sum);
-    // AOVs see as pictures do.
+    // AOVs use the same lens as images.
     std::vector<float> clear(std::size_t{side} * side);
     ASSERT_EQ(cumulet_read_aov(viewer_.get(), CUMULET_AOV_TRANSMITTANCE, clear.data(), clear.size()), CUMULET_OK);
     std::vector<float> opacity(clear.size() * 4);
@@ -182,7 +182,7 @@ TEST_F(Lens, OfParallelRaysBlursInProportionToTheWayFromItsFocus) {
   desc_.lens_radius = 2.0;
   const Spot blurred = spot(picture(), 0, 10.0);
   EXPECT_NEAR(std::sqrt(blurred.radius * blurred.radius - sharp.radius * sharp.radius), 2.0 * 4.0 / 10.0, 0.02);
-  desc_.near_plane = 3.0;  // from which rays start, and the plane that is sharp stays
+  desc_.near_plane = 3.0;  // moves the ray origins; the focal plane stays
   const Spot later = spot(picture(), 0, 10.0);
   EXPECT_NEAR(std::sqrt(later.radius * later.radius - sharp.radius * sharp.radius), 2.0 * 4.0 / 7.0, 0.02);
 }

@@ -1,4 +1,4 @@
-// Threads of the library, which end before the process' statics do.
+// Threads of the library end before the process' statics are destroyed.
 
 #include "base/library_thread.hpp"
 
@@ -27,7 +27,7 @@ constexpr int left_well = 7;
 constexpr int read_destroyed = 8;
 constexpr int was_not_refused = 9;
 
-// A static that is created by its first use, as other libraries have them.
+// A static that is created by its first use, as in other libraries.
 class Table {
  public:
   Table() = default;
@@ -51,7 +51,7 @@ class LibraryThreadDeathTest : public testing::Test {
   void SetUp() override { testing::GTEST_FLAG(death_test_style) = "threadsafe"; }
 };
 
-// A thread that reads until it is stopped.
+// A thread that reads the table until it is stopped.
 struct Reader {
   std::atomic<bool> stopped = false;
   std::atomic<bool> reads = false;
@@ -79,11 +79,11 @@ TEST(LibraryThread, WaitsForItsWork) {
   EXPECT_FALSE(process_is_ending());
 }
 
-// Without it the table is destroyed under the thread: the status is 8 in nearly every run.
+// Without LibraryThread, the table is destroyed while the thread reads: the exit status is 8 in nearly every run.
 TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatThereWereBefore) {
   const auto leave = [] {
     table().read();
-    auto* const reader = new Reader;  // nobody destroys it
+    auto* const reader = new Reader;  // never destroyed
     reader->reads = true;
     std::this_thread::sleep_for(milliseconds(2));
     std::exit(left_well);
@@ -111,7 +111,7 @@ TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatJobsAndCallbacksCreate) {
   EXPECT_EXIT(leave(StaticsOf::job), testing::ExitedWithCode(left_well), "");
 }
 
-// The thread that exits cannot wait for itself.
+// The thread that calls exit() cannot wait for itself.
 TEST_F(LibraryThreadDeathTest, ItsOwnWorkMayExit) {
   const auto leave = [] {
     auto* const worker = new viewer::Worker([] {
@@ -124,7 +124,7 @@ TEST_F(LibraryThreadDeathTest, ItsOwnWorkMayExit) {
   EXPECT_EXIT(leave(), testing::ExitedWithCode(left_well), "");
 }
 
-// A job that waits is never begun, and who waits for it does not wait for ever; nor does another begin.
+// A queued job is never started during exit. A thread that waits for it returns, and later jobs are rejected.
 TEST_F(LibraryThreadDeathTest, WhoWaitsForAJobIsAnswered) {
   const auto leave = [] {
     auto* const worker = new viewer::Worker([] {});
@@ -149,7 +149,7 @@ TEST_F(LibraryThreadDeathTest, WhoWaitsForAJobIsAnswered) {
   EXPECT_EXIT((leave(), std::this_thread::sleep_for(std::chrono::minutes(1))), testing::ExitedWithCode(left_well), "");
 }
 
-// Calls under way on other threads end first; others are refused there, but not on the thread that exits.
+// Calls in progress on other threads end first. New calls are rejected on other threads, but not on the exiting one.
 TEST_F(LibraryThreadDeathTest, CallsOfOtherThreadsEndFirst) {
   const auto leave = [] {
     struct Last {
@@ -179,8 +179,8 @@ TEST_F(LibraryThreadDeathTest, CallsOfOtherThreadsEndFirst) {
   EXPECT_EXIT(leave(), testing::ExitedWithCode(left_well), "");
 }
 
-// It does not have the thread, and would wait for ever. (So would log4cplus for its own, which OpenVDB may link: hence
-// the child goes no further than the statics before ours.)
+// A forked child does not have the thread, so waiting for it would never end. log4cplus, which OpenVDB may link, has
+// the same problem with its own thread. Therefore the child exits in the destructor of the first static.
 TEST(LibraryThread, AForkedChildDoesNotWait) {
   struct Last {
     Last() = default;

@@ -1,4 +1,4 @@
-// Groups of lights: together they are the picture, and each is what a picture has with its lights alone.
+// Light groups: they add up to the image, and each equals an image with only its lights.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ class LightGroups : public CViewerTest {
     light();
   }
 
-  // All lights there are, or one group's alone.
+  // Enables all lights, or only those of one group.
   void light(std::optional<std::uint32_t> alone = std::nullopt) {
     const auto on = [&](std::uint32_t group) { return !alone || *alone == group; };
     auto far = make_desc<cumulet_light_desc>();
@@ -106,7 +106,7 @@ class LightGroups : public CViewerTest {
     double value = 0.0;
     double error = 0.0;
   };
-  // Over pixels and channels, of pictures of several seeds.
+  // Mean and standard error over several seeds.
   static Mean mean_of(const std::vector<double>& seeds) {
     Mean mean;
     for (const double value : seeds) mean.value += value / double(seeds.size());
@@ -169,7 +169,7 @@ class LightGroups : public CViewerTest {
 };
 CUMULET_ON_BACKENDS(LightGroups);
 
-// A pane that shines, and the same dark.
+// A pane that emits this radiance, or 0.
 SurfacesRef make_pane(float emission) {
   auto mesh = make_desc<cumulet_mesh_desc>();
   for (float& value : mesh.base_color) value = 0.6F;
@@ -213,7 +213,7 @@ TEST_P(LightGroups, MakeNoOtherPicture) {
   }
 }
 
-// A background of a colour, or none, is no light.
+// A constant or transparent background is not light: it is in no group.
 TEST_P(LightGroups, HaveTheBackgroundThatIsTheirs) {
   set(8, 0, groups);
   make();
@@ -246,7 +246,7 @@ TEST_P(LightGroups, BeyondThoseThatAreGatheredCountInTheFirst) {
   EXPECT_EQ(cumulet_read_light_group(v_, 1, nullptr, rgb.size()), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-// What instances give off is of their own media.
+// Emission of an instance belongs to its medium's group.
 TEST_P(LightGroups, OfInstancesAreTheirMedias) {
   auto desc = make_desc<cumulet_instance_desc>();
   auto medium = medium_;
@@ -275,7 +275,7 @@ TEST_P(LightGroups, OfInstancesAreTheirMedias) {
   EXPECT_EQ(sum_of(all[sun]), 0.0);
 }
 
-// What is added to later, or by another process, is as if it had been made at once.
+// Samples added later, or by another process, give the same result as rendering all at once.
 TEST_P(LightGroups, GoOnWithMoreSamplesAndFromWhatWasKept) {
   set(9, 0, groups);
   make();

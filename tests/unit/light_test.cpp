@@ -1,5 +1,5 @@
-// Which lights are looked for how often; and that a new kind of light is a few lines: one that is here alone, against
-// quadrature.
+// Selection probabilities of lights. A new kind of light takes a few lines: a kind that exists only here is compared
+// with quadrature.
 
 #include <gtest/gtest.h>
 
@@ -21,13 +21,13 @@
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
-// Marches share one signature; each leaves some of it unused. So do kinds of light.
+// Traversals of all grid types share one signature, so each leaves some parameters unused. Kinds of light do too.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
 namespace cumulet::core {
 
-/// The shaders' path tracer over voxels, as C++, with the disc among the lights.
+/// The shaders' path tracer over voxels, compiled as C++, with the disc light added.
 struct CpuDisc {
   CmParameters cm{};
   const volume::ScalarVolume* volume = nullptr;
@@ -47,7 +47,8 @@ struct CpuDisc {
 #undef CM_MORE_LIGHTS
 };
 
-/// And with so many lamps that a float has few bits beside their numbers: even ones are looked for at 0.3 of each two.
+/// A tracer with so many lights that a float has few bits below their index. Of each pair, the even one has probability
+/// 0.3.
 struct CpuManyLamps {
   static constexpr uint pairs = 1U << 21U;
   CmParameters cm{};
@@ -150,7 +151,7 @@ core::CmLamp point_lamp(const glm::dvec3& at, float power) {
   return light::lamp_record(lamp, glm::dvec3(0.0));
 }
 
-// Each lamp's chance is what its entries of the alias table give it.
+// Compares each light's stored probability, and the probability that its alias table entries give.
 void expect_chances(const std::vector<core::CmLamp>& records, const std::vector<double>& expected) {
   std::vector<double> drawn(records.size(), 0.0);
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -167,19 +168,20 @@ void expect_chances(const std::vector<core::CmLamp>& records, const std::vector<
 
 TEST(Lamps, AreLookedForByWhatArrivesOfThem) {
   const std::vector<light::Lit> ball{{glm::dvec3(0.0), 1.0}};
-  // As much of one twice as far as of one of a quarter of its power; those within count from the rim.
+  // A light at twice the distance with four times the power has the same probability. For lights inside the ball, the
+  // distance is clamped to its radius.
   std::vector<core::CmLamp> records{point_lamp({10, 0, 0}, 1.0F), point_lamp({0, 20, 0}, 4.0F),
                                     point_lamp({0, 0, 5}, 0.5F), point_lamp({0, 0.1, 0}, 0.01F)};
   const double arrives = light::share_looks(records, ball);
   EXPECT_NEAR(arrives, 0.05 / (4.0 * std::numbers::pi), 1e-6);
   expect_chances(records, {0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.4, 0.05 + 0.8 * 0.2});
 
-  // Where there are two, the mean of shares: near the second ball is the first lamp alone.
+  // With two lit balls, the mean of both: near the second ball only the first light counts.
   records.resize(2);
   light::share_looks(records, std::vector<light::Lit>{ball[0], {glm::dvec3(10, 0, 0), 1e-3}});
   expect_chances(records, {0.1 + 0.8 * 0.75, 0.1 + 0.8 * 0.25});
 
-  // A lamp whose range ends before is not left out: its light may be asked for where nothing is said to be.
+  // A light whose range ends before the ball keeps a small probability, because points outside of the ball may need it.
   records[0].range = 3.0F;
   light::share_looks(records, ball);
   expect_chances(records, {0.1, 0.9});
@@ -211,7 +213,7 @@ TEST(Lamps, WithoutLightOrAnythingLitAreLookedForAlike) {
   EXPECT_EQ(light::share_looks({}, {}), 0.0);
 }
 
-// One that fills its box is left to flights.
+// A fire that fills its bounds is left to scattered rays.
 TEST(Lights, SmallFiresLeaveLooksForDistantLamps) {
   light::SceneLights sun;
   sun.lamps = 1;  // no flux: there is no surface
@@ -233,7 +235,7 @@ TEST(Lights, SmallFiresAreLookedFor) {
 class NewLight : public test::ViewerTest {};
 CUMULET_ON_BACKENDS(NewLight);
 
-// Voxels alike, marched densely, seen from its front at its middle.
+// A box of equal voxels (dense grid), seen from its front at its center.
 struct BoxOfVoxels {
   static constexpr double sigma = 0.08;
   ivec3 voxels = {40, 16, 24};
@@ -251,7 +253,7 @@ struct BoxOfVoxels {
 // Single scattering in a homogeneous box below the disc, by quadrature.
 double single_scattering(const dvec3& size, double sigma, double g, double cosine) {
   constexpr int n = 48;
-  const dvec3 eye_way(0.0, 0.0, -1.0);  // of flight
+  const dvec3 eye_way(0.0, 0.0, -1.0);  // direction of the scattered ray
   double sum = 0.0;
   for (int i = 0; i < n; ++i) {
     const double depth = (i + 0.5) / n * size.z;
@@ -261,7 +263,7 @@ double single_scattering(const dvec3& size, double sigma, double g, double cosin
         const double angle = 2.0 * pi * (k + 0.5) / n;
         const double sine = std::sqrt(1.0 - mu * mu);
         const dvec3 w(sine * std::cos(angle), mu, sine * std::sin(angle));
-        // From the middle of the box's height and width, that deep.
+        // At the center of the box's height and width, at this depth.
         const dvec3 at(0.5 * size.x, 0.5 * size.y, size.z - depth);
         double out = 1e30;
         for (int axis = 0; axis < 3; ++axis) {
@@ -308,7 +310,7 @@ TEST_P(NewLight, ADiscOfFiniteAngleIsFoundByLooksAndByFlights) {
   }
 }
 
-// A sun of that angle overhead, whose radiance is 1.
+// A sun of radiance 1 overhead, with this angular diameter.
 viewer::Light overhead(double angle) {
   viewer::Light light;
   light.sun_elevation_degrees = 90.0F;
@@ -330,7 +332,7 @@ TEST_P(Sun, OfAnAngleLightsAMediumAsQuadratureHasItHoweverItIsFound) {
     const double expected = single_scattering(dvec3(box.voxels), BoxOfVoxels::sigma, g, std::cos(0.6));
     const test::Picture picture = test::render(*viewer, {8, 8, 256, 1, render::View::shaded});
     EXPECT_NEAR(picture.mean().x, expected, 0.02 * expected) << g;
-    // Looked for with the chance that a dark disc leaves it; without one, found by flights alone.
+    // The sun is sampled with the probability that a dark disc leaves to it: from NEE only to scattered rays only.
     core::CpuDisc cpu;
     cpu.cm = viewer->viewer().trace_parameters();
     cpu.cm.dispatch.samples = 256;
@@ -346,8 +348,8 @@ TEST_P(Sun, OfAnAngleLightsAMediumAsQuadratureHasItHoweverItIsFound) {
   }
 }
 
-// Paths through that box as they would be written down: every event looks for a sun without extent, and what escapes
-// finds the sky, or a sun that has one, by itself. No weights, no roulette. Mean and standard error.
+// A naive path tracer for this box: NEE for a sun of angle 0, otherwise escaping rays hit sky or sun. No MIS and no
+// Russian roulette. Returns mean and standard error.
 std::pair<double, double> plainly_traced(const dvec3& size, double sigma, double g, double albedo,
                                          const viewer::Light& light) {
   constexpr int paths = 400'000;
@@ -397,8 +399,8 @@ std::pair<double, double> plainly_traced(const dvec3& size, double sigma, double
   return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / paths)};
 }
 
-// Of many events, where looks that would tell little are left out: few for an even sky, few of many, and few
-// along directions in which little is scattered. (An even sky in white is the furnace of trace_test.)
+// Multiple scattering, where Russian roulette skips shadow rays of low contribution: for a uniform sky, at late events,
+// and for directions with little scattering. (trace_test has the white furnace.)
 TEST_P(Sun, AndSkyLightADeepMediumAsPlainPathsHaveIt) {
   const BoxOfVoxels box;
   const double sigma = 0.3;
@@ -478,7 +480,7 @@ TEST_P(Sun, OfAnyAngleSendsWhatItsSettingSaysAndHalfOfItAtAnEdge) {
     viewer->set_medium({1.0, vec3(1.0F), {}, 1});
     const double half = degrees * pi / 360.0;
     for (const double share : {-1.2, -0.5, 0.3, 0.7, 1.2}) {
-      // Where the edge cuts the disc, whose projection on the floor is even.
+      // The edge of the roof cuts the sun's disc, which projects uniformly on the floor.
       const double x = 10.0 * std::tan(half) * share;
       if (degrees < 1.0F && std::abs(share) < 1.0) continue;
       const double at = degrees > 0.0F ? x : (share > 0.0 ? 1.0 : -1.0);
@@ -488,7 +490,7 @@ TEST_P(Sun, OfAnyAngleSendsWhatItsSettingSaysAndHalfOfItAtAnEdge) {
       constexpr int n = 400;
       for (int i = 0; i < n * n; ++i) {
         const double mu_2 =
-            1.0 - std::pow(std::sin(half), 2.0) * (std::floor(double(i) / n) + 0.5) / n;  // even in projection
+            1.0 - std::pow(std::sin(half), 2.0) * (std::floor(double(i) / n) + 0.5) / n;  // uniform in projection
         const double turn = 2.0 * pi * (i % n + 0.5) / n;
         const double across = std::sqrt(1.0 - mu_2) * std::cos(turn) / std::sqrt(mu_2);
         if (degrees > 0.0F ? at + 10.0 * across > 0.0 : at > 0.0) sum += 1.0 / (n * n);
@@ -501,7 +503,7 @@ TEST_P(Sun, OfAnyAngleSendsWhatItsSettingSaysAndHalfOfItAtAnEdge) {
 class NewLightShader : public test::GlTest {};
 CUMULET_ON_BACKENDS(NewLightShader);
 
-// The same source among the shader's own.
+// The same light source code, added to the library's shader.
 TEST_P(NewLightShader, IsOneForDriversToo) {
   const gl::Shader* shader = gl::find_shader("trace.comp");
   ASSERT_NE(shader, nullptr);

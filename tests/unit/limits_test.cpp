@@ -1,4 +1,4 @@
-// What a viewer may take of the machine: threads, main memory and GL memory, and what becomes of what would take more.
+// Limits of a viewer for threads, main memory and GL memory, and the behavior if they do not suffice.
 
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
@@ -37,7 +37,7 @@ using cumulet::test::VolumeRef;
 using cumulet::viewer::Allowance;
 using cumulet::viewer::Worker;
 
-// How many threads are in here at a time, at most.
+// Counts the maximum number of threads that are inside at the same time.
 class Crowd {
  public:
   void visit() {
@@ -55,7 +55,7 @@ class Crowd {
   std::atomic<int> most_ = 0;
 };
 
-// Of all workers of a viewer together, whatever a job splits into.
+// The limit applies to all workers of a viewer together, including the tasks of their jobs.
 TEST(Allowance, ThreadsAreThoseOfAllWorkers) {
   for (const unsigned threads : {1U, 2U, 3U}) {
     const auto allowance = std::make_shared<Allowance>();
@@ -78,7 +78,7 @@ TEST(Allowance, ThreadsAreThoseOfAllWorkers) {
   }
 }
 
-// A part of a job that waits for its other parts does not take up another job, which may want what this one holds.
+// A thread of a job that waits for its other tasks does not run another job, which might need a lock that it holds.
 TEST(Allowance, JobsDoNotNest) {
   const auto allowance = std::make_shared<Allowance>();
   allowance->set(1, Allowance::no_limit);
@@ -96,7 +96,7 @@ TEST(Allowance, JobsDoNotNest) {
     EXPECT_TRUE(worker->wait(std::chrono::steady_clock::now() + std::chrono::seconds(60)));
 }
 
-// A job's failure comes through.
+// The exception of a job is reported.
 TEST(Allowance, FailuresAreTheJobs) {
   const auto allowance = std::make_shared<Allowance>();
   allowance->set(2, Allowance::no_limit);
@@ -125,7 +125,7 @@ class Limits : public testing::Test {
     EXPECT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
     return stats;
   }
-  // By frames alone; then nothing is under way, nor has failed.
+  // Renders frames until nothing is in progress, and expects no error.
   cumulet_stats settle(const ViewerPtr& viewer) {
     auto whole = target_.frame();
     whole.target = CUMULET_TARGET_NONE;
@@ -135,7 +135,8 @@ class Limits : public testing::Test {
     }
     return stats_of(viewer);
   }
-  // A cap that is an eighth of the cells too small cuts them, once, and leaves more than such a part. Returns the cap.
+  // Sets a limit that is too small by an eighth of the cells. Expects that the grid is rebuilt once and keeps more than
+  // 1 / part of the cells. Returns the limit.
   std::uint64_t expect_cut(const ViewerPtr& viewer, const cumulet_stats& all, std::uint64_t part) {
     const std::uint64_t room = all.gl_bytes - all.cell_bytes / 8;
     limit(viewer, 0, room);
@@ -162,7 +163,7 @@ TEST_F(Limits, AreRefusedInOneLine) {
   EXPECT_EQ(cumulet_set_limits(viewer.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-// However few threads, it is the same picture.
+// The image does not depend on the number of threads.
 TEST_F(Limits, ThreadsChangeNoPicture) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr free = make();
@@ -174,7 +175,7 @@ TEST_F(Limits, ThreadsChangeNoPicture) {
   }
 }
 
-// Cells are as coarse as it takes, and what does not fit at all is refused, while what was there stays.
+// Grids are coarsened to fit. Volumes that do not fit at all are rejected, and the previous image stays.
 TEST_F(Limits, MemoryIsKept) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr viewer = make();
@@ -186,7 +187,7 @@ TEST_F(Limits, MemoryIsKept) {
 
   const std::uint64_t some = all.memory_bytes - all.cells * 18;
   limit(viewer, some);
-  EXPECT_EQ(stats_of(viewer).cells, all.cells);  // what is there stays
+  EXPECT_EQ(stats_of(viewer).cells, all.cells);  // an existing grid is kept
   const auto coarse = picture_of(viewer.get(), ball.get(), target_);
   const cumulet_stats fewer = stats_of(viewer);
   EXPECT_LE(fewer.memory_bytes, some);
@@ -206,13 +207,13 @@ TEST_F(Limits, MemoryIsKept) {
   ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
   EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
   EXPECT_EQ(difference(target_.pixels(), coarse), "");
-  // With room again, it is there.
+  // With a larger limit, it is displayed.
   limit(viewer, 0);
   picture_of(viewer.get(), larger.get(), target_);
   EXPECT_EQ(stats_of(viewer).limited, 0);
 }
 
-// A march over voxels needs them all.
+// Voxel grid types cannot be coarsened.
 TEST_F(Limits, MemoryOfVoxelsIsKept) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr viewer = make();
@@ -229,8 +230,7 @@ TEST_F(Limits, MemoryOfVoxelsIsKept) {
   EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_OUT_OF_MEMORY);
 }
 
-// A grid is as coarse as it takes, and the one after it finds room, too.
-// Cells of a voxel: so many that a page of the heap is little beside them.
+// Refines to the voxels: so many cells that a page of the heap is small in comparison.
 void split_to_the_voxel(const ViewerPtr& viewer, cumulet_build build) {
   auto grid = make_desc<cumulet_grid_desc>();
   grid.threshold = -1.0;
@@ -254,7 +254,7 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
     ASSERT_EQ(all.limited, 0);
     picture_of(viewer.get(), make_ball(8).get(), target_);
     const cumulet_stats before = stats_of(viewer);
-    // Shaders take more than cells while they make them.
+    // The GPU build needs more memory than the cells.
     const std::uint64_t cells_bytes = build == CUMULET_BUILD_GPU ? 3 * all.cell_bytes : all.cell_bytes * 5 / 4;
     const std::uint64_t room = before.gl_bytes - before.cell_bytes + cells_bytes;
     limit(viewer, 0, room);
@@ -272,7 +272,7 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
       EXPECT_EQ(stats_of(viewer).cells, cut.cells) << "however often";
       EXPECT_LE(stats_of(viewer).gl_bytes, room);
     }
-    // With room again, all are there.
+    // With a larger limit, all cells are there.
     limit(viewer, 0, 0);
     picture_of(viewer.get(), large.get(), target_);
     EXPECT_EQ(stats_of(viewer).cells, all.cells);
@@ -280,8 +280,7 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
   for (const std::string& line : lines) EXPECT_EQ(line.find("on the CPU"), std::string::npos) << line;
 }
 
-// A smaller cap cuts the cells that are there, without being asked and without an error; a larger one refines them
-// again.
+// A smaller limit rebuilds existing grids automatically and without an error. A larger one refines them again.
 TEST_F(Limits, CellsFollowTheCap) {
   const VolumeRef ball = make_ball(56);
   for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
@@ -297,7 +296,7 @@ TEST_F(Limits, CellsFollowTheCap) {
   }
 }
 
-// Grids of other volumes have as much of the cap each, also those that come later, and refine again.
+// Each volume's grid gets its part of the limit, including volumes added later, and refines again.
 TEST_F(Limits, InstancesShareTheCap) {
   const std::vector<VolumeRef> balls = [] {
     std::vector<VolumeRef> made;
@@ -322,14 +321,14 @@ TEST_F(Limits, InstancesShareTheCap) {
     const cumulet_stats all = settle(viewer);
     ASSERT_EQ(all.limited, 0);
     ASSERT_GT(all.cells, own.cells);
-    // What is there is cut, and makes room for another.
+    // Existing grids shrink and make room for another volume.
     const std::uint64_t room = expect_cut(viewer, all, 12);
     add(3);
     const cumulet_stats more = settle(viewer);
     EXPECT_LE(more.gl_bytes, room);
     EXPECT_EQ(more.limited, 1);
     EXPECT_GE(more.cell_bytes, 32 * more.cells) << "all are in GL";
-    // All are shown: without a limit all have their cells.
+    // All volumes are displayed: without a limit each has its full grid.
     limit(viewer, 0, 0);
     const cumulet_stats free = settle(viewer);
     EXPECT_EQ(free.limited, 0);
@@ -339,7 +338,7 @@ TEST_F(Limits, InstancesShareTheCap) {
   }
 }
 
-// Also of a first grid, which was begun before there was a cap.
+// A limit also applies to the first grid if its build started before.
 TEST_F(Limits, CellsUnderWayFollowTheCap) {
   const VolumeRef ball = make_ball(56);
   auto frame = target_.frame();
@@ -357,9 +356,9 @@ TEST_F(Limits, CellsUnderWayFollowTheCap) {
   const ViewerPtr viewer = begin();
   limit(viewer, 0, room);
   auto result = make_desc<cumulet_frame_result>();
-  int refused = 0;  // what was built before may come first
+  int refused = 0;  // the grid built before the limit may arrive first
   for (int i = 0; i < 100000 && (result.flags & CUMULET_RENDER_CONVERGED) == 0; ++i) {
-    cumulet_wait(viewer.get(), 1.0);  // or not: frames that have nothing to draw take next to no time
+    cumulet_wait(viewer.get(), 1.0);  // frames that draw nothing take almost no time
     if (cumulet_render(viewer.get(), &frame, &result) == CUMULET_ERROR_OUT_OF_MEMORY) ++refused;
     ASSERT_LE(refused, 1) << cumulet_last_error(viewer.get());
   }
@@ -369,7 +368,7 @@ TEST_F(Limits, CellsUnderWayFollowTheCap) {
   EXPECT_GT(cut.cells, all.cells / 10);
 }
 
-// Where the lattice that GL builds of would leave little, the CPU's cells come instead, which need none.
+// If the lattice of a GPU build would leave little memory for cells, the CPU builds the grid, which needs no lattice.
 TEST_F(Limits, NoLatticeTakesTheCellsRoom) {
   const VolumeRef ball = make_ball(56);
   std::vector<std::string> lines;
@@ -397,7 +396,7 @@ TEST_F(Limits, NoLatticeTakesTheCellsRoom) {
       lines, [](const std::string& line) { return line.find("its grid is built on the CPU") != std::string::npos; }));
 }
 
-// One that was lowered and raised again before any cells were cut; one in which no cells fit.
+// Cells survive a limit that is lowered and raised again before a rebuild, and a limit in which no cells fit.
 TEST_F(Limits, CellsOutliveACapThatPasses) {
   const VolumeRef ball = make_ball(56);
   const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
@@ -423,7 +422,7 @@ TEST_F(Limits, GlMemoryIsKept) {
   const VolumeRef large = make_ball(96);
   const ViewerPtr viewer = make();
   auto grid = make_desc<cumulet_grid_desc>();
-  grid.march = CUMULET_MARCH_DENSE;  // bytes by the voxel
+  grid.march = CUMULET_MARCH_DENSE;  // memory in proportion to the voxels
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
   const auto before = picture_of(viewer.get(), small.get(), target_);
   const std::uint64_t room = stats_of(viewer).gl_bytes + 100'000;
@@ -435,12 +434,12 @@ TEST_F(Limits, GlMemoryIsKept) {
   EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_ERROR_OUT_OF_MEMORY);
   const std::string line = cumulet_last_error(viewer.get());
   EXPECT_EQ(line.rfind("uploading the volume needs ", 0), 0U) << line;
-  // Once; and the picture before stays.
+  // The error is returned once, and the previous image stays.
   target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
   EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
   EXPECT_EQ(difference(target_.pixels(), before), "");
   EXPECT_LE(stats_of(viewer).gl_bytes, room);
-  // With room again, it is there.
+  // With a larger limit, it is displayed.
   limit(viewer, 0, 0);
   auto whole = target_.frame();
   whole.target = CUMULET_TARGET_NONE;

@@ -1,4 +1,4 @@
-// States that lie in a host's textures and buffers: to the last bit what the same numbers are from memory.
+// Live volumes from a host's textures and buffers: bit-identical to the same values from main memory.
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ using Picture = std::vector<std::uint8_t>;
 constexpr Sides small = {24, 24, 24};
 constexpr Sides odd = {23, 31, 17};
 
-/// A number as a format keeps it: its bits, and what they stand for.
+/// A number as a format stores it: its bits and its value.
 struct Kept {
   std::vector<std::byte> bits;
   float value = 0.0F;
@@ -78,7 +78,7 @@ Kept keep(cumulet_voxel_format format, float v) {
   }
 }
 
-/// An array in a format, and what is in it.
+/// An array in a format, and its values.
 struct Array {
   std::vector<std::byte> bytes;
   std::vector<float> values;
@@ -101,7 +101,7 @@ constexpr auto types = std::to_array<Type>({{CUMULET_VOXEL_FORMAT_R32F, GL_R32F,
                                             {CUMULET_VOXEL_FORMAT_R16, GL_R16, GL_UNSIGNED_SHORT},
                                             {CUMULET_VOXEL_FORMAT_R8, GL_R8, GL_UNSIGNED_BYTE}});
 
-/// A host's objects; all of a context's functions.
+/// Textures and buffers of a host.
 class Objects {
  public:
   explicit Objects(const GladGLContext& gl) : gl_(gl) {}
@@ -191,7 +191,7 @@ State dense(const Sides& size, const std::vector<float>& values) {
   return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, values));
 }
 
-/// A host whose viewer goes through a FakeGl, and shows nothing yet.
+/// A host whose viewer uses a FakeGl and shows a live volume without a state.
 class LiveGl : public testing::Test {
  protected:
   ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
@@ -216,7 +216,7 @@ class LiveGl : public testing::Test {
     EXPECT_EQ(cumulet_get_live_info(v_, &info), CUMULET_OK) << cumulet_last_error(v_);
     return info.handed_state;
   }
-  // Frames until so many states came of what is on its way, and some more. Returns how many did.
+  // Renders until `count` states have arrived, and some more frames. Returns the number of arrived states.
   std::uint64_t arrive(std::uint64_t count = 1) {
     const std::uint64_t before = handed();
     cumulet_frame_desc frame = target_.frame();
@@ -230,7 +230,7 @@ class LiveGl : public testing::Test {
     return handed() - before;
   }
   Picture picture() { return test::drawn_once(v_, target_); }
-  // What the first frame that fails says, with the target as it leaves it.
+  // Returns the first failing frame's status. The target shows what that frame drew.
   cumulet_status frames_until_failure() {
     const cumulet_frame_desc frame = target_.frame();
     cumulet_status status = CUMULET_OK;
@@ -271,7 +271,7 @@ TEST_F(LiveGl, EveryFormatIsWhatItIsInMemory) {
       }
     }
   }
-  // What GL alone can say what it is: as its own read-back has it.
+  // A format without a CPU reference is compared with GL's own read-back.
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 3);
   const GLuint signs = objects_.texture(odd, GL_R16_SNORM, GL_RED, GL_FLOAT, values.data());
   std::vector<float> read(values.size());
@@ -302,8 +302,8 @@ TEST_F(LiveGl, ValuesFarFromOneArrive) {
   }
 }
 
-// Every half there is, signs, denormals and zeros of both signs among them; and of floats those that flushing would
-// change.
+// All finite halves, including negative ones, denormals and zeros of both signs; and floats that flushing denormals
+// would change.
 TEST_F(LiveGl, BitsStayWhatTheyAre) {
   constexpr Sides size = {64, 32, 31};
   std::vector<float> halves;
@@ -342,7 +342,7 @@ TEST_F(LiveGl, BitsStayWhatTheyAre) {
   expect_same(newest(live_), expected);
 }
 
-// All channels, of which three colours and three velocities lie in one texture each.
+// All channels; the three colors and the three velocities each share one texture.
 TEST_F(LiveGl, ComponentsAreFields) {
   State state = dense(odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
   const Array density(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
@@ -365,7 +365,7 @@ TEST_F(LiveGl, ComponentsAreFields) {
   expect_same(newest(live_), alone(state));
 }
 
-// z fastest, with gaps, not from the beginning; and voxels of three numbers each.
+// z fastest, with gaps and an offset, and voxels of three numbers each.
 TEST_F(LiveGl, BuffersHaveStrides) {
   for (const Type& type : types) {
     SCOPED_TRACE(type.format);
@@ -387,8 +387,8 @@ TEST_F(LiveGl, BuffersHaveStrides) {
   }
 }
 
-// Boxes of what changed, read between them or not, on top of states from GL and from memory, and boxes that are too
-// large, overlap, or lie outside.
+// Partial updates by boxes, with and without a read between them, on states from GL and from memory. Some boxes are too
+// large, overlap or are outside.
 TEST_F(LiveGl, BoxesAreTheWhole) {
   for (const bool from_memory : {false, true}) {
     for (const bool read : {false, true}) {
@@ -402,7 +402,7 @@ TEST_F(LiveGl, BoxesAreTheWhole) {
         const cumulet_state_desc desc = whole.desc();
         ASSERT_EQ(cumulet_live_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
       } else {
-        hand_over(fields);  // boxes follow while it is on its way
+        hand_over(fields);  // boxes follow while the state is in transfer
         ++on_their_way;
       }
       for (int step = 1; step < 5; ++step) {
@@ -417,7 +417,7 @@ TEST_F(LiveGl, BoxesAreTheWhole) {
         std::vector<cumulet_voxel_box> boxes{{{-9, 40, 0}, {-2, 99, 16}}, {{5, 5, 5}, {4, 9, 9}}};
         for (const Sides& b : State::bricks(odd, now.values, before.values)) {
           boxes.push_back({{b[0], b[1], b[2]}, {b[0] + 7, b[1] + 7, b[2] + 7}});
-          // A voxel is enough.
+          // A box of one voxel updates its whole brick.
           if (b[0] % 16 == 0) boxes.back() = {{b[0] + 3, b[1], b[2]}, {b[0] + 3, b[1], b[2]}};
           if (b[1] % 16 == 0) boxes.push_back({{b[0] - 100, b[1] + 1, b[2]}, {b[0], b[1] + 1, b[2] + 1}});
         }
@@ -427,7 +427,7 @@ TEST_F(LiveGl, BoxesAreTheWhole) {
       }
       EXPECT_EQ(arrive(on_their_way), on_their_way);
       expect_same(newest(live_), alone(dense(odd, before.values)));
-      // No box at all is a state, too.
+      // An update without any voxel is a state too.
       const std::uint64_t number = handed();
       hand_over(fields, {{{99, 99, 99}, {120, 120, 120}}});
       EXPECT_EQ(arrive(), 1U);
@@ -437,7 +437,7 @@ TEST_F(LiveGl, BoxesAreTheWhole) {
   }
 }
 
-// Memory's bricks on top of GL's state.
+// Updates a state from GL with bricks from main memory.
 TEST_F(LiveGl, TakesBricksFromMemory) {
   const Array before(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const auto now = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
@@ -451,7 +451,7 @@ TEST_F(LiveGl, TakesBricksFromMemory) {
   expect_same(newest(live_), alone(dense(odd, now)));
 }
 
-// What the host does with its texture after the call is no matter, to delete it among it; nor that others were deleted.
+// The host may change or delete its texture after the call.
 TEST_F(LiveGl, IsCopiedAtOnce) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
   const Array other(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 2));
@@ -466,7 +466,7 @@ TEST_F(LiveGl, IsCopiedAtOnce) {
   expect_same(newest(live_), alone(dense(odd, array.values)));
 }
 
-// However fast they come: the oldest on its way, and the newest.
+// If states are submitted faster than they arrive, the oldest one in transfer and the newest one arrive.
 TEST_F(LiveGl, TheNewestWinsAndNoneStarves) {
   std::vector<Array> arrays;
   std::vector<GLuint> names;
@@ -475,7 +475,7 @@ TEST_F(LiveGl, TheNewestWinsAndNoneStarves) {
                         simulated(CUMULET_CHANNEL_DENSITY, step % 2 == 0 ? odd : small, step));
     names.push_back(objects_.texture(step % 2 == 0 ? odd : small, types[0], arrays.back()));
   }
-  const LiveRef other = make_live();  // none of its states is lost to those
+  const LiveRef other = make_live();  // this live volume's state must not be lost
   const auto fields = std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, names[2])};
   const cumulet_gl_state_desc desc = state_of(fields);
   ASSERT_EQ(cumulet_live_set_gl(v_, other.get(), &desc), CUMULET_OK);
@@ -488,12 +488,12 @@ TEST_F(LiveGl, TheNewestWinsAndNoneStarves) {
     bytes.push_back(stats.gl_bytes);
     EXPECT_EQ(arrive(2), 2U);
     expect_same(newest(live_), alone(dense(small, arrays[5].values)));
-    picture();  // what else is in GL is the same in each round
+    picture();  // makes the other GL memory equal in each round
   }
   expect_same(newest(other), alone(dense(odd, arrays[2].values)));
-  // What else is in GL differs by some uploads; a state that stayed behind in each round would be more than this.
+  // Other GL memory differs by a few uploads. A leaked state per round would be more than this.
   EXPECT_LT(bytes[5], bytes[3] + 100'000) << "memory grows with states";
-  // While they come between frames all the time, pictures follow.
+  // While states are submitted between all frames, images are still drawn.
   cumulet_frame_desc frame = target_.frame();
   auto info = make_desc<cumulet_live_info>();
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
@@ -595,7 +595,7 @@ TEST_F(LiveGl, IsRefusedInOneLine) {
   EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(handed(), 0U);
 
-  // Nothing of this is in the way of what is right; of boxes, the state's channels.
+  // Errors do not affect later valid states. A partial update may only have channels of the state.
   hand_over(fine);
   std::vector<cumulet_gl_field> flame{texture};
   flame[0].channel = CUMULET_CHANNEL_FLAME;
@@ -605,7 +605,7 @@ TEST_F(LiveGl, IsRefusedInOneLine) {
   EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
   EXPECT_EQ(arrive(), 1U);
   EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
-  // A fence is waited for by the device.
+  // The GPU waits for the fence, not the CPU.
   desc = state_of(fine);
   const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
   desc.wait = fence;
@@ -613,7 +613,7 @@ TEST_F(LiveGl, IsRefusedInOneLine) {
   EXPECT_EQ(fake_.calls("WaitSync"), 1U);
   gl_.DeleteSync(fence);
   EXPECT_EQ(arrive(), 1U);
-  // Without the context, or one at all.
+  // While detached.
   ASSERT_EQ(cumulet_detach(v_), CUMULET_OK);
   EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_ERROR_DETACHED);
 }
@@ -637,7 +637,7 @@ TEST_F(LiveGl, WhatIsNotFiniteLeavesTheLastGoodState) {
         if (boxes) {
           hand_over(good_fields);
           states += arrive();
-          picture();  // all of its samples: what fails shows it as it is
+          picture();  // with all samples, because the failing frame draws this image again
           hand_over(fields, {{{0, 16, 8}, {7, 23, 15}}});
         } else {
           hand_over(fields);
@@ -684,7 +684,7 @@ TEST_F(LiveGl, WhatElseFailsInItsFrameIsToldToTheLog) {
   viewer_.reset();
 }
 
-// They were on top of that, not of the state before.
+// Boxes submitted after a rejected state are discarded with it, and not applied to the previous state.
 TEST_F(LiveGl, BoxesOnARefusedStateGoWithIt) {
   const Array good(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array next(CUMULET_VOXEL_FORMAT_R32F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
@@ -718,7 +718,7 @@ TEST_F(LiveGl, BoxesOnARefusedStateGoWithIt) {
   expect_same(newest(live_), alone(dense(odd, next.values)));
 }
 
-// What is on its way when the context goes never arrives; what was there stays, and the next arrives in the new one.
+// A state in transfer is lost with the context. The previous state stays, and the next one arrives in the new context.
 TEST_F(LiveGl, EndsWithItsContext) {
   const Array first(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array second(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
@@ -748,7 +748,7 @@ TEST_F(LiveGl, EndsWithItsContext) {
   EXPECT_FALSE(alive.empty());
 }
 
-// Lost in the midst of it, at each call.
+// The context is lost at various GL calls inside cumulet_live_set_gl.
 TEST_F(LiveGl, TheContextIsLostInTheCall) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const GLuint name = objects_.texture(odd, types[1], array);
@@ -783,7 +783,7 @@ TEST_F(LiveGl, WithoutMemoryNothingIsLost) {
   fake_.fail_storage(false);
   EXPECT_EQ(arrive(), 1U);
   expect_same(newest(live_), alone(dense(odd, array.values)));
-  // Nor where it lacks when the state is found.
+  // A failed allocation when the frame processes the state.
   hand_over(larger);
   fake_.fail_storage(true);
   cumulet_frame_desc frame = target_.frame();
@@ -816,7 +816,7 @@ TEST_F(LiveGl, NoCallWaitsForTheDevice) {
   EXPECT_EQ(fake_.uploaded() > 0, true);
 }
 
-// A sparse plume costs what it has: of what is empty nothing comes back.
+// Only occupied bricks of a sparse plume are copied back.
 TEST_F(LiveGl, CopiesBackWhatItHas) {
   constexpr Sides wide = {96, 96, 96};
   std::vector<float> values(96 * 96 * 96);
@@ -835,7 +835,7 @@ TEST_F(LiveGl, CopiesBackWhatItHas) {
   expect_same(newest(live_), alone(dense(wide, values)));
 }
 
-// Grids that GL builds are of these states, too.
+// GPU-built grids of states from GL.
 TEST_F(LiveGl, TheGridIsGlsToo) {
   viewer_ = make(CUMULET_BUILD_GPU);
   v_ = viewer_.get();
@@ -847,7 +847,7 @@ TEST_F(LiveGl, TheGridIsGlsToo) {
   EXPECT_EQ(difference(picture(), test::picture_of(single.get(), alone(dense(odd, array.values)).get(), target_)), "");
 }
 
-/// Of a live volume whose density stays in GL, and a viewer that builds there.
+/// A GPU-resident live volume and a viewer that builds grids on the GPU.
 class LiveInGl : public LiveGl {
  protected:
   void SetUp() override {
@@ -858,7 +858,7 @@ class LiveInGl : public LiveGl {
     v_ = viewer_.get();
     ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
   }
-  // Of the same numbers in main memory, by a viewer of its own.
+  // The image of the same values from main memory, made by another viewer.
   Picture reference(const std::vector<float>& values) {
     const ViewerPtr other = make(CUMULET_BUILD_GPU);
     return test::picture_of(other.get(), alone(dense(odd, values)).get(), target_);
@@ -881,7 +881,7 @@ class LiveInGl : public LiveGl {
   }
 };
 
-// Powers of two change no digit, and so no sample.
+// Scaling by a power of two changes no mantissa, so it changes no sample.
 TEST_F(LiveInGl, ExtremeValuesAreDrawnAsOrdinaryOnes) {
   const std::vector<float> plain = simulated(CUMULET_CHANNEL_DENSITY, odd, 0);
   auto medium = make_desc<cumulet_medium_desc>();
@@ -930,7 +930,7 @@ TEST_F(LiveInGl, EveryFormatIsTheSamePicture) {
   }
 }
 
-// Boxes, some of which empty bricks, built between them or not; in other precision, too. What was replaced goes.
+// Partial updates, some of which empty bricks, with and without a build between them. Replaced bricks are freed.
 TEST_F(LiveInGl, BoxesAreTheWhole) {
   const auto memory = [&] {
     auto stats = make_desc<cumulet_stats>();
@@ -942,7 +942,7 @@ TEST_F(LiveInGl, BoxesAreTheWhole) {
   const GLuint name = objects_.texture(odd, type, before);
   const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
   hand_over(fields);
-  // Where the whole stands is where its boxes do.
+  // The transform of partial updates is ignored; the state keeps its own.
   std::vector<cumulet_gl_field> parts = fields;
   for (double& x : parts[0].index_to_world) x = 0.0;
   std::uint64_t on_their_way = 1;
@@ -968,7 +968,7 @@ TEST_F(LiveInGl, BoxesAreTheWhole) {
   EXPECT_LE(memory(), most + most / 4);
 }
 
-// Whoever cannot do without voxels gets them, of the state that is there and of all that come.
+// If something needs the voxels in main memory, the current state and all later ones are read back.
 TEST_F(LiveInGl, ComesToMemoryWhereItIsNeeded) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
   const Picture expected = reference(array.values);
@@ -993,7 +993,7 @@ TEST_F(LiveInGl, ComesToMemoryWhereItIsNeeded) {
     picture();
     EXPECT_FALSE(shows_voxels());
     need.make();
-    EXPECT_EQ(arrive(), 1U);  // the same once more
+    EXPECT_EQ(arrive(), 1U);  // the same state again, now in main memory
     expect_same(newest(live_), alone(dense(odd, array.values)));
     EXPECT_EQ(difference(picture(), expected), "");
     EXPECT_TRUE(shows_voxels());
@@ -1004,7 +1004,7 @@ TEST_F(LiveInGl, ComesToMemoryWhereItIsNeeded) {
   }
 }
 
-// All that is refused of states in GL, and what is there stays.
+// Rejected states leave the current one.
 TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
   const Array good(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   hand_over_density(good, types[1]);
@@ -1018,7 +1018,7 @@ TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
     EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
     EXPECT_EQ(difference(target_.pixels(), before), "");
     EXPECT_EQ(handed(), 1U);
-    // Boxes on top of it have no state.
+    // Boxes after a rejected state have no state to update.
     const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], good))};
     cumulet_gl_state_desc boxes = state_of(fields);
     const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
@@ -1037,8 +1037,7 @@ TEST_F(LiveInGl, WhatIsRefusedLeavesTheLastGoodState) {
   EXPECT_EQ(difference(picture(), before), "");
 }
 
-// Of nothing at all, which is a state, too; of fields that stand apart, which come to main memory; and what comes there
-// by itself.
+// An empty state; fields with different transforms, which are read back to main memory; and states from main memory.
 TEST_F(LiveInGl, GoesAlongWithOtherStates) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array nothing(CUMULET_VOXEL_FORMAT_R16F, std::vector<float>(array.values.size(), 0.0F));
@@ -1070,7 +1069,7 @@ TEST_F(LiveInGl, GoesAlongWithOtherStates) {
 
 const std::vector<cumulet_channel> of_fire{CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_TEMPERATURE, CUMULET_CHANNEL_FLAME};
 
-// Density, temperature and flame of a step, in halves; or other channels.
+// Density, temperature and flame of a step, as halves; or other channels.
 class FireInGl : public LiveInGl {
  protected:
   explicit FireInGl(const std::vector<cumulet_channel>& channels = of_fire) : channels_(channels) {}
@@ -1088,7 +1087,7 @@ class FireInGl : public LiveInGl {
     }
     return made;
   }
-  // One of its channels has a voxel that is not finite.
+  // Returns the fire with one non-finite voxel in a channel.
   Fire spoilt(Fire fire, std::size_t channel) {
     auto values = fire.arrays[channel].values;
     values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::infinity();
@@ -1107,13 +1106,13 @@ class FireInGl : public LiveInGl {
     medium.blackbody = blackbody;
     ASSERT_EQ(cumulet_set_medium(viewer, &medium), CUMULET_OK) << cumulet_last_error(viewer);
   }
-  // By a viewer of its own, of the same in main memory.
+  // The image of the same fields from main memory, made by another viewer.
   Picture by_memory(const Fire& fire, float strength, float blackbody = 0.0F) {
     const ViewerPtr other = make(CUMULET_BUILD_GPU);
     burn(other.get(), strength, blackbody);
     return test::picture_of(other.get(), alone(in_memory(fire)).get(), target_);
   }
-  // By a viewer of its own, in GL.
+  // The image of the same GPU-resident fields, made by another viewer.
   Picture by_gl(const Fire& fire, float strength, float blackbody = 0.0F) {
     auto desc = make_desc<cumulet_live_desc>();
     desc.stays_in_gl = 1;
@@ -1125,13 +1124,13 @@ class FireInGl : public LiveInGl {
     EXPECT_EQ(cumulet_live_set_gl(other.get(), live.get(), &state), CUMULET_OK);
     return settled(other.get());
   }
-  // Once nothing comes any more.
+  // Renders until nothing changes any more.
   Picture settled(cumulet_viewer* viewer) {
     cumulet_frame_desc frame = target_.frame();
     frame.target = CUMULET_TARGET_NONE;
     for (int quiet = 0; quiet < 5;) {
       auto result = make_desc<cumulet_frame_result>();
-      cumulet_wait(viewer, 10.0);  // or not: there is more to come
+      cumulet_wait(viewer, 10.0);  // may time out; the loop continues
       if (cumulet_render(viewer, &frame, &result) != CUMULET_OK) {
         ADD_FAILURE() << cumulet_last_error(viewer);
         break;
@@ -1140,7 +1139,7 @@ class FireInGl : public LiveInGl {
     }
     return test::drawn_once(viewer, target_);
   }
-  // Of colours found in floats in place of doubles: paths go the same ways but for a few.
+  // Colors are computed in floats instead of doubles, so a few paths differ.
   static void expect_alike(const Picture& a, const Picture& b) {
     ASSERT_EQ(a.size(), b.size());
     std::size_t others = 0;
@@ -1151,7 +1150,7 @@ class FireInGl : public LiveInGl {
   std::vector<cumulet_channel> channels_;
 };
 
-// Fire, and all that a state may have.
+// Fire channels, and all channels that a state may have.
 class StatesInGl : public FireInGl, public testing::WithParamInterface<std::vector<cumulet_channel>> {
  protected:
   StatesInGl() : FireInGl(GetParam()) {}
@@ -1177,7 +1176,7 @@ TEST_P(StatesInGl, IsThatOfMainMemory) {
   }
 }
 
-// It is found anew, of voxels that stay.
+// The emission is recomputed from the GPU-resident voxels.
 TEST_F(FireInGl, FollowsTheMedium) {
   const Fire burning = fire(1);
   hand_over(burning.fields);
@@ -1191,7 +1190,7 @@ TEST_F(FireInGl, FollowsTheMedium) {
     EXPECT_FALSE(shows_voxels());
     before = now;
   }
-  // States that follow come with it.
+  // The next state arrives with it.
   const std::uint64_t states = handed();
   hand_over(fire(2).fields);
   settled(v_);
@@ -1231,7 +1230,7 @@ TEST_P(StatesInGl, ComesToMemoryWhereItIsNeeded) {
   EXPECT_EQ(difference(found, by_memory(burning, 2.0F)), "");
 }
 
-// Of viewers that share it each finds what it wants.
+// Viewers that share a live volume each compute the emission for their own medium.
 TEST_F(FireInGl, BurnsInEachViewerAsItIsTold) {
   cumulet_programs* programs = nullptr;
   const auto programs_desc = make_desc<cumulet_programs_desc>();
@@ -1258,7 +1257,7 @@ TEST_F(FireInGl, BurnsInEachViewerAsItIsTold) {
   }
 }
 
-// Where there is no memory to find it in, main memory has other ways.
+// If GL memory does not suffice for computing the emission, the fields are read back to main memory.
 TEST_F(FireInGl, WithoutMemoryItComesToMainMemory) {
   const Fire burning = fire(2);
   burn(v_, 2.0F);
@@ -1280,7 +1279,7 @@ TEST_F(FireInGl, WithoutMemoryItComesToMainMemory) {
   EXPECT_EQ(difference(found, by_memory(burning, 3.0F)), "");
 }
 
-// Whichever allocation fails, of a state whose light is wanted, it is told, and the next state is there.
+// Each allocation fails once. The error is returned, and the next state is displayed.
 TEST_F(FireInGl, WhateverIsNotAllocatedNothingIsLost) {
   const Fire first = fire(1);
   const Fire second = fire(2);
@@ -1290,7 +1289,7 @@ TEST_F(FireInGl, WhateverIsNotAllocatedNothingIsLost) {
   frame.target = CUMULET_TARGET_NONE;
   int failures = 0;
   int in_main_memory = 0;
-  int successes = 0;  // since the last failure; others of a frame's are among them
+  int successes = 0;  // since the last failure; other allocations of a frame are among them
   for (int allocation = 0; successes < 8 && !HasFailure(); ++allocation) {
     SCOPED_TRACE(allocation);
     auto desc = make_desc<cumulet_live_desc>();
@@ -1324,7 +1323,7 @@ TEST_F(FireInGl, WhateverIsNotAllocatedNothingIsLost) {
   EXPECT_GT(in_main_memory, 3) << "what it gives off was not found";
 }
 
-// Boxes on a state that was refused have none to be on top of, whatever is found of the one before.
+// Boxes after a rejected state are rejected, even after the previous state's emission is recomputed.
 TEST_F(FireInGl, NothingIsOnTopOfWhatIsRefused) {
   hand_over(fire(0).fields);
   settled(v_);
@@ -1340,7 +1339,7 @@ TEST_F(FireInGl, NothingIsOnTopOfWhatIsRefused) {
   EXPECT_EQ(refusal(boxes, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
 }
 
-// A host may do so wherever it is called back.
+// Hosts may call cumulet_cancel in any callback.
 TEST_F(FireInGl, IsCancelledInCallbacks) {
   struct Host {
     std::atomic<cumulet_viewer*> viewer = nullptr;
@@ -1351,7 +1350,7 @@ TEST_F(FireInGl, IsCancelledInCallbacks) {
                                .update =
                                    [](void* user) {
                                      auto& of = *static_cast<Host*>(user);
-                                     // Some of what is under way goes on.
+                                     // Lets some of the work continue.
                                      if (of.viewer != nullptr && ++of.calls % 3 == 0) cumulet_cancel(of.viewer);
                                    },
                                .update_user = &host,
@@ -1388,7 +1387,7 @@ TEST_F(FireInGl, WhatIsNotFiniteIsRefused) {
   EXPECT_EQ(difference(settled(v_), before), "");
 }
 
-// Another context cannot see the voxels; it gets them by way of main memory.
+// Another context cannot access the voxels. It gets them through main memory.
 TEST_F(LiveInGl, IsShownInOtherContexts) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Picture expected = reference(array.values);
@@ -1417,7 +1416,7 @@ TEST_F(LiveInGl, IsShownInOtherContexts) {
   context_.make_current();
 }
 
-// Boxes that follow when voxels were asked for, and no frame brought them yet.
+// Partial updates that follow after voxels were requested and before a frame has read them back.
 TEST_F(LiveInGl, BoxesFollowWhatIsBroughtBack) {
   const Type& type = types[1];
   const Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
@@ -1429,7 +1428,7 @@ TEST_F(LiveInGl, BoxesFollowWhatIsBroughtBack) {
   const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
   hand_over(fields);
   EXPECT_EQ(arrive(), 1U);
-  hand_over(fields, {{{0, 0, 0}, {9, 9, 9}}});  // on its way to GL
+  hand_over(fields, {{{0, 0, 0}, {9, 9, 9}}});  // in transfer to GL
   get_volume(CUMULET_ERROR_UNSUPPORTED);
   objects_.put(name, odd, GL_RED, type.type, now.bytes.data());
   hand_over(fields, boxes);
@@ -1438,7 +1437,7 @@ TEST_F(LiveInGl, BoxesFollowWhatIsBroughtBack) {
   EXPECT_EQ(difference(picture(), reference(now.values)), "");
 }
 
-// By another viewer boxes do not come, and what it does is no matter to the state.
+// Partial updates through another viewer are rejected, and that viewer has no effect on the state.
 TEST_F(LiveInGl, BoxesComeByTheSameViewer) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array))};
@@ -1471,7 +1470,7 @@ TEST_F(LiveInGl, BoxesComeByTheSameViewer) {
   EXPECT_FALSE(shows_voxels());
 }
 
-// Viewers that share programs have it together, and any of them brings voxels when one is needed.
+// Viewers that share programs share the GPU-resident state, and each of them can read voxels back.
 TEST_F(LiveInGl, IsSharedWithPrograms) {
   const Type& type = types[1];
   const Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
@@ -1498,7 +1497,7 @@ TEST_F(LiveInGl, IsSharedWithPrograms) {
   EXPECT_EQ(arrive(), 1U);
   EXPECT_EQ(difference(picture(), reference(before.values)), "");
   EXPECT_EQ(difference(test::drawn_once(other.get(), target_), reference(before.values)), "");
-  // Boxes come by either.
+  // Partial updates work through either viewer.
   objects_.put(name, odd, GL_RED, type.type, now.bytes.data());
   std::vector<cumulet_voxel_box> boxes;
   for (const Sides& b : State::bricks(odd, now.values, before.values))
@@ -1510,7 +1509,7 @@ TEST_F(LiveInGl, IsSharedWithPrograms) {
   EXPECT_EQ(difference(picture(), reference(now.values)), "");
   EXPECT_EQ(difference(test::drawn_once(other.get(), target_), reference(now.values)), "");
   EXPECT_EQ(handed(), 2U) << "nobody asked for voxels";
-  // It is the others' when the one goes that brought it, and comes to main memory by them.
+  // The state survives the viewer that submitted it. Another viewer can read it back.
   other.reset();
   EXPECT_EQ(difference(picture(), reference(now.values)), "");
   EXPECT_FALSE(shows_voxels());
@@ -1518,12 +1517,12 @@ TEST_F(LiveInGl, IsSharedWithPrograms) {
   EXPECT_EQ(arrive(), 1U);
   expect_same(newest(live_), alone(dense(odd, now.values)));
   EXPECT_EQ(difference(picture(), reference(now.values)), "");
-  // With the last of them it goes.
+  // The last viewer frees it.
   ASSERT_EQ(cumulet_context_lost(v_), CUMULET_OK);
   EXPECT_EQ(test::FakeGl::strays(), 0U);
 }
 
-// Boxes that one viewer has on its way to GL when another brings the rest to main memory go there, too.
+// One viewer has partial updates in transfer while another reads the rest back. The updates go to main memory too.
 TEST_F(LiveInGl, BoxesFollowWhatAnotherBroughtBack) {
   const Type& type = types[1];
   const Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
@@ -1576,7 +1575,7 @@ TEST_F(LiveInGl, EndsWithItsContext) {
     const Picture before = picture();
     ASSERT_EQ(lost ? cumulet_context_lost(v_) : cumulet_detach(v_), CUMULET_OK);
     ASSERT_EQ(cumulet_attach(v_, test::FakeGl::get_proc, &fake_), CUMULET_OK);
-    // Nothing of it is there, and all else goes on.
+    // The state is lost with the context; the rest continues.
     EXPECT_NE(difference(picture(), before), "");
     EXPECT_EQ(get_volume(CUMULET_ERROR_UNSUPPORTED),
               "the volume's voxels went with the context that they were in; hand over the next state");
@@ -1602,7 +1601,7 @@ TEST_F(LiveInGl, WithoutMemoryNothingIsLost) {
   EXPECT_EQ(difference(picture(), expected), "");
 }
 
-/// What needs no viewer.
+/// Tests that need no viewer.
 class Transfers : public test::GlTest {
  protected:
   void SetUp() override {
@@ -1620,7 +1619,7 @@ class Transfers : public test::GlTest {
   }
 };
 
-// Layer by layer, where the driver's storage blocks are small, of textures and of buffers, whole and boxes.
+// With small storage blocks, transfers run in layers: from textures and buffers, whole states and boxes.
 TEST_P(Transfers, SmallStorageBlocksAreEnough) {
   constexpr Sides size = {20, 17, 61};
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, size, 1);
@@ -1657,7 +1656,7 @@ TEST_P(Transfers, SmallStorageBlocksAreEnough) {
         test::expect_same_voxels(found.density, expected.density);
         EXPECT_GT(transfers->bytes(), 0U);
       }
-      // A layer alone is too much.
+      // Too small for one layer.
       limits.storage_block_bytes = 4096;
       render::VoxelTransfers refusing(gl_, programs_, limits, memories);
       const gl::StateGuard guard(*gl_);

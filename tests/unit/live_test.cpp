@@ -1,5 +1,5 @@
-// Live volumes, as hosts have them: each state is what it would be alone, the newest wins, none starves, and what is
-// refused leaves the last good one.
+// Live volumes in the C API: each state gives the same image as alone, the newest state is always displayed, and
+// rejected states leave the last good one.
 
 #include <gtest/gtest.h>
 
@@ -85,7 +85,7 @@ void expect_same(const VolumeRef& a, const VolumeRef& b) {
 
 class CLive : public cumulet::test::CPlaybackTest {
  protected:
-  // Of a viewer of its own, which never showed another.
+  // The image of a new viewer that shows only this state.
   Picture picture_alone(const State& state) {
     const ViewerPtr viewer = make();
     return picture_of(viewer.get(), alone(state).get(), target_);
@@ -95,7 +95,7 @@ class CLive : public cumulet::test::CPlaybackTest {
     EXPECT_EQ(cumulet_get_live_info(viewer.get(), &info), CUMULET_OK) << cumulet_last_error(viewer.get());
     return info;
   }
-  // Frames until that state is to be seen. Returns the states that were, in their order.
+  // Renders until this state is displayed. Returns the displayed states in order.
   std::vector<std::uint64_t> show(const ViewerPtr& viewer, std::uint64_t state) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     const auto frame = target_.frame();
@@ -159,10 +159,10 @@ TEST_F(CLive, IsRefusedInOneLine) {
   EXPECT_EQ(refusal(live, astray.desc(), CUMULET_ERROR_FILE),
             "smoke: density: its brick origin (4, 8, 8) is no multiple of 8");
   EXPECT_EQ(cumulet_live_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
-  // Nothing was handed over.
+  // No state was submitted.
   EXPECT_EQ(newest(live), nullptr);
 
-  // Updates.
+  // Partial updates.
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}});
   const auto no_update = [&](const State& state, const char* cause) {
@@ -181,7 +181,7 @@ TEST_F(CLive, IsRefusedInOneLine) {
   EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer shows no live volume");
 }
 
-// States whose grids GL builds: with and without channels, of sizes that change, each is what it is alone.
+// GPU-built grids of states with and without channels and of changing sizes. Each image equals that of the state alone.
 TEST_F(CLive, AStatesGridIsGlsToo) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make(CUMULET_BUILD_GPU);
@@ -198,7 +198,7 @@ TEST_F(CLive, AStatesGridIsGlsToo) {
   }
 }
 
-// Odd sizes, sizes and channels that change: to the last bit what it is alone, voxels and picture.
+// Odd sizes, and changing sizes and channels. Voxels and image are bit-identical to those of the state alone.
 TEST_F(CLive, AStateIsWhatItIsAlone) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
@@ -231,7 +231,7 @@ TEST_F(CLive, AStateIsWhatItIsAlone) {
   check(smoke(small, 7), "smoke again");
 }
 
-// Frames are those of VDB files, field by field.
+// Channels correspond to those of VDB files, field by field.
 TEST_F(CLive, ChannelsAreThoseOfFiles) {
   const VolumeRef volume = alone(fire(small, 0));
   const auto& frame = volume->asset->frame();
@@ -250,7 +250,8 @@ TEST_F(CLive, ChannelsAreThoseOfFiles) {
   }
 }
 
-// Brick by brick, read between updates or not, of bricks and of a dense array: what it is as a whole.
+// Partial updates by bricks, with and without reads between them, on sparse and dense states. The result equals the
+// whole state.
 TEST_F(CLive, AnUpdateIsTheWhole) {
   for (const bool dense : {true, false}) {
     for (const bool read : {true, false}) {
@@ -274,7 +275,7 @@ TEST_F(CLive, AnUpdateIsTheWhole) {
         const auto now = simulated(CUMULET_CHANNEL_DENSITY, odd, step);
         State changes;
         changes.sparse(CUMULET_CHANNEL_DENSITY, odd, now, State::bricks(odd, now, before));
-        // What is dense has no mask of its own.
+        // Dense states have no active mask.
         if (dense) changes.last_sparse().brick_active = nullptr;
         if (step % 2 == 0) {
           const auto heat = simulated(CUMULET_CHANNEL_TEMPERATURE, odd, step);
@@ -285,7 +286,7 @@ TEST_F(CLive, AnUpdateIsTheWhole) {
         before = now;
       }
       expect_same(newest(live), alone(whole(before, heat_before)));
-      // A picture, too.
+      // The image is equal too.
       const ViewerPtr viewer = make();
       ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
       EXPECT_EQ(difference(picture(viewer.get()), picture_alone(whole(before, heat_before))), "");
@@ -312,7 +313,7 @@ TEST_F(CLive, WhatIsRefusedLeavesTheLastGoodState) {
   }
   EXPECT_EQ(difference(picture(viewer.get()), good), "");
   EXPECT_EQ(info_of(viewer).handed_state, 1U);
-  // What cannot be shown though all are numbers is found out later: so far apart are no two voxels of a volume.
+  // Errors that appear only when the grid is built: the voxels are too far from each other for one volume.
   State far;
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, small, 1);
   far.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}});
@@ -338,7 +339,7 @@ TEST_F(CLive, WhatIsRefusedLeavesTheLastGoodState) {
   EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
   EXPECT_EQ(difference(target_.pixels(), good), "");
   EXPECT_EQ(info_of(viewer).drawn_state, 1U);
-  // Nothing can be put on top of it, and the next whole state goes on.
+  // It cannot be updated; the next whole state works.
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}});
   EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_live_update),
@@ -350,7 +351,7 @@ TEST_F(CLive, WhatIsRefusedLeavesTheLastGoodState) {
 struct Releases {
   std::atomic<int> count = 0;
   static void add(void* user) {
-    // From inside, the library refuses.
+    // Calls from inside the callback are rejected.
     EXPECT_EQ(cumulet_live_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
     ++static_cast<Releases*>(user)->count;
   }
@@ -373,15 +374,15 @@ TEST_F(CLive, MemoryThatIsHeldIsGivenBackOnce) {
   EXPECT_EQ(releases.count, 0);
   const cumulet_state_desc two = held(second);
   ASSERT_EQ(cumulet_live_set(live.get(), &two, error.data(), error.size()), CUMULET_OK) << error.data();
-  EXPECT_EQ(releases.count, 1);  // nobody had read the first
+  EXPECT_EQ(releases.count, 1);  // the first state was not read yet
   expect_same(newest(live), alone(second));
   EXPECT_EQ(releases.count, 2);
-  // Refused in the call: it stays the host's.
+  // Rejected in the call: the host keeps the memory.
   const State nothing;
   EXPECT_EQ(refusal(live, held(nothing), CUMULET_ERROR_INVALID_ARGUMENT),
             "smoke: has neither density nor temperature nor flame");
   EXPECT_EQ(releases.count, 2);
-  // Refused when it is read: the last good one stays, and it goes back.
+  // Rejected when it is read: the last good state stays, and the memory is released.
   auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
   values[State::at({22, 30, 16}, odd)] = std::numeric_limits<float>::quiet_NaN();
   State bad;
@@ -393,7 +394,7 @@ TEST_F(CLive, MemoryThatIsHeldIsGivenBackOnce) {
   EXPECT_STREQ(error.data(), "smoke: density: its voxel (22, 30, 16) is not finite");
   EXPECT_EQ(releases.count, 3);
   expect_same(newest(live), alone(second));
-  // No voxels are kept of it.
+  // The library keeps no voxels of it.
   ASSERT_EQ(cumulet_live_set(live.get(), &two, error.data(), error.size()), CUMULET_OK);
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 3), {{8, 8, 8}});
@@ -414,7 +415,8 @@ TEST_F(CLive, MemoryGoesBackWithTheHandle) {
   EXPECT_EQ(releases.count, 1);
 }
 
-// A host has a lock of its own around its memory, which it holds as well while it asks for the newest state.
+// The release callback is called without a lock of the library. The host holds a lock of its own in it, and while it
+// asks for the newest state.
 TEST_F(CLive, MemoryGoesBackUnderNoLock) {
   static std::recursive_mutex pool;
   const LiveRef live = make_live();
@@ -455,8 +457,8 @@ TEST_F(CLive, ViewersGoWhileStatesCome) {
   host.join();
 }
 
-// A host that hands over far faster than states are built and drawn: states are seen in their order, each that was
-// taken up is seen, and the last is.
+// A host submits states much faster than they are built and drawn. States are displayed in order, each built state is
+// displayed, and so is the last one.
 TEST_F(CLive, NoneStarvesAndTheNewestWins) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
@@ -468,7 +470,7 @@ TEST_F(CLive, NoneStarvesAndTheNewestWins) {
   states.reserve(8);
   for (int step = 0; step < 8; ++step) states.push_back(smoke(small, step));
   hand_over(live, states[0]);
-  show(viewer, 1);  // compiled
+  show(viewer, 1);  // programs are compiled
 
   std::atomic<bool> stop = false;
   std::atomic<std::uint64_t> handed = 1;
@@ -497,13 +499,13 @@ TEST_F(CLive, NoneStarvesAndTheNewestWins) {
   const cumulet_live_info info = info_of(viewer);
   EXPECT_EQ(info.drawn_count, info.ready_count);
   EXPECT_EQ(info.handed_state, handed);
-  // And it is that state's picture.
+  // The final image is that of the last state.
   sampling.preview = CUMULET_PREVIEW_OFF;
   ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(states[(handed - 1) % states.size()])), "");
 }
 
-// Slower than that, each is seen.
+// At a slower rate, each state is displayed.
 TEST_F(CLive, EachIsSeenIfThereIsTime) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
@@ -537,7 +539,7 @@ cumulet_live_info told_of(const ViewerPtr& viewer, const InstanceRef& instance) 
   return info;
 }
 
-// Instances of it show what instances of the state's own volume would, beside the viewer's own live volume.
+// Instances of a live volume look like instances of the state's own volume, beside the viewer's own live volume.
 TEST_F(CLive, InstancesShowItsNewestState) {
   const LiveRef live = make_live();
   const LiveRef own = make_live();
@@ -566,7 +568,7 @@ TEST_F(CLive, InstancesShowItsNewestState) {
     const InstanceRef b = stand(other, volume.get(), 30.0);
     EXPECT_EQ(difference(shown, picture(other.get())), "");
   }
-  // Hidden and shown again it is the newest.
+  // After it was hidden, an instance shows the newest state.
   auto hidden = make_desc<cumulet_instance_desc>();
   hidden.live = live.get();
   std::ranges::copy(at(-20, 0, 0), hidden.to_world);
@@ -600,7 +602,8 @@ TEST_F(CLive, InstancesOfItAreRefusedInOneLine) {
   EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer does not show the instance");
 }
 
-// However fast states come, each that an instance takes up is seen, and the newest last; while it comes and goes.
+// States change quickly while the instance is added and removed. Each state that the instance builds is displayed, and
+// the newest last.
 TEST_F(CLive, NoneOfAnInstancesStarves) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
@@ -651,7 +654,7 @@ TEST_F(CLive, SeveralViewersAndThreads) {
   const auto hands_over = [&](const State& state, HandOver how) {
     const cumulet_state_desc desc = state.desc();
     while (!stop) {
-      how(live.get(), &desc, nullptr, 0);  // updates may come before the first state
+      how(live.get(), &desc, nullptr, 0);  // partial updates may precede the first state
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   };
@@ -686,7 +689,7 @@ TEST_F(CLive, VolumesAndLiveOnesTakeTurns) {
   const VolumeRef ball = make_ball(20);
   const Picture of_ball = picture_of(viewer.get(), ball.get(), target_);
   ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
-  // What was there stays until there is a state.
+  // The previous volume stays until the first state arrives.
   EXPECT_EQ(difference(picture(viewer.get()), of_ball), "");
   hand_over(live, smoke(small, 1));
   const Picture of_smoke = picture_alone(smoke(small, 1));
@@ -699,7 +702,7 @@ TEST_F(CLive, VolumesAndLiveOnesTakeTurns) {
   EXPECT_EQ(difference(picture(viewer.get()), of_ball), "");
   ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(smoke(small, 2))), "");
-  live.reset();  // the viewer has its share
+  live.reset();  // the viewer keeps a reference
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(smoke(small, 2))), "");
   ASSERT_EQ(cumulet_set_live(viewer.get(), nullptr), CUMULET_OK);
   double box[6];
@@ -716,7 +719,7 @@ TEST_F(CLive, OtherSettingsAreThoseOfTheNewest) {
   grid.threshold = 0.02;
   grid.cells = CUMULET_CELLS_CONSTANT;
   for (int i = 0; i < 3; ++i) {
-    if (i == 1) grid.camera_adaptive = 1;  // cells that follow the camera wait for one
+    if (i == 1) grid.camera_adaptive = 1;  // camera-adaptive grids need a camera
     if (i == 2) grid.march = CUMULET_MARCH_BRICK;
     ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
     hand_over(live, fire(small, 2 + i));
@@ -727,7 +730,7 @@ TEST_F(CLive, OtherSettingsAreThoseOfTheNewest) {
   }
 }
 
-// Cameras that fit and grounds below go by the bounds that were told, not by what is there so far.
+// Fitted cameras and the ground plane use the declared bounds, not those of the current state.
 TEST_F(CLive, NothingJumps) {
   auto desc = make_desc<cumulet_live_desc>();
   for (double& x : desc.bounds_min) x = -8.0;

@@ -1,4 +1,4 @@
-// Loads: which failures are reported and for how long, and that paths are those of the moment of the call.
+// Loading: which failures are reported and for how long, and that relative paths are resolved at the call.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -78,7 +78,7 @@ class Loading : public testing::Test {
     EXPECT_EQ(cumulet_get_progress(v_, &progress), CUMULET_OK);
     return progress;
   }
-  // Both name this file, or neither has anything to say.
+  // Expects that the status and the frame report a failure of this file.
   void expect_reported(const std::string& file) {
     SCOPED_TRACE(file);
     EXPECT_EQ(wait(), CUMULET_ERROR_FILE);
@@ -126,12 +126,12 @@ TEST_F(Loading, AFailureIsReportedUntilOtherWorkBegins) {
     for (const auto& other : others) {
       kind.fail();
       expect_reported(kind.file);
-      expect_reported(kind.file);  // as often as it is asked for
+      expect_reported(kind.file);  // with each call
       other();
       expect_none();
       expect_none();
       kind.fail();
-      expect_reported(kind.file);  // the same failure, but another one
+      expect_reported(kind.file);  // an equal failure of a new load
     }
   }
 }
@@ -141,7 +141,7 @@ TEST_F(Loading, AnUnreportedFailureIsNotForgotten) {
   ASSERT_EQ(cumulet_load_volume(v_, clip_.path(0).c_str(), nullptr), CUMULET_OK);
   ASSERT_EQ(cumulet_set_environment(v_, nullptr), CUMULET_OK);
   expect_reported("none.gltf");
-  // Each of several has its turn, and its own status in any case.
+  // Several failures are reported one after another. Each kind also has its own status.
   ASSERT_EQ(cumulet_load_environment(v_, "none.hdr"), CUMULET_OK);
   ASSERT_EQ(cumulet_load_volume(v_, "none.vdb", nullptr), CUMULET_OK);
   expect_reported("none.vdb");
@@ -161,7 +161,7 @@ TEST_F(Loading, SettingAKindClearsItsFailure) {
   const auto clear = [&](const char* file, cumulet_status set) {
     SCOPED_TRACE(file);
     EXPECT_EQ(set, CUMULET_OK);
-    // At the call, not when somebody waits.
+    // Cleared by the call, without a wait.
     const cumulet_progress told = progress();
     EXPECT_EQ(told.status, CUMULET_OK) << told.message;
     EXPECT_EQ(told.volume_status, CUMULET_OK);
@@ -193,7 +193,7 @@ TEST_F(Loading, SettingAKindClearsItsFailure) {
   }
 }
 
-// An instance whose file is missing, and a dynamic volume that does not fit.
+// An instance whose file is missing, and a live volume that does not fit.
 TEST_F(Loading, DynamicVolumesAndInstancesFollowTheSameRule) {
   const auto live_desc = make_desc<cumulet_live_desc>();
   const LiveRef live = test::made_by<LiveRef>(cumulet_live_create, live_desc);
@@ -253,7 +253,7 @@ TEST_F(Loading, AFrameReportsAsWaitDoes) {
     EXPECT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
     return (result.flags & CUMULET_RENDER_FAILED) != 0;
   };
-  // Without a call of wait that reports it.
+  // Reported by a frame without a call of cumulet_wait.
   ASSERT_EQ(cumulet_load_surfaces(v_, "none.gltf"), CUMULET_OK);
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (!failed() && std::chrono::steady_clock::now() < until)
@@ -268,7 +268,7 @@ TEST_F(Loading, AFrameReportsAsWaitDoes) {
   EXPECT_TRUE(failed());
   ASSERT_EQ(cumulet_set_volume(v_, nullptr), CUMULET_OK);
   EXPECT_FALSE(failed());
-  viewer_.reset();  // while there is the context
+  viewer_.reset();  // before its context
 }
 
 TEST(ReportedFailures, CopiesAreTheSameFailure) {
@@ -299,7 +299,7 @@ TEST(ReportedFailures, CopiesAreTheSameFailure) {
 
 // ---- paths ----
 
-// The process' current folder, until it goes.
+// Sets the process' current folder during its lifetime.
 class CurrentFolder {
  public:
   explicit CurrentFolder(const std::filesystem::path& folder) { std::filesystem::current_path(folder); }
@@ -324,7 +324,7 @@ TEST(FilePaths, AreThoseOfTheMomentAndHaveTheNameThatWasGiven) {
   EXPECT_EQ(whole.absolute(), here / "b.vdb");
   EXPECT_EQ(other.absolute(), here / "c.vdb");
   EXPECT_EQ(FilePath().absolute(), std::filesystem::path());
-  // A folder that was removed: the name as it was given.
+  // If the current folder was removed, the name stays as given.
   std::filesystem::current_path(here.path());
   std::filesystem::create_directory("gone");
   std::filesystem::current_path("gone");
@@ -332,13 +332,13 @@ TEST(FilePaths, AreThoseOfTheMomentAndHaveTheNameThatWasGiven) {
   EXPECT_EQ(FilePath("d.vdb").absolute(), std::filesystem::path("d.vdb"));
 }
 
-// A worker reads while the current folder is another: it waits until the folder has changed.
+// A worker reads after the current folder has changed.
 TEST_F(Loading, RelativePathsAreOfTheFolderAtTheCall) {
   const Folder elsewhere;
   const CurrentFolder current(folder_.path());
   for (int frame = 0; frame < 2; ++frame)
     std::filesystem::copy_file(clip_.path(frame), "clip." + std::to_string(frame) + ".vdb");
-  // What the workers do meanwhile keeps them from the files.
+  // Work of other kinds delays the workers until the folder has changed.
   const auto after_leaving = [&](const char* what, const std::function<void()>& call) {
     SCOPED_TRACE(what);
     std::filesystem::current_path(folder_.path());
@@ -364,7 +364,7 @@ TEST_F(Loading, RelativePathsAreOfTheFolderAtTheCall) {
   ASSERT_EQ(wait(), CUMULET_OK) << error();
   ASSERT_EQ(cumulet_rebuild(v_), CUMULET_OK);
   ASSERT_EQ(wait(), CUMULET_OK) << error();
-  // Messages have the name that was given.
+  // Messages contain the name as given.
   ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 2.0), CUMULET_OK);
   ASSERT_EQ(wait(), CUMULET_OK) << error();
   std::array<char, 256> cause{};
@@ -379,7 +379,7 @@ TEST_F(Loading, RelativePathsAreOfTheFolderAtTheCall) {
   expect_missing(cumulet_load_environment(v_, "gone.hdr"), "gone.hdr");
 }
 
-// An inspection reads a grid's voxels when it is asked for them.
+// An inspection reads a grid's voxels later, on request.
 TEST_F(Loading, AnInspectionReadsTheFileThatWasNamed) {
   const Folder elsewhere;
   const CurrentFolder current(std::filesystem::path(clip_.path(0)).parent_path());

@@ -1,4 +1,4 @@
-// Readers, writers and messages in a host whose locales group digits and have a decimal comma.
+// Readers, writers and messages in a host whose locales group digits and use a decimal comma.
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -35,7 +35,7 @@ namespace {
 using namespace cumulet;
 namespace fs = std::filesystem;
 
-/// 1234567.5 is 1.234.567,5 with it.
+/// Formats 1234567.5 as 1.234.567,5.
 class Grouping final : public std::numpunct<char> {
  protected:
   [[nodiscard]] char do_decimal_point() const override { return ','; }
@@ -43,10 +43,10 @@ class Grouping final : public std::numpunct<char> {
   [[nodiscard]] std::string do_grouping() const override { return "\3"; }
 };
 
-/// The process' locales while it lives.
+/// Sets the process' locales during its lifetime.
 class HostileLocales {
  public:
-  /// also_c: C's as well as C++'s.
+  /// also_c: sets the C locale in addition to C++'s.
   explicit HostileLocales(bool also_c) : cpp_(std::locale::global(std::locale(std::locale::classic(), new Grouping))) {
     const char* before = std::setlocale(LC_ALL, nullptr);
     c_ = before == nullptr ? "C" : before;
@@ -88,7 +88,7 @@ std::string error_of(Call&& call) {
   }
 }
 
-/// All that is read and written, by what it is.
+/// All texts that are read and written, by kind.
 using Texts = std::map<std::string, std::string>;
 
 openvdb::FloatGrid::Ptr dot(const std::string& name, float value) {

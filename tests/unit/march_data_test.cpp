@@ -1,5 +1,5 @@
-// Grids of a set share buffers: whatever stands beside it, in however many pages, shaders find what each has, and one
-// that was there before is not brought again.
+// Grids of a set share buffers. Shaders find each grid's data for any neighbors and any number of pages, and grids that
+// are already uploaded are not uploaded again.
 
 #include "render/march_data.hpp"
 
@@ -33,13 +33,14 @@ class Random {
  public:
   explicit Random(unsigned seed) : engine_(seed) {}
   std::uint32_t operator()() { return static_cast<std::uint32_t>(engine_()); }
-  // Of what there is in a record, whose bits shaders take as they are.
+  // Random data of a record type. Shaders read its bits unchanged.
   template <class T>
   std::vector<T> records(std::size_t count) {
     std::vector<T> all(count);
     for (T& record : all) {
       std::array<std::uint32_t, (sizeof(T) + 3) / 4> words{};
-      for (std::uint32_t& word : words) word = (*this)() & 0xbfffffffU;  // floats that are no NaN, or drivers turn bits
+      for (std::uint32_t& word : words)
+        word = (*this)() & 0xbfffffffU;  // floats that are not NaN, because drivers change NaN bits
       std::memcpy(static_cast<void*>(&record), words.data(), sizeof record);
     }
     return all;
@@ -73,13 +74,13 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
   return source;
 }
 
-// What is in a grid's cells, channels, tree and roots, as shaders have it: in the order of `kinds`.
+// A grid's cells, channels, tree and roots as shaders read them, in the order of `kinds`.
 constexpr std::array kinds{"records", "emission", "glow", "colour", "anisotropy", "velocity", "tree", "roots"};
 std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
   const grid::TetGrid& grid = *source->grid;
   std::array<Words, kinds.size()> words;
   for (const grid::CellRecord& cell : grid.cells) words[0].insert(words[0].end(), {cell.links, cell.data});
-  // Of a grid that has none, data() may be null, which memcpy must not be given.
+  // If a grid has none, data() may be null, which memcpy does not allow.
   const auto copy_words = [](Words& to, const void* from, std::size_t count) {
     to.resize(count);
     if (count > 0) std::memcpy(to.data(), from, count * sizeof to.front());
@@ -116,7 +117,7 @@ class GridSets : public test::GlTest {
     return work.take();
   }
 
-  // By kernels, which know the grid and what is bound.
+  // Reads the data with a compute shader that uses the library's accessors.
   Words read(const MarchData& data, const core::CmGrid& grid, std::size_t kind, std::size_t count) {
     std::string text = "#version 450\nlayout(local_size_x = 64) in;\n#define CM_CHANNELS 1\n#define CM_VELOCITY 1\n";
     for (const std::string& define : data.defines(false)) text += "#define " + define + "\n";
@@ -175,7 +176,7 @@ class GridSets : public test::GlTest {
 
   std::unique_ptr<test::FakeGl> fake_;
   std::unique_ptr<gl::WordHeap> heap_;
-  // Of odd sizes, as parts of one page, of two, and at the end of the last.
+  // Odd sizes: inside one page, across two, and at the end of the last.
   const MarchSourcePtr plain_ = source_of({.cells = 1900, .tree = 301}, 1);
   const MarchSourcePtr coloured_ = source_of(
       {.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .velocity = 301, .tree = 99}, 2);
@@ -225,7 +226,7 @@ TEST_P(GridSets, AnExchangeBringsOnlyWhatIsNew) {
   }
 }
 
-// A set of one, as it was when there were no sets: nothing is before it but its roots.
+// A set of one grid is laid out as a grid without sets, except for its roots.
 TEST_P(GridSets, WhatIsLargeGoesInPieces) {
   const MarchSourcePtr large = source_of({.cells = 200000, .tree = 200000}, 5);  // 6.4 MB and 0.8 MB
   MarchUpload work(gl_, gl::query_limits(*gl_), *heap_, {plain_, large});
@@ -245,7 +246,8 @@ TEST_P(GridSets, WhatIsLargeGoesInPieces) {
   expect_whole(copy.take(), {large, plain_}, "copied");
 }
 
-// Of voxels it takes a texture of the whole box: no reason to refuse what has few bricks in it.
+// Velocity of a voxel grid needs a dense texture of the whole bounds. If it does not fit, a sparse volume is still
+// accepted.
 TEST_P(GridSets, MotionThatDoesNotFitIsLeftOut) {
   const auto brick_source = [](int size, bool moves) {
     const volume::ScalarVolume ends =

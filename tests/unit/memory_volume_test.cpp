@@ -1,4 +1,4 @@
-// Volumes of the C ABI: files, dense and sparse voxels in memory, and grids of the host's own OpenVDB.
+// Volumes of the C API: files, dense and sparse voxels in memory, and grids of the host's own OpenVDB.
 
 #include <cumulet/cumulet.h>
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ Volume made(Call&& call) {
   return Volume(volume);
 }
 
-/// Runs a call that must fail so, with one line.
+/// Runs a call that must fail with this status and a one-line message, which it returns.
 template <class Call>
 std::string refused(cumulet_status status, Call&& call) {
   int dummy = 0;
@@ -94,7 +94,7 @@ struct Sparse {
   void brick(int x, int y, int z, float value = 1.0F) {
     origins.insert(origins.end(), {x, y, z});
     values.insert(values.end(), 512, value);
-    values.back() = 2.0F;  // not of one value
+    values.back() = 2.0F;  // not constant
   }
   void tile(Coord min, Coord max, float value = 0.5F, int active_flag = 1) {
     tiles.push_back({{min.x(), min.y(), min.z()}, {max.x(), max.y(), max.z()}, value, active_flag});
@@ -192,7 +192,7 @@ TEST(DenseVolume, TellsItsInfo) {
   const std::array<double, 3> high{3.5, 2.5, 1.5};
   EXPECT_TRUE(std::equal(low.begin(), low.end(), info.bounds_min));
   EXPECT_TRUE(std::equal(high.begin(), high.end(), info.bounds_max));
-  // A host of an older header knows only of the first fields.
+  // A host of an older header has only the first members.
   cumulet_volume_info shorter{};
   shorter.struct_size = offsetof(cumulet_volume_info, bounds_min);
   ASSERT_EQ(cumulet_volume_get_info(volume.get(), &shorter), CUMULET_OK);
@@ -218,7 +218,7 @@ TEST(DenseVolume, RefusesWhatIsWrong) {
   EXPECT_HAS(wrong(argument, [](Dense& d) { d.desc.value_count = ~std::uint64_t{0}; }), "more than memory holds");
   EXPECT_HAS(wrong(argument, [](Dense& d) { d.desc.size[1] = 0; }), "size is (9, 0, 11)");
   EXPECT_HAS(wrong(argument, [](Dense& d) { d.desc.size[2] = -11; }), "size is");
-  // 2^30 x 2^30 x 2^4 is 0 in 64 bits.
+  // 2^30 x 2^30 x 2^4 overflows to 0 in 64 bits.
   EXPECT_HAS(wrong(argument,
                    [](Dense& d) {
                      d.desc.size[0] = d.desc.size[1] = 1 << 30;
@@ -245,7 +245,7 @@ TEST(DenseVolume, RefusesWhatIsWrong) {
 
 TEST(DenseVolume, TakesDefaults) {
   Dense dense(2, 2, 2);
-  dense.at(1, 1, 1) = -3.0F;  // clamped, silently: there is no log
+  dense.at(1, 1, 1) = -3.0F;  // clamped without a message, because there is no log
   dense.at(0, 1, 1) = 1.0F;
   dense.desc.name = nullptr;
   const Volume volume = made(dense.call());
@@ -273,7 +273,7 @@ TEST(DenseVolume, CountsWhatCountsAsZero) {
   EXPECT_EQ(info.max_value, 2.0F);
   EXPECT_EQ(value_at(inside(volume), {0, 0, 0}), 0.0F);
 
-  // Nothing at all is a volume, too.
+  // An empty volume is valid.
   const Volume nothing = made(Dense(2, 2, 2).call());
   ASSERT_EQ(cumulet_volume_get_info(nothing.get(), &info), CUMULET_OK);
   EXPECT_EQ(info.active_voxels, 0U);
@@ -295,7 +295,7 @@ TEST(SparseVolume, HoldsBricksTilesAndBackground) {
   sparse.active.assign(16, 0);
   sparse.active[0] = 1;                              // voxel (8, -16, 0)
   sparse.active[8 + 7] = std::uint64_t{1} << 63U;    // voxel (-1, 7, 31)
-  sparse.tile({16, 0, 0}, {18, 40, 3}, 1.5F);        // no power of two, not aligned
+  sparse.tile({16, 0, 0}, {18, 40, 3}, 1.5F);        // not a power of two, not aligned
   sparse.tile({16, 41, 0}, {90, 49, 30}, 0.75F, 0);  // inactive, partly outside
   sparse.desc.background = 0.25F;
   sparse.desc.name = "tree";
@@ -309,7 +309,7 @@ TEST(SparseVolume, HoldsBricksTilesAndBackground) {
     return sparse.values[512 * brick + static_cast<std::size_t>(64 * x + 8 * y + z)];
   };
   EXPECT_EQ(value_at(v, {8, -16, 0}), in_brick(0, 0, 0, 0));
-  EXPECT_EQ(value_at(v, {13, -14, 7}), in_brick(0, 5, 2, 7));  // inactive voxels count within the bounds
+  EXPECT_EQ(value_at(v, {13, -14, 7}), in_brick(0, 5, 2, 7));  // inactive voxels count inside the bounds
   EXPECT_EQ(value_at(v, {-1, 3, 26}), in_brick(1, 7, 3, 2));
   EXPECT_EQ(value_at(v, {-2, 3, 26}), 0.0F);  // outside
   EXPECT_EQ(value_at(v, {17, 40, 3}), 1.5F);
@@ -349,7 +349,7 @@ TEST(SparseVolume, RefusesWhatIsWrong) {
   EXPECT_HAS(wrong(argument, [](Sparse& s) { s.tile({30, 0, 0}, {30, 9, 9}, 1.0F, 2); }), "active is 2");
   EXPECT_HAS(wrong(content, [](Sparse& s) { s.desc.index_to_world[0] = 1.0; }), "not affine");
   EXPECT_HAS(wrong(content, [](Sparse& s) { s.brick(1 << 21, 0, 0); }), "span 2097160 x 8 x 8 voxels");
-  // The ends of the integers.
+  // Limits of the integer type.
   EXPECT_HAS(wrong(content,
                    [](Sparse& s) {
                      const int least = std::numeric_limits<int>::min();
@@ -379,7 +379,7 @@ TEST(SparseVolume, RefusesWhatIsWrong) {
   EXPECT_HAS(null([](auto& desc) { ++desc.struct_size; }), "struct_size");
 }
 
-// The check for overlaps against all pairs, on tiles of all shapes; with disjoint ones it has to find nothing.
+// Compares the overlap check with a test of all pairs, on tiles of many shapes. For disjoint tiles it must find none.
 TEST(SparseVolume, FindsEveryOverlapAndNoOther) {
   std::mt19937 random(12);
   const auto pick = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
@@ -391,7 +391,7 @@ TEST(SparseVolume, FindsEveryOverlapAndNoOther) {
     for (int i = 0; i < count; ++i) {
       Coord low(pick(120), pick(120), pick(120));
       Coord high = low.offsetBy(pick(4), pick(4), pick(4));
-      high[pick(3)] += pick(longest);  // sticks
+      high[pick(3)] += pick(longest);  // bars
       if (round % 5 == 0) {
         low = Coord(9 * i, 0, 0);  // plates side by side
         high = Coord(9 * i + 8 + (pick(4 * count) == 0 ? 1 : 0), 500, 500);
@@ -487,7 +487,7 @@ TEST_F(OpenVdbVolume, IsTheOneOfTheFile) {
   }
   const auto wide = rich<openvdb::DoubleGrid>(0.0F);
   expect_identical(inside(copy(wide)), inside(open(write({wide}))));
-  // Values that half holds exactly: written as half, or half in memory.
+  // Values that are exact halves: stored as half in the file, or half in memory.
   const auto narrow = rich(0.0F);
   narrow->setSaveFloatAsHalf(true);
   const Volume file = open(write({narrow}));
@@ -633,12 +633,12 @@ TEST_F(OpenVdbVolume, FilesOpenAndFail) {
   EXPECT_HAS(refused(CUMULET_ERROR_FILE, opening("/nowhere/x.vdb", nullptr)), "/nowhere/x.vdb: no such file");
   EXPECT_HAS(refused(CUMULET_ERROR_INVALID_ARGUMENT, opening(nullptr, nullptr)), "path is NULL");
   EXPECT_EQ(cumulet_volume_open(file.c_str(), "density[1]", nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
-  // A control cube does not hold it; the message names the file all the same.
+  // A control cube cannot hold it; the message still names the file.
   other->tree().setValue(Coord(500000, 0, 0), 1.0F);
   const std::string wide = write({other});
   const std::string line = refused(CUMULET_ERROR_UNSUPPORTED, opening(wide.c_str(), nullptr));
   EXPECT_EQ(line.rfind(wide + ": ", 0), 0U) << line;
-  // A message longer than its buffer is cut, and ends.
+  // A message longer than its buffer is truncated and terminated.
   std::array<char, 12> buffer{};
   buffer.fill('x');
   cumulet_volume* volume = nullptr;
@@ -662,14 +662,14 @@ TEST_F(OpenVdbVolume, ListsGrids) {
   EXPECT_EQ(listed[0], (std::array<std::string, 3>{"density[0]", "float", ""}));
   EXPECT_EQ(listed[1], (std::array<std::string, 3>{"surface", "float", "is a level set, not a fog volume"}));
   EXPECT_EQ(listed[2][0], "density[1]");
-  // Every name that can be shown opens by that name.
+  // Every listed name can be opened.
   expect_identical(inside(open(file, "density[0]")), inside(open(file, "density[1]")));
 
   EXPECT_EQ(cumulet_list_grids("/nowhere/x.vdb", list, &listed, error, sizeof error), CUMULET_ERROR_FILE);
   EXPECT_STREQ(error, "/nowhere/x.vdb: no such file");
   EXPECT_EQ(cumulet_list_grids(nullptr, list, &listed, error, sizeof error), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_list_grids(file.c_str(), nullptr, nullptr, error, sizeof error), CUMULET_ERROR_INVALID_ARGUMENT);
-  // What a host throws goes no further than the call.
+  // An exception of a host's callback does not leave the call.
   const auto throwing = [](void*, const char*, const char*, const char*) { throw std::runtime_error("host's own"); };
   EXPECT_EQ(cumulet_list_grids(file.c_str(), throwing, nullptr, error, sizeof error), CUMULET_ERROR_INTERNAL);
   // A callback may not open files, and gets NULL instead.
@@ -718,7 +718,7 @@ TEST(VolumeHandle, IsCountedByManyThreads) {
   EXPECT_TRUE(asset.expired());
 }
 
-// Grids of a host's own OpenVDB as a live volume's state: the density is that of the volume by itself.
+// Grids of a host's own OpenVDB as a state of a live volume. The density equals that of a volume made from it.
 TEST(LiveOpenVdb, IsTheVolume) {
   const auto density = openvdb::FloatGrid::create();
   const auto heat = openvdb::DoubleGrid::create();

@@ -1,4 +1,4 @@
-// cumulet-merge: parts of a picture by samples that are known one by one, and parts that do not belong together.
+// cumulet-merge: partial renders made of known samples, and parts that do not belong together.
 
 #include "merge.hpp"
 
@@ -29,7 +29,7 @@ constexpr std::uint32_t width = 5;
 constexpr std::uint32_t height = 3;
 constexpr std::size_t pixels = std::size_t{width} * height;
 
-/// What a file is of: a test changes what it is about.
+/// Description of a part; tests change single members.
 struct Description {
   std::uint32_t width = ::width;
   std::string version = "0.2.0";
@@ -40,7 +40,7 @@ struct Description {
   bool error = true;
   bool volume = false;
   bool denoised = false;
-  std::string manifest = {};  // of mattes; "": there are none
+  std::string manifest = {};  // of the Cryptomatte; "": there is none
   bool whole = true;          // every pixel has its samples
 };
 
@@ -48,7 +48,7 @@ double luminance(const std::array<double, 4>& rgba) { return 0.2126 * rgba[0] + 
 
 class Merge : public ::testing::Test {
  protected:
-  /// That sample of a pixel: some are dark, and few are bright.
+  /// The value of this sample of a pixel: some are dark, few are bright.
   static std::array<double, 4> sample(std::size_t pixel, std::uint64_t number) {
     std::mt19937_64 dice(1000 * number + pixel);
     std::uniform_real_distribution<double> u(0.0, 1.0);
@@ -56,7 +56,7 @@ class Merge : public ::testing::Test {
     return {bright, 0.5 * bright, 0.25 * bright + 0.1 * u(dice), u(dice) < 0.5 ? 1.0 : 0.0};
   }
 
-  /// The file of those samples, as cumulet-render would have it.
+  /// Writes a file of those samples, in the format of cumulet-render.
   std::string part(std::uint64_t first, std::uint64_t samples, const Description& of = {}) {
     std::vector<float> rgba;
     std::vector<float> errors;
@@ -85,7 +85,7 @@ class Merge : public ::testing::Test {
     if (of.error) all.push_back({layers::error, errors});
     if (of.volume) all.push_back({layers::volume, rgba});
     if (of.denoised) all.push_back({layers::denoised, rgba});
-    // Two that were not merged, as ids have no mean.
+    // Two layers that are not merged, because ids cannot be averaged.
     std::vector<float> mattes;
     for (std::size_t i = 0; i < rgba.size(); ++i) mattes.push_back(static_cast<float>(i) * 1e-30F);
     if (!of.manifest.empty()) {
@@ -180,7 +180,7 @@ TEST_F(Merge, WhatIsMergedIsAPartOfMore) {
   const demo::Merged merged = merge({folder_ / "late.exr", early}, output());
   EXPECT_EQ(merged.samples, 16u);
   expect_layer(part(0, 16), layers::error, 1e-5);
-  // One alone is itself.
+  // Merging one part gives that part.
   EXPECT_EQ(merge({early}, output()).samples, 3u);
   expect_layer(early, layers::beauty, 0.0);
 }

@@ -1,4 +1,4 @@
-// The two levels of a scene's triangles: rays meet what they meet among the same triangles laid out in the world.
+// The two-level BVH of models: rays hit the same triangles as in a scene where all triangles are in world space.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ std::shared_ptr<test::StillScene> lumps(std::mt19937& random) {
   return scene;
 }
 
-// Of any kind: turned, sheared, stretched by up to 10 to 1, and every second one mirrored.
+// A random transform: rotated, sheared and stretched by up to 10 to 1; mirrored on request.
 dmat4 any_place(std::mt19937& random, bool mirrored) {
   std::uniform_real_distribution<double> even(-1.0, 1.0);
   dmat4 place(1.0);
@@ -43,7 +43,7 @@ struct Met {
   dvec3 normal{0.0};  // towards the ray
 };
 
-// Among all triangles in the world, in double precision (Moeller and Trumbore).
+// Nearest hit among all triangles in world space, in double precision (Moeller and Trumbore).
 Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const dvec3& d) {
   Met met;
   for (std::size_t m = 0; m < models.size(); ++m) {
@@ -126,7 +126,7 @@ TEST(Models, NormalsAreUprightOnWhatIsSheared) {
       ASSERT_TRUE(rays.cm_trace_models(o, d, 0.0F, 1e30F, false, hit));
       EXPECT_TRUE(hit.front);
       const auto point = rays.cm_surface_point(hit.triangle, hit.barycentrics, d, false);
-      // An ellipsoid's: the gradient of |A^-1 (p - c)|^2.
+      // Of an ellipsoid: the gradient of |A^-1 (p - c)|^2.
       const dvec3 own = glm::inverse(glm::dmat3(place)) * (dvec3(point.position) - dvec3(place[3]));
       const dvec3 expected = glm::normalize(glm::transpose(glm::inverse(glm::dmat3(place))) * own);
       EXPECT_GT(glm::dot(dvec3(point.material.smooth_normal), expected), 0.97) << i;
@@ -135,7 +135,7 @@ TEST(Models, NormalsAreUprightOnWhatIsSheared) {
   }
 }
 
-// Chances of emissive triangles are by the area that they have where they stand, and sum to 1.
+// Probabilities of emissive triangles are proportional to their world-space area and sum to 1.
 TEST(Models, EmissiveTrianglesAreFoundByTheirArea) {
   auto scene = std::make_shared<test::StillScene>();
   scene->materials.push_back(test::diffuse(vec3(0.0F)));

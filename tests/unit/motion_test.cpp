@@ -1,4 +1,4 @@
-// Where what pixels show was a frame ago, against projections in double precision.
+// Motion vectors: positions of the visible points one frame ago, compared with projections in double precision.
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ constexpr std::size_t count = std::size_t{width} * height;
 constexpr double fovy = 30.0;
 constexpr double tolerance = 2e-3;  // pixels
 
-// A camera, and where it sees a point: pixels from the middle, y up.
+// A camera, and its projection of points: pixels from the center, y up.
 struct Eye {
   dvec3 at{0.0, 0.0, 40.0};
   dvec3 target{0.0};
@@ -58,14 +58,14 @@ struct Eye {
   [[nodiscard]] double half(double z) const {
     return orthographic_height > 0.0 ? 0.5 * orthographic_height : z * std::tan(fovy * std::numbers::pi / 360.0);
   }
-  // A point, or where homogeneous.w is 0 a direction.
+  // Projects a point, or a direction if homogeneous.w is 0.
   [[nodiscard]] dvec2 sees(const glm::dvec4& homogeneous) const {
     const Axes to = axes();
     const dvec3 way = dvec3(homogeneous) - homogeneous.w * at;
     const double scale = 0.5 * height / half(glm::dot(way, to.forward));
     return scale * dvec2(glm::dot(way, to.right), glm::dot(way, to.up));
   }
-  // The ray through a place of a pixel, from its upper left.
+  // The ray through a position in a pixel, measured from its upper left corner.
   struct Ray {
     dvec3 o, d;
   };
@@ -78,7 +78,7 @@ struct Eye {
   }
 };
 
-// A thin plate of medium, across z = 0, that moves by so much a second.
+// A thin plate of medium at z = 0 with this velocity per second.
 VolumeRef make_plate(const dvec3& velocity) {
   constexpr std::int32_t side = 64;
   const std::size_t voxels = std::size_t{side} * side;
@@ -111,7 +111,7 @@ VolumeRef make_plate(const dvec3& velocity) {
   return VolumeRef(out);
 }
 
-// A square across z = 0, 40 wide.
+// A square at z = 0, 40 wide.
 SurfacesRef make_wall() {
   const std::array<float, 18> corners{-20, -20, 0, 20, -20, 0, 20, 20, 0, -20, -20, 0, 20, 20, 0, -20, 20, 0};
   auto mesh = make_desc<cumulet_mesh_desc>();
@@ -153,7 +153,7 @@ class Motion : public CViewerTest {
     make();
     return aov(which, 2);
   }
-  // before: of what is seen along a ray now, where it was; none: it is not looked at.
+  // before: returns the previous position of the point that a ray sees now; nullopt if the ray is ignored.
   using Before = std::function<std::optional<glm::dvec4>(const Eye::Ray&, glm::dvec4& now)>;
   void expect(cumulet_aov aov, const Before& before, const std::string& what, double within = tolerance) {
     const std::vector<float> made = read(aov);
@@ -161,7 +161,7 @@ class Motion : public CViewerTest {
     double most = 0.0;
     for (std::uint32_t y = 0; y < height; ++y) {
       for (std::uint32_t x = 0; x < width; ++x) {
-        // The volume's is a mean over the 16 rays that glsl/aovs.comp has.
+        // The volume's motion is the mean over the 16 rays of glsl/aovs.comp.
         const int rays = aov == CUMULET_AOV_VOLUME_MOTION ? 16 : 1;
         dvec2 wanted(0.0);
         bool known = true;
@@ -184,7 +184,7 @@ class Motion : public CViewerTest {
     EXPECT_GT(looked_at, 100) << what;
     EXPECT_GT(most, 0.2) << what << ": there is motion to be seen";
   }
-  // What is seen in the plane of all, which a map has moved from elsewhere.
+  // The previous position of a point in a plane that moved by this transform.
   static Before on_plane(const dmat4& moved, const dmat4& place = dmat4(1.0)) {
     return [=](const Eye::Ray& ray, glm::dvec4& now) -> std::optional<glm::dvec4> {
       const dmat4 back = glm::inverse(place);
@@ -226,7 +226,7 @@ TEST_P(Motion, OfTheCameraMovesAll) {
   ASSERT_EQ(cumulet_set_volume(v_, plate.get()), CUMULET_OK);
   then(elsewhere);
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(dmat4(1.0)), "volume");
-  // Behind it nothing: what is far away turns with the camera alone.
+  // Behind it there is nothing: distant points move only by the camera's rotation.
   const Before far = [](const Eye::Ray& ray, glm::dvec4& now) -> std::optional<glm::dvec4> {
     now = glm::dvec4(ray.d, 0.0);
     return now;
@@ -235,7 +235,7 @@ TEST_P(Motion, OfTheCameraMovesAll) {
   const SurfacesRef wall = make_wall();
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
   expect(CUMULET_AOV_MOTION, on_plane(dmat4(1.0)), "surface");
-  // Parallel now, then, or both.
+  // Orthographic now, before, or both.
   Eye parallel = elsewhere;
   parallel.orthographic_height = 20.0;
   then(parallel);
@@ -277,7 +277,7 @@ TEST_P(Motion, OfTheMediumIsItsVelocity) {
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * v)), "velocity");
   then(elsewhere, seconds);
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * v)), "and the camera");
-  // Where it stands turned, it moves so.
+  // With a rotated instance transform, the motion is rotated too.
   const dmat4 place = glm::rotate(dmat4(1.0), 0.5, dvec3(0.0, 1.0, 0.0));
   ASSERT_EQ(cumulet_set_volume_places(v_, glm::value_ptr(place), 1), CUMULET_OK);
   const dvec3 there = glm::dmat3(place) * v;
@@ -293,7 +293,7 @@ TEST_P(Motion, OfPlacesIsWhereTheyWere) {
   ASSERT_EQ(cumulet_set_previous_volume_places(v_, glm::value_ptr(was), 1), CUMULET_OK);
   then(std::nullopt);
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, place), "a place", 2e-2);
-  // Of several, each by itself: one far away that stands still.
+  // Several transforms move separately. One far away stays fixed.
   std::array<dmat4, 2> places{place, glm::translate(dmat4(1.0), dvec3(0.0, 0.0, -500.0))};
   ASSERT_EQ(cumulet_set_volume_places(v_, glm::value_ptr(places[0]), 2), CUMULET_OK);
   auto medium = make_desc<cumulet_medium_desc>();
@@ -339,7 +339,7 @@ TEST_P(Motion, OfAModelIsItsOwn) {
   expect(CUMULET_AOV_MOTION, on_plane(turned, place), "a model");
 }
 
-// A wall that an animation shifts by 2 a second along x, and stretches along y.
+// A wall whose animation moves it by 2 per second along x and stretches it along y.
 SurfacesRef make_animated() {
   GltfModel model;
   const json primitive = {

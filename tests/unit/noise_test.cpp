@@ -1,4 +1,4 @@
-// The error that a picture tells of itself: against what pictures of other seeds show, and as what it stops at.
+// The error estimate of an image: compared with the spread between seeds, and used as the stopping criterion.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ TEST_P(Noise, ErrorIsTheSpreadBetweenSeedsPixelByPixel) {
   constexpr std::uint32_t seeds = 96;
   std::vector<double> sum(pixels);
   std::vector<double> square(pixels);
-  std::vector<double> told(pixels);  // squared
+  std::vector<double> told(pixels);  // squared error estimates
   for (std::uint32_t seed = 0; seed < seeds; ++seed) {
     const std::vector<double> bright = picture(16, seed);
     const std::vector<float> error = errors();
@@ -51,14 +51,14 @@ TEST_P(Noise, ErrorIsTheSpreadBetweenSeedsPixelByPixel) {
       told[i] += double(error[i]) * error[i] / seeds;
       all += double(error[i]) * error[i];
     }
-    // The picture's noise is that of its pixels.
+    // The image's noise is the root mean square of its pixels' errors, relative to the mean.
     const double mean = std::accumulate(bright.begin(), bright.end(), 0.0) / double(pixels);
     EXPECT_NEAR(viewer().measure_noise().value(), std::sqrt(all / double(pixels)) / mean, 1e-5);
     EXPECT_EQ(viewer().stats().noise, viewer().measure_noise());
   }
   std::vector<double> truly(pixels);
   for (std::size_t i = 0; i < pixels; ++i) truly[i] = (square[i] - sum[i] * sum[i] / seeds) / (seeds - 1);
-  // By quarters of the pixels, from those with the least error on: of sky, where it is none, to the cloud's brightest.
+  // In quarters of the pixels, ordered by error: from the sky, which has none, to the brightest parts of the cloud.
   std::vector<std::size_t> order(pixels);
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, {}, [&](std::size_t i) { return told[i]; });
@@ -70,7 +70,8 @@ TEST_P(Noise, ErrorIsTheSpreadBetweenSeedsPixelByPixel) {
       truth += truly[order[k]];
     }
     RecordProperty("ratio" + std::to_string(quarter), std::to_string(std::sqrt(truth / estimate)));
-    // Never less than it is, but for chance; more where samples are spread better than by chance.
+    // The estimate is not below the true error, except for chance. It is above where samples are better distributed
+    // than random ones.
     EXPECT_LT(truth, 1.08 * estimate + 1e-9) << quarter;
     EXPECT_GT(truth, 0.5 * estimate - 1e-9) << quarter;
   }
@@ -87,7 +88,7 @@ TEST_P(Noise, OneSampleTellsNothingOfItsError) {
   EXPECT_GT(viewer().measure_noise(), 0.0);
 }
 
-// In the dark all samples of a pixel are equal: then there really is none.
+// In the dark all samples of a pixel are equal, so the error is really 0.
 TEST_P(Noise, ABlackPictureHasNone) {
   viewer().set_light({});
   picture(2, 0);
@@ -96,9 +97,9 @@ TEST_P(Noise, ABlackPictureHasNone) {
   EXPECT_FALSE(viewer().measure_noise());
 }
 
-// Everything but how long it goes on.
+// Result of a render: sample count and pixels.
 struct Ended {
-  double samples = 0.0;  // a pixel
+  double samples = 0.0;  // per pixel
   std::vector<float> pixels;
   bool operator==(const Ended&) const = default;
 };
@@ -107,7 +108,7 @@ class Stops : public Noise {
  protected:
   static constexpr std::uint32_t most = 4096;
 
-  // Without previews, so that the same wish is the same picture.
+  // Without previews, so that equal settings give equal images.
   static viewer::Sampling sampling(std::optional<double> noise_target, std::uint32_t samples = most) {
     viewer::Sampling sampling;
     sampling.samples = samples;
@@ -135,7 +136,7 @@ class Stops : public Noise {
 };
 CUMULET_ON_BACKENDS(Stops);
 
-// 16, 23, 32, 45, 64, ...
+// Sample counts at which the noise is checked: 16, 23, 32, 45, 64, ...
 std::vector<std::uint32_t> looks() {
   std::vector<std::uint32_t> counts;
   for (int i = 0; i < 14; ++i) counts.push_back(static_cast<std::uint32_t>(std::lround(16.0 * std::pow(2.0, 0.5 * i))));
@@ -165,7 +166,7 @@ TEST_P(Stops, AtTheSameSamplesWhateverTheBudget) {
   for (const double budget_ms : {1.0, 7.0}) {
     viewer::Sampling other = sampling(0.05);
     other.seed = 9;
-    end(other, 20.0);  // so that it begins anew
+    end(other, 20.0);  // forces a restart
     EXPECT_EQ(end(sampling(0.05), budget_ms), at_once) << budget_ms;
   }
 }
@@ -197,14 +198,14 @@ TEST_P(Stops, GoesOnWhereLessNoiseIsAskedForAndBeginsAnewWhereMoreIs) {
   EXPECT_EQ(end(sampling(0.03, 50)).samples, 50.0);
   EXPECT_EQ(end(sampling(0.03, 60)).samples, 60.0);
   EXPECT_EQ(end(sampling(0.03)), fine);
-  // Of a picture that was enough, more samples change nothing.
+  // Once the target is reached, a larger sample limit changes nothing.
   EXPECT_EQ(end(sampling(0.03, 2 * most)), fine);
-  // Nor where its last samples were those of the look that was enough.
+  // The same holds if the sample limit equals the count of that noise check.
   end(sampling(std::nullopt, 3));
   EXPECT_EQ(end(sampling(0.08, static_cast<std::uint32_t>(coarse.samples))), coarse);
   EXPECT_EQ(end(sampling(0.08)), coarse);
   EXPECT_EQ(end(sampling(0.03)), fine);
-  // In a window what is there stays, and is enough.
+  // With previews on, existing samples are kept, and they reach the target.
   viewer::Sampling kept = sampling(0.03);
   kept.preview = true;
   end(kept);
@@ -214,7 +215,7 @@ TEST_P(Stops, GoesOnWhereLessNoiseIsAskedForAndBeginsAnewWhereMoreIs) {
 
 class Adaptive : public Stops {
  protected:
-  static constexpr glm::uvec2 size{36, 28};  // not whole squares
+  static constexpr glm::uvec2 size{36, 28};  // not a multiple of the block size
 
   static viewer::Sampling adaptive(double noise_target, std::uint32_t samples = most) {
     viewer::Sampling wish = sampling(noise_target, samples);
@@ -231,7 +232,7 @@ TEST_P(Adaptive, ReachesTheTargetWithFewerSamples) {
   const Ended ended = end_small(adaptive(target));
   EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
   EXPECT_LT(ended.samples, 0.8 * even.samples);
-  // The sky has no noise, and is looked at once.
+  // The sky has no noise and stops at the first noise check.
   EXPECT_GT(ended.samples, 16.0);
   std::vector<float> error(std::size_t{size.x} * size.y);
   viewer().read_aov(viewer::Aov::error, error.data(), error.size());
@@ -241,7 +242,7 @@ TEST_P(Adaptive, ReachesTheTargetWithFewerSamples) {
 TEST_P(Adaptive, IsTheSamePictureWhateverTheBudget) {
   const Ended at_once = end_small(adaptive(0.03));
   for (const double budget_ms : {1.0, 7.0}) {
-    end_small(adaptive(0.2), 20.0);  // so that it begins anew
+    end_small(adaptive(0.2), 20.0);  // forces a restart
     EXPECT_EQ(end_small(adaptive(0.03), budget_ms), at_once) << budget_ms;
   }
   EXPECT_NE(end_small(sampling(0.03)), at_once);
@@ -260,7 +261,7 @@ TEST_P(Adaptive, GoesOnFromWhatWasSavedAnywhere) {
   begin_anew();
   std::size_t kept = 0;
   double seen = 0.0;
-  // At many places of passes: each time what is saved is taken up again, and must not matter.
+  // At many points of the passes: saves, restarts and restores. The result must not depend on it.
   for (viewer::FrameResult result = one_frame(0.5); !result.converged; result = one_frame(0.5)) {
     const double samples = double(viewer().stats().samples);
     if (samples < seen + 900.0) continue;
@@ -289,7 +290,7 @@ TEST_P(Adaptive, RefusesWhatIsSavedOfAnother) {
   const std::vector<std::byte> even = saved(sampling(0.1));
   std::vector<std::byte> own = saved(adaptive(0.1));
   EXPECT_THROW(viewer().restore_accumulation(even), Error);
-  // A pass beyond the picture's samples.
+  // A pass number beyond the image's samples.
   own[even.size() + 3] = std::byte{0xff};
   EXPECT_THROW(viewer().restore_accumulation(own), Error);
 }

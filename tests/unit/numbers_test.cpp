@@ -1,4 +1,4 @@
-// What a float is, by its bits: of every kind of float, in C++ and as drivers compile it.
+// Classification of floats by their bits, for every kind of float, in C++ and as drivers compile it.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ constexpr auto sorts = std::to_array<Sort>({
     {.bits = 0x00000001, .nan = false, .finite = true, .small = true, .positive = false},  // denormals
     {.bits = 0x007fffff, .nan = false, .finite = true, .small = true, .positive = false},
     {.bits = 0x807fffff, .nan = false, .finite = true, .small = true, .positive = false},
-    {.bits = 0x00800000, .nan = false, .finite = true, .small = true, .positive = true},  // the least that is normal
+    {.bits = 0x00800000, .nan = false, .finite = true, .small = true, .positive = true},  // smallest normal number
     {.bits = 0x80800000, .nan = false, .finite = true, .small = true, .positive = false},
     {.bits = 0x3f800000, .nan = false, .finite = true, .small = true, .positive = true},  // 1
     {.bits = 0xbf800000, .nan = false, .finite = true, .small = true, .positive = false},
@@ -37,7 +37,7 @@ constexpr auto sorts = std::to_array<Sort>({
     {.bits = 0xff7fffff, .nan = false, .finite = true, .small = false, .positive = false},
     {.bits = 0x7f800000, .nan = false, .finite = false, .small = false, .positive = true},  // infinity
     {.bits = 0xff800000, .nan = false, .finite = false, .small = false, .positive = false},
-    {.bits = 0x7f800001, .nan = true, .finite = false, .small = false, .positive = false},  // signalling
+    {.bits = 0x7f800001, .nan = true, .finite = false, .small = false, .positive = false},  // signaling
     {.bits = 0xff800001, .nan = true, .finite = false, .small = false, .positive = false},
     {.bits = 0x7fc00000, .nan = true, .finite = false, .small = false, .positive = false},  // quiet
     {.bits = 0xffffffff, .nan = true, .finite = false, .small = false, .positive = false},
@@ -47,7 +47,7 @@ std::uint32_t expected(const Sort& sort) {
   return (sort.nan ? 1U : 0U) | (sort.finite ? 2U : 0U) | (sort.small ? 4U : 0U) | (sort.positive ? 8U : 0U);
 }
 
-// Each place of a vector counts.
+// Tests each component of a vector.
 template <typename Test>
 bool in_any_place(Test test, float x) {
   const glm::vec3 places[] = {{x, 1.0F, 1.0F}, {1.0F, x, 1.0F}, {1.0F, 1.0F, x}};

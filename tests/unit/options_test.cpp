@@ -24,7 +24,7 @@ namespace {
 using namespace cumulet::demo;
 using Arguments = std::vector<std::string>;
 
-/// With what is required, so that a test names only what it is about.
+/// Adds the required arguments.
 Arguments with(const Arguments& more) {
   Arguments all = {"--volume", "cloud.vdb", "-o", "out.png"};
   all.insert(all.end(), more.begin(), more.end());
@@ -186,7 +186,7 @@ TEST(Options, ASkyModelTakesItsSunsPlaceAlone) {
   EXPECT_EQ(clear.scene.light.ground_albedo, 0.25f);
   EXPECT_EQ(clear.scene.light.sun_azimuth_degrees, 120.0f);
   EXPECT_EQ(clear.scene.light.sun_elevation_degrees, 20.0f);
-  // By itself it is of the default's time of day.
+  // Without a position, the sun has the default time of day.
   const RenderOptions day = parse({"--sky-model", "3,0"});
   EXPECT_EQ(day.scene.light.sky, CUMULET_SKY_PHYSICAL);
   EXPECT_EQ(day.scene.light.sun_elevation_degrees, parse({}).scene.light.sun_elevation_degrees);
@@ -205,7 +205,7 @@ TEST(Options, WithoutAWordOfLightItIsAClearDay) {
 }
 
 TEST(Options, APresetIsAMediumThatFlagsOverride) {
-  // Whatever the order on the command line.
+  // Independent of the order on the command line.
   const RenderOptions preset = parse({"--flame-strength", "7", "--density-scale", "3", "--preset", "explosion"});
   const cumulet_medium_desc& medium = preset.scene.medium;
   EXPECT_EQ(medium.blackbody, 12.0F);
@@ -222,7 +222,8 @@ TEST(Options, APresetIsAMediumThatFlagsOverride) {
   }
   EXPECT_FALSE(preset_of(SceneOptions().medium));
 
-  // Of a volume that burns: as bright in its smoke, however dense it is and whatever its simulation's numbers are.
+  // For a burning volume: the fire's brightness relative to its smoke depends neither on the density scale nor on the
+  // units of the simulation.
   const auto burns = [](double scale, double flame, double temperature) {
     cumulet_medium_desc made = SceneOptions().medium;
     made.density_scale = scale;
@@ -254,7 +255,7 @@ TEST(Options, ARampIsPointsBetweenCommas) {
             std::string::npos);
 }
 
-// Each key, and what a scene file makes of the same words.
+// Compares each key with the same words in a scene file.
 TEST(Options, ALampIsThatOfASceneFile) {
   const SceneOptions scene = parse({"--lamp",
                                     "rectangle  position=-1,.5,2e1 direction=0,-.5,1 across=1,0,0 color=1,0.5,.25 "
@@ -502,7 +503,7 @@ TEST(Options, HelpSaysWhichFilesThereAre) {
 }
 
 TEST(Progress, RatesAreShownOnceTheyMeanSomething) {
-  // What was done before the first line took no time that anybody measured.
+  // Time before the first line was not measured.
   EXPECT_EQ(rendering_line(0.5, 0.0, 1e9, 0.0), "rendering [############............] 50 %");
   EXPECT_EQ(rendering_line(0.5, 0.01, 1e7, 1e-9), "rendering [############............] 50 %");
   EXPECT_EQ(rendering_line(0.0, 0.0, 0.0, 10.0), "rendering [........................] 0 %");
@@ -571,7 +572,7 @@ TEST(PictureMemory, IsToldBeforeItIsMissed) {
     }
     return "";
   };
-  // What a software driver takes is main memory as well.
+  // Memory of a software driver is main memory.
   EXPECT_EQ(told("llvmpipe (LLVM 15.0.6, 256 bits)", 15 * gib),
             "a picture of 16384x16384 needs 8.0 GiB of OpenGL's memory and 11.0 GiB of main memory: 15.0 GiB of main "
             "memory are free, and this driver has no other");
@@ -618,7 +619,7 @@ TEST(Options, ACriterionThatIsNamedIsNoDefault) {
   EXPECT_EQ(criterion_of({"--criterion", "deviation"}), CUMULET_CRITERION_DEVIATION);
   EXPECT_EQ(criterion_of({"--criterion", "transmittance"}), CUMULET_CRITERION_TRANSMITTANCE);
   EXPECT_EQ(criterion_of({"--criterion", "transmittance", "--threshold", "0.1"}), CUMULET_CRITERION_TRANSMITTANCE);
-  EXPECT_EQ(criterion_of({"--threshold", "0.1"}), CUMULET_CRITERION_DEVIATION);  // as ever
+  EXPECT_EQ(criterion_of({"--threshold", "0.1"}), CUMULET_CRITERION_DEVIATION);  // unchanged behavior
   EXPECT_EQ(parse({"--criterion", "deviation"}).scene.grid.threshold, 0.02);
 }
 
@@ -672,7 +673,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--camera", "0,0,nan 0,0,0 40"},
                                         {"--camera", "0,0 0,0,0 40"},
                                         {"--march", "fast"},
-                                        {"--aovs", "all"},  // of a .png
+                                        {"--aovs", "all"},  // with a .png
                                         {"--aovs", "cryptomatte"},
                                         {"--march", ""},
                                         {"--cells", "Linear"},
@@ -759,7 +760,7 @@ TEST(Options, TheUpAxisTurnsTheVolume) {
   const cumulet_volume_file_desc file = volume_file(turned);
   EXPECT_STREQ(file.path, "cloud.vdb");
   EXPECT_STREQ(file.grid_name, "smoke");
-  // Column 2 is where Z goes: up. Column 1, Y: away from the camera.
+  // Column 2 is the image of Z: up. Column 1 is that of Y: away from the camera.
   EXPECT_EQ(file.to_world[9], 1.0);
   EXPECT_EQ(file.to_world[6], -1.0);
   EXPECT_NE(usage_error(with({"--up", "x"})).find("--up"), std::string::npos);
@@ -775,7 +776,7 @@ TEST(Options, FilesNeedNoFlag) {
   EXPECT_TRUE(info->info && info->json);
   EXPECT_NE(usage_error({"a.vdb", "b.nvdb", "-o", "a.png"}).find("b.nvdb"), std::string::npos);
   EXPECT_NE(usage_error({"a.txt", "-o", "a.png"}).find("a.txt"), std::string::npos);
-  // By content, and a scene's settings below the flags.
+  // Files are recognized by content. Flags override a scene file's settings.
   const cumulet::test::Folder folder;
   const std::string scene = (folder.path() / "scene").string();
   std::ofstream(scene) << R"({"cumulet_scene": 1, "volume": {"file": "/v.vdb", "up": "z"}, "light": {},

@@ -1,4 +1,4 @@
-// Scenes and models count from origins of their own, so that floats hold them far from the world's origin.
+// Scenes and models have local origins, so that float coordinates stay precise far from the world's origin.
 
 #include <gtest/gtest.h>
 
@@ -48,7 +48,7 @@ TEST(SceneOrigin, IsZeroNearTheWorldsAndCloseToWhatIsFar) {
 }
 
 TEST(SceneOrigin, OfAWideSceneIsNearWhatTheEyeIsNearTo) {
-  // A marker at 0 and a house, and a house on a globe.
+  // A marker at 0 and a house on a globe, seen from near each.
   const std::array apart{box_at(dvec3(0.0), 1.0), box_at(ecef, 10.0)};
   EXPECT_LE(largest(scene::origin_of_scene(apart, ecef + dvec3(20.0)) - ecef), 64.0 * 64.0);
   EXPECT_LE(largest(scene::origin_of_scene(apart, dvec3(3.0))), 256.0);
@@ -59,7 +59,7 @@ TEST(SceneOrigin, OfAWideSceneIsNearWhatTheEyeIsNearTo) {
 
 // ---- models ----
 
-// A primitive: a box with these half edges around a middle, of six quads.
+// A primitive: a box with these half edges around a center, made of six quads.
 json box(GltfModel& model, const glm::vec3& half, const glm::vec3& middle = glm::vec3(0.0F)) {
   std::vector<float> positions;
   std::vector<std::uint32_t> indices;
@@ -80,7 +80,7 @@ json box(GltfModel& model, const glm::vec3& half, const glm::vec3& middle = glm:
           {"indices", model.accessor<std::uint32_t>("SCALAR", 1, indices)}};
 }
 
-// All corners of its triangles in the world, as paths meet them, in double precision.
+// World positions of all triangle vertices as the path tracer uses them, in double precision.
 std::vector<dvec3> corners(const ScenePtr& scene, const Pose& pose, const dmat4& to_world = dmat4(1.0)) {
   const scene::ModelSourcePtr source = scene::make_model_source(scene, pose, nullptr);
   std::vector<dvec3> all;
@@ -104,9 +104,9 @@ void expect_moved(const std::vector<dvec3>& far, const std::vector<dvec3>& near,
 }
 
 const std::array places{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.0), dvec3(1e8)};
-constexpr double precision = 2e-5;  // of things of size 1
+constexpr double precision = 2e-5;  // of objects of size 1
 
-// A turned, nested box and a camera and a light above it.
+// A rotated, nested box, with a camera and a light above it.
 GltfModel georeferenced(const dvec3& at) {
   GltfModel model;
   model.root["extensionsUsed"] = {"KHR_lights_punctual"};
@@ -144,10 +144,10 @@ TEST(FarModels, HaveTheShapeThatTheyHaveNearby) {
   }
 }
 
-// A box whose vertices have the offset in them, under a node that takes it away again: as far as floats hold it, there
-// is no more lost.
+// A box whose vertices contain the offset, under a node that subtracts it. No precision is lost beyond that of the
+// float vertices.
 TEST(FarModels, OffsetsInVerticesCancelWithNodes) {
-  const glm::vec3 middle(4201234.5F, 168000.25F, 4780000.5F);  // floats
+  const glm::vec3 middle(4201234.5F, 168000.25F, 4780000.5F);  // exact floats
   for (const bool instanced : {false, true}) {
     GltfModel model;
     json node = {{"translation", {-double{middle.x}, -double{middle.y}, -double{middle.z}}}};
@@ -173,7 +173,7 @@ TEST(FarModels, OffsetsInVerticesCancelWithNodes) {
   }
 }
 
-// A strip that bends at a joint, both far away, and comes back half a second later.
+// A strip that bends at a joint, with both far away. It returns half a second later.
 GltfModel skinned(const dvec3& at) {
   GltfModel model;
   json primitive = {{"attributes",
@@ -239,7 +239,7 @@ TEST(FarModels, VerticesThatFloatsDoNotHoldAreWarnedOf) {
   EXPECT_TRUE(test::has(far, " % of its size")) << far;
   EXPECT_TRUE(test::has(remark(glm::vec3(0.5F), glm::vec3(1e8F)), "more than its size")) << "it is one point";
 
-  // Where an animation takes a node, and instances are, is of floats, too.
+  // Translations of animations and of instances are floats too.
   GltfModel animated = skinned(dvec3(0.0));
   json& channel = animated.root["animations"][0]["channels"][0]["target"];
   channel["path"] = "translation";

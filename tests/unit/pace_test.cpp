@@ -1,4 +1,4 @@
-// Pace: what a frame may do in its budget, how dispatches are bounded, and what is shown meanwhile.
+// Scheduling: the work of a frame within its budget, bounds of dispatches, and images shown meanwhile.
 
 #include <gtest/gtest.h>
 
@@ -35,9 +35,9 @@ constexpr double no_bound = std::numeric_limits<double>::infinity();
 TEST(RoundCost, KnowsNothingFromNothing) {
   render::RoundCost cost;
   EXPECT_FALSE(cost.most(1.0));
-  cost.learn(100.0, 500.0, 500.0);  // the driver compiled in it
+  cost.learn(100.0, 500.0, 500.0);  // ignored: the driver compiled in it
   EXPECT_FALSE(cost.most(1.0));
-  cost.learn(100.0, 0.001, no_bound);  // sky: nothing marched
+  cost.learn(100.0, 0.001, no_bound);  // ignored: only sky, no traversal
   EXPECT_FALSE(cost.most(1.0));
 }
 
@@ -46,8 +46,8 @@ TEST(RoundCost, GuessesOnTheSafeSide) {
   cost.learn(128.0, 1.0, 1.0);
   cost.learn(128.0, 1.0, 1.0);
   EXPECT_DOUBLE_EQ(*cost.most(128.0), 1.0);
-  EXPECT_DOUBLE_EQ(*cost.most(1024.0), 8.0);  // as if there were no more lanes than those
-  EXPECT_DOUBLE_EQ(*cost.most(2.0), 1.0);     // as if one lane took as long
+  EXPECT_DOUBLE_EQ(*cost.most(1024.0), 8.0);  // assumes no more parallel lanes than seen
+  EXPECT_DOUBLE_EQ(*cost.most(2.0), 1.0);     // assumes that one lane takes as long
 }
 
 TEST(RoundCost, CheapWindowsTeachNothingOfDearOnes) {
@@ -55,7 +55,7 @@ TEST(RoundCost, CheapWindowsTeachNothingOfDearOnes) {
   for (int i = 0; i < 2; ++i) cost.learn(128.0, 1.0, 1.0);
   for (int i = 0; i < 1000; ++i) cost.learn(128.0, 1e-4, no_bound);  // sky
   EXPECT_DOUBLE_EQ(*cost.most(128.0), 1.0);
-  // Half of the lanes marched, some of the rounds: it is known to lie between.
+  // Half of the lanes traverse the cloud in some of the rounds: the known cost is between the two bounds.
   cost.learn(128.0, 0.3, 3.0);
   EXPECT_DOUBLE_EQ(*cost.most(128.0), 1.0);
 }
@@ -65,9 +65,9 @@ TEST(RoundCost, AnInterruptedDispatchIsForgiven) {
   for (int i = 0; i < 2; ++i) cost.learn(128.0, 1.0, 1.0);
   cost.learn(128.0, 50.0, 50.0);
   EXPECT_NEAR(*cost.most(128.0), 1.0, 0.01);
-  cost.learn(128.0, 3.0, 3.0);  // twice in a row it is believed
+  cost.learn(128.0, 3.0, 3.0);  // the second time in a row it counts
   EXPECT_NEAR(*cost.most(128.0), 3.0, 0.1);
-  // However busy the machine is: no more than some times what it can do, so that work goes on.
+  // On a busy machine, the estimate is limited to a small multiple of the best cost, so that work continues.
   for (int i = 0; i < 20; ++i) cost.learn(128.0, 1000.0, 1000.0);
   EXPECT_LT(*cost.most(128.0), 5.0);
   EXPECT_LT(*cost.most(128.0, true), 2.0);
@@ -76,7 +76,7 @@ TEST(RoundCost, AnInterruptedDispatchIsForgiven) {
 TEST(Reserve, OneOfTwentyCallsMayBeLate) {
   render::Reserve reserve;
   EXPECT_EQ(reserve.of(10.0), 0.0);
-  // A machine that takes from 0 to 4 ms of a call of 10, each as often.
+  // Other programs take 0 to 4 ms of each 10 ms call, uniformly distributed.
   int late = 0;
   for (int i = 0; i < 2000; ++i) {
     const double others = double((i * 7) % 41) * 0.1;
@@ -85,18 +85,18 @@ TEST(Reserve, OneOfTwentyCallsMayBeLate) {
     reserve.learn(10.0, taken);
   }
   EXPECT_NEAR(late, 50, 10);
-  // Whatever happens, there is something left; and once it is over, all.
+  // A part of the budget always remains. After the disturbance, the whole budget is used again.
   for (int i = 0; i < 100; ++i) reserve.learn(10.0, 14.0);
   EXPECT_GE(10.0 - reserve.of(10.0), 5.0);
   for (int i = 0; i < 100; ++i) reserve.learn(10.0, 1.0);
   EXPECT_EQ(reserve.of(10.0), 0.0);
-  // A driver that compiles, or draws within the call: less work of ours would not have helped.
+  // If the driver compiles or draws inside the call, a reserve would not have helped.
   for (int i = 0; i < 100; ++i) reserve.learn(10.0, 1000.0);
   EXPECT_EQ(reserve.of(10.0), 0.0);
 }
 
-/// A device with a clock of its own, which traces lanes of sky, of a cloud, and of its rim: what a dispatch takes is
-/// known and never another's doing. A round takes as long as its dearest lane, or as all lanes take those that run at
+/// A simulated device with its own clock. Its lanes trace sky, a cloud or the cloud's rim, so the cost of a dispatch is
+/// known exactly. A round takes as long as its most expensive lane, or as all lanes if more are active than run at
 /// once.
 class MadeDevice {
  public:
@@ -106,7 +106,7 @@ class MadeDevice {
     double cloud_ms = 0.0;  // a full round of one lane, in the cheapest part of the cloud
     double launch_ms = 0.0;
   };
-  static constexpr double dearer = 1000.0;  // a lane in the cloud than one in the sky, a round
+  static constexpr double dearer = 1000.0;  // cost of a cloud lane relative to a sky lane, per round
 
   MadeDevice(const Speed& speed, std::size_t count, double sky) : blocks(count), speed_(speed), lanes_(count) {
     const auto rows = static_cast<std::size_t>(sky * static_cast<double>(count));
@@ -118,7 +118,7 @@ class MadeDevice {
 
   render::Blocks blocks;
 
-  /// Another pass, of so many samples a pixel.
+  /// Starts another pass with this number of samples per pixel.
   void begin_pass(std::uint32_t samples) {
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       blocks[i].unfinished = a_block;
@@ -143,7 +143,7 @@ class MadeDevice {
       double sum = 0.0;
       double dearest = 0.0;
       for (Pixel* pixel : alive) {
-        // The depth of a cloud is up to three times as dear as its rim.
+        // The depth of a cloud costs up to three times as much as its edge.
         const double part = pixel->lane == Lane::cloud ? 1.0 + 2.0 * double(pixel->block) / double(lanes_.size())
                             : pixel->lane == Lane::rim ? 0.1
                                                        : 1.0 / dearer;
@@ -172,7 +172,7 @@ class MadeDevice {
   std::vector<std::vector<Pixel>> lanes_;
 };
 
-/// Traces a pass as Tracer does, with dispatches under way whose ends are heard of late.
+/// Traces a pass as Tracer does, with in-flight dispatches whose completion is known late.
 void trace_pass(MadeDevice& device, const std::shared_ptr<render::RoundCost>& cost, double aim_ms,
                 std::vector<render::DispatchRecord>& log) {
   constexpr std::uint32_t most_rounds = 65536;
@@ -217,7 +217,7 @@ TEST(PaceOfDispatches, NoneOnACloudIsOverFourTimesItsAimThoughSkyIsAThousandTime
     for (const double aim_ms : {3.5, 11.0, 100.0, 500.0}) {
       const auto cost = std::make_shared<render::RoundCost>();
       std::vector<render::DispatchRecord> log;
-      // Tiles of sky, one that is cloud in its lower half, and one that is all cloud: again and again.
+      // Tiles of sky, one with a cloud in its lower half, and one that is all cloud, repeatedly.
       std::vector<MadeDevice> tiles;
       for (const double sky : {1.0, 1.0, 0.5, 0.0}) tiles.emplace_back(speed, 48, sky);
       for (const std::uint32_t samples : {1U, 4U, 16U}) {
@@ -249,7 +249,7 @@ TEST(PaceOfDispatches, WindowsOfAFastDeviceAreLarge) {
   }
   const auto largest = std::ranges::max(log, {}, &render::DispatchRecord::lanes);
   EXPECT_GE(largest.lanes, 128U * 1024U);
-  // And most of what is traced is traced in such.
+  // Most of the work is done in such large dispatches.
   double in_large = 0.0;
   double all = 0.0;
   for (const render::DispatchRecord& dispatch : log) {
@@ -274,7 +274,7 @@ class Pace : public test::StillTest {
 TEST_P(Pace, DispatchesOnACloudAreBoundedThoughSkyIsCheap) {
   std::vector<render::DispatchRecord> log;
   viewer().wait(-1.0);
-  // Sky tiles and passes first: their lanes end at once, and thousands of rounds take no time.
+  // Sky tiles and passes come first. Their lanes end at once, so thousands of rounds take no time.
   viewer().set_sampling({8, 1, render::View::shaded, false});
   viewer().set_dispatch_log(&log);
   viewer::FrameResult result;
@@ -286,7 +286,7 @@ TEST_P(Pace, DispatchesOnACloudAreBoundedThoughSkyIsCheap) {
   }
   ASSERT_GT(over.size(), 20U);
   std::ranges::sort(over);
-  // The machine may interrupt a few for others.
+  // Other programs may delay a few.
   EXPECT_LT(over[over.size() * 95 / 100], 4.0);
   EXPECT_LT(over.back(), 40.0);
 }
@@ -296,7 +296,7 @@ TEST_P(Pace, SmallBudgetsConvergeToTheSamePicture) {
   std::vector<std::vector<float>> pictures;
   for (const double budget_ms : {1e6, 3.0}) {
     viewer().set_sampling({2, 3, render::View::shaded, false});
-    viewer().render(frame(16, 16, 1.0));  // another picture between
+    viewer().render(frame(16, 16, 1.0));  // another image between
     viewer().set_sampling({1, 3, render::View::shaded, false});
     viewer::FrameResult result;
     double last = 0.0;
@@ -332,17 +332,17 @@ TEST_P(Pace, CoarsePicturesAreWorthShowingAndProgressIsOfTheWish) {
   int checked = 0;
   for (int i = 0; i < 20000 && !result.converged; ++i) {
     result = viewer().render(f);
-    // The drag's last answer may be finished first: its progress is none of the wish's.
+    // The drag's last image may be finished first. Its progress is not that of the new settings.
     settled = settled || result.progress > 0.0;
     if (settled) {
       EXPECT_GE(result.progress, last);
       last = result.progress;
     }
     told_early = told_early || (result.preview && result.progress > 0.0);
-    // The first that is seen may be the drag's.
+    // The first image may be the drag's.
     if (settled && result.size != size && ++changes > 1 && size.x > 0) {
       ++checked;
-      // The one before, as it was left: as many samples as a quarter of the full picture's pixels, nearly.
+      // The previous, coarser image: it had almost as many samples as a quarter of the full image's pixels.
       const double divisor = 512.0 / size.x;
       const double each = std::clamp(divisor * divisor / 4.0, 1.0, 4.0);
       EXPECT_GE(double(samples), 0.85 * each * size.x * size.y) << size.x;
@@ -359,7 +359,7 @@ TEST_P(Pace, CoarsePicturesAreWorthShowingAndProgressIsOfTheWish) {
 
 CUMULET_ON_BACKENDS(Pace);
 
-// What waits for the device, by the functions' names.
+// Number of calls that wait for the GPU.
 std::uint64_t waits(const test::FakeGl& gl) {
   std::uint64_t sum = 0;
   for (const char* name :
@@ -394,11 +394,11 @@ TEST(PaceOfFrames, NoFrameWaitsForTheDevice) {
     EXPECT_GT(fake.calls("DispatchCompute"), dispatches + 2);
     std::vector<float> rgba(std::size_t{200} * 120 * 4);
     EXPECT_EQ(cumulet_read_linear(viewer.get(), rgba.data(), rgba.size()), CUMULET_OK);
-    EXPECT_GT(waits(fake), before);  // which the test would see
+    EXPECT_GT(waits(fake), before);  // this call waits, so the counter works
   }
 }
 
-// A host that draws a lot of its own before each frame, and never waits: nor does the viewer.
+// A host that queues much GPU work before each frame and never waits. The viewer does not wait either.
 TEST(PaceOfFrames, NoCallWaitsForWhatTheHostHasQueued) {
   headless::Context context = headless::Context::create(headless::Backend::automatic);
   const GladGLContext gl = test::load_gl(headless::Context::get_proc, &context);
@@ -415,7 +415,7 @@ TEST(PaceOfFrames, NoCallWaitsForWhatTheHostHasQueued) {
     cumulet_frame_desc frame = target.frame();
     frame.budget_ms = 5.0;
     auto result = test::make_desc<cumulet_frame_result>();
-    // What is compiled is compiled, of every size that is drawn.
+    // Compiles all programs first, for every size that is drawn.
     for (int i = 0; i < 60; ++i) ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
     gl.Finish();
     const test::BusyHost host(gl, 1000.0);
@@ -434,7 +434,7 @@ TEST(PaceOfFrames, NoCallWaitsForWhatTheHostHasQueued) {
     EXPECT_GT(result.progress, before) << "preview " << preview;
     gl.DeleteSync(queued);
     gl.Finish();
-    // Beside what was queued, which a busy machine slows down as well: a call takes its budget, 1 in 200 of it.
+    // The queued work takes longer on a busy machine too. A call should take its budget, 1 / 200 of that time.
     const double whole = milliseconds(Clock::now() - begun);
     std::ranges::sort(calls);
     RecordProperty("median_call_ms", std::to_string(calls[4]));
@@ -443,8 +443,8 @@ TEST(PaceOfFrames, NoCallWaitsForWhatTheHostHasQueued) {
   }
 }
 
-// The same in a drag, frame after frame: what was drawn long ago must not be waited for, either, though llvmpipe may
-// take it for being drawn still.
+// The same during a drag, frame by frame. The library must not wait for old frames, although llvmpipe may treat their
+// buffers as still in use.
 TEST(PaceOfFrames, NoFrameOfADragWaitsForWhatTheHostHasQueued) {
   headless::Context context = headless::Context::create(headless::Backend::automatic);
   const GladGLContext gl = test::load_gl(headless::Context::get_proc, &context);
@@ -466,7 +466,7 @@ TEST(PaceOfFrames, NoFrameOfADragWaitsForWhatTheHostHasQueued) {
     ASSERT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
     ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
   };
-  for (const double budget_ms : {1.0, 4.0, 16.0, 64.0, 256.0}) {  // whatever is compiled is
+  for (const double budget_ms : {1.0, 4.0, 16.0, 64.0, 256.0}) {  // compiles all programs
     frame.budget_ms = budget_ms;
     for (int i = 0; i < 8; ++i) render(true);
   }

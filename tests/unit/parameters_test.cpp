@@ -1,4 +1,4 @@
-// glsl/parameters.glsl is one text for GLSL and C++: whether a driver lays it out as C++ does.
+// glsl/parameters.glsl is one source for GLSL and C++. Tests that drivers lay it out as C++ does.
 
 #include "render/parameters.hpp"
 
@@ -159,7 +159,7 @@ const std::array fields{
 class Parameters : public test::GlTest {};
 CUMULET_ON_BACKENDS(Parameters);
 
-// A uint or float, or a vector of them, as one word by its index.
+// A uint or float, or one component of a vector of them, as one word.
 std::string word_of(const Field& field, std::size_t i) {
   std::ostringstream text;
   text << "word(cm." << field.name;
@@ -168,7 +168,7 @@ std::string word_of(const Field& field, std::size_t i) {
   return text.str();
 }
 
-// Of a shader, up to the block.
+// The shader's source up to the block.
 std::string head() {
   return "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("bindings.glsl") +
          test::glsl_file("parameters.glsl");
@@ -183,7 +183,7 @@ void main() {
 )";
   std::vector<std::uint32_t> expected;
   std::vector<std::uint32_t> block(sizeof(CmParameters) / 4);
-  std::iota(block.begin(), block.end(), 0x3f800000U);  // floats from 1 on, each another
+  std::iota(block.begin(), block.end(), 0x3f800000U);  // distinct floats from 1 upwards
   for (const Field& field : fields) {
     for (std::size_t i = 0; i < field.words; ++i) {
       text += "  words[" + std::to_string(expected.size()) + "] = " + word_of(field, i) + ";\n";

@@ -1,4 +1,4 @@
-// Parts of a picture, each of some of its samples, are together the whole.
+// Partial renders with disjoint sample ranges add up to the whole image.
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ class Parts : public test::StillCloudTest {
       first += samples;
     }
     for (std::size_t i = 0; i < sum.size(); ++i) EXPECT_NEAR(sum[i], whole[i], 2e-6 * (1.0 + sum[i])) << i;
-    // The same samples again: no other picture, and not another's.
+    // The same range gives the same image, another range another image.
     EXPECT_EQ(picture(0, 40), whole);
     EXPECT_NE(picture(40, 40), whole);
   }
@@ -68,7 +68,7 @@ TEST_P(Parts, BeginAnewWithAnotherFirstSample) {
   EXPECT_EQ(double(viewer().stats().samples), 16.0 * side * side);
 }
 
-// A picture that goes on in another viewer from what its samples had come to.
+// A render that continues in another viewer from its saved samples.
 class Resumed : public Parts {
  protected:
   static viewer::Sampling sampling(std::uint32_t samples, std::optional<double> noise_target = std::nullopt) {
@@ -103,7 +103,7 @@ class Resumed : public Parts {
     ended.steps = viewer().stats().steps;
     return ended;
   }
-  // Anew: nothing is left of what another process had.
+  // Restarts, so that nothing of the other process remains.
   void begin(const viewer::Sampling& wish) {
     viewer::Sampling other = wish;
     other.seed = 99;
@@ -117,7 +117,7 @@ class Resumed : public Parts {
     viewer().read_accumulation(bytes);
     return bytes;
   }
-  // Stopped after so many frames of a millisecond or so, each time in another state.
+  // Stops after various numbers of frames of a millisecond or so, each time in another state.
   void expect_resumed_as_whole(const viewer::Sampling& wish, glm::uvec2 size) {
     begin(wish);
     const Ended whole = end(size);
@@ -163,7 +163,7 @@ TEST_P(Resumed, WhatWasDoneIsDone) {
   viewer().render(frame(side, side, 1.0));
   viewer().restore_accumulation(bytes);
   EXPECT_EQ(end({side, side}), whole);
-  // More samples go on from there.
+  // Continues with more samples.
   begin(sampling(20));
   const Ended longer = end({side, side});
   begin(sampling(20));
@@ -190,7 +190,7 @@ TEST_P(Resumed, WhatIsNotOfThePictureIsRefused) {
   EXPECT_THROW(viewer().restore_accumulation({}), Error);
   bytes[0] = std::byte{0};
   EXPECT_THROW(viewer().restore_accumulation(bytes), Error) << "no accumulation";
-  // And the picture is as it was.
+  // The image is unaffected.
   begin(sampling(8));
   const Ended whole = end({side, side});
   EXPECT_EQ(whole.samples, 8.0);
@@ -201,7 +201,7 @@ TEST_P(Resumed, WhatIsNotOfThePictureIsRefused) {
   EXPECT_THROW(static_cast<void>(viewer().accumulation_bytes()), Error);
 }
 
-// What a kernel numbers goes around where numbers end.
+// Sample numbers wrap around at 2^32.
 TEST_P(Parts, BeginAgainAtZeroBeyondTheLastNumber) {
   const std::vector<float> around = picture(0xffffffffU, 2);
   const std::vector<float> last = picture(0xffffffffU, 1);

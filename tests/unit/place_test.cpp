@@ -1,4 +1,4 @@
-// A volume's place: pictures, grids and bounds are those of a volume that was made there.
+// The instance transform of a volume: images, grids and bounds equal those of a volume with that index_to_world.
 
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ viewer::GridSettings transmittance(double threshold) {
   return settings;
 }
 
-// In powers of two, and by whole voxels, nothing is rounded.
+// Powers of two and whole voxels cause no rounding.
 const dmat4& exact_place() {
   static const dmat4 place(glm::dvec4(0, 2, 0, 0), glm::dvec4(0, 0, -2, 0), glm::dvec4(2, 0, 0, 0),
                            glm::dvec4(-16, 64, 8, 1));
@@ -56,7 +56,7 @@ class Place : public test::ViewerTest {
     placed_ = make();
     made_there_ = make();
   }
-  // Both viewers show the same: one placed, one made there.
+  // Shows the same scene in both viewers: one with the instance transform, one with the transform in the volume.
   void show_both(const dmat4& place, const viewer::GridSettings& grid) {
     viewer::Medium medium;
     medium.density_scale = 0.2;
@@ -100,7 +100,7 @@ TEST_P(Place, MayBeSheared) {
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(placed.mean()[i], made_there.mean()[i], 2e-3 * made_there.mean()[i]) << i;
 }
 
-// Moving it brings no data to the GPU and builds no grid, turned and mirrored as well; what shows is another picture.
+// Changing the transform uploads no data and builds no grid, even if it rotates or mirrors. The image changes.
 TEST_P(Place, MovesWithoutAnotherGrid) {
   show_both(dmat4(1.0), transmittance(0.02));
   const test::Picture before = test::render(*placed_, small);

@@ -1,4 +1,4 @@
-// From a clock to frames of a sequence, and which come next.
+// Maps clock times to frames of a sequence, and orders the next ones.
 
 #include "scene/playback.hpp"
 
@@ -23,7 +23,7 @@ std::uint32_t frame_at(const Playback& playback, double seconds) {
   return frame_of(playback, moment_at(playback, seconds));
 }
 
-// What comes in so many frames' time, from the clock's frame `from` on.
+// The frames of the next `count` frame durations, from the clock's frame `from` on.
 Frames played(const Playback& playback, int from, int count) {
   Frames frames;
   for (int i = from; i < from + count; ++i)
@@ -51,7 +51,7 @@ TEST(Playback, ASingleFrameIsAlwaysThere) {
     EXPECT_EQ(played({.repeat = repeat, .first = 2, .count = 1}, -3, 7), Frames(7, 2));
 }
 
-// Each frame is there for its whole time, whichever way it goes.
+// Each frame is displayed for a whole frame duration in both directions.
 TEST(Playback, FramesLastTheSame) {
   for (const Repeat repeat : {Repeat::loop, Repeat::ping_pong}) {
     const Playback playback{.frames_per_second = 10.0, .repeat = repeat, .count = 5};
@@ -135,19 +135,19 @@ TEST(Playback, StepsBetweenFramesComeInTheirOrder) {
   EXPECT_EQ(at(hold, 5.0), 16U);
   EXPECT_EQ(upcoming(hold, moment_at(hold, 1.5 / 24.0), true), (Frames{14, 15, 16, 13, 12, 11, 10, 9, 8}));
   EXPECT_EQ(upcoming(hold, moment_at(hold, 1.5 / 24.0), false), (Frames{14, 13, 12, 11, 10, 9, 8, 15, 16}));
-  // Back again each is there as long as the next takes to come.
+  // On the way back, each step lasts until the next one.
   Playback back = hold;
   back.repeat = Repeat::ping_pong;
   EXPECT_EQ(at(back, 2.25), 15U);
   EXPECT_EQ(at(back, 2.3), 15U);
   EXPECT_EQ(frame_of(back, moment_at(back, 2.3 / 24.0)), 3U) << "as the step that is shown";
-  // From the last of a loop to the first there is nothing.
+  // There is no interpolation from the last frame of a loop to the first.
   Playback loop = hold;
   loop.repeat = Repeat::loop;
   EXPECT_EQ(at(loop, 2.0), 16U);
   EXPECT_EQ(at(loop, 2.75), 16U);
   EXPECT_EQ(at(loop, 3.0), 8U);
-  // Any part of a frame that is named is its own.
+  // Each fraction of a frame maps to its own step.
   for (const std::uint32_t steps : {3U, 7U, 10U, 1000U}) {
     Playback fine{.count = 20, .between = Between::advect, .steps = steps};
     for (std::uint32_t step = 0; step < 19 * steps; ++step)

@@ -1,4 +1,4 @@
-// Light that covers nothing, over what a host's target holds: each blend mode, encoding and format against radiance.
+// Emission without opacity, blended over a host's target: each blend mode, encoding and format compared with radiance.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ namespace render = cumulet::render;
 
 float encode(float x) { return image::srgb_encode(std::clamp(x, 0.0F, 1.0F)); }
 
-// Premultiplied: fire, thin smoke that glows, smoke, something dark, something opaque, nothing.
+// Premultiplied: fire, thin emissive smoke, smoke, something dark, something opaque, nothing.
 const std::vector<glm::vec4> pixels{{0.2F, 0.2F, 0.2F, 0.0F},    {1.0F, 0.35F, 0.03F, 0.0F},  {3.0F, 1.0F, 0.2F, 0.0F},
                                     {0.5F, 0.3F, 0.1F, 0.05F},   {0.08F, 0.08F, 0.08F, 0.1F}, {0.4F, 0.4F, 0.4F, 0.5F},
                                     {0.02F, 0.02F, 0.02F, 0.5F}, {0.6F, 0.5F, 0.4F, 1.0F},    {0.0F, 0.0F, 0.0F, 0.0F}};
@@ -38,13 +38,13 @@ const std::vector<std::size_t> gray_pixels{0, 4, 5, 6, 8};
 
 class Premultiplied : public cumulet::test::GlTest {
  protected:
-  /// What a target of that format, filled with a value, holds after the picture was drawn: not decoded.
+  /// Draws over a target of this format that is filled with a value. Returns the stored values, not decoded.
   std::vector<glm::vec4> draw(const Display& display, GLenum format, bool blend_over, glm::vec4 before) {
     const FlatPicture picture(gl_, size, pixels);
     const Object color = gl::make_texture_2d(gl_, format, size.x, size.y, "color");
     const Object framebuffer = gl::make_framebuffer(gl_);
     gl_->NamedFramebufferTexture(framebuffer.name(), GL_COLOR_ATTACHMENT0, color.name(), 0);
-    // What is cleared so is stored as it is.
+    // The clear value is stored without encoding.
     for (int k = 0; k < 3 && format == GL_SRGB8_ALPHA8; ++k) before[k] = encode(before[k]);
     gl_->ClearTexImage(color.name(), 0, GL_RGBA, GL_FLOAT, &before);
     FrameTarget target;
@@ -82,7 +82,7 @@ TEST_P(Premultiplied, LinearTargetsHoldTheRadianceOverAnyBackdrop) {
   struct Case {
     ColourEncoding encoding;
     GLenum format;
-    float step;  // that it stores
+    float step;  // of the format
   };
   for (const Case& c :
        {Case{ColourEncoding::linear, GL_RGBA8, 1.0F / 255.0F}, Case{ColourEncoding::linear, GL_RGBA16F, 2e-3F},
@@ -111,7 +111,7 @@ TEST_P(Premultiplied, LinearTargetsHoldTheRadianceOverAnyBackdrop) {
   }
 }
 
-// What GL blends there are encoded values, no sums of light: right over black and white, near in between.
+// GL blends encoded values there, which are not sums of light: exact over black and white, approximate in between.
 TEST_P(Premultiplied, EncodedTargetsAreRightOverBlackAndWhite) {
   for (const GLenum format : {GL_RGBA8, GL_RGBA16F, GL_RGBA32F}) {
     for (const float backdrop : {0.0F, 0.1F, 0.3F, 0.6F, 1.0F}) {
@@ -157,7 +157,7 @@ TEST_P(Premultiplied, OverBlackIsTheOpaquePicture) {
           }
         }
         EXPECT_GT(brightest, 0.5F);
-        // Encoded values have the alpha of their own blend.
+        // Encoded targets use an alpha of their own, chosen for blending.
         if (c.encoding != ColourEncoding::srgb) {
           EXPECT_EQ(transparent[1].a, 0.0F) << "fire covers nothing";
         }
@@ -180,16 +180,16 @@ TEST(StraightDisplay, HoldsWhatGlowsByAlpha) {
       ASSERT_GE(got.a, pixel.a - 1e-6F);
       const float peak = std::max({pixel.x, pixel.y, pixel.z});
       if (pixel.a == 0.0F || pixel.a == 1.0F) {
-        // Over black, as it is displayed.
+        // Over black it equals the displayed color.
         const glm::vec3 shown = core::cm_display(glm::vec3(pixel), 1.0F, curve, true);
         for (int k = 0; k < 3; ++k) ASSERT_NEAR(got.a * got[k], shown[k], 1e-5F);
       } else if (peak <= pixel.a) {
-        // What only covers has its own color and alpha.
+        // A pixel without emission keeps its own color and alpha.
         const glm::vec3 straight = core::cm_display(glm::vec3(pixel) / pixel.a, 1.0F, curve, true);
         ASSERT_FLOAT_EQ(got.a, pixel.a);
         for (int k = 0; k < 3; ++k) ASSERT_NEAR(got[k], straight[k], 1e-5F);
       } else {
-        // Thin smoke does not dim what glows in it.
+        // Thin smoke does not dim the emission in it.
         const glm::vec3 shown = core::cm_display(glm::vec3(pixel), 1.0F, curve, true);
         ASSERT_NEAR(got.a * got.x, shown.x, 0.06F);
       }
@@ -198,7 +198,7 @@ TEST(StraightDisplay, HoldsWhatGlowsByAlpha) {
   EXPECT_EQ(render::straight_display(glm::vec4(0.0F), CM_TONE_MAP_CLIP), glm::vec4(0.0F));
 }
 
-// More light is never less color.
+// More radiance never gives a darker color.
 TEST(StraightDisplay, RisesWithRadiance) {
   for (const float alpha : {0.0F, 0.01F, 0.3F, 0.9F, 1.0F}) {
     float last = -1.0F;

@@ -1,4 +1,4 @@
-// Programs: one of a kind for all viewers that share them, compiled once, kept in files between runs.
+// Shader programs: shared by all viewers of a cumulet_programs, compiled once, and cached in files.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -61,7 +61,7 @@ class ProgramsTest : public testing::Test {
  protected:
   [[nodiscard]] std::uint64_t compiled() const { return fake_.calls("CompileShader") + fake_.calls("LinkProgram"); }
   [[nodiscard]] std::shared_ptr<ProgramFiles> files() const { return std::make_shared<ProgramFiles>(folder_.path()); }
-  // In the host's stead: one viewer's picture.
+  // Creates a viewer as a host would, for one image.
   [[nodiscard]] ViewerPtr viewer(cumulet_programs* programs) {
     auto desc = make_desc<cumulet_create_desc>();
     desc.get_proc = FakeGl::get_proc;
@@ -145,7 +145,7 @@ TEST_F(ProgramsTest, ASecondViewerCompilesNothing) {
   EXPECT_GT(before, 0U);
   EXPECT_EQ(picture_of(second.get(), volume.get(), target), picture);
   EXPECT_EQ(compiled(), before);
-  // What the one leaves the other goes on with.
+  // Programs stay available to the other viewer.
   second.reset();
   EXPECT_EQ(picture_of(first.get(), volume.get(), target), picture);
   EXPECT_EQ(compiled(), before);
@@ -196,7 +196,7 @@ TEST_F(ProgramsTest, WhatIsDamagedIsIgnoredAndWrittenAnew) {
       [](auto& bytes) { bytes[9] ^= std::byte{1}; },                 // of another source or driver
       [](auto& bytes) { bytes[24] ^= std::byte{1}; },                // length
       [](auto& bytes) { bytes[bytes.size() / 2] ^= std::byte{1}; },  // content
-      [](auto& bytes) { bytes[40] ^= std::byte{1}; },                // a format that the driver does not know
+      [](auto& bytes) { bytes[40] ^= std::byte{1}; },                // a binary format unknown to the driver
       [](auto& bytes) { std::ranges::fill(bytes, std::byte{0xff}); },
   };
   for (std::size_t i = 0; i < damages.size(); ++i) {
@@ -224,7 +224,7 @@ TEST_F(ProgramsTest, ShadersOfAFolderAreReadAnew) {
     const auto before = fs::last_write_time(file);
     write(file, bytes);
     fs::last_write_time(file, before + std::chrono::seconds(2));
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it looks so often
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the interval at which it checks the folder
   };
   std::vector<std::string> told;
   const cumulet::Log log([&](cumulet::LogLevel /*level*/, const char* message) { told.emplace_back(message); });
@@ -313,7 +313,7 @@ TEST(ProgramFilesTest, NoBitOfAHeaderIsTrusted) {
 
 TEST(ProgramFilesTest, WhatCannotBeWrittenIsAnErrorOfOneLine) {
   const Folder folder;
-  write(folder / "file", {});  // where a folder shall be
+  write(folder / "file", {});  // where a folder is needed
   ProgramFiles files(folder / "file" / "inside");
   EXPECT_FALSE(files.find("driver", "source"));
   try {

@@ -1,4 +1,4 @@
-// Radiance pictures as environments: headers and codings of all kinds of programs.
+// Radiance images as environments: headers and encodings of many programs.
 
 #include <gtest/gtest.h>
 
@@ -134,7 +134,7 @@ TEST(Radiance, AllEightOrientationsShowTheSamePicture) {
   }
 }
 
-/// `count` gray pixels of this value, flat.
+/// `count` gray pixels of this value, uncompressed.
 std::string flat(std::size_t count, char value) {
   std::string pixels;
   for (std::size_t i = 0; i < count; ++i) pixels += std::string({value, value, value, '\x81'});
@@ -143,7 +143,7 @@ std::string flat(std::size_t count, char value) {
 
 TEST(Radiance, FlatPicturesMayLookCoded) {
   const std::string header = "#?RADIANCE\n\n-Y 2 +X 64\n";
-  // As a coded line's start of another width, of the right width, and as an old run.
+  // Pixels that look like the start of a coded line of another width, of the right width, and like an old run.
   for (const std::string& pixel :
        {std::string("\x02\x02\x04\x78", 4), std::string("\x02\x02\x00\x40", 4), std::string("\x01\x01\x01\x20", 4)}) {
     for (const std::size_t at : {std::size_t{0}, std::size_t{64}}) {
@@ -158,7 +158,7 @@ TEST(Radiance, FlatPicturesMayLookCoded) {
       }
     }
   }
-  // A picture that is no flat one stays damaged.
+  // An image that is not uncompressed stays invalid.
   EXPECT_EQ(refusal(header + std::string("\x02\x02\x04\x78", 4) + flat(128, '\x40')),
             "sky.hdr: a row of another width");
 }
@@ -168,7 +168,7 @@ TEST(Radiance, OldRunsAndNarrowPicturesAreRead) {
   const EnvironmentPixels old = read("#?RADIANCE\n\n-Y 1 +X 301\n" + flat(1, '\x40') + run);
   ASSERT_EQ(old.values.size(), 301U);
   for (const vec3& value : old.values) EXPECT_EQ(value, vec3(0.5F));
-  // Below 8 pixels nothing is coded by channel.
+  // Images narrower than 8 pixels are never coded by channel.
   const EnvironmentPixels narrow =
       read("#?RADIANCE\n\n-Y 1 +X 7\n" + std::string("\x02\x02\x00\x07", 4) + flat(6, '\x40'));
   ASSERT_EQ(narrow.values.size(), 7U);

@@ -1,4 +1,4 @@
-// Ramps over what grids hold: the curve, the cells that are made of it, and pictures against closed forms.
+// Ramps (transfer functions) of grid values: the curve, the resulting cells, and images compared with closed forms.
 
 #include "volume/ramp.hpp"
 
@@ -73,7 +73,7 @@ TEST(Ramp, GoesOverBricksTilesAndBackgrounds) {
     EXPECT_EQ(out.active_voxels, v.active_voxels);
     EXPECT_EQ(out.bounds_max, v.bounds_max);
   }
-  // A background that no voxel has is none that counts.
+  // A background that no voxel has does not count.
   v.tiles = {{{8, 0, 0}, {39, 7, 7}, 2.0F}};
   v.background = 8.0F;
   EXPECT_EQ(apply(Ramp({{7.5F, 1.0F}, {8.0F, 50.0F}}), v).max_value, 1.0F);
@@ -98,7 +98,7 @@ TEST(Histogram, CountsWhatIsAboveZero) {
 
 // ---- Cells
 
-// Cells hold means of ramped values, which are not the ramp of means.
+// Cells hold means of ramped values, not the ramp of means.
 TEST(Ramp, OfACellIsTheMeanOfItsVoxels) {
   const Ramp ramp({{0.3F, 0.0F}, {0.4F, 2.0F}, {0.6F, 0.25F}});
   const viewer::VolumeAsset asset(test::noise_volume(ivec3(16), ivec3(0), 5));
@@ -117,14 +117,15 @@ TEST(Ramp, OfACellIsTheMeanOfItsVoxels) {
   double of_cells = 0.0;
   for (const auto& cell : grid.cells) of_cells += glm::unpackHalf2x16(cell.data.z).x / 24.0;
   EXPECT_NEAR(of_cells, mean, 1e-3 * mean);
-  // Kept until another is asked for; without a ramp it is the volume's own.
+  // Cached until another ramp is requested. Without a ramp it is the volume itself.
   EXPECT_EQ(asset.density(ramp, progress, seconds).statistics, density.statistics);
   EXPECT_EQ(seconds, 0.0);
   EXPECT_EQ(asset.density({}, progress, seconds).voxels.get(), &asset.volume());
   EXPECT_EQ(asset.density(ramp, progress, seconds).statistics, density.statistics);
 }
 
-// What a ramp takes away is split for no more, what it brings out is.
+// Refinement follows the ramped values: where the ramp removes detail there is none, and where it adds detail there is
+// more.
 TEST(Ramp, IsWhatCellsAreSplitFor) {
   const viewer::VolumeAsset asset(test::make_volume(ivec3(64), ivec3(0), [](const ivec3& p) {
     return (p.x < 32 ? 0.1F : 1.0F) + 0.01F * static_cast<float>(p.y & 1);
@@ -145,7 +146,7 @@ TEST(Ramp, IsWhatCellsAreSplitFor) {
   EXPECT_GT(cells(Ramp({{0.105F, 0.0F}, {0.106F, 1.0F}, {1.001F, 0.0F}, {1.009F, 1.0F}})), 10 * plain);
 }
 
-// A density ramp comes before colours; temperature's and flame's before the light that is made of them.
+// A density ramp is applied before colors. Temperature and flame ramps are applied before the conversion to radiance.
 TEST(Ramp, OfChannelsComesFirst) {
   const auto field = [](float value) {
     return test::make_volume(ivec3(8), ivec3(0), [=](const ivec3& p) { return p.x < 4 ? value : 0.0F; });
@@ -170,14 +171,14 @@ TEST(Ramp, OfChannelsComesFirst) {
     EXPECT_NEAR(test::value_at((*radiance)[i], {1, 1, 1}), expected, 2e-3F * expected);
     EXPECT_EQ(test::value_at((*radiance)[i], {5, 1, 1}), 0.0F) << "dark where neither is";
   }
-  // What a ramp makes 0 of is dark whatever the offset.
+  // Values that a ramp maps to 0 emit nothing, whatever the temperature offset.
   emission = {.temperature_offset = 2000.0, .blackbody = 1.0};
   emission.temperature_ramp = Ramp({{1.0F, 0.0F}, {2.0F, 1.0F}});
   emission.flame_ramp = Ramp({{5.0F, 0.0F}, {6.0F, 1.0F}});
   EXPECT_FALSE(scene::emission_of(frame, emission));
 }
 
-// ---- Pictures
+// ---- Images
 
 class RampPicture : public test::ViewerTest {
  protected:
@@ -190,7 +191,7 @@ class RampPicture : public test::ViewerTest {
 };
 CUMULET_ON_BACKENDS(RampPicture);
 
-// Layers of 0, 1, 2 and 3, before a sky of 1. The ramp makes 2, 0.5 and 0 of them, and nothing of what is around.
+// Layers of 0, 1, 2 and 3 in front of a sky of 1. The ramp maps them to 2, 0.5 and 0, and does not affect the outside.
 TEST_P(RampPicture, OfDensityFollowsBeerAndLambert) {
   const auto viewer = make();
   viewer->set_volume(std::make_shared<const viewer::VolumeAsset>(
@@ -234,7 +235,7 @@ TEST_P(RampPicture, OfTemperatureFollowsTheBlackBody) {
   }
 }
 
-// Of those, only what can change the grid builds it.
+// Only ramps that affect the grid cause a rebuild.
 TEST_P(RampPicture, BuildsWhatDependsOnIt) {
   const auto viewer = make();
   viewer->set_volume(std::make_shared<const viewer::VolumeAsset>(test::noise_volume(ivec3(16), ivec3(0), 5)));

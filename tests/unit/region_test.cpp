@@ -1,4 +1,5 @@
-// A part of a picture alone: its pixels have the bits that they have in the whole, and the rest is left alone.
+// Render regions (crop windows): pixels inside are bit-identical to those of the whole image, and nothing else is
+// rendered.
 
 #include "render/region.hpp"
 
@@ -37,7 +38,7 @@ TEST(RegionPixels, AreThoseWhoseMiddlesItHolds) {
   EXPECT_EQ(pixels_of({1.0F, 1.0F, 0.0F, 0.0F}, 8, 8), (PixelBox{{7, 7}, {1, 1}})) << "one at least";
   EXPECT_EQ(pixels_of({0.40F, 0.40F, 0.01F, 0.01F}, 8, 8), (PixelBox{{3, 3}, {1, 1}}));
   EXPECT_EQ(pixels_of({0.0F, 0.0F, 1e-6F, 1e-6F}, 1, 1), (PixelBox{{0, 0}, {1, 1}}));
-  // Of pixels, exactly those.
+  // A region given in pixels selects exactly those.
   for (const std::uint32_t size : {7U, 100U, 1921U, 16384U}) {
     for (std::uint32_t first = 0; first < size; first += 1 + size / 13) {
       for (const std::uint32_t count : {1U, 2U, size / 3, size - first}) {
@@ -65,7 +66,7 @@ TEST(RegionPixels, OfThoseThatShareAnEdgeEachIsInOne) {
   }
 }
 
-// 0.1 + 0.6 and 0.7 are not the same as floats, and the middle of pixel 787 lies between them.
+// 0.1 + 0.6 and 0.7 differ as floats, and the center of pixel 787 is between them.
 TEST(RegionPixels, OfEdgesThatDifferByRoundingEachIsInOne) {
   const PixelBox first = pixels_of({0.1F, 0.0F, 0.6F, 0.0F}, 1125, 1);
   const PixelBox second = pixels_of({0.7F, 0.0F, 0.0F, 0.0F}, 1125, 1);
@@ -111,7 +112,7 @@ class RegionPicture : public CViewerTest {
     std::copy(region.begin(), region.end(), sampling_.region);
     ASSERT_EQ(cumulet_set_sampling(viewer_.get(), &sampling_), CUMULET_OK) << cumulet_last_error(viewer_.get());
   }
-  // As in another picture within the region, and elsewhere this.
+  // Compares with another image inside the region and with a constant outside.
   template <class Value>
   static void expect_part(const std::vector<Value>& made, const std::vector<Value>& of, Value elsewhere,
                           const std::array<float, 4>& region = part) {
@@ -170,7 +171,7 @@ TEST_P(RegionPicture, TakesItsOwnSamplesAlone) {
   auto stats = make_desc<cumulet_stats>();
   ASSERT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
   EXPECT_EQ(stats.samples, pixels_of(part, side, side).area() * sampling_.samples);
-  // A step at a time its progress comes to the same end.
+  // In small steps, the progress reaches 1 as well.
   auto frame = target_->frame();
   frame.target = CUMULET_TARGET_NONE;
   frame.budget_ms = 0.1;
@@ -187,7 +188,7 @@ TEST_P(RegionPicture, TakesItsOwnSamplesAlone) {
   EXPECT_EQ(before, 1.0);
 }
 
-// Of several tiles, too, and of fewer pixels than there are lanes, of a whole that has more.
+// Several tiles, and a region of fewer pixels than lanes in an image of more.
 TEST_P(RegionPicture, OfALargePictureHasTheBitsOfTheWhole) {
   constexpr std::uint32_t width = 1200;
   constexpr std::uint32_t height = 40;
@@ -253,7 +254,7 @@ TEST_P(RegionPicture, GoesOnFromWhatWasKept) {
       << cumulet_last_error(viewer_.get());
   make();
   EXPECT_EQ(linear(), wanted);
-  // Another part's are not this one's.
+  // An accumulation of another region is rejected.
   set(whole);
   ASSERT_EQ(cumulet_render(viewer_.get(), &frame, nullptr), CUMULET_OK);
   EXPECT_EQ(cumulet_restore_accumulation(viewer_.get(), kept.data(), size), CUMULET_ERROR_INVALID_ARGUMENT);
@@ -295,7 +296,7 @@ TEST_P(RegionPicture, IsTransparentAroundWhereItIsReadAsDisplayed) {
   expect_part(made, all, std::uint8_t{0});
 }
 
-// What is beyond it is no neighbour: a picture of one colour stays that to its edges.
+// Pixels beyond the region are not filter inputs: a region of one color stays constant up to its edges.
 TEST_P(RegionPicture, IsDenoisedByItself) {
   auto display = make_desc<cumulet_display_desc>();
   ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
@@ -317,7 +318,7 @@ TEST_P(RegionPicture, IsDenoisedByItself) {
   }
 }
 
-// A coarse picture's last pixels lie beyond the region, so that none within shows what is not made.
+// A coarse preview covers the region completely, so that no pixel inside shows unrendered values.
 TEST_P(RegionPicture, OfAPreviewIsCoveredToItsEdges) {
   sampling_.preview = CUMULET_PREVIEW_AUTO;
   sampling_.samples = 4;
@@ -346,7 +347,7 @@ TEST_P(RegionPicture, OfAPreviewIsCoveredToItsEdges) {
     const std::vector<std::uint8_t> made = target_->pixels();
     for (std::size_t at = 0; at < made.size(); at += 4) {
       const glm::uvec2 pixel(at / 4 % side, side - 1 - at / 4 / side);
-      // All is sky.
+      // The whole image is sky.
       if (box.holds(pixel)) {
         ASSERT_GT(made[at], 200) << pixel.x << ", " << pixel.y << " of " << result.width;
       } else {

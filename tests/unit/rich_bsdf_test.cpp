@@ -1,5 +1,5 @@
-// What surfaces reflect and transmit by glTF's richer extensions: the BSDF of CM_RICH that shaders and C++ share, by
-// quadrature, by sampling, and against closed forms in double precision.
+// The BSDF of the extended-material variant (CM_RICH, glTF extensions) that shaders and C++ share. Tested by
+// quadrature, by sampling, and with closed forms in double precision.
 
 #include <gtest/gtest.h>
 
@@ -148,7 +148,7 @@ Sampled sample(const CmSurface& s, vec3 wo, Random& random) {
   return result;
 }
 
-/// The share of constant radiance that comes back or through, and its standard error.
+/// The reflected and transmitted fraction of constant radiance, and its standard error.
 std::pair<dvec3, double> share(const CmSurface& s, vec3 wo, int n = 40000) {
   Random random{std::mt19937(11)};
   dvec3 sum(0.0);
@@ -184,7 +184,7 @@ TEST(RichBsdf, DensityIsOneOverAllDirectionsAndSamplesFollowIt) {
       });
       Random random{std::mt19937(2)};
       for (int i = 0; i < n; ++i) ++counted[bin_of(sample(s, wo, random).wi)];
-      // A few visible normals mirror back below the surface, to where no half vector is above it.
+      // A few visible normals reflect below the surface, where no half vector is valid.
       EXPECT_NEAR(sum, 1.0, 5e-3) << name << ' ' << cosine;
       double chi2 = 0.0;
       int bins = 0;
@@ -214,7 +214,7 @@ TEST(RichBsdf, TheMeanOfSamplesIsTheIntegral) {
 
 TEST(RichBsdf, IsReciprocal) {
   for (const auto& [name, s] : all_surfaces()) {
-    // What goes through is told apart by the side; the other side's surface has the index the other way round.
+    // Transmission depends on the side. Seen from the other side, the surface has the inverse index.
     CmSurface back = s;
     if (s.eta > 0.0F) back.eta = 1.0F / s.eta;
     back.normal = back.matte_normal = back.smooth_normal = back.geometric = -s.normal;
@@ -227,7 +227,7 @@ TEST(RichBsdf, IsReciprocal) {
       const vec3 there = cm_bsdf_eval(s, wo, up) / static_cast<float>(b);
       const vec3 again = cm_bsdf_eval(s, up, wo) / static_cast<float>(a);
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(there[c], again[c], 2e-3F * there[c] + 1e-6F) << name;
-      // The coat and the sheen dim what goes in as it is seen from outside alone.
+      // Coat and sheen attenuate transmitted light only on the outside, so they are not reciprocal.
       if (!(s.transmission > 0.0F) || s.clearcoat > 0.0F) continue;
       const vec3 down = direction(-b, 0.3 * i + pi + 0.2 * (i % 7));
       const float index2 = s.eta > 0.0F ? s.eta * s.eta : 1.0F;
@@ -265,7 +265,7 @@ TEST(RichBsdf, RoughGlassLosesNoMoreThanSaid) {
   }
 }
 
-// Where smooth glass sends light is Snell's law, and how much of it Fresnel's, by Schlick: in double precision.
+// Smooth glass refracts by Snell's law, with Fresnel weights by Schlick, in double precision.
 TEST(RichBsdf, SmoothGlassFollowsSnellAndSchlick) {
   Random random{std::mt19937(4)};
   for (const double eta : {1.5, 1.0 / 1.33, 2.4}) {
@@ -280,7 +280,7 @@ TEST(RichBsdf, SmoothGlassFollowsSnellAndSchlick) {
         if (got.wi.z > 0.0F) continue;
         through += got.weight.x / n;
         if (i % 100 == 0) {
-          // The narrow lobe is some thousandths wide.
+          // The narrow lobe is a few thousandths wide.
           const dvec3 across = dvec3(wo) - dvec3(0, 0, cosine);
           const dvec3 expected = -across / length(across) * sine - dvec3(0, 0, std::sqrt(1.0 - sine * sine));
           EXPECT_GT(dot(dvec3(got.wi), expected), 0.999) << eta << ' ' << cosine;
@@ -313,12 +313,12 @@ TEST(RichBsdf, ClearThinWallsPassWhatTheyDoNotMirror) {
   }
 }
 
-// White under sheen, and under a film, is as bright as what is around it.
+// White furnace tests: white under sheen and under a thin film.
 TEST(RichBsdf, WhiteUnderSheenVanishesInAFurnace) {
   for (const float roughness : {0.2F, 0.5F, 1.0F}) {
     for (const double cosine : {1.0, 0.6, 0.3, 0.1}) {
       const auto [mean, error] = share(velvet(vec3(1.0F), roughness), direction(cosine, 0.3));
-      // What the base mirrors goes out as it comes in, or the lesser of both: some is lost.
+      // The base's attenuation is the smaller of those for the two directions, so some energy is lost.
       EXPECT_NEAR(mean.x, 1.0, 4.0 * error + 0.03) << roughness << ' ' << cosine;
     }
   }
@@ -330,7 +330,7 @@ TEST(RichBsdf, WhiteUnderAFilmVanishesInAFurnace) {
       CmSurface s = filmed(0.0F, thickness);
       s.base_color = vec3(1.0F);
       const auto [mean, error] = share(s, direction(cosine, 0.3));
-      // Its largest channel is what the matte lobe goes by.
+      // The diffuse lobe is weighted by the film's largest channel.
       EXPECT_LT(std::max({mean.x, mean.y, mean.z}), 1.0 + 4.0 * error + 0.03) << thickness << ' ' << cosine;
       EXPECT_GT(std::max({mean.x, mean.y, mean.z}), 1.0 - 4.0 * error - 0.03) << thickness << ' ' << cosine;
     }
@@ -375,8 +375,8 @@ TEST(RichBsdf, BrushedMetalIsTheExtensionsLobe) {
   }
 }
 
-// Airy's sum over all inner reflections, wavenumber by wavenumber, in double precision.
-// rest: what the terms beyond the second of its series are at most.
+// Airy's sum over all inner reflections, integrated over wavenumbers in double precision. rest: upper bound of the
+// series' terms beyond the second.
 dvec3 airy(double film_ior, double thickness, double base_f0, double cosine, double& rest) {
   const double sine2 = (1.0 - cosine * cosine) / (film_ior * film_ior);
   const double inner = std::sqrt(1.0 - sine2);
@@ -413,7 +413,7 @@ dvec3 airy(double film_ior, double thickness, double base_f0, double cosine, dou
       white[curve.row] += weight;
     }
   }
-  // What does not depend on the wavenumber is white, whatever the curves' own white is.
+  // A term that does not depend on the wavenumber is white, whatever the white point of the curves.
   const double both = r12 * r12 * r23 * r23;
   const double even = r12 * r12 + std::pow(1.0 - r12 * r12, 2.0) * r23 * r23 / (1.0 - both);
   rest = 2.0 * (1.0 - r12 * r12) * std::pow(both, 1.5) / (1.0 - std::sqrt(both));
@@ -476,7 +476,7 @@ TEST(Dispersion, WhiteStaysWhite) {
     ASSERT_GE(wavelength, 402.0F);
     ASSERT_LE(wavelength, 673.0F);
     mean += dvec3(cm_wavelength_colour(wavelength)) / double(n);
-    // Tents: half of each lies within 1 - 1/sqrt(2) of its half width.
+    // Triangular distributions: half of each is within 1 - 1/sqrt(2) of its half width.
     const float off = std::abs(wavelength - 611.0F);
     if (i < n / 3 && off < 62.0F * (1.0F - std::sqrt(0.5F))) ++counts[0];
   }

@@ -1,4 +1,4 @@
-// What a host must be able to rely on when things go wrong: memory, the context, files, sizes and moments.
+// Error handling that hosts rely on: out of memory, context loss, bad files, extreme sizes and calls at any time.
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -44,7 +44,7 @@ constexpr bool sanitized = false;
 
 constexpr int side = 24;
 
-/// A context whose every GL call the library makes is seen.
+/// A context in which every GL call of the library is counted.
 struct Host {
   Context context = Context::create(Backend::automatic);
   FakeGl fake{Context::get_proc, &context};
@@ -56,10 +56,10 @@ struct Host {
   [[nodiscard]] cumulet_status attach(cumulet_viewer* v) { return cumulet_attach(v, FakeGl::get_proc, &fake); }
 };
 
-/// Nobody's picture: what is not drawn over is seen.
+/// A color that no image has, so that pixels that are not drawn are noticed.
 constexpr std::array<float, 4> marker{1.0F, 0.0F, 1.0F, 1.0F};
 
-/// The picture that the next frame shows, whatever it returns.
+/// The image that the next frame draws, whatever status it returns.
 Picture shown(const Host& host, cumulet_viewer* viewer, cumulet_status* status = nullptr, double budget_ms = -1.0,
               std::uint32_t* flags = nullptr) {
   host.target.clear(marker);
@@ -91,7 +91,8 @@ void change_medium(cumulet_viewer* viewer, double density_scale) {
   ASSERT_EQ(cumulet_set_medium(viewer, &medium), CUMULET_OK);
 }
 
-/// Renders until the picture is whole or something fails; returns the failures, at most so many frames.
+/// Renders until the image is converged, and some frames after a failure. Returns the failures. `frames` is the
+/// maximum.
 std::vector<cumulet_status> render_all(cumulet_viewer* viewer, const cumulet_frame_desc& frame, int frames = 400) {
   std::vector<cumulet_status> failures;
   auto result = make_desc<cumulet_frame_result>();
@@ -100,7 +101,7 @@ std::vector<cumulet_status> render_all(cumulet_viewer* viewer, const cumulet_fra
     const cumulet_status status = cumulet_render(viewer, &frame, &result);
     if (status != CUMULET_OK) failures.push_back(status);
     if (status == CUMULET_ERROR_CONTEXT_LOST || status == CUMULET_ERROR_DETACHED) break;
-    // After a failure a few frames more: it may be told once only.
+    // After a failure, a few frames more, because it may be returned only once.
     if (!failures.empty() && i + 4 < frames) i = frames - 4;
     if (status == CUMULET_OK && failures.empty() && (result.flags & CUMULET_RENDER_CONVERGED) != 0) break;
   }
@@ -119,13 +120,13 @@ testing::AssertionResult converges(cumulet_viewer* viewer, const HostTarget& tar
 
 std::size_t heap_bytes() { return mallinfo2().uordblks + mallinfo2().hblkhd; }
 
-// ---- Life, a thousand times ---------------------------------------------------------------------------------------
+// ---- A thousand viewers -------------------------------------------------------------------------------------------
 
 TEST(Robust, AThousandLivesLeaveNothing) {
   Host host;
   const int lives = sanitized ? 30 : 1000;
   const int stretch = lives / 10;
-  std::vector<double> heap;  // after each stretch of lives but the first
+  std::vector<double> heap;  // after each group of viewers except the first
   Picture first;
   for (int life = 0; life < lives; ++life) {
     const VolumeRef volume = make_ball(12);
@@ -142,7 +143,8 @@ TEST(Robust, AThousandLivesLeaveNothing) {
   EXPECT_EQ(host.fake.wrong_deletes(), 0U);
   EXPECT_EQ(FakeGl::strays(), 0U);
   if (!sanitized) {
-    // What leaks does so in every stretch; Mesa's tables grow in some of them, and the more the busier the machine is.
+    // A leak grows the heap in every group. Mesa's tables grow only in some groups, more on a busy machine. So the
+    // lower quartile counts.
     std::vector<double> growth;
     for (std::size_t i = 1; i < heap.size(); ++i) growth.push_back((heap[i] - heap[i - 1]) / stretch);
     const std::size_t quarter = growth.size() / 4;
@@ -203,7 +205,7 @@ TEST(Robust, SurfacesLeaveNothing) {
 
 // ---- Out of memory ------------------------------------------------------------------------------------------------
 
-/// A viewer that shows a is made to show b, while each GL allocation in turn fails.
+/// A viewer that shows a is asked to show b while each GL allocation in turn fails.
 class OutOfMemory : public testing::Test {
  protected:
   void SetUp() override {
@@ -213,7 +215,7 @@ class OutOfMemory : public testing::Test {
     ASSERT_NE(picture_a_, picture_b_);
   }
 
-  /// Renders all while the n-th allocation fails. The failures; refused_: whether there was an n-th.
+  /// Renders while the n-th allocation fails and returns the failures. refused_: whether there was an n-th allocation.
   std::vector<cumulet_status> failing(std::int64_t n, cumulet_viewer* viewer, const HostTarget& target) {
     const std::uint64_t before = host_.fake.allocations();
     host_.fake.fail_allocation(n);
@@ -245,12 +247,12 @@ TEST_F(OutOfMemory, ANewVolumeThatDoesNotFitLeavesTheOldOne) {
     ++refusals;
     SCOPED_TRACE(host_.fake.refused());
     ASSERT_EQ(failures, std::vector<cumulet_status>{CUMULET_ERROR_OUT_OF_MEMORY});
-    // What a transient object's failure kept from being drawn once is drawn now, and was drawn with anything else's.
+    // Failed transient objects prevented only one draw. The next frame draws a or b.
     cumulet_status status = CUMULET_OK;
     const Picture now = shown(host_, viewer_.get(), &status);
     ASSERT_EQ(status, CUMULET_OK);
     ASSERT_TRUE(now == picture_a_ || now == picture_b_);
-    // With memory again, a setting brings what was asked for.
+    // With memory available, a changed setting triggers the retry.
     change_medium(viewer_.get(), 2.0);
     shown(host_, viewer_.get(), nullptr, 5.0);
     change_medium(viewer_.get(), 1.0);
@@ -261,7 +263,7 @@ TEST_F(OutOfMemory, ANewVolumeThatDoesNotFitLeavesTheOldOne) {
   EXPECT_GT(refusals, 2);
 }
 
-// Previews and --surface-light none have textures of their own to lose.
+// Previews and CUMULET_SURFACE_LIGHT_NONE allocate textures of their own.
 TEST_F(OutOfMemory, SurfacesThatDoNotFitLeaveTheVolume) {
   const SurfacesRef panes = cumulet::test::make_panes(4.0F);
   for (const auto mode : {CUMULET_PREVIEW_OFF, CUMULET_PREVIEW_AUTO}) {
@@ -294,7 +296,8 @@ TEST_F(OutOfMemory, SurfacesThatDoNotFitLeaveTheVolume) {
         cumulet_status status = CUMULET_OK;
         shown(host_, viewer_.get(), &status);
         ASSERT_EQ(status, CUMULET_OK);
-        // With memory again, a setting brings what was asked for; another size, where only a coarser picture fitted.
+        // With memory available, a changed setting triggers the retry. So does another size, if only a coarser image
+        // had fitted.
         change_medium(viewer_.get(), 2.0);
         cumulet_frame_desc smaller = host_.target.frame();
         smaller.viewport[2] = smaller.viewport[3] = side / 2;
@@ -309,7 +312,7 @@ TEST_F(OutOfMemory, SurfacesThatDoNotFitLeaveTheVolume) {
 }
 
 TEST_F(OutOfMemory, WhileThereIsNoStorageTheOldVolumeStays) {
-  // Voxels: cells would find room in what is left of other volumes.
+  // A voxel grid, because cells could fit into memory left by other volumes.
   auto dense = make_desc<cumulet_grid_desc>();
   dense.march = CUMULET_MARCH_DENSE;
   const ViewerPtr other = host_.viewer();
@@ -384,7 +387,7 @@ TEST_F(OutOfMemory, FromTheFirstFrameOn) {
     ++refusals;
     SCOPED_TRACE(host_.fake.refused());
     EXPECT_EQ(failures.size(), 1U);
-    // A shader that does not build is told as that.
+    // A shader that does not build returns CUMULET_ERROR_GL.
     const bool shader = host_.fake.refused() == "CompileShader" || host_.fake.refused() == "LinkProgram";
     EXPECT_EQ(failures.empty() ? CUMULET_OK : failures[0], shader ? CUMULET_ERROR_GL : CUMULET_ERROR_OUT_OF_MEMORY);
     change_medium(viewer.get(), 2.0);
@@ -428,7 +431,7 @@ TEST_F(OutOfMemory, ReadingBackFailsAlone) {
       ASSERT_NE(status, CUMULET_OK);
       ASSERT_EQ(difference(shown(host_, viewer_.get()), picture_a_), "");
       ASSERT_EQ(call(viewer_.get(), rgba, bytes, pick, noise), CUMULET_OK) << cumulet_last_error(viewer_.get());
-      // What it made may be kept: begin anew without it.
+      // The viewer may keep the objects that the call made, so start again with a new viewer.
       viewer_ = host_.viewer();
       ASSERT_EQ(difference(picture_of(viewer_.get(), a_.get(), host_.target), picture_a_), "");
     }
@@ -455,7 +458,7 @@ class ContextLossAt : public testing::Test {
     ASSERT_TRUE(host.fake.alive().empty());
   }
 
-  /// The context is lost at the n-th call; then the picture comes back in a fresh one.
+  /// Loses the context at the n-th call. The image must then be restored in a new context.
   void lose(std::uint64_t n) {
     SCOPED_TRACE("lost at call " + std::to_string(n) + " of " + std::to_string(calls_));
     {
@@ -464,19 +467,19 @@ class ContextLossAt : public testing::Test {
       const cumulet_status attached = host.attach(viewer_.get());
       if (attached == CUMULET_OK) {
         auto failures = render_all(viewer_.get(), host.target.frame());
-        // Lost in the very last calls of a frame: the next one tells. How many calls a picture takes is a matter of
-        // timing, too: then a later one loses it.
+        // If the loss is in the last calls of a frame, the next frame returns it. The number of calls per image depends
+        // on timing, so a later frame may be the one that loses it.
         for (int i = 0; i < 20 && failures.empty(); ++i) failures = render_all(viewer_.get(), host.target.frame());
         EXPECT_EQ(failures, std::vector<cumulet_status>{CUMULET_ERROR_CONTEXT_LOST});
         ASSERT_FALSE(failures.empty());
         ASSERT_EQ(failures.back(), CUMULET_ERROR_CONTEXT_LOST);
         EXPECT_NE(std::string(cumulet_last_error(viewer_.get())), "");
       } else {
-        // A context that is lost need not say its version.
+        // A lost context may not report its version.
         ASSERT_TRUE(attached == CUMULET_ERROR_CONTEXT_LOST || attached == CUMULET_ERROR_UNSUPPORTED) << attached;
       }
       ASSERT_TRUE(host.fake.lost());
-      // Detached: no GL from now on.
+      // Detached: no GL calls any more.
       const std::uint64_t before = host.fake.calls();
       const cumulet_frame_desc frame = host.target.frame();
       ASSERT_EQ(cumulet_render(viewer_.get(), &frame, nullptr), CUMULET_ERROR_DETACHED);
@@ -534,7 +537,7 @@ TEST(ContextLoss, OtherCallsTellItToo) {
     if (which == 1) status = cumulet_pick_at(viewer.get(), 5.0, 5.0, &pick);
     if (which == 2) status = cumulet_measure_noise(viewer.get(), &noise);
     if (which == 3) {
-      EXPECT_EQ(cumulet_detach(viewer.get()), CUMULET_OK);  // what it wants is so
+      EXPECT_EQ(cumulet_detach(viewer.get()), CUMULET_OK);  // already detached
     } else {
       EXPECT_EQ(status, CUMULET_ERROR_CONTEXT_LOST);
     }
@@ -606,7 +609,7 @@ TEST(Sizes, AnyFromNothingTo16384EachFrame) {
   EXPECT_EQ(difference(host.target.pixels(), picture), "");
 }
 
-// ---- Moments ------------------------------------------------------------------------------------------------------
+// ---- Any time -----------------------------------------------------------------------------------------------------
 
 class Files : public testing::Test {
  protected:
@@ -655,13 +658,13 @@ TEST_F(Files, BadOnesWhileOneIsShownLoseNothing) {
     EXPECT_EQ(cumulet_get_bounds(viewer.get(), low.data(), high.data()), CUMULET_OK);
     EXPECT_NEAR(high[0], 6.0, 1.0);
   }
-  // A good one then clears the failure.
+  // A successful load clears the failure.
   ASSERT_EQ(cumulet_load_volume(viewer.get(), path("good.vdb").c_str(), nullptr), CUMULET_OK);
   EXPECT_EQ(converge(viewer.get(), host.target.frame()).flags & CUMULET_RENDER_FAILED, 0U);
   EXPECT_NE(host.target.pixels(), picture);
 }
 
-// Loads, sets, cancels, renders, resizes and destroys in a random order, while another thread asks and cancels.
+// Loads, sets, cancels, renders, resizes and destroys in a random order, while another thread queries and cancels.
 TEST_F(Files, AnythingAtAnyMoment) {
   const VolumeRef a = make_ball(12);
   const VolumeRef b = make_ball(40, 1.0F);
@@ -727,7 +730,7 @@ TEST_F(Files, AnythingAtAnyMoment) {
       }
       over = true;
       bystander.join();
-      if (lives < 2) continue;  // destroyed as it is
+      if (lives < 2) continue;  // destroyed in any state
       auto grid = make_desc<cumulet_grid_desc>();
       ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
       ASSERT_EQ(cumulet_set_volume(viewer.get(), a.get()), CUMULET_OK);
@@ -806,7 +809,7 @@ TEST(UpdateCallback, IsCoalescedAndMayNotCallBackIn) {
   EXPECT_EQ(cumulet_camera_orbit(camera.get(), 0.1, 0.0), CUMULET_OK);
   EXPECT_EQ(updates.count, 1) << "camera";
   settle();
-  // From the worker, when the grid is ready; and that callback may not call in either.
+  // Called by the worker thread when the grid is ready. Calls from that callback are rejected too.
   updates.refused = 0;
   EXPECT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
@@ -814,7 +817,7 @@ TEST(UpdateCallback, IsCoalescedAndMayNotCallBackIn) {
   EXPECT_EQ(updates.accepted, 0);
   EXPECT_GE(updates.refused, 5);
   settle();
-  // Still the same volume: none of those calls did anything.
+  // The volume is unchanged: none of those calls had an effect.
   cumulet_volume* shown_volume = nullptr;
   EXPECT_EQ(cumulet_get_volume(viewer.get(), &shown_volume), CUMULET_OK);
   EXPECT_NE(shown_volume, nullptr);

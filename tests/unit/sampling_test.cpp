@@ -37,7 +37,7 @@ TEST(Phase, IntegratesToOneAndHasMeanCosineG) {
 }
 
 TEST(Phase, SamplingFollowsTheDensity) {
-  // Evenly spread u, bin by bin against the density.
+  // Evenly spread u, compared bin by bin with the pdf.
   for (const float g : {-0.7F, 0.0F, 5e-4F, 2e-3F, 0.4F, 0.9F}) {
     const int n = 200000;
     std::array<double, 20> expected{};
@@ -59,8 +59,8 @@ CmPhase phase_of(const cumulet::scene::Phase& p) {
   return {p.anisotropy, p.second_anisotropy, p.second_bend, p.second_share};
 }
 
-// Each by quadrature in double precision, over what its sampling gives for evenly spread u. The lobe of droplets is a
-// few degrees wide: bins are even in the square root of 1 - cosine.
+// Mixtures: quadrature of the phase function in double precision, compared with samples of evenly spread u. The droplet
+// lobe is a few degrees wide, so bins are uniform in the square root of 1 - cosine.
 TEST(Phase, MixturesIntegrateToOneAndAreSampledAsTheyAre) {
   const auto bin_of = [](double cosine) {
     return std::min(29, static_cast<int>(30.0 * std::sqrt((1.0 - cosine) / 2.0)));
@@ -90,8 +90,8 @@ TEST(Phase, MixturesIntegrateToOneAndAreSampledAsTheyAre) {
   }
 }
 
-// The fit's own figures for 20 micrometres (Jendersie and d'Eon 2023), and Draine's mean cosine
-// g (1 + bend (3 + 2 g^2) / 5) / (1 + bend (1 + 2 g^2) / 3).
+// The fit's published values for 20 micrometers (Jendersie and d'Eon 2023), and Draine's mean cosine g (1 + bend (3 + 2
+// g^2) / 5) / (1 + bend (1 + 2 g^2) / 3).
 TEST(Phase, DropletsGoForward) {
   const cumulet::scene::Phase made = cumulet::scene::mie_phase(20.0F);
   EXPECT_NEAR(made.anisotropy, 0.99461, 1e-4);
@@ -142,7 +142,7 @@ TEST(Random, IsUniformAndUncorrelated) {
 }
 
 TEST(Random, NeighbouringPixelsAndSamplesAreIndependent) {
-  // First numbers of the streams of a row of pixels, and of one pixel's samples.
+  // First numbers of the streams of a row of pixels, and of the samples of one pixel.
   for (const bool samples : {false, true}) {
     const uint n = 1 << 18;
     double sum = 0.0;
@@ -177,8 +177,8 @@ TEST(Random, DepthIsExponential) {
 
 }  // namespace
 
-// Each box of a 2^k-th of the unit square, of whatever shape, has one of any 2^k numbers that begin at a multiple of
-// it.
+// (0,2)-sequence: any 2^k points that start at a multiple of 2^k have one point in each box of area 2^-k, for every box
+// shape.
 TEST(EvenPair, AreEvenWhereverTheyBegin) {
   for (const uint pixel : {1U, 77U, 0x9e3779b9U}) {
     for (const uint set : {0U, 1U, 6U}) {
@@ -201,7 +201,7 @@ TEST(EvenPair, AreEvenWhereverTheyBegin) {
   }
 }
 
-// As random as any numbers over pixels, and one set's tell nothing of another's.
+// Over pixels, the points are as random as independent numbers, and sets are independent of each other.
 TEST(EvenPair, AreUniformOverPixelsAndIndependentOverSets) {
   const uint n = 1U << 18;
   for (const uint number : {0U, 1U, 6U, 1000U}) {

@@ -27,10 +27,10 @@ std::string error_of(const std::string& text) {
   }
 }
 
-/// A scene with this one more section.
+/// A scene with one more section.
 std::string with(const std::string& more) { return R"({"cumulet_scene": 1, )" + more + "}"; }
 
-/// What is told of a scene of version 2 with these sections.
+/// The error message for a scene of version 2 with these sections.
 std::string told(const std::string& sections) { return error_of(R"({"cumulet_scene": 2, )" + sections + "}"); }
 
 SceneOptions full_scene() {
@@ -104,7 +104,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   const SceneOptions scene = full_scene();
   const SceneOptions read = parse_scene(scene_text(scene, "/elsewhere/s.json"), "/elsewhere/s.json");
   EXPECT_TRUE(same_scene(scene, read));
-  // same_scene compares what is written: the numbers themselves, too.
+  // same_scene compares the written text; these compare the values too.
   EXPECT_EQ(read.volume, scene.volume);
   EXPECT_EQ(read.grid_name, scene.grid_name);
   EXPECT_EQ(read.surfaces, scene.surfaces);
@@ -223,7 +223,7 @@ TEST(SceneFile, AKeyIsGivenOnce) {
             "dir/s.json: picture.width: is given twice");
   EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "light": {"sun": {"irradiance": [1, 1, 1], "irradiance": [2, 2, 2]}}})"),
             "dir/s.json: light.sun.irradiance: is given twice");
-  // The same key in two objects is no repeat.
+  // The same key in two objects is not a duplicate.
   EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "volume": {"file": "a.vdb"}, "surfaces": {"file": "a.glb"}})"), "");
 }
 
@@ -231,7 +231,7 @@ TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
   const SceneOptions read = parse_scene(R"({"cumulet_scene": 1})", "s.json");
   SceneOptions day;
   day.set_daylight_of_version_1();
-  day.auto_density_scale = false;  // a file of version 1 means 1, for ever
+  day.auto_density_scale = false;  // the default 1 of version 1 files never changes
   EXPECT_TRUE(same_scene(read, day));
   EXPECT_EQ(read.grid.threshold, 0.0);
   EXPECT_EQ(read.grid.max_cells, 0u);
@@ -252,12 +252,12 @@ TEST(SceneFile, ACriterionThatIsNamedIsNoDefault) {
 TEST(SceneFile, DaylightModelsWhatADefaultCameraSees) {
   SceneOptions day;
   day.set_daylight();
-  // From in front and from a side, above: the default camera looks from +Z and a little above.
+  // From the front, the side and above: the default camera looks from +Z and slightly above.
   EXPECT_GE(std::abs(day.light.sun_azimuth_degrees), 40.0f);
   EXPECT_LE(std::abs(day.light.sun_azimuth_degrees), 70.0f);
   EXPECT_GE(day.light.sun_elevation_degrees, 30.0f);
   EXPECT_LE(day.light.sun_elevation_degrees, 50.0f);
-  // A matte white that faces the sun is about as bright as the screen, one in the shade a tenth of that.
+  // A matte white surface that faces the sun is about as bright as the screen; one in the shade has a tenth of that.
   const auto luminance = [](const float(&rgb)[3]) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; };
   const double lit = luminance(day.light.sun_irradiance) / std::numbers::pi;
   const double shade = luminance(day.light.sky_radiance);
@@ -348,14 +348,14 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
                            R"({"cumulet_scene": "1"})", R"({"medium": {"density_scale": 1e999}})", "\xff\xfe"})
     EXPECT_EQ(error_of(text).rfind("dir/s.json: ", 0), 0u) << text;
   EXPECT_EQ(error_of(with(R"("col\nour": {})")).find('\n'), std::string::npos);
-  // A hostile depth ends in an error, not on the stack.
+  // Extreme nesting gives an error, not a stack overflow.
   EXPECT_NE(error_of(std::string(500000, '[')), "");
 }
 
 TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
   SceneOptions scene = full_scene();
   const std::string first = scene_text(scene, "s.json", SceneFormat::first);
-  // All but what it does not know.
+  // Equal except for settings that version 1 does not have.
   EXPECT_FALSE(same_scene(parse_scene(first, "s.json"), scene));
   scene.lamps.clear();
   scene.to_world = {};
@@ -439,7 +439,8 @@ TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
   const SceneOptions parts = parse_scene(
       R"({"cumulet_scene": 2, "volumes": [{"translate": [5, 6, 7], "rotate_degrees": [90, 0, 90], "scale": [2, 3, 4]}]})",
       "s.json");
-  // x, doubled, is turned about z to y; y, tripled, about x to z; z, times 4, about x to -y, and about z to x.
+  // x, doubled, is rotated about z to y. y, tripled, is rotated about x to z. z, times 4, goes about x to -y, and about
+  // z to x.
   const std::array<double, 16> expected = {0, 2, 0, 0, 0, 0, 3, 0, 4, 0, 0, 0, 5, 6, 7, 1};
   for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(parts.to_world[i], expected[i], 1e-12) << i;
   const SceneOptions places = parse_scene(
@@ -452,7 +453,7 @@ TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
   SceneOptions z_up = parts;
   z_up.up = UpAxis::z;
   const cumulet_volume_file_desc file = volume_file(z_up);
-  // What is up in the file, z, is y before it is placed.
+  // The file's up axis z becomes y before the instance transform.
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(file.to_world[8 + i], expected[4 + i], 1e-12) << i;
 }
 
@@ -495,7 +496,7 @@ TEST(SceneFile, WhatMovesIsKept) {
             "dir/s.json: camera.close.lens_radius: there is no such setting");
   EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
             "dir/s.json: volumes[0].open.turn: there is no such setting");
-  // Of what stands somewhere, from there.
+  // Shutter transforms are relative to the instance transform.
   double place[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1};
   double open[16];
   double close[16];
@@ -532,7 +533,7 @@ TEST(SceneFile, CamerasAreKept) {
   EXPECT_EQ(reread.cameras[1].camera.orthographic_height, 20.0);
   EXPECT_EQ(reread.camera.eye[0], 7.0);
 
-  // By name, with all that is its own; it is written so, as long as nobody moves it.
+  // The camera is referenced by name, with all its settings. It is written by name until it is moved.
   const SceneOptions front = read(R"(, "camera": "front")");
   EXPECT_TRUE(same(front.camera, scene.cameras[0].camera));
   EXPECT_EQ(front.camera.lens_radius, 0.25);
@@ -551,7 +552,7 @@ TEST(SceneFile, CamerasAreKept) {
   end_shutter(still);
   EXPECT_EQ(looked_through(still), nullptr);
 
-  // They count for the scene, not for the picture.
+  // Names affect the scene comparison, but not the image hash.
   SceneOptions renamed = scene;
   renamed.cameras[2].name = "anywhere";
   EXPECT_FALSE(same_scene(scene, renamed));
@@ -649,13 +650,13 @@ TEST(SceneFile, ASequenceIsKept) {
   const SceneOptions again = parse_scene(scene_text(scene, "/folder/scene.json"), "/folder/scene.json");
   EXPECT_TRUE(same_scene(scene, again));
   EXPECT_EQ(again.sequence.frame, 7);
-  // The playhead is no change of the scene; how it plays is.
+  // The current frame does not count as a change of the scene, the playback settings do.
   SceneOptions other = scene;
   other.sequence.frame = 8;
   EXPECT_TRUE(same_scene(scene, other));
   other.sequence.last = 8;
   EXPECT_FALSE(same_scene(scene, other));
-  // Nothing is written of what nobody said.
+  // Defaults are not written.
   EXPECT_EQ(scene_text(SceneOptions(), "scene.json").find("sequence"), std::string::npos);
   const auto refused = [&](const std::string& sequence) {
     try {
@@ -730,11 +731,11 @@ TEST(SceneFile, ModelsAreKept) {
   EXPECT_EQ(read.surfaces, scene.surfaces);
   EXPECT_EQ(read.models, scene.models);
   EXPECT_TRUE(same_scene(read, scene));
-  // Of the first version none are written, and it reads.
+  // Version 1 files contain no models, and can still be read.
   const SceneOptions first = parse_scene(scene_text(scene, path, SceneFormat::first), path);
   EXPECT_EQ(first.surfaces, scene.surfaces);
   EXPECT_TRUE(first.models.empty());
-  // Each of them counts, and its name for the scene, but not for the picture.
+  // Each setting affects scene and image hash. The name affects only the scene.
   for (const auto& change : std::vector<std::function<void(SceneModel&)>>{
            [](SceneModel& m) { m.file = "/data/other.glb"; }, [](SceneModel& m) { m.to_world[12] = 9; },
            [](SceneModel& m) { m.visible = true; }, [](SceneModel& m) { m.shadow_only = false; },
@@ -748,7 +749,7 @@ TEST(SceneFile, ModelsAreKept) {
   renamed.models[1].name = "another fox";
   EXPECT_FALSE(same_scene(scene, renamed));
   EXPECT_EQ(scene_hash(scene), scene_hash(renamed));
-  // Without surfaces the first of them is the file's first, with how surfaces are lit.
+  // Without surfaces, the first model is the first surface entry of the file, with the surface lighting.
   scene.surfaces.clear();
   const SceneOptions alone = parse_scene(scene_text(scene, path), path);
   EXPECT_TRUE(alone.surfaces.empty());

@@ -72,14 +72,14 @@ TEST(Cumulus, HasWhatItPromises) {
   // Wider below than above, flat at the base.
   EXPECT_GT(bottom, top);
   const double voxel = grid->voxelSize().x();
-  // Metres: opaque through the middle (tens of optical depths), not a wall.
+  // In meters: opaque through the middle (tens of optical depths), but not solid.
   const double mean_depth = mass * voxel * voxel * voxel / (75.0 * 45.0);
   EXPECT_GT(mean_depth, 5.0);
   EXPECT_LT(mean_depth, 80.0);
 }
 
 TEST(Cumulus, GainsDetailWithResolution) {
-  // The border's area grows faster than a smooth shape's would: active voxels with an inactive neighbour.
+  // Active voxels with an inactive neighbor: their number grows faster than that of a smooth shape.
   const auto border = [](const openvdb::FloatGrid& grid) {
     auto accessor = grid.getConstAccessor();
     double n = 0.0;
@@ -100,7 +100,7 @@ TEST(Cumulus, GainsDetailWithResolution) {
 
 struct Burning {
   double soot = 0.0;    // voxels
-  double height = 0.0;  // of the soot's middle
+  double height = 0.0;  // of the soot's center
   double width = 0.0;
   double hottest = 0.0;
   double flames = 0.0;
@@ -166,7 +166,7 @@ TEST(Explosion, IsTheSameWhateverTheThreads) {
   EXPECT_THROW((void)scene::make_explosion({30000, 1}, 21), std::runtime_error);
 }
 
-// The mountains as the importer has them, and the names of their nodes.
+// The mountains as imported, and the names of their nodes.
 class Mountains : public testing::Test {
  protected:
   Mountains() {
@@ -190,7 +190,7 @@ class Mountains : public testing::Test {
     return std::nullopt;
   }
 
-  // Of the triangles of a node, or of one material of it, in the order of the file.
+  // Positions of the triangles of a node, or of one material of it, in file order.
   [[nodiscard]] std::vector<glm::vec3> points(const char* name, const surface::Pose& pose,
                                               const std::string& material = "") const {
     std::vector<glm::vec3> found;
@@ -227,7 +227,7 @@ TEST(Mesh, PartsAreWoundOutwards) {
   mesh.turned({-9, 0, 0}, {{0.0F, 0.0F}, {2.0F, 1.0F}, {0.0F, 3.0F}}, 12);
   EXPECT_GT(area(), 88.0 + 12.0 + 12.0 + 10.0);
   EXPECT_EQ(surface::detail::winding_of(mesh.position, mesh.index).inward, 0.0);
-  // And the normals agree with it.
+  // The normals agree with the winding.
   for (std::size_t i = 0; i + 2 < mesh.index.size(); i += 3) {
     const auto at = [&](std::size_t k) { return mesh.position[mesh.index[i + k]]; };
     for (std::size_t k = 0; k < 3; ++k) {
@@ -236,9 +236,10 @@ TEST(Mesh, PartsAreWoundOutwards) {
   }
 }
 
-// Whatever is seen first from around the tower is seen from its front. From above: the roofs are sheets that jut out.
+// From around the tower, the first hit is always a front face. From above it may not be, because the roofs are
+// overhanging sheets.
 TEST_F(Mountains, ShowTheirFronts) {
-  std::vector<std::uint32_t> flags(scene_->triangle_count(), 0);  // rays meet backs as well
+  std::vector<std::uint32_t> flags(scene_->triangle_count(), 0);  // rays hit back faces too
   const surface::Bvh bvh = surface::Bvh::build(pose_.vertices, scene_->indices, flags);
   core::BvhRays rays{&bvh};
   const auto corner = [&](std::size_t triangle, std::size_t k) {
@@ -271,7 +272,8 @@ TEST_F(Mountains, ShowTheirFronts) {
     }
   }
   EXPECT_GT(seen, 10000U);
-  // But for windows, flat before a wall that leans: some are seen edge-on, from behind. Of bars it would be a half.
+  // Except for windows, flat in front of a slanted wall: some are seen edge-on from behind. Inverted winding would give
+  // about a half.
   EXPECT_LT(200 * backs, seen);
 }
 
@@ -290,7 +292,7 @@ TEST_F(Mountains, AreImportedWithoutAWarning) {
   }
   EXPECT_TRUE(glows);
   EXPECT_TRUE(metal);
-  // What glTF asks of its writers and the importer does not.
+  // Requirements of glTF for writers that the importer does not check.
   for (const nlohmann::json& mesh : json_["meshes"]) {
     for (const nlohmann::json& primitive : mesh["primitives"]) {
       const nlohmann::json& positions = json_["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
@@ -316,7 +318,7 @@ TEST_F(Mountains, HaveTheSceneFilesCameraAndALanternThatTurns) {
   const surface::Pose later = scene_->pose(1.5);
   const std::vector<glm::vec3> before = points("Lantern", pose_);
   const std::vector<glm::vec3> after = points("Lantern", later);
-  // A quarter of a turn about the tower: +X comes to -Z.
+  // A quarter turn about the tower: +X moves to -Z.
   for (std::size_t i = 0; i < before.size(); ++i) {
     const glm::vec3 from = before[i] - scene::tower_foot;
     const glm::vec3 to = after[i] - scene::tower_foot;
@@ -355,11 +357,11 @@ TEST_F(Mountains, StandInTheCloud) {
     ASSERT_GT(p.y, low.y());
     ASSERT_LT(p.y, high.y());
   }
-  // A part of it in the cloud, its top and its foot out of it.
+  // A part of the tower is in the cloud, its top and foot are outside.
   EXPECT_GT(covered, static_cast<int>(tower.size() / 20));
   EXPECT_LT(covered, static_cast<int>(tower.size() / 2));
 
-  // The ground: level under the tower, and up in the cloud elsewhere.
+  // The ground is level below the tower, and reaches up into the cloud elsewhere.
   int level = 0;
   int clouded = 0;
   for (const glm::vec3& p : points("Terrain", pose_)) {

@@ -27,7 +27,7 @@ Schedule in(State state) {
   return schedule;
 }
 
-// The table of schedule.hpp, whole.
+// The complete table of schedule.hpp.
 TEST(Schedule, DoesAsItsTableSays) {
   struct Row {
     State from;
@@ -91,10 +91,10 @@ TEST(Stillness, IsThereAtOnceWhenTheHandLetsGo) {
   EXPECT_TRUE(still.rests(start));
   still.see(false, false, start);
   EXPECT_TRUE(still.rests(start));
-  still.see(true, false, start);  // something else changed it
+  still.see(true, false, start);  // changed by something else than the user
   EXPECT_FALSE(still.rests(start));
   still.see(true, true, start);
-  still.see(true, false, start);  // let go with the last change
+  still.see(true, false, start);  // released with the last change
   EXPECT_TRUE(still.rests(start));
 }
 

@@ -1,5 +1,5 @@
-// Sequences, as hosts have them: what is refused, what is shown of broken ones, and that a frame is the same however it
-// came.
+// Sequences in the C API: rejected arguments, handling of broken frames, and frames that are identical however they are
+// reached.
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ class CSequence : public cumulet::test::CPlaybackTest {
     EXPECT_EQ(cumulet_get_sequence_info(viewer, &info, nullptr, 0), CUMULET_OK) << cumulet_last_error(viewer);
     return info;
   }
-  // All frames are ready, or failed; false after a minute.
+  // Waits until all frames are ready or failed. Returns false after a minute.
   static bool is_cached(cumulet_viewer* viewer) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     for (;;) {
@@ -57,7 +57,7 @@ class CSequence : public cumulet::test::CPlaybackTest {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
   }
-  // Of this file, by itself.
+  // The image of this file, loaded by a new viewer.
   Picture alone(int frame) {
     const ViewerPtr viewer = make();
     EXPECT_EQ(cumulet_load_volume(viewer.get(), clip_.path(frame).c_str(), nullptr), CUMULET_OK);
@@ -115,7 +115,7 @@ TEST_F(CSequence, IsRefusedInOneLine) {
   double seconds = 99.0;
   EXPECT_EQ(cumulet_sequence_get_frame_at(sequence.get(), 0.0, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_sequence_get_time_of(sequence.get(), count, &seconds), CUMULET_ERROR_INVALID_ARGUMENT);
-  // What is refused changed nothing: frames 3 to 6 at 24 a second.
+  // Rejected calls changed nothing: frames 3 to 6 at 24 per second.
   EXPECT_EQ(cumulet_sequence_get_frame_at(sequence.get(), 2.0 / 24.0, &frame), CUMULET_OK);
   EXPECT_EQ(frame, 5U);
   EXPECT_EQ(cumulet_sequence_get_time_of(sequence.get(), 5, &seconds), CUMULET_OK);
@@ -173,7 +173,7 @@ TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
   EXPECT_EQ(info.asked_position, 2.5);
   EXPECT_EQ(info.drawn_frame, 2U);
   EXPECT_EQ(info.drawn_position, 2.5);
-  // The same until the next step, and played, scrubbed to or made anew.
+  // The image stays until the next step. It is the same when played, scrubbed to or rebuilt.
   EXPECT_EQ(difference(at(2.7), half), "");
   EXPECT_EQ(info_of(viewer.get()).asked_position, 2.5);
   EXPECT_NE(difference(at(2.75), half), "");
@@ -181,7 +181,7 @@ TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
   EXPECT_EQ(difference(picture(viewer.get()), half), "");
   ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), half), "");
-  // Frames' own stay what they are.
+  // Whole frames are not interpolated.
   for (const int frame : {0, 3, 6}) EXPECT_EQ(difference(at(frame), alone(frame)), "") << frame;
   playback.between = CUMULET_BETWEEN_NONE;
   ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
@@ -189,7 +189,7 @@ TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
   EXPECT_EQ(info_of(viewer.get()).asked_position, 2.0);
 }
 
-// Played, scrubbed to, or loaded by itself: to the last bit.
+// Played, scrubbed to, or loaded separately: bit-identical.
 TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
   clip_.empty(1);
   clip_.with_flame(4);
@@ -210,7 +210,7 @@ TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
   EXPECT_GT(info_of(viewer.get()).bytes, 10'000U);
 }
 
-// Frames whose grids GL builds, one after another on as many lattices.
+// GPU-built grids of frames, one after another, each with its own lattice.
 TEST_F(CSequence, AFramesGridIsGlsToo) {
   clip_.with_flame(2);
   const SequenceRef sequence = make_sequence(clip_.paths());
@@ -277,12 +277,12 @@ TEST_F(CSequence, WithoutAFrameItFailsAndWhatWasThereStays) {
   EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
   EXPECT_EQ(difference(target_.pixels(), before), "");
   EXPECT_EQ(info_of(viewer.get()).is_drawn, 0);
-  // The next wish makes it old news.
+  // The next request clears the failure.
   ASSERT_EQ(cumulet_load_volume(viewer.get(), clip_.path(0).c_str(), nullptr), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), before), "");
 }
 
-// One density scale, one camera and one ground, by the largest frame.
+// One density scale, one camera and one ground plane for all frames, derived from the largest one.
 TEST_F(CSequence, NothingJumps) {
   std::vector<std::uintmax_t> sizes;
   for (const std::string& path : clip_.paths()) sizes.push_back(std::filesystem::file_size(path));
@@ -353,7 +353,7 @@ TEST_F(CSequence, VolumesAndSequencesTakeTurns) {
   EXPECT_EQ(difference(picture(viewer.get()), third), "");
   auto info = make_desc<cumulet_sequence_info>();
   EXPECT_EQ(cumulet_get_sequence_info(viewer.get(), &info, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
-  ASSERT_EQ(cumulet_set_sequence(viewer.get(), nullptr), CUMULET_OK);  // there is none
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), nullptr), CUMULET_OK);  // no sequence
   EXPECT_EQ(difference(picture(viewer.get()), third), "");
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), first), "");
@@ -361,7 +361,7 @@ TEST_F(CSequence, VolumesAndSequencesTakeTurns) {
   EXPECT_EQ(difference(picture(viewer.get()), first), "");
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
-  sequence.reset();  // the viewer has its share
+  sequence.reset();  // the viewer keeps a reference
   EXPECT_EQ(difference(picture(viewer.get()), first), "");
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), nullptr), CUMULET_OK);
   double box[6];
@@ -383,7 +383,7 @@ TEST_F(CSequence, GoesOnWhereAVolumeCannotBeRead) {
   while (info_of(viewer.get()).drawn_frame != 4U && ++calls < 2000)
     ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
   EXPECT_LT(calls, 2000);
-  // Another setting is of all frames, and makes the failure old news.
+  // A changed setting applies to all frames and clears the failure.
   auto grid = make_desc<cumulet_grid_desc>();
   grid.threshold = 0.02;
   grid.cells = CUMULET_CELLS_CONSTANT;
@@ -394,7 +394,7 @@ TEST_F(CSequence, GoesOnWhereAVolumeCannotBeRead) {
   ASSERT_EQ(cumulet_set_grid(single.get(), &grid), CUMULET_OK);
   ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(4).c_str(), nullptr), CUMULET_OK);
   EXPECT_EQ(difference(found, picture(single.get())), "");
-  // Settings that change while it is read are those of both.
+  // Settings changed during the load apply to the sequence too.
   ASSERT_EQ(cumulet_load_volume(viewer.get(), "missing.vdb", nullptr), CUMULET_OK);
   grid.threshold = 0.05;
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
@@ -431,7 +431,7 @@ TEST_F(CSequence, OtherSettingsAreThoseOfAllFrames) {
     ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(frame).c_str(), nullptr), CUMULET_OK);
     EXPECT_EQ(difference(found, picture(single.get())), "") << frame;
   }
-  // Cells that follow the camera wait for one.
+  // Camera-adaptive grids need a camera.
   grid.camera_adaptive = 1;
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
   ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 2.0), CUMULET_OK);
@@ -442,7 +442,7 @@ TEST_F(CSequence, OtherSettingsAreThoseOfAllFrames) {
   EXPECT_EQ(difference(found, picture(single.get())), "");
 }
 
-// Once they are there, each frame that is asked for for long enough to be drawn is drawn, with previews and a budget.
+// Once all frames are cached, each requested frame is drawn if it is requested long enough, with previews and a budget.
 TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
@@ -458,7 +458,7 @@ TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
   ASSERT_TRUE(is_cached(viewer.get()));
   for (int i = 0; i < 3 * count; ++i) {
     ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), i / 24.0), CUMULET_OK);
-    // Of a test's own clock: frames that are drawn, not seconds, which a busy machine has few of.
+    // The test counts rendered frames instead of seconds, because a busy machine is slow.
     int calls = 0;
     do {
       ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
@@ -467,7 +467,7 @@ TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
   }
 }
 
-// On a device so slow that no picture is whole before the next wish.
+// Simulates a device so slow that no image is complete before the next request.
 TEST_F(CSequence, PlaysOnWhileTheCameraMoves) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
@@ -546,7 +546,7 @@ TEST_F(CSequence, MovesInAnyThread) {
   ends = true;
   for (std::thread& thread : threads) thread.join();
   ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 4.0), CUMULET_OK);
-  ASSERT_EQ(cumulet_rebuild(other.get()), CUMULET_OK);  // cancelled last, it rests until something else is asked for
+  ASSERT_EQ(cumulet_rebuild(other.get()), CUMULET_OK);  // after a cancel, the viewer is idle until another request
   const Picture found = picture(viewer.get());
   EXPECT_EQ(difference(found, alone(4)), "");
   EXPECT_EQ(difference(picture(other.get()), found), "");
@@ -567,7 +567,7 @@ InstanceRef make_instance(cumulet_sequence* sequence, double x = 0.0, double den
 
 class PlayedInstances : public CSequence {
  protected:
-  // Of instances of this file's volume.
+  // The image of instances of this file's volume.
   Picture still(int frame, const std::vector<double>& places) {
     auto file = make_desc<cumulet_volume_file_desc>();
     file.path = clip_.path(frame).c_str();
@@ -587,7 +587,7 @@ class PlayedInstances : public CSequence {
     see_all(viewer.get());
     return picture(viewer.get());
   }
-  // However large each frame is.
+  // Sees all instances for any frame's size.
   static void see_all(cumulet_viewer* viewer) {
     auto desc = make_desc<cumulet_camera_desc>();
     desc.eye[0] = 10.0;
@@ -618,7 +618,7 @@ TEST_F(PlayedInstances, AFrameIsTheVolumesAlone) {
     EXPECT_EQ(info.drawn_frame, std::uint32_t(frame));
     EXPECT_EQ(info.is_drawn, 1);
   }
-  // Both are one: a grid each would be twice the cells.
+  // Both instances share one grid. Separate grids would have twice the cells.
   auto stats = make_desc<cumulet_stats>();
   ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
   const std::uint64_t shared = stats.cells;
@@ -642,7 +642,7 @@ TEST_F(PlayedInstances, EachAtItsOwnMomentBesideTheViewersOwn) {
   EXPECT_EQ(info_of(viewer.get()).drawn_frame, 1U);
   EXPECT_EQ(instance_info(viewer.get(), instance.get()).drawn_frame, 5U);
   EXPECT_NE(difference(both, still(1, {0.0})), "");
-  // Hidden it is not followed, and nothing is known of it.
+  // Hidden instances do not follow their sequence and have no state.
   auto desc = make_desc<cumulet_instance_desc>();
   desc.sequence = late.get();
   desc.hidden = 1;
@@ -674,7 +674,7 @@ TEST_F(PlayedInstances, GapsAreNamedAndPlayedOver) {
   EXPECT_EQ(std::string(cause.data()).rfind(clip_.path(3) + ": ", 0), 0U) << cause.data();
   EXPECT_EQ(cumulet_get_instance_sequence_frame(viewer.get(), instance.get(), count, cause.data(), cause.size()),
             CUMULET_ERROR_INVALID_ARGUMENT);
-  // With none that can be shown the load has failed.
+  // If no frame can be displayed, the load fails.
   const SequenceRef none = make_sequence({"not-there.1.vdb"});
   const InstanceRef lost = make_instance(none.get());
   ASSERT_EQ(cumulet_add_instance(viewer.get(), lost.get()), CUMULET_OK);
@@ -694,7 +694,7 @@ TEST_F(PlayedInstances, AVolumeAndASequenceAreNotBothOfOne) {
   std::array<char, 256> error{};
   EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
-  // From one to the other, and to neither.
+  // From volume to sequence and back, and to neither.
   const ViewerPtr viewer = make();
   see_all(viewer.get());
   const InstanceRef instance = make_instance(sequence.get());

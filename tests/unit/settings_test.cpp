@@ -1,4 +1,5 @@
-// The table of settings against all that is made of it: the C API, scene files, flags, and their page.
+// The table of settings compared with everything derived from it: C API, scene files, flags, and their documentation
+// page.
 
 #include "settings/settings.hpp"
 
@@ -24,7 +25,7 @@ using namespace cumulet;
 using demo::SceneOptions;
 using settings::Setting;
 
-/// Calls visit with each descriptor of a scene and what gives it to a viewer.
+/// Calls visit with each descriptor of a scene and the function that sets it on a viewer.
 template <class Visit>
 void for_each_descriptor(Visit&& visit) {
   visit(&SceneOptions::medium, cumulet_set_medium);
@@ -37,7 +38,7 @@ void for_each_descriptor(Visit&& visit) {
   visit(&SceneOptions::display, cumulet_set_display);
 }
 
-/// A value that is not the default, and that people may give.
+/// Sets a valid value that is not the default.
 template <class Desc, class Value>
 void set_sample(const Setting<Desc, Value>& setting, Value& value) {
   if constexpr (settings::Enumerated<Value>) {
@@ -60,7 +61,7 @@ void set_sample(const Setting<Desc, Value>& setting, Value& value) {
   }
 }
 
-/// The same on the command line.
+/// The text of that value on the command line.
 template <class Desc, class Value>
 std::string sample_text(const Setting<Desc, Value>& setting, const Value& value) {
   if constexpr (settings::Enumerated<Value>) {
@@ -80,7 +81,7 @@ std::string sample_text(const Setting<Desc, Value>& setting, const Value& value)
   }
 }
 
-/// A value that the C API refuses; false if there is none.
+/// Sets a value that the C API rejects. Returns false if there is none.
 template <class Desc, class Value>
 bool set_bad(const Setting<Desc, Value>&, Value& value) {
   if constexpr (settings::Enumerated<Value> || settings::Switch<Value>) {
@@ -161,7 +162,7 @@ TEST(Settings, SceneFilesKeepEach) {
       EXPECT_TRUE(settings::same(read.*part, scene.*part)) << setting.key;
     });
   });
-  // What a picture's file has no say in, or says by name (surfaces.variant).
+  // Settings that scene files do not contain, or contain by name (surfaces.variant).
   EXPECT_EQ(without, (std::set<std::string>{"first_sample", "light_groups", "preview", "variant", "volume_alone"}));
 }
 
@@ -234,7 +235,7 @@ TEST(Settings, AFlagSetsEach) {
       EXPECT_TRUE(equal(options->scene.*part.*setting.field, scene.*part.*setting.field)) << setting.flag;
     });
   });
-  // --sun and --sky-model set three at once.
+  // --sun and --sky-model set three settings at once.
   EXPECT_EQ(without, (std::set<std::string>{"first_sample", "ground_albedo", "light_groups", "preview", "sky",
                                             "sun_azimuth_degrees", "sun_elevation_degrees", "sun_irradiance",
                                             "turbidity", "variant", "volume_alone"}));

@@ -1,4 +1,4 @@
-// A volume that stands in several places: pictures are those of one volume with the sum of their densities.
+// A volume with several instance transforms: images equal those of one volume with the sum of the densities.
 
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ volume::ScalarVolume flames() {
   return test::make_volume({12, 10, 12}, {5, 4, 5}, [](const ivec3& p) { return p.x < 8 ? 1.5F : 0.25F; });
 }
 
-// All of them in one lattice.
+// One volume with the sum of all translated copies.
 volume::ScalarVolume merged(const volume::ScalarVolume& one, const Offsets& offsets) {
   ivec3 low(1 << 20);
   ivec3 high(-(1 << 20));
@@ -72,7 +72,7 @@ class Several : public test::CloudTest {
       return test::render(*still_, {edge, edge, samples, 100 + k, render::View::shaded});
     });
   }
-  // In places and merged.
+  // Compares the instances with the merged volume.
   void expect_same_as_merged(const Offsets& offsets, bool burns = false) {
     const auto flame = burns ? std::optional(flames()) : std::nullopt;
     show(cloud(), flame, offsets);
@@ -86,7 +86,7 @@ CUMULET_ON_BACKENDS(Several);
 const Offsets apart{{0, 0, 0}, {30, 0, 0}, {0, 0, 28}};
 const Offsets overlapping{{0, 0, 0}, {9, 3, 0}, {4, -5, 10}, {9, 3, 0}};
 
-// What is behind a slab with so many before it, in closed form.
+// Transmittance of `count` slabs, in closed form.
 TEST_P(Several, ExtinctionsAddUpAlongARay) {
   only_absorb(0.05);
   const auto slab = test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3&) { return 1.0F; });
@@ -152,7 +152,7 @@ TEST_P(Several, StandAmongSurfaces) {
   expect_same_as_merged(overlapping, true);
 }
 
-// Turned, stretched and sheared, twice at half the density.
+// Two instances at half the density equal one, with a rotated, stretched and sheared transform.
 TEST_P(Several, TwiceAtHalfTheDensityIsOne) {
   const dmat4 place(dvec4(0.7, 0.2, -0.4, 0), dvec4(0.3, 1.4, 0.1, 0), dvec4(0.2, -0.5, 1.1, 0),
                     dvec4(3.0, -2.0, 11.0, 1));
@@ -175,7 +175,7 @@ TEST_P(Several, APictureDependsOnNoTime) {
   EXPECT_EQ(test::render(*still_, image, 0.5).pixels, whole.pixels) << "in bounded steps";
 }
 
-// A sky of them: none is lost, whatever stands where.
+// A thousand instances: each one is visible at any position.
 TEST_P(Several, MayBeAThousand) {
   only_absorb(3.0);
   Offsets offsets;
@@ -190,7 +190,7 @@ TEST_P(Several, MayBeAThousand) {
   EXPECT_EQ(viewer().bounds().max.z, 406.5);
 }
 
-// What is known without chance: the same of places and of one lattice, whose voxels are the same.
+// AOVs and debug views have no noise. They are equal for instances and for one volume with the same voxels.
 TEST_P(Several, FactsAndViewsAreThoseOfOne) {
   const Offsets many{{0, 0, 0}, {9, 3, 0}, {4, -5, 10}, {9, 3, 0}, {30, 0, 0}};
   const test::Image image{edge, edge, 1, 1, render::View::shaded};
@@ -252,7 +252,8 @@ TEST_P(Several, PicksSayWhichAndSurfacesAreNone) {
   EXPECT_FALSE(surface.place);
 }
 
-// Deeper than kernels keep at once: what comes last is taken up later, and none is lost on paths.
+// Overlap deeper than the list of active volumes that kernels keep. Later volumes are processed afterwards, and paths
+// lose none.
 TEST_P(Several, MayOverlapDeeply) {
   medium_ = {};
   medium_.albedo = vec3(0.0F);
@@ -267,14 +268,14 @@ TEST_P(Several, MayOverlapDeeply) {
   EXPECT_NEAR(transmittance, expected, 4.5 * std::sqrt(expected * (1.0 - expected) / 65536.0));
 }
 
-// Too far away for the tree: what was there before stays, and comes back.
+// A transform too far away for the instance tree is rejected. The previous state stays and can be restored.
 TEST_P(Several, WhatIsRefusedLeavesTheOthers) {
   const test::Image image{edge, edge, 4, 3, render::View::shaded};
   const auto picture = [&] {
     test::render(*still_, image);
     return still_->read();
   };
-  // Told once, until a setting changes.
+  // The error is returned once per setting.
   const auto picture_after_refusal = [&] {
     EXPECT_THROW(test::render(*still_, image), Error);
     while (!still_->render(1e9)) {
@@ -287,7 +288,7 @@ TEST_P(Several, WhatIsRefusedLeavesTheOthers) {
   far.push_back({glm::translate(dmat4(1.0), dvec3(1e13, 0.0, 0.0))});
   viewer().set_places(far);
   EXPECT_EQ(picture_after_refusal(), before) << "as it was";
-  // Another volume, of which there is no table then: once, where the first place is.
+  // Another volume has no instance table at that time, so it is displayed once, with the first transform.
   still_->set_volume(merged(cloud(), overlapping));
   const std::vector<float> once = picture_after_refusal();
   viewer().set_places({{}});
@@ -353,7 +354,7 @@ class Instances : public Several {
 };
 CUMULET_ON_BACKENDS(Instances);
 
-// Of other lattices and places, beside the viewer's own or alone.
+// Volumes with other index_to_world matrices and transforms, with the viewer's own volume and without it.
 TEST_P(Instances, OfOtherVolumesAreThoseOfTheirSum) {
   const ivec3 aside(9, 3, 4);
   show(sum_of(cloud(), ivec3(0), other_cloud(), aside), std::nullopt, {ivec3(0)});
@@ -366,7 +367,7 @@ TEST_P(Instances, OfOtherVolumesAreThoseOfTheirSum) {
   test::expect_alike(blocks(), one);
 }
 
-// One has flames, the other none: what either lacks is not read.
+// Only one volume has flames. Missing channels are not read.
 TEST_P(Instances, MayBeFiresOrNot) {
   medium_.field_emission.flame_strength = 0.5;
   still_->set_medium(medium_);
@@ -406,7 +407,7 @@ TEST_P(Instances, HaveMediaOfTheirOwn) {
   EXPECT_THROW(viewer().bounds(), Error) << "nothing is left";
 }
 
-// A ramp of one is not that of another, and cuts its voxels before cells are made of them.
+// Each instance has its own ramp, applied to voxels before cells are built.
 TEST_P(Instances, HaveRampsOfTheirOwn) {
   only_absorb(0.05);
   look_along_z();
@@ -433,7 +434,7 @@ TEST_P(Instances, OfAVolumeShareItsGrid) {
   test::expect_alike(blocks(), in_places);
   EXPECT_EQ(viewer().stats().cells, alone.cells);
   EXPECT_EQ(viewer().stats().cell_bytes, alone.cell_bytes);
-  // Once the viewer has another, they keep theirs.
+  // When the viewer's volume changes, the instances keep their grid.
   still_->set_volume(nullptr);
   static_cast<void>(transmittance(1));
   EXPECT_EQ(viewer().stats().cell_bytes, alone.cell_bytes);
@@ -458,7 +459,7 @@ TEST_P(Instances, PicksTellTheirTag) {
   EXPECT_EQ(other.tag, 77U);
 }
 
-// What voxels cannot show together is told, and what was shown stays.
+// Voxel grids cannot show different volumes together. The error is returned, and the previous image stays.
 TEST_P(Instances, OfVoxelsAreOfOneGrid) {
   still_->set_grid(test::settings_of({render::March::brick, grid::CellKind::constant}));
   const auto volume = asset_of(cloud());
@@ -473,7 +474,7 @@ TEST_P(Instances, OfVoxelsAreOfOneGrid) {
   EXPECT_GT(transmittance(1), 0.0);
 }
 
-// What the viewer's own settings have become since its grid was made is nothing to an instance of the same.
+// Changed settings of the viewer's own volume do not affect an instance of the same volume.
 TEST_P(Instances, AreShownWhateverBecameOfTheOwnSettings) {
   only_absorb(0.05);
   look_along_z();
@@ -493,7 +494,7 @@ TEST_P(Instances, AreShownWhateverBecameOfTheOwnSettings) {
   expect_transmittance(transmittance(), 3.0 * 0.05 * 8.0);
 }
 
-// A hidden one has nothing of others when it is shown, and nothing is built again that is there.
+// An instance that was hidden shows its own grid again, without a rebuild.
 TEST_P(Instances, ComeBackAsTheyWere) {
   only_absorb(0.05);
   look_along_z();
@@ -508,7 +509,7 @@ TEST_P(Instances, ComeBackAsTheyWere) {
   hide(*thick, false);
   const test::Picture at_once = test::render(*still_, {16, 16, 256, 1, render::View::shaded});
   expect_transmittance(at_once.mean().x, 0.05 * 10.0);
-  // One alone goes, and another comes, with the camera at rest.
+  // The only visible instance is removed and another added, with a fixed camera.
   viewer().remove_instance(*thin);
   hide(*thick, true);
   viewer().render(frame(16, 16));
@@ -516,7 +517,7 @@ TEST_P(Instances, ComeBackAsTheyWere) {
   expect_transmittance(transmittance(), 0.05 * 4.0);
 }
 
-// While all are built for another march what there was is shown, and then all are.
+// When the grid type changes, the old image stays until all volumes are built.
 TEST_P(Instances, ChangeTheirCellsTogether) {
   only_absorb(0.05);
   look_along_z();
@@ -531,7 +532,7 @@ TEST_P(Instances, ChangeTheirCellsTogether) {
   expect_transmittance(transmittance(), 0.05 * 12.0);
 }
 
-// A camera-adaptive grid is as fine as the nearest of its instances needs.
+// A camera-adaptive grid is as fine as its nearest instance needs.
 TEST_P(Instances, AreRefinedForTheCamera) {
   viewer::GridSettings adaptive = test::settings_of(test::march_kinds[1]);
   adaptive.camera_adaptive = true;

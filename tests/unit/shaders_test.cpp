@@ -1,4 +1,4 @@
-// The table of the shaders' variants, from which programs are made: cmake/embed_glsl.py.
+// The table of shader variants from which programs are made: cmake/embed_glsl.py.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Motion blur: against closed forms, and against means of many pictures of what stands still.
+// Motion blur, compared with closed forms and with means of many images without motion.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ using test::Blocks;
 
 dmat4 moved(double x, double y, double z) { return glm::translate(dmat4(1.0), dvec3(x, y, z)); }
 
-// Straight from one to the other, as the library has it.
+// Linear interpolation of the matrices, as in the library.
 dmat4 between(const dmat4& a, const dmat4& b, double t) { return a + (b - a) * t; }
 
 class Shutter : public test::CloudTest {
@@ -51,7 +51,7 @@ class Shutter : public test::CloudTest {
   static volume::ScalarVolume flames() {
     return test::make_volume({12, 10, 12}, {5, 4, 5}, [](const ivec3& p) { return p.x < 8 ? 1.5F : 0.25F; });
   }
-  // The mean transmittance along the lines near (x, y), and how sure it is of two values at most.
+  // The mean transmittance along lines near (x, y). sigma() is its standard error if samples are 0 or 1.
   double along_z(double x, double y, double shutter = 1.0) {
     viewer::CameraPose pose = test::camera_at({x, y, 300.0}, {x, y, 0.0});
     pose.orthographic_height = 1e-3;
@@ -67,7 +67,7 @@ class Shutter : public test::CloudTest {
       return test::render(*still_, {edge, edge, 48, 100 + k, render::View::shaded, 1.0});
     });
   }
-  // The mean of still pictures over the shutter's time; set(t) makes it stand as it does then.
+  // The mean of still images over the shutter interval; set(t) sets the scene to time t.
   template <class Set>
   Blocks still_mean(const Set& set) {
     constexpr unsigned pictures = 6;
@@ -75,7 +75,7 @@ class Shutter : public test::CloudTest {
     return test::blocks_of(pictures, [&](unsigned k) {
       test::Picture sum;
       for (unsigned i = 0; i < moments; ++i) {
-        // Of each interval another moment each time.
+        // Each image uses another time in each interval.
         set((i + (k + 0.5) / pictures) / moments);
         const test::Picture one = test::render(*still_, {edge, edge, 8, 1000 * k + i, render::View::shaded});
         sum.width = one.width;
@@ -92,29 +92,29 @@ class Shutter : public test::CloudTest {
     test::expect_alike(swept, still_mean([&](double t) { viewer().set_places({{between(open, close, t)}}); }));
   }
 };
-// Numbers alone are looked at here, in one driver's.
+// Only numbers are compared, so one driver is enough.
 INSTANTIATE_TEST_SUITE_P(Gl, Shutter, testing::Values(test::Door{headless::Backend::egl}), test::backend_name);
 
-// A ray is within the box for a part of the time.
+// A ray is inside the box for a fraction of the time.
 TEST_P(Shutter, ABoxThatPassesCoversForItsPartOfTheTime) {
   only_absorb(0.1);
   show(test::make_volume({8, 64, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
   const double clear = std::exp(-0.1 * 16.0);
   for (const test::MarchKind& kind : test::march_kinds) {
     still_->set_grid(test::settings_of(kind));
-    // From x in [-0.5, 7.5] by 20 to each side: over x = 3.5 for 8 of 40.
+    // The box x in [-0.5, 7.5] moves by 20 to each side: it covers x = 3.5 for 8 of 40.
     viewer().set_places({{dmat4(1.0), scene::PlaceEnds{moved(-20, 0, 0), moved(20, 0, 0)}}});
     const double covered = 8.0 / 40.0;
     const double expected = 1.0 - covered * (1.0 - clear);
     EXPECT_NEAR(along_z(3.5, 31.5), expected, 4.5 * sigma(expected));
-    // Over x = 23 for what is left of the way once it gets there: [-0.5, 7.5] + 40 t - 20 holds it from t = 0.8875 on.
+    // It covers x = 23 from t = 0.8875 to the end: [-0.5, 7.5] + 40 t - 20.
     const double late = 1.0 - (1.0 - 0.8875) * (1.0 - clear);
     EXPECT_NEAR(along_z(23.0, 31.5), late, 4.5 * sigma(late));
     EXPECT_NEAR(along_z(3.5, 31.5, 0.0), clear, 4.5 * sigma(clear)) << "the shutter is closed";
   }
 }
 
-// Its thickness grows evenly: the mean of e^-(a t + b) is a difference of exponentials.
+// Its thickness grows linearly: the mean of e^-(a t + b) is a difference of exponentials.
 TEST_P(Shutter, ABoxThatGrowsIsTheMeanOfItsTransmittances) {
   only_absorb(0.05);
   show(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
@@ -125,7 +125,7 @@ TEST_P(Shutter, ABoxThatGrowsIsTheMeanOfItsTransmittances) {
   EXPECT_NEAR(along_z(7.5, 7.5), expected, 4.5 * sigma(expected));
 }
 
-// The two bits of a pixel's own time are the path's: of what does not move nothing changes, to the bit.
+// The sample's time must not change other random numbers: without motion the image is bit-identical.
 TEST_P(Shutter, WithoutAnyPicturesAreAsBefore) {
   show(cloud(), flames());
   const test::Image image{edge, edge, 8, 3, render::View::shaded};
@@ -154,7 +154,7 @@ TEST_P(Shutter, AFireThatMovesShinesAsStillsDo) {
   medium_.field_emission.flame_strength = 0.5;
   still_->set_medium(medium_);
   show(cloud(), flames());
-  // It grows, too: cells' volumes are others than at the frame's moment.
+  // It grows too, so cell volumes differ from those at the frame time.
   expect_as_stills(moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.7)), moved(4, 3, 0));
 }
 
@@ -177,7 +177,7 @@ TEST_P(Shutter, AmongOthersThatStand) {
   test::expect_alike(swept, still_mean([&](double t) { viewer().set_places(places({moved(24 * t - 12, 0, 0)})); }));
 }
 
-// It turns and moves: its axes evenly about one axis, its eye straight.
+// The camera rotates about one axis at constant speed, and its position moves linearly.
 TEST_P(Shutter, APanIsTheMeanOfStills) {
   show(cloud());
   const dvec3 from(40.0, 22.0, 50.0);
@@ -193,7 +193,7 @@ TEST_P(Shutter, APanIsTheMeanOfStills) {
   test::expect_alike(swept, still_mean([&](double t) { still_->set_camera(pose_at(t)); }));
 }
 
-// A roll of a right angle about the look: straight between matrices would be halfway a zoom.
+// A roll by a right angle about the view direction. Linear interpolation of matrices would zoom halfway.
 TEST_P(Shutter, ARollKeepsItsFieldOfView) {
   show(cloud(), flames());
   medium_.field_emission.flame_strength = 0.2;
@@ -210,7 +210,7 @@ TEST_P(Shutter, ARollKeepsItsFieldOfView) {
   const Blocks swept = blurred();
   test::expect_alike(swept, still_mean([&](double t) {
                        viewer::CameraPose pose = pose_at(t);
-                       // What is even is the picture's height at a distance.
+                       // The tangent of the half angle is linear in time, as is the image height at a given distance.
                        const double height = tangent(30.0) + t * (tangent(36.0) - tangent(30.0));
                        pose.fovy_degrees = 2.0 * glm::degrees(std::atan(height));
                        still_->set_camera(pose);
@@ -236,8 +236,7 @@ TEST_P(Shutter, ACamerasShutterEndsWithItsNextMove) {
   EXPECT_THROW(viewer().camera()->set_shutter(aside, std::nullopt), Error) << "looks nowhere";
 }
 
-// A square that shines passes over the middle of the picture, and casts its light on a floor, as a fire does that
-// grows.
+// An emissive square moves across the image and lights a floor, as does a growing fire.
 TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
   auto scene = std::make_shared<test::StillScene>();
   surface::Material glow = test::diffuse(vec3(0.3F));
@@ -251,7 +250,7 @@ TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
   medium_.density_scale = 0.02;
   medium_.field_emission.flame_strength = 20.0;
   still_->set_medium(medium_);
-  // So small that looks are aimed at its cells.
+  // So small that NEE samples its cells.
   show(cloud(), test::make_volume({2, 2, 2}, {11, 3, 10}, [](const ivec3&) { return 1.5F; }));
   const scene::PlaceEnds growth{moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.5)), dmat4(1.0)};
   viewer().set_places({{dmat4(1.0), growth}});
@@ -274,7 +273,7 @@ TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
                      }));
 }
 
-// Posed by its moment: `move` changes the pose at rest.
+// A scene whose pose depends on the time; `move` changes the rest pose.
 class PosedScene final : public test::StillScene {
  public:
   std::function<void(surface::Pose&, double)> move;
@@ -299,7 +298,7 @@ viewer::ModelSettings posed_at(std::shared_ptr<const surface::Scene> scene, doub
   return settings;
 }
 
-// Black, before a sky of 1.
+// A black square in front of a sky of 1.
 std::shared_ptr<PosedScene> black_square() {
   auto scene = std::make_shared<PosedScene>();
   scene->add_quad({{{0, 0, 0}, {8, 0, 0}, {8, 8, 0}, {0, 8, 0}}}, scene->add(test::diffuse(vec3(0.0F))));
@@ -309,29 +308,28 @@ std::shared_ptr<PosedScene> black_square() {
 TEST_P(Shutter, ASquareThatDeformsCoversForItsPartOfTheTime) {
   only_absorb(0.1);
   const std::shared_ptr<PosedScene> square = black_square();
-  // Its right edge goes from x = 8 to 16 in a second, all of it 40 up.
+  // Its right edge moves from x = 8 to 16 in a second, and the whole square moves up by 40.
   square->move = [](surface::Pose& pose, double t) {
     for (std::size_t i = 0; i < 4; ++i)
       pose.vertices[i].position += vec3(i == 1 || i == 2 ? 8.0 * t : 0.0, 40.0 * t, 0.0);
   };
   const auto model = std::make_shared<viewer::ModelInstance>(posed_at(square, 0.5));
   viewer().add_model(model);
-  // y = 20 is covered from 20 = 8 + 40 t on, to 20 = 40 t.
+  // y = 20 is covered from 20 = 8 + 40 t to 20 = 40 t.
   EXPECT_NEAR(along_z(4.0, 20.0), 0.8, 4.5 * sigma(0.8));
-  // x = 11 is there from 8 + 8 t = 11 on.
+  // x = 11 is covered from 8 + 8 t = 11 on.
   const double clear = 1.0 - (0.5 - 0.375);
   EXPECT_NEAR(along_z(11.0, 20.0), clear, 4.5 * sigma(clear));
   EXPECT_NEAR(along_z(11.0, 24.0, 0.0), 0.0, 1e-6) << "the shutter is closed";
   EXPECT_NEAR(along_z(4.0, 10.0, 0.0), 1.0, 1e-6) << "the shutter is closed";
-  // In half of the time from t = 0.25 on: it is there from 0.375 to 0.5.
+  // Half of the shutter time, from t = 0.25 on: it is covered from 0.375 to 0.5.
   EXPECT_NEAR(along_z(11.0, 20.0, 0.5), 0.75, 4.5 * sigma(0.75));
   model->edit([](viewer::ModelSettings& of) { of.choice.time = 4.5; });
   EXPECT_NEAR(along_z(11.0, 20.0), 1.0, 1e-6) << "it is elsewhere";
   EXPECT_NEAR(along_z(11.0, 180.0), 0.8, 4.5 * sigma(0.8)) << "it is posed anew";
 }
 
-// Each moves by as much as its model, or its instance, moves back: at any moment it is in one place, if all of them are
-// of the same moment.
+// Vertex motion and transform motion cancel. The object stays in place only if both are evaluated at the same time.
 TEST_P(Shutter, WhatMovesAgainstItsPlaceStands) {
   only_absorb(0.1);
   const std::shared_ptr<PosedScene> squares = black_square();
@@ -350,7 +348,7 @@ TEST_P(Shutter, WhatMovesAgainstItsPlaceStands) {
   }
 }
 
-// It stays where it is, and only its normals turn away from the sun, which stands behind the camera.
+// It stays in place while its normals turn away from the sun, which is behind the camera.
 TEST_P(Shutter, NormalsTurnAsVerticesMove) {
   only_absorb(0.1);
   still_->set_light({0.0F, 0.0F, vec3(std::numbers::pi_v<float>), vec3(0.0F)});
@@ -372,13 +370,13 @@ TEST_P(Shutter, NormalsTurnAsVerticesMove) {
   double mean = 0.0;
   for (int i = 0; i < moments; ++i) mean += still((i + 0.5) / moments) / moments;
   EXPECT_NEAR(swept, mean, 2e-3);
-  // Lit by what the normals say at each moment: neither end's.
+  // Shading uses the normals at each time, which differ from those at both ends.
   EXPECT_NEAR(still(0.0), 0.5, 5e-3);
   EXPECT_LT(still(1.0), 0.35);
 }
 
-// One that shines grows, is sheared and turns its normals; copies of a sphere are squashed, and stand on a way of their
-// own, on that of their model.
+// An emissive square grows, is sheared and turns its normals. Instances of a sphere are deformed and move in addition
+// to their model.
 TEST_P(Shutter, AModelThatDeformsIsTheMeanOfStills) {
   auto scene = std::make_shared<PosedScene>();
   surface::Material glow = test::diffuse(vec3(0.3F));
@@ -452,7 +450,7 @@ TEST_P(Shutter, WhatIsPosedAlikeIsAsBefore) {
   EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "closed again";
 }
 
-// A host's own triangles go by their velocities, as the viewer's own surfaces.
+// A host's triangles move by their velocities, as the viewer's own surfaces.
 TEST_P(Shutter, AHostsTrianglesMoveByTheirVelocities) {
   only_absorb(0.1);
   const std::array<float, 9> positions{0, 0, 0, 8, 0, 0, 0, 8, 0};
@@ -464,13 +462,14 @@ TEST_P(Shutter, AHostsTrianglesMoveByTheirVelocities) {
   mesh.material = test::diffuse(vec3(0.0F));
   const surface::ScenePtr scene = surface::import_triangles(std::span(&mesh, 1), "mesh");
   viewer().set_surfaces(std::make_shared<const viewer::SurfaceAsset>(scene, std::string("mesh")));
-  // At y = 8 from x = 0 to 8, by 5 to each side: over x = 6 but for what is left of t = 1 - 3 / 10, and x < 0.
+  // At y = 8 the triangle covers x = 0 to 8 and moves by 5 to each side. x = 6 is covered except from t = 1 - 3 / 10
+  // on, and x = -2 after that.
   EXPECT_NEAR(along_z(6.0, 8.0), 0.3, 4.5 * sigma(0.3));
   EXPECT_NEAR(along_z(-2.0, 8.0), 0.7, 4.5 * sigma(0.7));
   EXPECT_NEAR(along_z(6.0, 8.0, 0.0), 0.0, 1e-6) << "the shutter is closed";
 }
 
-// It moves by its own width: where it is at one end alone its depth is linear in time, from nothing to all of it.
+// It moves by its own width. Where it is at only one end of the interval, its optical depth is linear in time.
 TEST_P(Shutter, ASlabMovesByItsVelocity) {
   only_absorb(0.1);
   const ivec3 size(16, 64, 16);
@@ -497,7 +496,7 @@ TEST_P(Shutter, ASlabMovesByItsVelocity) {
   }
 }
 
-// Its voxels a second are another length for each scale.
+// The velocity is multiplied by the playback's velocity scale.
 TEST_P(Shutter, ASequenceMovesByItsVelocityTimesItsScale) {
   only_absorb(0.1);
   openvdb::initialize();

@@ -1,4 +1,4 @@
-// The sky of a clear day: what everybody sees, and what has been measured of it.
+// The physical clear-day sky, compared with well-known properties and published measurements.
 
 #include "light/sky.hpp"
 
@@ -53,18 +53,18 @@ TEST(Sky, TheSunSetsRed) {
   EXPECT_EQ(sky(2.0, -0.3).sun_irradiance(), vec3(0.0F));
 }
 
-// Straight through air alone: by Rayleigh's optical depths of 0.065 at 605 nm, 0.097 at 550 and 0.22 at 450, and
-// ozone's of 0.04, 0.03 and 0.
+// Vertically through clean air: Rayleigh optical depths of 0.065 at 605 nm, 0.097 at 550 and 0.22 at 450, and ozone's
+// of 0.04, 0.03 and 0.
 TEST(Sky, AirLetsThroughWhatIsMeasured) {
   const vec3 through = sky(1.0, 90.0).sun_irradiance() / 5.0F;
   EXPECT_NEAR(through.r, 0.91, 0.02);
   EXPECT_NEAR(through.g, 0.88, 0.02);
   EXPECT_NEAR(through.b, 0.80, 0.02);
-  // A clear day's, with aerosols: 0.7 to 0.8.
+  // On a clear day with aerosols: 0.7 to 0.8.
   EXPECT_NEAR(bright(sky(2.5, 90.0).sun_irradiance()) / 5.0, 0.75, 0.05);
 }
 
-// Of a clear day at noon the sky gives 0.1 to 0.2 of what the sun gives.
+// On a clear day at noon, the sky gives 0.1 to 0.2 of the sun's irradiance.
 TEST(Sky, ShareOfTheSkyIsMeasuredOnes) {
   const Sky noon = sky(2.0, 60.0, 0.2);
   const double share = bright(noon.sky_irradiance()) / bright(noon.sun_irradiance());
@@ -161,20 +161,20 @@ TEST(Sky, TheSameTwice) {
 class SkyPicture : public test::ViewerTest {};
 CUMULET_ON_BACKENDS(SkyPicture);
 
-// The same samples of the same seed, so that nothing is random between two pictures of the same light.
+// The same seed and samples, so that two images with the same light have no random difference.
 TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
   const SkyModel model{.turbidity = 2.0, .ground_albedo = 0.4};
   const Sky day(model, direction(25.0, 40.0));
-  // Of the sevens nothing is seen.
+  // The values 7 are ignored with a physical sky.
   const viewer::Light physical{40.0F, 25.0F, vec3(7.0F), vec3(7.0F), model};
-  const viewer::Light sun{40.0F, 25.0F, day.sun_irradiance(), vec3(0.0F)};  // of angle 0, as that of the other
+  const viewer::Light sun{40.0F, 25.0F, day.sun_irradiance(), vec3(0.0F)};  // of angle 0, as the other sun
   const auto still = make();
   still->set_volume(test::make_volume(glm::ivec3(20), glm::ivec3(0), [](const glm::ivec3& p) {
     return glm::length(vec3(p) - 9.5F) < 9.0F ? 1.0F : 0.0F;
   }));
   still->set_camera(test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 25.0));
   still->set_medium({0.15, vec3(0.9F), {0.3F}, 0});
-  // Paths are others: how bright a texel is beside the mean decides which looks are made.
+  // Paths differ, because sampling probabilities depend on the texels' brightness relative to the mean.
   const auto seen = [&] { return dvec3(test::render(*still, {24, 24, 512, 1}).mean()); };
   const auto expect_same = [](const dvec3& a, const dvec3& b) {
     EXPECT_LT(glm::distance(a, b), 4e-3 * glm::length(b));
@@ -192,7 +192,7 @@ TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
   still->viewer().set_environment(light::make_environment(pixels, "a picture of it"));
   expect_same(seen(), whole);
 
-  // A host's environment is there instead of the sky, and the sun stays.
+  // A host's environment replaces the sky, and the sun stays.
   still->viewer().set_environment(light::make_environment({1, 1, {vec3(0.0F)}}, "black"));
   const dvec3 alone = seen();
   still->set_light(physical);
@@ -201,7 +201,7 @@ TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
   still->viewer().set_environment(nullptr);
   expect_same(seen(), whole);
 
-  // Where the picture's parts are.
+  // Orientation of the sky in the image.
   const dvec3 away = glm::normalize(dvec3(0.3, 0.2, 1.0));
   still->set_camera(test::camera_at({9.5, 9.5, 60.0}, dvec3(9.5, 9.5, 60.0) + away, 0.5));
   const dvec3 background = seen();

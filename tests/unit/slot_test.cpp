@@ -22,7 +22,7 @@ TEST(Slot, IsMadeOfWhatItIsNotOf) {
   EXPECT_EQ(**slot, 7);
   EXPECT_EQ(slot.of(), "a");
   EXPECT_FALSE(slot.wants("a", 1));
-  EXPECT_FALSE(slot.wants("a", 2));  // settings alone make nothing new
+  EXPECT_FALSE(slot.wants("a", 2));  // other settings alone do not cause a rebuild
   EXPECT_TRUE(slot.wants("b", 1));
 }
 
@@ -31,13 +31,13 @@ TEST(Slot, WhatFailedIsTriedAgainWhenSomethingChanges) {
   slot.put("a", std::make_unique<int>(7));
   const auto fail = []() -> Thing { throw std::runtime_error("no memory"); };
   EXPECT_THROW(slot.make("b", 1, fail), std::runtime_error);
-  EXPECT_EQ(slot.of(), "a");  // what there was serves
+  EXPECT_EQ(slot.of(), "a");  // the previous value stays available
   EXPECT_FALSE(slot.wants("b", 1));
   EXPECT_TRUE(slot.wants("b", 2));
   EXPECT_TRUE(slot.wants("c", 1));
   EXPECT_FALSE(slot.wants("a", 1));
   slot.put("c", std::make_unique<int>(8));
-  EXPECT_TRUE(slot.wants("b", 1));  // another was made since
+  EXPECT_TRUE(slot.wants("b", 1));  // a new value clears the failure
 }
 
 TEST(Slot, TakenIsGoneAndClearedForgetsFailures) {

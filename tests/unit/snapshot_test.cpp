@@ -10,7 +10,7 @@ TEST(Snapshot, APartIsAnotherWhereItsValueIs) {
   Snapshot draft;
   const Snapshot before = draft;
   cumulet::light::DistantLights lights = *draft.lights;
-  draft.lights.set(lights);  // the same again
+  draft.lights.set(lights);  // equal value: no new version
   EXPECT_EQ(draft, before);
   lights.sky_radiance = glm::vec3(1.0F);
   draft.lights.set(lights);
@@ -19,7 +19,7 @@ TEST(Snapshot, APartIsAnotherWhereItsValueIs) {
   EXPECT_FALSE(draft == before);
   const Snapshot after = draft;
   EXPECT_EQ(after, draft);
-  draft.lights.set(*before.lights);  // back: another state, though of the same value
+  draft.lights.set(*before.lights);  // a new version, although with an earlier value
   EXPECT_FALSE(draft.lights == before.lights);
 }
 

@@ -1,5 +1,5 @@
-// What is shown of a large file until it is read: against OpenVDB's own trees, and in a viewer while a load stands
-// still.
+// Coarse proxies shown while a large file loads: compared with OpenVDB's own trees, and in a viewer whose load is
+// paused.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ namespace {
 using namespace cumulet;
 using namespace std::chrono_literals;
 
-/// A ball of this radius about (centre, centre, centre), of values of their place.
+/// A ball of this radius around (centre, centre, centre); values depend on the position.
 openvdb::FloatGrid::Ptr ball(const std::string& name, int centre, int radius,
                              const std::function<float(const openvdb::Coord&)>& value) {
   auto grid = test::fog(name);
@@ -83,7 +83,7 @@ double sum_of(const volume::ScalarVolume& field) {
 
 class StandIns : public testing::Test {
  protected:
-  /// Imports the file; the stand-in, if there was one.
+  /// Imports the file. Returns the proxy, if there was one.
   std::optional<volume::StandIn> import(std::uint64_t least_bricks = 1, const volume::GridNames& names = {}) {
     std::optional<volume::StandIn> taken;
     const volume::StandInWish wish{[&](volume::StandIn made) {
@@ -102,7 +102,7 @@ class StandIns : public testing::Test {
   test::Folder folder_;
 };
 
-// What is known of the tree alone: with one value everywhere, all of it.
+// The proxy uses only the tree and its masks. With one value everywhere it is exact.
 TEST_F(StandIns, OneValueIsExactInEveryCompression) {
   constexpr float value = 0.75F;
   using namespace openvdb::io;
@@ -140,8 +140,8 @@ TEST_F(StandIns, OneValueIsExactInEveryCompression) {
   }
 }
 
-// Against the whole in double precision: of what varies slowly the sum is right to a per cent, and near each place
-// the values are.
+// Compared with the whole volume in double precision. For slowly varying values the sum is right to one percent, and
+// local values are close.
 TEST_F(StandIns, MeansAreTheWholes) {
   const auto slope = [](const openvdb::Coord& at) {
     return 1.0F + 0.004F * static_cast<float>(at.x()) + 0.002F * static_cast<float>(at.z());
@@ -154,7 +154,7 @@ TEST_F(StandIns, MeansAreTheWholes) {
   EXPECT_NEAR(64.0 * sum_of(coarse) / whole, 1.0, 0.01);
   for (const int x : {24, 48, 64, 80, 104})
     EXPECT_NEAR(value_at(coarse, glm::ivec3(x, 64, 64) >> 2), slope(openvdb::Coord(x, 64, 64)), 0.05) << x;
-  // A voxel's centre lies where those do that it is of.
+  // The center of a coarse voxel is the center of the voxels that it covers.
   const glm::dvec3 first(coarse.index_to_world * glm::dvec4(3.0, 5.0, 7.0, 1.0));
   const glm::dvec3 of(whole_.density.index_to_world * glm::dvec4(13.5, 21.5, 29.5, 1.0));
   EXPECT_LT(glm::distance(first, of), 1e-12);
@@ -186,10 +186,10 @@ TEST_F(StandIns, AreOfLargeFilesAlone) {
   ASSERT_TRUE(import());
   const std::uint64_t bricks = whole_.density.brick_origins.size();
   EXPECT_FALSE(import(10 * bricks));
-  EXPECT_GT(whole_.density.active_voxels, 0U);  // and the whole is read of the tree that was looked at
+  EXPECT_GT(whole_.density.active_voxels, 0U);  // the whole volume is read from the same tree
 }
 
-// A message and the file's other fields are as without.
+// Messages and the file's other fields are the same as without a proxy.
 TEST_F(StandIns, TheWholeIsAsItIsWithout) {
   const auto varied = [](const openvdb::Coord& at) {
     return static_cast<float>((at.x() * 7 + at.y() * 3) & 63) / 64.0F;
@@ -225,7 +225,7 @@ TEST_F(StandIns, WhatIsWrongIsToldOfTheWhole) {
     });
   };
   EXPECT_EQ(refusal(true, missing), refusal(false, missing));
-  // It ends within the temperature.
+  // The file ends inside the temperature grid.
   const volume::GridNames any;
   for (const double at : {0.95, 0.75, 0.55}) {
     std::filesystem::resize_file(file(), static_cast<std::uintmax_t>(at * double(size)));
@@ -233,7 +233,7 @@ TEST_F(StandIns, WhatIsWrongIsToldOfTheWhole) {
     EXPECT_EQ(refusal(true, any), refusal(false, any)) << at;
   }
   write_both();
-  // Values that no codec takes: of the density, which comes first, or of the temperature.
+  // Values that no codec accepts: in the density, which comes first, or in the temperature.
   for (const double at : {0.9, 0.25}) {
     std::fstream damaged(file(), std::ios::in | std::ios::out | std::ios::binary);
     damaged.seekp(static_cast<std::streamoff>(at * double(size)));
@@ -245,7 +245,8 @@ TEST_F(StandIns, WhatIsWrongIsToldOfTheWhole) {
   }
 }
 
-/// A viewer whose loads stand still once they have read the density, which has a negative voxel: until it is let go on.
+/// A viewer whose loads pause after the density was read, until go_on(). A negative voxel in the density causes the log
+/// message that pauses them.
 class StandInViewer : public test::BackendTest {
  protected:
   static constexpr std::uint32_t size = 48;
@@ -302,7 +303,7 @@ class StandInViewer : public test::BackendTest {
     frame.budget_ms = budget_ms;
     return viewer_->render(frame);
   }
-  /// Of what is to be seen after some frames: how opaque the picture is.
+  /// The mean opacity of the image after some frames.
   double opacity() {
     viewer::FrameResult result;
     for (int i = 0; i < 6 || result.preview || result.size.x != size; ++i) result = render(200.0);
@@ -357,7 +358,7 @@ TEST_P(StandInViewer, IsSeenUntilTheWholeIsThere) {
   EXPECT_EQ(early.max, whole.max);
   EXPECT_NEAR(opacity(), early_opacity, 0.03);
   EXPECT_EQ(viewer_->camera()->pose(), early_pose);
-  // What comes in the end is what comes without.
+  // The final image is the same as without a proxy.
   set_sampling(false);
   const std::vector<float> with = finished();
   viewer_->set_volume(nullptr);
@@ -431,7 +432,7 @@ TEST_P(StandInViewer, WaitsForItsViewWhereGridsDependOnIt) {
   EXPECT_GT(opacity(), 0.2);
   go_on();
   viewer_->wait(-1.0);
-  // The file is read; its grid is asked for by a frame, which still has something to show.
+  // The file is read. Its grid is requested by a frame, which still shows the proxy.
   EXPECT_TRUE(render().loading);
   viewer_->wait(-1.0);
   EXPECT_GT(opacity(), 0.2);

@@ -1,4 +1,4 @@
-// The GL state contract: what a guard saves, sets and restores, and the tools that look for leaks.
+// The GL state contract: state that a guard saves, sets and restores, and the helpers that find leaks.
 
 #include "gl/state_guard.hpp"
 
@@ -31,7 +31,7 @@ namespace render = cumulet::render;
 class State : public cumulet::test::GlTest {};
 CUMULET_ON_PROFILES(State);
 
-/// Changes all that the contract lets a call change.
+/// Changes all state that the contract allows a call to change.
 class Scribbler {
  public:
   explicit Scribbler(const gl::FunctionsPtr& gl) : gl_(*gl), programs_(*gl, nullptr) {
@@ -95,7 +95,7 @@ class Scribbler {
     gl_.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
   }
 
-  /// Uses what has known values, and sets none of them to another.
+  /// Uses state with known values and leaves the values unchanged.
   void touch() const {
     const std::array<GLfloat, 4> nothing{};
     gl_.ClearNamedFramebufferfv(framebuffer_.name(), GL_DEPTH, 0, nothing.data());
@@ -117,7 +117,7 @@ class Scribbler {
   mutable gl::Programs programs_;
 };
 
-/// What the library does in a frame of its own: a picture with depth into a framebuffer that also gives depth.
+/// A frame of the library: draws an image with depth into a framebuffer that also supplies host depth.
 struct Frame {
   Frame(const gl::FunctionsPtr& functions, const gl::ProgramsPtr& programs)
       : gl_(functions), compositor(functions, programs), depth(functions, programs) {
@@ -172,7 +172,7 @@ struct Frame {
     }
     compositor.draw(picture, display, to);
   }
-  /// Colours, then depths.
+  /// Colors, then depths.
   [[nodiscard]] std::vector<float> read() const {
     const StateGuard guard(*gl_);
     std::vector<float> pixels(64 * 5);
@@ -192,7 +192,7 @@ TEST_P(State, TheReaderSeesWhatIsScrambled) {
   ScramblingHost host(gl_, legacy_);
   const GlState fresh = read_gl_state(*gl_, legacy_);
   EXPECT_EQ(state_differences(fresh, read_gl_state(*gl_, legacy_)), "");
-  // Every value but for a few that cannot be anything else here has been different at some time.
+  // Each value must have changed at some seed, except for a few that cannot have another value here.
   std::vector<bool> moved(fresh.size(), false);
   for (std::uint32_t seed = 0; seed < 24; ++seed) {
     host.scramble(seed);
@@ -227,8 +227,8 @@ TEST_P(State, EverythingComesBack) {
   }
 }
 
-/// The frame is the same and leaves everything as it was, whatever the host has set by these seeds, the last one left
-/// out.
+/// For each seed in [first, second), scrambles the state and draws. The frame must be the same and leave the state
+/// unchanged.
 void expect_untouched(const gl::FunctionsPtr& functions, const cumulet::test::LegacyGlPtr& legacy, Frame& frame,
                       const std::vector<float>& expected, std::pair<std::uint32_t, std::uint32_t> seeds) {
   ScramblingHost host(functions, legacy);
@@ -368,7 +368,7 @@ TEST_P(State, ProgramsThatCannotBeUsedAgain) {
   const Scribbler scribbler(gl_);
   const gl::ProgramKey key{"composite.frag", {"CM_DEPTH 1"}, "composite.vert"};
   const GLuint name = programs_->get(key).name();
-  // Relinked without success, it can run on but not be used anew.
+  // After a failed relink the program still runs, but cannot be made current again.
   gl_->UseProgram(name);
   Object shader(gl_, Object::Kind::shader, gl_->CreateShader(GL_FRAGMENT_SHADER));
   const char* nonsense = "#version 450\nnonsense\n";
@@ -385,7 +385,7 @@ TEST_P(State, ProgramsThatCannotBeUsedAgain) {
   EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
   EXPECT_EQ(integer(*gl_, GL_CURRENT_PROGRAM), 0);
 
-  // Deleted while current, it lives until another is used.
+  // A program deleted while current exists until another becomes current.
   auto others = std::make_unique<gl::Programs>(*gl_, nullptr);
   const GLuint second = others->get(key).name();
   const auto second_name = static_cast<GLint>(second);
@@ -461,7 +461,7 @@ TEST_P(State, ObjectsDeletedInAnotherContextWhileBound) {
     sampler = {};
     buffer = {};
     gl_->Finish();
-    // The names may be given out again, to something of another target.
+    // The driver may reuse the names for objects of another target.
     std::vector<Object> others;
     for (int i = 0; reused && i < 8; ++i) others.push_back(gl::make_texture_3d(gl_, GL_R8, 2, 2, 2, "another"));
     shared.use(shared.first);
@@ -473,14 +473,15 @@ TEST_P(State, ObjectsDeletedInAnotherContextWhileBound) {
       gl_->UseProgram(0);
     }
     const std::string lost = state_differences(before, read_gl_state(*gl_, legacy_));
-    EXPECT_EQ(lost.find("GL_TEXTURE_BINDING"), std::string::npos) << lost;  // what was not touched stays
+    EXPECT_EQ(lost.find("GL_TEXTURE_BINDING"), std::string::npos)
+        << lost;  // bindings that the guard did not save are unchanged
     {
       const StateGuard guard(*gl_);
       scribbler.scribble();
     }
     EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
     gl_->ActiveTexture(GL_TEXTURE2);
-    // Some drivers (NVIDIA's) still take the name of what is bound somewhere.
+    // Some drivers (NVIDIA's) still accept the name of an object that is bound elsewhere.
     EXPECT_TRUE(integer(*gl_, GL_TEXTURE_BINDING_2D) == 0 || integer(*gl_, GL_TEXTURE_BINDING_2D) == name);
     EXPECT_EQ(integer(*gl_, GL_SAMPLER_BINDING), 0);
     EXPECT_EQ(integer(*gl_, GL_PIXEL_PACK_BUFFER_BINDING), 0);

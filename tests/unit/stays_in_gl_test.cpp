@@ -1,4 +1,4 @@
-// What stays in GL: what is known of it, what is made of it, and the grids that are made of that there.
+// GPU-resident volumes: their statistics, the channels derived on the GPU, and the grids built from them.
 
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ constexpr Sides odd = {52, 44, 37};
 struct Cells {
   std::vector<grid::CellRecord> cells;
   bool limited = false;
-  // Empty where there is no such channel.
+  // Empty if there is no such channel.
   std::vector<grid::EmissionRecord> emission;
   std::vector<std::uint32_t> colour;
   std::vector<std::int16_t> anisotropy;
@@ -64,13 +64,14 @@ class StaysInGl : public test::GlTest {
     gl_->NamedBufferData(name, static_cast<GLsizeiptr>(values.size() * 4), values.data(), GL_DYNAMIC_COPY);
     return name;
   }
-  // As floats, or as halves, which they then are.
+  // Float values; if `halves`, passed as half floats.
   struct Values {
     volume::Channel channel;
     std::vector<float> values;
     bool halves = false;
   };
-  // before: that they are boxes of; none: a whole state. wanted: by which settings it is found what it gives off.
+  // Transfers fields to the GPU and waits. before: the state that `changed` updates; null: a whole state. wanted:
+  // emission settings for which radiance is computed.
   scene::StateInGl bring(const std::vector<Values>& fields, const Sides& size, const glm::dmat4& to_world,
                          const std::vector<scene::Emission>& wanted,
                          std::optional<std::vector<render::VoxelBox>> changed = {},
@@ -107,7 +108,7 @@ class StaysInGl : public test::GlTest {
       return true;
     };
     transfers_->begin(state, this, std::move(stay), [] {});
-    // The device takes its time.
+    // The GPU works asynchronously.
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!found && std::chrono::steady_clock::now() < until) transfers_->follow(Deadline::max());
     return std::move(found).value();
@@ -123,14 +124,14 @@ class StaysInGl : public test::GlTest {
     return GridReference(
         volume::volume_on_device(std::make_shared<const volume::DeviceBricks>(std::move(bricks)), "smoke", to_world));
   }
-  // In the same cube as that.
+  // A reference in main memory, in the same cube as in_gl.
   static GridReference in_memory(const std::vector<float>& values, const Sides& size, const glm::dmat4& to_world,
                                  const GridReference& in_gl) {
     const volume::MemoryField field{volume::Channel::density,
                                     volume::DenseVoxels{values, {size[0], size[1], size[2]}, to_world}};
     return GridReference(volume::import_fields(std::vector{field}, "smoke", {}).density, in_gl.statistics->cube());
   }
-  // between: after each step of the upload.
+  // between: called after each step of the upload.
   Cells build(const GridReference& field, const grid::RefineSettings& settings,
               const std::function<void()>& between = {}) {
     const gl::StateGuard guard(*gl_);
@@ -161,7 +162,7 @@ class StaysInGl : public test::GlTest {
     get(channel(grid::Channel::velocity), read.velocity);
     return read;
   }
-  // The same in main memory.
+  // Reads the volume back to main memory.
   volume::ScalarVolume copied(const volume::ScalarVolume& in_gl) {
     const volume::DeviceBricks& bricks = *in_gl.on_device;
     std::vector<float> values;
@@ -190,7 +191,7 @@ std::vector<float> as_halves(std::vector<float> values) {
   return values;
 }
 
-// Anisotropic, turned.
+// Anisotropic and rotated.
 glm::dmat4 place() {
   glm::dmat4 m(1.0);
   m[0] = {0.5, 0.1, 0.0, 0.0};
@@ -200,10 +201,10 @@ glm::dmat4 place() {
   return m;
 }
 
-// scale: of what adds up to them.
+// scale: magnitude of the summands.
 void expect_near(double a, double b, double scale) { EXPECT_NEAR(a, b, 1e-6 * scale); }
 
-// What main memory is told is what it would find itself.
+// Statistics computed on the GPU equal those computed in main memory.
 TEST_P(StaysInGl, StatisticsAreThoseOfTheVoxels) {
   for (const bool halves : {false, true}) {
     auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
@@ -299,7 +300,7 @@ TEST_P(StaysInGl, GridsAreThoseOfTheVoxels) {
   EXPECT_GT(brick_cells, 100U);
 }
 
-// Of what burns: light of flame and of temperature, by ramps or without, where only one of them is, and next to none.
+// Emission settings: flame and temperature with and without ramps, only one of them, and values close to 0.
 std::vector<scene::Emission> emissions() {
   scene::Emission plain{.flame_strength = 3.0, .flame_colour = {1.0F, 0.5F, 0.1F}, .blackbody = 1.0};
   scene::Emission curved{.flame_strength = 0.5,
@@ -322,7 +323,7 @@ volume::VolumeFrame frame_of(const std::vector<std::pair<volume::Channel, std::v
   return volume::import_fields(views, "smoke", {});
 }
 
-// But for its values, of which the most is as near as that.
+// Compares all except the values. The maximum may differ by the fraction `apart`.
 void expect_same_bricks(const volume::ScalarVolume& found, const volume::ScalarVolume& expected, float apart) {
   ASSERT_EQ(found.brick_origins, expected.brick_origins);
   EXPECT_EQ(found.bounds_min, expected.bounds_min);
@@ -354,7 +355,7 @@ void expect_same_light(const Cells& found, const grid::TetGrid& expected) {
 TEST_P(StaysInGl, WhatBurnsIsFound) {
   test::Cameras cameras(4);
   auto density = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
-  // Other sizes than the density's, and elsewhere.
+  // Sizes and positions differ from the density's.
   const auto flame = as_halves(simulated(CUMULET_CHANNEL_FLAME, odd, 4));
   const auto temperature = simulated(CUMULET_CHANNEL_TEMPERATURE, odd, 2);
   const std::vector<scene::Emission> wanted = emissions();
@@ -412,7 +413,7 @@ TEST_P(StaysInGl, WhatBurnsIsFound) {
   }
 }
 
-// What scatters, by colours and anisotropies beyond what they may be, and velocities of either sign; coloured: or not.
+// Colors and anisotropies beyond their valid range, and velocities of both signs. coloured: with colors.
 std::vector<std::pair<volume::Channel, std::vector<float>>> scattering_fields(bool coloured, int step) {
   using volume::Channel;
   std::vector<std::pair<Channel, std::vector<float>>> fields;
@@ -420,7 +421,7 @@ std::vector<std::pair<volume::Channel, std::vector<float>>> scattering_fields(bo
     const auto channel = static_cast<Channel>(i);
     const bool colour = channel == Channel::red || channel == Channel::green || channel == Channel::blue;
     if (channel == Channel::temperature || channel == Channel::flame || (colour && !coloured)) continue;
-    // Elsewhere than the density.
+    // At other positions than the density.
     auto values = simulated(static_cast<cumulet_channel>(i), odd, channel == Channel::density ? step : step + 1);
     for (std::size_t v = 0; v < values.size(); ++v) {
       if (colour) values[v] *= v % 7 == 0 ? -1.0F : 2.5F;
@@ -453,7 +454,7 @@ void expect_same_channels(const Cells& found, const grid::TetGrid& expected, flo
     ASSERT_LE(std::max({apart.x, apart.y, apart.z}), 1) << i;
   }
   for (std::size_t i = 0; i < expected.anisotropy.size(); ++i) {
-    // Next to nothing is known less well: sums above bricks are of floats.
+    // For very low scattering the tolerance is larger, because sums over bricks are floats.
     float scatters = glm::unpackHalf2x16(expected.cells[i].data.z).x;
     if (!expected.colour.empty()) scatters *= static_cast<float>(colour_of(expected.colour[i]).y) / 2047.0F;
     ASSERT_NEAR(found.anisotropy[i], expected.anisotropy[i], scatters > 0.01F ? 4 : 1000) << i;
@@ -470,7 +471,7 @@ TEST_P(StaysInGl, WhatScattersIsMade) {
     const auto fields = scattering_fields(coloured, 1);
     std::vector<Values> handed;
     for (const auto& [channel, values] : fields) handed.push_back({channel, values, channel == volume::Channel::green});
-    // It burns beside.
+    // With flames in addition.
     handed.push_back({volume::Channel::flame, simulated(CUMULET_CHANNEL_FLAME, odd, 3)});
     const scene::Emission burning = emissions()[2];
     const scene::StateInGl state = bring(handed, odd, place(), {burning});
@@ -526,7 +527,7 @@ TEST_P(StaysInGl, WhatScattersIsMade) {
     for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
       grid::RefineSettings refine;
       refine.cells = cells;
-      refine.criterion = grid::Criterion::deviation;  // which nothing is known of but by what is the same, bit for bit
+      refine.criterion = grid::Criterion::deviation;  // which uses only data that is equal bit by bit
       for (const double threshold : {0.03, 0.2}) {
         refine.threshold = threshold;
         const Cells made = build(known, refine);
@@ -539,7 +540,7 @@ TEST_P(StaysInGl, WhatScattersIsMade) {
   }
 }
 
-// Smoke whose colour is nowhere near is black, and what is no smoke has none.
+// Smoke with color 0 is black. Without smoke there are no channels at all.
 TEST_P(StaysInGl, WhatIsNowhereScattersNothing) {
   using volume::Channel;
   auto density = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
@@ -560,7 +561,7 @@ TEST_P(StaysInGl, WhatIsNowhereScattersNothing) {
   EXPECT_TRUE(none.has_wanted({}));
 }
 
-// Boxes, some of which take all away, leave what is made of a whole state.
+// Partial updates, some of which empty bricks, give the same channels as a whole state.
 TEST_P(StaysInGl, WhatBoxesChangeIsMadeThere) {
   const std::vector<scene::Emission> wanted = emissions();
   const auto fields_at = [&](int step) {
@@ -585,7 +586,7 @@ TEST_P(StaysInGl, WhatBoxesChangeIsMadeThere) {
         }
       }
     }
-    // Others are wanted from the second on.
+    // Other emission settings are requested from the second state on.
     state = bring(fields, odd, place(), {wanted[0], wanted[2]}, std::vector{box}, &*state);
     const scene::StateInGl whole = bring(fields, odd, place(), {wanted[0], wanted[2]});
     ASSERT_EQ(state->products.size(), 5U);
@@ -606,7 +607,7 @@ TEST_P(StaysInGl, WhatBoxesChangeIsMadeThere) {
   }
 }
 
-// Other states come and go while one is uploaded.
+// Other states are transferred and freed during the upload.
 TEST_P(StaysInGl, AnUploadTakesManyFrames) {
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
   const auto others = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
@@ -627,7 +628,7 @@ TEST_P(StaysInGl, AnUploadTakesManyFrames) {
   EXPECT_LT(memories_->bytes(), bytes);
 }
 
-// What is scattered over memories is gathered, and the same.
+// Bricks in several buffers are gathered into one. The grid is the same.
 TEST_P(StaysInGl, ScatteredBricksAreGathered) {
   const auto old = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
   auto values = as_halves(old);

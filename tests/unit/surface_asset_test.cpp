@@ -12,7 +12,7 @@ using namespace cumulet;
 using glm::vec3;
 using viewer::SurfaceAsset;
 
-/// Notes how often it is posed; time is its height.
+/// Counts the calls of pose(). The time is the scene's height.
 class CountedScene final : public test::StillScene {
  public:
   CountedScene() {

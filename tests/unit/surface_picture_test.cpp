@@ -1,4 +1,5 @@
-// Where camera rays end: the surface pass against traced triangles and analytic answers, at edges too; previews; AOVs.
+// The end of camera rays at surfaces: the raster pass compared with traced triangles and analytic results, also at
+// edges. Previews and AOVs.
 
 #include <gtest/gtest.h>
 
@@ -25,14 +26,15 @@ using viewer::Aov;
 using viewer::SurfaceLight;
 
 constexpr std::uint32_t side = 48;
-constexpr double left = 3.5;   // of the picture, in the world; its top is 27.5, a pixel half a unit
-constexpr double scale = 0.5;  // world units a pixel
+constexpr double left = 3.5;   // left edge of the image in the world; its top is 27.5, and a pixel is half a unit
+constexpr double scale = 0.5;  // world units per pixel
 constexpr double sigma = 0.06;
 constexpr double box_high = 31.5;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
 /// A homogeneous cube of 32 voxels seen along z by an orthographic camera, with unlit surfaces in front of it, inside
-/// and behind: each straight edge at a fraction of a pixel, of eighths, which the surface pass's layers have exactly.
+/// and behind. Each straight edge is at a multiple of an eighth of a pixel, which the layers of the raster pass
+/// represent exactly.
 class SurfacePicture : public test::ViewerTest {
  protected:
   static constexpr float front_edge = 8.1875F;   // in front of the cube, left of it: 2 0 0
@@ -80,7 +82,7 @@ class SurfacePicture : public test::ViewerTest {
   [[nodiscard]] test::Picture render(std::uint32_t seed, std::uint32_t samples = 256) const {
     return test::render(*viewer_, {side, side, samples, seed, render::View::shaded});
   }
-  /// As render, and with the volume alone summed apart.
+  /// As render(), with the volume accumulated separately for its AOV.
   void trace_for_aovs(std::uint32_t samples) const {
     viewer_->set_image({side, side, samples, 1, render::View::shaded});
     viewer_->viewer().set_sampling({samples, 1, render::View::shaded, false, true});
@@ -96,7 +98,7 @@ class SurfacePicture : public test::ViewerTest {
   static double to_sphere_edge(std::uint32_t x, std::uint32_t y) {
     return std::abs(std::hypot(left + (x + 0.5) * scale - 23.0, 27.5 - (y + 0.5) * scale - 18.0) - 3.0) / scale;
   }
-  /// Distance of a pixel's middle, in pixels, to the nearest edge of any surface.
+  /// Distance from a pixel's center to the nearest edge of any surface, in pixels.
   static double to_edge(std::uint32_t x, std::uint32_t y) {
     const double wx = left + (x + 0.5) * scale;
     const double wy = 27.5 - (y + 0.5) * scale;
@@ -104,8 +106,8 @@ class SurfacePicture : public test::ViewerTest {
     for (const double edge : {front_edge, inside_low, inside_high}) nearest = std::min(nearest, std::abs(wx - edge));
     return std::min(nearest / scale, to_sphere_edge(x, y));
   }
-  /// Compares two ways to make the same picture, by the mean squared difference over its expected noise, and by the
-  /// mean difference, among pixels within (and beyond) three of an edge.
+  /// Compares two modes for the same image: the mean squared difference relative to the expected noise, and the mean
+  /// difference. Pixels within three pixels of an edge and the others are compared separately.
   void expect_same(SurfaceLight a, SurfaceLight b, const std::shared_ptr<StillScene>& scene) const {
     show(scene, a);
     const std::array<test::Picture, 2> first{render(1), render(2)};
@@ -123,14 +125,14 @@ class SurfacePicture : public test::ViewerTest {
             if ((to_edge(x, y) < 3.0) != strip) continue;
             const std::size_t i = std::size_t{y} * side + x;
             const auto at = [&](const test::Picture& p) { return double(p.pixels[i][c]); };
-            // Each has half the variance of a difference between seeds; so do both means together.
+            // Each has half the variance of a difference between seeds; so has the difference of both means.
             const double own =
                 0.25 * (std::pow(at(first[0]) - at(first[1]), 2) + std::pow(at(second[0]) - at(second[1]), 2));
             const double d = 0.5 * (at(first[0]) + at(first[1]) - at(second[0]) - at(second[1]));
             all_noise += own;
             sum += d;
             ++pixels;
-            // Of a slanted edge the surface pass has eight parts.
+            // The raster pass resolves a slanted edge only in eighths.
             if (to_sphere_edge(x, y) < 1.0) continue;
             noise += own;
             difference += 0.5 * d * d;
@@ -153,8 +155,8 @@ TEST_P(SurfacePicture, TheSurfacePassEndsRaysWhereTrianglesDo) {
   expect_same(SurfaceLight::none, SurfaceLight::full, scene());
 }
 
-// What the volume scatters towards the eye ends at the surfaces, too. Black surfaces send it nothing, and a sun behind
-// the eye casts no shadow that is seen.
+// In-scattered light ends at the surfaces too. Black surfaces send no light to the volume, and a sun behind the camera
+// casts no visible shadow.
 TEST_P(SurfacePicture, InscatteringEndsWhereTrianglesDo) {
   viewer::Medium medium;
   medium.density_scale = sigma;
@@ -167,7 +169,7 @@ TEST_P(SurfacePicture, InscatteringEndsWhereTrianglesDo) {
   expect_same(SurfaceLight::none, SurfaceLight::full, scene(0.0F));
 }
 
-// Columns of the picture against the front wall's edge, and those beside it: no rim, neither bright nor dark.
+// Columns at the front wall's edge and beside it: no bright or dark rim.
 TEST_P(SurfacePicture, SilhouettesHaveNoRim) {
   for (const SurfaceLight mode : {SurfaceLight::none, SurfaceLight::full, SurfaceLight::shadows}) {
     show(scene(), mode);
@@ -214,8 +216,8 @@ TEST_P(SurfacePicture, FromInsideTheCloudToo) {
   }
 }
 
-// A camera's depth convention is the host's affair: not a bit of the picture depends on it, with the host's surfaces
-// (whose depth both hold exactly) or without.
+// The image does not depend on the camera's depth convention, bit by bit. Tested with and without host surfaces (whose
+// depth both conventions represent exactly).
 TEST_P(SurfacePicture, StandardAndReversedDepthAreBitEqual) {
   auto functions = gl::load_functions(headless::Context::get_proc, context_.get());
   const gl::Object depth = gl::make_texture_2d(functions, GL_R32F, side, side, "depth");
@@ -240,7 +242,7 @@ TEST_P(SurfacePicture, StandardAndReversedDepthAreBitEqual) {
         frame.viewport = {0, 0, side, side};
         frame.budget_ms = 1e9;
         if (host) {
-          // A wall at depth 200 before the upper half.
+          // A wall at depth 200 in front of the upper half.
           std::vector<float> values(std::size_t{side} * side, reversed ? 0.0F : 1.0F);
           for (std::size_t i = values.size() / 2; i < values.size(); ++i) values[i] = reversed ? 0.25F : 0.75F;
           functions->TextureSubImage2D(depth.name(), 0, 0, 0, side, side, GL_RED, GL_FLOAT, values.data());
@@ -256,7 +258,7 @@ TEST_P(SurfacePicture, StandardAndReversedDepthAreBitEqual) {
       EXPECT_TRUE(pictures[0] == pictures[1]) << "host " << host;
       double green = 0.0;
       for (std::size_t i = 1; i < pictures[0].size() / 2; i += 4) green += pictures[0][i];
-      // The wall inside is behind the host's: z = 204.5.
+      // The inner wall is behind the host's: z = 204.5.
       if (host) {
         EXPECT_EQ(green, 0.0);
       } else {
@@ -266,7 +268,7 @@ TEST_P(SurfacePicture, StandardAndReversedDepthAreBitEqual) {
   }
 }
 
-// BLEND in front of the volume, inside and behind: where rays end, a share of them goes on.
+// BLEND materials in front of the volume, inside and behind: a fraction of the rays passes through.
 TEST_P(SurfacePicture, BlendedSurfacesAreSortedAgainstTheVolume) {
   for (const SurfaceLight mode : {SurfaceLight::none, SurfaceLight::full}) {
     for (const float z : {40.0F, 15.5F, -10.0F}) {
@@ -332,7 +334,7 @@ TEST_P(SurfacePicture, AovsAreTheAnalyticOnes) {
       EXPECT_NEAR(normal[3 * i + 2], std::isinf(z) ? 0.0 : 1.0, 0.02) << x << " " << y;
       EXPECT_NEAR(volume[4 * i + 3], 1.0 - std::exp(-sigma * depth), 0.2);
     }
-    // All over: nothing in the dark volume, and its alpha is what does not pass.
+    // In the whole image: the dark volume has no radiance, and its alpha is 1 - transmittance.
     double alpha = 0.0;
     for (std::size_t i = 0; i < std::size_t{side} * side; ++i) {
       alpha += (volume[4 * i + 3] - (1.0 - transmittance[i])) / (side * side);
@@ -395,17 +397,18 @@ TEST_P(SurfacePicture, SurfacesAreThereBeforeTheVolume) {
                                pixels.data());
     return pixels[std::size_t{side} * 12 + 2].x;
   };
-  // A step of their upload a frame, at least, and there are fewer.
+  // Each frame does at least one step of the upload, and there are fewer than 60.
   float seen = red();
   for (int frames = 1; frames < 60 && seen == 0.0F; ++frames) seen = red();
   EXPECT_NEAR(seen, 2.0F, 0.01F);
-  // And gone with them.
+  // They disappear when the surfaces are removed.
   viewer_->viewer().set_surfaces(nullptr);
   viewer_->set_volume(viewer::VolumeAssetPtr());
   EXPECT_EQ(red(), 0.0F);
 }
 
-// While the volume is coarse, surfaces are as fine as the frame, in front of it and behind; read back, they are there.
+// While the volume's preview is coarse, surfaces have full resolution, in front of it and behind. They are also in the
+// image that is read back.
 TEST_P(SurfacePicture, PreviewsShowSurfacesAtFullResolution) {
   show(scene(), SurfaceLight::full);
   viewer::Sampling sampling;
@@ -424,7 +427,7 @@ TEST_P(SurfacePicture, PreviewsShowSurfacesAtFullResolution) {
   frame.flip_y = true;
   frame.budget_ms = 0.5;
   viewer::FrameResult result;
-  // On a busy machine a frame that short may get nothing done.
+  // On a busy machine a frame this short may do no work.
   const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
   while (result.size == glm::uvec2(0U) && std::chrono::steady_clock::now() < end)
     result = viewer_->viewer().render(frame);
@@ -433,7 +436,7 @@ TEST_P(SurfacePicture, PreviewsShowSurfacesAtFullResolution) {
   std::vector<glm::vec4> pixels(std::size_t{fine} * fine);
   functions->GetTextureImage(result.texture, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels.size() * 16),
                              pixels.data());
-  // The front wall's edge, in the middle row: full on its side; beyond it nothing of its colour.
+  // The front wall's edge in the middle row: full color on its side, none beyond it.
   const auto edge = static_cast<std::size_t>((front_edge - left) / scale * 4.0);
   const std::size_t row = std::size_t{fine} / 4 * fine;
   double inside = 0.0;
@@ -441,7 +444,7 @@ TEST_P(SurfacePicture, PreviewsShowSurfacesAtFullResolution) {
   EXPECT_NEAR(inside, 2.0, 0.02);
   EXPECT_GT(pixels[row + edge - 3].x, 0.9F);
   EXPECT_LT(pixels[row + edge + 3].x, 1e-3F);
-  // The one inside is dimmed by what the coarse volume is.
+  // The inner wall is attenuated by the coarse volume.
   double dimmed = 0.0;
   int count = 0;
   for (std::size_t y = 0; y < fine * 5 / 8; ++y) {
@@ -451,11 +454,11 @@ TEST_P(SurfacePicture, PreviewsShowSurfacesAtFullResolution) {
     }
   }
   EXPECT_NEAR(dimmed / count, 1.5 * std::exp(-sigma * 16.0), 0.12);
-  // Read back as coarse as it is, but whole.
+  // The image that is read back is coarse but complete.
   std::vector<glm::vec4> coarse(std::size_t{result.size.x} * result.size.y);
   viewer_->viewer().read_linear(&coarse[0].x, coarse.size() * 4);
   EXPECT_NEAR(coarse[std::size_t{result.size.x} * (result.size.y / 4) + 1].x, 2.0, 0.05);
-  // At rest it becomes the traced one.
+  // At rest the path traced image replaces it.
   frame.budget_ms = 1e9;
   while (!(result = viewer_->viewer().render(frame)).converged) {
   }

@@ -1,4 +1,4 @@
-// The raster pass for surfaces: scenes made by hand against analytic depth and radiance.
+// The raster pass for surfaces: scenes built in code, compared with analytic depth and radiance.
 
 #include "render/surface_raster.hpp"
 
@@ -53,7 +53,7 @@ namespace surface = cumulet::surface;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr float pi = std::numbers::pi_v<float>;
 
-/// A scene and its one pose.
+/// A scene with a fixed pose.
 class HandScene : public cumulet::test::TexturedScene {
  public:
   [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/,
@@ -68,8 +68,8 @@ class HandScene : public cumulet::test::TexturedScene {
     return result;
   }
 
-  /// A parallelogram: counter-clockwise seen from where right x up points to. uv (0, 0) is the corner at `right` 0 and
-  /// `up` 1, as in a picture.
+  /// A parallelogram, counter-clockwise seen from the direction right x up. uv (0, 0) is the corner at `right` 0 and
+  /// `up` 1, as in an image.
   void add_quad(glm::vec3 corner, glm::vec3 right, glm::vec3 up, std::uint32_t material, bool flipped = false) {
     const auto base = static_cast<std::uint32_t>(attributes.size());
     const glm::vec3 normal = glm::normalize(glm::cross(right, up));
@@ -89,7 +89,7 @@ class HandScene : public cumulet::test::TexturedScene {
     draws.push_back({draw_first, 6, material, 0});
     posed.flipped.push_back(flipped ? 1 : 0);
   }
-  /// A quad that faces +z at this height, 2 half wide and high, around the z axis.
+  /// A quad at z that faces +z and is 2 half wide and high, centered on the z axis.
   void add_wall(float z, float half, std::uint32_t material) {
     add_quad({-half, -half, z}, {2.0F * half, 0.0F, 0.0F}, {0.0F, 2.0F * half, 0.0F}, material);
   }
@@ -146,7 +146,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
     const StateGuard guard(*gl_);
     raster_->show({{content_of(scene, scene->pose(0.0, 0))}});
   }
-  /// In GL.
+  /// Uploads the scene to GL.
   RasterContentPtr content_of(const std::shared_ptr<HandScene>& scene, surface::Pose pose) {
     return content_of(scene, std::move(pose), cumulet::gl::query_limits(*gl_));
   }
@@ -176,7 +176,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
     gl_->GetTextureImage(layers_.colour.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(all * 16),
                          picture.colours.data());
     gl_->GetTextureImage(layers_.z.name(), 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(all * 4), picture.depths.data());
-    // The blended over the others.
+    // Blended surfaces over the opaque ones.
     for (std::size_t i = 0; i < all - count; ++i) {
       const glm::vec4 over = picture.colours[count + i];
       picture.colours[i] = over + (1.0F - over.a) * picture.colours[i];
@@ -186,7 +186,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
     picture.depths.resize(count);
     return picture;
   }
-  /// One wall at z = -2, seen from the origin.
+  /// Draws one wall at z = -2, seen from the origin.
   Picture draw_wall(const std::shared_ptr<HandScene>& scene, const SurfaceLighting& lighting) {
     scene->add_wall(-2.0F, 3.0F, 0);
     set(scene);
@@ -241,10 +241,10 @@ TEST_P(SurfaceRasters, NothingIsInfinitelyFarAndTransparent) {
 }
 
 TEST_P(SurfaceRasters, DepthIsTheAnalyticOne) {
-  // Hardware puts vertices on a raster of 1/256 of a pixel; llvmpipe's planes are those of the vertices themselves.
+  // Hardware rounds vertices to 1/256 of a pixel. llvmpipe interpolates from the exact vertices.
   const std::string driver = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
   const double slack = driver.find("llvmpipe") != std::string::npos ? 4e-6 : 1e-3;
-  // A wall z = -6 + 0.5 x - 0.25 y, not over the right of the picture, and a box's face at z = -3 before it.
+  // A wall z = -6 + 0.5 x - 0.25 y that leaves the right of the image empty, and a box's face at z = -3 in front of it.
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F)).double_sided = true;
   const auto plane = [](float x, float y) { return glm::vec3(x, y, -6.0F + 0.5F * x - 0.25F * y); };
@@ -293,7 +293,7 @@ TEST_P(SurfaceRasters, DepthIsTheAnalyticOne) {
 }
 
 TEST_P(SurfaceRasters, FarFromTheOriginNothingJitters) {
-  // A wall of whole coordinates, that floats hold exactly, with the eye at fractions of them.
+  // A wall with integer coordinates, which floats represent exactly, and an eye at fractions of them.
   for (const double offset : {0.0, 1048576.0, -4194304.0}) {
     const auto scene = std::make_shared<HandScene>();
     scene->add_matte(glm::vec3(1.0F));
@@ -307,7 +307,7 @@ TEST_P(SurfaceRasters, FarFromTheOriginNothingJitters) {
 }
 
 TEST_P(SurfaceRasters, NearAndFarSurfacesAreAllThere) {
-  // Inside of bounds that are huge against what is nearest, and far away from all.
+  // One surface is close, inside huge bounds, and one is far from all others.
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F)).double_sided = true;
   scene->add_wall(-0.5F, 0.1F, 0);
@@ -413,7 +413,7 @@ TEST_P(SurfaceRasters, PunctualLights) {
     const Picture picture = draw(straight({0, 0, 0}, 0.01), {});
     expect_colour(picture.centre(), glm::vec4(glm::vec3(1.0F, 0.5F, 0.0F) * (c.irradiance / pi), 1.0F));
   }
-  // All of them together, thrice.
+  // All of them together, three times.
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F));
   float sum = 0.0F;
@@ -467,7 +467,8 @@ TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndKeepTheNearestDepth) {
   EXPECT_NEAR(front.z(3, 3, 1), 4.0F, 1e-5F);
   EXPECT_NEAR(front.blended_depths.at(front.index(3, 3, 1)), 2.0F, 1e-5F);
   expect_colour(front.colour(3, 3, 1), {4.0F, 0.5F * 2.0F, 0.5F * 0.75F * 8.0F, 1.0F});
-  // From behind, single-sided: nothing; from in front without the wall: alpha adds up, and nothing has depth.
+  // From behind, single-sided surfaces are invisible. From the front without the wall, alphas combine, and there is no
+  // depth.
   EXPECT_EQ(draw(straight({0, 0, -20}, 0.1), {}).centre(), glm::vec4(0.0F));
   const auto thin = std::make_shared<HandScene>();
   thin->materials = scene->materials;
@@ -532,7 +533,7 @@ TEST_P(SurfaceRasters, SidesAndMirroring) {
 }
 
 TEST_P(SurfaceRasters, LayersSampleTheirPlaces) {
-  // An edge in each direction at every eighth of a pixel: a layer covers what its place is in.
+  // An edge in each direction at every eighth of a pixel: a layer is covered if its sample position is.
   for (unsigned layers = 1; layers <= 8; ++layers) {
     for (int eighth = 0; eighth < 8; ++eighth) {
       const float edge = 5.0F + (static_cast<float>(eighth) + 0.07F) / 8.0F;  // pixels, from the left and the top
@@ -562,7 +563,7 @@ TEST_P(SurfaceRasters, LayersSampleTheirPlaces) {
 }
 
 TEST_P(SurfaceRasters, TexturesWrapAndTransform) {
-  // 2 x 2 of distinct colours; the wall shows uv from -1 to 2.
+  // 2 x 2 distinct colors; the wall shows uv from -1 to 2.
   const std::vector<std::uint8_t> texels{255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 128, 128, 128, 255};
   const float grey = std::pow((128.0F / 255.0F + 0.055F) / 1.055F, 2.4F);
   const std::array<glm::vec3, 4> colours{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(grey)};
@@ -582,7 +583,7 @@ TEST_P(SurfaceRasters, TexturesWrapAndTransform) {
         surface::Material& material = scene->add_matte(glm::vec3(1.0F));
         material.base_color_texture.texture = scene->add_texture(2, 2, texels, sampler);
         material.base_color_texture.uv_set = set_of;
-        // uv' = (-1 + 3 u + v / 8, -1 + 3 v), whatever the set.
+        // uv' = (-1 + 3 u + v / 8, -1 + 3 v) for both uv sets.
         const float scale = set_of == 0 ? 1.0F : 0.5F;
         material.base_color_texture.transform =
             glm::mat3x2(3.0F * scale, 0.0F, 0.125F * scale, 3.0F * scale, -1.0F, -1.0F);
@@ -609,7 +610,7 @@ TEST_P(SurfaceRasters, TexturesWrapAndTransform) {
 }
 
 TEST_P(SurfaceRasters, MipmapsAverageWhatIsSmall) {
-  // Black and white in linear light, much smaller than a pixel.
+  // A checkerboard of black and white, much finer than a pixel; the mean is in linear light.
   std::vector<std::uint8_t> texels;
   for (int i = 0; i < 64 * 64; ++i) {
     const std::uint8_t value = ((i ^ (i >> 6)) & 1) != 0 ? 255 : 0;
@@ -680,7 +681,8 @@ TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
 }
 
 TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
-  // The map leans by 0.48 to its right and 0.36 up, so little that the mirror image of the eye is above the wall.
+  // The map leans by 0.48 to its right and 0.36 up. That is little enough that the mirrored view direction is above the
+  // wall.
   const glm::vec3 m(0.48F, 0.36F, 0.8F);
   const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround((value + 1.0F) * 127.5F)); };
   const std::vector<std::uint8_t> texel{byte(m.x), byte(m.y), byte(m.z), 255};
@@ -718,7 +720,7 @@ TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
           SurfaceLighting lighting;
           lighting.sun_direction = sun;
           lighting.sun_irradiance = glm::vec3(pi);
-          // With the soft terminator of mapped normals.
+          // With the soft terminator for mapped normals.
           const float cosine = std::max(0.0F, glm::dot(normal, sun));
           const float above = glm::dot(smooth, sun) / (std::max(cosine, 1e-6F) * glm::dot(normal, smooth));
           const float t = glm::clamp(above, 0.0F, 1.0F);
@@ -730,7 +732,7 @@ TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
   }
 }
 
-/// A row of spheres by roughness for each of some metallic values, smooth normals.
+/// Spheres with smooth normals: roughness increases along a row, metallic differs per row.
 std::shared_ptr<HandScene> sphere_grid(int columns, int rows) {
   auto scene = std::make_shared<HandScene>();
   constexpr int stacks = 48;
@@ -818,7 +820,7 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
   }
   EXPECT_GT(compared, 2000);
 
-  // To look at: CUMULET_PICTURES=DIR.
+  // For visual inspection: CUMULET_PICTURES=DIR.
   if (const char* folder = std::getenv("CUMULET_PICTURES")) {
     lighting.sky_radiance = {0.25F, 0.35F, 0.5F};
     const Picture layered = draw(straight({0, 0, 12}, 0.31, 7.0 / 3.0), lighting, size, 8);
@@ -834,8 +836,8 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
   }
 }
 
-// Whatever the driver's pace, and whatever the pass's vertices cost it: a drag shows half of the pixels or more, rest
-// all of them; and pictures of one view are drawn over one pass.
+// For any speed of the driver and any vertex cost: a drag shows at least half of the resolution, and at rest all of it.
+// Images of one view share one raster pass.
 TEST_P(SurfaceRasters, PreviewsAreSharp) {
   using namespace cumulet::render;
   Tracer tracer(gl_, programs_);
@@ -874,8 +876,7 @@ TEST_P(SurfaceRasters, PreviewsAreSharp) {
   EXPECT_LE(tracer.bytes(), 2 * bytes) << "what no picture shows is used again";
 }
 
-// Whatever a drag leaves under way: once the hand lets go, nothing more is finished over a coarse pass, and all coarse
-// pictures share one of full size.
+// After a drag ends, no image is finished over a coarse raster pass, and all coarse images share one pass of full size.
 TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   using namespace cumulet::render;
   const auto scene = std::make_shared<HandScene>();
@@ -900,7 +901,7 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
     }
     progressive.advance(wish, nothing, surfaces, std::chrono::steady_clock::now(), 0.1);
   };
-  for (int i = 0; i < 200; ++i) {  // two calls a frame, as hosts may
+  for (int i = 0; i < 200; ++i) {  // two calls per frame, as some hosts do
     step(i % 2 == 0);
     std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
@@ -933,7 +934,8 @@ TEST_P(SurfaceRasters, TellsWhatItHolds) {
   scene->add_wall(-2.0F, 1.0F, 0);
   set(scene);
   draw(straight({0, 0, 0}, 1.0), {}, {5U, 3U});
-  constexpr std::uint64_t more = 64U * 32U * 6U * 16U + 15U * 4U;  // what glossy surfaces see, and a place
+  constexpr std::uint64_t more =
+      64U * 32U * 6U * 16U + 15U * 4U;  // the prefiltered environment of glossy surfaces, and one instance transform
   EXPECT_EQ(raster_->bytes(), empty + more);
   draw(straight({0, 0, 0}, 1.0), {}, {32U, 16U});
   EXPECT_EQ(raster_->bytes(), empty + more + (32U * 16U - 5U * 3U) * 4U);
@@ -962,7 +964,7 @@ TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
     host.scramble(seed);
     const cumulet::test::GlState before = cumulet::test::read_gl_state(*gl_);
     {
-      // All of it again under this state: uploads too.
+      // Uploads everything again in this state.
       const StateGuard guard(*gl_);
       raster_ = std::make_unique<SurfaceRaster>(gl_);
     }
@@ -1011,7 +1013,7 @@ TEST_P(SurfaceRasters, RefusesWhatDoesNotFit) {
   SurfaceView flat = straight({0, 0, 0}, 0.5);
   flat.up = flat.right;
   EXPECT_EQ(code_of([&] { raster_->draw(flat, {}, {4U, 4U}, 1, layers_); }), ErrorCode::internal);
-  // What was there still is.
+  // The previous content is kept.
   EXPECT_NEAR(draw(straight({0, 0, 0}, 0.1), {}).centre_z(), 2.0F, 1e-6F);
 }
 

@@ -1,4 +1,4 @@
-// Surfaces and volume in one picture, against analytic answers.
+// Surfaces and volume in one image, compared with analytic results.
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ viewer::Light sun_at(float elevation_degrees, const vec3& irradiance, const vec3
   return light;
 }
 
-/// A horizontal square at a height, its front up.
+/// A horizontal square at this height that faces up.
 std::array<vec3, 4> floor_at(float y, float half = 200.0F) {
   return {{{32 - half, y, 32 + half}, {32 + half, y, 32 + half}, {32 + half, y, 32 - half}, {32 - half, y, 32 - half}}};
 }
@@ -100,7 +100,7 @@ TEST_P(SurfaceTrace, TheSkyLightsAFloorAsMuchAsItReflects) {
   }
 }
 
-// Nothing absorbs: whatever the surfaces and the medium do, everything is as bright as the sky.
+// White furnace test: without absorption, surfaces and medium are as bright as the sky.
 TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
@@ -134,8 +134,8 @@ TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
   }
 }
 
-// A sphere of few triangles is lit as the smooth one that its normals speak of, down to the terminator: no facet's own
-// edge stops light, and none is lost in a furnace.
+// A sphere of few triangles is lit like the smooth sphere given by its normals, up to the terminator. Facet edges block
+// no light, and no light is lost in a white furnace.
 TEST_P(SurfaceTrace, ACoarseSphereHasASmoothTerminator) {
   const auto viewer = make();
   auto scene = std::make_shared<StillScene>();
@@ -168,7 +168,7 @@ TEST_P(SurfaceTrace, ACoarseSphereHasASmoothTerminator) {
   EXPECT_NEAR(furnace.mean().x, 1.0, 2e-3);
 }
 
-// A tile of every texel: base colour, metal, roughness and coat from textures, under the sun alone.
+// One tile per texel: base color, metallic, roughness and clearcoat from textures, lit only by the sun.
 TEST_P(SurfaceTrace, TexturedGlossIsAppendixBInDoublePrecision) {
   constexpr std::uint32_t tiles = 4;
   constexpr int side = 64;
@@ -221,7 +221,7 @@ TEST_P(SurfaceTrace, TexturedGlossIsAppendixBInDoublePrecision) {
       };
       const dvec3 expected =
           pi * reference(o, i, below(reference.dielectric, 1.0), below(reference.coat, reference.clearcoat));
-      // The middle of the tile, whose texture's first row is at the quad's bottom.
+      // The center of the tile; the texture's first row is at the quad's bottom.
       const double x = (2.0 * (k % tiles + 0.5) / tiles - 1.0) * double{half} * o.z;
       const double y = (2.0 * (k / tiles + 0.5) / tiles - 1.0) * double{half};
       const auto column = static_cast<int>((x / 24.0 + 0.5) * side);
@@ -245,7 +245,7 @@ Material metal(float roughness) {
   return m;
 }
 
-// The sun in a ball throws rare bright samples on a floor: softened, as much light, and far less noise.
+// The sun reflected by a ball causes fireflies on a floor. Path regularization keeps the mean and reduces the noise.
 TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
@@ -257,7 +257,7 @@ TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
   scene->add_sphere({32.0F, 0.0F, 32.0F}, 8.0F, scene->add(metal(0.1F)), 48);
   viewer->viewer().show_surfaces(test::source_of(scene));
   viewer->set_camera(test::camera_at({60.0, 60.0, 90.0}, {32.0, -10.0, 44.0}, 8.0));
-  // The mean of two pictures, and the noise of a pixel.
+  // The mean of two images, and the noise of a pixel.
   const auto measure = [&] {
     const test::Picture a = test::render(*viewer, {32, 32, 64, 1, render::View::shaded});
     const test::Picture b = test::render(*viewer, {32, 32, 64, 2, render::View::shaded});
@@ -274,7 +274,7 @@ TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
   EXPECT_LT(soft_noise, 0.25 * noise);
 }
 
-// Up a periscope, at a card whose edge is in the picture's middle.
+// A card seen through a periscope; its edge is in the image's center.
 TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
   const auto viewer = make();
   Material card = test::diffuse(vec3(0.0F));
@@ -282,7 +282,7 @@ TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
   auto scene = std::make_shared<StillScene>();
   const std::uint32_t mirror = scene->add(metal(0.0F));
   for (const float y : {100.0F, 120.0F}) {
-    const float up = y == 100.0F ? 4.0F : -4.0F;  // its normal's way
+    const float up = y == 100.0F ? 4.0F : -4.0F;  // direction of its normal
     scene->add_quad({{{32 - up, y - 4, 36}, {32 + up, y - 4, 36}, {32 + up, y + 4, 28}, {32 - up, y + 4, 28}}}, mirror);
   }
   scene->add_quad({{{32, 110, 0}, {52, 110, 0}, {52, 130, 0}, {32, 130, 0}}}, scene->add(card));
@@ -300,7 +300,8 @@ TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
   EXPECT_LT(difference, 1e-3);
 }
 
-// A floor below an opaque glowing slab that scatters nothing: albedo / pi times S cos^2 / r^2 over its underside.
+// A floor below an opaque emissive slab without scattering: albedo / pi times S cos^2 / r^2, integrated over its
+// underside.
 TEST_P(SurfaceTrace, AFireLightsTheFloor) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
@@ -331,7 +332,7 @@ TEST_P(SurfaceTrace, AFireLightsTheFloor) {
   }
 }
 
-// A black floor in the middle of a glowing slab: S (1 - e^-tau) of what is above it, by triangles and by the surface
+// A black floor in the middle of an emissive slab: S (1 - e^-tau) of the part above, by triangles and by the raster
 // pass.
 TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
   const auto viewer = make();
@@ -409,7 +410,7 @@ TEST_P(SurfaceTrace, CoverageIsAShareOfTheRays) {
   }
 }
 
-// Neither budgets nor tiles: no path is lost or run twice between kernels, rounds and dispatches.
+// Budgets and tiles do not affect the image: no path is lost or run twice between kernels, rounds and dispatches.
 TEST_P(SurfaceTrace, SeedAndSamplesAloneDecideTheImage) {
   auto scene = std::make_shared<StillScene>();
   scene->add(test::diffuse(vec3(0.8F)));
@@ -438,7 +439,7 @@ TEST_P(SurfaceTrace, SurfacesNeedNoVolume) {
   viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.5F)))));
   const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
   EXPECT_NEAR(picture.mean().x, 0.5 * (1.0 + 1.0 / pi), 0.01);
-  // As posed far from the origin, too, and with a volume that comes later.
+  // A volume that is set later is displayed too.
   viewer->set_volume(test::slab());
   viewer::Medium medium;
   medium.density_scale = 100.0;
@@ -460,7 +461,7 @@ TEST_P(SurfaceTrace, CamerasSeeThroughBacksAndLightDoesNot) {
   std::swap(ceiling[1], ceiling[3]);
   scene->add_quad(ceiling, 0);
   viewer->viewer().show_surfaces(test::source_of(scene));
-  // Its back is towards the camera: the floor is seen, in the ceiling's shadow.
+  // The ceiling's back faces the camera: the floor is visible in the ceiling's shadow.
   const test::Picture shadowed = test::render(*viewer, {16, 16, 16, 1, render::View::shaded});
   EXPECT_NEAR(shadowed.mean().x, 0.0, 1e-6);
   EXPECT_NEAR(shadowed.mean().w, 1.0, 1e-6);

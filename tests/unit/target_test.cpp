@@ -1,4 +1,4 @@
-// Targets that a picture cannot be right in are errors that name the cause; all others are drawn to.
+// Unsuitable render targets return errors that name the cause. All other targets are drawn to.
 
 #include <gtest/gtest.h>
 
@@ -62,7 +62,7 @@ class HostTargets : public cumulet::test::BackendTest {
     desc.colour = color;
     return desc;
   }
-  /// "" where it is drawn to.
+  /// The error message of a frame, "" if it is drawn.
   std::string error_of(const cumulet_frame_desc& desc) {
     const cumulet_status status = cumulet_render(viewer_.get(), &desc, nullptr);
     if (status == CUMULET_OK) return "";
@@ -73,7 +73,7 @@ class HostTargets : public cumulet::test::BackendTest {
     const std::string error = error_of(desc);
     EXPECT_NE(error.find(cause), std::string::npos) << "'" << error << "', not '" << cause << "'";
     EXPECT_EQ(error.find('\n'), std::string::npos);
-    // The viewer goes on with one that is right.
+    // The viewer continues with a valid target.
     EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
   }
 
@@ -117,12 +117,12 @@ TEST_P(HostTargets, AreRefusedByTheirEncoding) {
 
 TEST_P(HostTargets, AreRefusedByWhatIsNotThere) {
   gl_.NamedFramebufferTexture(framebuffer_, GL_DEPTH_ATTACHMENT, texture(GL_DEPTH_COMPONENT24), 0);
-  refused(frame(), "color");  // depth only: Mesa counts it as complete
+  refused(frame(), "color");  // depth only: Mesa reports it as complete
   gl_.NamedFramebufferDrawBuffer(framebuffer_, GL_NONE);
   refused(frame(), "GL_NONE");
   attach(GL_COLOR_ATTACHMENT0, texture(GL_RGBA8));
   refused(frame(), "GL_NONE");
-  // The second draw buffer is not the picture's.
+  // Only draw buffer 0 is used; the second one does not count.
   const std::array<GLenum, 2> second{GL_NONE, GL_COLOR_ATTACHMENT0};
   gl_.NamedFramebufferDrawBuffers(framebuffer_, 2, second.data());
   refused(frame(), "GL_NONE");
@@ -134,7 +134,7 @@ TEST_P(HostTargets, AreRefusedByWhatIsNotThere) {
   attach(GL_DEPTH_ATTACHMENT, 0);
   refused(desc, "write_depth");
   EXPECT_EQ(error_of(frame()), "");
-  // Depth with stencil serves.
+  // Depth with stencil is accepted.
   gl_.NamedFramebufferTexture(framebuffer_, GL_DEPTH_STENCIL_ATTACHMENT, texture(GL_DEPTH24_STENCIL8), 0);
   EXPECT_EQ(error_of(desc), "");
 }
@@ -144,7 +144,7 @@ TEST_P(HostTargets, AreRefusedWhereTheyAreSmallerThanTheFrame) {
   refused(frame(), "32 x 31 pixels, smaller than the frame of 32 x 32");
   attach(GL_COLOR_ATTACHMENT0, texture(GL_RGBA8, side + 9, side));
   EXPECT_EQ(error_of(frame()), "");
-  // A level of a larger texture, and depth that is smaller than the color.
+  // A mipmap level of a larger texture, and depth that is smaller than the color attachment.
   GLuint levels = 0;
   gl_.CreateTextures(GL_TEXTURE_2D, 1, &levels);
   gl_.TextureStorage2D(levels, 2, GL_RGBA8, side, side);
@@ -175,7 +175,7 @@ TEST_P(HostTargets, AreDrawnToByTheirFirstDrawBuffer) {
   const cumulet::test::VolumeRef volume = cumulet::test::make_ball(16, 2.0F);
   ASSERT_EQ(cumulet_set_volume(viewer_.get(), volume.get()), CUMULET_OK);
   const GLuint other = texture(GL_RGBA8);
-  attach(GL_COLOR_ATTACHMENT0, texture(GL_RGBA8UI));  // not the one that is drawn to
+  attach(GL_COLOR_ATTACHMENT0, texture(GL_RGBA8UI));  // this attachment is not the draw buffer
   attach(GL_COLOR_ATTACHMENT2, other);
   gl_.NamedFramebufferDrawBuffer(framebuffer_, GL_COLOR_ATTACHMENT2);
   ASSERT_EQ(error_of(frame()), "");
@@ -183,13 +183,13 @@ TEST_P(HostTargets, AreDrawnToByTheirFirstDrawBuffer) {
   std::vector<std::uint8_t> bytes(std::size_t{side} * side * 4);
   gl_.GetTextureImage(other, 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(bytes.size()), bytes.data());
   EXPECT_GT(std::ranges::max(bytes), 60);
-  // And several samples a pixel.
+  // Multisampled attachments too.
   attach(GL_COLOR_ATTACHMENT0, 0);
   attach(GL_COLOR_ATTACHMENT2, texture(GL_RGBA8, side, side, 4));
   EXPECT_EQ(error_of(frame()), "");
 }
 
-// What is wrong is told in every frame, and once it is right the picture is there.
+// Errors are returned in every frame. Once the target is valid, the image is drawn.
 TEST_P(HostTargets, AreCheckedInEachFrame) {
   attach(GL_COLOR_ATTACHMENT0, texture(GL_RGBA8));
   for (int i = 0; i < 2; ++i) {

@@ -1,4 +1,4 @@
-// The tracer against analytic answers, an independent path tracer, and itself.
+// The path tracer compared with analytic results, with an independent path tracer, and with itself.
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ TEST_P(Trace, SlabFollowsBeerLambertInEveryMarch) {
       medium.density_scale = sigma;
       medium.albedo = vec3(0.0F);
       viewer->set_medium(medium);
-      // Straight through 8 voxels; then from the slab's middle plane through 4.
+      // Straight through 8 voxels; then from the slab's center plane through 4.
       for (const double from : {500.0, 3.5}) {
         viewer->set_camera(test::camera_at({31.5, 31.5, from}, {31.5, 31.5, from - 1.0}, 0.5));
         const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
@@ -82,7 +82,7 @@ TEST_P(Trace, WhiteFurnaceIsOneEverywhere) {
   }
 }
 
-// S (1 - e^-tau) of a slab that glows and does not scatter, before a sky.
+// S (1 - e^-tau) of a slab that emits and does not scatter, in front of a sky.
 TEST_P(Trace, AGlowingSlabInEveryMarch) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
@@ -102,7 +102,7 @@ TEST_P(Trace, AGlowingSlabInEveryMarch) {
   }
 }
 
-// As hot as what is around it: whatever it absorbs and scatters, it cannot be seen.
+// A medium in thermal balance with its environment is invisible, whatever it absorbs and scatters.
 TEST_P(Trace, AMediumInBalanceIsInvisible) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
@@ -124,8 +124,8 @@ TEST_P(Trace, AMediumInBalanceIsInvisible) {
   }
 }
 
-// An independent path tracer: delta tracking over the voxels, no next-event estimation towards the sky, no roulette;
-// the sun by ratio of delta-tracked transmittance. Nothing shared with glsl/ but the definition of the medium.
+// An independent path tracer: delta tracking over the voxels, no NEE towards the sky, no Russian roulette;
+// transmittance towards the sun by delta tracking. It shares only the definition of the medium with glsl/.
 class Reference {
  public:
   Reference(const volume::ScalarVolume& volume, double scale, const dvec3& albedo, double g, const dvec3& sun,
@@ -179,7 +179,7 @@ class Reference {
     }
   }
   dvec3 scatter(const dvec3& d) {
-    // Rejection, so that no inversion formula is shared.
+    // Rejection sampling, so that no inversion formula is shared.
     while (true) {
       const double z = 2.0 * uniform() - 1.0;
       const double angle = 2.0 * std::numbers::pi * uniform();
@@ -238,7 +238,7 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
     const test::Picture a = test::render(*viewer, {32, 32, 96, 3, render::View::shaded});
     const test::Picture b = test::render(*viewer, {32, 32, 96, 4, render::View::shaded});
     for (int c = 0; c < 3; ++c) {
-      // The two renders' difference gives the noise of their mean.
+      // The difference of the two renders gives the noise of their mean.
       double difference = 0.0;
       for (std::size_t i = 0; i < a.pixels.size(); ++i) difference += std::pow(a.pixels[i][c] - b.pixels[i][c], 2.0);
       const double error = 0.5 * std::sqrt(difference) / double(a.pixels.size());
@@ -250,8 +250,8 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
 }
 
 TEST_P(Trace, SingleScatteringMatchesQuadrature) {
-  // A homogeneous box, the sun straight above, a horizontal camera ray through the middle: every scattering point has
-  // the same way out. L = albedo phase E e^{-s h} (1 - e^{-s L}).
+  // A homogeneous box, the sun straight above, a horizontal camera ray through the center: every scattering point has
+  // the same distance to the surface. L = albedo phase E e^{-s h} (1 - e^{-s L}).
   const auto viewer = make();
   viewer->set_volume(box_volume({400, 16, 16}));
   const double sigma = 0.15;
@@ -286,7 +286,7 @@ TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
     viewer->set_grid(test::settings_of(test::march_kinds[i], i == 0 ? 0.01 : -1.0));
     pictures[i] = test::render(*viewer, {32, 32, 16, 1, render::View::shaded});
   }
-  // The same seed takes the same path, but for rounding.
+  // The same seed gives the same path, except for rounding.
   for (const std::size_t other : {1U, 3U}) {
     std::size_t same = 0;
     for (std::size_t i = 0; i < 1024; ++i) {
@@ -323,7 +323,7 @@ TEST_P(Trace, PagesChangeNothing) {
     EXPECT_EQ(error.code(), ErrorCode::unsupported);
     EXPECT_NE(std::string(error.what()).find("GL_MAX_TEXTURE_BUFFER_SIZE"), std::string::npos) << error.what();
   }
-  // Told once; the old cells are drawn on.
+  // The error is returned once; the old cells stay in use.
   while (!viewer->render(10.0)) {
   }
   viewer->viewer().set_page_texels(0);
@@ -336,7 +336,7 @@ TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
   viewer->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
   viewer->set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
-  // Wider than a tile, so that several take part.
+  // Wider than a tile, so that several tiles are used.
   const test::Image image{600, 10, 5, 9, render::View::shaded};
   const test::Picture one = test::render(*viewer, image);
   EXPECT_EQ(one.pixels, test::render(*viewer, image, 0.5).pixels);
@@ -377,8 +377,8 @@ TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {
 }
 
 TEST_P(Trace, AnyAffineTransformKeepsWorldDistances) {
-  // A slab, sheared, turned, stretched and moved; the camera looks along its short axis' world image. Through the
-  // middle the path length is the thickness between its two faces.
+  // A sheared, rotated, stretched and translated slab. The camera looks along the world image of its short axis.
+  // Through the center, the path length is the distance between its two faces.
   auto volume = box_volume({64, 64, 8});
   glm::dmat4 m = glm::translate(glm::dmat4(1.0), dvec3(1000.0, -40.0, 7.0));
   m = glm::rotate(m, 0.7, glm::normalize(dvec3(1.0, 2.0, 0.5)));
@@ -420,7 +420,7 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
   camera.up = dvec3(rotation * glm::dvec4(0, 1, 0, 0));
   viewer->set_camera(camera);
   const test::Picture rotated = test::render(*viewer, image);
-  // Scattered directions are sampled around other axes, so pixels agree in the mean.
+  // Scattered directions are sampled around other axes, so pixels agree only in the mean.
   EXPECT_NEAR(straight.mean().x, rotated.mean().x, 0.01 * straight.mean().x);
   EXPECT_NEAR(straight.mean().w, rotated.mean().w, 0.002);
 }
@@ -490,7 +490,7 @@ TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
   }
   std::vector<float> after = viewer->read();
   EXPECT_EQ(std::memcmp(after.data(), before.pixels.data(), after.size() * sizeof(float)), 0);
-  // An empty medium shows the sky, and nothing else: without rounding after many samples, and without noise.
+  // An empty medium shows only the sky: without rounding errors after many samples, and without noise.
   auto empty = test::noise_volume({16, 16, 16}, ivec3(0), 1);
   empty.brick_origins.clear();
   empty.brick_values = {};

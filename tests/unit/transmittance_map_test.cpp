@@ -1,4 +1,4 @@
-// Transmittance maps, as a host's shaders look into them, against sums over voxels in double precision.
+// Transmittance maps as a host's shaders sample them, compared with sums over voxels in double precision.
 
 #include <gtest/gtest.h>
 
@@ -30,9 +30,9 @@ using glm::dmat4;
 using glm::dvec3;
 using glm::dvec4;
 
-constexpr int side = 14;  // of a volume, voxels; odd sizes of maps do not divide it
+constexpr int side = 14;  // side length of the volume in voxels; the odd map sizes are not multiples of it
 
-/// A lopsided blob, with a hole, of another value in each voxel.
+/// An asymmetric blob with a hole and a different value in each voxel.
 class Blob {
  public:
   Blob() {
@@ -59,7 +59,7 @@ class Blob {
   }
   [[nodiscard]] cumulet_volume* get() const { return volume_.get(); }
 
-  /// Of the line from a to b in the world, of the values where it stands.
+  /// Integral of the density along the line from a to b in world space.
   [[nodiscard]] double integral(const dvec3& a, const dvec3& b, const dmat4& to_world) const {
     const dmat4 to_index = glm::inverse(to_world);
     const dvec3 from = dvec3(to_index * dvec4(a, 1.0)) + 0.5;
@@ -129,7 +129,7 @@ class TransmittanceMaps : public testing::Test {
     return map;
   }
   [[nodiscard]] dvec3 from() const { return {desc_.position[0], desc_.position[1], desc_.position[2]}; }
-  /// Where light of the map comes from, on its way to the point.
+  /// Position of the light for a point of the map.
   [[nodiscard]] dvec3 source(const dvec3& point, const dvec3& towards) const {
     return desc_.light == CUMULET_MAP_LIGHT_POINT ? from() : point + 400.0 * towards;
   }
@@ -139,7 +139,7 @@ class TransmittanceMaps : public testing::Test {
       depth += one.density * blob_.integral(source(point, towards), point, one.to_world);
     return std::exp(-depth);
   }
-  /// What a host's shader finds at points.
+  /// Values that a host's shader samples at these points.
   std::vector<float> looked_up(const cumulet_transmittance_map& map, const std::vector<dvec3>& points) {
     const GladGLContext& gl = fake_.real();
     const std::string source =
@@ -182,7 +182,7 @@ class TransmittanceMaps : public testing::Test {
     gl.DeleteProgram(program);
     return found;
   }
-  /// Where middles of texels are in the world.
+  /// World positions of the texel centers.
   [[nodiscard]] std::vector<dvec3> middles(const cumulet_transmittance_map& map) const {
     dmat4 to_map(1.0);
     for (int i = 0; i < 16; ++i) to_map[i / 4][i % 4] = map.to_map[i];
@@ -221,12 +221,12 @@ class TransmittanceMaps : public testing::Test {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double truth = expected(points[i], towards);
       least = std::min(least, truth);
-      // A ray along faces of voxels may be on either side of them.
+      // A ray along voxel faces may be on either side of them.
       if (std::abs(found[i] - truth) > 2e-3) ++far_off;
     }
     EXPECT_LE(far_off, static_cast<int>(points.size()) / 200);
     EXPECT_LT(least, 0.4) << "there is some shadow";
-    // Anywhere: what lies between is interpolated.
+    // At arbitrary points, values are interpolated.
     std::mt19937 random(3);
     std::uniform_real_distribution<double> within(-15.0, 30.0);
     std::vector<dvec3> scattered;
@@ -252,7 +252,7 @@ class TransmittanceMaps : public testing::Test {
   cumulet_transmittance_map_desc desc_ = make_desc<cumulet_transmittance_map_desc>();
 };
 
-// make_viewer's.
+// The sun direction of make_viewer.
 dvec3 sun() {
   const double azimuth = glm::radians(60.0);
   const double elevation = glm::radians(40.0);
@@ -306,7 +306,7 @@ TEST_F(TransmittanceMaps, AreOfAllInstancesWhereTheyStand) {
   converge(viewer_.get(), target_.frame());
   standing_.push_back({place, 0.2});
   expect_truth(sun());
-  // Moved, and asked for once more.
+  // After a move and another update.
   place[3] += dvec4(-5.0, 2.0, 0.0, 0.0);
   for (int i = 0; i < 16; ++i) desc.to_world[i] = place[i / 4][i % 4];
   ASSERT_EQ(cumulet_instance_set_to_world(one.get(), desc.to_world), CUMULET_OK);

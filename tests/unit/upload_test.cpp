@@ -1,4 +1,5 @@
-// Everything large goes to GL in pieces: never more than one where a frame has no time, and never half a pose shown.
+// Large data is uploaded in pieces: at most one per frame if the budget is used up, and a partly uploaded pose is never
+// displayed.
 
 #include "render/upload.hpp"
 
@@ -89,7 +90,7 @@ TEST_P(Uploads, ImagesAndBuffersArriveWhole) {
   EXPECT_TRUE(back == rgba);
 }
 
-/// Hills of 200,000 triangles, with an image, that rise with time.
+/// Hills of 200,000 triangles with an image; they rise with time.
 class RisingScene : public test::StillScene {
  public:
   RisingScene() {
@@ -148,7 +149,7 @@ class SurfaceUploads : public testing::Test {
     viewer().read_linear(rgba.data(), rgba.size());
     return rgba;
   }
-  /// How far the pose that paths meet has risen.
+  /// Height of the pose that paths currently intersect.
   double risen() { return viewer().trace_parameters().surfaces.low.y - scene_->rest.low.y; }
 
   std::shared_ptr<const RisingScene> scene_ = std::make_shared<RisingScene>();
@@ -157,7 +158,8 @@ class SurfaceUploads : public testing::Test {
   std::optional<viewer::Viewer> viewer_;
 };
 
-// A frame without time copies one piece of surfaces, one of volumes and what its passes are told: of 40 MB.
+// A frame without a budget uploads one piece of surfaces, one of volumes, and the parameters of its passes; 40 MB in
+// total.
 TEST_F(SurfaceUploads, AFrameCopiesNoMoreThanItsTimeAllows) {
   constexpr std::uint64_t small = 64U << 10U;
   for (const double time : {0.0, 1.0, 2.0}) {
@@ -172,7 +174,7 @@ TEST_F(SurfaceUploads, AFrameCopiesNoMoreThanItsTimeAllows) {
       const auto since = std::chrono::steady_clock::now();
       loading = render(1e-6).loading;
       const double ms = milliseconds(std::chrono::steady_clock::now() - since);
-      // The last of them traces as well.
+      // The last frame traces as well.
       if (loading) longest_ms = std::max(longest_ms, ms);
       if (loading) sum_ms += ms;
       most = std::max(most, fake_->uploaded() - begun);

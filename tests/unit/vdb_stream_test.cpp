@@ -1,4 +1,5 @@
-// Values that are read from a file leaf by leaf, against OpenVDB's own trees: of files with more leaves than a run has.
+// Streaming of values from a file leaf by leaf, compared with OpenVDB's own trees. The files have more leaves than are
+// read in one run.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ using namespace cumulet;
 
 constexpr int leaves = 700;
 
-/// Leaves of values that are halves exactly, apart in space, with inactive voxels of two values of their own.
+/// Disjoint leaves of values that are exact halves, with inactive voxels of two values of their own.
 template <class GridT>
 typename GridT::Ptr scattered(float background) {
   auto grid = GridT::create(background);
@@ -54,7 +55,7 @@ class VdbStream : public testing::Test {
   }
   [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "streamed.vdb"; }
 
-  /// Every voxel of every brick, and how many bricks there are.
+  /// Compares the number of bricks and every voxel.
   template <class GridT>
   static void expect_same(const GridT& grid, const volume::ScalarVolume& found) {
     ASSERT_EQ(found.brick_origins.size(), std::size_t{leaves});
@@ -98,7 +99,7 @@ TEST_F(VdbStream, EveryCompressionEqualsTheTree) {
   expect_same(*doubles, through_file(doubles, COMPRESS_ZIP, true));
 }
 
-// In the last leaf that is read: all before were kept as halves until then.
+// A value that is not a half in the last leaf; all values before were kept as halves.
 TEST_F(VdbStream, WhatHalvesDoNotHoldBeginsAnewAsFloats) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   std::vector<openvdb::FloatTree::LeafNodeType*> nodes;
@@ -120,7 +121,7 @@ TEST_F(VdbStream, WhatIsNoDensityIsCountedOnce) {
     nodes[leaf]->setValueOn(11, std::numeric_limits<float>::quiet_NaN());
     nodes[leaf]->setValueOn(12, -std::numeric_limits<float>::infinity());
     nodes[leaf]->setValueOn(13, -0.0F);
-    nodes[leaf]->setValueOn(14, 6e-8F);  // no half, but near the smallest of them
+    nodes[leaf]->setValueOn(14, 6e-8F);  // not a half, but near the smallest one
   }
   const volume::ScalarVolume found = through_file(grid, openvdb::io::COMPRESS_ZIP, false);
   EXPECT_EQ(found.negative_voxels, 2U);
@@ -129,7 +130,7 @@ TEST_F(VdbStream, WhatIsNoDensityIsCountedOnce) {
   expect_same(*grid, found);
 }
 
-// Bricks of one value are tiles: those beside them close up.
+// Constant bricks become tiles, and the remaining bricks are compacted.
 TEST_F(VdbStream, GapsOfConstantLeavesAreClosed) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   std::vector<openvdb::FloatTree::LeafNodeType*> nodes;
@@ -154,7 +155,7 @@ TEST_F(VdbStream, GapsOfConstantLeavesAreClosed) {
   }
 }
 
-// A listing's numbers are those of one voxel after another.
+// The inspection's numbers equal those computed voxel by voxel.
 TEST_F(VdbStream, InspectionSeesEveryLeaf) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   through_file(grid, openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK, true);

@@ -1,4 +1,4 @@
-// How volumes move: what cells have of it, against sums over voxels, and what pixels have, against closed forms.
+// Velocities of volumes: cell data compared with sums over voxels, and AOVs compared with closed forms.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ using glm::vec3;
 using volume::ScalarVolume;
 using volume::VolumeFrame;
 
-// What a function gives, of the file's axes.
+// Velocities from a function, along the file's axes.
 template <class Function>
 volume::Velocity velocity(const ivec3& size, const ivec3& low, Function of) {
   volume::Velocity made;
@@ -56,10 +56,10 @@ grid::TetGrid cells_of(const VolumeFrame& frame, const grid::Cube& cube, const v
   return builder.records(settings.cells, density.max_value, channels);
 }
 
-// Against sums over the sixths of voxels that a cell is made of.
+// Compared with sums over the sixths of voxels that make up a cell.
 TEST(Velocity, OfACellIsTheMeanByItsDensity) {
   constexpr int size = 16;
-  // A part of it is thin beside the rest.
+  // A part of it has a density that is tiny beside the rest.
   const ScalarVolume noise = test::noise_volume(ivec3(size), ivec3(0), 5);
   VolumeFrame frame{.density = test::make_volume(ivec3(size), ivec3(0), [&](const ivec3& p) {
                       return (p.x % 3 == 0 ? 1e-6F : 1.0F) * test::value_at(noise, p);
@@ -89,7 +89,7 @@ TEST(Velocity, OfACellIsTheMeanByItsDensity) {
     for (std::size_t cell = 0; cell < made.cells.size(); ++cell) {
       const dvec3 mean = mass[cell] > 0.0 ? momentum[cell] / mass[cell] : dvec3(0.0);
       const dvec3 stored(core::cm_cell_velocity(made.velocity[cell]));
-      // Half floats; and of the fastest, 1800, what single precision leaves.
+      // Precision of half floats, and the float error of the largest value, 1800.
       for (int i = 0; i < 3; ++i)
         ASSERT_NEAR(stored[i], mean[i], 5e-4 * std::abs(mean[i]) + 5e-4) << cell << " axis " << i;
     }
@@ -137,7 +137,7 @@ TEST(Velocity, OfMuchWithoutDetailIsLeftOutWithAWarning) {
             std::string::npos);
 }
 
-// Another light moves nothing.
+// A change of the emission does not change velocities.
 TEST(Velocity, IsKeptWhileEmissionChanges) {
   VolumeFrame frame{.density = test::slab(), .flame = test::slab(0.5F)};
   const ivec3 size(64, 8, 64);
@@ -158,7 +158,7 @@ TEST(Velocity, IsKeptWhileEmissionChanges) {
   EXPECT_EQ(other.emission, ramped.emission);
 }
 
-// ---- Pixels
+// ---- Images
 
 class VelocityPicture : public test::ViewerTest {
  protected:
@@ -196,7 +196,7 @@ std::string name_of(const test::MarchKind& kind) {
          (kind.cells == grid::CellKind::linear ? " linear" : "");
 }
 
-// However thick it is: a mean, not a sum.
+// The velocity is a mean, not a sum, so it does not depend on the optical depth.
 TEST_P(VelocityPicture, ASlabMovesAsItDoes) {
   const auto viewer = make();
   const vec3 v(3.0F, -40.0F, 0.125F);
@@ -215,7 +215,7 @@ TEST_P(VelocityPicture, ASlabMovesAsItDoes) {
   }
 }
 
-// One before the other: each counts by the light that it scatters first.
+// One slab in front of the other: velocities are weighted by single scattering towards the camera.
 TEST_P(VelocityPicture, TwoSlabsFollowTheClosedForm) {
   const auto viewer = make();
   const vec3 near(3.0F, -40.0F, 0.125F);
@@ -235,7 +235,7 @@ TEST_P(VelocityPicture, TwoSlabsFollowTheClosedForm) {
       expect_all(look(*viewer), mean, name_of(kind) + ", " + std::to_string(sigma));
     }
   }
-  // A surface between them leaves the first.
+  // With a surface between them, only the first counts.
   viewer->set_medium(thick(0.1));
   test::StillScene wall;
   wall.add_quad({vec3(-100, -100, 7.5), vec3(100, -100, 7.5), vec3(100, 100, 7.5), vec3(-100, 100, 7.5)},
@@ -247,7 +247,7 @@ TEST_P(VelocityPicture, TwoSlabsFollowTheClosedForm) {
   }
 }
 
-// Facts that a denoiser has asked for before are found once more, with what moves; and are what they were.
+// If the denoiser has already requested feature buffers, the velocity AOV recomputes them, and they stay the same.
 TEST_P(VelocityPicture, ComesAfterOtherFacts) {
   const auto viewer = make();
   const vec3 v(1.0F, 2.0F, 3.0F);
@@ -266,7 +266,7 @@ TEST_P(VelocityPicture, ComesAfterOtherFacts) {
   EXPECT_EQ(read(viewer::Aov::transmittance, 1), transmittance);
 }
 
-// What stands turned and larger moves so.
+// A rotated and scaled file has rotated and scaled velocities.
 TEST_P(VelocityPicture, AFileMovesAsItStands) {
   openvdb::initialize();
   const test::Folder folder;
@@ -290,7 +290,8 @@ TEST_P(VelocityPicture, AFileMovesAsItStands) {
     viewer->set_grid(test::settings_of(kind, 0.1));
     viewer->set_volume(asset);
     expect_all(look(*viewer, middle + dvec3(0.0, 0.0, 500.0), middle), dvec3(3.0, 9.0, -6.0), name_of(kind));
-    // Two places, one turned by a quarter about y and seen alone from its side: (x, y, z) to (z, y, -x).
+    // Two instance transforms. The second is rotated by a quarter turn about y, and only it is in view: (x, y, z) to
+    // (z, y, -x).
     const dmat4 turned = glm::rotate(glm::translate(dmat4(1.0), dvec3(200.0, 0.0, 0.0)), 0.5 * M_PI, dvec3(0, 1, 0));
     viewer->viewer().set_places({{dmat4(1.0)}, {turned}});
     expect_all(look(*viewer, middle + dvec3(0.0, 0.0, 500.0), middle), dvec3(3.0, 9.0, -6.0), name_of(kind));
@@ -301,12 +302,12 @@ TEST_P(VelocityPicture, AFileMovesAsItStands) {
   }
 }
 
-// Where places overlap each counts by its extinction.
+// Where instances overlap, velocities are weighted by extinction.
 TEST_P(VelocityPicture, PlacesThatOverlapAreMeans) {
   const auto viewer = make();
   viewer->set_medium(thick(0.1));
   show(*viewer, slab_of({64, 64, 8}, vec3(1.0F, 2.0F, 3.0F)));
-  // About the slab's own axis z by a half: (x, y, z) to (-x, -y, z).
+  // Rotated by a half turn about the slab's own z axis: (x, y, z) to (-x, -y, z).
   const dmat4 turned = glm::translate(dmat4(1.0), dvec3(31.5, 31.5, 0.0)) *
                        glm::rotate(dmat4(1.0), M_PI, dvec3(0, 0, 1)) *
                        glm::translate(dmat4(1.0), dvec3(-31.5, -31.5, 0.0));

@@ -1,4 +1,4 @@
-// What the viewer makes of settings and frames: which change restarts what, previews, cameras, surfaces, picking.
+// The viewer's reaction to settings and frames: which changes restart sampling, previews, cameras, surfaces, picking.
 
 #include <gtest/gtest.h>
 
@@ -46,7 +46,7 @@ class ViewerFrames : public test::StillTest {
     ADD_FAILURE() << "does not converge";
     return result;
   }
-  // As hosts do between frames, for a device to get on.
+  // Waits as hosts do between frames, so that the GPU can proceed.
   static void wait_a_little() { std::this_thread::sleep_for(std::chrono::microseconds(100)); }
   [[nodiscard]] std::vector<float> read(glm::uvec2 size) const {
     std::vector<float> rgba(std::size_t{size.x} * size.y * 4);
@@ -81,7 +81,7 @@ TEST_P(ViewerFrames, PreviewsEndInThePictureThatThereIsWithoutThem) {
   }
 }
 
-// Nobody waits for second samples of pixels that are quick.
+// A preview does not wait for second samples of pixels that finish early.
 TEST_P(ViewerFrames, APreviewIsShownWithItsFirstSamples) {
   show_noise();
   viewer().set_sampling({1000, 3, render::View::shaded, true});
@@ -139,13 +139,13 @@ TEST_P(ViewerFrames, ChangesRestartOnlyWhatDependsOnThem) {
   EXPECT_TRUE(still_converged());
   viewer().set_display({2.0F, render::ToneMap::filmic, true});
   EXPECT_TRUE(still_converged());
-  viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});  // the same again
+  viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});  // unchanged
   viewer().set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   EXPECT_TRUE(still_converged());
   viewer().set_medium({0.8, vec3(1.0F), {0.3F}, 0});
   const viewer::FrameResult result = viewer().render(frame(48, 48, 0.001));
   EXPECT_FALSE(result.converged);
-  EXPECT_FALSE(result.loading);  // the cells stay
+  EXPECT_FALSE(result.loading);  // the cells are kept
   converge(f);
   EXPECT_EQ(viewer().stats().cells, cells);
   viewer::GridSettings grid;
@@ -175,13 +175,13 @@ TEST_P(ViewerFrames, CellsOfATransmittanceAreBuiltForIt) {
   EXPECT_NE(denser, before);
   EXPECT_EQ(cells_at(0.41, 0.3F), denser);
   EXPECT_NE(cells_at(0.41, 0.9F), denser);
-  // One that is made anew is of what there is now, however little it differs.
+  // A rebuild uses the current medium, even if the change is small.
   cells_at(0.81, 0.3F);
   viewer().set_medium({0.5, vec3(1.0F), {0.3F}, 0});
   viewer().rebuild();
   still_->build();
   EXPECT_NE(viewer().stats().cells, denser);
-  // Others do not know of it.
+  // Other criteria do not depend on the medium.
   viewer().set_grid({});
   still_->build();
   const std::uint64_t deviation = viewer().stats().cells;
@@ -220,7 +220,7 @@ TEST_P(ViewerFrames, EnvironmentsAndSkiesComeWhileFramesGoOn) {
   const std::vector<float> by_day = read({24, 24});
   EXPECT_NE(by_day, surrounded);
 
-  // As if nothing had been there before.
+  // A new viewer gives the same image.
   still_ = make();
   viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   show_noise();
@@ -246,15 +246,14 @@ TEST_P(ViewerFrames, NoVolumeShowsNothingAgain) {
   EXPECT_THROW(read({16, 16}), Error);
 }
 
-// A slab of 16 voxels, from z = -0.5 to 15.5.
-/// The box of the pixels that are opaque; high is exclusive.
+/// The bounding box of opaque pixels; `high` is exclusive.
 struct Silhouette {
   ivec2 low{1 << 20};
   ivec2 high{0};
 };
 
 TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
-  // A ball of radius 10, away from the middle of a box that is all but empty.
+  // A ball of radius 10, away from the center of a box that is nearly empty.
   const auto ball = [](const ivec3& p) { return glm::distance(vec3(p), vec3(50, 24, 30)) < 10.0F ? 1.0F : 1e-5F; };
   still_->set_volume(test::make_volume({80, 60, 70}, ivec3(0), ball));
   viewer().set_medium({3.0, vec3(1.0F), {0.0F}, 1});
@@ -282,20 +281,20 @@ TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
     const ivec2 off = glm::abs(seen.low + seen.high - ivec2(size));
     EXPECT_LE(std::max(off.x, off.y), 4) << "not in the middle";
   };
-  expect_fitted({120, 90});  // a camera that waited
+  expect_fitted({120, 90});  // a camera that waited for bounds
   for (const dvec3& back : {dvec3(1, 0, 0), dvec3(-1, 2, 0.5), dvec3(0.3, -1, -1)}) {
     for (const double height : {0.0, 7.0}) {
       viewer::CameraPose pose;
       pose.eye = 100.0 * back;
       pose.orthographic_height = height;
       viewer().camera()->set(pose);
-      converge(frame(90, 100));  // tells the size
+      converge(frame(90, 100));  // passes the image size
       viewer().frame_all();
       expect_fitted({90, 100});
     }
   }
 
-  // Nothing that is seen: the bounds.
+  // If nothing is visible, the camera fits the bounds.
   viewer().set_medium({1e-6, vec3(1.0F), {0.0F}, 1});
   viewer().frame_all();
   viewer::Camera plain(viewer().camera()->pose());
@@ -315,6 +314,7 @@ TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
   EXPECT_NEAR(viewer().camera()->pose().target.x, 35.0, 0.5);
 }
 
+// Views of a slab of 16 voxels, from z = -0.5 to 15.5.
 class ViewerSlab : public ViewerFrames {
  protected:
   void SetUp() override {
@@ -339,13 +339,13 @@ TEST_P(ViewerSlab, OrthographicAndOffAxisCamerasObeyBeerAndLambert) {
   viewer().camera()->set(pose);
   converge(frame(32, 32));
   EXPECT_NEAR(mean_alpha(read({32, 32})), expected, 0.01);
-  // Sheared by the projection: eye straight above the slab's middle, the picture looks at its edge.
+  // An off-axis projection: the eye is straight above the slab's center, and the image shows its edge.
   const glm::dmat4 view = glm::lookAt(dvec3(31.5, 31.5, 215.5), dvec3(31.5, 31.5, 0.0), dvec3(0, 1, 0));
   const glm::dmat4 projection = glm::frustum(0.0 * 1.0, 0.01, -0.005, 0.005, 0.1, 1000.0);
   viewer().camera()->set_matrices(view, projection, viewer::ClipDepth::negative_one_to_one);
   converge(frame(32, 32));
   EXPECT_NEAR(mean_alpha(read({32, 32})), expected, 0.01);
-  // A cone of which half misses.
+  // A view of which half misses the slab.
   const glm::dmat4 half = glm::frustum(0.0, 0.1 * 2.0 * 32.0 / 200.0, -0.005, 0.005, 0.1, 1000.0);
   viewer().camera()->set_matrices(view, half, viewer::ClipDepth::negative_one_to_one);
   converge(frame(32, 32));
@@ -387,7 +387,7 @@ TEST_P(ViewerSlab, AColourIsSeenBehindAllAndNowhereElse) {
 TEST_P(ViewerSlab, AnOrthographicRayBeginsAtTheNearPlane) {
   viewer::CameraPose pose = viewer().camera()->pose();
   pose.orthographic_height = 20.0;
-  pose.near_plane = 200.0 + 8.0;  // in the slab's middle
+  pose.near_plane = 200.0 + 8.0;  // in the slab's center plane
   pose.far_plane = 1000.0;
   viewer().camera()->set(pose);
   converge(frame(32, 32));
@@ -402,7 +402,7 @@ TEST_P(ViewerSlab, TheHostsSurfaceEndsCameraRays) {
   f.depth_source = render::DepthSource::texture;
   f.depth_name = depth.name();
   for (const double part : {0.25, 0.75, 2.0}) {
-    // Half of the rows: nothing is in front there.
+    // Half of the rows have no surface in front.
     std::vector<float> values(std::size_t{32} * 32, static_cast<float>(view.depth_a));
     for (std::size_t i = 0; i < values.size() / 2; ++i)
       values[i] = static_cast<float>(view.depth_a + view.depth_b / (200.0 + 16.0 * part));
@@ -414,7 +414,7 @@ TEST_P(ViewerSlab, TheHostsSurfaceEndsCameraRays) {
     EXPECT_NEAR(mean_alpha(top), 1.0 - std::exp(-1.6), 0.012);
     EXPECT_NEAR(mean_alpha(bottom), 1.0 - std::exp(-1.6 * std::min(part, 1.0)), 0.012) << part;
   }
-  // The same depth again restarts nothing.
+  // The same depth again does not restart sampling.
   EXPECT_TRUE(viewer().render(f).converged);
   f.depth_source = render::DepthSource::none;
   EXPECT_FALSE(viewer().render(frame(32, 32, 0.001)).converged);
@@ -430,7 +430,7 @@ TEST_P(ViewerSlab, PickingFindsHalfOpacity) {
   EXPECT_NEAR(pick.distance, 200.0 + depth, 0.05);
   EXPECT_FALSE(viewer().pick(-1.0, 3.0).hit);
   EXPECT_FALSE(viewer().pick(std::nan(""), 3.0).hit);
-  viewer().set_medium({0.01, vec3(0.0F), {0.0F}, 0});  // never half opaque
+  viewer().set_medium({0.01, vec3(0.0F), {0.0F}, 0});  // opacity never reaches one half
   converge(frame(32, 32));
   EXPECT_FALSE(viewer().pick(16.0, 16.0).hit);
 }
@@ -487,7 +487,7 @@ TEST_P(ViewerSlab, NoiseIsTheSpreadBetweenSeeds) {
     mean += sum / 12.0 / double(pixels);
   }
   const double seen = std::sqrt(variance) / mean;
-  // Stratified samples do a little better than their own spread says.
+  // Stratified samples have a slightly lower error than estimated from their variance.
   EXPECT_LT(seen, 1.1 * told);
   EXPECT_GT(seen, 0.6 * told);
 }

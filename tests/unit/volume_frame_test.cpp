@@ -1,4 +1,4 @@
-// The fields of one file, on one lattice.
+// The fields of one file, resampled to one lattice.
 
 #define NANOVDB_USE_ZIP
 #define NANOVDB_USE_BLOSC
@@ -58,7 +58,7 @@ class Frame : public ::testing::Test {
   cumulet::test::Folder folder_;
 };
 
-/// One voxel of this value, the second of another so that a grid is no constant.
+/// Two voxels with different values, so that the grid is not constant. `value` is the first.
 FloatGrid::Ptr dot(const std::string& name, float value) {
   auto grid = fog(name);
   grid->tree().setValue(Coord(1, 2, 3), value);
@@ -106,11 +106,11 @@ TEST_F(Frame, NamesChooseAndLeaveOut) {
   EXPECT_TRUE(frame.density.empty());
   EXPECT_TRUE(frame.temperature && frame.flame);
 
-  // What is named for one field is not found for another.
+  // A grid named for one field is not used for another.
   frame = import_frame(file, naming({{&GridNames::flame, "temperature"}}), {});
   EXPECT_FALSE(frame.temperature);
 
-  // Without fire, as import_volume has it.
+  // Without fire, the choice is that of import_volume.
   const auto fire = write({dot("temperature", 2.0F), dot("flames", 3.0F)});
   frame = import_frame(fire, naming({{&GridNames::temperature, "none"}, {&GridNames::flame, "none"}}), {});
   EXPECT_EQ(frame.density.name, "flames");
@@ -185,7 +185,7 @@ TEST_F(Frame, ColourOfVectors) {
   }
 }
 
-// Velocities are told, in whatever form, and are no density.
+// Velocities are listed as such in every form, and are never used as density.
 TEST_F(Frame, VelocitiesAreFoundAndNotMistaken) {
   const auto told = [&](const openvdb::GridPtrVec& grids) {
     return cumulet::volume::channels_by_name(cumulet::volume::list_grids(write(grids)));
@@ -211,7 +211,7 @@ TEST_F(Frame, VelocitiesAreFoundAndNotMistaken) {
   EXPECT_EQ(told({dot("v_x", 1.0F), dot("v_x", 1.0F), dot("v_y", 1.0F)}), (Channels{"density", "", ""})) << "no z";
 }
 
-// A value that two volumes hold, above 0 and below.
+// A value stored in two volumes: its positive and its negative part.
 float anisotropy_at(const VolumeFrame& frame, const glm::ivec3& p) {
   return value_at((*frame.anisotropy)[0], p) - value_at((*frame.anisotropy)[1], p);
 }
@@ -251,7 +251,7 @@ TEST_F(Frame, AnisotropyIsFoundWithItsSign) {
     grid->setName(name);
     EXPECT_TRUE(import_frame(write({density, grid}), {}, {}).anisotropy) << name;
   }
-  // Nor is it what is shown for want of a density, but where there is nothing else.
+  // It is not used as density either, unless there is no other grid.
   const VolumeFrame cloud = import_frame(write({grid, dot("cloud", 1.0F)}), {}, {});
   EXPECT_EQ(cloud.density.name, "cloud");
   EXPECT_TRUE(cloud.anisotropy);
@@ -282,7 +282,7 @@ TEST_F(Frame, AnisotropyBeyondOneIsClamped) {
   EXPECT_HAS(messages.warnings[1], "grid \"anisotropy\": 514 voxels beyond -1 and 1 clamped to these");
 }
 
-// Grids that lie otherwise are resampled with their signs.
+// Grids with another transform are resampled with their signs.
 TEST_F(Frame, AnisotropyIsResampled) {
   const auto density = fog("density");
   density->fill({{0, 0, 0}, {15, 15, 15}}, 1.0F);
@@ -354,7 +354,7 @@ TEST_F(Frame, WhatIsNotShownIsRemarkedOn) {
 
 // --- fields on another lattice ---
 
-/// A box of voxels of function(world), with this transform.
+/// A box of voxels with values function(world position) and this transform.
 template <class Function>
 FloatGrid::Ptr box(const std::string& name, const openvdb::math::Mat4d& index_to_world, int size, Function function) {
   auto grid = fog(name);
@@ -379,7 +379,7 @@ openvdb::math::Mat4d scaled(double voxel, const Vec3d& first = Vec3d(0.0)) {
 
 float plane(const Vec3d& p) { return static_cast<float>(2.0 + 0.125 * p.x() - 0.0625 * p.y() + 0.03125 * p.z()); }
 
-/// Compares at every voxel whose place is within the box [low, high].
+/// Compares all voxels whose world position is in the box [low, high].
 template <class Function>
 void expect_values(const ScalarVolume& v, const Vec3d& low, const Vec3d& high, Function function, double tolerance) {
   int compared = 0;
@@ -398,7 +398,7 @@ void expect_values(const ScalarVolume& v, const Vec3d& low, const Vec3d& high, F
   EXPECT_GT(compared, 100);
 }
 
-/// What a field holds over all of space.
+/// The integral of a field over space.
 double integral(const ScalarVolume& v) {
   double sum = 0.0;
   for (glm::ivec3 p = v.bounds_min; p.x <= v.bounds_max.x; ++p.x) {
@@ -410,7 +410,7 @@ double integral(const ScalarVolume& v) {
 }
 
 TEST_F(Frame, CoarserFieldsAreInterpolated) {
-  // A plane is what trilinear interpolation keeps.
+  // Trilinear interpolation reproduces a linear function.
   const auto density = box("density", scaled(0.5), 40, [](const Vec3d&) { return 1.0F; });
   const auto heat = box("heat", scaled(1.75, Vec3d(1.0, 2.0, 3.0)), 8, plane);
   const VolumeFrame frame = import_frame(write({density, heat}), {}, {});
@@ -418,7 +418,7 @@ TEST_F(Frame, CoarserFieldsAreInterpolated) {
   const ScalarVolume& v = *frame.temperature;
   EXPECT_EQ(v.index_to_world, frame.density.index_to_world);
   EXPECT_EQ(v.name, "heat");
-  // From the first centre to the last; then down to 0 at the next, which is one of the lattice's.
+  // Exact from the first voxel center to the last. Beyond, it falls to 0 at the next center of the field's lattice.
   expect_values(v, Vec3d(1.0, 2.0, 3.0), Vec3d(1.0, 2.0, 3.0) + 7.0 * 1.75, plane, 1e-5);
   EXPECT_EQ(v.bounds_min, glm::ivec3(-1, 1, 3));
   EXPECT_EQ(v.bounds_max, glm::ivec3(29, 31, 33));
@@ -442,7 +442,8 @@ TEST_F(Frame, TurnedAndShearedLatticesAreInterpolated) {
 }
 
 TEST_F(Frame, FinerFieldsAreAveraged) {
-  // Voxels of the lattice hold 2, 3 and 4 of the field's, whole: noise keeps its mean, voxel by voxel.
+  // Each voxel of the lattice covers 2, 3 or 4 whole voxels of the field per axis, so the mean of noise is kept voxel
+  // by voxel.
   std::mt19937 random(5);
   for (const int ratio : {2, 3, 4}) {
     const auto density = box("density", scaled(ratio), 16, [](const Vec3d&) { return 1.0F; });
@@ -469,7 +470,7 @@ TEST_F(Frame, AnOffsetOfWholeVoxelsMovesValuesExactly) {
   std::mt19937 random(6);
   const auto noise = [&](const Vec3d&) { return static_cast<float>(random()); };
   const auto density = box("density", scaled(0.1), 4, noise);
-  // As float arithmetic has it, which is not exactly 3 voxels.
+  // An offset computed in floats, which is not exactly 3 voxels.
   const auto flame = box("flame", scaled(0.1, Vec3d(static_cast<double>(0.3F))), 20, noise);
   const VolumeFrame frame = import_frame(write({density, flame}), {}, {});
   ASSERT_TRUE(frame.flame);
@@ -507,13 +508,13 @@ TEST_F(Frame, WithoutDensityTheFinestFieldGivesTheLattice) {
   EXPECT_EQ(import_frame(write({heat, flame}), {}, {}).density.index_to_world[0][0], 0.25);
   EXPECT_EQ(import_frame(write({flame, heat}), naming({{&GridNames::flame, "none"}}), {}).density.index_to_world[0][0],
             0.5);
-  // A density of nothing, as frames before the smoke have it, says nothing of voxels.
+  // An empty density, as in frames before the smoke, does not determine the lattice.
   auto none = box("density", scaled(1.0), 10, ones);
   none->clear();
   const VolumeFrame early = import_frame(write({none, heat, flame}), {}, {});
   EXPECT_EQ(early.density.index_to_world[0][0], 0.25);
   EXPECT_TRUE(early.density.empty());
-  // Of the same size the one of more voxels, which is then as it was.
+  // If voxel sizes are equal, the field with more voxels determines the lattice and is not resampled.
   heat = box("temperature", scaled(0.25, Vec3d(0.1)), 11, ones);
   const VolumeFrame frame = import_frame(write({flame, heat}), {}, {});
   EXPECT_TRUE(frame.density.empty());
@@ -549,7 +550,7 @@ TEST_F(Frame, FieldsBesideDensityAreKeptAndTold) {
 
 // --- velocities ---
 
-// Along the file's axes, of a lattice of voxels of this size.
+// Velocity along the file's axes, for a lattice with this voxel size.
 glm::dvec3 velocity_at(const VolumeFrame& frame, const glm::ivec3& p, double voxel = 1.0) {
   const auto& parts = frame.velocity->parts;
   glm::dvec3 given(0.0);
@@ -603,7 +604,7 @@ TEST_F(Frame, VelocityOfVectors) {
       EXPECT_FALSE(import_frame(file, naming({{&GridNames::colour, name}}), {}).velocity) << "it is the colour";
     }
   }
-  // Of several the name that comes first; any other if it is named.
+  // If there are several, a priority order of names decides. Any other grid can be named.
   const auto vel = vectors("vel");
   const auto wind = vectors("wind");
   auto velocity = vectors("velocity");
@@ -634,7 +635,7 @@ TEST_F(Frame, VelocityOfANanoVdb) {
   }
 }
 
-// A component lies on the voxel's lower face along its axis: at the centre is the mean of two.
+// A staggered component is on the voxel's lower face along its axis, so the value at the center is the mean of two.
 TEST_F(Frame, VelocityOfAStaggeredGrid) {
   std::mt19937 random(11);
   const auto noise = [&] { return static_cast<float>(random() % 2000) / 100.0F - 10.0F; };
@@ -662,7 +663,7 @@ TEST_F(Frame, VelocityOfAStaggeredGrid) {
   }
 }
 
-// Of numbers, each with a lattice of its own, as simulations write faces that way.
+// Three scalar grids, each with a lattice of its own, as some simulations write face velocities.
 TEST_F(Frame, VelocityOfThreeGrids) {
   const auto density = box("density", scaled(1.0), 10, [](const Vec3d&) { return 1.0F; });
   const auto along = [](int axis) {
@@ -685,7 +686,7 @@ TEST_F(Frame, VelocityOfThreeGrids) {
     EXPECT_TRUE(import_frame(path(), naming({{&GridNames::velocity, named}}), {}).velocity);
     EXPECT_FALSE(import_frame(path(), naming({{&GridNames::temperature, stem + "y"}}), {}).velocity);
   }
-  // Named, they are nothing else; by another name they are not found.
+  // Grids named as velocity are not used otherwise. With other names they are not found.
   const openvdb::GridPtrVec winds{dot("windx", 1.0F), dot("windy", 2.0F), dot("windz", 3.0F), dot("cloud", 1.0F)};
   EXPECT_EQ(import_frame(write(winds), {}, {}).density.name, "windx");
   const VolumeFrame frame = import_frame(path(), naming({{&GridNames::velocity, "wind"}}), {});
@@ -693,10 +694,10 @@ TEST_F(Frame, VelocityOfThreeGrids) {
   EXPECT_EQ(velocity_at(frame, {1, 2, 3}), glm::dvec3(1.0, 2.0, 3.0));
 }
 
-// In the world, unless their metadata say that they are of their own lattice, and change with it.
+// Vectors are in world space, unless their metadata declare local space. Then they follow the transform.
 TEST_F(Frame, VelocityInLocalSpace) {
   openvdb::math::Mat4d turned = scaled(2.0);
-  turned.postRotate(openvdb::math::Z_AXIS, 0.5 * M_PI);  // of row vectors: x to y, y to -x
+  turned.postRotate(openvdb::math::Z_AXIS, 0.5 * M_PI);  // row vectors: x to y, y to -x
   auto density = box("density", turned, 10, [](const Vec3d&) { return 1.0F; });
   auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(1.0F, 2.0F, 3.0F));
   grid->setName("v");
@@ -741,7 +742,7 @@ TEST_F(Frame, VelocitiesThatAreNoneOrTooFastAreTold) {
   EXPECT_HAS(messages.warnings[0], "grid \"vel\", x: 2 non-finite voxels counted as 0");
   EXPECT_HAS(messages.warnings[1], "grid \"vel\", y: 1 non-finite voxel counted as 0");
   EXPECT_HAS(messages.warnings[2], "grid \"vel\": 2 components beyond 65504 voxels a second clamped to that");
-  // Nothing moves, or nothing is there.
+  // An empty grid also gives a warning.
   grid->tree().clear();
   messages.warnings.clear();
   EXPECT_TRUE(import_frame(write({density, grid}), {}, messages.log).velocity);
@@ -749,7 +750,7 @@ TEST_F(Frame, VelocitiesThatAreNoneOrTooFastAreTold) {
   EXPECT_HAS(messages.warnings[0], "is empty");
 }
 
-// What nobody named is no reason to refuse what was asked for.
+// A velocity that was not named is left out with a warning. A named one causes an error.
 TEST_F(Frame, AVelocityThatFailsIsLeftOutUnlessItIsNamed) {
   const auto density = box("density", scaled(1.0), 10, [](const Vec3d&) { return 1.0F; });
   const auto expect = [&](const openvdb::GridPtrVec& grids, const std::string& name, const std::string& cause) {
@@ -783,7 +784,7 @@ TEST_F(Frame, AVelocityThatFailsIsLeftOutUnlessItIsNamed) {
   EXPECT_HAS(refusal(path(), naming({{&GridNames::velocity, "v"}})), "voxels span");
 }
 
-// However large the domain: of a lattice far finer, too, what is kept is of density's box.
+// Velocities are kept only in the bounds of the density, for any size and resolution of their grid.
 TEST_F(Frame, AVelocityIsKeptOverDensityAlone) {
   const auto ones = [](const Vec3d&) { return 1.0F; };
   std::mt19937 random(3);
@@ -797,7 +798,7 @@ TEST_F(Frame, AVelocityIsKeptOverDensityAlone) {
       const Coord c(i / (size * size) - 16, i / size % size - 16, i % size - 16);
       grid->tree().setValue(c, openvdb::Vec3f(component(), component(), component()));
     }
-    // Of no density: all that there is of it.
+    // Without a density, all velocities are kept.
     const VolumeFrame all = import_frame(write({box("flame", scaled(1.0), 10, ones), grid}), {}, {});
     const VolumeFrame frame = import_frame(write({box("density", scaled(1.0), 10, ones), grid}), {}, {});
     ASSERT_TRUE(all.velocity && frame.velocity);
@@ -812,7 +813,7 @@ TEST_F(Frame, AVelocityIsKeptOverDensityAlone) {
       ASSERT_EQ(velocity_at(frame, p), velocity_at(all, p)) << p.x << " " << p.y << " " << p.z;
     }
   }
-  // The whole would fill more bricks than there may be.
+  // The whole velocity grid would exceed the brick limit.
   const auto coarse = vectors("vel");
   coarse->setTransform(openvdb::math::Transform::createLinearTransform(scaled(200.0)));
   Messages messages;
@@ -826,7 +827,7 @@ TEST_F(Frame, ALatticeOutOfReachIsRefused) {
   EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": is too far off or too large");
   far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e-3)));
   EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": has voxels too small");
-  // The lowest and highest places that there are.
+  // Near the limits of the coordinates.
   auto wide = fog("flame");
   wide->tree().setValue(Coord(1 << 30), 1.0F);
   wide->setTransform(openvdb::math::Transform::createLinearTransform(scaled(0.5)));
@@ -844,14 +845,14 @@ TEST_F(Frame, ALatticeFarFinerThanAFieldIsRefusedAtOnce) {
 }
 
 TEST_F(Frame, WhereAFieldIsFarFinerEmptySpaceCostsLittle) {
-  // 500 dots, a brick each, 40 times finer than the lattice.
+  // 500 dots in separate bricks, 40 times finer than the lattice.
   auto dots = fog("flame");
   std::mt19937 random(10);
   const auto pick = [&] { return static_cast<int>(random() % 20000); };
   for (int i = 0; i < 500; ++i) dots->tree().setValue(Coord(pick(), pick(), pick()), 1.0F);
   auto density = dot("density", 1.0F);
   density->setTransform(openvdb::math::Transform::createLinearTransform(scaled(40.0)));
-  // Voxel by voxel of the finer lattice it would not come to its end before the test's time is up.
+  // Iterating over all voxels of the finer lattice would take longer than the test's time limit.
   const VolumeFrame frame = import_frame(write({density, dots}), {}, {});
   EXPECT_LE(frame.flame->brick_origins.size(), 1000U);
 }

@@ -1,5 +1,5 @@
-// The importer against OpenVDB itself: what it accepts must equal getValue() within the active
-// bounds, and what it refuses must be refused in one line that names file and cause.
+// The importer compared with OpenVDB: accepted grids must equal getValue() inside the active bounds. Rejected files
+// give a one-line error that names file and cause.
 
 #define NANOVDB_USE_ZIP
 #define NANOVDB_USE_BLOSC
@@ -45,7 +45,7 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 
-/// Point queries on a volume, by the contract in volume.hpp.
+/// Point queries on a volume, as volume.hpp defines them.
 class Lookup {
  public:
   explicit Lookup(const ScalarVolume& volume) : volume_(volume) {
@@ -114,7 +114,7 @@ void expect_contract(const ScalarVolume& v) {
   }
 }
 
-/// Every rule of the contract, and the values at random voxels inside and outside the bounds.
+/// Checks every rule of volume.hpp, and values at random voxels inside and outside the bounds.
 template <typename GridT>
 void expect_same(const GridT& grid, const ScalarVolume& v, double tolerance = 0.0) {
   expect_contract(v);
@@ -138,7 +138,7 @@ void expect_same(const GridT& grid, const ScalarVolume& v, double tolerance = 0.
     compare({pick(bounds.min().x() - 12, bounds.max().x() + 12), pick(bounds.min().y() - 12, bounds.max().y() + 12),
              pick(bounds.min().z() - 12, bounds.max().z() + 12)});
   }
-  // Random places miss small features; the neighbourhood of active voxels does not.
+  // Random positions miss small features; the neighborhood of active voxels does not.
   int n = 0;
   for (auto it = grid.cbeginValueOn(); it && n < 20000; ++it, ++n) {
     compare(it.getCoord());
@@ -193,12 +193,12 @@ FloatGrid::Ptr rich(float background) {
   tree.addTile(1, Coord(64, 8, 0), 0.5F, false);
   tree.addTile(1, Coord(64, 16, 0), background, true);
   tree.addTile(2, Coord(128, 0, 0), 1.25F, true);
-  tree.addTile(2, Coord(0, 128, 0), 0.375F, false);  // reaches into the bounds, inactive
+  tree.addTile(2, Coord(0, 128, 0), 0.375F, false);  // inactive, partly inside the bounds
   tree.setValue(Coord(30, 140, 3), 3.5F);
-  // Inactive, outside of the active bounds: no part of the field.
+  // Inactive, outside of the active bounds: not a part of the field.
   tree.setValueOff(Coord(-200, 0, 0), 9.0F);
   tree.addTile(1, Coord(600, 0, 0), 9.0F, false);
-  // Half in, half out of the bounds.
+  // Half inside the bounds.
   tree.addTile(2, Coord(-128, -128, 0), 0.625F, false);
   tree.setValue(Coord(-30, -130, 7), 0.25F);
   return grid;
@@ -299,7 +299,7 @@ TEST_F(VolumeImport, ReadsEveryCompressionAndPipes) {
     out.write({grid});
     expect_same(*grid, import_volume(file, "", {}));
   }
-  // io::Stream writes no offsets: the second grid is found only by reading through the first.
+  // io::Stream writes no offsets: the second grid can only be reached by reading the first.
   auto other = fog("second");
   other->tree().setValue(Coord(1, 2, 3), 4.0F);
   {
@@ -398,7 +398,7 @@ TEST_F(VolumeImport, NonFiniteValuesCountAsZeroAndAreCounted) {
   EXPECT_EQ(Lookup(one).value({17, 2, 3}), 0.0F);
   EXPECT_EQ(Lookup(one).value({0, 0, 0}), 1.0F);
   EXPECT_EQ(one.active_voxels, 2U);
-  voxel->tree().setValue(Coord(17, 2, 4), -inf);  // is not negative too
+  voxel->tree().setValue(Coord(17, 2, 4), -inf);  // counted as non-finite only
   voxel->tree().setValue(Coord(17, 2, 5), inf);
   EXPECT_EQ(expect_counted(voxel, 3, "3 non-finite voxels counted as 0").max_value, 1.0F);
   const auto tile = fog("density");
@@ -480,7 +480,7 @@ TEST_F(VolumeImport, ChoosesTheGrid) {
   EXPECT_EQ(import_volume(write({heat, density, smoke}), "smoke", {}).max_value, 2.0F);
   EXPECT_EQ(import_volume(write({vec, heat}), "", {}).name, "heat");
 
-  // Without a density the first by the stated order, whatever the file's, and a warning that names the others.
+  // Without a density, the documented order decides, independent of the file's order. A warning names the other grids.
   const auto expect_shown = [&](const openvdb::GridPtrVec& grids, const std::string& name, const std::string& warning) {
     Messages messages;
     const auto file = write(grids);
@@ -526,7 +526,7 @@ TEST_F(VolumeImport, BadPathsAndContents) {
   EXPECT_HAS(refusal(write_bytes("this is a text file, not a volume\n", "text.vdb")), "not a VDB");
   EXPECT_HAS(refusal("/dev/null"), "not a regular file");
   EXPECT_THROW((void)list_grids(path("none.vdb")), cumulet::Error);
-  // Content decides, not the extension.
+  // The content decides, not the extension.
   const auto grid = rich(0.0F);
   fs::rename(write({grid}), path("wrong.nvdb"));
   expect_same(*grid, import_volume(path("wrong.nvdb"), "", {}));
@@ -556,7 +556,7 @@ TEST_F(VolumeImport, EveryTruncationIsOneClearLine) {
 
 TEST_F(VolumeImport, DamagedFilesNeverCrash) {
 #if defined(__SANITIZE_ADDRESS__)
-  __lsan_disable();  // OpenVDB forgets the node it was reading when its stream throws
+  __lsan_disable();  // OpenVDB leaks the node that it was reading when its stream throws
 #endif
   const auto grid = rich(0.125F);
   const auto vdb_file = path("whole.vdb");
@@ -577,7 +577,7 @@ TEST_F(VolumeImport, DamagedFilesNeverCrash) {
   for (const std::string& whole : files) {
     for (int i = 0; i < 60; ++i) {
       std::string bytes = whole;
-      // Half of the damage in the headers, where it hurts most.
+      // Half of the damage is in the headers, where it has the largest effect.
       for (int n = 0; n < 4; ++n) {
         const std::size_t range = i % 2 == 0 ? std::min<std::size_t>(bytes.size(), 1200) : bytes.size();
         bytes[8 + random() % (range - 8)] = static_cast<char>(random());
@@ -596,7 +596,7 @@ TEST_F(VolumeImport, DamagedFilesNeverCrash) {
 #endif
 }
 
-// OpenVDB itself writes past its buffer where the length of packed values is negative.
+// OpenVDB writes beyond its buffer if the length of packed values is negative.
 TEST_F(VolumeImport, DamagedLengthsOfPackedValuesAreTold) {
   const auto grid = FloatGrid::create();
   for (int i = 0; i < 40; ++i)
@@ -612,7 +612,7 @@ TEST_F(VolumeImport, DamagedLengthsOfPackedValuesAreTold) {
     for (std::size_t at = 200; at + 8 < whole.size(); ++at) {
       std::int64_t length = 0;
       std::memcpy(&length, whole.data() + at, sizeof length);
-      // Before what begins as zlib's data does, or as Blosc's.
+      // Lengths are in front of bytes that look like the start of zlib or Blosc data.
       const char first = compression == openvdb::io::COMPRESS_ZIP ? '\x78' : '\x02';
       if (length < 17 || length > 200'000 || whole[at + 8] != first || told > 5) continue;
       for (const std::int64_t wrong : {std::int64_t{-300'000}, std::int64_t{1} << 50U, length + 1}) {
@@ -623,7 +623,7 @@ TEST_F(VolumeImport, DamagedLengthsOfPackedValuesAreTold) {
           for (std::size_t i = 0; i < inspection.grids().size(); ++i) {
             if (inspection.facts(i).refusal.find("not as long as it says") != std::string::npos) ++told;
           }
-        } catch (const cumulet::Error&) {  // of another word of the file
+        } catch (const cumulet::Error&) {  // the patched bytes were another field of the file
         }
       }
     }
@@ -708,7 +708,7 @@ TEST_F(VolumeImport, NanoVdbChecksumIsLookedAt) {
   EXPECT_HAS(messages.warnings[0], "checksum");
 }
 
-// 22M active voxels, against OpenVDB's own reading of the same file: a ratio holds on busy machines too.
+// 22M active voxels. The time is relative to OpenVDB reading the same file, because a ratio holds on busy machines too.
 TEST_F(VolumeImport, LargeGridsImportInTime) {
   const auto grid = fog("density");
   grid->tree().denseFill(CoordBBox(Coord(-140), Coord(139)), 1.0F, true);
@@ -738,7 +738,7 @@ EXPECT_LT(import, 8 * read);  // about 2.5
 #endif
 }  // namespace
 
-// --- what is in a file ---
+// --- inspection of files ---
 
 TEST_F(VolumeImport, InspectionTellsGridsValuesAndMetadata) {
   using cumulet::volume::Inspection;
@@ -794,7 +794,7 @@ TEST_F(VolumeImport, InspectionTellsGridsValuesAndMetadata) {
   histogram[48] = 512;
   histogram[63] = 1;
   EXPECT_EQ(values.histogram, histogram);
-  // What the voxels would take here is about what they do take.
+  // The estimated memory is close to the actual memory.
   const auto volume = import_volume(file, "density", {});
   EXPECT_GE(values.memory_bytes, volume.brick_values.size() * sizeof(float));
 
@@ -803,7 +803,7 @@ TEST_F(VolumeImport, InspectionTellsGridsValuesAndMetadata) {
   EXPECT_HAS(inspection.facts(0).refusal, "of type vec3s");
   EXPECT_FALSE(inspection.facts(2).values);
 
-  // Damaged voxels are told of that grid, and the others can still be read.
+  // Errors in damaged voxels name the grid, and the other grids can still be read.
   std::string bytes = bytes_of(file);
   EXPECT_THROW(Inspection(path("none.vdb")), cumulet::Error);
   const auto cut = write_bytes(bytes.substr(0, bytes.size() - 40), "cut.vdb");
@@ -821,9 +821,9 @@ TEST_F(VolumeImport, InspectionTellsGridsValuesAndMetadata) {
   EXPECT_HAS(damaged.facts(0).refusal, "damaged");
 }
 
-// --- how dense a volume is, seen from outside ---
+// --- optical depth of a volume seen from outside ---
 
-/// A box of voxels, by a function of the position in it, from -1 to 1.
+/// A cube of voxels with a density function of the position, from -1 to 1.
 template <class Density>
 ScalarVolume made_of(int side, const Density& density, const glm::dmat4& index_to_world = glm::dmat4(1.0)) {
   std::vector<float> values;
@@ -843,7 +843,7 @@ double suggested(const ScalarVolume& volume) {
 }
 
 TEST(DensityScale, IsEightMeanDepthsOfABall) {
-  // Mean chord of a ball: 4/3 of its radius; of a cube: 2/3 of its edge, and more without those that just graze it.
+  // Mean chord of a ball: 4/3 of its radius. Of a cube: 2/3 of its edge, and more without chords that graze it.
   EXPECT_NEAR(suggested(made_of(64, ball)), 8.0 / (4.0 / 3.0 * 0.9 * 32), 0.03 * 0.21);
   EXPECT_NEAR(suggested(made_of(60, [](glm::vec3) { return 0.25F; })), 8.0 / (0.25 * 40.0), 0.05 * 0.8);
   EXPECT_FALSE(
@@ -855,7 +855,7 @@ TEST(DensityScale, FollowsValuesAndSizesAndNoTurn) {
   EXPECT_NEAR(suggested(made_of(64, [](glm::vec3 p) { return 1e-6F * ball(p); })), 1e6 * plain, 1e4 * plain);
   EXPECT_NEAR(suggested(made_of(64, [](glm::vec3 p) { return 1e20F * ball(p); })), 1e-20 * plain, 1e-22 * plain);
   EXPECT_NEAR(suggested(made_of(64, ball, glm::scale(glm::dmat4(1.0), glm::dvec3(0.01)))), 100 * plain, plain);
-  EXPECT_NEAR(suggested(made_of(128, ball)), 0.5 * plain, 0.01 * plain);  // more voxels of one edge length
+  EXPECT_NEAR(suggested(made_of(128, ball)), 0.5 * plain, 0.01 * plain);  // more voxels of the same edge length
   const auto slab = [](glm::vec3 p) { return std::abs(p.x) < 0.2F && glm::length(p) < 0.9F ? 1.0F : 0.0F; };
   const double straight = suggested(made_of(64, slab));
   for (const glm::dvec3 axis : {glm::dvec3(1, 2, 3), glm::dvec3(0, 0, 1), glm::dvec3(-1, 1, 0)}) {
@@ -865,7 +865,7 @@ TEST(DensityScale, FollowsValuesAndSizesAndNoTurn) {
 }
 
 TEST(DensityScale, HeedsNeitherHazeNorSpecks) {
-  // The box around a ball that fills a seventh of its projection.
+  // A ball that fills a seventh of the projection of its bounds.
   const auto body = [](glm::vec3 p) { return glm::length(p) < 0.4F ? 1.0F : 0.0F; };
   const double plain = suggested(made_of(64, body));
   const auto haze = [&](glm::vec3 p) { return std::max(0.004F, body(p)); };
@@ -875,7 +875,7 @@ TEST(DensityScale, HeedsNeitherHazeNorSpecks) {
   EXPECT_NEAR(suggested(made_of(64, specks)), plain, 0.05 * plain);
 }
 
-/// How far what is seen along direction reaches along each axis of the world.
+/// Bounding box in world space of the part that is visible along this direction.
 std::array<glm::dvec3, 2> seen(const ScalarVolume& volume, const glm::dvec3& direction, double scale) {
   std::array<glm::dvec3, 2> box{glm::dvec3(1e30), glm::dvec3(-1e30)};
   for (const auto& p : cumulet::volume::CoarseVolume(volume).visible(direction, scale))
@@ -888,14 +888,14 @@ TEST(Visible, IsWhatIsOpaqueAndNoHazeBesideBeforeOrBehindIt) {
   const auto turn = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(glm::dvec3(1, 2, 3)));
   for (const glm::dmat4& to_world : {glm::dmat4(1.0), turn, glm::scale(turn, glm::dvec3(0.5))}) {
     const auto volume = made_of(64, haze, to_world);
-    // Voxel i is centred on i: the ball is from 25.1 to 57.1 in x, from 15.5 to 47.5 in y and z.
+    // Voxel i is centered on i: the ball extends from 25.1 to 57.1 in x, and from 15.5 to 47.5 in y and z.
     const glm::dvec3 centre(to_world * glm::dvec4(41.1, 31.5, 31.5, 1.0));
     const double voxel = glm::length(glm::dvec3(to_world[0]));
     for (const glm::dvec3& direction : {glm::dvec3(0, 0, 1), glm::dvec3(-1, 0, 0), glm::normalize(glm::dvec3(1, 1, 1)),
                                         glm::normalize(glm::dvec3(-0.3, 0.8, 0.1))}) {
       const auto points = cumulet::volume::CoarseVolume(volume).visible(direction, 1.0 / voxel);
       ASSERT_FALSE(points.empty());
-      // Aside and along: as far as the ball, to a voxel.
+      // Across and along the view direction, the extent is that of the ball within one voxel.
       const glm::dvec3 u = glm::normalize(glm::cross(direction, glm::dvec3(0.1, 0.2, 0.7)));
       for (const glm::dvec3& n : {u, -u, glm::cross(u, direction), direction, -direction}) {
         double reach = -1e30;
@@ -909,7 +909,7 @@ TEST(Visible, IsWhatIsOpaqueAndNoHazeBesideBeforeOrBehindIt) {
 TEST(Visible, ChangesWithTheDensityScaleAndWithTheSide) {
   const auto haze = [](glm::vec3 p) { return glm::length(p) < 0.5F ? 1.0F : 1e-5F; };
   const auto volume = made_of(64, haze);
-  // So dense that the haze is opaque: all of it. So thin that nothing is: nothing.
+  // With an opaque haze, everything is visible. In a very thin medium, nothing is.
   const auto [low, high] = seen(volume, {0, 0, 1}, 1e4);
   EXPECT_NEAR(low.x, -0.5, 1e-6);
   EXPECT_NEAR(high.y, 63.5, 1e-6);
@@ -917,7 +917,7 @@ TEST(Visible, ChangesWithTheDensityScaleAndWithTheSide) {
   const auto nothing = cumulet::volume::CoarseVolume(volume).visible({0, 0, 1}, 1e-9);
   EXPECT_TRUE(nothing.empty());
   EXPECT_TRUE(cumulet::volume::CoarseVolume(made_of(8, [](glm::vec3) { return 0.0F; })).visible({1, 0, 0}, 1).empty());
-  // A thin sheet across x, with a ball at its middle: it is seen from its edge alone.
+  // A thin sheet across x with a ball at its center. The sheet is opaque only seen edge-on.
   const auto sheet = [](glm::vec3 p) { return glm::length(p) < 0.3F ? 1.0F : (std::abs(p.x) < 0.05F ? 0.01F : 0.0F); };
   const auto flat = made_of(64, sheet);
   EXPECT_NEAR(seen(flat, {1, 0, 0}, 1.0)[1].y, 31.5 + 0.3 * 32, 1.5);
@@ -925,7 +925,7 @@ TEST(Visible, ChangesWithTheDensityScaleAndWithTheSide) {
 }
 
 TEST(CoarseVolume, KeepsTheMassOfBricksTilesAndBackground) {
-  // Depth along z through a file's own mixture, against sums of its voxels: by a scale that is 8 over the mean.
+  // Suggested scale (8 over the mean depth) for a mixture of brick, tile and background, compared with the same voxels.
   cumulet::volume::SparseVoxels voxels;
   const std::vector<std::int32_t> origins = {0, 0, 0};
   std::vector<float> values(512, 1.0F);
@@ -939,7 +939,7 @@ TEST(CoarseVolume, KeepsTheMassOfBricksTilesAndBackground) {
   EXPECT_NEAR(suggested(mixed), all_one, 0.05 * all_one);
 }
 
-// --- the assets under CUMULET_SHARED_DATA, where they are present ---
+// --- the assets under CUMULET_SHARED_DATA, if present ---
 
 fs::path asset(const std::string& name) { return fs::path(CUMULET_SHARED_DATA) / "vdb" / name; }
 

@@ -1,5 +1,5 @@
-// Pictures of known noise, filtered: what is known of them is still so, and there is less of it. Pictures that follow
-// one another, too: what the last one knew is found again, and nothing else is.
+// The wavelet filter on images with known noise: means are kept and the noise is reduced. Temporal history: valid
+// samples of earlier images are reused, and others are not.
 
 #include "render/wavelet.hpp"
 
@@ -33,17 +33,17 @@ namespace gl = cumulet::gl;
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
-/// What a pixel is of, by which its samples are drawn.
+/// Describes the distribution of a pixel's samples.
 struct Pixel {
-  glm::vec3 front{1.0F};  // of what covers it
-  float cover = 1.0F;     // the chance of that
+  glm::vec3 front{1.0F};  // radiance of the surface or volume that covers it
+  float cover = 1.0F;     // probability of that
   glm::vec3 behind{0.0F};
-  float spread = 0.5F;     // of a sample's light, which is even between 1 - spread and 1 + spread of it
-  glm::vec3 normal{0.0F};  // of a surface that covers it, else the volume does
+  float spread = 0.5F;     // a sample's radiance is uniform between 1 - spread and 1 + spread times `front`
+  glm::vec3 normal{0.0F};  // of a surface that covers it; 0: the volume does
   glm::vec3 albedo{0.0F};
-  float z = infinite;        // of that surface, or where the volume is half opaque
-  glm::vec3 emission{0.0F};  // seen straight, in every sample
-  glm::vec3 sunlit{0.0F};    // the part of front that is known to be the sun's
+  float z = infinite;        // of that surface, or where the volume's opacity is one half
+  glm::vec3 emission{0.0F};  // directly visible emission, in every sample
+  glm::vec3 sunlit{0.0F};    // the part of `front` that is in the noise-free sunlight
 };
 
 using Scene = std::function<Pixel(int x, int y)>;
@@ -53,7 +53,7 @@ float luminance_of(const glm::vec3& colour) { return static_cast<float>(cumulet:
 // A pixel's side at depth 1.
 constexpr float pixel_at_1 = 0.01F;
 
-/// Of a picture of that size, from the world's (x, 0, 0) along -z.
+/// The view of an image of this size from (x, 0, 0) along -z.
 PictureView view_at(double x, glm::ivec2 size) {
   PictureView view;
   view.eye = {x, 0.0, 0.0};
@@ -62,7 +62,7 @@ PictureView view_at(double x, glm::ivec2 size) {
   return view;
 }
 
-/// Samples of a scene, as a film has them, and what is known of it without noise.
+/// Samples of a scene as in a film, with the noise-free feature buffers.
 class Samples {
  public:
   Samples(const gl::FunctionsPtr& gl, glm::ivec2 size, unsigned count, const Scene& scene, unsigned seed = 1)
@@ -105,14 +105,14 @@ class Samples {
   }
 
   std::vector<glm::vec4>& sums() { return sum_; }
-  /// Makes one of a pixel's samples that bright.
+  /// Adds a firefly of this brightness to one of a pixel's samples.
   void add_speck(glm::ivec2 at, float light) {
     const auto i = static_cast<std::size_t>(at.y * size_.x + at.x);
     sum_[i] += glm::vec4(glm::vec3(light), 0.0F);
     squares_[i] += light * light / static_cast<float>(counts_[i].x);
   }
   [[nodiscard]] const std::vector<glm::vec4>& truth() const { return truth_; }
-  /// In front of the background, before the filter and after it.
+  /// Means without the background, before filtering.
   [[nodiscard]] std::vector<glm::vec4> raw() const {
     std::vector<glm::vec4> means;
     for (std::size_t i = 0; i < sum_.size(); ++i) means.push_back(sum_[i] / static_cast<float>(counts_[i].x));
@@ -126,7 +126,8 @@ class Samples {
     EXPECT_EQ(wavelet.bytes(), 112U * static_cast<unsigned>(size_.x * size_.y));
     return values;
   }
-  /// By one that may know pictures before it; with a view, what this one tells is kept. An error: that of begin().
+  /// Filters with a Wavelet that may have a history; with a view, this image becomes history. error: receives that of
+  /// begin().
   std::vector<glm::vec4> filtered_by(Wavelet& wavelet, const std::optional<PictureView>& view,
                                      MeansBackground background = MeansBackground::left_out,
                                      std::optional<cumulet::Error>* error = nullptr) const {
@@ -153,7 +154,7 @@ class Samples {
     EXPECT_TRUE(wavelet.able(picture, background, true));
     auto why = wavelet.begin(picture);
     if (error != nullptr) *error = std::move(why);
-    // By steps as small as there are.
+    // In the smallest possible steps.
     while (!wavelet.work(picture, std::chrono::steady_clock::now())) {
     }
     wavelet.give(picture, background, means.name(), behind.name());
@@ -235,16 +236,16 @@ TEST_P(Wavelets, WhatIsHalfOpenKeepsItsMeansToo) {
   const glm::vec3 sky(0.4F, 0.6F, 2.0F);
   const Samples samples(gl_, {64, 64}, 2, [&](int, int) { return Pixel{.cover = 0.4F, .behind = sky}; });
   const auto clean = samples.filtered(programs_);
-  // What is less than half of the samples counts a little less: 3 %.
+  // Radiance seen in less than half of the samples is underestimated by up to 3 %.
   EXPECT_NEAR(moments_of(clean).mean, moments_of(samples.raw()).mean, 0.02);
   EXPECT_NEAR(moments_of(clean, 3).mean, moments_of(samples.raw(), 3).mean, 0.02);
   EXPECT_LT(moments_of(clean, 3).variance, 0.05 * moments_of(samples.raw(), 3).variance);
-  // With what is behind: where nothing of it was seen, too.
+  // With the background, also in pixels without a background sample.
   const auto whole = samples.filtered(programs_, MeansBackground::added);
   EXPECT_NEAR(moments_of(whole, 2).mean, 0.4 * 1.0 + 0.6 * 2.0, 0.03);
 }
 
-// On one side of a straight edge there is light, none on the other: what crosses it is smear.
+// A straight edge between bright and dark: light that crosses it is blur.
 TEST_P(Wavelets, ASurfacesSilhouetteStays) {
   const auto scene = [](int x, int) {
     Pixel pixel{.front = glm::vec3(x < 24 ? 1.0F : 0.2F), .normal = {0.0F, 0.0F, 1.0F}, .albedo = glm::vec3(0.5F)};
@@ -264,7 +265,7 @@ TEST_P(Wavelets, ASurfacesSilhouetteStays) {
   EXPECT_LT(error_of(clean, samples.truth()), 0.05 * error_of(samples.raw(), samples.truth()));
 }
 
-// As of leaves: mean normals are short, but all is covered; what shows through would be the background.
+// As for leaves: the mean normals are short, but the pixels are fully covered. A leak would show the background.
 TEST_P(Wavelets, WhatIsCoveredStaysSoWhateverItsMeanNormal) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3(0.4F),
@@ -281,7 +282,7 @@ TEST_P(Wavelets, WhatIsCoveredStaysSoWhateverItsMeanNormal) {
   }
 }
 
-// The volume covers more and more of the pixels over a few of them, up to all.
+// The coverage by the volume increases to 1 over a few pixels.
 TEST_P(Wavelets, ACloudsEdgeStays) {
   const auto scene = [](int x, int) {
     const float cover = std::clamp((float(x) - 20.0F) / 6.0F, 0.0F, 1.0F);
@@ -299,7 +300,7 @@ TEST_P(Wavelets, ACloudsEdgeStays) {
   EXPECT_LT(error_of(clean, samples.truth()), 0.1 * error_of(samples.raw(), samples.truth()));
 }
 
-// A lamp in a wall of the same plane: its light is as bright as fifty walls, and dark what it reflects.
+// A light in a wall of the same plane: its emission is fifty times the wall's radiance, and its albedo is low.
 TEST_P(Wavelets, ALampDoesNotLeak) {
   const auto is_lamp = [](int x, int y) { return x >= 20 && x < 28 && y >= 20 && y < 24; };
   const auto scene = [&](int x, int y) {
@@ -320,8 +321,8 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
   EXPECT_LT(error_of(clean, samples.truth()), 0.3 * error_of(samples.raw(), samples.truth()));
 }
 
-// A shadow on a plane with stripes, in which a sample tells little: its edge is where the sun's light is known to end,
-// and what is left of the light is as far from even as the colours are.
+// A shadow on a striped plane with few informative samples. The noise-free sunlight defines its edge. The remaining
+// light varies with the albedo.
 TEST_P(Wavelets, AShadowThatIsKnownHasItsEdge) {
   const auto scene = [](bool known) {
     return [known](int x, int y) {
@@ -341,7 +342,7 @@ TEST_P(Wavelets, AShadowThatIsKnownHasItsEdge) {
   EXPECT_LT(error, 0.5 * unknown);
 }
 
-// Flames without smoke: they cover nothing, and end in clear air.
+// Flames without smoke have no alpha and end in clear air.
 TEST_P(Wavelets, FlamesHaveNoHalo) {
   const auto scene = [](int x, int) {
     return Pixel{
@@ -352,7 +353,7 @@ TEST_P(Wavelets, FlamesHaveNoHalo) {
   for (std::size_t i = 0; i < clean.size(); ++i) EXPECT_NEAR(clean[i].x, samples.truth()[i].x, 1e-3) << i;
 }
 
-// An edge that only light has, so that nothing but samples tells of it.
+// An edge that no feature buffer shows, only the samples.
 TEST_P(Wavelets, ConvergesToTheMeanOfSamples) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3((x / 4 + y / 4) % 2 == 0 ? 1.0F : 0.5F), .z = 5.0F};
@@ -370,11 +371,11 @@ TEST_P(Wavelets, ConvergesToTheMeanOfSamples) {
   EXPECT_LT(last, 1e-4);
 }
 
-// What no guide tells of and the noise nearly hides: better left with its noise than blurred.
+// Detail that no feature buffer shows and that is close to the noise level: noise is better than blur.
 TEST_P(Wavelets, WhatIsBlurredByMoreThanTheNoiseIsTakenAsItIs) {
   constexpr unsigned count = 64;
   const double noise = 0.5 / std::sqrt(3.0 * count);
-  // Of the raw picture's error; the filter alone leaves 0.76, 1.28 and 1.55.
+  // Limits relative to the noisy image's error. The filter without this rule gives 0.76, 1.28 and 1.55.
   for (const auto& [contrast, most] : {std::pair(1.0, 0.7), std::pair(2.0, 1.2), std::pair(4.0, 1.47)}) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -414,7 +415,7 @@ TEST_P(Wavelets, WhatIsNoNumberStaysInItsPixel) {
   }
 }
 
-// One of few samples found a light: an estimate of its pixel as good as any, and nothing to show.
+// One of few samples hit a light: unbiased, but a firefly that must not be displayed.
 TEST_P(Wavelets, ASpeckDoesNotStayNorSpreadAsDots) {
   constexpr glm::ivec2 size(48, 48);
   for (const unsigned count : {1U, 4U, 16U}) {
@@ -427,7 +428,7 @@ TEST_P(Wavelets, ASpeckDoesNotStayNorSpreadAsDots) {
   }
 }
 
-// But where a pixel's own samples are sure of what they see it stays, however dark all around it is.
+// A bright pixel whose own samples agree is kept, even in dark surroundings.
 TEST_P(Wavelets, ABrightPixelStays) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3(x == 20 && y == 20 ? 20.0F : 1.0F), .spread = 0.1F, .z = 5.0F};
@@ -447,9 +448,9 @@ TEST_P(Wavelets, AnySizeWillDo) {
   }
 }
 
-// ---- Pictures that follow one another ----
+// ---- Sequences of images ----
 
-// Light that only samples know of: a number for each place of a wall, which lies at depth 5, a pixel of it 0.05 wide.
+// Detail that only samples show: a random value for each position of a wall at depth 5, where a pixel is 0.05 wide.
 float painted(int x, int y) {
   const auto hash = static_cast<unsigned>((x + 1000) * 7919 + (y + 1000) * 104729);
   return 0.3F + 0.1F * static_cast<float>((hash ^ (hash >> 7U)) % 14U);
@@ -457,7 +458,7 @@ float painted(int x, int y) {
 constexpr double wall_z = 5.0;
 constexpr double wall_pixel = wall_z * pixel_at_1;
 
-// The wall from an eye that is so many of its pixels to the right.
+// The wall seen from an eye that is moved to the right by this number of its pixels.
 Scene wall_from(int moved) {
   return [moved](int x, int y) {
     return Pixel{.front = glm::vec3(painted(x + moved, y)),
@@ -477,7 +478,7 @@ class History : public cumulet::test::GlTest {
     wavelet_.reset();
     GlTest::TearDown();
   }
-  // Pictures of a wall of one sample each, from eyes that are a step apart.
+  // Filters images of a wall of one sample per pixel, moving the eye by a step each time. Returns the last.
   std::vector<glm::vec4> after(int pictures, int step, std::vector<glm::vec4>* truth = nullptr) {
     std::vector<glm::vec4> last;
     for (int i = 0; i < pictures; ++i) {
@@ -526,9 +527,9 @@ TEST_P(History, OrthographicAndTurnedViewsAreFollowed) {
     const Samples samples(gl_, size_, 1, wall_from(2 * i), static_cast<unsigned>(i + 1));
     PictureView view = view_at(2 * i * wall_pixel, size_);
     view.orthographic = true;
-    view.right *= wall_z;  // where perspective pixels are as large as these
+    view.right *= wall_z;  // so that pixels have the same size as with perspective
     view.up *= wall_z;
-    // One that is turned, eyes apart by as much along its own axis.
+    // A rotated view; the eye moves by the same distance along its own axis.
     const glm::dmat3 turn(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
     view = {
         turn * view.eye + glm::dvec3(7.0, 8.0, 9.0), turn * view.forward, turn * view.right, turn * view.up, true, 0};
@@ -538,11 +539,11 @@ TEST_P(History, OrthographicAndTurnedViewsAreFollowed) {
   EXPECT_LT(many, 0.65 * one);
 }
 
-// A card at depth 2 in front of a wall that is a little darker, by less than noise tells: as the eye moves it uncovers
-// ever more of it.
+// A card at depth 2 in front of a slightly darker wall, with a difference below the noise. As the eye moves, more of
+// the wall becomes visible.
 TEST_P(History, WhatWasHiddenHasNoTrail) {
   constexpr int first = 30;
-  constexpr int step = 5;  // pixels of the card's; two of the wall's
+  constexpr int step = 5;  // pixels of the card, which are two of the wall
   constexpr int views = 5;
   const auto scene = [](int i) {
     return [i](int x, int) {
@@ -559,7 +560,7 @@ TEST_P(History, WhatWasHiddenHasNoTrail) {
     const Samples samples(gl_, size_, 2, scene(i), static_cast<unsigned>(i + 1));
     last = samples.filtered_by(*wavelet_, view_at(2 * i * wall_pixel, size_));
   }
-  // What the last step uncovered: where the card was as long as there was any other view.
+  // The area that the last step uncovered was covered in all earlier views.
   double mean = 0.0;
   for (int y = 0; y < size_.y; ++y) {
     for (int x = first - step * (views - 1); x < first - step * (views - 2); ++x) {
@@ -569,7 +570,7 @@ TEST_P(History, WhatWasHiddenHasNoTrail) {
   EXPECT_NEAR(mean, 0.1, 0.008);
 }
 
-// Light that changed and that nobody was told of.
+// The light changed without a reset of the history.
 TEST_P(History, WhatIsWrongFadesAndIsGoneWithManySamples) {
   const auto lit = [](float light) {
     return [light](int, int) { return Pixel{.front = glm::vec3(light), .z = 5.0F}; };
@@ -598,14 +599,14 @@ TEST_P(History, AnotherSceneAndAnotherViewerKnowNothing) {
   EXPECT_EQ(samples.filtered_by(*wavelet_, other), alone);
   static_cast<void>(after(8, 0));
   EXPECT_NE(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone);
-  // Without a view nothing is asked for, and nothing is kept.
+  // Without a view, the history is neither used nor kept.
   EXPECT_EQ(samples.filtered_by(*wavelet_, std::nullopt), alone);
   wavelet_->free();
   EXPECT_EQ(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone);
   EXPECT_EQ(wavelet_->bytes(), (112U + 16U + 32U) * static_cast<unsigned>(size_.x * size_.y));
 }
 
-// One that is filtered again, as samples come, does not count them twice.
+// Filtering the same image again, as samples arrive, does not count them twice.
 TEST_P(History, APictureIsNotItsOwn) {
   const Samples samples(gl_, size_, 1, wall_from(0), 3);
   const auto alone = samples.filtered(programs_);
@@ -634,7 +635,7 @@ TEST_P(History, AnySizeMayFollowAnyOther) {
   }
 }
 
-// A coarse picture, as previews are, tells the finer one that follows, and does not take the place of a finer one.
+// A coarse preview may be history for a finer image, but does not replace a finer history.
 TEST_P(History, CoarsePicturesDoNotReplaceFineOnes) {
   std::vector<glm::vec4> truth;
   const double one = error_of(after(1, 0, &truth), truth);
@@ -655,7 +656,7 @@ TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
   const auto alone = samples.filtered(programs_);
   cumulet::test::FakeGl fake(cumulet::headless::Context::get_proc, context_.get());
   const gl::FunctionsPtr functions = gl::load_functions(cumulet::test::FakeGl::get_proc, &fake);
-  // Textures that are made, by two calls each.
+  // Numbers of textures; each takes two calls.
   constexpr std::int64_t filter = 2 * 7;
   constexpr std::int64_t history = 2 * 3;
   for (std::int64_t n = 0; n < filter + history; ++n) {
@@ -671,7 +672,7 @@ TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
     ASSERT_TRUE(error) << n;
     EXPECT_EQ(error->code(), cumulet::ErrorCode::out_of_memory);
     EXPECT_EQ(wavelet.bytes(), 112U * static_cast<unsigned>(size_.x * size_.y));
-    // Told once.
+    // The error is returned once.
     EXPECT_EQ(samples.filtered_by(wavelet, view_at(0.0, size_), MeansBackground::left_out, &error), alone) << n;
     EXPECT_FALSE(error) << n;
   }

@@ -1,4 +1,4 @@
-// Volumes of more than 2^15 voxels a side: what is far out in them looks as it does by itself.
+// Volumes of more than 2^15 voxels per side: distant parts look the same as in a small volume.
 
 #include <gtest/gtest.h>
 
@@ -19,14 +19,14 @@ using viewer::BuildOn;
 
 class Wide : public test::StillTest {
  protected:
-  // To the voxel, so that media are alike, whatever else a grid is for.
+  // Refines to the voxels, so that the grids are equal in both volumes.
   static void set_grid(test::Still& still, BuildOn on) {
     viewer::GridSettings settings;
     settings.build.on = on;
     settings.build.refine.threshold = -1.0;
     still.set_grid(settings);
   }
-  // Of what stands there, 30 voxels wide.
+  // Looks at a cloud at this position, 30 voxels wide.
   static void look(test::Still& still, const ivec3& at) {
     const dvec3 centre = dvec3(at) + dvec3(15.0, 14.0, 12.0);
     still.set_camera(test::camera_at(centre + dvec3(20.0, 15.0, 80.0), centre, 28.0));
@@ -41,7 +41,7 @@ double most_apart(const test::Picture& a, const test::Picture& b) {
   return most;
 }
 
-// Root of the mean square of all values, beside their mean.
+// Root mean square of the differences, relative to the mean.
 double apart(const test::Picture& a, const test::Picture& b) {
   double square = 0.0;
   for (std::size_t i = 0; i < a.pixels.size(); ++i) {
@@ -52,8 +52,8 @@ double apart(const test::Picture& a, const test::Picture& b) {
   return std::sqrt(square / (3.0 * double(a.pixels.size()))) * 3.0 / (mean.r + mean.g + mean.b);
 }
 
-// Of two clouds the far one beside the same cloud by itself, near 0: as opaque to a thousandth, the same paths but
-// where a rounding decides. Both builders.
+// The far one of two clouds compared with a single cloud near the origin. Opacities agree within 2e-3, and paths are
+// the same except where rounding decides. Tests CPU and GPU builds.
 TEST_P(Wide, ACloudFarOutIsThatNearby) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
   const ivec3 low(1'000'000, -500'000, 64);
@@ -87,7 +87,7 @@ TEST_P(Wide, ACloudFarOutIsThatNearby) {
   }
 }
 
-// A sheet of 8 voxels at the far end, seen from nearby and from 100,000 voxels away: Beer and Lambert.
+// A sheet of 8 voxels at the far end, seen from nearby and from 100,000 voxels away: Beer-Lambert law.
 TEST_P(Wide, ASheetFarOutIsAsOpaqueAsItIs) {
   const ivec3 at(240'000, 131'080, 131'064);
   const auto speck = test::make_volume({8, 8, 8}, ivec3(0), [](const ivec3&) { return 1.0F; });
@@ -106,7 +106,7 @@ TEST_P(Wide, ASheetFarOutIsAsOpaqueAsItIs) {
   }
 }
 
-// What burns far out, and is looked for: its table of lights has cells of both kinds of records.
+// A fire far away, sampled by NEE: its light table has cells of both record layouts.
 TEST_P(Wide, AFireFarOutIsThatNearby) {
   const auto fire = [](const ivec3& by) {
     volume::VolumeFrame frame;

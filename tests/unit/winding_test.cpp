@@ -1,4 +1,5 @@
-// Whether closed shapes show their fronts, and that an importer says so of those that do not.
+// Winding checks: whether the faces of closed meshes point outwards, and the importer's warning about meshes whose
+// faces do not.
 
 #include "surface/winding.hpp"
 
@@ -27,7 +28,7 @@ struct Mesh {
     positions.insert(positions.end(), {a, b, c, d});
     for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) indices.push_back(first + i);
   }
-  /// No two faces share a vertex. inward: how many of the six faces are wound the wrong way.
+  /// Faces share no vertices. inward: number of the six faces with inverted winding.
   void box(const vec3& low, const vec3& high, int inward = 0) {
     const vec3 size = high - low;
     for (int face = 0; face < 6; ++face) {
@@ -70,11 +71,11 @@ TEST(Winding, OnlyClosedShapesAreJudged) {
   sheet.quad({0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0});
   sheet.quad({0, 1, 0}, {1, 1, 0}, {1, 0, 0}, {0, 0, 0});
   EXPECT_EQ(sheet.winding().area, 0.0);
-  Mesh fin;  // a wall of a box goes on: an edge of three
+  Mesh fin;  // an additional wall: an edge of three faces
   fin.box(vec3(0.0F), vec3(1.0F), 6);
   fin.quad({0, 0, 0}, {0, 0, 1}, {-1, 0, 1}, {-1, 0, 0});
   EXPECT_EQ(fin.winding().area, 0.0);
-  Mesh strip;  // closed round a twist: no inside
+  Mesh strip;  // a closed twisted strip: it has no inside
   constexpr int sides = 9;
   for (int i = 0; i < sides; ++i) {
     const auto across = [](int at) {
@@ -100,7 +101,7 @@ TEST(Winding, WallsOfCavitiesFaceInto) {
   EXPECT_NEAR(hollow.winding().inward, 6.0, 1e-4);
 }
 
-/// The warnings about a file of these meshes; materials[0] of which is theirs.
+/// The warnings about a file of these meshes, which use materials[0].
 std::vector<std::string> warnings(const std::vector<Mesh>& meshes, const json& material = json::object(),
                                   const json& node = json::object()) {
   GltfModel model;
@@ -130,9 +131,9 @@ TEST(Winding, TheImporterNamesFileAndMesh) {
   };
   EXPECT_TRUE(warnings({box(0), box(0)}).empty());
   EXPECT_TRUE(warnings({box(6)}, {{"doubleSided", true}}).empty());
-  // The format itself turns what is mirrored.
+  // glTF inverts the winding of mirrored nodes.
   EXPECT_TRUE(warnings({box(0)}, json::object(), {{"scale", {-1, 1, 1}}}).empty());
-  for (const int inward : {6, 2}) {  // 2: a half of the long sides, as of a bar whose maker was wrong about two
+  for (const int inward : {6, 2}) {  // 2: half of the four long sides, as of a bar with two inverted faces
     EXPECT_EQ(warnings({box(0), box(inward)}),
               std::vector<std::string>{"made.gltf: much of mesh 1 (Box 2) faces into its closed shape, and is not seen "
                                        "from outside: double_sided of the surface settings shows it"});

@@ -1,4 +1,4 @@
-// Spans of shared pages: nothing overlaps, nothing is lost, whatever the order.
+// Allocation of spans in shared pages: no overlaps and no leaks in any order.
 
 #include "gl/word_heap.hpp"
 
@@ -32,7 +32,7 @@ TEST(SpanAllocator, AgreesWithAListOfUnits) {
   for (int i = 0; i < 20000; ++i) {
     if (taken.empty() || below(100) < 52) {
       const std::size_t wanted = below(20) == 0 ? 1 + below(300) : 1 + below(30);
-      // The smallest gap that holds it, the first of such.
+      // Best fit: the smallest gap that is large enough, and the first of equal ones.
       std::size_t best = size;
       std::size_t best_gap = size + 1;
       for (std::size_t at = 0; at < size; ++at) {
@@ -120,7 +120,7 @@ TEST_P(Heaps, SpansDoNotTouchEachOther) {
   EXPECT_EQ(heap.pages(), 0U) << "what is gone leaves nothing";
 }
 
-// Two at a time, as poses come: pages are used again, not made anew.
+// Two spans at a time, as when poses are replaced: pages are reused instead of created.
 TEST_P(Heaps, WhatComesAndGoesFindsItsPageAgain) {
   WordHeap heap(gl_, {.page_bytes = 1U << 12U});
   WordHeap::Span shown = heap.take(100000, "creating");
@@ -134,7 +134,7 @@ TEST_P(Heaps, WhatComesAndGoesFindsItsPageAgain) {
   for (std::size_t i = 2; i < buffers.size(); ++i) EXPECT_EQ(buffers[i], buffers[i - 2]);
 }
 
-// A large thing is gone, a small one comes while another is there: the large page is not kept for it.
+// A large span is freed while small ones remain: its page is not kept for them.
 TEST_P(Heaps, ALargePageIsNotKeptForATrifle) {
   WordHeap heap(gl_, {.page_bytes = 1U << 12U});
   WordHeap::Span small = heap.take(1000, "creating");
@@ -162,7 +162,7 @@ TEST_P(Heaps, LimitsAreErrorsAndLoseNothing) {
   const WordHeap::Span first = filled(heap, 3000, 1);
   const WordHeap::Span second = filled(heap, 12000, 2);
   EXPECT_EQ(code_of(heap, 60000), ErrorCode::out_of_memory);
-  // What is left of the cap, though it is less than a page.
+  // Uses the rest of the limit, although it is less than a page.
   const WordHeap::Span third = filled(heap, 3000, 3);
   EXPECT_LE(heap.bytes(), 80000U);
   EXPECT_EQ(code_of(heap, 10000), ErrorCode::out_of_memory);

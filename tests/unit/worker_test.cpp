@@ -1,4 +1,4 @@
-// The thread behind loads, builds and poses.
+// The worker thread of loads, builds and poses.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -19,7 +19,7 @@ using Stage = Progress::Stage;
 
 class WorkerTest : public testing::Test {
  protected:
-  /// Runs until it is let go or cancelled; then notes its name.
+  /// Runs until it is released or cancelled. If released, records its name.
   Worker::Job job(const std::string& name) {
     return {name, Stage::refining, [this, name](Progress& progress) {
               started_ = true;
@@ -63,24 +63,24 @@ TEST_F(WorkerTest, ReplacingCancelsWhatIsUnderWayAndTellsNobody) {
   EXPECT_FALSE(worker_.status().failure);
 }
 
-// However fast wishes come, every second job is finished.
+// For any rate of requests, at least every second job is finished.
 TEST_F(WorkerTest, NoTwoInARowAreReplaced) {
   begin("first");
   started_ = false;
-  worker_.replace(job("second"));  // "first" is cancelled for it
+  worker_.replace(job("second"));  // this cancels "first"
   started_.wait(false);
   worker_.replace(job("third"));
   worker_.replace(job("fourth"));
   EXPECT_EQ(done(), (std::vector<std::string>{"second", "fourth"}));
   EXPECT_FALSE(worker_.status().failure);
-  // Answered: the next may be replaced again.
+  // After a finished job, the next one may be replaced again.
   let_go_ = false;
   started_ = false;
   done_.clear();
   begin("fifth");
   worker_.replace(job("sixth"));
   EXPECT_EQ(done(), (std::vector<std::string>{"sixth"}));
-  // What was cancelled for no other counts for nothing.
+  // A job cancelled by cancel() does not count as replaced.
   let_go_ = false;
   started_ = false;
   done_.clear();
@@ -120,7 +120,7 @@ TEST_F(WorkerTest, CancelEndsBoth) {
   EXPECT_TRUE(done_.empty());
   ASSERT_TRUE(worker_.status().failure);
   EXPECT_EQ(worker_.status().failure->code(), ErrorCode::cancelled);
-  // A new wish forgets it.
+  // A new request clears the failure.
   worker_.post(job("third"));
   EXPECT_FALSE(worker_.status().failure);
   EXPECT_EQ(done(), (std::vector<std::string>{"third"}));
@@ -159,7 +159,7 @@ TEST_F(WorkerTest, DestroyingItCancels) {
     }
   }
   EXPECT_GE(notified_, 1);
-  EXPECT_LE(notified_, 2);  // the second may not have begun when the worker went
+  EXPECT_LE(notified_, 2);  // the second may not have started when the worker was destroyed
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ class EglContext {
   }
 
   void make_current() const {
-    eglBindAPI(EGL_OPENGL_API);  // the current API is a thread's own
+    eglBindAPI(EGL_OPENGL_API);  // the current API is thread-local
     if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE)
       throw std::runtime_error("eglMakeCurrent failed");
   }
@@ -39,7 +39,7 @@ class EglContext {
   static void* get_proc(void*, const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }
 
  private:
-  /// The first device's display that takes OpenGL; initialised once more a context, never terminated.
+  /// The first device's display that supports OpenGL. It is initialized once per context and never terminated.
   static EGLDisplay open() {
     const auto query = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
     std::array<EGLDeviceEXT, 16> devices{};

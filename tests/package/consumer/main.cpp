@@ -1,7 +1,7 @@
 #include <array>
 #include <iostream>
 
-// What X11's headers, which come along with EGL's, leave behind.
+// A macro that X11's headers, included by EGL's, define.
 #define Always 2
 #define Bool int
 #define False 0
@@ -15,7 +15,7 @@ int main() {
   const auto v = cumulet::version();
   std::cout << v / 10000 << '.' << v / 100 % 100 << '.' << v % 100 << '\n';
 
-  // Without a context: a volume is read and its grid built.
+  // Without a context: reads a volume and builds its grid.
   auto viewer = cumulet::Viewer::create().value();
   const std::array<float, 9> voxels{1, 2, 3, 4, 5, 6, 7, 8, 9};
   viewer.set_volume(cumulet::Volume::from_dense({.values = voxels, .size = {9, 1, 1}}).value()).value();

@@ -1,7 +1,7 @@
 #include <cumulet/cumulet.hpp>
 #include <cumulet/cumulet_openvdb.hpp>
 
-// A grid of this program's own OpenVDB becomes a volume.
+// Makes a volume from a grid of this program's own OpenVDB.
 int main() {
   openvdb::initialize();
   auto grid = openvdb::FloatGrid::create();

@@ -1,6 +1,6 @@
 #pragma once
 
-// Suites that run in a context of each headless backend.
+// Base class for suites that run in a context of each headless backend.
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ inline std::string name_of(const Door& door) {
 
 inline void PrintTo(const Door& door, std::ostream* out) { *out << name_of(door); }
 
-/// A context of its own; skipped where the backend has none.
+/// Creates one context per test. The test is skipped if the backend is not available.
 class BackendTest : public testing::TestWithParam<Door> {
  protected:
   void SetUp() override {
@@ -46,13 +46,13 @@ inline std::string backend_name(const testing::TestParamInfo<Door>& info) { retu
 
 }  // namespace cumulet::test
 
-/// Runs a suite of BackendTest on both.
+/// Runs a suite of BackendTest on EGL and OSMesa.
 #define CUMULET_ON_BACKENDS(suite)                                                                   \
   INSTANTIATE_TEST_SUITE_P(Gl, suite,                                                                \
                            testing::Values(cumulet::test::Door{cumulet::headless::Backend::egl},     \
                                            cumulet::test::Door{cumulet::headless::Backend::osmesa}), \
                            cumulet::test::backend_name)
-/// And in a context of the compatibility profile of each.
+/// Runs the suite in a core and in a compatibility profile context of each backend.
 #define CUMULET_ON_PROFILES(suite)                                                                             \
   CUMULET_ON_BACKENDS(suite);                                                                                  \
   INSTANTIATE_TEST_SUITE_P(                                                                                    \

@@ -10,16 +10,16 @@
 
 #include "support/gl_viewer.hpp"
 
-/// Whether two sets of noisy pictures have the same mean.
+/// Tests whether two sets of noisy images have the same mean.
 namespace cumulet::test {
 
-/// Means of blocks of 4 x 4 pixels, of several pictures; and how sure each is.
+/// Means of blocks of 4 x 4 pixels over several images, and the variance of each mean.
 struct Blocks {
   std::vector<glm::dvec3> mean;
   std::vector<glm::dvec3> variance;  // of the mean
 };
 
-/// Of so many pictures, square ones; each is picture_of(its number).
+/// Averages `pictures` square images; picture_of(i) renders image i.
 template <class PictureOf>
 Blocks blocks_of(unsigned pictures, const PictureOf& picture_of) {
   Blocks blocks;
@@ -42,7 +42,8 @@ Blocks blocks_of(unsigned pictures, const PictureOf& picture_of) {
   return blocks;
 }
 
-/// Apart, of pairs of blocks: none by more than some standard errors, and their sum by few.
+/// Expects that each pair of blocks differs by less than 7 standard errors, and the sum over all blocks by less than
+/// 4.5.
 inline void expect_alike(const Blocks& a, const Blocks& b) {
   glm::dvec3 apart(0.0);
   glm::dvec3 spread(0.0);

@@ -7,8 +7,8 @@
 
 namespace cumulet::test {
 
-/// A host with GPU work of its own: fragments that count. queue() sends about as many milliseconds of it as were asked
-/// for, measured when this is made, and does not wait.
+/// A host with GPU work of its own: a fragment shader that counts. queue() submits about the requested milliseconds of
+/// it and does not wait. The constructor measures the rate.
 class BusyHost {
  public:
   BusyHost(const GladGLContext& gl, double milliseconds) : gl_(gl) {
@@ -29,7 +29,7 @@ class BusyHost {
     gl_.CreateFramebuffers(1, &framebuffer_);
     gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, colour_, 0);
     gl_.CreateVertexArrays(1, &vertices_);
-    // The first draw compiles; then as often as takes a while.
+    // The first draw compiles the program. The loop then draws more and more until the time is long enough to measure.
     draw(1);
     gl_.Finish();
     for (int rounds = 64;; rounds *= 4) {

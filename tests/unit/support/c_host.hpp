@@ -17,7 +17,7 @@
 #include "cumulet/cumulet.h"
 #include "headless.hpp"
 
-/// What a test needs to be a host by cumulet.h alone.
+/// Helpers for tests that use the library only through cumulet.h.
 namespace cumulet::test {
 
 template <class Desc>
@@ -69,12 +69,12 @@ struct ReleaseCamera {
 };
 using CameraRef = std::unique_ptr<cumulet_camera, ReleaseCamera>;
 
-/// The place that moves things so far.
+/// An instance transform that translates by (x, y, z).
 inline std::array<double, 16> at(double x, double y, double z) {
   return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
 }
 
-/// What such a call of the C API makes of a description. Throws std::runtime_error with its words.
+/// Calls a create function of the C API and returns its object. Throws std::runtime_error with the error message.
 template <class Ref, class Create, class Desc>
 Ref made_by(Create create, const Desc& desc) {
   typename Ref::pointer out = nullptr;
@@ -91,7 +91,7 @@ inline InstanceRef make_instance(const cumulet_instance_desc& desc) {
   return made_by<InstanceRef>(cumulet_instance_create, desc);
 }
 
-/// A lumpy ball of size^3 voxels centred on the origin, as a dense array.
+/// A lumpy ball of size^3 voxels centered on the origin, as a dense array.
 inline VolumeRef make_ball(int size, float density = 0.4F) {
   std::vector<float> values;
   const float middle = 0.5F * static_cast<float>(size - 1);
@@ -116,7 +116,8 @@ inline VolumeRef make_ball(int size, float density = 0.4F) {
   return make_dense(desc);
 }
 
-/// Bright on one side, of another colour on each: turned, it lights otherwise. Throws std::runtime_error.
+/// An environment with a bright patch on one side and another color elsewhere, so that rotating it changes the image.
+/// Throws std::runtime_error.
 inline EnvironmentRef make_environment(std::uint32_t width, std::uint32_t height, float bright = 6.0F) {
   std::vector<float> values;
   for (std::uint32_t i = 0; i < width * height; ++i) {
@@ -135,7 +136,7 @@ inline EnvironmentRef make_environment(std::uint32_t width, std::uint32_t height
   return EnvironmentRef(out);
 }
 
-/// Of a file's bytes. Throws std::runtime_error.
+/// Reads surfaces from the bytes of a file. Throws std::runtime_error.
 inline SurfacesRef read_surfaces(const std::vector<std::uint8_t>& file) {
   cumulet_surfaces* out = nullptr;
   std::array<char, 256> error{};
@@ -157,8 +158,8 @@ inline SurfacesRef make_surfaces(std::span<const cumulet_mesh_desc> meshes) {
   return SurfacesRef(out);
 }
 
-/// Two triangles with these corners, in their order, which show from both sides. card: what else there is to say of
-/// them.
+/// Two double-sided triangles with these corners in order. `card` gives the other fields of the mesh. Throws
+/// std::runtime_error.
 inline SurfacesRef make_quad(const std::array<float, 12>& corners,
                              cumulet_mesh_desc card = make_desc<cumulet_mesh_desc>()) {
   const std::array<std::uint32_t, 6> indices{0, 1, 2, 0, 2, 3};
@@ -170,7 +171,7 @@ inline SurfacesRef make_quad(const std::array<float, 12>& corners,
   return make_surfaces({&card, 1});
 }
 
-/// Two panes across a ball of make_ball: an opaque one that reaches so far, and one that covers half.
+/// Two panes that cross a ball of make_ball: an opaque one that extends to `reach`, and one with alpha 0.5.
 inline SurfacesRef make_panes(float reach) {
   const std::array<float, 9> opaque{-reach, -reach, 0.0F, reach, -reach, 0.0F, 0.0F, reach + 1.0F, 1.0F};
   const std::array<float, 9> veil{-9.0F, -2.0F, 9.0F, 9.0F, -2.0F, 9.0F, 0.0F, 2.0F, 9.0F};
@@ -196,7 +197,7 @@ inline GladGLContext load_gl(cumulet_get_proc_fn get_proc, void* user) {
   return gl;
 }
 
-/// A host's framebuffer: colour and depth, read back as bytes from the bottom row up.
+/// A host's framebuffer with color and depth. pixels() reads it back as bytes from the bottom row up.
 class HostTarget {
  public:
   HostTarget(const GladGLContext& gl, int width, int height, GLenum format = GL_RGBA8)
@@ -222,7 +223,7 @@ class HostTarget {
     gl_.ClearNamedFramebufferfv(framebuffer_, GL_COLOR, 0, colour.data());
     gl_.ClearNamedFramebufferfv(framebuffer_, GL_DEPTH, 0, &depth);
   }
-  /// A frame of all of it.
+  /// A frame descriptor that covers the whole framebuffer.
   [[nodiscard]] cumulet_frame_desc frame() const {
     auto desc = make_desc<cumulet_frame_desc>();
     desc.budget_ms = 50.0;
@@ -274,10 +275,10 @@ struct ViewerOptions {
   cumulet_build build = CUMULET_BUILD_CPU;
 };
 
-/// As the library makes one.
+/// A viewer with the default settings of the library.
 inline ViewerPtr make_plain_viewer(const cumulet_create_desc& desc) { return made_by<ViewerPtr>(cumulet_create, desc); }
 
-/// From there, by a camera of its own. Throws std::runtime_error.
+/// Sets a new camera with this pose on the viewer. Throws std::runtime_error.
 inline void look(cumulet_viewer* viewer, const cumulet_camera_desc& stand) {
   cumulet_camera* camera = nullptr;
   if (cumulet_camera_create(&stand, &camera) != CUMULET_OK) throw std::runtime_error("no camera");
@@ -285,7 +286,7 @@ inline void look(cumulet_viewer* viewer, const cumulet_camera_desc& stand) {
   if (cumulet_set_camera(viewer, camera) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
 }
 
-/// A picture of so many pixels a row, of four bytes each, with its last row first.
+/// Reverses the order of rows. `width` is in pixels of 4 bytes.
 inline std::vector<std::uint8_t> upside_down(const std::vector<std::uint8_t>& rgba, std::size_t width) {
   std::vector<std::uint8_t> turned;
   for (auto row = rgba.end(); row != rgba.begin();) {
@@ -295,7 +296,8 @@ inline std::vector<std::uint8_t> upside_down(const std::vector<std::uint8_t>& rg
   return turned;
 }
 
-/// A viewer with light, a camera before make_ball, few samples a pixel and no preview. Throws std::runtime_error.
+/// A viewer with light, a camera in front of make_ball, few samples per pixel and no preview. Throws
+/// std::runtime_error.
 inline ViewerPtr make_viewer(const ViewerOptions& options) {
   auto create = make_desc<cumulet_create_desc>();
   create.get_proc = options.get_proc;
@@ -328,7 +330,7 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   return viewer;
 }
 
-/// Renders until the picture has all its samples. Throws std::runtime_error for an error, or after a minute.
+/// Renders until the image has all its samples. Throws std::runtime_error after an error or after two minutes.
 inline cumulet_frame_result converge(cumulet_viewer* viewer, const cumulet_frame_desc& frame) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
   constexpr std::uint32_t moving = CUMULET_RENDER_MORE | CUMULET_RENDER_LOADING | CUMULET_RENDER_CONVERGED;
@@ -342,7 +344,7 @@ inline cumulet_frame_result converge(cumulet_viewer* viewer, const cumulet_frame
   return result;
 }
 
-/// How two pictures differ, "" if they do not.
+/// Describes the difference of two images. Returns "" if they are equal.
 inline std::string difference(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
   if (a.size() != b.size()) return "their sizes";
   std::size_t bytes = 0;
@@ -355,8 +357,8 @@ inline std::string difference(const std::vector<std::uint8_t>& a, const std::vec
   return std::to_string(bytes) + " of " + std::to_string(a.size()) + " bytes, by at most " + std::to_string(largest);
 }
 
-/// Renders all of the picture. The bytes of the target, into which it is drawn once: frames that are drawn while it
-/// comes would show through where it is transparent, and their number is a matter of timing.
+/// Renders all samples without drawing, then draws once and returns the bytes of the target. Drawing intermediate
+/// frames would show through transparent pixels, and their number depends on timing.
 inline std::vector<std::uint8_t> drawn_once(cumulet_viewer* viewer, const HostTarget& target) {
   auto frame = target.frame();
   frame.target = CUMULET_TARGET_NONE;
@@ -366,7 +368,7 @@ inline std::vector<std::uint8_t> drawn_once(cumulet_viewer* viewer, const HostTa
   if (cumulet_render(viewer, &frame, nullptr) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
   return target.pixels();
 }
-/// The same of this volume.
+/// Returns drawn_once() for this volume.
 inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volume* volume, const HostTarget& target) {
   if (cumulet_set_volume(viewer, volume) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
   return drawn_once(viewer, target);

@@ -13,7 +13,7 @@
 
 namespace cumulet::test {
 
-/// Warnings that any thread logs.
+/// Collects the warnings that any thread logs.
 struct Warnings {
   std::mutex mutex;
   std::vector<std::string> lines;
@@ -24,7 +24,7 @@ struct Warnings {
   }
 };
 
-/// Makes any number of viewers of one context, with two samples a pixel, and draws them into one target.
+/// Makes any number of viewers of one context, with two samples per pixel, and draws them into one target.
 class CPlaybackTest : public testing::Test {
  protected:
   [[nodiscard]] ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// A viewer of the C API on each backend, and what is read of its pictures.
+// A viewer of the C API on each backend, with statistics of its images.
 
 #include <cstdint>
 #include <vector>
@@ -22,7 +22,7 @@ class CViewerTest : public BackendTest {
     v_ = viewer_.get();
   }
 
-  /// Drawn nowhere.
+  /// A frame with CUMULET_TARGET_NONE.
   [[nodiscard]] cumulet_frame_desc undrawn() const {
     auto frame = make_desc<cumulet_frame_desc>();
     frame.target = CUMULET_TARGET_NONE;

@@ -12,7 +12,7 @@
 /// A sequence of small volumes in a folder of its own.
 namespace cumulet::test {
 
-/// A ball that grows and moves, with waves in it: other bounds, bricks and values in each frame.
+/// A ball that grows and moves and has waves, so that bounds, bricks and values differ in each frame.
 inline openvdb::FloatGrid::Ptr clip_ball(int frame, const std::string& name = "density") {
   auto grid = fog(name);
   auto accessor = grid->getAccessor();

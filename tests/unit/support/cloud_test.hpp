@@ -8,7 +8,7 @@
 
 namespace cumulet::test {
 
-/// Pictures of a medium that scatters otherwise in each colour, or of one that only absorbs.
+/// Images of a medium whose scattering differs per color channel, or of a medium that only absorbs.
 class CloudTest : public StillTest {
  protected:
   void SetUp() override {
@@ -24,7 +24,7 @@ class CloudTest : public StillTest {
     frame.flame = std::move(flame);
     still_->set_volume(std::move(frame));
   }
-  /// Under a sky of 1: pictures are of transmittance.
+  /// Uses an absorbing medium under a sky of radiance 1, so that images show the transmittance.
   void only_absorb(double density_scale) {
     medium_ = {};
     medium_.albedo = glm::vec3(0.0F);

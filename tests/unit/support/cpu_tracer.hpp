@@ -13,7 +13,7 @@
 #include "support/volumes.hpp"
 #include "surface/ggx_albedo.hpp"
 
-// Functions of variants share their signatures; each leaves some of it unused.
+// Functions of shader variants share their signatures, so each variant leaves some parameters unused.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
@@ -39,13 +39,13 @@ struct CpuTet : CpuTetData {
 
 struct CpuSurfaceData {
   const scene::ModelSource* shown_source = nullptr;
-  std::vector<uvec4> shown_words;  // its own, and what models share
+  std::vector<uvec4> shown_words;  // the words of this source and those that models share
   std::vector<CmModel> cm_models;
   std::vector<CmInstanceNode> cm_model_nodes;
   uint cm_model = 0;
   scene::TextureAtlas shown_atlas;
 
-  // These, all of one source; returns what the parameters are of them.
+  // Shows these models, all of one source. Returns the surface tables of the parameters.
   CmSurfaceTables show(std::span<const scene::Model> models) {
     shown_source = models.front().source.get();
     shown_words = shown_source->words;
@@ -82,7 +82,8 @@ struct CpuSurfaceData {
   vec4 cm_atlas_value(ivec3 at) const {
     for (std::size_t i = 0; i < shown_atlas.places[0].size(); ++i) {
       const scene::TextureAtlas::Place& place = shown_atlas.places[0][i];
-      const uvec2 texel = uvec2(ivec2(at)) - place.corner;  // beyond any size to the left or above
+      const uvec2 texel =
+          uvec2(ivec2(at)) - place.corner;  // texels to the left or above wrap to values beyond any size
       if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
       const std::uint8_t* const value =
           &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
@@ -90,7 +91,7 @@ struct CpuSurfaceData {
     }
     throw std::out_of_range("no image there");
   }
-  // Camera rays are not ended by the surface pass, which is drawn where paths meet no triangles.
+  // Camera rays do not end at the surface pass, which is only used where paths do not intersect triangles.
   static float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, vec4& colour) { return 3.0e38F; }
 };
 

@@ -1,6 +1,8 @@
-// A kind of light that is in no shader of the library: a disc far away, of finite angle. What glsl/light.glsl wants of a
-// kind; whoever includes this has
-//   vec3 cm_disc_to, float cm_disc_cosine, vec3 cm_disc_radiance_in   its middle, world, unit; of its angle; radiance
+// A light that no shader of the library has: a distant disc of finite angle, with the interface that glsl/light.glsl
+// needs. The includer declares
+//   cm_disc_to           vec3, unit direction to its center, in world space
+//   cm_disc_cosine       float, cosine of its half angle
+//   cm_disc_radiance_in  vec3, its radiance
 #ifndef CM_DISC_LIGHT_GLSL
 #define CM_DISC_LIGHT_GLSL
 

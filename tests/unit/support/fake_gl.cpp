@@ -140,7 +140,8 @@ struct FakeGl::Wrappers {
         return value;
       }
     }
-    /// As OpenGL 4.5, section 2.3.2: a lost context's calls do nothing, and what a host might poll says it is done.
+    /// OpenGL 4.5, section 2.3.2: calls in a lost context do nothing, and queries that a host may poll report
+    /// completion.
     static Result lost([[maybe_unused]] Args... args) {
       if constexpr (F == Fn::GetGraphicsResetStatus) return GL_GUILTY_CONTEXT_RESET;
       if constexpr (F == Fn::GetError) return GL_CONTEXT_LOST;
@@ -251,7 +252,7 @@ bool FakeGl::answer(GLuint /*name*/, GLenum what, GLint* value) {
 const GLubyte* FakeGl::extension(GLenum what, GLuint index) const {
   const auto bytes = [](const char* text) { return reinterpret_cast<const GLubyte*>(text); };
   if (parallel_ && what == GL_EXTENSIONS && index == 0) return bytes("GL_KHR_parallel_shader_compile");
-  // Where the driver itself compiles beside its calls, only a test that wants that may see it.
+  // Hides the extensions for parallel shader compilation unless a test enables them.
   const auto* real = reinterpret_cast<const char*>(real_.GetStringi(what, index));
   return real != nullptr && contains(real, "parallel_shader_compile") ? bytes("") : nullptr;
 }

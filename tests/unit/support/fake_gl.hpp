@@ -12,12 +12,12 @@
 
 namespace cumulet::test {
 
-/// A get_proc that stands between the library and a context: it counts calls and objects, can refuse the n-th
-/// allocation, and can lose the context at the n-th call.
+/// A get_proc between the library and a context. It counts calls and objects, can make the n-th allocation fail, and
+/// can lose the context at the n-th call.
 ///
-/// GL functions have no user pointer, so their wrappers find the fake that is current on their thread (the one made
-/// current last, or asked last for a function). A GL call on a thread without one is counted in strays() and does
-/// nothing: no such call is allowed.
+/// GL functions have no user pointer. Their wrappers use the fake that is current on their thread: the last one made
+/// current, or the last one asked for a function. A GL call on a thread without a current fake does nothing and is
+/// counted in strays(); no such call is allowed.
 class FakeGl {
  public:
   using GetProc = void* (*)(void* user, const char* name);
@@ -29,51 +29,52 @@ class FakeGl {
 
   void make_current();
 
-  /// Fits cumulet_get_proc_fn; user is the FakeGl.
+  /// Fits cumulet_get_proc_fn; `user` is the FakeGl.
   static void* get_proc(void* user, const char* name);
 
-  /// The functions themselves, uncounted, for the host's own use.
+  /// The wrapped functions, uncounted, for the host's own use.
   [[nodiscard]] const GladGLContext& real() const { return real_; }
 
   [[nodiscard]] std::uint64_t calls() const { return calls_; }
   [[nodiscard]] std::uint64_t calls(const std::string& name) const;
-  /// Calls that ask for state: glGet* and glIs*, but for errors, the reset status and whether a context is one of ours.
+  /// Number of calls that query state: glGet* and glIs*, except errors, the reset status and glIsBuffer.
   [[nodiscard]] std::uint64_t questions() const;
-  /// Dispatches and draws with a program that was not used before: drivers may compile in them.
+  /// Number of first dispatches or draws with a program. Drivers may compile in them.
   [[nodiscard]] std::uint64_t first_uses() const { return used_.size(); }
   [[nodiscard]] std::uint64_t allocations() const { return allocations_; }
-  /// Bytes that were copied to buffers and textures (of four bytes a texel) from main memory.
+  /// Bytes copied from main memory to buffers and textures (4 bytes per texel).
   [[nodiscard]] std::uint64_t uploaded() const { return uploaded_; }
-  /// The allocation that was refused last, "" if none was.
+  /// Name of the last allocation that was made to fail, "" if none.
   [[nodiscard]] const std::string& refused() const { return refused_; }
   /// Objects made and not deleted, by kind: "Buffers", "Textures", "Shader", "Sync", ...
   [[nodiscard]] std::map<std::string, std::size_t> alive() const;
-  /// Deletions of names that were not alive.
+  /// Number of deletions of names that were not alive.
   [[nodiscard]] std::uint64_t wrong_deletes() const { return wrong_deletes_; }
   static std::uint64_t strays();
 
-  /// The n-th allocation from now (0 is the next) fails: nothing is made, and glGetError says GL_OUT_OF_MEMORY, or the
-  /// shader does not compile or link. Negative: none.
+  /// Makes the n-th allocation after this call fail (0 is the next one; negative: none). Nothing is allocated, and
+  /// glGetError returns GL_OUT_OF_MEMORY, or the shader does not compile or link.
   void fail_allocation(std::int64_t n) { fail_at_ = n < 0 ? -1 : static_cast<std::int64_t>(allocations_) + n; }
-  /// From now on every allocation of storage for a buffer or texture fails, and nothing else.
+  /// If true, every allocation of storage for a buffer or texture fails; other calls work.
   void fail_storage(bool fail) { fail_storage_ = fail; }
-  /// Likewise no program links.
+  /// If true, no program links; other calls work.
   void fail_linking(bool fail) { fail_linking_ = fail; }
-  /// The n-th call from now (0 is the next) finds the context lost. Negative: never. From then on calls do nothing.
+  /// Loses the context at the n-th call after this one (0 is the next one; negative: never). All later calls do
+  /// nothing.
   void lose_context(std::int64_t n) { lose_at_ = n < 0 ? -1 : static_cast<std::int64_t>(calls_) + n; }
   [[nodiscard]] bool lost() const { return lost_; }
 
-  /// Says that the driver compiles in parallel, and is never done before finish_compiling(true).
+  /// Reports parallel compilation to the library. No compilation completes before finish_compiling(true).
   void compile_in_parallel() { parallel_ = true; }
   void finish_compiling(bool finish) { compiled_ = finish; }
-  /// From now on compute shaders with any of these lines in their source are compiled without what they do: for tests
-  /// of which programs are built, in scenes that use others.
+  /// Compute shaders compiled after this call whose source has any of these lines get an empty body. For tests that
+  /// only check which programs are built.
   void hollow_kernels(std::vector<std::string> lines) { hollow_ = std::move(lines); }
-  /// Questions about programs and shaders that a driver could not have answered while it was compiling.
+  /// Number of queries of programs and shaders that would have blocked on a compilation in progress.
   [[nodiscard]] std::uint64_t waits() const { return waits_; }
 
  private:
-  // One for each function: fake_gl.cpp.
+  // One wrapper per function; defined in fake_gl.cpp.
   struct Wrappers;
 
   void made(const std::string& kind, std::uintptr_t name);
@@ -82,7 +83,7 @@ class FakeGl {
   void deleted(const std::string& kind, std::uintptr_t name);
   void deleted(const std::string& kind, GLsizei n, const GLuint* names);
   void use(GLuint program);
-  // GL_COMPLETION_STATUS_KHR; all other questions wait for the driver.
+  // Answers GL_COMPLETION_STATUS_KHR. All other queries would wait for the driver.
   bool answer(GLuint name, GLenum what, GLint* value);
   const GLubyte* extension(GLenum what, GLuint index) const;
   bool hollow(GLuint shader, GLsizei count, const GLchar* const* sources, const GLint* lengths) const;
@@ -91,7 +92,7 @@ class FakeGl {
   void* user_;
   GladGLContext real_{};
   std::uint64_t calls_ = 0;
-  std::vector<std::uint64_t> calls_of_;  // by function
+  std::vector<std::uint64_t> calls_of_;  // indexed by function
   std::uint64_t allocations_ = 0;
   std::uint64_t uploaded_ = 0;
   std::int64_t fail_at_ = -1;

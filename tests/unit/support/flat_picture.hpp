@@ -8,13 +8,12 @@
 
 namespace cumulet::test {
 
-/// A picture of one sample a pixel, before black.
+/// An image of one sample per pixel over black.
 struct FlatPicture {
   glm::ivec2 size{0};
   gl::Object sum, background, counts, z;
 
-  /// pixels: premultiplied radiance and alpha, the top row first. What is not given is 0. Its volume is at view
-  /// depth 2.
+  /// pixels: premultiplied radiance and alpha, top row first; missing pixels are 0. The volume is at view depth 2.
   FlatPicture(const gl::FunctionsPtr& gl, glm::ivec2 of_size, std::vector<glm::vec4> pixels) : size(of_size) {
     const auto count = static_cast<std::size_t>(size.x * size.y);
     sum = gl::make_texture_2d(gl, GL_RGBA32F, size.x, size.y, "sum");

@@ -1,6 +1,6 @@
 #pragma once
 
-// All of a context's state by glGet, and a host that sets it to unusual but legal values: for state-leak tests.
+// For state-leak tests: reads all state of a context with glGet, and a host that sets it to unusual but legal values.
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ class GlTest : public BackendTest {
   LegacyGlPtr legacy_;  // null in a core context
 };
 
-/// One value of the state, by its name (with unit or index).
+/// One value of the state; the name includes unit or index.
 struct GlValue {
   std::string name;
   std::vector<double> values;
@@ -71,7 +71,7 @@ inline const std::vector<Named>& texture_bindings() {
   return bindings;
 }
 
-/// With glIsEnabled; the scrambled ones come first.
+/// State read with glIsEnabled. The capabilities that scramble() changes come first.
 inline const std::vector<Named>& capabilities() {
   static const std::vector<Named> list{CUMULET_NAMED(GL_DEPTH_TEST),
                                        CUMULET_NAMED(GL_DEPTH_CLAMP),
@@ -109,7 +109,7 @@ inline const std::vector<Named>& capabilities() {
   return list;
 }
 
-/// With glGet, at most four values.
+/// State read with glGet, at most four values each.
 inline const std::vector<Named>& values() {
   static const std::vector<Named> list{CUMULET_NAMED(GL_ACTIVE_TEXTURE),
                                        CUMULET_NAMED(GL_CURRENT_PROGRAM),
@@ -210,7 +210,7 @@ inline const std::vector<Named>& values() {
   return list;
 }
 
-/// With glGetIntegeri_v, or glGetInteger64i_v where wide; the number of indices looked at.
+/// State read with glGetIntegeri_v (glGetInteger64i_v if `wide`), for `count` indices.
 struct Indexed {
   Named what;
   GLuint count;
@@ -245,10 +245,10 @@ inline const std::vector<Indexed>& indexed_values() {
 
 }  // namespace detail
 
-/// All that glGet tells of the current context. Leaves it as it was. A value that the driver does not know is a
-/// failure. legacy: null in a core context.
+/// Reads all state of the current context with glGet and leaves it unchanged. A value that the driver does not support
+/// is a test failure. legacy: null in a core context.
 inline GlState read_gl_state(const gl::Functions& gl, const LegacyGlPtr& legacy = nullptr) {
-  gl.CheckFramebufferStatus(GL_DRAW_FRAMEBUFFER);  // Mesa clamps GL_STENCIL_REF to bits that it counts only then
+  gl.CheckFramebufferStatus(GL_DRAW_FRAMEBUFFER);  // before this call, Mesa clamps GL_STENCIL_REF to stale stencil bits
   GlState state;
   const auto add = [&](const std::string& name, std::vector<double> values) {
     EXPECT_EQ(gl.GetError(), GLenum{GL_NO_ERROR}) << name;
@@ -307,7 +307,7 @@ inline GlState read_gl_state(const gl::Functions& gl, const LegacyGlPtr& legacy 
   return state;
 }
 
-/// The names whose values differ, with both values, a line each; "" if none do.
+/// Lists the names whose values differ, with both values, one per line. Returns "" if there are none.
 inline std::string state_differences(const GlState& before, const GlState& after) {
   std::ostringstream lines;
   if (before.size() != after.size()) return "states of different sizes";
@@ -325,8 +325,8 @@ inline std::string state_differences(const GlState& before, const GlState& after
   return lines.str();
 }
 
-/// A host with objects of its own, bound wherever it likes. A GL error while it lives is a test failure, by its debug
-/// callback.
+/// A host with objects of its own at arbitrary bindings. Its debug callback turns every GL error during its lifetime
+/// into a test failure.
 class ScramblingHost {
  public:
   /// legacy: null in a core context.
@@ -359,8 +359,8 @@ class ScramblingHost {
   ScramblingHost(ScramblingHost&&) = delete;
   ScramblingHost& operator=(ScramblingHost&&) = delete;
 
-  /// Sets every state that read_gl_state looks at, and that may be set outside a frame of the host's own making, to
-  /// something that seed decides.
+  /// Sets all state that read_gl_state reads to values derived from `seed`, except state that may not be set outside a
+  /// frame.
   void scramble(std::uint32_t seed) {
     random_.seed(seed);
     scramble_bindings();
@@ -381,7 +381,7 @@ class ScramblingHost {
   GLenum one_of(const GLenum (&values)[N]) {
     return values[below(N)];
   }
-  /// One of them, or 0.
+  /// Returns a random object of the list, or 0.
   GLuint any(const std::vector<gl::Object>& objects) {
     const std::uint32_t pick = below(static_cast<std::uint32_t>(objects.size()) + 1);
     return pick == objects.size() ? 0 : objects[pick].name();

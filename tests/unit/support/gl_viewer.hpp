@@ -27,7 +27,7 @@ class StillTest : public ViewerTest {
     still_->set_light({30.0F, 30.0F, glm::vec3(3.0F), glm::vec3(0.3F)});
   }
   [[nodiscard]] viewer::Viewer& viewer() const { return still_->viewer(); }
-  /// Drawn nowhere.
+  /// A frame that is not drawn (Target::none).
   static viewer::Frame frame(std::uint32_t width, std::uint32_t height, double budget_ms = 20.0) {
     viewer::Frame f;
     f.target = viewer::Target::none;
@@ -48,7 +48,7 @@ inline viewer::CameraPose camera_at(const glm::dvec3& eye, const glm::dvec3& tar
   return c;
 }
 
-/// Straight down on (32, y, 32), the middle of slab().
+/// A camera that looks straight down at (32, y, 32), the middle of slab().
 inline viewer::CameraPose looking_down(double fovy = 1.0) {
   viewer::CameraPose c = camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, fovy);
   c.up = {0.0, 0.0, -1.0};

@@ -9,7 +9,7 @@
 
 namespace cumulet::test {
 
-/// As if nobody had looked for clear cones.
+/// Returns the grid without clear cones, as if they had not been computed.
 inline grid::TetGrid without_clear_cones(grid::TetGrid grid) {
   for (grid::CellRecord& cell : grid.cells) {
     if (cell.data.z == 0) cell.data.w = 0;
@@ -17,13 +17,13 @@ inline grid::TetGrid without_clear_cones(grid::TetGrid grid) {
   return grid;
 }
 
-/// A volume, its statistics, and what the processor makes of them.
+/// A volume, its statistics, and the grid that the CPU builds from them.
 struct GridReference {
   std::shared_ptr<const volume::ScalarVolume> volume;
   std::shared_ptr<const grid::Statistics> statistics;
   grid::Channels channels;
 
-  /// cube: none: the volume's own.
+  /// cube: if not given, the volume's own.
   explicit GridReference(volume::ScalarVolume v, const std::optional<grid::Cube>& cube = std::nullopt,
                          grid::Channels beside = {})
       : volume(std::make_shared<const volume::ScalarVolume>(std::move(v))),

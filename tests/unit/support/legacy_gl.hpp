@@ -1,6 +1,7 @@
 #pragma once
 
-// The state that only compatibility contexts have: its functions, all of it by glGet, and unusual but legal values.
+// The state that only compatibility contexts have: its functions, all its values by glGet, and unusual but legal
+// values.
 
 #include <glad/gl.h>
 #include <gtest/gtest.h>
@@ -43,7 +44,8 @@ constexpr GLenum index_shift = 0x0D12;
 constexpr GLenum index_offset = 0x0D13;
 constexpr std::array<GLenum, 5> scales{0x0D14, 0x0D18, 0x0D1A, 0x0D1C, 0x0D1E};  // red, green, blue, alpha, depth
 constexpr std::array<GLenum, 5> biases{0x0D15, 0x0D19, 0x0D1B, 0x0D1D, 0x0D1F};
-constexpr std::array<GLenum, 4> color_maps{0x0C76, 0x0C77, 0x0C78, 0x0C79};  // GL_PIXEL_MAP_R_TO_R and so on
+constexpr std::array<GLenum, 4> color_maps{0x0C76, 0x0C77, 0x0C78,
+                                           0x0C79};  // GL_PIXEL_MAP_R_TO_R to GL_PIXEL_MAP_A_TO_A
 constexpr GLenum texture_filter_control = 0x8500;
 constexpr GLenum texture_env = 0x2300;
 constexpr GLenum texture_env_mode = 0x2200;
@@ -140,7 +142,7 @@ constexpr std::array<Named, 55> values{{{"GL_ALPHA_TEST_FUNC", 0x0BC1},
 
 }  // namespace legacy
 
-/// Their functions, in a context that has them.
+/// Functions of the compatibility profile, loaded from a context that has them.
 struct LegacyGl {
   explicit LegacyGl(headless::Context& context) {
     const auto load = [&context](auto& function, const char* name) {
@@ -243,12 +245,13 @@ struct LegacyGl {
 /// Null in a core context.
 using LegacyGlPtr = std::shared_ptr<const LegacyGl>;
 
-/// Pixel maps and the polygon stipple, which GL writes to the pixel pack buffer by the pack parameters.
+/// Reads pixel maps and the polygon stipple. GL writes them to the pixel pack buffer, using the pack parameters.
 template <class Add>
 void read_legacy_patterns(const GladGLContext& gl, const LegacyGl& legacy_gl, const Add& add) {
   GLint pack = 0;
   gl.GetIntegerv(GL_PIXEL_PACK_BUFFER_BINDING, &pack);
-  if (pack != 0 && gl.IsBuffer(static_cast<GLuint>(pack)) == GL_FALSE) return;  // binding it again would make another
+  if (pack != 0 && gl.IsBuffer(static_cast<GLuint>(pack)) == GL_FALSE)
+    return;  // a deleted buffer cannot be bound again
   gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   for (const GLenum map : legacy::color_maps) {
     std::array<GLfloat, 16> entries{};
@@ -261,7 +264,7 @@ void read_legacy_patterns(const GladGLContext& gl, const LegacyGl& legacy_gl, co
   gl.BindBuffer(GL_PIXEL_PACK_BUFFER, static_cast<GLuint>(pack));
 }
 
-/// The current context's legacy state: names, with unit where there are several, and values.
+/// The legacy state of the current context: names (with the unit where there are several) and values.
 inline std::vector<std::pair<std::string, std::vector<double>>> read_legacy_state(const GladGLContext& gl,
                                                                                   const LegacyGl& legacy_gl) {
   std::vector<std::pair<std::string, std::vector<double>>> state;
@@ -294,7 +297,7 @@ inline std::vector<std::pair<std::string, std::vector<double>>> read_legacy_stat
   return state;
 }
 
-/// Sets the legacy state at random: a part of ScramblingHost.
+/// Sets the legacy state at random; part of ScramblingHost.
 class LegacyHost {
  public:
   LegacyHost(const GladGLContext& gl, LegacyGlPtr legacy_gl) : gl_(gl), legacy_(std::move(legacy_gl)) {}
@@ -320,7 +323,8 @@ class LegacyHost {
     }
   }
 
-  // Calls of the library come inside a host's glPushAttrib and glPushMatrix.
+  // Pushes attributes and matrices, because a host may call the library between glPushAttrib or glPushMatrix and its
+  // pop.
   void scramble_stacks() {
     constexpr GLbitfield current_and_fog = 0x00000001 | 0x00000080;
     const auto deepen = [this](GLenum depth_name, auto&& push, auto&& pop) {

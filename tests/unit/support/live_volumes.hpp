@@ -1,6 +1,6 @@
 #pragma once
 
-// Volumes of live ones.
+// Makes volumes from live volumes and from states.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 namespace cumulet::test {
 
-/// Of a state by itself.
+/// Makes a volume from one state, without a live volume.
 inline VolumeRef alone(const State& state) {
   std::array<char, 256> error{};
   cumulet_volume* out = nullptr;
@@ -20,7 +20,7 @@ inline VolumeRef alone(const State& state) {
   return VolumeRef(out);
 }
 
-/// Of the newest state.
+/// Returns the volume of the newest state.
 inline VolumeRef newest(const LiveRef& live) {
   std::array<char, 256> error{};
   cumulet_volume* out = nullptr;

@@ -6,7 +6,7 @@
 
 namespace cumulet::test {
 
-/// A march, and what cells its grid has.
+/// A grid type and the kind of its cells.
 struct MarchKind {
   render::March march;
   grid::CellKind cells;
@@ -16,7 +16,7 @@ inline constexpr std::array<MarchKind, 4> march_kinds{{{render::March::tet, grid
                                                        {render::March::dense, grid::CellKind::constant},
                                                        {render::March::brick, grid::CellKind::constant}}};
 
-/// A grid of a threshold; below 0: down to the voxel.
+/// Grid settings with this threshold. A negative threshold refines down to the voxels.
 inline viewer::GridSettings settings_of(const MarchKind& kind, double threshold = -1.0) {
   viewer::GridSettings s;
   s.build.march = kind.march;

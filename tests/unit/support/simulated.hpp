@@ -1,6 +1,6 @@
 #pragma once
 
-// States of a simulation that is none: a lumpy ball that moves, as a host hands them over.
+// Simulation frames as a host passes them: a lumpy ball that moves.
 
 #include <array>
 #include <cmath>
@@ -15,7 +15,8 @@ namespace cumulet::test {
 
 using Sides = std::array<int, 3>;
 
-/// x fastest. Where the ball is goes by `step`; of channels that may be negative both signs are there.
+/// Values with x fastest. The position of the ball depends on `step`. Channels that allow negative values have both
+/// signs.
 inline std::vector<float> simulated(cumulet_channel channel, const Sides& size, int step) {
   std::vector<float> values;
   values.reserve(static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
@@ -44,7 +45,7 @@ inline std::vector<float> simulated(cumulet_channel channel, const Sides& size, 
   return values;
 }
 
-/// Centred on the origin, 16 units high.
+/// index_to_world of a volume centered on the origin, 16 units high.
 inline std::array<double, 16> simulated_place(const Sides& size) {
   const double voxel = 16.0 / size[1];
   std::array<double, 16> m{};
@@ -56,7 +57,7 @@ inline std::array<double, 16> simulated_place(const Sides& size) {
   return m;
 }
 
-/// Fields to hand over, and what they refer to.
+/// Owns the fields of a state description and the data that they refer to.
 class State {
  public:
   State& dense(cumulet_channel channel, const Sides& size, std::vector<float> values) {
@@ -75,7 +76,7 @@ class State {
   State& dense(cumulet_channel channel, const Sides& size, int step) {
     return dense(channel, size, simulated(channel, size, step));
   }
-  /// The bricks of a dense array at these places in their order; all: those that have any value.
+  /// Adds the bricks of a dense array at these origins, in this order. Default: all bricks that have a nonzero value.
   State& sparse(cumulet_channel channel, const Sides& size, const std::vector<float>& values,
                 const std::vector<Sides>& origins) {
     std::vector<std::int32_t>& o = origins_.emplace_back();
@@ -124,7 +125,7 @@ class State {
                static_cast<std::size_t>(size[0]) +
            static_cast<std::size_t>(p[0]);
   }
-  /// Where bricks differ, or of one array are not all 0.
+  /// Origins of the bricks in which a and b differ. If b is empty, of the bricks of a that are not all 0.
   static std::vector<Sides> bricks(const Sides& size, const std::vector<float>& a, const std::vector<float>& b = {}) {
     std::vector<Sides> found;
     for (int x = 0; x < size[0]; x += 8) {

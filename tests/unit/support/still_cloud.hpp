@@ -5,7 +5,7 @@
 
 namespace cumulet::test {
 
-/// A viewer that shows a small cloud, detailed down to its voxels.
+/// A viewer that shows a small cloud with a grid refined down to its voxels.
 class StillCloudTest : public StillTest {
  protected:
   void SetUp() override {

@@ -18,14 +18,14 @@ namespace cumulet::test {
 
 struct Messages {
   std::vector<std::string> warnings;
-  std::vector<std::string> hints;  ///< of level info
+  std::vector<std::string> hints;  ///< messages of level info
   Log log{[this](LogLevel level, const char* text) {
     if (level == LogLevel::warning) warnings.emplace_back(text);
     if (level == LogLevel::info) hints.emplace_back(text);
   }};
 };
 
-/// The message of reading a file that is refused, which must be one line that begins with the file's name.
+/// Returns the error message of reading a file that must fail. Expects one line that begins with the file's name.
 template <class Read>
 std::string refusal(const std::filesystem::path& file, Read&& read) {
   try {

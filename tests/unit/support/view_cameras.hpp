@@ -1,6 +1,6 @@
 #pragma once
 
-// Small volumes of every kind that a grid has to do with, and cameras about them.
+// Small volumes of every kind that a grid has to handle, and cameras around them.
 
 #include <random>
 #include <string>
@@ -17,8 +17,8 @@ struct SmallVolume {
   grid::RefineSettings settings;  ///< without a camera
 };
 
-/// Noise, thin and thick and stretched; a wall; tiles, and a background that ends within bricks; what fills its cube; a
-/// single voxel; nothing.
+/// Volumes: noise (low density, high density, stretched), a wall, tiles, a background that ends within bricks, a full
+/// cube, a single voxel, an empty volume.
 inline std::vector<SmallVolume> small_volumes() {
   using glm::ivec3;
   grid::RefineSettings deviation;
@@ -69,7 +69,8 @@ inline std::vector<SmallVolume> small_volumes() {
   return all;
 }
 
-/// Without end: near, within, far, some that see a part alone, some of several places.
+/// Generates an endless series of random cameras: near, inside and far. Some see only a part of the cube, and some have
+/// an instance transform.
 class Cameras {
  public:
   explicit Cameras(unsigned seed) : engine_(seed) {}

@@ -14,7 +14,7 @@
 
 namespace cumulet::test {
 
-/// mt19937 with 32-bit results, the same everywhere.
+/// mt19937 with 32-bit results on every platform.
 class Random {
  public:
   using result_type = std::uint32_t;
@@ -27,7 +27,7 @@ class Random {
   std::mt19937 engine_;
 };
 
-/// The reference medium's value at a voxel, by definition: zero outside bounds, else brick, tile or background.
+/// The value of a voxel by definition: 0 outside the bounds, else brick, tile or background.
 inline float value_at(const volume::ScalarVolume& v, const glm::ivec3& p) {
   if (glm::any(glm::lessThan(p, v.bounds_min)) || glm::any(glm::greaterThan(p, v.bounds_max))) return 0.0F;
   const glm::ivec3 origin = p & ~7;
@@ -45,7 +45,7 @@ inline float value_at(const volume::ScalarVolume& v, const glm::ivec3& p) {
   return v.background;
 }
 
-/// All but where it is.
+/// Compares everything except index_to_world.
 inline void expect_same_voxels(const volume::ScalarVolume& a, const volume::ScalarVolume& b) {
   EXPECT_EQ(a.name, b.name);
   EXPECT_EQ(a.bounds_min, b.bounds_min);
@@ -67,7 +67,7 @@ inline void expect_identical(const volume::ScalarVolume& a, const volume::Scalar
   expect_same_voxels(a, b);
 }
 
-/// Fills bounds with function(index), brick by brick; bricks that are all zero are left out.
+/// Fills bounds with function(index), brick by brick. Bricks that are all zero are left out.
 template <class Function>
 volume::ScalarVolume make_volume(const glm::ivec3& size, const glm::ivec3& low, Function function) {
   volume::ScalarVolume v;
@@ -98,12 +98,13 @@ volume::ScalarVolume make_volume(const glm::ivec3& size, const glm::ivec3& low, 
   return v;
 }
 
-/// 64 x 8 x 64 voxels alike.
+/// 64 x 8 x 64 voxels of one value.
 inline volume::ScalarVolume slab(float value = 1.0F) {
   return make_volume({64, 8, 64}, glm::ivec3(0), [=](const glm::ivec3& /*p*/) { return value; });
 }
 
-/// Each sixth of the voxels of a cube from 0 on, of which cells are made: f(voxel, a point within it).
+/// Calls f(voxel, a point inside it) for each of the six tetrahedra of every voxel of a cube with origin 0. Cells
+/// consist of such tetrahedra.
 template <class Function>
 void for_each_sixth(int size, Function f) {
   for (int i = 0; i < size * size * size; ++i) {
@@ -121,7 +122,7 @@ void for_each_sixth(int size, Function f) {
   }
 }
 
-/// Three puffs in a box that they are far from filling.
+/// Three puffs that fill only a small part of their bounds.
 inline volume::ScalarVolume puffs(const glm::ivec3& size, const glm::ivec3& low) {
   constexpr std::array<std::array<float, 4>, 3> balls{
       {{0.3F, 0.35F, 0.4F, 0.17F}, {0.55F, 0.5F, 0.3F, 0.12F}, {0.7F, 0.75F, 0.8F, 0.1F}}};

@@ -1,6 +1,6 @@
 #pragma once
 
-// Volumes that are next to nothing in a very wide box.
+// Sparse volumes in very large bounds.
 
 #include <glm/glm.hpp>
 
@@ -8,7 +8,7 @@
 
 namespace cumulet::test {
 
-/// The same voxels elsewhere. by: whole bricks.
+/// The same voxels, translated by a multiple of the brick size.
 inline volume::ScalarVolume moved(volume::ScalarVolume v, const glm::ivec3& by) {
   v.bounds_min += by;
   v.bounds_max += by;
@@ -16,7 +16,7 @@ inline volume::ScalarVolume moved(volume::ScalarVolume v, const glm::ivec3& by) 
   return v;
 }
 
-/// The voxels of both, of which the bricks of the second come behind those of the first.
+/// The union of two volumes. The bricks of b come after those of a.
 inline volume::ScalarVolume both(volume::ScalarVolume a, const volume::ScalarVolume& b) {
   a.bounds_min = glm::min(a.bounds_min, b.bounds_min);
   a.bounds_max = glm::max(a.bounds_max, b.bounds_max);
@@ -28,7 +28,7 @@ inline volume::ScalarVolume both(volume::ScalarVolume a, const volume::ScalarVol
   return a;
 }
 
-/// A small cloud, and the same one so far from it.
+/// A small cloud and a copy of it at this offset.
 inline volume::ScalarVolume clouds_apart(const volume::ScalarVolume& cloud, const glm::ivec3& by) {
   return both(cloud, moved(cloud, by));
 }
