@@ -58,7 +58,7 @@ struct Options {
   std::vector<std::string> scenes;    ///< names of the scenes for those; empty: all
   std::filesystem::path sample_dir;   ///< written by cumulet-scene --full
   std::filesystem::path usual_dir;    ///< written by cumulet-scene without --full
-  std::string oidn_weights;           ///< folder of networks; empty: where cumulet-render looks for them
+  std::string oidn_weights;           ///< folder of networks; empty: the default folder of cumulet-render
   std::uint32_t reference_samples = 8192;
   std::uint32_t raw_samples = 256;    ///< largest sample count of noisy images, at least 64
   std::uint32_t frames = 30;          ///< of an orbit; 0: none

@@ -4,7 +4,7 @@
 
 namespace cumulet::gpu_cost {
 
-/// Resources that a kernel's machine code uses on a GPU. Of two-stage programs, the fragment shader's.
+/// Resources that a kernel's machine code uses on a GPU. For two-stage programs, those of the fragment shader.
 struct Cost {
   std::uint32_t registers = 0;        // vector registers per lane
   std::uint32_t spilled = 0;          // vector registers spilled to memory

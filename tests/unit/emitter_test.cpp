@@ -58,7 +58,7 @@ std::array<vec3, 4> square(float y, float half, bool down) {
 constexpr float floor_y = -10.0F;
 constexpr float patch_y = 20.0F;
 constexpr float patch_half = 10.0F;
-// Of the slab of voxels.
+// Bounds of the slab of voxels.
 constexpr double slab_low = -0.5;
 constexpr double slab_high = 7.5;
 

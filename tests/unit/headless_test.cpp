@@ -27,7 +27,7 @@ Function get(Context& context, const char* name) {
   return reinterpret_cast<Function>(Context::get_proc(&context, name));
 }
 
-/// Checks that the driver computes, not only what it reports: writes a buffer and reads it back.
+/// Checks the reported version and that the driver computes: writes a buffer and reads it back.
 void expect_works(Context& context) {
   const auto get_integer = get<void (*)(unsigned, int*)>(context, "glGetIntegerv");
   const auto get_string = get<const unsigned char* (*)(unsigned)>(context, "glGetString");

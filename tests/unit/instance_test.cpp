@@ -181,7 +181,7 @@ Visits visits_of(core::InstanceRays& rays, const Ray& ray) {
   return visits;
 }
 
-// The same instances as a flat list, without the tree.
+// Keeps the same instances as a flat list, without the tree.
 InstanceTable flattened(const InstanceTable& table) {
   InstanceTable list = table;
   list.nodes = {table.nodes[0]};

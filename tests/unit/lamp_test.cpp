@@ -268,7 +268,7 @@ TEST_P(Lamps, OfAnyBrightnessLeaveNumbers) {
   still_->set_volume(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
   set_medium(2.0, 1.0F);
   still_->set_camera(test::camera_at({8.0, 8.0, 60.0}, {8.0, 8.0, 8.0}, 20.0));
-  // Of size 0 and inside the medium, so that paths scatter close to them.
+  // Lights of size 0 inside the medium, so that paths scatter close to them.
   auto spot = lamp(CUMULET_LAMP_SPOT, {8.0, 8.0, 8.0}, 9e29F);
   auto disc = lamp(CUMULET_LAMP_DISC, {8.0, 8.0, 12.0}, 9e29F);
   auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 9e29F);

@@ -230,7 +230,7 @@ class LiveGl : public testing::Test {
     return handed() - before;
   }
   Picture picture() { return test::drawn_once(v_, target_); }
-  // Returns the first failing frame's status. The target shows what that frame drew.
+  // Returns the first failing frame's status. The target holds that frame's image.
   cumulet_status frames_until_failure() {
     const cumulet_frame_desc frame = target_.frame();
     cumulet_status status = CUMULET_OK;

@@ -126,7 +126,7 @@ TEST(Models, NormalsAreUprightOnWhatIsSheared) {
       ASSERT_TRUE(rays.cm_trace_models(o, d, 0.0F, 1e30F, false, hit));
       EXPECT_TRUE(hit.front);
       const auto point = rays.cm_surface_point(hit.triangle, hit.barycentrics, d, false);
-      // Of an ellipsoid: the gradient of |A^-1 (p - c)|^2.
+      // The normal of an ellipsoid is the gradient of |A^-1 (p - c)|^2.
       const dvec3 own = glm::inverse(glm::dmat3(place)) * (dvec3(point.position) - dvec3(place[3]));
       const dvec3 expected = glm::normalize(glm::transpose(glm::inverse(glm::dmat3(place))) * own);
       EXPECT_GT(glm::dot(dvec3(point.material.smooth_normal), expected), 0.97) << i;

@@ -843,7 +843,7 @@ double suggested(const ScalarVolume& volume) {
 }
 
 TEST(DensityScale, IsEightMeanDepthsOfABall) {
-  // Mean chord of a ball: 4/3 of its radius. Of a cube: 2/3 of its edge, and more without chords that graze it.
+  // The mean chord of a ball is 4/3 of its radius. That of a cube is 2/3 of its edge, more without grazing chords.
   EXPECT_NEAR(suggested(made_of(64, ball)), 8.0 / (4.0 / 3.0 * 0.9 * 32), 0.03 * 0.21);
   EXPECT_NEAR(suggested(made_of(60, [](glm::vec3) { return 0.25F; })), 8.0 / (0.25 * 40.0), 0.05 * 0.8);
   EXPECT_FALSE(
