@@ -217,7 +217,7 @@ struct Case {
 
 class PeersTest : public testing::TestWithParam<Case> {};
 
-TEST_P(PeersTest, ScattersLikeTheVoxels) {
+TEST_P(PeersTest, ScatteringMatchesTheVoxels) {
   const Case& c = GetParam();
   headless::Context context = headless::Context::create(headless::Backend::automatic);
   const auto volume = std::make_shared<const viewer::VolumeAsset>(broken_volume());

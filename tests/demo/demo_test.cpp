@@ -40,7 +40,7 @@ SceneOptions scene_with(double density) {
 
 using Points = cumulet::settings::RampPoints;
 
-TEST(RampEdit, AddsMovesAndTakesAway) {
+TEST(RampEdit, AddsMovesAndRemovesPoints) {
   Points points = {{0.0f, 0.0f}, {1.0f, 1.0f}};
   EXPECT_EQ(add_point(points, {0.5f, 0.25f}), 1u);
   EXPECT_EQ(add_point(points, {2.0f, 3.0f}), 3u);
@@ -55,7 +55,7 @@ TEST(RampEdit, AddsMovesAndTakesAway) {
 }
 
 // After any edit it is a valid ramp.
-TEST(RampEdit, StaysARamp) {
+TEST(RampEdit, StaysAValidRamp) {
   Points points = {{0.0f, 0.0f}, {1.0f, 1.0f}};
   for (int i = 0; i < 40; ++i) static_cast<void>(add_point(points, {0.01f * static_cast<float>(i * 7 % 40), 0.5f}));
   EXPECT_EQ(points.size(), cumulet::settings::most_ramp_points);
@@ -67,7 +67,7 @@ TEST(RampEdit, StaysARamp) {
   }
 }
 
-TEST(RampEdit, ShowsAllOfItAndRoomAbove) {
+TEST(RampEdit, FitsTheViewWithAMargin) {
   RampView view;
   view.chosen = 5;
   fit(view, {{0.0f, 0.0f}, {1.0f, 2.0f}}, 3.0f);
@@ -82,7 +82,7 @@ TEST(RampEdit, ShowsAllOfItAndRoomAbove) {
   EXPECT_EQ(view.most_value, 1.0f) << "not while it is dragged";
 }
 
-TEST(RampEdit, LetsGoOfWhatAnUndoTookAway) {
+TEST(RampEdit, ReleasesPointsRemovedByUndo) {
   RampView view;
   view.held = view.chosen = 2;
   fit(view, {{0.0f, 0.0f}, {1.0f, 1.0f}}, 1.0f);
@@ -94,7 +94,7 @@ TEST(RampEdit, LetsGoOfWhatAnUndoTookAway) {
   EXPECT_EQ(view.chosen, 0u);
 }
 
-TEST(History, ARampIsAStep) {
+TEST(UndoHistory, RampChangeIsOneStep) {
   History history(scene_with(1));
   SceneOptions scene = scene_with(1);
   scene.ramps[CUMULET_RAMP_DENSITY] = {{0.0f, 0.0f}, {1.0f, 2.0f}};
@@ -104,7 +104,7 @@ TEST(History, ARampIsAStep) {
   EXPECT_TRUE(before->ramps[CUMULET_RAMP_DENSITY].empty());
 }
 
-TEST(History, OneStepADragAndBack) {
+TEST(UndoHistory, DragIsOneStep) {
   History history(scene_with(1));
   for (const double density : {1.5, 2.0, 3.0}) history.offer(scene_with(density), true);
   history.offer(scene_with(3), false);
@@ -115,7 +115,7 @@ TEST(History, OneStepADragAndBack) {
   EXPECT_FALSE(history.redo(scene_with(3)).has_value());
 }
 
-TEST(History, WhatChangedSinceIsAStepOfItsOwn) {
+TEST(UndoHistory, LaterChangeIsASeparateStep) {
   History history(scene_with(1));
   history.offer(scene_with(2), false);
   history.offer(scene_with(4), true);
@@ -126,7 +126,7 @@ TEST(History, WhatChangedSinceIsAStepOfItsOwn) {
   EXPECT_FALSE(history.can_redo());
 }
 
-TEST(History, TheFirstPlaceOfACameraIsNoStep) {
+TEST(UndoHistory, FirstCameraIsNoStep) {
   History history(scene_with(1));
   SceneOptions placed = scene_with(1);
   placed.camera.eye[2] = 5.0;
@@ -137,7 +137,7 @@ TEST(History, TheFirstPlaceOfACameraIsNoStep) {
   EXPECT_EQ(history.undo(placed)->camera.eye[2], 5.0);
 }
 
-TEST(History, IsBounded) {
+TEST(UndoHistory, IsBounded) {
   History history(scene_with(1));
   for (int i = 2; i < 1000; ++i) history.offer(scene_with(i), false);
   EXPECT_LT(history.depth(), 300u);
@@ -164,7 +164,7 @@ Event move(double x) {
   return event;
 }
 
-TEST(Input, AFrameSeesAButtonChangeOnce) {
+TEST(Input, EachFrameHandlesOneButtonChange) {
   Input input;
   for (const Event& event : {move(1), button(0, true), move(2), button(0, false), button(0, true)}) input.push(event);
   EXPECT_EQ(input.take().size(), 2u);
@@ -187,7 +187,7 @@ Event key_change(int code, bool down) {
 }
 
 // Tests each order of releasing the two keys, and each part of the events in one frame.
-TEST(Input, AChordThatIsOverInAFrameIsStillAChord) {
+TEST(Input, ChordWithinOneFrameIsRecognized) {
   const std::vector<std::vector<Event>> chords = {
       {key_change(GLFW_KEY_LEFT_CONTROL, true), key_change(GLFW_KEY_O, true), key_change(GLFW_KEY_O, false),
        key_change(GLFW_KEY_LEFT_CONTROL, false)},
@@ -222,7 +222,7 @@ TEST(Input, AChordThatIsOverInAFrameIsStillAChord) {
   }
 }
 
-TEST(Input, TypingTakesNoFrames) {
+TEST(Input, TypingIsHandledInOneFrame) {
   Input input;
   for (int i = 0; i < 57; ++i) {
     input.push(key_change(GLFW_KEY_A + i % 26, true));
@@ -235,7 +235,7 @@ TEST(Input, TypingTakesNoFrames) {
   EXPECT_EQ(input.take().size(), 3u * 57u);
 }
 
-TEST(Preferences, WhatCannotBeOpenedIsNotRecent) {
+TEST(Preferences, FilesThatFailToOpenAreNotRecent) {
   Preferences preferences;
   preferences.remember("/a/cloud.vdb");
   preferences.remember("/a/b/../fire.vdb");
@@ -258,7 +258,7 @@ TEST(Input, ModifiersFollowTheKeysUntilTheFocusIsLost) {
   EXPECT_FALSE(input.any_button());
 }
 
-TEST(Input, EveryKeyHasTheNameItIsFoundBy) {
+TEST(Input, KeyNamesRoundTrip) {
   int named = 0;
   for (int code = 0; code < Input::keys; ++code) {
     const std::string name = key_name(code);
@@ -317,7 +317,7 @@ TEST(Replay, ErrorsNameTheLine) {
         << line << ": " << replay_error("frames 1\n" + std::string(line));
 }
 
-TEST(FrameTimes, AreThoseBetweenPicturesNotTheWindows) {
+TEST(FrameTimes, CountImagesNotWindowFrames) {
   FrameTimes times;
   std::vector<double> waited;
   // A two-second drag: the window is drawn every 1/64 s, and every 16th time with a new image.
@@ -331,7 +331,7 @@ TEST(FrameTimes, AreThoseBetweenPicturesNotTheWindows) {
   EXPECT_EQ(waited, std::vector<double>(pictures, 16 * frame));
 }
 
-TEST(FrameTimes, AtRestAreFromAnEventToTheWindow) {
+TEST(FrameTimes, AtRestMeasureEventLatency) {
   FrameTimes times;
   EXPECT_FALSE(times.shown(1.0, true, false)) << "nobody waited";
   EXPECT_FALSE(times.shown(2.0, false, false));
@@ -375,7 +375,7 @@ ReplayHost host_with_control() {
   return host;
 }
 
-TEST(Replay, PlacesAreOfTheWindowTheViewportAndControls) {
+TEST(Replay, PositionsAreInWindowViewportOrControls) {
   const auto events =
       play("move 5 6\nmove viewport 0.5 0.25\nmove \"Exposure\"\nmove \"Exposure\" 0 1\nquit", host_with_control());
   ASSERT_EQ(events.size(), 4u);
@@ -386,7 +386,7 @@ TEST(Replay, PlacesAreOfTheWindowTheViewportAndControls) {
   EXPECT_THROW(play("click \"Nothing\"\n", host_with_control()), std::runtime_error);
 }
 
-TEST(Replay, ADragIsAPressMovesAndARelease) {
+TEST(Replay, DragIsPressMovesAndRelease) {
   const auto events = play("drag viewport 0 0 to viewport 1 1 middle\n", host_with_control());
   ASSERT_EQ(events.size(), 11u);
   EXPECT_TRUE(events[1].down);
@@ -395,7 +395,7 @@ TEST(Replay, ADragIsAPressMovesAndARelease) {
   EXPECT_FALSE(events[10].down);
 }
 
-TEST(Replay, AChordIsHeldInOrder) {
+TEST(Replay, ChordKeysArePressedInOrder) {
   const auto events = play("key ctrl+shift+z\ntext \"\xC3\xA4\\\"b\"", host_with_control());
   ASSERT_EQ(events.size(), 9u);
   EXPECT_EQ(events[2].code, GLFW_KEY_Z);
@@ -407,7 +407,7 @@ TEST(Replay, AChordIsHeldInOrder) {
   EXPECT_EQ(events[7].code, '"');
 }
 
-TEST(Replay, OrdersComeInTheirFrame) {
+TEST(Replay, CommandsRunInTheirFrame) {
   std::vector<Player::Order> orders;
   play("frames 3\nscreenshot \"a.png\"\nreport \"a.json\"\nquit\n", host_with_control(), &orders);
   ASSERT_EQ(orders.size(), 6u);
@@ -416,7 +416,7 @@ TEST(Replay, OrdersComeInTheirFrame) {
   EXPECT_TRUE(orders[5].quit);
 }
 
-TEST(Replay, WhatIsRecordedPlaysTheSame) {
+TEST(Replay, RecordingReplaysIdentically) {
   const cumulet::test::Folder folder;
   const std::string path = (folder / "recorded.replay").string();
   const std::string text =
@@ -446,7 +446,7 @@ TEST(Replay, WhatIsRecordedPlaysTheSame) {
   EXPECT_THROW(Recorder("/nowhere/a.replay"), std::runtime_error);
 }
 
-TEST(SunDial, PointsAndAnglesAgree) {
+TEST(SunDial, PointsAndAnglesRoundTrip) {
   for (int azimuth = -179; azimuth <= 180; azimuth += 7) {
     for (int elevation = 0; elevation < 90; elevation += 4) {
       const SunAngles sun = dial_angles(dial_point({1.0 * azimuth, 1.0 * elevation}), 0.0);
@@ -465,7 +465,7 @@ TEST(SunDial, PointsAndAnglesAgree) {
   EXPECT_EQ(dial_step({0.0, 89.0}, 2.0, 2.0).elevation, 90.0);
 }
 
-TEST(EnvironmentView, FollowsThePointer) {
+TEST(EnvironmentView, RotationFollowsThePointer) {
   // The image coordinate below a position in the view.
   const auto under = [](double rotation, double place) {
     const double u = left_edge(rotation) + place;
@@ -490,7 +490,7 @@ TEST(EnvironmentView, FollowsThePointer) {
   EXPECT_NEAR(dragged(0.0, -0.25), 90.0, 1e-12);
 }
 
-TEST(EnvironmentView, IsNeitherBlackNorWhite) {
+TEST(EnvironmentView, ThumbnailIsNeitherBlackNorWhite) {
   constexpr std::size_t pixels = std::size_t{Thumbnail::width} * Thumbnail::height;
   for (const float brightness : {1e-4f, 1.0f, 1e4f}) {
     std::vector<float> radiance(3 * pixels, brightness);
@@ -506,7 +506,7 @@ TEST(EnvironmentView, IsNeitherBlackNorWhite) {
   EXPECT_EQ(dark.rgba[0], 0);
 }
 
-TEST(Model, AnEnvironmentTakesThePlaceOfDefaultDaylightAlone) {
+TEST(DemoModel, EnvironmentReplacesOnlyDefaultDaylight) {
   SceneOptions scene;
   scene.set_daylight();
   spell_out_defaults(scene);
@@ -525,7 +525,7 @@ TEST(Model, AnEnvironmentTakesThePlaceOfDefaultDaylightAlone) {
   EXPECT_TRUE(same_scene(scene, chosen));
 }
 
-TEST(Preferences, AreKeptAndForgiving) {
+TEST(Preferences, RoundTripAndTolerateDamage) {
   const cumulet::test::Folder folder;
   const std::string path = (folder / "cumulet" / "demo.json").string();
   Preferences preferences;
@@ -553,7 +553,7 @@ TEST(Preferences, AreKeptAndForgiving) {
   EXPECT_THROW(save_preferences(preferences, "/proc/nowhere/demo.json"), std::runtime_error);
 }
 
-TEST(DemoOptions, TakeTheSceneFlagsAndAFile) {
+TEST(DemoOptions, AcceptSceneFlagsAndAFile) {
   std::ostringstream out;
   const auto options =
       parse_demo_options({"cloud.vdb", "--density-scale", "3", "--ui-scale", "1.5", "--size", "800x600"}, out);
@@ -572,7 +572,7 @@ TEST(DemoOptions, TakeTheSceneFlagsAndAFile) {
   EXPECT_EQ(parse_demo_options({"--shader-cache", "kept"}, out)->shader_cache, "kept");
 }
 
-TEST(Model, AModelTakesAwayTheGroundThatNobodyChose) {
+TEST(DemoModel, ModelRemovesTheDefaultGround) {
   const auto ground_with = [](std::vector<std::string> arguments) {
     std::ostringstream out;
     const auto options = parse_demo_options(std::move(arguments), out);
@@ -589,7 +589,7 @@ TEST(Model, AModelTakesAwayTheGroundThatNobodyChose) {
   EXPECT_EQ(ground_with({"--ground-height", "2"}), CUMULET_GROUND_AT_HEIGHT);
 }
 
-TEST(Model, DefaultsAreSpelledOut) {
+TEST(DemoModel, DefaultsBecomeExplicit) {
   SceneOptions scene;
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
   spell_out_defaults(scene);
@@ -618,7 +618,7 @@ void change(Value& value) {
 }
 
 // The demo's defaults differ from the library's, so every group must be passed once.
-TEST(GivenSettings, EachGroupIsGivenAtFirstAndThenEachChange) {
+TEST(GivenSettings, EachGroupIsPassedOnceThenOnChange) {
   std::ostringstream out;
   SceneOptions first = parse_demo_options({}, out)->scene;
   for (SceneOptions scene : {SceneOptions(), first}) {
@@ -643,7 +643,7 @@ TEST(GivenSettings, EachGroupIsGivenAtFirstAndThenEachChange) {
   }
 }
 
-TEST(SavedPicture, APreviewIsNotWhole) {
+TEST(SavedPicture, PreviewIsNotSaved) {
   cumulet_frame_result shown{};
   EXPECT_FALSE(is_whole(shown, 0, 0)) << "there is none";
   shown.width = 640;
@@ -657,7 +657,7 @@ TEST(SavedPicture, APreviewIsNotWhole) {
   EXPECT_TRUE(is_whole(shown, 640, 480));
 }
 
-TEST(Model, ASceneIsCalledByWhatIsInIt) {
+TEST(DemoModel, SceneTitleNamesItsContent) {
   SceneOptions scene;
   EXPECT_EQ(main_file(scene), "");
   scene.environment = "sky.hdr";
@@ -675,7 +675,7 @@ TEST(Model, ASceneIsCalledByWhatIsInIt) {
   EXPECT_TRUE(suggest_path(model, ".png").ends_with("town-001.png")) << suggest_path(model, ".png");
 }
 
-TEST(Model, TypingKeepsItsKeys) {
+TEST(DemoModel, TypingDoesNotTriggerShortcuts) {
   EXPECT_TRUE(command_of(GLFW_KEY_F, 0, false).has_value());
   EXPECT_FALSE(command_of(GLFW_KEY_F, 0, true).has_value());
   EXPECT_FALSE(command_of(GLFW_KEY_Z, modifier_ctrl, true).has_value());
@@ -770,7 +770,7 @@ TEST_P(PanelTest, LabelsFitBesideTheirControls) {
   }
 }
 
-TEST_P(PanelTest, AnEnvironmentIsTurnedByItsPicture) {
+TEST_P(PanelTest, ThumbnailRotatesTheEnvironment) {
   panel_.ui().bring_into_view("Environment view");
   for (int i = 0; i < 5; ++i) frame();
   const auto place = panel_.ui().find("Environment view");
@@ -804,7 +804,7 @@ TEST_P(PanelTest, AnEnvironmentIsTurnedByItsPicture) {
   EXPECT_EQ(rotation, 0.0f) << "a double click turns it back";
 }
 
-TEST_P(PanelTest, PathsShowTheirEnds) {
+TEST_P(PanelTest, PathsAreElidedAtTheStart) {
   const std::string path = "/a/folder/of a very long name/\xc3\xa9t\xc3\xa9/another/cloud_0042.vdb";
   ImGui::NewFrame();
   const float whole = ImGui::CalcTextSize(path.c_str()).x;
@@ -826,7 +826,7 @@ TEST_P(PanelTest, DrawingChangesNothing) {
   EXPECT_TRUE(commands_.empty());
 }
 
-TEST_P(PanelTest, ADialogOffersFilesOfItsKindOnly) {
+TEST_P(PanelTest, DialogListsOnlyItsFileTypes) {
   model_.preferences.recent = {"/a/cloud.vdb", "/a/sky.HDR", "/a/town.glb"};
   const auto offers = [&](const char* name) { return panel_.ui().controls().contains(std::string("Recent/") + name); };
   panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, "");
@@ -839,7 +839,7 @@ TEST_P(PanelTest, ADialogOffersFilesOfItsKindOnly) {
   EXPECT_FALSE(offers("sky.HDR"));
 }
 
-TEST_P(PanelTest, AModelByItselfIsListedAndSaved) {
+TEST_P(PanelTest, SceneWithOnlyAModelIsListedAndSaved) {
   model_ = Model();
   model_.scene.surfaces = "/a/town.glb";
   model_.status.has_content = true;
@@ -851,7 +851,7 @@ TEST_P(PanelTest, AModelByItselfIsListedAndSaved) {
   EXPECT_NE(panel_.state().find("saving picture.png"), std::string::npos) << panel_.state();
 }
 
-TEST_P(PanelTest, AButtonSaysWhatItIsFor) {
+TEST_P(PanelTest, ButtonsIssueTheirCommands) {
   frame();
   frame();
   const Rectangle place = *panel_.ui().find("Open");
@@ -872,7 +872,7 @@ INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
                                            std::make_pair(1.0f, ImVec2(640, 400)),
                                            std::make_pair(1.25f, ImVec2(1024, 3000))));
 
-TEST(WorkOf, ShadersAreCompiledWhereNothingIsLoaded) {
+TEST(WorkStatus, ShowsShaderCompilationWhenIdle) {
   Status status;
   status.compiled = 0.25;
   EXPECT_STREQ(work_of(status).name, "Compiling shaders");

@@ -46,9 +46,9 @@ struct Destroy {
   void operator()(cumulet_viewer* viewer) const { cumulet_destroy(viewer); }
 };
 
-class Exr : public testing::TestWithParam<Backend> {
+class RenderedExr : public testing::TestWithParam<Backend> {
  protected:
-  Exr() : context_(Context::create(GetParam())) {
+  RenderedExr() : context_(Context::create(GetParam())) {
     cumulet_create_desc desc{};
     desc.struct_size = sizeof desc;
     desc.get_proc = Context::get_proc;
@@ -148,7 +148,7 @@ class Exr : public testing::TestWithParam<Backend> {
   cumulet::test::Folder folder_;
 };
 
-TEST_P(Exr, NoiseOfOneSampleIsUnknown) {
+TEST_P(RenderedExr, NoiseOfOneSampleIsUnknown) {
   cumulet_stats stats{};
   stats.struct_size = sizeof stats;
   ASSERT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
@@ -165,7 +165,7 @@ TEST_P(Exr, NoiseOfOneSampleIsUnknown) {
   EXPECT_EQ(Imf::InputFile(path.c_str()).header().findTypedAttribute<Imf::DoubleAttribute>("cumulet:noise"), nullptr);
 }
 
-TEST_P(Exr, SaysHowThePictureWasMade) {
+TEST_P(RenderedExr, MetadataDescribesTheRendering) {
   render();
   const std::string path = write("a.exr");
   const Imf::InputFile file(path.c_str());
@@ -200,7 +200,7 @@ TEST_P(Exr, SaysHowThePictureWasMade) {
 }
 
 // Compared with the renderer's own image. (merge_test compares with samples.)
-TEST_P(Exr, SevenMergedPartsAreTheWhole) {
+TEST_P(RenderedExr, SevenMergedPartsEqualTheFullRendering) {
   scene_.sampling.volume_alone = 1;
   aovs_ = {CUMULET_AOV_VOLUME, CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_VOLUME_DEPTH, CUMULET_AOV_VELOCITY,
            CUMULET_AOV_ERROR};
@@ -257,7 +257,7 @@ TEST_P(Exr, SevenMergedPartsAreTheWhole) {
   EXPECT_THROW(cumulet::demo::merge({parts[0], write("other.exr")}, merged), std::runtime_error);
 }
 
-TEST_P(Exr, GroupsOfLightsAreLayersWhoseSumIsThePicture) {
+TEST_P(RenderedExr, LightGroupLayersSumToTheImage) {
   scene_.light.sun_group = 1;
   for (float& value : scene_.light.sun_irradiance) value = 2.0F;
   scene_.sampling.light_groups = 2;
@@ -282,7 +282,7 @@ TEST_P(Exr, GroupsOfLightsAreLayersWhoseSumIsThePicture) {
 }
 
 // As Cryptomatte's specification requires, read with OpenEXR's library and a JSON parser.
-TEST_P(Exr, HasMattesByName) {
+TEST_P(RenderedExr, HasCryptomattesByName) {
   scene_.name = "a \"cloud\" of \xc3\xa4ther";
   scene_.ground.place = CUMULET_GROUND_AT_HEIGHT;
   scene_.ground.height = -3.0;
@@ -339,7 +339,7 @@ TEST_P(Exr, HasMattesByName) {
   }
 }
 
-TEST(ObjectName, IsThatOfTheSceneOrTheFile) {
+TEST(ObjectName, ComesFromTheSceneOrTheFile) {
   SceneOptions scene;
   const cumulet::demo::Instances others;
   const auto name = [&](cumulet_object_kind kind, std::uint64_t tag) {
@@ -360,7 +360,7 @@ TEST(ObjectName, IsThatOfTheSceneOrTheFile) {
 }
 
 // Pixels of a render region equal those of the whole image, and its partial renders can be merged.
-TEST_P(Exr, OfARegionIsThatWindowOfTheWhole) {
+TEST_P(RenderedExr, RegionIsAWindowOfTheFullImage) {
   namespace layers = cumulet::image::layers;
   aovs_ = {CUMULET_AOV_VOLUME_DEPTH};
   render();
@@ -395,7 +395,7 @@ TEST_P(Exr, OfARegionIsThatWindowOfTheWhole) {
   EXPECT_THROW(cumulet::demo::merge({whole, write("next.exr")}, merged), std::runtime_error);
 }
 
-TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {
+TEST_P(RenderedExr, MatricesProjectTheVolumeIntoTheImage) {
   for (const bool orthographic : {false, true}) {
     if (orthographic) scene_.camera.orthographic_height = 9.0;
     render();
@@ -430,7 +430,7 @@ TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Gl, Exr, testing::Values(Backend::egl, Backend::osmesa),
+INSTANTIATE_TEST_SUITE_P(Gl, RenderedExr, testing::Values(Backend::egl, Backend::osmesa),
                          [](const auto& given) { return given.param == Backend::egl ? "egl" : "osmesa"; });
 
 }  // namespace

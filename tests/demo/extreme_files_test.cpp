@@ -109,7 +109,7 @@ void expect_same_picture(const Done& a, const Done& b) {
     ASSERT_NEAR(a.pixels[i], b.pixels[i], 0.02F + 0.05F * std::abs(b.pixels[i])) << i;
 }
 
-TEST_F(ExtremeFiles, KelvinBurnAsRelativeTemperaturesDo) {
+TEST_F(ExtremeFiles, KelvinFilesEmitLikeRelativeTemperatures) {
   constexpr float most = 2250.0F;
   write("kelvin.vdb", {smoke(), heat(most)});
   write("relative.vdb", {smoke(), heat(most / 1500.0F)});
@@ -124,20 +124,20 @@ TEST_F(ExtremeFiles, KelvinBurnAsRelativeTemperaturesDo) {
             3.0 * render("kelvin.vdb", "--temperature-scale 1 --blackbody 1").mean());
 }
 
-TEST_F(ExtremeFiles, KelvinAloneAreNoWhiteOut) {
+TEST_F(ExtremeFiles, KelvinOnlyFilesAreNotOverexposed) {
   write("kelvin.vdb", {heat(2250.0F)});
   write("relative.vdb", {heat(1.5F)});
   expect_same_picture(render("kelvin.vdb"), render("relative.vdb"));
 }
 
-TEST_F(ExtremeFiles, ACoarserTemperatureBurns) {
+TEST_F(ExtremeFiles, CoarserTemperatureGridEmits) {
   write("coarse.vdb", {smoke(), heat(2250.0F, 10, 2.0)});
   const Done coarse = render("coarse.vdb");
   EXPECT_TRUE(coarse.says("it burns") && coarse.says("as kelvin do")) << coarse.said;
   EXPECT_GT(coarse.mean(), 1.2 * render("coarse.vdb", "--temperature-grid none --preset explosion").mean());
 }
 
-TEST_F(ExtremeFiles, WarmAirDoesNotGlow) {
+TEST_F(ExtremeFiles, WarmAirDoesNotEmit) {
   write("warm.vdb", {smoke(), ball("temperature", [](float) { return 293.0F; })});
   // Its emission is omitted, but the cells stay: the noise is the same.
   for (const std::string more : {"", "--blackbody 1"}) {
@@ -148,7 +148,7 @@ TEST_F(ExtremeFiles, WarmAirDoesNotGlow) {
 }
 
 // When a fire goes out, its last frames have only a few kelvin.
-TEST_F(ExtremeFiles, FramesOfASequenceHaveOneScale) {
+TEST_F(ExtremeFiles, SequenceFramesShareOneScale) {
   write("fire.0001.vdb", {smoke(), heat(2250.0F)});
   write("fire.0002.vdb", {ball("density", [](float middle) { return middle > 0.5F ? 1.0F : 0.0F; }), heat(15.0F, 6)});
   const Done run = command("fire.####.vdb", path("p.####.pfm"), "");

@@ -46,7 +46,7 @@ std::vector<Sight> sights() {
 
 void expect_near(const dvec3& a, const dvec3& b, double within) { EXPECT_LE(glm::distance(a, b), within); }
 
-TEST(Gizmo, ARayPassesAnAxisWhereItIsNearest) {
+TEST(Gizmo, FindsTheNearestPointOnAnAxis) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   const auto vector = [&] { return dvec3(normal(random), normal(random), normal(random)); };
@@ -83,7 +83,7 @@ TEST(Gizmo, ARayPassesAnAxisWhereItIsNearest) {
   EXPECT_EQ(nearest_on_axis(ray, {1.0, 0.0, -5.0}, {1.0, 0.0, 0.0}), -1.0);
 }
 
-TEST(Gizmo, ARayMeetsAPlaneBeforeIt) {
+TEST(Gizmo, FindsThePlaneHitInFrontOfTheRay) {
   const Ray ray{{1.0, 2.0, 3.0}, glm::normalize(dvec3(0.0, 3.0, -4.0))};
   const auto hit = plane_hit(ray, {0.0, 0.0, -1.0}, {0.0, 0.0, 1.0});
   ASSERT_TRUE(hit);
@@ -92,13 +92,13 @@ TEST(Gizmo, ARayMeetsAPlaneBeforeIt) {
   EXPECT_FALSE(plane_hit(ray, {0.0, 0.0, 0.0}, {1.0, 0.0, 0.0})) << "along it";
 }
 
-TEST(Gizmo, TurnsAreRightHanded) {
+TEST(Gizmo, RotationsAreRightHanded) {
   EXPECT_NEAR(angle_about({0.0, 0.0, 1.0}, {1.0, 0.0, 5.0}, {0.0, 2.0, -3.0}), pi / 2.0, 1e-12);
   EXPECT_NEAR(angle_about({0.0, 0.0, -1.0}, {1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}), -pi / 2.0, 1e-12);
   EXPECT_NEAR(angle_about({0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 0.0, 0.0}), pi / 2.0, 1e-12);
 }
 
-TEST(Gizmo, StepsAreRound) {
+TEST(Gizmo, SnapStepsAreRoundNumbers) {
   EXPECT_DOUBLE_EQ(round_step(1.0), 1.0);
   EXPECT_DOUBLE_EQ(round_step(0.73), 0.5);
   EXPECT_DOUBLE_EQ(round_step(48.0), 20.0);
@@ -106,7 +106,7 @@ TEST(Gizmo, StepsAreRound) {
   EXPECT_EQ(round_step(0.0), 0.0);
 }
 
-TEST(Sight, PixelsAndRaysAreEachOthersInverse) {
+TEST(ViewProjection, PixelsAndRaysRoundTrip) {
   for (const Sight& sight : sights()) {
     for (const dvec3& point : {dvec3(0.0), dvec3(1.0, -0.5, 0.3), dvec3(-1.5, 1.0, -1.0)}) {
       const auto pixel = sight.project(point);
@@ -130,7 +130,7 @@ TEST(Sight, PixelsAndRaysAreEachOthersInverse) {
   }
 }
 
-TEST(Sight, WhatIsBehindTheEyeIsNotShown) {
+TEST(ViewProjection, PointsBehindTheCameraAreHidden) {
   const Sight sight(camera({0.0, 0.0, 5.0}), window);
   EXPECT_FALSE(sight.project({0.0, 0.0, 6.0}));
   EXPECT_FALSE(sight.project({0.0, 0.0, 5.0}));
@@ -144,7 +144,7 @@ TEST(Sight, WhatIsBehindTheEyeIsNotShown) {
 
 dvec2 at(const Sight& sight, const dvec3& point) { return sight.project(point).value(); }
 
-TEST(Drag, MovesAsFarAsTheHandDoes) {
+TEST(Drag, MovesAsFarAsThePointer) {
   const dvec3 pivot(0.3, -0.2, 0.5);
   for (const Sight& sight : sights()) {
     for (const Handle handle : all) {
@@ -164,7 +164,7 @@ TEST(Drag, MovesAsFarAsTheHandDoes) {
   }
 }
 
-TEST(Drag, MovesAlongTheThingsOwnAxes) {
+TEST(Drag, MovesAlongTheObjectsOwnAxes) {
   const Sight sight(camera({4.0, 5.0, 9.0}), window);
   const dmat4 place = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0))) *
                       glm::scale(dmat4(1.0), dvec3(2.0, 3.0, 0.5));
@@ -188,7 +188,7 @@ TEST(Drag, SnapsToRoundSteps) {
               {10.4 * step, -3.6 * step, 0.0}, 1e-9);
 }
 
-TEST(Drag, TurnsWithTheHand) {
+TEST(Drag, RotatesWithThePointer) {
   const dvec3 pivot(0.3, -0.2, 0.5);
   for (const Sight& sight : sights()) {
     for (const Handle handle : {Handle::x, Handle::y, Handle::z, Handle::free}) {
@@ -219,7 +219,7 @@ TEST(Drag, TurnsWithTheHand) {
 }
 
 // If the ring is seen edge-on, its plane is useless: the drag follows the tangent, and one handle length is one radian.
-TEST(Drag, TurnsARingThatIsSeenFromItsEdge) {
+TEST(Drag, RotatesARingSeenEdgeOn) {
   for (const double height : {0.0, 12.0}) {
     const Sight sight(camera({0.0, 0.0, 9.0}, height), window);
     const Gizmo gizmo = gizmo_of(Tool::rotate, Axes::world, dmat4(1.0), dvec3(0.0), reach);
@@ -235,7 +235,7 @@ TEST(Drag, TurnsARingThatIsSeenFromItsEdge) {
   }
 }
 
-TEST(Drag, StretchesAlongTheThingsOwnAxes) {
+TEST(Drag, ScalesAlongTheObjectsOwnAxes) {
   const dvec3 pivot(0.3, -0.2, 0.5);
   const dmat4 place = glm::translate(dmat4(1.0), pivot) *
                       glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0))) *
@@ -269,7 +269,7 @@ TEST(Drag, StretchesAlongTheThingsOwnAxes) {
 }
 
 // For any drag on the screen and beyond, the transform is finite, not mirrored, and not far away.
-TEST(Drag, NothingBadComesFromBehindTheEye) {
+TEST(Drag, TransformStaysValidForAnyDrag) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> anywhere(-3000.0, 4000.0);
   const dmat4 place = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0)));
@@ -297,7 +297,7 @@ TEST(Drag, NothingBadComesFromBehindTheEye) {
 }
 
 // An axis that points towards the eye is dragged past it: the object stays at its last position.
-TEST(Drag, StaysWhereTheRayPassesTheAxisBehindTheEye) {
+TEST(Drag, DoesNotMoveIfTheNearestPointIsBehindTheCamera) {
   const Sight sight(camera({0.6, 0.4, 5.0}), window);
   const Gizmo gizmo = gizmo_of(Tool::move, Axes::world, dmat4(1.0), dvec3(0.0), reach);
   Drag drag(gizmo, Handle::z, sight, at(sight, {0.0, 0.0, 0.5}));
@@ -310,7 +310,7 @@ TEST(Drag, StaysWhereTheRayPassesTheAxisBehindTheEye) {
   EXPECT_EQ(drag.to(sight, vanishes, false), last) << "and at that point";
 }
 
-TEST(Handles, AreFoundWhereTheyAre) {
+TEST(Handles, ArePickedAtTheirPosition) {
   for (const Sight& sight : sights()) {
     for (const Tool tool : {Tool::move, Tool::rotate, Tool::scale}) {
       const Gizmo gizmo = gizmo_of(tool, Axes::world, dmat4(1.0), dvec3(0.2, 0.1, -0.3), reach);
@@ -336,7 +336,7 @@ TEST(Handles, AreFoundWhereTheyAre) {
   }
 }
 
-TEST(Handles, AreAsLargeNearAndFar) {
+TEST(Handles, HaveConstantScreenSize) {
   for (const double distance : {2.0, 20.0, 2000.0}) {
     const Sight sight(camera({0.0, 0.0, distance}), window);
     const Gizmo gizmo = gizmo_of(Tool::move, Axes::world, dmat4(1.0), dvec3(0.0), reach);
@@ -371,7 +371,7 @@ SceneOptions scene_of_all() {
   return scene;
 }
 
-TEST(Items, AreWhatStandsSomewhere) {
+TEST(Items, AreTheObjectsWithAPosition) {
   const SceneOptions scene = scene_of_all();
   const std::vector<Item> items = items_of(scene);
   std::vector<std::string> names;
@@ -384,7 +384,7 @@ TEST(Items, AreWhatStandsSomewhere) {
   EXPECT_FALSE(place_of(scene, {Item::Kind::volume, 1, 2}));
 }
 
-TEST(Items, StandWhereTheyArePut) {
+TEST(Items, TransformsRoundTrip) {
   const SceneOptions before = scene_of_all();
   const dmat4 change = glm::translate(dmat4(1.0), dvec3(1.0, 2.0, 3.0)) *
                        glm::rotate(dmat4(1.0), 0.7, glm::normalize(dvec3(1.0, 1.0, 0.0)));
@@ -405,7 +405,7 @@ TEST(Items, StandWhereTheyArePut) {
   }
 }
 
-TEST(Items, ALampIsStretchedAndKeepsItsWords) {
+TEST(Items, ScaledLightKeepsItsOtherSettings) {
   const Item item{Item::Kind::lamp, 1, 0};
   SceneOptions scene = scene_of_all();
   const dmat4 place = place_of(scene, item).value();
@@ -419,7 +419,7 @@ TEST(Items, ALampIsStretchedAndKeepsItsWords) {
   expect_near(dvec3(place_of(scene, item).value()[2]), {0.0, -1.0, 0.0}, 1e-12);
 }
 
-TEST(Items, AChoiceFollowsWhatIsTakenAway) {
+TEST(Items, SelectionFollowsRemovals) {
   std::optional<Item> chosen = Item{Item::Kind::model, 2, 0};
   forget(chosen, Item::Kind::volume, 0);
   forget(chosen, Item::Kind::model, 3);
@@ -430,7 +430,7 @@ TEST(Items, AChoiceFollowsWhatIsTakenAway) {
   EXPECT_FALSE(chosen);
 }
 
-TEST(Items, TurnAboutTheirMiddle) {
+TEST(Items, RotateAboutTheirCenter) {
   const SceneOptions scene = scene_of_all();
   Boxes boxes;
   boxes.volumes.emplace_back(VolumeFile{.volume = "a.vdb"}, Box{{0.0, 2.0, 4.0}, {2.0, 4.0, 8.0}});

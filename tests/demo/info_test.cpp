@@ -61,7 +61,7 @@ void expect_line(const std::string& text, const std::string& line) {
   EXPECT_NE(("\n" + text).find("\n" + line + "\n"), std::string::npos) << line << "\nis not a line of\n" << text;
 }
 
-TEST_F(Info, OfAVdb) {
+TEST_F(Info, DescribesAVdb) {
   auto velocity = openvdb::Vec3SGrid::create(openvdb::Vec3s(0));
   velocity->tree().setValue({0, 0, 0}, openvdb::Vec3s(3, 4, 0));
   velocity->setName("vel");
@@ -112,7 +112,7 @@ TEST_F(Info, OfAVdb) {
   EXPECT_EQ(text.find("histogram"), std::string::npos);
 }
 
-TEST_F(Info, OfANanoVdb) {
+TEST_F(Info, DescribesANanoVdb) {
   const auto handle = nanovdb::openToNanoVDB(*box("smoke"));
   nanovdb::io::writeGrid(path("one.nvdb"), handle);
   const json all = told(volume("one.nvdb"));
@@ -125,7 +125,7 @@ TEST_F(Info, OfANanoVdb) {
   expect_line(lines(volume("one.nvdb")), "- smoke");
 }
 
-TEST_F(Info, OfAScenesCameras) {
+TEST_F(Info, DescribesAScenesCameras) {
   write_vdb("one.vdb", {box("density")});
   SceneOptions scene = volume("one.vdb");
   EXPECT_FALSE(told(scene).contains("scene"));
@@ -134,7 +134,7 @@ TEST_F(Info, OfAScenesCameras) {
   expect_line(lines(scene), "- the side");
 }
 
-TEST_F(Info, OfAModel) {
+TEST_F(Info, DescribesAModel) {
   // Two meshes, one of two primitives. The first is used twice, the other one not at all.
   std::ofstream(path("model.gltf")) << R"({
     "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],

@@ -314,7 +314,7 @@ class Compatibility : public testing::Test {
   std::vector<float> first_;
 };
 
-TEST_F(Compatibility, PicturesAreThoseOfACoreContextWhateverIsSet) {
+TEST_F(Compatibility, ImagesMatchACoreContextForAnyLegacyState) {
   const Pictures expected = in_core();
   ASSERT_GT(*std::ranges::max_element(expected.drawn), 1.5F);
   ASSERT_GT(*std::ranges::max_element(expected.rasterized), 1.5F);
@@ -329,7 +329,7 @@ TEST_F(Compatibility, PicturesAreThoseOfACoreContextWhateverIsSet) {
   expect_pictures(expected, {"all of them, and the host resets", set_all}, CUMULET_GL_STATE_HOST_RESETS);
 }
 
-TEST_F(Compatibility, AnOpenDisplayListIsRefusedByName) {
+TEST_F(Compatibility, OpenDisplayListIsRejectedByName) {
   show_volume();
   for (const GLenum mode : {legacy::compile, legacy::compile_and_execute}) {
     const GLuint list = legacy_.GenLists(1);
@@ -353,7 +353,7 @@ TEST_F(Compatibility, AnOpenDisplayListIsRefusedByName) {
   }
 }
 
-TEST_F(Compatibility, AViewerMayEndInADisplayList) {
+TEST_F(Compatibility, ViewerMayBeDestroyedInADisplayList) {
   show_volume();
   const GLuint list = legacy_.GenLists(1);
   legacy_.NewList(list, legacy::compile);
@@ -367,7 +367,7 @@ TEST_F(Compatibility, AViewerMayEndInADisplayList) {
   legacy_.DeleteLists(list, 1);
 }
 
-TEST_F(Compatibility, SelectionAndFeedbackAreRefusedByName) {
+TEST_F(Compatibility, SelectionAndFeedbackAreRejectedByName) {
   show_volume();
   std::array<GLuint, 16> names{};
   std::array<GLfloat, 16> values{};
@@ -384,7 +384,7 @@ TEST_F(Compatibility, SelectionAndFeedbackAreRefusedByName) {
   }
 }
 
-TEST_F(Compatibility, BetweenBeginAndEndIsRefusedByName) {
+TEST_F(Compatibility, CallsBetweenBeginAndEndAreRejectedByName) {
   show_volume();
   gl_.BindFramebuffer(GL_FRAMEBUFFER, target_.framebuffer());
   legacy_.Begin(GL_TRIANGLES);
@@ -400,7 +400,7 @@ TEST_F(Compatibility, BetweenBeginAndEndIsRefusedByName) {
 }
 
 // A host's get_proc may not return functions of the window system.
-TEST_F(Compatibility, WithoutTheWindowSystemBothCausesAreNamed) {
+TEST_F(Compatibility, WithoutAWindowSystemBothCausesAreNamed) {
   const ViewerPtr viewer =
       viewer_of(context_, nullptr, CUMULET_GL_STATE_RESTORE, [](void* user, const char* name) -> void* {
         return std::strstr(name, "GetCurrentContext") != nullptr ? nullptr : Context::get_proc(user, name);
@@ -418,13 +418,13 @@ TEST_F(Compatibility, WithoutTheWindowSystemBothCausesAreNamed) {
   EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
 }
 
-TEST_F(Compatibility, WithoutAContextThatIsWhatTheErrorSays) {
+TEST_F(Compatibility, WithoutAContextTheErrorSaysSo) {
   show_volume();
   std::thread([&] { expect_refused("no OpenGL", "glBegin"); }).join();
   expect_healed();
 }
 
-TEST_F(Compatibility, MissingFunctionsAreRefusedByName) {
+TEST_F(Compatibility, MissingFunctionsAreNamed) {
   for (const char* missing : {"glPixelTransferf", "glTexEnvf", "glGetTexEnvfv"}) {
     static const char* absent = nullptr;
     absent = missing;
@@ -436,7 +436,7 @@ TEST_F(Compatibility, MissingFunctionsAreRefusedByName) {
   }
 }
 
-TEST(CoreContext, IsAskedForNoLegacyFunction) {
+TEST(CoreContext, RequestsNoLegacyFunctions) {
   Context core = Context::create(Backend::egl);
   struct Asked {
     Context* context;

@@ -296,7 +296,7 @@ void expect_same_but_edges(const Bytes& a, const Bytes& b, const Bytes& plain) {
   EXPECT_GT(compared, 60);
 }
 
-TEST(ReversedZ, AMultisampledReversedHostSeesWhatAPlainOneSees) {
+TEST(ReversedZ, MultisampledReversedHostMatchesAPlainOne) {
   const Bytes standard = check_convention({}, "standard");
   const Bytes reversed = check_convention({.reversed = true}, "reversed");
   const Bytes multisampled = check_convention(

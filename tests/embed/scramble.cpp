@@ -26,7 +26,7 @@ using cumulet::test::ViewerPtr;
 
 constexpr int side = 24;
 
-class Scramble : public GlTest {
+class StateScramble : public GlTest {
  protected:
   /// Scrambles, calls and compares. A GL error of the host may be pending before.
   void expect_kept(ScramblingHost& host, std::uint32_t seed, const std::string& what,
@@ -47,7 +47,7 @@ class Scramble : public GlTest {
   }
 };
 
-TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
+TEST_P(StateScramble, EveryCallRestoresTheState) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const auto small = cumulet::test::make_ball(12);
@@ -159,7 +159,7 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
 
 // With surfaces in all variants: textures, blended ones, lights and emitters; each lighting mode, path traced and
 // rasterized, previews, each kind of host depth, targets, read-backs and AOVs.
-TEST_P(Scramble, EveryCallWithSurfacesToo) {
+TEST_P(StateScramble, EveryCallWithSurfacesRestoresTheState) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
@@ -249,7 +249,7 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
 }
 
 // With an environment and with a physical sky: their uploads, previews, and removal.
-TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
+TEST_P(StateScramble, EveryCallWithAnEnvironmentRestoresTheState) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
@@ -314,7 +314,7 @@ TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
 }
 
 // Failing calls preserve the state too.
-TEST_P(Scramble, FailuresLeaveTheStateToo) {
+TEST_P(StateScramble, FailedCallsRestoreTheState) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);
   const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
@@ -338,7 +338,7 @@ TEST_P(Scramble, FailuresLeaveTheStateToo) {
 }
 
 // The drawn image does not depend on the state either.
-TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
+TEST_P(StateScramble, ImageDoesNotDependOnTheHostsState) {
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
   const auto draw = [&] {
@@ -375,7 +375,7 @@ TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
 }
 
 // Pending errors of the host are cleared. Its debug callback and filters stay.
-TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
+TEST_P(StateScramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   const HostTarget target(*gl_, side, side);
   const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
   const auto volume = cumulet::test::make_ball(12);
@@ -416,7 +416,7 @@ GLuint make_capturing_program(const GladGLContext& gl) {
 }
 
 // The host's queries may be active, and its transform feedback paused.
-TEST_P(Scramble, QueriesAndPausedTransformFeedbackGoOn) {
+TEST_P(StateScramble, QueriesAndPausedTransformFeedbackContinue) {
   const HostTarget target(*gl_, side, side);
   const auto volume = cumulet::test::make_ball(12);
   ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get(), .samples = 2});
@@ -470,6 +470,6 @@ TEST_P(Scramble, QueriesAndPausedTransformFeedbackGoOn) {
   gl_->DeleteVertexArrays(1, &array);
 }
 
-CUMULET_ON_PROFILES(Scramble);
+CUMULET_ON_PROFILES(StateScramble);
 
 }  // namespace

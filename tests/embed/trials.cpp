@@ -37,9 +37,9 @@ constexpr int side = 16;
 /// Timeout of a stream; much longer than needed on any test machine.
 constexpr auto patience = 60s;
 
-class Trial : public testing::Test {
+class RapidChanges : public testing::Test {
  protected:
-  Trial() : gl_((context_.make_current(), cumulet::test::load_gl(EglContext::get_proc, nullptr))) {}
+  RapidChanges() : gl_((context_.make_current(), cumulet::test::load_gl(EglContext::get_proc, nullptr))) {}
 
   [[nodiscard]] cumulet_stats stats() const {
     auto stats = make_desc<cumulet_stats>();
@@ -81,7 +81,7 @@ cumulet_grid_desc slow_grid() {
 
 // ---- streams ----
 
-TEST_F(Trial, VolumesThatChangeFasterThanTheyBuildAreSeen) {
+TEST_F(RapidChanges, VolumesChangedFasterThanBuildsAreShown) {
   const cumulet_grid_desc grid = slow_grid();
   ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
   std::vector<VolumeRef> volumes;
@@ -103,7 +103,7 @@ TEST_F(Trial, VolumesThatChangeFasterThanTheyBuildAreSeen) {
   EXPECT_EQ(stats().cell_bytes, last);
 }
 
-TEST_F(Trial, AThresholdThatChangesFasterThanItBuildsIsSeen) {
+TEST_F(RapidChanges, ThresholdChangedFasterThanBuildsIsShown) {
   const VolumeRef volume = make_ball(40);
   ASSERT_EQ(cumulet_set_volume(v_, volume.get()), CUMULET_OK);
   EXPECT_GE(stream(
@@ -118,7 +118,7 @@ TEST_F(Trial, AThresholdThatChangesFasterThanItBuildsIsSeen) {
 }
 
 // A grid that is built within one frame, but takes many frames to upload.
-TEST_F(Trial, VolumesThatChangeFasterThanTheyUploadAreSeen) {
+TEST_F(RapidChanges, VolumesChangedFasterThanUploadsAreShown) {
   const cumulet_grid_desc grid = slow_grid();
   ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
   const std::vector<VolumeRef> volumes = [] {
@@ -161,7 +161,7 @@ SurfacesRef make_cloth(int n, float width) {
   return cumulet::test::make_surfaces({&mesh, 1});
 }
 
-TEST_F(Trial, SurfacesThatChangeFasterThanTheyArePosedAreSeen) {
+TEST_F(RapidChanges, SurfacesChangedFasterThanPosesAreShown) {
   std::vector<SurfacesRef> cloths;
   for (int i = 0; i < 8; ++i) cloths.push_back(make_cloth(120, 1.0F + static_cast<float>(i)));
   const auto width = [&] {
@@ -185,7 +185,7 @@ TEST_F(Trial, SurfacesThatChangeFasterThanTheyArePosedAreSeen) {
 
 // ---- without a context ----
 
-class NoContext : public Trial {
+class NoContext : public RapidChanges {
  protected:
   NoContext() { first_ = picture_of(v_, volume_.get(), target_); }
 
@@ -238,7 +238,7 @@ class NoContext : public Trial {
   std::vector<std::uint8_t> first_;
 };
 
-TEST_F(NoContext, EachCallIsAnErrorAndTheNextOneWithItGoesOn) {
+TEST_F(NoContext, EachCallFailsAndRecoversWithTheContext) {
   for (int i = 0; i < 2; ++i) {
     context_.release();
     expect_refused();
@@ -247,7 +247,7 @@ TEST_F(NoContext, EachCallIsAnErrorAndTheNextOneWithItGoesOn) {
   }
 }
 
-TEST_F(NoContext, TheFirstFrameOfAllMayLackIt) {
+TEST_F(NoContext, FirstFrameMayLackTheContext) {
   const ViewerPtr viewer = make_viewer({.get_proc = EglContext::get_proc});
   ASSERT_EQ(cumulet_set_volume(viewer.get(), volume_.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
@@ -260,7 +260,7 @@ TEST_F(NoContext, TheFirstFrameOfAllMayLackIt) {
   EXPECT_GT(std::ranges::max(target_.pixels()), 100);
 }
 
-TEST_F(NoContext, AStrangersContextIsNone) {
+TEST_F(NoContext, UnrelatedContextIsRejected) {
   const EglContext stranger;
   stranger.make_current();
   // Objects of the other context with the same names as the viewer's.
@@ -560,7 +560,7 @@ void expect_returns(const std::string& what, const std::function<void()>& call) 
   std::_Exit(1);
 }
 
-TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
+TEST(Callbacks, EveryFunctionIsRejectedInsideWithoutDeadlock) {
   Caller caller;
   const ViewerPtr viewer = make_viewer(
       {.update = Caller::on_update, .update_user = &caller, .log = Caller::on_log, .log_user = &caller, .samples = 1});

@@ -36,7 +36,7 @@ Picture alone(cumulet_volume* volume) {
   return picture_of(viewer.get(), volume, target);
 }
 
-class Together : public testing::Test {
+class MultipleViewers : public testing::Test {
  protected:
   void SetUp() override {
     // A black image would equal any image that fails to draw.
@@ -49,7 +49,7 @@ class Together : public testing::Test {
   Picture lone_other_ = alone(other_.get());
 };
 
-TEST_F(Together, TwoThreadsShareOneVolume) {
+TEST_F(MultipleViewers, TwoThreadsShareOneVolume) {
   for (int round = 0; round < 3; ++round) {
     std::vector<Picture> pictures(4);
     std::vector<std::thread> threads;
@@ -60,7 +60,7 @@ TEST_F(Together, TwoThreadsShareOneVolume) {
   }
 }
 
-TEST_F(Together, TwoViewersInOneContextTakeTurns) {
+TEST_F(MultipleViewers, TwoViewersInOneContextTakeTurns) {
   const EglContext context;
   context.make_current();
   const GladGLContext gl = gl_here();
@@ -91,7 +91,7 @@ TEST_F(Together, TwoViewersInOneContextTakeTurns) {
   EXPECT_EQ(second.pixels(), lone_other_);
 }
 
-TEST_F(Together, MadeOnOneThreadRenderedOnAnother) {
+TEST_F(MultipleViewers, MadeOnOneThreadRenderedOnAnother) {
   const EglContext context;
   ViewerPtr viewer;
   std::thread([&] {
@@ -115,7 +115,7 @@ TEST_F(Together, MadeOnOneThreadRenderedOnAnother) {
 }
 
 // Objects that are not shared between contexts (framebuffers, vertex arrays) must not outlive a call.
-TEST_F(Together, AttachedInOneContextRenderedInAnotherThatShares) {
+TEST_F(MultipleViewers, AttachedInOneContextRenderedInAnotherThatShares) {
   const EglContext a;
   const EglContext b(&a);
   a.make_current();
@@ -144,7 +144,7 @@ TEST_F(Together, AttachedInOneContextRenderedInAnotherThatShares) {
   }
 }
 
-TEST_F(Together, OneCameraSteersTwoViewers) {
+TEST_F(MultipleViewers, OneCameraControlsTwoViewers) {
   const EglContext context;
   context.make_current();
   const GladGLContext gl = gl_here();

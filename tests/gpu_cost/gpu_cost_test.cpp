@@ -40,7 +40,7 @@ Bounds one_bound() {
 
 std::string complaint(const Cost& of) { return one_bound().complaint("navi21", "trace.comp PAGES=1", of); }
 
-TEST(Bounds, HoldWithALittleRoom) {
+TEST(CostBounds, AllowASmallExcess) {
   EXPECT_EQ(complaint(cost), "");
   Cost more = cost;
   more.registers += 4;
@@ -52,7 +52,7 @@ TEST(Bounds, HoldWithALittleRoom) {
   EXPECT_EQ(complaint(less), "");
 }
 
-TEST(Bounds, TellEachNumberThatIsOver) {
+TEST(CostBounds, ReportEachExceededNumber) {
   const auto with = [](std::uint32_t Cost::*number, std::uint32_t value) {
     Cost changed = cost;
     changed.*number = value;
@@ -71,7 +71,7 @@ TEST(Bounds, TellEachNumberThatIsOver) {
   EXPECT_EQ(complaint(two), "128 registers (at most 100), 4 waves (at least 5)");
 }
 
-TEST(Bounds, AKernelThatSpillsNothingMayNotBegin) {
+TEST(CostBounds, NewRegisterSpillingFails) {
   Cost none = cost;
   none.spilled = none.spilled_scalars = none.scratch_bytes = 0;
   Bounds bounds;
@@ -80,7 +80,7 @@ TEST(Bounds, AKernelThatSpillsNothingMayNotBegin) {
   EXPECT_EQ(bounds.complaint("navi21", "k", none), "1 spilled (at most 0)");
 }
 
-TEST(Bounds, AreOfOneFamilyAndOneKernel) {
+TEST(CostBounds, ApplyToOneFamilyAndOneKernel) {
   EXPECT_EQ(one_bound().complaint("gfx1100", "trace.comp PAGES=1", cost), "has no bound");
   EXPECT_EQ(one_bound().complaint("navi21", "trace.comp PAGES=8", cost), "has no bound");
   EXPECT_EQ(one_bound().stale("navi21", {Kernel{"trace.comp PAGES=8", {}, {}, {}}}),
@@ -89,7 +89,7 @@ TEST(Bounds, AreOfOneFamilyAndOneKernel) {
   EXPECT_TRUE(one_bound().stale("gfx1100", {}).empty());
 }
 
-TEST(Bounds, AreReadAsWritten) {
+TEST(CostBounds, RoundTrip) {
   const std::string path = temporary("bounds");
   Bounds bounds = one_bound();
   bounds.driver = "Mesa 1.2.3";
@@ -136,7 +136,7 @@ Outcome run(const Bounds& bounds) {
   return outcome;
 }
 
-TEST(GpuCost, FailsAboveABoundAndWithoutOne) {
+TEST(GpuCost, FailsAboveOrWithoutABound) {
   Bounds bounds;
   bounds.set("navi21", "sign.comp", {.registers = 256, .waves = 1, .code_bytes = 1000000});
   const Outcome within = run(bounds);

@@ -71,7 +71,7 @@ double farthest_off(const ScalarVolume& field, const ivec3& from, const ivec3& t
   return most;
 }
 
-TEST(Advection, WholeVoxelsMoveAsTheyAreAndFlowOutOfTheBox) {
+TEST(Advection, WholeVoxelShiftsAreExactAndLeaveTheBox) {
   VolumeFrame frame{.density = test::noise_volume({24, 20, 17}, low, 3)};
   frame.temperature = test::noise_volume({9, 20, 17}, low + 4, 4);
   frame.velocity = velocity(size, low, [](const dvec3& /*p*/) { return dvec3(12.0, -44.0, 8.0); });
@@ -92,7 +92,7 @@ TEST(Advection, WholeVoxelsMoveAsTheyAreAndFlowOutOfTheBox) {
   ASSERT_TRUE(after.velocity);
 }
 
-TEST(Advection, PartsOfVoxelsAreTrilinear) {
+TEST(Advection, SubvoxelShiftsAreTrilinear) {
   // Linear, so that interpolation is exact.
   const auto linear = [](const dvec3& p) { return 100.0 + 2.0 * p.x - p.y + 0.5 * p.z; };
   VolumeFrame frame{.density = filled(linear)};
@@ -105,7 +105,7 @@ TEST(Advection, PartsOfVoxelsAreTrilinear) {
   }
 }
 
-TEST(Advection, ABlobTurnsAsASolid) {
+TEST(Advection, BlobRotatesRigidly) {
   const double turns_a_second = 0.25;
   const double omega = 2.0 * std::numbers::pi * turns_a_second;
   const dvec3 middle = centre + dvec3(8.0, 0.0, 0.0);
@@ -129,7 +129,7 @@ TEST(Advection, ABlobTurnsAsASolid) {
             0.12);
 }
 
-TEST(Advection, AFlowWithoutSourcesKeepsMass) {
+TEST(Advection, DivergenceFreeFlowConservesMass) {
   // Eddies that vanish at the sides.
   const auto phase = [](const dvec3& p) { return std::numbers::pi * (p - dvec3(low)) / dvec3(size - 1); };
   VolumeFrame frame{.density = filled([&](const dvec3& p) { return gauss(p, centre + 5.0, 4.0); })};
@@ -146,7 +146,7 @@ TEST(Advection, AFlowWithoutSourcesKeepsMass) {
   }
 }
 
-TEST(Advection, StaggeredAndCentredVelocitiesAreTheSameFlow) {
+TEST(Advection, StaggeredAndCenteredVelocitiesAgree) {
   openvdb::initialize();
   const double grows = 0.5;  // per second; matter at x moves to x e^(grows t)
   const double width = 4.0;
@@ -178,7 +178,7 @@ TEST(Advection, StaggeredAndCentredVelocitiesAreTheSameFlow) {
   }
 }
 
-TEST(Advection, WhatIsOfDensityKeepsItsValueAtTheRim) {
+TEST(Advection, ColorKeepsItsValueAtTheEdgeOfTheSmoke) {
   // Red wherever there is smoke, 0 elsewhere.
   VolumeFrame frame{.density =
                         filled([](const dvec3& p) { return std::max(0.0, 1.0 - glm::length(p - centre) / 9.0); })};
@@ -202,7 +202,7 @@ TEST(Advection, WhatIsOfDensityKeepsItsValueAtTheRim) {
   EXPECT_GT(seen, 2000);
 }
 
-TEST(Advection, WhatDoesNotMoveStaysAsItIs) {
+TEST(Advection, ZeroVelocityChangesNothing) {
   VolumeFrame frame{.density = test::noise_volume(size, low, 5)};
   test::expect_identical(advect(frame, 1.0).density, frame.density);
   frame.velocity = velocity(size, low, [](const dvec3& p) { return p.x < 10.0 ? dvec3(0.0) : dvec3(0.0, 2.0, 0.0); });
@@ -215,7 +215,7 @@ TEST(Advection, WhatDoesNotMoveStaysAsItIs) {
   }
 }
 
-TEST(Advection, InsideATileNothingIsSampled) {
+TEST(Advection, TilesAreNotResampled) {
   ScalarVolume density;
   density.name = "density";
   density.bounds_min = ivec3(0);
@@ -239,7 +239,7 @@ TEST(Advection, InsideATileNothingIsSampled) {
   EXPECT_NEAR(mass(after.density) / mass(density), 1.0, 1e-9);
 }
 
-TEST(Advection, AnOutlierMovesBySixtyFourVoxelsAtMost) {
+TEST(Advection, DisplacementIsLimitedTo64Voxels) {
   VolumeFrame frame{.density = filled([](const dvec3& /*p*/) { return 1.0; }, ivec3(8), ivec3(0))};
   frame.velocity = velocity(ivec3(8), ivec3(0), [](const dvec3& /*p*/) { return dvec3(1e4, 0.0, 0.0); });
   const VolumeFrame after = advect(frame, 1.0);
@@ -247,7 +247,7 @@ TEST(Advection, AnOutlierMovesBySixtyFourVoxelsAtMost) {
   EXPECT_EQ(after.density.bounds_max, ivec3(71, 7, 7));
 }
 
-TEST(Advection, IsTheSameOnOneThreadAndEndsWhenItIsCancelled) {
+TEST(Advection, IsIdenticalOnOneThreadAndCancellable) {
   VolumeFrame frame{.density = test::noise_volume(size, low, 6)};
   frame.flame = test::noise_volume(size - 9, low + 6, 7);
   frame.velocity = velocity(size, low, [](const dvec3& p) { return 0.3 * dvec3(p.y, -p.z, p.x); });

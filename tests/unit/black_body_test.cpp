@@ -37,13 +37,13 @@ struct Published {
 constexpr std::array<Published, 4> locus = {
     {{2000.0, 0.52669, 0.41331}, {2856.0, 0.44757, 0.40745}, {6500.0, 0.3135, 0.3237}, {10000.0, 0.28063, 0.28828}}};
 
-TEST(BlackBody, ColoursAreThoseOfPlancksLaw) {
+TEST(BlackBody, ColorsFollowPlancksLaw) {
   for (const Published& p : locus) {
     EXPECT_LT(glm::distance(uv_of(black_body_colour(p.kelvin)), uv_of_xy(p.x, p.y)), 0.0005) << p.kelvin << " K";
   }
 }
 
-TEST(BlackBody, ColoursHaveLuminanceOne) {
+TEST(BlackBody, ColorsHaveLuminanceOne) {
   for (double kelvin = 100.0; kelvin < 1.0e5; kelvin *= 1.1) {
     const glm::dvec3 colour = black_body_colour(kelvin);
     EXPECT_NEAR(cumulet::luminance(colour), 1.0, 1.0e-9) << kelvin << " K";
@@ -52,7 +52,7 @@ TEST(BlackBody, ColoursHaveLuminanceOne) {
 }
 
 // At 1500 K (x = 0.58568, y = 0.39323) blue is negative. It is clipped to 0, and the ratio of red to green stays.
-TEST(BlackBody, WhatRec709CannotMixIsClipped) {
+TEST(BlackBody, OutOfGamutColorsAreClipped) {
   EXPECT_GT(black_body_colour(1930.0).b, 0.0);
   EXPECT_EQ(black_body_colour(1800.0).b, 0.0);
   const glm::dvec3 clipped = black_body_colour(1500.0);
@@ -64,7 +64,7 @@ TEST(BlackBody, WhatRec709CannotMixIsClipped) {
   EXPECT_EQ(black_body_colour(500.0).g, 0.0);
 }
 
-TEST(BlackBody, RadianceIsStefanBoltzmannsAtFullIntensity) {
+TEST(BlackBody, RadianceFollowsStefanBoltzmann) {
   const double constant = 1.0e-6 * 5.670373e-8 / std::numbers::pi;
   EXPECT_DOUBLE_EQ(black_body_radiance(2000.0, 1.0), constant * 1.6e13);
   EXPECT_DOUBLE_EQ(black_body_radiance(2000.0, 0.25), constant * (0.75 + 0.25 * 1.6e13));
@@ -72,7 +72,7 @@ TEST(BlackBody, RadianceIsStefanBoltzmannsAtFullIntensity) {
   EXPECT_EQ(black_body_radiance(99.0, 1.0), 0.0);
 }
 
-TEST(BlackBody, TheTableIsAsGoodAsWhatItHolds) {
+TEST(BlackBody, TableInterpolationIsAccurate) {
   const BlackBody table;
   for (double kelvin = 101.0; kelvin < 39999.0; kelvin *= 1.0173) {
     const glm::dvec3 fast(table.emission(static_cast<float>(kelvin), 0.7F));
@@ -81,7 +81,7 @@ TEST(BlackBody, TheTableIsAsGoodAsWhatItHolds) {
   }
 }
 
-TEST(BlackBody, WhatIsNotATemperatureIsDark) {
+TEST(BlackBody, InvalidTemperaturesEmitNothing) {
   const BlackBody table;
   for (const float kelvin : {-300.0F, 0.0F, 99.0F, std::numeric_limits<float>::quiet_NaN()}) {
     EXPECT_EQ(table.emission(kelvin, 1.0F), glm::vec3(0.0F)) << kelvin;

@@ -22,7 +22,7 @@ namespace {
 using namespace cumulet;
 using volume::BrickValues;
 
-TEST(BrickValues, EveryHalfIsOneAndStaysWhatItIs) {
+TEST(BrickValues, EveryHalfFloatRoundTrips) {
   for (std::uint32_t bits = 0; bits < 0x7c00U; ++bits) {
     const auto half = static_cast<std::uint16_t>(bits);
     const float value = glm::unpackHalf1x16(half);
@@ -48,7 +48,7 @@ volume::ScalarVolume imported(std::vector<float> values) {
   return volume::import_sparse(voxels, "made", {});
 }
 
-TEST(BrickValues, AreHalvesWhereAllOfAVolumeAre) {
+TEST(BrickValues, AreStoredAsHalfFloatsIfAllFit) {
   std::vector<float> values(1024);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i) / 1024.0F;
   values[3] = -1.0F;  // counts as 0
@@ -72,7 +72,7 @@ TEST(BrickValues, AreHalvesWhereAllOfAVolumeAre) {
   EXPECT_EQ(changed.bytes(), 4096U);
 }
 
-TEST(BrickValues, OfAFileOfHalvesTakeHalfOfTheMemory) {
+TEST(BrickValues, HalfFloatFileUsesHalfTheMemory) {
   const auto file = std::filesystem::path(CUMULET_SHARED_DATA) / "vdb" / "embergen_fire_a" / "embergen_fire_a_0060.vdb";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file;
   const volume::VolumeFrame frame = volume::import_frame(file, {}, {});
@@ -83,10 +83,10 @@ TEST(BrickValues, OfAFileOfHalvesTakeHalfOfTheMemory) {
   }
 }
 
-class HalfPictures : public test::StillTest {};
-CUMULET_ON_BACKENDS(HalfPictures);
+class HalfFloatImages : public test::StillTest {};
+CUMULET_ON_BACKENDS(HalfFloatImages);
 
-TEST_P(HalfPictures, AreThoseOfTheSameFloatsToTheBit) {
+TEST_P(HalfFloatImages, AreBitIdenticalToFloatImages) {
   volume::ScalarVolume floats = test::noise_volume({40, 30, 35}, glm::ivec3(-3, 0, 5), 4);
   std::vector<std::uint16_t> halves;
   for (float& value : floats.brick_values.as_floats()) {

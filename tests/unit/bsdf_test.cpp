@@ -125,7 +125,7 @@ TEST(Bsdf, DielectricReflectanceFollowsTheExtensions) {
   EXPECT_NEAR(cm_dielectric_f0(1.5F, 0.5F, vec3(1.0F, 2.0F, 100.0F)).z, 0.5F, 1e-6F);
 }
 
-TEST(Bsdf, DensityIntegratesToOneLessTheFailedSamples) {
+TEST(Bsdf, PdfIntegratesToOneMinusFailedSamples) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
   for (const CmSurface& s : all_surfaces()) {
@@ -148,7 +148,7 @@ TEST(Bsdf, DensityIntegratesToOneLessTheFailedSamples) {
   }
 }
 
-TEST(Bsdf, SamplesFollowTheDensity) {
+TEST(Bsdf, SamplesMatchThePdf) {
   // Chi-square over bins of equal solid angle.
   constexpr int rings = 8;
   constexpr int sectors = 12;
@@ -190,7 +190,7 @@ TEST(Bsdf, SamplesFollowTheDensity) {
   }
 }
 
-TEST(Bsdf, SampleWeightsAreEvalOverDensityAndTheirMeanIsTheAlbedo) {
+TEST(Bsdf, SampleWeightsAreValueOverPdfWithMeanAlbedo) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
   for (const CmSurface& s : all_surfaces()) {
@@ -232,7 +232,7 @@ TEST(Bsdf, IsReciprocal) {
   }
 }
 
-TEST(Bsdf, NeverReflectsMoreThanComesIn) {
+TEST(Bsdf, ConservesEnergy) {
   for (const float metallic : {0.0F, 0.5F, 1.0F}) {
     for (const float clearcoat : {0.0F, 1.0F}) {
       for (const float ior : {1.0F, 1.5F, 2.5F}) {
@@ -252,7 +252,7 @@ TEST(Bsdf, NeverReflectsMoreThanComesIn) {
   }
 }
 
-TEST(Bsdf, IsAppendixBInDoublePrecision) {
+TEST(Bsdf, MatchesGltfAppendixBInDoublePrecision) {
   using cumulet::test::AppendixB;
   using cumulet::test::Below;
   constexpr std::array<double, 4> out{0.95, 0.6, 0.25, 0.08};
@@ -306,7 +306,7 @@ TEST(Bsdf, IsAppendixBInDoublePrecision) {
 
 // White furnace test: a white dielectric of any roughness and index, with or without a coat, is as bright as its
 // environment.
-TEST(Bsdf, WhiteVanishesInAFurnaceFromEveryAngle) {
+TEST(Bsdf, PassesTheWhiteFurnaceTestFromEveryAngle) {
   for (const float clearcoat : {0.0F, 1.0F}) {
     for (const float ior : {1.0F, 1.5F, 2.5F}) {
       for (const float roughness : {0.15F, 0.3F, 0.5F, 0.75F, 1.0F}) {
@@ -340,7 +340,7 @@ std::vector<std::pair<vec3, vec3>> normals_and_viewers(vec3 geometric) {
   return result;
 }
 
-TEST(Bsdf, BentNormalsMirrorAboveTheSurface) {
+TEST(Bsdf, BentNormalsReflectAboveTheSurface) {
   const vec3 g = normalize(vec3(0.3F, -0.2F, 0.9F));
   int bent_ones = 0;
   for (const auto& [n, wo] : normals_and_viewers(g)) {
@@ -361,7 +361,7 @@ TEST(Bsdf, BentNormalsMirrorAboveTheSurface) {
   EXPECT_GT(bent_ones, 3000);
 }
 
-TEST(Bsdf, BentNormalsLoseNoLight) {
+TEST(Bsdf, BentNormalsConserveEnergy) {
   const vec3 g(0.0F, 0.0F, 1.0F);
   const auto all = normals_and_viewers(g);
   for (std::size_t i = 0; i < all.size(); i += 400) {
@@ -374,7 +374,7 @@ TEST(Bsdf, BentNormalsLoseNoLight) {
   }
 }
 
-TEST(Bsdf, MatteLightKnowsNothingOfBending) {
+TEST(Bsdf, BentNormalsDoNotAffectDiffuseReflection) {
   const vec3 g(0.0F, 0.0F, 1.0F);
   const auto all = normals_and_viewers(g);
   int bent = 0;
@@ -433,7 +433,7 @@ TEST(Bsdf, TheTerminatorOfMappedNormalsIsSoft) {
   }
 }
 
-TEST(Bsdf, WhiteWithoutInterfaceReflectsAll) {
+TEST(Bsdf, WhiteDiffuseReflectsEverything) {
   CmSurface s = make_surface(vec3(1.0F), 0.0F, 0.5F);
   s.f0 = vec3(0.0F);
   s.specular = 0.0F;
@@ -470,7 +470,7 @@ TEST(Bsdf, SmoothWhiteMetalIsAMirror) {
   }
 }
 
-TEST(Bsdf, NothingComesFromBelow) {
+TEST(Bsdf, DirectionsBelowTheSurfaceHaveZeroValue) {
   for (const CmSurface& s : all_surfaces()) {
     const vec3 above = direction(s, 0.5, 0.0);
     const vec3 below = direction(s, -0.3, 1.0);
@@ -510,7 +510,7 @@ TEST(Bsdf, ExtremesStayFinite) {
   }
 }
 
-TEST(Bsdf, AlbedoByTheTableIsTheIntegral) {
+TEST(Bsdf, TabulatedAlbedoMatchesTheIntegral) {
   for (const float roughness : {0.25F, 0.46F, 0.72F, 1.0F}) {
     for (const float metallic : {0.0F, 1.0F}) {
       CmSurface s = make_surface({0.9F, 0.5F, 0.1F}, metallic, roughness);

@@ -153,20 +153,20 @@ void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed,
   EXPECT_GE(hits, count / 20);
 }
 
-TEST(Bvh, RandomSoupsAreHitWhereBruteForceSays) {
+TEST(Bvh, RandomTrianglesMatchBruteForce) {
   expect_like_brute_force(test::soup(3, 1.0F, 1), 1000, 1);
   expect_like_brute_force(test::soup(5, 1.0F, 2), 1000, 2);
   expect_like_brute_force(test::soup(300, 0.3F, 3), 3000, 3);
   expect_like_brute_force(test::soup(3000, 0.1F, 4), 3000, 4);
 }
 
-TEST(Bvh, MeshesAreHitWhereBruteForceSays) {
+TEST(Bvh, MeshesMatchBruteForce) {
   expect_like_brute_force(test::icosphere(3), 3000, 5, 0.1);
   expect_like_brute_force(test::terrain(30), 3000, 6, 0.1);
   expect_like_brute_force(test::cube(3), 3000, 7, 0.1);
 }
 
-TEST(Bvh, SliversAreHitWhereBruteForceSays) { expect_like_brute_force(test::slivers(1500, 8), 4000, 8, 0.7); }
+TEST(Bvh, SliversMatchBruteForce) { expect_like_brute_force(test::slivers(1500, 8), 4000, 8, 0.7); }
 
 // Rays from inside a closed mesh towards difficult targets (vertices, edges).
 std::vector<Ray> rays_out_of(const Mesh& mesh, std::size_t count, unsigned seed) {
@@ -235,7 +235,7 @@ bool same_hit(const Hit& a, const Hit& b) {
   return a.t == b.t && a.triangle == b.triangle && a.barycentrics == b.barycentrics && a.front == b.front;
 }
 
-TEST(Bvh, RefitHitsWhatARebuildHits) {
+TEST(Bvh, RefitMatchesARebuild) {
   const Mesh rest = test::soup(20000, 0.05F, 11);
   Bvh bvh = build(rest);
   const std::vector<Bvh::Node> before(bvh.nodes().begin(), bvh.nodes().end());
@@ -273,7 +273,7 @@ TEST(Bvh, RefitHitsWhatARebuildHits) {
   EXPECT_EQ(bvh.cost(), cost);
 }
 
-TEST(Bvh, CostIsNearWhatRaysPay) {
+TEST(Bvh, CostIsCloseToTheExpectedSteps) {
   // For a plane of n triangles, a good tree costs about log2(n) nodes. Splits at the median count cost far more.
   const Mesh plane = test::terrain(100);
   EXPECT_LT(build(plane).cost(), 60.0);
@@ -323,7 +323,7 @@ void expect_sound(const Bvh& bvh, std::size_t triangles) {
   EXPECT_EQ(std::adjacent_find(numbers.begin(), numbers.end()), numbers.end());
 }
 
-TEST(Bvh, NothingAndLittleAreTrees) {
+TEST(Bvh, EmptyAndTinyMeshesBuild) {
   const Bvh none;
   BvhRays rays{&none};
   Hit hit{};
@@ -346,7 +346,7 @@ TEST(Bvh, NothingAndLittleAreTrees) {
   }
 }
 
-TEST(Bvh, HostileTrianglesEndInASoundTree) {
+TEST(Bvh, InvalidTrianglesGiveAValidTree) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float inf = std::numeric_limits<float>::infinity();
   Mesh one_point = test::soup(5000, 0.0F, 1);
@@ -446,7 +446,7 @@ TEST(Bvh, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Bvh, FlagsSayWhatIsHit) {
+TEST(Bvh, FlagsSelectTriangles) {
   // Four sheets at z = 1 to 4 that face -z, against the ray.
   Mesh sheets;
   for (int i = 1; i <= 4; ++i) {
@@ -479,7 +479,7 @@ TEST(Bvh, FlagsSayWhatIsHit) {
   EXPECT_EQ(first(1.5F * z, -z).triangle, CM_BVH_NONE);
 }
 
-TEST(Bvh, SceneTellsTheFlags) {
+TEST(Bvh, FlagsFollowTheScene) {
   struct Still : surface::Scene {
     [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/,
                                      const cumulet::Progress* /*progress*/ = nullptr) const override {
@@ -498,7 +498,7 @@ TEST(Bvh, SceneTellsTheFlags) {
                                         2U | TriangleFlags::one_sided | TriangleFlags::clockwise}));
 }
 
-TEST(Bvh, IncludersDecideOnHitsOfFlaggedTriangles) {
+TEST(Bvh, AnyHitFunctionDecidesOnFlaggedTriangles) {
   // cm_hit_accept rejects hits with a small barycentric coordinate of v1, so that rays reach the triangle behind.
   Mesh sheets = test::soup(0, 0.0F, 0);
   for (const float z : {1.0F, 2.0F}) sheets.append_triangle({-1.0F, -1.0F, z}, {0.0F, 2.0F, z}, {1.0F, -1.0F, z});
@@ -515,7 +515,7 @@ TEST(Bvh, IncludersDecideOnHitsOfFlaggedTriangles) {
   EXPECT_FALSE(rays.cm_bvh_occluded({0.0F, -0.9F, 0.0F}, z, 0.0F, 1.5F));
 }
 
-TEST(Bvh, OriginsLeaveTheirSurface) {
+TEST(Bvh, OffsetOriginsLeaveTheirSurface) {
   // A ray that starts at another ray's hit point does not hit the same flat mesh again.
   std::mt19937 engine(5);
   std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
@@ -549,7 +549,7 @@ TEST(Bvh, OriginsLeaveTheirSurface) {
 class BvhGl : public test::BackendTest {};
 CUMULET_ON_BACKENDS(BvhGl);
 
-TEST_P(BvhGl, ShadersHitWhatTheCpuHits) {
+TEST_P(BvhGl, ShadersMatchTheCpu) {
   const test::GlRays gl(*context_, "");
   for (const Mesh& mesh : {test::soup(20000, 0.05F, 31), test::terrain(60), test::slivers(2000, 33), test::icosphere(4),
                            test::soup(1, 1.0F, 35), Mesh()}) {
@@ -597,7 +597,7 @@ TEST_P(BvhGl, NoRaySlipsOutOfAClosedMesh) {
   }
 }
 
-TEST_P(BvhGl, IncludersDecideOnHitsOfFlaggedTriangles) {
+TEST_P(BvhGl, AnyHitFunctionDecidesOnFlaggedTriangles) {
   const test::GlRays gl(*context_, "return (triangle & 1u) == 1u && barycentrics.x > 0.3;");
   const Mesh mesh = test::soup(5000, 0.1F, 51);
   std::vector<std::uint32_t> flags(5000);

@@ -44,7 +44,7 @@ class CApi : public testing::Test {
   cumulet_viewer* viewer_ = nullptr;
 };
 
-TEST(CApiCreate, SaysWhatIsMissing) {
+TEST(CApiCreate, ErrorsNameMissingFunctions) {
   char message[200] = "unchanged";
   cumulet_viewer* viewer = reinterpret_cast<cumulet_viewer*>(1);
   auto desc = make_desc<cumulet_create_desc>();
@@ -95,7 +95,7 @@ TEST_F(CApi, EveryStatusHasAText) {
   }
 }
 
-TEST_F(CApi, RampsAreRefusedInOneLine) {
+TEST_F(CApi, InvalidRampsGiveAOneLineError) {
   using Points = std::vector<float>;
   const auto set = [&](int ramp, const Points& points, std::size_t count) {
     cumulet_ramp which{};
@@ -190,7 +190,7 @@ TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   EXPECT_EQ(cumulet_read_linear(viewer_, pixels, 64), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(CApi, MissingFileNamesIt) {
+TEST_F(CApi, MissingFileErrorNamesTheFile) {
   EXPECT_EQ(cumulet_load_volume(viewer_, "no such cloud.vdb", nullptr), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_ERROR_FILE);
   EXPECT_NE(error().find("no such cloud.vdb"), std::string::npos);
@@ -213,7 +213,7 @@ TEST_F(CApi, MissingFileNamesIt) {
   EXPECT_NE(std::string(stats.gl_version), "");
 }
 
-TEST(CApiVersion, IsTheHeaders) { EXPECT_EQ(cumulet_version(), 200U); }
+TEST(CApiVersion, MatchesTheHeader) { EXPECT_EQ(cumulet_version(), 200U); }
 
 /// A triangle 2 wide and 2 high that moves 5 to the right in 2 seconds, and a camera, in one file.
 class CApiSurfaces : public CApi {
@@ -384,7 +384,7 @@ TEST_F(CApiSurfaces, EveryValidModelOfTheValidatorConverges) {
 }
 
 // One-sided materials are invisible from behind unless the viewer shows both sides. Path traced and rasterized.
-TEST_F(CApiSurfaces, DoubleSidedShowsBacksThatGlow) {
+TEST_F(CApiSurfaces, DoubleSidedShowsEmissiveBackFaces) {
   std::ifstream file(path_);
   std::string text(std::istreambuf_iterator<char>(file), {});
   const auto replace = [&text](const std::string& from, const std::string& to) {
@@ -420,7 +420,7 @@ TEST_F(CApiSurfaces, DoubleSidedShowsBacksThatGlow) {
   EXPECT_NE(error().find("double_sided is not 0 or 1"), std::string::npos);
 }
 
-TEST_F(CApiSurfaces, SurfacesDoNotHideThatTheVolumeFailed) {
+TEST_F(CApiSurfaces, VolumeFailureIsReportedDespiteSurfaces) {
   ASSERT_EQ(cumulet_load_volume(viewer_, "no such cloud.vdb", nullptr), CUMULET_OK);
   ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_ERROR_FILE);
@@ -432,7 +432,7 @@ TEST_F(CApiSurfaces, SurfacesDoNotHideThatTheVolumeFailed) {
   EXPECT_EQ(progress.surfaces_status, CUMULET_OK);
 }
 
-TEST_F(CApiSurfaces, ABadFileLosesNothing) {
+TEST_F(CApiSurfaces, InvalidFileKeepsTheScene) {
   ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
   ASSERT_EQ(cumulet_load_surfaces(viewer_, (path_ + ".none").c_str()), CUMULET_OK);
@@ -484,7 +484,7 @@ cumulet_status make_triangles(const std::vector<cumulet_mesh_desc>& meshes, cumu
   return status;
 }
 
-TEST_F(CApiSurfaces, VariantsAreTold) {
+TEST_F(CApiSurfaces, VariantsAreListed) {
   const std::string text = R"({"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_materials_variants"],
       "extensions": {"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}}})";
   cumulet_surfaces* surfaces = nullptr;
@@ -499,7 +499,7 @@ TEST_F(CApiSurfaces, VariantsAreTold) {
   cumulet_surfaces_release(surfaces);
 }
 
-TEST_F(CApiSurfaces, HandlesOpenFilesAndTellOfThem) {
+TEST_F(CApiSurfaces, HandlesOpenFilesAndDescribeThem) {
   char error[512] = "";
   cumulet_surfaces* surfaces = nullptr;
   ASSERT_EQ(cumulet_surfaces_open(path_.c_str(), &surfaces, error, sizeof error), CUMULET_OK) << error;
@@ -533,7 +533,7 @@ TEST_F(CApiSurfaces, HandlesOpenFilesAndTellOfThem) {
   EXPECT_EQ(cumulet_surfaces_open(path_.c_str(), nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(CApiSurfaces, AFileInMemoryFindsOthersInItsFolderAlone) {
+TEST_F(CApiSurfaces, FileInMemoryReadsOnlyFromItsFolder) {
   std::ifstream file(path_, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
   const std::string folder = folder_.path().string();
@@ -586,7 +586,7 @@ TEST_F(CApiSurfaces, ABinaryFileInMemoryNeedsNoFolder) {
   cumulet_surfaces_release(surfaces);
 }
 
-TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
+TEST_F(CApiSurfaces, HostTrianglesAreVisible) {
   const Square square;
   cumulet_mesh_desc left = square.mesh(-1.0, 1.0);  // red, indexed, with normals
   left.normals = square.normals;
@@ -652,7 +652,7 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreSeenWhereAndAsTheyAre) {
 }
 
 // base_color under a white sky: the image's channels are ordered as those of the color.
-TEST_F(CApiSurfaces, TrianglesOfAHostAreLit) {
+TEST_F(CApiSurfaces, HostTrianglesAreLit) {
   const Square square;
   cumulet_mesh_desc mesh = square.mesh(0.0, 0.0);
   mesh.base_color[0] = 0.8F;
@@ -681,7 +681,7 @@ TEST_F(CApiSurfaces, TrianglesOfAHostAreLit) {
   EXPECT_NEAR(mean[0], mean[2] + 0.8 * (1.0 - mean[2]), 0.05);
 }
 
-TEST_F(CApiSurfaces, BadTrianglesAreRefusedInOneLine) {
+TEST_F(CApiSurfaces, InvalidTrianglesGiveAOneLineError) {
   const Square square;
   const cumulet_mesh_desc good = square.mesh(0.0, 0.0);
   std::string message;
@@ -809,7 +809,7 @@ TEST_F(CApiSurfaces, WithoutTrianglesThePictureConvergesAndIsEmpty) {
 }
 
 // An array of an older header's struct, which ended before `emission`.
-TEST_F(CApiSurfaces, ShorterMeshesAreReadByTheirOwnSize) {
+TEST_F(CApiSurfaces, OlderMeshStructSizesAreAccepted) {
   struct Older {
     alignas(cumulet_mesh_desc) unsigned char bytes[offsetof(cumulet_mesh_desc, emission) / 8 * 8];
   };
@@ -865,7 +865,7 @@ TEST_F(CApiSurfaces, TwoViewersShareAHandleThatOutlivesThem) {
   EXPECT_EQ(cumulet_get_surfaces(viewer_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(CApiSurfaces, AMomentThatIsSetMeanwhileIsTheOneThatIsShown) {
+TEST_F(CApiSurfaces, TimeSetDuringLoadingIsUsed) {
   cumulet_surfaces* surfaces = nullptr;
   ASSERT_EQ(cumulet_surfaces_open(path_.c_str(), &surfaces, nullptr, 0), CUMULET_OK);
   auto settings = make_desc<cumulet_surface_settings_desc>();

@@ -35,7 +35,7 @@ InstanceRef make_instance(cumulet_volume* volume, const std::array<double, 16>& 
   return cumulet::test::make_instance(desc);
 }
 
-class CInstance : public testing::Test {
+class CVolumeInstance : public testing::Test {
  protected:
   [[nodiscard]] ViewerPtr make() { return make_viewer({.get_proc = FakeGl::get_proc, .user = &fake_, .samples = 1}); }
   Picture picture(cumulet_viewer* of) {
@@ -51,7 +51,7 @@ class CInstance : public testing::Test {
   VolumeRef small_ = make_ball(10, 4.0F);
 };
 
-TEST_F(CInstance, IsRefusedInOneLine) {
+TEST_F(CVolumeInstance, InvalidInputGivesAOneLineError) {
   const auto refused = [&](const auto& change, const char* cause) {
     auto desc = make_desc<cumulet_instance_desc>();
     desc.volume = ball_.get();
@@ -94,7 +94,7 @@ TEST_F(CInstance, IsRefusedInOneLine) {
   EXPECT_STREQ(cumulet_last_error(shows.get()), "the viewer shows the instance already");
 }
 
-TEST_F(CInstance, IsSeenByAllItsViewersAsItChanges) {
+TEST_F(CVolumeInstance, ChangesAppearInAllItsViewers) {
   const ViewerPtr first = make();
   const ViewerPtr second = make();
   ASSERT_EQ(cumulet_set_volume(first.get(), ball_.get()), CUMULET_OK);
@@ -125,7 +125,7 @@ TEST_F(CInstance, IsSeenByAllItsViewersAsItChanges) {
 }
 
 // With several volumes only the instance table is uploaded again.
-TEST_F(CInstance, MovesWithoutItsGrid) {
+TEST_F(CVolumeInstance, MovingDoesNotRebuildTheGrid) {
   const ViewerPtr shows = make();
   ASSERT_EQ(cumulet_set_volume(shows.get(), ball_.get()), CUMULET_OK);
   const InstanceRef one = make_instance(small_.get(), at(6.0, 0.0, 0.0));
@@ -148,7 +148,7 @@ TEST_F(CInstance, MovesWithoutItsGrid) {
   EXPECT_GT(stats.cell_bytes, 100'000U);
 }
 
-TEST_F(CInstance, BlursAsItMovesUntilItStands) {
+TEST_F(CVolumeInstance, MotionBlurEndsWithTheMotion) {
   const ViewerPtr shows = make();
   const InstanceRef one = make_instance(ball_.get());
   ASSERT_EQ(cumulet_add_instance(shows.get(), one.get()), CUMULET_OK);
@@ -170,7 +170,7 @@ TEST_F(CInstance, BlursAsItMovesUntilItStands) {
   EXPECT_EQ(difference(picture(shows.get()), sharp), "");
 }
 
-TEST_F(CInstance, AVolumesPlacesMoveTillTheyAreSet) {
+TEST_F(CVolumeInstance, VolumeTransformsMoveUntilSetAgain) {
   const ViewerPtr shows = make();
   ASSERT_EQ(cumulet_set_volume(shows.get(), ball_.get()), CUMULET_OK);
   auto sampling = make_desc<cumulet_sampling_desc>();
@@ -189,7 +189,7 @@ TEST_F(CInstance, AVolumesPlacesMoveTillTheyAreSet) {
 }
 
 // Images are bit-identical: nothing remains of earlier transforms.
-TEST_F(CInstance, AreWhereTheyAreHoweverTheyCame) {
+TEST_F(CVolumeInstance, ImageDoesNotDependOnEarlierTransforms) {
   const InstanceRef one = make_instance(small_.get());
   const InstanceRef other = make_instance(ball_.get());
   const auto make_with_both = [&] {
@@ -207,7 +207,7 @@ TEST_F(CInstance, AreWhereTheyAreHoweverTheyCame) {
   }
 }
 
-TEST_F(CInstance, ChangesInAnyThread) {
+TEST_F(CVolumeInstance, MayBeChangedFromAnyThread) {
   const ViewerPtr shows = make();
   ASSERT_EQ(cumulet_set_volume(shows.get(), ball_.get()), CUMULET_OK);
   std::vector<InstanceRef> instances;

@@ -99,7 +99,7 @@ double mean_of(const Picture& picture) {
   return std::accumulate(picture.begin(), picture.end(), 0.0) / static_cast<double>(picture.size());
 }
 
-class CModel : public testing::Test {
+class CModelInstance : public testing::Test {
  protected:
   [[nodiscard]] ViewerPtr make(std::uint32_t samples = 1) {
     return make_viewer({.get_proc = FakeGl::get_proc, .user = &fake_, .samples = samples});
@@ -121,7 +121,7 @@ class CModel : public testing::Test {
   SurfacesRef box_ = surfaces_of({at(0, 0, 0)});
 };
 
-TEST_F(CModel, IsRefusedInOneLine) {
+TEST_F(CModelInstance, InvalidInputGivesAOneLineError) {
   const auto refused = [&](const auto& change, const char* cause) {
     auto desc = make_desc<cumulet_model_desc>();
     desc.surfaces = box_.get();
@@ -158,7 +158,7 @@ TEST_F(CModel, IsRefusedInOneLine) {
   EXPECT_STREQ(cumulet_last_error(shows.get()), "the viewer shows the model already");
 }
 
-TEST_F(CModel, IsSeenByAllItsViewersAsItChanges) {
+TEST_F(CModelInstance, ChangesAppearInAllItsViewers) {
   const ViewerPtr first = make();
   const ViewerPtr second = make();
   ASSERT_EQ(cumulet_set_surfaces(first.get(), box_.get()), CUMULET_OK);
@@ -191,7 +191,7 @@ TEST_F(CModel, IsSeenByAllItsViewersAsItChanges) {
 }
 
 // Two instances of one mesh look like two meshes: sheared, stretched and mirrored, lit by sun, sky and each other.
-TEST_F(CModel, AreWhatOneOfBothWouldBe) {
+TEST_F(CModelInstance, TwoInstancesMatchOneMergedMesh) {
   for (const float emission : {0.0F, 0.7F}) {
     const SurfacesRef one = surfaces_of({at(0, 0, 0)}, Box(), emission);
     const SurfacesRef both = surfaces_of({at(-4, 0, 0), askew}, Box(), emission);
@@ -211,7 +211,7 @@ TEST_F(CModel, AreWhatOneOfBothWouldBe) {
   }
 }
 
-TEST_F(CModel, MovesWithoutItsTriangles) {
+TEST_F(CModelInstance, MovingDoesNotReuploadTriangles) {
   const SurfacesRef many = surfaces_of({at(0, 0, 0)}, Box(20000));
   const ViewerPtr shows = make();
   std::vector<ModelRef> models;
@@ -239,7 +239,7 @@ TEST_F(CModel, MovesWithoutItsTriangles) {
   EXPECT_LT(uploads(), of_a_medium + 4096);
 }
 
-TEST_F(CModel, AThousandTakeTheMemoryOfOne) {
+TEST_F(CModelInstance, ThousandInstancesUseTheMemoryOfOne) {
   const SurfacesRef many = surfaces_of({at(0, 0, 0)}, Box(20000));
   const ViewerPtr shows = make();
   const auto bytes = [&] {
@@ -260,7 +260,7 @@ TEST_F(CModel, AThousandTakeTheMemoryOfOne) {
   EXPECT_GT(of_one, 4'000'000U);
 }
 
-TEST_F(CModel, IsPickedByItsTag) {
+TEST_F(CModelInstance, PickReturnsItsTag) {
   const SurfacesRef two = surfaces_of({at(0, 0, 0), at(0, 100, 0)});
   const ViewerPtr shows = make();
   const ModelRef here = make_model(two.get(), {}, false, 77);
@@ -294,7 +294,7 @@ TEST_F(CModel, IsPickedByItsTag) {
   EXPECT_NEAR(second.normal[2], 1.0, 1e-6);
 }
 
-TEST_F(CModel, OfShadowsAloneIsNotSeenButShades) {
+TEST_F(CModelInstance, ShadowOnlyModelIsInvisibleButCastsShadows) {
   const ViewerPtr shows = make(64);
   const Matrix floor{4, 0, 0, 0, 0, 0.1, 0, 0, 0, 0, 4, 0, 0, -4, 0, 1};
   const ModelRef ground = make_model(box_.get(), floor, false, 1);
@@ -322,7 +322,7 @@ TEST_F(CModel, OfShadowsAloneIsNotSeenButShades) {
 }
 
 // Rasterized previews show models where the path tracer does. The image is only the rasterized layers.
-TEST_F(CModel, AreDrawnWherePathsMeetThem) {
+TEST_F(CModelInstance, RasterizationMatchesPathTracing) {
   const SurfacesRef own = surfaces_of({at(0, 0, 0)}, Box(), 1.0F);
   const auto silhouette = [&](cumulet_surface_light light) {
     const ViewerPtr shows = make(16);
@@ -343,7 +343,7 @@ TEST_F(CModel, AreDrawnWherePathsMeetThem) {
   EXPECT_NEAR(mean_of(drawn), mean_of(traced), 2.0);
 }
 
-TEST_F(CModel, ChangesInAnyThread) {
+TEST_F(CModelInstance, MayBeChangedFromAnyThread) {
   const SurfacesRef other = surfaces_of({at(0, 1, 0)});
   const ViewerPtr shows = make();
   std::vector<ModelRef> models;

@@ -155,7 +155,7 @@ TEST(Camera, FrameIsSymmetricWithTheAxisOfLengthOne) {
   }
 }
 
-TEST(Camera, DepthIsTheHeadersFormula) {
+TEST(Camera, DepthMatchesTheFormulaInTheHeader) {
   const double n = 0.5;
   const double f = 80.0;
   const double z = 7.0;
@@ -175,7 +175,7 @@ TEST(Camera, DepthIsTheHeadersFormula) {
   }
 }
 
-TEST(Camera, ANearPlaneBeyondEverythingBreaksNothing) {
+TEST(Camera, NearPlaneBeyondTheSceneIsHandled) {
   for (const double height : {0.0, 4.0}) {
     CameraPose pose = pose_at({0, 0, 0.01});
     pose.orthographic_height = height;
@@ -235,7 +235,7 @@ std::vector<HostProjection> host_projections() {
   };
 }
 
-TEST(CameraMatrices, OfHostsComeBackAndGiveTheirRaysAndDepths) {
+TEST(CameraMatrices, HostMatricesRoundTripWithTheirRaysAndDepths) {
   Random random;
   const dmat4 view = glm::lookAt(dvec3(3, 4, 5), dvec3(0.5, 0, 0), dvec3(0, 1, 0));
   for (const HostProjection& host : host_projections()) {
@@ -253,7 +253,7 @@ TEST(CameraMatrices, OfHostsComeBackAndGiveTheirRaysAndDepths) {
   }
 }
 
-TEST(CameraMatrices, OfAnyPoseAreAcceptedAndSeeTheSame) {
+TEST(CameraMatrices, MatricesOfAnyPoseAreAcceptedAndShowTheSameView) {
   Random random;
   for (int i = 0; i < 100; ++i) {
     CameraPose pose = random_pose(random);
@@ -284,7 +284,7 @@ TEST(CameraMatrices, OfAnyPoseAreAcceptedAndSeeTheSame) {
   }
 }
 
-TEST(CameraMatrices, NearestPoseKeepsPlanesMiddleAndLevel) {
+TEST(CameraMatrices, NearestPoseKeepsPlanesCenterAndLevelHorizon) {
   Camera camera(pose_at({0, 0, 10}, {0, 1, 0}));
   // Single precision, off axis: when an operation switches to a pose, the point in the image's center stays there.
   const glm::mat4 view = glm::lookAt(glm::vec3(6, 5, 4), glm::vec3(0, 1, 0), glm::vec3(0, 1, 0));
@@ -316,7 +316,7 @@ TEST(CameraMatrices, NearestPoseKeepsPlanesMiddleAndLevel) {
   expect_near(camera.pose().up, leaning.up, 1e-5);
 }
 
-TEST(CameraMatrices, KeepTheTargetInMindWhileTheHostLooksAround) {
+TEST(CameraMatrices, TargetIsKeptWhileTheHostRotatesTheView) {
   Camera camera(pose_at({0, 0, 10}, {0, 0, 1}));
   const dmat4 projection = glm::infinitePerspective(0.8, 1.4, 0.3);
   const dvec3 target(0, 0, 1);
@@ -332,7 +332,7 @@ TEST(CameraMatrices, KeepTheTargetInMindWhileTheHostLooksAround) {
   expect_near(camera.pose().target, {0, 0, 1}, 1e-9);
 }
 
-TEST(CameraMatrices, BeforeAnyBoundsTakeTheirTargetFromTheFirst) {
+TEST(CameraMatrices, TargetComesFromTheFirstBoundsAfterSetMatrices) {
   Camera camera;
   const dmat4 view = glm::lookAt(dvec3(0, 0, 50), dvec3(0), dvec3(0, 1, 0));
   camera.set_matrices(view, glm::infinitePerspective(0.8, 1.4, 0.3), ClipDepth::negative_one_to_one);
@@ -359,7 +359,7 @@ std::string refusal(const dmat4& view, const dmat4& projection) {
   return why;
 }
 
-TEST(CameraMatrices, RefuseWhatIsNoViewOrNoProjection) {
+TEST(CameraMatrices, InvalidViewOrProjectionIsRejected) {
   const dmat4 view = glm::lookAt(dvec3(3, 4, 5), dvec3(0), dvec3(0, 1, 0));
   const dmat4 projection = glm::perspective(0.8, 1.4, 0.1, 50.0);
   const auto with = [](dmat4 m, int column, int row, double value) {
@@ -433,7 +433,7 @@ std::array<double, 4> margins(const Camera& camera, const Bounds& box, double as
   return {(least.x + 1.0) * side.x, (1.0 - most.x) * side.x, (least.y + 1.0) * side.y, (1.0 - most.y) * side.y};
 }
 
-TEST(CameraFit, LeavesTheSameMarginOnBothOfTheTighterSides) {
+TEST(CameraFit, MarginsAreEqualOnTheTighterAxis) {
   Random random;
   for (int i = 0; i < 200; ++i) {
     const dvec3 corner = random.vector(100.0);
@@ -460,7 +460,7 @@ TEST(CameraFit, LeavesTheSameMarginOnBothOfTheTighterSides) {
   }
 }
 
-TEST(CameraFit, IsOfWhatIsSeen) {
+TEST(CameraFit, UsesVisibleContentNotTheBoundingBox) {
   // A ball in a larger box. `reach` is the ball's support function.
   const dvec3 centre(3, -2, 5);
   const double radius = 2.0;
@@ -497,7 +497,7 @@ TEST(CameraFit, IsOfWhatIsSeen) {
   }
 }
 
-TEST(CameraShutter, HasTheCamerasOwnPlanesAndLens) {
+TEST(CameraShutter, ShutterPosesUseTheCamerasClipPlanesAndLens) {
   CameraPose pose = pose_at({0.0, 2.0, 9.0});
   pose.orthographic_height = 6.0;
   pose.near_plane = 2.0;
@@ -522,7 +522,7 @@ TEST(CameraShutter, HasTheCamerasOwnPlanesAndLens) {
   EXPECT_EQ(ends->open, there.view(1.0, std::nullopt));
 }
 
-TEST(CameraShutter, IsKeptWhereTheCameraFitsTheScene) {
+TEST(CameraShutter, ShutterPosesSurviveFittingTheCamera) {
   Camera camera;
   const CameraPose aside = pose_at({5.0, 0.0, 9.0});
   camera.set_shutter(std::nullopt, aside);
@@ -533,7 +533,7 @@ TEST(CameraShutter, IsKeptWhereTheCameraFitsTheScene) {
   EXPECT_FALSE(camera.ends(1.0, camera.view(1.0, subject)));
 }
 
-TEST(CameraFit, IsForGoodAndCountsAsAChange) {
+TEST(CameraFit, FitIsPermanentAndIncrementsTheRevision) {
   const Bounds box{dvec3(-1), dvec3(2)};
   Camera camera;
   const ViewFrame waiting = camera.view(1.0, std::nullopt);
@@ -550,7 +550,7 @@ TEST(CameraFit, IsForGoodAndCountsAsAChange) {
   EXPECT_NEAR(widest(camera, box, 1.0), 0.88, 1e-9);
 }
 
-TEST(CameraFit, WaitingCamerasStayUntilThereIsSomethingToTurnAbout) {
+TEST(CameraFit, NavigationHasNoEffectBeforeThereAreBounds) {
   Camera camera;
   camera.orbit(1.0, 0.5);
   camera.look(1.0, 0.5);
@@ -572,7 +572,7 @@ TEST(CameraFit, WaitingCamerasStayUntilThereIsSomethingToTurnAbout) {
   EXPECT_NEAR(widest(framed, box, 1.0), 1.0, 1e-9);
 }
 
-TEST(CameraFrame, FillsThePictureFromTheDirectionItHad) {
+TEST(CameraFrame, FrameAllKeepsTheViewDirection) {
   Random random;
   for (int i = 0; i < 200; ++i) {
     CameraPose pose = random_pose(random);
@@ -637,7 +637,7 @@ TEST(CameraOperations, OrbitCirclesTheTargetAboutUp) {
   EXPECT_EQ(other.pose().up, z_up.up);
 }
 
-TEST(CameraOperations, OrbitStopsShortOfThePolesAndDoesNotJitter) {
+TEST(CameraOperations, OrbitStopsBeforeThePolesWithoutJitter) {
   for (const double side : {1.0, -1.0}) {
     Camera camera(pose_at({1000, 0, 1010}, {1000, 0, 1000}));
     camera.orbit(0.3, 0.0);
@@ -665,7 +665,7 @@ TEST(CameraOperations, OrbitStopsShortOfThePolesAndDoesNotJitter) {
   EXPECT_NEAR(elevation(down.pose()), pi / 2 - 0.3, 1e-9);
 }
 
-TEST(CameraOperations, OrbitAddsUp) {
+TEST(CameraOperations, OrbitStepsAddUp) {
   Camera once(pose_at({3, 4, 10}, {1, 0, 0}));
   Camera often(once.pose());
   once.orbit(2.0, 0.4);
@@ -686,7 +686,7 @@ TEST(CameraOperations, LookTurnsAboutTheEye) {
   EXPECT_NEAR(distance(camera.pose()), 10.0, 1e-9);
 }
 
-TEST(CameraOperations, RollTurnsThePictureAndNothingElse) {
+TEST(CameraOperations, RollRotatesOnlyTheImage) {
   Random random;
   for (int i = 0; i < 20; ++i) {
     const CameraPose pose = i == 0 ? pose_at({0, 10, 0}) : random_pose(random);  // the first looks along up
@@ -706,7 +706,7 @@ TEST(CameraOperations, RollTurnsThePictureAndNothingElse) {
   }
 }
 
-TEST(CameraOperations, PanMovesTheSceneByPartsOfThePicturesHeight) {
+TEST(CameraOperations, PanMovesTheSceneByFractionsOfTheImageHeight) {
   Random random;
   for (int i = 0; i < 50; ++i) {
     CameraPose pose = random_pose(random);
@@ -726,7 +726,7 @@ TEST(CameraOperations, PanMovesTheSceneByPartsOfThePicturesHeight) {
   }
 }
 
-TEST(CameraOperations, DollyMultipliesAndStaysSensible) {
+TEST(CameraOperations, DollyMultipliesTheDistanceWithinLimits) {
   CameraPose pose = pose_at({0, 0, 10});
   Camera camera(pose);
   camera.dolly(0.5);
@@ -774,7 +774,7 @@ TEST(CameraOperations, FlyMovesEyeAndTargetAlongTheCamerasAxes) {
   expect_near(camera.pose().target, {-3, 2, -1}, 1e-12);
 }
 
-TEST(CameraOperations, ThatWouldLoseTheCameraAreRefused) {
+TEST(CameraOperations, NonFiniteResultsAreRejected) {
   Camera camera(pose_at({0, 0, 10}));
   const std::function<void()> wild[] = {[&] { camera.fly(1e31, 0, 0); }, [&] { camera.fly(0, 0, 1e25); },
                                         [&] { camera.pan(NAN, 0); }, [&] { camera.pan(0, 1e300); },
@@ -786,7 +786,7 @@ TEST(CameraOperations, ThatWouldLoseTheCameraAreRefused) {
   EXPECT_EQ(camera.revision(), 1U);
 }
 
-TEST(CameraOperations, LookFromTheSides) {
+TEST(CameraOperations, LooksFromAxisViews) {
   struct Case {
     dvec3 up;
     AxisView side;
@@ -853,7 +853,7 @@ TEST(CameraOperations, OrthographicShowsTheSameAtTheTargetAndNeverCutsTheScene) 
   expect_near(dvec3(dvec2(project(flat, p, 1.3)), 0), dvec3(dvec2(there), 0), 1e-12);
 }
 
-TEST(CameraOperations, RevisionCountsWhatChangesAndNothingElse) {
+TEST(CameraOperations, RevisionCountsOnlyChanges) {
   Camera camera(pose_at({0, 0, 10}));
   camera.set(pose_at({0, 0, 10}));
   camera.orbit(0, 0);
@@ -875,7 +875,7 @@ TEST(CameraOperations, RevisionCountsWhatChangesAndNothingElse) {
   EXPECT_EQ(camera.revision(), 5U);
 }
 
-TEST(CameraOperations, ListenersHearOfEveryChangeAndNothingElse) {
+TEST(CameraOperations, ListenersAreNotifiedOnlyOfChanges) {
   auto camera = std::make_unique<Camera>();
   int heard = 0;
   int other = 0;
@@ -899,7 +899,7 @@ TEST(CameraOperations, ListenersHearOfEveryChangeAndNothingElse) {
   second.reset();
 }
 
-TEST(CameraOperations, FromManyThreadsAllCount) {
+TEST(CameraOperations, ConcurrentOperationsAllCount) {
   Camera camera(pose_at({0, 0, 10}));
   {
     std::vector<std::jthread> threads;
@@ -1069,7 +1069,7 @@ TEST(CameraAbi, RefusesNullsAndBadNumbers) {
   EXPECT_EQ(desc.eye[2], 10.0);
 }
 
-TEST(CameraAbi, OperatesAsTheCameraDoes) {
+TEST(CameraAbi, CFunctionsMatchTheCamera) {
   const Handle handle = make_camera(camera_desc({0, 0, 10}));
   cumulet_camera* const camera = handle.get();
   Camera same(pose_at({0, 0, 10}));
@@ -1173,7 +1173,7 @@ Motion motion_of(NavigationStyle style, bool fly, int button, std::uint32_t modi
   return target ? Motion::look : Motion::none;
 }
 
-TEST(Navigation, ButtonsMeanWhatEachStyleSays) {
+TEST(Navigation, ButtonsFollowTheNavigationStyle) {
   for (const auto style : {NavigationStyle::simple, NavigationStyle::blender, NavigationStyle::maya}) {
     for (const int button : {CUMULET_BUTTON_LEFT, CUMULET_BUTTON_MIDDLE, CUMULET_BUTTON_RIGHT}) {
       for (std::uint32_t modifiers = 0; modifiers < 8; ++modifiers) {
@@ -1199,7 +1199,7 @@ TEST(Navigation, ButtonsMeanWhatEachStyleSays) {
   }
 }
 
-TEST(Navigation, DragsTurnTheSceneWithThePointer) {
+TEST(Navigation, DragsRotateTheSceneWithThePointer) {
   Session session;
   session.down(CUMULET_BUTTON_LEFT, 100, 200);
   session.move(300, 200);  // right by half the height: the scene's front goes right, the eye left
@@ -1230,7 +1230,7 @@ TEST(Navigation, DragsTurnTheSceneWithThePointer) {
   EXPECT_EQ(fly.eye(), dvec3(0, 0, 10));
 }
 
-TEST(Navigation, PanHoldsThePointUnderThePointer) {
+TEST(Navigation, PanKeepsThePointUnderThePointer) {
   for (const double orthographic_height : {0.0, 3.0}) {
     Session session;
     CameraPose pose = pose_at({3, 4, 10}, {1, 0, 0});
@@ -1249,7 +1249,7 @@ TEST(Navigation, PanHoldsThePointUnderThePointer) {
   }
 }
 
-TEST(Navigation, ADragLastsUntilItsOwnButtonIsUp) {
+TEST(Navigation, DragEndsWhenItsButtonIsReleased) {
   Session session;
   EXPECT_FALSE(session.move(10, 10));
   EXPECT_FALSE(session.up(CUMULET_BUTTON_LEFT, 10, 10));
@@ -1278,7 +1278,7 @@ TEST(Navigation, ADragLastsUntilItsOwnButtonIsUp) {
   EXPECT_EQ(maya.eye(), eye);
 }
 
-TEST(Navigation, FocusLostLetsGoOfEverything) {
+TEST(Navigation, FocusLossReleasesButtonsAndKeys) {
   Session session(NavigationStyle::simple, true);
   EXPECT_FALSE(session.lose_focus());
   session.press('W', shift);
@@ -1293,7 +1293,7 @@ TEST(Navigation, FocusLostLetsGoOfEverything) {
   EXPECT_EQ(session.camera.revision(), 1U);
 }
 
-TEST(Navigation, OtherHabitsEndWhatIsUnderWay) {
+TEST(Navigation, ChangingTheStyleEndsTheCurrentDrag) {
   Session session(NavigationStyle::simple, true);
   session.press('W');
   session.down(CUMULET_BUTTON_LEFT, 100, 100);
@@ -1308,7 +1308,7 @@ TEST(Navigation, OtherHabitsEndWhatIsUnderWay) {
   EXPECT_FALSE(session.move(120, 100));
 }
 
-TEST(Navigation, WheelStepsMayBeFractions) {
+TEST(Navigation, WheelStepsMayBeFractional) {
   Session session;
   EXPECT_TRUE(session.wheel(1.0));
   const double step = 10.0 / distance(session.camera.pose());
@@ -1346,7 +1346,7 @@ TEST(Navigation, SpeedScalesEveryMotion) {
   expect_near(half.eye(), whole.eye(), 1e-12);
 }
 
-TEST(Navigation, WithoutAPictureDragsMoveNothing) {
+TEST(Navigation, DragsWithoutAnImageSizeMoveNothing) {
   Session session;
   session.down(CUMULET_BUTTON_LEFT, 0, 0);
   const InputEvent move{InputEvent::Type::pointer_move, 50, 50, 0.0, 0, 0, 0};
@@ -1357,7 +1357,7 @@ TEST(Navigation, WithoutAPictureDragsMoveNothing) {
   EXPECT_NEAR(widest(session.camera, *session.bounds, 1.0), 0.88, 1e-9);
 }
 
-TEST(Navigation, KeysFrameAll) {
+TEST(Navigation, FrameAllKeysWork) {
   for (const auto style : {NavigationStyle::simple, NavigationStyle::blender, NavigationStyle::maya}) {
     for (const bool fly : {false, true}) {
       for (const int key :
@@ -1380,7 +1380,7 @@ TEST(Navigation, KeysFrameAll) {
   }
 }
 
-TEST(Navigation, ArrowsAndSignsServeTheKeyboardInEveryStyle) {
+TEST(Navigation, ArrowPlusAndMinusKeysWorkInEveryStyle) {
   for (const auto style : {NavigationStyle::simple, NavigationStyle::blender, NavigationStyle::maya}) {
     for (const bool fly : {false, true}) {
       Session session(style, fly);
@@ -1413,7 +1413,7 @@ TEST(Navigation, ArrowsAndSignsServeTheKeyboardInEveryStyle) {
   }
 }
 
-TEST(Navigation, KeypadIsBlenders) {
+TEST(Navigation, KeypadViewsMatchBlender) {
   const auto key = [](int digit) { return CUMULET_KEY_KEYPAD_0 + digit; };
   for (const auto style : {NavigationStyle::simple, NavigationStyle::maya}) {
     Session session(style);
@@ -1452,7 +1452,7 @@ TEST(Navigation, KeypadIsBlenders) {
   expect_near(session.eye(), {0, 0, 10}, 1e-2);
 }
 
-TEST(Navigation, FlightCoversTheSameWayAtAnyFrameRate) {
+TEST(Navigation, FlySpeedIsIndependentOfTheFrameRate) {
   dvec3 ends[3];
   const int frames[] = {1, 30, 1000};
   for (int i = 0; i < 3; ++i) {
@@ -1514,7 +1514,7 @@ TEST(Navigation, FlyKeysMoveAlongTheCamerasAxes) {
   expect_near(both.eye(), {0, 0, 0}, 1e-9);
 }
 
-TEST(Navigation, TurntableTurnsByTheClock) {
+TEST(Navigation, TurntableSpeedFollowsTheClock) {
   for (const int frames : {1, 25}) {
     Session session;
     NavigationSettings settings;

@@ -325,7 +325,7 @@ TEST_F(CancelImport, NanoVdbOfEveryCodec) {
   }
 }
 
-TEST_F(CancelImport, ADestroyedViewerTakesASmallPartOfItsLoad) {
+TEST_F(CancelImport, ADestroyedViewerCancelsItsLoadQuickly) {
   // Measured in CPU time of all threads and compared with a whole load of the same run, so that a busy machine does not
   // matter.
   const std::string file = write(openvdb::io::COMPRESS_ZIP, {grid_}).string();
@@ -417,7 +417,7 @@ TEST(Cancel, Poses) {
   EXPECT_THROW((void)scene->pose(0.0, 0, &progress), Error);
 }
 
-TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {
+TEST(VolumeAsset, CallersThatAreNotCancelledGetTheStatistics) {
   const viewer::VolumeAsset asset(large_volume());
   double seconds = 0.0;
   expect_cancels([&](Progress& progress) {
@@ -446,7 +446,7 @@ TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {
   EXPECT_EQ(seconds, 0.0);
 }
 
-TEST(VolumeAsset, CallersWaitForOneAnotherUnlessCancelled) {
+TEST(VolumeAsset, CallersWaitForEachOtherUnlessCancelled) {
   const viewer::VolumeAsset asset(large_volume());
   Progress first;
   std::thread computing([&] {
@@ -466,7 +466,7 @@ TEST(VolumeAsset, CallersWaitForOneAnotherUnlessCancelled) {
   computing.join();
 }
 
-TEST(VolumeAsset, TheFirstOfTwoIsCancelledAndTheSecondComputes) {
+TEST(VolumeAsset, SecondCallerComputesIfTheFirstIsCancelled) {
   const viewer::VolumeAsset asset(large_volume());
   Progress first;
   std::thread computing([&] {

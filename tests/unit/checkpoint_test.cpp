@@ -16,9 +16,9 @@ namespace {
 
 using namespace cumulet::demo;
 
-class Kept : public ::testing::Test {
+class CheckpointFile : public ::testing::Test {
  protected:
-  Kept() {
+  CheckpointFile() {
     options_.scene.volume = "cloud.vdb";
     // Arbitrary bytes, including line breaks and end markers.
     for (int i = 0; i < 1000; ++i) checkpoint_.accumulation.push_back(static_cast<std::byte>(i * 7 % 256));
@@ -43,7 +43,7 @@ class Kept : public ::testing::Test {
   Checkpoint checkpoint_;
 };
 
-TEST_F(Kept, IsReadAsItWasWritten) {
+TEST_F(CheckpointFile, RoundTrips) {
   EXPECT_FALSE(read_checkpoint(path(), checkpoint_.of)) << "none is no error";
   write_checkpoint(path(), checkpoint_);
   const auto read = read_checkpoint(path(), checkpoint_.of);
@@ -53,7 +53,7 @@ TEST_F(Kept, IsReadAsItWasWritten) {
   EXPECT_EQ(read->accumulation, checkpoint_.accumulation);
 }
 
-TEST_F(Kept, IsOfOnePictureAlone) {
+TEST_F(CheckpointFile, IsRejectedForAnotherImage) {
   write_checkpoint(path(), checkpoint_);
   EXPECT_EQ(refusal(), "");
   const auto differs = [&](auto change) {
@@ -76,7 +76,7 @@ TEST_F(Kept, IsOfOnePictureAlone) {
   EXPECT_EQ(differs([&] { options_.output = "elsewhere.exr"; }), "");
 }
 
-TEST_F(Kept, CutOffOrDamagedIsTold) {
+TEST_F(CheckpointFile, TruncatedOrDamagedFileIsReported) {
   write_checkpoint(path(), checkpoint_);
   const std::string whole = cumulet::image::read_file(path());
   const std::string damaged = "is no checkpoint of cumulet-render, or damaged: without it the picture begins anew";

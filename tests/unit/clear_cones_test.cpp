@@ -88,7 +88,7 @@ Found look(const grid::TetGrid& grid) {
   return found;
 }
 
-TEST(ClearCones, NoRayInThemMeetsAnything) {
+TEST(ClearCones, RaysInThemHitNothing) {
   for (const ivec3& size : {ivec3(60, 45, 50), ivec3(130, 90, 200), ivec3(9, 40, 7)}) {
     const volume::ScalarVolume volume = test::puffs(size, {-5, 3, 11});
     for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
@@ -106,7 +106,7 @@ TEST(ClearCones, NoRayInThemMeetsAnything) {
   }
 }
 
-TEST(ClearCones, NorOfAVolumeThatIsWide) {
+TEST(ClearCones, RaysInThemHitNothingInLargeVolumes) {
   grid::RefineSettings settings;
   settings.threshold = 0.1;
   const grid::TetGrid grid =
@@ -118,7 +118,7 @@ TEST(ClearCones, NorOfAVolumeThatIsWide) {
 }
 
 // From a cell outside of a ball, no ray that goes away from the ball's center reaches it.
-TEST(ClearCones, AreFoundAllAroundABall) {
+TEST(ClearCones, SurroundABall) {
   const float radius = 40.0F;
   const vec3 middle(50.0F);
   const volume::ScalarVolume volume = test::make_volume(ivec3(100), ivec3(0), [&](const ivec3& p) {
@@ -144,7 +144,7 @@ TEST(ClearCones, AreFoundAllAroundABall) {
 }
 
 // Cells without density may emit light. Cells without density at mid-shutter may have some before or after.
-TEST(ClearCones, WhatGlowsOrIsThereAtTimesIsMet) {
+TEST(ClearCones, ExcludeEmissionAndMovingContent) {
   const volume::ScalarVolume volume = test::puffs({60, 45, 50}, ivec3(0));
   grid::RefineSettings settings;
   settings.threshold = 0.05;
@@ -169,7 +169,7 @@ TEST(ClearCones, WhatGlowsOrIsThereAtTimesIsMet) {
   }
 }
 
-TEST(ClearCones, AreOfEmptyCellsAlone) {
+TEST(ClearCones, ExistOnlyForEmptyCells) {
   const grid::TetGrid full = grid_of(test::make_volume(ivec3(64), ivec3(0), [](const ivec3&) { return 1.0F; }), {});
   EXPECT_EQ(look(full).cones, 0U);
   EXPECT_GT(full.cells.size(), 0U);

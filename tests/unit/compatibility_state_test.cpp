@@ -139,7 +139,7 @@ class ImagingDriver : public testing::Test {
   Functions gl_;
 };
 
-TEST_F(ImagingDriver, IsSetAsACoreContextIsAndRestored) {
+TEST_F(ImagingDriver, LegacyStateIsSetLikeACoreContextAndRestored) {
   load();
   ASSERT_NE(gl_.compatibility, nullptr);
   const auto known = driver().values;
@@ -162,7 +162,7 @@ TEST_F(ImagingDriver, IsSetAsACoreContextIsAndRestored) {
   EXPECT_EQ(driver().matrix_mode, modelview);
 }
 
-TEST_F(ImagingDriver, NothingIsSetThatIsRightAlready) {
+TEST_F(ImagingDriver, StateThatIsCorrectIsNotSet) {
   load();
   CompatibilityState state(gl_, true);
   state.prepare_fragments();
@@ -173,7 +173,7 @@ TEST_F(ImagingDriver, NothingIsSetThatIsRightAlready) {
   EXPECT_EQ(driver().sets, 0);
 }
 
-TEST_F(ImagingDriver, WhereTheHostResetsAllIsSetAndNothingIsAsked) {
+TEST_F(ImagingDriver, WithHostResetsStateIsSetWithoutQueries) {
   load();
   driver().enabled = {steps.begin(), steps.end()};
   driver().enabled.insert({0x0BC0, 0x0B42});
@@ -199,7 +199,7 @@ TEST_F(ImagingDriver, MissingFunctionsAreNamed) {
   EXPECT_EQ(refusal(), "");
 }
 
-TEST_F(ImagingDriver, CoreAndForwardCompatibleContextsHaveNone) {
+TEST_F(ImagingDriver, CoreAndForwardCompatibleContextsHaveNoLegacyState) {
   driver().missing = "glPixelTransferf";
   driver().profile = GL_CONTEXT_CORE_PROFILE_BIT;
   EXPECT_EQ(refusal(), "");
@@ -217,7 +217,7 @@ TEST_F(ImagingDriver, CoreAndForwardCompatibleContextsHaveNone) {
   EXPECT_EQ(driver().sets, 0);
 }
 
-TEST_F(ImagingDriver, TheRenderModeIsNamed) {
+TEST_F(ImagingDriver, WrongRenderModeIsNamed) {
   load();
   gl::require_rendering(gl_);
   for (const auto& [mode, name] : {std::pair{0x1C02, "GL_SELECT"}, std::pair{0x1C01, "GL_FEEDBACK"}}) {

@@ -77,7 +77,7 @@ TEST(Display, CurvesRiseFromBlackToWhite) {
               0.5 * (2.51 * 0.5 + 0.03) / (0.5 * (2.43 * 0.5 + 0.59) + 0.14), 1e-6);
 }
 
-TEST(Display, WhatCannotBeShownIsBlackOrWhite) {
+TEST(Display, OutOfRangeValuesAreBlackOrWhite) {
   const float infinite = std::numeric_limits<float>::infinity();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (const std::uint32_t curve : {CM_TONE_MAP_NEUTRAL, CM_TONE_MAP_FILMIC, CM_TONE_MAP_CLIP}) {
@@ -87,7 +87,7 @@ TEST(Display, WhatCannotBeShownIsBlackOrWhite) {
   }
 }
 
-TEST(Display, BytesOfAReadback) {
+TEST(Display, ReadbackBytesMatchTheTarget) {
   const std::vector<float> linear{0.2F, 0.1F, 0.05F, 0.5F, 0.0F, 0.0F, 0.0F, 0.0F, 4.0F, 0.02F, 0.0F, 1.0F};
   const auto byte = [](float unit) { return static_cast<int>(std::lround(255.0F * unit)); };
   std::vector<std::uint8_t> bytes(linear.size());
@@ -393,7 +393,7 @@ TEST_P(Compositing, SizesFlipsRectanglesAndSamples) {
   }
 }
 
-TEST_P(Compositing, HolesTakeAfterTheirNeighbours) {
+TEST_P(Compositing, UnsampledPixelsAreFilledFromNeighbors) {
   for (const glm::ivec2 s : {glm::ivec2(40, 28), glm::ivec2(11, 9), glm::ivec2(1, 1)}) {
     Picture picture(gl_, s.x, s.y, false);
     picture.holes = true;
@@ -407,7 +407,7 @@ TEST_P(Compositing, HolesTakeAfterTheirNeighbours) {
   }
 }
 
-TEST_P(Compositing, AColourIsBehindAll) {
+TEST_P(Compositing, BackgroundColorIsBehindEverything) {
   Picture picture(gl_, 21, 13, false);
   for (const bool holes : {false, true}) {
     picture.holes = holes;
@@ -423,7 +423,7 @@ TEST_P(Compositing, AColourIsBehindAll) {
   }
 }
 
-TEST_P(Compositing, LegendsAreShownAsTheyAre) {
+TEST_P(Compositing, LegendsAreNotToneMapped) {
   const Picture picture(gl_, 21, 13, true);
   FrameTarget target;
   target.viewport = {7, 5, 21, 13};
@@ -438,7 +438,7 @@ TEST_P(Compositing, LegendsAreShownAsTheyAre) {
   }
 }
 
-TEST_P(Compositing, OtherDrawBuffersAreNotWritten) {
+TEST_P(Compositing, OnlyTheFirstDrawBufferIsWritten) {
   const Picture picture(gl_, 16, 16, false);
   const Target made = make_target(GL_RGBA32F, 0);
   const Object other = gl::make_texture_2d(gl_, GL_RGBA32F, size.x, size.y, "another");
@@ -461,7 +461,7 @@ TEST_P(Compositing, OtherDrawBuffersAreNotWritten) {
   EXPECT_LT(std::count(drawn.begin(), drawn.end(), before), size.x * size.y / 4);
 }
 
-TEST_P(Compositing, DepthIsWrittenByTheConvention) {
+TEST_P(Compositing, DepthFollowsTheConvention) {
   struct Convention {
     bool reversed, orthographic;
     double a, b;
@@ -544,7 +544,7 @@ TEST_P(Compositing, DepthOutsideItsRangeIsClamped) {
 }
 
 // The upper rows have no samples yet, more rows than neighbors can fill.
-TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
+TEST_P(Compositing, UnsampledPixelsShowThePreviousImage) {
   const auto flat = [&](int side, const glm::vec4& colour, int empty_rows) {
     Picture picture(gl_, side, side, false);
     picture.holes = true;
@@ -593,7 +593,7 @@ TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
 
 // Draws as many images as may be in flight, alternating between two displays. Each is drawn as requested, with programs
 // that are already compiled.
-TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
+TEST_P(Compositing, BackgroundChangesAreDrawnWhileTheGpuIsBusy) {
   gl::find_out_dispatches(gl_, *programs_);
   const Picture picture(gl_, 21, 13, false);
   const Target made = make_target(GL_RGBA32F, 0);
@@ -633,7 +633,7 @@ TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
 
 // Surface layers beneath the image have their own resolution and are enlarged after the display transform, each pixel
 // once.
-TEST_P(Compositing, SurfacesOfAnotherSizeAreEnlargedAsDisplayed) {
+TEST_P(Compositing, SurfacesAreUpscaledInDisplaySpace) {
   const glm::ivec2 coarse(9, 7);
   render::SurfaceLayers layers;
   layers.size = glm::uvec2(coarse);
@@ -695,7 +695,7 @@ TEST_P(Compositing, SurfacesOfAnotherSizeAreEnlargedAsDisplayed) {
   }
 }
 
-TEST_P(Compositing, NothingToDraw) {
+TEST_P(Compositing, EmptyImageDrawsTheBackground) {
   const Picture picture(gl_, 8, 8, false);
   const Target made = make_target(GL_RGBA8, 0);
   const std::vector<glm::vec4> untouched = read(made, GL_RGBA8, 0);
@@ -709,7 +709,7 @@ TEST_P(Compositing, NothingToDraw) {
   EXPECT_EQ(read(made, GL_RGBA8, 0), untouched);
 }
 
-TEST_P(Compositing, BadTargetsAreTold) {
+TEST_P(Compositing, InvalidTargetsAreReported) {
   const Picture picture(gl_, 8, 8, false);
   const Object incomplete = gl::make_framebuffer(gl_);
   FrameTarget target;

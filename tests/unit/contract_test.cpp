@@ -1,5 +1,5 @@
 // The embedding contract of docs/architecture.md, one test per point, using only cumulet.h and cumulet.hpp. Points that
-// need more than one test (all state, all allocations, threads, windows) are in robust_test.cpp and tests/embed.
+// need more than one test (all state, all allocations, threads, windows) are in robustness_test.cpp and tests/embed.
 #include <gtest/gtest.h>
 
 #include <sys/wait.h>
@@ -523,7 +523,7 @@ TEST_F(Contract, PassesAreTimedWithoutWaiting) {
   EXPECT_EQ(fake_.alive().count("Queries"), 0U) << "contexts do not share them";
 }
 
-TEST_F(Contract, FramesPassesAndJobsAreToldAsTheyEnd) {
+TEST_F(Contract, FramesPassesAndJobsAreReportedAtTheirEnd) {
   struct Told {
     std::mutex mutex;
     std::map<std::string, std::vector<std::pair<double, double>>> pieces;
@@ -580,7 +580,7 @@ TEST_F(Contract, Contract10FramebufferZeroIsNotAssumed) {
   gl_.DeleteFramebuffers(1, &empty);
 }
 
-TEST_F(Contract, Contract11ATextureOfTheViewersOwn) {
+TEST_F(Contract, Contract11ViewerOwnedTexture) {
   const Picture picture = picture_of(v_, volume_.get(), target_);
   for (const GLenum format : {GL_RGBA8, GL_RGBA16F, GL_RGBA32F}) {
     auto frame = target_.frame();
@@ -694,7 +694,7 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_TRANSMITTANCE, passes.data(), passes.size()), CUMULET_ERROR_DETACHED);
 }
 
-TEST_F(Contract, AnAccumulationGoesOnInAnotherViewer) {
+TEST_F(Contract, AccumulationContinuesInAnotherViewer) {
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.samples = 40;
   sampling.preview = CUMULET_PREVIEW_OFF;
@@ -825,7 +825,7 @@ TEST_F(Contract, Contract14PremultipliedAlphaAndDepthOut) {
   EXPECT_EQ(depths[0], 1.0F);
 }
 
-TEST_F(Contract, Contract15Colours) {
+TEST_F(Contract, Contract15Colors) {
   ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
   const auto draw = [&](cumulet_colour colour, GLenum format) {
     const HostTarget target(gl_, side, side, format);
@@ -882,8 +882,8 @@ TEST_F(Contract, Contract16SizesArePhysicalAndMayBeZero) {
   EXPECT_EQ(difference(target_.pixels(), picture), "");
 }
 
-// Coalescing and errors: UpdateCallback in robust_test.cpp.
-TEST_F(Contract, Contract17TheUpdateCallbackTellsOfWhatTheWorkerMade) {
+// Coalescing and errors: UpdateCallback in robustness_test.cpp.
+TEST_F(Contract, Contract17UpdateCallbackReportsFinishedJobs) {
   std::atomic<int> updates = 0;
   const ViewerPtr told =
       viewer({.update = [](void* user) { ++*static_cast<std::atomic<int>*>(user); }, .update_user = &updates});
@@ -899,7 +899,7 @@ TEST_F(Contract, Contract17TheUpdateCallbackTellsOfWhatTheWorkerMade) {
   EXPECT_LE(updates, 2);
 }
 
-TEST_F(Contract, Contract18ProgressiveWithinItsBudget) {
+TEST_F(Contract, Contract18ProgressiveWithinTheTimeBudget) {
   const HostTarget large(gl_, 512, 512);
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.samples = 100000;
@@ -934,7 +934,7 @@ TEST_F(Contract, Contract18ProgressiveWithinItsBudget) {
   EXPECT_EQ(stats.samples, samples);
 }
 
-TEST_F(Contract, Contract19FlagsTellWhatIsToCome) {
+TEST_F(Contract, Contract19FlagsReportPendingWork) {
   auto result = make_desc<cumulet_frame_result>();
   const auto frame = target_.frame();
   ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
@@ -997,7 +997,7 @@ TEST_F(Contract, Contract20AnyThreadAndLoadingIsAsynchronous) {
   EXPECT_EQ(cumulet_wait(v_, 0.0), CUMULET_ERROR_CANCELLED) << "how the last one ended";
 }
 
-TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
+TEST_F(Contract, Contract20bEnvironmentsLoadAsynchronously) {
   const cumulet::test::Folder folder;
   const auto write = [&](const char* name, std::uint32_t width, std::uint32_t height) {
     const std::string path = (folder / name).string();
@@ -1103,7 +1103,7 @@ TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
   EXPECT_EQ(result.flags & CUMULET_RENDER_FAILED, 0U);
 }
 
-TEST_F(Contract, EnvironmentsAreSeenAtAnotherSize) {
+TEST_F(Contract, EnvironmentPixelsAreReadAtAnySize) {
   const EnvironmentRef environment = cumulet::test::make_environment(64, 32);
   std::vector<float> rgb(std::size_t{3} * 8 * 4 + 1, -1.0F);
   const auto get = [&](std::uint32_t width, std::uint32_t height, std::uint64_t count) {
@@ -1190,8 +1190,8 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   EXPECT_EQ(std::ranges::count(told.threads, std::this_thread::get_id()), 0);
 }
 
-// Context loss at each call: ContextLossAt in robust_test.cpp.
-TEST_F(Contract, Contract21AContextGoesAndAnotherComes) {
+// Context loss at each call: ContextLossAt in robustness_test.cpp.
+TEST_F(Contract, Contract21ContextIsReplaced) {
   const Picture picture = picture_of(v_, volume_.get(), target_);
   for (const bool lost : {false, true}) {
     ASSERT_EQ(lost ? cumulet_context_lost(v_) : cumulet_detach(v_), CUMULET_OK);
@@ -1210,7 +1210,7 @@ TEST_F(Contract, Contract21AContextGoesAndAnotherComes) {
 }
 
 // Threads and share groups: tests/embed/two_threads.cpp.
-TEST_F(Contract, Contract22InstancesDoNotKnowOfEachOther) {
+TEST_F(Contract, Contract22ViewersAreIndependent) {
   const VolumeRef other = make_ball(12);
   const Picture alone = picture_of(v_, volume_.get(), target_);
   const ViewerPtr second = viewer({.samples = 2});
@@ -1405,7 +1405,7 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
   }
 }
 
-TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
+TEST_F(Contract, Contract26bFramesDoNotWaitForParallelCompilation) {
   const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   fake_.compile_in_parallel();
   const ViewerPtr own = viewer();
@@ -1476,7 +1476,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   warm_up(own.get(), frame);
 }
 
-TEST_F(Contract, Contract26cReadingBackWaitsForTheDriver) {
+TEST_F(Contract, Contract26cReadBackWaitsForCompilation) {
   const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   fake_.compile_in_parallel();
   fake_.finish_compiling(true);
@@ -1507,7 +1507,7 @@ TEST_F(Contract, Contract26cReadingBackWaitsForTheDriver) {
 }
 
 // On GPUs, the depth query of each call is still pending when the call returns.
-TEST_F(Contract, Contract26dAWarmUpWithTheHostsDepthEnds) {
+TEST_F(Contract, Contract26dWarmUpWithHostDepthEnds) {
   const HostTarget large(gl_, 2048, 2048);
   const ViewerPtr own = viewer();
   ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
@@ -1526,7 +1526,7 @@ TEST_F(Contract, Contract26dAWarmUpWithTheHostsDepthEnds) {
 
 // Checks that the warm-up proceeds under any budget, and that a program that does not build does not stop the others.
 // One test, because it builds all programs: a minute and gigabytes if the driver has not cached them.
-TEST_F(Contract, Contract26eAWarmUpOfAllEndsAndIsForEveryScene) {
+TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
   // The scenes below use only a few of the hundreds of kernels. The others take a driver many minutes, so they are
   // compiled only in the long tier.
   if (std::getenv("CUMULET_WHOLE_KERNELS") == nullptr) {
@@ -1610,7 +1610,7 @@ TEST_F(Contract, Contract26eAWarmUpOfAllEndsAndIsForEveryScene) {
   }
 }
 
-TEST_F(Contract, Contract26fAFrameThatCannotBeDrawnIsToldOnceAndNotBuiltEachTime) {
+TEST_F(Contract, Contract26fFailedProgramIsReportedOnceAndNotRebuilt) {
   const ViewerPtr own = viewer();
   const auto frame = target_.frame();
   auto none = frame;

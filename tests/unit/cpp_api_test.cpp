@@ -98,7 +98,7 @@ TEST(CppResult, TextIsCutToFit) {
   EXPECT_TRUE(Text<4>().empty());
 }
 
-TEST(CppDescs, BecomeTheirCounterparts) {
+TEST(CppDescs, ConvertToTheCStructs) {
   const cumulet_grid_desc grid = GridDesc{.march = March::brick,
                                           .cells = Cells::constant,
                                           .criterion = Criterion::range_mean,
@@ -261,7 +261,7 @@ TEST(CppDescs, BecomeTheirCounterparts) {
   EXPECT_STREQ(sparse.name, "b");
 }
 
-TEST(CppLibrary, TellsVersionAndStatus) {
+TEST(CppLibrary, ReportsVersionAndStatus) {
   EXPECT_EQ(version(), cumulet_version());
   EXPECT_STREQ(status_text(StatusCode::cancelled), cumulet_status_text(CUMULET_ERROR_CANCELLED));
 }
@@ -344,7 +344,7 @@ TEST(CppSequence, IsSharedByCopies) {
   EXPECT_FALSE(Sequence().set_time(0.0).has_value());
 }
 
-TEST(CppVolume, OfBricksAndTiles) {
+TEST(CppVolume, FromBricksAndTiles) {
   const std::array<std::int32_t, 3> origin{8, 0, 0};
   const std::vector<float> values(512, 2.0F);
   const std::vector<std::uint64_t> active(8, ~std::uint64_t{0});
@@ -534,7 +534,7 @@ TEST_F(CppViewer, ShowsAVolume) {
   EXPECT_NE(textured.depth_texture, 0U);
 }
 
-TEST_F(CppViewer, TellsWhyACallFailed) {
+TEST_F(CppViewer, ReportsWhyACallFailed) {
   const auto context_of_nothing = Viewer::create({.get_proc = [](const char*) -> void* { return nullptr; }});
   EXPECT_EQ(context_of_nothing.error().status, StatusCode::unsupported);
   EXPECT_FALSE(context_of_nothing.error().message.empty());
@@ -558,7 +558,7 @@ TEST_F(CppViewer, TellsWhyACallFailed) {
   viewer.cancel();
 }
 
-TEST_F(CppViewer, CallsBackWhereverItIsMoved) {
+TEST_F(CppViewer, CallbacksSurviveMoves) {
   std::atomic<int> updates = 0;
   std::vector<std::string> warnings;  // written while this thread is in wait()
   auto holder = std::make_unique<Viewer>(Viewer::create({.log =
@@ -577,7 +577,7 @@ TEST_F(CppViewer, CallsBackWhereverItIsMoved) {
   EXPECT_EQ(warnings.size(), 1U) << testing::PrintToString(warnings);
 }
 
-TEST_F(CppViewer, LoadsAVolumeWithTheDensityScaleThatSuitsIt) {
+TEST_F(CppViewer, LoadsAVolumeWithItsSuggestedDensityScale) {
   const BallFile file;
   const auto loaded = [&](double density_scale, bool suggested) {
     Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
@@ -633,7 +633,7 @@ TEST_F(CppViewer, LoadsAVolumeWithTheDensityScaleThatSuitsIt) {
 }
 
 // A worker thread may be in a callback while the viewer is replaced.
-TEST_F(CppViewer, OutlivesNoCallback) {
+TEST_F(CppViewer, NoCallbackAfterDestruction) {
   struct Captured {
     std::atomic<bool>& gone;
     ~Captured() { gone = true; }
@@ -657,7 +657,7 @@ TEST_F(CppViewer, OutlivesNoCallback) {
   EXPECT_FALSE(gone_in_log);
 }
 
-TEST_F(CppViewer, ComesAndGoesWithContexts) {
+TEST_F(CppViewer, AttachesAndDetachesContexts) {
   Viewer viewer = Viewer::create().value();  // detached
   EXPECT_EQ(viewer.render({.width = 8, .height = 8}).error().status, StatusCode::detached);
   viewer.set_volume(ball_volume()).value();
@@ -678,7 +678,7 @@ TEST_F(CppViewer, ComesAndGoesWithContexts) {
   EXPECT_EQ(viewer.attach({}).error().status, StatusCode::invalid_argument);
 }
 
-TEST_F(CppViewer, LooksThroughACamera) {
+TEST_F(CppViewer, UsesASharedCamera) {
   Viewer viewer = Viewer::create({.get_proc = get_proc(), .gl_state = GlState::host_resets}).value();
   viewer.set_volume(ball_volume()).value();
   Camera camera = Camera::create({.eye = {8, 8, 50}, .target = {8, 8, 8}}).value();
@@ -702,7 +702,7 @@ TEST_F(CppViewer, LooksThroughACamera) {
   EXPECT_NEAR(viewer.get_camera()->get()->target[0], 8.0, 1e-6);
 }
 
-TEST(CppSurfaces, AreAHostsTriangles) {
+TEST(CppSurfaces, FromHostTriangles) {
   const std::array<float, 9> positions = {0, 0, 0, 2, 0, 0, 0, 1, 0};
   const std::array<float, 9> normals = {0, 0, 1, 0, 0, 1, 0, 0, 1};
   const std::array<float, 12> colors = {1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1};
@@ -760,7 +760,7 @@ TEST(CppSurfaces, AreAHostsTriangles) {
   }
 }
 
-TEST(CppSurfaces, AreFilesAndBytes) {
+TEST(CppSurfaces, FromFilesAndMemory) {
   const std::string json = R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
     "buffers": [{"byteLength": 36, "uri": "corners.bin"}], "bufferViews": [{"buffer": 0, "byteLength": 36}],
@@ -890,7 +890,7 @@ TEST(CppLive, IsSharedByCopies) {
   EXPECT_FALSE(viewer.get_live_info());
 }
 
-TEST(CppLive, StatesAreHandedOver) {
+TEST(CppLive, StatesAreSubmitted) {
   const std::vector<float> values(8 * 8 * 8, 0.5F);
   const cumulet::DenseDesc dense{.values = values, .size = {8, 8, 8}};
   const std::array<cumulet::Field, 2> fields{cumulet::Field(cumulet::Channel::density, dense),

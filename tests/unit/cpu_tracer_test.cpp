@@ -64,7 +64,7 @@ double same_pixels(Twin& twin, const test::Picture& gpu) {
   return double(same) / double(gpu.pixels.size());
 }
 
-TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
+TEST_P(CpuTracer, VolumePathsMatchTheGpu) {
   const auto volume = test::noise_volume({40, 36, 30}, ivec3(0), 2);
   const auto viewer = make();
   show(*viewer, volume, 0.3);
@@ -88,7 +88,7 @@ TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
 }
 
 // Clear cones of empty cells end paths early. The result is bit-identical with fewer steps.
-TEST_P(CpuTracer, WhereNothingIsMetAnyMorePathsEndAndTheSameBitsStay) {
+TEST_P(CpuTracer, ClearConesEndPathsWithBitIdenticalImages) {
   const auto volume = test::puffs({40, 36, 30}, ivec3(0));
   const auto viewer = make();
   show(*viewer, volume, 9.0);
@@ -154,7 +154,7 @@ std::shared_ptr<StillScene> room_with_emitters() {
 }
 
 // About one ray in thirty million touched the bounds this way (a light in smoke), and its pixel became NaN.
-TEST(PassedLine, HasAShareWhereItOnlyTouchesTheBox) {
+TEST(LightPassingRay, RayThatOnlyTouchesTheBoxHasAFiniteWeight) {
   core::CpuTetPassing twin;
   twin.cm.space.to_cube_x = {1.0F, 0.0F, 0.0F};
   twin.cm.space.to_cube_y = {0.0F, 1.0F, 0.0F};
@@ -167,7 +167,7 @@ TEST(PassedLine, HasAShareWhereItOnlyTouchesTheBox) {
 }
 
 // The pdf must be finite: a probability of 0 times an infinite or NaN pdf would be NaN.
-TEST(GlowingBox, HasADensityFromAnywhere) {
+TEST(EmissiveBoxSampling, PdfIsDefinedFromAnywhere) {
   core::CpuTetSurfaces twin;
   core::CmSpace& space = twin.cm.space;
   space.to_cube_x = space.from_cube_x = vec3(1.0F, 0.0F, 0.0F);
@@ -225,7 +225,7 @@ class CpuTracerSurfaces : public CpuTracer {
 };
 CUMULET_ON_BACKENDS(CpuTracerSurfaces);
 
-TEST_P(CpuTracerSurfaces, PathsAmongTrianglesAreTheSame) {
+TEST_P(CpuTracerSurfaces, TrianglePathsMatchTheGpu) {
   const viewer::GridSettings settings = settings_of(March::tet);
   const grid::TetGrid grid = grid_of(volume_, settings);
   core::CpuTetSurfaces twin;
@@ -233,7 +233,7 @@ TEST_P(CpuTracerSurfaces, PathsAmongTrianglesAreTheSame) {
   expect_same(twin, room(), settings);
 }
 
-TEST_P(CpuTracerSurfaces, PathsAmongEmittersAreTheSame) {
+TEST_P(CpuTracerSurfaces, EmitterPathsMatchTheGpu) {
   const viewer::GridSettings tet = settings_of(March::tet);
   const grid::TetGrid grid = grid_of(volume_, tet);
   core::CpuTetEmitters twin;

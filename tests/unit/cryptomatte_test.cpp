@@ -40,7 +40,7 @@ TEST(CryptomatteId, IsMurmurHash3) {
   EXPECT_EQ(cumulet_cryptomatte_id("\xc3\xa4\xf0\x9f\x90\xb0"), cumulet::cryptomatte_id("\u00e4\U0001f430")) << "bytes";
 }
 
-TEST(CryptomatteId, IsAFiniteNumber) {
+TEST(CryptomatteId, IsAFiniteFloat) {
   EXPECT_EQ(cumulet::murmur_hash_3("n17"), 0x000738c5U) << "a denormal number";
   EXPECT_EQ(cumulet_cryptomatte_id("n17"), 0x008738c5U);
   EXPECT_EQ(cumulet::murmur_hash_3("n535"), 0xff8d97efU) << "no number";
@@ -167,7 +167,7 @@ class Cryptomatte : public CViewerTest {
 };
 CUMULET_ON_BACKENDS(Cryptomatte);
 
-TEST_P(Cryptomatte, OfAWallThatCoversHalf) {
+TEST_P(Cryptomatte, CoverageOfAWall) {
   const SurfacesRef wall = make_wall(-400.0F, 0.25F);
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
   names_[{CUMULET_OBJECT_SURFACES, 0}] = "wall";
@@ -192,7 +192,7 @@ TEST_P(Cryptomatte, OfAWallThatCoversHalf) {
 }
 
 // Along the ray: the other volume, both, the first volume, then a wall.
-TEST_P(Cryptomatte, OfVolumesThatOverlap) {
+TEST_P(Cryptomatte, CoverageOfOverlappingVolumes) {
   constexpr double one = 0.1;
   constexpr double other = 0.3;
   const VolumeRef block = make_block();
@@ -268,7 +268,7 @@ TEST_P(Cryptomatte, AddsUpToAlpha) {
 }
 
 // Instances with one name share one matte. Hidden objects are excluded. A holdout occludes and has no matte.
-TEST_P(Cryptomatte, GoesByNames) {
+TEST_P(Cryptomatte, ObjectsWithOneNameShareAMatte) {
   const VolumeRef block = make_block();
   constexpr double extinction = 0.05;
   const InstanceRef near = add_instance(block.get(), 1, extinction, 10.0);
@@ -320,7 +320,7 @@ TEST_P(Cryptomatte, GoesByNames) {
   EXPECT_EQ(asked_.size(), 2U);
 }
 
-TEST_P(Cryptomatte, TellsPlacesOfTheVolume) {
+TEST_P(Cryptomatte, InstancesOfTheVolumeAreSeparate) {
   const VolumeRef block = make_block();
   ASSERT_EQ(cumulet_set_volume(v_, block.get()), CUMULET_OK);
   std::vector<double> places;
@@ -340,7 +340,7 @@ TEST_P(Cryptomatte, TellsPlacesOfTheVolume) {
 std::string strip_name(std::uint64_t width) { return std::string("strip ").append(std::to_string(width)); }
 
 // A pixel with strips of widths 1, 2, ... 8: the smallest are dropped, and the rest is exact.
-TEST_P(Cryptomatte, KeepsTheLargest) {
+TEST_P(Cryptomatte, KeepsTheLargestCoverages) {
   look(side * 36.0);
   std::vector<SurfacesRef> strips;
   std::vector<ModelRef> models;
@@ -375,7 +375,7 @@ TEST_P(Cryptomatte, KeepsTheLargest) {
 }
 
 // An edge that moves over eight pixels during the shutter interval covers each for its fraction of that time.
-TEST_P(Cryptomatte, IsOfTheTimeThatTheShutterIsOpen) {
+TEST_P(Cryptomatte, CoverageIsAveragedOverTheShutter) {
   const SurfacesRef wall = make_wall(-400.0F, 0.0F);
   auto desc = make_desc<cumulet_model_desc>();
   std::ranges::copy(at(-4.0, 0.0, 0.0), desc.open_to_world);
@@ -395,7 +395,7 @@ TEST_P(Cryptomatte, IsOfTheTimeThatTheShutterIsOpen) {
   }
 }
 
-TEST_P(Cryptomatte, IsRefusedInOneLine) {
+TEST_P(Cryptomatte, InvalidInputGivesAOneLineError) {
   std::vector<float> values(count * 2);
   const auto name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "a"; };
   const auto read = [&](std::uint32_t ranks, std::size_t room) {

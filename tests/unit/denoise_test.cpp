@@ -135,13 +135,13 @@ class DenoiseMore : public Denoise {};
 INSTANTIATE_TEST_SUITE_P(Gl, DenoiseMore, testing::Values(test::Door{headless::Backend::egl}),
                          [](const auto&) { return "egl"; });
 
-TEST_P(Denoise, IsTheNetworkOfPlainLoops) {
+TEST_P(Denoise, MatchesAPlainLoopImplementation) {
   expect_reference(random_archive(small_widths, 3, 1), Scene({48, 32}), "small", random_mean, random_most);
   expect_reference(random_archive(small_widths, 9, 2), Scene({48, 32}), "small, guided", random_mean, random_most);
   expect_reference(random_archive(base_widths, 9, 3), Scene({48, 32}), "base, guided", random_mean, random_most);
 }
 
-TEST_P(DenoiseMore, PublishedNetworksAreThoseOfPlainLoops) {
+TEST_P(DenoiseMore, PublishedNetworksMatchAPlainLoopImplementation) {
   const fs::path data = CUMULET_SHARED_DATA "/oidn_weights";
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
   for (const char* name : {"rt_hdr_alb_nrm.tza", "rt_hdr_alb_nrm_small.tza", "rt_hdr_calb_cnrm.tza", "rt_hdr.tza"}) {
@@ -161,7 +161,7 @@ double error_of(const std::vector<vec4>& picture, const Scene& truth) {
   return sum;
 }
 
-TEST_P(DenoiseMore, PublishedNetworksTakeNoiseAwayAndKeepWhatIsClean) {
+TEST_P(DenoiseMore, PublishedNetworksRemoveNoiseAndKeepCleanImages) {
   const fs::path data = CUMULET_SHARED_DATA "/oidn_weights";
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
   const Scene noisy({96, 64});
@@ -187,7 +187,7 @@ TEST_P(DenoiseMore, PublishedNetworksTakeNoiseAwayAndKeepWhatIsClean) {
   }
 }
 
-TEST_P(DenoiseMore, AnySizeAndAnyStepsGiveTheSame) {
+TEST_P(DenoiseMore, ResultDoesNotDependOnSizeOrSteps) {
   const NetworkPtr network = make_network(random_archive(small_widths, 9), "small");
   for (const ivec2 size : {ivec2(1, 1), ivec2(17, 3), ivec2(5, 40), ivec2(33, 31)}) {
     const Scene scene(size);
@@ -203,7 +203,7 @@ TEST_P(DenoiseMore, AnySizeAndAnyStepsGiveTheSame) {
   EXPECT_TRUE(denoiser.step(whole));
 }
 
-TEST_P(DenoiseMore, TilesAreNotSeen) {
+TEST_P(DenoiseMore, TilesLeaveNoSeams) {
   test::NetworkWidths narrow;
   narrow.fill(3);
   const NetworkPtr network = make_network(random_archive(narrow, 3), "narrow");
@@ -217,7 +217,7 @@ TEST_P(DenoiseMore, TilesAreNotSeen) {
   EXPECT_EQ(different, 0U);
 }
 
-TEST_P(Denoise, WhatIsNotFiniteStaysInItsPixel) {
+TEST_P(Denoise, NonFiniteValuesStayInTheirPixel) {
   const NetworkPtr network = make_network(random_archive(small_widths, 9), "small");
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinite = std::numeric_limits<float>::infinity();
@@ -243,7 +243,7 @@ TEST_P(Denoise, WhatIsNotFiniteStaysInItsPixel) {
   for (const vec4& texel : denoised(network, broken)) EXPECT_TRUE(std::isfinite(texel.r + texel.g + texel.b));
 }
 
-TEST_P(Denoise, LeavesTheHostsStateAsItIsAndReadsNoneOfIt) {
+TEST_P(Denoise, HostStateIsRestoredAndNotRead) {
   const NetworkPtr network = make_network(random_archive(small_widths, 9), "small");
   const Scene scene({20, 20});
   const auto expected = denoised(network, scene);
@@ -256,7 +256,7 @@ TEST_P(Denoise, LeavesTheHostsStateAsItIsAndReadsNoneOfIt) {
   }
 }
 
-TEST(DenoisePlan, TilesCoverThePictureOnceAndKnowWhatTheyDependOn) {
+TEST(DenoisePlan, TilesCoverTheImageOnceWithTheirReceptiveField) {
   constexpr unsigned reach = denoise::Network::reach;
   for (const uvec2 size : {uvec2(1), uvec2(16, 700), uvec2(1921, 1080), uvec2(4000, 300), uvec2(16384)}) {
     for (const std::uint64_t most : {std::uint64_t{1}, std::uint64_t{300000}, std::uint64_t{1} << 40U}) {
@@ -283,7 +283,7 @@ TEST(DenoisePlan, TilesCoverThePictureOnceAndKnowWhatTheyDependOn) {
   }
 }
 
-TEST(DenoisePlan, NothingIsOverWrittenThatIsStillRead) {
+TEST(DenoisePlan, BuffersAreNotOverwrittenWhileInUse) {
   const NetworkPtr network = make_network(random_archive(base_widths, 9), "base");
   const uvec2 size(512, 256);
   const denoise::Memory memory = denoise::memory_of(*network, size);

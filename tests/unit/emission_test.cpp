@@ -41,7 +41,7 @@ float radiance_at(const grid::RgbField::Components& radiance, int component, con
   return test::value_at(radiance[static_cast<std::size_t>(component)], p);
 }
 
-TEST(Emission, IsNothingWithoutAFieldThatGlows) {
+TEST(Emission, IsZeroWithoutEmissiveFields) {
   VolumeFrame frame{.density = field(ivec3(8), ivec3(0), 1.0F)};
   EXPECT_FALSE(scene::emission_of(frame, {.blackbody = 1.0}));
   frame.temperature = field(ivec3(8), ivec3(0), 1.0F);
@@ -53,7 +53,7 @@ TEST(Emission, IsNothingWithoutAFieldThatGlows) {
   EXPECT_FALSE(scene::emission_of(frame, {.flame_strength = 0.0}));
 }
 
-TEST(Emission, IsFlameAndBlackBodyTogether) {
+TEST(Emission, IsTheSumOfFlameAndBlackBody) {
   VolumeFrame frame{.density = nothing()};
   frame.flame = field({8, 8, 8}, ivec3(0), 2.0F);
   frame.temperature = field({12, 8, 8}, {4, 0, 0}, 1.5F);
@@ -74,7 +74,7 @@ TEST(Emission, IsFlameAndBlackBodyTogether) {
   }
 }
 
-TEST(Emission, IsFiniteWhateverIsGiven) {
+TEST(Emission, IsFiniteForAnyInput) {
   VolumeFrame frame{.density = nothing()};
   frame.flame = field(ivec3(8), ivec3(0), 1e30F);
   frame.temperature = field(ivec3(8), ivec3(0), 1e30F);
@@ -90,7 +90,7 @@ TEST(Emission, IsFiniteWhateverIsGiven) {
   EXPECT_GT(radiance_at(*radiance, 0, {1, 1, 1}), 1e11F);
 }
 
-TEST(Emission, TilesAndBackgroundsGlow) {
+TEST(Emission, TilesAndBackgroundsEmit) {
   VolumeFrame frame{.density = nothing()};
   ScalarVolume& flame = frame.flame.emplace(field({8, 8, 8}, ivec3(0), 1.0F));
   flame.bounds_max = {39, 7, 7};
@@ -116,7 +116,7 @@ std::array<ScalarVolume, 3> colours(const ivec3& size, const ivec3& low, vec3 (*
 }
 
 // Constant colors and densities have no bricks, only tiles and backgrounds, and may be large.
-TEST(Colour, MayBeConstantOverALargeBox) {
+TEST(ColorField, MayBeConstantOverALargeBox) {
   VolumeFrame frame{.density = field(ivec3(16), ivec3(0), 1.0F)};
   frame.colour = colours(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return vec3(2.0F, 0.5F, 0.0F); });
   for (ScalarVolume& component : *frame.colour) {
@@ -129,7 +129,7 @@ TEST(Colour, MayBeConstantOverALargeBox) {
   EXPECT_EQ(radiance_at(*scattering, 1, {12, 12, 12}), 0.5F);
 }
 
-TEST(Colour, OfACellIsThatOfItsDensity) {
+TEST(ColorField, CellColorIsTheDensityWeightedMean) {
   VolumeFrame frame{.density =
                         test::make_volume(ivec3(16), ivec3(0), [](const ivec3& p) { return p.x < 5 ? 3.0F : 0.5F; })};
   EXPECT_FALSE(scene::scattering_of(frame));
@@ -197,7 +197,7 @@ float stored_anisotropy(const grid::TetGrid& grid, std::size_t cell) {
 }
 
 // Compared with sums over the sixths of voxels that make up a cell.
-TEST(Anisotropy, OfACellIsTheMeanOfWhatScattersInIt) {
+TEST(AnisotropyField, CellAnisotropyIsTheScatteringWeightedMean) {
   constexpr int size = 16;
   VolumeFrame frame{.density = test::noise_volume(ivec3(size), ivec3(0), 5)};
   EXPECT_FALSE(scene::forward_of(frame));
@@ -235,7 +235,7 @@ TEST(Anisotropy, OfACellIsTheMeanOfWhatScattersInIt) {
   }
 }
 
-TEST(Anisotropy, StaysShortOfOne) {
+TEST(AnisotropyField, IsClampedBelowOne) {
   for (const float all : {-1.0F, 1.0F}) {
     VolumeFrame frame{.density = field(ivec3(8), ivec3(0), 1.0F)};
     frame.anisotropy = anisotropy(ivec3(8), ivec3(0), [=](const ivec3& /*p*/) { return all; });
@@ -244,7 +244,7 @@ TEST(Anisotropy, StaysShortOfOne) {
   }
 }
 
-TEST(Anisotropy, CellsAreSplitWhereItVaries) {
+TEST(AnisotropyField, CellsAreRefinedWhereItVaries) {
   VolumeFrame frame{.density = field(ivec3(64), ivec3(0), 1.0F)};
   const auto count = [&](grid::Criterion criterion) {
     grid::RefineSettings settings;
@@ -265,7 +265,7 @@ TEST(Anisotropy, CellsAreSplitWhereItVaries) {
 
 // ---- Images
 
-class EmissionPicture : public test::ViewerTest {
+class EmissionRendering : public test::ViewerTest {
  protected:
   static void show(test::Still& viewer, VolumeFrame frame) { viewer.set_volume(std::move(frame)); }
   // Looks down -z at the middle of a slab of 64 x 64 voxels.
@@ -274,9 +274,9 @@ class EmissionPicture : public test::ViewerTest {
     return test::render(viewer, {16, 16, samples, 1, render::View::shaded});
   }
 };
-CUMULET_ON_BACKENDS(EmissionPicture);
+CUMULET_ON_BACKENDS(EmissionRendering);
 
-TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
+TEST_P(EmissionRendering, AFlameWithoutDensityIsExact) {
   const auto viewer = make();
   VolumeFrame frame{.density = nothing()};
   frame.flame = field({64, 64, 8}, ivec3(0), 2.0F);
@@ -302,7 +302,7 @@ TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
 }
 
 // frame_all() shows a whole tall flame, with thin smoke and without density.
-TEST_P(EmissionPicture, AFlameIsFramed) {
+TEST_P(EmissionRendering, FlameIsInTheFittedView) {
   const auto viewer = make();
   for (const bool smoke : {false, true}) {
     VolumeFrame frame{.density = smoke ? field(ivec3(8), ivec3(0), 1e-3F) : nothing()};
@@ -323,7 +323,7 @@ TEST_P(EmissionPicture, AFlameIsFramed) {
 }
 
 // A file with only a temperature emits light too.
-TEST_P(EmissionPicture, ATemperatureAloneShines) {
+TEST_P(EmissionRendering, TemperatureWithoutDensityEmits) {
   const auto viewer = make();
   viewer->set_light({});
   for (const bool smoke : {false, true}) {
@@ -336,7 +336,7 @@ TEST_P(EmissionPicture, ATemperatureAloneShines) {
   }
 }
 
-TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
+TEST_P(EmissionRendering, AbsorbingSlabMatchesTheClosedForm) {
   const auto viewer = make();
   VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};
   frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
@@ -372,7 +372,7 @@ float share_within(const ivec3& p, const glm::dvec3& middle, double radius) {
 }
 
 // The total emission of a sphere in one direction, and the radiance along its chords.
-TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
+TEST_P(EmissionRendering, AbsorbingSphereMatchesTheClosedForm) {
   constexpr double radius = 27.0;
   constexpr double strength = 0.5;
   const auto viewer = make();
@@ -437,7 +437,7 @@ TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
 }
 
 // A medium that emits as much as it absorbs from a sky of radiance 1 is invisible.
-TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
+TEST_P(EmissionRendering, MediumInThermalBalanceWithTheSkyIsInvisible) {
   const auto viewer = make();
   const ScalarVolume noise = test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3);
   VolumeFrame frame{.density = noise};
@@ -461,7 +461,7 @@ TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
 }
 
 // A hot thin front in homogeneous smoke: emission causes refinement.
-TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
+TEST_P(EmissionRendering, CellsAreRefinedForEmission) {
   const auto viewer = make();
   VolumeFrame frame{.density = field(ivec3(64), ivec3(0), 1.0F)};
   frame.flame = test::make_volume(ivec3(64), ivec3(0), [](const ivec3& p) {
@@ -493,7 +493,7 @@ TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
 }
 
 // Rays end at triangles before the emission behind them is added, in any arrangement.
-TEST_P(EmissionPicture, EndsAtSurfaces) {
+TEST_P(EmissionRendering, EmissionEndsAtSurfaces) {
   const auto viewer = make();
   VolumeFrame frame{.density = nothing()};
   frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
@@ -510,7 +510,7 @@ TEST_P(EmissionPicture, EndsAtSurfaces) {
   }
 }
 
-TEST_P(EmissionPicture, AColourIsAnAlbedo) {
+TEST_P(EmissionRendering, ColorFieldIsAnAlbedo) {
   const auto viewer = make();
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   viewer::Medium medium;
@@ -532,7 +532,7 @@ TEST_P(EmissionPicture, AColourIsAnAlbedo) {
 }
 
 // The medium is red on one side and green on the other. Only single scattering.
-TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
+TEST_P(EmissionRendering, ColorVariesInSpace) {
   const auto viewer = make();
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   VolumeFrame frame{.density = field(ivec3(32), ivec3(0), 1.0F)};
@@ -554,7 +554,7 @@ TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
   }
 }
 
-TEST_P(EmissionPicture, AnAnisotropyIsTheMediums) {
+TEST_P(EmissionRendering, ConstantAnisotropyFieldMatchesTheMediums) {
   const auto viewer = make();
   viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
   viewer::Medium medium;
@@ -580,7 +580,7 @@ TEST_P(EmissionPicture, AnAnisotropyIsTheMediums) {
 }
 
 // Two slabs side by side; single scattering is compared with the closed form.
-TEST_P(EmissionPicture, AnAnisotropyIsThatOfItsPlace) {
+TEST_P(EmissionRendering, AnisotropyVariesInSpace) {
   const auto viewer = make();
   const double height = std::asin(0.6);
   viewer->set_light({0.0F, static_cast<float>(glm::degrees(height)), vec3(4.0F), vec3(0.0F)});
@@ -607,7 +607,7 @@ TEST_P(EmissionPicture, AnAnisotropyIsThatOfItsPlace) {
 }
 
 // Triangles use other kernels. The medium must scatter equally in them.
-TEST_P(EmissionPicture, AnAnisotropyHoldsAmongSurfaces) {
+TEST_P(EmissionRendering, AnisotropyFieldWorksWithSurfaces) {
   const auto viewer = make();
   viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
   viewer::Medium medium;
@@ -628,7 +628,7 @@ TEST_P(EmissionPicture, AnAnisotropyHoldsAmongSurfaces) {
   EXPECT_NEAR(means[1], means[0], 6e-3 * means[0]);
 }
 
-TEST_P(EmissionPicture, MieKeepsItsOwnAnisotropy) {
+TEST_P(EmissionRendering, MieKeepsItsOwnAnisotropy) {
   const auto viewer = make();
   viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
   viewer::Medium medium;
@@ -656,7 +656,7 @@ TEST_P(EmissionPicture, MieKeepsItsOwnAnisotropy) {
 }
 
 // Frames of a sequence share one warning.
-TEST(Anisotropy, ThatIsNotShownIsToldOnce) {
+TEST(AnisotropyField, UnsupportedFieldIsReportedOnce) {
   std::vector<std::string> told;
   viewer::Viewer viewer(Log([&](LogLevel, const char* message) { told.emplace_back(message); }), nullptr, true);
   const auto show = [&] {
@@ -681,7 +681,7 @@ TEST(Anisotropy, ThatIsNotShownIsToldOnce) {
 
 // A small fire in thick smoke that is seen by the light it scatters. Scattered rays reach it rarely, NEE reaches it
 // always.
-TEST_P(EmissionPicture, LooksFindAHotCore) {
+TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
   const auto viewer = make();
   VolumeFrame frame{.density = field(ivec3(48), ivec3(0), 1.0F)};
   frame.flame = test::make_volume(
@@ -751,7 +751,7 @@ TEST_P(EmissionPicture, LooksFindAHotCore) {
 
 // A floor just below a wide emissive slab. Radiance from each direction is the path length in the slab: 8 / cosine, as
 // far as the slab extends.
-TEST_P(EmissionPicture, LightsAFloor) {
+TEST_P(EmissionRendering, FireLightsAFloor) {
   const auto viewer = make();
   VolumeFrame frame{.density = nothing()};
   frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);

@@ -159,7 +159,7 @@ double area_of(const StillScene& scene, std::uint32_t triangle) {
   return 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
 }
 
-TEST(Emitters, ArePickedByPower) {
+TEST(Emitters, SelectionFollowsPower) {
   auto scene = std::make_shared<StillScene>();
   scene->add(test::diffuse(vec3(1.0F)));
   scene->add(emitter(vec3(1.0F)));
@@ -200,7 +200,7 @@ TEST(Emitters, ArePickedByPower) {
   EXPECT_NEAR(light::emitter_table(emissive, *scene, scene->rest).flux / (flux + pi * one_sided), 1.0, 1e-6);
 }
 
-TEST(Emitters, WithoutAreaOrLightAreNone) {
+TEST(Emitters, ZeroAreaOrPowerIsExcluded) {
   auto scene = std::make_shared<StillScene>();
   scene->add(emitter(vec3(1.0F)));
   scene->add(emitter(vec3(1.0F)));
@@ -219,7 +219,7 @@ TEST(Emitters, WithoutAreaOrLightAreNone) {
   EXPECT_EQ(table.flux, 0.0);
 }
 
-TEST(Emitters, TexturesSayWhichTrianglesShine) {
+TEST(Emitters, EmissiveTexturesSelectTriangles) {
   auto scene = std::make_shared<StillScene>();
   scene->add(emitter(vec3(1.0F)));
   scene->images.push_back(stripes());
@@ -240,7 +240,7 @@ TEST(Emitters, TexturesSayWhichTrianglesShine) {
   EXPECT_EQ(emissive[2].luminance, emissive[3].luminance);
 }
 
-TEST(Emitters, AnotherPoseHasAnotherTable) {
+TEST(Emitters, EachPoseHasItsOwnTable) {
   const auto scene = patch_over_floor(emitter(vec3(2.0F)));
   const auto first = test::source_of(scene);
   surface::Pose pose = scene->rest;
@@ -255,7 +255,7 @@ TEST(Emitters, AnotherPoseHasAnotherTable) {
 
 // ---- images ----
 
-class EmitterTrace : public test::ViewerTest {
+class EmitterRendering : public test::ViewerTest {
  protected:
   std::unique_ptr<test::Still> dark(std::shared_ptr<const StillScene> scene) const {
     auto viewer = make();
@@ -267,11 +267,11 @@ class EmitterTrace : public test::ViewerTest {
     return viewer;
   }
 };
-CUMULET_ON_BACKENDS(EmitterTrace);
+CUMULET_ON_BACKENDS(EmitterRendering);
 
 const auto constant = [](const dvec3& /*p*/) { return 3.0; };
 
-TEST_P(EmitterTrace, APatchLightsAFloorThroughASlab) {
+TEST_P(EmitterRendering, PatchLightsAFloorThroughASlab) {
   const auto viewer = dark(patch_over_floor(emitter(vec3(3.0F))));
   for (const SurfaceLight mode : {SurfaceLight::full, SurfaceLight::shadows}) {
     viewer->viewer().set_surface_settings(surface_light(mode));
@@ -291,7 +291,7 @@ TEST_P(EmitterTrace, APatchLightsAFloorThroughASlab) {
 }
 
 // The floor is lit only if the patch's front faces it. A mirrored node flips the front.
-TEST_P(EmitterTrace, OneSidedTrianglesEmitFromTheirFront) {
+TEST_P(EmitterRendering, OneSidedTrianglesEmitFromTheirFront) {
   for (const SurfaceLight mode : {SurfaceLight::full, SurfaceLight::shadows}) {
     for (const bool down : {false, true}) {
       for (const bool flipped : {false, true}) {
@@ -316,7 +316,7 @@ TEST_P(EmitterTrace, OneSidedTrianglesEmitFromTheirFront) {
   }
 }
 
-TEST_P(EmitterTrace, ATextureEmitsWhereItShines) {
+TEST_P(EmitterRendering, EmissiveTextureEmitsWhereBright) {
   Material patch = emitter(vec3(3.0F));
   patch.emission_texture.texture = 0;
   auto scene = patch_over_floor(patch);
@@ -336,7 +336,7 @@ TEST_P(EmitterTrace, ATextureEmitsWhereItShines) {
 }
 
 // Single scattering: the sum along the camera's ray over the patch.
-TEST_P(EmitterTrace, APatchLightsAVolume) {
+TEST_P(EmitterRendering, PatchLightsAVolume) {
   auto scene = std::make_shared<StillScene>();
   scene->add(emitter(vec3(3.0F)));
   scene->add_quad(square(patch_y, patch_half, true), 0);
@@ -369,7 +369,7 @@ TEST_P(EmitterTrace, APatchLightsAVolume) {
 
 // Walls that emit E and reflect the fraction a: radiance E / (1 - a) everywhere, for any scattering medium. With direct
 // light only: E + a E.
-TEST_P(EmitterTrace, AGlowingBoxIsInBalance) {
+TEST_P(EmitterRendering, EmissiveBoxIsInThermalBalance) {
   auto scene = std::make_shared<StillScene>();
   scene->add(emitter(vec3(1.0F), vec3(0.5F)));
   const std::array<vec3, 8> c{
@@ -440,7 +440,7 @@ std::shared_ptr<StillScene> gallery(const Kind& kind, bool by_chance) {
   return scene;
 }
 
-TEST_P(EmitterTrace, AgreesWithWhatChanceMeets) {
+TEST_P(EmitterRendering, MatchesScatteredRaysOnly) {
   using surface::AlphaMode;
   for (const Kind& kind : {Kind{"opaque", AlphaMode::opaque, false, false, SurfaceLight::full},
                            Kind{"blend, with sun, sky and lamp", AlphaMode::blend, false, true, SurfaceLight::full},
@@ -475,7 +475,7 @@ TEST_P(EmitterTrace, AgreesWithWhatChanceMeets) {
 }
 
 // 100,000 triangles, of which few emit most of the light.
-TEST_P(EmitterTrace, ManyLightsAreAsOne) {
+TEST_P(EmitterRendering, ManyEmittersMatchOne) {
   auto scene = std::make_shared<StillScene>();
   scene->add(test::diffuse(vec3(0.5F)));
   scene->add(emitter(vec3(0.1F)));
@@ -502,7 +502,7 @@ TEST_P(EmitterTrace, ManyLightsAreAsOne) {
 }
 
 // A small emissive square in a room: noise with and without NEE.
-TEST_P(EmitterTrace, LookingForALampTakesFewerSamples) {
+TEST_P(EmitterRendering, NextEventEstimationReducesNoise) {
   for (const double sigma : {1e-6, 0.02}) {
     std::array<double, 2> noise{};
     for (const bool by_chance : {false, true}) {

@@ -85,7 +85,7 @@ vec3 direction(double azimuth, double down) {
   return {std::sin(down) * std::sin(azimuth), std::cos(down), std::sin(down) * std::cos(azimuth)};
 }
 
-TEST(Environment, TheMiddleIsAtZAndTheLeftIsTowardsXAndTurnsFromZToX) {
+TEST(Environment, CenterMapsToZLeftToXAndRotationGoesFromZToX) {
   const auto environment = made(64, 32, [](std::uint32_t x, std::uint32_t y) {
     return vec3(x == 16 ? 1.0F : 0.0F, y < 8 ? 1.0F : 0.0F, x == 32 ? 1.0F : 0.0F);
   });
@@ -111,7 +111,7 @@ light::EnvironmentPtr uneven() {
   });
 }
 
-TEST(Environment, TheDensityOfLooksIntegratesToOneAndIsThatOfWhatIsDrawn) {
+TEST(Environment, SamplingPdfIntegratesToOneAndMatchesSamples) {
   const auto environment = uneven();
   core::CpuEnvironment cpu = twin(*environment, 70.0F);
   constexpr std::size_t columns = 12;
@@ -187,7 +187,7 @@ vec3 two_colours(std::uint32_t x, std::uint32_t y) {
   return (y < 32 ? vec3(1.0F, 0.6F, 0.2F) : vec3(0.1F, 0.3F, 0.9F)) * (x < 64 ? 1.0F : 0.5F);
 }
 
-TEST(Environment, HarmonicsHaveTheIrradiance) {
+TEST(Environment, SphericalHarmonicsMatchIrradiance) {
   expect_irradiance(*made(128, 64, [](auto, auto) { return vec3(0.3F, 2.0F, 7.0F); }), 1e-3);
   expect_irradiance(*made(128, 64, two_colours), 0.01);
   // A smooth function of all orders up to the second: exact except for the texels.
@@ -200,7 +200,7 @@ TEST(Environment, HarmonicsHaveTheIrradiance) {
   expect_irradiance(*made(128, 64, [](auto x, auto y) { return vec3(x == 20 && y == 25 ? 5000.0F : 0.0F); }), 0.35);
 }
 
-TEST(Environment, PixelsThatAreNoRadianceCountAsZeroAndAreTold) {
+TEST(Environment, NonFinitePixelsCountAsZeroAndAreReported) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const auto environment = made(2, 2, [&](std::uint32_t x, std::uint32_t y) {
     if (y == 0) return x == 0 ? vec3(nan, 1.0F, 1.0F) : vec3(1.0F, -1.0F, 1.0F);
@@ -214,7 +214,7 @@ TEST(Environment, PixelsThatAreNoRadianceCountAsZeroAndAreTold) {
   EXPECT_EQ(light::LightTable({}, {dark}, {}, {}).parameters().any, 0U);
 }
 
-TEST(Environment, KeepsEveryMagnitude) {
+TEST(Environment, PreservesRadianceOfAnyMagnitude) {
   for (const float value : {1e30F, 72704.0F, 1.0F, 0.3F, 1e-12F, 1e-38F}) {
     const auto environment = made(1, 1, [&](std::uint32_t, std::uint32_t) { return vec3(value, 0.5F * value, 0.0F); });
     core::CpuEnvironment cpu = twin(*environment);
@@ -225,7 +225,7 @@ TEST(Environment, KeepsEveryMagnitude) {
   }
 }
 
-TEST(Environment, PixelsOfAnotherSizeAreMeansOfThoseInTheirPlace) {
+TEST(Environment, DownsampledPixelsAreMeans) {
   const auto environment = made(8, 4, [](std::uint32_t x, std::uint32_t y) { return vec3(float(x), float(y), 1.0F); });
   const std::vector<vec3> half = light::pixels_of(*environment, 4, 2);
   ASSERT_EQ(half.size(), 8U);
@@ -246,7 +246,7 @@ double gloss_at(const light::Environment& environment, int level, int x, int y) 
 }
 
 // Near the poles a texel's solid angle varies strongly inside its row.
-TEST(EnvironmentGloss, ASmallLightNearAPoleCountsAsMuchAsItIsLarge) {
+TEST(PrefilteredEnvironment, SmallLightNearAPoleIsWeightedBySolidAngle) {
   constexpr std::uint32_t columns = 512;
   constexpr std::uint32_t rows = 256;
   constexpr std::uint32_t column = 100;
@@ -284,7 +284,7 @@ TEST(EnvironmentGloss, ASmallLightNearAPoleCountsAsMuchAsItIsLarge) {
 }
 
 // Weighted by the solid angle of the cells, for images of any size.
-TEST(EnvironmentGloss, WhatTheSmoothestSeeHasTheEnvironmentsMean) {
+TEST(PrefilteredEnvironment, SharpestLevelKeepsTheMeanRadiance) {
   for (const auto& [columns, rows] : {std::pair(100U, 37U), std::pair(256U, 128U), std::pair(5U, 3U)}) {
     std::mt19937 random(3);
     const auto environment = made(columns, rows, [&](auto, auto) { return vec3(float(random() % 1000)); });
@@ -298,13 +298,13 @@ TEST(EnvironmentGloss, WhatTheSmoothestSeeHasTheEnvironmentsMean) {
   }
 }
 
-TEST(EnvironmentGloss, ThereIsNoneOfAnEvenSkyOrADarkOne) {
+TEST(PrefilteredEnvironment, IsNotBuiltForUniformOrBlackSkies) {
   for (const float value : {0.0F, 0.3F, 1e30F})
     EXPECT_EQ(made(100, 37, [&](auto, auto) { return vec3(value, 0.5F * value, 0.0F); })->gloss, nullptr) << value;
   EXPECT_NE(made(100, 37, [](auto x, auto) { return vec3(x == 3 ? 0.301F : 0.3F); })->gloss, nullptr);
 }
 
-TEST(EnvironmentGloss, IsCancelledBetweenRows) {
+TEST(PrefilteredEnvironment, CanBeCancelledBetweenRows) {
   Progress progress;
   std::atomic<int> rows = 0;
   const auto read = [&](std::uint32_t, std::vector<vec3>& row) {
@@ -324,7 +324,7 @@ std::string refusal_of(const light::EnvironmentPixels& pixels) {
   return test::refusal([&] { light::make_environment(pixels, "host"); });
 }
 
-TEST(Environment, SizesThatAreNoneAreRefusedInALine) {
+TEST(Environment, InvalidSizesGiveOneLineErrors) {
   EXPECT_EQ(refusal_of({0, 4, {}}), "host: an environment of 0x4 pixels");
   EXPECT_EQ(refusal_of({32768, 1, {}}), "host: an environment of 32768x1 pixels; at most 16384 a side");
   EXPECT_EQ(refusal_of({2, 2, {vec3(1.0F)}}), "host: an environment of 2x2 pixels has 1");
@@ -340,7 +340,7 @@ std::string radiance_file(const std::string& resolution, const std::string& body
   return "#?RADIANCE\n# a comment\nFORMAT=32-bit_rle_rgbe\n\n" + resolution + "\n" + body;
 }
 
-TEST(EnvironmentFile, AFolderIsNone) {
+TEST(EnvironmentFile, FolderIsRejected) {
   const test::Folder folder;
   const std::string path = (folder / "").string();
   try {
@@ -352,7 +352,7 @@ TEST(EnvironmentFile, AFolderIsNone) {
   }
 }
 
-TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
+TEST(EnvironmentFile, RadianceHdrIsReadFlatAndRunLengthEncoded) {
   const test::Folder folder;
   const std::string path = (folder / "a.hdr").string();
   const auto read = [&](const std::string& text) {
@@ -386,7 +386,7 @@ TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
             std::string::npos);
 }
 
-class Surrounded : public test::ViewerTest {
+class EnvironmentLighting : public test::ViewerTest {
  protected:
   struct Seen {
     dvec3 mean{0.0};
@@ -421,9 +421,9 @@ class Surrounded : public test::ViewerTest {
     return still;
   }
 };
-CUMULET_ON_BACKENDS(Surrounded);
+CUMULET_ON_BACKENDS(EnvironmentLighting);
 
-TEST_P(Surrounded, ByOneColourAsByASkyOfIt) {
+TEST_P(EnvironmentLighting, UniformEnvironmentEqualsUniformSky) {
   const vec3 colour(0.25F, 0.5F, 1.0F);
   const auto still = ball(0.6F, vec3(0.9F, 0.8F, 1.0F));
   still->set_light({30.0F, 20.0F, vec3(0.5F), colour});
@@ -437,7 +437,7 @@ TEST_P(Surrounded, ByOneColourAsByASkyOfIt) {
   expect_same(see(*still, 32), sky, 0.0);
 }
 
-TEST_P(Surrounded, AFurnaceIsOfOneColour) {
+TEST_P(EnvironmentLighting, WhiteFurnaceHasOneColor) {
   const auto still = ball(0.0F, vec3(1.0F));
   still->set_light({});
   still->viewer().set_environment(made(8, 4, [](std::uint32_t, std::uint32_t) { return vec3(1.0F); }));
@@ -447,7 +447,7 @@ TEST_P(Surrounded, AFurnaceIsOfOneColour) {
 }
 
 // Shading without shadows is exact for convex objects.
-TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
+TEST_P(EnvironmentLighting, RasterizedSpheresMatchPathTracedOnes) {
   const auto still = make();
   still->set_volume(test::make_volume(ivec3(4), ivec3(-2, -2, -20), [](const ivec3&) { return 1.0F; }));
   still->set_medium({1e-6, vec3(1.0F), {0.0F}, 0});
@@ -499,7 +499,7 @@ TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
 }
 
 // Rasterized glossy surfaces show the current environment, independent of the previous one.
-TEST_P(Surrounded, RasterisedGlossIsOfTheLastEnvironment) {
+TEST_P(EnvironmentLighting, RasterizedReflectionsUseTheCurrentEnvironment) {
   const auto glossy = [&] {
     auto still = make();
     still->set_volume(test::make_volume(ivec3(4), ivec3(-2, -2, -20), [](const ivec3&) { return 1.0F; }));
@@ -535,7 +535,7 @@ TEST_P(Surrounded, RasterisedGlossIsOfTheLastEnvironment) {
   for (std::size_t i = 1; i < pictures.size(); ++i) EXPECT_NE(pictures[i].pixels, pictures[i - 1].pixels) << i;
 }
 
-TEST_P(Surrounded, ABrightTexelIsASun) {
+TEST_P(EnvironmentLighting, BrightTexelLightsLikeASun) {
   const auto still = ball(0.3F, vec3(0.9F));
   constexpr std::uint32_t width = 512;
   constexpr std::uint32_t height = 256;
@@ -564,7 +564,7 @@ vec3 patch(std::uint32_t x, std::uint32_t y) {
 
 // Compares NEE with MIS, NEE with lower probability, and scattered rays only. Media with one and with many scattering
 // events, and a matte ground plane.
-TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
+TEST_P(EnvironmentLighting, NextEventEstimationAgreesWithScatteredRaysOnly) {
   const light::EnvironmentPtr environment = made(128, 64, patch);
   const volume::ScalarVolume volume = test::make_volume(ivec3(20), ivec3(0), [](const ivec3&) { return 1.0F; });
   struct Case {
@@ -627,7 +627,7 @@ TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
 
 // A sun as in spiaggia_di_mondello_1k.hdr: 72,704 in one or two texels of a sky of 0.5. A pixel's differences between
 // seeds must be in the range of its neighbors' noise, without single outliers.
-TEST_P(Surrounded, ASunInAPictureLeavesNoFireflies) {
+TEST_P(EnvironmentLighting, SunInAnEnvironmentMapGivesNoFireflies) {
   const light::EnvironmentPtr environment = made(1024, 512, [](std::uint32_t x, std::uint32_t y) {
     if (x == 300 && (y == 120 || y == 121)) return vec3(72704.0F, 68000.0F, 60000.0F);
     return y < 256 ? vec3(0.4F, 0.5F, 0.7F) : vec3(0.2F, 0.18F, 0.15F);

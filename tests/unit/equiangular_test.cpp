@@ -1,5 +1,5 @@
 // Equiangular sampling of lights along rays (glsl/equiangular.glsl): the same mean as without it, together with all
-// other lights, and less noise. lamp_test has closed forms.
+// other lights, and less noise. analytic_lights_test has closed forms.
 //
 // Kernels use it depending on the lights and the medium's optical depth. If the only light is outside of a medium that
 // is not thin, they use it once another light is inside. Here that light is so faint that it changes nothing else.
@@ -31,7 +31,7 @@ core::CmLamp record(std::uint32_t kind, const vec3& position) {
   return lamp;
 }
 
-TEST(NearestLamp, IsTheNearestThatStandsSomewhere) {
+TEST(NearestLight, IgnoresDistantLights) {
   const light::Lit ball{dvec3(1.0, 0.0, 0.0), 2.0};
   EXPECT_FALSE(light::nearest_lamp({}, ball));
   std::vector<core::CmLamp> lamps{record(core::CM_LAMP_DISTANT, vec3(1.0F, 0.0F, 0.0F))};
@@ -43,7 +43,7 @@ TEST(NearestLamp, IsTheNearestThatStandsSomewhere) {
   EXPECT_FALSE(light::nearest_lamp(lamps, light::Lit{})) << "no medium";
 }
 
-TEST(NearestLamp, InAThinMediumIsWorthLooksFromFlights) {
+TEST(NearestLight, EnablesEquiangularSamplingInThinMediaOnly) {
   EXPECT_TRUE(light::suits_equiangular(0.5, 1.0));
   EXPECT_FALSE(light::suits_equiangular(0.5, 10.0)) << "collisions find it";
   EXPECT_FALSE(light::suits_equiangular(2.0, 1.0)) << "its light is even";
@@ -142,7 +142,7 @@ class Equiangular : public test::ViewerTest {
 };
 CUMULET_ON_BACKENDS(Equiangular);
 
-TEST_P(Equiangular, LooksBringTheSameLightInAnyMarch) {
+TEST_P(Equiangular, AgreesWithDistanceSamplingForEveryGridType) {
   for (const grid::CellKind cells : {grid::CellKind::linear, grid::CellKind::constant}) {
     set_march(March::tet, cells);
     expect_the_same("tet");
@@ -153,14 +153,14 @@ TEST_P(Equiangular, LooksBringTheSameLightInAnyMarch) {
   expect_the_same("brick");
 }
 
-TEST_P(Equiangular, LooksEndWithTheBouncesThatAreLeft) {
+TEST_P(Equiangular, RespectsTheBounceLimit) {
   for (const std::uint32_t bounces : {1U, 2U, 3U}) {
     set_medium(0.06, bounces);
     expect_the_same(("bounces: " + std::to_string(bounces)).c_str());
   }
 }
 
-TEST_P(Equiangular, LooksBringTheSameLightBesideSunSkyAndGround) {
+TEST_P(Equiangular, AgreesWithDistanceSamplingUnderSunSkyAndGround) {
   still_->set_light({30.0F, 40.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.4F)});
   expect_the_same("sun and sky");
   still_->viewer().set_ground({viewer::GroundPlace::at_height, -2.0, vec3(0.6F)});
@@ -169,7 +169,7 @@ TEST_P(Equiangular, LooksBringTheSameLightBesideSunSkyAndGround) {
   expect_the_same("ground within");
 }
 
-TEST_P(Equiangular, LooksBringTheSameLightAmongSurfaces) {
+TEST_P(Equiangular, AgreesWithDistanceSamplingAmongSurfaces) {
   auto scene = std::make_shared<test::StillScene>();
   scene->add(test::diffuse(vec3(0.7F)));
   scene->add_quad({{{-20, 6, 50}, {50, 6, 50}, {50, 6, -20}, {-20, 6, -20}}}, 0);  // through the medium
@@ -185,7 +185,7 @@ TEST_P(Equiangular, LooksBringTheSameLightAmongSurfaces) {
   expect_the_same("shadows");
 }
 
-TEST_P(Equiangular, LooksBringTheSameLightInSeveralVolumesThatOverlap) {
+TEST_P(Equiangular, AgreesWithDistanceSamplingInOverlappingVolumes) {
   const glm::dmat4 aside = glm::translate(glm::dmat4(1.0), dvec3(10.0, 4.0, -6.0));
   still_->viewer().set_places({{glm::dmat4(1.0)}, {aside}});
   set_medium(0.03);
@@ -198,7 +198,7 @@ TEST_P(Equiangular, LooksBringTheSameLightInSeveralVolumesThatOverlap) {
   expect_the_same("two places and surfaces");
 }
 
-TEST_P(Equiangular, LooksHaveLessNoiseInThinSmoke) {
+TEST_P(Equiangular, ReducesNoiseInThinSmoke) {
   set_march(March::tet);
   // Thin enough that a light outside enables equiangular sampling, and slightly too dense for it.
   set_medium(0.006);

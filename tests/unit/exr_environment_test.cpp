@@ -184,7 +184,7 @@ TEST_F(ExrEnvironment, ChromaDoesNotBleedAcrossEdges) {
               halves, 0.03F);
 }
 
-TEST_F(ExrEnvironment, ChromaHasAnySamplingAndTheFilesPrimaries) {
+TEST_F(ExrEnvironment, ChromaSupportsAnySubsamplingAndPrimaries) {
   const Imf::Chromaticities p3({0.680F, 0.320F}, {0.265F, 0.690F}, {0.150F, 0.060F}, {0.3127F, 0.3290F});
   for (const int step : {1, 2, 4}) {
     SCOPED_TRACE(step);
@@ -210,7 +210,7 @@ TEST_F(ExrEnvironment, ChromaHasAnySamplingAndTheFilesPrimaries) {
   }
 }
 
-TEST_F(ExrEnvironment, ADataWindowIsPlacedInItsDisplayWindow) {
+TEST_F(ExrEnvironment, DataWindowIsPlacedInTheDisplayWindow) {
   const Imath::Box2i display({0, 0}, {width - 1, height - 1});
   Imf::Header smaller(display, Imath::Box2i({10, 4}, {29, 19}));
   EnvironmentPixels got = written(smaller, rgb(smooth));
@@ -241,7 +241,7 @@ TEST_F(ExrEnvironment, ADataWindowIsPlacedInItsDisplayWindow) {
 
 vec3 of_direction(const vec3& w) { return vec3(1.5F) + w; }
 
-TEST_F(ExrEnvironment, ACubeIsResampledByTheConventionOfOpenExr) {
+TEST_F(ExrEnvironment, CubeMapFollowsTheOpenExrConvention) {
   constexpr int side = 24;
   Imf::Header header(side, 6 * side);
   Imf::addEnvmap(header, Imf::ENVMAP_CUBE);
@@ -395,7 +395,7 @@ TEST_F(ExrEnvironment, TilesOfAnyLevelsAreRead) {
   }
 }
 
-TEST_F(ExrEnvironment, APartAndALayerIsChosenAndTold) {
+TEST_F(ExrEnvironment, SelectedPartAndLayerAreReported) {
   const auto other = [](int, int) { return vec3(9.0F); };
   std::vector<Imf::Header> headers(3, Imf::Header(width, height));
   std::vector<std::vector<Channel>> channels = {
@@ -430,7 +430,7 @@ TEST_F(ExrEnvironment, APartAndALayerIsChosenAndTold) {
   EXPECT_TRUE(got.remarks.empty());
 }
 
-TEST_F(ExrEnvironment, WhatHasNoColorsIsRefusedInALine) {
+TEST_F(ExrEnvironment, ImageWithoutColorsGivesAOneLineError) {
   const auto without = [&](const std::vector<std::string>& names) {
     std::vector<Channel> channels;
     for (const std::string& name : names) channels.push_back({name, Imf::HALF, [](int, int) { return 1.0F; }, 1});
@@ -469,7 +469,7 @@ TEST_F(ExrEnvironment, WhatHasNoColorsIsRefusedInALine) {
   }
 }
 
-TEST_F(ExrEnvironment, TheSharedTrialsLightAsTheyShould) {
+TEST_F(ExrEnvironment, SharedTestImagesHaveTheExpectedRadiance) {
   const std::filesystem::path trials = std::filesystem::path(CUMULET_SHARED_DATA) / "trials" / "exr-luma-chroma";
   if (!std::filesystem::exists(trials)) GTEST_SKIP() << "no shared data";
   const auto of = [&](const char* name) { return light::read_environment((trials / name).string()); };

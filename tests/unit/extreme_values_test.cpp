@@ -91,7 +91,7 @@ void expect_same_grid(const grid::TetGrid& a, const grid::TetGrid& b) {
 }
 
 // A factor that is a power of two changes no mantissa, so it changes no cell.
-TEST(ExtremeValues, HaveTheCellsOfOrdinaryOnes) {
+TEST(ExtremeValues, GiveTheSameCellsAsOrdinaryOnes) {
   Progress progress;
   for (const bool coloured : {false, true}) {
     const auto plain = viewer::build_grid({}, noise_times(1.0, coloured), settings_for(1.0), progress).source;
@@ -109,7 +109,7 @@ TEST(ExtremeValues, HaveTheCellsOfOrdinaryOnes) {
   }
 }
 
-TEST(ExtremeValues, AreRefinedForGlAsOrdinaryOnes) {
+TEST(ExtremeValues, GiveTheSameGpuBuiltCellsAsOrdinaryOnes) {
   Progress progress;
   const auto lattice = [&](double factor) {
     const auto settings = settings_for(factor, viewer::BuildOn::gpu);
@@ -124,7 +124,7 @@ TEST(ExtremeValues, AreRefinedForGlAsOrdinaryOnes) {
 }
 
 // Values in the denormal range are refined too.
-TEST(ExtremeValues, AreRefinedBelowWhatFloatsHoldWhole) {
+TEST(ExtremeValues, AreRefinedWithDenormalFloats) {
   Progress progress;
   const auto cells = [&](double factor) {
     return viewer::build_grid({}, noise_times(factor, false), settings_for(factor), progress)
@@ -133,7 +133,7 @@ TEST(ExtremeValues, AreRefinedBelowWhatFloatsHoldWhole) {
   EXPECT_NEAR(static_cast<double>(cells(1e-41)) / static_cast<double>(cells(1.0)), 1.0, 0.02);
 }
 
-TEST(ExtremeValues, ARampMayMakeThem) {
+TEST(ExtremeValues, MayResultFromARamp) {
   Progress progress;
   const auto asset = noise_times(1.0, true);
   const auto built = [&](float most) {
@@ -145,14 +145,14 @@ TEST(ExtremeValues, ARampMayMakeThem) {
   expect_same_grid(*built(0x1p-90F)->grid, *built(1.0F)->grid);
 }
 
-TEST(ExtremeValues, SuggestTheScaleThatSuitsThem) {
+TEST(ExtremeValues, GiveASuitableDensityScale) {
   const auto scale = [](double factor) { return *noise_times(factor, false)->coarse().suggest_density_scale(); };
   for (const double factor : {1e29, 1e22, 1e-25, 1e-38, 1e-43})
     EXPECT_NEAR(scale(factor) * factor / scale(1.0), 1.0, 0.02) << factor;
 }
 
 // A larger density scale would not change the image, so refinement does not become coarser for it.
-TEST(ExtremeValues, MayHaveAnyDensityScale) {
+TEST(ExtremeValues, WorkWithAnyDensityScale) {
   Progress progress;
   const auto asset = noise_times(1.0, false);
   viewer::BuildSettings settings = settings_for(1.0);
@@ -192,7 +192,7 @@ TEST(ExtremeValues, FillValuesCountAsZeroAndAreCounted) {
   }
 }
 
-TEST(ExtremeValues, WhatIsAsLargeAsAnyMayBeIsKept) {
+TEST(ExtremeValues, LargestFiniteValuesAreKept) {
   Filled field;
   field.values[7] = 1e30F;
   Messages messages;
@@ -245,14 +245,14 @@ viewer::VolumeAssetPtr with_temperature(float most, std::optional<double> of_seq
   return std::make_shared<const viewer::VolumeAsset>(std::move(frame));
 }
 
-TEST(Kelvin, AreKnownByTheirValues) {
+TEST(KelvinTemperatures, AreDetectedByTheirValues) {
   for (const float relative : {0.5F, 1.0F, 3.0F, 20.0F})
     EXPECT_EQ(with_temperature(relative)->temperature_scale(), 1500.0);
   for (const float kelvin : {293.0F, 3000.0F, 1e5F}) EXPECT_EQ(with_temperature(kelvin)->temperature_scale(), 1.0);
   EXPECT_EQ(with_temperature(5.0F, 1.0)->temperature_scale(), 1.0) << "as the sequence has it";
 }
 
-TEST(Kelvin, WhatIsSaidWins) {
+TEST(KelvinTemperatures, ExplicitScaleOverridesDetection) {
   const auto hot = with_temperature(2000.0F);
   EXPECT_EQ(hot->emission_by({.blackbody = 1.0}).temperature_scale, 1.0);
   EXPECT_EQ(hot->emission_by({.temperature_scale = 700.0, .blackbody = 1.0}).temperature_scale, 700.0);
@@ -261,7 +261,7 @@ TEST(Kelvin, WhatIsSaidWins) {
   EXPECT_EQ(hot->emission_by({.blackbody = 1.0, .temperature_ramp = to_relative}).temperature_scale, 1500.0);
 }
 
-TEST(Kelvin, GlowAsRelativeTemperaturesDo) {
+TEST(KelvinTemperatures, EmitLikeRelativeTemperatures) {
   Progress progress;
   const auto light = [&](float most) {
     const auto channels = with_temperature(most)->channels({}, {.blackbody = 1.0}, false, progress);
@@ -274,7 +274,7 @@ TEST(Kelvin, GlowAsRelativeTemperaturesDo) {
 
 // ---- Images
 
-class ExtremePicture : public test::ViewerTest {
+class ExtremeValueRendering : public test::ViewerTest {
  protected:
   // White furnace test: a white medium under a white sky is invisible at any density.
   static test::Picture furnace(test::Still& still, double density_scale) {
@@ -284,9 +284,9 @@ class ExtremePicture : public test::ViewerTest {
     return test::render(still, {16, 16, 16, 3, render::View::shaded});
   }
 };
-CUMULET_ON_BACKENDS(ExtremePicture);
+CUMULET_ON_BACKENDS(ExtremeValueRendering);
 
-TEST_P(ExtremePicture, OpaqueWhiteMediaEndAndKeepTheirLight) {
+TEST_P(ExtremeValueRendering, OpaqueWhiteMediaConvergeAndConserveEnergy) {
   const auto still = make();
   still->set_volume(test::noise_volume(glm::ivec3(40), glm::ivec3(0), 3));
   for (const auto march : {scene::March::tet, scene::March::dense, scene::March::brick}) {
@@ -300,7 +300,7 @@ TEST_P(ExtremePicture, OpaqueWhiteMediaEndAndKeepTheirLight) {
   }
 }
 
-TEST_P(ExtremePicture, TetrahedraShowWhatVoxelsAre) {
+TEST_P(ExtremeValueRendering, TetrahedralGridsMatchVoxelGrids) {
   for (const double factor : {1e29, 1e-25, 1e-41}) {
     SCOPED_TRACE(factor);
     std::vector<test::Picture> pictures;

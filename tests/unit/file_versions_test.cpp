@@ -373,7 +373,7 @@ TEST_F(FileVersions, DamagedNanoVdbBuffersNeverCrash) {
   }
 }
 
-TEST_F(FileVersions, VdbIsNeverRefusedForItsNumber) {
+TEST_F(FileVersions, AnyVdbVersionNumberIsAccepted) {
   const auto grid = cloud<openvdb::FloatGrid>("density");
   std::string bytes = vdb({grid});
   const ScalarVolume wanted = read(write(bytes, "224.vdb"));
@@ -404,7 +404,7 @@ TEST_F(FileVersions, VdbIsNeverRefusedForItsNumber) {
   EXPECT_HAS(refusal(write(bytes, "old.vdb")), "VDB file format 215 is not supported");
 }
 
-TEST_F(FileVersions, VdbGridsOfHalvesAreRead) {
+TEST_F(FileVersions, VdbHalfFloatGridsAreRead) {
   const auto grid = cloud<HalfGrid>("density");
   const auto same = cloud<openvdb::FloatGrid>("density");
   const auto other = cloud<openvdb::FloatGrid>("flame");
@@ -443,7 +443,7 @@ TEST_F(FileVersions, VdbGridsOfHalvesAreRead) {
   expect_same(read(folder_ / "pipe.vdb", "flame"), wanted);
 }
 
-TEST_F(FileVersions, VdbMetadataOfHalvesAreNumbers) {
+TEST_F(FileVersions, VdbHalfFloatMetadataIsRead) {
   const auto grid = cloud<openvdb::FloatGrid>("density");
   openvdb::UnknownMetadata half("half");
   half.setValue({0x00, 0x3e});
@@ -458,7 +458,7 @@ TEST_F(FileVersions, VdbMetadataOfHalvesAreNumbers) {
   EXPECT_EQ(found->value, "1.5");
 }
 
-TEST_F(FileVersions, OnlyAnUnknownTypeOfGridIsRefused) {
+TEST_F(FileVersions, OnlyUnknownGridTypesAreRejected) {
   const auto grid = cloud<openvdb::FloatGrid>("density");
   std::string bytes = vdb({grid, cloud<openvdb::FloatGrid>("future")});
   patch(bytes, 226);

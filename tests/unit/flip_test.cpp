@@ -36,7 +36,7 @@ Bytes step(int x) {
 
 double mean(const Bytes& a, const Bytes& b) { return Flip(side, side).mean(a, b); }
 
-TEST(Flip, IdenticalPicturesDoNotDiffer) {
+TEST(Flip, IdenticalImagesHaveNoDifference) {
   for (const Bytes& picture : {filled(0, 0, 0), filled(200, 30, 90), noise(1), step(20)})
     EXPECT_EQ(mean(picture, picture), 0.0);
 }
@@ -44,7 +44,7 @@ TEST(Flip, IdenticalPicturesDoNotDiffer) {
 // Computed by hand from the paper's definitions. For uniform colors, filters and features have no effect. Black and
 // white differ by a lightness of 100: 100^0.7 = 25.119. The maximum is that of green and blue, 203.30^0.7 = 41.277. The
 // result is 0.95 + 0.05 (25.119 - 0.4 x 41.277) / (0.6 x 41.277) = 0.96738.
-TEST(Flip, EvenColoursDifferByTheirDistanceAlone) {
+TEST(Flip, UniformColorsDifferByTheirColorDistance) {
   EXPECT_NEAR(mean(filled(0, 0, 0), filled(255, 255, 255)), 0.96738, 2e-5);
   EXPECT_NEAR(mean(filled(0, 255, 0), filled(0, 0, 255)), 1.0, 1e-9);
   // Grays of lightness 53.585 and 53.977, difference 0.3916: 0.95 x 0.3916^0.7 / (0.4 x 41.277).
@@ -53,7 +53,7 @@ TEST(Flip, EvenColoursDifferByTheirDistanceAlone) {
 
 // Reference value of an independent Python program with two-dimensional kernels and the rounded matrices of the
 // authors' documentation.
-TEST(Flip, APictureWithDetailDiffersAsAnotherProgramSays) {
+TEST(Flip, DetailedImageMatchesTheReferenceImplementation) {
   constexpr int width = 24;
   constexpr int height = 20;
   Bytes a;
@@ -71,13 +71,13 @@ TEST(Flip, APictureWithDetailDiffersAsAnotherProgramSays) {
   EXPECT_NEAR(Flip(width, height).mean(a, b), 0.599686, 2e-5);
 }
 
-TEST(Flip, ItIsTheSameBothWays) {
+TEST(Flip, IsSymmetric) {
   EXPECT_NEAR(mean(noise(1), noise(2)), mean(noise(2), noise(1)), 1e-12);
   EXPECT_NEAR(mean(noise(1), filled(90, 90, 90)), mean(filled(90, 90, 90), noise(1)), 1e-12);
 }
 
 // An edge that only one image has counts, equally in both directions.
-TEST(Flip, FeaturesCountMoreThanTheirColours) {
+TEST(Flip, EdgesCountMoreThanColors) {
   const Bytes other = step(20);
   const std::vector<double> differences = Flip(side, side).map(filled(0, 0, 0), other);
   const auto at = [&](int x, int y) { return differences[static_cast<std::size_t>(y * side + x)]; };
@@ -107,7 +107,7 @@ TEST(Flip, FineDetailIsBlurredByDistance) {
   EXPECT_LT(Flip(side, side, 67.0).mean(grey, checks), 0.05);
 }
 
-TEST(Flip, PicturesOfOtherSizesAreRefused) {
+TEST(Flip, ImagesOfDifferentSizesAreRejected) {
   EXPECT_THROW((void)mean(filled(0, 0, 0), Bytes(16)), std::invalid_argument);
 }
 

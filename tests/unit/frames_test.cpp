@@ -56,7 +56,7 @@ TEST(Frames, RangesAreReadInTheirOrder) {
   EXPECT_EQ(parse_frames("9999998-9999999"), (Moments{9999998, 9999999}));
 }
 
-TEST(Frames, WhatIsNoRangeIsRefusedByItsOwnName) {
+TEST(Frames, InvalidRangesAreRejectedByName) {
   EXPECT_EQ(refusal([] { return parse_frames("10-1"); }), "'10-1' runs backwards");
   EXPECT_EQ(refusal([] { return parse_frames("1-3,9-8"); }), "'9-8' runs backwards");
   EXPECT_EQ(refusal([] { return parse_frames("1-9x0"); }), "'1-9x0' has a step of 0");
@@ -76,7 +76,7 @@ TEST(Frames, WhatIsNoRangeIsRefusedByItsOwnName) {
     EXPECT_NE(refusal([&] { return parse_frames(text); }), "") << text;
 }
 
-TEST(Frames, WhatIsBetweenThemIsReadInDecimals) {
+TEST(Frames, SubframesAreReadAsDecimals) {
   EXPECT_EQ(parse_frames("1-3x0.5"), (Moments{1, {1, 500}, 2, {2, 500}, 3}));
   EXPECT_EQ(parse_frames("1.5"), (Moments{{1, 500}}));
   EXPECT_EQ(parse_frames("0.9-1.3x0.1"), (Moments{{0, 900}, 1, {1, 100}, {1, 200}, {1, 300}}));
@@ -109,14 +109,14 @@ TEST(Frames, MayBeNegative) {
   EXPECT_EQ(parse_frames(frames_text({-3, -2, -1})), (Moments{-3, -2, -1})) << "as it is written it is read";
 }
 
-TEST(Frames, AreToldInFewWords) {
+TEST(Frames, ArePrintedCompactly) {
   EXPECT_EQ(frames_text({}), "");
   EXPECT_EQ(frames_text({4}), "4");
   EXPECT_EQ(frames_text({5, 4}), "4, 5");
   EXPECT_EQ(frames_text({20, 1, 2, 3, 7, 21, 22, 23}), "1-3, 7, 20-23");
 }
 
-TEST(FramePattern, ManyWaysToWriteOnePlace) {
+TEST(FramePattern, SupportsSeveralNotations) {
   for (const char* pattern : {"a/fire.####.vdb", "a/fire.%04d.vdb", "a/fire.$F4.vdb", "a/fire.<frame04>.vdb",
                               "a/fire.<frame4>.vdb", "a/fire.%4d.vdb"}) {
     EXPECT_EQ(file(pattern, 12), "a/fire.0012.vdb") << pattern;
@@ -130,7 +130,7 @@ TEST(FramePattern, ManyWaysToWriteOnePlace) {
   EXPECT_EQ(file("##", 3), "03");
 }
 
-TEST(FramePattern, NamesWithoutOrWithTooMuch) {
+TEST(FramePattern, RejectsNamesWithNoneOrSeveralPatterns) {
   for (const char* name : {"cloud.vdb", "cloud_0012.vdb", "100%.vdb", "%s.vdb", "a%04x.vdb", "<frames>.vdb", "$G4.vdb",
                            "####/cloud.vdb", "a %d/$F4/cloud.vdb", ""})
     EXPECT_FALSE(FramePattern::parse(name)) << name;
@@ -142,7 +142,7 @@ TEST(FramePattern, NamesWithoutOrWithTooMuch) {
   EXPECT_NE(refusal([] { return FramePattern::parse("a.$F99999999999999999999999"); }), "");
 }
 
-TEST(FramePattern, AFileKnowsItsNeighbours) {
+TEST(FramePattern, FindsNeighborsOfAFile) {
   EXPECT_EQ(neighbour("a/fluid_data_0010.vdb", 9), "a/fluid_data_0009.vdb");
   EXPECT_EQ(neighbour("fire7.vdb", 10), "fire10.vdb");
   EXPECT_EQ(neighbour("shot2_fire.0010.nvdb", 3), "shot2_fire.0003.nvdb") << "the last number counts";
@@ -157,7 +157,7 @@ TEST(FramePattern, AFileKnowsItsNeighbours) {
 }
 
 // In C, Houdini and ffmpeg the sign counts as a digit. In Blender it does not.
-TEST(FramePattern, PadsNegativeNumbersAsThoseThatAreThere) {
+TEST(FramePattern, PadsNegativeNumbersLikeExistingFiles) {
   EXPECT_EQ(file("out.####.exr", -2), "out.-002.exr");
   EXPECT_EQ(file("out.%04d.exr", -12345), "out.-12345.exr");
   EXPECT_EQ(file("out.#.exr", -2), "out.-2.exr");
@@ -184,7 +184,7 @@ TEST(FramePattern, PadsNegativeNumbersAsThoseThatAreThere) {
   }
 }
 
-TEST(FramePattern, NamesTheFilesThatItPassesOver) {
+TEST(FramePattern, ReportsSkippedFiles) {
   const Folder folder;
   for (const char* name : {"f.0001.vdb", "f.0002.vdb", "f.3.vdb", "f.04.vdb", "f.-1.vdb", "f.a.vdb", "f.0005.tmp"})
     write(folder / name, "x");
@@ -197,14 +197,14 @@ TEST(FramePattern, NamesTheFilesThatItPassesOver) {
 }
 
 // In k_1001_v2.vdb the version is the last number. The frame number is the one that differs between files.
-TEST(FramePattern, TheNumberThatFilesDifferInIsTheFrames) {
+TEST(FramePattern, FrameNumberIsTheOneThatVaries) {
   const Folder folder;
   for (const char* name : {"k_1001_v2.vdb", "k_1002_v2.vdb", "k_1003_v2.vdb", "k_1003_v1.vdb"})
     write(folder / name, "x");
   EXPECT_EQ(neighbour(folder / "k_1001_v2.vdb", 1002), folder / "k_1002_v2.vdb");
 }
 
-TEST(FramePattern, ZerosInFrontAreThoseOfTheFolder) {
+TEST(FramePattern, LeadingZerosFollowExistingFiles) {
   const Folder folder;
   EXPECT_EQ(neighbour(folder / "a.100.vdb", 9), folder / "a.9.vdb");
   write(folder / "a.099.vdb", "");
@@ -222,9 +222,9 @@ TEST(FramePattern, FindsItsFramesAndNoOthers) {
 }
 
 /// A plan of a folder's files.
-class Plan : public ::testing::Test {
+class FrameSelection : public ::testing::Test {
  protected:
-  Plan() { options.output = "out.####.exr"; }
+  FrameSelection() { options.output = "out.####.exr"; }
   void there(const char* name, std::size_t bytes) const { write(folder / name, std::string(bytes, 'x')); }
   std::string said() {
     try {
@@ -240,7 +240,7 @@ class Plan : public ::testing::Test {
   std::optional<FramePlan> plan;
 };
 
-TEST_F(Plan, APatternIsAllThatIsThere) {
+TEST_F(FrameSelection, PatternSelectsAllExistingFrames) {
   there("f.0003.vdb", 10);
   there("f.0001.vdb", 30);
   there("f.0002.vdb", 30);
@@ -263,7 +263,7 @@ TEST_F(Plan, APatternIsAllThatIsThere) {
   EXPECT_EQ(plan->frames[1].volume, folder / "f.0009.vdb") << "missing, which its turn tells";
 }
 
-TEST_F(Plan, AFileIsOneOfItsNeighboursWhereFramesAreAskedFor) {
+TEST_F(FrameSelection, FileWithFramesSelectsItsNeighbors) {
   there("f_0003.vdb", 10);
   options.scene.volume = folder / "f_0003.vdb";
   ASSERT_EQ(said(), "");
@@ -274,14 +274,14 @@ TEST_F(Plan, AFileIsOneOfItsNeighboursWhereFramesAreAskedFor) {
   EXPECT_EQ(plan->frames.at(0).output, "out.0002.exr");
 }
 
-TEST_F(Plan, AFileMayBeCalledAsAPatternIs) {
+TEST_F(FrameSelection, FileNameMayLookLikeAPattern) {
   there("cloud#1.vdb", 10);
   options.scene.volume = folder / "cloud#1.vdb";
   ASSERT_EQ(said(), "");
   EXPECT_FALSE(plan);
 }
 
-TEST_F(Plan, OneFrameNeedsNoPlaceForItsNumberAndTwoDo) {
+TEST_F(FrameSelection, SeveralFramesNeedANumberInTheOutput) {
   there("f.1.vdb", 10);
   there("f.2.vdb", 10);
   options.scene.volume = folder / "f.#.vdb";
@@ -300,7 +300,7 @@ TEST_F(Plan, OneFrameNeedsNoPlaceForItsNumberAndTwoDo) {
   EXPECT_NE(said().find("--stats: the name 's.json'"), std::string::npos);
 }
 
-TEST_F(Plan, WhatIsNoSequenceIsRefused) {
+TEST_F(FrameSelection, NonSequencesAreRejected) {
   options.scene.volume = folder / "f.####.vdb";
   EXPECT_EQ(said(), options.scene.volume + ": no file of such a name is there");
   options.scene.volume = folder / "cloud.vdb";
@@ -315,7 +315,7 @@ TEST_F(Plan, WhatIsNoSequenceIsRefused) {
   EXPECT_NE(said().find("--overwrite"), std::string::npos);
 }
 
-TEST_F(Plan, ASceneThatStandsAtAFrameIsThatFrame) {
+TEST_F(FrameSelection, SceneFrameIsSelected) {
   for (const char* name : {"f.1.vdb", "f.2.vdb", "f.3.vdb"}) there(name, 10);
   options.scene.volume = folder / "f.#.vdb";
   options.scene.sequence.frame = 2;
@@ -329,7 +329,7 @@ TEST_F(Plan, ASceneThatStandsAtAFrameIsThatFrame) {
   EXPECT_EQ(plan->frames.size(), 2U);
 }
 
-TEST_F(Plan, WhatIsBetweenTwoFilesIsOfBoth) {
+TEST_F(FrameSelection, SubframesNeedBothFiles) {
   for (const char* name : {"f.0010.vdb", "f.0012.vdb", "f.0014.vdb"}) there(name, 10);
   options.scene.volume = folder / "f.####.vdb";
   options.scene.sequence.playback.frames_per_second = 10.0;
@@ -358,7 +358,7 @@ TEST_F(Plan, WhatIsBetweenTwoFilesIsOfBoth) {
   EXPECT_EQ(said(), "frame 10.333: the files are 2 frames apart, of which this is no thousandth");
 }
 
-TEST_F(Plan, BeginsBeforeZero) {
+TEST_F(FrameSelection, NegativeFramesAreSupported) {
   for (const char* name : {"n.-002.vdb", "n.-001.vdb", "n.0000.vdb", "n.0001.vdb", "n.0002.vdb"}) there(name, 10);
   options.scene.volume = folder / "n.####.vdb";
   ASSERT_EQ(said(), "");
@@ -385,7 +385,7 @@ TEST_F(Plan, BeginsBeforeZero) {
   EXPECT_NE(plan->passed_over.find("n.-1.vdb"), std::string::npos);
 }
 
-TEST_F(Plan, ARowHasGapsAndEqualSteps) {
+TEST_F(FrameSelection, RangesMayHaveGapsAndSteps) {
   for (const char* name : {"f.0010.vdb", "f.0014.vdb", "f.0012.vdb", "f.0020.vdb", "other.0011.vdb"}) there(name, 10);
   const auto row = FrameRow::of_name(folder / "f.####.vdb");
   ASSERT_TRUE(row);
@@ -409,14 +409,14 @@ TEST_F(Plan, ARowHasGapsAndEqualSteps) {
   EXPECT_FALSE(FrameRow::around(folder / "far.1.vdb"));
 }
 
-TEST(FrameLine, OneOfEachState) {
+TEST(FrameLine, PrintsEachState) {
   EXPECT_EQ(frame_line(12, 3, 20, FrameState::done, "out.0012.exr in 8.21 s"),
             "frame 12 (3 of 20) done out.0012.exr in 8.21 s");
   EXPECT_EQ(frame_line(1, 1, 1, FrameState::kept, "a.exr"), "frame 1 (1 of 1) kept a.exr");
   EXPECT_EQ(frame_line(1, 1, 1, FrameState::failed, "a\nb.vdb: no"), "frame 1 (1 of 1) failed a b.vdb: no");
 }
 
-TEST(FrameMade, AnEmptyFileIsNone) {
+TEST(FrameOutput, EmptyFileDoesNotCount) {
   const Folder folder;
   EXPECT_FALSE(is_made(folder / "a.exr"));
   write(folder / "a.exr", "");

@@ -62,7 +62,7 @@ double schlick(double f0, double cosine) { return f0 + (1.0 - f0) * std::pow(1.0
 
 // A slab seen from above under a uniform sky: the outer reflection, and the light transmitted after any number of
 // internal reflections. Each pass adds one path length of absorption.
-TEST_P(Glass, ASlabAbsorbsByBeerAndLambertOverAllItsWays) {
+TEST_P(Glass, SlabAbsorptionFollowsBeerLambertOnEveryPath) {
   const auto viewer = make();
   viewer->set_camera(test::looking_down());
   viewer->set_light(sky(1.0F));
@@ -82,7 +82,7 @@ TEST_P(Glass, ASlabAbsorbsByBeerAndLambertOverAllItsWays) {
 }
 
 // A camera inside the glass sees the same absorption on the way out.
-TEST_P(Glass, ACameraWithinIsWithin) {
+TEST_P(Glass, CameraMayBeInside) {
   const auto viewer = make();
   viewer->set_light(sky(1.0F));
   auto scene = std::make_shared<StillScene>();
@@ -102,7 +102,7 @@ TEST_P(Glass, ACameraWithinIsWithin) {
 
 // White furnace test without absorption: glass balls, dispersive glass, nested balls, thin walls and smoke around them
 // are as bright as the sky.
-TEST_P(Glass, AFurnaceOfGlassIsOne) {
+TEST_P(Glass, WhiteFurnaceIsOne) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({24, 20, 22}, glm::ivec3(0), 3));
   viewer->set_light(sky(1.0F));
@@ -135,7 +135,7 @@ TEST_P(Glass, AFurnaceOfGlassIsOne) {
 
 // A clear thin wall reflects and transmits by Fresnel and its color. Light passes straight through it to surfaces
 // below.
-TEST_P(Glass, AThinWallTintsWhatIsBehindAndTheSunThroughIt) {
+TEST_P(Glass, ThinWallTintsTheBackgroundAndSunlight) {
   const auto viewer = make();
   const vec3 colour(1.0F, 0.5F, 0.25F);
   const auto wall = [&](StillScene& scene, float y) {
@@ -175,7 +175,7 @@ TEST_P(Glass, AThinWallTintsWhatIsBehindAndTheSunThroughIt) {
 
 // A prism refracts each wavelength by Snell's law. A bright wall begins where 549 nm arrives. All of red (refracted
 // less) hits it, none of blue, and half of green.
-TEST_P(Glass, APrismPartsColoursByCauchysIndex) {
+TEST_P(Glass, PrismDispersionFollowsCauchy) {
   const auto viewer = make();
   constexpr double bend = 30.0 * pi / 180.0;
   constexpr float way = 100.0F;
@@ -217,7 +217,7 @@ TEST_P(Glass, APrismPartsColoursByCauchysIndex) {
 }
 
 // Textures give the same result as equal factors.
-TEST_P(Glass, TexturesTakeThePlaceOfFactors) {
+TEST_P(Glass, TexturesMatchEqualFactors) {
   const auto viewer = make();
   viewer::Light light = sky(0.5F);
   light.sun_elevation_degrees = 50.0F;
@@ -288,7 +288,7 @@ TEST_P(Glass, TexturesTakeThePlaceOfFactors) {
 }
 
 // Brushed metal shows the sun as a streak along its tangent.
-TEST_P(Glass, BrushedMetalStreaksAlongItsTangent) {
+TEST_P(Glass, BrushedMetalHighlightsFollowTheTangent) {
   const auto viewer = make();
   viewer::Light light = sky(0.0F);
   light.sun_elevation_degrees = 90.0F;

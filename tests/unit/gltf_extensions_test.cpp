@@ -31,7 +31,7 @@ using test::refused;
 /// KHR_node_visibility.
 json visible(bool is) { return {{"KHR_node_visibility", {{"visible", is}}}}; }
 
-TEST(GltfVisibility, HiddenNodesAndWhatDescendsFromThemAreNotThere) {
+TEST(GltfVisibility, HiddenNodesAndDescendantsAreNotImported) {
   GltfModel model;
   model.root["extensionsUsed"] = {"KHR_node_visibility", "KHR_lights_punctual"};
   model.root["extensionsRequired"] = {"KHR_node_visibility"};
@@ -55,7 +55,7 @@ TEST(GltfVisibility, HiddenNodesAndWhatDescendsFromThemAreNotThere) {
   EXPECT_EQ(pose.cameras.size(), 1U);
 }
 
-TEST(GltfVisibility, HiddenJointsMoveWhatIsSeen) {
+TEST(GltfVisibility, HiddenJointsStillDeformVisibleMeshes) {
   GltfModel model;
   const json primitive = {{"attributes",
                            {{"POSITION", model.triangle()},
@@ -69,12 +69,12 @@ TEST(GltfVisibility, HiddenJointsMoveWhatIsSeen) {
   EXPECT_EQ(scene->pose(0.0).low.z, 3.0);
 }
 
-TEST(GltfVisibility, WhatIsNoTruthValueIsRefused) {
+TEST(GltfVisibility, NonBooleanVisibilityIsRejected) {
   GltfModel model = test::triangle_model({{"extensions", {{"KHR_node_visibility", {{"visible", 0}}}}}});
   EXPECT_TRUE(has(refused(model), "nodes[0].extensions.KHR_node_visibility.visible is not true or false"));
 }
 
-TEST(GltfWebp, TexelsAreThoseOfThePicture) {
+TEST(GltfWebp, TexelsMatchTheImage) {
   const Bytes rgba = {255, 0, 0, 255, 0, 255, 0, 128, 10, 20, 30, 40, 250, 251, 252, 253, 1, 2, 3, 4, 5, 6, 7, 8};
   const ScenePtr scene = imported(test::seed_webp(test::webp(3, 2, rgba)));
   ASSERT_EQ(scene->images.size(), 1U);
@@ -91,7 +91,7 @@ TEST(GltfWebp, TexelsAreThoseOfThePicture) {
   for (std::size_t i = 0; i < even.size(); ++i) EXPECT_NEAR(lossy->images[0].rgba[i], even[i], 6) << i;
 }
 
-TEST(GltfWebp, TheOtherImageIsForWhereThereIsNone) {
+TEST(GltfWebp, FallbackImageIsUsedIfWebpFails) {
   const Bytes blue = {0, 0, 255};
   const Bytes other = test::png(1, 1, 8, 2, blue);
   const Bytes good = test::webp(1, 1, {255, 0, 0, 255});
@@ -108,7 +108,7 @@ TEST(GltfWebp, TheOtherImageIsForWhereThereIsNone) {
   EXPECT_TRUE(has(lines.warnings[0], "image 0 (small) is left out: is a WebP cut short")) << lines.warnings[0];
 }
 
-TEST(GltfWebp, HostileFilesCostOneLine) {
+TEST(GltfWebp, InvalidFilesGiveOneWarning) {
   const auto line = [](const Bytes& picture) {
     Lines lines;
     const ScenePtr scene = imported(test::seed_webp(picture), lines.log);
@@ -161,7 +161,7 @@ GltfModel moving_model(const json& material = json::object()) {
   return model;
 }
 
-TEST(GltfPointers, NodesMoveAsByPathsOfTheirOwn) {
+TEST(GltfAnimationPointers, NodePointersMatchNodeChannels) {
   GltfModel model = moving_model();
   animate(model, {{"/nodes/0/translation", 3, {0, 0, 0, 10, 0, 0}},
                   {"/nodes/0/scale", 3, {1, 1, 1, 3, 3, 3}},
@@ -177,7 +177,7 @@ TEST(GltfPointers, NodesMoveAsByPathsOfTheirOwn) {
   test::near(test::corners(*scene, scene->pose(0.5))[0], {5, 0, 1});
 }
 
-TEST(GltfPointers, VisibilityComesAndGoesWithAllThatIsMadeOfIt) {
+TEST(GltfAnimationPointers, VisibilityCanBeAnimated) {
   GltfModel model = moving_model({{"emissiveFactor", {1, 1, 1}}});
   const json second = model.root["meshes"][0]["primitives"][0];
   const int far = model.show(second, {{"translation", {50, 0, 0}}});
@@ -211,7 +211,7 @@ TEST(GltfPointers, VisibilityComesAndGoesWithAllThatIsMadeOfIt) {
   EXPECT_EQ(then->words, scene::make_model_source(scene, with, &progress)->words);
 }
 
-TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
+TEST(GltfAnimationPointers, MaterialsCanBeAnimated) {
   GltfModel model = moving_model({{"emissiveFactor", {0, 0, 0}},
                                   {"alphaMode", "MASK"},
                                   {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 2}}}}}});
@@ -273,7 +273,7 @@ TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
   EXPECT_EQ(bright->images, dark->images);
 }
 
-TEST(GltfPointers, EachAnimationMovesMaterials) {
+TEST(GltfAnimationPointers, EachAnimationHasItsOwnMaterials) {
   GltfModel model = moving_model();
   animate(model, {{"/materials/0/alphaCutoff", 1, {0, 1}}});
   animate(model, {{"/materials/0/pbrMetallicRoughness/metallicFactor", 1, {1, 0}}});
@@ -283,7 +283,7 @@ TEST(GltfPointers, EachAnimationMovesMaterials) {
   EXPECT_FLOAT_EQ(scene->pose(0.25, 1).materials.at(0).alpha_cutoff, 0.5F);
 }
 
-TEST(GltfPointers, LightsAreThoseOfTheMoment) {
+TEST(GltfAnimationPointers, LightsCanBeAnimated) {
   GltfModel model = moving_model();
   const std::string of = "/extensions/KHR_lights_punctual/lights/0/";
   animate(model, {{of + "color", 3, {0, 0, 0, 1, 0.5F, 0}},
@@ -299,7 +299,7 @@ TEST(GltfPointers, LightsAreThoseOfTheMoment) {
   EXPECT_EQ(scene->pose(0.0, 7).lights[0].intensity, glm::vec3(4, 2, 1));
 }
 
-TEST(GltfPointers, SplinesThatLeadBeyondAllNumbersStayNumbers) {
+TEST(GltfAnimationPointers, OverflowingSplinesStayFinite) {
   // In-tangents, values and out-tangents of two keys.
   constexpr float steep = 3e38F;
   const auto spline = [](const std::string& pointer, std::size_t width) {
@@ -336,7 +336,7 @@ TEST(GltfPointers, SplinesThatLeadBeyondAllNumbersStayNumbers) {
   }
 }
 
-TEST(GltfPointers, WhatIsNotFollowedIsToldOnce) {
+TEST(GltfAnimationPointers, UnsupportedPointersAreReportedOnce) {
   GltfModel model = moving_model();
   animate(model, {{"/cameras/0/perspective/yfov", 1, {0.5F, 1}},
                   {"/materials/0/extensions/KHR_materials_transmission/transmissionFactor", 1, {0, 1}},
@@ -352,7 +352,7 @@ TEST(GltfPointers, WhatIsNotFollowedIsToldOnce) {
   EXPECT_EQ(scene->pose(1.0).low.x, 10.0);
 }
 
-TEST(GltfPointers, HostileOnesAreRefusedInALine) {
+TEST(GltfAnimationPointers, InvalidPointersGiveAOneLineError) {
   const auto line = [](const test::Pointing& pointing) {
     GltfModel model = moving_model();
     animate(model, {pointing});
@@ -378,7 +378,7 @@ GltfModel layered_model(const json& extensions) {
   return model;
 }
 
-TEST(GltfLayers, WhatIsNotSaidIsAsTheExtensionsHaveIt) {
+TEST(GltfMaterialLayers, MissingPropertiesHaveTheExtensionsDefaults) {
   const json none = json::object();
   Lines lines;
   const ScenePtr scene = imported(layered_model({{"KHR_materials_volume", none},
@@ -400,7 +400,7 @@ TEST(GltfLayers, WhatIsNotSaidIsAsTheExtensionsHaveIt) {
   }
 }
 
-TEST(GltfLayers, VolumesAreBoundedByBothSidesOfWhatTransmits) {
+TEST(GltfMaterialLayers, TransmissiveSurfacesBoundVolumesOnBothSides) {
   const json volume = {{"thicknessFactor", 0.5}};
   const json through = {{"transmissionFactor", 1}};
   const ScenePtr wall = imported(layered_model({{"KHR_materials_transmission", through}}));
@@ -415,7 +415,7 @@ TEST(GltfLayers, VolumesAreBoundedByBothSidesOfWhatTransmits) {
   EXPECT_EQ(triangle_flags(*glass, glass->pose(0.0))[0] & (TriangleFlags::ask | TriangleFlags::one_sided), 0U);
 }
 
-TEST(GltfLayers, OnlyWhatIsSeenMakesPathsDearer) {
+TEST(GltfMaterialLayers, UnusedMaterialsDoNotSelectTheExtendedShaders) {
   Progress progress;
   const auto rich = [&](const json& extensions, bool shown) {
     GltfModel model = layered_model(extensions);
@@ -433,7 +433,7 @@ TEST(GltfLayers, OnlyWhatIsSeenMakesPathsDearer) {
   EXPECT_FALSE(rich({{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}, true));
 }
 
-TEST(GltfLayers, AnisotropyHasTangentsWithoutANormalMap) {
+TEST(GltfMaterialLayers, AnisotropyHasTangentsWithoutANormalMap) {
   GltfModel model = layered_model({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}}}});
   // u increases along +y of the triangle.
   model.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = model.vec2({0, 0, 0, 1, 1, 0});
@@ -446,7 +446,7 @@ TEST(GltfLayers, AnisotropyHasTangentsWithoutANormalMap) {
   EXPECT_EQ(test::broken(*bare, bare->pose(0.0)), "");
 }
 
-TEST(GltfLayers, HostileNumbersAreBoundedOrRefusedInALine) {
+TEST(GltfMaterialLayers, InvalidNumbersAreClampedOrGiveAOneLineError) {
   const auto line = [](const char* extension, const json& members) {
     return refused(layered_model({{extension, members}}));
   };
@@ -480,7 +480,7 @@ TEST(GltfLayers, HostileNumbersAreBoundedOrRefusedInALine) {
   EXPECT_EQ(m.iridescence, 1.0F);
 }
 
-TEST(GltfLayers, PreviewsDrawVolumesAsTintedWallsAndRoundLobes) {
+TEST(GltfMaterialLayers, PreviewsUseTintedWallsAndIsotropicLobes) {
   GltfModel model =
       layered_model({{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
                      {"KHR_materials_volume",
@@ -498,7 +498,7 @@ TEST(GltfLayers, PreviewsDrawVolumesAsTintedWallsAndRoundLobes) {
   EXPECT_NEAR(block.reflection.y, std::sqrt(std::sqrt(0.25 * (0.25 * 0.36 + 0.64))), 1e-5);
 }
 
-TEST(GltfLayers, FactorsMoveByPointers) {
+TEST(GltfMaterialLayers, FactorsCanBeAnimated) {
   GltfModel model = layered_model({{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
                                    {"KHR_materials_volume", {{"thicknessFactor", 1}, {"attenuationDistance", 2}}},
                                    {"KHR_materials_sheen", json::object()},
@@ -561,7 +561,7 @@ GltfModel variant_model() {
   return model;
 }
 
-TEST(GltfVariants, MaterialsAreThoseThatAreChosen) {
+TEST(GltfVariants, SelectedVariantSetsMaterials) {
   Lines lines;
   const ScenePtr scene = imported(variant_model(), lines.log);
   EXPECT_TRUE(lines.warnings.empty());
@@ -598,7 +598,7 @@ TEST(GltfVariants, MaterialsAreThoseThatAreChosen) {
   EXPECT_EQ(shown(3)->words, none->words);  // an index out of range
 }
 
-TEST(GltfVariants, HostileMappingsAreRefusedInALine) {
+TEST(GltfVariants, InvalidMappingsGiveAOneLineError) {
   const auto line = [](const json& mapping) {
     GltfModel model = variant_model();
     model.root["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"]["mappings"] =
@@ -632,7 +632,7 @@ detail::SpecularGlossiness mixture(const glm::vec3& colour, float metallic) {
   return {glm::vec4(colour * (1.0F - metallic) * 0.96F / rest, 1.0F), specular, 0.25F};
 }
 
-TEST(GltfGlossiness, ConversionTakesApartWhatMixingMakes) {
+TEST(GltfGlossiness, ConversionInvertsMetallicRoughness) {
   // For gray mixtures, the conversion is exact. For colored ones, it is exact only for pure metals and dielectrics.
   for (const float metallic : {0.0F, 0.25F, 0.5F, 0.9F, 1.0F}) {
     for (const float grey : {0.2F, 0.5F, 0.8F}) {
@@ -653,7 +653,7 @@ TEST(GltfGlossiness, ConversionTakesApartWhatMixingMakes) {
   test::near(glm::vec3(plastic.base_color), {0.5F, 0.2F, 0.1F});
 }
 
-TEST(GltfGlossiness, FactorsAlone) {
+TEST(GltfGlossiness, FactorsWithoutTexturesAreConverted) {
   const ScenePtr scene = imported(glossy_model(
       {{"diffuseFactor", {0.5, 0.2, 0.1, 0.5}}, {"specularFactor", {0.04, 0.04, 0.04}}, {"glossinessFactor", 0.75}}));
   const Material& m = scene->materials[0];
@@ -669,7 +669,7 @@ TEST(GltfGlossiness, FactorsAlone) {
   test::near(glm::vec3(mirror.base_color), glm::vec3(1.0F));
 }
 
-TEST(GltfGlossiness, TexelsBecomeOthers) {
+TEST(GltfGlossiness, TexelsAreConverted) {
   const json transform = {{"KHR_texture_transform", {{"offset", {0.5, 0.25}}}}};
   const ScenePtr scene =
       imported(glossy_model({{"specularFactor", {0.04, 0.04, 0.04}},
@@ -704,7 +704,7 @@ TEST(GltfGlossiness, TexelsBecomeOthers) {
   EXPECT_EQ(rough.rgba[5], 127);
 }
 
-TEST(GltfGlossiness, OddTexturesAreTold) {
+TEST(GltfGlossiness, UnsupportedTexturesAreReported) {
   Lines lines;
   imported(glossy_model(
                {{"diffuseTexture", {{"index", 0}}}, {"specularGlossinessTexture", {{"index", 1}, {"texCoord", 1}}}}),
@@ -754,7 +754,7 @@ std::array<glm::vec3, 3> placed_corners(const Scene& scene, const Pose& pose, st
   return corners;
 }
 
-TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
+TEST(GltfInstances, TransformsCombineAttributesAndNode) {
   GltfModel model = instanced_model(
       [](GltfModel& m) {
         return json{
@@ -783,14 +783,14 @@ TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
   test::near(glm::vec3(pose.high), {120, 4, 10}, 1e-3F);
 }
 
-TEST(GltfInstances, MoveWithTheirNode) {
+TEST(GltfInstances, FollowTheirNode) {
   GltfModel model = instanced_model([](GltfModel& m) { return json{{"TRANSLATION", m.vec3({0, 0, 0, 3, 0, 0})}}; });
   animate(model, {{"/nodes/0/translation", 3, {0, 0, 0, 0, 8, 0}}});
   const ScenePtr scene = imported(model);
   test::near(placed_corners(*scene, scene->pose(1.0), 1)[0], {3, 8, 0});
 }
 
-TEST(GltfInstances, WhatIsNotReadIsTold) {
+TEST(GltfInstances, UnsupportedAttributesAreReported) {
   Lines lines;
   GltfModel model = instanced_model([](GltfModel& m) { return json{{"_COLOR", m.vec3({1, 0, 0, 0, 1, 0})}}; });
   const ScenePtr scene = imported(model, lines.log);
@@ -801,7 +801,7 @@ TEST(GltfInstances, WhatIsNotReadIsTold) {
   EXPECT_EQ(imported(instanced_model([](GltfModel&) { return json::object(); }))->triangle_count(), 1U);
 }
 
-TEST(GltfInstances, HostileOnesAreRefusedInALine) {
+TEST(GltfInstances, InvalidInstancesGiveAOneLineError) {
   const auto line = [](const std::function<json(GltfModel&)>& attributes) {
     return refused(instanced_model(attributes));
   };
@@ -826,7 +826,7 @@ TEST(GltfInstances, HostileOnesAreRefusedInALine) {
   EXPECT_TRUE(has(refused(many(1000), ErrorCode::file, small), "instances' transforms would need more than the"));
 }
 
-TEST(GltfInstances, FlatOnesAreNotDrawn) {
+TEST(GltfInstances, ZeroScaleInstancesAreNotDrawn) {
   const ScenePtr scene = imported(instanced_model([](GltfModel& m) {
     return json{{"SCALE", m.vec3({1, 1, 1, 1, 0, 1, 0, 0, 0})}};
   }));

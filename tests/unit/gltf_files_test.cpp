@@ -64,7 +64,7 @@ struct Lines {
 
 bool one_line(const std::string& text) { return !text.empty() && text.find_first_of("\n\r") == std::string::npos; }
 
-TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
+TEST(GltfFiles, EachIsImportedOrGivesAOneLineError) {
   if (!std::filesystem::exists(models)) GTEST_SKIP() << "no shared data";
   std::set<std::string> seen;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(models)) {
@@ -103,7 +103,7 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
 }
 
 // Test models of Khronos' glTF-Validator with its report for each.
-TEST(GltfFiles, WhatTheValidatorCallsValidLoadsAndTheRestIsTold) {
+TEST(GltfFiles, ValidFilesLoadAndOthersAreReported) {
   const auto suite = models / validator;
   if (!std::filesystem::exists(suite)) GTEST_SKIP() << "no shared data";
   std::size_t valid = 0;
@@ -140,7 +140,7 @@ TEST(GltfFiles, WhatTheValidatorCallsValidLoadsAndTheRestIsTold) {
   EXPECT_GE(invalid, 243U);
 }
 
-TEST(GltfFiles, DracoIsTheSameEngine) {
+TEST(GltfFiles, DracoFileMatchesTheUncompressedOne) {
   const auto folder = models / "assimp_glTF2";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no shared data";
   const Pose plain = import_gltf((folder / "2CylinderEngine-glTF-Binary/2CylinderEngine.glb").string(), {})->pose(0.0);
@@ -150,7 +150,7 @@ TEST(GltfFiles, DracoIsTheSameEngine) {
   EXPECT_LT(glm::length(plain.high - small.high), 1e-3 * size);
 }
 
-TEST(GltfFiles, ImagesThatCannotBeHadCostAWarningEach) {
+TEST(GltfFiles, UnreadableImagesGiveOneWarningEach) {
   const auto file = models / "bevy/AnisotropyBarnLamp/AnisotropyBarnLamp.gltf";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no shared data";
   Lines lines;

@@ -116,7 +116,7 @@ void expect_color(const Read& read, std::uint32_t x, std::uint32_t y, int r, int
   EXPECT_EQ(at[3], 255);
 }
 
-TEST(GltfJpeg, WhatLibjpegReadsIsRead) {
+TEST(GltfJpeg, ReadsWhatLibjpegReads) {
   for (const Coding& coding :
        {Coding{}, Coding{.progressive = true}, Coding{.progressive = true, .restart = 2}, Coding{.restart = 1},
         Coding{.arithmetic = true}, Coding{.sampling = 1}, Coding{.sampling = 4}, Coding{.to = JCS_RGB}}) {
@@ -146,7 +146,7 @@ TEST(GltfJpeg, WhatLibjpegReadsIsRead) {
   }
 }
 
-TEST(GltfJpeg, GrayAndInksAreColors) {
+TEST(GltfJpeg, GrayAndCmykAreConverted) {
   expect_color(read(jpeg(32, {120}, {.from = JCS_GRAYSCALE})), 3, 3, 120, 120, 120);
   // Adobe's programs store complements.
   for (const J_COLOR_SPACE space : {JCS_CMYK, JCS_YCCK}) {
@@ -157,7 +157,7 @@ TEST(GltfJpeg, GrayAndInksAreColors) {
                3, 200, 40, 90);
 }
 
-TEST(GltfJpeg, DamageIsToldAndTheRestIsShown) {
+TEST(GltfJpeg, DamagedImageIsReportedAndPartlyShown) {
   for (const Coding& coding : {Coding{}, Coding{.progressive = true}}) {
     const Bytes whole = jpeg(64, {200, 40, 90}, coding);
     // If only the end marker is missing, all pixels are read.
@@ -186,7 +186,7 @@ TEST(GltfJpeg, DamageIsToldAndTheRestIsShown) {
   EXPECT_TRUE(has(got.warnings[0], "Unsupported JPEG data precision 12")) << got.warnings[0];
 }
 
-TEST(GltfJpeg, AnyBytesAreRefusedOrRead) {
+TEST(GltfJpeg, RandomBytesAreReadOrRejected) {
   const Bytes whole = jpeg(32, {200, 40, 90}, {.progressive = true, .restart = 1});
   std::uint32_t random = 1;
   for (int i = 0; i < 300; ++i) {
@@ -200,7 +200,7 @@ TEST(GltfJpeg, AnyBytesAreRefusedOrRead) {
   }
 }
 
-TEST(GltfJpeg, TheSharedTrialsAreRead) {
+TEST(GltfJpeg, ReadsTheSharedTestImages) {
   const fs::path trials = fs::path(CUMULET_SHARED_DATA) / "trials" / "jpeg-tails";
   if (!fs::exists(trials)) GTEST_SKIP() << "no shared data";
   std::size_t count = 0;
@@ -215,7 +215,7 @@ TEST(GltfJpeg, TheSharedTrialsAreRead) {
   EXPECT_GE(count, 12U);
 }
 
-TEST(GltfUris, AreUrlReferencesThenNames) {
+TEST(GltfUris, AreDecodedAsUrlsThenAsPlainNames) {
   using detail::paths_of;
   using Paths = std::vector<std::string>;
   EXPECT_EQ(paths_of("a.png"), Paths{"a.png"});
@@ -332,7 +332,7 @@ TEST_F(GltfFolder, DataUrisOfAllKindsHoldBytes) {
   }
 }
 
-TEST(GltfCounts, AnAccessorOfNoElementsLosesWhatReadsIt) {
+TEST(GltfCounts, EmptyAccessorDropsItsPrimitive) {
   const auto two = [](const std::function<void(GltfModel&)>& change) {
     GltfModel model = test::triangle_model();
     change(model);
@@ -369,7 +369,7 @@ TEST(GltfCounts, AnAccessorOfNoElementsLosesWhatReadsIt) {
   EXPECT_TRUE(has(lines.warnings[1], "1 nodes are not drawn: an accessor of their instances"));
 }
 
-TEST(OneLine, HasNoRawBytes) {
+TEST(OneLine, EscapesRawBytes) {
   EXPECT_EQ(one_line(" two\r\n lines\t"), "two lines");
   EXPECT_EQ(one_line("\x1b[31mred\x7f!"), "[31mred !");
   EXPECT_EQ(one_line("na\xc3\xafve \xe2\x82\xac \xf0\x9f\x8c\x8b"), "na\xc3\xafve \xe2\x82\xac \xf0\x9f\x8c\x8b");
@@ -382,7 +382,7 @@ TEST(OneLine, HasNoRawBytes) {
   EXPECT_EQ(one_line("a\xe2\x82\xac\xe2\x82\xac", 3), "a\xe2\x82\xac...");
 }
 
-TEST(GltfJson, ErrorsShowNoRawBytes) {
+TEST(GltfJson, ErrorsEscapeRawBytes) {
   for (const std::string& text :
        {std::string("\x89PNG\r\n\x1a\n"), std::string("{\"asset\": \"\xff\xfe\x01\"}"), std::string("\x01\x02\xFF\xFE"),
         std::string("{\"a\x1b[2J\": 1}"), std::string("{\"a\": \x9b}"), std::string("{\"a\": tru\xe2\x82")}) {

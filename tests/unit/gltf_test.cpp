@@ -105,7 +105,7 @@ TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
 }
 
 // Files that Khronos' validator accepts, with buffers that have no data. They matter only where something reads them.
-TEST(Gltf, WhatIsNotThereMattersToWhoReadsIt) {
+TEST(Gltf, MissingBufferDataMattersOnlyIfRead) {
   const auto with = [](const std::function<void(json&)>& change) {
     GltfModel model = triangle_model();
     // These buffers are added after the model's own.
@@ -183,7 +183,7 @@ TEST(Gltf, WhatIsNotThereMattersToWhoReadsIt) {
                   "POSITION has a type of element that is none of glTF's"));
 }
 
-TEST(Gltf, NewerMinorVersionsAreReadAsThisOne) {
+TEST(Gltf, NewerMinorVersionsAreAccepted) {
   GltfModel model = triangle_model();
   model.root["asset"] = {{"version", "2.1"}};
   Lines silent;
@@ -200,7 +200,7 @@ TEST(Gltf, NewerMinorVersionsAreReadAsThisOne) {
   }
 }
 
-TEST(Gltf, PlainDataUrisHoldBytesAsTheyAre) {
+TEST(Gltf, PlainDataUrisAreReadVerbatim) {
   GltfModel model = triangle_model();
   std::string plain;
   for (const std::uint8_t byte : model.data()) {
@@ -214,7 +214,7 @@ TEST(Gltf, PlainDataUrisHoldBytesAsTheyAre) {
   near(corners(*scene, scene->pose(0.0))[1], {1, 0, 0});
 }
 
-TEST(Gltf, NumbersOutOfRangeAreTold) {
+TEST(Gltf, OutOfRangeNumbersAreReported) {
   GltfModel model = triangle_model();
   model.root["materials"] = nlohmann::json::array({{{"emissiveFactor", {0.0, 1.0, 0.5}}, {"alphaCutoff", 7.0}}});
   {
@@ -238,7 +238,7 @@ TEST(Gltf, NumbersOutOfRangeAreTold) {
   }
 }
 
-TEST(Gltf, SkinsAndWeightsThatDoNothingAreTold) {
+TEST(Gltf, UnusedSkinsAndWeightsAreReported) {
   const auto warnings = [](const GltfModel& model) {
     Lines lines;
     imported(model, lines.log);
@@ -439,7 +439,7 @@ TEST(Gltf, InterleavedAttributes) {
   }
 }
 
-TEST(Gltf, VerticesThatNothingNamesAreLeftOut) {
+TEST(Gltf, UnreferencedVerticesAreDropped) {
   GltfModel model;
   std::vector<float> many(300, 1000.0F);
   for (std::size_t i = 0; i < 9; ++i) many[i + 30] = i == 3 || i == 7 ? 1.0F : 0.0F;
@@ -470,7 +470,7 @@ TEST(Gltf, SparseAccessors) {
   near(pose.vertices[1].normal, {0, 0, 1});
 }
 
-TEST(Gltf, AnimationsStepLinearAndCubic) {
+TEST(Gltf, AnimationsInterpolateStepLinearAndCubic) {
   const ScenePtr scene = imported(test::seed_animated().gltf());
   ASSERT_EQ(scene->animations.size(), 2U);
   EXPECT_EQ(scene->animations[0].name, "all");
@@ -516,7 +516,7 @@ TEST(Gltf, AnimationsStepLinearAndCubic) {
   near(scene->pose(0.5, 1).vertices[0].position, {1.5F, 1.5F, 1.5F});
 }
 
-TEST(Gltf, RotationsTakeTheShorterWay) {
+TEST(Gltf, RotationsTakeTheShorterArc) {
   GltfModel model = triangle_model();
   // The identity, and 90 degrees about z with the sign of the quaternion reversed: halfway is 45 degrees.
   const int turns = model.accessor<float>("VEC4", 4, {0, 0, 0, 1, 0, 0, -0.70710678F, -0.70710678F});
@@ -530,7 +530,7 @@ TEST(Gltf, RotationsTakeTheShorterWay) {
   near(corners(*scene, scene->pose(3.0))[1], {0, 1, 0});
 }
 
-TEST(Gltf, AShutterStopsAtAnAnimationsEndsUnlessTheyAreAlike) {
+TEST(Gltf, ShutterCrossesTheLoopOnlyIfItsEndsMatch) {
   const auto moved_by = [](const std::vector<float>& way) {
     GltfModel model = triangle_model();
     model.add("animations",
@@ -558,7 +558,7 @@ TEST(Gltf, AShutterStopsAtAnAnimationsEndsUnlessTheyAreAlike) {
   expect_ends(*again, 1.0, 4.0, 0.0F, 0.0F);  // more than the whole animation
 }
 
-TEST(Gltf, MorphedFlatTrianglesTurnTheirNormals) {
+TEST(Gltf, MorphedFlatTrianglesUpdateTheirNormals) {
   GltfModel model;
   const int target = model.vec3({0, 0, 0, 0, 0, 0, 0, -1, 1});  // the third vertex: from (0, 1, 0) to (0, 0, 1)
   model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"targets", json::array({{{"POSITION", target}}})}},
@@ -635,7 +635,7 @@ TEST(Gltf, BrokenNormalsAreReplaced) {
   EXPECT_EQ(lines.warnings.size(), 1U);
 }
 
-TEST(Gltf, MaterialsAreReadWhole) {
+TEST(Gltf, MaterialsAreReadCompletely) {
   Lines lines;
   const ScenePtr scene = imported(test::seed_materials().glb(), lines.log);
   ASSERT_EQ(scene->materials.size(), 4U);
@@ -746,7 +746,7 @@ TEST(Gltf, ImagesOfEightAndSixteenBitsAndJpeg) {
   EXPECT_EQ(scene->images.size(), 5U);  // independent of the number of uses; two are converted images
 }
 
-TEST(Gltf, CamerasAndLightsStandWhereTheirNodesAre) {
+TEST(Gltf, CamerasAndLightsUseTheirNodesTransforms) {
   const ScenePtr scene = imported(test::seed_materials().gltf());
   const Pose pose = scene->pose(0.0);
   ASSERT_EQ(pose.cameras.size(), 2U);
@@ -781,7 +781,7 @@ TEST(Gltf, CamerasAndLightsStandWhereTheirNodesAre) {
   near(bulb.intensity, {1, 1, 1});
 }
 
-TEST(Gltf, OnlyTheDefaultSceneIsShown) {
+TEST(Gltf, OnlyTheDefaultSceneIsImported) {
   GltfModel model = triangle_model();
   model.show({{"attributes", {{"POSITION", model.triangle()}}}}, {{"translation", {5, 0, 0}}});
   model.root["scenes"] = json::array({{{"nodes", json::array({0})}}, {{"nodes", json::array({1})}}});
@@ -871,7 +871,7 @@ TEST(Gltf, MeshoptExponentialAndQuaternionFilters) {
   near(corners(*scene, scene->pose(1.0))[1], {4, 3, -8}, 1e-2F);  // (1, 0, 0), rotated to y and translated
 }
 
-TEST(Gltf, ExtensionsRequiredAreKnownOrRefusedByName) {
+TEST(Gltf, UnknownRequiredExtensionsAreRejectedByName) {
   GltfModel model = triangle_model();
   model.root["extensionsRequired"] = {"KHR_texture_transform", "VENDOR_secret"};
   EXPECT_TRUE(has(refused(model, ErrorCode::unsupported), "VENDOR_secret"));
@@ -886,7 +886,7 @@ TEST(Gltf, ExtensionsRequiredAreKnownOrRefusedByName) {
   EXPECT_FALSE(has(lines.warnings[0], "ior"));
 }
 
-TEST(Gltf, TexturesThatCannotBeHadAreLeftOutWithALine) {
+TEST(Gltf, UnreadableTexturesAreDroppedWithAWarning) {
   const auto with = [](const json& texture, const json& image) {
     GltfModel model;
     if (!image.is_null()) model.add("images", image);
@@ -936,7 +936,7 @@ struct Hostile {
   const char* cause;
 };
 
-TEST(Gltf, HostileFilesEndInOneLine) {
+TEST(Gltf, InvalidFilesGiveAOneLineError) {
   const auto accessor = [](GltfModel& m) -> json& { return m.root["accessors"][0]; };
   const auto primitive = [](GltfModel& m) -> json& { return m.root["meshes"][0]["primitives"][0]; };
   const Hostile cases[] = {
@@ -1090,7 +1090,7 @@ TEST(Gltf, HostileFilesEndInOneLine) {
   }
 }
 
-TEST(Gltf, HostileContainersEndInOneLine) {
+TEST(Gltf, InvalidContainersGiveAOneLineError) {
   const auto text = [](const std::string& content) { return Bytes(content.begin(), content.end()); };
   EXPECT_TRUE(has(refused(Bytes{}), "is empty"));
   EXPECT_TRUE(has(refused(text("{")), "is not JSON"));
@@ -1120,7 +1120,7 @@ TEST(Gltf, HostileContainersEndInOneLine) {
   EXPECT_EQ(imported(marked)->triangle_count(), 1U);
 }
 
-TEST(Gltf, CompressedDataOfHostileSizesIsRefused) {
+TEST(Gltf, CompressedDataOfInvalidSizesIsRejected) {
   GltfModel huge = test::seed_meshopt();
   huge.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["count"] = 100000000;
   EXPECT_TRUE(has(refused(huge), "cannot hold 100000000 elements"));
@@ -1135,7 +1135,7 @@ TEST(Gltf, CompressedDataOfHostileSizesIsRefused) {
   EXPECT_TRUE(has(refused(draco), "cannot be decompressed"));
 }
 
-TEST(Gltf, DracoAttributesThatAreNotThereAreRefused) {
+TEST(Gltf, MissingDracoAttributesAreRejected) {
   GltfModel model = test::seed_draco();
   model.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = 77;
   EXPECT_TRUE(has(refused(model), "there is no Draco attribute 77"));
@@ -1159,7 +1159,7 @@ TEST(Gltf, AnimationsBeyondFloatStayFinite) {
   for (const double time : {0.0, 0.3, 1.0, 1.7, 2.0}) EXPECT_EQ(test::broken(*scene, scene->pose(time)), "") << time;
 }
 
-TEST(Gltf, RootsThatLeadToEachOtherAreShownOnce) {
+TEST(Gltf, NestedRootsAreImportedOnce) {
   // A chain of 100000 nodes. All are roots of the scene, the deepest first.
   GltfModel model = triangle_model();
   json roots = json::array({0});
@@ -1248,7 +1248,7 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
   return bytes;
 }
 
-TEST(Gltf, MutatedFilesAreImportedOrRefusedByOneLine) {
+TEST(Gltf, MutatedFilesAreImportedOrGiveAOneLineError) {
   const GltfModel seeds[] = {test::seed_materials(), test::seed_animated(),
                              test::seed_draco(),     test::seed_meshopt(),
                              triangle_model(),       test::seed_pointers(),

@@ -74,7 +74,7 @@ void expect_same_paths(test::Still& gl, const test::Picture& a, test::Still& cpu
   EXPECT_LT(difference(a, b), 0.3 * other_paths);
 }
 
-TEST_P(GpuGrid, PicturesAreThoseOfTheCpusGrid) {
+TEST_P(GpuGrid, ImagesMatchCpuBuiltGrids) {
   const test::Image image{40, 30, 32, 5, render::View::shaded};
   const auto other = make();
   show(*other);
@@ -95,7 +95,7 @@ TEST_P(GpuGrid, PicturesAreThoseOfTheCpusGrid) {
   }
 }
 
-TEST_P(GpuGrid, BudgetsEndTheRefinementThere) {
+TEST_P(GpuGrid, RefinementStopsAtTheCellBudget) {
   viewer::GridSettings settings = settings_on(BuildOn::gpu);
   settings.build.refine.max_cells = 2000;
   still_->set_grid(settings);
@@ -106,7 +106,7 @@ TEST_P(GpuGrid, BudgetsEndTheRefinementThere) {
 }
 
 // While a camera moves, there is always an image: the old grid's until the next grid is complete.
-TEST_P(GpuGrid, TheGridBeforeIsShownUntilTheNextIsWhole) {
+TEST_P(GpuGrid, PreviousGridIsShownUntilTheNextIsComplete) {
   still_->set_grid(settings_on(BuildOn::gpu, true));
   test::render(*still_, {40, 30, 1, 0, render::View::shaded});
   std::uint64_t before = viewer().stats().cells;
@@ -139,7 +139,7 @@ volume::VolumeFrame fire() {
 }
 
 // A fire with colors: the same paths, and the same emissive cells for NEE.
-TEST_P(GpuGrid, FiresAreThoseOfTheCpusGrid) {
+TEST_P(GpuGrid, FiresMatchCpuBuiltGrids) {
   const test::Image image{32, 32, 32, 5, render::View::shaded};
   const auto other = make();
   const auto look_at = [](test::Still& still, BuildOn on) {
@@ -162,7 +162,7 @@ TEST_P(GpuGrid, FiresAreThoseOfTheCpusGrid) {
   EXPECT_GT(b.mean().x, 3.0 * b.mean().z) << "it burns";
 }
 
-TEST(GpuGridBuild, OfAFireIsPlanned) {
+TEST(GpuGridBuild, FireBuildIsPlanned) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(fire());
   std::vector<std::string> lines;
   const Log log([&](LogLevel /*level*/, const char* line) { lines.emplace_back(line); });
@@ -182,7 +182,7 @@ TEST(GpuGridBuild, OfAFireIsPlanned) {
 }
 
 // Density scale and anisotropy of the medium affect the lattice only with the transmittance criterion.
-TEST(GpuGridBuild, MediaShareALatticeWhereNoneCounts) {
+TEST(GpuGridBuild, MediaShareALatticeUnlessTheCriterionDependsOnThem) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({30, 30, 30}, glm::ivec3(0), 1));
   Progress progress;
   viewer::BuildSettings settings;
@@ -199,7 +199,7 @@ TEST(GpuGridBuild, MediaShareALatticeWhereNoneCounts) {
 }
 
 // bytes() does not block while a lattice is being made.
-TEST(GpuGridBuild, NobodyWaitsToBeToldHowMuchThereIs) {
+TEST(GpuGridBuild, MemoryQueryDoesNotBlockDuringABuild) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({120, 110, 100}, glm::ivec3(0), 1));
   int told = 0;
   for (int i = 0; i < 10 && told == 0; ++i) {

@@ -131,7 +131,7 @@ grid::Moments brute_moments(const volume::ScalarVolume& volume, const grid::Cube
   return m;
 }
 
-TEST(Shapes, AreClosedUnderBisection) {
+TEST(Shapes, TetrahedronShapesAreClosedUnderBisection) {
   std::set<std::uint32_t> seen;
   std::vector<std::pair<vec3, std::uint32_t>> todo;
   for (unsigned root = 0; root < 24; ++root) {
@@ -229,7 +229,7 @@ TEST(Statistics, MatchBruteForceOnEveryCellAboveAndInsideBricks) {
   }
 }
 
-TEST(Statistics, TilesAndBackgroundCountLikeVoxels) {
+TEST(Statistics, TilesAndBackgroundAreWeightedLikeVoxels) {
   volume::ScalarVolume volume;
   volume.name = "density";
   volume.bounds_min = {3, 0, 0};
@@ -258,7 +258,7 @@ TEST(Statistics, TilesAndBackgroundCountLikeVoxels) {
   EXPECT_EQ(sum.min, 0.0F);
 }
 
-TEST(Statistics, GrowWithTheActiveNodesNotWithTheBox) {
+TEST(Statistics, MemoryGrowsWithActiveNodesNotWithTheBoundingBox) {
   volume::ScalarVolume volume;
   volume.name = "density";
   volume.bounds_min = {0, 0, 0};
@@ -281,7 +281,7 @@ TEST(Statistics, GrowWithTheActiveNodesNotWithTheBox) {
 }
 
 // Records hold every cell that bisection can reach in cubes of all sizes, from the roots down to sixths of voxels.
-TEST(WideRecords, HoldEveryCell) {
+TEST(WideRecords, RoundTripEveryCell) {
   test::Random random(5);
   for (const int log2_size : {15, 16, 17, 18}) {
     const bool wide = log2_size > 15;
@@ -308,7 +308,7 @@ TEST(WideRecords, HoldEveryCell) {
 }
 
 // A cloud far away in a wide box has the same cells, voxel by voxel, as without the rest.
-TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
+TEST(Grid, DistantCloudsHaveTheSameCellsAsNearOnes) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
   const grid::RefineSettings settings = voxel_by_voxel();
   const Built near = build(cloud, settings);
@@ -340,7 +340,7 @@ TEST(Grid, OfAWideVolumeIsThatOfItsClouds) {
 
 // Rays that start far from the origin hit the same cells as rays near it, because differences of large coordinates are
 // exact.
-TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
+TEST(Traversal, RaysFarFromTheOriginHitTheSameCells) {
   const auto cloud = test::noise_volume({30, 28, 25}, ivec3(0), 1);
   const grid::RefineSettings settings = voxel_by_voxel();
   const Built near = build(cloud, settings);
@@ -377,7 +377,7 @@ TEST(Traversal, RaysFarOutMeetWhatThoseNearbyDo) {
   EXPECT_GT(sum, 20000.0);
 }
 
-TEST(Statistics, WideTilesAreSummedWhole) {
+TEST(Statistics, LargeTilesAreSummedCompletely) {
   volume::ScalarVolume tile;
   tile.name = "density";
   tile.bounds_max = {(1 << 17) - 1, (1 << 18) - 1, (1 << 16) - 1};
@@ -388,7 +388,7 @@ TEST(Statistics, WideTilesAreSummedWhole) {
   EXPECT_LT(statistics.bytes(), 100'000U);
 }
 
-TEST(Cube, TheWidestIsRefusedInALine) {
+TEST(Cube, TooLargeVolumesGiveAOneLineError) {
   volume::ScalarVolume bar;
   bar.name = "bar";
   bar.bounds_min = {1'000'000, -1'000'000, 64};
@@ -448,7 +448,7 @@ TEST(Grid, ConformsForEveryCriterionAndBudget) {
   }
 }
 
-TEST(Grid, TransmittanceIsOfTheSixWaysOut) {
+TEST(Grid, TransmittanceCriterionUsesSixAxisDirections) {
   auto volume = test::noise_volume({40, 24, 32}, ivec3(-8, 0, 16), 3);
   volume.index_to_world = glm::dmat4(glm::dmat3(2.0, 0, 0, 0, 1.0, 0, 0, 0, 0.5));
   const double extinction = 0.3;
@@ -552,7 +552,7 @@ TEST(Grid, FullyRefinedConstantCellsAreTheVoxels) {
 
 // The error is weighted by luminance: equal noise is more visible in the green channel of a red fire than in the red
 // channel of a green one.
-TEST(Grid, ARedFireIsSplitForItsGreen) {
+TEST(Grid, RefinementWeightsEmissionByLuminance) {
   const ivec3 size(32);
   const auto even = test::make_volume(size, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
   const auto black = test::make_volume(size, ivec3(0), [](const ivec3& /*p*/) { return 0.0F; });
@@ -571,7 +571,7 @@ TEST(Grid, ARedFireIsSplitForItsGreen) {
   EXPECT_GT(static_cast<double>(cells(even, noise)), 1.1 * static_cast<double>(cells(noise, even)));
 }
 
-TEST(Grid, KeepsTheMassAndIsNeverNegative) {
+TEST(Grid, ConservesMassAndIsNeverNegative) {
   const auto volume = test::noise_volume({60, 45, 50}, ivec3(-20, 0, 9), 1);
   double mass = 0.0;
   for (std::size_t i = 0; i < volume.brick_values.size(); ++i) mass += double{volume.brick_values[i]};
@@ -616,7 +616,7 @@ TEST(Grid, LinearCellsReproduceALinearField) {
   }
 }
 
-TEST(Grid, IsTheSameWhateverTheThreads) {
+TEST(Grid, IsIdenticalForAnyThreadCount) {
   const auto volume = test::noise_volume({90, 70, 80}, ivec3(0), 4);
   grid::RefineSettings settings;
   settings.threshold = 0.01;

@@ -40,9 +40,9 @@ viewer::Light sun_at(float elevation_degrees, float irradiance, float sky) {
   return light;
 }
 
-// Same expectation as AFloorUnderASlabIsLitAndSeenThroughIt (surface_trace_test): albedo / pi * E cos * exp(-tau / cos)
-// on the way in, exp(-tau) out. The plane is below the slab, or halfway up in it.
-TEST_P(Ground, UnderASlabIsLitAndSeenThroughIt) {
+// Same expectation as FloorUnderASlabIsLitAndVisibleThroughIt (surface_trace_test): albedo / pi * E cos * exp(-tau /
+// cos) on the way in, exp(-tau) out. The plane is below the slab, or halfway up in it.
+TEST_P(Ground, UnderASlabIsLitAndVisibleThroughIt) {
   const auto still = make();
   still->set_volume(test::slab());
   still->set_camera(test::looking_down());
@@ -72,7 +72,7 @@ TEST_P(Ground, UnderASlabIsLitAndSeenThroughIt) {
 }
 
 // The volume of a sequence before the smoke begins: albedo / pi * E cos.
-TEST_P(Ground, AtAHeightIsThereWhereAVolumeIsEmpty) {
+TEST_P(Ground, ExistsAtAGivenHeightWithoutAVolume) {
   const auto still = make();
   still->set_volume(test::make_volume({8, 8, 8}, ivec3(0), [](const ivec3&) { return 0.0F; }));
   still->set_camera(test::looking_down());
@@ -89,7 +89,7 @@ TEST_P(Ground, AtAHeightIsThereWhereAVolumeIsEmpty) {
 }
 
 // White furnace test: without absorption everything is as bright as the sky.
-TEST_P(Ground, InAFurnaceIsOne) {
+TEST_P(Ground, WhiteFurnaceIsOne) {
   const auto still = make();
   still->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
   still->set_light(sun_at(0.0F, 0.0F, 1.0F));
@@ -101,7 +101,7 @@ TEST_P(Ground, InAFurnaceIsOne) {
 }
 
 // With and without a model, under sky and lights, the plane equals two triangles of the same albedo.
-TEST_P(Ground, IsAsTwoTriangles) {
+TEST_P(Ground, MatchesTwoTriangles) {
   const auto cloud = test::make_volume({24, 16, 24}, ivec3(0), [](const ivec3& p) {
     return glm::length(vec3(p) - vec3(12.0F, 8.0F, 12.0F)) < 8.0F ? 1.0F : 0.0F;
   });
@@ -161,7 +161,7 @@ TEST_P(Ground, IsAsTwoTriangles) {
   }
 }
 
-TEST_P(Ground, IsMetFromAboveAlone) {
+TEST_P(Ground, IsHitOnlyFromAbove) {
   const auto still = make();
   still->set_volume(test::slab());
   still->set_light(sun_at(90.0F, 3.0F, 0.0F));

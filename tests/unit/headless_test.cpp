@@ -154,7 +154,7 @@ TEST(Headless, AnotherThread) {
   }).join();
 }
 
-TEST(Headless, GetProcSurvivesNonsense) {
+TEST(Headless, GetProcHandlesUnknownNames) {
   Context context = Context::create(Backend::egl);
   EXPECT_EQ(Context::get_proc(nullptr, "glGetError"), nullptr);
   EXPECT_EQ(Context::get_proc(&context, nullptr), nullptr);

@@ -66,7 +66,7 @@ SurfacesRef make_wall(float emission) {
 }
 
 // A holdout wall leaves the part of the volume in front of it, equal sample by sample.
-TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
+TEST_P(Holdout, WallShowsOnlyTheVolumeInFrontOfIt) {
   const SurfacesRef wall = make_wall(3.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
   set_medium(0.2, false);
@@ -104,7 +104,7 @@ TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
 }
 
 // In a thin medium, lights also use equiangular sampling. It must not add the sky behind the holdout.
-TEST_P(Holdout, OfAWallShowsNoSkyWhereThereAreLamps) {
+TEST_P(Holdout, WallHidesSkyAndLights) {
   const SurfacesRef wall = make_wall(0.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
   hold_out_surfaces(true);
@@ -147,7 +147,7 @@ TEST_P(Holdout, AnEmissiveVolumeIsDenoisedToBlack) {
 }
 
 // Pixels beside the holdout keep its shadow, bit by bit.
-TEST_P(Holdout, ThrowsItsShadow) {
+TEST_P(Holdout, CastsShadows) {
   const SurfacesRef panes = make_panes(4.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, panes.get()), CUMULET_OK);
   set_medium(0.3, false);
@@ -182,7 +182,7 @@ TEST_P(Holdout, ThrowsItsShadow) {
 }
 
 // Only the background remains, attenuated by the medium.
-TEST_P(Holdout, OfAVolumeLeavesWhatComesThrough) {
+TEST_P(Holdout, VolumeAttenuatesTheBackground) {
   std::vector<float> clear(count);
   auto light = make_desc<cumulet_light_desc>();
   for (float& value : light.sky_radiance) value = 1.0F;
@@ -202,7 +202,7 @@ TEST_P(Holdout, OfAVolumeLeavesWhatComesThrough) {
 }
 
 // A holdout volume keeps the volume in front of it and hides the one behind it.
-TEST_P(Holdout, OfOneVolumeAmongOthers) {
+TEST_P(Holdout, WorksForOneVolumeAmongOthers) {
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 0.2;
   auto desc = make_desc<cumulet_instance_desc>();
@@ -234,7 +234,7 @@ TEST_P(Holdout, OfOneVolumeAmongOthers) {
   EXPECT_GT(before[4 * middle], 0.05F);
 }
 
-TEST_P(Holdout, HasNoLightOfAnyGroup) {
+TEST_P(Holdout, HasNoRadianceInAnyLightGroup) {
   const SurfacesRef panes = make_panes(4.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, panes.get()), CUMULET_OK);
   hold_out_surfaces(true);

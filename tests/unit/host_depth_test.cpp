@@ -367,7 +367,7 @@ TEST_P(HostDepths, SubRectangles) {
   scene_->expect_scene(camera, viewport, false, 1, 1.2e-7);
 }
 
-TEST_P(HostDepths, TexturesAsHostsHaveThem) {
+TEST_P(HostDepths, TextureParametersAreIgnoredAndKept) {
   const Camera& camera = cameras[0];
   const glm::ivec4 viewport(0, 0, size);
   const DepthScene::Host host = scene_->make_host(GL_DEPTH24_STENCIL8, 0, false);
@@ -418,7 +418,7 @@ TEST_P(HostDepths, MutableTextures) {
   }
 }
 
-TEST_P(HostDepths, NumbersOfAnR32F) {
+TEST_P(HostDepths, R32FValues) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<float> depths{0.0F, 0.5F, 0.999F, 1.0F, 1.5F, nan, infinite, -infinite};
   const Object texture = gl::make_texture_2d(gl_, GL_R32F, 8, 1, "depth");
@@ -470,7 +470,7 @@ TEST_P(HostDepths, FarSurfacesKeepTheirPrecision) {
   }
 }
 
-TEST_P(HostDepths, ChangesAreFound) {
+TEST_P(HostDepths, ChangesAreDetected) {
   const Camera& camera = cameras[0];
   const glm::ivec4 viewport(0, 0, size);
   const DepthScene::Host host = scene_->make_host(GL_DEPTH_COMPONENT32F, 4, false);
@@ -513,7 +513,7 @@ TEST_P(HostDepths, ChangesAreFound) {
   EXPECT_FALSE(scene_->update(input));
 }
 
-TEST_P(HostDepths, BadNamesAreToldAndLoseNothing) {
+TEST_P(HostDepths, InvalidNamesAreReportedAndKeepTheImage) {
   const Camera& camera = cameras[0];
   const glm::ivec4 viewport(0, 0, size);
   const DepthScene::Host host = scene_->make_host(GL_DEPTH_COMPONENT24, 0, false);
@@ -565,7 +565,7 @@ TEST_P(HostDepths, BadNamesAreToldAndLoseNothing) {
   scene_->expect_scene(camera, viewport, false, 1, 2.5e-7);
 }
 
-TEST_P(HostDepths, LeavesTheHostsFramebufferAlone) {
+TEST_P(HostDepths, DoesNotModifyTheHostsFramebuffer) {
   const DepthScene::Host host = scene_->make_host(GL_DEPTH_COMPONENT32F, 0, true);
   const glm::ivec4 viewport(0, 0, size);
   scene_->draw_scene(cameras[0], host.framebuffer.name(), viewport);
@@ -612,7 +612,7 @@ struct DefaultFramebuffer {
   }
 };
 
-TEST(DefaultFramebufferDepth, IsReadLikeAnother) {
+TEST(DefaultFramebufferDepth, IsReadLikeAnyFramebuffer) {
   for (const auto& [depth_bits, stencil_bits] : {std::pair{24, 8}, std::pair{16, 0}, std::pair{32, 0}}) {
     SCOPED_TRACE(depth_bits);
     DefaultFramebuffer screen(DepthScene::size, depth_bits, stencil_bits);

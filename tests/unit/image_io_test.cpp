@@ -112,7 +112,7 @@ TEST_F(ImageIo, ExrLayersRoundTripIsExact) {
   EXPECT_EQ(count(), 1u);
 }
 
-TEST_F(ImageIo, PicturesSayTheirPrimaries) {
+TEST_F(ImageIo, FilesStoreTheirPrimaries) {
   write_exr(path("a.exr"), gradient(8, 4));
   const Imf::InputFile file(path("a.exr").c_str());
   ASSERT_TRUE(Imf::hasChromaticities(file.header()));
@@ -131,7 +131,7 @@ TEST_F(ImageIo, PicturesSayTheirPrimaries) {
   EXPECT_EQ(png.find("IDAT"), 33 + srgb.size() + gama.size() + chrm.size() + 4);
 }
 
-TEST_F(ImageIo, ExrOfAPartOfAPictureSaysWhich) {
+TEST_F(ImageIo, ExrOfARegionStoresItsWindow) {
   const Rendered rendered;
   const Windows windows{Rendered::width, Rendered::height, 4, 7, 100, 50};
   write_exr(path("a.exr"), windows, rendered.all);
@@ -147,7 +147,7 @@ TEST_F(ImageIo, ExrOfAPartOfAPictureSaysWhich) {
   }
 }
 
-TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
+TEST_F(ImageIo, ExrLayersMatchOpenExrsReader) {
   const Rendered rendered;
   write_exr(path("a.exr"), Rendered::width, Rendered::height, rendered.all);
   Imf::InputFile file(path("a.exr").c_str());
@@ -204,7 +204,7 @@ TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
   for (std::size_t i = 0; i < z.size(); ++i) EXPECT_EQ(z[i], rendered.values[5][3 * i + 2]) << i;
 }
 
-TEST_F(ImageIo, ExrAttributesAreWhatOpenExrReads) {
+TEST_F(ImageIo, ExrAttributesMatchOpenExrsReader) {
   const std::vector<float> one(6);
   const Layer depth{layers::depth, one};
   std::array<float, 16> matrix{};
@@ -234,7 +234,7 @@ TEST_F(ImageIo, ExrAttributesAreWhatOpenExrReads) {
   EXPECT_EQ(count(), 1u);
 }
 
-TEST_F(ImageIo, ExrLayersReportWhatIsWrong) {
+TEST_F(ImageIo, ExrLayerErrorsAreReported) {
   const std::vector<float> one(6);
   const auto write = [&](const std::string& to, std::initializer_list<Layer> layers) {
     write_exr(to, 3, 2, std::span<const Layer>(layers.begin(), layers.size()));
@@ -255,7 +255,7 @@ TEST_F(ImageIo, ExrLayersReportWhatIsWrong) {
   EXPECT_EQ(missing.find('\n'), std::string::npos) << missing;
 }
 
-TEST_F(ImageIo, PfmRoundTripIsExactButForAlpha) {
+TEST_F(ImageIo, PfmRoundTripIsExactExceptAlpha) {
   Image image = gradient(5, 4);
   write_pfm(path("a.pfm"), image);
   const Image back = read_pfm(path("a.pfm"));
@@ -265,7 +265,7 @@ TEST_F(ImageIo, PfmRoundTripIsExactButForAlpha) {
   EXPECT_EQ(back.rgba, image.rgba);
 }
 
-TEST_F(ImageIo, PfmBytesAreThoseOfTheFormat) {
+TEST_F(ImageIo, PfmBytesMatchTheFormat) {
   // One column, two rows: the top pixel is (1, 2, -0.5), the bottom one black.
   write_pfm(path("a.pfm"), Image{1, 2, {1.0f, 2.0f, -0.5f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f}});
   std::string expected = "PF\n1 2\n-1.0\n";
@@ -279,7 +279,7 @@ TEST_F(ImageIo, PfmReadsBigEndianAndGrey) {
   EXPECT_EQ(read_pfm(path("a.pfm")).rgba, (std::vector<float>{1.0f, 1.0f, 1.0f, 1.0f}));
 }
 
-TEST_F(ImageIo, DamagedFilesGiveOneLineThatNamesThem) {
+TEST_F(ImageIo, DamagedFilesGiveAOneLineErrorWithTheName) {
   write_exr(path("good.exr"), gradient(64, 64));
   write_pfm(path("good.pfm"), gradient(64, 64));
   write_png(path("good.png"), gradient(64, 64));
@@ -340,7 +340,7 @@ TEST(ToneMapping, SrgbCurveInverts) {
   EXPECT_NEAR(srgb_encode(0.18f), 0.46136f, 1e-4f);
 }
 
-TEST_F(ImageIo, PngHoldsTheToneCurve) {
+TEST_F(ImageIo, PngAppliesTheToneCurve) {
   const auto byte = [&](const PngOptions& options, float value) {
     write_png(path("a.png"), pixel(value, value, value, 0.25f), options);
     const Image back = read_png(path("a.png"));
@@ -363,7 +363,7 @@ TEST_F(ImageIo, PngKeepsAlphaWhenAsked) {
   EXPECT_NEAR(read_png(path("a.png")).rgba[3], 0.2f, 0.5f / 255.0f);
 }
 
-TEST_F(ImageIo, PngSurvivesNumbersThatAreNone) {
+TEST_F(ImageIo, PngHandlesNonFiniteValues) {
   const float infinite = std::numeric_limits<float>::infinity();
   const float none = std::numeric_limits<float>::quiet_NaN();
   write_png(path("a.png"), pixel(infinite, none, -1.0f, none), {0.0, ToneMapping::none, true});
@@ -397,7 +397,7 @@ TEST_F(ImageIo, FailedWriteLeavesTheOldFile) {
   EXPECT_EQ(count(), 1u);
 }
 
-TEST_F(ImageIo, CheckWritableTellsAndTouchesNothing) {
+TEST_F(ImageIo, CheckWritableModifiesNothing) {
   EXPECT_NE(failure([&] { check_writable(path("absent/a.png")); }).find(path("absent/a.png")), std::string::npos);
   EXPECT_NE(failure([&] { check_writable(folder_.path().string()); }), "");
   EXPECT_NE(failure([&] { check_writable(""); }), "");
@@ -408,7 +408,7 @@ TEST_F(ImageIo, CheckWritableTellsAndTouchesNothing) {
   EXPECT_EQ(count(), 1u);
 }
 
-TEST_F(ImageIo, LinksAndPermissionsStay) {
+TEST_F(ImageIo, LinksAndPermissionsAreKept) {
   put(path("target"), "old");
   fs::permissions(path("target"), fs::perms{0640});
   fs::create_symlink("target", path("link"));

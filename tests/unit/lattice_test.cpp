@@ -30,7 +30,7 @@ grid::TetGrid grid_of(const grid::Statistics& statistics, const grid::DiamondSet
   return builder.records(grid::CellKind::linear, 1.0F);
 }
 
-TEST(ViewLevels, AreThoseWhoseLongestEdgeCoversThePixels) {
+TEST(ViewLevels, LevelIsChosenByTheLongestEdgeInPixels) {
   // Edge lengths computed by hand: a sheared and stretched lattice, seen from far away.
   volume::ScalarVolume volume = test::noise_volume({60, 45, 50}, ivec3(0), 1);
   volume.index_to_world = glm::dmat4(1.0);
@@ -83,7 +83,7 @@ TEST(ViewLevels, AreThoseWhoseLongestEdgeCoversThePixels) {
   EXPECT_EQ(grid::ViewLevels(cube, settings).in(ivec3(24, 16, 16), 3), 0U) << "behind the eye";
 }
 
-TEST(OwnPriorities, GiveTheSplitsThatEvaluatingAnewGives) {
+TEST(RefinementPriorities, StoredPrioritiesGiveTheSameSplitsAsReevaluation) {
   test::Cameras cameras(3);
   for (const test::SmallVolume& small : test::small_volumes()) {
     const grid::Statistics statistics(small.volume, grid::fit_cube(small.volume));
@@ -107,7 +107,7 @@ TEST(OwnPriorities, GiveTheSplitsThatEvaluatingAnewGives) {
 }
 
 // A shaking camera changes many cells if each view is refined separately, and few if hysteresis keeps existing cells.
-TEST(OwnPriorities, InMotionKeepWhatMayStay) {
+TEST(RefinementPriorities, HysteresisKeepsCellsWhileTheCameraMoves) {
   const auto volume = test::noise_volume({120, 100, 110}, ivec3(0), 1);
   const grid::Statistics statistics(volume, grid::fit_cube(volume));
   grid::RefineSettings settings;
@@ -139,7 +139,7 @@ TEST(OwnPriorities, InMotionKeepWhatMayStay) {
 }
 
 // Each of the 42 coefficient entries belongs to one cell and equals that cell's record.
-TEST(Lattice, CoarseCellsHaveTheirRecords) {
+TEST(Lattice, EachRecordBelongsToOneCoarseCell) {
   for (const test::SmallVolume& small : test::small_volumes()) {
     const grid::Statistics statistics(small.volume, grid::fit_cube(small.volume));
     const grid::Lattice lattice(statistics, {}, small.settings, 1.0F);
@@ -203,7 +203,7 @@ TEST(Lattice, CoarseCellsHaveTheirRecords) {
   EXPECT_EQ(*places.rbegin(), CM_COARSE_CELLS - 1);
 }
 
-TEST(Lattice, EdgesOfBricksAreThoseOfAllTheirCells) {
+TEST(Lattice, BrickEdgeLengthsCoverAllTheirCells) {
   glm::dmat4 sheared(1.0);
   sheared[0] = {0.5, 0.0, 0.0, 0.0};
   sheared[1] = {0.3, 1.0, 0.1, 0.0};
@@ -224,7 +224,7 @@ TEST(Lattice, EdgesOfBricksAreThoseOfAllTheirCells) {
   }
 }
 
-TEST(Lattice, PartsOfCellsFillThem) {
+TEST(Lattice, SubcellVolumesSumToTheCell) {
   // In sixths of voxels, each shape has half of the previous one. The parts' centers balance about the centroid.
   const grid::CellParts& parts = grid::cell_parts();
   for (unsigned level = 0; level <= grid::brick_levels; ++level) {

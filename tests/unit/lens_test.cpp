@@ -111,7 +111,7 @@ class Lens : public testing::Test {
 };
 
 // A point at z becomes a disc of radius R |z - f| / z in the focal plane, with the same total brightness.
-TEST_F(Lens, BlursSurfacesAsAThinLensDoes) {
+TEST_F(Lens, BlursSurfacesLikeAThinLens) {
   for (const float z : {-8.0F, 4.0F}) {
     SCOPED_TRACE(z);
     const SurfacesRef glowing = make_glowing(z, 0.15F);
@@ -129,7 +129,7 @@ TEST_F(Lens, BlursSurfacesAsAThinLensDoes) {
   }
 }
 
-TEST_F(Lens, HasSharpWhatIsInFocus) {
+TEST_F(Lens, ObjectsInFocusAreSharp) {
   const SurfacesRef glowing = make_glowing(-3.0F, 0.8F);
   ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), glowing.get()), CUMULET_OK);
   const Spot sharp = spot(picture(), 0, 13.0);
@@ -146,7 +146,7 @@ TEST_F(Lens, HasSharpWhatIsInFocus) {
   EXPECT_NEAR(spot(picture(), 0, 13.0).radius, nearer, 0.01 * nearer);
 }
 
-TEST_F(Lens, BlursVolumesInEveryMarch) {
+TEST_F(Lens, BlursVolumesForEveryGridType) {
   const VolumeRef speck = make_speck(-5.0, 0.3);
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 1000.0;  // opaque
@@ -174,7 +174,7 @@ TEST_F(Lens, BlursVolumesInEveryMarch) {
   }
 }
 
-TEST_F(Lens, OfParallelRaysBlursInProportionToTheWayFromItsFocus) {
+TEST_F(Lens, OrthographicBlurIsProportionalToFocusDistance) {
   const SurfacesRef glowing = make_glowing(-4.0F, 0.15F);
   ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), glowing.get()), CUMULET_OK);
   desc_.orthographic_height = 8.0;
@@ -187,7 +187,7 @@ TEST_F(Lens, OfParallelRaysBlursInProportionToTheWayFromItsFocus) {
   EXPECT_NEAR(std::sqrt(later.radius * later.radius - sharp.radius * sharp.radius), 2.0 * 4.0 / 7.0, 0.02);
 }
 
-TEST_F(Lens, IsKeptByTheHostsMatrices) {
+TEST_F(Lens, SurvivesHostMatrices) {
   const SurfacesRef glowing = make_glowing(-8.0F, 0.15F);
   ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), glowing.get()), CUMULET_OK);
   desc_.lens_radius = 1.2;
@@ -210,7 +210,7 @@ TEST_F(Lens, IsKeptByTheHostsMatrices) {
   EXPECT_NEAR(spot(rgba, 0, 10.0).radius, own.radius, 0.01 * own.radius);
 }
 
-TEST_F(Lens, IsRefusedInOneLine) {
+TEST_F(Lens, InvalidInputGivesAOneLineError) {
   for (const double wrong : {-1.0, 1e31, std::nan("")}) {
     for (double cumulet_camera_desc::*field :
          {&cumulet_camera_desc::lens_radius, &cumulet_camera_desc::focus_distance}) {

@@ -63,7 +63,7 @@ struct Reader {
                        [this] { stopped = true; }};
 };
 
-TEST(LibraryThread, WaitsForItsWork) {
+TEST(LibraryThread, ExitWaitsForItsWork) {
   std::atomic<bool> done = false;
   {
     const LibraryThread thread([&] {
@@ -80,7 +80,7 @@ TEST(LibraryThread, WaitsForItsWork) {
 }
 
 // Without LibraryThread, the table is destroyed while the thread reads: the exit status is 8 in nearly every run.
-TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatThereWereBefore) {
+TEST_F(LibraryThreadDeathTest, EndsBeforeEarlierStaticsAreDestroyed) {
   const auto leave = [] {
     table().read();
     auto* const reader = new Reader;  // never destroyed
@@ -91,7 +91,7 @@ TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatThereWereBefore) {
   EXPECT_EXIT(leave(), testing::ExitedWithCode(left_well), "");
 }
 
-TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatJobsAndCallbacksCreate) {
+TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsOfJobsAndCallbacksAreDestroyed) {
   const auto leave = [](StaticsOf of) {
     auto* const reader = new Reader;
     std::this_thread::sleep_for(milliseconds(2));
@@ -112,7 +112,7 @@ TEST_F(LibraryThreadDeathTest, EndsBeforeStaticsThatJobsAndCallbacksCreate) {
 }
 
 // The thread that calls exit() cannot wait for itself.
-TEST_F(LibraryThreadDeathTest, ItsOwnWorkMayExit) {
+TEST_F(LibraryThreadDeathTest, JobsMayCallExit) {
   const auto leave = [] {
     auto* const worker = new viewer::Worker([] {
       const CallbackScope callback;
@@ -125,7 +125,7 @@ TEST_F(LibraryThreadDeathTest, ItsOwnWorkMayExit) {
 }
 
 // A queued job is never started during exit. A thread that waits for it returns, and later jobs are rejected.
-TEST_F(LibraryThreadDeathTest, WhoWaitsForAJobIsAnswered) {
+TEST_F(LibraryThreadDeathTest, WaitersReturnDuringExit) {
   const auto leave = [] {
     auto* const worker = new viewer::Worker([] {});
     const auto job = [](Progress& progress) {
@@ -150,7 +150,7 @@ TEST_F(LibraryThreadDeathTest, WhoWaitsForAJobIsAnswered) {
 }
 
 // Calls in progress on other threads end first. New calls are rejected on other threads, but not on the exiting one.
-TEST_F(LibraryThreadDeathTest, CallsOfOtherThreadsEndFirst) {
+TEST_F(LibraryThreadDeathTest, ExitWaitsForCallsOfOtherThreads) {
   const auto leave = [] {
     struct Last {
       Last() = default;

@@ -178,9 +178,9 @@ SurfacesRef make_pane(float emission) {
   return make_quad({-9.0F, -9.0F, -9.0F, 9.0F, -9.0F, -9.0F, 9.0F, 9.0F, -9.0F, -9.0F, 9.0F, -9.0F}, mesh);
 }
 
-TEST_P(LightGroups, AreEachAsAloneInAVolume) { expect_each_alone("volume"); }
+TEST_P(LightGroups, EachMatchesItsLightsOnlyInAVolume) { expect_each_alone("volume"); }
 
-TEST_P(LightGroups, AreEachAsAloneAmongSurfaces) {
+TEST_P(LightGroups, EachMatchesItsLightsOnlyAmongSurfaces) {
   const SurfacesRef shines = make_pane(0.7F);
   const SurfacesRef dark = make_pane(0.0F);
   shines_ = shines.get();
@@ -190,7 +190,7 @@ TEST_P(LightGroups, AreEachAsAloneAmongSurfaces) {
   expect_each_alone("surfaces");
 }
 
-TEST_P(LightGroups, MakeNoOtherPicture) {
+TEST_P(LightGroups, DoNotChangeTheImage) {
   const SurfacesRef panes = make_panes(4.0F);
   for (const bool surfaces : {false, true}) {
     ASSERT_EQ(cumulet_set_surfaces(v_, surfaces ? panes.get() : nullptr), CUMULET_OK);
@@ -214,7 +214,7 @@ TEST_P(LightGroups, MakeNoOtherPicture) {
 }
 
 // A constant or transparent background is not light: it is in no group.
-TEST_P(LightGroups, HaveTheBackgroundThatIsTheirs) {
+TEST_P(LightGroups, ContainTheirOwnBackground) {
   set(8, 0, groups);
   make();
   const Rgb with_sky = group(sky);
@@ -230,7 +230,7 @@ TEST_P(LightGroups, HaveTheBackgroundThatIsTheirs) {
   EXPECT_GT(with_sky[0], without_sky[0]);
 }
 
-TEST_P(LightGroups, BeyondThoseThatAreGatheredCountInTheFirst) {
+TEST_P(LightGroups, GroupsBeyondTheLimitCountInTheFirst) {
   set(8, 0, groups);
   make();
   const std::vector<Rgb> all = all_groups();
@@ -247,7 +247,7 @@ TEST_P(LightGroups, BeyondThoseThatAreGatheredCountInTheFirst) {
 }
 
 // Emission of an instance belongs to its medium's group.
-TEST_P(LightGroups, OfInstancesAreTheirMedias) {
+TEST_P(LightGroups, EmissionOfInstancesFollowsTheirMediumsGroup) {
   auto desc = make_desc<cumulet_instance_desc>();
   auto medium = medium_;
   medium.group = sky;
@@ -276,7 +276,7 @@ TEST_P(LightGroups, OfInstancesAreTheirMedias) {
 }
 
 // Samples added later, or by another process, give the same result as rendering all at once.
-TEST_P(LightGroups, GoOnWithMoreSamplesAndFromWhatWasKept) {
+TEST_P(LightGroups, ContinueWithMoreSamplesAndFromASavedState) {
   set(9, 0, groups);
   make();
   const std::vector<Rgb> wanted = all_groups();

@@ -56,7 +56,7 @@ class Crowd {
 };
 
 // The limit applies to all workers of a viewer together, including the tasks of their jobs.
-TEST(Allowance, ThreadsAreThoseOfAllWorkers) {
+TEST(WorkerThreadLimit, LimitIsSharedByAllWorkers) {
   for (const unsigned threads : {1U, 2U, 3U}) {
     const auto allowance = std::make_shared<Allowance>();
     allowance->set(threads, Allowance::no_limit);
@@ -79,7 +79,7 @@ TEST(Allowance, ThreadsAreThoseOfAllWorkers) {
 }
 
 // A thread of a job that waits for its other tasks does not run another job, which might need a lock that it holds.
-TEST(Allowance, JobsDoNotNest) {
+TEST(WorkerThreadLimit, JobsDoNotNest) {
   const auto allowance = std::make_shared<Allowance>();
   allowance->set(1, Allowance::no_limit);
   std::mutex mutex;
@@ -97,7 +97,7 @@ TEST(Allowance, JobsDoNotNest) {
 }
 
 // The exception of a job is reported.
-TEST(Allowance, FailuresAreTheJobs) {
+TEST(WorkerThreadLimit, ExceptionsReachTheJob) {
   const auto allowance = std::make_shared<Allowance>();
   allowance->set(2, Allowance::no_limit);
   Worker worker([] {}, cumulet::Trace(), allowance);
@@ -154,7 +154,7 @@ class Limits : public testing::Test {
   HostTarget target_{gl_, 32, 32};
 };
 
-TEST_F(Limits, AreRefusedInOneLine) {
+TEST_F(Limits, InvalidLimitsGiveAOneLineError) {
   const ViewerPtr viewer = make();
   auto desc = make_desc<cumulet_limits_desc>();
   desc.threads = 1025;
@@ -164,7 +164,7 @@ TEST_F(Limits, AreRefusedInOneLine) {
 }
 
 // The image does not depend on the number of threads.
-TEST_F(Limits, ThreadsChangeNoPicture) {
+TEST_F(Limits, ThreadLimitDoesNotChangeTheImage) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr free = make();
   const auto wanted = picture_of(free.get(), ball.get(), target_);
@@ -176,7 +176,7 @@ TEST_F(Limits, ThreadsChangeNoPicture) {
 }
 
 // Grids are coarsened to fit. Volumes that do not fit at all are rejected, and the previous image stays.
-TEST_F(Limits, MemoryIsKept) {
+TEST_F(Limits, MemoryLimitHolds) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr viewer = make();
   picture_of(viewer.get(), ball.get(), target_);
@@ -214,7 +214,7 @@ TEST_F(Limits, MemoryIsKept) {
 }
 
 // Voxel grid types cannot be coarsened.
-TEST_F(Limits, MemoryOfVoxelsIsKept) {
+TEST_F(Limits, MemoryLimitHoldsForVoxelGrids) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr viewer = make();
   auto grid = make_desc<cumulet_grid_desc>();
@@ -238,7 +238,7 @@ void split_to_the_voxel(const ViewerPtr& viewer, cumulet_build build) {
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
 }
 
-TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
+TEST_F(Limits, GpuMemoryLimitCoarsensCells) {
   std::vector<std::string> lines;
   const auto keep = [](void* user, cumulet_log_level /*level*/, const char* line) {
     static_cast<std::vector<std::string>*>(user)->emplace_back(line);
@@ -281,7 +281,7 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
 }
 
 // A smaller limit rebuilds existing grids automatically and without an error. A larger one refines them again.
-TEST_F(Limits, CellsFollowTheCap) {
+TEST_F(Limits, CellCountFollowsTheGpuMemoryLimit) {
   const VolumeRef ball = make_ball(56);
   for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
     SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
@@ -297,7 +297,7 @@ TEST_F(Limits, CellsFollowTheCap) {
 }
 
 // Each volume's grid gets its part of the limit, including volumes added later, and refines again.
-TEST_F(Limits, InstancesShareTheCap) {
+TEST_F(Limits, InstancesShareTheGpuMemoryLimit) {
   const std::vector<VolumeRef> balls = [] {
     std::vector<VolumeRef> made;
     for (const int size : {24, 56, 48, 40}) made.push_back(make_ball(size));
@@ -339,7 +339,7 @@ TEST_F(Limits, InstancesShareTheCap) {
 }
 
 // A limit also applies to the first grid if its build started before.
-TEST_F(Limits, CellsUnderWayFollowTheCap) {
+TEST_F(Limits, BuildInProgressFollowsTheGpuMemoryLimit) {
   const VolumeRef ball = make_ball(56);
   auto frame = target_.frame();
   frame.target = CUMULET_TARGET_NONE;
@@ -369,7 +369,7 @@ TEST_F(Limits, CellsUnderWayFollowTheCap) {
 }
 
 // If the lattice of a GPU build would leave little memory for cells, the CPU builds the grid, which needs no lattice.
-TEST_F(Limits, NoLatticeTakesTheCellsRoom) {
+TEST_F(Limits, CpuBuildsWhenALatticeLeavesNoMemoryForCells) {
   const VolumeRef ball = make_ball(56);
   std::vector<std::string> lines;
   const auto keep = [](void* user, cumulet_log_level /*level*/, const char* line) {
@@ -397,7 +397,7 @@ TEST_F(Limits, NoLatticeTakesTheCellsRoom) {
 }
 
 // Cells survive a limit that is lowered and raised again before a rebuild, and a limit in which no cells fit.
-TEST_F(Limits, CellsOutliveACapThatPasses) {
+TEST_F(Limits, CellsSurviveATemporaryLimit) {
   const VolumeRef ball = make_ball(56);
   const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
   split_to_the_voxel(viewer, CUMULET_BUILD_CPU);
@@ -417,7 +417,7 @@ TEST_F(Limits, CellsOutliveACapThatPasses) {
   EXPECT_EQ(stats_of(viewer).cells, all.cells);
 }
 
-TEST_F(Limits, GlMemoryIsKept) {
+TEST_F(Limits, GpuMemoryLimitHolds) {
   const VolumeRef small = make_ball(12);
   const VolumeRef large = make_ball(96);
   const ViewerPtr viewer = make();

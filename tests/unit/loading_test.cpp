@@ -102,7 +102,7 @@ class Loading : public testing::Test {
   cumulet_viewer* v_ = viewer_.get();
 };
 
-TEST_F(Loading, AFailureIsReportedUntilOtherWorkBegins) {
+TEST_F(Loading, FailureIsReportedUntilOtherWorkStarts) {
   struct Kind {
     const char* file;
     std::function<void()> fail;
@@ -194,7 +194,7 @@ TEST_F(Loading, SettingAKindClearsItsFailure) {
 }
 
 // An instance whose file is missing, and a live volume that does not fit.
-TEST_F(Loading, DynamicVolumesAndInstancesFollowTheSameRule) {
+TEST_F(Loading, LiveVolumesAndInstancesReportFailuresAlike) {
   const auto live_desc = make_desc<cumulet_live_desc>();
   const LiveRef live = test::made_by<LiveRef>(cumulet_live_create, live_desc);
   const auto limit = [&](std::uint64_t bytes) {
@@ -240,7 +240,7 @@ TEST_F(Loading, DynamicVolumesAndInstancesFollowTheSameRule) {
   EXPECT_EQ(progress().volume_status, CUMULET_OK);
 }
 
-TEST_F(Loading, AFrameReportsAsWaitDoes) {
+TEST_F(Loading, RenderReportsFailuresLikeWait) {
   const headless::Context context = headless::Context::create(headless::Backend::automatic);
   ASSERT_EQ(cumulet_attach(v_, headless::Context::get_proc, const_cast<headless::Context*>(&context)), CUMULET_OK);
   const auto failed = [&] {
@@ -271,7 +271,7 @@ TEST_F(Loading, AFrameReportsAsWaitDoes) {
   viewer_.reset();  // before its context
 }
 
-TEST(ReportedFailures, CopiesAreTheSameFailure) {
+TEST(ReportedFailures, CopiesAreReportedOnce) {
   using viewer::ContentFailures;
   using viewer::ContentKind;
   using viewer::ReportedFailures;
@@ -311,7 +311,7 @@ class CurrentFolder {
   std::filesystem::path before_ = std::filesystem::current_path();
 };
 
-TEST(FilePaths, AreThoseOfTheMomentAndHaveTheNameThatWasGiven) {
+TEST(FilePaths, ResolveAtConstructionAndKeepTheGivenName) {
   const Folder here;
   const Folder there;
   const CurrentFolder current(here.path());
@@ -333,7 +333,7 @@ TEST(FilePaths, AreThoseOfTheMomentAndHaveTheNameThatWasGiven) {
 }
 
 // A worker reads after the current folder has changed.
-TEST_F(Loading, RelativePathsAreOfTheFolderAtTheCall) {
+TEST_F(Loading, RelativePathsUseTheWorkingFolderOfTheCall) {
   const Folder elsewhere;
   const CurrentFolder current(folder_.path());
   for (int frame = 0; frame < 2; ++frame)

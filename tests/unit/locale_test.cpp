@@ -217,13 +217,13 @@ class Locales : public ::testing::Test {
   Texts classic_;
 };
 
-TEST_F(Locales, OfCAndCppChangeNothingThatIsReadOrWritten) {
+TEST_F(Locales, CAndCppLocalesDoNotAffectFiles) {
   const HostileLocales hostile(true);
   if (!hostile.has_comma()) GTEST_SKIP() << "SKIPPED: no locale of C with a decimal comma is here";
   expect_same(all_texts(folder_.path(), options_), classic_);
 }
 
-TEST_F(Locales, OfCppChangeNothingThatIsReadOrWritten) {
+TEST_F(Locales, CppLocaleDoesNotAffectFiles) {
   const HostileLocales hostile(false);
   std::ostringstream grouped;
   grouped << 1234567;

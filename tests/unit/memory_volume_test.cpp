@@ -112,7 +112,7 @@ struct Sparse {
   }
 };
 
-TEST(DenseVolume, HoldsEveryVoxelInItsPlace) {
+TEST(DenseVolume, EveryVoxelIsAtItsPosition) {
   for (const glm::ivec3 size : {glm::ivec3(1), glm::ivec3(8, 16, 24), glm::ivec3(37, 5, 61), glm::ivec3(7, 130, 9)}) {
     Dense dense(size.x, size.y, size.z);
     std::mt19937 random(4);
@@ -177,7 +177,7 @@ TEST(DenseVolume, SkipsEmptyBricks) {
   EXPECT_LE(inside(volume).brick_origins.size(), 2U);
 }
 
-TEST(DenseVolume, TellsItsInfo) {
+TEST(DenseVolume, ReportsItsInfo) {
   Dense dense(4, 4, 4);
   dense.at(1, 0, 0) = 7.0F;
   dense.at(3, 2, 1) = 1.0F;
@@ -200,7 +200,7 @@ TEST(DenseVolume, TellsItsInfo) {
   EXPECT_EQ(shorter.bounds_max[0], 0.0);
 }
 
-TEST(DenseVolume, RefusesWhatIsWrong) {
+TEST(DenseVolume, RejectsInvalidInput) {
   const auto wrong = [](cumulet_status status, auto&& change) {
     Dense dense(9, 10, 11);
     dense.at(0, 0, 0) = 1.0F;
@@ -243,7 +243,7 @@ TEST(DenseVolume, RefusesWhatIsWrong) {
   EXPECT_HAS(refused(CUMULET_ERROR_UNSUPPORTED, bar.call()), "300000 voxels wide; the limit is 262144");
 }
 
-TEST(DenseVolume, TakesDefaults) {
+TEST(DenseVolume, HasDefaults) {
   Dense dense(2, 2, 2);
   dense.at(1, 1, 1) = -3.0F;  // clamped without a message, because there is no log
   dense.at(0, 1, 1) = 1.0F;
@@ -257,7 +257,7 @@ TEST(DenseVolume, TakesDefaults) {
   EXPECT_HAS(refused(CUMULET_ERROR_FILE, dense.call()), "a b: ");
 }
 
-TEST(DenseVolume, CountsWhatCountsAsZero) {
+TEST(DenseVolume, CountsInvalidValuesAsZero) {
   Dense dense(3, 3, 3);
   dense.at(0, 0, 0) = INFINITY;
   dense.at(1, 0, 0) = NAN;
@@ -327,7 +327,7 @@ TEST(SparseVolume, AllVoxelsAreActiveWithoutMasks) {
   EXPECT_EQ(inside(made(tiles.call())).active_voxels, std::uint64_t{1} << 36U);
 }
 
-TEST(SparseVolume, RefusesWhatIsWrong) {
+TEST(SparseVolume, RejectsInvalidInput) {
   const auto wrong = [](cumulet_status status, auto&& change) {
     Sparse sparse;
     sparse.brick(0, 0, 0);
@@ -380,7 +380,7 @@ TEST(SparseVolume, RefusesWhatIsWrong) {
 }
 
 // Compares the overlap check with a test of all pairs, on tiles of many shapes. For disjoint tiles it must find none.
-TEST(SparseVolume, FindsEveryOverlapAndNoOther) {
+TEST(SparseVolume, DetectsExactlyTheOverlaps) {
   std::mt19937 random(12);
   const auto pick = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
   int overlapping = 0;
@@ -476,7 +476,7 @@ class OpenVdbVolume : public ::testing::Test {
   cumulet::test::Folder folder_;
 };
 
-TEST_F(OpenVdbVolume, IsTheOneOfTheFile) {
+TEST_F(OpenVdbVolume, MatchesTheFileImport) {
   for (const float background : {0.0F, 0.125F}) {
     const auto grid = rich(background);
     const Volume file = open(write({grid}));
@@ -496,7 +496,7 @@ TEST_F(OpenVdbVolume, IsTheOneOfTheFile) {
   expect_identical(inside(copy(rich<HalfGrid>(0.0F))), inside(file));
 }
 
-TEST_F(OpenVdbVolume, ReadsWhatIsLoadedLater) {
+TEST_F(OpenVdbVolume, ReadsDelayLoadedLeaves) {
   const auto grid = rich(0.125F);
   const std::string file = write({grid});
   openvdb::io::File lazy(file);
@@ -507,7 +507,7 @@ TEST_F(OpenVdbVolume, ReadsWhatIsLoadedLater) {
   expect_identical(inside(copy(delayed)), inside(open(file)));
 }
 
-TEST_F(OpenVdbVolume, RefusesWhatFilesRefuse) {
+TEST_F(OpenVdbVolume, RejectsTheSameGridsAsFiles) {
   EXPECT_HAS(refusal(nullptr, CUMULET_ERROR_INVALID_ARGUMENT), "grid is NULL");
   const auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(5.0F, openvdb::Vec3f(0), 1.0F);
   sphere->setName("surface");
@@ -531,7 +531,7 @@ TEST_F(OpenVdbVolume, RefusesWhatFilesRefuse) {
   EXPECT_EQ(cumulet::volume_from_openvdb(rich(0.0F), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(OpenVdbVolume, FilesStandWhereTheHostWants) {
+TEST_F(OpenVdbVolume, FilesUseTheHostsTransform) {
   const auto grid = rich(0.0F);
   const std::string file = write({grid});
   cumulet_volume_file_desc desc{};
@@ -558,7 +558,7 @@ TEST_F(OpenVdbVolume, FilesStandWhereTheHostWants) {
   EXPECT_HAS(refused(CUMULET_ERROR_INVALID_ARGUMENT, call), "flattens space");
 }
 
-TEST_F(OpenVdbVolume, AreInspected) {
+TEST_F(OpenVdbVolume, CanBeInspected) {
   const auto grid = rich(0.0F);
   grid->insertMeta("author", openvdb::StringMetadata("me"));
   const auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(5.0F, openvdb::Vec3f(0), 1.0F);
@@ -719,7 +719,7 @@ TEST(VolumeHandle, IsCountedByManyThreads) {
 }
 
 // Grids of a host's own OpenVDB as a state of a live volume. The density equals that of a volume made from it.
-TEST(LiveOpenVdb, IsTheVolume) {
+TEST(LiveOpenVdb, LiveStateMatchesTheVolume) {
   const auto density = openvdb::FloatGrid::create();
   const auto heat = openvdb::DoubleGrid::create();
   for (int i = 0; i < 600; ++i) {

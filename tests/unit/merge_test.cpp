@@ -144,7 +144,7 @@ class Merge : public ::testing::Test {
   int files_ = 0;
 };
 
-TEST_F(Merge, SevenUnequalPartsAreTheWholeInAnyOrder) {
+TEST_F(Merge, SevenUnequalPartsEqualTheFullRenderingInAnyOrder) {
   std::vector<std::string> parts;
   std::uint64_t first = 0;
   for (const std::uint64_t samples : {5U, 1U, 16U, 2U, 1U, 30U, 9U}) {
@@ -174,7 +174,7 @@ TEST_F(Merge, SevenUnequalPartsAreTheWholeInAnyOrder) {
   EXPECT_NEAR(number(made, attributes::noise), number(wanted, attributes::noise), 1e-6);
 }
 
-TEST_F(Merge, WhatIsMergedIsAPartOfMore) {
+TEST_F(Merge, MergedPartsCanBeMergedAgain) {
   const std::string early = part(0, 3);
   merge({part(3, 4), part(7, 9)}, folder_ / "late.exr");
   const demo::Merged merged = merge({folder_ / "late.exr", early}, output());
@@ -185,7 +185,7 @@ TEST_F(Merge, WhatIsMergedIsAPartOfMore) {
   expect_layer(early, layers::beauty, 0.0);
 }
 
-TEST_F(Merge, PartsOfOneSampleTellTheirErrorTogether) {
+TEST_F(Merge, OneSamplePartsGiveAnErrorEstimateTogether) {
   merge({part(0, 1), part(1, 1)}, output());
   expect_layer(part(0, 2), layers::error, 1e-5);
   const std::string one = part(0, 1);
@@ -194,7 +194,7 @@ TEST_F(Merge, PartsOfOneSampleTellTheirErrorTogether) {
   EXPECT_EQ(number(image::read_contents(output()), attributes::noise), -1.0);
 }
 
-TEST_F(Merge, LayersThatNoSumGivesAreLeftOutAndTold) {
+TEST_F(Merge, NonAdditiveLayersAreDroppedAndReported) {
   const Description clear{.background = "transparent", .denoised = true};
   const demo::Merged merged = merge({part(0, 4, clear), part(4, 4, clear)}, output());
   EXPECT_TRUE(merged.without_error && merged.without_denoised);
@@ -203,7 +203,7 @@ TEST_F(Merge, LayersThatNoSumGivesAreLeftOutAndTold) {
   EXPECT_EQ(number(made, attributes::noise), -1.0);
 }
 
-TEST_F(Merge, SamplesThatTwoHaveOrNoneAreNamed) {
+TEST_F(Merge, OverlappingAndMissingSamplesAreNamed) {
   EXPECT_EQ(refusal({part(0, 16), part(8, 16)}),
             "part1.exr: has samples 8 to 23, some of which part0.exr has as well: samples 0 to 15");
   EXPECT_EQ(refusal({part(20, 4), part(0, 16)}), "between part3.exr and part2.exr no part has samples 16 to 19");
@@ -212,7 +212,7 @@ TEST_F(Merge, SamplesThatTwoHaveOrNoneAreNamed) {
   EXPECT_NE(refusal({twice, twice}).find("as well"), std::string::npos);
 }
 
-TEST_F(Merge, PartsOfOtherPicturesAreRefused) {
+TEST_F(Merge, PartsOfOtherImagesAreRejected) {
   const std::string a = part(0, 4);
   EXPECT_EQ(refusal({a, part(4, 4, {.width = 7})}), "part1.exr: is of 7x3 pixels, and part0.exr of 5x3");
   EXPECT_EQ(refusal({a, part(4, 4, {.version = "0.3.0"})}),
@@ -223,7 +223,7 @@ TEST_F(Merge, PartsOfOtherPicturesAreRefused) {
   EXPECT_EQ(refusal({a, part(4, 4, {.error = false})}), "part6.exr: has other layers than part0.exr");
 }
 
-TEST_F(Merge, MattesAreThoseOfTheFirstPart) {
+TEST_F(Merge, CryptomattesComeFromTheFirstPart) {
   const Description named{.manifest = R"({"cloud":"13851a76"})"};
   const std::string first = part(0, 4, named);
   merge({part(4, 12, named), first}, output());
@@ -238,7 +238,7 @@ TEST_F(Merge, MattesAreThoseOfTheFirstPart) {
   EXPECT_EQ(refusal({first, part(4, 4)}), "part3.exr: has other layers than part0.exr");
 }
 
-TEST_F(Merge, WhatIsNoPartIsRefused) {
+TEST_F(Merge, OtherFilesAreRejected) {
   const std::string a = part(0, 4);
   EXPECT_NE(refusal({a, part(4, 4, {.whole = false})}).find("part1.exr: is no part of a picture"), std::string::npos);
   image::write_exr(folder_ / "plain.exr", {1, 1, {0.0f, 0.0f, 0.0f, 1.0f}});

@@ -71,7 +71,7 @@ Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const d
   return met;
 }
 
-TEST(Models, RaysMeetWhatTheyMeetInTheWorld) {
+TEST(Models, RaysHitLikeInWorldSpace) {
   std::mt19937 random(7);
   const auto source = test::source_of(lumps(random));
   std::vector<scene::Model> models;
@@ -107,7 +107,7 @@ TEST(Models, RaysMeetWhatTheyMeetInTheWorld) {
   EXPECT_LE(other, 4U);
 }
 
-TEST(Models, NormalsAreUprightOnWhatIsSheared) {
+TEST(Models, NormalsArePerpendicularUnderShear) {
   std::mt19937 random(11);
   auto scene = std::make_shared<test::StillScene>();
   scene->materials.push_back(test::diffuse(vec3(0.5F)));
@@ -136,7 +136,7 @@ TEST(Models, NormalsAreUprightOnWhatIsSheared) {
 }
 
 // Probabilities of emissive triangles are proportional to their world-space area and sum to 1.
-TEST(Models, EmissiveTrianglesAreFoundByTheirArea) {
+TEST(Models, EmissiveTrianglesAreSelectedByArea) {
   auto scene = std::make_shared<test::StillScene>();
   scene->materials.push_back(test::diffuse(vec3(0.0F)));
   scene->materials.back().emission = vec3(2.0F);
@@ -168,7 +168,7 @@ TEST(Models, EmissiveTrianglesAreFoundByTheirArea) {
   EXPECT_NEAR(sum, 1.0, 1e-4);
 }
 
-TEST(Models, OfShadowsAloneAreMetByAllButCameras) {
+TEST(Models, ShadowOnlyModelsAreHitByAllButCameraRays) {
   std::mt19937 random(3);
   const auto source = test::source_of(lumps(random));
   core::CpuTetSurfaces rays;
@@ -180,7 +180,7 @@ TEST(Models, OfShadowsAloneAreMetByAllButCameras) {
   EXPECT_TRUE(rays.cm_trace_models(vec3(1, 0, 9), vec3(0, 0, -1), 0.0F, 1e30F, false, hit));
 }
 
-TEST(Models, PlacesThatCannotBeAreRefused) {
+TEST(Models, InvalidTransformsAreRejected) {
   std::mt19937 random(3);
   const auto source = test::source_of(lumps(random));
   const auto refused = [&](const dmat4& place, ErrorCode code, const char* cause) {

@@ -56,7 +56,7 @@ void expect_rgb(const float (&rgb)[3], float r, float g, float b) {
   EXPECT_FLOAT_EQ(rgb[2], b);
 }
 
-TEST(Options, DefaultsAreTheLibrarysOwn) {
+TEST(Options, DefaultsMatchTheLibrary) {
   const RenderOptions options = parse({});
   const SceneOptions& scene = options.scene;
   EXPECT_EQ(scene.volume, "cloud.vdb");
@@ -85,7 +85,7 @@ TEST(Options, DefaultsAreTheLibrarysOwn) {
   EXPECT_EQ(options.trace, "");
 }
 
-TEST(Options, EveryFlag) {
+TEST(Options, ParsesEveryFlag) {
   const RenderOptions options = parse({"--grid-name",
                                        "smoke",
                                        "--size",
@@ -167,7 +167,7 @@ TEST(Options, EveryFlag) {
   EXPECT_EQ(options.stats, "s.json");
 }
 
-TEST(Options, LightGivenIsTheOnlyLight) {
+TEST(Options, ExplicitLightReplacesTheDefaultLight) {
   const RenderOptions day = parse({});
   EXPECT_GT(day.scene.light.sun_irradiance[0], 0.0f);
   EXPECT_GT(day.scene.light.sky_radiance[2], 0.0f);
@@ -179,7 +179,7 @@ TEST(Options, LightGivenIsTheOnlyLight) {
   expect_rgb(night.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
 }
 
-TEST(Options, ASkyModelTakesItsSunsPlaceAlone) {
+TEST(Options, SkyModelReplacesOnlyTheSun) {
   const RenderOptions clear = parse({"--sky-model", "2.5,.25", "--sun", "120,20"});
   EXPECT_EQ(clear.scene.light.sky, CUMULET_SKY_PHYSICAL);
   EXPECT_EQ(clear.scene.light.turbidity, 2.5f);
@@ -195,7 +195,7 @@ TEST(Options, ASkyModelTakesItsSunsPlaceAlone) {
   EXPECT_EQ(parse({"--env", "a.hdr"}).scene.light.sky, CUMULET_SKY_CONSTANT);
 }
 
-TEST(Options, WithoutAWordOfLightItIsAClearDay) {
+TEST(Options, DefaultLightIsAClearDay) {
   const RenderOptions day = parse({});
   EXPECT_EQ(day.scene.light.sky, CUMULET_SKY_PHYSICAL);
   EXPECT_GT(day.scene.light.turbidity, 0.0f);
@@ -204,7 +204,7 @@ TEST(Options, WithoutAWordOfLightItIsAClearDay) {
   EXPECT_EQ(soft.scene.light.sun_angle_degrees, 5.0f);
 }
 
-TEST(Options, APresetIsAMediumThatFlagsOverride) {
+TEST(Options, FlagsOverrideAMediumPreset) {
   // Independent of the order on the command line.
   const RenderOptions preset = parse({"--flame-strength", "7", "--density-scale", "3", "--preset", "explosion"});
   const cumulet_medium_desc& medium = preset.scene.medium;
@@ -242,7 +242,7 @@ TEST(Options, APresetIsAMediumThatFlagsOverride) {
             "--preset: 'steam' is none of cumulus, smoke, fire, explosion, ground-fog");
 }
 
-TEST(Options, ARampIsPointsBetweenCommas) {
+TEST(Options, RampIsAListOfPoints) {
   using Points = cumulet::settings::RampPoints;
   const SceneOptions scene =
       parse({"--density-ramp", "0:0,.25:1e-1,3:2.5", "--temperature-ramp", "-1:0,1:2", "--flame-ramp", "none"}).scene;
@@ -256,7 +256,7 @@ TEST(Options, ARampIsPointsBetweenCommas) {
 }
 
 // Compares each key with the same words in a scene file.
-TEST(Options, ALampIsThatOfASceneFile) {
+TEST(Options, LightFlagsMatchSceneFileLights) {
   const SceneOptions scene = parse({"--lamp",
                                     "rectangle  position=-1,.5,2e1 direction=0,-.5,1 across=1,0,0 color=1,0.5,.25 "
                                     "power=+300 width=2 height=.5 angle_degrees=90 blend=0.25",
@@ -282,7 +282,7 @@ TEST(Options, ALampIsThatOfASceneFile) {
   EXPECT_EQ(parse({"--lamp", "point", "--lamp", "none"}).scene.light.sky, CUMULET_SKY_PHYSICAL) << "a day without";
 }
 
-TEST(Options, LampsAreBesideThoseOfAScene) {
+TEST(Options, LightFlagsAddToTheScenesLights) {
   const cumulet::test::Folder folder;
   const std::string scene = (folder.path() / "scene.json").string();
   std::ofstream(scene) << R"({"cumulet_scene": 2, "lights": [{"kind": "spot", "power": 7}]})";
@@ -301,7 +301,7 @@ TEST(Options, LampsAreBesideThoseOfAScene) {
   EXPECT_EQ(other[0].power, 3.0f);
 }
 
-TEST(Options, WordsAreBetweenAnyWhiteSpace) {
+TEST(Options, AnyWhiteSpaceSeparatesWords) {
   const auto lamps = parse({"--lamp", "\tdisc\n  power=3\r\n\twidth=2\n"}).scene.lamps;
   ASSERT_EQ(lamps.size(), 1u);
   EXPECT_EQ(lamps[0].kind, CUMULET_LAMP_DISC);
@@ -309,7 +309,7 @@ TEST(Options, WordsAreBetweenAnyWhiteSpace) {
   EXPECT_EQ(lamps[0].width, 2.0);
 }
 
-TEST(Options, ALampThatIsNoneIsToldInALine) {
+TEST(Options, InvalidLightGivesAOneLineError) {
   const auto told = [](const char* lamp) { return usage_error(with({"--lamp", lamp})); };
   EXPECT_EQ(told(""), "--lamp: '' is none of point, spot, disc, rectangle, sun");
   EXPECT_EQ(told("bulb power=1"), "--lamp: 'bulb' is none of point, spot, disc, rectangle, sun");
@@ -347,7 +347,7 @@ class SceneOption : public ::testing::Test {
   cumulet::test::Folder folder_;
 };
 
-TEST_F(SceneOption, FlagsOverrideTheSceneFileWhereverTheyStand) {
+TEST_F(SceneOption, FlagsOverrideTheSceneFileInAnyOrder) {
   const std::string path = write_scene(R"({"cumulet_scene": 1, "volume": {"file": "/a/smoke.vdb", "grid": "smoke"},
     "camera": {"eye": [0, 0, 9], "target": [0, 0, 0], "orthographic_height": 4},
     "medium": {"density_scale": 7, "anisotropy": 0.25},
@@ -378,7 +378,7 @@ TEST_F(SceneOption, FlagsOverrideTheSceneFileWhereverTheyStand) {
   EXPECT_EQ(mixed->scene.display.exposure_stops, 2.0f);
 }
 
-TEST_F(SceneOption, AnotherOfItsCamerasIsLookedThrough) {
+TEST_F(SceneOption, SelectsACameraOfTheScene) {
   const std::string path = write_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "/a/smoke.vdb"}],
     "models": [{"file": "/a/m.glb", "camera": 3}], "camera": "front", "cameras": [
       {"name": "front", "eye": [0, 0, 9], "target": [0, 0, 0], "fovy_degrees": 30},
@@ -409,7 +409,7 @@ TEST_F(SceneOption, AnotherOfItsCamerasIsLookedThrough) {
             R"(--scene-camera: there is no camera "side": the scene has none)");
 }
 
-TEST_F(SceneOption, MustNameAVolumeOrAFlag) {
+TEST_F(SceneOption, NeedsAVolumeInTheSceneOrAsAFlag) {
   const std::string path = write_scene(R"({"cumulet_scene": 1})");
   EXPECT_NE(usage_error({"--scene", path, "-o", "a.png"}).find("--volume"), std::string::npos);
   std::ostringstream out;
@@ -417,7 +417,7 @@ TEST_F(SceneOption, MustNameAVolumeOrAFlag) {
             0.0f);
 }
 
-TEST_F(SceneOption, ABadFileIsNoUsageError) {
+TEST_F(SceneOption, InvalidFileIsNotAUsageError) {
   std::ostringstream out;
   const std::string path = write_scene("{");
   for (const std::string& name : {path, std::string("/nowhere/scene.json")}) {
@@ -432,7 +432,7 @@ TEST_F(SceneOption, ABadFileIsNoUsageError) {
   }
 }
 
-TEST(Options, SurfacesMayComeAlone) {
+TEST(Options, SurfacesNeedNoVolume) {
   std::ostringstream out;
   const auto options = parse_render_options(
       {"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2", "--gltf-camera", "1", "--gltf-variant",
@@ -454,7 +454,7 @@ TEST(Options, SurfacesMayComeAlone) {
   for (const char* bad : {"-0.1", "1.1", "nan", "x"}) EXPECT_NE(usage_error(with({"--indirect-roughness", bad})), "");
 }
 
-TEST(Options, WhatIsOfAModelNeedsOne) {
+TEST(Options, ModelFlagsNeedAModel) {
   for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-variant", "--gltf-camera"}) {
     EXPECT_EQ(usage_error(with({flag, "1"})),
               std::string(flag) + " needs a model: --gltf, or a --scene that names one");
@@ -462,7 +462,7 @@ TEST(Options, WhatIsOfAModelNeedsOne) {
   }
 }
 
-TEST(Options, APartHasItsSamplesAndIsAnExr) {
+TEST(Options, PartialImageNeedsASampleRangeAndExr) {
   const RenderOptions part = parse({"-o", "a.exr", "--spp", "32", "--first-sample", "96"});
   EXPECT_EQ(part.scene.sampling.first_sample, 96u);
   EXPECT_EQ(part.scene.sampling.samples, 32u);
@@ -481,7 +481,7 @@ TEST(Options, APartHasItsSamplesAndIsAnExr) {
   EXPECT_NE(usage_error(with({"-o", "a.exr", "--first-sample", "-1"})), "");
 }
 
-TEST(Options, FramesOfASequence) {
+TEST(Options, ParsesSequenceFrames) {
   const RenderOptions options = parse({"--frames", "1-5x2", "--overwrite"});
   EXPECT_EQ(options.frames, (std::vector<Moment>{1, 3, 5}));
   EXPECT_TRUE(options.overwrite);
@@ -496,13 +496,13 @@ TEST(Options, FramesOfASequence) {
   EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' runs backwards");
 }
 
-TEST(Options, HelpSaysWhichFilesThereAre) {
+TEST(Options, HelpListsFileFormats) {
   std::ostringstream out;
   EXPECT_FALSE(parse_render_options({"--help"}, out).has_value());
   EXPECT_NE(out.str().find("OpenVDB or NanoVDB file (.vdb, .nvdb)"), std::string::npos) << out.str();
 }
 
-TEST(Progress, RatesAreShownOnceTheyMeanSomething) {
+TEST(Progress, RatesAreHiddenUntilMeasurable) {
   // Time before the first line was not measured.
   EXPECT_EQ(rendering_line(0.5, 0.0, 1e9, 0.0), "rendering [############............] 50 %");
   EXPECT_EQ(rendering_line(0.5, 0.01, 1e7, 1e-9), "rendering [############............] 50 %");
@@ -512,14 +512,14 @@ TEST(Progress, RatesAreShownOnceTheyMeanSomething) {
   EXPECT_NE(rendering_line(1.0, 1.0, 5e13, 10.0).find("5 Tsamples/s"), std::string::npos);
 }
 
-TEST(Progress, CountsTowardsWhatComesFirst) {
+TEST(Progress, CountsTowardTheNearestLimit) {
   EXPECT_EQ(part_done(0.3, 9.0, std::nullopt), 0.3);
   EXPECT_EQ(part_done(0.3, 6.0, 10.0), 0.6) << "the time";
   EXPECT_EQ(part_done(0.8, 6.0, 10.0), 0.8) << "the noise, or the samples";
   EXPECT_EQ(part_done(0.8, 11.0, 10.0), 1.0);
 }
 
-TEST(Progress, TheLastLineSaysWhyItEnded) {
+TEST(Progress, LastLineGivesTheReasonForStopping) {
   EXPECT_EQ(ending_line(Ending::noise, 0.01874, 91.0, 2.0, std::nullopt),
             "noise 1.87 % (target 2 %) after 91 samples a pixel");
   EXPECT_EQ(ending_line(Ending::samples, 0.024, 64.0, 2.0, 30.0),
@@ -532,7 +532,7 @@ TEST(Progress, TheLastLineSaysWhyItEnded) {
       << "a black picture has none";
 }
 
-TEST(HeldLines, AFailureIsSaidOnceAndInItsOrder) {
+TEST(HeldLines, FailureIsPrintedOnceAndInOrder) {
   HeldLines lines;
   EXPECT_EQ(lines.take(CUMULET_LOG_WARNING, "one"), "warning: one");
   lines.hold();
@@ -548,7 +548,7 @@ TEST(HeldLines, AFailureIsSaidOnceAndInItsOrder) {
   EXPECT_TRUE(lines.release().empty());
 }
 
-TEST(Options, WhatStopsAPictureHasRoomForSamples) {
+TEST(Options, NoiseAndTimeLimitsRaiseTheDefaultSampleLimit) {
   EXPECT_EQ(parse({"--noise-target", "2.5"}).scene.sampling.noise_target_percent, 2.5F);
   EXPECT_EQ(parse({"--noise-target", "2.5"}).scene.sampling.samples, 65536U);
   EXPECT_EQ(parse({"--time-limit", "0.5"}).time_limit, 0.5);
@@ -561,7 +561,7 @@ TEST(Options, WhatStopsAPictureHasRoomForSamples) {
   EXPECT_FALSE(parse({}).time_limit.has_value());
 }
 
-TEST(PictureMemory, IsToldBeforeItIsMissed) {
+TEST(PictureMemory, InsufficientMemoryIsReportedBeforeRendering) {
   RenderOptions options = parse({"--size", "16384x16384"});
   constexpr std::uint64_t gib = std::uint64_t{1} << 30U;
   const auto told = [&](std::string_view renderer, std::optional<std::uint64_t> available) -> std::string {
@@ -589,7 +589,7 @@ TEST(PictureMemory, IsToldBeforeItIsMissed) {
   EXPECT_GT(available_memory().value_or(gib), 0U);
 }
 
-TEST(Options, AovsAreListedOrAll) {
+TEST(Options, AovsAreAListOrAll) {
   const auto aovs_of = [](const char* text) {
     std::ostringstream out;
     return parse_render_options({"--volume", "a.vdb", "-o", "a.exr", "--aovs", text}, out)->aovs;
@@ -611,7 +611,7 @@ TEST(Options, AovsAreListedOrAll) {
   EXPECT_FALSE(parse({}).cryptomatte);
 }
 
-TEST(Options, ACriterionThatIsNamedIsNoDefault) {
+TEST(Options, NamedCriterionKeepsItsOwnThreshold) {
   const auto criterion_of = [](const std::vector<std::string>& arguments) {
     return cumulet::settings::criterion_of(parse(arguments).scene.grid);
   };
@@ -623,7 +623,7 @@ TEST(Options, ACriterionThatIsNamedIsNoDefault) {
   EXPECT_EQ(parse({"--criterion", "deviation"}).scene.grid.threshold, 0.02);
 }
 
-TEST(Options, ThresholdZeroIsTheVoxel) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }
+TEST(Options, ThresholdZeroRefinesToVoxels) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }
 
 TEST(Options, NegativeValuesAreNotFlags) {
   EXPECT_FLOAT_EQ(parse({"--anisotropy", "-.5"}).scene.medium.anisotropy, -0.5f);
@@ -632,7 +632,7 @@ TEST(Options, NegativeValuesAreNotFlags) {
   EXPECT_EQ(parse({"--camera", "-5,0,0 1,1,1 40"}).scene.camera.eye[0], -5.0);
 }
 
-TEST(Options, OutputFormatByItsEnding) {
+TEST(Options, OutputFormatFollowsTheSuffix) {
   const auto format = [](const std::string& name) {
     std::ostringstream out;
     return parse_render_options({"--volume", "v", "--output", name}, out)->format;
@@ -642,7 +642,7 @@ TEST(Options, OutputFormatByItsEnding) {
   EXPECT_NE(usage_error({"--volume", "v", "-o", "a.png/c"}), "");
 }
 
-TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
+TEST(Options, UsageErrorsAreOneLineAndNameTheFlag) {
   const std::vector<Arguments> wrong = {{"--size", "640"},
                                         {"--size", "0x10"},
                                         {"--size", "10x10x10"},
@@ -739,7 +739,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
   EXPECT_NE(usage_error(with({"--trace", "s.json", "--stats", "s.json"})), "");
 }
 
-TEST(Options, TheLastOfAFlagWins) {
+TEST(Options, LastValueOfAFlagWins) {
   EXPECT_EQ(parse({"--spp", "1", "--spp", "2"}).scene.sampling.samples, 2u);
   EXPECT_EQ(parse({"--volume", "b.vdb"}).scene.volume, "b.vdb");
   EXPECT_EQ(parse({"--march", "dense", "--march", "tet"}).scene.grid.march, CUMULET_MARCH_TET);
@@ -753,7 +753,7 @@ TEST(Options, TheDensityScaleIsAutoUnlessSaid) {
   EXPECT_EQ(again.medium.density_scale, 0.0);
 }
 
-TEST(Options, TheUpAxisTurnsTheVolume) {
+TEST(Options, UpAxisRotatesTheVolume) {
   const SceneOptions upright = parse({}).scene;
   EXPECT_EQ(volume_file(upright).to_world[0], 0.0) << "zero: as it is";
   const SceneOptions turned = parse({"--up", "z", "--grid-name", "smoke"}).scene;
@@ -789,7 +789,7 @@ TEST(Options, FilesNeedNoFlag) {
   EXPECT_FALSE(read->scene.auto_density_scale) << "a scene without a scale means 1, as it always did";
 }
 
-TEST(Options, HelpAndVersionNeedNothingElse) {
+TEST(Options, HelpAndVersionNeedNoOtherFlags) {
   std::ostringstream help;
   EXPECT_FALSE(parse_render_options({"--help"}, help).has_value());
   for (const char* flag : {"--volume", "--march", "--sun", "--stats", "--exposure", "--view", "--scene", "--tone-map"})

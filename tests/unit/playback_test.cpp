@@ -31,28 +31,28 @@ Frames played(const Playback& playback, int from, int count) {
   return frames;
 }
 
-TEST(Playback, HoldsBothEnds) {
+TEST(Playback, HoldClampsAtBothEnds) {
   const Playback hold{.first = 3, .count = 4};
   EXPECT_EQ(played(hold, -2, 9), (Frames{3, 3, 3, 4, 5, 6, 6, 6, 6}));
 }
 
-TEST(Playback, LoopsOnBothSides) {
+TEST(Playback, LoopWrapsAtBothEnds) {
   const Playback loop{.repeat = Repeat::loop, .first = 3, .count = 4};
   EXPECT_EQ(played(loop, -3, 10), (Frames{4, 5, 6, 3, 4, 5, 6, 3, 4, 5}));
 }
 
-TEST(Playback, PingPongShowsNoEndTwice) {
+TEST(Playback, PingPongDoesNotRepeatTheEnds) {
   const Playback back{.repeat = Repeat::ping_pong, .first = 3, .count = 4};
   EXPECT_EQ(played(back, -3, 14), (Frames{6, 5, 4, 3, 4, 5, 6, 5, 4, 3, 4, 5, 6, 5}));
 }
 
-TEST(Playback, ASingleFrameIsAlwaysThere) {
+TEST(Playback, SingleFrameIsAlwaysShown) {
   for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong})
     EXPECT_EQ(played({.repeat = repeat, .first = 2, .count = 1}, -3, 7), Frames(7, 2));
 }
 
 // Each frame is displayed for a whole frame duration in both directions.
-TEST(Playback, FramesLastTheSame) {
+TEST(Playback, FramesHaveEqualDuration) {
   for (const Repeat repeat : {Repeat::loop, Repeat::ping_pong}) {
     const Playback playback{.frames_per_second = 10.0, .repeat = repeat, .count = 5};
     for (int i = 0; i < 40; ++i) {
@@ -63,7 +63,7 @@ TEST(Playback, FramesLastTheSame) {
   }
 }
 
-TEST(Playback, AFramesTimeIsItsOwn) {
+TEST(Playback, FrameTimeRoundTrips) {
   for (const double rate : {23.976, 24.0, 25.0, 29.97, 60.0, 1000.0 / 3.0}) {
     const Playback playback{.frames_per_second = rate, .offset_seconds = 1.0 / 3.0, .first = 7, .count = 5000};
     for (std::uint32_t frame = 7; frame < 5007; ++frame)
@@ -71,7 +71,7 @@ TEST(Playback, AFramesTimeIsItsOwn) {
   }
 }
 
-TEST(Playback, SubFramesArePositions) {
+TEST(Playback, SubframesAreFractionalPositions) {
   const Playback playback{.frames_per_second = 10.0, .offset_seconds = 2.0, .repeat = Repeat::ping_pong, .count = 5};
   EXPECT_NEAR(moment_at(playback, 2.125).position, 1.25, 1e-9);
   EXPECT_NEAR(moment_at(playback, 2.525).position, 2.75, 1e-9);  // on the way back
@@ -79,7 +79,7 @@ TEST(Playback, SubFramesArePositions) {
   EXPECT_EQ(frame_at(playback, 2.525), 3U);
 }
 
-TEST(Playback, WhatIsFarAwayIsStillAFrame) {
+TEST(Playback, DistantTimesMapToAFrame) {
   for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong}) {
     const Playback playback{.repeat = repeat, .first = 2, .count = 5};
     for (const double seconds : {-1e15, -1e-18, 1e15, 1e300, -1e300}) {
@@ -90,7 +90,7 @@ TEST(Playback, WhatIsFarAwayIsStillAFrame) {
   }
 }
 
-TEST(Upcoming, AreInTheOrderOfPlay) {
+TEST(Upcoming, FollowThePlaybackOrder) {
   Playback playback{.repeat = Repeat::hold, .first = 2, .count = 5};
   EXPECT_EQ(upcoming(playback, {4.0, true}, true), (Frames{4, 5, 6, 3, 2}));
   EXPECT_EQ(upcoming(playback, {4.0, true}, false), (Frames{4, 3, 2, 5, 6}));
@@ -102,13 +102,13 @@ TEST(Upcoming, AreInTheOrderOfPlay) {
   EXPECT_EQ(upcoming(playback, {4.0, false}, true), (Frames{4, 3, 2, 5, 6}));
 }
 
-TEST(Upcoming, GoOnIntoTheRangeFromOutside) {
+TEST(Upcoming, ContinueIntoTheRangeFromOutside) {
   const Playback playback{.repeat = Repeat::loop, .first = 2, .count = 3};
   EXPECT_EQ(upcoming(playback, {0.0, true}, true), (Frames{0, 2, 3, 4}));
   EXPECT_EQ(upcoming(playback, {5.0, true}, true), (Frames{5, 4, 2, 3}));
 }
 
-TEST(Upcoming, AreAllThatArePlayedEachOnce) {
+TEST(Upcoming, ContainEachPlayedFrameOnce) {
   for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong}) {
     for (std::uint32_t now = 3; now < 7; ++now) {
       for (const bool forward : {false, true}) {

@@ -76,7 +76,7 @@ class ProgramsTest : public testing::Test {
   gl::FunctionsPtr gl_ = gl::load_functions(FakeGl::get_proc, &fake_);
 };
 
-TEST_F(ProgramsTest, AreMadeOnceAndStayWhereTheyAre) {
+TEST_F(ProgramsTest, AreCreatedOnceWithStableAddresses) {
   Programs programs(*gl_, nullptr);
   const Program& first = programs.get(resolve);
   EXPECT_EQ(first.state(), Program::State::linked);
@@ -89,7 +89,7 @@ TEST_F(ProgramsTest, AreMadeOnceAndStayWhereTheyAre) {
   gl_->UseProgram(0);
 }
 
-TEST_F(ProgramsTest, OneThatDoesNotBuildIsToldAndTriedAgainWhenThatIsAskedFor) {
+TEST_F(ProgramsTest, FailedBuildIsReportedAndRetriedOnRequest) {
   for (const int call : {1, 2}) {  // after glCreateProgram and glCreateShader
     SCOPED_TRACE(call);
     Programs programs(*gl_, nullptr);
@@ -121,7 +121,7 @@ TEST_F(ProgramsTest, OneThatDoesNotBuildIsToldAndTriedAgainWhenThatIsAskedFor) {
   }
 }
 
-TEST_F(ProgramsTest, AreSharedWhereContextsShare) {
+TEST_F(ProgramsTest, AreSharedBetweenSharingContexts) {
   ProgramPool pool;
   const auto first = pool.of_current(*gl_);
   EXPECT_EQ(pool.of_current(*gl_), first);
@@ -171,7 +171,7 @@ TEST_F(ProgramsTest, ProgramsEndWithTheLastViewer) {
   cumulet_programs_release(programs);
 }
 
-TEST_F(ProgramsTest, BinariesOfAnEarlierRunServe) {
+TEST_F(ProgramsTest, BinariesOfAnEarlierRunAreUsed) {
   { EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()); }
   if (files_in(folder_).empty()) GTEST_SKIP() << "the driver gives no program binaries";
   const auto before = compiled();
@@ -181,7 +181,7 @@ TEST_F(ProgramsTest, BinariesOfAnEarlierRunServe) {
   EXPECT_GT(compiled(), before);
 }
 
-TEST_F(ProgramsTest, WhatIsDamagedIsIgnoredAndWrittenAnew) {
+TEST_F(ProgramsTest, DamagedBinariesAreIgnoredAndRewritten) {
   { EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()); }
   if (files_in(folder_).empty()) GTEST_SKIP() << "the driver gives no program binaries";
   ASSERT_EQ(files_in(folder_).size(), 1U);
@@ -214,7 +214,7 @@ TEST_F(ProgramsTest, WhatIsDamagedIsIgnoredAndWrittenAnew) {
   }
 }
 
-TEST_F(ProgramsTest, ShadersOfAFolderAreReadAnew) {
+TEST_F(ProgramsTest, ShadersOfAFolderAreReloaded) {
   fs::copy(CUMULET_GLSL_DIR, folder_.path());
   const fs::path file = folder_ / "resolve.comp";
   const auto original = bytes_of(file);
@@ -252,7 +252,7 @@ TEST_F(ProgramsTest, ShadersOfAFolderAreReadAnew) {
   EXPECT_THROW(programs->get({"resolve.comp", {"CM_HOLES 1", "CM_BACKGROUND 0"}}), Error);
 }
 
-TEST(ProgramFilesTest, KeepWhatWasUsedLastWithinTheirBound) {
+TEST(ProgramFilesTest, KeepRecentlyUsedBinariesWithinTheLimit) {
   const Folder folder;
   ProgramFiles files(folder.path(), 2500);
   const ProgramFiles::Binary binary{7, std::vector<std::byte>(1000, std::byte{42})};
@@ -275,7 +275,7 @@ TEST(ProgramFilesTest, KeepWhatWasUsedLastWithinTheirBound) {
   EXPECT_FALSE(files.find("another driver", "one"));
 }
 
-TEST(ProgramFilesTest, TouchWhatTheyHaveWrittenAlone) {
+TEST(ProgramFilesTest, TouchOnlyTheirOwnFiles) {
   const Folder folder;
   const std::string ours(32, 'a');
   const std::vector<std::string> foreign{"notes.program",          "film.part",
@@ -295,7 +295,7 @@ TEST(ProgramFilesTest, TouchWhatTheyHaveWrittenAlone) {
   EXPECT_FALSE(fs::exists(folder / left));
 }
 
-TEST(ProgramFilesTest, NoBitOfAHeaderIsTrusted) {
+TEST(ProgramFilesTest, DamagedHeadersAreDetected) {
   const Folder folder;
   ProgramFiles files(folder.path());
   files.keep("driver", "source", {7, std::vector<std::byte>(100, std::byte{42})});
@@ -311,7 +311,7 @@ TEST(ProgramFilesTest, NoBitOfAHeaderIsTrusted) {
   EXPECT_TRUE(files.find("driver", "source"));
 }
 
-TEST(ProgramFilesTest, WhatCannotBeWrittenIsAnErrorOfOneLine) {
+TEST(ProgramFilesTest, WriteFailureGivesAOneLineError) {
   const Folder folder;
   write(folder / "file", {});  // where a folder is needed
   ProgramFiles files(folder / "file" / "inside");

@@ -28,7 +28,7 @@ using volume::VolumeFrame;
 
 // ---- The curve
 
-TEST(Ramp, IsStraightBetweenPointsAndLevelBeyond) {
+TEST(Ramp, IsLinearBetweenPointsAndConstantBeyond) {
   const Ramp ramp({{0.5F, 2.0F}, {1.0F, 4.0F}, {3.0F, 0.0F}, {4.0F, 1.0F}});
   EXPECT_EQ(ramp(0.25F), 2.0F);
   EXPECT_EQ(ramp(0.5F), 2.0F);
@@ -47,13 +47,13 @@ TEST(Ramp, WithoutPointsChangesNothing) {
   for (const float value : {0.0F, 1e-30F, 0.7F, 1e30F}) EXPECT_EQ(Ramp()(value), value);
 }
 
-TEST(Ramp, LeavesNothingWhereThereIsNothing) {
+TEST(Ramp, MapsEmptySpaceToZero) {
   const Ramp ramp({{0.0F, 5.0F}, {1.0F, 1.0F}});
   EXPECT_EQ(ramp(0.0F), 0.0F);
   EXPECT_NEAR(ramp(1e-6F), 5.0F, 1e-4F);
 }
 
-TEST(Ramp, GoesOverBricksTilesAndBackgrounds) {
+TEST(Ramp, AppliesToBricksTilesAndBackgrounds) {
   ScalarVolume v = test::make_volume({8, 8, 8}, ivec3(0), [](const ivec3& p) { return static_cast<float>(p.x); });
   v.bounds_max = {39, 7, 7};
   v.tiles.push_back({{16, 0, 0}, {23, 7, 7}, 20.0F});
@@ -99,7 +99,7 @@ TEST(Histogram, CountsWhatIsAboveZero) {
 // ---- Cells
 
 // Cells hold means of ramped values, not the ramp of means.
-TEST(Ramp, OfACellIsTheMeanOfItsVoxels) {
+TEST(Ramp, CellValueIsTheMeanOfItsVoxels) {
   const Ramp ramp({{0.3F, 0.0F}, {0.4F, 2.0F}, {0.6F, 0.25F}});
   const viewer::VolumeAsset asset(test::noise_volume(ivec3(16), ivec3(0), 5));
   Progress progress;
@@ -126,7 +126,7 @@ TEST(Ramp, OfACellIsTheMeanOfItsVoxels) {
 
 // Refinement follows the ramped values: where the ramp removes detail there is none, and where it adds detail there is
 // more.
-TEST(Ramp, IsWhatCellsAreSplitFor) {
+TEST(Ramp, CellsAreRefinedForMappedValues) {
   const viewer::VolumeAsset asset(test::make_volume(ivec3(64), ivec3(0), [](const ivec3& p) {
     return (p.x < 32 ? 0.1F : 1.0F) + 0.01F * static_cast<float>(p.y & 1);
   }));
@@ -147,7 +147,7 @@ TEST(Ramp, IsWhatCellsAreSplitFor) {
 }
 
 // A density ramp is applied before colors. Temperature and flame ramps are applied before the conversion to radiance.
-TEST(Ramp, OfChannelsComesFirst) {
+TEST(Ramp, AppliesBeforeColorsAndEmission) {
   const auto field = [](float value) {
     return test::make_volume(ivec3(8), ivec3(0), [=](const ivec3& p) { return p.x < 4 ? value : 0.0F; });
   };
@@ -180,7 +180,7 @@ TEST(Ramp, OfChannelsComesFirst) {
 
 // ---- Images
 
-class RampPicture : public test::ViewerTest {
+class RampRendering : public test::ViewerTest {
  protected:
   // Looks down -z at the middle of a slab of 64 x 64 voxels.
   static test::Picture look(test::Still& viewer, std::uint32_t samples) {
@@ -189,10 +189,10 @@ class RampPicture : public test::ViewerTest {
     return test::render(viewer, {16, 16, samples, 1, render::View::shaded});
   }
 };
-CUMULET_ON_BACKENDS(RampPicture);
+CUMULET_ON_BACKENDS(RampRendering);
 
 // Layers of 0, 1, 2 and 3 in front of a sky of 1. The ramp maps them to 2, 0.5 and 0, and does not affect the outside.
-TEST_P(RampPicture, OfDensityFollowsBeerAndLambert) {
+TEST_P(RampRendering, DensityRampFollowsBeerLambert) {
   const auto viewer = make();
   viewer->set_volume(std::make_shared<const viewer::VolumeAsset>(
       test::make_volume({64, 64, 16}, ivec3(0), [](const ivec3& p) { return static_cast<float>(p.z / 4); })));
@@ -212,7 +212,7 @@ TEST_P(RampPicture, OfDensityFollowsBeerAndLambert) {
   }
 }
 
-TEST_P(RampPicture, OfTemperatureFollowsTheBlackBody) {
+TEST_P(RampRendering, TemperatureRampFollowsTheBlackBody) {
   const auto viewer = make();
   VolumeFrame frame{.density = test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1e-6F; })};
   frame.temperature = test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& p) { return p.z < 4 ? 0.5F : 1.0F; });
@@ -236,7 +236,7 @@ TEST_P(RampPicture, OfTemperatureFollowsTheBlackBody) {
 }
 
 // Only ramps that affect the grid cause a rebuild.
-TEST_P(RampPicture, BuildsWhatDependsOnIt) {
+TEST_P(RampRendering, OnlyRampsThatAffectTheGridRebuildIt) {
   const auto viewer = make();
   viewer->set_volume(std::make_shared<const viewer::VolumeAsset>(test::noise_volume(ivec3(16), ivec3(0), 5)));
   viewer->build();

@@ -100,7 +100,7 @@ SceneOptions full_scene() {
   return scene;
 }
 
-TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
+TEST(SceneFile, RoundTripsEverything) {
   const SceneOptions scene = full_scene();
   const SceneOptions read = parse_scene(scene_text(scene, "/elsewhere/s.json"), "/elsewhere/s.json");
   EXPECT_TRUE(same_scene(scene, read));
@@ -126,7 +126,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_TRUE(same(read.display, scene.display));
 }
 
-TEST(SceneFile, AnyNumberOfVolumes) {
+TEST(SceneFile, SupportsAnyNumberOfVolumes) {
   SceneOptions scene = full_scene();
   scene.name = "the large one";
   scene.visible = false;
@@ -190,7 +190,7 @@ TEST(SceneFile, NumbersAreWrittenAsOneWouldTypeThem) {
   EXPECT_EQ(text.find("0.100000"), std::string::npos) << text;
 }
 
-TEST(SceneFile, EveryDifferenceCounts) {
+TEST(SceneFile, EveryDifferenceIsDetected) {
   const SceneOptions scene = full_scene();
   const auto differs = [&](auto change) {
     SceneOptions other = scene;
@@ -217,7 +217,7 @@ TEST(SceneFile, EveryDifferenceCounts) {
   EXPECT_FALSE(differs([](SceneOptions&) {}));
 }
 
-TEST(SceneFile, AKeyIsGivenOnce) {
+TEST(SceneFile, DuplicateKeysAreRejected) {
   EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "cumulet_scene": 1})"), "dir/s.json: cumulet_scene: is given twice");
   EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "picture": {"width": 8, "height": 8, "width": 9}})"),
             "dir/s.json: picture.width: is given twice");
@@ -227,7 +227,7 @@ TEST(SceneFile, AKeyIsGivenOnce) {
   EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "volume": {"file": "a.vdb"}, "surfaces": {"file": "a.glb"}})"), "");
 }
 
-TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
+TEST(SceneFile, MissingKeysHaveDefaults) {
   const SceneOptions read = parse_scene(R"({"cumulet_scene": 1})", "s.json");
   SceneOptions day;
   day.set_daylight_of_version_1();
@@ -240,7 +240,7 @@ TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
   EXPECT_EQ(dark.light.sky_radiance[2], 0.0f);
 }
 
-TEST(SceneFile, ACriterionThatIsNamedIsNoDefault) {
+TEST(SceneFile, NamedCriterionKeepsItsOwnThreshold) {
   const SceneOptions deviation = parse_scene(with(R"("grid": {"criterion": "deviation"})"), "s.json");
   EXPECT_EQ(cumulet::settings::criterion_of(deviation.grid), CUMULET_CRITERION_DEVIATION);
   const SceneOptions zeros = parse_scene(with(R"("grid": {})"), "s.json");
@@ -249,7 +249,7 @@ TEST(SceneFile, ACriterionThatIsNamedIsNoDefault) {
             CUMULET_CRITERION_DEVIATION);
 }
 
-TEST(SceneFile, DaylightModelsWhatADefaultCameraSees) {
+TEST(SceneFile, DaylightLightsTheDefaultCamerasView) {
   SceneOptions day;
   day.set_daylight();
   // From the front, the side and above: the default camera looks from +Z and slightly above.
@@ -277,7 +277,7 @@ TEST(SceneFile, TheDensityScaleIsSavedAsItWasFound) {
   EXPECT_FALSE(same_scene(scene, SceneOptions()));
 }
 
-TEST(SceneFile, AVolumeIsFoundFromTheFilesFolder) {
+TEST(SceneFile, PathsAreRelativeToTheSceneFile) {
   EXPECT_EQ(parse_scene(with(R"("volume": {"file": "a/cloud.vdb"})"), "dir/s.json").volume, "dir/a/cloud.vdb");
   EXPECT_EQ(parse_scene(with(R"("volume": {"file": "/a/cloud.vdb"})"), "dir/s.json").volume, "/a/cloud.vdb");
   SceneOptions scene;
@@ -352,7 +352,7 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
   EXPECT_NE(error_of(std::string(500000, '[')), "");
 }
 
-TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
+TEST(SceneFile, VersionTwoMatchesVersionOne) {
   SceneOptions scene = full_scene();
   const std::string first = scene_text(scene, "s.json", SceneFormat::first);
   // Equal except for settings that version 1 does not have.
@@ -367,7 +367,7 @@ TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
   EXPECT_TRUE(same_scene(parse_scene(second, "s.json"), scene));
 }
 
-TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
+TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   const std::string start = "dir/s.json: ";
   EXPECT_EQ(told(R"("volumes": [{}, {}])"), start + "volumes[1].file: is missing");
   EXPECT_EQ(told(R"("volumes": [{}, {"file": ""}])"), start + "volumes[1].file: is empty");
@@ -435,7 +435,7 @@ TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
   EXPECT_EQ(error_of(with(R"("lights": [])")), start + "lights: there is no such setting");
 }
 
-TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
+TEST(SceneFile, TransformIsAMatrixOrTranslationRotationScale) {
   const SceneOptions parts = parse_scene(
       R"({"cumulet_scene": 2, "volumes": [{"translate": [5, 6, 7], "rotate_degrees": [90, 0, 90], "scale": [2, 3, 4]}]})",
       "s.json");
@@ -457,7 +457,7 @@ TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(file.to_world[8 + i], expected[4 + i], 1e-12) << i;
 }
 
-TEST(SceneFile, WhatMovesIsKept) {
+TEST(SceneFile, MotionRoundTrips) {
   const SceneOptions scene = parse_scene(
       R"({"cumulet_scene": 2, "picture": {"shutter_seconds": 0.02},
           "camera": {"eye": [1, 2, 9], "target": [0, 1, 0], "fovy_degrees": 30,
@@ -506,7 +506,7 @@ TEST(SceneFile, WhatMovesIsKept) {
   EXPECT_EQ(close[15], 0.0) << "where it stands";
 }
 
-TEST(SceneFile, CamerasAreKept) {
+TEST(SceneFile, CamerasRoundTrip) {
   const std::string cameras = R"("cameras": [
       {"name": "front", "eye": [1, 2, 9], "target": [0, 1, 0], "fovy_degrees": 30, "lens_radius": 0.25,
        "focus_distance": 7, "open": {"eye": [0.5, 2, 9]}},
@@ -565,7 +565,7 @@ TEST(SceneFile, CamerasAreKept) {
   EXPECT_EQ(scene_hash(named), scene_hash(alone));
 }
 
-TEST(SceneFile, CamerasHaveNamesOfTheirOwn) {
+TEST(SceneFile, CameraNamesAreUnique) {
   const std::string two = R"("cameras": [{"name": "a"}, {"name": "b"}], )";
   EXPECT_EQ(told(two + R"("camera": "c")"), R"(dir/s.json: camera: there is no camera "c": the scene has "a", "b")");
   EXPECT_EQ(told(R"("camera": "c")"), R"(dir/s.json: camera: there is no camera "c": the scene has none)");
@@ -585,7 +585,7 @@ TEST(SceneFile, CamerasHaveNamesOfTheirOwn) {
   EXPECT_EQ(error_of(with(R"("camera": "a")")), "dir/s.json: camera is not an object");
 }
 
-TEST(SceneFile, WithoutAWordOnLightItIsDay) {
+TEST(SceneFile, DefaultLightIsDaylight) {
   const auto lit = [](const std::string& more) {
     const SceneOptions scene = parse_scene(R"({"cumulet_scene": 2)" + more + "}", "s.json");
     return scene.light.sky == CUMULET_SKY_PHYSICAL;
@@ -595,7 +595,7 @@ TEST(SceneFile, WithoutAWordOnLightItIsDay) {
   EXPECT_FALSE(lit(R"(, "lights": [])"));
 }
 
-TEST(SceneFile, FilesAreWrittenAndReadWhole) {
+TEST(SceneFile, FilesAreWrittenAtomically) {
   const cumulet::test::Folder folder;
   const std::string path = (folder / "scene.json").string();
   save_scene(full_scene(), path);
@@ -632,7 +632,7 @@ TEST(SceneFile, VariantsAreFoundByNameThenByNumber) {
   EXPECT_EQ(refusal("0", {}), R"(shoe.glb: there is no variant "0": the file has none)");
 }
 
-TEST(SceneFile, ASequenceIsKept) {
+TEST(SceneFile, SequenceRoundTrips) {
   const auto text = [](const std::string& sequence) {
     return R"({"cumulet_scene": 2, "volumes": [{"file": "fire.####.vdb"}], "sequence": )" + sequence + "}";
   };
@@ -674,7 +674,7 @@ TEST(SceneFile, ASequenceIsKept) {
   EXPECT_EQ(refused(R"({"speed": 2})"), "scene.json: sequence.speed: there is no such setting");
 }
 
-TEST(SceneFile, ASequenceMayBeginBeforeZero) {
+TEST(SceneFile, SequenceMayHaveNegativeFrames) {
   const SceneOptions scene = parse_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "fire.####.vdb"}],
                                             "sequence": {"first_frame": -20, "last_frame": -3, "frame": -7.25}})",
                                          "/folder/scene.json");
@@ -685,7 +685,7 @@ TEST(SceneFile, ASequenceMayBeginBeforeZero) {
   EXPECT_EQ(again.sequence, scene.sequence);
 }
 
-TEST(SceneFile, EachVolumeMayPlay) {
+TEST(SceneFile, EachVolumeMayBeASequence) {
   const auto read = [](const std::string& sequence) {
     return parse_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "a.vdb"}, {"file": "fire.####.vdb", "sequence": )" +
                            sequence + "}]}",
@@ -711,7 +711,7 @@ TEST(SceneFile, EachVolumeMayPlay) {
   }
 }
 
-TEST(SceneFile, ModelsAreKept) {
+TEST(SceneFile, ModelsRoundTrip) {
   SceneOptions scene;
   scene.surfaces = "/data/town.glb";
   scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
@@ -757,7 +757,7 @@ TEST(SceneFile, ModelsAreKept) {
   EXPECT_EQ(alone.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
 }
 
-TEST(SceneFile, AModelStandsByItsParts) {
+TEST(SceneFile, ModelTransformIsTranslationRotationScale) {
   const SceneOptions scene = parse_scene(
       R"({"cumulet_scene": 2, "models": [{"file": "a.glb", "translate": [1, 2, 3], "rotate_degrees": [0, 90, 0],
           "scale": [2, 2, 2]}, {"file": "b.glb", "translate": [4, 0, 0]}]})",

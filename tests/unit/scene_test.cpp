@@ -39,7 +39,7 @@ bool same(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
   return true;
 }
 
-TEST(Cumulus, IsTheSameWhateverTheThreads) {
+TEST(Cumulus, IsIdenticalForAnyThreadCount) {
   openvdb::FloatGrid::Ptr one;
   {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
@@ -50,7 +50,7 @@ TEST(Cumulus, IsTheSameWhateverTheThreads) {
   EXPECT_FALSE(same(*one, *cumulus(60000, 2)));
 }
 
-TEST(Cumulus, HasWhatItPromises) {
+TEST(Cumulus, HasTheRequestedVoxelCountAndShape) {
   const auto grid = cumulus(100000);
   EXPECT_EQ(grid->getName(), "density");
   EXPECT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
@@ -151,7 +151,7 @@ TEST(Explosion, ExpandsRisesAndCools) {
   EXPECT_NEAR(late.soot, 60000.0, 20000.0);
 }
 
-TEST(Explosion, IsTheSameWhateverTheThreads) {
+TEST(Explosion, IsIdenticalForAnyThreadCount) {
   openvdb::initialize();
   std::vector<openvdb::FloatGrid::Ptr> one;
   {
@@ -211,13 +211,13 @@ class Mountains : public testing::Test {
   surface::Pose pose_;
 };
 
-TEST_F(Mountains, AreTheSameEachTime) {
+TEST_F(Mountains, AreDeterministic) {
   EXPECT_TRUE(glb_ == scene::make_surfaces(1));
   EXPECT_FALSE(glb_ == scene::make_surfaces(2));
   EXPECT_LT(glb_.size(), 20000000U);
 }
 
-TEST(Mesh, PartsAreWoundOutwards) {
+TEST(Mesh, PartsFaceOutward) {
   scene::Mesh mesh;
   mesh.box({1, 2, 3}, {1, 2, 3}, 0.3F);
   const auto area = [&] { return surface::detail::winding_of(mesh.position, mesh.index).area; };
@@ -238,7 +238,7 @@ TEST(Mesh, PartsAreWoundOutwards) {
 
 // From around the tower, the first hit is always a front face. From above it may not be, because the roofs are
 // overhanging sheets.
-TEST_F(Mountains, ShowTheirFronts) {
+TEST_F(Mountains, FaceTheCamera) {
   std::vector<std::uint32_t> flags(scene_->triangle_count(), 0);  // rays hit back faces too
   const surface::Bvh bvh = surface::Bvh::build(pose_.vertices, scene_->indices, flags);
   core::BvhRays rays{&bvh};
@@ -304,7 +304,7 @@ TEST_F(Mountains, AreImportedWithoutAWarning) {
   EXPECT_EQ(json_["extensionsUsed"], nlohmann::json({"KHR_materials_emissive_strength"}));
 }
 
-TEST_F(Mountains, HaveTheSceneFilesCameraAndALanternThatTurns) {
+TEST_F(Mountains, ContainTheSceneFilesCameraAndARotatingLantern) {
   ASSERT_EQ(pose_.cameras.size(), 1U);
   const surface::SceneCamera& camera = pose_.cameras[0];
   const scene::View view;
@@ -327,7 +327,7 @@ TEST_F(Mountains, HaveTheSceneFilesCameraAndALanternThatTurns) {
   EXPECT_EQ(points("Tower", pose_), points("Tower", later));
 }
 
-TEST_F(Mountains, StandInTheCloud) {
+TEST_F(Mountains, ReachIntoTheCloud) {
   const auto cloud = cumulus(100000);
   auto accessor = cloud->getConstAccessor();
   const auto density = [&](const glm::vec3& p) {

@@ -67,7 +67,7 @@ class CSequence : public cumulet::test::CPlaybackTest {
   Clip clip_{count};
 };
 
-TEST_F(CSequence, IsRefusedInOneLine) {
+TEST_F(CSequence, InvalidInputGivesAOneLineError) {
   std::array<char, 256> error{};
   cumulet_sequence* out = nullptr;
   std::array<const char*, 2> paths{"a.vdb", nullptr};
@@ -134,7 +134,7 @@ TEST_F(CSequence, IsRefusedInOneLine) {
   EXPECT_EQ(cumulet_get_sequence_frame(viewer.get(), 0, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
+TEST_F(CSequence, PlaybackSettingsControlInterpolation) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   auto playback = make_desc<cumulet_playback_desc>();
   const auto refused = [&](const char* what) {
@@ -190,7 +190,7 @@ TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
 }
 
 // Played, scrubbed to, or loaded separately: bit-identical.
-TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
+TEST_F(CSequence, FrameIsBitIdenticalHoweverItWasReached) {
   clip_.empty(1);
   clip_.with_flame(4);
   const SequenceRef sequence = make_sequence(clip_.paths());
@@ -211,7 +211,7 @@ TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
 }
 
 // GPU-built grids of frames, one after another, each with its own lattice.
-TEST_F(CSequence, AFramesGridIsGlsToo) {
+TEST_F(CSequence, FramesMatchWithGpuBuiltGrids) {
   clip_.with_flame(2);
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make(CUMULET_BUILD_GPU);
@@ -230,7 +230,7 @@ TEST_F(CSequence, AFramesGridIsGlsToo) {
   }
 }
 
-TEST_F(CSequence, TellsWhatItPlaysOver) {
+TEST_F(CSequence, ReportsSkippedFrames) {
   clip_.remove(2);
   clip_.corrupt(3);
   const SequenceRef sequence = make_sequence(clip_.paths());
@@ -259,7 +259,7 @@ TEST_F(CSequence, TellsWhatItPlaysOver) {
   EXPECT_EQ(warnings_.lines.size(), 2U);
 }
 
-TEST_F(CSequence, WithoutAFrameItFailsAndWhatWasThereStays) {
+TEST_F(CSequence, SequenceWithoutReadableFramesKeepsTheOldVolume) {
   const ViewerPtr viewer = make();
   ASSERT_EQ(cumulet_load_volume(viewer.get(), clip_.path(0).c_str(), nullptr), CUMULET_OK);
   const Picture before = picture(viewer.get());
@@ -283,7 +283,7 @@ TEST_F(CSequence, WithoutAFrameItFailsAndWhatWasThereStays) {
 }
 
 // One density scale, one camera and one ground plane for all frames, derived from the largest one.
-TEST_F(CSequence, NothingJumps) {
+TEST_F(CSequence, ScaleCameraAndGroundAreTheSameForAllFrames) {
   std::vector<std::uintmax_t> sizes;
   for (const std::string& path : clip_.paths()) sizes.push_back(std::filesystem::file_size(path));
   const auto largest = static_cast<std::uint32_t>(std::ranges::max_element(sizes) - sizes.begin());
@@ -338,7 +338,7 @@ TEST_F(CSequence, NothingJumps) {
   EXPECT_TRUE(std::ranges::equal(stats.bounds_max, wanted.bounds_max));
 }
 
-TEST_F(CSequence, VolumesAndSequencesTakeTurns) {
+TEST_F(CSequence, VolumeAndSequenceReplaceEachOther) {
   const ViewerPtr viewer = make();
   const Picture first = alone(0);
   const Picture third = alone(2);
@@ -368,7 +368,7 @@ TEST_F(CSequence, VolumesAndSequencesTakeTurns) {
   EXPECT_EQ(cumulet_get_bounds(viewer.get(), box, box + 3), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(CSequence, GoesOnWhereAVolumeCannotBeRead) {
+TEST_F(CSequence, ContinuesAfterAnUnreadableVolume) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
@@ -413,7 +413,7 @@ TEST_F(CSequence, GoesOnWhereAVolumeCannotBeRead) {
   EXPECT_EQ(stats.cells, wanted.cells);
 }
 
-TEST_F(CSequence, OtherSettingsAreThoseOfAllFrames) {
+TEST_F(CSequence, ChangedSettingsApplyToAllFrames) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
@@ -468,7 +468,7 @@ TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
 }
 
 // Simulates a device so slow that no image is complete before the next request.
-TEST_F(CSequence, PlaysOnWhileTheCameraMoves) {
+TEST_F(CSequence, PlaysWhileTheCameraMoves) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
   auto sampling = make_desc<cumulet_sampling_desc>();
@@ -496,7 +496,7 @@ TEST_F(CSequence, PlaysOnWhileTheCameraMoves) {
   }
 }
 
-TEST_F(CSequence, WhatAnotherShowsIsNoneOfItsFrames) {
+TEST_F(CSequence, DrawnFrameIgnoresOtherSequences) {
   const ViewerPtr viewer = make();
   const SequenceRef all = make_sequence(clip_.paths());
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), all.get()), CUMULET_OK);
@@ -511,7 +511,7 @@ TEST_F(CSequence, WhatAnotherShowsIsNoneOfItsFrames) {
   EXPECT_EQ(info_of(viewer.get()).drawn_frame, 0U);
 }
 
-TEST_F(CSequence, MovesInAnyThread) {
+TEST_F(CSequence, TimeMayBeSetFromAnyThread) {
   clip_.corrupt(5);
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
@@ -603,7 +603,7 @@ class PlayedInstances : public CSequence {
   }
 };
 
-TEST_F(PlayedInstances, AFrameIsTheVolumesAlone) {
+TEST_F(PlayedInstances, FrameMatchesThatOfASingleVolume) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();
   see_all(viewer.get());
@@ -628,7 +628,7 @@ TEST_F(PlayedInstances, AFrameIsTheVolumesAlone) {
   EXPECT_EQ(stats.cells, shared);
 }
 
-TEST_F(PlayedInstances, EachAtItsOwnMomentBesideTheViewersOwn) {
+TEST_F(PlayedInstances, InstancesPlayIndependently) {
   const SequenceRef early = make_sequence(clip_.paths());
   const SequenceRef late = make_sequence(clip_.paths());
   ASSERT_EQ(cumulet_sequence_set_frame(early.get(), 1.0), CUMULET_OK);
@@ -654,7 +654,7 @@ TEST_F(PlayedInstances, EachAtItsOwnMomentBesideTheViewersOwn) {
   EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance shows no sequence");
 }
 
-TEST_F(PlayedInstances, GapsAreNamedAndPlayedOver) {
+TEST_F(PlayedInstances, MissingFramesAreReportedAndSkipped) {
   clip_.remove(2);
   clip_.corrupt(3);
   const SequenceRef sequence = make_sequence(clip_.paths());
@@ -684,7 +684,7 @@ TEST_F(PlayedInstances, GapsAreNamedAndPlayedOver) {
   EXPECT_EQ(difference(picture(viewer.get()), before), "");
 }
 
-TEST_F(PlayedInstances, AVolumeAndASequenceAreNotBothOfOne) {
+TEST_F(PlayedInstances, VolumeAndSequenceTogetherAreRejected) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const VolumeRef ball = cumulet::test::make_ball(8, 1.0F);
   auto desc = make_desc<cumulet_instance_desc>();

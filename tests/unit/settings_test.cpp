@@ -140,7 +140,7 @@ TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_navigation_desc>();
 }
 
-TEST(Settings, SceneFilesKeepEach) {
+TEST(Settings, SceneFilesRoundTripEachSetting) {
   std::set<std::string> keys;
   std::set<std::string> without;
   for_each_descriptor([&](auto part, auto) {
@@ -166,7 +166,7 @@ TEST(Settings, SceneFilesKeepEach) {
   EXPECT_EQ(without, (std::set<std::string>{"first_sample", "light_groups", "preview", "variant", "volume_alone"}));
 }
 
-TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
+TEST(Settings, DocumentationListsExactlyTheKeys) {
   std::ifstream file(CUMULET_DOCS "/scene_file.md");
   ASSERT_TRUE(file.is_open());
   std::set<std::string> told;
@@ -213,7 +213,7 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
   EXPECT_EQ(told, keys);
 }
 
-TEST(Settings, AFlagSetsEach) {
+TEST(Settings, EachSettingHasAFlag) {
   std::set<std::string> flags;
   std::set<std::string> without;
   for_each_descriptor([&](auto part, auto) {
@@ -241,7 +241,7 @@ TEST(Settings, AFlagSetsEach) {
                                             "turbidity", "variant", "volume_alone"}));
 }
 
-TEST(Settings, TheLibraryTakesEachAndNamesWhatItRefuses) {
+TEST(Settings, LibraryAcceptsEachAndNamesInvalidValues) {
   cumulet_create_desc create{};
   create.struct_size = sizeof create;
   cumulet_viewer* made = nullptr;
@@ -261,7 +261,7 @@ TEST(Settings, TheLibraryTakesEachAndNamesWhatItRefuses) {
   });
 }
 
-TEST(Settings, RangesAreTold) {
+TEST(Settings, RangesAreReported) {
   using settings::Range;
   EXPECT_EQ(Range{}.refusal(), "is not finite");
   EXPECT_EQ((Range{0.0}).refusal(), "is negative");

@@ -22,7 +22,7 @@ bool has(const char* shader, const Defines& defines) {
   return found != nullptr && found->has_variant(defines);
 }
 
-TEST(Shaders, NameTheirVariants) {
+TEST(Shaders, ListTheirVariants) {
   EXPECT_TRUE(has("trace.comp", {"CM_MARCH 0", "CM_LINEAR 1", "CM_PAGES 6"}));
   EXPECT_TRUE(has("trace.comp", {"CM_AOVS 1", "CM_MARCH 2", "CM_LINEAR 0", "CM_LAYERS 1", "CM_PAGES 1"}));
   EXPECT_TRUE(has("trace_travel.comp", {"CM_MARCH 2", "CM_LINEAR 0", "CM_SURFACES 2", "CM_PAGES 1"}));
@@ -47,7 +47,7 @@ TEST(Shaders, DefineTheirMacrosAfterTheVersion) {
 class Programs : public cumulet::test::GlTest {};
 CUMULET_ON_BACKENDS(Programs);
 
-TEST_P(Programs, AreOfTheTableAlone) {
+TEST_P(Programs, ExistOnlyForListedVariants) {
   gl::Programs programs(*gl_, nullptr);
   EXPECT_NE(programs.get({"host_depth.comp", {"CM_MULTISAMPLE 1"}}).name(), 0U);
   try {

@@ -55,7 +55,7 @@ TEST(Sky, TheSunSetsRed) {
 
 // Vertically through clean air: Rayleigh optical depths of 0.065 at 605 nm, 0.097 at 550 and 0.22 at 450, and ozone's
 // of 0.04, 0.03 and 0.
-TEST(Sky, AirLetsThroughWhatIsMeasured) {
+TEST(Sky, TransmittanceMatchesMeasurements) {
   const vec3 through = sky(1.0, 90.0).sun_irradiance() / 5.0F;
   EXPECT_NEAR(through.r, 0.91, 0.02);
   EXPECT_NEAR(through.g, 0.88, 0.02);
@@ -65,14 +65,14 @@ TEST(Sky, AirLetsThroughWhatIsMeasured) {
 }
 
 // On a clear day at noon, the sky gives 0.1 to 0.2 of the sun's irradiance.
-TEST(Sky, ShareOfTheSkyIsMeasuredOnes) {
+TEST(Sky, DiffuseFractionMatchesMeasurements) {
   const Sky noon = sky(2.0, 60.0, 0.2);
   const double share = bright(noon.sky_irradiance()) / bright(noon.sun_irradiance());
   EXPECT_GT(share, 0.1);
   EXPECT_LT(share, 0.2);
 }
 
-TEST(Sky, MakesNoLight) {
+TEST(Sky, ConservesEnergy) {
   for (double elevation = 5.0; elevation <= 90.0; elevation += 17.0) {
     const Sky black = sky(1.0, elevation, 0.0);
     const double sine = std::sin(elevation * std::numbers::pi / 180.0);
@@ -82,7 +82,7 @@ TEST(Sky, MakesNoLight) {
   }
 }
 
-TEST(Sky, IsTheSameOnBothSidesOfTheSun) {
+TEST(Sky, IsSymmetricAboutTheSun) {
   const dvec3 to_sun = direction(30.0, 65.0);
   const Sky turned(SkyModel{}, to_sun);
   const Sky straight(SkyModel{}, direction(30.0, 0.0));
@@ -97,7 +97,7 @@ TEST(Sky, IsTheSameOnBothSidesOfTheSun) {
   }
 }
 
-TEST(Sky, HazeTakesFromTheSunAndGivesToTheSky) {
+TEST(Sky, HazeMovesLightFromTheSunToTheSky) {
   double sun = 5.0;
   double from_sky = 0.0;
   for (double turbidity = 1.0; turbidity <= 10.0; turbidity += 1.0) {
@@ -109,7 +109,7 @@ TEST(Sky, HazeTakesFromTheSunAndGivesToTheSky) {
   }
 }
 
-TEST(Sky, TheGroundSendsBackItsShare) {
+TEST(Sky, GroundReflectsByItsAlbedo) {
   const Sky noon = sky(3.0, 40.0, 0.5);
   const double sine = std::sin(40.0 * std::numbers::pi / 180.0);
   const vec3 falls = noon.sky_irradiance() + noon.sun_irradiance() * static_cast<float>(sine);
@@ -119,7 +119,7 @@ TEST(Sky, TheGroundSendsBackItsShare) {
   EXPECT_GT(bright(noon.sky_irradiance()), bright(sky(3.0, 40.0, 0.0).sky_irradiance()));
 }
 
-TEST(Sky, GetsDarkAfterSunsetAndIsNeverBroken) {
+TEST(Sky, DarkensAfterSunsetAndStaysFinite) {
   double before = 1.0e9;
   for (double elevation = 0.0; elevation >= -90.0; elevation -= 6.0) {
     const Sky dusk({10.0, 1.0}, direction(elevation, 0.0));
@@ -136,7 +136,7 @@ TEST(Sky, GetsDarkAfterSunsetAndIsNeverBroken) {
   EXPECT_LT(before, 1.0e-9);
 }
 
-TEST(Sky, AnotherSunLeavesTheAir) {
+TEST(Sky, SunDirectionDoesNotRecomputeTheAtmosphere) {
   const SkyModel clear{2.0, 0.3};
   const light::Daylight morning = light::make_daylight({clear, 10.0});
   const light::Daylight noon = light::make_daylight({clear, 60.0}, &morning);
@@ -150,7 +150,7 @@ TEST(Sky, AnotherSunLeavesTheAir) {
   EXPECT_EQ(hazy.surroundings->words, light::make_daylight({haze, 60.0}).surroundings->words);
 }
 
-TEST(Sky, TheSameTwice) {
+TEST(Sky, IsDeterministic) {
   const Sky one = sky(3.0, 12.0);
   const Sky two = sky(3.0, 12.0);
   for (double e = -5.0; e <= 90.0; e += 5.0) {
@@ -158,11 +158,11 @@ TEST(Sky, TheSameTwice) {
   }
 }
 
-class SkyPicture : public test::ViewerTest {};
-CUMULET_ON_BACKENDS(SkyPicture);
+class SkyRendering : public test::ViewerTest {};
+CUMULET_ON_BACKENDS(SkyRendering);
 
 // The same seed and samples, so that two images with the same light have no random difference.
-TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
+TEST_P(SkyRendering, SkyModelMatchesItsEnvironmentImage) {
   const SkyModel model{.turbidity = 2.0, .ground_albedo = 0.4};
   const Sky day(model, direction(25.0, 40.0));
   // The values 7 are ignored with a physical sky.

@@ -6,7 +6,7 @@ namespace {
 
 using namespace cumulet::scene;
 
-TEST(Snapshot, APartIsAnotherWhereItsValueIs) {
+TEST(Snapshot, PartsChangeOnlyWithTheirValues) {
   Snapshot draft;
   const Snapshot before = draft;
   cumulet::light::DistantLights lights = *draft.lights;
@@ -23,7 +23,7 @@ TEST(Snapshot, APartIsAnotherWhereItsValueIs) {
   EXPECT_FALSE(draft.lights == before.lights);
 }
 
-TEST(Snapshot, TakenDoesNotChangeWithTheDraft) {
+TEST(Snapshot, DoesNotChangeWithTheDraft) {
   Snapshot draft;
   draft.volumes.emplace_back().source = std::make_shared<const MarchSource>();
   const SnapshotPtr taken = std::make_shared<const Snapshot>(draft);

@@ -32,7 +32,7 @@ class CountedScene final : public test::StillScene {
   mutable std::atomic<int> poses = 0;
 };
 
-TEST(SurfaceAsset, ViewersOfOneMomentShareItsPose) {
+TEST(SurfaceAsset, ViewersAtOneTimeShareThePose) {
   const auto scene = std::make_shared<const CountedScene>();
   const SurfaceAsset asset(scene, "counted");
   Progress progress;
@@ -48,7 +48,7 @@ TEST(SurfaceAsset, ViewersOfOneMomentShareItsPose) {
   EXPECT_EQ(scene->poses, 2);
 }
 
-TEST(SurfaceAsset, KeepsNoPoseThatNobodyShows) {
+TEST(SurfaceAsset, UnusedPosesAreFreed) {
   const auto scene = std::make_shared<const CountedScene>();
   const SurfaceAsset asset(scene, "counted");
   Progress progress;
@@ -58,7 +58,7 @@ TEST(SurfaceAsset, KeepsNoPoseThatNobodyShows) {
   EXPECT_EQ(scene->poses, 2);
 }
 
-TEST(SurfaceAsset, TellsOfTheSceneAtRest) {
+TEST(SurfaceAsset, ReportsTheRestPosesContents) {
   const auto scene = std::make_shared<const CountedScene>();
   const SurfaceAsset asset(scene, "counted");
   for (int i = 0; i < 2; ++i) {
@@ -69,7 +69,7 @@ TEST(SurfaceAsset, TellsOfTheSceneAtRest) {
   EXPECT_EQ(scene->poses, 1);
 }
 
-TEST(SurfaceAsset, WhoIsCancelledMakesNothing) {
+TEST(SurfaceAsset, CancelledCallerMakesNoPose) {
   const auto scene = std::make_shared<const CountedScene>();
   const SurfaceAsset asset(scene, "counted");
   Progress progress;

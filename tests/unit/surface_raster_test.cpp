@@ -221,7 +221,7 @@ TEST(SurfaceJitter, EveryRowAndColumnHasOneLayer) {
   EXPECT_EQ(surface_jitter(0, 1), glm::vec2(0.5F));
 }
 
-TEST_P(SurfaceRasters, NothingIsInfinitelyFarAndTransparent) {
+TEST_P(SurfaceRasters, EmptyPixelsAreTransparentWithInfiniteDepth) {
   Picture picture = draw(straight({0, 0, 0}, 1.0), {}, {5U, 3U}, 3);
   for (const float z : picture.depths) EXPECT_EQ(z, infinite);
   for (const glm::vec4& colour : picture.colours) EXPECT_EQ(colour, glm::vec4(0.0F));
@@ -306,7 +306,7 @@ TEST_P(SurfaceRasters, FarFromTheOriginNothingJitters) {
   }
 }
 
-TEST_P(SurfaceRasters, NearAndFarSurfacesAreAllThere) {
+TEST_P(SurfaceRasters, NearAndFarSurfacesAreNotClipped) {
   // One surface is close, inside huge bounds, and one is far from all others.
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F)).double_sided = true;
@@ -334,7 +334,7 @@ TEST_P(SurfaceRasters, SunOnMatte) {
   expect_colour(draw(straight({0, 0, 0}, 0.5), lighting).centre(), glm::vec4(0, 0, 0, 1));
 }
 
-TEST_P(SurfaceRasters, WhiteVanishesInAConstantSky) {
+TEST_P(SurfaceRasters, WhiteFurnaceIsInvisible) {
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F));
   scene->materials.emplace_back();  // white metal
@@ -428,7 +428,7 @@ TEST_P(SurfaceRasters, PunctualLights) {
   expect_colour(draw(straight({0, 0, 0}, 0.01), {}).centre(), glm::vec4(glm::vec3(sum / pi), 1.0F));
 }
 
-TEST_P(SurfaceRasters, MasksCut) {
+TEST_P(SurfaceRasters, AlphaMasksCutOut) {
   surface::Sampler nearest;
   nearest.magnify = surface::Filter::nearest;
   nearest.minify = surface::Filter::nearest;
@@ -532,7 +532,7 @@ TEST_P(SurfaceRasters, SidesAndMirroring) {
   }
 }
 
-TEST_P(SurfaceRasters, LayersSampleTheirPlaces) {
+TEST_P(SurfaceRasters, LayersUseTheirSubpixelPositions) {
   // An edge in each direction at every eighth of a pixel: a layer is covered if its sample position is.
   for (unsigned layers = 1; layers <= 8; ++layers) {
     for (int eighth = 0; eighth < 8; ++eighth) {
@@ -609,7 +609,7 @@ TEST_P(SurfaceRasters, TexturesWrapAndTransform) {
   }
 }
 
-TEST_P(SurfaceRasters, MipmapsAverageWhatIsSmall) {
+TEST_P(SurfaceRasters, MipmapsAverageDistantTextures) {
   // A checkerboard of black and white, much finer than a pixel; the mean is in linear light.
   std::vector<std::uint8_t> texels;
   for (int i = 0; i < 64 * 64; ++i) {
@@ -772,7 +772,7 @@ std::shared_ptr<HandScene> sphere_grid(int columns, int rows) {
   return scene;
 }
 
-TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
+TEST_P(SurfaceRasters, SphereShadingMatchesTheBsdf) {
   constexpr int columns = 7;
   constexpr int rows = 3;
   const auto scene = sphere_grid(columns, rows);
@@ -877,7 +877,7 @@ TEST_P(SurfaceRasters, PreviewsAreSharp) {
 }
 
 // After a drag ends, no image is finished over a coarse raster pass, and all coarse images share one pass of full size.
-TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
+TEST_P(SurfaceRasters, ImageIsSharpWhenTheCameraStops) {
   using namespace cumulet::render;
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(0.5F));
@@ -924,7 +924,7 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   EXPECT_EQ(shown, 3);
 }
 
-TEST_P(SurfaceRasters, TellsWhatItHolds) {
+TEST_P(SurfaceRasters, ReportsItsMemory) {
   EXPECT_EQ(raster_->bytes(), 0U);
   draw(straight({0, 0, 0}, 1.0), {}, {5U, 3U});
   const std::uint64_t empty = raster_->bytes();
@@ -941,7 +941,7 @@ TEST_P(SurfaceRasters, TellsWhatItHolds) {
   EXPECT_EQ(raster_->bytes(), empty + more + (32U * 16U - 5U * 3U) * 4U);
 }
 
-TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
+TEST_P(SurfaceRasters, GlStateIsRestoredAndNotRead) {
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(0.5F)).base_color_texture.texture =
       scene->add_texture(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 99, 99, 99, 255});
@@ -976,7 +976,7 @@ TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
   }
 }
 
-TEST_P(SurfaceRasters, RefusesWhatDoesNotFit) {
+TEST_P(SurfaceRasters, RejectsTooLargeScenes) {
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F));
   scene->add_wall(-2.0F, 1.0F, 0);

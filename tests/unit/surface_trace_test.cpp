@@ -56,7 +56,7 @@ std::shared_ptr<StillScene> floor_scene(const Material& material, float y = -10.
 
 // Radiance of a white floor under an absorbing slab: albedo / pi * E cos * exp(-tau / cos) on the way in, exp(-tau)
 // out.
-TEST_P(SurfaceTrace, AFloorUnderASlabIsLitAndSeenThroughIt) {
+TEST_P(SurfaceTrace, FloorUnderASlabIsLitAndVisibleThroughIt) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_camera(test::looking_down());
@@ -85,7 +85,7 @@ TEST_P(SurfaceTrace, AFloorUnderASlabIsLitAndSeenThroughIt) {
   }
 }
 
-TEST_P(SurfaceTrace, TheSkyLightsAFloorAsMuchAsItReflects) {
+TEST_P(SurfaceTrace, SkyLitFloorEqualsItsAlbedo) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_camera(test::looking_down());
@@ -101,7 +101,7 @@ TEST_P(SurfaceTrace, TheSkyLightsAFloorAsMuchAsItReflects) {
 }
 
 // White furnace test: without absorption, surfaces and medium are as bright as the sky.
-TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
+TEST_P(SurfaceTrace, WhiteFurnaceWithSurfacesIsOne) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
   viewer->set_light(sun_at(0.0F, vec3(0.0F), vec3(1.0F)));
@@ -169,7 +169,7 @@ TEST_P(SurfaceTrace, ACoarseSphereHasASmoothTerminator) {
 }
 
 // One tile per texel: base color, metallic, roughness and clearcoat from textures, lit only by the sun.
-TEST_P(SurfaceTrace, TexturedGlossIsAppendixBInDoublePrecision) {
+TEST_P(SurfaceTrace, TexturedMaterialMatchesGltfAppendixB) {
   constexpr std::uint32_t tiles = 4;
   constexpr int side = 64;
   const auto viewer = make();
@@ -246,7 +246,7 @@ Material metal(float roughness) {
 }
 
 // The sun reflected by a ball causes fireflies on a floor. Path regularization keeps the mean and reduces the noise.
-TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
+TEST_P(SurfaceTrace, IndirectRoughnessKeepsEnergyAndRemovesFireflies) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer::Medium medium;
@@ -275,7 +275,7 @@ TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
 }
 
 // A card seen through a periscope; its edge is in the image's center.
-TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
+TEST_P(SurfaceTrace, IndirectRoughnessKeepsMirrorImages) {
   const auto viewer = make();
   Material card = test::diffuse(vec3(0.0F));
   card.emission = vec3(1.0F);
@@ -302,7 +302,7 @@ TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
 
 // A floor below an opaque emissive slab without scattering: albedo / pi times S cos^2 / r^2, integrated over its
 // underside.
-TEST_P(SurfaceTrace, AFireLightsTheFloor) {
+TEST_P(SurfaceTrace, FireLightsTheFloor) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_light({});
@@ -334,7 +334,7 @@ TEST_P(SurfaceTrace, AFireLightsTheFloor) {
 
 // A black floor in the middle of an emissive slab: S (1 - e^-tau) of the part above, by triangles and by the raster
 // pass.
-TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
+TEST_P(SurfaceTrace, EmissionEndsAtASurface) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_light({});
@@ -356,7 +356,7 @@ TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
   }
 }
 
-TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
+TEST_P(SurfaceTrace, LightsFollowTheInverseSquareLaw) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_camera(test::looking_down(0.1));
@@ -384,7 +384,7 @@ TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
   }
 }
 
-TEST_P(SurfaceTrace, CoverageIsAShareOfTheRays) {
+TEST_P(SurfaceTrace, CoverageIsAFractionOfTheRays) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_camera(test::looking_down());
@@ -411,7 +411,7 @@ TEST_P(SurfaceTrace, CoverageIsAShareOfTheRays) {
 }
 
 // Budgets and tiles do not affect the image: no path is lost or run twice between kernels, rounds and dispatches.
-TEST_P(SurfaceTrace, SeedAndSamplesAloneDecideTheImage) {
+TEST_P(SurfaceTrace, ImageDependsOnlyOnSeedAndSamples) {
   auto scene = std::make_shared<StillScene>();
   scene->add(test::diffuse(vec3(0.8F)));
   Material lit = test::diffuse(vec3(0.5F));
@@ -448,7 +448,7 @@ TEST_P(SurfaceTrace, SurfacesNeedNoVolume) {
   EXPECT_NEAR(test::render(*viewer, {16, 16, 16, 1, render::View::shaded}).mean().x, 0.0, 1e-3);
 }
 
-TEST_P(SurfaceTrace, CamerasSeeThroughBacksAndLightDoesNot) {
+TEST_P(SurfaceTrace, BackFacesAreInvisibleToCamerasButBlockLight) {
   const auto viewer = make();
   viewer->set_volume(test::slab());
   viewer->set_camera(test::looking_down());

@@ -31,7 +31,7 @@ volume::ScalarVolume box_volume(const ivec3& size, float value = 1.0F) {
   return test::make_volume(size, ivec3(0), [=](const ivec3& /*p*/) { return value; });
 }
 
-TEST_P(Trace, SlabFollowsBeerLambertInEveryMarch) {
+TEST_P(Trace, SlabFollowsBeerLambertForEveryGridType) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
   viewer::Light light;
@@ -83,7 +83,7 @@ TEST_P(Trace, WhiteFurnaceIsOneEverywhere) {
 }
 
 // S (1 - e^-tau) of a slab that emits and does not scatter, in front of a sky.
-TEST_P(Trace, AGlowingSlabInEveryMarch) {
+TEST_P(Trace, EmissiveSlabMatchesForEveryGridType) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.0F, 0.5F, 3.0F)});
@@ -103,7 +103,7 @@ TEST_P(Trace, AGlowingSlabInEveryMarch) {
 }
 
 // A medium in thermal balance with its environment is invisible, whatever it absorbs and scatters.
-TEST_P(Trace, AMediumInBalanceIsInvisible) {
+TEST_P(Trace, MediumInThermalBalanceIsInvisible) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(2.0F, 1.0F, 0.5F)});
@@ -276,7 +276,7 @@ TEST_P(Trace, SingleScatteringMatchesQuadrature) {
   }
 }
 
-TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
+TEST_P(Trace, GridTypesAgreeOnConstantCellsAtVoxelResolution) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(7, -3, 0), 2));
   viewer->set_medium({0.4, vec3(0.98F), {0.5F}, 0});
@@ -298,7 +298,7 @@ TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
   EXPECT_NEAR(pictures[2].mean().x, pictures[0].mean().x, 0.02 * pictures[2].mean().x);
 }
 
-TEST_P(Trace, PagesChangeNothing) {
+TEST_P(Trace, ImageDoesNotDependOnThePageSize) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(0), 2));
   viewer->set_medium({0.4, vec3(1.0F), {0.0F}, 0});
@@ -331,7 +331,7 @@ TEST_P(Trace, PagesChangeNothing) {
   EXPECT_EQ(whole.pixels, test::render(*viewer, image).pixels);
 }
 
-TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
+TEST_P(Trace, ImageDependsOnlyOnSeedAndSamples) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
   viewer->set_medium({0.4, vec3(1.0F), {0.3F}, 0});
@@ -350,7 +350,7 @@ TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
   EXPECT_NE(one.pixels, test::render(*viewer, reseeded).pixels);
 }
 
-TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {
+TEST_P(Trace, CameraMayBeInsideOrOnFacesEdgesAndVertices) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({32, 32, 32}, ivec3(0), 1));
   viewer->set_medium({0.2, vec3(0.9F), {0.0F}, 0});
@@ -400,7 +400,7 @@ TEST_P(Trace, AnyAffineTransformKeepsWorldDistances) {
   }
 }
 
-TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
+TEST_P(Trace, RotatingVolumeAndCameraGivesTheSameImage) {
   const auto volume = test::noise_volume({30, 26, 34}, ivec3(0), 6);
   auto turned = volume;
   const glm::dmat4 rotation =
@@ -425,7 +425,7 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
   EXPECT_NEAR(straight.mean().w, rotated.mean().w, 0.002);
 }
 
-TEST_P(Trace, AFewVoxelsAreAVolume) {
+TEST_P(Trace, VolumesOfAFewVoxelsRender) {
   const auto viewer = make();
   viewer->set_medium({1.0, vec3(0.0F), {0.0F}, 0});
   for (const int size : {1, 3, 8, 9}) {
@@ -440,7 +440,7 @@ TEST_P(Trace, AFewVoxelsAreAVolume) {
   }
 }
 
-TEST_P(Trace, DensityViewIsTheOpacity) {
+TEST_P(Trace, DensityViewShowsOpacity) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
   viewer->set_medium({0.1, vec3(1.0F), {0.0F}, 0});
@@ -457,7 +457,7 @@ TEST_P(Trace, DensityViewIsTheOpacity) {
   }
 }
 
-TEST_P(Trace, AdaptsToTheCamera) {
+TEST_P(Trace, GridAdaptsToTheCamera) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({96, 96, 96}, ivec3(0), 1));
   viewer->set_image({64, 64, 1, 0, render::View::shaded});
@@ -472,7 +472,7 @@ TEST_P(Trace, AdaptsToTheCamera) {
   EXPECT_LT(viewer->viewer().stats().cells, everywhere / 2);  // a pixel is 8 voxels wide
 }
 
-TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
+TEST_P(Trace, InvalidSettingsAreRejectedAndKeepTheOldOnes) {
   const auto viewer = make();
   EXPECT_FALSE(viewer->render(1.0));
   EXPECT_THROW(viewer->read(), Error);

@@ -259,7 +259,7 @@ dvec3 sun() {
   return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
 }
 
-TEST_F(TransmittanceMaps, AreOfTheSunInEveryMarch) {
+TEST_F(TransmittanceMaps, FollowTheSunForEveryGridType) {
   show();
   for (const cumulet_march march : {CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK, CUMULET_MARCH_TET}) {
     SCOPED_TRACE(march);
@@ -269,7 +269,7 @@ TEST_F(TransmittanceMaps, AreOfTheSunInEveryMarch) {
   }
 }
 
-TEST_F(TransmittanceMaps, AreOfAnyDirection) {
+TEST_F(TransmittanceMaps, WorkForAnyDirection) {
   show();
   desc_.light = CUMULET_MAP_LIGHT_DIRECTION;
   for (const dvec3& towards : {dvec3(0.0, 3.0, 0.0), dvec3(0.0, -1.0, 0.0), dvec3(1e-5, 2e-5, -1e-5)}) {
@@ -278,7 +278,7 @@ TEST_F(TransmittanceMaps, AreOfAnyDirection) {
   }
 }
 
-TEST_F(TransmittanceMaps, AreOfPointsOutsideAndWithin) {
+TEST_F(TransmittanceMaps, CoverPointsOutsideAndInside) {
   show();
   desc_.light = CUMULET_MAP_LIGHT_POINT;
   desc_.size = 131;
@@ -289,7 +289,7 @@ TEST_F(TransmittanceMaps, AreOfPointsOutsideAndWithin) {
   }
 }
 
-TEST_F(TransmittanceMaps, AreOfAllInstancesWhereTheyStand) {
+TEST_F(TransmittanceMaps, IncludeAllInstances) {
   show();
   dmat4 place = glm::translate(dmat4(1.0), dvec3(9.0, -3.0, 4.0));
   place = glm::rotate(place, 0.7, dvec3(1.0, 2.0, 0.5));
@@ -315,7 +315,7 @@ TEST_F(TransmittanceMaps, AreOfAllInstancesWhereTheyStand) {
   expect_truth(sun());
 }
 
-TEST_F(TransmittanceMaps, CostNothingWhileNothingChanges) {
+TEST_F(TransmittanceMaps, AreReusedWhileNothingChanges) {
   show();
   const cumulet_transmittance_map map = update();
   const auto dispatches = fake_.calls("DispatchCompute");
@@ -335,7 +335,7 @@ TEST_F(TransmittanceMaps, CostNothingWhileNothingChanges) {
   EXPECT_EQ(fake_.real().IsTexture(other.texture), GL_FALSE);
 }
 
-TEST_F(TransmittanceMaps, FollowASceneThatChangesInEveryCallAndAreFullOnceItRests) {
+TEST_F(TransmittanceMaps, UpdateDuringContinuousChangesAndCompleteAtRest) {
   show();
   desc_.size = 512;
   desc_.slices = 64;
@@ -363,7 +363,7 @@ TEST_F(TransmittanceMaps, FollowASceneThatChangesInEveryCallAndAreFullOnceItRest
   expect_truth(sun());
 }
 
-TEST_F(TransmittanceMaps, LetAllLightThroughWhereThereIsNoVolume) {
+TEST_F(TransmittanceMaps, AreOneWithoutAVolume) {
   const auto frame = target_.frame();
   ASSERT_EQ(cumulet_render(viewer_.get(), &frame, nullptr), CUMULET_OK);
   EXPECT_EQ(looked_up(update(), {dvec3(0.0), dvec3(5.0)}), (std::vector<float>{1.0F, 1.0F}));
@@ -376,7 +376,7 @@ TEST_F(TransmittanceMaps, LetAllLightThroughWhereThereIsNoVolume) {
   EXPECT_EQ(looked_up(update(), {dvec3(7.0) - 20.0 * sun()})[0], 1.0F);
 }
 
-TEST_F(TransmittanceMaps, AreRefusedInOneLine) {
+TEST_F(TransmittanceMaps, InvalidInputGivesAOneLineError) {
   auto map = make_desc<cumulet_transmittance_map>();
   const auto refused = [&](const auto& change, const char* cause) {
     auto desc = make_desc<cumulet_transmittance_map_desc>();

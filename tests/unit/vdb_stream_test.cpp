@@ -79,7 +79,7 @@ class VdbStream : public testing::Test {
   test::Folder folder_;
 };
 
-TEST_F(VdbStream, EveryCompressionEqualsTheTree) {
+TEST_F(VdbStream, EveryCompressionMatchesTheTreeImport) {
   using namespace openvdb::io;
   for (const float background : {0.0F, 0.5F}) {
     const auto grid = scattered<openvdb::FloatGrid>(background);
@@ -100,7 +100,7 @@ TEST_F(VdbStream, EveryCompressionEqualsTheTree) {
 }
 
 // A value that is not a half in the last leaf; all values before were kept as halves.
-TEST_F(VdbStream, WhatHalvesDoNotHoldBeginsAnewAsFloats) {
+TEST_F(VdbStream, RestartsAsFloatsIfHalfFloatsDoNotFit) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   std::vector<openvdb::FloatTree::LeafNodeType*> nodes;
   grid->tree().getNodes(nodes);
@@ -112,7 +112,7 @@ TEST_F(VdbStream, WhatHalvesDoNotHoldBeginsAnewAsFloats) {
   EXPECT_DOUBLE_EQ(progress.fraction(), 1.0);
 }
 
-TEST_F(VdbStream, WhatIsNoDensityIsCountedOnce) {
+TEST_F(VdbStream, InvalidValuesAreCountedOnce) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   std::vector<openvdb::FloatTree::LeafNodeType*> nodes;
   grid->tree().getNodes(nodes);
@@ -131,7 +131,7 @@ TEST_F(VdbStream, WhatIsNoDensityIsCountedOnce) {
 }
 
 // Constant bricks become tiles, and the remaining bricks are compacted.
-TEST_F(VdbStream, GapsOfConstantLeavesAreClosed) {
+TEST_F(VdbStream, ConstantLeavesBecomeTilesAndBricksAreCompacted) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   std::vector<openvdb::FloatTree::LeafNodeType*> nodes;
   grid->tree().getNodes(nodes);

@@ -57,7 +57,7 @@ grid::TetGrid cells_of(const VolumeFrame& frame, const grid::Cube& cube, const v
 }
 
 // Compared with sums over the sixths of voxels that make up a cell.
-TEST(Velocity, OfACellIsTheMeanByItsDensity) {
+TEST(Velocity, CellVelocityIsTheDensityWeightedMean) {
   constexpr int size = 16;
   // A part of it has a density that is tiny beside the rest.
   const ScalarVolume noise = test::noise_volume(ivec3(size), ivec3(0), 5);
@@ -96,7 +96,7 @@ TEST(Velocity, OfACellIsTheMeanByItsDensity) {
   }
 }
 
-TEST(Velocity, ThatIsNoneOrTooMuch) {
+TEST(Velocity, ZeroAndTooLargeVelocitiesAreHandled) {
   VolumeFrame frame{.density = test::slab()};
   const ivec3 size(64, 8, 64);
   frame.velocity = velocity(size, ivec3(0), [](const ivec3& /*p*/) { return vec3(0.0F); });
@@ -118,7 +118,7 @@ TEST(Velocity, ThatIsNoneOrTooMuch) {
   EXPECT_FALSE(scene::momentum_of(frame)) << "nothing scatters";
 }
 
-TEST(Velocity, OfMuchWithoutDetailIsLeftOutWithAWarning) {
+TEST(Velocity, TooManyVelocityCellsAreDroppedWithAWarning) {
   VolumeFrame frame{.density = test::slab()};
   const ivec3 size(64, 8, 64);
   frame.velocity = velocity(size, ivec3(0), [](const ivec3& /*p*/) { return vec3(1.0F); });
@@ -138,7 +138,7 @@ TEST(Velocity, OfMuchWithoutDetailIsLeftOutWithAWarning) {
 }
 
 // A change of the emission does not change velocities.
-TEST(Velocity, IsKeptWhileEmissionChanges) {
+TEST(Velocity, IsReusedWhenEmissionChanges) {
   VolumeFrame frame{.density = test::slab(), .flame = test::slab(0.5F)};
   const ivec3 size(64, 8, 64);
   frame.velocity = velocity(size, ivec3(0), [](const ivec3& /*p*/) { return vec3(1.0F); });
@@ -160,7 +160,7 @@ TEST(Velocity, IsKeptWhileEmissionChanges) {
 
 // ---- Images
 
-class VelocityPicture : public test::ViewerTest {
+class VelocityAov : public test::ViewerTest {
  protected:
   static constexpr std::uint32_t edge = 8;
 
@@ -189,7 +189,7 @@ class VelocityPicture : public test::ViewerTest {
     return frame;
   }
 };
-CUMULET_ON_BACKENDS(VelocityPicture);
+CUMULET_ON_BACKENDS(VelocityAov);
 
 std::string name_of(const test::MarchKind& kind) {
   return "march " + std::to_string(static_cast<int>(kind.march)) +
@@ -197,7 +197,7 @@ std::string name_of(const test::MarchKind& kind) {
 }
 
 // The velocity is a mean, not a sum, so it does not depend on the optical depth.
-TEST_P(VelocityPicture, ASlabMovesAsItDoes) {
+TEST_P(VelocityAov, SlabHasItsVelocity) {
   const auto viewer = make();
   const vec3 v(3.0F, -40.0F, 0.125F);
   for (const test::MarchKind& kind : test::march_kinds) {
@@ -216,7 +216,7 @@ TEST_P(VelocityPicture, ASlabMovesAsItDoes) {
 }
 
 // One slab in front of the other: velocities are weighted by single scattering towards the camera.
-TEST_P(VelocityPicture, TwoSlabsFollowTheClosedForm) {
+TEST_P(VelocityAov, TwoSlabsFollowTheClosedForm) {
   const auto viewer = make();
   const vec3 near(3.0F, -40.0F, 0.125F);
   const vec3 far(-7.0F, 10.0F, 25.0F);
@@ -248,7 +248,7 @@ TEST_P(VelocityPicture, TwoSlabsFollowTheClosedForm) {
 }
 
 // If the denoiser has already requested feature buffers, the velocity AOV recomputes them, and they stay the same.
-TEST_P(VelocityPicture, ComesAfterOtherFacts) {
+TEST_P(VelocityAov, MayBeRequestedAfterOtherFeatureBuffers) {
   const auto viewer = make();
   const vec3 v(1.0F, 2.0F, 3.0F);
   show(*viewer, slab_of({64, 64, 8}, v));
@@ -267,7 +267,7 @@ TEST_P(VelocityPicture, ComesAfterOtherFacts) {
 }
 
 // A rotated and scaled file has rotated and scaled velocities.
-TEST_P(VelocityPicture, AFileMovesAsItStands) {
+TEST_P(VelocityAov, VelocityFollowsTheFilesTransform) {
   openvdb::initialize();
   const test::Folder folder;
   auto density = test::fog("density");
@@ -303,7 +303,7 @@ TEST_P(VelocityPicture, AFileMovesAsItStands) {
 }
 
 // Where instances overlap, velocities are weighted by extinction.
-TEST_P(VelocityPicture, PlacesThatOverlapAreMeans) {
+TEST_P(VelocityAov, OverlappingInstancesGiveTheMeanVelocity) {
   const auto viewer = make();
   viewer->set_medium(thick(0.1));
   show(*viewer, slab_of({64, 64, 8}, vec3(1.0F, 2.0F, 3.0F)));

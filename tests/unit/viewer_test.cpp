@@ -60,7 +60,7 @@ class ViewerFrames : public test::StillTest {
   }
 };
 
-TEST_P(ViewerFrames, PreviewsEndInThePictureThatThereIsWithoutThem) {
+TEST_P(ViewerFrames, PreviewsConvergeToTheImageWithoutPreviews) {
   show_noise();
   // One tile, and several.
   for (const glm::uvec2 size : {glm::uvec2(60, 44), glm::uvec2(600, 20)}) {
@@ -82,7 +82,7 @@ TEST_P(ViewerFrames, PreviewsEndInThePictureThatThereIsWithoutThem) {
 }
 
 // A preview does not wait for second samples of pixels that finish early.
-TEST_P(ViewerFrames, APreviewIsShownWithItsFirstSamples) {
+TEST_P(ViewerFrames, PreviewIsShownWithItsFirstSamples) {
   show_noise();
   viewer().set_sampling({1000, 3, render::View::shaded, true});
   viewer::FrameResult result;
@@ -91,7 +91,7 @@ TEST_P(ViewerFrames, APreviewIsShownWithItsFirstSamples) {
   EXPECT_LT(viewer().stats().samples, 3U * result.size.x * result.size.y);
 }
 
-TEST_P(ViewerFrames, ShowsSomethingWhileTheCameraNeverRests) {
+TEST_P(ViewerFrames, ImagesAppearDuringContinuousCameraMotion) {
   show_noise();
   viewer().render(frame(256, 256, 0.01));
   int pictures = 0;
@@ -109,7 +109,7 @@ TEST_P(ViewerFrames, ShowsSomethingWhileTheCameraNeverRests) {
   EXPECT_EQ(pictures, 5);
 }
 
-TEST_P(ViewerFrames, MoreSamplesGoOn) {
+TEST_P(ViewerFrames, RaisingTheSampleLimitContinues) {
   show_noise();
   for (const glm::uvec2 size : {glm::uvec2(40, 30), glm::uvec2(600, 10)}) {
     viewer().set_sampling({9, 3, render::View::shaded, false});
@@ -156,7 +156,7 @@ TEST_P(ViewerFrames, ChangesRestartOnlyWhatDependsOnThem) {
   EXPECT_LT(viewer().stats().cells, cells);
 }
 
-TEST_P(ViewerFrames, CellsOfATransmittanceAreBuiltForIt) {
+TEST_P(ViewerFrames, TransmittanceCriterionRebuildsWithTheMedium) {
   viewer::GridSettings grid;
   grid.build.refine.criterion = grid::Criterion::transmittance;
   grid.build.refine.threshold = 0.1;
@@ -188,7 +188,7 @@ TEST_P(ViewerFrames, CellsOfATransmittanceAreBuiltForIt) {
   EXPECT_EQ(cells_at(30.0, 0.0F), deviation);
 }
 
-TEST_P(ViewerFrames, EnvironmentsAndSkiesComeWhileFramesGoOn) {
+TEST_P(ViewerFrames, EnvironmentsAndSkiesLoadAsynchronously) {
   const test::Folder folder;
   std::vector<std::string> files;
   for (const std::uint32_t width : {16U, 128U}) {
@@ -235,7 +235,7 @@ TEST_P(ViewerFrames, EnvironmentsAndSkiesComeWhileFramesGoOn) {
   EXPECT_EQ(read({24, 24}), surrounded);
 }
 
-TEST_P(ViewerFrames, NoVolumeShowsNothingAgain) {
+TEST_P(ViewerFrames, RemovingTheVolumeShowsTheBackground) {
   show_noise();
   converge(frame(16, 16));
   viewer().set_volume(nullptr);
@@ -252,7 +252,7 @@ struct Silhouette {
   ivec2 high{0};
 };
 
-TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
+TEST_P(ViewerFrames, CameraFitIgnoresHaze) {
   // A ball of radius 10, away from the center of a box that is nearly empty.
   const auto ball = [](const ivec3& p) { return glm::distance(vec3(p), vec3(50, 24, 30)) < 10.0F ? 1.0F : 1e-5F; };
   still_->set_volume(test::make_volume({80, 60, 70}, ivec3(0), ball));
@@ -332,7 +332,7 @@ class ViewerSlab : public ViewerFrames {
   }
 };
 
-TEST_P(ViewerSlab, OrthographicAndOffAxisCamerasObeyBeerAndLambert) {
+TEST_P(ViewerSlab, OrthographicAndOffAxisCamerasFollowBeerLambert) {
   const double expected = 1.0 - std::exp(-1.6);
   viewer::CameraPose pose = viewer().camera()->pose();
   pose.orthographic_height = 20.0;
@@ -352,7 +352,7 @@ TEST_P(ViewerSlab, OrthographicAndOffAxisCamerasObeyBeerAndLambert) {
   EXPECT_NEAR(mean_alpha(read({32, 32})), 0.5 * expected, 0.02);
 }
 
-TEST_P(ViewerSlab, AColourIsSeenBehindAllAndNowhereElse) {
+TEST_P(ViewerSlab, BackgroundColorIsVisibleOnlyBehindEverything) {
   viewer().set_light({0.0F, 90.0F, vec3(0.0F), vec3(0.5F, 0.25F, 1.0F)});
   auto scene = std::make_shared<test::StillScene>();
   surface::Material mirror = test::diffuse(vec3(1.0F));
@@ -384,7 +384,7 @@ TEST_P(ViewerSlab, AColourIsSeenBehindAllAndNowhereElse) {
   EXPECT_GT(mirrored, 20U);
 }
 
-TEST_P(ViewerSlab, AnOrthographicRayBeginsAtTheNearPlane) {
+TEST_P(ViewerSlab, OrthographicRaysStartAtTheNearPlane) {
   viewer::CameraPose pose = viewer().camera()->pose();
   pose.orthographic_height = 20.0;
   pose.near_plane = 200.0 + 8.0;  // in the slab's center plane
@@ -394,7 +394,7 @@ TEST_P(ViewerSlab, AnOrthographicRayBeginsAtTheNearPlane) {
   EXPECT_NEAR(mean_alpha(read({32, 32})), 1.0 - std::exp(-0.8), 0.01);
 }
 
-TEST_P(ViewerSlab, TheHostsSurfaceEndsCameraRays) {
+TEST_P(ViewerSlab, HostDepthEndsCameraRays) {
   auto functions = gl::load_functions(headless::Context::get_proc, context_.get());
   gl::Object depth = gl::make_texture_2d(functions, GL_R32F, 32, 32, "depth");
   const viewer::ViewFrame view = viewer().camera()->view(1.0, std::nullopt);
@@ -435,7 +435,7 @@ TEST_P(ViewerSlab, PickingFindsHalfOpacity) {
   EXPECT_FALSE(viewer().pick(16.0, 16.0).hit);
 }
 
-TEST_P(ViewerSlab, WritesItsDepthForTheHost) {
+TEST_P(ViewerSlab, WritesDepthForTheHost) {
   viewer::Frame f = frame(24, 24);
   f.target = viewer::Target::texture;
   f.write_depth = true;
@@ -459,7 +459,7 @@ TEST_P(ViewerSlab, WritesItsDepthForTheHost) {
   }
 }
 
-TEST_P(ViewerSlab, NoiseIsTheSpreadBetweenSeeds) {
+TEST_P(ViewerSlab, NoiseEstimateMatchesTheVarianceBetweenSeeds) {
   viewer().set_medium({0.1, vec3(0.9F), {0.0F}, 0});
   std::vector<std::vector<float>> pictures;
   double told = 0.0;

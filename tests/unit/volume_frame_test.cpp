@@ -41,7 +41,7 @@ GridNames naming(std::initializer_list<std::pair<Field, std::string>> fields) {
   return names;
 }
 
-class Frame : public ::testing::Test {
+class VolumeFrameImport : public ::testing::Test {
  protected:
   void SetUp() override { openvdb::initialize(); }
 
@@ -66,7 +66,7 @@ FloatGrid::Ptr dot(const std::string& name, float value) {
   return grid;
 }
 
-TEST_F(Frame, FieldsAreFoundByTheirNamesInWhateverCase) {
+TEST_F(VolumeFrameImport, FieldNamesAreCaseInsensitive) {
   struct Case {
     std::vector<std::string> grids;
     std::string density, temperature, flame;
@@ -91,7 +91,7 @@ TEST_F(Frame, FieldsAreFoundByTheirNamesInWhateverCase) {
   }
 }
 
-TEST_F(Frame, NamesChooseAndLeaveOut) {
+TEST_F(VolumeFrameImport, NamesSelectAndExcludeFields) {
   const auto file = write({dot("density", 1.0F), dot("temperature", 2.0F), dot("flame", 3.0F), dot("shadow", 4.0F)});
   VolumeFrame frame = import_frame(
       file,
@@ -117,7 +117,7 @@ TEST_F(Frame, NamesChooseAndLeaveOut) {
   EXPECT_FALSE(frame.temperature || frame.flame);
 }
 
-TEST_F(Frame, WhatIsAskedForAndMissingIsNamed) {
+TEST_F(VolumeFrameImport, MissingRequestedFieldIsNamed) {
   const auto file = write({dot("density", 1.0F), dot("temperature", 2.0F)});
   for (const GridNames& names : {naming({{&GridNames::density, "nope"}}), naming({{&GridNames::temperature, "nope"}}),
                                  naming({{&GridNames::flame, "nope"}}), naming({{&GridNames::colour, "nope"}})}) {
@@ -132,7 +132,7 @@ TEST_F(Frame, WhatIsAskedForAndMissingIsNamed) {
   EXPECT_HAS(refusal(write({level_set}), naming({{&GridNames::temperature, "temperature"}})), "is a level set");
 }
 
-TEST_F(Frame, ColourOfThreeGrids) {
+TEST_F(VolumeFrameImport, ColorFromThreeGrids) {
   const auto file = write(
       {dot("density", 1.0F), dot("color_r", 0.25F), dot("color_g", 0.5F), dot("color_b", 0.75F), dot("x_r", 1.0F)});
   const VolumeFrame frame = import_frame(file, naming({{&GridNames::colour, "color"}}), {});
@@ -170,7 +170,7 @@ void expect_colours(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
   }
 }
 
-TEST_F(Frame, ColourOfVectors) {
+TEST_F(VolumeFrameImport, ColorFromAVectorGrid) {
   for (const bool half : {false, true}) {
     const auto grid = colours("Cd");
     grid->setSaveFloatAsHalf(half);
@@ -186,7 +186,7 @@ TEST_F(Frame, ColourOfVectors) {
 }
 
 // Velocities are listed as such in every form, and are never used as density.
-TEST_F(Frame, VelocitiesAreFoundAndNotMistaken) {
+TEST_F(VolumeFrameImport, VelocityGridsAreRecognized) {
   const auto told = [&](const openvdb::GridPtrVec& grids) {
     return cumulet::volume::channels_by_name(cumulet::volume::list_grids(write(grids)));
   };
@@ -216,7 +216,7 @@ float anisotropy_at(const VolumeFrame& frame, const glm::ivec3& p) {
   return value_at((*frame.anisotropy)[0], p) - value_at((*frame.anisotropy)[1], p);
 }
 
-TEST_F(Frame, AnisotropyIsFoundWithItsSign) {
+TEST_F(VolumeFrameImport, AnisotropyIsReadWithItsSign) {
   const auto grid = fog("Anisotropy");
   for (int i = 0; i < 100; ++i) grid->tree().setValue(Coord(i % 11, i % 7, i % 5), static_cast<float>(i - 50) / 50.0F);
   grid->tree().addTile(1, Coord(16, 0, 0), -0.75F, true);
@@ -260,7 +260,7 @@ TEST_F(Frame, AnisotropyIsFoundWithItsSign) {
   EXPECT_FALSE(alone.anisotropy);
 }
 
-TEST_F(Frame, AnisotropyBeyondOneIsClamped) {
+TEST_F(VolumeFrameImport, AnisotropyBeyondOneIsClamped) {
   const auto grid = fog("anisotropy");
   grid->tree().setValue(Coord(0, 0, 0), 1.5F);
   grid->tree().setValue(Coord(0, 0, 1), -30.0F);
@@ -283,7 +283,7 @@ TEST_F(Frame, AnisotropyBeyondOneIsClamped) {
 }
 
 // Grids with another transform are resampled with their signs.
-TEST_F(Frame, AnisotropyIsResampled) {
+TEST_F(VolumeFrameImport, AnisotropyIsResampled) {
   const auto density = fog("density");
   density->fill({{0, 0, 0}, {15, 15, 15}}, 1.0F);
   const auto grid = fog("anisotropy");
@@ -296,7 +296,7 @@ TEST_F(Frame, AnisotropyIsResampled) {
   EXPECT_NEAR(anisotropy_at(frame, {7, 8, 8}), 0.0F, 1e-6F) << "half way between";
 }
 
-TEST_F(Frame, AllBlackAndEmptyColours) {
+TEST_F(VolumeFrameImport, BlackAndEmptyColors) {
   auto black = colours("Cd");
   black->tree().clear();
   black->tree().setValue(Coord(1, 2, 3), openvdb::Vec3f(0.0F));
@@ -311,7 +311,7 @@ TEST_F(Frame, AllBlackAndEmptyColours) {
   EXPECT_EQ(messages.warnings.size(), 1U);
 }
 
-TEST_F(Frame, NanoVdbHasTheSameFields) {
+TEST_F(VolumeFrameImport, NanoVdbHasTheSameFields) {
   const auto density = dot("density", 1.0F);
   const auto heat = dot("heat", 2.5F);
   const auto flame = dot("Flame", 0.5F);
@@ -332,7 +332,7 @@ TEST_F(Frame, NanoVdbHasTheSameFields) {
   }
 }
 
-TEST_F(Frame, FilesThatCameThroughAPipeHaveTheSameFields) {
+TEST_F(VolumeFrameImport, FilesWithoutOffsetsHaveTheSameFields) {
   const auto grid = colours("Cd");
   {
     std::ofstream out(path(), std::ios::binary);
@@ -345,7 +345,7 @@ TEST_F(Frame, FilesThatCameThroughAPipeHaveTheSameFields) {
   expect_colours(frame, *grid);
 }
 
-TEST_F(Frame, WhatIsNotShownIsRemarkedOn) {
+TEST_F(VolumeFrameImport, UnusedFieldsAreReported) {
   Messages messages;
   (void)import_frame(write({dot("smoke", 1.0F), dot("temperature", 1.0F), dot("shadow", 1.0F)}), {}, messages.log);
   ASSERT_EQ(messages.warnings.size(), 1U);
@@ -409,7 +409,7 @@ double integral(const ScalarVolume& v) {
   return sum * std::abs(glm::determinant(glm::dmat3(v.index_to_world)));
 }
 
-TEST_F(Frame, CoarserFieldsAreInterpolated) {
+TEST_F(VolumeFrameImport, CoarserFieldsAreInterpolated) {
   // Trilinear interpolation reproduces a linear function.
   const auto density = box("density", scaled(0.5), 40, [](const Vec3d&) { return 1.0F; });
   const auto heat = box("heat", scaled(1.75, Vec3d(1.0, 2.0, 3.0)), 8, plane);
@@ -426,7 +426,7 @@ TEST_F(Frame, CoarserFieldsAreInterpolated) {
   EXPECT_NEAR(integral(v), integral(alone), 1e-2 * integral(alone));
 }
 
-TEST_F(Frame, TurnedAndShearedLatticesAreInterpolated) {
+TEST_F(VolumeFrameImport, RotatedAndShearedGridsAreInterpolated) {
   openvdb::math::Mat4d turned = scaled(0.8, Vec3d(4.0, 5.0, 6.0));
   turned.preRotate(openvdb::math::Z_AXIS, 0.7);
   turned.preRotate(openvdb::math::X_AXIS, -0.4);
@@ -441,7 +441,7 @@ TEST_F(Frame, TurnedAndShearedLatticesAreInterpolated) {
   EXPECT_NEAR(integral(*frame.flame), integral(alone), 2e-3 * integral(alone));
 }
 
-TEST_F(Frame, FinerFieldsAreAveraged) {
+TEST_F(VolumeFrameImport, FinerFieldsAreAveraged) {
   // Each voxel of the lattice covers 2, 3 or 4 whole voxels of the field per axis, so the mean of noise is kept voxel
   // by voxel.
   std::mt19937 random(5);
@@ -466,7 +466,7 @@ TEST_F(Frame, FinerFieldsAreAveraged) {
   }
 }
 
-TEST_F(Frame, AnOffsetOfWholeVoxelsMovesValuesExactly) {
+TEST_F(VolumeFrameImport, AnOffsetOfWholeVoxelsMovesValuesExactly) {
   std::mt19937 random(6);
   const auto noise = [&](const Vec3d&) { return static_cast<float>(random()); };
   const auto density = box("density", scaled(0.1), 4, noise);
@@ -483,7 +483,7 @@ TEST_F(Frame, AnOffsetOfWholeVoxelsMovesValuesExactly) {
   }
 }
 
-TEST_F(Frame, TilesAndBackgroundsStaySparse) {
+TEST_F(VolumeFrameImport, TilesAndBackgroundsStaySparse) {
   const auto density = dot("density", 1.0F);
   auto heat = fog("temperature", 0.25F);
   heat->setTransform(openvdb::math::Transform::createLinearTransform(scaled(2.0, Vec3d(0.3, 0.6, 0.9))));
@@ -501,7 +501,7 @@ TEST_F(Frame, TilesAndBackgroundsStaySparse) {
   EXPECT_LT(v.tiles.size(), 40000U);
 }
 
-TEST_F(Frame, WithoutDensityTheFinestFieldGivesTheLattice) {
+TEST_F(VolumeFrameImport, WithoutDensityTheFinestFieldSetsTheResolution) {
   const auto ones = [](const Vec3d&) { return 1.0F; };
   auto heat = box("temperature", scaled(0.5), 10, ones);
   auto flame = box("flame", scaled(0.25), 10, ones);
@@ -524,7 +524,7 @@ TEST_F(Frame, WithoutDensityTheFinestFieldGivesTheLattice) {
   EXPECT_EQ(frame.temperature->active_voxels, 1331U);
 }
 
-TEST_F(Frame, FieldsBesideDensityAreKeptAndTold) {
+TEST_F(VolumeFrameImport, AdditionalFieldsAreKeptAndReported) {
   const auto ones = [](const Vec3d&) { return 1.0F; };
   auto colour = colours("Cd");
   colour->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1.0, Vec3d(100.0))));
@@ -582,7 +582,7 @@ void expect_vectors(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
   EXPECT_EQ(velocity_at(frame, glm::ivec3(-3)), glm::dvec3(0.0));
 }
 
-TEST_F(Frame, VelocityOfVectors) {
+TEST_F(VolumeFrameImport, VelocityFromAVectorGrid) {
   const auto density = box("density", scaled(1.0), 24, [](const Vec3d&) { return 1.0F; });
   for (const std::string name : {"velocity", "Vel", "v"}) {
     for (const bool half : {false, true}) {
@@ -617,7 +617,7 @@ TEST_F(Frame, VelocityOfVectors) {
             (std::vector<std::string>{"density", "", "velocity", ""}));
 }
 
-TEST_F(Frame, VelocityOfANanoVdb) {
+TEST_F(VolumeFrameImport, VelocityFromNanoVdb) {
   const auto density = dot("density", 1.0F);
   for (const bool staggered : {false, true}) {
     const auto grid = vectors("vel");
@@ -636,7 +636,7 @@ TEST_F(Frame, VelocityOfANanoVdb) {
 }
 
 // A staggered component is on the voxel's lower face along its axis, so the value at the center is the mean of two.
-TEST_F(Frame, VelocityOfAStaggeredGrid) {
+TEST_F(VolumeFrameImport, VelocityFromAStaggeredGrid) {
   std::mt19937 random(11);
   const auto noise = [&] { return static_cast<float>(random() % 2000) / 100.0F - 10.0F; };
   auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
@@ -664,7 +664,7 @@ TEST_F(Frame, VelocityOfAStaggeredGrid) {
 }
 
 // Three scalar grids, each with a lattice of its own, as some simulations write face velocities.
-TEST_F(Frame, VelocityOfThreeGrids) {
+TEST_F(VolumeFrameImport, VelocityFromThreeGrids) {
   const auto density = box("density", scaled(1.0), 10, [](const Vec3d&) { return 1.0F; });
   const auto along = [](int axis) {
     return [axis](const Vec3d& p) { return static_cast<float>(axis + 1) * (plane(p) - 2.5F); };
@@ -695,7 +695,7 @@ TEST_F(Frame, VelocityOfThreeGrids) {
 }
 
 // Vectors are in world space, unless their metadata declare local space. Then they follow the transform.
-TEST_F(Frame, VelocityInLocalSpace) {
+TEST_F(VolumeFrameImport, VelocityInLocalSpace) {
   openvdb::math::Mat4d turned = scaled(2.0);
   turned.postRotate(openvdb::math::Z_AXIS, 0.5 * M_PI);  // row vectors: x to y, y to -x
   auto density = box("density", turned, 10, [](const Vec3d&) { return 1.0F; });
@@ -724,7 +724,7 @@ TEST_F(Frame, VelocityInLocalSpace) {
   expect(world(), {1.0, 2.0, 3.0});
 }
 
-TEST_F(Frame, VelocitiesThatAreNoneOrTooFastAreTold) {
+TEST_F(VolumeFrameImport, InvalidAndTooLargeVelocitiesAreReported) {
   const float infinite = std::numeric_limits<float>::infinity();
   auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
   grid->setName("vel");
@@ -751,7 +751,7 @@ TEST_F(Frame, VelocitiesThatAreNoneOrTooFastAreTold) {
 }
 
 // A velocity that was not named is left out with a warning. A named one causes an error.
-TEST_F(Frame, AVelocityThatFailsIsLeftOutUnlessItIsNamed) {
+TEST_F(VolumeFrameImport, FailedVelocityIsDroppedUnlessRequestedByName) {
   const auto density = box("density", scaled(1.0), 10, [](const Vec3d&) { return 1.0F; });
   const auto expect = [&](const openvdb::GridPtrVec& grids, const std::string& name, const std::string& cause) {
     const auto file = write(grids);
@@ -785,7 +785,7 @@ TEST_F(Frame, AVelocityThatFailsIsLeftOutUnlessItIsNamed) {
 }
 
 // Velocities are kept only in the bounds of the density, for any size and resolution of their grid.
-TEST_F(Frame, AVelocityIsKeptOverDensityAlone) {
+TEST_F(VolumeFrameImport, VelocityIsKeptOnlyInTheDensitysBounds) {
   const auto ones = [](const Vec3d&) { return 1.0F; };
   std::mt19937 random(3);
   const auto component = [&] { return static_cast<float>(random() % 2000) / 100.0F - 10.0F; };
@@ -821,7 +821,7 @@ TEST_F(Frame, AVelocityIsKeptOverDensityAlone) {
   EXPECT_TRUE(messages.warnings.empty());
 }
 
-TEST_F(Frame, ALatticeOutOfReachIsRefused) {
+TEST_F(VolumeFrameImport, OutOfRangeGridsAreRejected) {
   auto far = dot("flame", 1.0F);
   far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e9)));
   EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": is too far off or too large");
@@ -836,7 +836,7 @@ TEST_F(Frame, ALatticeOutOfReachIsRefused) {
   EXPECT_EQ(frame.flame->max_value, 0.125F);
 }
 
-TEST_F(Frame, ALatticeFarFinerThanAFieldIsRefusedAtOnce) {
+TEST_F(VolumeFrameImport, TooFineGridsAreRejectedImmediately) {
   std::mt19937 random(9);
   const auto coarse = box("flame", scaled(1.0), 60, [&](const Vec3d&) { return static_cast<float>(random() % 1000); });
   auto density = dot("density", 1.0F);
@@ -844,7 +844,7 @@ TEST_F(Frame, ALatticeFarFinerThanAFieldIsRefusedAtOnce) {
   EXPECT_HAS(refusal(write({density, coarse}), {}), "grid \"flame\": has voxels too large for the lattice");
 }
 
-TEST_F(Frame, WhereAFieldIsFarFinerEmptySpaceCostsLittle) {
+TEST_F(VolumeFrameImport, ResamplingAMuchFinerFieldSkipsEmptySpace) {
   // 500 dots in separate bricks, 40 times finer than the lattice.
   auto dots = fog("flame");
   std::mt19937 random(10);
@@ -857,7 +857,7 @@ TEST_F(Frame, WhereAFieldIsFarFinerEmptySpaceCostsLittle) {
   EXPECT_LE(frame.flame->brick_origins.size(), 1000U);
 }
 
-TEST_F(Frame, ResamplingIsTheSameWhateverTheThreadsAndCanBeStopped) {
+TEST_F(VolumeFrameImport, ResamplingIsIdenticalForAnyThreadCountAndCancellable) {
   std::mt19937 random(8);
   const auto noise = [&](const Vec3d&) { return static_cast<float>(random() % 1000); };
   write({box("density", scaled(1.0), 10, noise), box("flame", scaled(0.7, Vec3d(0.2)), 60, noise)});
@@ -881,7 +881,7 @@ TEST_F(Frame, ResamplingIsTheSameWhateverTheThreadsAndCanBeStopped) {
   EXPECT_NEAR(whole.fraction(), 1.0, 1e-9);
 }
 
-TEST_F(Frame, TemperaturesThatAreNotASimulationsAreRemarkedOn) {
+TEST_F(VolumeFrameImport, UnusualTemperaturesAreReported) {
   struct Case {
     float low, high;
     std::string hint;
@@ -899,7 +899,7 @@ TEST_F(Frame, TemperaturesThatAreNotASimulationsAreRemarkedOn) {
   }
 }
 
-TEST_F(Frame, SimulatedFiresAreReadAsTheyAre) {
+TEST_F(VolumeFrameImport, SimulatedFiresAreReadUnchanged) {
   const fs::path data = CUMULET_SHARED_DATA "/vdb";
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
   const auto smoke = data / "mantaflow_fire/fluid_data_0015.vdb";

@@ -230,7 +230,7 @@ TEST_F(VolumeImport, BackgroundCountsWithinBoundsOnly) {
   expect_same(*grid, volume);
 }
 
-TEST_F(VolumeImport, MaximumLeavesOutACoveredBackground) {
+TEST_F(VolumeImport, MaximumIgnoresACoveredBackground) {
   // The one voxel fills its bounds, so the larger background is nowhere in the field.
   const auto grid = fog("density", 5.0F);
   grid->tree().setValue(Coord(3, 4, 5), 0.25F);
@@ -431,7 +431,7 @@ TEST_F(VolumeImport, EmptyGridsAreEmptyVolumes) {
   }
 }
 
-TEST_F(VolumeImport, RefusesWhatIsNoScalarFog) {
+TEST_F(VolumeImport, RejectsGridsThatAreNotScalarFog) {
   const auto sphere = openvdb::tools::createLevelSetSphere<FloatGrid>(5.0F, openvdb::Vec3f(0), 1.0F);
   sphere->setName("surface");
   EXPECT_HAS(refusal(write({sphere})), "grid \"surface\" is a level set");
@@ -464,7 +464,7 @@ TEST_F(VolumeImport, RefusesWhatIsNoScalarFog) {
   EXPECT_HAS(refusal(write({far})), "span 4000000001 x 1 x 1 voxels");
 }
 
-TEST_F(VolumeImport, ChoosesTheGrid) {
+TEST_F(VolumeImport, SelectsTheGrid) {
   const auto make = [](const std::string& name, float value) {
     const auto grid = fog(name);
     grid->tree().setValue(Coord(0), value);
@@ -518,7 +518,7 @@ TEST_F(VolumeImport, ChoosesTheGrid) {
   EXPECT_EQ(import_volume(write({density, second}), "density[0]", {}).max_value, 3.0F);
 }
 
-TEST_F(VolumeImport, BadPathsAndContents) {
+TEST_F(VolumeImport, RejectsInvalidPathsAndContents) {
   EXPECT_HAS(refusal(path("none.vdb")), "no such file");
   EXPECT_HAS(refusal(folder_.path()), "is a directory");
   EXPECT_HAS(refusal(write_bytes("", "empty.vdb")), "is empty");
@@ -597,7 +597,7 @@ TEST_F(VolumeImport, DamagedFilesNeverCrash) {
 }
 
 // OpenVDB writes beyond its buffer if the length of packed values is negative.
-TEST_F(VolumeImport, DamagedLengthsOfPackedValuesAreTold) {
+TEST_F(VolumeImport, DamagedCompressedLengthsAreReported) {
   const auto grid = FloatGrid::create();
   for (int i = 0; i < 40; ++i)
     grid->tree().setValue(openvdb::Coord(i % 7, i / 7, i % 3), 0.01F * static_cast<float>(i));
@@ -663,7 +663,7 @@ TEST_F(VolumeImport, NanoVdbQuantisedGrids) {
   expect_same(*grid, import_volume(file, "", {}), 0.1);
 }
 
-TEST_F(VolumeImport, NanoVdbListsAndRefuses) {
+TEST_F(VolumeImport, NanoVdbListsGridsAndRejectsOthers) {
   const auto file = path("test.nvdb");
   const auto sphere = openvdb::tools::createLevelSetSphere<FloatGrid>(5.0F, openvdb::Vec3f(0), 1.0F);
   sphere->setName("surface");
@@ -694,7 +694,7 @@ TEST_F(VolumeImport, NanoVdbListsAndRefuses) {
   EXPECT_EQ(import_volume(file, "", {}).non_finite_voxels, 1U);
 }
 
-TEST_F(VolumeImport, NanoVdbChecksumIsLookedAt) {
+TEST_F(VolumeImport, NanoVdbChecksumIsChecked) {
   const auto grid = rich(0.0F);
   const auto file = path("test.nvdb");
   write_nano<float>(file, *grid, nanovdb::io::Codec::NONE);
@@ -740,7 +740,7 @@ EXPECT_LT(import, 8 * read);  // about 2.5
 
 // --- inspection of files ---
 
-TEST_F(VolumeImport, InspectionTellsGridsValuesAndMetadata) {
+TEST_F(VolumeImport, InspectionReportsGridsValuesAndMetadata) {
   using cumulet::volume::Inspection;
   const auto density = fog("density");
   density->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
@@ -842,7 +842,7 @@ double suggested(const ScalarVolume& volume) {
   return cumulet::volume::CoarseVolume(volume).suggest_density_scale().value_or(-1.0);
 }
 
-TEST(DensityScale, IsEightMeanDepthsOfABall) {
+TEST(DensityScale, GivesABallAnOpticalDepthOfEight) {
   // The mean chord of a ball is 4/3 of its radius. That of a cube is 2/3 of its edge, more without grazing chords.
   EXPECT_NEAR(suggested(made_of(64, ball)), 8.0 / (4.0 / 3.0 * 0.9 * 32), 0.03 * 0.21);
   EXPECT_NEAR(suggested(made_of(60, [](glm::vec3) { return 0.25F; })), 8.0 / (0.25 * 40.0), 0.05 * 0.8);
@@ -850,7 +850,7 @@ TEST(DensityScale, IsEightMeanDepthsOfABall) {
       cumulet::volume::CoarseVolume(made_of(8, [](glm::vec3) { return 0.0F; })).suggest_density_scale().has_value());
 }
 
-TEST(DensityScale, FollowsValuesAndSizesAndNoTurn) {
+TEST(DensityScale, FollowsValuesAndSizesButNotRotation) {
   const double plain = suggested(made_of(64, ball));
   EXPECT_NEAR(suggested(made_of(64, [](glm::vec3 p) { return 1e-6F * ball(p); })), 1e6 * plain, 1e4 * plain);
   EXPECT_NEAR(suggested(made_of(64, [](glm::vec3 p) { return 1e20F * ball(p); })), 1e-20 * plain, 1e-22 * plain);
@@ -864,7 +864,7 @@ TEST(DensityScale, FollowsValuesAndSizesAndNoTurn) {
   }
 }
 
-TEST(DensityScale, HeedsNeitherHazeNorSpecks) {
+TEST(DensityScale, IgnoresHazeAndSpecks) {
   // A ball that fills a seventh of the projection of its bounds.
   const auto body = [](glm::vec3 p) { return glm::length(p) < 0.4F ? 1.0F : 0.0F; };
   const double plain = suggested(made_of(64, body));
@@ -883,7 +883,7 @@ std::array<glm::dvec3, 2> seen(const ScalarVolume& volume, const glm::dvec3& dir
   return box;
 }
 
-TEST(Visible, IsWhatIsOpaqueAndNoHazeBesideBeforeOrBehindIt) {
+TEST(VisibleBounds, ExcludeHazeAroundOpaqueContent) {
   const auto haze = [](glm::vec3 p) { return glm::length(p - glm::vec3(0.3F, 0, 0)) < 0.5F ? 1.0F : 1e-5F; };
   const auto turn = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(glm::dvec3(1, 2, 3)));
   for (const glm::dmat4& to_world : {glm::dmat4(1.0), turn, glm::scale(turn, glm::dvec3(0.5))}) {
@@ -906,7 +906,7 @@ TEST(Visible, IsWhatIsOpaqueAndNoHazeBesideBeforeOrBehindIt) {
   }
 }
 
-TEST(Visible, ChangesWithTheDensityScaleAndWithTheSide) {
+TEST(VisibleBounds, DependOnDensityScaleAndViewDirection) {
   const auto haze = [](glm::vec3 p) { return glm::length(p) < 0.5F ? 1.0F : 1e-5F; };
   const auto volume = made_of(64, haze);
   // With an opaque haze, everything is visible. In a very thin medium, nothing is.
@@ -924,7 +924,7 @@ TEST(Visible, ChangesWithTheDensityScaleAndWithTheSide) {
   EXPECT_NEAR(seen(flat, {0, 0, 1}, 1.0)[1].y, 63.5, 1.0);
 }
 
-TEST(CoarseVolume, KeepsTheMassOfBricksTilesAndBackground) {
+TEST(CoarseVolume, ConservesTheMassOfBricksTilesAndBackground) {
   // Suggested scale (8 over the mean depth) for a mixture of brick, tile and background, compared with the same voxels.
   cumulet::volume::SparseVoxels voxels;
   const std::vector<std::int32_t> origins = {0, 0, 0};
@@ -984,7 +984,7 @@ TEST_F(VolumeAssets, Sergeneren) {
   }
 }
 
-TEST_F(VolumeAssets, ZenoHoldsNoFog) {
+TEST_F(VolumeAssets, ZenoFilesHaveNoFogGrid) {
   EXPECT_HAS(refusal(asset("zeno/res.vdb")), "level set");
   EXPECT_HAS(refusal(asset("zeno/sphere.vdb")), "level set");
   EXPECT_HAS(refusal(asset("zeno/vel_VDB_bound_v02.vdb")), "of type vec3s");

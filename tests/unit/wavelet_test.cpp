@@ -220,9 +220,9 @@ double error_of(const std::vector<glm::vec4>& values, const std::vector<glm::vec
   return sum;
 }
 
-class Wavelets : public cumulet::test::GlTest {};
+class WaveletFilter : public cumulet::test::GlTest {};
 
-TEST_P(Wavelets, AConstantKeepsItsMeanAndLosesItsNoise) {
+TEST_P(WaveletFilter, ConstantKeepsItsMeanAndLosesNoise) {
   for (const unsigned count : {1U, 4U, 64U}) {
     const Samples samples(gl_, {61, 47}, count, [](int, int) { return Pixel{.z = 5.0F}; });
     const Moments raw = moments_of(samples.raw());
@@ -232,7 +232,7 @@ TEST_P(Wavelets, AConstantKeepsItsMeanAndLosesItsNoise) {
   }
 }
 
-TEST_P(Wavelets, WhatIsHalfOpenKeepsItsMeansToo) {
+TEST_P(WaveletFilter, PartialCoverageKeepsItsMeans) {
   const glm::vec3 sky(0.4F, 0.6F, 2.0F);
   const Samples samples(gl_, {64, 64}, 2, [&](int, int) { return Pixel{.cover = 0.4F, .behind = sky}; });
   const auto clean = samples.filtered(programs_);
@@ -246,7 +246,7 @@ TEST_P(Wavelets, WhatIsHalfOpenKeepsItsMeansToo) {
 }
 
 // A straight edge between bright and dark: light that crosses it is blur.
-TEST_P(Wavelets, ASurfacesSilhouetteStays) {
+TEST_P(WaveletFilter, SurfaceSilhouettesStaySharp) {
   const auto scene = [](int x, int) {
     Pixel pixel{.front = glm::vec3(x < 24 ? 1.0F : 0.2F), .normal = {0.0F, 0.0F, 1.0F}, .albedo = glm::vec3(0.5F)};
     pixel.z = x < 24 ? 2.0F : 8.0F;
@@ -266,7 +266,7 @@ TEST_P(Wavelets, ASurfacesSilhouetteStays) {
 }
 
 // As for leaves: the mean normals are short, but the pixels are fully covered. A leak would show the background.
-TEST_P(Wavelets, WhatIsCoveredStaysSoWhateverItsMeanNormal) {
+TEST_P(WaveletFilter, FullCoverageIsKeptForAnyMeanNormal) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3(0.4F),
                  .behind = glm::vec3(9.0F),
@@ -283,7 +283,7 @@ TEST_P(Wavelets, WhatIsCoveredStaysSoWhateverItsMeanNormal) {
 }
 
 // The coverage by the volume increases to 1 over a few pixels.
-TEST_P(Wavelets, ACloudsEdgeStays) {
+TEST_P(WaveletFilter, CloudEdgesStaySharp) {
   const auto scene = [](int x, int) {
     const float cover = std::clamp((float(x) - 20.0F) / 6.0F, 0.0F, 1.0F);
     return Pixel{
@@ -301,7 +301,7 @@ TEST_P(Wavelets, ACloudsEdgeStays) {
 }
 
 // A light in a wall of the same plane: its emission is fifty times the wall's radiance, and its albedo is low.
-TEST_P(Wavelets, ALampDoesNotLeak) {
+TEST_P(WaveletFilter, BrightLightsDoNotLeak) {
   const auto is_lamp = [](int x, int y) { return x >= 20 && x < 28 && y >= 20 && y < 24; };
   const auto scene = [&](int x, int y) {
     const bool lamp = is_lamp(x, y);
@@ -323,7 +323,7 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
 
 // A shadow on a striped plane with few informative samples. The noise-free sunlight defines its edge. The remaining
 // light varies with the albedo.
-TEST_P(Wavelets, AShadowThatIsKnownHasItsEdge) {
+TEST_P(WaveletFilter, NoiseFreeShadowKeepsItsEdge) {
   const auto scene = [](bool known) {
     return [known](int x, int y) {
       const glm::vec3 albedo(x / 2 % 2 == 0 ? 0.2F : 0.8F);
@@ -343,7 +343,7 @@ TEST_P(Wavelets, AShadowThatIsKnownHasItsEdge) {
 }
 
 // Flames without smoke have no alpha and end in clear air.
-TEST_P(Wavelets, FlamesHaveNoHalo) {
+TEST_P(WaveletFilter, FlamesHaveNoHalo) {
   const auto scene = [](int x, int) {
     return Pixel{
         .cover = 0.0F, .behind = glm::vec3(0.02F), .spread = 0.0F, .emission = glm::vec3(x < 16 ? 3.0F : 0.0F)};
@@ -354,7 +354,7 @@ TEST_P(Wavelets, FlamesHaveNoHalo) {
 }
 
 // An edge that no feature buffer shows, only the samples.
-TEST_P(Wavelets, ConvergesToTheMeanOfSamples) {
+TEST_P(WaveletFilter, ConvergesToTheMeanOfSamples) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3((x / 4 + y / 4) % 2 == 0 ? 1.0F : 0.5F), .z = 5.0F};
   };
@@ -372,7 +372,7 @@ TEST_P(Wavelets, ConvergesToTheMeanOfSamples) {
 }
 
 // Detail that no feature buffer shows and that is close to the noise level: noise is better than blur.
-TEST_P(Wavelets, WhatIsBlurredByMoreThanTheNoiseIsTakenAsItIs) {
+TEST_P(WaveletFilter, FilterIsSkippedIfBlurExceedsTheNoise) {
   constexpr unsigned count = 64;
   const double noise = 0.5 / std::sqrt(3.0 * count);
   // Limits relative to the noisy image's error. The filter without this rule gives 0.76, 1.28 and 1.55.
@@ -390,7 +390,7 @@ TEST_P(Wavelets, WhatIsBlurredByMoreThanTheNoiseIsTakenAsItIs) {
   }
 }
 
-TEST_P(Wavelets, WithoutNoiseNothingIsFiltered) {
+TEST_P(WaveletFilter, WithoutNoiseNothingIsFiltered) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3(0.1F * static_cast<float>(1 + (x * 7 + y * 3) % 11)), .spread = 0.0F, .z = 5.0F};
   };
@@ -399,7 +399,7 @@ TEST_P(Wavelets, WithoutNoiseNothingIsFiltered) {
   for (std::size_t i = 0; i < clean.size(); ++i) EXPECT_NEAR(clean[i].x, samples.truth()[i].x, 2e-3) << i;
 }
 
-TEST_P(Wavelets, WhatIsNoNumberStaysInItsPixel) {
+TEST_P(WaveletFilter, NonFiniteValuesStayInTheirPixel) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), infinite, -infinite}) {
     Samples samples(gl_, {33, 29}, 2, [](int, int) { return Pixel{.z = 5.0F}; });
     constexpr std::size_t at = 33 * 14 + 16;
@@ -416,7 +416,7 @@ TEST_P(Wavelets, WhatIsNoNumberStaysInItsPixel) {
 }
 
 // One of few samples hit a light: unbiased, but a firefly that must not be displayed.
-TEST_P(Wavelets, ASpeckDoesNotStayNorSpreadAsDots) {
+TEST_P(WaveletFilter, FirefliesAreRemovedWithoutDots) {
   constexpr glm::ivec2 size(48, 48);
   for (const unsigned count : {1U, 4U, 16U}) {
     Samples samples(gl_, size, count, [](int, int) { return Pixel{.z = 5.0F}; });
@@ -429,7 +429,7 @@ TEST_P(Wavelets, ASpeckDoesNotStayNorSpreadAsDots) {
 }
 
 // A bright pixel whose own samples agree is kept, even in dark surroundings.
-TEST_P(Wavelets, ABrightPixelStays) {
+TEST_P(WaveletFilter, BrightPixelsAreKept) {
   const auto scene = [](int x, int y) {
     return Pixel{.front = glm::vec3(x == 20 && y == 20 ? 20.0F : 1.0F), .spread = 0.1F, .z = 5.0F};
   };
@@ -437,7 +437,7 @@ TEST_P(Wavelets, ABrightPixelStays) {
   EXPECT_NEAR(samples.filtered(programs_)[41 * 20 + 20].x, 20.0, 0.7);
 }
 
-TEST_P(Wavelets, AnySizeWillDo) {
+TEST_P(WaveletFilter, WorksForAnySize) {
   for (const glm::ivec2 size : {glm::ivec2(1, 1), {1, 40}, {40, 1}, {2, 3}, {7, 9}, {65, 33}}) {
     const Samples samples(gl_, size, 4, [](int, int) { return Pixel{.z = 5.0F}; });
     const auto clean = samples.filtered(programs_);
@@ -468,7 +468,7 @@ Scene wall_from(int moved) {
   };
 }
 
-class History : public cumulet::test::GlTest {
+class DenoiserHistory : public cumulet::test::GlTest {
  protected:
   void SetUp() override {
     GlTest::SetUp();
@@ -493,20 +493,20 @@ class History : public cumulet::test::GlTest {
   std::unique_ptr<Wavelet> wavelet_;
 };
 
-TEST_P(History, SamplesOfTheSameViewAddUp) {
+TEST_P(DenoiserHistory, SameViewAccumulates) {
   std::vector<glm::vec4> truth;
   const double one = error_of(after(1, 0, &truth), truth);
   const double many = error_of(after(12, 0, &truth), truth);
   EXPECT_LT(many, 0.5 * one);
 }
 
-TEST_P(History, WhatMovesIsFoundAgain) {
+TEST_P(DenoiserHistory, MovingObjectsAreReprojected) {
   std::vector<glm::vec4> truth;
   const double one = error_of(after(1, 0, &truth), truth);
   for (const int step : {2, -3}) EXPECT_LT(error_of(after(12, step, &truth), truth), 0.65 * one) << step;
 }
 
-TEST_P(History, TheMediumIsFoundByItsMeanDepth) {
+TEST_P(DenoiserHistory, MediumIsReprojectedByItsMeanDepth) {
   const auto scene = [](int moved) {
     return [moved](int x, int y) { return Pixel{.front = glm::vec3(painted(x + moved, y)), .z = float(wall_z)}; };
   };
@@ -520,7 +520,7 @@ TEST_P(History, TheMediumIsFoundByItsMeanDepth) {
   EXPECT_LT(many, 0.65 * one);
 }
 
-TEST_P(History, OrthographicAndTurnedViewsAreFollowed) {
+TEST_P(DenoiserHistory, OrthographicAndRotatedViewsAreReprojected) {
   double one = 0.0;
   double many = 0.0;
   for (int i = 0; i < 12; ++i) {
@@ -541,7 +541,7 @@ TEST_P(History, OrthographicAndTurnedViewsAreFollowed) {
 
 // A card at depth 2 in front of a slightly darker wall, with a difference below the noise. As the eye moves, more of
 // the wall becomes visible.
-TEST_P(History, WhatWasHiddenHasNoTrail) {
+TEST_P(DenoiserHistory, DisocclusionsLeaveNoGhosting) {
   constexpr int first = 30;
   constexpr int step = 5;  // pixels of the card, which are two of the wall
   constexpr int views = 5;
@@ -571,7 +571,7 @@ TEST_P(History, WhatWasHiddenHasNoTrail) {
 }
 
 // The light changed without a reset of the history.
-TEST_P(History, WhatIsWrongFadesAndIsGoneWithManySamples) {
+TEST_P(DenoiserHistory, OutdatedHistoryFadesOut) {
   const auto lit = [](float light) {
     return [light](int, int) { return Pixel{.front = glm::vec3(light), .z = 5.0F}; };
   };
@@ -590,7 +590,7 @@ TEST_P(History, WhatIsWrongFadesAndIsGoneWithManySamples) {
   }
 }
 
-TEST_P(History, AnotherSceneAndAnotherViewerKnowNothing) {
+TEST_P(DenoiserHistory, OtherScenesAndViewersHaveSeparateHistory) {
   static_cast<void>(after(8, 0));
   PictureView other = view_at(0.0, size_);
   other.scene = 7;
@@ -607,13 +607,13 @@ TEST_P(History, AnotherSceneAndAnotherViewerKnowNothing) {
 }
 
 // Filtering the same image again, as samples arrive, does not count them twice.
-TEST_P(History, APictureIsNotItsOwn) {
+TEST_P(DenoiserHistory, ImageIsNotItsOwnHistory) {
   const Samples samples(gl_, size_, 1, wall_from(0), 3);
   const auto alone = samples.filtered(programs_);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone) << i;
 }
 
-TEST_P(History, WhatWasNoNumberIsForgotten) {
+TEST_P(DenoiserHistory, NonFiniteHistoryIsDiscarded) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), infinite, -infinite}) {
     wavelet_->free();
     Samples before(gl_, size_, 2, wall_from(0), 1);
@@ -625,7 +625,7 @@ TEST_P(History, WhatWasNoNumberIsForgotten) {
   }
 }
 
-TEST_P(History, AnySizeMayFollowAnyOther) {
+TEST_P(DenoiserHistory, SizeMayChange) {
   unsigned seed = 1;
   for (const glm::ivec2 size : {glm::ivec2(1, 1), {40, 1}, {65, 33}, {7, 9}, {1, 40}, {64, 64}, {2, 3}, {1, 1}}) {
     const Samples samples(
@@ -636,7 +636,7 @@ TEST_P(History, AnySizeMayFollowAnyOther) {
 }
 
 // A coarse preview may be history for a finer image, but does not replace a finer history.
-TEST_P(History, CoarsePicturesDoNotReplaceFineOnes) {
+TEST_P(DenoiserHistory, CoarseImagesDoNotReplaceFineHistory) {
   std::vector<glm::vec4> truth;
   const double one = error_of(after(1, 0, &truth), truth);
   static_cast<void>(after(12, 0));
@@ -651,7 +651,7 @@ TEST_P(History, CoarsePicturesDoNotReplaceFineOnes) {
   EXPECT_LT(error_of(fine.filtered_by(*wavelet_, wide), truth), 0.5 * one);
 }
 
-TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
+TEST_P(DenoiserHistory, WithoutMemoryImagesAreFilteredWithoutHistory) {
   const Samples samples(gl_, size_, 1, wall_from(0), 20);
   const auto alone = samples.filtered(programs_);
   cumulet::test::FakeGl fake(cumulet::headless::Context::get_proc, context_.get());
@@ -678,7 +678,7 @@ TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
   }
 }
 
-CUMULET_ON_BACKENDS(Wavelets);
-CUMULET_ON_BACKENDS(History);
+CUMULET_ON_BACKENDS(WaveletFilter);
+CUMULET_ON_BACKENDS(DenoiserHistory);
 
 }  // namespace

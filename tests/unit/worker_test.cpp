@@ -48,7 +48,7 @@ class WorkerTest : public testing::Test {
   Worker worker_{[this] { ++notified_; }};
 };
 
-TEST_F(WorkerTest, OfThoseThatWaitOnlyTheNewestRuns) {
+TEST_F(WorkerTest, OnlyTheNewestPendingJobRuns) {
   begin("first");
   worker_.post(job("second"));
   worker_.post(job("third"));
@@ -56,7 +56,7 @@ TEST_F(WorkerTest, OfThoseThatWaitOnlyTheNewestRuns) {
   EXPECT_FALSE(worker_.status().failure);
 }
 
-TEST_F(WorkerTest, ReplacingCancelsWhatIsUnderWayAndTellsNobody) {
+TEST_F(WorkerTest, ReplacingCancelsTheRunningJobSilently) {
   begin("first");
   worker_.replace(job("second"));
   EXPECT_EQ(done(), (std::vector<std::string>{"second"}));
@@ -64,7 +64,7 @@ TEST_F(WorkerTest, ReplacingCancelsWhatIsUnderWayAndTellsNobody) {
 }
 
 // For any rate of requests, at least every second job is finished.
-TEST_F(WorkerTest, NoTwoInARowAreReplaced) {
+TEST_F(WorkerTest, EverySecondJobFinishes) {
   begin("first");
   started_ = false;
   worker_.replace(job("second"));  // this cancels "first"
@@ -93,7 +93,7 @@ TEST_F(WorkerTest, NoTwoInARowAreReplaced) {
   EXPECT_EQ(done(), (std::vector<std::string>{"ninth"}));
 }
 
-TEST_F(WorkerTest, LoadsAloneAreCancelled) {
+TEST_F(WorkerTest, CancelLoadsCancelsOnlyLoads) {
   begin("first");
   Worker::Job load = job("second");
   load.load = true;
@@ -112,7 +112,7 @@ TEST_F(WorkerTest, LoadsAloneAreCancelled) {
   EXPECT_TRUE(done_.empty());
 }
 
-TEST_F(WorkerTest, CancelEndsBoth) {
+TEST_F(WorkerTest, CancelEndsRunningAndPendingJobs) {
   begin("first");
   worker_.post(job("second"));
   worker_.cancel();
@@ -126,7 +126,7 @@ TEST_F(WorkerTest, CancelEndsBoth) {
   EXPECT_EQ(done(), (std::vector<std::string>{"third"}));
 }
 
-TEST_F(WorkerTest, TellsStageFailureAndEnd) {
+TEST_F(WorkerTest, ReportsStageFailureAndEnd) {
   EXPECT_EQ(worker_.status().stage, Stage::idle);
   EXPECT_FALSE(worker_.busy());
   begin("first");
@@ -147,7 +147,7 @@ TEST_F(WorkerTest, TellsStageFailureAndEnd) {
   EXPECT_EQ(failure([] { throw std::runtime_error("?"); }).code(), ErrorCode::internal);
 }
 
-TEST_F(WorkerTest, DestroyingItCancels) {
+TEST_F(WorkerTest, DestructorCancels) {
   {
     Worker worker([this] { ++notified_; });
     worker.post({"one", Stage::loading, [](Progress&) {}});

@@ -1,0 +1,145 @@
+// Files with grids whose names are equal or differ only in case: which grid is read, and which warning is logged.
+
+#include <gtest/gtest.h>
+
+#include "support/folder.hpp"
+#include "support/vdb_files.hpp"
+#include "volume/frame.hpp"
+#include "volume/volume.hpp"
+
+namespace {
+
+using cumulet::test::Messages;
+using cumulet::volume::channels_by_name;
+using cumulet::volume::GridNames;
+using cumulet::volume::import_frame;
+using cumulet::volume::import_volume;
+using cumulet::volume::list_grids;
+using cumulet::volume::VolumeFrame;
+using openvdb::Coord;
+
+openvdb::FloatGrid::Ptr dot(const std::string& name, float value) {
+  auto grid = cumulet::test::fog(name);
+  grid->tree().setValue(Coord(1, 2, 3), value);
+  grid->tree().setValue(Coord(1, 2, 4), 0.5F * value);
+  return grid;
+}
+
+openvdb::Vec3SGrid::Ptr arrow(const std::string& name, float value) {
+  auto grid = openvdb::Vec3SGrid::create();
+  grid->setName(name);
+  grid->tree().setValue(Coord(1, 2, 3), openvdb::Vec3s(value));
+  return grid;
+}
+
+class GridNameCase : public ::testing::Test {
+ protected:
+  void SetUp() override { openvdb::initialize(); }
+  [[nodiscard]] std::filesystem::path write(const openvdb::GridPtrVec& grids) const {
+    openvdb::io::File((folder_ / "case.vdb").string()).write(grids);
+    return folder_ / "case.vdb";
+  }
+  cumulet::test::Folder folder_;
+};
+
+TEST_F(GridNameCase, ExactCaseOfDensityIsPreferred) {
+  for (const openvdb::GridPtrVec& grids :
+       {openvdb::GridPtrVec{dot("Density", 1.0F), dot("DENSITY", 2.0F), dot("density", 3.0F)},
+        openvdb::GridPtrVec{dot("density", 3.0F), dot("Density", 1.0F), dot("DENSITY", 2.0F)}}) {
+    Messages messages;
+    const auto file = write(grids);
+    EXPECT_EQ(import_volume(file, "", messages.log).max_value, 3.0F);
+    EXPECT_EQ(import_frame(file, {}, messages.log).density.name, "density");
+    ASSERT_EQ(messages.warnings.size(), 2U);
+    for (const std::string& warning : messages.warnings) {
+      EXPECT_HAS(warning, "shows its grid \"density\" (float, fog volume); there is also \"Density\"");
+      EXPECT_HAS(warning, "\"DENSITY\"");
+    }
+  }
+  // Any spelling of "density" comes before an exact "soot".
+  EXPECT_EQ(import_volume(write({dot("soot", 1.0F), dot("Density", 2.0F)}), "", {}).name, "Density");
+}
+
+TEST_F(GridNameCase, CaseInsensitiveMatchIsReported) {
+  Messages messages;
+  const auto file = write({dot("DENSITY", 1.0F), dot("Density", 2.0F)});
+  EXPECT_EQ(import_frame(file, {}, messages.log).density.name, "DENSITY");
+  ASSERT_EQ(messages.warnings.size(), 1U);
+  EXPECT_EQ(messages.warnings[0],
+            file.string() +
+                ": shows its grid \"DENSITY\" (float, fog volume); there is also \"Density\" (float, fog volume)");
+  // With one candidate there is no warning.
+  messages.warnings.clear();
+  (void)import_frame(write({dot("Density", 1.0F), dot("Temperature", 2.0F), dot("dust", 1.0F)}), {}, messages.log);
+  EXPECT_TRUE(messages.warnings.empty()) << messages.warnings[0];
+}
+
+TEST_F(GridNameCase, OtherFieldsFollowTheSameRule) {
+  Messages messages;
+  const auto file = write({dot("density", 1.0F), dot("Temperature", 2.0F), dot("temperature", 3.0F), dot("FLAME", 4.0F),
+                           dot("Flame", 5.0F), dot("Phase_G", 0.5F), dot("phase_g", 0.25F), arrow("Cd", 0.5F),
+                           arrow("cd", 0.25F), arrow("Vel", 1.0F), arrow("vel", 2.0F)});
+  const VolumeFrame frame = import_frame(file, {}, messages.log);
+  EXPECT_EQ(frame.temperature->name, "temperature");
+  EXPECT_EQ(frame.flame->name, "FLAME");
+  EXPECT_EQ(frame.anisotropy->at(0).name, "phase_g");
+  EXPECT_EQ(frame.colour->at(0).name, "cd");
+  EXPECT_EQ(frame.velocity->parts[0].name, "vel");
+  std::string all;
+  for (const std::string& warning : messages.warnings) all += warning + "\n";
+  EXPECT_EQ(messages.warnings.size(), 5U) << all;
+  EXPECT_HAS(all, ": reads its grid \"temperature\" (float, fog volume) as temperature; there is also \"Temperature\"");
+  EXPECT_HAS(all, ": reads its grid \"FLAME\" (float, fog volume) as flame; there is also \"Flame\"");
+  EXPECT_HAS(all, ": reads its grid \"phase_g\" (float, fog volume) as anisotropy; there is also \"Phase_G\"");
+  EXPECT_HAS(all, ": reads its grid \"cd\" (vec3s, unknown) as color; there is also \"Cd\"");
+  EXPECT_HAS(all, ": reads its grid \"vel\" (vec3s, unknown) as velocity; there is also \"Vel\"");
+  // list_grids and channels_by_name choose the same grids.
+  const auto grids = list_grids(file);
+  const std::vector<std::string> channels = channels_by_name(grids);
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (grids[i].name == "temperature" || grids[i].name == "vel" || grids[i].name == "cd") {
+      EXPECT_NE(channels[i], "") << grids[i].name;
+    }
+    if (grids[i].name == "Temperature" || grids[i].name == "Vel" || grids[i].name == "Cd") {
+      EXPECT_EQ(channels[i], "") << grids[i].name;
+    }
+  }
+  // An explicitly named grid causes no warning.
+  messages.warnings.clear();
+  GridNames names;
+  names.temperature = "Temperature";
+  names.flame = "Flame";
+  names.anisotropy = names.colour = names.velocity = "none";
+  EXPECT_EQ(import_frame(file, names, messages.log).temperature->max_value, 2.0F);
+  EXPECT_TRUE(messages.warnings.empty()) << messages.warnings[0];
+}
+
+TEST_F(GridNameCase, DuplicateGridNamesAreReported) {
+  Messages messages;
+  const auto file = write({dot("density", 1.0F), dot("temperature", 2.0F), dot("temperature", 3.0F)});
+  EXPECT_EQ(import_frame(file, {}, messages.log).temperature->max_value, 2.0F);
+  ASSERT_EQ(messages.warnings.size(), 1U);
+  EXPECT_HAS(messages.warnings[0], "reads its grid \"temperature[0]\" (float, fog volume) as temperature");
+}
+
+TEST_F(GridNameCase, ComponentGridsMustHaveTheSameCase) {
+  Messages messages;
+  const auto file =
+      write({dot("density", 1.0F), dot("Vel_X", 1.0F), dot("Vel_Y", 1.0F), dot("Vel_Z", 1.0F), dot("vel_x", 2.0F),
+             dot("vel_y", 2.0F), dot("vel_z", 2.0F), dot("Color_r", 1.0F), dot("Color_g", 1.0F), dot("Color_b", 1.0F),
+             dot("color_r", 0.5F), dot("color_g", 0.5F), dot("color_b", 0.5F)});
+  GridNames names;
+  for (const std::string color : {"color", "Color"}) {
+    names.colour = color;
+    const VolumeFrame frame = import_frame(file, names, messages.log);
+    EXPECT_EQ(frame.colour->at(0).name, color + "_r");
+    EXPECT_EQ(frame.velocity->parts[0].name, "vel_x");
+    EXPECT_EQ(frame.velocity->parts[4].name, "vel_z");
+  }
+  names.velocity = "Vel";
+  names.colour = "none";
+  messages.warnings.clear();
+  EXPECT_EQ(import_frame(file, names, messages.log).velocity->parts[0].name, "Vel_X");
+}
+
+}  // namespace
