@@ -43,7 +43,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "ray.glsl"
 #include "walk.glsl"
 #include "ground.glsl"
-#include "fact_ray.glsl"
+#include "feature_ray.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform image2D cm_normal;
 layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform image2D cm_albedo;
@@ -209,7 +209,7 @@ void main() {
   float seen_before = 0.0;
   float squares = 0.0;
   for (int i = int(cm.dispatch.rays_before); i < int(cm.dispatch.samples); ++i) {
-    CmFactRay ray = cm_fact_ray(pixel, i);
+    CmFeatureRay ray = cm_feature_ray(pixel, i);
     vec3 o = ray.o;
     vec3 w = ray.w;
     vec3 d = ray.d;
@@ -234,7 +234,7 @@ void main() {
       bool is_hole = (cm_models[cm_model_of(hit.triangle)].flags & CM_MODEL_HOLDOUT) != 0u;
       if (!is_hole) of_surface = point.emission;
       float cosine = dot(point.material.matte_normal, to_sun);
-      if (cosine > 0.0 && !point.unlit && !is_hole && cm.surfaces.rich == 0u) {
+      if (cosine > 0.0 && !point.unlit && !is_hole && cm.surfaces.extended_bsdf == 0u) {
         of_sun = 0.318309886 * cosine * cm_terminator(point.material, to_sun) * cm.lights.sun_irradiance *
                  cm_matte_albedo(point.material, dot(point.material.normal, -w));
         vec3 shift;
@@ -296,7 +296,7 @@ void main() {
     transmittance += exp(-used);
 #if CM_SURFACES
     // If another renderer draws the surfaces below, their light is not part of this image.
-    bool drawn_here = cm.layers.count == 0u || cm.layers.coloured != 0u;
+    bool drawn_here = cm.layers.count == 0u || cm.layers.colored != 0u;
     of_sun *= exp(-used);
     if (drawn_here && surface_t <= ground_t) {
       emission += exp(-used) * of_surface;
@@ -315,7 +315,7 @@ void main() {
     }
     vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
 #if CM_SURFACES
-    if (cm.surfaces.rich != 0u) light[1] = vec3(0.0);
+    if (cm.surfaces.extended_bsdf != 0u) light[1] = vec3(0.0);
 #endif
     for (int k = 0; k < 2; ++k) {
       if (light[k] == vec3(0.0)) continue;

@@ -16,7 +16,7 @@ const int CM_UNIT_VELOCITY_VOXELS = 3;
 const int CM_UNIT_CHANGE_VOXELS = 4;  // or changes of bricks' values
 const int CM_UNIT_CHANNELS = 6;     // channels of cells; or emission of voxels
 const int CM_UNIT_ENVIRONMENT = 7;  // a page of a WordHeap
-const int CM_UNIT_LAYER_COLOUR = 8;
+const int CM_UNIT_LAYER_COLOR = 8;
 const int CM_UNIT_SCENE_WORDS = 9;  // a page of a WordHeap, like the tree
 const int CM_UNIT_ATLAS = 10;
 const int CM_UNIT_HOST_DEPTH = 11;
@@ -37,7 +37,7 @@ const int CM_UNIT_DEPTH_SOURCE = 0;
 // pack_bricks.comp:
 const int CM_UNIT_HOST_VOXELS = 0;
 // denoise_*.comp:
-const int CM_UNIT_DENOISE_COLOUR = 0;
+const int CM_UNIT_DENOISE_COLOR = 0;
 const int CM_UNIT_DENOISE_ALBEDO = 1;
 const int CM_UNIT_DENOISE_NORMAL = 2;
 const int CM_UNIT_MOMENTS = 7;       // denoise_guides.comp and wavelet_*.comp, beside those of resolve.comp
@@ -56,7 +56,7 @@ const int CM_UNIT_HISTORY_GUIDES = 2;
 // surface.frag:
 const int CM_UNIT_MAPS = 0;  // to 9, in the order of surface_parameters.glsl
 const int CM_UNIT_GGX_ALBEDO = 10;
-const int CM_UNIT_GLOSS = 11;
+const int CM_UNIT_PREFILTERED = 11;
 
 // Uniform buffers.
 const int CM_UNIFORM_PARAMETERS = 0;
@@ -71,7 +71,7 @@ const int CM_UNIFORM_POINT_PLACES = 1;  // own_priorities.comp
 const int CM_STORAGE_PATHS = 0;
 const int CM_STORAGE_BLOCKS = 1;
 const int CM_STORAGE_QUEUES = 2;
-const int CM_STORAGE_LAMPS = 3;
+const int CM_STORAGE_ANALYTIC_LIGHTS = 3;
 const int CM_STORAGE_INSTANCES = 4;
 const int CM_STORAGE_INSTANCE_NODES = 5;
 const int CM_STORAGE_MODELS = 6;
@@ -91,7 +91,7 @@ const int CM_STORAGE_BRICKS_FROM = 0;  // copy_bricks.comp
 const int CM_STORAGE_BRICKS_TO = 1;
 const int CM_STORAGE_BRICKS_MOVED = 2;
 const int CM_STORAGE_BRICKS_TOGETHER = 0;  // brick_products.comp, channel_numbers.comp
-const int CM_STORAGE_BRICKS_GLOW = 1;
+const int CM_STORAGE_BRICKS_EMISSIVE = 1;
 const int CM_STORAGE_BRICKS_FIRST = 2;
 const int CM_STORAGE_BRICKS_SECOND = 3;
 const int CM_STORAGE_BRICKS_THIRD = 4;
@@ -117,7 +117,7 @@ const int CM_STORAGE_GRID_BELOW = 6;
 const int CM_STORAGE_GRID_RECORDS = 6;
 const int CM_STORAGE_GRID_BRICKS = 7;
 const int CM_STORAGE_GRID_TREE = 7;
-const int CM_STORAGE_GRID_CHANNEL = 4;  // grid_channels.comp, grid_glow.comp
+const int CM_STORAGE_GRID_CHANNEL = 4;  // grid_channels.comp, grid_emissive.comp
 const int CM_STORAGE_GRID_GLOWING = 7;
 const int CM_STORAGE_GRID_CLEAR = 7;  // grid_clear.comp
 
@@ -142,7 +142,7 @@ const int CM_IMAGE_BACKGROUND_MEANS = 1;
 const int CM_IMAGE_HOST_DEPTH = 0;  // host_depth.comp
 const int CM_IMAGE_TRANSMITTANCE_MAP = 0;  // transmittance.comp
 const int CM_IMAGE_DENOISED = 0;    // denoise_convolution.comp
-const int CM_IMAGE_GUIDE_COLOUR = 0;  // denoise_guides.comp
+const int CM_IMAGE_GUIDE_COLOR = 0;  // denoise_guides.comp
 const int CM_IMAGE_GUIDE_ALBEDO = 1;
 const int CM_IMAGE_GUIDE_NORMAL = 2;
 const int CM_IMAGE_GUIDE_MISSING = 3;

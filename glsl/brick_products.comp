@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "bindings.glsl"
 #include "shared.glsl"
 #include "luminance.glsl"
-#include "brick_glow.glsl"
+#include "brick_emission.glsl"
 
 #if CM_PRODUCT == 0
 #define CM_FIELDS 2u  // temperature and flame
@@ -36,20 +36,20 @@ layout(location = 0) uniform uvec2 cm_range;    // bricks: first, and one past t
 layout(location = 1) uniform uint cm_to_first;  // destination of brick 0
 
 #if CM_PRODUCT == 0
-layout(std430, binding = CM_STORAGE_BRICKS_GLOW) readonly buffer CmGlowing { CmBrickGlow cm_glow; };
+layout(std430, binding = CM_STORAGE_BRICKS_EMISSIVE) readonly buffer CmGlowing { CmBrickEmissive cm_emissive; };
 
 // Evaluates a ramp like volume::Ramp: 0 stays 0. first: its first part. The binary search has no branch that is the
 // same for all voxels, because zink of Mesa 22.3 would keep the first outcome of such a branch.
 float cm_ramp(uint first, float value) {
   uint part = first;
   for (uint step = CM_RAMP_PARTS / 2u; step > 0u; step /= 2u)
-    part += value >= cm_glow.ramps[part + step].from ? step : 0u;
-  CmRampPart at = cm_glow.ramps[part];
+    part += value >= cm_emissive.ramps[part + step].from ? step : 0u;
+  CmRampPart at = cm_emissive.ramps[part];
   return value > 0.0 ? max(0.0, at.start + at.slope * (value - at.from)) : 0.0;
 }
 
-vec3 cm_body_colour(uint i) {
-  return vec3(cm_glow.colours[3u * i], cm_glow.colours[3u * i + 1u], cm_glow.colours[3u * i + 2u]);
+vec3 cm_body_color(uint i) {
+  return vec3(cm_emissive.colors[3u * i], cm_emissive.colors[3u * i + 1u], cm_emissive.colors[3u * i + 2u]);
 }
 
 // The same function as light::BlackBody::emission.
@@ -58,34 +58,34 @@ vec3 cm_black_body(float kelvin) {
   const float log_range = 5.99146455;  // log(40000 / coldest)
   if (!(kelvin >= coldest)) return vec3(0.0);
   float square = kelvin * kelvin;
-  float radiance = cm_glow.unit * (1.0 + cm_glow.intensity * (square * square - 1.0));
-  float at = float(CM_BODY_COLOURS - 1) * min(log(kelvin / coldest) / log_range, 1.0);
-  uint first = min(uint(at), uint(CM_BODY_COLOURS - 2));
-  return radiance * mix(cm_body_colour(first), cm_body_colour(first + 1u), at - float(first));
+  float radiance = cm_emissive.unit * (1.0 + cm_emissive.intensity * (square * square - 1.0));
+  float at = float(CM_BODY_COLORS - 1) * min(log(kelvin / coldest) / log_range, 1.0);
+  uint first = min(uint(at), uint(CM_BODY_COLORS - 2));
+  return radiance * mix(cm_body_color(first), cm_body_color(first + 1u), at - float(first));
 }
 
 vec3 cm_emission(float temperature_value, float flame_value) {
-  vec3 light = cm_ramp(CM_RAMP_PARTS, flame_value) * cm_glow.flame_colour;
+  vec3 light = cm_ramp(CM_RAMP_PARTS, flame_value) * cm_emissive.flame_color;
   float temperature = cm_ramp(0u, temperature_value);
   if (temperature > 0.0) {
     const float hottest = 1e6;
-    float kelvin = min(cm_glow.offset + cm_glow.scale * temperature, hottest);
-    light += cm_black_body(kelvin) * cm_glow.tint;
+    float kelvin = min(cm_emissive.offset + cm_emissive.scale * temperature, hottest);
+    light += cm_black_body(kelvin) * cm_emissive.tint;
   }
-  return min(light, vec3(cm_glow.most));
+  return min(light, vec3(cm_emissive.most));
 }
 
 vec3 cm_product(float fields[CM_FIELDS]) { return cm_emission(fields[0], fields[1]); }
 #else
 
-vec3 cm_coloured(float density, vec3 colour) { return density * clamp(colour, vec3(0.0), vec3(1.0)); }
+vec3 cm_colored(float density, vec3 color) { return density * clamp(color, vec3(0.0), vec3(1.0)); }
 
 #if CM_PRODUCT == 1
-vec3 cm_product(float fields[CM_FIELDS]) { return cm_coloured(fields[0], vec3(fields[1], fields[2], fields[3])); }
+vec3 cm_product(float fields[CM_FIELDS]) { return cm_colored(fields[0], vec3(fields[1], fields[2], fields[3])); }
 #elif CM_COMPONENTS == 1
 vec3 cm_product(float fields[CM_FIELDS]) {
 #if CM_PRODUCT == 3
-  float scatters = cm_luminance(cm_coloured(fields[0], vec3(fields[1], fields[2], fields[3])));
+  float scatters = cm_luminance(cm_colored(fields[0], vec3(fields[1], fields[2], fields[3])));
 #else
   float scatters = fields[0];
 #endif

@@ -1,10 +1,10 @@
 // The BSDF: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular and _clearcoat.
-// With CM_RICH also _transmission, _volume, _dispersion, _sheen, _anisotropy and _iridescence (glsl/film.glsl,
+// With CM_EXTENDED_BSDF also _transmission, _volume, _dispersion, _sheen, _anisotropy and _iridescence (glsl/film.glsl,
 // glsl/sheen.glsl). Shared by GLSL and C++. The includer provides before this
 //   vec2 cm_ggx_albedo(float roughness, float cosine)
 //   vec2 cm_ggx_albedo_average(float roughness)
 // which look up the table of src/surface/ggx_albedo.hpp: a GGX lobe with a Fresnel term of f0 and f90 reflects f0 x +
-// f90 y of constant radiance, towards a cosine and as a cosine-weighted average. With CM_RICH also
+// f90 y of constant radiance, towards a cosine and as a cosine-weighted average. With CM_EXTENDED_BSDF also
 //   float cm_sheen_albedo(float roughness, float cosine)
 //   float cm_sheen_albedo_average(float roughness)
 // which look up the table of src/surface/sheen_albedo.hpp.
@@ -33,7 +33,7 @@
 #include "frame.glsl"
 #include "ggx.glsl"
 #include "numbers.glsl"
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 #include "film.glsl"
 #include "sheen.glsl"
 #endif
@@ -49,7 +49,7 @@ struct CmSurface {
   float specular;             // reflectance of the dielectric at grazing incidence
   float clearcoat;            // weight of the coat, of ior 1.5
   float clearcoat_roughness;  // like roughness
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   vec3 geometric;         // triangle normal, unit, on wo's side: transmitted light is behind it
   vec3 tangent;           // unit, perpendicular to the normal: direction of alpha.x
   CmAlpha alpha;          // of the base lobe; roughness corresponds to their mean
@@ -82,7 +82,7 @@ CM_FN float cm_interface_fresnel(CmSurface s, float cosine) {
   return f0 + (s.specular - f0) * cm_schlick(cosine);
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 
 CM_FN void cm_surface_frame(CmSurface s, CM_OUT(vec3) u, CM_OUT(vec3) v) {
   u = s.tangent;
@@ -180,19 +180,19 @@ CM_FN float cm_below_coat_towards(CmSurface s, float cosine) {
 // Albedo of only the Lambertian lobe under constant radiance, without the coat.
 CM_FN vec3 cm_matte_albedo(CmSurface s, float cosine) {
   float share = (1.0f - s.metallic) * cm_below_interface(s, cosine);
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   share *= 1.0f - s.transmission;
 #endif
   return s.base_color * share;
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 
 // Color of the transmitted part of the light that passes the interface.
 CM_FN vec3 cm_transmitted(CmSurface s) { return s.base_color * (s.transmission * (1.0f - s.metallic)); }
 
 // Returns true if transmission goes straight on and is no lobe: cm_bsdf_passes.
-CM_FN bool cm_is_clear(CmSurface s) { return s.eta == 0.0f && max(s.alpha.x, s.alpha.y) <= 1.001f * CM_LEAST_ALPHA; }
+CM_FN bool cm_is_clear(CmSurface s) { return s.eta == 0.0f && max(s.alpha.x, s.alpha.y) <= 1.001f * CM_MIN_ALPHA; }
 
 // Fraction of light that passes straight on. Paths do so with the largest channel as probability. Paths that do not are
 // shaded with the lobes, weighted by cm_surface_point's `kept`.
@@ -271,7 +271,7 @@ CM_FN float cm_through_pdf(CmSurface s, vec3 wo, vec3 wi) {
 CM_FN vec4 cm_lobe_weights(CmSurface s, float cosine) {
   float below = cm_below_coat_towards(s, cosine);
   float sheen = 0.0f;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   float coat = below;
   below *= cm_below_sheen_towards(s, cosine);
   sheen = coat - below;
@@ -307,7 +307,7 @@ CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine,
     float through = cm_below_interface(s, matte_cosine) / max(average, 1e-6f);
     matte = cm_matte_albedo(s, wo.z) * (terminator * through * matte_cosine * CM_INV_PI);
   }
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   if (cm_max3(s.sheen) > 0.0f) {
     float rough = s.sheen_roughness;
     float out_of = cm_below_sheen_towards(s, wo.z);
@@ -336,7 +336,7 @@ CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi)
   if (!cm_is_positive(wo.z)) return 0.0f;
   vec4 lobes = cm_lobe_weights(s, wo.z);
   float pdf = lobes.z * max(matte_cosine, 0.0f) * CM_INV_PI;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   if (wi.z > 0.0f) pdf += lobes.w * CM_SHEEN_PDF;
   if (lobes.y > 0.0f) pdf += lobes.y * cm_through_pdf(s, wo, wi);
 #endif
@@ -344,7 +344,7 @@ CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi)
   vec3 h = normalize(wo + wi);
   if (!cm_is_positive(h.z)) return pdf;
   float base = lobes.y;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   base *= cm_reflects(s, dot(wo, h));
 #endif
   if (base > 0.0f) pdf += base * cm_ggx_pdf(cm_base_alpha(s), wo, h);
@@ -374,7 +374,7 @@ CM_FN vec3 cm_bsdf_eval(CmSurface s, vec3 wo, vec3 wi) {
   cm_surface_frame(s, u, v);
   vec3 o = cm_into_frame(u, v, s.normal, wo);
   vec3 i = cm_into_frame(u, v, s.normal, wi);
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   if (s.transmission > 0.0f && dot(s.geometric, wi) < 0.0f) return cm_is_positive(o.z) ? cm_through_eval(s, o, i) : vec3(0.0f);
 #endif
   return cm_bsdf_eval_local(s, cm_terminator(s, wi), dot(s.matte_normal, wi), o, i);
@@ -404,7 +404,7 @@ CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
     if (u0 < lobes.x) alpha = cm_coat_alpha(s);
     vec3 h = cm_ggx_visible_normal(alpha, o, u1, u2);
     i = h * (2.0f * dot(o, h)) - o;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
     if (u0 >= lobes.x && u0 - lobes.x >= lobes.y * cm_reflects(s, dot(o, h))) {
       i = s.eta == 0.0f ? vec3(i.x, i.y, -i.z) : cm_refracted(s, o, h);
     }
@@ -437,7 +437,7 @@ CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
   return bent2 > 1e-12f ? bent * (1.0f / sqrt(bent2)) : geometric;
 }
 
-#if !CM_RICH
+#if !CM_EXTENDED_BSDF
 
 // Albedo of each lobe under a sky of constant radiance 1 without occlusion: the integral of cm_bsdf_eval over wi.
 struct CmAlbedos {

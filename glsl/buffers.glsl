@@ -1,6 +1,6 @@
 // Bindings of the grid's data, of surfaces and of the host's depth.
 #include "tree_node.glsl"
-#include "here.glsl"
+#include "current_volume.glsl"
 
 layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_surface;
 
@@ -12,22 +12,22 @@ float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
 }
 
 #if CM_SURFACES || CM_LAYERS
-layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
+layout(binding = CM_UNIT_LAYER_COLOR) uniform sampler2DArray cm_layer_color;
 layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
 
 // The surface at which a camera ray ends: the layer's opaque surface, or, with their coverage as probability, the
 // blended ones in front of it, which count as one at the nearest. Returns its view depth. colour: radiance, with alpha
 // 1; alpha 0 if there is no surface.
-float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour) {
+float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 color) {
   vec2 at = (vec2(pixel) + within) * vec2(cm.layers.size) / vec2(cm.view.size.xy);
   ivec3 texel = ivec3(min(ivec2(at), ivec2(cm.layers.size) - 1), int(sample_number % cm.layers.count));
-  colour = texelFetch(cm_layer_colour, texel, 0);
+  color = texelFetch(cm_layer_color, texel, 0);
   float z = texelFetch(cm_layer_z, texel, 0).x;
   if (cm.layers.blended != 0u) {
     texel.z += int(cm.layers.count);
-    vec4 blended = texelFetch(cm_layer_colour, texel, 0);
+    vec4 blended = texelFetch(cm_layer_color, texel, 0);
     if (u < blended.a) {
-      colour = vec4(blended.rgb / blended.a, 1.0);
+      color = vec4(blended.rgb / blended.a, 1.0);
       z = texelFetch(cm_layer_z, texel, 0).x;
     }
   }
@@ -48,10 +48,10 @@ uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(word)); }
 vec4 cm_atlas_value(ivec3 at) { return texelFetch(cm_atlas, at, 0); }
 #endif
 
-#if CM_LAMPS
+#if CM_ANALYTIC_LIGHTS
 #include "punctual.glsl"
-layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };
-CmLamp cm_lamp(uint i) { return cm_lamps[i]; }
+layout(std430, binding = CM_STORAGE_ANALYTIC_LIGHTS) readonly buffer CmAnalyticLightRecords { CmAnalyticLight cm_analytic_lights[]; };
+CmAnalyticLight cm_analytic_light(uint i) { return cm_analytic_lights[i]; }
 #endif
 
 #if CM_ENVIRONMENT
@@ -68,7 +68,7 @@ uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(
 layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
 #endif
 #if CM_CELL_LIGHTS
-uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(CM_GRID.first_glowing + i)); }
+uvec4 cm_emissive_word(uint i) { return texelFetch(cm_channels, int(CM_GRID.first_glowing + i)); }
 #endif
 
 #ifdef CM_MARCH
@@ -105,7 +105,7 @@ uvec4 cm_record(uint cell, uint part) {
 #if CM_CHANNELS
 uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(CM_GRID.first_emission + cell)); }
 uint cm_channel_word(uint word) { return cm_link(texelFetch(cm_channels, int(word >> 2)), word & 3u); }
-uint cm_colour_record(uint cell) { return cm_channel_word(CM_GRID.first_colour + cell); }
+uint cm_color_record(uint cell) { return cm_channel_word(CM_GRID.first_color + cell); }
 uint cm_anisotropy_record(uint cell) { return cm_channel_word(CM_GRID.first_anisotropy + (cell >> 1)); }
 #endif
 #if CM_VELOCITY || CM_MOTION

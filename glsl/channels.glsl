@@ -81,7 +81,7 @@ CM_FN float cm_cell_anisotropy(uint word, uint cell) {
 CM_FN vec3 cm_cell_velocity(uvec2 words) { return vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x); }
 
 // Scattering color weighted by density: 11, 11 and 10 bits of a word.
-CM_FN vec3 cm_cell_colour(uint word) {
+CM_FN vec3 cm_cell_color(uint word) {
   return vec3(float(word & 2047u) / 2047.0f, float((word >> 11) & 2047u) / 2047.0f, float(word >> 22) / 1023.0f);
 }
 

@@ -23,9 +23,9 @@ layout(location = 4) uniform vec3 cm_backdrop;  // radiance behind everything, b
 layout(location = 6) uniform bool cm_with_background;  // false: without the background
 layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // mean radiance
 #endif
-layout(location = 0) out vec4 cm_colour;
+layout(location = 0) out vec4 cm_color;
 #if CM_LAYERS
-layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
+layout(binding = CM_UNIT_LAYER_COLOR) uniform sampler2DArray cm_layer_color;
 layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
 layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_host_z;
 layout(location = 5) uniform ivec4 cm_layers;  // layers, whether blended ones follow, the host's depth layers
@@ -40,13 +40,13 @@ vec4 cm_surfaces(ivec2 texel) {
       ivec2 at = ivec2(share * vec2(textureSize(cm_host_z, 0).xy));
       host_z = texelFetch(cm_host_z, ivec3(at, i % cm_layers.z), 0).x;
     }
-    vec4 colour = vec4(0.0);
-    if (texelFetch(cm_layer_z, ivec3(texel, i), 0).x <= host_z) colour = texelFetch(cm_layer_colour, ivec3(texel, i), 0);
+    vec4 color = vec4(0.0);
+    if (texelFetch(cm_layer_z, ivec3(texel, i), 0).x <= host_z) color = texelFetch(cm_layer_color, ivec3(texel, i), 0);
     if (cm_layers.y > 0 && texelFetch(cm_layer_z, ivec3(texel, cm_layers.x + i), 0).x <= host_z) {
-      vec4 blended = texelFetch(cm_layer_colour, ivec3(texel, cm_layers.x + i), 0);
-      colour = blended + (1.0 - blended.a) * colour;
+      vec4 blended = texelFetch(cm_layer_color, ivec3(texel, cm_layers.x + i), 0);
+      color = blended + (1.0 - blended.a) * color;
     }
-    sum += colour;
+    sum += color;
   }
   return sum / float(cm_layers.x);
 }
@@ -115,7 +115,7 @@ void main() {
 #else
   vec4 value = cm_texel(pixel);
 #endif
-  cm_colour = cm_display_over(value, cm_exposure, CM_TONE_MAP, CM_ENCODE);
+  cm_color = cm_display_over(value, cm_exposure, CM_TONE_MAP, CM_ENCODE);
 #else
   float z = texelFetch(cm_volume_z, min(ivec2(at), size - 1), 0).x;
   if (!cm_is_positive(z)) discard;

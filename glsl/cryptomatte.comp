@@ -26,7 +26,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "ray.glsl"
 #include "walk.glsl"
 #include "ground.glsl"
-#include "fact_ray.glsl"
+#include "feature_ray.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_MATTES) uniform image2DArray cm_mattes;
 
@@ -35,9 +35,9 @@ layout(std430, binding = CM_STORAGE_MATTES) readonly buffer CmMatteIds { uint cm
 const uint CM_MATTE_OF_VOLUMES = 1u;
 
 // Maximum number of IDs per pixel.
-const uint CM_MOST_MATTES = 32u;
-uint cm_matte_id[CM_MOST_MATTES];
-float cm_matte_share[CM_MOST_MATTES];
+const uint CM_MAX_MATTES = 32u;
+uint cm_matte_id[CM_MAX_MATTES];
+float cm_matte_share[CM_MAX_MATTES];
 uint cm_matte_count = 0u;
 uint cm_matte_last = 0u;  // the slot used last: the next contribution is mostly to the same ID
 
@@ -46,9 +46,9 @@ uint cm_matte_slot(uint id) {
   uint slot = 0u;
   while (slot < cm_matte_count && cm_matte_id[slot] != id) slot += 1u;
   if (slot < cm_matte_count) return slot;
-  if (slot == CM_MOST_MATTES) {
+  if (slot == CM_MAX_MATTES) {
     slot = 0u;
-    for (uint i = 1u; i < CM_MOST_MATTES; ++i) {
+    for (uint i = 1u; i < CM_MAX_MATTES; ++i) {
       if (cm_matte_share[i] < cm_matte_share[slot]) slot = i;
     }
   } else {
@@ -83,7 +83,7 @@ void main() {
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
   uvec2 pixel = cm.dispatch.tile_corner + local;
   uint first_model = CM_MATTE_OF_VOLUMES + max(cm.space.volumes, 1u);
-  const int slices = int(CM_MOST_MATTES / 2u);
+  const int slices = int(CM_MAX_MATTES / 2u);
   float before = float(cm.dispatch.rays_before);
   bool more = before > 0.0;
   for (int slice = 0; slice < slices && more; ++slice) {
@@ -96,7 +96,7 @@ void main() {
     cm_matte_count += more ? 2u : pairs.y > 0.0 ? 1u : 0u;
   }
   for (int i = int(cm.dispatch.rays_before); i < int(cm.dispatch.samples); ++i) {
-    CmFactRay ray = cm_fact_ray(pixel, i);
+    CmFeatureRay ray = cm_feature_ray(pixel, i);
     float solid_t = ray.end;
     uint solid = 0u;  // the host's surfaces have no ID
 #if CM_SURFACES

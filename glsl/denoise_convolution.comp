@@ -33,7 +33,7 @@ layout(location = 9) uniform uint cm_from_1;
 layout(location = 10) uniform uint cm_blocks_1;
 #if CM_RESULT == 2
 layout(std430, binding = CM_STORAGE_DENOISE_BINS) readonly buffer CmBins { float cm_exposure; };
-layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
+layout(binding = CM_UNIT_DENOISE_COLOR) uniform sampler2D cm_color;
 layout(rgba32f, binding = CM_IMAGE_DENOISED) uniform writeonly image2D cm_denoised;
 layout(location = 11) uniform ivec2 cm_begin;       // corner of the tile in the image
 layout(location = 12) uniform ivec2 cm_keep_begin;  // pixels for which the tile is valid
@@ -66,7 +66,7 @@ uvec4 cm_block(vec4 lower, vec4 upper) {
 void cm_keep(uvec2 p, vec3 encoded) {
   ivec2 texel = cm_begin + ivec2(p);
   if (any(lessThan(texel, cm_keep_begin)) || any(greaterThanEqual(texel, cm_keep_end))) return;
-  vec4 before = texelFetch(cm_colour, texel, 0);
+  vec4 before = texelFetch(cm_color, texel, 0);
   vec3 after = vec3(cm_pu_inverse(encoded.r), cm_pu_inverse(encoded.g), cm_pu_inverse(encoded.b)) / cm_exposure;
   bool better = cm_is_finite(before.rgb) && cm_is_finite(after);
   imageStore(cm_denoised, texel, better ? vec4(after, before.a) : before);

@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 #include "denoise.glsl"
 
 #if CM_STAGE == 0
-layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
+layout(binding = CM_UNIT_DENOISE_COLOR) uniform sampler2D cm_color;
 #endif
 layout(std430, binding = CM_STORAGE_DENOISE_BINS) buffer CmBins {
   float cm_exposure;
@@ -36,15 +36,15 @@ void main() {
   uint group = cm_first + gl_WorkGroupID.x;
   uvec2 bins = uvec2(cm_bins_x, cm_bins_y);
   uvec2 bin = uvec2(group % bins.x, group / bins.x);
-  uvec2 size = uvec2(textureSize(cm_colour, 0));
+  uvec2 size = uvec2(textureSize(cm_color, 0));
   uvec2 begin = bin * size / bins;
   uvec2 end = (bin + 1u) * size / bins;
   uint width = end.x - begin.x;
   uint count = width * (end.y - begin.y);
   float sum = 0.0;
   for (uint i = lane; i < count; i += 64u) {
-    vec3 colour = texelFetch(cm_colour, ivec2(begin + uvec2(i % width, i / width)), 0).rgb;
-    sum += dot(cm_radiance(colour), vec3(0.212671, 0.715160, 0.072169));
+    vec3 color = texelFetch(cm_color, ivec2(begin + uvec2(i % width, i / width)), 0).rgb;
+    sum += dot(cm_radiance(color), vec3(0.212671, 0.715160, 0.072169));
   }
   float luminance = cm_sum(vec2(sum, 0.0)).x / float(count);
   bool lit = luminance > 1e-8 && cm_is_finite(luminance);

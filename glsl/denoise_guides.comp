@@ -16,7 +16,7 @@ layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;    // of sur
 layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
 layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;  // in front of them
 layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
-layout(rgba32f, binding = CM_IMAGE_GUIDE_COLOUR) uniform writeonly image2D cm_colour_out;
+layout(rgba32f, binding = CM_IMAGE_GUIDE_COLOR) uniform writeonly image2D cm_color_out;
 layout(rgba32f, binding = CM_IMAGE_GUIDE_ALBEDO) uniform writeonly image2D cm_albedo_out;
 layout(rgba32f, binding = CM_IMAGE_GUIDE_NORMAL) uniform writeonly image2D cm_normal_out;
 #if CM_KNOWN
@@ -36,7 +36,7 @@ vec3 cm_known_light(ivec2 texel) {
 
 // Brightness of the noise-free light relative to its neighborhood: 0 if black, 1/2 if equal to the neighborhood.
 vec3 cm_relief(ivec2 texel) {
-  ivec2 end = cm_first + imageSize(cm_colour_out) - 1;
+  ivec2 end = cm_first + imageSize(cm_color_out) - 1;
   vec4 about = vec4(0.0);
   for (int y = -CM_STEPS; y <= CM_STEPS; ++y) {
     for (int x = -CM_STEPS; x <= CM_STEPS; ++x) {
@@ -51,22 +51,22 @@ vec3 cm_relief(ivec2 texel) {
 
 void main() {
   ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(at, imageSize(cm_colour_out)))) return;
+  if (any(greaterThanEqual(at, imageSize(cm_color_out)))) return;
   ivec2 texel = cm_first + at;
-  vec4 colour = texelFetch(cm_sum, texel, 0) / max(float(texelFetch(cm_counts, texel, 0).x), 1.0);
+  vec4 color = texelFetch(cm_sum, texel, 0) / max(float(texelFetch(cm_counts, texel, 0).x), 1.0);
 #if CM_BACKGROUND
-  colour.rgb += texelFetch(cm_background, texel, 0).rgb;
+  color.rgb += texelFetch(cm_background, texel, 0).rgb;
 #endif
   float transmittance = texelFetch(cm_transmittance, texel, 0).x;
 #if CM_KNOWN
-  vec3 left = colour.rgb - cm_exact_light(texelFetch(cm_emission, texel, 0), transmittance);
+  vec3 left = color.rgb - cm_exact_light(texelFetch(cm_emission, texel, 0), transmittance);
   bool finite = cm_is_finite(left);
-  if (finite) colour.rgb = max(left, vec3(0.0));
+  if (finite) color.rgb = max(left, vec3(0.0));
   imageStore(cm_missing_out, at, vec4(finite ? max(-left, vec3(0.0)) : vec3(0.0), 0.0));
 #endif
   vec3 medium = transmittance < 1.0 ? cm_medium_albedo * cm_relief(texel) : cm_medium_albedo;
   vec3 albedo = mix(medium, texelFetch(cm_albedo, texel, 0).rgb, transmittance);
-  imageStore(cm_colour_out, at, colour);
+  imageStore(cm_color_out, at, color);
   imageStore(cm_albedo_out, at, vec4(albedo, 0.0));
   imageStore(cm_normal_out, at, vec4(transmittance * texelFetch(cm_normal, texel, 0).xyz, 0.0));
 }

@@ -6,7 +6,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "denoise.glsl"
 
-layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
+layout(binding = CM_UNIT_DENOISE_COLOR) uniform sampler2D cm_color;
 #if CM_GUIDES
 layout(binding = CM_UNIT_DENOISE_ALBEDO) uniform sampler2D cm_albedo;
 layout(binding = CM_UNIT_DENOISE_NORMAL) uniform sampler2D cm_normal;
@@ -29,9 +29,9 @@ void main() {
   uint group = cm_first + gl_WorkGroupID.x;
   uint groups_x = cm_width / 8u;
   uvec2 p = uvec2(group % groups_x, group / groups_x) * 8u + gl_LocalInvocationID.xy;
-  ivec2 texel = cm_mirrored(cm_begin + ivec2(p), textureSize(cm_colour, 0));
-  vec3 exposed = min(cm_exposure * cm_radiance(texelFetch(cm_colour, texel, 0).rgb), vec3(3e38));
-  vec3 colour = vec3(cm_pu(exposed.r), cm_pu(exposed.g), cm_pu(exposed.b));
+  ivec2 texel = cm_mirrored(cm_begin + ivec2(p), textureSize(cm_color, 0));
+  vec3 exposed = min(cm_exposure * cm_radiance(texelFetch(cm_color, texel, 0).rgb), vec3(3e38));
+  vec3 color = vec3(cm_pu(exposed.r), cm_pu(exposed.g), cm_pu(exposed.b));
 #if CM_GUIDES
   vec3 a = texelFetch(cm_albedo, texel, 0).rgb;
   vec3 n = texelFetch(cm_normal, texel, 0).rgb;
@@ -42,7 +42,7 @@ void main() {
   vec3 normal = vec3(0.0);
 #endif
   uint at = cm_to + p.y * cm_width + p.x;
-  cm_channels[at] = uvec4(cm_pack(colour.rg), cm_pack(vec2(colour.b, albedo.r)), cm_pack(albedo.gb),
+  cm_channels[at] = uvec4(cm_pack(color.rg), cm_pack(vec2(color.b, albedo.r)), cm_pack(albedo.gb),
                           cm_pack(normal.rg));
 #if CM_GUIDES
   cm_channels[at + cm_width * cm_height] = uvec4(cm_pack(vec2(normal.b, 0.0)), 0u, 0u, 0u);

@@ -18,7 +18,7 @@ CM_FN float cm_wavelength(float u) {
 }
 
 // The channels' spectral weights at a wavelength, over the pdf of cm_wavelength. Their mean is 1.
-CM_FN vec3 cm_wavelength_colour(float wavelength) {
+CM_FN vec3 cm_wavelength_color(float wavelength) {
   vec3 tents = max(1.0f - abs(vec3(wavelength) - CM_TENT_MIDDLE) * (1.0f / CM_TENT_HALF), 0.0f);
   return tents * (3.0f / max(tents.x + tents.y + tents.z, 1e-6f));
 }

@@ -11,7 +11,7 @@ struct CmExtinction {
 #endif
 };
 
-// Extinction of the current volume of glsl/here.glsl.
+// Extinction of the current volume of glsl/current_volume.glsl.
 CM_FN float cm_extinction_here(vec3 o, vec3 d, uvec3 cell) {
   CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
   float t_1;

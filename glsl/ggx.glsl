@@ -5,8 +5,8 @@
 
 // 1 for the extended-material variant, which has more than reflecting lobes of one roughness: the extensions listed
 // second in glsl/bsdf.glsl. It is a variant, so that scenes without them do not pay for it.
-#ifndef CM_RICH
-#define CM_RICH 0
+#ifndef CM_EXTENDED_BSDF
+#define CM_EXTENDED_BSDF 0
 #endif
 
 const float CM_INV_PI = 0.318309886f;
@@ -14,8 +14,8 @@ const float CM_INV_PI = 0.318309886f;
 // Entries per side of the table of directional albedos made by src/surface/ggx_albedo.hpp.
 const int CM_GGX_ALBEDO_SIZE = 32;
 
-const float CM_LEAST_ALPHA = 1e-3f;
-CM_FN float cm_alpha(float roughness) { return max(roughness * roughness, CM_LEAST_ALPHA); }
+const float CM_MIN_ALPHA = 1e-3f;
+CM_FN float cm_alpha(float roughness) { return max(roughness * roughness, CM_MIN_ALPHA); }
 
 // (1 - cosine)^5
 CM_FN float cm_schlick(float cosine) {
@@ -26,7 +26,7 @@ CM_FN float cm_schlick(float cosine) {
 
 // The functions below take vectors in the frame of the normal: z is the cosine. Anisotropic lobes have their two widths
 // along x and y, and alpha is a vector.
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 #define CmAlpha vec2
 CM_FN float cm_ggx_area(CmAlpha alpha) { return alpha.x * alpha.y; }
 CM_FN float cm_shrunk_square(CmAlpha alpha, vec3 h) {

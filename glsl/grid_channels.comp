@@ -140,7 +140,7 @@ vec4 cm_fine_sum(vec3 v0, uint shape, uint first_value) {
 uvec2 cm_pack_sum(vec4 sum) {
   if (!(sum.w > 0.0)) return uvec2(0u);
   vec3 mean = sum.xyz / sum.w;
-#if CM_CHANNEL == CM_CHANNEL_COLOUR
+#if CM_CHANNEL == CM_CHANNEL_COLOR
   uvec3 parts = uvec3(clamp(mean, 0.0, 1.0) * vec3(2047.0, 2047.0, 1023.0) + 0.5);
   return uvec2(parts.x | (parts.y << 11) | (parts.z << 22), 0u);
 #elif CM_CHANNEL == CM_CHANNEL_ANISOTROPY
@@ -165,7 +165,7 @@ uvec2 cm_leaf_record(vec3 v0, uint shape) {
 
 void cm_put(vec3 v0, uint shape, uint rank) {
   uvec2 record = cm_leaf_record(v0, shape);
-#if CM_CHANNEL == CM_CHANNEL_COLOUR
+#if CM_CHANNEL == CM_CHANNEL_COLOR
   cm_channel[rank] = record.x;
 #elif CM_CHANNEL == CM_CHANNEL_ANISOTROPY
   atomicOr(cm_channel[rank / 2u], record.x << (16u * (rank & 1u)));  // the word belongs to two cells and starts at 0

@@ -113,8 +113,8 @@ vec3 cm_show_cell(inout CmWalk walk, float t, uint axis, float pixel_size) {
   float edge = 3.0e38;
   for (int i = 0; i < faces.count; ++i) edge = min(edge, cm_edge(faces.normal[i], faces.c[i], p, axis));
   float density = cm_density_at(front.cell, p);
-  vec3 colour = cm_ramp(faces.level) * (density > 0.0 ? 1.0 : 0.35) + 0.35 * density;
-  return mix(vec3(0.0), colour, clamp(0.35 + 0.65 * edge / (pixel_size * length(d)), 0.35, 1.0));
+  vec3 color = cm_ramp(faces.level) * (density > 0.0 ? 1.0 : 0.35) + 0.35 * density;
+  return mix(vec3(0.0), color, clamp(0.35 + 0.65 * edge / (pixel_size * length(d)), 0.35, 1.0));
 }
 
 // Distance of p, on one of the cell's faces, to that face's nearest edge.
@@ -148,7 +148,7 @@ void main() {
   float t_per_z = cm_camera_ray(pixel, vec2(0.5), o, w);
   vec3 d = cm_to_cube(w);
   uint steps = 0u;
-  vec3 colour = vec3(0.02);
+  vec3 color = vec3(0.02);
   float alpha = 0.0;
   float half_t = 0.0;
   uint densest = 0u;
@@ -170,7 +170,7 @@ void main() {
     float t = (middle - cm_pick(o, axis)) / cm_pick(d, axis);
     if (hit && t > walk.entry && t < walk.t_end && cm_walk_to(walk, t)) {
       float pixel_size = footprint * (cm.view.orthographic != 0u ? 1.0 : t);
-      colour = cm_show_cell(walk, t, axis, pixel_size);
+      color = cm_show_cell(walk, t, axis, pixel_size);
       alpha = 1.0;
     }
   } else if (hit) {
@@ -216,8 +216,8 @@ void main() {
     }
     alpha = 1.0 - exp(-used);
     // Steps: each doubling is a tenth of the ramp; 1024 is its end.
-    colour = view == CM_VIEW_STEPS ? cm_ramp(log2(1.0 + float(steps)) * 0.1) : vec3(alpha);
-    if (view == CM_VIEW_WIREFRAME) colour = lines + clear * vec3(0.02) + 0.04 * alpha;
+    color = view == CM_VIEW_STEPS ? cm_ramp(log2(1.0 + float(steps)) * 0.1) : vec3(alpha);
+    if (view == CM_VIEW_WIREFRAME) color = lines + clear * vec3(0.02) + 0.04 * alpha;
   }
   if (view == CM_VIEW_DEPTH) {
     bool met_volume = half_t > 0.0;
@@ -232,6 +232,6 @@ void main() {
     imageStore(cm_volume_z, ivec2(cm.dispatch.picks != 0u ? local : pixel), vec4(half_t / t_per_z));
     return;
   }
-  imageStore(cm_sum, ivec2(pixel), vec4(colour, alpha));
+  imageStore(cm_sum, ivec2(pixel), vec4(color, alpha));
   imageStore(cm_counts, ivec2(pixel), uvec4(1u, steps, 0u, 0u));
 }

@@ -11,13 +11,13 @@ layout(std140, binding = CM_STORAGE_INSTANCE_NODES) readonly buffer CmInstanceNo
 #endif
 
 #if CM_MOTION
-CM_FN CmStanding cm_instance_end(uint at) {
-  return CmStanding(cm_instances[at].space.from_cube_x, cm_instances[at].space.from_cube_y,
+CM_FN CmInstanceTransform cm_instance_end(uint at) {
+  return CmInstanceTransform(cm_instances[at].space.from_cube_x, cm_instances[at].space.from_cube_y,
                     cm_instances[at].space.from_cube_z, cm_instances[at].space.cube_origin);
 }
 // A moving instance has two further records behind the table's: transforms at shutter open and at shutter close.
 CM_FN bool cm_instance_moves(uint at) { return (cm_instances[at].flags & CM_INSTANCE_MOVES) != 0u; }
-CM_FN CmStanding cm_instance_standing(uint at) {
+CM_FN CmInstanceTransform cm_instance_transform(uint at) {
   return cm_between(cm_instance_end(at + cm.space.volumes), cm_instance_end(at + 2u * cm.space.volumes));
 }
 #endif
@@ -25,7 +25,7 @@ CM_FN CmStanding cm_instance_standing(uint at) {
 // Transforms a vector and a point from the scene's frame to an instance's cube space.
 CM_FN vec3 cm_in_instance(uint at, vec3 v) {
 #if CM_MOTION
-  if (cm_instance_moves(at)) return cm_in_standing(cm_instance_standing(at), v);
+  if (cm_instance_moves(at)) return cm_to_instance(cm_instance_transform(at), v);
 #endif
   CM_PRECISE vec3 turned = cm_instances[at].space.to_cube_x * v.x + cm_instances[at].space.to_cube_y * v.y +
                            cm_instances[at].space.to_cube_z * v.z;
@@ -34,8 +34,8 @@ CM_FN vec3 cm_in_instance(uint at, vec3 v) {
 CM_FN vec3 cm_in_instance_point(uint at, vec3 p) {
 #if CM_MOTION
   if (cm_instance_moves(at)) {
-    CmStanding standing = cm_instance_standing(at);
-    return cm_in_standing(standing, p - standing.origin);
+    CmInstanceTransform standing = cm_instance_transform(at);
+    return cm_to_instance(standing, p - standing.origin);
   }
 #endif
   return cm_in_instance(at, p - cm_instances[at].space.cube_origin);

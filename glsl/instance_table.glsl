@@ -15,7 +15,7 @@ const uint CM_INSTANCE_MOVES = 8u;     // its transform differs at shutter open 
 CM_BLOCK(CmInstance) {
   CmSpace space;
   CmGrid grid;
-  CmGlow glow;  // density: over all instances together
+  CmEmissive emissive;  // density: over all instances together
   CmMedium medium;
   uint flags;
   uint alias;        // alias table: a uniformly drawn entry stays if a random word is below this,

@@ -20,7 +20,7 @@
 
 // Channels of cells beside density.
 #define CM_CHANNEL_EMISSION 0
-#define CM_CHANNEL_COLOUR 1
+#define CM_CHANNEL_COLOR 1
 #define CM_CHANNEL_ANISOTROPY 2
 #define CM_CHANNEL_VELOCITY 3
 // Words of a channel for a cube's cells above bricks: `record` words per cell, and two words of bits.

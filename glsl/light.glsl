@@ -19,14 +19,14 @@
 #define CM_LIGHT_SKY 0u       // uniform; sampled in the direction of a scattered ray
 #define CM_LIGHT_SUN 1u       // distant: a disk, or without extent
 #define CM_LIGHT_TRIANGLE 2u  // emissive triangles
-#define CM_LIGHT_LAMP 3u      // lights of punctual.glsl
-#define CM_LIGHT_GLOW 4u      // emission of the medium: rays scattered at surfaces are aimed at its bounds
+#define CM_LIGHT_ANALYTIC_LIGHT 3u      // lights of punctual.glsl
+#define CM_LIGHT_EMISSIVE 4u      // emission of the medium: rays scattered at surfaces are aimed at its bounds
 #define CM_LIGHT_OTHER 5u     // kinds of CM_MORE_LIGHTS
 #define CM_LIGHT_ENVIRONMENT 6u  // environment map, instead of the sky
 #define CM_LIGHT_CELL 7u  // emissive cells
 
 #if CM_GROUPS
-uint cm_look_group = 0u;           // group of the light, triangle or cell that was picked last
+uint cm_nee_group = 0u;           // group of the light, triangle or cell that was picked last
 uint cm_group_lane = 0u;           // glsl/groups.glsl
 void cm_add_to_group(uint group, vec3 radiance);
 
@@ -35,7 +35,7 @@ void cm_add_to_group(uint group, vec3 radiance);
 uint cm_group_of(uint kind) {
   if (kind == CM_LIGHT_SUN) return cm.integrator.sun_group;
   if (kind == CM_LIGHT_SKY || kind == CM_LIGHT_ENVIRONMENT) return cm.integrator.sky_group;
-  return cm_look_group;
+  return cm_nee_group;
 }
 #endif
 
@@ -45,7 +45,7 @@ struct CmLightSample {
   vec3 radiance;   // arriving radiance; for kinds without extent an irradiance
   vec3 direction;  // world, unit
   float distance;  // 3e38: distant
-  float density;   // solid-angle pdf; without extent, the selection probability
+  float pdf;   // solid-angle pdf; without extent, the selection probability
 };
 
 // The light that a ray reaches.
@@ -53,18 +53,18 @@ struct CmLightHit {
   uint kind;
   vec3 o;         // cube space: origin of the ray
   vec3 w;         // world, unit: its direction
-  float flight;   // solid-angle pdf of the scattered ray's direction
+  float scattering_pdf;   // solid-angle pdf of the scattered ray's direction
   uint triangle;  // triangle that was hit
   vec3 point;     // world: point on that triangle
   vec3 normal;    // world, unit: normal of that triangle
 };
 
-CM_FN CmLightHit cm_light_hit(uint kind, vec3 o, vec3 w, float flight) {
+CM_FN CmLightHit cm_light_hit(uint kind, vec3 o, vec3 w, float scattering_pdf) {
   CmLightHit hit;
   hit.kind = kind;
   hit.o = o;
   hit.w = w;
-  hit.flight = flight;
+  hit.scattering_pdf = scattering_pdf;
   hit.triangle = 0u;
   hit.point = vec3(0.0f, 0.0f, 0.0f);
   hit.normal = w;
@@ -74,9 +74,9 @@ CM_FN CmLightHit cm_light_hit(uint kind, vec3 o, vec3 w, float flight) {
 // ---- The sky
 
 CM_FN vec3 cm_sky_radiance(vec3 w) { return cm.lights.sky_radiance; }
-CM_FN float cm_sky_pdf(CmLightHit hit) { return hit.flight; }
-CM_FN CmLightSample cm_sky_along(vec3 w, float flight) {
-  return CmLightSample(CM_LIGHT_SKY, cm_sky_radiance(w), w, 3.0e38f, flight);
+CM_FN float cm_sky_pdf(CmLightHit hit) { return hit.scattering_pdf; }
+CM_FN CmLightSample cm_sky_along(vec3 w, float scattering_pdf) {
+  return CmLightSample(CM_LIGHT_SKY, cm_sky_radiance(w), w, 3.0e38f, scattering_pdf);
 }
 // Placeholder: cm_scatter replaces it by cm_sky_along once it has sampled a direction. Until then `density` is only the
 // selection probability.
@@ -116,7 +116,7 @@ CM_FN CmLightSample cm_sun_sample(vec3 u) {
     light.direction =
         normalize(across * (sine * cos(angle)) + along * (sine * sin(angle)) + light.direction * (1.0f - spread));
     light.radiance = cm.lights.sun_radiance;
-    light.density = 0.159154943f / cm.lights.sun_spread;
+    light.pdf = 0.159154943f / cm.lights.sun_spread;
   }
   return light;
 }
@@ -125,19 +125,19 @@ CM_FN CmLightSample cm_sun_sample(vec3 u) {
 
 #include "channels.glsl"
 
-// ---- Emissive cells; their table is made by src/scene/glow.hpp
+// ---- Emissive cells; their table is made by src/scene/emissive_cells.hpp
 //
 // NEE picks an emissive cell by its power and samples a point in it; scattered rays accumulate the emission of all
 // cells that they cross. Both are combined by the balance heuristic. For scattered rays the pdf is that of their
 // direction. For NEE it is the cell's volume pdf times a lower bound of the squared distance. The latter depends only
-// on the cell and on the ray's origin, not on the sampled point. CmGlow.extent, a length, converts the volume pdf to a
+// on the cell and on the ray's origin, not on the sampled point. CmEmissive.extent, a length, converts the volume pdf to a
 // solid-angle pdf.
 
-CM_FN float cm_glow_pdf_of(vec3 mean, float distance) {
-  float least = distance * CM_GLOW.least_stretch;
-  return cm_luminance(mean) * CM_GLOW.density * CM_GLOW.extent * least * least;
+CM_FN float cm_emissive_pdf_of(vec3 mean, float distance) {
+  float least = distance * CM_EMISSIVE.min_stretch;
+  return cm_luminance(mean) * CM_EMISSIVE.density * CM_EMISSIVE.extent * least * least;
 }
-CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.mean, emission.distance); }
+CM_FN float cm_cell_pdf(CmEmission emission) { return cm_emissive_pdf_of(emission.mean, emission.distance); }
 
 #endif
 
@@ -152,12 +152,12 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 #endif
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x632be5abu)));
   uint i = cm_below(pick.x, CM_GRID.glowing);
-  uvec4 entry = cm_glow_word(2u * i);
+  uvec4 entry = cm_emissive_word(2u * i);
   if (pick.y > entry.x) {
     i = entry.y;
-    entry = cm_glow_word(2u * i);
+    entry = cm_emissive_word(2u * i);
   }
-  uvec4 record = cm_glow_word(2u * i + 1u);
+  uvec4 record = cm_emissive_word(2u * i + 1u);
   uvec4 place = uvec4(entry.z, entry.w, 0u, 0u);
   bool wide = cm_is_wide(CM_GRID.root_exponent);
   uint shape = cm_record_shape(place, wide);
@@ -171,20 +171,20 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   vec3 mean = cm_emission_mean(record);
   vec3 from_centroid = cm_to_frame(to_v0, shape) * -cm_shape_inverse_unit(shape) - cm_frame_centroid(cell_class);
   float distance = cm_cell_distance(from_centroid, shape);
-  float least = distance * CM_GLOW.least_stretch;
+  float least = distance * CM_EMISSIVE.min_stretch;
   CmLightSample light;
   light.kind = CM_LIGHT_CELL;
   light.direction = way * inversesqrt(length_2);
   light.distance = sqrt(length_2);
-  light.density = cm_glow_pdf_of(mean, distance);
-  light.radiance = mean * (cm_emission_at(record, cell_class, point) * CM_GLOW.extent * least * least / length_2);
+  light.pdf = cm_emissive_pdf_of(mean, distance);
+  light.radiance = mean * (cm_emission_at(record, cell_class, point) * CM_EMISSIVE.extent * least * least / length_2);
 #if CM_GROUPS
-  cm_look_group = CM_MEDIUM.group;
+  cm_nee_group = CM_MEDIUM.group;
 #endif
 #if CM_INSTANCES && CM_MOTION
   // The table's probabilities assume the volumes of the cells at the frame time.
   if (cm_instance_moves(cm_here))
-    light.radiance *= abs(cm_standing_volume(cm_instance_standing(cm_here))) / cm_instances[cm_here].space.unit_volume;
+    light.radiance *= abs(cm_transform_determinant(cm_instance_transform(cm_here))) / cm_instances[cm_here].space.unit_volume;
 #endif
 #if CM_INSTANCES
   cm_here = stood;
@@ -194,30 +194,30 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #endif
 
-#if CM_LAMPS
+#if CM_ANALYTIC_LIGHTS
 
-// ---- Punctual and area lights; no scattered ray hits them. The includer provides CmLamp cm_lamp(uint i)
+// ---- Punctual and area lights; no scattered ray hits them. The includer provides CmAnalyticLight cm_analytic_light(uint i)
 
 #include "punctual.glsl"
 
 // Picks a light by the alias table of light::share_looks. O(1).
-CM_FN CmLamp cm_pick_lamp(CmPath p, uint salt) {
+CM_FN CmAnalyticLight cm_pick_analytic_light(CmPath p, uint salt) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, salt)));
-  uint i = cm_below(pick.x, max(cm.lamps.count, 1u));
-  if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;
+  uint i = cm_below(pick.x, max(cm.analytic_lights.count, 1u));
+  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;
 #if CM_GROUPS
-  cm_look_group = cm_lamp(i).group;
+  cm_nee_group = cm_analytic_light(i).group;
 #endif
-  return cm_lamp(i);
+  return cm_analytic_light(i);
 }
 
-CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
-  CmLamp lamp = cm_pick_lamp(p, 0x2c1b3c6du);
-  vec3 from = lamp.extended != 0u ? cm_lamp_point(lamp, u.x, u.y) : vec3(0.0f, 0.0f, 0.0f);
+CM_FN CmLightSample cm_analytic_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
+  CmAnalyticLight analytic_light = cm_pick_analytic_light(p, 0x2c1b3c6du);
+  vec3 from = analytic_light.extended != 0u ? cm_analytic_light_point(analytic_light, u.x, u.y) : vec3(0.0f, 0.0f, 0.0f);
   CmLightSample light;
-  light.kind = CM_LIGHT_LAMP;
-  light.radiance = cm_lamp_irradiance(lamp, from, here, light.direction, light.distance);
-  light.density = lamp.chance;
+  light.kind = CM_LIGHT_ANALYTIC_LIGHT;
+  light.radiance = cm_analytic_light_irradiance(analytic_light, from, here, light.direction, light.distance);
+  light.pdf = analytic_light.chance;
   return light;
 }
 
@@ -231,7 +231,7 @@ CM_FN uvec4 cm_emitter(uint model, uint i) { return cm_words(cm_models[model].em
 
 // Solid-angle pdf of a point on an emissive triangle. The model and the triangle are picked by power, the point by
 // area. way: vector from the shading point to that point, along w (unit); n: unit normal of the triangle.
-CM_FN float cm_emitter_density(uint model, uvec4 entry, vec3 way, vec3 w, vec3 n) {
+CM_FN float cm_emitter_pdf(uint model, uvec4 entry, vec3 way, vec3 w, vec3 n) {
   float by_area = cm_models[model].emitter_chance * abs(uintBitsToFloat(entry.w)) * cm_own_area(model, n);
 #if CM_MOTION
   // The table's probabilities assume the triangles' areas at the frame time.
@@ -255,7 +255,7 @@ CM_FN float cm_triangle_pdf(CmLightHit hit) {
   }
   uvec4 entry = cm_emitter(model, low);
   vec3 way = hit.point - cm_from_cube_point(hit.o);
-  return entry.x == triangle ? cm_emitter_density(model, entry, way, hit.w, hit.normal) : 0.0f;
+  return entry.x == triangle ? cm_emitter_pdf(model, entry, way, hit.w, hit.normal) : 0.0f;
 }
 
 // Takes O(1). The distance ends just before the triangle.
@@ -266,7 +266,7 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
   uvec4 entry = cm_emitter(model, cm_below(pick.x, cm_models[model].emitter_count));
 #if CM_GROUPS
-  cm_look_group = cm_models[model].group;
+  cm_nee_group = cm_models[model].group;
 #endif
   if (pick.y > entry.y) entry = cm_emitter(model, entry.z);
   float root = sqrt(u.x);
@@ -284,7 +284,7 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   light.kind = CM_LIGHT_TRIANGLE;
   light.direction = way * inversesqrt(length_2);
   light.distance = sqrt(length_2) * 0.99999f;
-  light.density = cm_emitter_density(model, entry, way, light.direction, g);
+  light.pdf = cm_emitter_pdf(model, entry, way, light.direction, g);
   uint flags = cm_words(m.material + CM_MATERIAL_FLAGS).x;
   bool clockwise = (uintBitsToFloat(entry.w) < 0.0f) != cm_mirrors(model);
   light.radiance = along == clockwise || (flags & CM_ONE_SIDED) == 0u ? cm_emission(m) : vec3(0.0f, 0.0f, 0.0f);
@@ -294,13 +294,13 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 // ---- Emission of the medium: uniformly sampled points of its bounds
 
-CM_FN vec3 cm_glow_direction(vec3 o, vec3 u, vec3 otherwise) {
+CM_FN vec3 cm_emissive_direction(vec3 o, vec3 u, vec3 otherwise) {
   vec3 way = cm_to_world(mix(cm.space.box_min, cm.space.box_max, u) - o);
   return dot(way, way) > 0.0f ? normalize(way) : otherwise;
 }
 
 // Solid-angle pdf: the integral of t^2 over the ray's segment in the bounds, divided by the volume of the bounds.
-CM_FN float cm_glow_pdf(CmLightHit hit) {
+CM_FN float cm_emissive_pdf(CmLightHit hit) {
   vec2 range = cm_box_range(hit.o, cm_to_cube(hit.w));
   if (!(range.x < range.y)) return 0.0f;
   vec3 box = cm.space.box_max - cm.space.box_min;
@@ -337,11 +337,11 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 #if CM_SURFACES > 1
 #define CM_NEAR_LIGHTS(LIGHT)                                                                         \
   LIGHT(CM_LIGHT_TRIANGLE, cm.lights.triangle_chance, cm_triangle_sample, cm_triangle_pdf, cm_unused) \
-  LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)                   \
+  LIGHT(CM_LIGHT_ANALYTIC_LIGHT, cm.lights.analytic_light_chance, cm_analytic_light_sample, cm_no_pdf, cm_unused)                   \
   CM_GLOWING_LIGHTS(LIGHT)
-#elif CM_LAMPS
+#elif CM_ANALYTIC_LIGHTS
 #define CM_NEAR_LIGHTS(LIGHT)                                                       \
-  LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused) \
+  LIGHT(CM_LIGHT_ANALYTIC_LIGHT, cm.lights.analytic_light_chance, cm_analytic_light_sample, cm_no_pdf, cm_unused) \
   CM_GLOWING_LIGHTS(LIGHT)
 #else
 #define CM_NEAR_LIGHTS(LIGHT) CM_GLOWING_LIGHTS(LIGHT)
@@ -363,15 +363,15 @@ CM_FN float cm_light_pdf(CmLightHit hit) {
   CM_NEAR_LIGHTS(CM_DENSITY)
   if (hit.kind == CM_LIGHT_SUN) return cm_sun_chance() * cm_sun_pdf(hit);
 #if CM_SURFACES
-  if (hit.kind == CM_LIGHT_GLOW) return cm.lights.glow_chance * cm_glow_pdf(hit);
+  if (hit.kind == CM_LIGHT_EMISSIVE) return cm.lights.emissive_chance * cm_emissive_pdf(hit);
 #endif
   return 0.0f;
 }
 
-#define CM_LOOK(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                 \
+#define CM_NEE(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                 \
   if (u.z >= before && u.z < before + CHANCE) {                        \
     light = SAMPLE(p, here, vec3(u.x, u.y, (u.z - before) / CHANCE));  \
-    light.density *= CHANCE;                                           \
+    light.pdf *= CHANCE;                                           \
   }                                                                    \
   before += CHANCE;
 
@@ -379,15 +379,15 @@ CM_FN float cm_light_pdf(CmLightHit hit) {
 CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   CmLightSample light = cm_sun_sample(u);
   float before = 0.0f;
-  CM_FAR_LIGHTS(CM_LOOK)
-#if CM_LAMPS
+  CM_FAR_LIGHTS(CM_NEE)
+#if CM_ANALYTIC_LIGHTS
   // A new random number for the near kinds. The individual light is picked by the random state after it.
-  if (u.z >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
+  if (u.z >= before && cm.lights.triangle_chance + cm.lights.analytic_light_chance > 0.0f) {
     u.z = before + (1.0f - before) * cm_random(p.random, p.stream);
   }
 #endif
-  CM_NEAR_LIGHTS(CM_LOOK)
-  if (light.kind == CM_LIGHT_SUN) light.density *= max(0.0f, 1.0f - before);
+  CM_NEAR_LIGHTS(CM_NEE)
+  if (light.kind == CM_LIGHT_SUN) light.pdf *= max(0.0f, 1.0f - before);
   return light;
 }
 
@@ -399,10 +399,10 @@ CM_FN bool cm_is_far(CmLightSample light) {
 
 // Fraction of NEE samples of uniform distant light that are worth a shadow ray. Scattered rays also reach that light:
 // each one that is neither absorbed nor at its last event escapes in the end, with the same contribution.
-CM_FN float cm_look_share_of_even(CmPath p) {
+CM_FN float cm_nee_even_probability(CmPath p) {
   vec3 albedo = CM_MEDIUM.albedo;
 #if CM_CHANNELS && defined(CM_MARCH)
-  if (CM_MEDIUM.coloured != 0u) albedo *= cm_march_colour(p.start_cell);
+  if (CM_MEDIUM.colored != 0u) albedo *= cm_march_color(p.start_cell);
 #endif
   float absorbed = 1.0f - max(albedo.x, max(albedo.y, albedo.z));
   float left = float(cm.integrator.max_bounces) + 1.0f - float(p.bounces);
@@ -412,40 +412,40 @@ CM_FN float cm_look_share_of_even(CmPath p) {
 // Probability of tracing the shadow ray of a light sample. In media, samples with a small expected contribution are
 // skipped by Russian roulette; tests/bench/README.md has measurements. density: pdf of the light sample, including the
 // probability of its kind. flight: pdf of the same direction by the phase function.
-CM_FN float cm_look_chance(CmPath p, uint kind, float flight, float density) {
+CM_FN float cm_nee_probability(CmPath p, uint kind, float scattering_pdf, float pdf) {
   if (p.start != CM_IN_MEDIUM) return 1.0f;
-  if (kind == CM_LIGHT_SKY) return cm_look_share_of_even(p);
+  if (kind == CM_LIGHT_SKY) return cm_nee_even_probability(p);
   // In proportion to the phase function, and lower after many events. For near lights the number of events is ignored,
   // because their distance matters more.
-  float share = 12.5663706f * flight;
-  bool near = kind == CM_LIGHT_LAMP || kind == CM_LIGHT_TRIANGLE || kind == CM_LIGHT_CELL;
+  float share = 12.5663706f * scattering_pdf;
+  bool near = kind == CM_LIGHT_ANALYTIC_LIGHT || kind == CM_LIGHT_TRIANGLE || kind == CM_LIGHT_CELL;
   if (!near) share *= clamp(8.0f / float(p.bounces), 0.25f, 1.0f);
 #if CM_ENVIRONMENT
   // Where the environment is much brighter than its mean, such as a sun in it, scattered rays seldom find it.
-  float bright = 12.5663706f * density / max(cm.lights.environment_chance, 1e-30f);
-  if (kind == CM_LIGHT_ENVIRONMENT) share *= max(cm_look_share_of_even(p), min(1.0f, 0.125f * bright));
+  float bright = 12.5663706f * pdf / max(cm.lights.environment_chance, 1e-30f);
+  if (kind == CM_LIGHT_ENVIRONMENT) share *= max(cm_nee_even_probability(p), min(1.0f, 0.125f * bright));
 #endif
   return min(1.0f, share);
 }
 
 // Solid-angle pdf of NEE for the light that the path's scattered ray has reached, including the roulette on shadow
 // rays.
-CM_FN float cm_look_pdf(CmPath p, CmLightHit hit) {
-  float density = cm_light_pdf(hit);
-  return density * cm_look_chance(p, hit.kind, hit.flight, density);
+CM_FN float cm_nee_pdf(CmPath p, CmLightHit hit) {
+  float pdf = cm_light_pdf(hit);
+  return pdf * cm_nee_probability(p, hit.kind, hit.scattering_pdf, pdf);
 }
 
 // Weighted radiance of the distant lights that a scattered ray reaches when it escapes with this transmittance.
 #if CM_GROUPS
 #define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                                         \
-  of_kind = RADIANCE(p.w) * cm_balance(transmittance * p.density,                                \
-                                       cm_look_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.density))); \
+  of_kind = RADIANCE(p.w) * cm_balance(transmittance * p.pdf,                                \
+                                       cm_nee_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.pdf))); \
   brought += of_kind;                                                                            \
   cm_add_to_group(cm_group_of(NUMBER), p.throughput * of_kind);
 #else
 #define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)           \
-  brought += RADIANCE(p.w) * cm_balance(transmittance * p.density, \
-                                        cm_look_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.density)));
+  brought += RADIANCE(p.w) * cm_balance(transmittance * p.pdf, \
+                                        cm_nee_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.pdf)));
 #endif
 CM_FN vec3 cm_far_light(CmPath p, float transmittance) {
   vec3 brought = vec3(0.0f, 0.0f, 0.0f);

@@ -3,6 +3,6 @@
 #define CM_LUMINANCE_GLSL
 
 // Luminance of a linear Rec. 709 color.
-CM_FN float cm_luminance(vec3 colour) { return dot(colour, vec3(0.2126f, 0.7152f, 0.0722f)); }
+CM_FN float cm_luminance(vec3 color) { return dot(color, vec3(0.2126f, 0.7152f, 0.0722f)); }
 
 #endif

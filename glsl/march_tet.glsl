@@ -4,7 +4,7 @@
 //   uint cm_root_leaf(uint root), uint cm_root_node(uint root)
 // with CM_CHANNELS also
 //   uvec4 cm_emission_record(uint cell)     glsl/channels.glsl
-//   uint cm_colour_record(uint cell)        glsl/channels.glsl
+//   uint cm_color_record(uint cell)        glsl/channels.glsl
 //   uint cm_anisotropy_record(uint cell)    glsl/channels.glsl
 // with CM_MOTION also
 //   uvec2 cm_change_record(uint cell)       change of the density in its record
@@ -118,7 +118,7 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   return e;
 }
 
-CM_FN vec3 cm_march_colour(uvec2 cell) { return cm_cell_colour(cm_colour_record(cell.x)); }
+CM_FN vec3 cm_march_color(uvec2 cell) { return cm_cell_color(cm_color_record(cell.x)); }
 CM_FN float cm_march_anisotropy(uvec2 cell) { return cm_cell_anisotropy(cm_anisotropy_record(cell.x), cell.x); }
 #endif
 

@@ -119,7 +119,7 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   return e;
 }
 
-CM_FN vec3 cm_march_colour(uvec2 cell) {
+CM_FN vec3 cm_march_color(uvec2 cell) {
   ivec3 voxel = cm_voxel_of(uvec3(cell.x, cell.y, CM_NONE));
 #if CM_MARCH == 2
   float density = cm_brick_voxel(cm_brick_slot(voxel >> 3),

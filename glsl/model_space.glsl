@@ -3,14 +3,14 @@
 #define CM_MODEL_SPACE_GLSL
 
 #if CM_MOTION
-CM_FN CmStanding cm_model_end(uint at) {
-  return CmStanding(cm_models[at].to_world_x, cm_models[at].to_world_y, cm_models[at].to_world_z, cm_models[at].origin);
+CM_FN CmInstanceTransform cm_model_end(uint at) {
+  return CmInstanceTransform(cm_models[at].to_world_x, cm_models[at].to_world_y, cm_models[at].to_world_z, cm_models[at].origin);
 }
 // The table has further records behind its own: the transforms of all models at shutter open and at shutter close.
 CM_FN uint cm_model_open(uint at) { return at + cm.surfaces.models; }
 CM_FN uint cm_model_close(uint at) { return at + 2u * cm.surfaces.models; }
 CM_FN bool cm_model_moves(uint at) { return (cm_models[at].flags & CM_MODEL_MOVES) != 0u; }
-CM_FN CmStanding cm_model_standing(uint at) {
+CM_FN CmInstanceTransform cm_model_transform(uint at) {
   return cm_between(cm_model_end(cm_model_open(at)), cm_model_end(cm_model_close(at)));
 }
 // For a deforming model those records name a tree and vertices of that time.
@@ -20,7 +20,7 @@ CM_FN bool cm_model_deforms(uint at) { return (cm_models[at].flags & CM_MODEL_DE
 // World position of the origin of a model's own space.
 CM_FN vec3 cm_model_origin(uint at) {
 #if CM_MOTION
-  if (cm_model_moves(at)) return cm_model_standing(at).origin;
+  if (cm_model_moves(at)) return cm_model_transform(at).origin;
 #endif
   return cm_models[at].origin;
 }
@@ -28,14 +28,14 @@ CM_FN vec3 cm_model_origin(uint at) {
 // Transforms a vector and a point from the world to a model's own space, and back.
 CM_FN vec3 cm_in_model(uint at, vec3 v) {
 #if CM_MOTION
-  if (cm_model_moves(at)) return cm_in_standing(cm_model_standing(at), v);
+  if (cm_model_moves(at)) return cm_to_instance(cm_model_transform(at), v);
 #endif
   return cm_models[at].to_own_x * v.x + cm_models[at].to_own_y * v.y + cm_models[at].to_own_z * v.z;
 }
 CM_FN vec3 cm_in_model_point(uint at, vec3 p) { return cm_in_model(at, p - cm_model_origin(at)); }
 CM_FN vec3 cm_out_of_model(uint at, vec3 v) {
 #if CM_MOTION
-  if (cm_model_moves(at)) return cm_out_of_standing(cm_model_standing(at), v);
+  if (cm_model_moves(at)) return cm_from_instance(cm_model_transform(at), v);
 #endif
   return cm_models[at].to_world_x * v.x + cm_models[at].to_world_y * v.y + cm_models[at].to_world_z * v.z;
 }
@@ -54,8 +54,8 @@ CM_FN vec3 cm_model_normal(uint at, vec3 n) {
   vec3 v = vec3(dot(cm_models[at].to_own_x, n), dot(cm_models[at].to_own_y, n), dot(cm_models[at].to_own_z, n));
 #if CM_MOTION
   if (cm_model_moves(at)) {
-    CmStanding s = cm_model_standing(at);
-    v = (n.x * cross(s.y, s.z) + n.y * cross(s.z, s.x) + n.z * cross(s.x, s.y)) * sign(cm_standing_volume(s));
+    CmInstanceTransform s = cm_model_transform(at);
+    v = (n.x * cross(s.y, s.z) + n.y * cross(s.z, s.x) + n.z * cross(s.x, s.y)) * sign(cm_transform_determinant(s));
   }
 #endif
   float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
@@ -66,8 +66,8 @@ CM_FN vec3 cm_model_normal(uint at, vec3 n) {
 CM_FN float cm_own_area(uint at, vec3 n) {
 #if CM_MOTION
   if (cm_model_moves(at)) {
-    CmStanding s = cm_model_standing(at);
-    return length(vec3(dot(s.x, n), dot(s.y, n), dot(s.z, n))) / abs(cm_standing_volume(s));
+    CmInstanceTransform s = cm_model_transform(at);
+    return length(vec3(dot(s.x, n), dot(s.y, n), dot(s.z, n))) / abs(cm_transform_determinant(s));
   }
 #endif
   vec3 v = vec3(dot(cm_models[at].to_world_x, n), dot(cm_models[at].to_world_y, n), dot(cm_models[at].to_world_z, n));

@@ -27,7 +27,7 @@ CM_FN vec3 cm_straight(vec3 open, vec3 close) {
 
 // Interpolated instance transform of a moving object: columns of the linear part from its own space to the ray space,
 // and the position of its origin there. All of them, and so every point of the object, move linearly.
-struct CmStanding {
+struct CmInstanceTransform {
   vec3 x;
   vec3 y;
   vec3 z;
@@ -35,27 +35,27 @@ struct CmStanding {
 };
 
 // Interpolates the columns of both ends.
-CM_FN CmStanding cm_between(CmStanding open, CmStanding close) {
+CM_FN CmInstanceTransform cm_between(CmInstanceTransform open, CmInstanceTransform close) {
   CM_PRECISE vec3 x = open.x + cm_now * (close.x - open.x);
   CM_PRECISE vec3 y = open.y + cm_now * (close.y - open.y);
   CM_PRECISE vec3 z = open.z + cm_now * (close.z - open.z);
   CM_PRECISE vec3 origin = open.origin + cm_now * (close.origin - open.origin);
-  return CmStanding(x, y, z, origin);
+  return CmInstanceTransform(x, y, z, origin);
 }
 
 // Signed volume of a unit cell of its own space; negative if the transform mirrors.
-CM_FN float cm_standing_volume(CmStanding s) { return dot(s.x, cross(s.y, s.z)); }
+CM_FN float cm_transform_determinant(CmInstanceTransform s) { return dot(s.x, cross(s.y, s.z)); }
 
 // Transforms a vector to its own space by Cramer's rule. The inverse of the interpolated transform is not the
 // interpolation of the inverses.
-CM_FN vec3 cm_in_standing(CmStanding s, vec3 v) {
+CM_FN vec3 cm_to_instance(CmInstanceTransform s, vec3 v) {
   CM_PRECISE vec3 x = cross(s.y, s.z);
   CM_PRECISE vec3 y = cross(s.z, s.x);
   CM_PRECISE vec3 z = cross(s.x, s.y);
   CM_PRECISE vec3 own = vec3(dot(x, v), dot(y, v), dot(z, v)) / dot(s.x, x);
   return own;
 }
-CM_FN vec3 cm_out_of_standing(CmStanding s, vec3 v) { return s.x * v.x + s.y * v.y + s.z * v.z; }
+CM_FN vec3 cm_from_instance(CmInstanceTransform s, vec3 v) { return s.x * v.x + s.y * v.y + s.z * v.z; }
 
 #endif
 #endif

@@ -28,14 +28,14 @@
 #define CM_CELL_LIGHTS 0
 #endif
 #endif
-#ifndef CM_LAMPS
-#define CM_LAMPS CM_SURFACES
+#ifndef CM_ANALYTIC_LIGHTS
+#define CM_ANALYTIC_LIGHTS CM_SURFACES
 #endif
 #ifndef CM_EQUIANGULAR
 #define CM_EQUIANGULAR 0
 #endif
-#ifndef CM_RICH
-#define CM_RICH 0
+#ifndef CM_EXTENDED_BSDF
+#define CM_EXTENDED_BSDF 0
 #endif
 // 1 if radiance is also summed by light group (glsl/groups.glsl).
 #ifndef CM_GROUPS
@@ -107,7 +107,7 @@ CM_BLOCK(CmGrid) {
   uint first_cell;        // first record in its page, or, with several pages, in all of them together
   uint tree;              // first word of the point-location tree in its page, in 4-byte words; its roots are before it
   uint first_emission;    // first emission record in its page
-  uint first_colour;      // first color record, in 4-byte words
+  uint first_color;      // first color record, in 4-byte words
   uint first_anisotropy;  // first record of scattering's mean cosine, in 4-byte words
   float emission_unit;    // radiance per world unit of length of the stored value 1 of voxels
   uint first_glowing;     // first entry of the table of emissive cells in the page of their channels
@@ -118,12 +118,12 @@ CM_BLOCK(CmGrid) {
   CM_EQUALITY(CmGrid)
 };
 
-// NEE of a volume's emissive cells, depending on the instance transform. Written by scene::glow_of.
-CM_BLOCK(CmGlow) {
+// NEE of a volume's emissive cells, depending on the instance transform. Written by scene::emissive_of.
+CM_BLOCK(CmEmissive) {
   float density;        // volume pdf over a cell's luminance: 1 / power of all cells
   float extent;         // world: approximate length of a ray among the brightest cells
-  float least_stretch;  // world: minimum length of a vector that has length 1 in cube space
-  CM_EQUALITY(CmGlow)
+  float min_stretch;  // world: minimum length of a vector that has length 1 in cube space
+  CM_EQUALITY(CmEmissive)
 };
 
 // The participating medium. With several, emits, coloured and anisotropic are 1 if they are 1 for any. Written by
@@ -137,7 +137,7 @@ CM_BLOCK(CmMedium) {
   float second_bend;
   float second_share;
   uint emits;     // 1: its cells emit light; this and the next two only with CM_CHANNELS
-  uint coloured;  // 1: cells have a scattering color
+  uint colored;  // 1: cells have a scattering color
   uint anisotropic;  // 1: cells have an anisotropy, which replaces the one above
   uint group;        // light group of its emission; only with CM_GROUPS
   uint holdout;      // 1: holdout; only with CM_HOLDOUT
@@ -153,8 +153,8 @@ CM_BLOCK(CmLights) {
   float sky_chance;
   CM_ALIGN(16) vec3 sky_radiance;  // for an environment map its mean, which lights the surfaces of previews
   float triangle_chance;
-  float lamp_chance;  // of all lights of punctual.glsl together; the sun has the rest
-  float glow_chance;  // probability that a ray from a surface is aimed at the medium's emission
+  float analytic_light_chance;  // of all lights of punctual.glsl together; the sun has the rest
+  float emissive_chance;  // probability that a ray from a surface is aimed at the medium's emission
   float cell_chance;  // of emissive cells
   float environment_chance;
   float environment_strength;        // factor on the environment map's radiance
@@ -172,14 +172,14 @@ CM_BLOCK(CmSurfaceTables) {
   uint ggx_albedo;  // word index of the table of src/surface/ggx_albedo.hpp
   uint ggx_albedo_averages;
   uint sheen_albedo;  // word index of the table of src/surface/sheen_albedo.hpp
-  uint rich;          // 1: some materials need CM_RICH, and paths keep CM_PATH_WITHIN
+  uint extended_bsdf;  // 1: some materials need CM_EXTENDED_BSDF, and paths keep CM_PATH_WITHIN
   CM_EQUALITY(CmSurfaceTables)
 };
 
-// Lights of the scene and the host (glsl/punctual.glsl). Written by render::LampData, through Tracer.
-CM_BLOCK(CmLamps) {
+// Lights of the scene and the host (glsl/punctual.glsl). Written by render::AnalyticLightData, through Tracer.
+CM_BLOCK(CmAnalyticLights) {
   uint count;  // number of lights for NEE
-  CM_EQUALITY(CmLamps)
+  CM_EQUALITY(CmAnalyticLights)
 };
 
 // The environment map (glsl/environment.glsl). Written by render::EnvironmentData.
@@ -203,7 +203,7 @@ CM_BLOCK(CmLayers) {
   uint count;              // 0: none
   uint blended;            // 1: blended surfaces have their own layers after the others
   CM_ALIGN(8) uvec2 size;  // pixels
-  uint coloured;           // 1: paths that end at it get its color
+  uint colored;           // 1: paths that end at it get its color
   CM_EQUALITY(CmLayers)
 };
 
@@ -262,11 +262,11 @@ layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
   CmView view;
   CmSpace space;
   CmGrid grid;
-  CmGlow glow;
+  CmEmissive emissive;
   CmMedium medium;
   CmLights lights;
   CmSurfaceTables surfaces;
-  CmLamps lamps;
+  CmAnalyticLights analytic_lights;
   CmEnvironment environment;
   CmGround ground;
   CmLayers layers;

@@ -3,8 +3,8 @@
 //   cm                                            the parameters
 //   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface in that pixel
 //
-// The stages are functions. This file has cm_camera, cm_handle (which calls cm_end_ray, cm_look and cm_scatter) and
-// cm_finish. glsl/path_vertex.glsl has cm_meet and the code that differs with triangles. glsl/flight.glsl has cm_aim
+// The stages are functions. This file has cm_camera, cm_handle (which calls cm_end_ray, cm_nee and cm_scatter) and
+// cm_finish. glsl/path_vertex.glsl has cm_meet and the code that differs with triangles. glsl/free_flight.glsl has cm_aim
 // and cm_fly, which traverse the grid. Either one megakernel runs all stages (glsl/trace.comp), or a wavefront of
 // kernels runs one stage each over a queue of paths (glsl/path_queue.glsl).
 //
@@ -65,11 +65,11 @@ CM_FN float cm_camera_end(CM_INOUT(CmPath) p, uvec2 at, vec2 within, uint layer,
   float host_z = cm_surface_z(at, within, layer);
 #if CM_LAYERS
   if (cm.layers.count != 0u) {
-    vec4 colour = vec4(0.0f, 0.0f, 0.0f, 0.0f);
-    float layer_z = cm_layer_surface(at, within, layer, u, colour);
-    if (layer_z <= host_z && colour.a > 0.0f && cm.layers.coloured != 0u) {
+    vec4 color = vec4(0.0f, 0.0f, 0.0f, 0.0f);
+    float layer_z = cm_layer_surface(at, within, layer, u, color);
+    if (layer_z <= host_z && color.a > 0.0f && cm.layers.colored != 0u) {
       p.at_layer = 1u;
-      p.light = vec3(colour);
+      p.light = vec3(color);
     }
     return min(host_z, layer_z);
   }
@@ -104,7 +104,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.blurred = 0u;
   p.in_volume = 0u;
   p.at_layer = 0u;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   p.within = 0u;
   p.outside = 0u;
   p.through = 0u;
@@ -114,7 +114,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.steps = 0u;
   p.depth_0 = cm_free_depth(along.x);
   p.depth = p.depth_0;
-  p.ray = CM_RAY_FLIGHT;
+  p.ray = CM_RAY_SCATTERED;
   p.found = CM_FOUND_NOT_ASKED;
   p.start = CM_AT_CAMERA;
   // Consecutive samples use consecutive layers; each pixel starts at a random one.
@@ -136,13 +136,13 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
 CM_FN void cm_escape(CM_INOUT(CmPath) p) {
   float depth = p.depth_0 - p.depth;
   float transmittance = exp(-depth);
-  if (p.ray == CM_RAY_FLIGHT) {
+  if (p.ray == CM_RAY_SCATTERED) {
     if (p.bounces > 0u) p.radiance += p.throughput * cm_far_light(p, transmittance);
   } else {
     float survival = min(1.0f, exp(CM_SHADOW_DEPTH - depth));
-    p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.density)));
+    p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.pdf)));
 #if CM_GROUPS
-    cm_add_to_group(p.group, p.light * (transmittance / (survival * (1.0f + transmittance * p.density))));
+    cm_add_to_group(p.group, p.light * (transmittance / (survival * (1.0f + transmittance * p.pdf))));
 #endif
   }
 }
@@ -152,12 +152,12 @@ CM_FN void cm_escape(CM_INOUT(CmPath) p) {
 // e^-x) at a collision and S (1 - e^-x) without one. It has the same mean and almost no noise in thin flames. With
 // triangles x is not known, because a triangle may be nearer than the traversal went. With several volumes S is not
 // constant.
-CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
-  float glow = collided ? 1.0f : 0.0f;
-  if (CM_SURFACES == 0 && CM_INSTANCES == 0) glow = (collided ? 2.0f : (ended ? 1.0f : 0.0f)) * (1.0f - exp(max(0.0f, p.depth) - p.depth_0));
-  p.radiance += p.throughput * (glow * CM_MEDIUM.source);
+CM_FN void cm_emissive(CM_INOUT(CmPath) p, bool ended, bool collided) {
+  float emissive = collided ? 1.0f : 0.0f;
+  if (CM_SURFACES == 0 && CM_INSTANCES == 0) emissive = (collided ? 2.0f : (ended ? 1.0f : 0.0f)) * (1.0f - exp(max(0.0f, p.depth) - p.depth_0));
+  p.radiance += p.throughput * (emissive * CM_MEDIUM.source);
 #if CM_GROUPS
-  cm_add_to_group(CM_MEDIUM.group, p.throughput * (glow * CM_MEDIUM.source));
+  cm_add_to_group(CM_MEDIUM.group, p.throughput * (emissive * CM_MEDIUM.source));
 #endif
 }
 
@@ -173,7 +173,7 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   if (collided) p.throughput *= CM_MEDIUM.albedo;
   if (grounded) p.throughput *= cm.ground.albedo;
 #if CM_CHANNELS && defined(CM_MARCH)  // without CM_MARCH there are no collisions
-  if (collided && CM_MEDIUM.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
+  if (collided && CM_MEDIUM.colored != 0u) p.throughput *= cm_march_color(p.cell);
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
   // The ground as seen by the camera is large, uniform and dark. There Russian roulette would be the only noise.
@@ -193,48 +193,48 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
 }
 
 // A light sample for NEE, taken after a collision or on a triangle.
-struct CmLook {
-  bool looks;  // false: there is no shadow ray, and `light` only marks a scattered ray (kind sky)
+struct CmNee {
+  bool to_light;  // false: there is no shadow ray, and `light` only marks a scattered ray (kind sky)
   CmLightSample light;
   CmDraw draw;
 };
 
-CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
-  CmLook look;
-  look.looks = arrived && cm.lights.any != 0u;
-  look.draw = cm_draw(p, look.looks);
-  vec3 here = cm_look_from(p, vertex);
-  vec3 u = vec3(look.draw.turn.x, look.draw.turn.y, look.draw.choice);
-  look.light = cm_sky_sample(p, here, u);
-  if (look.looks) look.light = cm_light_sample(p, here, u);
+CM_FN CmNee cm_nee(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
+  CmNee nee;
+  nee.to_light = arrived && cm.lights.any != 0u;
+  nee.draw = cm_draw(p, nee.to_light);
+  vec3 here = cm_nee_origin(p, vertex);
+  vec3 u = vec3(nee.draw.u_direction.x, nee.draw.u_direction.y, nee.draw.u_choice);
+  nee.light = cm_sky_sample(p, here, u);
+  if (nee.to_light) nee.light = cm_light_sample(p, here, u);
 #ifdef CM_MARCH  // without CM_MARCH the vertex is on a triangle
-  if (look.looks) {
-    float chance = cm_look_chance(p, look.light.kind, cm_scattered(p, look.light.direction), look.light.density);
-    look.looks = look.draw.way < chance;
-    float rest = look.looks ? look.draw.way / chance : (look.draw.way - chance) / (1.0f - chance);
-    look.draw.way = min(rest, 0.99999994f);  // below 1, whatever the rounding of the driver's division
-    look.light.density *= chance;
-    if (!look.looks) {
+  if (nee.to_light) {
+    float chance = cm_nee_probability(p, nee.light.kind, cm_scattered(p, nee.light.direction), nee.light.pdf);
+    nee.to_light = nee.draw.u_distance < chance;
+    float rest = nee.to_light ? nee.draw.u_distance / chance : (nee.draw.u_distance - chance) / (1.0f - chance);
+    nee.draw.u_distance = min(rest, 0.99999994f);  // below 1, whatever the rounding of the driver's division
+    nee.light.pdf *= chance;
+    if (!nee.to_light) {
       // The probability may depend on the light's direction, and thus on the random numbers that chose it. The
       // scattered ray needs new ones.
-      look.draw.turn.x = cm_random(p.random, p.stream);
-      look.draw.turn.y = cm_random(p.random, p.stream);
-      look.light = cm_sky_sample(p, here, u);
+      nee.draw.u_direction.x = cm_random(p.random, p.stream);
+      nee.draw.u_direction.y = cm_random(p.random, p.stream);
+      nee.light = cm_sky_sample(p, here, u);
     }
   }
 #endif
   // Stretches the sky's range of u.z to [0, 1], so that the number can choose a lobe.
-  if (look.looks && look.light.kind == CM_LIGHT_SKY) look.draw.choice = min(1.0f, u.z / cm.lights.sky_chance);
-  if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);
+  if (nee.to_light && nee.light.kind == CM_LIGHT_SKY) nee.draw.u_choice = min(1.0f, u.z / cm.lights.sky_chance);
+  if (nee.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) nee.light.radiance = vec3(0.0f, 0.0f, 0.0f);
 #if CM_EQUIANGULAR && defined(CM_MARCH)
-  bool lamp = look.looks && look.light.kind == CM_LIGHT_LAMP && look.light.distance < 3.0e38f;
-  if (lamp && p.start == CM_IN_MEDIUM && cm_is_passed(p, p.bounces - 1u)) {
+  bool analytic_light = nee.to_light && nee.light.kind == CM_LIGHT_ANALYTIC_LIGHT && nee.light.distance < 3.0e38f;
+  if (analytic_light && p.start == CM_IN_MEDIUM && cm_is_passed(p, p.bounces - 1u)) {
     float extinction = cm_extinction_at(p, p.start_cell, p.bounces == 1u).extinction;
-    float density = cm_passing_density(p.o, p.w, look.light.direction, look.light.distance);
-    look.light.radiance *= 1.0f - cm_passing_share(density, extinction);
+    float pdf = cm_equiangular_pdf(p.o, p.w, nee.light.direction, nee.light.distance);
+    nee.light.radiance *= 1.0f - cm_equiangular_weight(pdf, extinction);
   }
 #endif
-  return look;
+  return nee;
 }
 
 #if CM_INSTANCES
@@ -262,41 +262,41 @@ CM_FN void cm_begin_march(CM_INOUT(CmPath) p) {
 #endif
 
 // Starts the shadow ray, or the scattered ray if there is none.
-CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
-  bool looks = look.looks;
-  CmLightSample light = look.light;
-  vec3 w = cm_turn_direction(p, vertex, look.draw);
+CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
+  bool to_light = nee.to_light;
+  CmLightSample light = nee.light;
+  vec3 w = cm_sample_direction(p, vertex, nee.draw);
   bool along = light.kind == CM_LIGHT_SKY;
-  CmTurn turn = cm_turn(p, vertex, along ? w : light.direction);
-  if (along) light = cm_sky_along(w, light.density * turn.density);
-  p.density = turn.density;
-  if (looks) {
+  CmScatterSample scatter = cm_scatter_sample(p, vertex, along ? w : light.direction);
+  if (along) light = cm_sky_along(w, light.pdf * scatter.pdf);
+  p.pdf = scatter.pdf;
+  if (to_light) {
     // For distant lights, cm_escape applies the balance heuristic, with the transmittance. For triangles and cells, the
     // heuristic leaves the transmittance out and is applied here.
-    if ((light.kind == CM_LIGHT_TRIANGLE && !turn.lifted) || light.kind == CM_LIGHT_CELL) light.density += turn.density;
-    float rare = 1.0f / max(light.density, 1e-30f);
-    p.light = p.throughput * light.radiance * (turn.share * rare);
-    p.density = cm_is_far(light) ? turn.density * rare : 0.0f;
+    if ((light.kind == CM_LIGHT_TRIANGLE && !scatter.lifted) || light.kind == CM_LIGHT_CELL) light.pdf += scatter.pdf;
+    float rare = 1.0f / max(light.pdf, 1e-30f);
+    p.light = p.throughput * light.radiance * (scatter.share * rare);
+    p.pdf = cm_is_far(light) ? scatter.pdf * rare : 0.0f;
 #if CM_GROUPS
     p.group = cm_group_of(light.kind);
 #endif
   } else {
-    p.throughput *= turn.weight;
+    p.throughput *= scatter.weight;
     p.w = light.direction;
-    if (cm_blurs(turn)) p.blurred = 1u;
+    if (cm_blurs(scatter)) p.blurred = 1u;
   }
-  p.lifted = turn.lifted ? 1u : 0u;
-#if CM_RICH
-  cm_leave_surface(p, vertex, turn, looks);
+  p.lifted = scatter.lifted ? 1u : 0u;
+#if CM_EXTENDED_BSDF
+  cm_leave_surface(p, vertex, scatter, to_light);
 #endif
   p.d = cm_to_cube(light.direction);
-  p.ray = looks ? CM_RAY_TO_LIGHT : CM_RAY_FLIGHT;
+  p.ray = to_light ? CM_RAY_TO_LIGHT : CM_RAY_SCATTERED;
   p.found = CM_FOUND_NOT_ASKED;
-  p.depth_0 = cm_free_depth(look.draw.way) + (looks ? CM_SHADOW_DEPTH : 0.0f);
+  p.depth_0 = cm_free_depth(nee.draw.u_distance) + (to_light ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
   float ground = cm_ground_distance(p.o, p.d);
-  p.to_ground = !looks && ground < light.distance ? 1u : 0u;
-  bool hidden = looks && ground < light.distance;
+  p.to_ground = !to_light && ground < light.distance ? 1u : 0u;
+  bool hidden = to_light && ground < light.distance;
   if (hidden) p.light = vec3(0.0f, 0.0f, 0.0f);
   p.reach = hidden ? 0.0f : min(light.distance, ground);
 #if CM_INSTANCES
@@ -312,7 +312,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
     p.cache = CM_NONE;
     p.stage = p.start == CM_ON_GROUND ? CM_STAGE_AIM : CM_STAGE_FLY;
   } else {
-    if (looks && !cm_is_positive(max(p.light.x, max(p.light.y, p.light.z)))) p.reach = 0.0f;  // no light
+    if (to_light && !cm_is_positive(max(p.light.x, max(p.light.y, p.light.z)))) p.reach = 0.0f;  // no light
     p.stage = CM_STAGE_AIM;
   }
 }
@@ -320,11 +320,11 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
 // Adds the contribution of a ray that came to an event. Returns true if the path is finished. arrived: the path
 // continues from the ray's end.
 CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived) {
-  bool flight = p.ray == CM_RAY_FLIGHT;
-  bool met = vertex.on_triangle && flight;
-  bool grounded = flight && p.event == CM_EVENT_ESCAPE && !met && p.to_ground != 0u;
+  bool scattered = p.ray == CM_RAY_SCATTERED;
+  bool met = vertex.on_triangle && scattered;
+  bool grounded = scattered && p.event == CM_EVENT_ESCAPE && !met && p.to_ground != 0u;
   bool escaped = p.event == CM_EVENT_ESCAPE && !met && !grounded;
-  bool collided = flight && p.event == CM_EVENT_COLLISION && !met;
+  bool collided = scattered && p.event == CM_EVENT_COLLISION && !met;
 #if CM_INSTANCES
   cm_here = collided ? p.instance : p.start_instance;
 #endif
@@ -341,10 +341,10 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   }
 #endif
   if (escaped) cm_escape(p);
-  bool finished = escaped && flight;
+  bool finished = escaped && scattered;
   if (met) cm_see(p, vertex);
   bool dark = (met && cm_among_surfaces_dark(p) && !cm_came_through(p)) || ((collided || grounded) && cm_is_dark(p));
-  cm_glow(p, flight, collided && !dark);
+  cm_emissive(p, scattered, collided && !dark);
   arrived = collided || met || grounded;
   if (grounded) p.t = cm_ground_distance(p.o, p.d);
   if (arrived) {
@@ -374,16 +374,16 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {
   bool arrived;
   bool finished = cm_end_ray(p, vertex, arrived);
 #if CM_EQUIANGULAR
-  if (passed.looks) {
-    cm_look_back(p, passed, finished);
+  if (passed.to_light) {
+    cm_equiangular_nee(p, passed, finished);
     return;
   }
 #endif
   if (!finished) {
     // Two statements, because both calls change p: in a nested call the outer one may get a copy from before the inner
     // one.
-    CmLook look = cm_look(p, vertex, arrived);
-    cm_scatter(p, vertex, look);
+    CmNee nee = cm_nee(p, vertex, arrived);
+    cm_scatter(p, vertex, nee);
   }
   if (finished) p.stage = CM_STAGE_FINISH;
 }

@@ -4,13 +4,13 @@
 #define CM_PATH_BLOCKS_GLSL
 
 #define CM_BLOCK_LANES 1024u
-#define CM_MOST_BLOCKS 256u
+#define CM_MAX_BLOCKS 256u
 #define CM_BEGINS 0x80000000u  // flag beside a block's number: a tile begins
-#define CM_TURN 16             // bit offset beside a block's number: its list to read (compaction); the next is written
-#define CM_TURNS 3u
+#define CM_LIST_BIT 16             // bit offset beside a block's number: its list to read (compaction); the next is written
+#define CM_LISTS 3u
 #define CM_SQUARE_EDGE 8u
 #define CM_SQUARE_PIXELS 64u
-#define CM_MOST_SQUARES 16384u  // per tile
+#define CM_MAX_SQUARES 16384u  // per tile
 #define CM_BAND_ROWS 16u  // rows per band of a tile: a dispatch reports which bands it changed
 #define CM_BANDS 64u      // maximum per tile
 // A word of the list: the number of the square in the tile; from this bit on, flags that its even and odd rows are

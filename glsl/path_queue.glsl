@@ -14,7 +14,7 @@
 #define CM_QUEUE_SHADE 2u
 #define CM_QUEUE_CAMERA 3u
 #define CM_QUEUES 4u
-#define CM_MOST_ROUNDS 64u
+#define CM_MAX_ROUNDS 64u
 #define CM_QUEUE_GROUP 64u  // lanes per work group
 #define CM_ROUND_LOCATION 0
 
@@ -27,7 +27,7 @@ struct CmQueueHead {
 };
 
 layout(std430, binding = CM_STORAGE_QUEUES) buffer CmQueues {
-  CmQueueHead cm_heads[CM_QUEUES * (CM_MOST_ROUNDS + 1u)];  // per round
+  CmQueueHead cm_heads[CM_QUEUES * (CM_MAX_ROUNDS + 1u)];  // per round
   uint cm_waiting[];  // lanes: one list per queue; CM_QUEUE_TRAVEL has two, for this round and the next
 };
 

@@ -18,7 +18,7 @@
 #define CM_EVENT_ESCAPE 2u     // the ray left the bounds or reached its end
 
 // The kind of a ray.
-#define CM_RAY_FLIGHT 0u
+#define CM_RAY_SCATTERED 0u
 #define CM_RAY_TO_LIGHT 1u  // shadow ray of next-event estimation
 #define CM_RAY_EQUIANGULAR 2u  // shadow ray from a point of the scattered ray, after that ray (glsl/equiangular.glsl)
 
@@ -49,7 +49,7 @@
 //   number          number of the sample in its pixel
 //   place           slot of its pixel (glsl/path_places.glsl)
 //   ahead           CM_RAY_EQUIANGULAR only: distance along w from o to the point where the path continues
-// CM_PATH_FLIGHT, state that passes to the next ray:
+// CM_PATH_SCATTERED, state that passes to the next ray:
 //   w               world direction of the camera or scattered ray; kept while a shadow ray is traced
 //   throughput      of the path
 //   light           radiance that an unblocked ray adds. Shadow ray: the light's. Camera ray: the layer's color or the
@@ -76,7 +76,7 @@
 //   start_instance  instance that contains o if o is in a medium; start_cell is a cell of it
 //   met, met_cell   scattered or camera ray: instance (or CM_NONE) and cell of the nearest collision so far, at t_end
 //   gathers         1: the ray's end is known, and a second sweep visits the emissive overlapping instances
-// CM_PATH_WITHIN, only with CM_RICH, and only in kernels that use triangle materials:
+// CM_PATH_WITHIN, only with CM_EXTENDED_BSDF, and only in kernels that use triangle materials:
 //   within          first word of the material whose volume contains the ray, plus one; 0: none
 //   outside         the same for the volume that encloses `within`
 //   through         1: the ray's origin is on the other side of its triangle than the path came from
@@ -92,8 +92,8 @@
 #else
 #define CM_PATH_AHEAD(FLOAT)
 #endif
-#define CM_PATH_FLIGHT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
-  VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(density)
+#define CM_PATH_SCATTERED(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
+  VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(pdf)
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 2) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
   BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1) BITS(to_ground, 1) CM_PATH_PASSED(BITS)
@@ -134,21 +134,21 @@
    (31 PART(CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_BITS_OF)) / 32)
 #define CM_RAY_QUADS ((CM_PATH_WORDS(CM_PATH_RAY) + 3) / 4)
 #define CM_SUM_QUADS ((CM_PATH_WORDS(CM_PATH_SUM) + 3) / 4)
-#define CM_FLIGHT_QUADS ((CM_PATH_WORDS(CM_PATH_FLIGHT) + 3) / 4)
+#define CM_SCATTERED_QUADS ((CM_PATH_WORDS(CM_PATH_SCATTERED) + 3) / 4)
 #define CM_ENDS_QUADS ((CM_PATH_WORDS(CM_PATH_ENDS) + 3) / 4)
 #define CM_VISIT_QUADS ((CM_PATH_WORDS(CM_PATH_VISIT) + 3) / 4)
 #define CM_WITHIN_QUADS ((CM_PATH_WORDS(CM_PATH_WITHIN) + 3) / 4)
-#define CM_PATH_QUADS (CM_RAY_QUADS + CM_SUM_QUADS + CM_FLIGHT_QUADS + CM_ENDS_QUADS)
+#define CM_PATH_QUADS (CM_RAY_QUADS + CM_SUM_QUADS + CM_SCATTERED_QUADS + CM_ENDS_QUADS)
 
 struct CmPath {
   CM_PATH_RAY(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
   CM_PATH_SUM(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
-  CM_PATH_FLIGHT(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+  CM_PATH_SCATTERED(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
   CM_PATH_ENDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 #if CM_INSTANCES
   CM_PATH_VISIT(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 #endif
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   CM_PATH_WITHIN(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 #endif
 };

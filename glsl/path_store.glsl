@@ -10,13 +10,13 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;  // x: full rounds of traversal, or visits of trace_travel.comp; y, z: bits of the tile's changed
                    // bands of rows; w: number of samples whose radiance was not finite
-  uvec4 cm_blocks[CM_MOST_BLOCKS];    // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
+  uvec4 cm_blocks[CM_MAX_BLOCKS];    // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
                                       // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
                                       // dispatch
   uint cm_next_place;                 // first unused pixel slot
-  uint cm_squares[CM_MOST_SQUARES];   // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
-  uint cm_rank_counts[CM_TURNS * CM_MOST_BLOCKS];  // per list and block: number of lanes with a path
-  uint cm_ranks[];                    // per list: lanes of all blocks; in each block the active lanes come first
+  uint cm_squares[CM_MAX_SQUARES];   // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
+  uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];  // per list and block: number of lanes with a path
+  uint cm_active_paths[];                    // per list: lanes of all blocks; in each block the active lanes come first
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
@@ -83,9 +83,9 @@ void cm_store_ray(CmPath p, uint lane) { CM_STORE(CM_PATH_RAY, CM_RAY_QUADS, 0) 
 #define CM_FIRST_SUM CM_RAY_QUADS
 void cm_load_sum(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_SUM, CM_SUM_QUADS, CM_FIRST_SUM) }
 void cm_store_sum(CmPath p, uint lane) { CM_STORE(CM_PATH_SUM, CM_SUM_QUADS, CM_FIRST_SUM) }
-#define CM_FIRST_FLIGHT (CM_RAY_QUADS + CM_SUM_QUADS)
-void cm_load_flight(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_FLIGHT, CM_FLIGHT_QUADS, CM_FIRST_FLIGHT) }
-void cm_store_flight(CmPath p, uint lane) { CM_STORE(CM_PATH_FLIGHT, CM_FLIGHT_QUADS, CM_FIRST_FLIGHT) }
+#define CM_FIRST_SCATTERED (CM_RAY_QUADS + CM_SUM_QUADS)
+void cm_load_scattered(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_SCATTERED, CM_SCATTERED_QUADS, CM_FIRST_SCATTERED) }
+void cm_store_scattered(CmPath p, uint lane) { CM_STORE(CM_PATH_SCATTERED, CM_SCATTERED_QUADS, CM_FIRST_SCATTERED) }
 #define CM_FIRST_ENDS (CM_PATH_QUADS - CM_ENDS_QUADS)
 void cm_load_ends(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_ENDS, CM_ENDS_QUADS, CM_FIRST_ENDS) }
 void cm_store_ends(CmPath p, uint lane) { CM_STORE(CM_PATH_ENDS, CM_ENDS_QUADS, CM_FIRST_ENDS) }
@@ -100,7 +100,7 @@ void cm_store_visit(CmPath p, uint lane) {}
 
 // The CM_PATH_WITHIN part lies behind the space of the CM_PATH_VISIT part. A new path is in no volume.
 #define CM_FIRST_WITHIN (CM_PATH_QUADS + CM_VISIT_QUADS)
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 void cm_load_within(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_WITHIN, CM_WITHIN_QUADS, CM_FIRST_WITHIN) }
 void cm_store_within(CmPath p, uint lane) { CM_STORE(CM_PATH_WITHIN, CM_WITHIN_QUADS, CM_FIRST_WITHIN) }
 #else
@@ -111,7 +111,7 @@ void cm_store_within(CmPath p, uint lane) {}
 #define CM_FIRST_GROUPS (CM_FIRST_WITHIN + CM_WITHIN_QUADS)
 
 void cm_begin_within(uint lane) {
-  if (cm.surfaces.rich == 0u) return;
+  if (cm.surfaces.extended_bsdf == 0u) return;
   for (int i = 0; i < CM_WITHIN_QUADS; ++i) cm_paths[lane + uint(CM_FIRST_WITHIN + i) * cm_lanes()] = uvec4(0u);
 }
 
@@ -119,12 +119,12 @@ CmPath cm_begin_path() {
   CmPath p;
   CM_PATH_RAY(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   CM_PATH_SUM(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
-  CM_PATH_FLIGHT(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+  CM_PATH_SCATTERED(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   CM_PATH_ENDS(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
 #if CM_INSTANCES
   CM_PATH_VISIT(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
 #endif
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   CM_PATH_WITHIN(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
 #endif
   p.stage = CM_STAGE_CAMERA;
@@ -135,7 +135,7 @@ CmPath cm_load_path(uint lane) {
   CmPath p = cm_begin_path();
   cm_load_ray(p, lane);
   cm_load_sum(p, lane);
-  cm_load_flight(p, lane);
+  cm_load_scattered(p, lane);
   cm_load_ends(p, lane);
 #if CM_MOTION
   cm_now = cm_moment(p.number, p.stream);
@@ -146,13 +146,13 @@ CmPath cm_load_path(uint lane) {
 void cm_store_path(CmPath p, uint lane) {
   cm_store_ray(p, lane);
   cm_store_sum(p, lane);
-  cm_store_flight(p, lane);
+  cm_store_scattered(p, lane);
   cm_store_ends(p, lane);
 }
 
 // For kernels with a row of work groups per block of the dispatch: number of the block, and of the invocation in it.
 // cm_block_lane may be beyond cm_lanes(). cm_block_begins: a tile begins, so that no lane has a path.
-uint cm_block() { return bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, 0, CM_TURN); }
+uint cm_block() { return bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, 0, CM_LIST_BIT); }
 uint cm_place_in_block() { return gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex; }
 uint cm_block_lane() { return cm_block() * CM_BLOCK_LANES + cm_place_in_block(); }
 bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
@@ -161,17 +161,17 @@ uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
 // Stream compaction: packs the active lanes of a block, so that SIMD groups stay full when many lanes are done. There
 // are three lists in rotation. Each dispatch reads the list that the block's last dispatch wrote, writes the next one
 // and clears the third.
-uint cm_turn(uint ahead) { return (bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, CM_TURN, 2) + ahead) % CM_TURNS; }
+uint cm_list(uint ahead) { return (bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, CM_LIST_BIT, 2) + ahead) % CM_LISTS; }
 uint cm_ranked_lane() {
-  if (cm_place_in_block() == 0u) cm_rank_counts[cm_turn(2u) * CM_MOST_BLOCKS + cm_block()] = 0u;
+  if (cm_place_in_block() == 0u) cm_active_counts[cm_list(2u) * CM_MAX_BLOCKS + cm_block()] = 0u;
   if (cm_block_begins()) return cm_block_lane();
-  if (cm_place_in_block() >= cm_rank_counts[cm_turn(0u) * CM_MOST_BLOCKS + cm_block()]) return cm_lanes();
-  return cm_ranks[cm_turn(0u) * cm_lanes() + cm_block_lane()];
+  if (cm_place_in_block() >= cm_active_counts[cm_list(0u) * CM_MAX_BLOCKS + cm_block()]) return cm_lanes();
+  return cm_active_paths[cm_list(0u) * cm_lanes() + cm_block_lane()];
 }
 // Adds the lane to the list of the next dispatch.
 void cm_join_ranks(uint lane) {
-  uint rank = atomicAdd(cm_rank_counts[cm_turn(1u) * CM_MOST_BLOCKS + cm_block()], 1u);
-  cm_ranks[cm_turn(1u) * cm_lanes() + cm_block() * CM_BLOCK_LANES + rank] = lane;
+  uint rank = atomicAdd(cm_active_counts[cm_list(1u) * CM_MAX_BLOCKS + cm_block()], 1u);
+  cm_active_paths[cm_list(1u) * cm_lanes() + cm_block() * CM_BLOCK_LANES + rank] = lane;
 }
 
 #endif

@@ -15,40 +15,40 @@
 
 // The random numbers of a ray from an event.
 struct CmDraw {
-  vec2 turn;     // direction, or point on the sampled light
-  float choice;  // choice of a lobe, or of a light
-  float way;     // free-flight distance
+  vec2 u_direction;  // random numbers for the direction, or for the point on the sampled light
+  float u_choice;    // for the lobe or the light
+  float u_distance;  // for the free-flight distance
 };
 
-CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool looks) {
+CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool to_light) {
   CmDraw draw;
   if (p.bounces <= CM_EVEN_EVENTS) {
-    uint set = 4u * p.bounces + (looks ? 0u : 2u);
-    draw.turn = cm_even_pair(p.number, p.stream, set);
+    uint set = 4u * p.bounces + (to_light ? 0u : 2u);
+    draw.u_direction = cm_even_pair(p.number, p.stream, set);
     vec2 second = cm_even_pair(p.number, p.stream, set + 1u);
-    draw.choice = second.x;
-    draw.way = second.y;
+    draw.u_choice = second.x;
+    draw.u_distance = second.y;
   } else {
-    draw.turn.x = cm_random(p.random, p.stream);
-    draw.turn.y = cm_random(p.random, p.stream);
-    draw.choice = cm_random(p.random, p.stream);
-    draw.way = cm_random(p.random, p.stream);
+    draw.u_direction.x = cm_random(p.random, p.stream);
+    draw.u_direction.y = cm_random(p.random, p.stream);
+    draw.u_choice = cm_random(p.random, p.stream);
+    draw.u_distance = cm_random(p.random, p.stream);
   }
   return draw;
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 #include "dispersion.glsl"
 #endif
 
 // Scattering of light at a vertex along a direction: value, pdf and weight of the BSDF or phase function.
-struct CmTurn {
+struct CmScatterSample {
   vec3 share;          // value: the phase function, or the BSDF times the cosine
-  float density;       // solid-angle pdf with which scattered rays take the direction
-  float lobe_density;  // the same, only of the lobes
+  float pdf;       // solid-angle pdf with which scattered rays take the direction
+  float lobe_pdf;  // the same, only of the lobes
   vec3 weight;         // share / density
   bool lifted;         // the ray's origin is above its triangle (cm_lift)
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   bool through;        // the ray's origin is behind its triangle
   bool disperses;      // the path has a single wavelength from here on
 #endif
@@ -112,24 +112,24 @@ CM_FN bool cm_is_dark(CmPath p) { return cm_among_surfaces_dark(p) && p.start ==
 struct CmVertex {
   bool on_triangle;
   CmSurfacePoint surface;  // valid only if on_triangle
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   uint bounds;   // first word of the material whose volume the triangle bounds, plus one; 0: none
   bool leaves;   // the path comes from inside
-  vec3 colour;   // color of the path's wavelength if it is chosen at this vertex; else white
+  vec3 color;   // color of the path's wavelength if it is chosen at this vertex; else white
   bool disperses;
 #endif
 };
 
 // Transmitted rays are not light among surfaces: they are traced even if light_among_surfaces is 0.
 CM_FN bool cm_came_through(CmPath p) {
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   return p.through != 0u && p.start == CM_ON_TRIANGLE;
 #else
   return false;
 #endif
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 
 // Index of refraction of a material's volume, by its first word plus one; 0: air.
 CM_FN float cm_index(uint within) { return within == 0u ? 1.0f : cm_floats(within - 1u + CM_MATERIAL_VOLUME).w; }
@@ -173,7 +173,7 @@ CM_FN uint cm_bounds(uint triangle) {
 CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
   vertex.bounds = cm_bounds(p.triangle);
   vertex.leaves = p.back != 0u;
-  vertex.colour = vec3(1.0f);
+  vertex.color = vec3(1.0f);
   vertex.disperses = false;
   if (vertex.bounds == 0u) return;
   uint other = vertex.leaves ? cm_beyond(vertex.bounds, p.within, p.outside) : p.within;
@@ -187,7 +187,7 @@ CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
     eta = cm_index_at(behind, wavelength) / cm_index_at(before, wavelength);
     if (p.dispersed == 0u) {
       vertex.disperses = true;
-      vertex.colour = cm_wavelength_colour(wavelength);
+      vertex.color = cm_wavelength_color(wavelength);
     }
     // White light is reflected with the index at the middle wavelength.
     if (p.dispersed != 0u || vertex.leaves) ratio = eta;
@@ -201,19 +201,19 @@ CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
 
 // Applies the absorption of material volumes between a ray's origin and its hit, collision or end.
 CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool met, CmHit hit) {
-  bool flight = p.ray == CM_RAY_FLIGHT;
+  bool scattered = p.ray == CM_RAY_SCATTERED;
   // Emissive media are traversed after this query. cm_see then dims the light of the triangle that was hit.
-  if (flight && cm.medium.emits != 0u) return;
+  if (scattered && cm.medium.emits != 0u) return;
   uint within = p.within;
   uint outside = p.outside;
-  if (!flight && p.start == CM_ON_TRIANGLE && p.through != 0u) cm_cross(cm_bounds(p.triangle), p.back != 0u, within, outside);
-  if (flight && met && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // a camera may be inside
-  float way = met ? hit.t : (flight && p.event == CM_EVENT_COLLISION ? p.t : p.reach);
+  if (!scattered && p.start == CM_ON_TRIANGLE && p.through != 0u) cm_cross(cm_bounds(p.triangle), p.back != 0u, within, outside);
+  if (scattered && met && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // a camera may be inside
+  float way = met ? hit.t : (scattered && p.event == CM_EVENT_COLLISION ? p.t : p.reach);
   // A ray without end left through a hole in the mesh.
   if (way > 1e30f) return;
   vec3 transmittance = cm_transmittance_within(within, way);
-  if (flight) p.throughput *= transmittance;
-  if (!flight || p.bounces == 0u) p.light *= transmittance;
+  if (scattered) p.throughput *= transmittance;
+  if (!scattered || p.bounces == 0u) p.light *= transmittance;
 }
 
 #endif
@@ -222,10 +222,10 @@ CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool met, CmHit hit) {
 // the traversal: in a dense medium the distance to a collision is short and few boxes are near it, and most shadow rays
 // end in the medium.
 CM_FN bool cm_asks(CmPath p) {
-  bool flight = p.ray == CM_RAY_FLIGHT;
-  if (p.event == CM_EVENT_COLLISION && !flight) return false;
-  if (flight && p.bounces == 0u && cm.layers.count != 0u) return false;
-  if (p.start == CM_ON_TRIANGLE && !cm_is_equiangular(p)) return flight || p.reach > 0.0f;  // from above it
+  bool scattered = p.ray == CM_RAY_SCATTERED;
+  if (p.event == CM_EVENT_COLLISION && !scattered) return false;
+  if (scattered && p.bounces == 0u && cm.layers.count != 0u) return false;
+  if (p.start == CM_ON_TRIANGLE && !cm_is_equiangular(p)) return scattered || p.reach > 0.0f;  // from above it
   float reach = p.event == CM_EVENT_COLLISION ? p.t : p.reach;
   return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, reach);
 }
@@ -233,15 +233,15 @@ CM_FN bool cm_asks(CmPath p) {
 // Returns true if the BVH must be queried before the traversal, because the emission collected along the ray depends on
 // where it ends.
 CM_FN bool cm_asks_first(CmPath p) {
-  if (p.ray != CM_RAY_FLIGHT || p.found != CM_FOUND_NOT_ASKED) return false;
+  if (p.ray != CM_RAY_SCATTERED || p.found != CM_FOUND_NOT_ASKED) return false;
   if (p.bounces == 0u && cm.layers.count != 0u) return false;
   return p.start == CM_ON_TRIANGLE || cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, p.reach);
 }
 
 // Intersects the ray with the triangles.
 CM_FN void cm_meet(CM_INOUT(CmPath) p) {
-  bool flight = p.ray == CM_RAY_FLIGHT;
-  bool first = flight && cm.medium.emits != 0u;
+  bool scattered = p.ray == CM_RAY_SCATTERED;
+  bool first = scattered && cm.medium.emits != 0u;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_from_cube_point(p.o);
   if (p.start == CM_ON_TRIANGLE && p.ray != CM_RAY_EQUIANGULAR) {
@@ -249,13 +249,13 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
     bool lifts = !cm_came_through(p);
     o = cm_surface_origin(p.triangle, p.weights, p.behind != 0u, lifts, d, shift);
     // The shadow ray ends where a ray from the point itself would: at a light.
-    if (!flight) d -= shift / p.reach;
+    if (!scattered) d -= shift / p.reach;
   }
   cm_hit_seed = p.random + p.ray;  // differs between a shadow ray and the scattered ray after it
-  cm_hit_camera = flight && p.bounces == 0u;
+  cm_hit_camera = scattered && p.bounces == 0u;
   CmHit hit;
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   cm_hit_direction = normalize(d);
   bool met = false;
   // Camera and scattered rays are traced again up to their hit: on the way to it the BVH also visited surfaces behind
@@ -263,21 +263,21 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   for (int turn = 0; turn < 2; ++turn) {
     CmHit found;
     cm_hit_passed = vec3(1.0f);
-    bool ends = cm_trace_models(o, d, 0.0f, turn == 0 ? reach : hit.t, !flight, found);
+    bool ends = cm_trace_models(o, d, 0.0f, turn == 0 ? reach : hit.t, !scattered, found);
     if (turn == 0) {
       met = ends;
       hit = found;
     }
-    if (!(met && flight) || cm_hit_passed == vec3(1.0f)) break;
+    if (!(met && scattered) || cm_hit_passed == vec3(1.0f)) break;
   }
-  if (flight) p.throughput *= cm_hit_passed;
-  if (!flight || p.bounces == 0u) p.light *= cm_hit_passed;
+  if (scattered) p.throughput *= cm_hit_passed;
+  if (!scattered || p.bounces == 0u) p.light *= cm_hit_passed;
   cm_absorb(p, met, hit);
 #else
-  bool met = cm_trace_models(o, d, 0.0f, reach, !flight, hit);
+  bool met = cm_trace_models(o, d, 0.0f, reach, !scattered, hit);
 #endif
-  if (met && !flight) p.event = CM_EVENT_COLLISION;
-  if (met && flight) {
+  if (met && !scattered) p.event = CM_EVENT_COLLISION;
+  if (met && scattered) {
     p.triangle = hit.triangle;
     p.weights = hit.barycentrics;
     p.back = hit.front ? 0u : 1u;
@@ -286,7 +286,7 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
     p.found = met ? CM_FOUND_TRIANGLE : CM_FOUND_NONE;
     if (met) p.reach = hit.t;
   }
-  bool vertex = flight ? met : p.start == CM_ON_TRIANGLE;
+  bool vertex = scattered ? met : p.start == CM_ON_TRIANGLE;
   p.stage = first ? CM_STAGE_AIM : (vertex ? CM_STAGE_VERTEX : CM_STAGE_EVENT);
 }
 
@@ -305,7 +305,7 @@ CM_FN CmVertex cm_on_triangle(CmPath p) {
   if (p.blurred != 0u) {
     float least = cm.integrator.blurred_roughness;
     vertex.surface.material.roughness = max(vertex.surface.material.roughness, least);
-#if CM_RICH
+#if CM_EXTENDED_BSDF
     // Clear surfaces still transmit without blur.
     if (vertex.surface.kept == 1.0f) {
       vertex.surface.material.alpha = max(vertex.surface.material.alpha, vec2(cm_alpha(least)));
@@ -313,14 +313,14 @@ CM_FN CmVertex cm_on_triangle(CmPath p) {
 #endif
     vertex.surface.material.clearcoat_roughness = max(vertex.surface.material.clearcoat_roughness, least);
   }
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   cm_bound(p, vertex);
 #endif
   return vertex;
 }
 
 // Distance that a finished ray covered.
-CM_FN float cm_flight_end(CmPath p, CmVertex vertex) {
+CM_FN float cm_scattered_end(CmPath p, CmVertex vertex) {
   if (vertex.on_triangle) return dot(vertex.surface.position - cm_from_cube_point(p.o), p.w);
   return p.event == CM_EVENT_COLLISION ? p.t : p.t_end;
 }
@@ -328,21 +328,21 @@ CM_FN float cm_flight_end(CmPath p, CmVertex vertex) {
 // Adds the emission of the triangle that was hit.
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
   vec3 emission = vertex.surface.emission;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   if (cm.medium.emits != 0u) {
     uint within = p.within == 0u && vertex.leaves ? vertex.bounds : p.within;
-    p.throughput *= cm_transmittance_within(within, max(0.0f, cm_flight_end(p, vertex)));
+    p.throughput *= cm_transmittance_within(within, max(0.0f, cm_scattered_end(p, vertex)));
   }
 #endif
   // The triangle may also be found by NEE at the previous vertex, whatever medium is between: weigh by the balance
   // heuristic. If the ray's origin was lifted above its triangle, the two see the light at different angles, and only
   // NEE counts.
   if (CM_SURFACES > 1 && p.bounces > 0u && !vertex.surface.unlit) {
-    CmLightHit hit = cm_light_hit(CM_LIGHT_TRIANGLE, p.o, p.w, p.density);
+    CmLightHit hit = cm_light_hit(CM_LIGHT_TRIANGLE, p.o, p.w, p.pdf);
     hit.triangle = p.triangle;
     hit.point = vertex.surface.position;
     hit.normal = vertex.surface.geometric;
-    emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_look_pdf(p, hit));
+    emission *= p.lifted != 0u ? 0.0f : cm_balance(p.pdf, cm_nee_pdf(p, hit));
   }
   p.radiance += p.throughput * emission;
 #if CM_GROUPS
@@ -359,72 +359,72 @@ CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
 }
 
 // Origin of light samples, world space.
-CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
+CM_FN vec3 cm_nee_origin(CmPath p, CmVertex vertex) {
   if (vertex.on_triangle) return cm_offset_origin(vertex.surface.position, vertex.surface.geometric);
   return cm_from_cube_point(p.o);
 }
 
 // Samples a direction for the scattered ray. From triangles, some samples are aimed at the bounds of the emissive
 // medium.
-CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
-  float u_0 = draw.turn.x;
-  float u_1 = draw.turn.y;
+CM_FN vec3 cm_sample_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
+  float u_0 = draw.u_direction.x;
+  float u_1 = draw.u_direction.y;
   if (!vertex.on_triangle) return cm_scattered_direction(p, u_0, u_1);
-  float u_3 = draw.choice;
-  float to_glow = cm.lights.glow_chance;
-  bool aimed = u_3 < to_glow;
-  u_3 = aimed ? u_3 / to_glow : (u_3 - to_glow) / (1.0f - to_glow);
+  float u_3 = draw.u_choice;
+  float to_emissive = cm.lights.emissive_chance;
+  bool aimed = u_3 < to_emissive;
+  u_3 = aimed ? u_3 / to_emissive : (u_3 - to_emissive) / (1.0f - to_emissive);
   vec3 w = cm_surface_sample(vertex.surface, p.w, u_0, u_1, u_3);
-  return aimed ? cm_glow_direction(p.o, vec3(u_0, u_1, u_3), w) : w;
+  return aimed ? cm_emissive_direction(p.o, vec3(u_0, u_1, u_3), w) : w;
 }
 
-CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
-  CmTurn turn;
-  turn.lifted = false;
-#if CM_RICH
-  turn.through = false;
-  turn.disperses = false;
+CM_FN CmScatterSample cm_scatter_sample(CmPath p, CmVertex vertex, vec3 wi) {
+  CmScatterSample scatter;
+  scatter.lifted = false;
+#if CM_EXTENDED_BSDF
+  scatter.through = false;
+  scatter.disperses = false;
 #endif
   if (vertex.on_triangle) {
-    turn.share = cm_surface_eval(vertex.surface, p.w, wi);
-    turn.lobe_density = cm_surface_pdf(vertex.surface, p.w, wi);
-    turn.density = (1.0f - cm.lights.glow_chance) * turn.lobe_density +
-                   cm_light_pdf(cm_light_hit(CM_LIGHT_GLOW, p.o, wi, turn.lobe_density));
-    turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
-#if CM_RICH
-    turn.through = vertex.surface.material.transmission > 0.0f && dot(vertex.surface.geometric, wi) < 0.0f;
-    turn.lifted = turn.lifted && !turn.through;
-    turn.disperses = vertex.disperses && (turn.through || vertex.leaves);
-    if (turn.disperses) turn.share *= vertex.colour;
+    scatter.share = cm_surface_eval(vertex.surface, p.w, wi);
+    scatter.lobe_pdf = cm_surface_pdf(vertex.surface, p.w, wi);
+    scatter.pdf = (1.0f - cm.lights.emissive_chance) * scatter.lobe_pdf +
+                   cm_light_pdf(cm_light_hit(CM_LIGHT_EMISSIVE, p.o, wi, scatter.lobe_pdf));
+    scatter.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
+#if CM_EXTENDED_BSDF
+    scatter.through = vertex.surface.material.transmission > 0.0f && dot(vertex.surface.geometric, wi) < 0.0f;
+    scatter.lifted = scatter.lifted && !scatter.through;
+    scatter.disperses = vertex.disperses && (scatter.through || vertex.leaves);
+    if (scatter.disperses) scatter.share *= vertex.color;
 #endif
   } else {
-    turn.lobe_density = cm_scattered(p, wi);
-    turn.density = turn.lobe_density;
-    turn.share = vec3(turn.lobe_density);
+    scatter.lobe_pdf = cm_scattered(p, wi);
+    scatter.pdf = scatter.lobe_pdf;
+    scatter.share = vec3(scatter.lobe_pdf);
   }
-  turn.weight = turn.density > 0.0f ? turn.share / turn.density : vec3(0.0f);
-  return turn;
+  scatter.weight = scatter.pdf > 0.0f ? scatter.share / scatter.pdf : vec3(0.0f);
+  return scatter;
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 
 // Sets the side of the ray's origin, and for a scattered ray the volume that it is in.
-CM_FN void cm_leave_surface(CM_INOUT(CmPath) p, CmVertex vertex, CmTurn turn, bool looks) {
-  p.through = turn.through ? 1u : 0u;
+CM_FN void cm_leave_surface(CM_INOUT(CmPath) p, CmVertex vertex, CmScatterSample scatter, bool to_light) {
+  p.through = scatter.through ? 1u : 0u;
   if (!vertex.on_triangle) return;
-  p.behind = vertex.surface.behind != turn.through ? 1u : 0u;
-  if (looks) return;
-  if (turn.through) cm_cross(vertex.bounds, vertex.leaves, p.within, p.outside);
-  if (turn.disperses) p.dispersed = 1u;
+  p.behind = vertex.surface.behind != scatter.through ? 1u : 0u;
+  if (to_light) return;
+  if (scatter.through) cm_cross(vertex.bounds, vertex.leaves, p.within, p.outside);
+  if (scatter.disperses) p.dispersed = 1u;
 }
 
 #endif
 
 // Returns true if the bounce is wider than the lobe of a surface with the minimum roughness. The bound is a quarter of
 // that lobe's peak pdf. Diffuse surfaces always count as wide.
-CM_FN bool cm_blurs(CmTurn turn) {
+CM_FN bool cm_blurs(CmScatterSample scatter) {
   float alpha = cm_alpha(cm.integrator.blurred_roughness);
-  return turn.lobe_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha));
+  return scatter.lobe_pdf < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha));
 }
 
 #else
@@ -440,22 +440,22 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {}
 CM_FN CmVertex cm_in_medium() { return CmVertex(false); }
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {}
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
-CM_FN bool cm_blurs(CmTurn turn) { return false; }
-CM_FN float cm_flight_end(CmPath p, CmVertex vertex) { return p.event == CM_EVENT_COLLISION ? p.t : p.t_end; }
-CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
+CM_FN bool cm_blurs(CmScatterSample scatter) { return false; }
+CM_FN float cm_scattered_end(CmPath p, CmVertex vertex) { return p.event == CM_EVENT_COLLISION ? p.t : p.t_end; }
+CM_FN vec3 cm_nee_origin(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
 
-CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
-  return cm_scattered_direction(p, draw.turn.x, draw.turn.y);
+CM_FN vec3 cm_sample_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
+  return cm_scattered_direction(p, draw.u_direction.x, draw.u_direction.y);
 }
 
-CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
-  CmTurn turn;
-  turn.density = cm_scattered(p, wi);
-  turn.lobe_density = turn.density;
-  turn.share = vec3(turn.density, turn.density, turn.density);
-  turn.weight = vec3(1.0f, 1.0f, 1.0f);
-  turn.lifted = false;
-  return turn;
+CM_FN CmScatterSample cm_scatter_sample(CmPath p, CmVertex vertex, vec3 wi) {
+  CmScatterSample scatter;
+  scatter.pdf = cm_scattered(p, wi);
+  scatter.lobe_pdf = scatter.pdf;
+  scatter.share = vec3(scatter.pdf, scatter.pdf, scatter.pdf);
+  scatter.weight = vec3(1.0f, 1.0f, 1.0f);
+  scatter.lifted = false;
+  return scatter;
 }
 
 #endif

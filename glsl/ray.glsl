@@ -8,11 +8,11 @@ CM_FN vec3 cm_to_cube(vec3 v) { return cm.space.to_cube_x * v.x + cm.space.to_cu
 CM_FN vec3 cm_to_world(vec3 v) {
   return cm.space.from_cube_x * v.x + cm.space.from_cube_y * v.y + cm.space.from_cube_z * v.z;
 }
-// Transforms a vector from the cube space of the current volume (glsl/here.glsl) to the world.
+// Transforms a vector from the cube space of the current volume (glsl/current_volume.glsl) to the world.
 CM_FN vec3 cm_out_of_volume(vec3 v) {
 #if CM_INSTANCES
 #if CM_MOTION
-  if (cm_instance_moves(cm_here)) return cm_out_of_standing(cm_instance_standing(cm_here), v);
+  if (cm_instance_moves(cm_here)) return cm_from_instance(cm_instance_transform(cm_here), v);
 #endif
   return cm_instances[cm_here].space.from_cube_x * v.x + cm_instances[cm_here].space.from_cube_y * v.y +
          cm_instances[cm_here].space.from_cube_z * v.z;

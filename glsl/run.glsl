@@ -1,5 +1,5 @@
 // Runs all stages of a path in one kernel, without triangles. Shared by GLSL and C++. The includer provides what
-// glsl/flight.glsl asks for, and
+// glsl/free_flight.glsl asks for, and
 //   uvec2 cm_pixel_of(uint place)                 the path's pixel
 //   CmPixel cm_load_pixel(uvec2 at)               the sums of its samples
 //   void cm_store_pixel(CmPixel pixel, uvec2 at)
@@ -7,7 +7,7 @@
 #ifndef CM_RUN_GLSL
 #define CM_RUN_GLSL
 
-#include "flight.glsl"
+#include "free_flight.glsl"
 
 // Work done by lanes.
 struct CmRun {

@@ -78,7 +78,7 @@ float cm_number(uint i) {
 #endif
 }
 
-void cm_look_at(uint t, uint slot) {
+void cm_visit_cell(uint t, uint slot) {
   uint not_zero = 0u;
   for (uint z = 0u; z < 8u; ++z) {
     float value = cm_number(512u * slot + 8u * t + z);
@@ -178,7 +178,7 @@ void main() {
   if (t == 0u) cm_most = 0u;
 #endif
   barrier();
-  cm_look_at(t, slot);
+  cm_visit_cell(t, slot);
   barrier();
 #if CM_CELLS
   cm_put_cells(t, slot);

@@ -8,7 +8,7 @@
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 #include "ggx.glsl"
-#include "gloss.glsl"
+#include "prefiltered.glsl"
 #include "luminance.glsl"
 #include "punctual.glsl"
 
@@ -33,11 +33,11 @@ layout(location = 3) in vec4 cm_texture_uv;
 layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
-layout(binding = CM_UNIT_GLOSS) uniform sampler2DArray cm_gloss;  // of light/gloss.hpp
+layout(binding = CM_UNIT_PREFILTERED) uniform sampler2DArray cm_prefiltered;  // of light/prefiltered_environment.hpp
 layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
-layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };  // relative to the eye
+layout(std430, binding = CM_STORAGE_ANALYTIC_LIGHTS) readonly buffer CmAnalyticLightRecords { CmAnalyticLight cm_analytic_lights[]; };  // relative to the eye
 
-layout(location = 0) out vec4 cm_colour;
+layout(location = 0) out vec4 cm_color;
 layout(location = 1) out float cm_depth_z;
 
 bool cm_has(int map) { return (CM_USED >> map & 1) != 0; }
@@ -99,19 +99,19 @@ vec3 cm_matte_beyond(vec3 normal) {
   return max(seen, -cm_view.sky_radiance.rgb);
 }
 
-vec3 cm_gloss_beyond(CmSurface s, vec3 wo, float roughness) {
-  vec2 place = cm_gloss_place(cm_turned(cm_gloss_middle(s.normal, wo, roughness), cm_view.sky_turn.xy));
-  float level = cm_gloss_level(roughness);
+vec3 cm_prefiltered_beyond(CmSurface s, vec3 wo, float roughness) {
+  vec2 place = cm_prefiltered_position(cm_turned(cm_prefiltered_middle(s.normal, wo, roughness), cm_view.sky_turn.xy));
+  float level = cm_prefiltered_level(roughness);
   float low = floor(level);
-  vec3 smoother = textureLod(cm_gloss, vec3(place, low), 0.0).rgb;
-  vec3 rougher = textureLod(cm_gloss, vec3(place, low + 1.0), 0.0).rgb;
+  vec3 smoother = textureLod(cm_prefiltered, vec3(place, low), 0.0).rgb;
+  vec3 rougher = textureLod(cm_prefiltered, vec3(place, low + 1.0), 0.0).rgb;
   return cm_view.sky_turn.z * mix(smoother, rougher, level - low);
 }
 
 void main() {
   vec4 base = cm_material.base_color * cm_vertex_color;
   if (cm_has(CM_MAP_BASE_COLOR)) base *= CM_SAMPLE(CM_MAP_BASE_COLOR);
-  vec3 colour = base.rgb;
+  vec3 color = base.rgb;
   float alpha = CM_ALPHA == 2 ? clamp(base.a, 0.0, 1.0) : 1.0;
   if (cm_material.flags.z == 0u) {
     vec3 wo = cm_view.counts.z != 0u ? -cm_view.forward.xyz : -normalize(cm_from_eye);
@@ -150,32 +150,32 @@ void main() {
     float occlusion = 1.0;
     if (cm_has(CM_MAP_OCCLUSION)) occlusion += reflection.w * (CM_SAMPLE(CM_MAP_OCCLUSION).r - 1.0);
     CmAlbedos albedos = cm_bsdf_albedos(s, wo);
-    colour = cm_view.sky_radiance.rgb * occlusion * cm_albedo_of(albedos);
+    color = cm_view.sky_radiance.rgb * occlusion * cm_albedo_of(albedos);
     if (cm_view.counts.y > 0u) {
       vec3 beyond = albedos.matte * cm_matte_beyond(s.matte_normal);
-      beyond += albedos.base * cm_gloss_beyond(s, wo, s.roughness);
+      beyond += albedos.base * cm_prefiltered_beyond(s, wo, s.roughness);
 #if CM_COATED
-      beyond += albedos.coat * cm_gloss_beyond(s, wo, s.clearcoat_roughness);
+      beyond += albedos.coat * cm_prefiltered_beyond(s, wo, s.clearcoat_roughness);
 #endif
-      colour += occlusion * beyond;
+      color += occlusion * beyond;
     }
-    colour += cm_view.sun_irradiance.rgb * cm_bsdf_eval(s, wo, cm_view.sun_direction.xyz);
+    color += cm_view.sun_irradiance.rgb * cm_bsdf_eval(s, wo, cm_view.sun_direction.xyz);
     for (uint i = 0u; i < cm_view.counts.x; ++i) {
       vec3 wi;
       float reach;
-      vec3 irradiance = cm_lamp_irradiance(cm_lamps[i], vec3(0.0), cm_from_eye, wi, reach);
-      if (cm_max3(irradiance) > 0.0) colour += irradiance * cm_bsdf_eval(s, wo, wi);
+      vec3 irradiance = cm_analytic_light_irradiance(cm_analytic_lights[i], vec3(0.0), cm_from_eye, wi, reach);
+      if (cm_max3(irradiance) > 0.0) color += irradiance * cm_bsdf_eval(s, wo, wi);
     }
     vec3 emission = cm_material.emission.rgb;
     if (cm_has(CM_MAP_EMISSION)) emission *= CM_SAMPLE(CM_MAP_EMISSION).rgb;
-    colour = (colour + emission) * covered;
+    color = (color + emission) * covered;
   } else {
-    colour *= alpha;
+    color *= alpha;
   }
 #if CM_ALPHA == 1
   if (base.a < cm_material.emission.w) discard;  // after the last use of derivatives
 #endif
-  cm_colour = vec4(clamp(colour, 0.0, 65000.0), alpha);
+  cm_color = vec4(clamp(color, 0.0, 65000.0), alpha);
   // Nearly invisible fragments get infinite depth.
   cm_depth_z = CM_ALPHA != 2 || alpha > 0.002 ? cm_z : uintBitsToFloat(0x7f800000u);
 }

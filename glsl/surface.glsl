@@ -44,7 +44,7 @@ CM_FN uvec4 cm_bvh_triangle(uint texel) {
 // Properties of the current ray, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 vec3 cm_hit_direction = vec3(0.0f);  // world, unit
 vec3 cm_hit_passed = vec3(1.0f);     // transmittance over pass probability of the clear surfaces passed so far
 #endif
@@ -66,7 +66,7 @@ CM_FN vec2 cm_ggx_albedo_average(float roughness) {
   return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), place - float(row));
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 
 CM_FN float cm_sheen_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
@@ -189,7 +189,7 @@ struct CmSurfacePoint {
   bool lifted;     // rays that leave at grazing angles start above the triangle: see cm_lift
   vec3 emission;   // emission to that side
   bool unlit;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   float kept;      // 1 / (1 - probability that a path passes through here)
 #endif
 };
@@ -251,7 +251,7 @@ CM_FN CmCorners cm_corners(CmVertexMix m) {
 
 CM_FN bool cm_mirrors(uint model) {
 #if CM_MOTION
-  if (cm_model_moves(model)) return cm_standing_volume(cm_model_standing(model)) < 0.0f;
+  if (cm_model_moves(model)) return cm_transform_determinant(cm_model_transform(model)) < 0.0f;
 #endif
   return (cm_models[model].flags & CM_MODEL_MIRRORS) != 0u;
 }
@@ -294,7 +294,7 @@ struct CmMaps {
   vec4 specular_color;
   vec4 clearcoat;
   vec4 clearcoat_roughness;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   vec4 transmission;
   vec4 sheen_color;
   vec4 sheen_roughness;
@@ -304,7 +304,7 @@ struct CmMaps {
 #endif
 };
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 const uint CM_LAST_USE = CM_USE_FILM_THICKNESS;
 #else
 const uint CM_LAST_USE = CM_USE_CLEARCOAT_ROUGHNESS;
@@ -315,7 +315,7 @@ CM_FN CmMaps cm_maps(CmVertexMix m) {
   CmMaps maps;
   for (uint use = CM_USE_BASE_COLOR; use <= CM_LAST_USE; use += 2u) {
     bool srgb = use == CM_USE_BASE_COLOR || use == CM_USE_EMISSION || use == CM_USE_SPECULAR_COLOR;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
     srgb = srgb || use == CM_USE_SHEEN_COLOR;
 #endif
     vec4 value = cm_texture(m, use, srgb);
@@ -327,7 +327,7 @@ CM_FN CmMaps cm_maps(CmVertexMix m) {
     if (use == CM_USE_SPECULAR_COLOR) maps.specular_color = value;
     if (use == CM_USE_CLEARCOAT) maps.clearcoat = value;
     if (use == CM_USE_CLEARCOAT_ROUGHNESS) maps.clearcoat_roughness = value;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
     if (use == CM_USE_TRANSMISSION) maps.transmission = value;
     if (use == CM_USE_SHEEN_COLOR) maps.sheen_color = value;
     if (use == CM_USE_SHEEN_ROUGHNESS) maps.sheen_roughness = value;
@@ -344,7 +344,7 @@ CM_FN vec3 cm_emission(CmVertexMix m) {
   return vec3(cm_floats(m.material + CM_MATERIAL_EMISSION)) * vec3(cm_texture(m, CM_USE_EMISSION, true));
 }
 
-#if CM_RICH
+#if CM_EXTENDED_BSDF
 
 // Projects a tangent onto the plane of the normal. Returns an arbitrary tangent if there is none.
 CM_FN vec3 cm_across(vec3 normal, vec3 tangent) {
@@ -405,7 +405,7 @@ CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent
 
 #endif
 
-// Shading data of the point of a triangle that a path along w (world) has hit, on its back or front. With CM_RICH a
+// Shading data of the point of a triangle that a path along w (world) has hit, on its back or front. With CM_EXTENDED_BSDF a
 // volume boundary is assumed to be in air; cm_bound (path_vertex.glsl) corrects that.
 CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
@@ -450,7 +450,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
       if (dot(bumped, bumped) > 1e-12f) normal = normalize(bumped);
     }
   }
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   vec3 shading = normal;  // shading normal of the front side
 #endif
   if (back) normal = -normal;
@@ -470,7 +470,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
   point.material.specular = specular;
   point.material.clearcoat = b.w * maps.clearcoat.r;
   point.material.clearcoat_roughness = c.x * maps.clearcoat_roughness.g;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   cm_enrich(point.material, word, maps, tangent, shading, point.geometric, from_back);
   if (point.unlit) point.material.transmission = 0.0f;
   // Rays that pass through are not shaded here, so the shaded ones are weighted by 1 / (1 - pass probability).
@@ -486,7 +486,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
 CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
   float solid = cm_coverage(cm_vertex_mix(cm_model, triangle, weights));
   uint number = cm_models[cm_model].first + triangle;
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   float u = cm_unit_float(cm_hash3(uvec3(cm_hit_seed, number, 0x68bc21ebu)).x);
   if (u >= solid) return false;
   CmSurfacePoint point = cm_surface_point(number, weights, cm_hit_direction, false);
@@ -513,7 +513,7 @@ CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
 // triangle: light found there from the ray's origin counts, often that of the surface itself.
 CM_FN vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
   vec3 share = cm_bsdf_eval(point.material, -w, wi);
-#if CM_RICH
+#if CM_EXTENDED_BSDF
   share *= point.kept;
 #endif
   return share;

@@ -1,7 +1,7 @@
 #version 450
 // Intersects queued rays with the triangles: glsl/path_queue.glsl.
 // variants: CM_SURFACES=1
-// variants: - or CM_RICH=1
+// variants: - or CM_EXTENDED_BSDF=1
 // variants: - or CM_GROUPS=1
 // variants: - or CM_MOTION=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -28,8 +28,8 @@ void main() {
   CmPath p = cm_load_path(lane);
   cm_load_within(p, lane);
   cm_meet(p);
-#if CM_RICH
-  cm_store_flight(p, lane);  // throughput and light, dimmed by absorption
+#if CM_EXTENDED_BSDF
+  cm_store_scattered(p, lane);  // throughput and light, dimmed by absorption
 #endif
   if (cm.medium.emits != 0u) cm_store_ray(p, lane);  // the ray may end earlier
   cm_store_ends(p, lane);

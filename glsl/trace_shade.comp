@@ -1,6 +1,6 @@
 #version 450
 // Shades the triangles that paths have hit, or where their shadow rays started: glsl/path_queue.glsl.
-// variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_RICH=1 CM_GROUPS=1
+// variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_EXTENDED_BSDF=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_EXTENDED_BSDF=1 CM_GROUPS=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1 or CM_MOTION=1 or CM_CHANNELS=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_ENVIRONMENT=1
 // variants: - or CM_HOLDOUT=1
@@ -31,7 +31,7 @@ void cm_forget_ray(inout CmPath p) {
   p.start_cell = uvec2(0u);
   p.reach = 0.0;
   p.light = vec3(0.0);
-  p.density = 0.0;
+  p.pdf = 0.0;
   p.event = CM_EVENT_NONE;
 }
 
@@ -44,9 +44,9 @@ void main() {
 #if CM_GROUPS
   cm_group_lane = lane;
 #endif
-  cm_load_flight(p, lane);
+  cm_load_scattered(p, lane);
   cm_load_ends(p, lane);
-#if CM_RICH || CM_MOTION
+#if CM_EXTENDED_BSDF || CM_MOTION
   cm_load_sum(p, lane);  // the sample's number
 #endif
 #if CM_MOTION
@@ -62,8 +62,8 @@ void main() {
   bool arrived;
   bool finished = cm_end_ray(p, vertex, arrived);
 #if CM_EQUIANGULAR
-  if (passed.looks) {
-    cm_look_back(p, passed, finished);
+  if (passed.to_light) {
+    cm_equiangular_nee(p, passed, finished);
     cm_store_path(p, lane);
     cm_send_on(p, lane);
     return;
@@ -75,16 +75,16 @@ void main() {
   if (finished) {
     p.stage = CM_STAGE_FINISH;
   } else {
-    cm_store_flight(p, lane);
-    CmLook look = cm_look(p, vertex, arrived);
-    cm_load_flight(kept, lane);
+    cm_store_scattered(p, lane);
+    CmNee nee = cm_nee(p, vertex, arrived);
+    cm_load_scattered(kept, lane);
     p.w = kept.w;
     p.throughput = kept.throughput;
-    cm_scatter(p, vertex, look);
+    cm_scatter(p, vertex, nee);
     cm_store_within(p, lane);
   }
   cm_store_ray(p, lane);
-  cm_store_flight(p, lane);
+  cm_store_scattered(p, lane);
   cm_load_ends(kept, lane);
   p.triangle = kept.triangle;
   p.weights = kept.weights;

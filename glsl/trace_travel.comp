@@ -22,7 +22,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "buffers.glsl"
 #include "surface.glsl"
 #include "march.glsl"
-#include "flight.glsl"
+#include "free_flight.glsl"
 #include "path_store.glsl"
 #include "path_queue.glsl"
 #include "groups.glsl"

@@ -1,15 +1,15 @@
 // Deterministic traversal of a ray through the volume, or through all volumes together, segment by segment. Extinction
-// is linear in each segment. Used for feature rays and transmittance; paths traverse volumes one by one (flight.glsl).
+// is linear in each segment. Used for feature rays and transmittance; paths traverse volumes one by one (free_flight.glsl).
 // The includer has march.glsl and ray.glsl before this.
 #ifndef CM_WALK_GLSL
 #define CM_WALK_GLSL
 
 // Maximum number of volumes that a ray may be in at once. If more overlap, those entered last wait until others end.
 #if CM_INSTANCES
-#define CM_MOST_FRONTS 4
+#define CM_MAX_FRONTS 4
 #define CM_IS_FRONT(k, walk) (k < walk.count)
 #else
-#define CM_MOST_FRONTS 1
+#define CM_MAX_FRONTS 1
 #define CM_IS_FRONT(k, walk) (k < 1 && k < walk.count)  // without a loop
 #endif
 
@@ -31,7 +31,7 @@ struct CmWalk {
   float t_end;
   bool of_camera;  // a camera ray, which skips volumes hidden from cameras
   int count;
-  CmFront front[CM_MOST_FRONTS];
+  CmFront front[CM_MAX_FRONTS];
   float entry;   // distance where it enters the next volume; 3e38: there is none
   uint volume;   // that next volume
 };
@@ -97,7 +97,7 @@ bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1
   t_1 = 3.0e38;
   e_0 = 0.0;
   e_1 = 0.0;
-  while (walk.count < CM_MOST_FRONTS && walk.entry < 3.0e38 && (walk.count == 0 || walk.entry <= walk.t)) {
+  while (walk.count < CM_MAX_FRONTS && walk.entry < 3.0e38 && (walk.count == 0 || walk.entry <= walk.t)) {
     walk.t = max(walk.t, walk.entry);
     CmFront front;
     front.volume = walk.volume;
@@ -109,7 +109,7 @@ bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1
     cm_walk_seek(walk);
   }
   if (walk.count == 0 || walk.t >= walk.t_end) return false;
-  if (walk.count < CM_MOST_FRONTS) t_1 = walk.entry;
+  if (walk.count < CM_MAX_FRONTS) t_1 = walk.entry;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) t_1 = min(t_1, walk.front[k].t_1);
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     e_0 += walk.t == walk.front[k].t_0 ? walk.front[k].e_0 : cm_front_extinction(walk.front[k], walk.t);
@@ -190,7 +190,7 @@ vec4 cm_walk_scatters(inout CmWalk walk) {
     vec3 albedo = CM_MEDIUM.holdout != 0u ? vec3(0.0) : CM_MEDIUM.albedo;
     vec4 here = vec4(albedo, mix(CM_MEDIUM.anisotropy, CM_MEDIUM.second_anisotropy, CM_MEDIUM.second_share));
 #if CM_CHANNELS
-    if (CM_MEDIUM.coloured != 0u) here.rgb *= cm_march_colour(walk.front[k].cell.xy);
+    if (CM_MEDIUM.colored != 0u) here.rgb *= cm_march_color(walk.front[k].cell.xy);
     if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy);
 #endif
     scatters += extinction * here;

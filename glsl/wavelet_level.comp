@@ -29,7 +29,7 @@ void main() {
   }
   vec4 slopes = cm_slopes(texel, here);
   float cover = cm_cover(spread.x);
-  vec3 colour = front.rgb / cover;
+  vec3 color = front.rgb / cover;
   float variance = spread.y / (cover * cover);
   float excess = front.a - spread.x;
   vec4 front_sum = vec4(0.0);
@@ -45,13 +45,13 @@ void main() {
       vec4 other = texelFetch(cm_front, at, 0);
       vec4 other_spread = texelFetch(cm_spread, at, 0);
       float other_cover = cm_cover(other_spread.x);
-      vec3 difference = other.rgb / other_cover - colour;
-      float of_colour = dot(difference, difference) /
+      vec3 difference = other.rgb / other_cover - color;
+      float of_color = dot(difference, difference) /
                         (3.0 * (variance + other_spread.y / (other_cover * other_cover)) + 1e-30);
       float more = other.a - other_spread.x - excess;
       float of_part = more * more / (spread.z + other_spread.z + 1e-30);
       float weight = cm_kernel[abs(x)] * cm_kernel[abs(y)] * cm_alike(here, there, slopes, vec2(offset)) *
-                     exp(-max(of_colour, of_part) / (2.0 * CM_TOLERANCE * CM_TOLERANCE));
+                     exp(-max(of_color, of_part) / (2.0 * CM_TOLERANCE * CM_TOLERANCE));
       front_sum += weight * other;
       spread_sum += vec3(weight, weight * weight, weight * weight) * other_spread.xyz;
       sum += weight;

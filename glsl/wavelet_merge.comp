@@ -11,7 +11,7 @@ layout(location = 3) uniform float cm_most;  // maximum number of samples in the
 layout(rgba32ui, binding = CM_IMAGE_HISTORY_LIGHT) uniform writeonly uimage2D cm_light_out;
 layout(rgba32ui, binding = CM_IMAGE_HISTORY_GUIDES) uniform writeonly uimage2D cm_guides_out;
 #if CM_HISTORY
-layout(binding = CM_UNIT_HISTORY_LIGHT) uniform usampler2D cm_recalled;
+layout(binding = CM_UNIT_HISTORY_LIGHT) uniform usampler2D cm_history_light;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
 
@@ -51,7 +51,7 @@ CmAround cm_around(ivec2 texel, CmGuides here, vec4 slopes) {
       if (!there.finite || spread.z == 0.0) continue;
       float over = 1.0 / cm_cover(spread.x);
       vec3 front = over * texelFetch(cm_front, at, 0).rgb;
-      CmLit lit = cm_unpacked_light(texelFetch(cm_recalled, at, 0));
+      CmLit lit = cm_unpacked_light(texelFetch(cm_history_light, at, 0));
       float weight = cm_alike(here, there, slopes, vec2(x, y));
       now += weight * spread.z * front;
       squares += weight * spread.z * front * front;
@@ -76,7 +76,7 @@ CmAround cm_around(ivec2 texel, CmGuides here, vec4 slopes) {
 }
 
 // History of the pixel, reduced and clamped where it disagrees with the new samples.
-CmLit cm_believed(CmLit lit, CmAround around, float cover, float samples) {
+CmLit cm_trusted_history(CmLit lit, CmAround around, float cover, float samples) {
   if (around.samples_now == 0.0 || lit.samples == 0.0) return lit;
   float off = cm_luminance(around.then - around.now);
   float noise = around.variance * (1.0 / around.samples_now + 1.0 / around.samples_then);
@@ -105,8 +105,8 @@ void main() {
 #if CM_HISTORY
   if (here.finite) {
     CmAround around = cm_around(texel, here, cm_slopes(texel, here));
-    CmLit lit = cm_unpacked_light(texelFetch(cm_recalled, texel, 0));
-    lit = cm_believed(lit, around, cm_cover(spread.x), spread.z);
+    CmLit lit = cm_unpacked_light(texelFetch(cm_history_light, texel, 0));
+    lit = cm_trusted_history(lit, around, cm_cover(spread.x), spread.z);
     if (lit.samples > 0.0) {
       float all = spread.z + lit.samples;
       front += (lit.samples / all) * (lit.front - front);

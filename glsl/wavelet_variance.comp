@@ -104,17 +104,17 @@ void main() {
       CmGuides there = cm_guides_at(at);
       vec4 other = texelFetch(cm_spread, at, 0);
       if (!there.finite || other.z == 0.0) continue;
-      vec4 colour = texelFetch(cm_front, at, 0);
+      vec4 color = texelFetch(cm_front, at, 0);
       float weight = cm_alike(here, there, slopes, vec2(x, y));
       float cover = cm_cover(other.x);
-      float dimmed = cm_dimmed(colour.rgb, other, about);
-      colour.rgb *= dimmed;
+      float dimmed = cm_dimmed(color.rgb, other, about);
+      color.rgb *= dimmed;
       other.y *= dimmed * dimmed;
-      float luminance = cm_luminance(colour.rgb);
+      float luminance = cm_luminance(color.rgb);
       float samples = weight * other.z;
-      front += samples * vec4(colour.rgb, cover);
-      either += samples * abs(colour.rgb);
-      open += samples * colour.a;
+      front += samples * vec4(color.rgb, cover);
+      either += samples * abs(color.rgb);
+      open += samples * color.a;
       square += samples * other.y;
       count += samples;
       deviation += samples * max(0.0, other.y - luminance * luminance);
@@ -129,9 +129,9 @@ void main() {
     float sample_variance =
         degrees >= CM_ENOUGH ? cover * deviation / freedom : max(0.0, cover * square / front.a - mean * mean);
     // Variance per channel, if the colors differ in all channels.
-    vec3 colour = either / count;
-    float luminance = cm_luminance(colour);
-    float channels = dot(colour, colour) / 3.0;
+    vec3 color = either / count;
+    float luminance = cm_luminance(color);
+    float channels = dot(color, color) / 3.0;
     // At most as for pure blue: the residual after subtracting emission has either sign.
     if (channels > 0.0) sample_variance *= min(64.0, channels / max(luminance * luminance, 1e-30));
     // None of few samples does not mean never: the Krichevsky-Trofimov estimator (1981).

@@ -35,12 +35,12 @@ using Json = nlohmann::ordered_json;
 constexpr double moving_budget = 16.0;
 constexpr double resting_budget = 60.0;
 
-constexpr double event_glow = 0.7;   // seconds of frames after an event, because tooltips and highlights appear late
-constexpr double motion_rest = 0.4;  // seconds without camera motion that end an undo step
+constexpr double event_emissive = 0.7;  // seconds of frames after an event, because tooltips and highlights appear late
+constexpr double motion_rest = 0.4;     // seconds without camera motion that end an undo step
 constexpr double replay_frame = 1.0 / 60.0;
-constexpr double least_frame = 1.0 / 60.0;  // minimum seconds between frames
-constexpr double picture_frame = 0.15;      // maximum seconds that the window waits for an image being rendered
-constexpr double click_reach = 4.0;         // pixels at scale 1 that the pointer may move during a click
+constexpr double min_frame = 1.0 / 60.0;  // minimum seconds between frames
+constexpr double picture_frame = 0.15;    // maximum seconds that the window waits for an image being rendered
+constexpr double click_reach = 4.0;       // pixels at scale 1 that the pointer may move during a click
 
 }  // namespace
 
@@ -82,7 +82,7 @@ void App::run() {
   while (!quit_ && !window_->should_close()) {
     Window::wait(patience());
     // Limits the frame rate: the remaining time is for rendering.
-    const double early = now_ + least_frame - glfwGetTime();
+    const double early = now_ + min_frame - glfwGetTime();
     if (!stepped() && early > 0.0) {
       std::this_thread::sleep_for(std::chrono::duration<double>(early));
       Window::wait(0.0);
@@ -96,10 +96,10 @@ void App::run() {
 double App::patience() const {
   if (stepped() || window_->input().pending()) return 0.0;
   double wait = player_ ? order_.idle : std::numeric_limits<double>::infinity();
-  if (owes_) wait = std::min(wait, std::max(drawn_at_ + picture_frame - now_, least_frame));
-  constexpr double glow_frame = 1.0 / 30.0;
-  if (model_.playing) return std::min(wait, least_frame);
-  if (now_ - last_event_ < event_glow) return std::min(wait, glow_frame);
+  if (has_pending_frame_) wait = std::min(wait, std::max(drawn_at_ + picture_frame - now_, min_frame));
+  constexpr double emissive_frame = 1.0 / 30.0;
+  if (model_.playing) return std::min(wait, min_frame);
+  if (now_ - last_event_ < event_emissive) return std::min(wait, emissive_frame);
   constexpr double blink = 0.4;
   constexpr double slow_frame = 0.1;
   if (ImGui::GetIO().WantTextInput) wait = std::min(wait, blink);
@@ -155,7 +155,7 @@ void App::frame() {
   held_ = ImGui::IsAnyItemActive() || viewport_buttons_ != 0 || now_ - last_motion_ < motion_rest;
   ask();
   if (stepped()) {
-    renderer_->wait_for(wish_.number);
+    renderer_->wait_for(desired_.number);
     take();
   }
   follow_history();
@@ -264,8 +264,8 @@ void App::let_go(const Event& event) {
 void App::choose_at(const glm::dvec2& pixel) {
   const auto seen = sight();
   if (!seen) return;
-  if (const auto lamp = Handles::lamp_at(model_, *seen, pixel, ui_scale_)) {
-    model_.chosen = lamp;
+  if (const auto analytic_light = Handles::analytic_light_at(model_, *seen, pixel, ui_scale_)) {
+    model_.chosen = analytic_light;
     return;
   }
   requests_.push_back({Request::Type::pick, {}, pixel.x - viewport_.x, pixel.y - viewport_.y});
@@ -567,7 +567,7 @@ void App::follow_playback() {
   if (!play) return;
   const cumulet_playback_desc now = playback_of(model_.scene.sequence, play->row);
   const bool known = std::exchange(known_sequence_, play->sequence.get()) == play->sequence.get();
-  if (known && settings::same(now, playback_of(wish_.scene.sequence, play->row))) return;
+  if (known && settings::same(now, playback_of(desired_.scene.sequence, play->row))) return;
   // After a change of the playback settings the clock is set so that the displayed frame stays.
   model_.clock = now.offset_seconds + (double(play->info.asked_frame) - now.first_frame) / now.frames_per_second;
 }
@@ -629,8 +629,8 @@ void App::save_scene(const std::string& path) {
 }
 
 bool App::waiting() const {
-  return answer_waits_ || answered_volume_ != wish_.volume_edit || answered_surfaces_ != wish_.surfaces_edit ||
-         answered_environment_ != wish_.environment_edit;
+  return answer_waits_ || answered_volume_ != desired_.volume_edit || answered_surfaces_ != desired_.surfaces_edit ||
+         answered_environment_ != desired_.environment_edit;
 }
 
 bool App::is_unsaid() const {
@@ -654,35 +654,36 @@ void App::follow_history() {
 }
 
 void App::ask() {
-  Wish wish;
-  wish.number = wish_.number;
-  wish.scene = model_.scene;
-  if (model_.status.play) wish.scene.surface.time = std::max(model_.clock, 0.0);
-  wish.camera_edit = wish_.camera_edit + (same_camera(wish.scene.camera, wish_.scene.camera) ? 0 : 1);
-  const bool load = std::exchange(reload_, false) || volume_of(wish.scene) != volume_of(wish_.scene);
-  wish.volume_edit = wish_.volume_edit + (load ? 1 : 0);
-  wish.fit = load ? std::exchange(fit_next_, false) : wish_.fit;
-  wish.suggest = load ? std::exchange(suggest_next_, false) : wish_.suggest;
-  wish.unsaid = load ? is_unsaid() : wish_.unsaid;
-  wish.surfaces_edit = wish_.surfaces_edit + (wish.scene.surfaces == wish_.scene.surfaces ? 0 : 1);
-  wish.environment_edit = wish_.environment_edit + (wish.scene.environment == wish_.scene.environment ? 0 : 1);
-  wish.navigation = model_.navigation;
-  wish.adaptive_resolution = model_.adaptive_resolution;
-  wish.held = held_;
-  wish.paused = panel_.dialog_open();
-  wish.budget_ms = held_ || now_ - last_event_ < motion_rest ? moving_budget : resting_budget;
-  wish.width = static_cast<std::uint32_t>(viewport_.width);
-  wish.height = static_cast<std::uint32_t>(viewport_.height);
-  wish.scale = static_cast<double>(ui_scale_);
-  if (!stepped() && same_wish(wish, wish_) && inputs_.empty() && requests_.empty()) return;
-  ++wish.number;
-  const bool changed = !inputs_.empty() || !same_scene(wish.scene, wish_.scene);
+  DesiredState desired;
+  desired.number = desired_.number;
+  desired.scene = model_.scene;
+  if (model_.status.play) desired.scene.surface.time = std::max(model_.clock, 0.0);
+  desired.camera_edit = desired_.camera_edit + (same_camera(desired.scene.camera, desired_.scene.camera) ? 0 : 1);
+  const bool load = std::exchange(reload_, false) || volume_of(desired.scene) != volume_of(desired_.scene);
+  desired.volume_edit = desired_.volume_edit + (load ? 1 : 0);
+  desired.fit = load ? std::exchange(fit_next_, false) : desired_.fit;
+  desired.suggest = load ? std::exchange(suggest_next_, false) : desired_.suggest;
+  desired.unsaid = load ? is_unsaid() : desired_.unsaid;
+  desired.surfaces_edit = desired_.surfaces_edit + (desired.scene.surfaces == desired_.scene.surfaces ? 0 : 1);
+  desired.environment_edit =
+      desired_.environment_edit + (desired.scene.environment == desired_.scene.environment ? 0 : 1);
+  desired.navigation = model_.navigation;
+  desired.adaptive_resolution = model_.adaptive_resolution;
+  desired.held = held_;
+  desired.paused = panel_.dialog_open();
+  desired.budget_ms = held_ || now_ - last_event_ < motion_rest ? moving_budget : resting_budget;
+  desired.width = static_cast<std::uint32_t>(viewport_.width);
+  desired.height = static_cast<std::uint32_t>(viewport_.height);
+  desired.scale = static_cast<double>(ui_scale_);
+  if (!stepped() && same_request(desired, desired_) && inputs_.empty() && requests_.empty()) return;
+  ++desired.number;
+  const bool changed = !inputs_.empty() || !same_scene(desired.scene, desired_.scene);
   if (changed && !changed_at_) {
     changed_at_ = now_;
-    changed_number_ = wish.number;
+    changed_number_ = desired.number;
   }
-  wish_ = wish;
-  renderer_->ask(std::move(wish), std::exchange(inputs_, {}), std::exchange(requests_, {}));
+  desired_ = desired;
+  renderer_->ask(std::move(desired), std::exchange(inputs_, {}), std::exchange(requests_, {}));
 }
 
 void App::take() {
@@ -692,9 +693,9 @@ void App::take() {
 void App::accept(const Answer& answer) {
   if (answer.drawn) {
     ++pictures_;
-    drawn_ = answer.wish;
+    drawn_ = answer.desired;
   }
-  answered_ = answer.wish;
+  answered_ = answer.desired;
   answer_waits_ = answer.waiting;
   answered_volume_ = answer.volume_edit;
   answered_surfaces_ = answer.surfaces_edit;
@@ -702,17 +703,17 @@ void App::accept(const Answer& answer) {
   camera_moved_ |= answer.camera_moved;
   if (answer.camera_moved) {
     end_shutter(model_.scene);
-    end_shutter(wish_.scene);
+    end_shutter(desired_.scene);
   }
   // Ignores values of the viewer that the user has changed since.
-  if (answer.camera_edit == wish_.camera_edit) model_.scene.camera = wish_.scene.camera = answer.camera;
-  if (answer.volume_edit == wish_.volume_edit) {
+  if (answer.camera_edit == desired_.camera_edit) model_.scene.camera = desired_.scene.camera = answer.camera;
+  if (answer.volume_edit == desired_.volume_edit) {
     set_volume(model_.scene, answer.volume);
-    set_volume(wish_.scene, answer.volume);
+    set_volume(desired_.scene, answer.volume);
   }
-  if (answer.surfaces_edit == wish_.surfaces_edit) model_.scene.surfaces = wish_.scene.surfaces = answer.surfaces;
-  if (answer.environment_edit == wish_.environment_edit)
-    model_.scene.environment = wish_.scene.environment = answer.environment;
+  if (answer.surfaces_edit == desired_.surfaces_edit) model_.scene.surfaces = desired_.scene.surfaces = answer.surfaces;
+  if (answer.environment_edit == desired_.environment_edit)
+    model_.scene.environment = desired_.scene.environment = answer.environment;
   if (!waiting() && !opening_environment_.empty()) {
     if (model_.scene.environment == opening_environment_) take_daylight(model_.scene);
     opening_environment_.clear();
@@ -804,7 +805,7 @@ bool App::draw() {
   const bool changed = window_->ui_changed();
   const bool waits = viewport_buttons_ != 0 && now_ - drawn_at_ < picture_frame;
   const bool draws = drawn_pictures_ != pictures_ || !order_.screenshot.empty() || (changed && !waits);
-  owes_ = changed && !draws;
+  has_pending_frame_ = changed && !draws;
   if (!draws) return false;
   gl_->BindFramebuffer(GL_FRAMEBUFFER, 0);
   gl_->Disable(GL_SCISSOR_TEST);
@@ -821,9 +822,9 @@ void App::take_frame_time(const std::vector<Event>& events, bool drawn, bool pic
   for (const Event& event : events)
     if (event.time > 0.0) frame_times_.hand(event.time);
   const bool refines = (model_.status.frame.flags & CUMULET_RENDER_MORE) != 0;
-  const bool due = !wish_.paused && (refines || !settled());
+  const bool due = !desired_.paused && (refines || !settled());
   if (!drawn) {
-    if (!owes_ && !due) frame_times_.rest();
+    if (!has_pending_frame_ && !due) frame_times_.rest();
     return;
   }
   if (const auto seconds = frame_times_.shown(glfwGetTime(), picture, due))

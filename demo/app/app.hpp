@@ -80,7 +80,7 @@ class App {
   void accept(const Answer& answer);
   void remember_files(const Answer& answer);
   /// Returns true if the latest request is answered.
-  [[nodiscard]] bool settled() const { return answered_ >= wish_.number; }
+  [[nodiscard]] bool settled() const { return answered_ >= desired_.number; }
   /// Returns true if a load is pending, also if the viewer has not received it yet.
   [[nodiscard]] bool waiting() const;
   /// Returns true if the medium was set neither by the user nor by a flag or scene file.
@@ -125,8 +125,8 @@ class App {
   bool pick_next_ = false;  // the volume being loaded was opened without a grid name
   bool answer_waits_ = false;
   bool camera_moved_ = false;
-  bool starting_ = true;  // until the files of the command line are loaded or have failed
-  bool owes_ = false;     // a change is not drawn yet
+  bool starting_ = true;            // until the files of the command line are loaded or have failed
+  bool has_pending_frame_ = false;  // a change is not drawn yet
   double now_ = 0.0;
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
@@ -134,7 +134,7 @@ class App {
   double device_seconds_ = 0.0;  // last value of the statistics
   std::uint64_t rate_samples_ = 0;
 
-  Wish wish_;                                // last sent; camera, volume and surfaces as the viewer has them
+  DesiredState desired_;                     // last sent; camera, volume and surfaces as the viewer has them
   std::optional<cumulet_medium_desc> look_;  // default medium that was set for a volume
   std::vector<ViewerInput> inputs_;
   std::vector<Request> requests_;

@@ -14,8 +14,8 @@ void Panel::environment(Model& model, std::vector<Command>& commands) {
   const std::string& file = model.scene.environment;
   using Desc = cumulet_environment_settings_desc;
   Desc& settings = model.scene.environment_settings;
-  ui_.fact("Picture",
-           file.empty() ? "none: drop a .hdr or .exr here" : std::filesystem::path(file).filename().string());
+  ui_.value_row("Picture",
+                file.empty() ? "none: drop a .hdr or .exr here" : std::filesystem::path(file).filename().string());
   ImGui::BeginDisabled(file.empty());
   if (model.thumbnail_texture != 0) {
     const auto& camera = model.scene.camera;
@@ -68,8 +68,8 @@ bool Ui::environment(const char* label, const char* tip, unsigned texture, float
   const float x =
       std::clamp(corner.x + width * static_cast<float>(place_of(ahead_degrees)), corner.x + px(6.0f), end.x - px(6.0f));
   const float wing = px(6.0f);
-  const auto triangle = [&](float size, ImU32 colour) {
-    draw.AddTriangleFilled({x - size, end.y}, {x + size, end.y}, {x, end.y - 1.5f * size}, colour);
+  const auto triangle = [&](float size, ImU32 color) {
+    draw.AddTriangleFilled({x - size, end.y}, {x + size, end.y}, {x, end.y - 1.5f * size}, color);
   };
   triangle(wing + px(1.5f), IM_COL32(0, 0, 0, 200));
   triangle(wing, IM_COL32(255, 255, 255, 255));

@@ -25,10 +25,10 @@ constexpr double plane_ends = 0.46;
 constexpr double outer_ring = 1.2;
 constexpr double free_radius = 0.09;
 // Minimum projected extent of an axis or plane; a handle seen from its end or edge is hidden.
-constexpr double least_axis = 0.17;
-constexpr double least_plane = 0.2;
-constexpr double least_ring = 0.15;  // rings seen more from the edge are dragged along their tangent
-constexpr double least_scale = 0.01;
+constexpr double min_axis = 0.17;
+constexpr double min_plane = 0.2;
+constexpr double min_ring = 0.15;  // rings seen more from the edge are dragged along their tangent
+constexpr double min_scale = 0.01;
 constexpr double behind = 0.3;  // part of a ring behind the center that is still shown, in radii
 constexpr int ring_parts = 64;
 
@@ -73,7 +73,7 @@ std::vector<dvec2> line_of(const Gizmo& gizmo, int axis, const Sight& sight) {
   const double length = gizmo.reach * sight.pixel_at(gizmo.pivot);
   const auto from = sight.project(gizmo.pivot);
   const auto to = sight.project(gizmo.pivot + length * gizmo.axes[axis]);
-  if (!from || !to || glm::distance(*from, *to) < least_axis * gizmo.reach) return {};
+  if (!from || !to || glm::distance(*from, *to) < min_axis * gizmo.reach) return {};
   return {*from, *to};
 }
 
@@ -82,7 +82,7 @@ std::vector<dvec2> square_of(const Gizmo& gizmo, int across, const Sight& sight)
   const dvec3& a = gizmo.axes[next(across)];
   const dvec3& b = gizmo.axes[next(next(across))];
   const dvec3 normal = glm::cross(a, b);
-  if (std::abs(glm::dot(normal, eye)) < least_plane * glm::length(normal)) return {};
+  if (std::abs(glm::dot(normal, eye)) < min_plane * glm::length(normal)) return {};
   // The square is on the eye's side, where it does not cover another axis.
   const double length = gizmo.reach * sight.pixel_at(gizmo.pivot);
   const dvec3 along_a = (glm::dot(a, eye) < 0.0 ? -length : length) * a;
@@ -130,10 +130,10 @@ std::string print(const char* format, Values... values) {
 }  // namespace
 
 std::optional<double> nearest_on_axis(const Ray& ray, const dvec3& point, const dvec3& axis) {
-  constexpr double least_sine_2 = 1e-4;  // 0.57 degrees
+  constexpr double min_sine_2 = 1e-4;  // 0.57 degrees
   const double cosine = glm::dot(ray.direction, axis);
   const double sine_2 = 1.0 - cosine * cosine;
-  if (!(sine_2 > least_sine_2)) return std::nullopt;
+  if (!(sine_2 > min_sine_2)) return std::nullopt;
   const dvec3 to_point = point - ray.origin;
   const double along_ray = glm::dot(to_point, ray.direction);
   const double along_axis = glm::dot(to_point, axis);
@@ -142,9 +142,9 @@ std::optional<double> nearest_on_axis(const Ray& ray, const dvec3& point, const 
 }
 
 std::optional<dvec3> plane_hit(const Ray& ray, const dvec3& point, const dvec3& normal) {
-  constexpr double least_cosine = 0.01;
+  constexpr double min_cosine = 0.01;
   const double cosine = glm::dot(ray.direction, normal);
-  if (!(std::abs(cosine) > least_cosine)) return std::nullopt;
+  if (!(std::abs(cosine) > min_cosine)) return std::nullopt;
   const double distance = glm::dot(point - ray.origin, normal) / cosine;
   if (!(distance > 0.0)) return std::nullopt;
   return ray.origin + distance * ray.direction;
@@ -282,7 +282,7 @@ Drag::Drag(const Gizmo& gizmo, Handle handle, const Sight& sight, const dvec2& f
     normal_ = glm::normalize(glm::cross(gizmo.axes[next(axis)], gizmo.axes[next(next(axis))]));
   }
   const dvec3 eye = sight.to_eye(pivot);
-  if (turns && std::abs(glm::dot(normal_, eye)) < least_ring) {
+  if (turns && std::abs(glm::dot(normal_, eye)) < min_ring) {
     // The ring's nearest point is dragged along the tangent.
     const double radius = gizmo.reach * sight.pixel_at(pivot);
     const dvec3 along = glm::normalize(glm::cross(normal_, eye));
@@ -334,8 +334,8 @@ void Drag::stretch(const Sight& sight, const dvec2& pixel) {
     if (!now || !grasp_ || !(glm::dot(*grasp_, *grasp_) > 0.0)) return;
     scale = glm::dot(*now, *grasp_) / glm::dot(*grasp_, *grasp_);
   }
-  constexpr double most_scale = 1000.0;
-  scale = std::clamp(scale, least_scale, most_scale);
+  constexpr double max_scale = 1000.0;
+  scale = std::clamp(scale, min_scale, max_scale);
   stretch_ = dvec3(1.0);
   for (int i = 0; i < 3; ++i) {
     const bool of_axis = handle_ != Handle::free && axis_of(handle_) == i;

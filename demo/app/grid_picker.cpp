@@ -103,9 +103,9 @@ bool GridPicker::draw_grid(Ui& ui, const Grid& grid) {
   std::array<char, 96> range{};
   std::snprintf(range.data(), range.size(), " voxels, %.4g to %.4g", static_cast<double>(grid.least),
                 static_cast<double>(grid.most));
-  const std::string facts = short_count(static_cast<double>(grid.voxels)) + range.data();
+  const std::string summary = short_count(static_cast<double>(grid.voxels)) + range.data();
   draw.AddText({corner.x, top + line}, quiet,
-               grid.refusal.empty() ? facts.c_str() : end_of(grid.refusal, room).c_str());
+               grid.refusal.empty() ? summary.c_str() : end_of(grid.refusal, room).c_str());
   const float left = corner.x + width - chart;
   const float bottom = corner.y + height - ui.px(3.0f);
   draw.AddRectFilled({left, top}, {left + chart, bottom}, ImGui::GetColorU32(ImGuiCol_FrameBg), ui.px(3.0f));

@@ -27,21 +27,21 @@ constexpr float tip = 10.0f;
 constexpr std::array all_handles = {Handle::x, Handle::y, Handle::z, Handle::yz, Handle::zx, Handle::xy, Handle::free};
 constexpr std::array handle_names = {"X", "Y", "Z", "YZ", "ZX", "XY", "free"};  // indexed by Handle
 constexpr ImU32 shade = IM_COL32(0, 0, 0, 110);
-constexpr ImU32 chosen_colour = IM_COL32(255, 176, 64, 230);
-constexpr ImU32 lamp_colour = IM_COL32(255, 238, 170, 200);
-constexpr ImU32 hot_colour = IM_COL32(255, 226, 72, 255);
+constexpr ImU32 chosen_color = IM_COL32(255, 176, 64, 230);
+constexpr ImU32 analytic_light_color = IM_COL32(255, 238, 170, 200);
+constexpr ImU32 hot_color = IM_COL32(255, 226, 72, 255);
 
 ImVec2 vec(const dvec2& p) { return {static_cast<float>(p.x), static_cast<float>(p.y)}; }
 
-ImU32 faded(ImU32 colour, double part) {
-  const double alpha = part * static_cast<double>((colour >> IM_COL32_A_SHIFT) & 0xFFU);
-  return (colour & ~IM_COL32_A_MASK) | static_cast<ImU32>(alpha) << IM_COL32_A_SHIFT;
+ImU32 faded(ImU32 color, double part) {
+  const double alpha = part * static_cast<double>((color >> IM_COL32_A_SHIFT) & 0xFFU);
+  return (color & ~IM_COL32_A_MASK) | static_cast<ImU32>(alpha) << IM_COL32_A_SHIFT;
 }
 
-ImU32 colour_of(Handle handle) {
-  constexpr std::array<ImU32, 3> colours = {IM_COL32(238, 78, 90, 255), IM_COL32(126, 204, 58, 255),
-                                            IM_COL32(74, 144, 246, 255)};
-  return handle == Handle::free ? IM_COL32(236, 236, 236, 235) : colours[static_cast<std::size_t>(axis_of(handle))];
+ImU32 color_of(Handle handle) {
+  constexpr std::array<ImU32, 3> colors = {IM_COL32(238, 78, 90, 255), IM_COL32(126, 204, 58, 255),
+                                           IM_COL32(74, 144, 246, 255)};
+  return handle == Handle::free ? IM_COL32(236, 236, 236, 235) : colors[static_cast<std::size_t>(axis_of(handle))];
 }
 
 /// Draws strokes on a wider dark stroke, so that they are visible on bright and dark images.
@@ -49,38 +49,38 @@ class Pen {
  public:
   Pen(ImDrawList& list, const Sight& sight, float scale) : list_(&list), sight_(&sight), scale_(scale) {}
 
-  void line(const dvec2& a, const dvec2& b, ImU32 colour, float width) const {
-    list_->AddLine(vec(a), vec(b), faded(shade, alpha(colour)), (width + 2.0f) * scale_);
-    list_->AddLine(vec(a), vec(b), colour, width * scale_);
+  void line(const dvec2& a, const dvec2& b, ImU32 color, float width) const {
+    list_->AddLine(vec(a), vec(b), faded(shade, alpha(color)), (width + 2.0f) * scale_);
+    list_->AddLine(vec(a), vec(b), color, width * scale_);
   }
-  void line(const dvec3& a, const dvec3& b, ImU32 colour, float width) const {
-    if (const auto ends = sight_->project(a, b)) line((*ends)[0], (*ends)[1], colour, width);
+  void line(const dvec3& a, const dvec3& b, ImU32 color, float width) const {
+    if (const auto ends = sight_->project(a, b)) line((*ends)[0], (*ends)[1], color, width);
   }
-  void lines(const std::vector<dvec2>& points, bool closed, ImU32 colour, float width) const {
+  void lines(const std::vector<dvec2>& points, bool closed, ImU32 color, float width) const {
     std::vector<ImVec2> all;
     all.reserve(points.size());
     for (const dvec2& point : points) all.push_back(vec(point));
     const ImDrawFlags flags = closed ? ImDrawFlags_Closed : ImDrawFlags_None;
     const int count = static_cast<int>(all.size());
-    list_->AddPolyline(all.data(), count, faded(shade, alpha(colour)), flags, (width + 2.0f) * scale_);
-    list_->AddPolyline(all.data(), count, colour, flags, width * scale_);
+    list_->AddPolyline(all.data(), count, faded(shade, alpha(color)), flags, (width + 2.0f) * scale_);
+    list_->AddPolyline(all.data(), count, color, flags, width * scale_);
   }
-  void fill(const std::vector<dvec2>& points, ImU32 colour) const {
+  void fill(const std::vector<dvec2>& points, ImU32 color) const {
     std::vector<ImVec2> all;
     all.reserve(points.size());
     for (const dvec2& point : points) all.push_back(vec(point));
-    list_->AddConvexPolyFilled(all.data(), static_cast<int>(all.size()), colour);
+    list_->AddConvexPolyFilled(all.data(), static_cast<int>(all.size()), color);
   }
   /// Draws the end of an axis: an arrowhead or a box.
-  void end(const dvec2& from, const dvec2& to, bool arrow, ImU32 colour) const {
+  void end(const dvec2& from, const dvec2& to, bool arrow, ImU32 color) const {
     const dvec2 along = glm::normalize(to - from) * static_cast<double>(tip * scale_);
     const dvec2 across(-0.45 * along.y, 0.45 * along.x);
     if (arrow)
-      fill({to + along, to - across, to + across}, colour);
+      fill({to + along, to - across, to + across}, color);
     else
       fill({to - across + 0.45 * along, to - across - 0.45 * along, to + across - 0.45 * along,
             to + across + 0.45 * along},
-           colour);
+           color);
   }
   void text(const dvec2& at, const std::string& words) const {
     const ImVec2 size = ImGui::CalcTextSize(words.c_str());
@@ -94,7 +94,7 @@ class Pen {
   [[nodiscard]] const Sight& sight() const { return *sight_; }
 
  private:
-  static double alpha(ImU32 colour) { return static_cast<double>((colour >> IM_COL32_A_SHIFT) & 0xFFU) / 255.0; }
+  static double alpha(ImU32 color) { return static_cast<double>((color >> IM_COL32_A_SHIFT) & 0xFFU) / 255.0; }
 
   ImDrawList* list_;
   const Sight* sight_;
@@ -109,11 +109,11 @@ void draw_box(const Pen& pen, const dmat4& place, const Box& box) {
   };
   for (unsigned i = 0; i < 8; ++i)
     for (unsigned bit = 1; bit < 8; bit *= 2)
-      if ((i & bit) == 0) pen.line(corner(i), corner(i | bit), chosen_colour, thin);
+      if ((i & bit) == 0) pen.line(corner(i), corner(i | bit), chosen_color, thin);
 }
 
 /// Draws the outline of a light: its size and the direction of its emission.
-void draw_lamp(const Pen& pen, const cumulet_lamp_desc& lamp, const dmat4& place) {
+void draw_analytic_light(const Pen& pen, const cumulet_lamp_desc& analytic_light, const dmat4& place) {
   const auto at = [&](double x, double y, double z) { return dvec3(place * dvec4(x, y, z, 1.0)); };
   const double far = handle_reach * static_cast<double>(pen.scale()) * pen.sight().pixel_at(at(0.0, 0.0, 0.0));
   const auto round = [&](double radius, double z) {
@@ -122,38 +122,39 @@ void draw_lamp(const Pen& pen, const cumulet_lamp_desc& lamp, const dmat4& place
       const double angle = 2.0 * std::numbers::pi * i / parts;
       return at(radius * std::cos(angle), radius * std::sin(angle), z);
     };
-    for (int i = 0; i < parts; ++i) pen.line(point(i), point(i + 1), chosen_colour, thin);
+    for (int i = 0; i < parts; ++i) pen.line(point(i), point(i + 1), chosen_color, thin);
   };
-  if (lamp.kind == CUMULET_LAMP_SPOT) {
+  if (analytic_light.kind == CUMULET_LAMP_SPOT) {
     // The cone is drawn with a constant size on the screen.
-    const double half = std::min(0.5 * lamp.angle_degrees, 85.0) * std::numbers::pi / 180.0;
+    const double half = std::min(0.5 * analytic_light.angle_degrees, 85.0) * std::numbers::pi / 180.0;
     const double radius = far * std::sin(half);
     const double depth = far * std::cos(half);
     round(radius, depth);
     for (const auto& [x, y] : {std::pair(1.0, 0.0), std::pair(-1.0, 0.0), std::pair(0.0, 1.0), std::pair(0.0, -1.0)})
-      pen.line(at(0.0, 0.0, 0.0), at(radius * x, radius * y, depth), chosen_colour, thin);
+      pen.line(at(0.0, 0.0, 0.0), at(radius * x, radius * y, depth), chosen_color, thin);
     return;
   }
-  if (lamp.kind == CUMULET_LAMP_DISC) round(0.5 * lamp.width, 0.0);
-  if (lamp.kind == CUMULET_LAMP_RECTANGLE) {
-    const double x = 0.5 * lamp.width;
-    const double y = 0.5 * lamp.height;
-    pen.line(at(-x, -y, 0.0), at(x, -y, 0.0), chosen_colour, thin);
-    pen.line(at(x, -y, 0.0), at(x, y, 0.0), chosen_colour, thin);
-    pen.line(at(x, y, 0.0), at(-x, y, 0.0), chosen_colour, thin);
-    pen.line(at(-x, y, 0.0), at(-x, -y, 0.0), chosen_colour, thin);
+  if (analytic_light.kind == CUMULET_LAMP_DISC) round(0.5 * analytic_light.width, 0.0);
+  if (analytic_light.kind == CUMULET_LAMP_RECTANGLE) {
+    const double x = 0.5 * analytic_light.width;
+    const double y = 0.5 * analytic_light.height;
+    pen.line(at(-x, -y, 0.0), at(x, -y, 0.0), chosen_color, thin);
+    pen.line(at(x, -y, 0.0), at(x, y, 0.0), chosen_color, thin);
+    pen.line(at(x, y, 0.0), at(-x, y, 0.0), chosen_color, thin);
+    pen.line(at(-x, y, 0.0), at(-x, -y, 0.0), chosen_color, thin);
   }
-  if (lamp.kind != CUMULET_LAMP_POINT) pen.line(at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.7 * far), chosen_colour, thin);
+  if (analytic_light.kind != CUMULET_LAMP_POINT)
+    pen.line(at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.7 * far), chosen_color, thin);
 }
 
-void draw_handle(const Pen& pen, const Gizmo& gizmo, Handle handle, ImU32 colour) {
+void draw_handle(const Pen& pen, const Gizmo& gizmo, Handle handle, ImU32 color) {
   const std::vector<dvec2> shape = shape_of(gizmo, handle, pen.sight());
   if (shape.empty()) return;
   const bool closed = is_closed(gizmo, handle);
   const bool turns = gizmo.tool == Tool::rotate;
-  if (closed && !turns) pen.fill(shape, faded(colour, handle == Handle::free ? 0.6 : 0.4));
-  pen.lines(shape, closed, colour, is_axis(handle) ? thick : thin);
-  if (is_axis(handle) && !turns) pen.end(shape[0], shape[1], gizmo.tool == Tool::move, colour);
+  if (closed && !turns) pen.fill(shape, faded(color, handle == Handle::free ? 0.6 : 0.4));
+  pen.lines(shape, closed, color, is_axis(handle) ? thick : thin);
+  if (is_axis(handle) && !turns) pen.end(shape[0], shape[1], gizmo.tool == Tool::move, color);
 }
 
 std::optional<Gizmo> gizmo_of(const Model& model, float scale) {
@@ -194,12 +195,13 @@ void Handles::cancel(Model& model) {
   held_.reset();
 }
 
-std::optional<Item> Handles::lamp_at(const Model& model, const Sight& sight, const dvec2& pixel, float scale) {
+std::optional<Item> Handles::analytic_light_at(const Model& model, const Sight& sight, const dvec2& pixel,
+                                               float scale) {
   if (model.tool == Tool::none) return std::nullopt;
   std::optional<Item> found;
   double least = (mark_radius + 3.0) * static_cast<double>(scale);
   for (const Item& item : items_of(model.scene)) {
-    if (item.kind != Item::Kind::lamp) continue;
+    if (item.kind != Item::Kind::analytic_light) continue;
     const auto at = sight.project(pivot_of(*place_of(model.scene, item), std::nullopt));
     if (!at || !(glm::distance(*at, pixel) <= least)) continue;
     least = glm::distance(*at, pixel);
@@ -235,16 +237,16 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
   for (const Item& item : items_of(model.scene)) {
     const bool is_chosen = item == model.chosen;
     const dmat4 place = *place_of(model.scene, item);
-    if (item.kind == Item::Kind::lamp) {
+    if (item.kind == Item::Kind::analytic_light) {
       const auto at = sight.project(pivot_of(place, std::nullopt));
       const double radius = mark_radius * static_cast<double>(scale);
       if (at) {
-        const ImU32 colour = is_chosen ? chosen_colour : lamp_colour;
+        const ImU32 color = is_chosen ? chosen_color : analytic_light_color;
         list.AddCircle(vec(*at), static_cast<float>(radius), shade, 0, (thin + 2.0f) * scale);
-        list.AddCircle(vec(*at), static_cast<float>(radius), colour, 0, thin * scale);
-        list.AddCircleFilled(vec(*at), static_cast<float>(0.3 * radius), colour);
+        list.AddCircle(vec(*at), static_cast<float>(radius), color, 0, thin * scale);
+        list.AddCircleFilled(vec(*at), static_cast<float>(0.3 * radius), color);
       }
-      if (is_chosen) draw_lamp(pen, model.scene.lamps[item.index], place);
+      if (is_chosen) draw_analytic_light(pen, model.scene.analytic_lights[item.index], place);
     } else if (is_chosen) {
       if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, place, *box);
     }
@@ -258,15 +260,15 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
     hot = handle_at(*gizmo, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
   constexpr double back = 0.3;  // opacity of the handles that are not dragged
   for (const Handle handle : all_handles)
-    if (handle != hot) draw_handle(pen, *gizmo, handle, faded(colour_of(handle), held_ ? back : 1.0));
+    if (handle != hot) draw_handle(pen, *gizmo, handle, faded(color_of(handle), held_ ? back : 1.0));
   if (!hot) return;
   if (held_ && is_axis(*hot) && gizmo->tool != Tool::rotate) {
     // Draws the line along which the object moves.
     constexpr double long_way = 20.0;
     const dvec3 way = long_way * gizmo->reach * sight.pixel_at(gizmo->pivot) * gizmo->axes[axis_of(*hot)];
-    pen.line(gizmo->pivot - way, gizmo->pivot + way, faded(colour_of(*hot), 0.6), 1.0f);
+    pen.line(gizmo->pivot - way, gizmo->pivot + way, faded(color_of(*hot), 0.6), 1.0f);
   }
-  draw_handle(pen, *gizmo, *hot, hot_colour);
+  draw_handle(pen, *gizmo, *hot, hot_color);
   const auto pivot = sight.project(gizmo->pivot);
   if (held_ && pivot) pen.text(*pivot + dvec2(0.3, 0.35) * gizmo->reach, held_->drag.told());
 }

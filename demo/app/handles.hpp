@@ -26,8 +26,8 @@ class Handles {
   [[nodiscard]] bool holds() const { return held_.has_value(); }
 
   /// Returns the light whose icon is at the pixel. Lights are not part of the image, so a pick cannot find them.
-  [[nodiscard]] static std::optional<Item> lamp_at(const Model& model, const Sight& sight, const glm::dvec2& pixel,
-                                                   float scale);
+  [[nodiscard]] static std::optional<Item> analytic_light_at(const Model& model, const Sight& sight,
+                                                             const glm::dvec2& pixel, float scale);
   /// Returns the position of a handle by its label, for replay files: "Handle X", "Handle YZ", "Handle free".
   [[nodiscard]] static std::optional<Rectangle> find(const std::string& label, const Model& model, const Sight& sight,
                                                      float scale);

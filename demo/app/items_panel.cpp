@@ -42,9 +42,9 @@ void Panel::items(Model& model) {
   const std::vector<Item> items = items_of(model.scene);
   if (items.empty()) return;
   // Maximum height of the list in rows; longer lists scroll.
-  constexpr std::size_t most_rows = 10;
+  constexpr std::size_t max_rows = 10;
   const float height = ImGui::GetTextLineHeightWithSpacing();
-  const auto rows = static_cast<float>(std::min(items.size(), most_rows));
+  const auto rows = static_cast<float>(std::min(items.size(), max_rows));
   ImGui::BeginChild("items", {0.0f, rows * height}, false, ImGuiWindowFlags_NavFlattened);
   ImGui::PushStyleColor(ImGuiCol_Header, IM_COL32(95, 143, 191, 120));
   ImGui::Indent(ui_.px(6.0f));

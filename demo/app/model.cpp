@@ -188,7 +188,7 @@ void spell_out_defaults(SceneOptions& scene) {
     settings::spell_out_zeros(other.medium);
     if (other.auto_density_scale) other.medium.density_scale = scale;
   }
-  for (cumulet_lamp_desc& lamp : scene.lamps) settings::spell_out_zeros(lamp);
+  for (cumulet_lamp_desc& analytic_light : scene.analytic_lights) settings::spell_out_zeros(analytic_light);
   scene.grid.criterion = settings::criterion_of(scene.grid);
   if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
 }

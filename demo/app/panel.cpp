@@ -89,7 +89,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
   section("Environment", true, [&] { environment(model, commands); });
-  section("Lamps", true, [&] { lamps(model); });
+  section("Lamps", true, [&] { analytic_lights(model); });
   section("Medium", true, [&] { medium(model, commands); });
   section("Volumes", true, [&] { volumes(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
@@ -230,10 +230,10 @@ void Panel::ground(Model& model) {
   });
 }
 
-void Panel::sun_angle(const settings::Facts& facts, cumulet_light_desc& light) {
+void Panel::sun_angle(const settings::SettingInfo& info, cumulet_light_desc& light) {
   const float given = light.sun_angle_degrees;
   double shown = given != 0.0F ? std::max(0.0F, given) : settings::default_sun_angle(light.sky);
-  if (rows_.draw(facts, shown)) light.sun_angle_degrees = shown > 0.0 ? static_cast<float>(shown) : -1.0F;
+  if (rows_.draw(info, shown)) light.sun_angle_degrees = shown > 0.0 ? static_cast<float>(shown) : -1.0F;
 }
 
 void Panel::surfaces(Model& model) {
@@ -241,7 +241,7 @@ void Panel::surfaces(Model& model) {
   Desc& surface = model.scene.surface;
   const cumulet_surfaces_info& info = model.status.surfaces;
   const bool any = !model.scene.surfaces.empty();
-  ui_.fact("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb here");
+  ui_.value_row("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb here");
   ImGui::BeginDisabled(!any);
   settings::for_each<Desc>([&](const auto& setting) {
     if (!setting.is(&Desc::time)) rows_.draw(setting, surface.*setting.field);
@@ -257,7 +257,7 @@ void Panel::surfaces(Model& model) {
   });
   ImGui::EndDisabled();
   variant(model);
-  if (any) ui_.fact("Triangles", short_count(double(info.triangles)));
+  if (any) ui_.value_row("Triangles", short_count(double(info.triangles)));
   if (ui_.button("Remove surfaces", "Shows the volume alone.")) model.scene.surfaces.clear();
   ImGui::EndDisabled();
 }
@@ -338,23 +338,24 @@ void Panel::grid(Model& model) {
   const cumulet_stats& stats = model.status.stats;
   if (grid.march == CUMULET_MARCH_TET) {
     const std::string limited = stats.limited != 0 ? " (at the budget)" : "";
-    ui_.fact("Live cells", model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
-    ui_.fact("Levels", model.status.has_volume ? std::to_string(stats.levels) : "-");
+    ui_.value_row("Live cells",
+                  model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
+    ui_.value_row("Levels", model.status.has_volume ? std::to_string(stats.levels) : "-");
   }
-  ui_.fact("March data", model.status.has_volume ? short_bytes(static_cast<double>(stats.cell_bytes)) : "-");
+  ui_.value_row("March data", model.status.has_volume ? short_bytes(static_cast<double>(stats.cell_bytes)) : "-");
 }
 
-void Panel::threshold(settings::Facts facts, cumulet_grid_desc& grid) {
+void Panel::threshold(settings::SettingInfo info, cumulet_grid_desc& grid) {
   bool to_voxel = grid.threshold < 0.0;
   if (ui_.checkbox("To the voxel", "Splits wherever the density varies at all, until the cells tile the voxels.",
                    to_voxel))
     grid.threshold = to_voxel ? -1.0 : settings::default_threshold(grid.criterion);
   const bool range = grid.criterion == CUMULET_CRITERION_RANGE_MEAN;
-  facts.row.least = range ? 1e-2 : 1e-4;
-  facts.row.most = range ? 100.0 : 1.0;
+  info.row.least = range ? 1e-2 : 1e-4;
+  info.row.most = range ? 100.0 : 1.0;
   double shown = to_voxel ? 0.0 : grid.threshold;
   ImGui::BeginDisabled(to_voxel);
-  if (rows_.draw(facts, shown)) grid.threshold = shown;
+  if (rows_.draw(info, shown)) grid.threshold = shown;
   ImGui::EndDisabled();
 }
 
@@ -394,13 +395,13 @@ void Panel::cameras(Model& model) {
 void Panel::camera(Model& model, std::vector<Command>& commands) {
   using Desc = cumulet_navigation_desc;
   Desc& navigation = model.navigation;
-  const auto turn = [&](const settings::Facts& facts) {
+  const auto turn = [&](const settings::SettingInfo& info) {
     bool on = navigation.turntable_degrees_per_second != 0.0;
     if (ui_.checkbox("Turntable", "The camera circles the target (T).", on))
       commands.push_back({Action::toggle_turntable});
     ImGui::BeginDisabled(!on);
     double speed = navigation.turntable_degrees_per_second;
-    if (rows_.draw(facts, speed) && on) navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
+    if (rows_.draw(info, speed) && on) navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
     ImGui::EndDisabled();
   };
   settings::for_each<Desc>([&](const auto& setting) {
@@ -464,22 +465,22 @@ void Panel::statistics(const Model& model) {
            charts.device_ms.values(), print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
   if (const double all = device_seconds(stats); all > 0.0) {
     const auto share = [all](double seconds) { return 100.0 * seconds / all; };
-    ui_.fact("Trace, surfaces", print("%.0f %%, ", share(stats.pass_seconds_trace)) +
-                                    print("%.0f %%", share(stats.pass_seconds_surfaces)));
-    ui_.fact("Upload, display", print("%.0f %%, ", share(stats.pass_seconds_upload)) +
-                                    print("%.0f %%", share(stats.pass_seconds_display)));
+    ui_.value_row("Trace, surfaces", print("%.0f %%, ", share(stats.pass_seconds_trace)) +
+                                         print("%.0f %%", share(stats.pass_seconds_surfaces)));
+    ui_.value_row("Upload, display", print("%.0f %%, ", share(stats.pass_seconds_upload)) +
+                                         print("%.0f %%", share(stats.pass_seconds_display)));
   }
   ImGui::Spacing();
   if (!status.has_content) return;
   if (status.has_volume) {
-    ui_.fact("Active voxels", short_count(static_cast<double>(stats.active_voxels)));
-    ui_.fact("Build", print("%.2f s", stats.build_seconds_total));
+    ui_.value_row("Active voxels", short_count(static_cast<double>(stats.active_voxels)));
+    ui_.value_row("Build", print("%.2f s", stats.build_seconds_total));
   }
-  ui_.fact("Trace", print("%.1f s", stats.trace_seconds));
+  ui_.value_row("Trace", print("%.1f s", stats.trace_seconds));
   if (stats.steps > 0 && stats.samples > 0)
-    ui_.fact("Steps a path", print("%.1f", static_cast<double>(stats.steps) / static_cast<double>(stats.samples)));
-  ui_.fact("OpenGL memory", short_bytes(static_cast<double>(stats.gl_bytes)));
-  ui_.fact("Renderer", stats.gl_renderer);
+    ui_.value_row("Steps a path", print("%.1f", static_cast<double>(stats.steps) / static_cast<double>(stats.samples)));
+  ui_.value_row("OpenGL memory", short_bytes(static_cast<double>(stats.gl_bytes)));
+  ui_.value_row("Renderer", stats.gl_renderer);
 }
 
 void Panel::hint() const {

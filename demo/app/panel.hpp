@@ -52,7 +52,7 @@ class Panel {
   // Draws the rows of the transform `place`. Returns the new transform if the user changed it.
   std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& place,
                                                  const std::string& number);
-  void lamps(Model& model);
+  void analytic_lights(Model& model);
   void sequence(Model& model, std::vector<Command>& commands);
   /// Draws the timeline below the image: the frames, their states and the current frame.
   void timeline(Model& model, std::vector<Command>& commands);
@@ -64,9 +64,9 @@ class Panel {
   void sampling(Model& model);
   void statistics(const Model& model);
   void absorption(float (&coalbedo)[3]);
-  void threshold(settings::Facts facts, cumulet_grid_desc& grid);
+  void threshold(settings::SettingInfo info, cumulet_grid_desc& grid);
   void ground(Model& model);
-  void sun_angle(const settings::Facts& facts, cumulet_light_desc& light);
+  void sun_angle(const settings::SettingInfo& info, cumulet_light_desc& light);
 
   void hint() const;
   void loading(const Model& model, std::vector<Command>& commands);

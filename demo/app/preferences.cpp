@@ -18,8 +18,8 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr std::size_t most_recent = 10;
-constexpr int least_side = 320;
-constexpr int most_side = 16384;
+constexpr int min_side = 320;
+constexpr int max_side = 16384;
 
 std::string absolute(const std::string& path) {
   std::error_code error;
@@ -56,8 +56,8 @@ Preferences load_preferences(const std::string& path) {
     const std::string style = json.value("navigation", std::string());
     for (const auto& choice : settings::navigation_choices)
       if (style == choice.name) preferences.style = static_cast<cumulet_navigation_style>(choice.value);
-    preferences.width = std::clamp(json.value("width", preferences.width), least_side, most_side);
-    preferences.height = std::clamp(json.value("height", preferences.height), least_side, most_side);
+    preferences.width = std::clamp(json.value("width", preferences.width), min_side, max_side);
+    preferences.height = std::clamp(json.value("height", preferences.height), min_side, max_side);
   } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): a first run, or nothing worth a complaint
   }
   return preferences;

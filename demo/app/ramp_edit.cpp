@@ -10,23 +10,23 @@ using settings::RampPoints;
 
 namespace {
 
-constexpr float farthest = settings::most_ramp_value;
+constexpr float farthest = settings::max_ramp_value;
 
 float value_of(const RampPoint& point) { return point[0]; }
 float result_of(const RampPoint& point) { return point[1]; }
 
 }  // namespace
 
-void fit(RampView& view, const RampPoints& points, float most_value) {
+void fit(RampView& view, const RampPoints& points, float max_value) {
   // An undo may have removed the dragged point.
   if (view.held && *view.held >= points.size()) view.held.reset();
   view.chosen = std::min(view.chosen, std::max<std::size_t>(points.size(), 1) - 1);
   if (view.held || points.empty()) return;
   constexpr float room = 1.25f;  // space above the highest point for dragging
-  view.most_value = std::max(most_value, value_of(points.back()));
-  if (!(view.most_value > 0.0f)) view.most_value = 1.0f;
+  view.max_value = std::max(max_value, value_of(points.back()));
+  if (!(view.max_value > 0.0f)) view.max_value = 1.0f;
   const float highest = result_of(*std::ranges::max_element(points, {}, result_of));
-  view.most_result = std::min(room * (highest > 0.0f ? highest : view.most_value), farthest);
+  view.max_result = std::min(room * (highest > 0.0f ? highest : view.max_value), farthest);
 }
 
 std::optional<std::size_t> add_point(RampPoints& points, RampPoint point) {
@@ -34,7 +34,7 @@ std::optional<std::size_t> add_point(RampPoints& points, RampPoint point) {
   const auto place = static_cast<std::size_t>(at - points.begin());
   if (at != points.end() && value_of(*at) == value_of(point)) {
     *at = point;
-  } else if (points.size() < settings::most_ramp_points) {
+  } else if (points.size() < settings::max_ramp_points) {
     points.insert(at, point);
   } else {
     return std::nullopt;

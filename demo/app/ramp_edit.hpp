@@ -8,14 +8,14 @@ namespace cumulet::demo {
 
 /// State of a curve editor for a ramp: the ranges of both axes, which begin at 0, and the edited points.
 struct RampView {
-  float most_value = 1.0f;
-  float most_result = 1.0f;
+  float max_value = 1.0f;
+  float max_result = 1.0f;
   std::optional<std::size_t> held;  // point dragged by the mouse; the ranges stay constant meanwhile
   std::size_t chosen = 0;           // point whose numbers can be typed
 };
 
 /// Fits the ranges to the points and to the maximum grid value.
-void fit(RampView& view, const settings::RampPoints& points, float most_value);
+void fit(RampView& view, const settings::RampPoints& points, float max_value);
 
 /// Inserts a point, or moves the existing point with the same value. Returns its index; nullopt if the maximum number
 /// of points is reached.

@@ -11,24 +11,24 @@ namespace cumulet::demo {
 
 void Panel::ramps(Model& model) {
   for (std::size_t i = 0; i < model.scene.ramps.size(); ++i) {
-    const settings::RampFacts& facts = settings::ramps[i];
+    const settings::RampInfo& info = settings::ramps[i];
     const FieldValues& field = model.status.fields[i];
     settings::RampPoints& points = model.scene.ramps[i];
     RampView& view = ramp_views_[i];
     bool on = !points.empty();
-    if (ui_.checkbox(facts.label, facts.tip, on)) {
-      const float most = field.most > 0.0f ? std::min(field.most, settings::most_ramp_value) : 1.0f;
+    if (ui_.checkbox(info.label, info.tip, on)) {
+      const float most = field.most > 0.0f ? std::min(field.most, settings::max_ramp_value) : 1.0f;
       points.clear();
       if (on) points = {{0.0f, 0.0f}, {most, most}};
     }
     fit(view, points, field.most);
     if (points.empty()) continue;
-    ui_.curve((std::string(facts.label) + " curve").c_str(),
+    ui_.curve((std::string(info.label) + " curve").c_str(),
               "Drag a point. A click adds one; a right click on one, or Delete, takes it away.", points, view,
               field.heights, field.most);
     double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
-    if (ui_.numbers(facts.point, "Of the point last touched: the value, and what it becomes.", chosen,
-                    0.005f * view.most_value))
+    if (ui_.numbers(info.point, "Of the point last touched: the value, and what it becomes.", chosen,
+                    0.005f * view.max_value))
       move_point(points, view.chosen, {static_cast<float>(chosen[0]), static_cast<float>(chosen[1])});
   }
 }

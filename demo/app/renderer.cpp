@@ -43,10 +43,10 @@ Renderer::~Renderer() {
   thread_.join();
 }
 
-void Renderer::ask(Wish wish, std::vector<ViewerInput> inputs, std::vector<Request> requests) {
+void Renderer::ask(DesiredState desired, std::vector<ViewerInput> inputs, std::vector<Request> requests) {
   {
     const std::lock_guard lock(mutex_);
-    next_ = std::move(wish);
+    next_ = std::move(desired);
     inputs_.insert(inputs_.end(), inputs.begin(), inputs.end());
     requests_.insert(requests_.end(), std::make_move_iterator(requests.begin()),
                      std::make_move_iterator(requests.end()));
@@ -68,7 +68,7 @@ std::optional<Answer> Renderer::take() {
 
 void Renderer::wait_for(std::uint64_t number) {
   std::unique_lock lock(mutex_);
-  answered_.wait(lock, [&] { return failure_ != nullptr || (answer_ && answer_->wish >= number); });
+  answered_.wait(lock, [&] { return failure_ != nullptr || (answer_ && answer_->desired >= number); });
 }
 
 void Renderer::cancel() {
@@ -144,23 +144,23 @@ void Renderer::turn() {
   {
     std::unique_lock lock(mutex_);
     const auto due = [this] { return stop_ || next_ || !inputs_.empty() || !requests_.empty() || poked_; };
-    if (wish_.number == 0 || !session_->more()) {
-      if (wish_.number != 0 && session_->busy())
+    if (desired_.number == 0 || !session_->more()) {
+      if (desired_.number != 0 && session_->busy())
         changed_.wait_for(lock, glance, due);
       else
         changed_.wait(lock, due);
     }
     if (stop_) return;
-    if (next_) wish_ = *std::exchange(next_, std::nullopt);
+    if (next_) desired_ = *std::exchange(next_, std::nullopt);
     inputs = std::exchange(inputs_, {});
     requests = std::exchange(requests_, {});
   }
-  if (wish_.number == 0) {  // no request yet
+  if (desired_.number == 0) {  // no request yet
     const std::lock_guard lock(mutex_);
     poked_ = false;
     return;
   }
-  session_->follow(wish_);
+  session_->follow(desired_);
   for (const ViewerInput& input : inputs) session_->input(input);
   for (const Request& request : requests) session_->execute(request);
 
@@ -170,9 +170,9 @@ void Renderer::turn() {
     while (free == shown_ || free == ready_) ++free;
     poked_ = false;  // this frame handles all updates so far
   }
-  const bool sized = wish_.width > 0 && wish_.height > 0;
+  const bool sized = desired_.width > 0 && desired_.height > 0;
   if (sized && session_->cold()) {
-    prepare(slots_[free], wish_.width, wish_.height);
+    prepare(slots_[free], desired_.width, desired_.height);
     session_->warm_up(slots_[free].framebuffer);
     publish(free, false);
     return;
@@ -181,7 +181,7 @@ void Renderer::turn() {
   // A new image is drawn when it is ready. The previous one is not drawn again.
   const bool draws = sized && session_->has_news();
   if (draws) {
-    prepare(slots_[free], wish_.width, wish_.height);
+    prepare(slots_[free], desired_.width, desired_.height);
     draw(slots_[free]);
   }
   publish(free, draws);

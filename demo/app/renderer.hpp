@@ -39,7 +39,7 @@ class Renderer {
   ~Renderer();
 
   /// Sends a request. Only the latest `wish` is processed; inputs and requests are all processed, in order.
-  void ask(Wish wish, std::vector<ViewerInput> inputs, std::vector<Request> requests);
+  void ask(DesiredState desired, std::vector<ViewerInput> inputs, std::vector<Request> requests);
   /// Returns the answer since the last call, and switches to its image. Rethrows the error that ended the thread.
   [[nodiscard]] std::optional<Answer> take();
   /// Waits for the answer to the request with this number.
@@ -79,12 +79,12 @@ class Renderer {
   // Used only by the viewer's thread.
   std::unique_ptr<GladGLContext> gl_;
   std::unique_ptr<Session> session_;
-  Wish wish_;
+  DesiredState desired_;
 
   mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
   std::condition_variable answered_;
-  std::optional<Wish> next_;
+  std::optional<DesiredState> next_;
   std::vector<ViewerInput> inputs_;
   std::vector<Request> requests_;
   bool poked_ = false;  // the viewer has an update

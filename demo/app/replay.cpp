@@ -10,7 +10,7 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr int most_frames = 100000;
+constexpr int max_frames = 100000;
 constexpr int drag_moves = 8;
 constexpr int control_frames = 30;  // maximum number of frames to wait for a control
 constexpr auto patience = std::chrono::seconds(300);
@@ -114,7 +114,7 @@ class Parser {
       if (what != "loaded" && what != "converged") line.fail("wait for loaded or for converged");
       add(what == "loaded" ? Type::wait_loaded : Type::wait_converged);
     } else if (command == "frames") {
-      add(Type::frames).count = line.integer(1, most_frames);
+      add(Type::frames).count = line.integer(1, max_frames);
     } else if (command == "idle") {
       ReplayStep& step = add(Type::idle);
       step.seconds = line.number();

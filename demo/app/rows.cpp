@@ -23,46 +23,46 @@ bool slide(Ui& ui, const settings::Row& row, Number& value, const char* format) 
 
 }  // namespace
 
-bool Rows::draw(const settings::Facts& facts, std::int32_t& value) {
-  if (!shown(facts.row)) return false;
+bool Rows::draw(const settings::SettingInfo& info, std::int32_t& value) {
+  if (!shown(info.row)) return false;
   bool on = value != 0;
-  if (!ui_.checkbox(facts.row.label, facts.row.tip, on)) return false;
+  if (!ui_.checkbox(info.row.label, info.row.tip, on)) return false;
   value = on ? 1 : 0;
   return true;
 }
 
-bool Rows::draw(const settings::Facts& facts, std::uint32_t& value) {
-  if (!shown(facts.row)) return false;
-  if (facts.row.most == 0.0) return ui_.integer(facts.row.label, facts.row.tip, value);
-  return slide(ui_, facts.row, value, "%u");
+bool Rows::draw(const settings::SettingInfo& info, std::uint32_t& value) {
+  if (!shown(info.row)) return false;
+  if (info.row.most == 0.0) return ui_.integer(info.row.label, info.row.tip, value);
+  return slide(ui_, info.row, value, "%u");
 }
 
-bool Rows::draw(const settings::Facts& facts, std::uint64_t& value) {
-  return shown(facts.row) && slide(ui_, facts.row, value, "%llu");
+bool Rows::draw(const settings::SettingInfo& info, std::uint64_t& value) {
+  return shown(info.row) && slide(ui_, info.row, value, "%llu");
 }
 
-bool Rows::draw(const settings::Facts& facts, float& value) {
-  return shown(facts.row) && slide(ui_, facts.row, value, facts.row.format);
+bool Rows::draw(const settings::SettingInfo& info, float& value) {
+  return shown(info.row) && slide(ui_, info.row, value, info.row.format);
 }
 
-bool Rows::draw(const settings::Facts& facts, double& value) {
-  return shown(facts.row) && slide(ui_, facts.row, value, facts.row.format);
+bool Rows::draw(const settings::SettingInfo& info, double& value) {
+  return shown(info.row) && slide(ui_, info.row, value, info.row.format);
 }
 
-bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
-  const settings::Row& row = facts.row;
+bool Rows::draw(const settings::SettingInfo& info, float (&value)[3]) {
+  const settings::Row& row = info.row;
   if (!shown(row)) return false;
-  if (facts.spelling == settings::Spelling::complement) {
+  if (info.spelling == settings::Spelling::complement) {
     float spelled[3] = {1.0f - value[0], 1.0f - value[1], 1.0f - value[2]};
-    if (!ui_.colour(row.label, row.tip, spelled)) return false;
+    if (!ui_.color(row.label, row.tip, spelled)) return false;
     for (std::size_t i = 0; i < 3; ++i) value[i] = std::clamp(1.0f - spelled[i], 0.0f, 1.0f);
     return true;
   }
-  if (*row.colour == '\0') {
-    if (!ui_.colour(row.label, row.tip, value)) return false;
+  if (*row.color == '\0') {
+    if (!ui_.color(row.label, row.tip, value)) return false;
     // Black would be all zeros, which means the library's default.
     constexpr float dark = 1e-6f;
-    if (facts.zero != 0.0) value[0] = std::max(value[0], dark);
+    if (info.zero != 0.0) value[0] = std::max(value[0], dark);
     return true;
   }
   std::array<float, 3>& kept = hues_.try_emplace(row.label, row.hue).first->second;
@@ -70,7 +70,7 @@ bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
   if (strength > 0.0f)
     for (std::size_t i = 0; i < 3; ++i) kept[i] = value[i] / strength;
   float hue[3] = {kept[0], kept[1], kept[2]};
-  bool changed = ui_.colour(row.colour, row.colour_tip, hue);
+  bool changed = ui_.color(row.color, row.color_tip, hue);
   changed |= ui_.slider(row.label, row.tip, strength, static_cast<float>(row.least), static_cast<float>(row.most),
                         row.format, ImGuiSliderFlags_Logarithmic);
   if (!changed) return false;
@@ -81,8 +81,8 @@ bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
   return true;
 }
 
-bool Rows::draw(const settings::Facts& facts, float (&value)[4]) {
-  const settings::Row& row = facts.row;
+bool Rows::draw(const settings::SettingInfo& info, float (&value)[4]) {
+  const settings::Row& row = info.row;
   if (!shown(row)) return false;
   constexpr float a_pixel = 0.002f;
   std::array<double, 4> numbers{};
@@ -93,12 +93,12 @@ bool Rows::draw(const settings::Facts& facts, float (&value)[4]) {
   return true;
 }
 
-bool Rows::choose(const settings::Facts& facts, int& value) {
-  if (!shown(facts.row)) return false;
+bool Rows::choose(const settings::SettingInfo& info, int& value) {
+  if (!shown(info.row)) return false;
   std::vector<Choice> choices;
-  for (const settings::Choice& choice : facts.choices) choices.push_back({choice.label, choice.value, choice.tip});
+  for (const settings::Choice& choice : info.choices) choices.push_back({choice.label, choice.value, choice.tip});
   std::ranges::sort(choices, {}, &Choice::value);  // default first
-  return ui_.choose(facts.row.label, facts.row.tip, choices, value);
+  return ui_.choose(info.row.label, info.row.tip, choices, value);
 }
 
 }  // namespace cumulet::demo

@@ -28,8 +28,8 @@ bool has(const SceneOptions& scene, const Item& item) {
       return item.place < std::max<std::size_t>(1, volume_at(scene, item.index).places.size());
     case Item::Kind::model:
       return item.index < scene.models.size();
-    case Item::Kind::lamp:
-      return item.index < scene.lamps.size() && scene.lamps[item.index].kind != CUMULET_LAMP_SUN;
+    case Item::Kind::analytic_light:
+      return item.index < scene.analytic_lights.size() && scene.analytic_lights[item.index].kind != CUMULET_LAMP_SUN;
   }
   return false;
 }
@@ -42,12 +42,12 @@ Numbers numbers_of(const dmat4& matrix) {
   return numbers;
 }
 
-dmat4 place_of(const cumulet_lamp_desc& lamp) {
+dmat4 place_of(const cumulet_lamp_desc& analytic_light) {
   dmat4 place(1.0);
   const dvec3 down(0.0, -1.0, 0.0);
-  const dvec3 shines = glm::make_vec3(lamp.direction);
+  const dvec3 shines = glm::make_vec3(analytic_light.direction);
   const dvec3 direction = glm::length(shines) > 0.0 ? glm::normalize(shines) : down;
-  dvec3 across = glm::make_vec3(lamp.across);
+  dvec3 across = glm::make_vec3(analytic_light.across);
   across -= glm::dot(across, direction) * direction;
   constexpr double least = 1e-9;
   // Default of cumulet_lamp_desc: horizontal, or +X.
@@ -57,16 +57,16 @@ dmat4 place_of(const cumulet_lamp_desc& lamp) {
   place[0] = dvec4(across, 0.0);
   place[1] = dvec4(glm::cross(direction, across), 0.0);
   place[2] = dvec4(direction, 0.0);
-  place[3] = dvec4(glm::make_vec3(lamp.position), 1.0);
+  place[3] = dvec4(glm::make_vec3(analytic_light.position), 1.0);
   return place;
 }
 
-void set_place(cumulet_lamp_desc& lamp, const dmat4& place) {
-  const dmat4 before = place_of(lamp);
-  std::copy_n(glm::value_ptr(place[3]), 3, lamp.position);
+void set_place(cumulet_lamp_desc& analytic_light, const dmat4& place) {
+  const dmat4 before = place_of(analytic_light);
+  std::copy_n(glm::value_ptr(place[3]), 3, analytic_light.position);
   // Unchanged directions keep their exact numbers.
-  if (place[2] != before[2]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[2]))), 3, lamp.direction);
-  if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, lamp.across);
+  if (place[2] != before[2]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[2]))), 3, analytic_light.direction);
+  if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, analytic_light.across);
   const auto stretched = [](double length, double by) {
     double longer = length;
     if (std::abs(by - 1.0) > 1e-9) longer *= by;
@@ -74,9 +74,9 @@ void set_place(cumulet_lamp_desc& lamp, const dmat4& place) {
   };
   const double wider = glm::length(dvec3(place[0]));
   const double higher = glm::length(dvec3(place[1]));
-  const bool is_disc = lamp.kind == CUMULET_LAMP_DISC;
-  lamp.width = stretched(lamp.width, is_disc ? std::sqrt(wider * higher) : wider);
-  if (!is_disc) lamp.height = stretched(lamp.height, higher);
+  const bool is_disc = analytic_light.kind == CUMULET_LAMP_DISC;
+  analytic_light.width = stretched(analytic_light.width, is_disc ? std::sqrt(wider * higher) : wider);
+  if (!is_disc) analytic_light.height = stretched(analytic_light.height, higher);
 }
 
 const char* kind_name(cumulet_lamp_kind kind) {
@@ -107,7 +107,7 @@ std::vector<Item> items_of(const SceneOptions& scene) {
     for (std::size_t place = 0; place < std::max<std::size_t>(1, places); ++place) add({Item::Kind::volume, i, place});
   }
   for (std::size_t i = 0; i < scene.models.size(); ++i) add({Item::Kind::model, i, 0});
-  for (std::size_t i = 0; i < scene.lamps.size(); ++i) add({Item::Kind::lamp, i, 0});
+  for (std::size_t i = 0; i < scene.analytic_lights.size(); ++i) add({Item::Kind::analytic_light, i, 0});
   return items;
 }
 
@@ -119,7 +119,7 @@ std::string title_of(const SceneOptions& scene, const Item& item) {
       return "Volume " + number + ", place " + std::to_string(item.place + 1);
     case Item::Kind::model:
       return "Model " + number;
-    case Item::Kind::lamp:
+    case Item::Kind::analytic_light:
       break;
   }
   return "Lamp " + number;
@@ -132,10 +132,10 @@ std::string name_of(const SceneOptions& scene, const Item& item) {
       return title + volume_at(scene, item.index).label();
     case Item::Kind::model:
       return title + scene.models[item.index].label();
-    case Item::Kind::lamp:
+    case Item::Kind::analytic_light:
       break;
   }
-  return title + kind_name(scene.lamps[item.index].kind);
+  return title + kind_name(scene.analytic_lights[item.index].kind);
 }
 
 void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index) {
@@ -155,10 +155,10 @@ std::optional<dmat4> place_of(const SceneOptions& scene, const Item& item) {
     }
     case Item::Kind::model:
       return matrix_of(scene.models[item.index].to_world);
-    case Item::Kind::lamp:
+    case Item::Kind::analytic_light:
       break;
   }
-  return place_of(scene.lamps[item.index]);
+  return place_of(scene.analytic_lights[item.index]);
 }
 
 void set_place(SceneOptions& scene, const Item& item, const dmat4& place) {
@@ -172,8 +172,8 @@ void set_place(SceneOptions& scene, const Item& item, const dmat4& place) {
     case Item::Kind::model:
       scene.models[item.index].to_world = numbers_of(place);
       break;
-    case Item::Kind::lamp:
-      set_place(scene.lamps[item.index], place);
+    case Item::Kind::analytic_light:
+      set_place(scene.analytic_lights[item.index], place);
       break;
   }
 }
@@ -186,8 +186,8 @@ void restore_place(SceneOptions& scene, const Item& item, const SceneOptions& fr
     case Item::Kind::model:
       scene.models[item.index].to_world = from.models[item.index].to_world;
       break;
-    case Item::Kind::lamp:
-      scene.lamps[item.index] = from.lamps[item.index];
+    case Item::Kind::analytic_light:
+      scene.analytic_lights[item.index] = from.analytic_lights[item.index];
       break;
   }
 }
@@ -203,13 +203,13 @@ std::optional<Box> box_of(const SceneOptions& scene, const Boxes& boxes, const I
       return found(boxes.volumes, static_cast<const VolumeFile&>(volume_at(scene, item.index)));
     case Item::Kind::model:
       return found(boxes.models, scene.models[item.index].file);
-    case Item::Kind::lamp:
+    case Item::Kind::analytic_light:
       break;
   }
-  const cumulet_lamp_desc& lamp = scene.lamps[item.index];
-  const bool is_disc = lamp.kind == CUMULET_LAMP_DISC;
-  if (!is_disc && lamp.kind != CUMULET_LAMP_RECTANGLE) return std::nullopt;
-  const dvec3 half = 0.5 * dvec3(lamp.width, is_disc ? lamp.width : lamp.height, 0.0);
+  const cumulet_lamp_desc& analytic_light = scene.analytic_lights[item.index];
+  const bool is_disc = analytic_light.kind == CUMULET_LAMP_DISC;
+  if (!is_disc && analytic_light.kind != CUMULET_LAMP_RECTANGLE) return std::nullopt;
+  const dvec3 half = 0.5 * dvec3(analytic_light.width, is_disc ? analytic_light.width : analytic_light.height, 0.0);
   return Box{-half, half};
 }
 

@@ -14,7 +14,7 @@ namespace cumulet::demo {
 /// An object that can be selected and moved: a volume (one of its transforms), a model, or a light with a position (all
 /// except suns).
 struct Item {
-  enum class Kind { volume, model, lamp };
+  enum class Kind { volume, model, analytic_light };
   Kind kind = Kind::volume;
   std::size_t index = 0;  // volumes: 0 is the scene's first volume, 1 the first of others
   std::size_t place = 0;  // index of a volume's transform

@@ -56,11 +56,11 @@ std::optional<Item> item_of(const std::optional<Instances::Placed>& placed) {
 
 bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { return same(a, b); }
 
-bool same_wish(const Wish& a, const Wish& b) {
-  const auto rest = [](const Wish& wish) {
-    return std::tie(wish.camera_edit, wish.volume_edit, wish.surfaces_edit, wish.environment_edit, wish.fit,
-                    wish.suggest, wish.unsaid, wish.adaptive_resolution, wish.held, wish.paused, wish.budget_ms,
-                    wish.width, wish.height, wish.scale);
+bool same_request(const DesiredState& a, const DesiredState& b) {
+  const auto rest = [](const DesiredState& desired) {
+    return std::tie(desired.camera_edit, desired.volume_edit, desired.surfaces_edit, desired.environment_edit,
+                    desired.fit, desired.suggest, desired.unsaid, desired.adaptive_resolution, desired.held,
+                    desired.paused, desired.budget_ms, desired.width, desired.height, desired.scale);
   };
   return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
@@ -110,18 +110,18 @@ bool Session::check(cumulet_status status) {
   return false;
 }
 
-void Session::follow(const Wish& wish) {
+void Session::follow(const DesiredState& desired) {
   const bool first = !known_;
-  Wish next = wish;
+  DesiredState next = desired;
   // Values that the user has not changed since are those of the viewer.
-  if (!first && wish.camera_edit == wish_.camera_edit) next.scene.camera = scene_.camera;
-  if (!first && wish.number == wish_.number) next.scene.medium = scene_.medium;
-  const bool load = !first && wish.volume_edit != wish_.volume_edit;
+  if (!first && desired.camera_edit == desired_.camera_edit) next.scene.camera = scene_.camera;
+  if (!first && desired.number == desired_.number) next.scene.medium = scene_.medium;
+  const bool load = !first && desired.volume_edit != desired_.volume_edit;
   if (!first && !load) set_volume(next.scene, volume_of(scene_));
-  if (!first && wish.surfaces_edit == wish_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
-  if (!first && wish.environment_edit == wish_.environment_edit) next.scene.environment = scene_.environment;
-  wish_ = std::move(next);
-  scene_.sampling.preview = wish_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
+  if (!first && desired.surfaces_edit == desired_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
+  if (!first && desired.environment_edit == desired_.environment_edit) next.scene.environment = scene_.environment;
+  desired_ = std::move(next);
+  scene_.sampling.preview = desired_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
   // Refused settings count as passed, so that the error is reported once.
   if (first) known_ = SceneOptions();
   if (first || load) {
@@ -129,13 +129,13 @@ void Session::follow(const Wish& wish) {
     if (is_unplaced(scene_.camera)) {
       // Fitted again when the density scale is known, because that determines the visible extent.
       if (scene_.surface_camera < 0) fit_ = scene_.camera;
-    } else if (wish_.fit) {
+    } else if (desired_.fit) {
       fit_.emplace();
       fit_->struct_size = sizeof *fit_;
       fit_->fovy_degrees = scene_.camera.fovy_degrees;
       fit_->lens_radius = scene_.camera.lens_radius;
     }
-    suggest_ = wish_.suggest;
+    suggest_ = desired_.suggest;
   }
   if (load && !scene_.volume.empty()) known_->volume.clear();
   const auto give = [this](auto group, auto set) {
@@ -148,10 +148,10 @@ void Session::follow(const Wish& wish) {
   give(&SceneOptions::light, cumulet_set_light);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   follow_environment();
-  follow_lamps();
+  follow_analytic_lights();
   give(&SceneOptions::sampling, cumulet_set_sampling);
   give(&SceneOptions::display, cumulet_set_display);
-  if (!(wish_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
+  if (!(desired_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
   if (!same(known_->camera, scene_.camera)) set_camera();
   follow_navigation();
   follow_surfaces();
@@ -284,10 +284,10 @@ void Session::follow_ramps() {
   }
 }
 
-void Session::follow_lamps() {
-  if (std::ranges::equal(known_->lamps, scene_.lamps, settings::same<cumulet_lamp_desc>)) return;
-  known_->lamps = scene_.lamps;
-  check(cumulet_set_lamps(viewer_.get(), scene_.lamps.data(), scene_.lamps.size()));
+void Session::follow_analytic_lights() {
+  if (std::ranges::equal(known_->analytic_lights, scene_.analytic_lights, settings::same<cumulet_lamp_desc>)) return;
+  known_->analytic_lights = scene_.analytic_lights;
+  check(cumulet_set_lamps(viewer_.get(), scene_.analytic_lights.data(), scene_.analytic_lights.size()));
 }
 
 void Session::follow_environment() {
@@ -524,16 +524,16 @@ void Session::follow_volume() {
 cumulet_frame_desc Session::frame() const {
   cumulet_frame_desc frame{};
   frame.struct_size = sizeof frame;
-  frame.width = wish_.width;
-  frame.height = wish_.height;
-  frame.scale = wish_.scale;
+  frame.width = desired_.width;
+  frame.height = desired_.height;
+  frame.scale = desired_.scale;
   return frame;
 }
 
 bool Session::has_news() const {
   const cumulet_frame_result& frame = status_.frame;
-  return frame.width == 0 || (frame.flags & CUMULET_RENDER_UNDRAWN) != 0 || drawn_width_ != wish_.width ||
-         drawn_height_ != wish_.height || !same(drawn_display_, scene_.display);
+  return frame.width == 0 || (frame.flags & CUMULET_RENDER_UNDRAWN) != 0 || drawn_width_ != desired_.width ||
+         drawn_height_ != desired_.height || !same(drawn_display_, scene_.display);
 }
 
 void Session::draw(unsigned framebuffer) {
@@ -543,19 +543,19 @@ void Session::draw(unsigned framebuffer) {
   status_.frame = {};
   status_.frame.struct_size = sizeof status_.frame;
   check(cumulet_render(viewer_.get(), &frame, &status_.frame));
-  drawn_width_ = wish_.width;
-  drawn_height_ = wish_.height;
+  drawn_width_ = desired_.width;
+  drawn_height_ = desired_.height;
   drawn_display_ = scene_.display;
 }
 
 bool Session::cold() const {
   const bool loads = waits() || status_.compiled;
-  return !warm_ && loads && !wish_.paused && status_.frame.width == 0;
+  return !warm_ && loads && !desired_.paused && status_.frame.width == 0;
 }
 
 void Session::warm_up(unsigned framebuffer) {
   cumulet_frame_desc frame = this->frame();
-  frame.budget_ms = wish_.budget_ms;
+  frame.budget_ms = desired_.budget_ms;
   frame.framebuffer = framebuffer;
   status_.frame = {};
   status_.frame.struct_size = sizeof status_.frame;
@@ -578,7 +578,7 @@ void Session::warm_up(unsigned framebuffer) {
 
 void Session::work() {
   cumulet_frame_desc frame = this->frame();
-  frame.budget_ms = wish_.paused ? -1.0 : wish_.budget_ms;
+  frame.budget_ms = desired_.paused ? -1.0 : desired_.budget_ms;
   frame.target = CUMULET_TARGET_NONE;
   status_.frame = {};
   status_.frame.struct_size = sizeof status_.frame;
@@ -716,7 +716,7 @@ void Session::see_boxes() {
 bool Session::more() const {
   const bool compiles =
       status_.compiled && (status_.work.stage == CUMULET_STAGE_IDLE || status_.work.stage == CUMULET_STAGE_UPLOADING);
-  return !wish_.paused && (compiles || (status_.frame.flags & CUMULET_RENDER_MORE) != 0);
+  return !desired_.paused && (compiles || (status_.frame.flags & CUMULET_RENDER_MORE) != 0);
 }
 
 Answer Session::answer() {
@@ -728,7 +728,7 @@ Answer Session::answer() {
     }
   }
   Answer answer;
-  answer.wish = wish_.number;
+  answer.desired = desired_.number;
   answer.status = status_;
   answer.grids = grids_;
   answer.waiting = waits() || drawing_.valid();
@@ -736,10 +736,10 @@ Answer Session::answer() {
   answer.volume = volume_of(scene_);
   answer.surfaces = scene_.surfaces;
   answer.environment = scene_.environment;
-  answer.camera_edit = wish_.camera_edit;
-  answer.volume_edit = wish_.volume_edit;
-  answer.surfaces_edit = wish_.surfaces_edit;
-  answer.environment_edit = wish_.environment_edit;
+  answer.camera_edit = desired_.camera_edit;
+  answer.volume_edit = desired_.volume_edit;
+  answer.surfaces_edit = desired_.surfaces_edit;
+  answer.environment_edit = desired_.environment_edit;
   answer.camera_moved = std::exchange(camera_moved_, false);
   answer.density_scale = std::exchange(density_scale_, std::nullopt);
   answer.look = std::exchange(look_, std::nullopt);
@@ -850,7 +850,7 @@ void Session::pick(double x, double y) {
 void Session::suggest_look() {
   suggest_density();
   const VolumePtr volume = shown();
-  if (!volume || !wish_.unsaid) return;
+  if (!volume || !desired_.unsaid) return;
   cumulet_medium_desc look = SceneOptions().medium;
   look.density_scale = known_->medium.density_scale;
   look = medium_of_fire(volume.get(), look).value_or(look);
@@ -905,7 +905,7 @@ void Session::execute(const Request& request) {
 }
 
 void Session::finish_saves() {
-  if (!saves_.empty() && is_whole(status_.frame, wish_.width, wish_.height)) {
+  if (!saves_.empty() && is_whole(status_.frame, desired_.width, desired_.height)) {
     for (const Request& request : std::exchange(saves_, {})) save(request);
     // Resumes the turntable.
     follow_navigation();
@@ -928,7 +928,7 @@ void Session::save(const Request& request) {
 }
 
 void Session::follow_navigation() {
-  cumulet_navigation_desc navigation = wish_.navigation;
+  cumulet_navigation_desc navigation = desired_.navigation;
   // A rotating camera gives only previews.
   if (!saves_.empty()) navigation.turntable_degrees_per_second = 0.0;
   if (given_.take(navigation)) check(cumulet_set_navigation(viewer_.get(), &navigation));
@@ -939,8 +939,8 @@ void Session::measure_noise() {
   constexpr double period = 1.0;
   const cumulet_frame_result& frame = status_.frame;
   const std::uint64_t samples = status_.stats.samples;
-  const bool refining = (frame.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_CONVERGED)) != 0 && !wish_.held &&
-                        !wish_.paused && frame.width > 0 && frame.progress > 0.0 &&
+  const bool refining = (frame.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_CONVERGED)) != 0 && !desired_.held &&
+                        !desired_.paused && frame.width > 0 && frame.progress > 0.0 &&
                         (frame.flags & CUMULET_RENDER_PREVIEW) == 0 && scene_.sampling.view == CUMULET_VIEW_SHADED;
   // A decreasing count means another image.
   if (samples < noise_samples_) {

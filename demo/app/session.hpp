@@ -42,7 +42,7 @@ struct Picked {
 };
 
 /// The complete state that the window requests, as a value that is sent to the viewer's thread.
-struct Wish {
+struct DesiredState {
   std::uint64_t number = 0;  // increases with each request
   SceneOptions scene;
   // The viewer itself changes the values counted here. They are taken from the scene only if the counter has changed,
@@ -66,7 +66,7 @@ struct Wish {
 
 /// The viewer's state, as the answer to a request.
 struct Answer {
-  std::uint64_t wish = 0;  // number of the latest request that was processed
+  std::uint64_t desired = 0;  // number of the latest request that was processed
   Status status;
   std::vector<GridInfo> grids;
   bool waiting = false;  // a load or the first camera fit is pending
@@ -99,7 +99,7 @@ struct Answer {
 
 [[nodiscard]] bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b);
 /// Returns true if both request the same state. The numbers are ignored.
-[[nodiscard]] bool same_wish(const Wish& a, const Wish& b);
+[[nodiscard]] bool same_request(const DesiredState& a, const DesiredState& b);
 
 /// A Cumulet viewer that is controlled by requests. All calls from the thread that has its GL context.
 class Session {
@@ -113,7 +113,7 @@ class Session {
 
   /// Passes the changes since the last request to the viewer. If the request is unchanged, passes changes that had to
   /// wait.
-  void follow(const Wish& wish);
+  void follow(const DesiredState& desired);
   void input(const ViewerInput& input);
   void execute(const Request& request);
   /// Returns true if the programs of the first scene are not compiled yet. Call warm_up instead of work.
@@ -188,7 +188,7 @@ class Session {
            opening_model_.made.valid();
   }
   void follow_ramps();
-  void follow_lamps();
+  void follow_analytic_lights();
   void follow_places();
   void follow_surfaces();
   void set_surfaces();
@@ -229,9 +229,9 @@ class Session {
   std::unique_ptr<Shared> shared_;
   std::unique_ptr<cumulet_viewer, DestroyViewer> viewer_;
   std::unique_ptr<cumulet_camera, ReleaseCamera> camera_;
-  Wish wish_;
-  SceneOptions& scene_ = wish_.scene;  // includes the viewer's changes
-  std::optional<SceneOptions> known_;  // state that was passed to the viewer
+  DesiredState desired_;
+  SceneOptions& scene_ = desired_.scene;  // includes the viewer's changes
+  std::optional<SceneOptions> known_;     // state that was passed to the viewer
   GivenSettings given_;
   std::vector<Request> saves_;  // waiting for a complete image
   cumulet_camera_desc seen_{};  // last camera of the viewer

@@ -11,7 +11,7 @@ namespace cumulet::demo {
 void Panel::sequence(Model& model, std::vector<Command>& commands) {
   if (!model.status.play) {
     const FrameRow& row = *model.status.neighbours;
-    ui_.fact("Frames", std::to_string(row.number(0)) + " to " + std::to_string(row.number(row.count() - 1)));
+    ui_.value_row("Frames", std::to_string(row.number(0)) + " to " + std::to_string(row.number(row.count() - 1)));
     if (ui_.button("Play the sequence", "The volume is one of several files that are numbered: plays them all.",
                    {-1.0f, 0.0f}))
       commands.push_back({Action::play_row});
@@ -31,9 +31,9 @@ void Panel::sequence(Model& model, std::vector<Command>& commands) {
     sequence.first = std::min(first, last);
   if (ui_.slider("Last played", "The one that it ends with (O: the one that is shown).", last, least, most, "%d"))
     sequence.last = std::max(first, last);
-  ui_.fact("Ready", std::to_string(play.info.ready_frames) + " of " + std::to_string(play.info.frames) + ", " +
-                        short_bytes(static_cast<double>(play.info.bytes)));
-  if (play.info.failed_frames > 0) ui_.fact("Missing", std::to_string(play.info.failed_frames));
+  ui_.value_row("Ready", std::to_string(play.info.ready_frames) + " of " + std::to_string(play.info.frames) + ", " +
+                             short_bytes(static_cast<double>(play.info.bytes)));
+  if (play.info.failed_frames > 0) ui_.value_row("Missing", std::to_string(play.info.failed_frames));
 }
 
 void Panel::timeline(Model& model, std::vector<Command>& commands) {
@@ -78,9 +78,9 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
   ui_.remember("Playhead", "Drag to a frame. Bright are those that are ready, red those that cannot be read.");
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const auto x_of = [&](float index) { return corner.x + room.x * index / count; };
-  const auto bar = [&](float from, float to, float high, float low, ImU32 colour) {
+  const auto bar = [&](float from, float to, float high, float low, ImU32 color) {
     list.AddRectFilled({x_of(from), corner.y + high * room.y},
-                       {std::max(x_of(to), x_of(from) + 1.0f), corner.y + low * room.y}, colour);
+                       {std::max(x_of(to), x_of(from) + 1.0f), corner.y + low * room.y}, color);
   };
   bar(0.0f, count, 0.0f, 1.0f, IM_COL32(40, 44, 50, 255));
   const cumulet_playback_desc played = playback_of(model.scene.sequence, play.row);

@@ -21,7 +21,7 @@ namespace {
 constexpr float font_size = 15.0f;
 constexpr float tip_delay = 0.5f;
 
-ImU32 colour_of(ImGuiCol index, float alpha = 1.0f) { return ImGui::GetColorU32(index, alpha); }
+ImU32 color_of(ImGuiCol index, float alpha = 1.0f) { return ImGui::GetColorU32(index, alpha); }
 
 std::string in_words(double value, const char* const* units, std::size_t count, const char* space) {
   std::size_t unit = 0;
@@ -219,7 +219,7 @@ bool Ui::choose(const char* label, const char* tip, const std::vector<Choice>& c
   return changed;
 }
 
-bool Ui::colour(const char* label, const char* tip, float (&rgb)[3]) {
+bool Ui::color(const char* label, const char* tip, float (&rgb)[3]) {
   begin_row(label);
   float shown[3];
   for (std::size_t i = 0; i < 3; ++i) shown[i] = image::srgb_encode(std::clamp(rgb[i], 0.0f, 1.0f));
@@ -245,7 +245,7 @@ bool Ui::text(const char* label, const char* tip, const char* hint, std::string&
   if (idle) {
     ImGui::PopStyleColor();
     const ImVec2 corner = ImGui::GetItemRectMin();
-    ImGui::GetWindowDrawList()->AddText({corner.x + padding.x, corner.y + padding.y}, colour_of(ImGuiCol_Text),
+    ImGui::GetWindowDrawList()->AddText({corner.x + padding.x, corner.y + padding.y}, color_of(ImGuiCol_Text),
                                         end_of(value, room).c_str());
   }
   remember(label, tip);
@@ -306,12 +306,12 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
   ImDrawList& draw = *window->DrawList;
   constexpr int segments = 48;
   const bool lit = hovered || g.ActiveId == id;
-  draw.AddCircleFilled(centre, radius, colour_of(lit ? ImGuiCol_FrameBgHovered : ImGuiCol_FrameBg), segments);
+  draw.AddCircleFilled(centre, radius, color_of(lit ? ImGuiCol_FrameBgHovered : ImGuiCol_FrameBg), segments);
   for (const float ring : {1.0f / 3.0f, 2.0f / 3.0f})
-    draw.AddCircle(centre, radius * ring, colour_of(ImGuiCol_Text, 0.12f), segments, px(1.0f));
-  draw.AddLine({centre.x - radius, centre.y}, {centre.x + radius, centre.y}, colour_of(ImGuiCol_Text, 0.12f), px(1.0f));
-  draw.AddLine({centre.x, centre.y - radius}, {centre.x, centre.y + radius}, colour_of(ImGuiCol_Text, 0.12f), px(1.0f));
-  draw.AddCircle(centre, radius, colour_of(ImGuiCol_Text, 0.35f), segments, px(1.5f));
+    draw.AddCircle(centre, radius * ring, color_of(ImGuiCol_Text, 0.12f), segments, px(1.0f));
+  draw.AddLine({centre.x - radius, centre.y}, {centre.x + radius, centre.y}, color_of(ImGuiCol_Text, 0.12f), px(1.0f));
+  draw.AddLine({centre.x, centre.y - radius}, {centre.x, centre.y + radius}, color_of(ImGuiCol_Text, 0.12f), px(1.0f));
+  draw.AddCircle(centre, radius, color_of(ImGuiCol_Text, 0.35f), segments, px(1.5f));
   struct Letter {
     const char* text;
     float x, y;
@@ -320,7 +320,7 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
     const ImVec2 size = ImGui::CalcTextSize(letter.text);
     const float at = radius + px(10.0f);
     draw.AddText({centre.x + letter.x * at - size.x * 0.5f, centre.y + letter.y * at - size.y * 0.5f},
-                 colour_of(ImGuiCol_TextDisabled), letter.text);
+                 color_of(ImGuiCol_TextDisabled), letter.text);
   }
   const DialPoint camera = dial_point({static_cast<double>(camera_azimuth), 0.0});
   const ImVec2 eye(centre.x + static_cast<float>(camera.x) * radius, centre.y + static_cast<float>(camera.y) * radius);
@@ -328,11 +328,11 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
   const float wing = px(5.0f);
   draw.AddTriangleFilled({eye.x + inward.x * wing * 1.8f, eye.y + inward.y * wing * 1.8f},
                          {eye.x - inward.y * wing, eye.y + inward.x * wing},
-                         {eye.x + inward.y * wing, eye.y - inward.x * wing}, colour_of(ImGuiCol_TextDisabled));
+                         {eye.x + inward.y * wing, eye.y - inward.x * wing}, color_of(ImGuiCol_TextDisabled));
   const DialPoint at = dial_point({static_cast<double>(azimuth), static_cast<double>(elevation)});
   const ImVec2 disc(centre.x + static_cast<float>(at.x) * radius, centre.y + static_cast<float>(at.y) * radius);
   const ImU32 gold = elevation < 0.0f ? IM_COL32(150, 120, 80, 255) : IM_COL32(255, 205, 110, 255);
-  draw.AddLine(centre, disc, colour_of(ImGuiCol_Text, 0.25f), px(1.0f));
+  draw.AddLine(centre, disc, color_of(ImGuiCol_Text, 0.25f), px(1.0f));
   draw.AddCircleFilled(disc, px(11.0f), (gold & 0x00FFFFFFu) | 0x38000000u, segments);
   draw.AddCircleFilled(disc, px(6.5f), gold, segments);
   ImGui::RenderNavHighlight(box, id);
@@ -352,13 +352,13 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   const ImVec2 low(corner.x + pad, end.y - pad);
   const ImVec2 high(end.x - pad, corner.y + pad);
   const auto place_of = [&](const settings::RampPoint& point) {
-    return ImVec2(low.x + (high.x - low.x) * (point[0] / view.most_value),
-                  low.y + (high.y - low.y) * (point[1] / view.most_result));
+    return ImVec2(low.x + (high.x - low.x) * (point[0] / view.max_value),
+                  low.y + (high.y - low.y) * (point[1] / view.max_result));
   };
   const ImVec2 mouse = ImGui::GetIO().MousePos;
   const auto under_mouse = [&]() -> settings::RampPoint {
-    return {std::clamp((mouse.x - low.x) / (high.x - low.x), 0.0f, 1.0f) * view.most_value,
-            std::clamp((mouse.y - low.y) / (high.y - low.y), 0.0f, 1.0f) * view.most_result};
+    return {std::clamp((mouse.x - low.x) / (high.x - low.x), 0.0f, 1.0f) * view.max_value,
+            std::clamp((mouse.y - low.y) / (high.y - low.y), 0.0f, 1.0f) * view.max_result};
   };
   std::optional<std::size_t> near;
   float nearest = px(9.0f);
@@ -394,16 +394,16 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
 
   if (!ImGui::IsItemVisible()) return changed;
   ImDrawList& draw = *ImGui::GetWindowDrawList();
-  draw.AddRectFilled(corner, end, colour_of(ImGuiCol_FrameBg), px(4.0f));
+  draw.AddRectFilled(corner, end, color_of(ImGuiCol_FrameBg), px(4.0f));
   draw.PushClipRect(corner, end, true);
   const float step = reach / static_cast<float>(std::max<std::size_t>(heights.size(), 1));
   for (std::size_t i = 0; i < heights.size(); ++i) {
     const float from = place_of({step * static_cast<float>(i), 0.0f}).x;
     const float to = place_of({step * static_cast<float>(i + 1), 0.0f}).x;
     draw.AddRectFilled({from, low.y + (high.y - low.y) * heights[i]}, {to, low.y},
-                       colour_of(ImGuiCol_PlotHistogram, 0.22f));
+                       color_of(ImGuiCol_PlotHistogram, 0.22f));
   }
-  const ImU32 line = colour_of(ImGuiCol_PlotLines);
+  const ImU32 line = color_of(ImGuiCol_PlotLines);
   ImVec2 before(corner.x, place_of(points.front()).y);
   for (const settings::RampPoint& point : points) {
     const ImVec2 at = place_of(point);
@@ -414,15 +414,15 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   for (std::size_t i = 0; i < points.size(); ++i) {
     const bool lit = i == near || i == view.held;
     draw.AddCircleFilled(place_of(points[i]), px(lit ? 5.5f : 4.0f),
-                         colour_of(i == view.chosen ? ImGuiCol_CheckMark : ImGuiCol_Text));
+                         color_of(i == view.chosen ? ImGuiCol_CheckMark : ImGuiCol_Text));
   }
   draw.PopClipRect();
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.most_result));
-  draw.AddText({corner.x + px(5.0f), corner.y + px(2.0f)}, colour_of(ImGuiCol_TextDisabled), text.data());
-  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.most_value));
+  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.max_result));
+  draw.AddText({corner.x + px(5.0f), corner.y + px(2.0f)}, color_of(ImGuiCol_TextDisabled), text.data());
+  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.max_value));
   const ImVec2 wide = ImGui::CalcTextSize(text.data());
-  draw.AddText({end.x - px(5.0f) - wide.x, end.y - px(2.0f) - wide.y}, colour_of(ImGuiCol_TextDisabled), text.data());
+  draw.AddText({end.x - px(5.0f) - wide.x, end.y - px(2.0f) - wide.y}, color_of(ImGuiCol_TextDisabled), text.data());
   return changed;
 }
 
@@ -435,7 +435,7 @@ void Ui::plot(const char* label, const char* tip, const std::vector<float>& valu
   if (!ImGui::IsItemVisible()) return;  // an invisible plot must not change the frame
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const ImVec2 end(corner.x + width, corner.y + height);
-  draw.AddRectFilled(corner, end, colour_of(ImGuiCol_FrameBg), px(4.0f));
+  draw.AddRectFilled(corner, end, color_of(ImGuiCol_FrameBg), px(4.0f));
   const float line = ImGui::GetTextLineHeight();
   const float pad = px(7.0f);
   const float top = corner.y + line + px(5.0f);
@@ -450,16 +450,16 @@ void Ui::plot(const char* label, const char* tip, const std::vector<float>& valu
     for (std::size_t i = 0; i + 1 < values.size(); ++i) {
       const ImVec2 a = point(i);
       const ImVec2 b = point(i + 1);
-      draw.AddQuadFilled(a, b, {b.x, bottom}, {a.x, bottom}, colour_of(ImGuiCol_PlotLines, 0.18f));
-      draw.AddLine(a, b, colour_of(ImGuiCol_PlotLines), px(1.3f));
+      draw.AddQuadFilled(a, b, {b.x, bottom}, {a.x, bottom}, color_of(ImGuiCol_PlotLines, 0.18f));
+      draw.AddLine(a, b, color_of(ImGuiCol_PlotLines), px(1.3f));
     }
   }
-  draw.AddText({corner.x + pad, corner.y + px(3.0f)}, colour_of(ImGuiCol_TextDisabled), label);
+  draw.AddText({corner.x + pad, corner.y + px(3.0f)}, color_of(ImGuiCol_TextDisabled), label);
   const ImVec2 size = ImGui::CalcTextSize(latest.c_str());
-  draw.AddText({end.x - pad - size.x, corner.y + px(3.0f)}, colour_of(ImGuiCol_Text), latest.c_str());
+  draw.AddText({end.x - pad - size.x, corner.y + px(3.0f)}, color_of(ImGuiCol_Text), latest.c_str());
 }
 
-void Ui::fact(const char* label, const std::string& value) {
+void Ui::value_row(const char* label, const std::string& value) {
   heading(label);
   ImGui::SameLine(px(132.0f));
   ImGui::PushTextWrapPos(0.0f);

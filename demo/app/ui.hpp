@@ -53,7 +53,7 @@ class Ui {
   /// Returns true if the user chose another entry.
   bool choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value);
   /// Edits a linear color. It is displayed in sRGB.
-  bool colour(const char* label, const char* tip, float (&rgb)[3]);
+  bool color(const char* label, const char* tip, float (&rgb)[3]);
   /// Returns true if the user pressed Enter.
   bool text(const char* label, const char* tip, const char* hint, std::string& value, float room_right = 0.0f);
   /// Edits the sun's direction: see sun_dial.hpp. camera_azimuth: direction of the camera, marked on the rim.
@@ -67,7 +67,7 @@ class Ui {
   /// Plots values over time, newest on the right. latest: the last value with its unit.
   void plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest);
   /// Shows a name and a value.
-  void fact(const char* label, const std::string& value);
+  void value_row(const char* label, const std::string& value);
 
   /// Stores the position of the last control and shows its tooltip. Call it for controls that are drawn directly with
   /// ImGui.

@@ -49,7 +49,7 @@ std::optional<Stand> stand_of(const Matrix& m) {
 void Panel::stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number) {
   auto& places = volume.places;
   if (places.size() > 1) {
-    ui_.fact(("Places" + number).c_str(), std::to_string(places.size()));
+    ui_.value_row(("Places" + number).c_str(), std::to_string(places.size()));
     if (!place || *place >= places.size()) return;
     if (const auto moved = stand_at(places[*place], number)) places[*place] = *moved;
     return;
@@ -87,7 +87,7 @@ void Panel::models(Model& model, std::vector<Command>& commands) {
     SceneModel& one = models[i];
     const std::string number = " of model " + std::to_string(i + 1);
     if (i > 0) ImGui::Separator();
-    ui_.fact(("Model " + std::to_string(i + 1)).c_str(), one.label());
+    ui_.value_row(("Model " + std::to_string(i + 1)).c_str(), one.label());
     std::string& typed = model_names_[i];
     if (!ImGui::IsAnyItemActive()) typed = one.name;
     if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
@@ -123,7 +123,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
   const auto row = [this, &model](SceneVolume& volume, std::size_t i) {
     const std::string number = std::string(" ").append(std::to_string(i));
     if (i > 1) ImGui::Separator();
-    ui_.fact(("Volume" + number).c_str(), volume.label());
+    ui_.value_row(("Volume" + number).c_str(), volume.label());
     std::string& typed = names_[i];
     if (!ImGui::IsAnyItemActive()) typed = volume.name;
     if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))

@@ -13,7 +13,7 @@ namespace {
 constexpr double coldest_fire = 800.0;
 constexpr double hottest_fire = 6000.0;
 
-double most_of(const cumulet_volume* volume, cumulet_ramp ramp) {
+double max_of(const cumulet_volume* volume, cumulet_ramp ramp) {
   cumulet_values_info info{};
   info.struct_size = sizeof info;
   return cumulet_volume_get_values(volume, ramp, &info) == CUMULET_OK ? double{info.max_value} : 0.0;
@@ -44,7 +44,7 @@ bool is_unsaid(const cumulet_medium_desc& medium) {
 }
 
 std::optional<float> temperature_scale_of(const cumulet_volume* volume) {
-  if (!(most_of(volume, CUMULET_RAMP_TEMPERATURE) > 0.0)) return std::nullopt;
+  if (!(max_of(volume, CUMULET_RAMP_TEMPERATURE) > 0.0)) return std::nullopt;
   return static_cast<float>(info_of(volume).temperature_scale);
 }
 
@@ -52,8 +52,8 @@ std::optional<cumulet_medium_desc> medium_of_fire(const cumulet_volume* volume, 
   cumulet_medium_desc medium = plain;
   settings::spell_out_zeros(medium);
   const cumulet_volume_info info = info_of(volume);
-  Burning burning{.flame = most_of(volume, CUMULET_RAMP_FLAME),
-                  .temperature = most_of(volume, CUMULET_RAMP_TEMPERATURE),
+  Burning burning{.flame = max_of(volume, CUMULET_RAMP_FLAME),
+                  .temperature = max_of(volume, CUMULET_RAMP_TEMPERATURE),
                   .size = size_of(info)};
   if (medium.temperature_scale == 0.0F) medium.temperature_scale = temperature_scale_of(volume).value_or(0.0F);
   // Warm smoke and clouds (about 270 K) also have temperatures, but do not burn.

@@ -70,12 +70,12 @@ struct Grid {
 
 /// Returns how to interpolate at `moment` between two files.
 PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, const Grid& grid) {
-  constexpr std::int64_t most_parts = 1000;  // limit of the library
+  constexpr std::int64_t max_parts = 1000;  // limit of the library
   const Frame before = grid.before(moment.frame);
   const std::int64_t way = moment.in_thousandths() - Moment(before).in_thousandths();
   const std::int64_t length = Moment(grid.step).in_thousandths();
   const std::int64_t common = std::gcd(way, length);
-  if (length / common > most_parts)
+  if (length / common > max_parts)
     throw UsageError("frame " + moment.text() + ": the files are " + std::to_string(grid.step) +
                      " frames apart, of which this is no thousandth");
   return {volume.file(before + grid.step), static_cast<std::uint32_t>(way / common),
@@ -136,7 +136,7 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   std::vector<std::string> files;
   files.reserve(there.size());
   for (const Frame frame : there) files.push_back(volume->file(frame));
-  plan.judged_by = by_size(files);
+  plan.analyzed_by = by_size(files);
   return plan;
 }
 

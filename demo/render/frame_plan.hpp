@@ -31,7 +31,7 @@ struct FramePlan {
   std::vector<PlannedFrame> frames;  ///< at least one, in the requested order
   /// All existing volumes of the sequence, largest file first. Settings shared by the sequence are derived from the
   /// first one that can be read, so that they do not depend on the requested frames.
-  std::vector<std::string> judged_by;
+  std::vector<std::string> analyzed_by;
   /// FramePattern::passed_over() of the volume: a warning about files that the pattern skips.
   std::string passed_over;
 };

@@ -192,8 +192,8 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
     out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
     return;
   }
-  for (const auto& [what, facts] : json.items()) {
-    for (const Json& file : facts.is_array() ? facts : Json::array({facts})) write_lines(file, "", out);
+  for (const auto& [what, properties] : json.items()) {
+    for (const Json& file : properties.is_array() ? properties : Json::array({properties})) write_lines(file, "", out);
   }
 }
 

@@ -211,11 +211,11 @@ class Limit {
   [[nodiscard]] bool reached() const { return seconds_ && over() >= *seconds_; }
   /// Returns the budget of the next frame in milliseconds, so that it ends in time.
   [[nodiscard]] double budget() const {
-    return seconds_ ? std::clamp(1e3 * (*seconds_ - over()), least_ms, budget_ms) : budget_ms;
+    return seconds_ ? std::clamp(1e3 * (*seconds_ - over()), min_ms, budget_ms) : budget_ms;
   }
 
  private:
-  static constexpr double least_ms = 5.0;
+  static constexpr double min_ms = 5.0;
   std::optional<double> seconds_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
@@ -433,11 +433,11 @@ void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& p
 
 /// Starts the image with the samples of the checkpoint.
 void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint& from, Progress& progress) {
-  constexpr double least_ms = 1.0;
+  constexpr double min_ms = 1.0;
   cumulet_frame_result frame{};
   while (frame.width == 0 && !(frame.progress > 0.0)) {
     check_not_interrupted();
-    frame = render_frame(viewer, options, least_ms);
+    frame = render_frame(viewer, options, min_ms);
     if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
   }
   if (cumulet_restore_accumulation(viewer.get(), from.accumulation.data(), from.accumulation.size()) != CUMULET_OK)
@@ -716,7 +716,7 @@ class Studio {
     // The ground is set first, because the sky is computed for it.
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_light(viewer_.get(), &scene.light));
-    check(viewer_, cumulet_set_lamps(viewer_.get(), scene.lamps.data(), scene.lamps.size()));
+    check(viewer_, cumulet_set_lamps(viewer_.get(), scene.analytic_lights.data(), scene.analytic_lights.size()));
     check(viewer_, set_places(viewer_.get(), scene));
     if (!scene.environment.empty()) {
       check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
@@ -835,24 +835,24 @@ void settle(const Viewer& viewer, RenderOptions& options) {
 std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
   const SceneOptions given = options.scene;
   const bool kept = !options.settled.empty() && !is_settled(given);
-  const bool known = kept && cumulet::demo::read_settled(options.settled, options.scene, plan.judged_by);
+  const bool known = kept && cumulet::demo::read_settled(options.settled, options.scene, plan.analyzed_by);
   if (kept && !known) cumulet::image::check_writable(options.settled);
   auto studio = std::make_unique<Studio>(options);
   wait(studio->viewer(), studio->progress());
   studio->choose_in_surfaces(options);
   if (known || is_settled(options.scene)) return studio;
-  for (const std::string& volume : plan.judged_by) {
-    SceneOptions judged = options.scene;
-    judged.volume = volume;
+  for (const std::string& volume : plan.analyzed_by) {
+    SceneOptions probe = options.scene;
+    probe.volume = volume;
     const std::string state = cumulet::demo::volume_state(volume);  // before: it may be replaced meanwhile
     try {
-      studio->load(judged);
-      static_cast<void>(ground_below(studio->viewer(), judged));  // throws if the volume is empty, to try the next one
+      studio->load(probe);
+      static_cast<void>(ground_below(studio->viewer(), probe));  // throws if the volume is empty, to try the next one
     } catch (const std::runtime_error&) {
       check_not_interrupted();
       continue;  // the error is reported when that frame is rendered
     }
-    studio->remark(judged);
+    studio->remark(probe);
     settle(studio->viewer(), options);
     if (kept) cumulet::demo::write_settled(options.settled, given, options.scene, state);
     break;

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <analytic_light_limits.hpp>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -9,7 +10,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <lamp_limits.hpp>
 #include <limits>
 #include <memory>
 #include <names.hpp>
@@ -255,10 +255,10 @@ std::vector<std::string> parse_light_groups(std::string_view text) {
 }
 
 /// Sets one field of a light by its scene file key. Returns false if there is no such key.
-bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::string& text) {
+bool take_analytic_light_key(cumulet_lamp_desc& analytic_light, std::string_view key, const std::string& text) {
   bool known = false;
   settings::for_each<cumulet_lamp_desc>([&](const auto& setting) {
-    auto& value = lamp.*setting.field;
+    auto& value = analytic_light.*setting.field;
     using Value = std::remove_reference_t<decltype(value)>;
     if (key != setting.key) return;
     if constexpr (settings::Real<Value>) {
@@ -276,16 +276,16 @@ bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::str
 }
 
 /// Parses a light such as "point position=0,1,2 power=100": a kind, then keys and values as in scene files.
-cumulet_lamp_desc parse_lamp(std::string_view text) {
+cumulet_lamp_desc parse_analytic_light(std::string_view text) {
   const std::vector<std::string_view> parts = words(text);
-  cumulet_lamp_desc lamp{};
-  lamp.struct_size = sizeof lamp;
+  cumulet_lamp_desc analytic_light{};
+  analytic_light.struct_size = sizeof analytic_light;
   const std::string_view kind = parts.empty() ? std::string_view{} : parts.front();
   const auto* const named =
-      std::ranges::find_if(settings::lamp_choices, [&](const auto& choice) { return kind == choice.name; });
-  if (named == settings::lamp_choices.end())
-    throw UsageError(in_quotes(kind) + " is none of " + list_names(settings::lamp_choices, ", "));
-  lamp.kind = static_cast<cumulet_lamp_kind>(named->value);
+      std::ranges::find_if(settings::analytic_light_choices, [&](const auto& choice) { return kind == choice.name; });
+  if (named == settings::analytic_light_choices.end())
+    throw UsageError(in_quotes(kind) + " is none of " + list_names(settings::analytic_light_choices, ", "));
+  analytic_light.kind = static_cast<cumulet_lamp_kind>(named->value);
   std::set<std::string_view> given;
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::size_t equals = parts[i].find('=');
@@ -296,28 +296,29 @@ cumulet_lamp_desc parse_lamp(std::string_view text) {
     if (!given.insert(key).second) throw UsageError(std::string(key) + " is given twice");
     bool known = false;
     try {
-      known = take_lamp_key(lamp, key, value);
+      known = take_analytic_light_key(analytic_light, key, value);
     } catch (const UsageError& error) {
       throw UsageError(std::string(key) + ": " + error.what());
     }
     if (!known) throw UsageError("lamps have no " + in_quotes(key));
   }
-  if (const auto refusal = settings::lamp_refusal(lamp))
+  if (const auto refusal = settings::analytic_light_refusal(analytic_light))
     throw UsageError(std::string(refusal->name) + " " + refusal->cause);
-  return lamp;
+  return analytic_light;
 }
 
 /// Adds --lamp: lights in addition to those of a scene file. "none" removes all lights before it.
-void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>& lamps) {
-  const auto take = [&lamps](const std::vector<std::string>& texts) {
+void add_analytic_lights(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>& analytic_lights) {
+  const auto take = [&analytic_lights](const std::vector<std::string>& texts) {
     try {
       for (const std::string& text : texts) {
         if (text == "none")
-          lamps.clear();
+          analytic_lights.clear();
         else
-          lamps.push_back(parse_lamp(text));
+          analytic_lights.push_back(parse_analytic_light(text));
       }
-      if (const std::string why = settings::lamp_count_refusal(lamps.size()); !why.empty()) throw UsageError(why);
+      if (const std::string why = settings::analytic_light_count_refusal(analytic_lights.size()); !why.empty())
+        throw UsageError(why);
     } catch (const UsageError& error) {
       throw CLI::ValidationError("--lamp", error.what());
     }
@@ -548,7 +549,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--sky-model", "\"turbidity,ground_albedo\"",
       [&](const std::string& text) { parse_sky_model(text, scene.light); },
       "A clear day's sun and sky: from 1 (no aerosols) over 3 (clear) to 10, and what the ground sends back, 0 to 1");
-  add_lamps(app, group, scene.lamps);
+  add_analytic_lights(app, group, scene.analytic_lights);
   add_settings(app, group, scene.ground);
   add_settings(app, "Grid", scene.grid);
 
@@ -638,9 +639,9 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
     const std::string sun = app.get_option("--sun")->results().back();
     if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
   }
-  const bool lamps_alone = !scene.lamps.empty() && app.count("--sky-model") == 0;
+  const bool analytic_lights_alone = !scene.analytic_lights.empty() && app.count("--sky-model") == 0;
   if (!files.scene && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
-      app.count("--env") == 0 && !lamps_alone) {
+      app.count("--env") == 0 && !analytic_lights_alone) {
     const cumulet_light_desc given = scene.light;
     scene.set_daylight();
     if (app.count("--sky-model") > 0) {
@@ -683,7 +684,7 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
 namespace {
 
 // Samples per pixel of an image that stops at a noise target or time limit.
-constexpr std::uint32_t most_samples = 65536;
+constexpr std::uint32_t max_samples = 65536;
 
 // Checks that an image with --first-sample can be merged with others.
 void check_part(const RenderOptions& options, bool part) {
@@ -882,7 +883,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   // Otherwise the default number of samples would end the image before the noise target or the time limit.
   const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
-  if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
+  if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = max_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr to write to");
   check_together(options, app.count("--first-sample") > 0);

@@ -11,7 +11,7 @@ namespace cumulet::demo {
 namespace {
 
 constexpr int bar_width = 24;
-constexpr double least_seconds = 0.3;
+constexpr double min_seconds = 0.3;
 
 /// Formats a count as "12.3 M": three digits, for display only.
 std::string format_count(double count) {
@@ -96,7 +96,7 @@ std::string ending_line(Ending ending, std::optional<double> noise, double sampl
 std::string rendering_line(double part, double gained, double samples, double seconds) {
   part = std::clamp(part, 0.0, 1.0);
   std::string line = "rendering " + bar(part);
-  if (gained > 0.0 && seconds >= least_seconds) {
+  if (gained > 0.0 && seconds >= min_seconds) {
     line += "  " + format_count(samples / seconds) + "samples/s";
     line += "  ETA " + format_duration(seconds * (1.0 - part) / gained);
   }

@@ -113,7 +113,7 @@ void add_mast(Tower& tower) {
 
 // Adds the station at the foot: two gabled houses and a dome.
 void add_station(Tower& tower) {
-  const auto house = [&](const vec3& at, const vec3& half, float roof) {
+  const auto cottage = [&](const vec3& at, const vec3& half, float roof) {
     tower.concrete.box(at + vec3(0.0F, half.y - 3.0F, 0.0F), {half.x, half.y + 3.0F, half.z});
     const vec3 eaves = at + vec3(0.0F, 2.0F * half.y, 0.0F);
     const float x = half.x + 0.5F;
@@ -140,8 +140,8 @@ void add_station(Tower& tower) {
       }
     }
   };
-  house({12.0F, 0.0F, 1.0F}, {6.5F, 2.6F, 3.6F}, 3.2F);
-  house({-10.0F, 0.0F, 2.5F}, {4.2F, 2.4F, 3.0F}, 2.6F);
+  cottage({12.0F, 0.0F, 1.0F}, {6.5F, 2.6F, 3.6F}, 3.2F);
+  cottage({-10.0F, 0.0F, 2.5F}, {4.2F, 2.4F, 3.0F}, 2.6F);
   // The dome, with its slit.
   const vec3 dome(-16.5F, 0.0F, -1.0F);
   tower.concrete.turned(dome, {{3.1F, -5.0F}, {3.1F, 3.0F}}, 32);
@@ -154,12 +154,12 @@ void add_station(Tower& tower) {
 }
 
 // Adds the rotating head: two lenses that face +X and -X, and an antenna below them.
-void add_lantern(Mesh& steel, Mesh& lamp) {
+void add_lantern(Mesh& steel, Mesh& analytic_light) {
   steel.box({0.0F, -0.9F, 0.0F}, {0.25F, 0.6F, 2.6F});
   steel.box({0.0F, 0.1F, 0.0F}, {0.7F, 0.5F, 0.5F});
   for (const float s : {-1.0F, 1.0F}) {
     const float x = 0.72F * s;
-    lamp.quad({x, -0.3F, s * 0.4F}, {x, -0.3F, s * -0.4F}, {x, 0.5F, s * -0.4F}, {x, 0.5F, s * 0.4F});
+    analytic_light.quad({x, -0.3F, s * 0.4F}, {x, -0.3F, s * -0.4F}, {x, 0.5F, s * -0.4F}, {x, 0.5F, s * 0.4F});
   }
 }
 
@@ -189,7 +189,7 @@ std::string make_surfaces(std::uint32_t seed) {
   const int white = gltf.material("white paint", {0.85F, 0.85F, 0.83F}, 0.0, 0.5);
   const int lit = gltf.glowing("lit windows", {0.2F, 0.18F, 0.15F}, {3.2F, 1.9F, 0.8F});
   const int beacon = gltf.glowing("beacon", {0.3F, 0.02F, 0.02F}, {9.0F, 0.7F, 0.4F});
-  const int lamp = gltf.glowing("lamp", {0.5F, 0.5F, 0.5F}, {12.0F, 11.0F, 8.0F});
+  const int analytic_light = gltf.glowing("lamp", {0.5F, 0.5F, 0.5F}, {12.0F, 11.0F, 8.0F});
 
   const Mesh ground = terrain.ground();
   gltf.node("Terrain", -1, gltf.mesh("terrain", {{&ground, rock}}));
@@ -229,8 +229,8 @@ std::string make_surfaces(std::uint32_t seed) {
   Mesh head;
   Mesh lenses;
   add_lantern(head, lenses);
-  const int lantern =
-      gltf.node("Lantern", building, gltf.mesh("lantern", {{&head, steel}, {&lenses, lamp}}), {0.0F, 61.4F, 0.0F});
+  const int lantern = gltf.node("Lantern", building, gltf.mesh("lantern", {{&head, steel}, {&lenses, analytic_light}}),
+                                {0.0F, 61.4F, 0.0F});
   gltf.spin("Beacon", lantern, 6.0);
   const View view;
   gltf.attach_camera(gltf.node("View", -1, -1, view.eye), view.target, glm::radians(view.fovy_degrees), 16.0 / 9.0);

@@ -1,6 +1,7 @@
 #include "scene_file.hpp"
 
 #include <algorithm>
+#include <analytic_light_limits.hpp>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -10,7 +11,6 @@
 #include <file.hpp>
 #include <filesystem>
 #include <frames.hpp>
-#include <lamp_limits.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -84,10 +84,10 @@ Matrix rotation(std::size_t axis, double degrees) {
   return m;
 }
 
-constexpr std::size_t most_places = 100'000;
-constexpr std::size_t most_volumes = 10'000;
-constexpr std::size_t most_models = 10'000;
-constexpr std::size_t most_cameras = 10'000;
+constexpr std::size_t max_places = 100'000;
+constexpr std::size_t max_volumes = 10'000;
+constexpr std::size_t max_models = 10'000;
+constexpr std::size_t max_cameras = 10'000;
 
 /// A transform: scale, then rotations about x, y and z, then translation.
 struct PlaceParts {
@@ -207,8 +207,8 @@ class Reader {
     if (!value) return;
     if (!value->is_array()) wrong(key, "is not a list");
     if (value->empty()) wrong(key, "is empty: without it the volume stands once");
-    if (value->size() > most_places)
-      wrong(key, "are " + std::to_string(value->size()) + ": this program shows " + std::to_string(most_places));
+    if (value->size() > max_places)
+      wrong(key, "are " + std::to_string(value->size()) + ": this program shows " + std::to_string(max_places));
     for (std::size_t i = 0; i < value->size(); ++i) {
       const Json& one = (*value)[i];
       const std::string where = key + "[" + std::to_string(i) + "]";
@@ -394,7 +394,7 @@ void read_camera(Reader& reader, SceneFormat format, const std::string& of, Scen
 }
 
 void read_named_cameras(Reader& reader, std::vector<NamedCamera>& cameras) {
-  cameras.resize(reader.list("cameras", most_cameras));
+  cameras.resize(reader.list("cameras", max_cameras));
   std::set<std::string_view> known;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const std::string of = "cameras[" + std::to_string(i) + "].";
@@ -451,15 +451,16 @@ void read_settings(Reader& reader, Desc& desc, const std::string& where = "") {
   });
 }
 
-void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
-  lamps.resize(reader.list("lights", settings::most_lamps));
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    cumulet_lamp_desc& lamp = lamps[i];
-    lamp.struct_size = sizeof lamp;
+void read_analytic_lights(Reader& reader, std::vector<cumulet_lamp_desc>& analytic_lights) {
+  analytic_lights.resize(reader.list("lights", settings::max_analytic_lights));
+  for (std::size_t i = 0; i < analytic_lights.size(); ++i) {
+    cumulet_lamp_desc& analytic_light = analytic_lights[i];
+    analytic_light.struct_size = sizeof analytic_light;
     const std::string where = "lights[" + std::to_string(i) + "].";
     if (!reader.has(where + "kind")) reader.wrong(where + "kind", "is missing");
-    read_settings(reader, lamp, where);
-    if (const auto refusal = settings::lamp_refusal(lamp)) reader.wrong(where + refusal->name, refusal->cause);
+    read_settings(reader, analytic_light, where);
+    if (const auto refusal = settings::analytic_light_refusal(analytic_light))
+      reader.wrong(where + refusal->name, refusal->cause);
   }
 }
 
@@ -557,7 +558,7 @@ bool is_placed(Reader& reader, const std::string& of) {
 }
 
 void read_models(Reader& reader, SceneOptions& scene) {
-  const std::size_t count = reader.list("models", most_models);
+  const std::size_t count = reader.list("models", max_models);
   for (std::size_t i = 0; i < count; ++i) {
     const std::string of = "models[" + std::to_string(i) + "].";
     if (i == 0 && !is_placed(reader, of)) continue;
@@ -587,9 +588,9 @@ void read_sequence(Reader& reader, SceneSequence& sequence) {
 /// Reads the sections that exist only in version 2.
 void read_second(Reader& reader, SceneOptions& scene) {
   reader.set_format(SceneFormat::second);
-  const std::size_t volumes = reader.list("volumes", most_volumes);
+  const std::size_t volumes = reader.list("volumes", max_volumes);
   read_models(reader, scene);
-  read_lamps(reader, scene.lamps);
+  read_analytic_lights(reader, scene.analytic_lights);
   for (std::size_t i = 1; i < volumes; ++i) {
     SceneVolume& volume = scene.others.emplace_back();
     reader.of_volume(i);
@@ -856,8 +857,8 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
     writer.put("environment.file", named(scene.environment));
     writer.put_settings(scene.environment_settings);
   }
-  for (std::size_t i = 0; second && i < scene.lamps.size(); ++i)
-    writer.put_settings(scene.lamps[i], "lights[" + std::to_string(i) + "].");
+  for (std::size_t i = 0; second && i < scene.analytic_lights.size(); ++i)
+    writer.put_settings(scene.analytic_lights[i], "lights[" + std::to_string(i) + "].");
   writer.put_settings(scene.ground);
   writer.put_settings(scene.grid);
   writer.put("picture.width", scene.width);

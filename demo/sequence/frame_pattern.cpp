@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t most_digits = 9;
+constexpr std::size_t max_digits = 9;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -34,12 +34,12 @@ struct Place {
   std::size_t digits;
 };
 
-/// Parses the digits at a position; 0 if there are none, more than most_digits on overflow.
+/// Parses the digits at a position; 0 if there are none, more than max_digits on overflow.
 std::size_t number_at(std::string_view text, std::size_t at, std::size_t length) {
   std::size_t number = 0;
   const auto digits = text.substr(at, length);
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-  return length > 0 && error != std::errc{} ? most_digits + 1 : number;
+  return length > 0 && error != std::errc{} ? max_digits + 1 : number;
 }
 
 /// Matches digits between two strings: "%" ... "d", "$F" ..., "<frame" ... ">".
@@ -71,8 +71,8 @@ std::optional<FramePattern> FramePattern::parse(const std::string& path) {
     at += place ? place->length : 1;
   }
   if (!found) return std::nullopt;
-  if (found->digits > most_digits)
-    throw UsageError("'" + path + "' has a number of more than " + std::to_string(most_digits) + " digits");
+  if (found->digits > max_digits)
+    throw UsageError("'" + path + "' has a number of more than " + std::to_string(max_digits) + " digits");
   return FramePattern(path.substr(0, found->at), path.substr(found->at + found->length),
                       std::max<std::size_t>(found->digits, 1));
 }
@@ -103,7 +103,7 @@ std::optional<FramePattern> FramePattern::of_digits(const std::string& path, std
   std::size_t first = end;
   while (first > begin && is_digit(path[first - 1])) --first;
   const std::size_t length = end - first;
-  if (length > most_digits) return std::nullopt;
+  if (length > max_digits) return std::nullopt;
   const bool minus = first > begin && path[first - 1] == '-';
   const bool is_sign = minus && (first - 1 == begin || std::isalnum(static_cast<unsigned char>(path[first - 2])) == 0);
   if (is_sign && path.find_first_not_of('0', first) < end) return of_negative(path, first - 1, end);
@@ -185,15 +185,15 @@ std::vector<Frame> FramePattern::frames_there() const {
 }
 
 std::string FramePattern::passed_over() const {
-  constexpr std::size_t most_named = 5;
+  constexpr std::size_t max_named = 5;
   std::vector<std::string> names;
   for (const std::string& path : files_alike())
     if (number_in(path) && !frame_of(path)) names.push_back(path.substr(name_begin(path)));
   if (names.empty()) return "";
   std::ranges::sort(names);
   std::string line = text() + ": passed over, for their numbers are written otherwise: ";
-  for (std::size_t i = 0; i < std::min(names.size(), most_named); ++i) line += (i > 0 ? ", " : "") + names[i];
-  if (names.size() > most_named) line += " and " + std::to_string(names.size() - most_named) + " more";
+  for (std::size_t i = 0; i < std::min(names.size(), max_named); ++i) line += (i > 0 ? ", " : "") + names[i];
+  if (names.size() > max_named) line += " and " + std::to_string(names.size() - max_named) + " more";
   return line;
 }
 

@@ -10,7 +10,7 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr std::uint32_t most_played = 1'000'000;  // limit of the library
+constexpr std::uint32_t max_played = 1'000'000;  // limit of the library
 
 }  // namespace
 
@@ -48,9 +48,9 @@ std::optional<FrameRow> FrameRow::of_name(const std::string& name) {
   const std::vector<Frame> there = pattern->frames_there();
   if (there.empty()) throw std::runtime_error(pattern->text() + ": no file of such a name is there");
   const FrameRow row(*pattern, there);
-  if (row.count() > most_played)
+  if (row.count() > max_played)
     throw std::runtime_error(pattern->text() + ": from the first to the last file there are more than " +
-                             std::to_string(most_played) + " frames");
+                             std::to_string(max_played) + " frames");
   return row;
 }
 
@@ -60,7 +60,7 @@ std::optional<FrameRow> FrameRow::around(const std::string& file) {
   const std::vector<Frame> there = pattern->frames_there();
   if (there.size() < 2) return std::nullopt;
   const FrameRow row(*std::move(pattern), there);
-  return row.count() <= most_played ? std::optional(row) : std::nullopt;
+  return row.count() <= max_played ? std::optional(row) : std::nullopt;
 }
 
 std::uint32_t FrameRow::index_of(Frame number) const {

@@ -14,7 +14,7 @@ namespace {
 }
 
 constexpr std::int64_t whole = 1000;  // thousandths
-constexpr std::int64_t most_moments = std::int64_t{last_frame} + 1;
+constexpr std::int64_t max_moments = std::int64_t{last_frame} + 1;
 
 [[noreturn]] void refuse_number(std::string_view part, bool negative) {
   refuse(part, "goes beyond frame " + std::to_string(negative ? first_frame : last_frame));
@@ -108,8 +108,8 @@ std::vector<Moment> parse_frames(std::string_view text) {
     if (last < first) refuse(part, "runs backwards");
     if (step == 0) refuse(part, "has a step of 0");
     if (step < 0) refuse(part, "has a negative step");
-    if ((last - first) / step + static_cast<std::int64_t>(moments.size()) >= most_moments)
-      refuse(part, "makes more than " + std::to_string(most_moments) + " frames");
+    if ((last - first) / step + static_cast<std::int64_t>(moments.size()) >= max_moments)
+      refuse(part, "makes more than " + std::to_string(max_moments) + " frames");
     for (std::int64_t moment = first; moment <= last; moment += step)
       if (known.insert(moment).second) moments.push_back(Moment::of_thousandths(moment));
   }

@@ -16,7 +16,7 @@ constexpr std::uint32_t taps = 9;
 constexpr std::uint32_t group_side = 16;       // pixels per side of a convolution work group
 constexpr std::uint32_t input_group_side = 8;  // pixels per side of an input work group
 constexpr std::uint32_t bin_side = 16;
-constexpr std::uint32_t most_groups = 65535;  // the minimum that GL guarantees
+constexpr std::uint32_t max_groups = 65535;  // the minimum that GL guarantees
 // Approximate multiply-adds per pixel of the other kernels.
 constexpr double bin_cost = 30.0;
 constexpr double input_cost = 200.0;
@@ -94,8 +94,8 @@ class WeightPacker {
 
 }  // namespace
 
-Denoiser::Denoiser(gl::FunctionsPtr gl, gl::ProgramsPtr programs, NetworkPtr network, std::uint64_t most_bytes)
-    : gl_(std::move(gl)), programs_(std::move(programs)), network_(std::move(network)), most_bytes_(most_bytes) {
+Denoiser::Denoiser(gl::FunctionsPtr gl, gl::ProgramsPtr programs, NetworkPtr network, std::uint64_t max_bytes)
+    : gl_(std::move(gl)), programs_(std::move(programs)), network_(std::move(network)), max_bytes_(max_bytes) {
   WeightPacker packer(*network_);
   for (std::size_t i = 0; i < Network::convolution_count; ++i) weights_at_.at(i) = packer.add(i);
   weights_bytes_ = packer.words().size() * sizeof(glm::uvec2);
@@ -127,7 +127,7 @@ void Denoiser::begin(const Pictures& pictures) {
   const double pixel_bytes = double(memory_of(*network_, glm::uvec2(side)).size) * sizeof(glm::uvec4) / (side * side);
   const std::uint64_t other_bytes = weights_bytes_ + bins_bytes_;
   const std::uint64_t room =
-      std::min<std::uint64_t>(most_bytes_ - std::min(most_bytes_, other_bytes),
+      std::min<std::uint64_t>(max_bytes_ - std::min(max_bytes_, other_bytes),
                               static_cast<std::uint64_t>(gl::query_limits(*gl_).storage_block_bytes));
   tiles_ = tiles_of(pictures.size + 2 * rim, static_cast<std::uint64_t>(static_cast<double>(room) / pixel_bytes));
   glm::uvec2 largest(0U);
@@ -190,7 +190,7 @@ void Denoiser::bind() const {
     gl.BindTextureUnit(unit, name);
     gl.BindSampler(unit, sampler_.name());
   };
-  texture(core::CM_UNIT_DENOISE_COLOUR, pictures_.colour);
+  texture(core::CM_UNIT_DENOISE_COLOR, pictures_.color);
   if (network_->inputs > 3) {
     texture(core::CM_UNIT_DENOISE_ALBEDO, pictures_.albedo);
     texture(core::CM_UNIT_DENOISE_NORMAL, pictures_.normal);
@@ -244,7 +244,7 @@ bool Denoiser::step(double multiply_adds) {
   const Stage& stage = stages_[stage_];
   const gl::Program& program = programs_->ask(key_of(stage));
   if (!program.usable()) return false;
-  const double fit = std::clamp(multiply_adds / stage.multiply_adds_each, 1.0, double{most_groups});
+  const double fit = std::clamp(multiply_adds / stage.multiply_adds_each, 1.0, double{max_groups});
   const std::uint32_t count = std::min(static_cast<std::uint32_t>(fit), stage.groups - group_);
   bind();
   const GLuint name = program.name();
@@ -266,7 +266,7 @@ bool Denoiser::step(double multiply_adds) {
   gl_->DispatchCompute(count, 1, 1);
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
                                GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
-  for (const GLint unit : {core::CM_UNIT_DENOISE_COLOUR, core::CM_UNIT_DENOISE_ALBEDO, core::CM_UNIT_DENOISE_NORMAL}) {
+  for (const GLint unit : {core::CM_UNIT_DENOISE_COLOR, core::CM_UNIT_DENOISE_ALBEDO, core::CM_UNIT_DENOISE_NORMAL}) {
     gl_->BindSampler(static_cast<GLuint>(unit), 0);
   }
   gl::check(*gl_, "denoising");

@@ -15,7 +15,7 @@ namespace cumulet::denoise {
 /// Textures of an image, with a texel per pixel.
 struct Pictures {
   glm::uvec2 size{0U};
-  GLuint colour = 0;    ///< rgba: radiance, linear Rec. 709, any exposure; alpha is passed through
+  GLuint color = 0;     ///< rgba: radiance, linear Rec. 709, any exposure; alpha is passed through
   GLuint albedo = 0;    ///< rgb, 0 to 1; only for networks with nine inputs
   GLuint normal = 0;    ///< xyz, -1 to 1; only for networks with nine inputs
   GLuint denoised = 0;  ///< GL_RGBA32F, written: denoised rgb and the alpha of `colour`
@@ -26,9 +26,9 @@ struct Pictures {
 /// same driver does not depend on tiles and steps. Calls need the context current and a StateGuard in scope.
 class Denoiser {
  public:
-  /// Uploads the weights. most_bytes: memory limit of its buffers; larger images are denoised in tiles. The minimum
+  /// Uploads the weights. max_bytes: memory limit of its buffers; larger images are denoised in tiles. The minimum
   /// tile is 256x256; its memory (16 MiB) is allocated in any case. Throws Error(out_of_memory, gl).
-  Denoiser(gl::FunctionsPtr gl, gl::ProgramsPtr programs, NetworkPtr network, std::uint64_t most_bytes);
+  Denoiser(gl::FunctionsPtr gl, gl::ProgramsPtr programs, NetworkPtr network, std::uint64_t max_bytes);
 
   /// Begins to denoise; cancels denoising under way. Throws Error(out_of_memory, gl).
   void begin(const Pictures& pictures);
@@ -62,7 +62,7 @@ class Denoiser {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   NetworkPtr network_;
-  std::uint64_t most_bytes_;
+  std::uint64_t max_bytes_;
   gl::Object weights_;
   std::uint64_t weights_bytes_ = 0;
   std::array<std::uint32_t, Network::convolution_count> weights_at_{};

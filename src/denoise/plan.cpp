@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t rounded_up(std::uint32_t value, std::uint32_t to) { return divided_up(value, to) * to; }
 
 // A smaller kept region would spend almost all work on the surroundings.
-constexpr std::uint32_t least_kept = 64;
+constexpr std::uint32_t min_kept = 64;
 
 /// Tiling along one axis of an image.
 struct Cut {
@@ -18,10 +18,10 @@ struct Cut {
 
   explicit Cut(std::uint32_t size) : whole(rounded_up(size, Network::alignment)), kept(whole) {}
   [[nodiscard]] std::uint32_t tile() const { return std::min(kept + 2 * Network::reach, whole); }
-  [[nodiscard]] bool divisible() const { return kept > least_kept; }
+  [[nodiscard]] bool divisible() const { return kept > min_kept; }
   void divide() {
     const std::uint32_t even = rounded_up(divided_up(whole, divided_up(whole, kept) + 1), Network::alignment);
-    kept = std::max(std::min(even, kept - Network::alignment), least_kept);
+    kept = std::max(std::min(even, kept - Network::alignment), min_kept);
   }
 };
 
@@ -62,9 +62,9 @@ std::uint32_t result_blocks(const Convolution& convolution) {
   return rounded_up(convolution.outputs, group_channels) / block_channels;
 }
 
-std::vector<Tile> tiles_of(glm::uvec2 picture, std::uint64_t most_pixels) {
+std::vector<Tile> tiles_of(glm::uvec2 picture, std::uint64_t max_pixels) {
   std::array<Cut, 2> cuts{Cut(picture.x), Cut(picture.y)};
-  while (std::uint64_t{cuts[0].tile()} * cuts[1].tile() > most_pixels) {
+  while (std::uint64_t{cuts[0].tile()} * cuts[1].tile() > max_pixels) {
     Cut& longer = cuts[cuts[0].tile() >= cuts[1].tile() ? 0 : 1];
     Cut& shorter = cuts[cuts[0].tile() >= cuts[1].tile() ? 1 : 0];
     if (!longer.divisible() && !shorter.divisible()) break;

@@ -33,7 +33,7 @@ struct Tile {
 
 /// Splits a padded image into tiles of at most that many pixels. Tiles keep at least 64 pixels per axis plus the pixels
 /// that these depend on, even if that exceeds the limit.
-std::vector<Tile> tiles_of(glm::uvec2 picture, std::uint64_t most_pixels);
+std::vector<Tile> tiles_of(glm::uvec2 picture, std::uint64_t max_pixels);
 
 /// Offsets of a tile's channels while it is denoised: memory that is no longer needed is reused.
 struct Memory {

@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t magic = 0x41D7;
 constexpr unsigned version = 2;
 constexpr std::size_t header_bytes = 12;
-constexpr unsigned most_dimensions = 4;
+constexpr unsigned max_dimensions = 4;
 
 class Reader {
  public:
@@ -66,14 +66,14 @@ class Reader {
     const std::string tensor_name = text(static_cast<std::size_t>(number(2)));
     tensor_ = "tensor '" + one_line(tensor_name, 60) + "' ";
     const std::uint64_t dimensions = number(1);
-    if (dimensions < 1 || dimensions > most_dimensions)
+    if (dimensions < 1 || dimensions > max_dimensions)
       fail(tensor_ + "has " + std::to_string(dimensions) + " dimensions");
     Tensor tensor;
     std::uint64_t count = 1;
     for (std::uint64_t i = 0; i < dimensions; ++i) {
       tensor.shape.push_back(static_cast<std::uint32_t>(number(4)));
       // The clamp avoids overflow: counts beyond the file size are rejected below.
-      count = std::min<std::uint64_t>(count * tensor.shape.back(), most_tza_bytes);
+      count = std::min<std::uint64_t>(count * tensor.shape.back(), max_tza_bytes);
     }
     tensor.layout = text(static_cast<std::size_t>(dimensions));
     const auto type = static_cast<char>(number(1));
@@ -127,7 +127,7 @@ TensorArchive read_tza(const FilePath& path) {
   if (!file) fail(std::strerror(errno));
   std::vector<std::uint8_t> bytes;
   read_rest(file, bytes, [&](std::size_t /*count*/) {
-    if (bytes.size() > most_tza_bytes) fail("is larger than 64 MiB, which no network of Open Image Denoise is");
+    if (bytes.size() > max_tza_bytes) fail("is larger than 64 MiB, which no network of Open Image Denoise is");
   });
   if (file.bad()) fail(std::strerror(errno));
   return read_tza(bytes, path.given());

@@ -28,10 +28,10 @@ using TensorArchive = std::map<std::string, Tensor>;
 /// name: prefix of messages. Throws Error(file) for anything else: truncated files, values outside of the file, tensors
 /// that together are larger than the file, and values that are not finite.
 TensorArchive read_tza(std::span<const std::uint8_t> bytes, const std::string& name);
-/// Reads a file of at most most_tza_bytes. Messages begin with its path.
+/// Reads a file of at most max_tza_bytes. Messages begin with its path.
 TensorArchive read_tza(const FilePath& path);
 
 /// The published networks have 2 MB.
-inline constexpr std::size_t most_tza_bytes = std::size_t{64} << 20U;
+inline constexpr std::size_t max_tza_bytes = std::size_t{64} << 20U;
 
 }  // namespace cumulet::denoise

@@ -70,7 +70,7 @@ struct Functions : GladGLContext {
   void Disablei(GLenum capability, GLuint index) const;
   void ColorMaski(GLuint buffer, GLboolean r, GLboolean g, GLboolean b, GLboolean a) const;
   void BlendFuncSeparatei(GLuint buffer, GLenum from, GLenum to, GLenum from_alpha, GLenum to_alpha) const;
-  void BlendEquationSeparatei(GLuint buffer, GLenum colour, GLenum alpha) const;
+  void BlendEquationSeparatei(GLuint buffer, GLenum color, GLenum alpha) const;
   void DepthMask(GLboolean write) const;
   void DepthFunc(GLenum function) const;
   void DepthRangeIndexed(GLuint index, GLdouble near, GLdouble far) const;

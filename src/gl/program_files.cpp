@@ -98,7 +98,7 @@ std::optional<ProgramFiles::Binary> ProgramFiles::find(const std::string& driver
   const fs::path path = file_of(folder_.absolute(), key);
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size <= sizeof(Header) || size > most_bytes_) return std::nullopt;
+  if (error || size <= sizeof(Header) || size > max_bytes_) return std::nullopt;
   Header header;
   Binary binary;
   binary.bytes.resize(static_cast<std::size_t>(size - sizeof(Header)));
@@ -168,7 +168,7 @@ void ProgramFiles::make_room() const {
   }
   std::ranges::sort(files, {}, &File::time);
   for (const File& file : files) {
-    if (bytes <= most_bytes_) return;
+    if (bytes <= max_bytes_) return;
     fs::remove(file.path, error);
     bytes -= file.size;
   }

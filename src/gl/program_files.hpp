@@ -24,22 +24,22 @@ class ProgramFiles {
   };
 
   /// The folder is created with the first file.
-  explicit ProgramFiles(FilePath folder, std::uintmax_t most_bytes = default_most_bytes)
-      : folder_(std::move(folder)), most_bytes_(most_bytes) {}
+  explicit ProgramFiles(FilePath folder, std::uintmax_t max_bytes = default_max_bytes)
+      : folder_(std::move(folder)), max_bytes_(max_bytes) {}
 
   [[nodiscard]] std::optional<Binary> find(const std::string& driver, const std::string& source);
   /// Throws Error(file).
   void keep(const std::string& driver, const std::string& source, const Binary& binary);
   [[nodiscard]] const FilePath& folder() const { return folder_; }
 
-  static constexpr std::uintmax_t default_most_bytes = std::uintmax_t{256} << 20U;
+  static constexpr std::uintmax_t default_max_bytes = std::uintmax_t{256} << 20U;
 
  private:
   void make_room() const;
 
   std::mutex mutex_;
   FilePath folder_;
-  std::uintmax_t most_bytes_;
+  std::uintmax_t max_bytes_;
 };
 
 }  // namespace cumulet::gl

@@ -322,7 +322,7 @@ void StateGuard::capability(GLenum name, bool on) {
 }
 
 void StateGuard::blend_enable(GLuint buffer) {
-  require_within(buffer, most_draw_buffers, "a draw buffer");
+  require_within(buffer, max_draw_buffers, "a draw buffer");
   if (!blend_enables_[buffer].use()) return;
   if (restore_) blend_enables_[buffer].value = gl_->IsEnabledi(GL_BLEND, buffer) != GL_FALSE;
   if (blend_enables_[buffer].value || !restore_) plain().Disablei(GL_BLEND, buffer);
@@ -390,7 +390,7 @@ void StateGuard::set_known() {
   if (pack_.used) set_pixels(true);
   if (unpack_.used) set_pixels(false);
   if (raster_.used) set_raster();
-  for (GLuint i = 0; i < most_draw_buffers; ++i) {
+  for (GLuint i = 0; i < max_draw_buffers; ++i) {
     if (blend_enables_[i].used) plain().Disablei(GL_BLEND, i);
   }
   for (GLuint i = 0; i < blended_buffers; ++i) {
@@ -518,7 +518,7 @@ void StateGuard::restore_raster() const {
     }
     gl.ClipControl(name_of(saved.clip_origin), name_of(saved.clip_depth));
   }
-  for (GLuint i = 0; i < most_draw_buffers; ++i) {
+  for (GLuint i = 0; i < max_draw_buffers; ++i) {
     if (!blend_enables_[i].used) continue;
     if (blend_enables_[i].value) {
       gl.Enablei(GL_BLEND, i);
@@ -697,9 +697,9 @@ void Functions::BlendFuncSeparatei(GLuint buffer, GLenum from, GLenum to, GLenum
   GladGLContext::BlendFuncSeparatei(buffer, from, to, from_alpha, to_alpha);
 }
 
-void Functions::BlendEquationSeparatei(GLuint buffer, GLenum colour, GLenum alpha) const {
+void Functions::BlendEquationSeparatei(GLuint buffer, GLenum color, GLenum alpha) const {
   if (guard != nullptr) guard->blend(buffer);
-  GladGLContext::BlendEquationSeparatei(buffer, colour, alpha);
+  GladGLContext::BlendEquationSeparatei(buffer, color, alpha);
 }
 
 void Functions::DepthMask(GLboolean write) const {

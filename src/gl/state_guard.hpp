@@ -47,7 +47,7 @@ class StateGuard {
   friend struct Functions;  // it reports the state that is about to be used
 
   static constexpr std::size_t targets = 11;
-  static constexpr std::size_t most_draw_buffers = 16;  // drivers have 8
+  static constexpr std::size_t max_draw_buffers = 16;  // drivers have 8
   static constexpr std::size_t capabilities = 28;
   static constexpr std::size_t pixel_parameters = 12;
 
@@ -86,7 +86,7 @@ class StateGuard {
   };
   struct Raster {
     std::array<bool, capabilities> enabled{};
-    std::array<std::array<GLboolean, 4>, most_draw_buffers> masks{};
+    std::array<std::array<GLboolean, 4>, max_draw_buffers> masks{};
     bool scissor = false;
     std::array<GLint, 2> polygon_mode{};  // front and back; core contexts have only one value
     GLint clip_origin = 0, clip_depth = 0;
@@ -148,7 +148,7 @@ class StateGuard {
   Saved<Pixels> pack_, unpack_;
   Saved<Raster> raster_;
   std::array<bool, capabilities> enabled_{};  // the current values, once raster_ was used
-  std::array<Saved<bool>, most_draw_buffers> blend_enables_{};
+  std::array<Saved<bool>, max_draw_buffers> blend_enables_{};
   std::array<Saved<Blend>, blended_buffers> blends_{};
   Saved<Depth> depth_;
   Saved<Cull> cull_;

@@ -8,9 +8,9 @@ namespace cumulet::gl {
 class TransientFramebuffer {
  public:
   /// depth: a texture, or 0 for none. Throws Error(gl).
-  TransientFramebuffer(const FunctionsPtr& gl, GLuint colour, GLuint depth) : framebuffer_(make_framebuffer(gl)) {
+  TransientFramebuffer(const FunctionsPtr& gl, GLuint color, GLuint depth) : framebuffer_(make_framebuffer(gl)) {
     label(*gl, Object::Kind::framebuffer, name(), "framebuffer of one call");
-    gl->NamedFramebufferTexture(name(), GL_COLOR_ATTACHMENT0, colour, 0);
+    gl->NamedFramebufferTexture(name(), GL_COLOR_ATTACHMENT0, color, 0);
     if (depth != 0) gl->NamedFramebufferTexture(name(), GL_DEPTH_ATTACHMENT, depth, 0);
     check(*gl, "making a framebuffer for one call");
   }

@@ -20,7 +20,7 @@ class WordHeap {
   struct Sizes {
     std::size_t page_bytes = std::size_t{4} << 20U;                      ///< of a page, unless one span needs more
     std::size_t largest_page = std::numeric_limits<std::size_t>::max();  ///< maximum size that the driver can bind
-    std::size_t most_bytes = std::numeric_limits<std::size_t>::max();    ///< total of all pages
+    std::size_t max_bytes = std::numeric_limits<std::size_t>::max();     ///< total of all pages
   };
   /// Alignment of spans: whole 16-byte words, on a cache line of any GPU.
   static constexpr std::size_t alignment = 256;
@@ -85,7 +85,7 @@ class WordHeap {
   }
 
   /// Allocates a span of undefined content. what: the step, such as "creating the surfaces' tables". Throws
-  /// Error(unsupported) for more than the driver can bind at once, and Error(out_of_memory) beyond most_bytes or if GL
+  /// Error(unsupported) for more than the driver can bind at once, and Error(out_of_memory) beyond max_bytes or if GL
   /// is out of memory. After an error only pages without a span may be gone. O(pages + gaps).
   Span take(std::size_t wanted, const char* what);
   /// Like take(), but at the beginning of a new page.

@@ -29,9 +29,9 @@ double mass_of(const Statistics& statistics) {
 // Mean over all scattering.
 double mean_anisotropy(const Statistics& density, const Channels& channels) {
   double scattering = mass_of(density);
-  if (const RgbField* coloured = channels.scattering.get()) {
+  if (const RgbField* colored = channels.scattering.get()) {
     scattering = luminance(
-        dvec3(mass_of(coloured->component(0)), mass_of(coloured->component(1)), mass_of(coloured->component(2))));
+        dvec3(mass_of(colored->component(0)), mass_of(colored->component(1)), mass_of(colored->component(2))));
   }
   return scattering > 0.0 ? 2.0 * mass_of(channels.forward->statistics()) / scattering - 1.0 : 0.0;
 }
@@ -56,7 +56,7 @@ Weights Weights::of_emission(const dvec3& depth, int component, const RefineSett
   dvec3 only(0.0);
   only[component] = 1.0;
   const double sharp = settings.criterion == Criterion::transmittance ? 1.2 : 1.0;
-  return {.per_depth = sharp * std::max(1.0 / most, luminance(only) / luminance(depth)), .there_and_back = false};
+  return {.per_depth = sharp * std::max(1.0 / most, luminance(only) / luminance(depth)), .two_way = false};
 }
 
 float Measure::bound(float min, float max, float edge_squared, float lit) const {
@@ -109,7 +109,7 @@ Evaluation::Evaluation(const Statistics& statistics, const Weights& weights, con
 unsigned Evaluation::levels_at_most(const Statistics::Node& brick, float floor) const {
   const volume::BrickSummary& summary = *statistics_->summary(brick);
   const float* blocks = lit(brick);
-  const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
+  const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_per_brick) : 1.0F;
   const auto all = static_cast<int>(splitting_levels(statistics_->cube().log2_size));
   auto levels =
       static_cast<unsigned>(std::clamp(all - kuhn_level(statistics_->cube().log2_size, 3), 0, int{brick_levels}));

@@ -42,10 +42,10 @@ class EdgeLengths {
 
 /// Weights of a field's deviations in the criterion.
 struct Weights {
-  double per_depth = 0.0;      ///< factor for deviation times edge length
-  double own_hiding = 0.0;     ///< reduced (similarity-scaled) extinction per grid value, for a cell's occlusion of
-                               ///< itself; 0: none
-  bool there_and_back = true;  ///< true: two-way transmittance, for density; false: one-way, for emission
+  double per_depth = 0.0;   ///< factor for deviation times edge length
+  double own_hiding = 0.0;  ///< reduced (similarity-scaled) extinction per grid value, for a cell's occlusion of
+                            ///< itself; 0: none
+  bool two_way = true;      ///< true: two-way transmittance, for density; false: one-way, for emission
 
   /// depth: mean optical depth of a ray per unit extinction scale.
   static Weights of_density(double depth, const RefineSettings& settings);
@@ -61,7 +61,7 @@ class Measure {
         cells_(settings.cells),
         scale_(static_cast<float>(weights.per_depth * weights.per_depth)),
         own_hiding_(static_cast<float>(weights.own_hiding)),
-        there_and_back_(weights.there_and_back) {}
+        two_way_(weights.two_way) {}
 
   /// Returns an upper bound for all cells of a region whose values lie in [min, max]: a variance is at most a quarter
   /// of the range squared. lit: maximum transmittance of the region.
@@ -70,7 +70,7 @@ class Measure {
   /// length. left: the same maximum for the variance that a linear fit leaves.
   [[nodiscard]] float bound_of_steepest(float variance, float left, float lit) const;
   [[nodiscard]] OwnMeasure numbers(float floor) const {
-    return {scale_, own_hiding_, floor, cells_ == CellKind::linear, there_and_back_, criterion_};
+    return {scale_, own_hiding_, floor, cells_ == CellKind::linear, two_way_, criterion_};
   }
   /// covariance: of position and density in the cell's frame, per unit. A result that is not above the floor may be
   /// inexact.
@@ -79,13 +79,13 @@ class Measure {
 
  private:
   // lit: transmittance from outside to the cell.
-  [[nodiscard]] float seen_squared(float lit) const { return there_and_back_ ? lit * lit * lit * lit : lit * lit; }
+  [[nodiscard]] float seen_squared(float lit) const { return two_way_ ? lit * lit * lit * lit : lit * lit; }
 
   Criterion criterion_;
   CellKind cells_;
   float scale_;
   float own_hiding_;
-  bool there_and_back_;
+  bool two_way_;
 };
 
 /// The refinement criterion of one field.
@@ -193,7 +193,7 @@ void Evaluation::brick(const Statistics::Node& node, unsigned levels, BrickSums&
   const ivec3 odd = (node.corner / 8) & 1;
   const auto signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
   const float* blocks = transmittance_ != nullptr ? transmittance_->blocks(node.corner) : nullptr;
-  const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
+  const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_per_brick) : 1.0F;
   const float* values = nullptr;
   float reference = 0.0F;
   volume::BrickValues::Brick room;

@@ -13,29 +13,29 @@ using glm::ivec3;
 using glm::vec3;
 
 ChannelFields::ChannelFields(Channel channel, const Statistics& density, const Channels& channels)
-    : channel_(channel), coloured_(channels.scattering != nullptr) {
+    : channel_(channel), colored_(channels.scattering != nullptr) {
   const auto add = [&](const Statistics& field) { fields_[used_++] = &field; };
-  const auto add_colours = [&](const auto& field) {
+  const auto add_colors = [&](const auto& field) {
     for (std::size_t i = 0; i < 3; ++i) add(field.component(i));
   };
   switch (channel) {
     case Channel::emission:
-      add_colours(*channels.emission);
+      add_colors(*channels.emission);
       return;
-    case Channel::colour:
-      add_colours(*channels.scattering);
+    case Channel::color:
+      add_colors(*channels.scattering);
       add(density);
       return;
     case Channel::anisotropy:
       add(channels.forward->statistics());
-      if (coloured_) {
-        add_colours(*channels.scattering);
+      if (colored_) {
+        add_colors(*channels.scattering);
       } else {
         add(density);
       }
       return;
     case Channel::velocity:
-      add_colours(*channels.momentum);
+      add_colors(*channels.momentum);
       add(density);
       fastest_ = channels.momentum->fastest();
       return;
@@ -48,7 +48,7 @@ std::size_t ChannelFields::count() const {
       return 3;
     case Channel::anisotropy:
       return 2;
-    case Channel::colour:
+    case Channel::color:
     case Channel::velocity:
       break;
   }
@@ -61,20 +61,20 @@ std::size_t ChannelFields::record_words() const {
       return sizeof(EmissionRecord) / 4;
     case Channel::velocity:
       return sizeof(glm::uvec2) / 4;
-    case Channel::colour:
+    case Channel::color:
     case Channel::anisotropy:
       break;
   }
   return 1;
 }
 
-ChannelNumbers ChannelFields::numbers(const std::array<float, most_fields>& values) const {
+ChannelNumbers ChannelFields::numbers(const std::array<float, max_fields>& values) const {
   switch (channel_) {
     case Channel::emission:
-    case Channel::colour:
+    case Channel::color:
       return values;
     case Channel::anisotropy: {
-      const float scatters = coloured_ ? luminance(vec3(values[1], values[2], values[3])) : values[1];
+      const float scatters = colored_ ? luminance(vec3(values[1], values[2], values[3])) : values[1];
       return {2.0F * values[0] - scatters, scatters};
     }
     case Channel::velocity:
@@ -86,7 +86,7 @@ ChannelNumbers ChannelFields::numbers(const std::array<float, most_fields>& valu
 }
 
 std::optional<ChannelNumbers> ChannelFields::even(const ivec3& corner, int log2_size) const {
-  std::array<float, most_fields> values{};
+  std::array<float, max_fields> values{};
   for (std::size_t i = 0; i < used_; ++i) {
     const Statistics::Node& node = fields_[i]->node_at(corner, log2_size);
     if (!node.is_uniform()) return std::nullopt;
@@ -101,13 +101,13 @@ void ChannelFields::fill(const ivec3& corner, std::span<float> out) const {
     float uniform = 0.0F;
     volume::BrickValues::Brick room{};
   };
-  std::array<Found, most_fields> found;
+  std::array<Found, max_fields> found;
   for (std::size_t i = 0; i < used_; ++i) {
     const Statistics::Node& node = fields_[i]->node_at(corner);
     found[i].uniform = node.uniform;
     if (!node.is_uniform()) found[i].values = fields_[i]->values(node, found[i].room);
   }
-  std::array<float, most_fields> values{};
+  std::array<float, max_fields> values{};
   for (std::size_t v = 0; v < volume::brick_voxels; ++v) {
     for (std::size_t i = 0; i < used_; ++i)
       values[i] = found[i].values == nullptr ? found[i].uniform : found[i].values[v];
@@ -137,11 +137,11 @@ void ChannelFields::put_record(const vec3& v0, std::uint32_t shape, CellKind cel
       record[3] = made.gradient;
       return;
     }
-    case Channel::colour:
-      record[0] = pack_colour(masses(0), mass(3));
+    case Channel::color:
+      record[0] = pack_color(masses(0), mass(3));
       return;
     case Channel::anisotropy:
-      record[0] = static_cast<std::uint16_t>(pack_anisotropy(mass(0), coloured_ ? luminance(masses(1)) : mass(1)));
+      record[0] = static_cast<std::uint16_t>(pack_anisotropy(mass(0), colored_ ? luminance(masses(1)) : mass(1)));
       return;
     case Channel::velocity: {
       const glm::uvec2 made = pack_velocity(masses(0), mass(3), fastest_);
@@ -155,7 +155,7 @@ void ChannelFields::put_record(const vec3& v0, std::uint32_t shape, CellKind cel
 std::vector<ChannelFields> fields_of(const Statistics& density, const Channels& channels) {
   std::vector<ChannelFields> all;
   if (channels.emission) all.emplace_back(Channel::emission, density, channels);
-  if (channels.scattering) all.emplace_back(Channel::colour, density, channels);
+  if (channels.scattering) all.emplace_back(Channel::color, density, channels);
   if (channels.forward) all.emplace_back(Channel::anisotropy, density, channels);
   if (channels.momentum) all.emplace_back(Channel::velocity, density, channels);
   return all;

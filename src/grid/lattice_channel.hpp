@@ -18,7 +18,7 @@ namespace cumulet::grid {
 /// Quantities that cells store beside density, each in a record of its own.
 enum class Channel {
   emission = CM_CHANNEL_EMISSION,
-  colour = CM_CHANNEL_COLOUR,
+  color = CM_CHANNEL_COLOR,
   anisotropy = CM_CHANNEL_ANISOTROPY,
   velocity = CM_CHANNEL_VELOCITY
 };
@@ -27,8 +27,8 @@ enum class Channel {
 /// times a weight, followed by the weight; the record stores the weighted mean of the vector. The weight of color and
 /// velocity is density, that of anisotropy is the scattering. The vector is the color, the mean cosine, or the velocity
 /// along the cube's axes relative to the fastest.
-inline constexpr std::size_t most_channel_numbers = 4;
-using ChannelNumbers = std::array<float, most_channel_numbers>;
+inline constexpr std::size_t max_channel_numbers = 4;
+using ChannelNumbers = std::array<float, max_channel_numbers>;
 
 /// The fields of a channel over the control cube.
 class ChannelFields {
@@ -53,15 +53,15 @@ class ChannelFields {
   [[nodiscard]] bool emits(const glm::vec3& v0, std::uint32_t shape) const;
 
  private:
-  static constexpr std::size_t most_fields = 4;
+  static constexpr std::size_t max_fields = 4;
   // Converts the fields' values at a voxel to the channel's values.
-  [[nodiscard]] ChannelNumbers numbers(const std::array<float, most_fields>& values) const;
+  [[nodiscard]] ChannelNumbers numbers(const std::array<float, max_fields>& values) const;
   [[nodiscard]] std::array<Moments, 3> emission(const glm::vec3& v0, std::uint32_t shape) const;
 
   Channel channel_;
-  std::array<const Statistics*, most_fields> fields_{};
+  std::array<const Statistics*, max_fields> fields_{};
   std::size_t used_ = 0;
-  bool coloured_ = false;  // the scattering has a color
+  bool colored_ = false;  // the scattering has a color
   float fastest_ = 0.0F;
 };
 /// Returns the fields of each channel that is present.

@@ -97,7 +97,7 @@ void find(const Evaluations& evaluations, const CubeKey& cube, int log2_size, fl
   }
 }
 
-constexpr std::uint64_t most_values = std::uint64_t{1} << 32U;
+constexpr std::uint64_t max_values = std::uint64_t{1} << 32U;
 [[noreturn]] void refuse_values(std::size_t bricks) {
   throw Error(ErrorCode::unsupported,
               "priorities of " + std::to_string(bricks) + " bricks: the limit is 2^32 of them; raise the threshold");
@@ -147,7 +147,7 @@ OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& chann
     all_nodes += p.nodes.size();
     all_values += p.values.size();
   }
-  if (all_values >= most_values) refuse_values(all_nodes);
+  if (all_values >= max_values) refuse_values(all_nodes);
   if (on_device) values.reserve(all_values + 1);
   nodes.reserve(all_nodes);
   values.reserve(all_values);
@@ -173,7 +173,7 @@ void OwnPriorities::plan_to_rate(const Evaluations& evaluations, const std::vect
   for (const Evaluation& evaluation : evaluations) to_rate.fields.push_back({evaluation.measure(floor), {}});
   for (const ivec3& corner : bricks) {
     const auto number = static_cast<std::uint32_t>(nodes.size() - to_rate.first_node);
-    unsigned most_levels = 0;
+    unsigned max_levels = 0;
     auto field = to_rate.fields.begin();
     for (const Evaluation& evaluation : evaluations) {
       BricksToRate::Field& of = *field++;
@@ -182,19 +182,19 @@ void OwnPriorities::plan_to_rate(const Evaluations& evaluations, const std::vect
       const unsigned levels = evaluation.levels_at_most(brick, floor);
       if (levels == 0) continue;
       of.nodes.push_back(number);
-      most_levels = std::max(most_levels, levels);
+      max_levels = std::max(max_levels, levels);
     }
-    if (most_levels == 0) continue;
+    if (max_levels == 0) continue;
     const std::size_t first = all_values();
-    if (first >= most_values) refuse_values(nodes.size());
-    nodes.emplace_back(core::cm_node_words(corner, 3, most_levels), static_cast<std::uint32_t>(first));
-    to_rate.values += (points_of_levels[most_levels] + 1) / 2 * 2;
+    if (first >= max_values) refuse_values(nodes.size());
+    nodes.emplace_back(core::cm_node_words(corner, 3, max_levels), static_cast<std::uint32_t>(first));
+    to_rate.values += (points_of_levels[max_levels] + 1) / 2 * 2;
     const Transmittance* transmittance = evaluations.transmittance();
     if (transmittance == nullptr) continue;
     if (const float* lit = transmittance->blocks(corner)) {
-      to_rate.lit.insert(to_rate.lit.end(), lit, lit + Transmittance::blocks_a_brick);
+      to_rate.lit.insert(to_rate.lit.end(), lit, lit + Transmittance::blocks_per_brick);
     } else {
-      to_rate.lit.resize(to_rate.lit.size() + Transmittance::blocks_a_brick, 1.0F);
+      to_rate.lit.resize(to_rate.lit.size() + Transmittance::blocks_per_brick, 1.0F);
     }
   }
 }

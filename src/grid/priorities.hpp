@@ -33,7 +33,7 @@ struct OwnMeasure {
   float own_hiding = 0.0F;
   float floor = 0.0F;  ///< criteria not above it count as 0
   bool linear = false;
-  bool there_and_back = true;  ///< two-way transmittance (density) instead of one-way (emission)
+  bool two_way = true;  ///< two-way transmittance (density) instead of one-way (emission)
   Criterion criterion = Criterion::transmittance;
 };
 

@@ -433,7 +433,7 @@ class GridBuilder::LeafChannels {
  public:
   LeafChannels(const Statistics& density, const Channels& channels, CellKind cells) {
     if (channels.emission) emitted_.emplace(*channels.emission, cells);
-    if (channels.scattering) coloured_.emplace(*channels.scattering);
+    if (channels.scattering) colored_.emplace(*channels.scattering);
     if (channels.forward) forward_.emplace(channels.forward->statistics());
     if (channels.momentum) velocity_.emplace(density, *channels.momentum);
   }
@@ -442,9 +442,9 @@ class GridBuilder::LeafChannels {
     bool emits = false;
     if (emitted_) emits = emitted_->put(node, centroid, grid.emission[rank]);
     double scattered = mass;
-    if (coloured_) {
-      const dvec3 scattering = (*coloured_)(node, centroid);
-      grid.colour[rank] = pack_colour(scattering, mass);
+    if (colored_) {
+      const dvec3 scattering = (*colored_)(node, centroid);
+      grid.color[rank] = pack_color(scattering, mass);
       scattered = luminance(scattering);
     }
     if (forward_) grid.anisotropy[rank] = pack_anisotropy((*forward_)(node, centroid).mass, scattered);
@@ -454,7 +454,7 @@ class GridBuilder::LeafChannels {
 
  private:
   std::optional<LeafEmission> emitted_;
-  std::optional<LeafScattering> coloured_;
+  std::optional<LeafScattering> colored_;
   std::optional<LeafMoments> forward_;
   std::optional<LeafVelocity> velocity_;
 };
@@ -479,7 +479,7 @@ bool emits(const std::array<Moments, 3>& moments) {
   return std::ranges::any_of(moments, [](const Moments& m) { return m.max > 0.0F; });
 }
 
-std::uint32_t pack_colour(const dvec3& scattering, double mass) {
+std::uint32_t pack_color(const dvec3& scattering, double mass) {
   if (!(mass > 0.0)) return 0;
   const auto whole = [&](double part, float most) {
     return static_cast<std::uint32_t>(std::lround(most * std::clamp(static_cast<float>(part / mass), 0.0F, 1.0F)));
@@ -529,7 +529,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   ProgressPart places(progress, 0.0, 0.1, nodes_.size());
   places.resize(grid.cells, count);
   if (channels.emission) places.resize(grid.emission, count);
-  if (channels.scattering) places.resize(grid.colour, count);
+  if (channels.scattering) places.resize(grid.color, count);
   if (channels.forward) places.resize(grid.anisotropy, count);
   if (channels.momentum) places.resize(grid.velocity, count);
   if (channels.ends) places.resize(grid.change, count);

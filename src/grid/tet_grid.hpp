@@ -34,7 +34,7 @@ bool emits(const std::array<Moments, 3>& moments);
 
 /// Packs the mean scattering color for shaders; layout: glsl/channels.glsl. scattering: mass of density x color. mass:
 /// of density; if it is 0 the color is black.
-std::uint32_t pack_colour(const glm::dvec3& scattering, double mass);
+std::uint32_t pack_color(const glm::dvec3& scattering, double mass);
 
 /// Packs the mean cosine of scattering for shaders, clamped to +-0.999. forward: mass of scattering x (1 + anisotropy)
 /// / 2. scattering: its mass; if it is 0 the cosine is 0.
@@ -74,8 +74,8 @@ struct TetGrid {
   float density_unit = 1.0F;          ///< grid value of a record's density 1
   /// One per cell; empty if no cell emits light.
   std::vector<EmissionRecord> emission;
-  /// One per cell, pack_colour(); empty if scattering is white.
-  std::vector<std::uint32_t> colour;
+  /// One per cell, pack_color(); empty if scattering is white.
+  std::vector<std::uint32_t> color;
   /// One per cell, pack_anisotropy(); empty if the medium's anisotropy applies.
   std::vector<std::int16_t> anisotropy;
   /// One per cell, pack_velocity(); empty if there is no velocity.
@@ -88,7 +88,7 @@ struct TetGrid {
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
-    return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + colour.size() * 4 +
+    return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + color.size() * 4 +
            anisotropy.size() * 2 + velocity.size() * 8 + change.size() * 8 + tree.size() * 4 + 200;
   }
 };

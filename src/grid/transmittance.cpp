@@ -44,7 +44,7 @@ Transmittance::Transmittance(const Statistics& statistics, double extinction, co
 
 const float* Transmittance::blocks(const ivec3& corner) const {
   const Statistics::Node& node = statistics_->node_at(corner);
-  return node.values < 0 ? nullptr : transmittance_.data() + place(node) * blocks_a_brick;
+  return node.values < 0 ? nullptr : transmittance_.data() + place(node) * blocks_per_brick;
 }
 
 float Transmittance::most(const ivec3& corner, int log2_size) const {
@@ -54,13 +54,13 @@ float Transmittance::most(const ivec3& corner, int log2_size) const {
 
 void Transmittance::sum_blocks(const Progress* progress) {
   const auto& bricks = statistics_->nodes_of_size(3);
-  resize(sums_, bricks.size() * blocks_a_brick, progress, 0.0F);
+  resize(sums_, bricks.size() * blocks_per_brick, progress, 0.0F);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 64), [&](const auto& range) {
     check(progress);
     volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Statistics::Node& brick = statistics_->nodes()[bricks[i]];
-      float* sums = sums_.data() + i * blocks_a_brick;
+      float* sums = sums_.data() + i * blocks_per_brick;
       if (const volume::BrickSummary* known = statistics_->summary(brick)) {
         std::ranges::copy(known->blocks, sums);
         continue;
@@ -103,14 +103,14 @@ void Transmittance::sweep_column(int axis, ivec3 at) {
       continue;
     }
     bricks.push_back({place(node), depth});
-    const float* sums = sums_.data() + place(node) * blocks_a_brick;
+    const float* sums = sums_.data() + place(node) * blocks_per_brick;
     for (int row = 0; row < 16; ++row) {
       for (int along = 0; along < 4; ++along)
         depth[static_cast<std::size_t>(row)] += to_depth * sums[block_at(axis, along, row / 4, row % 4)];
     }
   }
   for (const Passed& passed : bricks) {
-    const std::size_t first = passed.brick * blocks_a_brick;
+    const std::size_t first = passed.brick * blocks_per_brick;
     for (int row = 0; row < 16; ++row) {
       float before = passed.before[static_cast<std::size_t>(row)];
       for (int along = 0; along < 4; ++along) {
@@ -129,8 +129,8 @@ void Transmittance::fill_pyramid() {
   for (int size = 3; size <= statistics_->cube().log2_size; ++size) nodes += statistics_->nodes_of_size(size).size();
   most_.resize(nodes, 0.0F);
   for (std::size_t i = 0; i < statistics_->nodes_of_size(3).size(); ++i) {
-    const auto first = transmittance_.begin() + static_cast<std::ptrdiff_t>(i * blocks_a_brick);
-    most_[i] = *std::max_element(first, first + blocks_a_brick);
+    const auto first = transmittance_.begin() + static_cast<std::ptrdiff_t>(i * blocks_per_brick);
+    most_[i] = *std::max_element(first, first + blocks_per_brick);
   }
   for (int size = 4; size <= statistics_->cube().log2_size; ++size) {
     for (const std::uint32_t n : statistics_->nodes_of_size(size)) {

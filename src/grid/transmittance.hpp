@@ -15,7 +15,7 @@ namespace cumulet::grid {
 /// full light count as full light.
 class Transmittance {
  public:
-  static constexpr int blocks_a_brick = 64;
+  static constexpr int blocks_per_brick = 64;
 
   /// extinction: per grid value and world unit. Runs in parallel; O(voxels of bricks). Throws Error(cancelled) if
   /// progress is cancelled.

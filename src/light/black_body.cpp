@@ -18,7 +18,7 @@ constexpr float log_range = 5.99146455F;  // log(hottest / coldest)
 
 }  // namespace
 
-glm::dvec3 black_body_colour(double kelvin) {
+glm::dvec3 black_body_color(double kelvin) {
   // Planck's law divided by its value at 555 nm: for cold bodies the unnormalized values would underflow.
   constexpr double second_constant = 1.438776877e7;  // h c / k, nm K
   const double reference = second_constant / (555.0 * kelvin);
@@ -29,8 +29,8 @@ glm::dvec3 black_body_colour(double kelvin) {
     const double ratio = std::exp(reference - x) * std::expm1(-reference) / std::expm1(-x);
     spectrum[i] = std::pow(555.0 / wavelength(i), 5.0) * ratio;
   }
-  const glm::dvec3 colour = glm::max(rec709(spectrum), glm::dvec3(0.0));
-  return colour / luminance(colour);
+  const glm::dvec3 color = glm::max(rec709(spectrum), glm::dvec3(0.0));
+  return color / luminance(color);
 }
 
 double black_body_radiance(double kelvin, double intensity) {
@@ -41,22 +41,22 @@ double black_body_radiance(double kelvin, double intensity) {
 }
 
 BlackBody::BlackBody() {
-  const auto steps = static_cast<double>(colours_.size() - 1);
-  for (std::size_t i = 0; i < colours_.size(); ++i) {
+  const auto steps = static_cast<double>(colors_.size() - 1);
+  for (std::size_t i = 0; i < colors_.size(); ++i) {
     const double kelvin = coldest * std::pow(hottest / coldest, static_cast<double>(i) / steps);
-    colours_[i] = glm::vec3(black_body_colour(kelvin));
+    colors_[i] = glm::vec3(black_body_color(kelvin));
   }
 }
 
 glm::vec3 BlackBody::emission(float kelvin, float intensity) const {
   const double radiance = black_body_radiance(kelvin, intensity);
   if (!(radiance > 0.0)) return glm::vec3(0.0F);
-  const auto steps = static_cast<float>(colours_.size() - 1);
+  const auto steps = static_cast<float>(colors_.size() - 1);
   const float along = std::log(kelvin / static_cast<float>(coldest)) / log_range;
   const float at = steps * std::min(along, 1.0F);
-  const std::size_t first = std::min(static_cast<std::size_t>(at), colours_.size() - 2);
-  const glm::vec3 colour = glm::mix(colours_[first], colours_[first + 1], at - static_cast<float>(first));
-  return static_cast<float>(radiance) * colour;
+  const std::size_t first = std::min(static_cast<std::size_t>(at), colors_.size() - 2);
+  const glm::vec3 color = glm::mix(colors_[first], colors_[first + 1], at - static_cast<float>(first));
+  return static_cast<float>(radiance) * color;
 }
 
 }  // namespace cumulet::light

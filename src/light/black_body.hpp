@@ -9,7 +9,7 @@ namespace cumulet::light {
 
 /// Returns the color of a black body from Planck's law: linear Rec. 709 with luminance 1. Below about 1,900 K the color
 /// is outside of the Rec. 709 gamut: negative components become 0, and the luminance stays 1. kelvin: >= 100.
-glm::dvec3 black_body_colour(double kelvin);
+glm::dvec3 black_body_color(double kelvin);
 
 /// Returns the emission of fire at this temperature per unit length, as in Blender's Principled Volume: 1e-6 sigma / pi
 /// x mix(1, kelvin^4, intensity). Intensity 1 gives the Stefan-Boltzmann law; intensities near 0 give the same value at
@@ -21,15 +21,15 @@ double black_body_radiance(double kelvin, double intensity);
 class BlackBody {
  public:
   BlackBody();
-  /// Returns black_body_colour() x black_body_radiance(). Above 40,000 K the color is that of 40,000 K. Returns 0 for
+  /// Returns black_body_color() x black_body_radiance(). Above 40,000 K the color is that of 40,000 K. Returns 0 for
   /// NaN.
   [[nodiscard]] glm::vec3 emission(float kelvin, float intensity) const;
   /// Colors from 100 K to 40,000 K, equidistant in the logarithm of the temperature.
-  using Colours = std::array<glm::vec3, 1024>;
-  [[nodiscard]] const Colours& colours() const { return colours_; }
+  using Colors = std::array<glm::vec3, 1024>;
+  [[nodiscard]] const Colors& colors() const { return colors_; }
 
  private:
-  Colours colours_;
+  Colors colors_;
 };
 
 }  // namespace cumulet::light

@@ -30,7 +30,7 @@ using surface::Wrap;
 // The texture of a triangle is sampled at this many points. Because these may miss bright texels, the result is at
 // least this fraction of the image's mean.
 constexpr int looks = 16;
-constexpr float least_share = 0.05F;
+constexpr float min_share = 0.05F;
 
 using FromSrgb = std::array<float, 256>;
 
@@ -38,7 +38,7 @@ vec3 texel(const FromSrgb& linear, const Image& image, std::size_t i) {
   return {linear[image.rgba[4 * i]], linear[image.rgba[4 * i + 1]], linear[image.rgba[4 * i + 2]]};
 }
 
-dvec3 mean_colour(const FromSrgb& linear, const Image& image, const Progress* progress) {
+dvec3 mean_color(const FromSrgb& linear, const Image& image, const Progress* progress) {
   const std::size_t texels = std::size_t{image.width} * image.height;
   const dvec3 sum = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, texels, 1U << 16U), dvec3(0.0),
@@ -71,7 +71,7 @@ class Emission {
     if (use.texture >= 0) {
       texture_ = &scene.textures[static_cast<std::size_t>(use.texture)];
       image_ = &scene.images[texture_->image];
-      mean = vec3(mean_colour(linear, *image_, progress));
+      mean = vec3(mean_color(linear, *image_, progress));
     }
     mean_ = luminance(material.emission * mean);
   }
@@ -97,7 +97,7 @@ class Emission {
       const std::size_t y = wrapped(at.y, image_->height, texture_->sampler.wrap_t);
       sum += texel(*linear_, *image_, y * image_->width + x);
     }
-    return std::max(luminance(material_->emission * sum) / static_cast<float>(looks), least_share * mean_);
+    return std::max(luminance(material_->emission * sum) / static_cast<float>(looks), min_share * mean_);
   }
 
  private:

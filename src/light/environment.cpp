@@ -32,12 +32,12 @@ struct Packed {
   std::uint32_t w = 0;
 };
 
-Packed pack(const vec3& colour) {
-  const float most = std::max(colour.x, std::max(colour.y, colour.z));
+Packed pack(const vec3& color) {
+  const float most = std::max(color.x, std::max(color.y, color.z));
   if (!(most > 0.0F)) return {};
   // Scales the largest component to [1, 2), so that its half has full precision; denormal floats have less.
   const auto unit = std::max(std::bit_cast<std::uint32_t>(most) & 0x7F800000U, 0x00800000U);
-  const vec3 halves = colour / std::bit_cast<float>(unit);
+  const vec3 halves = color / std::bit_cast<float>(unit);
   return {glm::packHalf2x16({halves.x, halves.y}), glm::packHalf2x16({halves.z, 0.0F}) | unit};
 }
 
@@ -104,15 +104,15 @@ class RowMaker {
     const double cosine = std::cos(down);
     for (std::uint32_t x = 0; x < pixels_.width; ++x) {
       const std::size_t i = std::size_t{y} * pixels_.width + x;
-      vec3 colour = pixels_.values[i];
+      vec3 color = pixels_.values[i];
       bool good = true;
       for (int c = 0; c < 3; ++c) {
-        if (colour[c] >= 0.0F && colour[c] <= brightest) continue;
+        if (color[c] >= 0.0F && color[c] <= brightest) continue;
         good = false;
-        colour[c] = 0.0F;
+        color[c] = 0.0F;
       }
       if (!good) ++sums.replaced;
-      const Packed packed = pack(colour);
+      const Packed packed = pack(color);
       const glm::dvec3 kept(unpack(packed));
       weights_[i] = luminance(kept) * sine;
       sums.weight += weights_[i];
@@ -203,7 +203,7 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
       row[x] = unpack({word.z, word.w});
     }
   };
-  made->gloss = make_gloss({made->width, made->height, read}, made->mean, progress);
+  made->prefiltered = prefilter({made->width, made->height, read}, made->mean, progress);
   if (progress != nullptr) progress->at(1.0);
   return made;
 }

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/progress.hpp"
-#include "light/gloss.hpp"
+#include "light/prefiltered_environment.hpp"
 
 namespace cumulet::light {
 
@@ -41,7 +41,7 @@ struct Environment {
   std::vector<glm::uvec4> words;
   glm::dvec3 mean{0.0};  ///< over all directions
   Harmonics harmonics{};
-  GlossPtr gloss;  ///< prefiltered maps for glossy reflection; null: the environment is constant
+  PrefilteredEnvironmentPtr prefiltered;  ///< prefiltered maps for glossy reflection; null: the environment is constant
   /// Solid-angle pdf of sampling a texel, divided by the texel's luminance: 1 / (sum of weights x texel solid angle /
   /// sine). 0: the environment is black.
   float density = 0.0F;

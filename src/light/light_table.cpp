@@ -27,14 +27,14 @@ double environment_chance(double sun, double environment, bool near) {
 // Triangles' fraction of all light samples that are not for the sky: by flux, but 0.2 to 0.8 if there are other lights.
 double triangle_share(const SceneLights& scene, double sun) {
   if (scene.triangles == 0) return 0.0;
-  const double others = scene.lamp_flux + sun * scene.cross_section;
+  const double others = scene.analytic_light_flux + sun * scene.cross_section;
   return others > 0.0 ? std::clamp(scene.triangle_flux / (scene.triangle_flux + others), 0.2, 0.8) : 1.0;
 }
 
 // The sun's fraction of the samples for sun and lights: by irradiance, but 0.2 to 0.8 if there are lights.
 double sun_share(const SceneLights& scene, double sun) {
   if (!(sun > 0.0)) return 0.0;
-  return scene.lamps > 0 ? std::clamp(sun / (sun + scene.lamps_arrive), 0.2, 0.8) : 1.0;
+  return scene.analytic_lights > 0 ? std::clamp(sun / (sun + scene.analytic_lights_arrive), 0.2, 0.8) : 1.0;
 }
 
 // Probability of sampling emissive cells: by their irradiance at the rim of the medium's box, compared with that of all
@@ -46,9 +46,9 @@ double cell_chance(const MediumLight& medium, const SceneLights& scene, double d
   // frame it cost 1.7 times the steps for a tenth less noise. They rarely reach a small fire.
   const double seen = 1.0 - medium.length * medium.length / (0.04 * square);
   if (!(seen > 0.0)) return 0.0;
-  const double others = distant + (scene.lamp_flux + scene.triangle_flux) / (4.0 * std::numbers::pi * square);
+  const double others = distant + (scene.analytic_light_flux + scene.triangle_flux) / (4.0 * std::numbers::pi * square);
   // A distant light has no flux if there is no surface to catch it.
-  if (!(others > 0.0)) return scene.lamps + scene.triangles > 0 ? 0.5 : 1.0;
+  if (!(others > 0.0)) return scene.analytic_lights + scene.triangles > 0 ? 0.5 : 1.0;
   const double cells = medium.power / square;
   return seen * std::clamp(cells / (cells + others), 0.2, 0.8);
 }
@@ -85,20 +85,20 @@ LightTable::LightTable(const DistantLights& distant, const Surroundings& surroun
   const auto add = [&](Kind kind, double chance) {
     if (chance > 0.0) entries_.push_back({kind, static_cast<float>(chance)});
   };
-  const bool near = scene.lamps + scene.triangles > 0;
+  const bool near = scene.analytic_lights + scene.triangles > 0;
   const bool surrounded = surroundings.environment != nullptr;
   const double to_cells = cell_chance(medium, scene, sun + sky);
   const double rest = 1.0 - to_cells;
   const double to_far = surrounded ? environment_chance(sun, sky, near) : sky_chance(sun, sky, near);
   const double to_triangles = (1.0 - to_far) * triangle_share(scene, sun);
   const double to_sun = sun_share(scene, sun) * (1.0 - to_far - to_triangles);
-  const double to_lamps = scene.lamps > 0 ? 1.0 - to_far - to_triangles - to_sun : 0.0;
+  const double to_analytic_lights = scene.analytic_lights > 0 ? 1.0 - to_far - to_triangles - to_sun : 0.0;
   add(surrounded ? Kind::environment : Kind::sky, rest * to_far);
   add(Kind::triangle, rest * to_triangles);
-  add(Kind::lamp, rest * to_lamps);
+  add(Kind::analytic_light, rest * to_analytic_lights);
   add(Kind::sun, rest * to_sun);
   add(Kind::cell, to_cells);
-  if (medium.aimed) add(Kind::glow, 0.5);
+  if (medium.aimed) add(Kind::emissive, 0.5);
 }
 
 float LightTable::chance(Kind kind) const {
@@ -118,11 +118,11 @@ core::CmLights LightTable::parameters() const {
     p.sun_radiance = distant_.sun_irradiance / static_cast<float>(std::numbers::pi * std::pow(std::sin(half), 2.0));
     p.sun_spread = static_cast<float>(2.0 * std::pow(std::sin(0.5 * half), 2.0));
   }
-  p.any = std::ranges::any_of(entries_, [](const Entry& entry) { return entry.kind != Kind::glow; }) ? 1U : 0U;
+  p.any = std::ranges::any_of(entries_, [](const Entry& entry) { return entry.kind != Kind::emissive; }) ? 1U : 0U;
   p.sky_chance = chance(Kind::sky);
   p.triangle_chance = chance(Kind::triangle);
-  p.lamp_chance = chance(Kind::lamp);
-  p.glow_chance = chance(Kind::glow);
+  p.analytic_light_chance = chance(Kind::analytic_light);
+  p.emissive_chance = chance(Kind::emissive);
   p.cell_chance = chance(Kind::cell);
   p.environment_chance = chance(Kind::environment);
   p.environment_strength = surroundings_.strength;

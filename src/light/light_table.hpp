@@ -12,7 +12,7 @@
 namespace cumulet::light {
 
 /// The kinds of glsl/light.glsl.
-enum class Kind { sky, sun, triangle, lamp, glow, environment, cell };
+enum class Kind { sky, sun, triangle, analytic_light, emissive, environment, cell };
 
 /// The emission of a medium.
 struct MediumLight {
@@ -20,7 +20,7 @@ struct MediumLight {
   bool aimed = false;
   /// Luminance per steradian of all cells that NEE may sample; 0: none.
   double power = 0.0;
-  double length = 0.0;  ///< world: cube root of the volume of a uniform emitter, see scene::GlowSum
+  double length = 0.0;  ///< world: cube root of the volume of a uniform emitter, see scene::EmissiveSum
   double radius = 0.0;  ///< world: radius of the bounding box of the medium
 };
 

@@ -59,8 +59,8 @@ double at_band(const std::array<double, 42>& bins, std::size_t band) {
 }
 
 // Contribution of a band to a color: a triangular spectrum that falls to 0 at the adjacent bands.
-std::array<vec3, band_count> band_colours() {
-  std::array<vec3, band_count> colours{};
+std::array<vec3, band_count> band_colors() {
+  std::array<vec3, band_count> colors{};
   dvec3 all(0.0);
   for (std::size_t band = 0; band < band_count; ++band) {
     const double sun = at_band(solar_irradiance, band);
@@ -69,12 +69,12 @@ std::array<vec3, band_count> band_colours() {
     spectrum[sample] = sun;
     if (sample > 0) spectrum[sample - 1] = 0.5 * sun;
     if (sample + 1 < spectrum.size()) spectrum[sample + 1] = 0.5 * sun;
-    const dvec3 colour = rec709(spectrum);
-    all += colour;
-    colours[band] = vec3(colour);
+    const dvec3 color = rec709(spectrum);
+    all += color;
+    colors[band] = vec3(color);
   }
-  for (vec3& colour : colours) colour *= vec3(sun_outside / all);
-  return colours;
+  for (vec3& color : colors) color *= vec3(sun_outside / all);
+  return colors;
 }
 
 // Densities of air, aerosols and ozone per km, as fractions of the whole column above the ground.
@@ -318,9 +318,9 @@ double aerosol_phase(double cosine) {
          ((2.0 + g * g) * std::pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
 }
 
-vec3 colour_of(const std::array<vec3, band_count>& colours, const Bands& bands) {
+vec3 color_of(const std::array<vec3, band_count>& colors, const Bands& bands) {
   vec3 sum(0.0F);
-  for (std::size_t b = 0; b < band_count; ++b) sum += bands[b] * colours[b];
+  for (std::size_t b = 0; b < band_count; ++b) sum += bands[b] * colors[b];
   return sum;
 }
 
@@ -335,7 +335,7 @@ Sky::Sky(const SkyModel& model, const dvec3& to_sun) : Sky(Atmosphere(model), to
 
 Sky::Sky(const Atmosphere& atmosphere, const dvec3& to_sun) : to_sun_(to_sun), table_(rows * columns) {
   constexpr int steps = 40;
-  const std::array<vec3, band_count> colours = band_colours();
+  const std::array<vec3, band_count> colors = band_colors();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, table_.size()), [&](const auto& range) {
     for (std::size_t k = range.begin(); k != range.end(); ++k) {
       const double mu = std::sin(elevation_of_row(k / columns, rows));
@@ -353,11 +353,11 @@ Sky::Sky(const Atmosphere& atmosphere, const dvec3& to_sun) : to_sun_(to_sun), t
                            more[b] += (air[b] + aerosols[b]) * even[b];
                          }
                        });
-      table_[k] = {colour_of(colours, once_by_air), colour_of(colours, once_by_aerosols), colour_of(colours, more)};
+      table_[k] = {color_of(colors, once_by_air), color_of(colors, once_by_aerosols), color_of(colors, more)};
     }
   });
 
-  sun_irradiance_ = glm::max(colour_of(colours, atmosphere.sunlight(ground, to_sun.y)), vec3(0.0F));
+  sun_irradiance_ = glm::max(color_of(colors, atmosphere.sunlight(ground, to_sun.y)), vec3(0.0F));
 
   // Samples uniform over the unit disk below the hemisphere are cosine-weighted.
   constexpr int rings = 64;

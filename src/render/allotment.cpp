@@ -40,9 +40,9 @@ void Allotment::for_each_half(Visit&& visit) {
 }
 
 double Allotment::even_out(double squared) {
-  constexpr int most_steps = 16;
+  constexpr int max_steps = 16;
   double least = 0.0;
-  for (int step = 0; step < most_steps; ++step) {
+  for (int step = 0; step < max_steps; ++step) {
     double left = squared;
     double deviations = 0.0;
     for_each_half([&](const Half& half, glm::uvec2, unsigned, double count) {

@@ -37,7 +37,7 @@ gl::Object make_brick_tree(const gl::FunctionsPtr& gl, const std::array<float, C
   return gl::make_buffer(gl, sizeof words, &words, 0, "creating the tree of a brick's cells");
 }
 
-std::uint32_t bricks_a_step(const gl::Functions& gl) {
+std::uint32_t bricks_per_step(const gl::Functions& gl) {
   // If a driver runs dispatches within the call, the call takes as long as the kernel. The count is small enough that a
   // frame can stop between two dispatches.
   return gl.dispatches_in_call ? 64 : 4096;

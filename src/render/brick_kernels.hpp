@@ -28,7 +28,7 @@ void dispatch_groups(const gl::Functions& gl, std::uint32_t groups);
                                          const std::array<float, CM_BRICK_EDGES>& edges_squared);
 
 /// Returns the number of bricks per dispatch for kernels that visit every cell of a brick.
-[[nodiscard]] std::uint32_t bricks_a_step(const gl::Functions& gl);
+[[nodiscard]] std::uint32_t bricks_per_step(const gl::Functions& gl);
 
 /// A copied brick: its index in the source memory and its index in the destination.
 using MovedBrick = glm::uvec2;

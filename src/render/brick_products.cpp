@@ -19,7 +19,7 @@ gl::ProgramKey program_of(const scene::Product& product) {
   struct Number {
     int operator()(const scene::Emission& /*unused*/) const { return 0; }
     int operator()(const scene::Scattering& /*unused*/) const { return 1; }
-    int operator()(const scene::Forward& forward) const { return forward.coloured ? 3 : 2; }
+    int operator()(const scene::Forward& forward) const { return forward.colored ? 3 : 2; }
     int operator()(const scene::Momentum& /*unused*/) const { return 4; }
   };
   return {"brick_products.comp", {"CM_PRODUCT " + std::to_string(std::visit(Number(), product))}};
@@ -47,7 +47,7 @@ BrickProducts::BrickProducts(gl::FunctionsPtr gl, gl::ProgramsPtr programs, Devi
   find_origins(changed);
   if (origins_.empty()) return;
   prepare(body, state.index_to_world);
-  const std::size_t most = std::max<std::size_t>(memories_->most_bytes() / volume::DeviceMemory::bytes_of(1, false), 1);
+  const std::size_t most = std::max<std::size_t>(memories_->max_bytes() / volume::DeviceMemory::bytes_of(1, false), 1);
   for (std::size_t first = 0; first < origins_.size(); first += most) {
     Part& part = parts_.emplace_back();
     part.first = first;
@@ -95,10 +95,10 @@ void BrickProducts::prepare(const light::BlackBody& body, const glm::dmat4& inde
     if (const auto* light = std::get_if<scene::Emission>(&product_)) {
       // Padded to a multiple of 16 bytes, as uniform blocks are.
       struct alignas(16) Block {
-        core::CmBrickGlow glow;
+        core::CmBrickEmissive emissive;
       };
-      const Block block{scene::shader_glow(*light, body)};
-      glow_ = gl::make_buffer(gl_, sizeof block, &block, 0, "creating what bricks give off by");
+      const Block block{scene::shader_emissive(*light, body)};
+      emissive_ = gl::make_buffer(gl_, sizeof block, &block, 0, "creating what bricks give off by");
     }
     tree_ = make_brick_tree(gl_, grid::brick_edges(index_to_world));
   });
@@ -106,7 +106,7 @@ void BrickProducts::prepare(const light::BlackBody& body, const glm::dmat4& inde
 
 void BrickProducts::plan(Part& part) {
   upload_.add([this, &part] { make(part); });
-  const std::uint32_t a_step = bricks_a_step(*gl_);
+  const std::uint32_t a_step = bricks_per_step(*gl_);
   moves_.plan_together(
       upload_, fields_, std::span(origins_).subspan(part.first, part.count), [&](std::size_t to, std::uint32_t count) {
         upload_.add_dispatches(programs_, program_of(product_), count, a_step,
@@ -164,7 +164,7 @@ void BrickProducts::multiply(const Part& part, std::size_t to, const gl::Program
     gl_->ProgramUniform1f(name, 5, most_);
   }
   bind(core::CM_STORAGE_BRICKS_TOGETHER, moves_.together());
-  if (glow_) bind(core::CM_STORAGE_BRICKS_GLOW, glow_);
+  if (emissive_) bind(core::CM_STORAGE_BRICKS_EMISSIVE, emissive_);
   constexpr std::array<int, 3> bindings{core::CM_STORAGE_BRICKS_FIRST, core::CM_STORAGE_BRICKS_SECOND,
                                         core::CM_STORAGE_BRICKS_THIRD};
   for (std::size_t c = 0; c < components(); ++c) bind(bindings[c], *memories_->find(*part.kept[c]));

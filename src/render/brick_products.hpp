@@ -62,7 +62,7 @@ class BrickProducts {
   glm::ivec3 bricks_{0};
   glm::mat3 to_relative_{1.0F};  // transforms velocities
   float most_ = 0.0F;
-  gl::Object glow_, tree_;
+  gl::Object emissive_, tree_;
   BrickMoves moves_;
   std::deque<Part> parts_;
   gl::Fence fence_;

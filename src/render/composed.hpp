@@ -22,7 +22,7 @@ struct MeansOf {
   MeansBackground background = MeansBackground::added;
   glm::uvec2 size{0U};
   std::uint64_t picture = 0;
-  std::uint64_t wish = 0;
+  std::uint64_t request = 0;
   std::optional<std::uint64_t> revision;
   bool filtered = false;
   bool operator==(const MeansOf&) const = default;

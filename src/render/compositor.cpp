@@ -15,7 +15,7 @@ namespace {
 GLint as_bool(bool value) { return value ? 1 : 0; }
 
 // More frames than a host queues ahead.
-constexpr std::size_t most_means = 3;
+constexpr std::size_t max_means = 3;
 // Minimum time between two means of an unfinished picture, as a multiple of the time that they took.
 constexpr double pause = 4.0;
 
@@ -42,7 +42,7 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool over
   const bool waits = !overwrite && gl_->dispatches_in_call && !gl::Fence(gl_).passed();
   if (waits) {
     std::erase_if(means_, [this](const auto& means) { return means.get() != newest_ && means->drawn.passed(); });
-    if (means_.size() >= most_means) {
+    if (means_.size() >= max_means) {
       if (newest_serves) return nullptr;
       newest_ = nullptr;
       means_.erase(means_.begin());
@@ -75,10 +75,10 @@ const gl::Program& Compositor::program(const gl::ProgramKey& key, Wait wait, boo
 }
 
 MeansOf Compositor::means_of(const PictureTextures& picture, Background background, bool filtered) {
-  return {picture.sum,   picture.holes ? picture.sum_before : 0,
-          picture.holes, background,
-          picture.size,  picture.picture,
-          picture.wish,  picture.revision,
+  return {picture.sum,     picture.holes ? picture.sum_before : 0,
+          picture.holes,   background,
+          picture.size,    picture.picture,
+          picture.request, picture.revision,
           filtered};
 }
 
@@ -102,7 +102,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   const bool alike = newest_ != nullptr && newest_->of.filtered && newest_->of.background == background;
   if (alike && wanted.revision && newest_->of == wanted) return newest_;
   const bool older = alike && newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
-  Means* const serves = older || (alike && newest_->of.wish == wanted.wish) ? newest_ : nullptr;
+  Means* const serves = older || (alike && newest_->of.request == wanted.request) ? newest_ : nullptr;
   if (no_memory_for_ == picture.size || cannot_filter_ == picture.size) return nullptr;
   const bool always = target.wait == Wait::always;
   // able() might ask for another program variant otherwise.
@@ -193,7 +193,7 @@ void Compositor::denoise(const PictureTextures& picture, const Display& display,
 }
 
 Compositor::Background Compositor::background_of(const PictureTextures& picture, const Display& display) {
-  if (picture.beneath != nullptr && picture.beneath->colour) return Background::apart;
+  if (picture.beneath != nullptr && picture.beneath->color) return Background::apart;
   return display.shows_background() ? Background::added : Background::left_out;
 }
 
@@ -242,21 +242,21 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   return means;
 }
 
-const gl::Program* Compositor::colour_program(const Kind& kind, const Display& display, Wait wait) {
+const gl::Program* Compositor::color_program(const Kind& kind, const Display& display, Wait wait) {
   std::vector<std::string> defines{"CM_DEPTH 0", kind.bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
                                    kind.resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
-                                   kind.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
+                                   kind.encoding == ColorEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   if (kind.layered) defines.emplace_back("CM_LAYERS 1");
-  const bool serves = colour_ != nullptr && colour_kind_ == kind;  // colour_ can be used meanwhile
+  const bool serves = color_ != nullptr && color_kind_ == kind;  // colour_ can be used meanwhile
   const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
   if (wanted.usable()) {
-    colour_ = &wanted;
-    colour_kind_ = kind;
-    return colour_;
+    color_ = &wanted;
+    color_kind_ = kind;
+    return color_;
   }
   lags_ = true;
-  return serves ? colour_ : nullptr;
+  return serves ? color_ : nullptr;
 }
 
 void Compositor::draw_depth(const PictureTextures& picture, const FrameTarget& target) {
@@ -300,7 +300,7 @@ void Compositor::aim(const FrameTarget& target, const Display& display) const {
     gl.Enablei(GL_SCISSOR_TEST, 0);
     gl.ScissorIndexed(0, target.viewport.x + first.x, target.viewport.y + bottom, size.x, size.y);
   }
-  if (display.encoding == ColourEncoding::srgb_framebuffer) {
+  if (display.encoding == ColorEncoding::srgb_framebuffer) {
     gl.Enable(GL_FRAMEBUFFER_SRGB);
   } else {
     gl.Disable(GL_FRAMEBUFFER_SRGB);
@@ -322,8 +322,8 @@ void Compositor::place(const gl::Functions& gl, const gl::Program& program, cons
   gl.ProgramUniform1i(program.name(), 1, as_bool(target.flip_y));
 }
 
-void Compositor::bind_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
-                             const FrameTarget& target) const {
+void Compositor::bind_color(const Shown& shown, const PictureTextures& picture, const Display& display,
+                            const FrameTarget& target) const {
   const auto& gl = *gl_;
   const bool resolved = shown.means != nullptr;
   gl.BindTextureUnit(core::CM_UNIT_SUM, resolved ? shown.means->texture.name() : picture.sum);
@@ -331,26 +331,26 @@ void Compositor::bind_colour(const Shown& shown, const PictureTextures& picture,
   if (shown.layered || !resolved) {
     gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, resolved ? shown.means->background.name() : picture.background);
   }
-  const GLuint colour = shown.program->name();
+  const GLuint color = shown.program->name();
   place(gl, *shown.program, target);
-  gl.ProgramUniform1f(colour, 2, exposure_of(display));
-  gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
+  gl.ProgramUniform1f(color, 2, exposure_of(display));
+  gl.ProgramUniform1i(color, 3, as_bool(display.transparent));
   const glm::vec3 backdrop = display.backdrop.value_or(glm::vec3(0.0F));
-  gl.ProgramUniform3f(colour, 4, backdrop.x, backdrop.y, backdrop.z);
-  if (shown.layered || !resolved) gl.ProgramUniform1i(colour, 6, as_bool(display.shows_background()));
+  gl.ProgramUniform3f(color, 4, backdrop.x, backdrop.y, backdrop.z);
+  if (shown.layered || !resolved) gl.ProgramUniform1i(color, 6, as_bool(display.shows_background()));
   if (shown.layered) {
     const SurfaceLayers& layers = *picture.beneath;
-    gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, layers.colour.name());
+    gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOR, layers.color.name());
     gl.BindTextureUnit(core::CM_UNIT_LAYER_Z, layers.z.name());
     if (picture.host_z != 0) gl.BindTextureUnit(core::CM_UNIT_HOST_DEPTH, picture.host_z);
-    gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
+    gl.ProgramUniform4i(color, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
                         picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
   }
 }
 
-void Compositor::draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
-                             const FrameTarget& target) const {
-  bind_colour(shown, picture, display, target);
+void Compositor::draw_color(const Shown& shown, const PictureTextures& picture, const Display& display,
+                            const FrameTarget& target) const {
+  bind_color(shown, picture, display, target);
   aim(target, display);
   shown.program->use(*gl_);
   gl_->DrawArrays(GL_TRIANGLES, 0, 3);
@@ -368,7 +368,7 @@ void Compositor::compose(GLuint texture, const std::vector<RowRange>& rows, cons
   whole.viewport = {0, 0, size};
   whole.flip_y = true;
   whole.blend_over = false;
-  bind_colour(shown, picture, display, whole);
+  bind_color(shown, picture, display, whole);
   aim(whole, display);
   shown.program->use(gl);
   gl.Enablei(GL_SCISSOR_TEST, 0);
@@ -420,7 +420,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
                                const Display& display, const FrameTarget& target) {
   const auto& gl = *gl_;
   // Without sRGB encoding, 8 bits would show banding.
-  const GLenum format = display.encoding == ColourEncoding::srgb ? GL_RGBA8 : GL_RGBA32F;
+  const GLenum format = display.encoding == ColorEncoding::srgb ? GL_RGBA8 : GL_RGBA32F;
   const Small kind{picture.beneath->size, format};
   const glm::ivec2 size(kind.size);
   // The error is thrown once. Pictures at rest need no enlarging.
@@ -446,7 +446,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
   small.viewport = {0, 0, size};
   small.flip_y = true;
   small.blend_over = false;
-  draw_colour(shown, picture, display, small);
+  draw_color(shown, picture, display, small);
   gl.BindTextureUnit(core::CM_UNIT_SUM, small_.name());
   place(gl, enlarge, target);
   aim(target, display);
@@ -480,8 +480,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool resolved = means != nullptr || lags_;
   const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
-  const gl::Program* const shown =
-      colour_program({layered, resolved, bilinear, display.encoding}, display, target.wait);
+  const gl::Program* const shown = color_program({layered, resolved, bilinear, display.encoding}, display, target.wait);
   const gl::Program* enlarge = nullptr;
   if (layered && glm::ivec2(picture.beneath->size) != glm::ivec2(viewport.z, viewport.w)) {
     enlarge = &program({"enlarge.frag", {}, "composite.vert"}, target.wait, false);
@@ -496,7 +495,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     // The surfaces beneath a picture may change while the picture does not.
     const bool composed =
         means != nullptr && !layered && draw_composed({means, shown, layered}, picture, display, target, format);
-    if (!composed) draw_colour({means, shown, layered}, picture, display, target);
+    if (!composed) draw_color({means, shown, layered}, picture, display, target);
   }
   if (layered || means == nullptr) composed_.drop();
   if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);

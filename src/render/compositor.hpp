@@ -108,14 +108,14 @@ class Compositor {
     bool layered = false;
     bool resolved = false;
     bool bilinear = false;
-    ColourEncoding encoding = ColourEncoding::srgb;
+    ColorEncoding encoding = ColorEncoding::srgb;
     bool operator==(const Kind&) const = default;
   };
   // serves: something else can be drawn until the program is linked.
   const gl::Program& program(const gl::ProgramKey& key, Wait wait, bool serves);
   // Returns the program for this display. While it is compiling, returns the previous one if it is of the same kind,
   // else null.
-  const gl::Program* colour_program(const Kind& kind, const Display& display, Wait wait);
+  const gl::Program* color_program(const Kind& kind, const Display& display, Wait wait);
   // Inputs of a color pass.
   struct Shown {
     const Means* means = nullptr;  // null: reads the picture's sums
@@ -127,10 +127,10 @@ class Compositor {
   void aim(const FrameTarget& target, const Display& display) const;
   static void place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
   // Binds the inputs of a color pass and sets its uniforms, except the framebuffer state that aim() sets.
-  void bind_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
-                   const FrameTarget& target) const;
-  void draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
-                   const FrameTarget& target) const;
+  void bind_color(const Shown& shown, const PictureTextures& picture, const Display& display,
+                  const FrameTarget& target) const;
+  void draw_color(const Shown& shown, const PictureTextures& picture, const Display& display,
+                  const FrameTarget& target) const;
   // Draws by a copy of the composed image. Returns false if it is not used.
   bool draw_composed(const Shown& shown, const PictureTextures& picture, const Display& display,
                      const FrameTarget& target, const TargetFormat& format);
@@ -175,8 +175,8 @@ class Compositor {
   gl::Object small_;  // a picture over surfaces, before it is enlarged
   Small small_kind_;
   std::optional<Small> no_memory_for_small_;
-  const gl::Program* colour_ = nullptr;  // the program that was drawn with last
-  Kind colour_kind_;
+  const gl::Program* color_ = nullptr;  // the program that was drawn with last
+  Kind color_kind_;
   std::optional<glm::uvec2> no_memory_for_;  // size that did not fit; retried when the size changes
   std::optional<Error> untold_;              // error to be thrown by the next draw
   std::optional<glm::uvec2> cannot_filter_;  // size of pictures that cannot be denoised

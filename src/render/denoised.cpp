@@ -26,7 +26,7 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   const auto make = [&](const char* what) {
     return gl::make_texture_2d(gl, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y), what);
   };
-  const gl::Object colour = make("creating the picture to denoise");
+  const gl::Object color = make("creating the picture to denoise");
   const gl::Object albedo = make("creating the denoiser's albedo");
   const gl::Object normal = make("creating the denoiser's normals");
   gl::Object result = make("creating the denoised picture");
@@ -55,7 +55,7 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   read(core::CM_UNIT_GUIDE_NORMAL, film_layers::normal);
   read(core::CM_UNIT_GUIDE_TRANSMITTANCE, film_layers::transmittance);
   read(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
-  write(core::CM_IMAGE_GUIDE_COLOUR, colour);
+  write(core::CM_IMAGE_GUIDE_COLOR, color);
   write(core::CM_IMAGE_GUIDE_ALBEDO, albedo);
   write(core::CM_IMAGE_GUIDE_NORMAL, normal);
   if (denoising.known_light) write(core::CM_IMAGE_GUIDE_MISSING, missing);
@@ -64,19 +64,19 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   gl->ProgramUniform2i(guides.name(), 1, first.x, first.y);
   dispatch(guides, "making the denoiser's guides");
 
-  denoise::Denoiser denoiser(gl, programs, denoising.network, denoising.most_bytes);
+  denoise::Denoiser denoiser(gl, programs, denoising.network, denoising.max_bytes);
   const auto denoise = [&](const gl::Object& from, const gl::Object& to) {
     denoiser.begin({size, from.name(), albedo.name(), normal.name(), to.name()});
     denoiser.build();
     while (!denoiser.step(step_multiply_adds)) {
     }
   };
-  denoise(colour, result);
+  denoise(color, result);
   if (!denoising.known_light) return result;
-  denoise(missing, colour);
+  denoise(missing, color);
 
   const gl::Program& known = programs->get({"denoise_known.comp", {}});
-  gl->BindTextureUnit(core::CM_UNIT_DENOISE_COLOUR, colour.name());
+  gl->BindTextureUnit(core::CM_UNIT_DENOISE_COLOR, color.name());
   read(core::CM_UNIT_GUIDE_TRANSMITTANCE, film_layers::transmittance);
   read(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
   write(core::CM_IMAGE_DENOISED, result, GL_READ_WRITE);

@@ -14,12 +14,12 @@ struct Denoising {
   /// True if the feature buffers may contain a noise-free component: light of surfaces, or emission of media. It is
   /// subtracted before the network and added back after it, so that its detail is kept. The network then runs twice.
   bool known_light = false;
-  std::uint64_t most_bytes = 0;  ///< limit for the buffers of denoise::Denoiser
+  std::uint64_t max_bytes = 0;  ///< limit for the buffers of denoise::Denoiser
 };
 
 /// Returns a GL_RGBA32F texture of the picture's box, row 0 at the top: denoised radiance and unchanged alpha. The
-/// picture must have its feature buffers (Tracer::find_facts). Waits for the driver's compiler, never for the device.
-/// Needs a current context and an active StateGuard. Throws Error(out_of_memory, gl).
+/// picture must have its feature buffers (Tracer::find_features). Waits for the driver's compiler, never for the
+/// device. Needs a current context and an active StateGuard. Throws Error(out_of_memory, gl).
 gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const Picture& picture,
                     const Denoising& denoising);
 

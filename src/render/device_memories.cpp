@@ -44,7 +44,7 @@ bool DeviceMemories::has(const volume::DeviceBricks& bricks) const {
 volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, const volume::DeviceBricks& bricks) {
   const bool halves = bricks.are_halves();
   const std::uint64_t bytes = volume::DeviceMemory::bytes_of(bricks.origins.size(), halves);
-  if (bytes > most_bytes_) return nullptr;
+  if (bytes > max_bytes_) return nullptr;
   for (const bool from : {false, true}) {
     if (!programs_->ask(BrickCopies{.from_halves = from, .to_halves = halves}.program()).usable()) return nullptr;
   }

@@ -18,10 +18,10 @@ namespace cumulet::render {
 /// concurrently.
 class DeviceMemories {
  public:
-  /// gl: an instance of its own, because viewers may be destroyed earlier. programs: of the share group. most_bytes:
+  /// gl: an instance of its own, because viewers may be destroyed earlier. programs: of the share group. max_bytes:
   /// maximum size of one memory, the limit of a storage block.
-  DeviceMemories(gl::FunctionsPtr gl, gl::ProgramsPtr programs, std::uint64_t most_bytes)
-      : gl_(std::move(gl)), programs_(std::move(programs)), most_bytes_(most_bytes) {}
+  DeviceMemories(gl::FunctionsPtr gl, gl::ProgramsPtr programs, std::uint64_t max_bytes)
+      : gl_(std::move(gl)), programs_(std::move(programs)), max_bytes_(max_bytes) {}
   DeviceMemories(const DeviceMemories&) = delete;
   DeviceMemories& operator=(const DeviceMemories&) = delete;
   /// Marks all memories that are still held as gone. Without a current context of the group the buffers leak.
@@ -42,7 +42,7 @@ class DeviceMemories {
   void collect();
   [[nodiscard]] std::uint64_t bytes() const;
   /// Maximum size of one memory.
-  [[nodiscard]] std::uint64_t most_bytes() const { return most_bytes_; }
+  [[nodiscard]] std::uint64_t max_bytes() const { return max_bytes_; }
 
  private:
   struct Kept {
@@ -56,7 +56,7 @@ class DeviceMemories {
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
-  std::uint64_t most_bytes_;
+  std::uint64_t max_bytes_;
   mutable std::mutex mutex_;  // guards kept_ against calls that query
   std::list<Kept> kept_;
 };

@@ -18,7 +18,7 @@ namespace cumulet::core {
 namespace cumulet::render {
 
 enum class ToneMap { neutral = 0, filmic = 1, clip = 2 };
-enum class ColourEncoding { srgb = 0, srgb_framebuffer = 1, linear = 2, hdr = 3 };
+enum class ColorEncoding { srgb = 0, srgb_framebuffer = 1, linear = 2, hdr = 3 };
 
 /// How radiance is converted to a displayed color.
 struct Display {
@@ -27,7 +27,7 @@ struct Display {
   bool legend = false;                  // debug view: without exposure and tone mapping
   bool transparent = false;             // premultiplied, without the background
   std::optional<glm::vec3> backdrop{};  // opaque: radiance that replaces the background
-  ColourEncoding encoding = ColourEncoding::srgb;
+  ColorEncoding encoding = ColorEncoding::srgb;
   bool denoise = false;
   bool operator==(const Display&) const = default;
 
@@ -40,7 +40,7 @@ inline float exposure_of(const Display& display) { return display.legend ? 1.0F 
 
 /// Returns the tone curve, numbered as in glsl/display.glsl.
 inline std::uint32_t curve_of(const Display& display) {
-  if (display.encoding == ColourEncoding::hdr) return CM_TONE_MAP_NONE;
+  if (display.encoding == ColorEncoding::hdr) return CM_TONE_MAP_NONE;
   return display.legend ? CM_TONE_MAP_CLIP : static_cast<std::uint32_t>(display.tone_map);
 }
 
@@ -51,15 +51,15 @@ inline std::uint32_t curve_of(const Display& display) {
 inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve) {
   const float alpha = std::min(core::cm_displayable(exposed.w), 1.0F);
   glm::vec3 covering(0.0F);
-  glm::vec3 glow(0.0F);
+  glm::vec3 emissive(0.0F);
   for (int c = 0; c < 3; ++c) {
     const float radiance = core::cm_displayable(exposed[c]);
     const bool glows = radiance > alpha;
-    glow[c] = glows ? radiance - alpha : 0.0F;
+    emissive[c] = glows ? radiance - alpha : 0.0F;
     if (alpha > 0.0F) covering[c] = glows ? radiance + (1.0F - alpha) : radiance / alpha;
   }
   const glm::vec3 color = alpha * core::cm_display(covering, 1.0F, curve, true) +
-                          (1.0F - alpha) * core::cm_display(glow, 1.0F, curve, true);
+                          (1.0F - alpha) * core::cm_display(emissive, 1.0F, curve, true);
   const float raised = std::max({alpha, color.x, color.y, color.z});
   return raised > 0.0F ? glm::vec4(color / raised, raised) : glm::vec4(0.0F);
 }
@@ -71,7 +71,7 @@ inline void to_display(std::span<const float> linear, const Display& display, st
     return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0F, 1.0F) * 255.0F));
   };
   Display encoded = display;
-  encoded.encoding = ColourEncoding::srgb;
+  encoded.encoding = ColorEncoding::srgb;
   const float exposure = exposure_of(encoded);
   const std::uint32_t curve = curve_of(encoded);
   for (std::size_t i = 0; i + 4 <= linear.size(); i += 4) {

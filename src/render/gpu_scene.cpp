@@ -37,7 +37,7 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   m.second_bend = medium.phase.second_bend;
   m.second_share = medium.phase.second_share;
   m.emits = source.emits() ? 1U : 0U;
-  m.coloured = source.coloured() ? 1U : 0U;
+  m.colored = source.colored() ? 1U : 0U;
   m.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;
   m.changes = source.changes() ? 1U : 0U;
   return m;
@@ -112,7 +112,7 @@ void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Dea
   if (!sources.empty()) update_data(sources, snapshot, wanted, deadline);
   find_present(snapshot);
   update_instances(snapshot, wanted);
-  update_lamps(snapshot, wanted);
+  update_analytic_lights(snapshot, wanted);
 }
 
 void GpuScene::find_present(const scene::Snapshot& snapshot) {
@@ -166,7 +166,7 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
                          .grid = grid,
                          .medium = medium_of(*volume.medium, *volume.source, extent),
                          .ends = volume.place.ends,
-                         .glow = *data_->glow(*volume.source)});
+                         .emissive = *data_->emissive(*volume.source)});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
   const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };
@@ -406,25 +406,27 @@ std::array<light::Lit, 2> GpuScene::lit() const {
   return lit;
 }
 
-void GpuScene::update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted) {
-  const auto make = [&](Slot<LampData, LampsOf>& lamps, const PlacedModels* models) {
+void GpuScene::update_analytic_lights(const scene::Snapshot& snapshot, const Wanted& wanted) {
+  const auto make = [&](Slot<AnalyticLightData, AnalyticLightsOf>& analytic_lights, const PlacedModels* models) {
     const auto of_scene =
-        models != nullptr ? std::span(models->table().lamps) : std::span<const surface::PunctualLight>();
-    const auto groups = models != nullptr ? std::span(models->table().lamp_groups) : std::span<const std::uint32_t>();
-    LampsOf of{snapshot.lamps, {}, {}};
+        models != nullptr ? std::span(models->table().analytic_lights) : std::span<const surface::PunctualLight>();
+    const auto groups =
+        models != nullptr ? std::span(models->table().analytic_light_groups) : std::span<const std::uint32_t>();
+    AnalyticLightsOf of{snapshot.analytic_lights, {}, {}};
     // If there are no lights, the bounds of lit objects do not matter.
     if (!of_scene.empty()) of.models = models->models();
-    if (!of_scene.empty() || !snapshot.lamps->empty()) of.lit = lit();
-    if (!lamps.wants(of, wanted.settings)) return;
-    lamps.make(of, wanted.settings,
-               [&] { return LampData::make(gl_, limits_, *snapshot.lamps, of_scene, groups, of.lit); });
+    if (!of_scene.empty() || !snapshot.analytic_lights->empty()) of.lit = lit();
+    if (!analytic_lights.wants(of, wanted.settings)) return;
+    analytic_lights.make(of, wanted.settings, [&] {
+      return AnalyticLightData::make(gl_, limits_, *snapshot.analytic_lights, of_scene, groups, of.lit);
+    });
   };
   if (placed_) {
-    make(host_lamps_, nullptr);
+    make(host_analytic_lights_, nullptr);
   } else {
-    host_lamps_.clear();
+    host_analytic_lights_.clear();
   }
-  make(lamps_, placed_.get());
+  make(analytic_lights_, placed_.get());
 }
 
 void GpuScene::drop_data() {
@@ -449,21 +451,21 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
     const MarchUpload::Sources of = upload_->of;
     try {
       if (!upload_->work) {
-        if (!build_grids(of, wanted.most_bytes, deadline)) break;
+        if (!build_grids(of, wanted.max_bytes, deadline)) break;
         auto work =
             std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels, &grids_.built());
         const auto fits_beside = [&](std::uint64_t held) {
           held -= std::min(heap_.free_bytes(), work->bytes());
-          return work->bytes() <= wanted.most_bytes - std::min(wanted.most_bytes, held);
+          return work->bytes() <= wanted.max_bytes - std::min(wanted.max_bytes, held);
         };
         // Lattices are only needed for later views, so they are freed first.
-        if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.most_bytes, deadline);
+        if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.max_bytes, deadline);
         // If the new cells do not fit beside the old ones, the old ones are freed first. They are kept if they include
         // some of the new grids, because those would have to be made again. Exception: if the memory in use exceeds the
         // limit by itself, grids in main memory are uploaded again from there.
         const std::uint64_t held = data_bytes() + other_bytes();
         const auto is_kept = [&](const scene::MarchSourcePtr& source) {
-          return data_->grid(*source) != nullptr && (source->plan || held <= wanted.most_bytes);
+          return data_->grid(*source) != nullptr && (source->plan || held <= wanted.max_bytes);
         };
         if (data_ && of.front()->march == scene::March::tet && !fits_beside(held) && fits_beside(other_bytes()) &&
             std::ranges::none_of(of, is_kept)) {
@@ -473,7 +475,7 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
           data_revision_.advance();
           continue;
         }
-        require_room(work->bytes(), wanted.most_bytes);
+        require_room(work->bytes(), wanted.max_bytes);
         upload_->work = std::move(work);
       }
       const bool done = upload_->work->advance(deadline);
@@ -495,22 +497,22 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
   }
 }
 
-bool GpuScene::build_grids(const MarchUpload::Sources& of, std::uint64_t most_bytes, Deadline deadline) {
+bool GpuScene::build_grids(const MarchUpload::Sources& of, std::uint64_t max_bytes, Deadline deadline) {
   const auto begun = Clock::now();
   // Grids that are uploaded are copied.
   MarchUpload::Sources missing;
   std::ranges::copy_if(of, std::back_inserter(missing),
                        [&](const scene::MarchSourcePtr& source) { return !data_ || data_->grid(*source) == nullptr; });
   const std::uint64_t others = data_bytes() + other_bytes() - grids_.bytes();
-  const bool done = grids_.advance(missing, of, most_bytes - std::min(most_bytes, others), deadline);
+  const bool done = grids_.advance(missing, of, max_bytes - std::min(max_bytes, others), deadline);
   if (!done) took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
   return done;
 }
 
-void GpuScene::require_room(std::uint64_t bytes, std::uint64_t most_bytes) const {
+void GpuScene::require_room(std::uint64_t bytes, std::uint64_t max_bytes) const {
   // The old data stay until the new ones are complete. Free space of the heap's pages can be used.
   const std::uint64_t held = data_bytes() + other_bytes() - std::min(heap_.free_bytes(), bytes);
-  const std::uint64_t room = most_bytes - std::min(most_bytes, held);
+  const std::uint64_t room = max_bytes - std::min(max_bytes, held);
   if (bytes <= room) return;
   throw Error(ErrorCode::out_of_memory, "uploading the volume needs " + std::to_string(bytes) +
                                             " bytes of GL memory; " + std::to_string(room) +
@@ -555,30 +557,31 @@ light::DistantLights GpuScene::lights(const scene::Snapshot& snapshot) const {
   return lights;
 }
 
-Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
-  Obstacles obstacles;
-  obstacles.scene = placed_.get();
-  obstacles.raster = raster_ ? &surface_pass_ : nullptr;
-  obstacles.traced = traced || obstacles.raster == nullptr;
-  if (*snapshot.view) obstacles.view = **snapshot.view;
+TraceInputs GpuScene::trace_inputs(const scene::Snapshot& snapshot, bool traced) {
+  TraceInputs trace_inputs;
+  trace_inputs.scene = placed_.get();
+  trace_inputs.raster = raster_ ? &surface_pass_ : nullptr;
+  trace_inputs.traced = traced || trace_inputs.raster == nullptr;
+  if (*snapshot.view) trace_inputs.view = **snapshot.view;
   const light::DistantLights lights = this->lights(snapshot);
   const light::Surroundings around = sky_surroundings(snapshot);
-  obstacles.lighting = {.sun_direction = glm::vec3(lights.to_sun),
-                        .sun_irradiance = lights.sun_irradiance,
-                        .sky_radiance = lights.sky_radiance,
-                        .sky = light::harmonics_of(around),
-                        .gloss = around.environment ? around.environment->gloss : nullptr,
-                        .gloss_strength = around.strength,
-                        .sky_turn = light::turn_of(around),
-                        .lamps = *snapshot.lamps};
-  obstacles.environment = environment_.get();
+  trace_inputs.lighting = {.sun_direction = glm::vec3(lights.to_sun),
+                           .sun_irradiance = lights.sun_irradiance,
+                           .sky_radiance = lights.sky_radiance,
+                           .sky = light::harmonics_of(around),
+                           .prefiltered = around.environment ? around.environment->prefiltered : nullptr,
+                           .prefiltered_strength = around.strength,
+                           .sky_turn = light::turn_of(around),
+                           .analytic_lights = *snapshot.analytic_lights};
+  trace_inputs.environment = environment_.get();
   // Selection probabilities are normalized over a whole table, so there is one table per case.
-  obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
-  obstacles.instances = instances_.get();
-  obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
-  obstacles.model_holdout =
-      obstacles.met() != nullptr && std::ranges::any_of(placed_->models(), &scene::Model::holdout);
-  return obstacles;
+  trace_inputs.analytic_lights =
+      !placed_ || trace_inputs.met() != nullptr ? analytic_lights_.get() : host_analytic_lights_.get();
+  trace_inputs.instances = instances_.get();
+  trace_inputs.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
+  trace_inputs.model_holdout =
+      trace_inputs.met() != nullptr && std::ranges::any_of(placed_->models(), &scene::Model::holdout);
+  return trace_inputs;
 }
 
 scene::MotionTable GpuScene::motion(const scene::Snapshot& snapshot) const {
@@ -592,7 +595,7 @@ scene::MotionTable GpuScene::motion(const scene::Snapshot& snapshot) const {
       [&](const scene::ModelSource& source) { return data.words_of(source).first + source.vertices; });
 }
 
-PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,
+PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const TraceInputs& trace_inputs,
                                        const core::CmIntegrator& integrator, glm::uvec2 size) const {
   const scene::Viewpoint& view = **snapshot.view;
   PictureParameters p;
@@ -601,8 +604,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   if (instances_) {
     p.space = instances_->space();
     eye_of = [origin = instances_->origin()](const glm::dvec3& eye) { return glm::vec3(eye - origin); };
-    own.power = instances_->glow_power();
-    own.length = instances_->glow_length();
+    own.power = instances_->emissive_power();
+    own.length = instances_->emissive_length();
     p.medium = instances_->medium();
   } else {
     const scene::Volume& volume = present_.front();
@@ -616,10 +619,10 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
     eye_of = [to_cube = glm::inverse(to_world)](const glm::dvec3& eye) {
       return glm::vec3(to_cube * glm::dvec4(eye, 1.0));
     };
-    const scene::PlacedGlow glow = scene::glow_of(*data_->glow(source), source.cube.to_world, place);
-    p.glow = glow.looks;
-    own.power = glow.power;
-    own.length = glow.length;
+    const scene::PlacedEmissive emissive = scene::emissive_of(*data_->emissive(source), source.cube.to_world, place);
+    p.emissive = emissive.looks;
+    own.power = emissive.power;
+    own.length = emissive.length;
   }
   p.view = view_of(view, eye_of(view.eye), size);
   const std::optional<scene::ViewEnds>& ends = *snapshot.view_ends;
@@ -629,11 +632,12 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   }
   own.radius = lit()[0].radius;
   own.aimed = integrator.light_among_surfaces != 0U && (p.medium.emits != 0U || p.medium.source != glm::vec3(0.0F));
-  const PlacedModels* met = obstacles.met();
+  const PlacedModels* met = trace_inputs.met();
   light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
-  light::add_lamps(near, *snapshot.lamps);
-  near.lamps_arrive = obstacles.lamps != nullptr ? obstacles.lamps->arrives() : 0.0;
-  const std::optional<double> nearest = obstacles.lamps != nullptr ? obstacles.lamps->nearest() : std::nullopt;
+  light::add_analytic_lights(near, *snapshot.analytic_lights);
+  near.analytic_lights_arrive = trace_inputs.analytic_lights != nullptr ? trace_inputs.analytic_lights->arrives() : 0.0;
+  const std::optional<double> nearest =
+      trace_inputs.analytic_lights != nullptr ? trace_inputs.analytic_lights->nearest() : std::nullopt;
   p.equiangular = nearest && light::suits_equiangular(nearest, optical_depth());
   const light::LightTable table(lights(snapshot), surroundings(snapshot), near, own);
   p.lights = table.parameters();

@@ -8,9 +8,9 @@
 
 #include "base/revision.hpp"
 #include "base/slot.hpp"
+#include "render/analytic_light_data.hpp"
 #include "render/environment_data.hpp"
 #include "render/instance_data.hpp"
-#include "render/lamp_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_upload.hpp"
 #include "render/tracer.hpp"
@@ -36,7 +36,7 @@ class GpuScene {
     std::uint64_t settings = 0;    // changes with every change of a setting, so that failed parts are tried again
     std::int64_t page_texels = 0;  // size of a page of cell data; 0: the driver's limit
     // Memory limit of the scene: volumes that would exceed it are not uploaded.
-    std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
+    std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max();
   };
   /// Uploads the differences to the snapshot until about the deadline. Throws Error(out_of_memory, unsupported, gl) if
   /// a part cannot be uploaded; the previous data of the part stay. If the data of the surface pass fail, the surfaces
@@ -86,12 +86,12 @@ class GpuScene {
   /// The snapshot's lights. Their sky radiance is the mean of the environment, uploaded or not.
   [[nodiscard]] light::DistantLights lights(const scene::Snapshot& snapshot) const;
   /// Trace inputs, without the host's depth. traced: paths hit triangles even if there is a surface pass.
-  [[nodiscard]] Obstacles obstacles(const scene::Snapshot& snapshot, bool traced);
+  [[nodiscard]] TraceInputs trace_inputs(const scene::Snapshot& snapshot, bool traced);
   /// Transforms of the objects in the previous frame, for motion vectors. Needs data() and the snapshot's view.
   [[nodiscard]] scene::MotionTable motion(const scene::Snapshot& snapshot) const;
   /// Parameters for a picture of this size, with the snapshot's view and lights and the uploaded data. Needs data() and
   /// the snapshot's view.
-  [[nodiscard]] PictureParameters parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,
+  [[nodiscard]] PictureParameters parameters(const scene::Snapshot& snapshot, const TraceInputs& trace_inputs,
                                              const core::CmIntegrator& integrator, glm::uvec2 size) const;
 
  private:
@@ -108,8 +108,8 @@ class GpuScene {
   void place_raster();
   void drop_data();
   // Builds the grids that are built on the GPU and are not uploaded. Returns whether all are built.
-  bool build_grids(const MarchUpload::Sources& of, std::uint64_t most_bytes, Deadline deadline);
-  void require_room(std::uint64_t bytes, std::uint64_t most_bytes) const;
+  bool build_grids(const MarchUpload::Sources& of, std::uint64_t max_bytes, Deadline deadline);
+  void require_room(std::uint64_t bytes, std::uint64_t max_bytes) const;
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   // Sets present_: the snapshot's volumes whose data are uploaded. A volume whose newest data are missing keeps its
   // previous ones. If there are none, those of the last upload.
@@ -123,7 +123,7 @@ class GpuScene {
   [[nodiscard]] double optical_depth() const;
   // Bounding spheres of all volumes and of all models; radius 0 if there are none.
   [[nodiscard]] std::array<light::Lit, 2> lit() const;
-  void update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted);
+  void update_analytic_lights(const scene::Snapshot& snapshot, const Wanted& wanted);
   // Surroundings with the uploaded environment, or if none is uploaded yet, with the snapshot's.
   [[nodiscard]] light::Surroundings sky_surroundings(const scene::Snapshot& snapshot) const;
   void update_data(const MarchUpload::Sources& sources, const scene::Snapshot& snapshot, const Wanted& wanted,
@@ -190,14 +190,15 @@ class GpuScene {
   };
   Slot<InstanceData, InstancesOf> instances_;  // if there are several volumes, a holdout, or anything that moves
   Revision<InstanceData> instances_revision_;
-  struct LampsOf {
-    scene::Part<light::Lamps> host;
+  struct AnalyticLightsOf {
+    scene::Part<light::AnalyticLights> host;
     std::vector<scene::Model> models;  // uploaded ones
     std::array<light::Lit, 2> lit;
-    bool operator==(const LampsOf&) const = default;
+    bool operator==(const AnalyticLightsOf&) const = default;
   };
-  Slot<LampData, LampsOf> lamps_;       // for paths that hit the models, if there are any...
-  Slot<LampData, LampsOf> host_lamps_;  // ...and for paths that do not, only if there are models
+  Slot<AnalyticLightData, AnalyticLightsOf> analytic_lights_;  // for paths that hit the models, if there are any...
+  Slot<AnalyticLightData, AnalyticLightsOf>
+      host_analytic_lights_;  // ...and for paths that do not, only if there are models
 };
 
 }  // namespace cumulet::render

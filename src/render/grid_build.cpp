@@ -29,8 +29,8 @@ namespace {
 
 constexpr std::uint32_t group = 64;  // invocations per work group, of all kernels here
 constexpr std::size_t roots_words = 2 * CM_ROOTS + 4;
-constexpr double parts_weight = 0.05;      // cost of a part of a cell, relative to the rest of its record
-constexpr double most_in_flight_ms = 8.0;  // independent of the deadline, because the host draws, too
+constexpr double parts_weight = 0.05;     // cost of a part of a cell, relative to the rest of its record
+constexpr double max_in_flight_ms = 8.0;  // independent of the deadline, because the host draws, too
 
 // Layout as in glsl/grid_leaves.glsl.
 struct TreeCell {
@@ -64,7 +64,7 @@ void require_block(const gl::Limits& limits, std::uint64_t bytes, const char* wh
                                           std::to_string(limits.storage_block_bytes));
 }
 
-// Layout as in glsl/grid_glow.comp: cell number, position, emission.
+// Layout as in glsl/grid_emissive.comp: cell number, position, emission.
 constexpr std::size_t glowing_words = 7;
 
 // Returns the emissive cells in the order of the grid.
@@ -108,8 +108,8 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   data_->lattice_ = std::move(lattice);
   const grid::Lattice& l = *data_->lattice_;
   // The shader's counters of added cells have 32 bits.
-  constexpr std::size_t most_blocks = std::size_t{1} << 20U;
-  if (l.blocks.size() > most_blocks) {
+  constexpr std::size_t max_blocks = std::size_t{1} << 20U;
+  if (l.blocks.size() > max_blocks) {
     throw Error(ErrorCode::unsupported,
                 "a lattice of " + std::to_string(l.blocks.size()) + " blocks: the limit is 2^20; raise the threshold");
   }
@@ -205,7 +205,7 @@ void LatticeUpload::plan_device_bricks(const grid::LatticeChannel& channel, cons
                            {"CM_CHANNEL " + std::to_string(static_cast<int>(fields.channel())),
                             "CM_FIELDS " + std::to_string(bricks.size())}};
   moves_.plan_together(upload_, bricks, origins, [&](std::size_t first, std::uint32_t count) {
-    upload_.add_dispatches(programs_, key, count, bricks_a_step(*gl_),
+    upload_.add_dispatches(programs_, key, count, bricks_per_step(*gl_),
                            [this, &to, to_first = to_first + static_cast<std::uint32_t>(first)](
                                const gl::Program& program, std::uint32_t begin, std::uint32_t end) {
                              gl_->ProgramUniform2ui(program.name(), 0, begin, end);
@@ -286,14 +286,14 @@ void LatticeUpload::plan_priorities(const std::vector<glm::uvec2>& list, bool of
                            {of_density && l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
                             "CM_CRITERION " + std::to_string(static_cast<int>(measure.criterion))}};
   upload_.add_dispatches(
-      programs_, key, count, bricks_a_step(*gl_),
+      programs_, key, count, bricks_per_step(*gl_),
       [this, &l, &measure, &values](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
         const GLuint name = program.name();
         gl_->ProgramUniform2ui(name, 0, first, end);
         gl_->ProgramUniform1ui(name, 1, static_cast<GLuint>(l.own.to_rate.first_node));
         gl_->ProgramUniform3f(name, 2, measure.scale, measure.own_hiding, measure.floor);
         gl_->ProgramUniform1i(name, 3, measure.linear ? 1 : 0);
-        gl_->ProgramUniform1f(name, 4, measure.there_and_back ? 1.0F : 0.0F);
+        gl_->ProgramUniform1f(name, 4, measure.two_way ? 1.0F : 0.0F);
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_NODES, data_->nodes_.name());
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_OWN, data_->own_.name());
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_GRID_BRICKS, values.name());
@@ -338,7 +338,7 @@ std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells) {
   switch (channel) {
     case grid::Channel::emission:
       return cells * sizeof(grid::EmissionRecord);
-    case grid::Channel::colour:
+    case grid::Channel::color:
       return cells * sizeof(std::uint32_t);
     case grid::Channel::anisotropy:
       return cells * sizeof(std::int16_t);
@@ -348,7 +348,7 @@ std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells) {
   return cells * sizeof(glm::uvec2);
 }
 
-std::uint64_t building_bytes_a_cell(bool emits) {
+std::uint64_t building_bytes_per_cell(bool emits) {
   // A tree with n leaves has fewer than n inner cells.
   return 2 * tree_cell_bytes + (emits ? glowing_words * sizeof(std::uint32_t) : 0);
 }
@@ -391,7 +391,7 @@ void GridPace::learn(const std::vector<Sent>& sent, double ms, Measured measured
 }
 
 GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, LatticeDataPtr data,
-                     std::vector<std::uint8_t> levels, std::uint64_t max_cells, std::uint64_t most_bytes,
+                     std::vector<std::uint8_t> levels, std::uint64_t max_cells, std::uint64_t max_bytes,
                      GridPacePtr pace)
     : gl_(std::move(gl)),
       programs_(std::move(programs)),
@@ -399,7 +399,7 @@ GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Li
       data_(std::move(data)),
       levels_(std::move(levels)),
       max_cells_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(max_cells, CM_ROOTS, std::uint64_t{1} << 30U))),
-      most_bytes_(most_bytes),
+      max_bytes_(max_bytes),
       pace_(std::move(pace)),
       decision_(gl_, "deciding which cells split") {
   levels_.resize(std::max<std::size_t>((levels_.size() + 3) / 4 * 4, 4));
@@ -418,11 +418,11 @@ bool GridBuild::advance(Deadline deadline) {
     if (!decision_.advance(deadline)) return false;
     plan_cells();
   }
-  if (!glow_) {
+  if (!emissive_) {
     if (!cells_->advance(deadline)) return false;
-    plan_glow();
+    plan_emissive();
   }
-  return glow_->advance(deadline);
+  return emissive_->advance(deadline);
 }
 
 gl::Object GridBuild::make_storage(std::uint64_t bytes, const char* what) {
@@ -439,9 +439,9 @@ void GridBuild::bind_storage(std::initializer_list<std::pair<GLint, const gl::Ob
 }
 
 void GridBuild::require_room(std::uint64_t bytes) const {
-  if (bytes <= most_bytes_ - std::min(most_bytes_, bytes_)) return;
+  if (bytes <= max_bytes_ - std::min(max_bytes_, bytes_)) return;
   throw Error(ErrorCode::out_of_memory, "building the grid needs " + std::to_string(bytes_ + bytes) +
-                                            " bytes of GL memory; " + std::to_string(most_bytes_) +
+                                            " bytes of GL memory; " + std::to_string(max_bytes_) +
                                             " are left of those allowed");
 }
 
@@ -453,7 +453,7 @@ double GridBuild::aim_ms() const {
 }
 
 bool GridBuild::has_room_in_flight() {
-  if (in_flight_ms_ < most_in_flight_ms) return true;
+  if (in_flight_ms_ < max_in_flight_ms) return true;
   if (!fence_.passed()) return false;
   pace_->learn(in_flight_, milliseconds(std::chrono::steady_clock::now() - sent_), GridPace::Measured::at_most);
   in_flight_.clear();
@@ -466,9 +466,9 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   if (!has_room_in_flight()) return std::nullopt;
   const gl::Program& program = programs_->ask(pass.key);
   if (!program.usable()) return std::nullopt;
-  constexpr std::uint32_t most_groups = 65535;  // supported by every driver
+  constexpr std::uint32_t max_groups = 65535;  // supported by every driver
   const double ms = pass.weight * pace_->ms(pass.key, pass.cost * cost_ms(*gl_));
-  const double fit = std::clamp(aim_ms() / ms, double{group}, double{most_groups} * (pass.item_a_group ? 1.0 : group));
+  const double fit = std::clamp(aim_ms() / ms, double{group}, double{max_groups} * (pass.item_a_group ? 1.0 : group));
   const std::uint32_t items = std::min(static_cast<std::uint32_t>(fit), end - first);
   const gl::DebugGroup debug(*gl_, "cumulet: grid");
   gl_->ProgramUniform1ui(program.name(), 0, first);
@@ -487,7 +487,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   if (in_flight_.empty()) sent_ = begun;
   in_flight_.push_back(sent);
   in_flight_ms_ += ms * items;
-  if (in_flight_ms_ >= most_in_flight_ms) fence_ = gl::Fence(gl_);
+  if (in_flight_ms_ >= max_in_flight_ms) fence_ = gl::Fence(gl_);
   return first + items;
 }
 
@@ -716,7 +716,7 @@ void GridBuild::plan_channels() {
                   {core::CM_STORAGE_GRID_CHANNEL, &emission},
                   {core::CM_STORAGE_GRID_GLOWING, &glowing_}});
   };
-  plan_pass(*cells_, {{"grid_glow.comp", {}}, 2, false, false}, 0, built_.count, bind);
+  plan_pass(*cells_, {{"grid_emissive.comp", {}}, 2, false, false}, 0, built_.count, bind);
 }
 
 void GridBuild::plan_channel(std::size_t index) {
@@ -744,37 +744,37 @@ void GridBuild::plan_channel(std::size_t index) {
   plan_leaves(pass, pass, bind);
 }
 
-void GridBuild::plan_glow() {
-  glow_.emplace(gl_, "reading what glows");
+void GridBuild::plan_emissive() {
+  emissive_.emplace(gl_, "reading what glows");
   if (state_.glowing == 0) return;
   const std::size_t bytes = std::size_t{state_.glowing} * glowing_words * 4;
-  glow_->add([this, bytes] {
-    glow_read_back_ = gl::ReadBack(gl_, bytes, "creating the read-back of what glows");
-    glow_words_.resize(bytes / 4);
+  emissive_->add([this, bytes] {
+    emissive_read_back_ = gl::ReadBack(gl_, bytes, "creating the read-back of what glows");
+    emissive_words_.resize(bytes / 4);
   });
-  glow_->add_pieces(bytes, [this](std::size_t first, std::size_t count) {
-    gl_->CopyNamedBufferSubData(glowing_.name(), glow_read_back_.name(), static_cast<GLintptr>(first),
+  emissive_->add_pieces(bytes, [this](std::size_t first, std::size_t count) {
+    gl_->CopyNamedBufferSubData(glowing_.name(), emissive_read_back_.name(), static_cast<GLintptr>(first),
                                 static_cast<GLintptr>(first), static_cast<GLsizeiptr>(count));
   });
-  glow_->add([this] {
+  emissive_->add([this] {
     gl::memory_barrier(*gl_, GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
     fence_ = gl::Fence(gl_);
   });
-  glow_->add_until([this] { return fence_.passed(); });
-  glow_->add_pieces(
+  emissive_->add_until([this] { return fence_.passed(); });
+  emissive_->add_pieces(
       bytes,
       [this](std::size_t first, std::size_t count) {
-        std::memcpy(&glow_words_[first / 4], glow_read_back_.data() + first, count);
+        std::memcpy(&emissive_words_[first / 4], emissive_read_back_.data() + first, count);
       },
       4);
-  glow_->add([this] {
-    glow_read_back_ = {};
+  emissive_->add([this] {
+    emissive_read_back_ = {};
     glowing_ = {};
-    begin_glow_table();
+    begin_emissive_table();
   });
-  glow_->add_until([this] {
-    if (glow_table_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
-    built_.glow = glow_table_.get();
+  emissive_->add_until([this] {
+    if (emissive_table_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    built_.emissive = emissive_table_.get();
     return true;
   });
 }
@@ -798,11 +798,11 @@ std::future<Made> make_apart(const char* what, Work work) {
 
 }  // namespace
 
-void GridBuild::begin_glow_table() {
-  glow_table_ = make_apart<scene::GlowTable>("the table of what glows",
-                                             [words = std::move(glow_words_), cube = data_->lattice().cube] {
-                                               return scene::glow_table(in_order(words), cube);
-                                             });
+void GridBuild::begin_emissive_table() {
+  emissive_table_ = make_apart<scene::EmissiveTable>(
+      "the table of what glows", [words = std::move(emissive_words_), cube = data_->lattice().cube] {
+        return scene::emissive_table(in_order(words), cube);
+      });
 }
 
 void GridBuild::plan_tree_cells() {
@@ -839,7 +839,7 @@ LatticeDataPtr GridBuilds::find(const grid::LatticePtr& lattice) const {
   return found == lattices_.end() ? nullptr : *found;
 }
 
-bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint64_t most_bytes, Deadline deadline) {
+bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint64_t max_bytes, Deadline deadline) {
   std::erase_if(lattices_, [&](const LatticeDataPtr& data) {
     return std::ranges::none_of(kept, [&](const scene::MarchSourcePtr& source) {
       return source->plan && source->plan->lattice.get() == &data->lattice();
@@ -847,7 +847,7 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint6
   });
   try {
     return std::ranges::all_of(sources, [&](const scene::MarchSourcePtr& source) {
-      return !source->plan || built_.contains(source) || build(source, most_bytes, deadline);
+      return !source->plan || built_.contains(source) || build(source, max_bytes, deadline);
     });
   } catch (...) {
     upload_.reset();
@@ -897,7 +897,7 @@ volume::DeviceBricksPtr GridBuilds::not_here(const scene::MarchSource& source) c
   return found == all.end() ? nullptr : *found;
 }
 
-bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
+bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t max_bytes, Deadline deadline) {
   const volume::DeviceBricksPtr& in_gl = source->statistics->on_device();
   if (const volume::DeviceBricksPtr elsewhere = not_here(*source)) {
     // Other volumes of the scene are shown meanwhile.
@@ -913,7 +913,7 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_b
   if (!on_cpu_ || on_cpu_->of() != source) {
     on_cpu_.reset();
     try {
-      return build_there(source, most_bytes, deadline);
+      return build_there(source, max_bytes, deadline);
     } catch (const Error& error) {
       upload_.reset();
       under_way_.reset();
@@ -935,21 +935,21 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_b
   return true;
 }
 
-void GridBuilds::begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes) {
+void GridBuilds::begin_upload(const scene::MarchSource& source, std::uint64_t max_bytes) {
   upload_ = std::make_unique<LatticeUpload>(gl_, programs_, limits_, source.plan->lattice, source.statistics,
                                             source.channels, memories_);
   const std::uint64_t needs = bytes();
-  if (needs <= most_bytes) return;
+  if (needs <= max_bytes) return;
   throw Error(ErrorCode::out_of_memory, "the lattice needs " + std::to_string(needs) + " bytes of GL memory; " +
-                                            std::to_string(most_bytes) + " are left of those allowed");
+                                            std::to_string(max_bytes) + " are left of those allowed");
 }
 
-bool GridBuilds::build_there(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
+bool GridBuilds::build_there(const scene::MarchSourcePtr& source, std::uint64_t max_bytes, Deadline deadline) {
   const scene::GridPlan& plan = *source->plan;
   LatticeDataPtr data = find(plan.lattice);
   if (!data) {
     under_way_.reset();
-    if (!upload_ || upload_->lattice() != plan.lattice) begin_upload(*source, most_bytes);
+    if (!upload_ || upload_->lattice() != plan.lattice) begin_upload(*source, max_bytes);
     if (!upload_->advance(deadline)) return false;
     data = upload_->take();
     upload_.reset();
@@ -957,7 +957,7 @@ bool GridBuilds::build_there(const scene::MarchSourcePtr& source, std::uint64_t 
   }
   if (!under_way_ || under_way_->of != source) {
     under_way_.reset();
-    const std::uint64_t room = most_bytes - std::min(most_bytes, bytes());
+    const std::uint64_t room = max_bytes - std::min(max_bytes, bytes());
     under_way_ = UnderWay{source, std::make_unique<GridBuild>(gl_, programs_, limits_, std::move(data), plan.levels,
                                                               plan.max_cells, room, pace_)};
   }
@@ -981,7 +981,7 @@ CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
     grid::GridBuilder builder(*of->statistics, diamonds);
     builder.bisect(progress.get());
     BuiltGrid made = built_of(builder.records(plan.lattice->cells, of->max_value, of->channels, progress.get()));
-    made.glow = scene::glow_table(*made.grid, progress.get());
+    made.emissive = scene::emissive_table(*made.grid, progress.get());
     return made;
   });
 }

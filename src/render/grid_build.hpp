@@ -26,7 +26,7 @@
 #include "render/brick_moves.hpp"
 #include "render/device_memories.hpp"
 #include "render/upload.hpp"
-#include "scene/glow.hpp"
+#include "scene/emissive_cells.hpp"
 #include "scene/march_source.hpp"
 
 namespace cumulet::core {
@@ -120,7 +120,7 @@ struct BuiltGrid {
   gl::Object tree;   ///< 26 grid::RootEntry, of which the last is padding, then TetGrid::tree
   /// Records as in TetGrid, indexed by grid::Channel; null: there is no such channel.
   std::array<gl::Object, 4> channels;
-  scene::GlowTable glow;  ///< in main memory
+  scene::EmissiveTable emissive;  ///< in main memory
   /// Set instead of the buffers if the GPU could not build it; why_not then gives the reason.
   std::shared_ptr<const grid::TetGrid> grid;
   std::string why_not;
@@ -136,7 +136,7 @@ struct BuiltGrid {
 /// Returns the size of the records of a channel.
 std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells);
 /// Returns the GL memory per cell of a build in progress, in addition to its result.
-std::uint64_t building_bytes_a_cell(bool emits);
+std::uint64_t building_bytes_per_cell(bool emits);
 /// Returns the minimum GL memory of a build in progress, however few cells it has.
 std::uint64_t building_bytes_at_least();
 
@@ -173,10 +173,10 @@ using GridPacePtr = std::shared_ptr<GridPace>;
 /// between dispatches. Fences bound the work in flight. All calls need a current context and an active StateGuard.
 class GridBuild {
  public:
-  /// levels: grid::OwnPriorities::levels() of the view. max_cells: capped at 2^30. most_bytes: limit of GL memory.
+  /// levels: grid::OwnPriorities::levels() of the view. max_cells: capped at 2^30. max_bytes: limit of GL memory.
   GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, LatticeDataPtr data,
             std::vector<std::uint8_t> levels, std::uint64_t max_cells,
-            std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max(),
+            std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max(),
             GridPacePtr pace = std::make_shared<GridPace>());
   GridBuild(const GridBuild&) = delete;
   GridBuild& operator=(const GridBuild&) = delete;
@@ -222,8 +222,8 @@ class GridBuild {
   void plan_channels();
   void plan_channel(std::size_t index);
   void plan_clear_cones();
-  void plan_glow();
-  void begin_glow_table();
+  void plan_emissive();
+  void begin_emissive_table();
   void plan_read_back(Upload& upload);
   // Plans a pass over items [first, end), in dispatches of bounded time. bind: binds buffers, and sets uniforms beyond
   // the first three.
@@ -243,7 +243,7 @@ class GridBuild {
   LatticeDataPtr data_;
   std::vector<std::uint8_t> levels_;
   std::uint32_t max_cells_;
-  std::uint64_t most_bytes_;
+  std::uint64_t max_bytes_;
   GridPacePtr pace_;
   Deadline deadline_{};  // of the current call
   std::uint64_t bytes_ = 0;
@@ -257,12 +257,12 @@ class GridBuild {
   std::chrono::steady_clock::time_point sent_;  // when the first of them was sent
   core::CmGridState state_{};                   // as read back
   Upload decision_;
-  gl::ReadBack glow_read_back_;
-  std::vector<std::uint32_t> glow_words_;
-  std::future<scene::GlowTable> glow_table_;
+  gl::ReadBack emissive_read_back_;
+  std::vector<std::uint32_t> emissive_words_;
+  std::future<scene::EmissiveTable> emissive_table_;
   std::vector<Level> tree_levels_;
-  std::optional<Upload> cells_;  // set when the number of cells is known; their steps use the members above
-  std::optional<Upload> glow_;   // set when the number of emissive cells is known
+  std::optional<Upload> cells_;     // set when the number of cells is known; their steps use the members above
+  std::optional<Upload> emissive_;  // set when the number of emissive cells is known
 };
 
 /// Builds the grid of a source with a plan on a worker thread, if the GPU cannot. The destructor cancels it.
@@ -300,9 +300,9 @@ class GridBuilds {
       : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits), memories_(std::move(memories)) {}
 
   /// Builds the grids of sources until about the deadline. Returns whether all are built. kept: sources whose lattices
-  /// are kept, these included; other lattices are freed. most_bytes: limit of GL memory for lattices and grids. Throws
+  /// are kept, these included; other lattices are freed. max_bytes: limit of GL memory for lattices and grids. Throws
   /// Error(gl), and the errors of the CPU build; then no build is in progress.
-  bool advance(const Sources& sources, const Sources& kept, std::uint64_t most_bytes, Deadline deadline);
+  bool advance(const Sources& sources, const Sources& kept, std::uint64_t max_bytes, Deadline deadline);
   [[nodiscard]] const BuiltGrids& built() const { return built_; }
   /// Fraction of the current build that is done, 0 to 1; 1 if there is none.
   [[nodiscard]] double progress() const;
@@ -315,12 +315,12 @@ class GridBuilds {
 
  private:
   // Returns whether the grid is built.
-  bool build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
+  bool build(const scene::MarchSourcePtr& source, std::uint64_t max_bytes, Deadline deadline);
   // Returns bricks of the source that are in another context or were lost with it; null: none.
   [[nodiscard]] volume::DeviceBricksPtr not_here(const scene::MarchSource& source) const;
   // Builds on the GPU.
-  bool build_there(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline);
-  void begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes);
+  bool build_there(const scene::MarchSourcePtr& source, std::uint64_t max_bytes, Deadline deadline);
+  void begin_upload(const scene::MarchSource& source, std::uint64_t max_bytes);
   [[nodiscard]] LatticeDataPtr find(const grid::LatticePtr& lattice) const;
 
   gl::FunctionsPtr gl_;

@@ -11,7 +11,7 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr int most_layers = 8;
+constexpr int max_layers = 8;
 
 [[noreturn]] void refuse(const HostDepthInput& input, const std::string& cause) {
   const char* kind = input.source == DepthSource::framebuffer ? "framebuffer " : "texture ";
@@ -201,10 +201,10 @@ bool HostDepth::update(const HostDepthInput& input) {
     return earlier;
   }
   // If the device is far behind, the depth of a later frame is read instead.
-  if (asked_.size() == most_asked) return earlier;
+  if (asked_.size() == max_asked) return earlier;
   const auto& gl = *gl_;
   const Source source = input.source == DepthSource::framebuffer ? open_framebuffer(input) : open_texture(input);
-  const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, most_layers));
+  const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, max_layers));
   const bool multisample = source.samples > 0;
   const gl::Program& program =
       programs_->ask({"host_depth.comp", {multisample ? "CM_MULTISAMPLE 1" : "CM_MULTISAMPLE 0"}});
@@ -212,7 +212,7 @@ bool HostDepth::update(const HostDepthInput& input) {
   if (waits_) return earlier;
   if (!sampler_) sampler_ = gl::make_sampler(gl_);
   if (!changed_) changed_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the depth's flag");
-  if (!answers_) answers_ = gl::ReadBack(gl_, most_asked * 4, "creating the depth's flags");
+  if (!answers_) answers_ = gl::ReadBack(gl_, max_asked * 4, "creating the depth's flags");
   const bool fits = z_ && size == size_ && layers == layers_;
   gl::Object made;
   if (!fits) {
@@ -235,7 +235,7 @@ bool HostDepth::update(const HostDepthInput& input) {
   gl.DispatchCompute((size.x + 7) / 8, (size.y + 7) / 8, layers);
   gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
                              GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
-  const std::size_t place = next_place_++ % most_asked;
+  const std::size_t place = next_place_++ % max_asked;
   gl.CopyNamedBufferSubData(changed_.name(), answers_.name(), 0, static_cast<GLintptr>(place * 4), 4);
   asked_.push_back({place, gl.dispatches_in_call ? gl::Fence() : gl::Fence(gl_)});
   gl.BindSampler(core::CM_UNIT_DEPTH_SOURCE, 0);

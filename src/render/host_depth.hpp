@@ -68,7 +68,7 @@ class HostDepth {
   int copy_samples_ = 0;
   gl::Object sampler_;
   gl::Object changed_;
-  static constexpr std::size_t most_asked = 8;
+  static constexpr std::size_t max_asked = 8;
   gl::ReadBack answers_;  // read-back of changed_, one slot per request
   struct Asked {
     std::size_t place = 0;

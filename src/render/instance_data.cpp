@@ -33,13 +33,13 @@ InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& li
     data.medium_.source = glm::max(data.medium_.source, instance.medium.source);
     data.medium_.second_share = std::max(data.medium_.second_share, instance.medium.second_share);
     data.medium_.emits |= instance.medium.emits;
-    data.medium_.coloured |= instance.medium.coloured;
+    data.medium_.colored |= instance.medium.colored;
     data.medium_.anisotropic |= instance.medium.anisotropic;
     data.medium_.changes |= instance.medium.changes;
   }
   data.moves_ = !table.ends.empty() || data.medium_.changes != 0;
-  data.glow_power_ = table.glow_power;
-  data.glow_length_ = table.glow_length;
+  data.emissive_power_ = table.emissive_power;
+  data.emissive_length_ = table.emissive_length;
   data.bytes_ = record_bytes + node_bytes;
   return data;
 }

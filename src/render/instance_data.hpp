@@ -24,9 +24,9 @@ class InstanceData {
   /// Medium of the first instance. Properties that decide which programs and lights are needed are the maximum over all
   /// instances.
   [[nodiscard]] const core::CmMedium& medium() const { return medium_; }
-  /// Total emitted power and length scale of all instances, as in scene::GlowSum.
-  [[nodiscard]] double glow_power() const { return glow_power_; }
-  [[nodiscard]] double glow_length() const { return glow_length_; }
+  /// Total emitted power and length scale of all instances, as in scene::EmissiveSum.
+  [[nodiscard]] double emissive_power() const { return emissive_power_; }
+  [[nodiscard]] double emissive_length() const { return emissive_length_; }
   /// True if any instance moves while the shutter is open.
   [[nodiscard]] bool moves() const { return moves_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -37,8 +37,8 @@ class InstanceData {
   core::CmSpace space_{};
   core::CmMedium medium_{};
   glm::dvec3 origin_{0.0};
-  double glow_power_ = 0.0;
-  double glow_length_ = 0.0;
+  double emissive_power_ = 0.0;
+  double emissive_length_ = 0.0;
   bool moves_ = false;
   std::uint64_t bytes_ = 0;
 };

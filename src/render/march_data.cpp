@@ -75,10 +75,10 @@ std::vector<float> scattering_slab(const scene::MarchSource& source, std::size_t
   const auto add = [&](const grid::Statistics& statistics, float weight) {
     for_slab(source, statistics, first, last, [&](std::size_t at, float value) { slab[at] += weight * value; });
   };
-  const grid::RgbField* coloured = source.channels.scattering.get();
-  if (coloured == nullptr) add(*source.statistics, 1.0F);
-  for (std::size_t i = 0; coloured != nullptr && i < 3; ++i)
-    add(coloured->component(i), luminance(vec3(glm::mat3(1.0F)[static_cast<int>(i)])));
+  const grid::RgbField* colored = source.channels.scattering.get();
+  if (colored == nullptr) add(*source.statistics, 1.0F);
+  for (std::size_t i = 0; colored != nullptr && i < 3; ++i)
+    add(colored->component(i), luminance(vec3(glm::mat3(1.0F)[static_cast<int>(i)])));
   return slab;
 }
 
@@ -105,27 +105,27 @@ static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 struct ChannelBytes {
   // cells, glowing: counts for grids with a plan.
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing)
-      : glow(glowing * sizeof(scene::GlowingCell)) {
+      : emissive(glowing * sizeof(scene::GlowingCell)) {
     using grid::Channel;
     if (const grid::TetGrid* made = source.grid.get()) {
       emission = channel_bytes(Channel::emission, made->emission.size());
       velocity = channel_bytes(Channel::velocity, made->velocity.size());
       change = made->change.size() * sizeof(glm::uvec2);  // grids built on the GPU have none
-      colour = channel_bytes(Channel::colour, made->colour.size());
+      color = channel_bytes(Channel::color, made->color.size());
       anisotropy = channel_bytes(Channel::anisotropy, made->anisotropy.size());
       return;
     }
     if (source.emits()) emission = channel_bytes(Channel::emission, cells);
     if (source.moves()) velocity = channel_bytes(Channel::velocity, cells);
-    if (source.coloured()) colour = channel_bytes(Channel::colour, cells);
+    if (source.colored()) color = channel_bytes(Channel::color, cells);
     if (source.anisotropic()) anisotropy = channel_bytes(Channel::anisotropy, cells);
   }
-  std::size_t emission = 0, glow = 0, velocity = 0, change = 0, colour = 0, anisotropy = 0;
-  [[nodiscard]] std::size_t glow_at() const { return emission; }
-  [[nodiscard]] std::size_t velocity_at() const { return glow_at() + glow; }
+  std::size_t emission = 0, emissive = 0, velocity = 0, change = 0, color = 0, anisotropy = 0;
+  [[nodiscard]] std::size_t emissive_at() const { return emission; }
+  [[nodiscard]] std::size_t velocity_at() const { return emissive_at() + emissive; }
   [[nodiscard]] std::size_t change_at() const { return velocity_at() + velocity; }
-  [[nodiscard]] std::size_t colour_at() const { return change_at() + change; }
-  [[nodiscard]] std::size_t anisotropy_at() const { return colour_at() + colour; }
+  [[nodiscard]] std::size_t color_at() const { return change_at() + change; }
+  [[nodiscard]] std::size_t anisotropy_at() const { return color_at() + color; }
   // Rounded up to whole texels.
   [[nodiscard]] std::size_t all() const { return (anisotropy_at() + anisotropy + 15) / 16 * 16; }
 };
@@ -142,9 +142,9 @@ const MarchData::Cells* MarchData::cells(const scene::MarchSource& source) const
   return part == nullptr ? nullptr : &part->cells;
 }
 
-const scene::GlowSum* MarchData::glow(const scene::MarchSource& source) const {
+const scene::EmissiveSum* MarchData::emissive(const scene::MarchSource& source) const {
   const Part* part = part_of(source);
-  return part == nullptr ? nullptr : &part->glow;
+  return part == nullptr ? nullptr : &part->emissive;
 }
 
 const MarchData::Part* MarchData::part_of(const scene::MarchSource& source) const {
@@ -200,15 +200,15 @@ void MarchUpload::describe(MarchData::Part& part) const {
   if (source.grid) {
     part.cells = {source.grid->cells.size(), source.grid->limited};
     part.inner = source.grid->tree.size();
-    part.glow = source.glow;
-    part.glowing = source.glow.cells.size();
+    part.emissive = source.emissive;
+    part.glowing = source.emissive.cells.size();
   }
   if (!source.plan) return;
   if (const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(source)) {
     part.grid = old->grid;
     part.cells = old->cells;
     part.inner = old->inner;
-    part.glow = old->glow;
+    part.emissive = old->emissive;
     part.glowing = old->glowing;
     return;
   }
@@ -218,16 +218,16 @@ void MarchUpload::describe(MarchData::Part& part) const {
   part.grid.levels = made.levels;
   part.cells = {made.count, made.limited, made.grid ? std::optional(made.why_not) : std::nullopt};
   part.inner = made.count - 24;  // each split adds one cell
-  part.glow = made.glow;
-  part.glowing = made.glow.cells.size();
+  part.emissive = made.emissive;
+  part.glowing = made.emissive.cells.size();
 }
 
 const grid::TetGrid* MarchUpload::grid_of(const MarchData::Part& part) const {
   return part.source->plan ? built_->at(part.source).grid.get() : part.source->grid.get();
 }
 
-const scene::GlowTable& MarchUpload::glow_of(const MarchData::Part& part) const {
-  return part.source->plan ? built_->at(part.source).glow : part.source->glow;
+const scene::EmissiveTable& MarchUpload::emissive_of(const MarchData::Part& part) const {
+  return part.source->plan ? built_->at(part.source).emissive : part.source->emissive;
 }
 
 void MarchUpload::add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes) {
@@ -326,10 +326,10 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
       const std::size_t first = data_.channels_.offset() + part.channels;
       part.grid.first_emission = static_cast<std::uint32_t>(first / 16);
-      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.glow_at()) / 16);
+      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive_at()) / 16);
       part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.velocity_at()) / 4);
       part.grid.first_change = static_cast<std::uint32_t>((first + channels.change_at()) / 4);
-      part.grid.first_colour = static_cast<std::uint32_t>((first + channels.colour_at()) / 4);
+      part.grid.first_color = static_cast<std::uint32_t>((first + channels.color_at()) / 4);
       part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.anisotropy_at()) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.glowing);
     }
@@ -349,7 +349,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       add_copy(place_at(0), from, channels.all());
       continue;
     }
-    upload_.add_bytes(place_at(channels.glow_at()), glow_of(part).cells.data(), channels.glow);
+    upload_.add_bytes(place_at(channels.emissive_at()), emissive_of(part).cells.data(), channels.emissive);
     const grid::TetGrid* grid = grid_of(part);
     if (grid == nullptr) {
       const BuiltGrid& made = built_->at(part.source);
@@ -365,14 +365,14 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       using grid::Channel;
       add(Channel::emission, 0, channels.emission);
       add(Channel::velocity, channels.velocity_at(), channels.velocity);
-      add(Channel::colour, channels.colour_at(), channels.colour);
+      add(Channel::color, channels.color_at(), channels.color);
       add(Channel::anisotropy, channels.anisotropy_at(), channels.anisotropy);
       continue;
     }
     upload_.add_bytes(place_at(0), grid->emission.data(), channels.emission);
     upload_.add_bytes(place_at(channels.velocity_at()), grid->velocity.data(), channels.velocity);
     upload_.add_bytes(place_at(channels.change_at()), grid->change.data(), channels.change);
-    upload_.add_bytes(place_at(channels.colour_at()), grid->colour.data(), channels.colour);
+    upload_.add_bytes(place_at(channels.color_at()), grid->color.data(), channels.color);
     upload_.add_bytes(place_at(channels.anisotropy_at()), grid->anisotropy.data(), channels.anisotropy);
   }
 }

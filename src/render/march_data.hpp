@@ -46,7 +46,7 @@ class MarchData {
   /// Null: it is not uploaded. O(grids).
   [[nodiscard]] const Cells* cells(const scene::MarchSource& source) const;
   /// Null: it is not uploaded. O(grids).
-  [[nodiscard]] const scene::GlowSum* glow(const scene::MarchSource& source) const;
+  [[nodiscard]] const scene::EmissiveSum* emissive(const scene::MarchSource& source) const;
 
  private:
   friend class MarchUpload;
@@ -55,7 +55,7 @@ class MarchData {
     scene::MarchSourcePtr source;
     core::CmGrid grid{};
     Cells cells;
-    scene::GlowSum glow;
+    scene::EmissiveSum emissive;
     std::size_t glowing = 0;   // emissive cells in the table
     std::size_t inner = 0;     // inner nodes of its tree
     std::size_t cell = 0;      // first cell, among those of all grids
@@ -117,7 +117,7 @@ class MarchUpload {
   void describe(MarchData::Part& part) const;
   // Returns the grid in main memory; null: it was built on the GPU, or is copied from `before`.
   [[nodiscard]] const grid::TetGrid* grid_of(const MarchData::Part& part) const;
-  [[nodiscard]] const scene::GlowTable& glow_of(const MarchData::Part& part) const;
+  [[nodiscard]] const scene::EmissiveTable& emissive_of(const MarchData::Part& part) const;
   void plan_tets(gl::WordHeap& heap, std::int64_t page_texels);
   void plan_cells(gl::WordHeap& heap, std::int64_t texels);
   void plan_channels(gl::WordHeap& heap, std::int64_t texels);

@@ -114,7 +114,7 @@ void ModelData::add_common(std::uint32_t first) {
   ggx_albedo_averages_ = here();
   common_.insert(common_.end(), averages.begin(), averages.end());
   sheen_albedo_ = here();
-  if (std::ranges::none_of(parts_, [](const Part& part) { return part.source->rich; })) return;
+  if (std::ranges::none_of(parts_, [](const Part& part) { return part.source->extended_bsdf; })) return;
   const std::vector<glm::uvec4> sheen = surface::SheenAlbedo::table().words();
   common_.insert(common_.end(), sheen.begin(), sheen.end());
 }
@@ -153,8 +153,8 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
   placed.tables_.ggx_albedo = data->ggx_albedo();
   placed.tables_.ggx_albedo_averages = data->ggx_albedo_averages();
   placed.tables_.sheen_albedo = data->sheen_albedo();
-  placed.tables_.rich =
-      std::ranges::any_of(models, [](const scene::Model& model) { return model.source->rich; }) ? 1U : 0U;
+  placed.tables_.extended_bsdf =
+      std::ranges::any_of(models, [](const scene::Model& model) { return model.source->extended_bsdf; }) ? 1U : 0U;
   placed.bytes_ = record_bytes + node_bytes;
   Numbering numbering;
   for (const scene::ModelPart& part : table.parts)
@@ -162,7 +162,7 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
                            models[part.model].source->meshes[part.mesh].first_triangle);
   // Paths inside transmissive objects store the object's material as a word offset in the data.
   const bool lasts = last != nullptr && *last->numbering_ == numbering &&
-                     (last->data_ == data || (placed.tables_.rich | last->tables_.rich) == 0U);
+                     (last->data_ == data || (placed.tables_.extended_bsdf | last->tables_.extended_bsdf) == 0U);
   placed.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
   placed.models_ = std::move(models);
   placed.data_ = std::move(data);

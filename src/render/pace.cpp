@@ -20,7 +20,7 @@ constexpr double close_ms = 0.3;
 // Fallback for drivers that show marks no earlier than fences.
 constexpr double patience_ms = 200.0;
 // Maximum growth of the estimate by two dispatches.
-constexpr double most_growth = 4.0;
+constexpr double max_growth = 4.0;
 // The most expensive rounds take about three times as long as the cheapest in which all lanes traverse cells. Longer
 // times are caused by other processes.
 constexpr double spread = 4.0;
@@ -40,7 +40,7 @@ std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std:
     const Block& block = blocks[index];
     if (block.unfinished == 0 || block.under_way != under_way) continue;
     const double lanes = what.lanes + block.unfinished;
-    const double slots = what.slots + std::ceil(block.unfinished / lanes_a_slot);
+    const double slots = what.slots + std::ceil(block.unfinished / lanes_per_slot);
     const auto ms = what.cost->most(slots, free);
     if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > what.aim_ms)) break;
     what.blocks.push_back(static_cast<std::uint32_t>(index));
@@ -52,7 +52,7 @@ std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std:
 }
 
 std::optional<Dispatched> choose_for(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
-                                     double aim_ms, std::uint32_t most_rounds, bool least) {
+                                     double aim_ms, std::uint32_t max_rounds, bool least) {
   Dispatched what;
   what.cost = cost;
   what.aim_ms = aim_ms;
@@ -60,11 +60,11 @@ std::optional<Dispatched> choose_for(const Blocks& blocks, std::size_t from, con
   // too small.
   auto round_ms = choose_blocks(blocks, from, 0, least, what);
   if (what.blocks.empty()) round_ms = choose_blocks(blocks, from, 1, least, what);
-  if (what.blocks.empty() || (!least && round_ms.value_or(least_ms) > aim_ms)) return std::nullopt;
+  if (what.blocks.empty() || (!least && round_ms.value_or(min_ms) > aim_ms)) return std::nullopt;
   what.rounds = first_rounds;
   if (round_ms) {
-    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *round_ms, 1.0, double(most_rounds)));
-    what.most_ms = *round_ms * what.rounds;
+    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *round_ms, 1.0, double(max_rounds)));
+    what.max_ms = *round_ms * what.rounds;
   }
   return what;
 }
@@ -72,13 +72,13 @@ std::optional<Dispatched> choose_for(const Blocks& blocks, std::size_t from, con
 }  // namespace
 
 std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
-                                 double aim_ms, std::uint32_t most_rounds) {
-  return choose_for(blocks, from, cost, aim_ms, most_rounds, false);
+                                 double aim_ms, std::uint32_t max_rounds) {
+  return choose_for(blocks, from, cost, aim_ms, max_rounds, false);
 }
 
-std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
-                                       std::uint32_t most_rounds) {
-  return choose_for(blocks, from, cost, least_ms, most_rounds, true);
+std::optional<Dispatched> choose_minimum(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
+                                         std::uint32_t max_rounds) {
+  return choose_for(blocks, from, cost, min_ms, max_rounds, true);
 }
 
 void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds) {
@@ -125,7 +125,7 @@ void RoundCost::learn(double slots, double low_ms, double high_ms) {
   const double ratio = before ? low_ms / *before : 0.0;
   const double sure = std::min(ratio, std::exchange(last_ratio_, ratio));
   if (!(sure > 1.0)) return;
-  low_ms = std::min(sure, most_growth) * *before;
+  low_ms = std::min(sure, max_growth) * *before;
   for (Known& known : known_) {
     if (known.slots > 0.0) known.ms = std::max(known.ms, low_ms * std::min(1.0, known.slots / slots));
   }
@@ -135,10 +135,10 @@ void Reserve::learn(double budget_ms, double taken_ms) {
   constexpr double late_at = 1.15;
   constexpr double may_be_late = 0.05;
   constexpr double step = 0.2;
-  constexpr double most_part = 0.5;
-  if (taken_ms > (1.0 + most_part) * budget_ms) return;
+  constexpr double max_part = 0.5;
+  if (taken_ms > (1.0 + max_part) * budget_ms) return;
   const bool late = taken_ms > late_at * budget_ms;
-  part_ = std::clamp(part_ + step * ((late ? 1.0 : 0.0) - may_be_late), 0.0, most_part);
+  part_ = std::clamp(part_ + step * ((late ? 1.0 : 0.0) - may_be_late), 0.0, max_part);
 }
 
 ErrorSums& ErrorSums::operator+=(const ErrorSums& other) {
@@ -153,28 +153,28 @@ std::optional<double> ErrorSums::noise() const {
   return brightness > 0.0 ? std::sqrt(squared * pixels) / brightness : 0.0;
 }
 
-void Flights::leave(Mark mark) {
+void InFlightDispatches::leave(Mark mark) {
   gl_->ClearNamedBufferSubData(ring_.name(), GL_R32UI, static_cast<GLintptr>(mark_at(next_, mark)), 4, GL_RED_INTEGER,
                                GL_UNSIGNED_INT, &next_.serial);
 }
 
-bool Flights::left(const Flight& flight, Mark mark) const {
+bool InFlightDispatches::left(const InFlightDispatch& pending, Mark mark) const {
   // The device may write it at any time.
-  const auto* word = reinterpret_cast<const volatile std::uint32_t*>(ring_.data() + mark_at(flight, mark));
-  return *word == flight.serial;
+  const auto* word = reinterpret_cast<const volatile std::uint32_t*>(ring_.data() + mark_at(pending, mark));
+  return *word == pending.serial;
 }
 
-bool Flights::has_begun(const Flight& flight) const {
-  return gl_->dispatches_in_call ? flight.before.passed() : left(flight, Mark::begun);
+bool InFlightDispatches::has_begun(const InFlightDispatch& pending) const {
+  return gl_->dispatches_in_call ? pending.before.passed() : left(pending, Mark::begun);
 }
 
-bool Flights::is_over(Flight& flight, Clock::time_point now) const {
-  if (!left(flight, Mark::over) && milliseconds(now - flight.asked) < patience_ms) return false;
-  flight.asked = now;
-  return flight.after.passed();
+bool InFlightDispatches::is_over(InFlightDispatch& pending, Clock::time_point now) const {
+  if (!left(pending, Mark::over) && milliseconds(now - pending.asked) < patience_ms) return false;
+  pending.asked = now;
+  return pending.after.passed();
 }
 
-void Flights::begin(Kind kind) {
+void InFlightDispatches::begin(Kind kind) {
   if (!ring_) ring_ = gl::ReadBack(gl_, (most + 1) * place_bytes, "creating the counters' ring");
   next_ = {};
   next_.place = next_place_;
@@ -182,7 +182,7 @@ void Flights::begin(Kind kind) {
   next_.serial = ++serial_;
   next_.in_call = kind == Kind::dispatch && gl_->dispatches_in_call;
   if (!next_.in_call) {
-    if (gl_->dispatches_in_call && flying_.empty()) next_.before = gl::Fence(gl_);
+    if (gl_->dispatches_in_call && in_flight_.empty()) next_.before = gl::Fence(gl_);
     leave(Mark::begun);
     if (timers_ && !gl_->dispatches_in_call) {
       // The queries are created per dispatch, because contexts do not share queries.
@@ -193,7 +193,7 @@ void Flights::begin(Kind kind) {
   next_.sent = next_.asked = next_.looked = Clock::now();
 }
 
-void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
+void InFlightDispatches::end(Dispatched what, GLuint buffer, std::size_t words) {
   if (next_.in_call) next_.in_call_ms = milliseconds(Clock::now() - next_.sent);
   next_.what = std::move(what);
   next_.words = words;
@@ -216,18 +216,18 @@ void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
     leave(Mark::over);
     next_.after = gl::Fence(gl_);
   }
-  flying_.push_back(std::move(next_));
+  in_flight_.push_back(std::move(next_));
 }
 
-void Flights::give_up() {
+void InFlightDispatches::give_up() {
   if (queries_[0] != 0) gl_->DeleteQueries(2, queries_.data());
   queries_ = {};
   next_place_ = next_.place;
 }
 
-std::optional<Flights::Landed> Flights::land() {
-  if (flying_.empty()) return std::nullopt;
-  Flight& first = flying_.front();
+std::optional<InFlightDispatches::Completed> InFlightDispatches::take_completed() {
+  if (in_flight_.empty()) return std::nullopt;
+  InFlightDispatch& first = in_flight_.front();
   const auto now = Clock::now();
   const bool close = milliseconds(now - first.looked) < close_ms;
   if (!first.in_call && first.waits && has_begun(first)) {
@@ -238,81 +238,81 @@ std::optional<Flights::Landed> Flights::land() {
     first.looked = now;
     return std::nullopt;
   }
-  Landed landed;
-  landed.ms = first.in_call_ms;
-  landed.at_most_ms = milliseconds(now - first.sent);
+  Completed completed;
+  completed.ms = first.in_call_ms;
+  completed.at_most_ms = milliseconds(now - first.sent);
   if (first.timed) {
     std::array<std::uint64_t, 2> times{};
     std::memcpy(times.data(), ring_.data() + times_at(first), sizeof(times));
     timers_ = times[1] > times[0];
-    if (timers_) landed.ms = 1e-6 * static_cast<double>(times[1] - times[0]);
+    if (timers_) completed.ms = 1e-6 * static_cast<double>(times[1] - times[0]);
   }
-  if (!landed.ms && first.began && close) landed.ms = milliseconds(now - *first.began);
-  landed.words.resize(first.words);
-  if (first.words > 0) std::memcpy(landed.words.data(), ring_.data() + first.place * place_bytes, first.words * 16);
-  landed.what = std::move(first.what);
-  if (landed.ms && landed.what.most_ms > 0.0) {
-    likely_ += 0.1 * (std::clamp(*landed.ms / landed.what.most_ms, 0.05, 1.0) - likely_);
+  if (!completed.ms && first.began && close) completed.ms = milliseconds(now - *first.began);
+  completed.words.resize(first.words);
+  if (first.words > 0) std::memcpy(completed.words.data(), ring_.data() + first.place * place_bytes, first.words * 16);
+  completed.what = std::move(first.what);
+  if (completed.ms && completed.what.max_ms > 0.0) {
+    likely_ += 0.1 * (std::clamp(*completed.ms / completed.what.max_ms, 0.05, 1.0) - likely_);
   }
-  flying_.pop_front();
-  if (!flying_.empty()) {
-    Flight& next = flying_.front();
+  in_flight_.pop_front();
+  if (!in_flight_.empty()) {
+    InFlightDispatch& next = in_flight_.front();
     next.waits = false;
     next.looked = now;
     if (close) next.began = now;
   }
-  return landed;
+  return completed;
 }
 
-void Flights::finish() const {
-  if (!flying_.empty()) flying_.back().after.wait();
+void InFlightDispatches::finish() const {
+  if (!in_flight_.empty()) in_flight_.back().after.wait();
 }
 
-void Flights::order() const {
-  if (!flying_.empty()) flying_.back().after.order();
+void InFlightDispatches::order() const {
+  if (!in_flight_.empty()) in_flight_.back().after.order();
 }
 
-double Flights::expected_ms() const {
+double InFlightDispatches::expected_ms() const {
   double sum = 0.0;
-  for (const Flight& flight : flying_) sum += flight.what.most_ms;
+  for (const InFlightDispatch& pending : in_flight_) sum += pending.what.max_ms;
   return likely_ * sum;
 }
 
 void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
-void learn_rows(const Flights::Landed& landed) {
-  const double ms = landed.ms.value_or(landed.at_most_ms);
-  if (landed.what.cost) landed.what.cost->learn(landed.what.slots, landed.ms ? ms : 0.0, ms);
+void learn_rows(const InFlightDispatches::Completed& completed) {
+  const double ms = completed.ms.value_or(completed.at_most_ms);
+  if (completed.what.cost) completed.what.cost->learn(completed.what.slots, completed.ms ? ms : 0.0, ms);
 }
 
-void send_rows(Flights& flights, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size, std::uint32_t& row,
-               Clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
+void send_rows(InFlightDispatches& dispatches, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size,
+               std::uint32_t& row, Clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
                const std::function<void()>& collect) {
-  const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
-  const auto slots = [&](std::uint32_t rows) { return double(rows) * size.x / lanes_a_slot; };
+  const double aim = std::clamp(0.7 * milliseconds_until(deadline), min_ms, dispatch_ms);
+  const auto slots = [&](std::uint32_t rows) { return double(rows) * size.x / lanes_per_slot; };
   bool sent = false;
   while (row < size.y) {
-    const double left = part_of_rest * milliseconds_until(deadline) - flights.expected_ms();
-    const bool anyway = !sent && flights.empty();
-    const double most_ms = std::clamp(left, anyway ? least_ms : 0.0, aim);
+    const double left = part_of_rest * milliseconds_until(deadline) - dispatches.expected_ms();
+    const bool anyway = !sent && dispatches.empty();
+    const double max_ms = std::clamp(left, anyway ? min_ms : 0.0, aim);
     const auto fits = [&](std::uint32_t rows) {
       const auto ms = cost->most(slots(rows));
-      return ms && *ms <= most_ms;
+      return ms && *ms <= max_ms;
     };
     std::uint32_t height = 8;
     while (height < size.y && fits(2 * height)) height *= 2;
-    if (!flights.full() && (anyway || fits(height) || !cost->most(1.0))) {
+    if (!dispatches.full() && (anyway || fits(height) || !cost->most(1.0))) {
       height = std::min(height, size.y - row);
       Dispatched what;
       what.slots = slots(height);
       what.cost = cost;
-      what.most_ms = cost->most(what.slots).value_or(0.0);
-      flights.begin(Flights::Kind::dispatch);
+      what.max_ms = cost->most(what.slots).value_or(0.0);
+      dispatches.begin(InFlightDispatches::Kind::dispatch);
       send({row, row + height});
-      flights.end(std::move(what), 0, 0);
+      dispatches.end(std::move(what), 0, 0);
       row += height;
       sent = true;
-    } else if (flights.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) {
+    } else if (dispatches.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) {
       break;
     } else {
       pass_time();

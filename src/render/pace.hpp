@@ -58,7 +58,7 @@ struct Block {
   std::uint32_t empty = 0;       // lanes of these whose pixel has no sample
   std::uint32_t under_way = 0;   // dispatches in flight
   bool begins = true;
-  std::uint32_t turn = 0;  // list index: CM_TURN of glsl/path_blocks.glsl
+  std::uint32_t list = 0;  // list index: CM_LIST_BIT of glsl/path_blocks.glsl
 };
 using Blocks = std::vector<Block>;
 
@@ -101,29 +101,30 @@ struct Dispatched {
   std::vector<std::uint32_t> blocks;
   std::uint32_t rounds = 1;
   double lanes = 0.0;  // lanes that had work
-  double slots = 0.0;  // groups of lanes_a_slot lanes
+  double slots = 0.0;  // groups of lanes_per_slot lanes
   std::shared_ptr<RoundCost> cost;
   double aim_ms = 0.0;
-  double most_ms = 0.0;
+  double max_ms = 0.0;
 };
 
 /// A slot: this many lanes cost about as much as one.
-constexpr double lanes_a_slot = 8.0;
+constexpr double lanes_per_slot = 8.0;
 /// Minimum GPU time per frame for any budget, so that there is progress.
-constexpr double least_ms = 1.0;
+constexpr double min_ms = 1.0;
 /// Maximum time of a dispatch: well below any driver's watchdog, well above its overhead.
 constexpr double dispatch_ms = 500.0;
 /// Fraction of the remaining time that a dispatch may be estimated to take.
 constexpr double part_of_rest = 0.9;
 
-/// Chooses blocks of a tile, from block `from` on, and the number of rounds (at most most_rounds) for a dispatch of
+/// Chooses blocks of a tile, from block `from` on, and the number of rounds (at most max_rounds) for a dispatch of
 /// aim_ms. Returns nullopt if one round would take longer.
 [[nodiscard]] std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from,
                                                const std::shared_ptr<RoundCost>& cost, double aim_ms,
-                                               std::uint32_t most_rounds);
-/// Chooses a dispatch of least_ms, with at least one round of one block even if that takes longer.
-[[nodiscard]] std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from,
-                                                     const std::shared_ptr<RoundCost>& cost, std::uint32_t most_rounds);
+                                               std::uint32_t max_rounds);
+/// Chooses a dispatch of min_ms, with at least one round of one block even if that takes longer.
+[[nodiscard]] std::optional<Dispatched> choose_minimum(const Blocks& blocks, std::size_t from,
+                                                       const std::shared_ptr<RoundCost>& cost,
+                                                       std::uint32_t max_rounds);
 /// Updates the cost estimate with a finished dispatch. ms: GPU time, if known; at_most_ms: its upper bound.
 /// full_rounds: number of rounds that all lanes together traversed cells in.
 void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds);
@@ -140,15 +141,15 @@ struct DispatchRecord {
 
 /// In-flight dispatches: reads back their results, and measures their time on the device without other work that the
 /// host has queued. Only finish() waits. If a driver runs dispatches within the call, none are in flight.
-class Flights {
+class InFlightDispatches {
  public:
   static constexpr std::size_t most = 3;
-  static constexpr std::size_t most_words = 16384;  // maximum result size in uvec4: one per block of a tile
+  static constexpr std::size_t max_words = 16384;  // maximum result size in uvec4: one per block of a tile
 
-  explicit Flights(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  explicit InFlightDispatches(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
   enum class Kind { dispatch, draws };
-  struct Landed {
+  struct Completed {
     Dispatched what;
     std::vector<glm::uvec4> words;
     /// GPU time. nullopt: unknown, but no more than at_most_ms, which includes all that the host had queued.
@@ -163,20 +164,20 @@ class Flights {
   /// Call it instead of end() if the dispatch failed.
   void give_up();
   /// Returns the oldest dispatch if it is finished. Never waits.
-  std::optional<Landed> land();
+  std::optional<Completed> take_completed();
   /// Waits until all are finished; land() returns them.
   void finish() const;
   /// Makes later commands of this context run after the dispatches, whichever context sent them.
   void order() const;
 
-  [[nodiscard]] bool empty() const { return flying_.empty(); }
-  [[nodiscard]] bool full() const { return flying_.size() >= most; }
+  [[nodiscard]] bool empty() const { return in_flight_.empty(); }
+  [[nodiscard]] bool full() const { return in_flight_.size() >= most; }
   /// Estimated time of the in-flight dispatches, in milliseconds.
   [[nodiscard]] double expected_ms() const;
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Flight {
+  struct InFlightDispatch {
     Dispatched what;
     std::size_t words = 0;
     std::size_t place = 0;
@@ -197,26 +198,26 @@ class Flights {
   // fence is queried. (Drivers that run dispatches within the call also write marks at once, before queued work; fences
   // are used there.)
   static constexpr std::size_t times_bytes = 16;
-  static constexpr std::size_t place_bytes = most_words * 16 + times_bytes + 16;
+  static constexpr std::size_t place_bytes = max_words * 16 + times_bytes + 16;
   enum class Mark : std::size_t { begun = 0, over = 1 };
-  [[nodiscard]] static std::size_t times_at(const Flight& flight) {
-    return flight.place * place_bytes + most_words * 16;
+  [[nodiscard]] static std::size_t times_at(const InFlightDispatch& pending) {
+    return pending.place * place_bytes + max_words * 16;
   }
-  [[nodiscard]] static std::size_t mark_at(const Flight& flight, Mark mark) {
-    return times_at(flight) + times_bytes + 4 * static_cast<std::size_t>(mark);
+  [[nodiscard]] static std::size_t mark_at(const InFlightDispatch& pending, Mark mark) {
+    return times_at(pending) + times_bytes + 4 * static_cast<std::size_t>(mark);
   }
   void leave(Mark mark);
-  [[nodiscard]] bool left(const Flight& flight, Mark mark) const;
-  [[nodiscard]] bool has_begun(const Flight& flight) const;
-  [[nodiscard]] bool is_over(Flight& flight, Clock::time_point now) const;
+  [[nodiscard]] bool left(const InFlightDispatch& pending, Mark mark) const;
+  [[nodiscard]] bool has_begun(const InFlightDispatch& pending) const;
+  [[nodiscard]] bool is_over(InFlightDispatch& pending, Clock::time_point now) const;
 
   gl::FunctionsPtr gl_;
   gl::ReadBack ring_;
   std::size_t next_place_ = 0;
   std::uint32_t serial_ = 0;  // of the newest; the value of its marks
-  std::deque<Flight> flying_;
+  std::deque<InFlightDispatch> in_flight_;
   std::array<GLuint, 2> queries_{};
-  Flight next_;
+  InFlightDispatch next_;
   bool timers_ = true;   // timestamp queries work
   double likely_ = 0.5;  // mean actual time over the estimated maximum
 };
@@ -225,12 +226,12 @@ class Flights {
 void pass_time();
 
 /// Updates the cost estimate, if there is one, with a finished dispatch of rows.
-void learn_rows(const Flights::Landed& landed);
+void learn_rows(const InFlightDispatches::Completed& completed);
 /// Dispatches the remaining rows, from `row` on, until all are sent or about the deadline. Each pixel costs one round.
 /// Later GL commands run after them. send: receives the first row and the end of a range, and dispatches it. collect:
 /// takes finished dispatches and updates the cost.
-void send_rows(Flights& flights, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size, std::uint32_t& row,
-               std::chrono::steady_clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
-               const std::function<void()>& collect);
+void send_rows(InFlightDispatches& dispatches, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size,
+               std::uint32_t& row, std::chrono::steady_clock::time_point deadline,
+               const std::function<void(glm::uvec2 rows)>& send, const std::function<void()>& collect);
 
 }  // namespace cumulet::render

@@ -9,7 +9,7 @@ struct PictureParameters {
   core::CmView view{};
   core::CmSpace space{};
   core::CmGrid grid{};
-  core::CmGlow glow{};
+  core::CmEmissive emissive{};
   core::CmMedium medium{};
   core::CmLights lights{};
   core::CmEnvironment environment{};

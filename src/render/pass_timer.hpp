@@ -20,43 +20,44 @@ struct PassSeconds {
 /// Times passes on the GPU as Flights times dispatches, without waiting. A pass is not timed if too many are in flight.
 class PassTimer {
  public:
-  explicit PassTimer(gl::FunctionsPtr gl) : flights_(std::move(gl)) {}
+  explicit PassTimer(gl::FunctionsPtr gl) : dispatches_in_flight_(std::move(gl)) {}
 
   /// Runs the pass. Throws its errors, and once Error(out_of_memory) if there is no memory for timing.
   template <class Pass>
   void run(Pass&& pass) {
-    while (const auto landed = flights_.land()) seconds_ += 1e-3 * landed->ms.value_or(0.0);
-    if (!times_ || flights_.full()) {
+    while (const auto completed = dispatches_in_flight_.take_completed())
+      seconds_ += 1e-3 * completed->ms.value_or(0.0);
+    if (!times_ || dispatches_in_flight_.full()) {
       pass();
       return;
     }
     try {
-      flights_.begin(Flights::Kind::dispatch);
+      dispatches_in_flight_.begin(InFlightDispatches::Kind::dispatch);
     } catch (const Error&) {  // no memory for timing: reported once, so that the pass can use the memory
       times_ = false;
       pass();
       throw;
     }
     struct End {
-      Flights& flights;
-      explicit End(Flights& of) : flights(of) {}
+      InFlightDispatches& dispatches;
+      explicit End(InFlightDispatches& of) : dispatches(of) {}
       End(const End&) = delete;
       End& operator=(const End&) = delete;
       ~End() {
         try {
-          flights.end({}, 0, 0);
+          dispatches.end({}, 0, 0);
         } catch (const std::exception&) {  // no memory to record the pass: it is not timed
-          flights.finish();
+          dispatches.finish();
         }
       }
     };
-    const End end(flights_);
+    const End end(dispatches_in_flight_);
     pass();
   }
   [[nodiscard]] double seconds() const { return seconds_; }
 
  private:
-  Flights flights_;
+  InFlightDispatches dispatches_in_flight_;
   bool times_ = true;
   double seconds_ = 0.0;
 };

@@ -27,16 +27,16 @@ constexpr std::size_t lane_bytes(bool visits, bool within, std::uint32_t groups)
 
 // A head holds the arguments of glDispatchComputeIndirect and the number of waiting paths.
 constexpr std::size_t head_bytes = sizeof(glm::uvec4);
-constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MOST_ROUNDS + 1) * head_bytes;
+constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MAX_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // per lane
 
 // Offsets of cm_next_place and the fields after it, behind cm_total and cm_blocks.
-constexpr std::size_t next_place_at = (1 + CM_MOST_BLOCKS) * sizeof(glm::uvec4);
+constexpr std::size_t next_place_at = (1 + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
 constexpr std::size_t squares_at = next_place_at + sizeof(std::uint32_t);
-constexpr std::size_t rank_counts_at = squares_at + CM_MOST_SQUARES * sizeof(std::uint32_t);
-constexpr std::size_t rank_counts_bytes = std::size_t{CM_TURNS} * CM_MOST_BLOCKS * sizeof(std::uint32_t);
+constexpr std::size_t rank_counts_at = squares_at + CM_MAX_SQUARES * sizeof(std::uint32_t);
+constexpr std::size_t rank_counts_bytes = std::size_t{CM_LISTS} * CM_MAX_BLOCKS * sizeof(std::uint32_t);
 constexpr std::size_t blocks_bytes(std::size_t lanes) {
-  return rank_counts_at + rank_counts_bytes + CM_TURNS * lanes * sizeof(std::uint32_t);
+  return rank_counts_at + rank_counts_bytes + CM_LISTS * lanes * sizeof(std::uint32_t);
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t lanes,
   }
 }
 
-std::uint32_t PathKernels::most_rounds() { return CM_MOST_ROUNDS; }
+std::uint32_t PathKernels::max_rounds() { return CM_MAX_ROUNDS; }
 
 std::uint64_t PathKernels::bytes() const {
   return path_bytes_ + (blocks_ ? blocks_bytes(ranked_lanes_) : 0) +

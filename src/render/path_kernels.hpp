@@ -24,7 +24,7 @@ struct StagePrograms {
 class PathKernels {
  public:
   static constexpr std::uint32_t block_lanes = CM_BLOCK_LANES;
-  static constexpr std::uint32_t most_lanes = CM_BLOCK_LANES * CM_MOST_BLOCKS;
+  static constexpr std::uint32_t max_lanes = CM_BLOCK_LANES * CM_MAX_BLOCKS;
   static constexpr std::uint32_t begins_tile = CM_BEGINS;
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
@@ -47,7 +47,7 @@ class PathKernels {
   /// Runs rounds of the wavefront stages over the blocks.
   void run_stages(const StagePrograms& programs, std::uint32_t lanes, std::size_t blocks, std::uint32_t rounds) const;
   /// Maximum rounds of run_stages().
-  static std::uint32_t most_rounds();
+  static std::uint32_t max_rounds();
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:

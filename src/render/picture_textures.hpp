@@ -11,7 +11,7 @@
 
 namespace cumulet::render {
 
-/// Noise-free feature buffers (PixelFact) that guide the denoiser.
+/// Noise-free feature buffers (FeatureBuffer) that guide the denoiser.
 struct PictureGuides {
   GLuint albedo = 0;
   GLuint normal = 0;
@@ -54,7 +54,7 @@ struct PictureTextures {
   std::optional<std::uint64_t> revision{};
   const RowRevisions* rows = nullptr;     // when rows changed; null: unknown
   std::uint64_t picture = 0;              // changes with every picture that is started
-  std::uint64_t wish = 0;                 // request number: equal for pictures of the same content at any resolution
+  std::uint64_t request = 0;              // request number: equal for pictures of the same content at any resolution
   bool may_lag = false;                   // more samples are on their way, so an image of some frames ago may be drawn
   GLuint moments = 0;                     // r32f: means of samples' squared luminance, background included
   std::optional<PictureGuides> guides{};  // nullopt: the picture is not denoised

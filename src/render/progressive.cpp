@@ -18,7 +18,7 @@ constexpr std::uint32_t preview_samples = 16;
 // The last few samples of a coarse picture have the longest paths. The next picture does not wait for them.
 constexpr double nearly_all = 0.9;
 // Memory for the surface pass at full resolution: eight layers at 1080p.
-constexpr double most_layer_bytes = 256e6;
+constexpr double max_layer_bytes = 256e6;
 // Frames that the first picture after a change may take.
 constexpr double answer_frames = 2.0;
 // Feature rays per pixel that the denoiser starts with. More would take longer than samples of equal benefit.
@@ -39,14 +39,14 @@ std::uint32_t seed_of(const PictureParameters& parameters) {
   return hash;
 }
 
-std::shared_ptr<const void> scene_met(const Obstacles& obstacles) {
-  const PlacedModels* met = obstacles.met();
+std::shared_ptr<const void> scene_met(const TraceInputs& trace_inputs) {
+  const PlacedModels* met = trace_inputs.met();
   return met != nullptr ? met->numbering() : nullptr;
 }
 
 }  // namespace
 
-bool PictureWish::Content::shows_same(const Content& other) const {
+bool PictureRequest::Content::shows_same(const Content& other) const {
   Content seen = other;
   seen.viewpoint = viewpoint;
   seen.previous = previous;
@@ -64,21 +64,23 @@ bool PictureWish::Content::shows_same(const Content& other) const {
 }
 
 std::uint32_t Progressive::enough(std::uint32_t divisor) const {
-  const std::uint32_t wanted = wish_.content.view == View::shaded ? wish_.samples : 1;
+  const std::uint32_t wanted = request_.content.view == View::shaded ? request_.samples : 1;
   if (divisor <= finest_) return wanted;
   // A quarter of the work of one sample per pixel at full resolution.
   const std::uint32_t affordable = divisor / finest_ * (divisor / finest_) / 4;
   return std::clamp(std::min(affordable, preview_samples), 1U, wanted);
 }
 
-glm::uvec2 Progressive::size_of(std::uint32_t divisor) const { return (wish_.content.size + divisor - 1U) / divisor; }
+glm::uvec2 Progressive::size_of(std::uint32_t divisor) const {
+  return (request_.content.size + divisor - 1U) / divisor;
+}
 
 double Progressive::pixels_of(std::uint32_t divisor) const {
-  return static_cast<double>(wish_.content.region.pixels(size_of(divisor), margin_of(divisor)).area());
+  return static_cast<double>(request_.content.region.pixels(size_of(divisor), margin_of(divisor)).area());
 }
 
 unsigned Progressive::margin_of(std::uint32_t divisor) const {
-  return divisor > 1 && !wish_.content.region.is_whole() ? 1 : 0;
+  return divisor > 1 && !request_.content.region.is_whole() ? 1 : 0;
 }
 
 bool Progressive::is_enough() const {
@@ -88,7 +90,7 @@ bool Progressive::is_enough() const {
 }
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
-  if (!wish_.content.preview) return 1;
+  if (!request_.content.preview) return 1;
   const double pixels = pixels_of(1);
   std::uint32_t divisor = finest_;
   while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > answer_frames * answer_rate_ * budget_ms)
@@ -118,50 +120,51 @@ PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size,
   return settings;
 }
 
-PictureSettings Progressive::settings(std::uint32_t divisor, const Obstacles& obstacles, double budget_ms,
+PictureSettings Progressive::settings(std::uint32_t divisor, const TraceInputs& trace_inputs, double budget_ms,
                                       bool still) const {
-  const glm::uvec2 size = wish_.content.size;
+  const glm::uvec2 size = request_.content.size;
   PictureSettings settings;
-  if (obstacles.raster != nullptr && divisor > finest_) {
+  if (trace_inputs.raster != nullptr && divisor > finest_) {
     settings = quick_layers(tracer_, size, budget_ms, still);
-  } else if (obstacles.raster != nullptr && !obstacles.traced) {
+  } else if (trace_inputs.raster != nullptr && !trace_inputs.traced) {
     settings.layered = Layered::within;
     settings.layer_size = size;
-    const double layer_bytes = (obstacles.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
-    settings.layers = static_cast<unsigned>(std::clamp(most_layer_bytes / layer_bytes, 1.0, 8.0));
+    const double layer_bytes = (trace_inputs.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
+    settings.layers = static_cast<unsigned>(std::clamp(max_layer_bytes / layer_bytes, 1.0, 8.0));
   }
-  settings.view = wish_.content.view;
-  settings.hasty = wish_.content.preview;
-  settings.region = wish_.content.region;
+  settings.view = request_.content.view;
+  settings.previews_first = request_.content.preview;
+  settings.region = request_.content.region;
   settings.margin = margin_of(divisor);
-  settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
-  if (divisor == finest_) settings.light_groups = wish_.content.light_groups;
-  if (divisor == finest_) settings.noise_target = wish_.noise_target;
-  settings.adaptive = wish_.content.adaptive;
+  settings.volume_alone = request_.content.volume_alone && divisor == finest_;
+  if (divisor == finest_) settings.light_groups = request_.content.light_groups;
+  if (divisor == finest_) settings.noise_target = request_.noise_target;
+  settings.adaptive = request_.content.adaptive;
   return settings;
 }
 
 bool Progressive::blurs() const {
   return working_ && working_->picture->layered() == Layered::beneath &&
-         working_->picture->layers().size != wish_.content.size;
+         working_->picture->layers().size != request_.content.size;
 }
 
-bool Progressive::able(const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings) {
-  return tracer_.able(data, wish_.parameters, obstacles, settings);
+bool Progressive::able(const MarchData& data, const TraceInputs& trace_inputs, const PictureSettings& settings) {
+  return tracer_.able(data, request_.parameters, trace_inputs, settings);
 }
 
-void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles,
+void Progressive::start(std::uint32_t divisor, const MarchData& data, const TraceInputs& trace_inputs,
                         const PictureSettings& settings) {
-  PictureParameters parameters = wish_.parameters;
+  PictureParameters parameters = request_.parameters;
   parameters.view.size = size_of(divisor);
   // Without previews the read-back result must depend only on the settings.
-  if (wish_.guides && wish_.content.preview) parameters.integrator.seed = seed_of(parameters);
+  if (request_.guides && request_.content.preview) parameters.integrator.seed = seed_of(parameters);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
   try {
-    tracer_.begin(picture, data, parameters, enough(divisor), obstacles, settings);
+    tracer_.begin(picture, data, parameters, enough(divisor), trace_inputs, settings);
   } catch (const Error& error) {
-    const bool memory = error.code() == ErrorCode::out_of_memory && wish_.content.preview && divisor < coarsest_divisor;
+    const bool memory =
+        error.code() == ErrorCode::out_of_memory && request_.content.preview && divisor < coarsest_divisor;
     if (memory) {
       finest_ = divisor * 2;
     } else {
@@ -170,42 +173,42 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
     throw;
   }
   working_ = Work{&picture,
-                  wish_.content.data,
-                  wish_.content.instances,
+                  request_.content.data,
+                  request_.content.instances,
                   divisor,
-                  scene_met(obstacles),
-                  wish_.content.environment,
-                  wish_.frames,
-                  wishes_,
+                  scene_met(trace_inputs),
+                  request_.content.environment,
+                  request_.frames,
+                  requests_,
                   scenes_};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
 
 bool Progressive::needs_depth() const {
-  return wish_.depth && shown_ && !shown_->picture->film().has(film_layers::depth) &&
-         shown_->data == wish_.content.data && shown_->instances == wish_.content.instances;
+  return request_.depth && shown_ && !shown_->picture->film().has(film_layers::depth) &&
+         shown_->data == request_.content.data && shown_->instances == request_.content.instances;
 }
 
 std::uint32_t Progressive::guide_rays(const Work& work) const {
   const Picture& picture = *work.picture;
   // The factor keeps the time for feature rays below that for samples.
-  const bool rough = work.divisor > finest_ || !picture.has_facts();
-  const std::uint64_t more = rough ? 0 : 2 * picture.samples_a_pixel();
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guide_rays + more, most_fact_rays));
+  const bool rough = work.divisor > finest_ || !picture.has_features();
+  const std::uint64_t more = rough ? 0 : 2 * picture.samples_per_pixel();
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guide_rays + more, max_feature_rays));
 }
 
 bool Progressive::needs_guides(const Work& work) const {
-  return wish_.guides && wish_.content.view == View::shaded && work.data == wish_.content.data &&
-         work.instances == wish_.content.instances && no_guides_for_ != work.picture->size() &&
-         (!work.picture->has_facts() || work.picture->rays_of_facts() < guide_rays(work));
+  return request_.guides && request_.content.view == View::shaded && work.data == request_.content.data &&
+         work.instances == request_.content.instances && no_guides_for_ != work.picture->size() &&
+         (!work.picture->has_features() || work.picture->rays_of_features() < guide_rays(work));
 }
 
-void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
+void Progressive::find_guides(const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline) {
   if (!needs_guides(*working_)) return;
   try {
-    if (!tracer_.able_to_find(*working_->picture, data, obstacles)) return;
-    tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays(*working_));
+    if (!tracer_.able_to_find(*working_->picture, data, trace_inputs)) return;
+    tracer_.find_features(*working_->picture, data, trace_inputs, deadline, guide_rays(*working_));
   } catch (const Error& error) {
     // Pictures are also shown without guides if the driver does not build their program.
     if (error.code() != ErrorCode::out_of_memory && error.code() != ErrorCode::gl) throw;
@@ -214,42 +217,42 @@ void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles,
   }
 }
 
-void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
-  const PictureWish::Content& last = wish_.content;
-  const bool resized = wish.content.size != last.size;
-  const bool changed = state() == State::idle || wish.content != last;
-  stillness_.see(changed, wish.held, Clock::now());
+void Progressive::take(const PictureRequest& request, const TraceInputs& trace_inputs) {
+  const PictureRequest::Content& last = request_.content;
+  const bool resized = request.content.size != last.size;
+  const bool changed = state() == State::idle || request.content != last;
+  stillness_.see(changed, request.held, Clock::now());
   if (changed) {
-    ++wishes_;
-    if (!wish.content.shows_same(last)) ++scenes_;
-    const bool other_data = resized || wish.content.data != last.data;
+    ++requests_;
+    if (!request.content.shows_same(last)) ++scenes_;
+    const bool other_data = resized || request.content.data != last.data;
     if (other_data) finest_ = 1;
     // In-flight paths are invalid for other data or for another scene's triangles. The program in use may read an
     // environment that does not exist any more.
-    const bool other_scene =
-        working_ && (scene_met(obstacles) != working_->scene || wish.content.environment != working_->environment);
-    if (other_data || wish.content.preview != last.preview || other_scene) {
+    const bool other_scene = working_ && (scene_met(trace_inputs) != working_->scene ||
+                                          request.content.environment != working_->environment);
+    if (other_data || request.content.preview != last.preview || other_scene) {
       working_.reset();
     }
-    schedule_.change(working_ && wish.content.preview);
+    schedule_.change(working_ && request.content.preview);
   } else if (working_ && working_->divisor == finest_) {
     const std::optional<double> stops_at = working_->picture->noise_target();
-    const bool fewer = wish.samples < working_->picture->target_samples() ||
-                       (stops_at && wish.noise_target && *wish.noise_target > *stops_at) ||
-                       (working_->picture->is_adaptive() && wish.noise_target != stops_at);
-    if (!wish.content.preview && fewer) {
+    const bool fewer = request.samples < working_->picture->target_samples() ||
+                       (stops_at && request.noise_target && *request.noise_target > *stops_at) ||
+                       (working_->picture->is_adaptive() && request.noise_target != stops_at);
+    if (!request.content.preview && fewer) {
       schedule_.drop();
     } else {
-      working_->picture->extend(wish.samples, wish.noise_target);
+      working_->picture->extend(request.samples, request.noise_target);
       if (!working_->picture->done()) schedule_.extend();
     }
   }
-  wish_ = wish;
+  request_ = request;
 }
 
-void Progressive::advance(const PictureWish& wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                          double budget_ms) {
-  take(wish, obstacles);
+void Progressive::advance(const PictureRequest& request, const MarchData& data, const TraceInputs& trace_inputs,
+                          Deadline deadline, double budget_ms) {
+  take(request, trace_inputs);
   if (state() == State::failed) return;
   try {
     do {
@@ -257,20 +260,20 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
       if (blurs() && rests) schedule_.drop();
       if (state() == State::due) {
         first_divisor_ = coarsest(budget_ms);
-        const PictureSettings first = settings(first_divisor_, obstacles, budget_ms, rests);
-        const bool ready = able(data, obstacles, first);
+        const PictureSettings first = settings(first_divisor_, trace_inputs, budget_ms, rests);
+        const bool ready = able(data, trace_inputs, first);
         // The driver can compile the programs of the final picture meanwhile.
-        if (first_divisor_ > finest_) able(data, obstacles, settings(finest_, obstacles, budget_ms, true));
+        if (first_divisor_ > finest_) able(data, trace_inputs, settings(finest_, trace_inputs, budget_ms, true));
         if (!ready) return;
-        start(first_divisor_, data, obstacles, first);
+        start(first_divisor_, data, trace_inputs, first);
         schedule_.begin();
       } else if (state() == State::refining && working_->divisor > finest_ && is_enough()) {
         const std::uint32_t divisor = working_->divisor / 2;
-        const PictureSettings finer = settings(divisor, obstacles, budget_ms, true);
-        if (!able(data, obstacles, finer)) return;
-        start(divisor, data, obstacles, finer);
+        const PictureSettings finer = settings(divisor, trace_inputs, budget_ms, true);
+        if (!able(data, trace_inputs, finer)) return;
+        start(divisor, data, trace_inputs, finer);
       }
-      work(data, obstacles, deadline);
+      work(data, trace_inputs, deadline);
       // In state `due`, the loop ends so that the previous request's picture is shown first. The next one is started
       // for the newest request.
     } while (state() != State::done && state() != State::due && Clock::now() < deadline);
@@ -286,23 +289,23 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
   if (const auto failure = std::exchange(no_guides_, std::nullopt)) throw Error(*failure);
 }
 
-void Progressive::work(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
+void Progressive::work(const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline) {
   Picture& picture = *working_->picture;
   const auto begun = Clock::now();
   const bool was_complete = picture.complete();
-  find_guides(data, obstacles, deadline);
-  tracer_.trace(picture, data, obstacles, deadline, working_->divisor > finest_);
+  find_guides(data, trace_inputs, deadline);
+  tracer_.trace(picture, data, trace_inputs, deadline, working_->divisor > finest_);
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
   trace_seconds_ += seconds;
   if (!was_complete) answer_seconds_ += seconds;
   if (picture.complete()) {
-    if (!was_complete && wish_.content.view == View::shaded) {
+    if (!was_complete && request_.content.view == View::shaded) {
       const auto pixels = static_cast<double>(picture.box().area());
       answer_rate_ += 0.3 * (pixels / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
     }
     if (shown() != &picture) before_ = shown_ ? shown_->picture : nullptr;
     shown_ = working_;
-    if (needs_depth()) tracer_.trace_depth(picture, data, obstacles, deadline);
+    if (needs_depth()) tracer_.trace_depth(picture, data, trace_inputs, deadline);
   }
   follow();
 }
@@ -334,7 +337,7 @@ bool Progressive::more() const {
   }
 }
 
-bool Progressive::owes_picture() const {
+bool Progressive::has_pending_picture() const {
   return state() == State::due || state() == State::answering || state() == State::overtaken;
 }
 
@@ -359,7 +362,7 @@ void Progressive::settle() {
 }
 
 Picture& Progressive::accumulating() {
-  if (!working_ || wish_.content.preview || working_->divisor != 1 || working_->picture->view() != View::shaded) {
+  if (!working_ || request_.content.preview || working_->divisor != 1 || working_->picture->view() != View::shaded) {
     throw Error(ErrorCode::invalid_argument,
                 "there is no shaded picture under way without previews: set CUMULET_PREVIEW_OFF, and render");
   }

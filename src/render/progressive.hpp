@@ -17,7 +17,7 @@
 namespace cumulet::render {
 
 /// A request for a picture.
-struct PictureWish {
+struct PictureRequest {
   /// Inputs that samples depend on: if any changes, a new picture is started. Values are the newest ones. Data that are
   /// uploaded over several frames are identified by the revision that is on the GPU.
   struct Content {
@@ -26,7 +26,7 @@ struct PictureWish {
     scene::Part<std::optional<scene::ViewEnds>> view_ends;
     scene::Part<light::DistantLights> lights;
     scene::Part<light::Surroundings> surroundings;
-    scene::Part<light::Lamps> lamps;
+    scene::Part<light::AnalyticLights> analytic_lights;
     scene::Part<std::optional<scene::Ground>> ground;
     std::vector<scene::Volume> volumes;  // without sources and frames: `data` identifies the uploaded ones
     Revision<MarchData> data;
@@ -79,7 +79,7 @@ class Progressive {
 
   /// Processes the request until about the deadline. If a picture cannot be made, throws once. Later calls continue
   /// with the existing picture, or a coarser one.
-  void advance(const PictureWish& wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+  void advance(const PictureRequest& request, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                double budget_ms);
   /// Deletes all pictures.
   void reset();
@@ -87,7 +87,7 @@ class Progressive {
   /// The newest complete picture; null before the first.
   [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
   /// Number of the request for which the shown picture was started.
-  [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
+  [[nodiscard]] std::uint64_t shown_request() const { return shown_ ? shown_->request : 0; }
   /// Frames of sequences that the shown picture shows.
   [[nodiscard]] scene::SequenceFrames shown_frames() const { return shown_ ? shown_->frames : scene::SequenceFrames(); }
   /// Number of the scene of the shown picture; equal for all pictures of the same scene from any view.
@@ -110,15 +110,15 @@ class Progressive {
   }
   /// True if newest() has the scene's current view and previous-frame state.
   [[nodiscard]] bool newest_is_seen_as(const scene::Snapshot& scene) const {
-    return newest_work() && newest_work()->wish == wishes_ && wish_.content.viewpoint == scene.view &&
-           wish_.content.previous == scene.previous;
+    return newest_work() && newest_work()->request == requests_ && request_.content.viewpoint == scene.view &&
+           request_.content.previous == scene.previous;
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
   /// True if coarse pictures may come first, so that the result may depend on earlier pictures.
-  [[nodiscard]] bool previews() const { return wish_.content.preview; }
+  [[nodiscard]] bool previews() const { return request_.content.preview; }
   [[nodiscard]] bool converged() const;
   /// True if no picture of the request has been shown yet, but one will be.
-  [[nodiscard]] bool owes_picture() const;
+  [[nodiscard]] bool has_pending_picture() const;
   /// True if advance() has work left.
   [[nodiscard]] bool more() const;
   /// Fraction of the request's work that is done, 0 to 1. It does not decrease while the request is the same.
@@ -147,21 +147,22 @@ class Progressive {
     std::shared_ptr<const void> scene;      // PlacedModels::numbering() of the triangles that its paths hit
     Revision<EnvironmentData> environment;  // hit by paths that escape
     scene::SequenceFrames frames;
-    std::uint64_t wish = 0;    // number of its request
-    std::uint64_t scenes = 0;  // number of its scene
+    std::uint64_t request = 0;  // number of its request
+    std::uint64_t scenes = 0;   // number of its scene
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
-    return wish_.content.preview || !working_ ? shown_ : working_;
+    return request_.content.preview || !working_ ? shown_ : working_;
   }
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
-  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Obstacles& obstacles, double budget_ms,
+  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const TraceInputs& trace_inputs, double budget_ms,
                                          bool still) const;
   // True if the picture being rendered uses a coarser surface pass than pictures at rest do.
   [[nodiscard]] bool blurs() const;
   // Returns whether start() can begin. Until then the previous picture is shown.
-  bool able(const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
+  bool able(const MarchData& data, const TraceInputs& trace_inputs, const PictureSettings& settings);
   Picture& acquire(glm::uvec2 size);
-  void start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
+  void start(std::uint32_t divisor, const MarchData& data, const TraceInputs& trace_inputs,
+             const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;
   // Returns the number of feature rays that the picture's guides should have now. It grows with the samples, because
   // rough guides then lose more detail.
@@ -169,18 +170,18 @@ class Progressive {
   [[nodiscard]] bool needs_guides(const Work& work) const;
   // Renders the guides if they are due: before the samples, so that the first samples are denoised as soon as they are
   // shown.
-  void find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline);
+  void find_guides(const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline);
   // Accepts a request, and decides whether the picture being rendered can be kept for it.
-  void take(const PictureWish& wish, const Obstacles& obstacles);
+  void take(const PictureRequest& request, const TraceInputs& trace_inputs);
   // Continues the picture being rendered, and shows it once it is complete.
-  void work(const MarchData& data, const Obstacles& obstacles, Deadline deadline);
+  void work(const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline);
   // Updates the schedule with the state of the picture being rendered.
   void follow();
 
   Tracer tracer_;
   std::vector<std::unique_ptr<Picture>> pictures_;
-  PictureWish wish_;
-  std::uint64_t wishes_ = 0;
+  PictureRequest request_;
+  std::uint64_t requests_ = 0;
   std::uint64_t scenes_ = 0;
   std::optional<glm::uvec2> no_guides_for_;  // size of pictures without memory for guides
   std::optional<Error> no_guides_;           // error to be thrown by advance()

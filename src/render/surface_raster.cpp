@@ -11,20 +11,20 @@
 #include "base/corners.hpp"
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
-#include "light/lamps.hpp"
+#include "light/analytic_lights.hpp"
 #include "scene/model_table.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
-#include "gloss.glsl"
 #include "jitter.glsl"
+#include "prefiltered.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::render {
 
 namespace {
 
-using core::CmLamp;
+using core::CmAnalyticLight;
 using core::CmMaterial;
 using core::CmSurfaceView;
 using surface::AlphaMode;
@@ -229,7 +229,7 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
   if (input.pose->vertices.size() != input.scene->scene->attributes.size()) {
     throw Error(ErrorCode::internal, "a pose of another scene");
   }
-  if (static_cast<std::int64_t>(input.pose->lights.size() * sizeof(CmLamp)) > limits.storage_block_bytes) {
+  if (static_cast<std::int64_t>(input.pose->lights.size() * sizeof(CmAnalyticLight)) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(input.pose->lights.size()) +
                                             " lights are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
                                             std::to_string(limits.storage_block_bytes) + ", holds");
@@ -393,11 +393,11 @@ void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers
     depth_test_ = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, width, height, "creating the surfaces' depth test");
     depth_test_size_ = size;
   }
-  if (into.colour && size == into.size && layers == into.layers && blended == into.blended) return;
+  if (into.color && size == into.size && layers == into.layers && blended == into.blended) return;
   into = {};
   SurfaceLayers made;
   const auto depth = static_cast<int>(blended ? 2 * layers : layers);
-  made.colour = gl::make_texture_2d_array(gl_, GL_RGBA16F, width, height, depth, "creating the surfaces' colour");
+  made.color = gl::make_texture_2d_array(gl_, GL_RGBA16F, width, height, depth, "creating the surfaces' colour");
   made.z = gl::make_texture_2d_array(gl_, GL_R32F, width, height, depth, "creating the surfaces' depth");
   made.size = size;
   made.layers = layers;
@@ -422,33 +422,36 @@ void SurfaceRaster::make_fixtures() {
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   // The texture wraps around the horizon, and is clamped at the poles.
-  gloss_sampler_ = gl::make_sampler(gl_);
-  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_WRAP_S, GL_REPEAT);
-  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  prefiltered_sampler_ = gl::make_sampler(gl_);
+  gl_->SamplerParameteri(prefiltered_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl_->SamplerParameteri(prefiltered_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  gl_->SamplerParameteri(prefiltered_sampler_.name(), GL_TEXTURE_WRAP_S, GL_REPEAT);
+  gl_->SamplerParameteri(prefiltered_sampler_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   view_block_ = gl::make_buffer(gl_, sizeof(CmSurfaceView), nullptr, GL_DYNAMIC_STORAGE_BIT, what);
 }
 
 std::uint64_t SurfaceRaster::bytes() const {
   std::uint64_t bytes =
       light_bytes_ + place_bytes_ + sorted_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
-  if (gloss_) bytes += std::uint64_t{core::CM_GLOSS_WIDTH} * core::CM_GLOSS_HEIGHT * core::CM_GLOSS_LEVELS * 16;
+  if (prefiltered_)
+    bytes += std::uint64_t{core::CM_PREFILTERED_WIDTH} * core::CM_PREFILTERED_HEIGHT * core::CM_PREFILTERED_LEVELS * 16;
   if (!view_block_) return bytes;
   const std::uint64_t table = std::uint64_t(surface::GgxAlbedo::width()) * surface::GgxAlbedo::height() * 4;
   return bytes + 4 + table + sizeof(CmSurfaceView);
 }
 
-void SurfaceRaster::upload_gloss(const light::GlossPtr& gloss) {
-  constexpr int width = core::CM_GLOSS_WIDTH;
-  constexpr int height = core::CM_GLOSS_HEIGHT;
-  constexpr int levels = core::CM_GLOSS_LEVELS;
-  if (!gloss_)
-    gloss_ = gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
+void SurfaceRaster::upload_prefiltered(const light::PrefilteredEnvironmentPtr& prefiltered) {
+  constexpr int width = core::CM_PREFILTERED_WIDTH;
+  constexpr int height = core::CM_PREFILTERED_HEIGHT;
+  constexpr int levels = core::CM_PREFILTERED_LEVELS;
+  if (!prefiltered_)
+    prefiltered_ =
+        gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
   // Without gloss the shader does not read it.
-  if (!gloss || uploaded_gloss_ == gloss) return;
-  gl_->TextureSubImage3D(gloss_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT, gloss->data());
-  uploaded_gloss_ = gloss;
+  if (!prefiltered || uploaded_prefiltered_ == prefiltered) return;
+  gl_->TextureSubImage3D(prefiltered_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT,
+                         prefiltered->data());
+  uploaded_prefiltered_ = prefiltered;
 }
 
 void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& lighting) {
@@ -466,27 +469,28 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sun_irradiance = glm::vec4(lighting.sun_irradiance, 0.0F);
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
   block.sky = block_of(lighting.sky);
-  block.sky_turn = glm::vec4(lighting.sky_turn, lighting.gloss_strength, 0.0F);
-  std::vector<surface::PunctualLight> lamps;
+  block.sky_turn = glm::vec4(lighting.sky_turn, lighting.prefiltered_strength, 0.0F);
+  std::vector<surface::PunctualLight> analytic_lights;
   for (const RasterItem& item : items_) {
     const surface::Pose& pose = item.content->pose();
-    for (const surface::PunctualLight& lamp : pose.lights)
-      lamps.push_back(scene::placed(lamp, surface::from_origin(item.to_world, pose)));
+    for (const surface::PunctualLight& analytic_light : pose.lights)
+      analytic_lights.push_back(scene::placed(analytic_light, surface::from_origin(item.to_world, pose)));
   }
-  light::Lamps of_host = lighting.lamps;
-  for (light::Lamp& lamp : of_host) {
+  light::AnalyticLights of_host = lighting.analytic_lights;
+  for (light::AnalyticLight& analytic_light : of_host) {
     // Only the center of the disk is used, and a wide sun's center is brighter than its mean.
-    if (lamp.kind == light::Lamp::Kind::sun) lamp.angle = 0.0;
+    if (analytic_light.kind == light::AnalyticLight::Kind::sun) analytic_light.angle = 0.0;
   }
-  const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
+  const std::vector<CmAnalyticLight> records = light::analytic_light_records(of_host, analytic_lights, view.eye);
   block.counts.x = static_cast<std::uint32_t>(records.size());
-  block.counts.y = lighting.gloss && lighting.gloss_strength > 0.0F ? 1U : 0U;
+  block.counts.y = lighting.prefiltered && lighting.prefiltered_strength > 0.0F ? 1U : 0U;
   block.counts.z = view.orthographic ? 1U : 0U;
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
-  fill(light_buffer_, light_bytes_, records.data(), records.size() * sizeof(CmLamp), "creating the surfaces' lights");
+  fill(light_buffer_, light_bytes_, records.data(), records.size() * sizeof(CmAnalyticLight),
+       "creating the surfaces' lights");
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_SURFACE_VIEW, view_block_.name());
-  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, light_buffer_.name());
+  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_ANALYTIC_LIGHTS, light_buffer_.name());
 }
 
 // Draws batches, and skips redundant binds.
@@ -633,9 +637,9 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     gl.BindVertexArray(array);
     gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
     gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());
-    upload_gloss(lighting.gloss);
-    gl.BindTextureUnit(core::CM_UNIT_GLOSS, gloss_.name());
-    gl.BindSampler(core::CM_UNIT_GLOSS, gloss_sampler_.name());
+    upload_prefiltered(lighting.prefiltered);
+    gl.BindTextureUnit(core::CM_UNIT_PREFILTERED, prefiltered_.name());
+    gl.BindSampler(core::CM_UNIT_PREFILTERED, prefiltered_sampler_.name());
   }
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target);
   gl.ViewportIndexedf(0, 0.0F, 0.0F, static_cast<GLfloat>(size.x), static_cast<GLfloat>(size.y));
@@ -649,7 +653,7 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   gl.BlendEquationSeparatei(1, GL_MIN, GL_MIN);
   for (GLuint i = 0; i < buffers.size(); ++i) gl.ColorMaski(i, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   const auto clear_to = [&](unsigned layer) {
-    gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT0, into.colour.name(), 0, static_cast<GLint>(layer));
+    gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT0, into.color.name(), 0, static_cast<GLint>(layer));
     gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT1, into.z.name(), 0, static_cast<GLint>(layer));
     const glm::vec4 black(0.0F);
     const glm::vec4 nowhere(std::numeric_limits<float>::infinity());

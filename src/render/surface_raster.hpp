@@ -24,17 +24,18 @@ struct SurfaceLighting {
   glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
   glm::vec3 sky_radiance{0.0F};               ///< the mean over all directions
   light::Harmonics sky{};                     ///< difference to the mean, before rotation
-  light::GlossPtr gloss;           ///< environment prefiltered for glossy reflection, before rotation; null: none
-  float gloss_strength = 1.0F;     ///< factor on gloss
-  glm::vec2 sky_turn{1.0F, 0.0F};  ///< rotation, as light::turn_of()
-  light::Lamps lamps;
+  light::PrefilteredEnvironmentPtr
+      prefiltered;                    ///< environment prefiltered for glossy reflection, before rotation; null: none
+  float prefiltered_strength = 1.0F;  ///< factor on gloss
+  glm::vec2 sky_turn{1.0F, 0.0F};     ///< rotation, as light::turn_of()
+  light::AnalyticLights analytic_lights;
   bool operator==(const SurfaceLighting&) const = default;
 };
 
 /// Result of the surface pass: linear color and view depth, one layer per sub-pixel position.
 struct SurfaceLayers {
-  gl::Object colour;  ///< GL_TEXTURE_2D_ARRAY, rgba16f, row 0 the picture's top: radiance times coverage, coverage
-  gl::Object z;       ///< GL_TEXTURE_2D_ARRAY, r32f: view depth of the nearest surface, infinity without, as HostDepth
+  gl::Object color;  ///< GL_TEXTURE_2D_ARRAY, rgba16f, row 0 the picture's top: radiance times coverage, coverage
+  gl::Object z;      ///< GL_TEXTURE_2D_ARRAY, r32f: view depth of the nearest surface, infinity without, as HostDepth
   glm::uvec2 size{0U};
   unsigned layers = 0;  ///< of the opaque surfaces (coverage 0 or 1)
   /// as many layers follow for BLEND surfaces in front of the opaque ones: blended color, nearest z
@@ -168,7 +169,7 @@ class SurfaceRaster {
   void sort_blended(const SurfaceView& view);
   void make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into);
   void make_fixtures();
-  void upload_gloss(const light::GlossPtr& gloss);
+  void upload_prefiltered(const light::PrefilteredEnvironmentPtr& prefiltered);
   void upload_view(const SurfaceView& view, const SurfaceLighting& lighting);
   struct PlaceRecord;
   void upload_places(const SurfaceView& view);
@@ -189,9 +190,9 @@ class SurfaceRaster {
   gl::Object white_;
   gl::Object albedo_table_;
   gl::Object table_sampler_;
-  gl::Object gloss_;
-  light::GlossPtr uploaded_gloss_;  // null: gloss_ has no content
-  gl::Object gloss_sampler_;
+  gl::Object prefiltered_;
+  light::PrefilteredEnvironmentPtr uploaded_prefiltered_;  // null: gloss_ has no content
+  gl::Object prefiltered_sampler_;
   gl::Object view_block_;
   gl::Object light_buffer_;
   std::size_t light_bytes_ = 0;

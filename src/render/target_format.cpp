@@ -87,16 +87,16 @@ bool tells_encoding(const gl::Functions& gl, const FrameTarget& target) {
 }
 
 void check_encoding(const gl::Functions& gl, const FrameTarget& target, const TargetFormat& format,
-                    ColourEncoding encoding) {
-  if (encoding == ColourEncoding::srgb_framebuffer && !format.is_srgb && tells_encoding(gl, target)) {
-    refuse(target, "has no sRGB format: OpenGL would not encode what CUMULET_COLOUR_SRGB_FRAMEBUFFER gives it");
+                    ColorEncoding encoding) {
+  if (encoding == ColorEncoding::srgb_framebuffer && !format.is_srgb && tells_encoding(gl, target)) {
+    refuse(target, "has no sRGB format: OpenGL would not encode what CUMULET_COLOR_SRGB_FRAMEBUFFER gives it");
   }
-  if (encoding == ColourEncoding::hdr && !format.is_float) {
-    refuse(target, "has no float format: it would clamp what CUMULET_COLOUR_HDR gives it");
+  if (encoding == ColorEncoding::hdr && !format.is_float) {
+    refuse(target, "has no float format: it would clamp what CUMULET_COLOR_HDR gives it");
   }
 }
 
-TargetFormat check_color(const gl::Functions& gl, const FrameTarget& target, ColourEncoding encoding) {
+TargetFormat check_color(const gl::Functions& gl, const FrameTarget& target, ColorEncoding encoding) {
   GLint draw_buffer = GL_NONE;
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.GetIntegerv(GL_DRAW_BUFFER0, &draw_buffer);
@@ -121,8 +121,8 @@ TargetFormat check_color(const gl::Functions& gl, const FrameTarget& target, Col
 
 }  // namespace
 
-GLenum copy_format(const TargetFormat& format, ColourEncoding encoding) {
-  if (encoding == ColourEncoding::srgb_framebuffer && format.is_srgb) return GL_SRGB8_ALPHA8;
+GLenum copy_format(const TargetFormat& format, ColorEncoding encoding) {
+  if (encoding == ColorEncoding::srgb_framebuffer && format.is_srgb) return GL_SRGB8_ALPHA8;
   if (format.is_float) return format.bits > 16 ? GL_RGBA32F : GL_RGBA16F;
   return format.bits > 8 || format.bits == 0 ? GL_RGBA16 : GL_RGBA8;
 }
@@ -132,7 +132,7 @@ std::uint64_t bytes_per_texel(GLenum format) {
   return format == GL_RGBA16F || format == GL_RGBA16 ? 8 : 4;
 }
 
-TargetFormat check_target(const gl::Functions& gl, const FrameTarget& target, ColourEncoding encoding) {
+TargetFormat check_target(const gl::Functions& gl, const FrameTarget& target, ColorEncoding encoding) {
   const GLuint framebuffer = target.framebuffer;
   if (framebuffer != 0 && gl.IsFramebuffer(framebuffer) == GL_FALSE) {
     throw Error(ErrorCode::invalid_argument,

@@ -18,7 +18,7 @@ struct TargetFormat {
 };
 
 /// Returns the internal format of a texture that can be copied to such a target without a visible difference.
-[[nodiscard]] GLenum copy_format(const TargetFormat& format, ColourEncoding encoding);
+[[nodiscard]] GLenum copy_format(const TargetFormat& format, ColorEncoding encoding);
 /// format: one that copy_format() returns.
 [[nodiscard]] std::uint64_t bytes_per_texel(GLenum format);
 
@@ -26,6 +26,6 @@ struct TargetFormat {
 /// complete. Its color attachment must store fractions of red, green and blue, have one layer, be as large as the frame
 /// and suit the encoding. A depth attachment must exist if depth is written. Throws Error(invalid_argument), which
 /// names the cause. Binds the framebuffer for drawing. Queries driver state only, so it never waits for the device.
-[[nodiscard]] TargetFormat check_target(const gl::Functions& gl, const FrameTarget& target, ColourEncoding encoding);
+[[nodiscard]] TargetFormat check_target(const gl::Functions& gl, const FrameTarget& target, ColorEncoding encoding);
 
 }  // namespace cumulet::render

@@ -25,24 +25,24 @@ constexpr std::uint32_t block_lanes = PathKernels::block_lanes;
 // of them fetch another pixel when theirs is done. Wavefront stages have more, because each kernel processes only some
 // of them. Drivers that run dispatches on the CPU have few enough for its caches.
 constexpr std::uint32_t lanes_at_once = 128 * block_lanes;
-constexpr std::uint32_t lanes_of_stages = PathKernels::most_lanes;
+constexpr std::uint32_t lanes_of_stages = PathKernels::max_lanes;
 constexpr std::uint32_t lanes_in_call = 32 * block_lanes;
-static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_MOST_SQUARES);
-static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
-static_assert(CM_MOST_SQUARES <= 1U << CM_SQUARE_ROWS);
+static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_MAX_SQUARES);
+static_assert(CM_MAX_SQUARES <= InFlightDispatches::max_words, "told at once");
+static_assert(CM_MAX_SQUARES <= 1U << CM_SQUARE_ROWS);
 static_assert(tile_edge <= CM_BAND_ROWS * CM_BANDS);
-constexpr double hasty_rest = 0.03;  // fraction of a tile's pixels
-static_assert(lanes_in_call > hasty_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
+constexpr double preview_rest = 0.03;  // fraction of a tile's pixels
+static_assert(lanes_in_call > preview_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
 // llvmpipe silently ends a shader's loops after 65,535 iterations in total. These constants bound the iterations of a
 // dispatch: a round takes some hundred iterations, and a ray some thousand. Cryptomatte rays take more than feature
 // rays.
-constexpr std::uint32_t most_rounds = 256;
-constexpr std::uint32_t facts_rays_at_once = 2;
+constexpr std::uint32_t max_rounds = 256;
+constexpr std::uint32_t feature_rays_at_once = 2;
 constexpr std::uint32_t matte_rays_at_once = 1;
 constexpr int matte_slices = 16;  // as in cryptomatte.comp
-static_assert(fact_rays % facts_rays_at_once == 0);
+static_assert(feature_rays % feature_rays_at_once == 0);
 constexpr std::uint32_t longest_pass = 64;
-constexpr std::uint32_t most_samples = 1U << 31U;
+constexpr std::uint32_t max_samples = 1U << 31U;
 constexpr double nearly_done = 0.99;
 constexpr std::uint32_t view_depth = 5;  // as in inspect.comp
 
@@ -58,10 +58,10 @@ std::size_t far_step(std::size_t n) {
 
 // Sets the parameters that may have changed since the picture was started: poses of surfaces, lights, and the host's
 // depth.
-void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
-  parameters.host_depth = {obstacles.size, obstacles.depth != 0 ? obstacles.layers : 0};
-  if (obstacles.scene != nullptr) parameters.surfaces = obstacles.scene->tables();
-  parameters.lamps.count = obstacles.lamps_met();
+void describe(const TraceInputs& trace_inputs, core::CmParameters& parameters) {
+  parameters.host_depth = {trace_inputs.size, trace_inputs.depth != 0 ? trace_inputs.layers : 0};
+  if (trace_inputs.scene != nullptr) parameters.surfaces = trace_inputs.scene->tables();
+  parameters.analytic_lights.count = trace_inputs.analytic_lights_met();
 }
 
 // Pixel transfer format of a layer.
@@ -81,25 +81,25 @@ constexpr const char* noise_kernel = "noise.comp";
 constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 constexpr const char* equiangular_macro = "CM_EQUIANGULAR 1";
-constexpr const char* rich_macro = "CM_RICH 1";
+constexpr const char* extended_bsdf_macro = "CM_EXTENDED_BSDF 1";
 constexpr const char* groups_macro = "CM_GROUPS 1";
 constexpr const char* holdout_macro = "CM_HOLDOUT 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
-core::CmParameters assemble(const PictureParameters& picture, const Obstacles& obstacles) {
+core::CmParameters assemble(const PictureParameters& picture, const TraceInputs& trace_inputs) {
   core::CmParameters parameters{};
   parameters.view = picture.view;
   parameters.space = picture.space;
   parameters.grid = picture.grid;
-  parameters.glow = picture.glow;
+  parameters.emissive = picture.emissive;
   parameters.medium = picture.medium;
   parameters.lights = picture.lights;
   parameters.environment = picture.environment;
   parameters.ground = picture.ground;
   parameters.integrator = picture.integrator;
   parameters.shutter = picture.shutter;
-  describe(obstacles, parameters);
+  describe(trace_inputs, parameters);
   return parameters;
 }
 
@@ -119,15 +119,15 @@ namespace {
 // Returns the next number of samples per pixel at which a picture with a noise target is measured.
 std::uint32_t look_after(std::uint32_t samples) {
   double count = Picture::first_measured;
-  while (std::round(count) <= double(samples) && count < double(most_samples)) count *= std::numbers::sqrt2;
-  return static_cast<std::uint32_t>(std::min(std::round(count), double(most_samples)));
+  while (std::round(count) <= double(samples) && count < double(max_samples)) count *= std::numbers::sqrt2;
+  return static_cast<std::uint32_t>(std::min(std::round(count), double(max_samples)));
 }
 
 }  // namespace
 
 std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   std::uint32_t next = samples;
-  if (samples == 0 && hasty_) {
+  if (samples == 0 && previews_first_) {
     next = 1;  // the first image is shown at once
   } else if (!noise_target_) {
     // The pass size doubles, so that waiting for slow pixels at a pass's end costs little. If each pixel has a lane,
@@ -247,10 +247,10 @@ void Picture::end_tile() {
     empty += block.empty;
   }
   const glm::uvec2 extent = tile_extent();
-  const auto rest = hasty_ && !complete_ ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
+  const auto rest = previews_first_ && !complete_ ? static_cast<std::uint64_t>(preview_rest * extent.x * extent.y) : 0;
   const bool all_begun = has_lanes_for_all();
   if (all_begun && empty <= rest) complete_ = true;
-  holes_ = all_begun ? empty > 0 : hasty_ && pass_ < 2;
+  holes_ = all_begun ? empty > 0 : previews_first_ && pass_ < 2;
   // With PictureSettings::hasty, the first pass leaves its last few pixels to the second.
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
@@ -342,7 +342,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
   add_medium(picture, more);
   if (picture.environment_) more.emplace_back(environment_macro);
-  if (picture.lamps_ || groups) more.emplace_back("CM_LAMPS 1");
+  if (picture.analytic_lights_ || groups) more.emplace_back("CM_ANALYTIC_LIGHTS 1");
   if (picture.equiangular_) more.emplace_back(equiangular_macro);
   add_march(picture, more);
   return program(data.defines(picture.several_, picture.motion_), "trace.comp", more);
@@ -358,9 +358,9 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   if (picture.equiangular_) shade.emplace_back(equiangular_macro);
   if (picture.model_holdout_) shade.emplace_back(holdout_macro);
   std::vector<std::string> meet{"CM_SURFACES 1"};
-  if (picture.rich_) {
-    shade.emplace_back(rich_macro);
-    meet.emplace_back(rich_macro);
+  if (picture.extended_bsdf_) {
+    shade.emplace_back(extended_bsdf_macro);
+    meet.emplace_back(extended_bsdf_macro);
   }
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.motion_) {
@@ -393,84 +393,84 @@ bool Tracer::asked(Find&& find) {
   return *std::exchange(asked_, std::nullopt);
 }
 
-void Tracer::find_programs(const Picture& picture, const MarchData& data, const Obstacles& obstacles) {
+void Tracer::find_programs(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs) {
   if (picture.view_ == View::shaded && picture.traced_ > 0) {
     stage_programs(picture, data);
   } else if (picture.view_ == View::shaded) {
     trace_program(picture, data);
   } else {
-    inspect_program(data, obstacles, "inspect.comp");
+    inspect_program(data, trace_inputs, "inspect.comp");
   }
   if (picture.noise_target_) program({}, noise_kernel);
 }
 
-unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
+unsigned Tracer::traced_of(const PictureParameters& parameters, const TraceInputs& trace_inputs,
                            const PictureSettings& settings) {
   // To appear at once, the volume of a preview is lit only by sun and sky, as its surfaces are. If there is no such
   // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const PlacedModels* met = settings.view == View::shaded && !preview ? obstacles.met() : nullptr;
-  return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().rich != 0U ? 2 : 1);
+  const PlacedModels* met = settings.view == View::shaded && !preview ? trace_inputs.met() : nullptr;
+  return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().extended_bsdf != 0U ? 2 : 1);
 }
 
-void Tracer::classify(Picture& picture, const PictureParameters& parameters, const Obstacles& obstacles,
+void Tracer::classify(Picture& picture, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                       const PictureSettings& settings) {
   const bool shaded = settings.view == View::shaded;
   picture.view_ = settings.view;
-  picture.traced_ = traced_of(parameters, obstacles, settings);
-  picture.rich_ = picture.traced_ > 0 && obstacles.met()->tables().rich != 0U;
+  picture.traced_ = traced_of(parameters, trace_inputs, settings);
+  picture.extended_bsdf_ = picture.traced_ > 0 && trace_inputs.met()->tables().extended_bsdf != 0U;
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   const core::CmMedium& medium = parameters.medium;
-  picture.channels_ = medium.emits != 0U || medium.coloured != 0U || medium.anisotropic != 0U;
-  picture.environment_ = obstacles.environment != nullptr;
-  picture.lamps_ = obstacles.lamps_met() > 0;
-  picture.several_ = obstacles.instances != nullptr;
-  picture.volume_holdout_ = shaded && obstacles.volume_holdout;
-  picture.model_holdout_ = shaded && picture.traced_ > 0 && obstacles.model_holdout;
+  picture.channels_ = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
+  picture.environment_ = trace_inputs.environment != nullptr;
+  picture.analytic_lights_ = trace_inputs.analytic_lights_met() > 0;
+  picture.several_ = trace_inputs.instances != nullptr;
+  picture.volume_holdout_ = shaded && trace_inputs.volume_holdout;
+  picture.model_holdout_ = shaded && picture.traced_ > 0 && trace_inputs.model_holdout;
   picture.motion_ = shaded && parameters.shutter.lasts != 0U;
-  picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
+  picture.layered_ = shaded && trace_inputs.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
   picture.light_groups_ = shaded ? settings.light_groups : 0;
   if (picture.light_groups_ > 0 && picture.traced_ > 0) picture.traced_ = 2;
   // Equiangular sampling is off in these cases. The separate volume AOV depends on the first hit of a path, but such
   // light may lie before a surface. The color of a surface layer is stored in the same field as the light of such an
   // NEE sample. A holdout has no light.
-  picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ && !picture.rich_ &&
-                         !picture.volume_holdout_ && !picture.model_holdout_ &&
+  picture.equiangular_ = picture.analytic_lights_ && parameters.equiangular && !picture.volume_alone_ &&
+                         !picture.extended_bsdf_ && !picture.volume_holdout_ && !picture.model_holdout_ &&
                          (picture.traced_ > 0 || picture.layered_ == Layered::no);
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
   picture.adaptive_ = picture.noise_target_ && settings.adaptive;
 }
 
-bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
+bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                   const PictureSettings& settings) {
   Picture like;
-  classify(like, parameters, obstacles, settings);
-  return asked([&] { find_programs(like, data, obstacles); });
+  classify(like, parameters, trace_inputs, settings);
+  return asked([&] { find_programs(like, data, trace_inputs); });
 }
 
-const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name,
+const Tracer::Program& Tracer::inspect_program(const MarchData& data, const TraceInputs& trace_inputs, const char* name,
                                                std::span<const char* const> macros) {
   std::vector<std::string> more;
-  if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
+  if (trace_inputs.scene != nullptr) more.emplace_back("CM_SURFACES 1");
   more.insert(more.end(), macros.begin(), macros.end());
-  return program(data.defines(obstacles.instances != nullptr), name, more);
+  return program(data.defines(trace_inputs.instances != nullptr), name, more);
 }
 
-const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles,
-                                             PixelFacts facts) {
+const Tracer::Program& Tracer::feature_program(const Picture& picture, const MarchData& data,
+                                               const TraceInputs& trace_inputs, FeatureSet features) {
   constexpr std::array<const char*, 2> macros{channels_macro, "CM_VELOCITY 1"};
   const bool emits = picture.parameters_.medium.emits != 0U;
-  const std::size_t used = facts == PixelFacts::all ? 2 : (emits ? 1 : 0);
-  return inspect_program(data, obstacles, "aovs.comp", std::span(macros).first(used));
+  const std::size_t used = features == FeatureSet::all ? 2 : (emits ? 1 : 0);
+  return inspect_program(data, trace_inputs, "aovs.comp", std::span(macros).first(used));
 }
 
 const Tracer::Program& Tracer::matte_program(const Picture& picture, const MarchData& data,
-                                             const Obstacles& obstacles) {
+                                             const TraceInputs& trace_inputs) {
   std::vector<std::string> more;
-  if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
-  const bool several = obstacles.instances != nullptr;
+  if (trace_inputs.scene != nullptr) more.emplace_back("CM_SURFACES 1");
+  const bool several = trace_inputs.instances != nullptr;
   return program(data.defines(several, several && picture.motion_), "cryptomatte.comp", more);
 }
 
@@ -519,7 +519,7 @@ std::uint64_t Tracer::bytes() const {
   return bytes;
 }
 
-void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const PictureSettings& settings) {
+void Tracer::draw_layers(Picture& picture, const TraceInputs& trace_inputs, const PictureSettings& settings) {
   // The surface pass changes GL state; later code in the frame relies on the known state.
   struct Known {
     const gl::Functions& gl;
@@ -534,7 +534,8 @@ void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const Pic
   picture.layered_ = Layered::no;
   picture.layers_.reset();
   const glm::uvec2 size = settings.layer_size;
-  const LayersOf wanted{obstacles.raster->content(), obstacles.view, obstacles.lighting, size, settings.layers};
+  const LayersOf wanted{trace_inputs.raster->content(), trace_inputs.view, trace_inputs.lighting, size,
+                        settings.layers};
   const auto found = std::ranges::find_if(drawn_layers_, [&](const auto& drawn) { return drawn->of == wanted; });
   if (found != drawn_layers_.end()) {
     picture.layers_ = {*found, &(*found)->layers};
@@ -548,9 +549,9 @@ void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const Pic
   drop_unused_layers();
   collect();
   const bool measured = !rasters_.full();
-  if (measured) rasters_.begin(Flights::Kind::draws);
+  if (measured) rasters_.begin(InFlightDispatches::Kind::draws);
   try {
-    obstacles.raster->draw(obstacles.view, obstacles.lighting, size, settings.layers, made->layers);
+    trace_inputs.raster->draw(trace_inputs.view, trace_inputs.lighting, size, settings.layers, made->layers);
   } catch (...) {
     if (measured) rasters_.give_up();
     throw;
@@ -558,7 +559,7 @@ void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const Pic
   if (measured) {
     Dispatched what;
     what.lanes = double(size.x) * size.y * settings.layers;
-    what.most_ms = what.lanes / raster_rate_;
+    what.max_ms = what.lanes / raster_rate_;
     rasters_.end(std::move(what), 0, 0);
   }
   made->of = wanted;
@@ -568,7 +569,7 @@ void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const Pic
 }
 
 void Tracer::begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
-                   const Obstacles& obstacles, const PictureSettings& settings) {
+                   const TraceInputs& trace_inputs, const PictureSettings& settings) {
   const glm::uvec2 size = parameters.view.size;
   const bool shaded = settings.view == View::shaded;
   make_shared_objects();
@@ -580,9 +581,9 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.region_ = settings.region;
   picture.box_ = box;
   picture.film_.begin(size);
-  classify(picture, parameters, obstacles, settings);
+  classify(picture, parameters, trace_inputs, settings);
   if (picture.layered_ != Layered::no) {
-    draw_layers(picture, obstacles, settings);
+    draw_layers(picture, trace_inputs, settings);
   } else {
     picture.layers_.reset();
     drop_unused_layers();
@@ -591,12 +592,12 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   if (picture.light_groups_ == 0) picture.film_.drop(film_layers::light_groups(0));
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
   const bool stages = picture.traced_ > 0;
-  const std::uint32_t most_lanes = gl_->dispatches_in_call ? lanes_in_call : (stages ? lanes_of_stages : lanes_at_once);
-  const std::uint32_t lanes = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, most_lanes);
-  if (shaded && !kernels_.reserve(lanes, stages, picture.several_, picture.rich_, picture.light_groups_))
+  const std::uint32_t max_lanes = gl_->dispatches_in_call ? lanes_in_call : (stages ? lanes_of_stages : lanes_at_once);
+  const std::uint32_t lanes = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, max_lanes);
+  if (shaded && !kernels_.reserve(lanes, stages, picture.several_, picture.extended_bsdf_, picture.light_groups_))
     paths_of_.reset();
-  find_programs(picture, data, obstacles);
-  picture.parameters_ = assemble(parameters, obstacles);
+  find_programs(picture, data, trace_inputs);
+  picture.parameters_ = assemble(parameters, trace_inputs);
   picture.parameters_.integrator.groups = picture.light_groups_;
   picture.target_samples_ = samples;
   if (picture.layered_ != Layered::no) {
@@ -609,7 +610,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.tiles_ = (box.size + tile - 1U) / tile;
   picture.tile_ = 0;
   picture.lanes_ = lanes;
-  picture.hasty_ = settings.hasty;
+  picture.previews_first_ = settings.previews_first;
   picture.pass_ = 0;
   picture.holes_ = true;
   picture.pass_target_ = picture.pass_after(0);
@@ -628,8 +629,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.change_all(++revision_);
   picture.begun_ = picture.revision_;
   picture.depth_row_ = 0;
-  picture.facts_row_ = picture.facts_rays_ = 0;
-  picture.facts_ = PixelFacts::guides;
+  picture.feature_row_ = picture.feature_rays_ = 0;
+  picture.features_ = FeatureSet::guides;
   empty(picture, shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0);
 }
 
@@ -646,8 +647,8 @@ void Tracer::clear(Picture& picture) {
   picture.change_all(++revision_);
   picture.begun_ = picture.revision_;
   picture.view_ = View::shaded;
-  picture.depth_row_ = picture.facts_row_ = picture.facts_rays_ = 0;
-  picture.facts_ = PixelFacts::guides;
+  picture.depth_row_ = picture.feature_row_ = picture.feature_rays_ = 0;
+  picture.features_ = FeatureSet::guides;
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
   empty(picture, glm::vec3(0.0F), 1);
@@ -660,52 +661,51 @@ void Tracer::set_background(Picture& picture, const glm::vec3& radiance) {
   picture.change_all(++revision_);
 }
 
-void Tracer::bind(const MarchData& data, const Obstacles& obstacles) const {
+void Tracer::bind(const MarchData& data, const TraceInputs& trace_inputs) const {
   data.bind(*gl_);
-  if (obstacles.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, obstacles.depth);
-  if (obstacles.scene != nullptr) obstacles.scene->bind(*gl_);
-  if (obstacles.environment != nullptr) obstacles.environment->bind(*gl_);
-  if (obstacles.lamps != nullptr) obstacles.lamps->bind(*gl_);
-  if (obstacles.instances != nullptr) obstacles.instances->bind(*gl_);
+  if (trace_inputs.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, trace_inputs.depth);
+  if (trace_inputs.scene != nullptr) trace_inputs.scene->bind(*gl_);
+  if (trace_inputs.environment != nullptr) trace_inputs.environment->bind(*gl_);
+  if (trace_inputs.analytic_lights != nullptr) trace_inputs.analytic_lights->bind(*gl_);
+  if (trace_inputs.instances != nullptr) trace_inputs.instances->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
 }
 
 void Tracer::collect() {
-  while (const auto landed = flights_.land()) {
-    const Dispatched& what = landed->what;
-    const double ms = landed->ms.value_or(landed->at_most_ms);
-    (landed->words.empty() ? seconds_.inspect : seconds_.trace) += 1e-3 * landed->ms.value_or(0.0);
-    if (landed->words.empty()) {
-      learn_rows(*landed);
+  while (const auto completed = dispatches_in_flight_.take_completed()) {
+    const Dispatched& what = completed->what;
+    const double ms = completed->ms.value_or(completed->at_most_ms);
+    (completed->words.empty() ? seconds_.inspect : seconds_.trace) += 1e-3 * completed->ms.value_or(0.0);
+    if (completed->words.empty()) {
+      learn_rows(*completed);
       continue;
     }
     if (what.errors) {
-      for (const glm::uvec4& square : landed->words) {
+      for (const glm::uvec4& square : completed->words) {
         const auto error = std::bit_cast<glm::vec4>(square);
         what.errors->push_back({{error.x, error.y}, error.z, error.w});
       }
       continue;
     }
-    learn(what, landed->ms, landed->at_most_ms, landed->words[0].x);
-    what.rows->change(what.first_row, landed->words[0].y, landed->words[0].z, what.revision);
-    for (const std::uint32_t block : what.blocks) what.samples->finished += landed->words[1 + block].w;
-    what.samples->not_finite += landed->words[0].w;
+    learn(what, completed->ms, completed->at_most_ms, completed->words[0].x);
+    what.rows->change(what.first_row, completed->words[0].y, completed->words[0].z, what.revision);
+    for (const std::uint32_t block : what.blocks) what.samples->finished += completed->words[1 + block].w;
+    what.samples->not_finite += completed->words[0].w;
     if (log_ != nullptr) {
       const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_lanes;
-      log_->push_back(
-          {what.aim_ms, ms, lanes, static_cast<std::uint32_t>(what.lanes), what.rounds, what.most_ms > 0.0});
+      log_->push_back({what.aim_ms, ms, lanes, static_cast<std::uint32_t>(what.lanes), what.rounds, what.max_ms > 0.0});
     }
     for (const std::uint32_t index : what.blocks) {
       Block& block = (*what.tile)[index];
-      block.unfinished = landed->words[1 + index].y;
-      block.empty = landed->words[1 + index].z;
+      block.unfinished = completed->words[1 + index].y;
+      block.empty = completed->words[1 + index].z;
       --block.under_way;
     }
   }
-  while (const auto landed = rasters_.land()) {
-    seconds_.surfaces += 1e-3 * landed->ms.value_or(0.0);
-    const double rate = landed->what.lanes / std::max(1e-3, landed->ms.value_or(landed->at_most_ms));
-    if (landed->ms || rate > raster_rate_) raster_rate_ += 0.3 * (rate - raster_rate_);
+  while (const auto completed = rasters_.take_completed()) {
+    seconds_.surfaces += 1e-3 * completed->ms.value_or(0.0);
+    const double rate = completed->what.lanes / std::max(1e-3, completed->ms.value_or(completed->at_most_ms));
+    if (completed->ms || rate > raster_rate_) raster_rate_ += 0.3 * (rate - raster_rate_);
   }
 }
 
@@ -719,31 +719,33 @@ bool Tracer::layers_ready(Deadline deadline) {
 }
 
 void Tracer::settle(Picture& picture) {
-  flights_.finish();
+  dispatches_in_flight_.finish();
   collect();
   picture.end_tile();
 }
 
-bool Tracer::trace(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+bool Tracer::trace(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                    bool until_complete) {
   collect();
   picture.end_tile();
   if (picture.done_) return true;
   const std::vector<FilmLayer> layers = accumulated(picture);
-  const auto work = [&](Film&, Deadline until) { return accumulate(picture, data, obstacles, until, until_complete); };
+  const auto work = [&](Film&, Deadline until) {
+    return accumulate(picture, data, trace_inputs, until, until_complete);
+  };
   return run(gl_, picture.film_, {"cumulet: samples", layers, layers, work}, deadline);
 }
 
-bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+bool Tracer::accumulate(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                         bool until_complete) {
   if (picture.layered_ != Layered::no && !layers_ready(deadline)) return false;
   const bool shaded = picture.view_ == View::shaded;
-  const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, obstacles, "inspect.comp");
-  flights_.order();
+  const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, trace_inputs, "inspect.comp");
+  dispatches_in_flight_.order();
   program.object->use(*gl_);
-  bind(data, obstacles);
+  bind(data, trace_inputs);
   if (picture.layered_ != Layered::no) {
-    gl_->BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, picture.layers_->colour.name());
+    gl_->BindTextureUnit(core::CM_UNIT_LAYER_COLOR, picture.layers_->color.name());
     gl_->BindTextureUnit(core::CM_UNIT_LAYER_Z, picture.layers_->z.name());
   }
   kernels_.bind();
@@ -759,7 +761,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
     film.bind(*gl_, core::CM_IMAGE_GROUPS, film_layers::light_groups(picture.light_groups_), GL_READ_WRITE);
   if (!shaded) {
     core::CmParameters parameters = picture.parameters_;
-    describe(obstacles, parameters);
+    describe(trace_inputs, parameters);
     picture.change_all(++revision_);
     picture.done_ = picture.complete_ = inspect(picture.box_, parameters, program.cost, picture.view_row_, deadline);
     picture.holes_ = !picture.done_;
@@ -772,25 +774,26 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   // Blocks whose paths were overwritten by another picture's start again.
   const auto begun = [](const Block& block) { return !block.begins; };
   if (paths_of_.lock() != picture.blocks_ && std::ranges::any_of(*picture.blocks_, begun)) picture.begin_tile();
-  const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
-  const std::uint32_t rounds = stages ? PathKernels::most_rounds() : most_rounds;
+  const double aim = std::clamp(0.7 * milliseconds_until(deadline), min_ms, dispatch_ms);
+  const std::uint32_t rounds = stages ? PathKernels::max_rounds() : max_rounds;
   bool sent = false;
   while (!picture.done_ && !(until_complete && picture.complete_)) {
-    const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
-    if (!flights_.full() && picture.awaits_error()) {
-      measure(picture, obstacles);
+    const double left = part_of_rest * milliseconds_until(deadline) - dispatches_in_flight_.expected_ms();
+    if (!dispatches_in_flight_.full() && picture.awaits_error()) {
+      measure(picture, trace_inputs);
       (stages ? stages->travel : program.object)->use(*gl_);
       sent = true;
       collect();
       picture.end_tile();
       continue;
     }
-    if (!flights_.full()) {
+    if (!dispatches_in_flight_.full()) {
       const Blocks& blocks = *picture.blocks_;
       auto what = choose(blocks, picture.block_, program.cost, std::clamp(left, 0.0, aim), rounds);
-      if (!what && !sent && flights_.empty()) what = choose_least(blocks, picture.block_, program.cost, rounds);
+      if (!what && !sent && dispatches_in_flight_.empty())
+        what = choose_minimum(blocks, picture.block_, program.cost, rounds);
       if (what) {
-        dispatch(picture, obstacles, stages, std::move(*what));
+        dispatch(picture, trace_inputs, stages, std::move(*what));
         sent = true;
         collect();
         picture.end_tile();
@@ -798,7 +801,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
       }
     }
     // The dispatches in flight last until the deadline, or there is no time for more.
-    if (flights_.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) break;
+    if (dispatches_in_flight_.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) break;
     pass_time();
     collect();
     picture.end_tile();
@@ -806,33 +809,34 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   return picture.done_;
 }
 
-void Tracer::measure(Picture& picture, const Obstacles& obstacles) {
+void Tracer::measure(Picture& picture, const TraceInputs& trace_inputs) {
   core::CmParameters parameters = picture.parameters_;
-  describe(obstacles, parameters);
+  describe(trace_inputs, parameters);
   parameters.dispatch.tile_corner = picture.tile_corner();
   parameters.dispatch.tile_size = picture.tile_extent();
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
   program({}, noise_kernel).object->use(*gl_);
   if (!errors_)
-    errors_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::vec4), nullptr, 0, "creating the squares' errors");
+    errors_ = gl::make_buffer(gl_, InFlightDispatches::max_words * sizeof(glm::vec4), nullptr, 0,
+                              "creating the squares' errors");
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_ERRORS, errors_.name());
   Dispatched what;
   what.errors = picture.tile_errors_ = std::make_shared<SquareErrors>();
   const glm::uvec2 squares = picture.tile_squares();
-  flights_.begin(Flights::Kind::dispatch);
+  dispatches_in_flight_.begin(InFlightDispatches::Kind::dispatch);
   gl_->DispatchCompute(squares.x, squares.y, 1);
-  flights_.end(std::move(what), errors_.name(), std::size_t{squares.x} * squares.y);
+  dispatches_in_flight_.end(std::move(what), errors_.name(), std::size_t{squares.x} * squares.y);
   kernels_.bind();
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   gl::check(*gl_, "measuring the noise");
 }
 
-void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
+void Tracer::dispatch(Picture& picture, const TraceInputs& trace_inputs, const std::optional<StagePrograms>& stages,
                       Dispatched what) {
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
-  describe(obstacles, parameters);
-  parameters.surfaces.rich = picture.rich_ ? 1U : 0U;  // as there is memory for in the paths
+  describe(trace_inputs, parameters);
+  parameters.surfaces.extended_bsdf = picture.extended_bsdf_ ? 1U : 0U;  // as there is memory for in the paths
   parameters.dispatch.tile_corner = picture.tile_corner();
   parameters.dispatch.tile_size = extent;
   parameters.dispatch.rounds = what.rounds;
@@ -851,10 +855,10 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   std::vector<glm::uvec4> words(1 + picture.blocks_->size(), glm::uvec4(0U));
   for (std::size_t i = 0; i < count; ++i) {
     Block& block = (*picture.blocks_)[what.blocks[i]];
-    words[1 + i].x = what.blocks[i] | block.turn << CM_TURN | (block.begins ? PathKernels::begins_tile : 0U);
+    words[1 + i].x = what.blocks[i] | block.list << CM_LIST_BIT | (block.begins ? PathKernels::begins_tile : 0U);
     lanes_a_block = std::max(lanes_a_block, block.begins ? block_lanes : block.unfinished);
     block.begins = false;
-    block.turn = (block.turn + 1) % CM_TURNS;
+    block.list = (block.list + 1) % CM_LISTS;
     ++block.under_way;
   }
   picture.revision_ = ++revision_;
@@ -870,13 +874,13 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
     kernels_.set_squares(picture.squares_, picture.lanes_);
     paths_of_ = picture.blocks_;
   }
-  flights_.begin(Flights::Kind::dispatch);
+  dispatches_in_flight_.begin(InFlightDispatches::Kind::dispatch);
   if (stages) {
     kernels_.run_stages(*stages, picture.lanes_, count, what.rounds);
   } else {
     kernels_.run_one(std::min(picture.lanes_, lanes_a_block), count);
   }
-  flights_.end(std::move(what), kernels_.counters(), words.size());
+  dispatches_in_flight_.end(std::move(what), kernels_.counters(), words.size());
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
                                GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT |
                                GL_TEXTURE_FETCH_BARRIER_BIT);
@@ -894,7 +898,7 @@ bool Tracer::inspect(const PixelBox& box, const core::CmParameters& parameters, 
     gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
     gl_->DispatchCompute((size.x + 7) / 8, (rows.y - rows.x + 7) / 8, 1);
   };
-  send_rows(flights_, cost, size, row, deadline, send, [&] { collect(); });
+  send_rows(dispatches_in_flight_, cost, size, row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
                                GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   gl::check(*gl_, "looking at the pixels");
@@ -924,20 +928,20 @@ void Tracer::empty_around(const Picture& picture, std::span<const FilmLayer> lay
   }
 }
 
-bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
+bool Tracer::trace_depth(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline) {
   if (picture.film_.has(film_layers::depth)) return true;
-  if (!asked([&] { inspect_program(data, obstacles, "inspect.comp"); })) return false;
+  if (!asked([&] { inspect_program(data, trace_inputs, "inspect.comp"); })) return false;
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
-    flights_.order();
-    const Program& program = inspect_program(data, obstacles, "inspect.comp");
+    dispatches_in_flight_.order();
+    const Program& program = inspect_program(data, trace_inputs, "inspect.comp");
     program.object->use(*gl_);
-    bind(data, obstacles);
+    bind(data, trace_inputs);
     film.bind(*gl_, core::CM_IMAGE_SUM, film_layers::radiance, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, film_layers::depth, GL_WRITE_ONLY);
     core::CmParameters parameters = picture.parameters_;
-    describe(obstacles, parameters);
+    describe(trace_inputs, parameters);
     parameters.dispatch.view = view_depth;
     if (picture.depth_row_ == 0) empty_around(picture, std::array{film_layers::depth});
     return inspect(picture.box_, parameters, program.cost, picture.depth_row_, until);
@@ -945,54 +949,54 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
   return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
 }
 
-bool Tracer::able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles) {
-  return asked([&] { facts_program(picture, data, obstacles, PixelFacts::guides); });
+bool Tracer::able_to_find(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs) {
+  return asked([&] { feature_program(picture, data, trace_inputs, FeatureSet::guides); });
 }
 
-std::uint64_t Picture::samples_a_pixel() const { return samples() / std::max<std::uint64_t>(box_.area(), 1); }
+std::uint64_t Picture::samples_per_pixel() const { return samples() / std::max<std::uint64_t>(box_.area(), 1); }
 
-bool Picture::has_facts() const { return film_.has(film_layers::normal); }
+bool Picture::has_features() const { return film_.has(film_layers::normal); }
 
-bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                        std::uint32_t rays, PixelFacts facts) {
+bool Tracer::find_features(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
+                           std::uint32_t rays, FeatureSet features) {
   using namespace film_layers;
   // A failed read may have requested more buffers.
-  if (obstacles.motion == nullptr && !picture.film_.has(motion)) picture.facts_ = PixelFacts::guides;
-  if (picture.facts_ < facts) {
-    picture.facts_ = facts;
-    picture.facts_row_ = picture.facts_rays_ = 0;
+  if (trace_inputs.motion == nullptr && !picture.film_.has(motion)) picture.features_ = FeatureSet::guides;
+  if (picture.features_ < features) {
+    picture.features_ = features;
+    picture.feature_row_ = picture.feature_rays_ = 0;
   }
-  if (picture.facts_rays_ >= rays && picture.film_.has(normal)) return true;
+  if (picture.feature_rays_ >= rays && picture.film_.has(normal)) return true;
   // Motion vectors need Obstacles::motion. Without it only guides are refined.
-  const PixelFacts found = obstacles.motion != nullptr ? picture.facts_ : PixelFacts::guides;
+  const FeatureSet found = trace_inputs.motion != nullptr ? picture.features_ : FeatureSet::guides;
   std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
-  if (found == PixelFacts::all) written.insert(written.end(), {velocity, motion});
+  if (found == FeatureSet::all) written.insert(written.end(), {velocity, motion});
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
-    flights_.order();
-    const Program& program = facts_program(picture, data, obstacles, found);
+    dispatches_in_flight_.order();
+    const Program& program = feature_program(picture, data, trace_inputs, found);
     program.object->use(*gl_);
-    bind(data, obstacles);
+    bind(data, trace_inputs);
     film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_ALBEDO, albedo, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_READ_WRITE);
-    if (found == PixelFacts::all) {
+    if (found == FeatureSet::all) {
       film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_READ_WRITE);
       film.bind(*gl_, core::CM_IMAGE_MOTION, motion, GL_READ_WRITE);
-      upload_motion(*obstacles.motion);
+      upload_motion(*trace_inputs.motion);
       gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MOTION, motion_.name());
     }
     core::CmParameters parameters = picture.parameters_;
-    describe(obstacles, parameters);
-    if (picture.facts_row_ == 0 && picture.facts_rays_ == 0) empty_around(picture, written);
-    parameters.dispatch.rays_least = fact_rays;
-    const std::uint32_t before = picture.facts_rays_;
-    const bool done = look_along_rays(picture.box_, parameters, program, facts_rays_at_once, picture.facts_rays_, rays,
-                                      picture.facts_row_, until);
-    if (picture.facts_rays_ != before) picture.revision_ = ++revision_;
+    describe(trace_inputs, parameters);
+    if (picture.feature_row_ == 0 && picture.feature_rays_ == 0) empty_around(picture, written);
+    parameters.dispatch.rays_least = feature_rays;
+    const std::uint32_t before = picture.feature_rays_;
+    const bool done = look_along_rays(picture.box_, parameters, program, feature_rays_at_once, picture.feature_rays_,
+                                      rays, picture.feature_row_, until);
+    if (picture.feature_rays_ != before) picture.revision_ = ++revision_;
     return done;
   };
   return run(gl_, picture.film_, {"cumulet: facts", {}, written, work}, deadline);
@@ -1005,40 +1009,40 @@ void Tracer::upload_motion(const scene::MotionTable& motion) {
   motion_ = gl::make_buffer(gl_, bytes.size(), bytes.data(), 0, "creating the table of motions");
 }
 
-void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) const {
+void Tracer::read_feature(const Picture& picture, FeatureBuffer feature, float* values) const {
   const std::array layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
                           film_layers::normal,        film_layers::albedo,    film_layers::velocity,
                           film_layers::motion,        film_layers::motion};
-  const FilmLayer& layer = layers.at(static_cast<std::size_t>(fact));
+  const FilmLayer& layer = layers.at(static_cast<std::size_t>(feature));
   if (layer == film_layers::motion) {
     for (const glm::vec4& both : texels<glm::vec4>(picture, layer, GL_RGBA, GL_FLOAT)) {
-      *values++ = fact == PixelFact::motion ? both.x : both.z;
-      *values++ = fact == PixelFact::motion ? both.y : both.w;
+      *values++ = feature == FeatureBuffer::motion ? both.x : both.z;
+      *values++ = feature == FeatureBuffer::motion ? both.y : both.w;
     }
     return;
   }
-  const std::size_t channels = channels_of(fact);
+  const std::size_t channels = channels_of(feature);
   const std::size_t floats = std::size_t{picture.size_.x} * picture.size_.y * channels;
   gl_->GetTextureImage(picture.film_.texture(layer), 0, channels == 1 ? GL_RED : GL_RGB, GL_FLOAT,
                        static_cast<GLsizei>(floats * sizeof(float)), values);
   gl::check(*gl_, "reading what is known of pixels");
 }
 
-void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
-                         std::uint32_t ranks, float* values) {
+void Tracer::read_mattes(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs,
+                         const MatteIds& ids, std::uint32_t ranks, float* values) {
   const gl::DebugGroup group(*gl_, "cumulet: mattes");
   std::vector<std::uint32_t> table{ids.ground};
   table.insert(table.end(), ids.volumes.begin(), ids.volumes.end());
-  if (obstacles.scene != nullptr) {
-    for (const scene::ModelPart& part : obstacles.scene->table().parts) table.push_back(ids.models.at(part.model));
+  if (trace_inputs.scene != nullptr) {
+    for (const scene::ModelPart& part : trace_inputs.scene->table().parts) table.push_back(ids.models.at(part.model));
   }
   const gl::Object buffer =
       gl::make_buffer(gl_, table.size() * sizeof(std::uint32_t), table.data(), 0, "creating the table of mattes");
   make_shared_objects();
-  flights_.order();
-  const Program& program = matte_program(picture, data, obstacles);
+  dispatches_in_flight_.order();
+  const Program& program = matte_program(picture, data, trace_inputs);
   core::CmParameters parameters = picture.parameters_;
-  describe(obstacles, parameters);
+  describe(trace_inputs, parameters);
   parameters.dispatch.rays_least = matte_rays;
   std::fill_n(values, std::size_t{2} * ranks * picture.size_.x * picture.size_.y, 0.0F);
   const PixelBox& box = picture.box_;
@@ -1056,7 +1060,7 @@ void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Ob
     std::uint32_t row = 0;
     std::uint32_t rays = 0;
     program.object->use(*gl_);
-    bind(data, obstacles);
+    bind(data, trace_inputs);
     gl_->BindImageTexture(core::CM_IMAGE_MATTES, mattes.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA32F);
     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MATTES, buffer.name());
     while (!look_along_rays(part, parameters, program, matte_rays_at_once, rays, matte_rays, row,
@@ -1079,20 +1083,20 @@ void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Ob
   }
 }
 
-Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
+Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                             glm::uvec2 pixel) {
   make_shared_objects();
-  flights_.order();
+  dispatches_in_flight_.order();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
   if (!pick_place_) pick_place_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the texture of what is picked");
-  core::CmParameters p = assemble(parameters, obstacles);
+  core::CmParameters p = assemble(parameters, trace_inputs);
   p.dispatch.tile_corner = pixel;
   p.dispatch.tile_size = glm::uvec2(1U);
   p.dispatch.view = view_depth;
   p.dispatch.picks = 1;
   p.dispatch.rows = {0U, 1U};
-  inspect_program(data, obstacles, "inspect.comp").object->use(*gl_);
-  bind(data, obstacles);
+  inspect_program(data, trace_inputs, "inspect.comp").object->use(*gl_);
+  bind(data, trace_inputs);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(core::CM_IMAGE_COUNTS, pick_place_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);

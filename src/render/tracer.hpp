@@ -13,10 +13,10 @@
 
 #include "gl/programs.hpp"
 #include "render/allotment.hpp"
+#include "render/analytic_light_data.hpp"
 #include "render/environment_data.hpp"
 #include "render/film.hpp"
 #include "render/instance_data.hpp"
-#include "render/lamp_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_data.hpp"
 #include "render/pace.hpp"
@@ -41,7 +41,7 @@ struct Totals {
 
 /// Trace inputs other than the volume data: host depth as of HostDepth, triangles, environment, lights, and the
 /// instance table if there are several volumes.
-struct Obstacles {
+struct TraceInputs {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
   glm::uvec2 size{0U};
@@ -51,15 +51,18 @@ struct Obstacles {
   SurfaceView view;
   SurfaceLighting lighting;
   const EnvironmentData* environment = nullptr;  // hit by paths that escape
-  const LampData* lamps = nullptr;               // sampled by NEE: those of the scene if paths hit it, and the host's
-  const InstanceData* instances = nullptr;       // set if there are several volumes; else the volume is the only one
-  bool volume_holdout = false;                   // one of the volumes is a holdout
-  bool model_holdout = false;                    // one of the models that paths hit is a holdout
-  const scene::MotionTable* motion = nullptr;    // transforms for motion vectors; required for PixelFacts::all
+  const AnalyticLightData* analytic_lights =
+      nullptr;                                 // sampled by NEE: those of the scene if paths hit it, and the host's
+  const InstanceData* instances = nullptr;     // set if there are several volumes; else the volume is the only one
+  bool volume_holdout = false;                 // one of the volumes is a holdout
+  bool model_holdout = false;                  // one of the models that paths hit is a holdout
+  const scene::MotionTable* motion = nullptr;  // transforms for motion vectors; required for FeatureSet::all
 
   /// Returns the scene whose triangles paths hit; null: none.
   [[nodiscard]] const PlacedModels* met() const { return traced ? scene : nullptr; }
-  [[nodiscard]] std::uint32_t lamps_met() const { return lamps == nullptr ? 0 : lamps->count(); }
+  [[nodiscard]] std::uint32_t analytic_lights_met() const {
+    return analytic_lights == nullptr ? 0 : analytic_lights->count();
+  }
 };
 
 /// How camera rays use the surface pass (rasterized surfaces).
@@ -72,7 +75,7 @@ enum class Layered {
 struct PictureSettings {
   View view = View::shaded;
   /// The first pass leaves the last few pixels of a tile, those with the longest paths, to the second.
-  bool hasty = false;
+  bool previews_first = false;
   Layered layered = Layered::no;
   glm::uvec2 layer_size{0U};
   unsigned layers = 1;
@@ -90,22 +93,23 @@ struct PictureSettings {
 };
 
 /// Noise-free feature buffers (AOVs); documented in glsl/aovs.comp.
-enum class PixelFact { transmittance, surface_z, volume_z, normal, albedo, velocity, motion, volume_motion };
-constexpr std::size_t channels_of(PixelFact fact) {
-  if (fact == PixelFact::motion || fact == PixelFact::volume_motion) return 2;
-  return fact == PixelFact::normal || fact == PixelFact::albedo || fact == PixelFact::velocity ? 3 : 1;
+enum class FeatureBuffer { transmittance, surface_z, volume_z, normal, albedo, velocity, motion, volume_motion };
+constexpr std::size_t channels_of(FeatureBuffer feature) {
+  if (feature == FeatureBuffer::motion || feature == FeatureBuffer::volume_motion) return 2;
+  return feature == FeatureBuffer::normal || feature == FeatureBuffer::albedo || feature == FeatureBuffer::velocity ? 3
+                                                                                                                    : 1;
 }
 /// Feature buffers that are rendered together: denoiser guides, or velocity and motion vectors as well.
-enum class PixelFacts { guides, all };
+enum class FeatureSet { guides, all };
 
 /// Feature rays per pixel when feature buffers are read back; the denoiser starts with fewer. In pixels whose rays
-/// differ, as with triangles or shadows finer than a pixel, more rays improve denoising, up to most_fact_rays.
-constexpr std::uint32_t fact_rays = 16;
-constexpr std::uint32_t most_fact_rays = 64;
+/// differ, as with triangles or shadows finer than a pixel, more rays improve denoising, up to max_feature_rays.
+constexpr std::uint32_t feature_rays = 16;
+constexpr std::uint32_t max_feature_rays = 64;
 
 /// Rays per pixel for Cryptomatte, and its maximum number of ranks.
 constexpr std::uint32_t matte_rays = 64;
-constexpr std::uint32_t most_matte_ranks = 16;
+constexpr std::uint32_t max_matte_ranks = 16;
 
 /// Cryptomatte IDs (cryptomatte_id) of the visible objects; 0: in no matte. Volumes are in the order of Picked::place,
 /// and models in their own.
@@ -159,17 +163,17 @@ class Picture {
   /// Finished camera paths with nonfinite radiance, which count as black.
   [[nodiscard]] std::uint64_t samples_not_finite() const { return samples_ ? samples_->not_finite : 0; }
   /// Mean number of samples per pixel, rounded down.
-  [[nodiscard]] std::uint64_t samples_a_pixel() const;
+  [[nodiscard]] std::uint64_t samples_per_pixel() const;
   /// The surface pass that camera rays ended at. Do not call it with Layered::no.
   [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }
   [[nodiscard]] bool volume_alone() const { return volume_alone_; }
   /// Number of light groups with separate sums.
   [[nodiscard]] std::uint32_t light_groups() const { return light_groups_; }
-  /// True if there are feature buffers that the denoiser can use (Tracer::find_facts).
-  [[nodiscard]] bool has_facts() const;
+  /// True if there are feature buffers that the denoiser can use (Tracer::find_features).
+  [[nodiscard]] bool has_features() const;
   /// Feature rays per pixel so far, in pixels whose rays differ.
-  [[nodiscard]] std::uint32_t rays_of_facts() const { return facts_rays_; }
+  [[nodiscard]] std::uint32_t rays_of_features() const { return feature_rays_; }
   /// Raises the number of samples, and sets the noise target of a picture that has one. Sampling continues from the
   /// current state.
   void extend(std::uint32_t samples, std::optional<double> noise_target);
@@ -202,14 +206,14 @@ class Picture {
   std::uint32_t light_groups_ = 0;
   std::shared_ptr<const SurfaceLayers> layers_;  // from Tracer::drawn_layers_
   Layered layered_ = Layered::no;
-  unsigned traced_ = 0;       // 0: no triangles; 1: paths hit triangles; 2: and NEE samples emissive ones
-  bool second_lobe_ = false;  // the medium's phase function has two lobes
-  bool channels_ = false;     // cells carry more than density
-  bool environment_ = false;  // paths that escape hit an environment
-  bool lamps_ = false;        // there are lights to sample
-  bool equiangular_ = false;  // NEE samples lights from points on the ray, too
-  bool several_ = false;      // several volumes
-  bool rich_ = false;         // materials need CM_RICH (extended material model)
+  unsigned traced_ = 0;           // 0: no triangles; 1: paths hit triangles; 2: and NEE samples emissive ones
+  bool second_lobe_ = false;      // the medium's phase function has two lobes
+  bool channels_ = false;         // cells carry more than density
+  bool environment_ = false;      // paths that escape hit an environment
+  bool analytic_lights_ = false;  // there are lights to sample
+  bool equiangular_ = false;      // NEE samples lights from points on the ray, too
+  bool several_ = false;          // several volumes
+  bool extended_bsdf_ = false;    // materials need CM_EXTENDED_BSDF (extended material model)
   bool volume_holdout_ = false;
   bool model_holdout_ = false;
   [[nodiscard]] glm::uvec2 tile_corner() const {
@@ -244,7 +248,7 @@ class Picture {
   // updated by finished dispatches, even if the picture was restarted in the meantime
   std::shared_ptr<SampleCount> samples_;
   std::uint32_t view_row_ = 0;  // debug views are rendered by rows
-  bool hasty_ = false;
+  bool previews_first_ = false;
   std::optional<double> noise_target_;
   bool motion_ = false;  // something moves while the shutter is open
   bool adaptive_ = false;
@@ -263,32 +267,32 @@ class Picture {
   bool done_ = false;
   // Next rows of the depth and feature passes.
   std::uint32_t depth_row_ = 0;
-  std::uint32_t facts_row_ = 0;
-  std::uint32_t facts_rays_ = 0;  // feature rays per pixel; rows before facts_row_ already have some more
-  PixelFacts facts_ = PixelFacts::guides;
+  std::uint32_t feature_row_ = 0;
+  std::uint32_t feature_rays_ = 0;  // feature rays per pixel; rows before feature_row_ already have some more
+  FeatureSet features_ = FeatureSet::guides;
 };
 
 /// Traces pictures by bounded dispatches over tiles. All calls need a current context and an active StateGuard.
 class Tracer {
  public:
   Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
-      : gl_(gl), programs_(std::move(programs)), kernels_(gl), flights_(gl), rasters_(std::move(gl)) {}
+      : gl_(gl), programs_(std::move(programs)), kernels_(gl), dispatches_in_flight_(gl), rasters_(std::move(gl)) {}
 
   /// Returns whether the programs that begin() needs with these settings are linked. Requests them if the driver
   /// compiles in parallel, and does not wait. Throws if a program does not build.
-  bool able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
+  bool able(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
             const PictureSettings& settings);
   /// Starts a new picture with this many samples per pixel. If it throws, the picture is unchanged or not complete.
   void begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
-             const Obstacles& obstacles, const PictureSettings& settings);
+             const TraceInputs& trace_inputs, const PictureSettings& settings);
   /// Traces until about the deadline, and may return with dispatches in flight; only calls that read wait for them.
   /// Except for the first, no dispatch is sent that would probably end after the deadline. The picture that was last
   /// started or traced continues; any other restarts its in-flight paths. until_complete: stops once every pixel has a
   /// sample, if that was not so before. Returns whether the picture is done.
-  bool trace(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+  bool trace(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
              bool until_complete = false);
   /// Computes the depth at half opacity until about the deadline; returns whether it is ready.
-  bool trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
+  bool trace_depth(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline);
   /// The pick result for one pixel.
   struct Picked {
     float z = 0.0F;  ///< view depth of the volume at half opacity, or of a triangle; 0: neither was hit
@@ -296,14 +300,15 @@ class Tracer {
     std::optional<std::uint32_t> place;
     std::optional<std::uint32_t> triangle;  ///< if a triangle was hit: its number among those of all models
   };
-  Picked pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles, glm::uvec2 pixel);
+  Picked pick(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
+              glm::uvec2 pixel);
   /// Makes a picture of one transparent pixel over a black background, to be shown before the first picture.
   void clear(Picture& picture);
   /// Sets the background of a picture that clear() made.
   void set_background(Picture& picture, const glm::vec3& radiance);
   /// Draws the surface pass for a picture, unless another picture has the same one. begin() calls it; call it to show a
   /// picture of clear() over surfaces.
-  void draw_layers(Picture& picture, const Obstacles& obstacles, const PictureSettings& settings);
+  void draw_layers(Picture& picture, const TraceInputs& trace_inputs, const PictureSettings& settings);
 
   /// Reads width * height * 4 floats: mean radiance, with or without the background's, and alpha; (0,0) is the top
   /// left.
@@ -325,23 +330,23 @@ class Tracer {
   /// samples.
   void read_error(const Picture& picture, float* errors) const;
   /// Renders the feature buffers of a picture until about the deadline. data, obstacles: those that the picture was
-  /// started with. rays: minimum rays per pixel; beyond fact_rays it applies only to pixels whose rays differ. Returns
-  /// whether they are ready. The next call continues.
-  bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                  std::uint32_t rays, PixelFacts facts = PixelFacts::guides);
-  /// Like able(), for find_facts() of guides.
-  bool able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
-  /// Reads a feature buffer, channels_of(fact) floats per pixel, after find_facts() has rendered it.
-  void read_fact(const Picture& picture, PixelFact fact, float* values) const;
+  /// started with. rays: minimum rays per pixel; beyond feature_rays it applies only to pixels whose rays differ.
+  /// Returns whether they are ready. The next call continues.
+  bool find_features(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
+                     std::uint32_t rays, FeatureSet features = FeatureSet::guides);
+  /// Like able(), for find_features() of guides.
+  bool able_to_find(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs);
+  /// Reads a feature buffer, channels_of(fact) floats per pixel, after find_features() has rendered it.
+  void read_feature(const Picture& picture, FeatureBuffer feature, float* values) const;
   /// Renders and reads Cryptomatte (glsl/cryptomatte.comp): width * height * ranks pairs of floats, sorted by
   /// descending coverage. A pair is an ID as a float's bits and its coverage of the pixel. ranks: 1 to
-  /// most_matte_ranks. data, obstacles: those that the picture was started with.
-  void read_mattes(const Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
+  /// max_matte_ranks. data, obstacles: those that the picture was started with.
+  void read_mattes(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, const MatteIds& ids,
                    std::uint32_t ranks, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
   /// Makes later commands of this context run after the in-flight dispatches, whichever context sent them. Does not
   /// wait.
-  void order() const { flights_.order(); }
+  void order() const { dispatches_in_flight_.order(); }
   /// Waits for in-flight dispatches, so that everything known about the picture is exact.
   void settle(Picture& picture);
   /// Appends a record for every dispatch that ends, for tests.
@@ -370,14 +375,14 @@ class Tracer {
   struct Program {
     const gl::Program* object = nullptr;
     std::shared_ptr<RoundCost> cost = std::make_shared<RoundCost>();
-    // for rays beyond fact_rays, when most pixels are done
+    // for rays beyond feature_rays, when most pixels are done
     std::shared_ptr<RoundCost> settled_cost = std::make_shared<RoundCost>();
   };
   // stages: the wavefront programs; nullopt: the program in use is the megakernel.
-  void dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
+  void dispatch(Picture& picture, const TraceInputs& trace_inputs, const std::optional<StagePrograms>& stages,
                 Dispatched what);
   // Dispatches the kernel that measures the error of a tile whose samples are done.
-  void measure(Picture& picture, const Obstacles& obstacles);
+  void measure(Picture& picture, const TraceInputs& trace_inputs);
   // Processes finished dispatches.
   void collect();
   // Returns whether the surface pass is done, on drivers where a dispatch that reads it would wait for it.
@@ -387,12 +392,12 @@ class Tracer {
   template <class Find>
   bool asked(Find&& find);
   // Looks up all programs that a picture is traced with.
-  void find_programs(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
+  void find_programs(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs);
   // Sets the picture's fields that decide which programs it needs.
-  static void classify(Picture& picture, const PictureParameters& parameters, const Obstacles& obstacles,
+  static void classify(Picture& picture, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                        const PictureSettings& settings);
   // Returns Picture::traced_ of a picture with these settings.
-  static unsigned traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
+  static unsigned traced_of(const PictureParameters& parameters, const TraceInputs& trace_inputs,
                             const PictureSettings& settings);
   // Adds the macros that the holdouts, motion and light groups of a picture need.
   static void add_march(const Picture& picture, std::vector<std::string>& defines);
@@ -401,11 +406,11 @@ class Tracer {
   // Returns the megakernel, or the wavefront stage whose cost estimate covers all stages.
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);
-  const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name,
+  const Program& inspect_program(const MarchData& data, const TraceInputs& trace_inputs, const char* name,
                                  std::span<const char* const> macros = {});
-  const Program& facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles,
-                               PixelFacts facts);
-  const Program& matte_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
+  const Program& feature_program(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs,
+                                 FeatureSet features);
+  const Program& matte_program(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs);
   // Runs inspect.comp, aovs.comp or cryptomatte.comp over the rows from `row` on, until done or about the deadline.
   bool inspect(const PixelBox& box, const core::CmParameters& parameters, const std::shared_ptr<RoundCost>& cost,
                std::uint32_t& row, Deadline deadline);
@@ -424,9 +429,9 @@ class Tracer {
   // Calls visit with each of these layers, its offset in the saved state, and its size there.
   template <class Visit>
   static void for_each_saved(const Picture& picture, Visit&& visit);
-  bool accumulate(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+  bool accumulate(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                   bool until_complete);
-  void bind(const MarchData& data, const Obstacles& obstacles) const;
+  void bind(const MarchData& data, const TraceInputs& trace_inputs) const;
   void read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const;
   template <class Texel>
   [[nodiscard]] std::vector<Texel> texels(const Picture& picture, const FilmLayer& layer, GLenum format,
@@ -455,8 +460,8 @@ class Tracer {
   gl::Object pick_place_;  // ...and the object that it hit
   gl::Object motion_;      // Obstacles::motion, for the feature pass in progress
   gl::Object errors_;      // errors of a tile
-  Flights flights_;
-  Flights rasters_;
+  InFlightDispatches dispatches_in_flight_;
+  InFlightDispatches rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;
   PassSeconds seconds_;
   double raster_rate_ = 2e4;

@@ -13,7 +13,7 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr std::uint32_t least_size = 16;
+constexpr std::uint32_t min_size = 16;
 
 struct Axes {
   glm::dvec3 right;
@@ -57,7 +57,7 @@ TransmittanceMap::Made TransmittanceMap::make(const gl::FunctionsPtr& gl, std::u
 }
 
 TransmittanceMap::TransmittanceMap(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
-    : gl_(gl), programs_(std::move(programs)), flights_(std::move(gl)) {}
+    : gl_(gl), programs_(std::move(programs)), dispatches_in_flight_(std::move(gl)) {}
 
 std::uint64_t TransmittanceMap::bytes() const {
   const auto of = [](const Made& made) { return std::uint64_t{2} * made.size * made.size * made.slices; };
@@ -67,7 +67,7 @@ std::uint64_t TransmittanceMap::bytes() const {
 void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& scene) {
   const std::vector<glm::dvec3> corners = scene.corners();
   const MapRequest& request = of.request;
-  const std::uint32_t size = std::max(least_size, request.size >> coarser_);
+  const std::uint32_t size = std::max(min_size, request.size >> coarser_);
   UnderWay next;
   scene::Viewpoint view;
   if (request.light.kind == MapLight::Kind::parallel) {
@@ -102,7 +102,7 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
   }
   scene::Snapshot seen = snapshot;
   seen.view.set(view);
-  const PictureParameters picture = scene.parameters(seen, scene.obstacles(seen, false), {}, glm::uvec2(size));
+  const PictureParameters picture = scene.parameters(seen, scene.trace_inputs(seen, false), {}, glm::uvec2(size));
   next.parameters.view = picture.view;
   next.parameters.space = picture.space;
   next.parameters.grid = picture.grid;
@@ -129,7 +129,7 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
 }
 
 void TransmittanceMap::collect() {
-  while (const auto landed = flights_.land()) learn_rows(*landed);
+  while (const auto completed = dispatches_in_flight_.take_completed()) learn_rows(*completed);
 }
 
 void TransmittanceMap::show_clear() {
@@ -167,9 +167,9 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
   if (whole) coarser_ = 0;  // the scene rests
   if (under_way_ && under_way_->of != of) {
     under_way_.reset();
-    if (request.size >> coarser_ > least_size) ++coarser_;
+    if (request.size >> coarser_ > min_size) ++coarser_;
   }
-  const Obstacles met = scene.obstacles(snapshot, false);
+  const TraceInputs met = scene.trace_inputs(snapshot, false);
   const gl::Program& program = programs_->ask({"transmittance.comp", data->defines(met.instances != nullptr)});
   if (!program.usable()) return;
   if (failed_ == of) return;
@@ -185,7 +185,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
   UnderWay& work = *under_way_;
   failed_.reset();
-  flights_.order();
+  dispatches_in_flight_.order();
   data->bind(*gl_);
   if (met.instances != nullptr) met.instances->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
@@ -201,7 +201,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(work.parameters), &work.parameters);
     gl_->DispatchCompute((size.x + 7) / 8, (rows.y - rows.x + 7) / 8, 1);
   };
-  send_rows(flights_, cost_, size, work.row, deadline, send, [&] { collect(); });
+  send_rows(dispatches_in_flight_, cost_, size, work.row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   gl::check(*gl_, "making a map of transmittances");
   if (work.row < size.y) return;

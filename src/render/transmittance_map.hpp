@@ -87,7 +87,7 @@ class TransmittanceMap {
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
-  Flights flights_;
+  InFlightDispatches dispatches_in_flight_;
   std::shared_ptr<RoundCost> cost_ = std::make_shared<RoundCost>();
   gl::Object uniforms_;
   Made shown_;

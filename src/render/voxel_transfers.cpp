@@ -21,7 +21,7 @@ using volume::brick_size;
 using volume::brick_voxels;
 
 constexpr int longest_side = 1 << 20;  // limit of all volumes
-constexpr std::uint64_t most_bricks = std::uint64_t{1} << 27U;
+constexpr std::uint64_t max_bricks = std::uint64_t{1} << 27U;
 constexpr const char* what_step = "copying a host's voxels";
 
 [[noreturn]] void refuse(ErrorCode code, const std::string& what, const std::string& cause) {
@@ -192,7 +192,7 @@ VoxelTransfers::VoxelTransfers(gl::FunctionsPtr gl, gl::ProgramsPtr programs, co
                                DeviceMemoriesPtr memories)
     : gl_(std::move(gl)), programs_(std::move(programs)), memories_(std::move(memories)) {
   constexpr std::int64_t most = std::int64_t{1} << 31U;  // word indices are 32-bit
-  most_bytes_ = static_cast<std::uint64_t>(std::min(limits.storage_block_bytes, most));
+  max_bytes_ = static_cast<std::uint64_t>(std::min(limits.storage_block_bytes, most));
   GLint alignment = 0;
   gl_->GetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
   alignment_ = static_cast<std::uint64_t>(std::max(alignment, 4));
@@ -279,7 +279,7 @@ VoxelTransfers::Source VoxelTransfers::open(const GlVoxels& field, const std::st
   Source source =
       texture != nullptr ? open_texture(*texture, what) : open_buffer(std::get<VoxelBuffer>(field.source), what);
   const glm::u64vec3 bricks(bricks_of(source.size));
-  if (bricks.x * bricks.y * bricks.z > most_bricks)
+  if (bricks.x * bricks.y * bricks.z > max_bricks)
     refuse(ErrorCode::unsupported, what, "its size of " + text(source.size) + " is more than 2^36 voxels");
   return source;
 }
@@ -302,10 +302,10 @@ void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vect
   const std::uint64_t layer = std::uint64_t(bricks.x) * std::uint64_t(bricks.y);
   const std::size_t each = std::max(brick_bytes(source.format), transfer.stays_in_gl() ? kept_bytes(source.format) : 0);
   const auto fits = [&](std::uint64_t count, glm::ivec2 layers) {
-    if (count * each > most_bytes_) return false;
+    if (count * each > max_bytes_) return false;
     if (source.buffer == 0) return true;
     const glm::u64vec2 range = range_of(source, layers);
-    return range.y - range.x <= most_bytes_;
+    return range.y - range.x <= max_bytes_;
   };
   // Returns the number of bricks before this layer.
   const auto before = [&](int z) {
@@ -318,7 +318,7 @@ void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vect
     int end = z + 1;
     if (!fits(before(end) - first, {z, end})) {
       refuse(ErrorCode::unsupported, what,
-             "a layer of bricks of it takes more than the driver's storage blocks of " + std::to_string(most_bytes_) +
+             "a layer of bricks of it takes more than the driver's storage blocks of " + std::to_string(max_bytes_) +
                  " bytes");
     }
     while (end < bricks.z && fits(before(end + 1) - first, {z, end + 1})) ++end;
@@ -581,7 +581,7 @@ bool VoxelTransfers::summarize(Transfer& transfer, Deadline deadline) {
     if (!programs_->ask(summaries_of(transfer, piece).program()).usable()) return false;
   }
   if (!transfer.brick_tree) begin_summaries(transfer);
-  const std::uint32_t a_step = bricks_a_step(gl);
+  const std::uint32_t a_step = bricks_per_step(gl);
   for (Piece& piece : transfer.pieces) {
     const BrickSummaries work = summaries_of(transfer, piece);
     while (piece.summarized < piece.filled) {
@@ -775,9 +775,9 @@ bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
 
 void VoxelTransfers::recycle(Transfer& transfer) {
   for (Piece& piece : transfer.pieces) spare_.push_back(std::move(piece.room));
-  most_pieces_ = std::max(most_pieces_, transfer.pieces.size());
+  max_pieces_ = std::max(max_pieces_, transfer.pieces.size());
   // Enough for two states: one in flight and one that waits.
-  while (spare_.size() > 2 * most_pieces_) spare_.pop_front();
+  while (spare_.size() > 2 * max_pieces_) spare_.pop_front();
 }
 
 VoxelTransfers::Transfers::iterator VoxelTransfers::drop(const Transfers::iterator& transfer) {
@@ -805,7 +805,7 @@ void VoxelTransfers::follow(Deadline deadline) {
   if (transfers_.empty()) {
     if (++idle_ == long_time) {
       spare_.clear();
-      most_pieces_ = 0;
+      max_pieces_ = 0;
     }
     return;
   }

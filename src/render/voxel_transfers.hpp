@@ -240,14 +240,14 @@ class VoxelTransfers {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   DeviceMemoriesPtr memories_;
-  std::uint64_t most_bytes_;
+  std::uint64_t max_bytes_;
   std::uint64_t alignment_;
   gl::Object sampler_;
   std::optional<light::BlackBody> body_;  // made when first needed, in about a millisecond
   Transfers transfers_;                   // in the order of begin()
   std::deque<Room> spare_;
-  std::size_t most_pieces_ = 0;  // recent maximum per state
-  int idle_ = 0;                 // calls of follow() without transfers
+  std::size_t max_pieces_ = 0;  // recent maximum per state
+  int idle_ = 0;                // calls of follow() without transfers
 };
 
 }  // namespace cumulet::render

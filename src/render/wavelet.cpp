@@ -13,29 +13,29 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // Each level doubles the stride of the filter: together 32 pixels to each side, if the picture is that large.
-constexpr std::uint32_t most_levels = 5;
+constexpr std::uint32_t max_levels = 5;
 // Minimum rows per dispatch.
-constexpr std::uint32_t least_rows = 8;
-constexpr std::uint64_t bytes_a_pixel = 112;
+constexpr std::uint32_t min_rows = 8;
+constexpr std::uint64_t bytes_per_pixel = 112;
 // Uniform locations in the shaders.
 constexpr GLint rows_at = 0;
 constexpr GLint footprint_at = 2;
 constexpr GLint own_at = 3;        // PictureGuides::surfaces, or the level's stride
 constexpr GLint box_at = 4;        // wavelet_input.comp
-constexpr GLint most_at = 3;       // wavelet_merge.comp
+constexpr GLint max_at = 3;        // wavelet_merge.comp
 constexpr GLint to_before_at = 3;  // wavelet_reproject.comp
 constexpr GLint moved_at = 4;
 constexpr GLint orthographic_at = 5;
 constexpr GLint footprint_before_at = 6;
 constexpr GLint surfaces_at = 7;
-constexpr GLint most_recalled_at = 8;
+constexpr GLint max_history_at = 8;
 // A larger maximum would blur, because each picture is resampled from the previous one between its pixels. It would
 // also hide changes.
-constexpr float most_samples = 32.0F;
+constexpr float max_samples = 32.0F;
 // A finer history is kept for this many requests before a coarser one replaces it.
-constexpr std::uint64_t most_wishes = 16;
-constexpr std::uint64_t history_bytes_a_pixel = 32;
-constexpr std::uint64_t recalled_bytes_a_pixel = 16;
+constexpr std::uint64_t max_requests = 16;
+constexpr std::uint64_t history_bytes_per_pixel = 32;
+constexpr std::uint64_t history_light_bytes_per_pixel = 16;
 
 std::uint64_t area(glm::uvec2 size) { return std::uint64_t{size.x} * size.y; }
 
@@ -50,7 +50,7 @@ Motion motion(const PictureView& from, const PictureView& to) {
   return {glm::mat3(back * glm::dmat3(from.right, from.up, from.forward)), glm::vec3(back * (from.eye - to.eye))};
 }
 
-double slots_of(glm::uvec2 size, std::uint32_t rows) { return double(rows) * size.x / lanes_a_slot; }
+double slots_of(glm::uvec2 size, std::uint32_t rows) { return double(rows) * size.x / lanes_per_slot; }
 
 gl::ProgramKey output_key(MeansBackground background) {
   return {"wavelet_output.comp", {"CM_BACKGROUND " + std::to_string(static_cast<int>(background))}};
@@ -61,7 +61,7 @@ gl::ProgramKey output_key(MeansBackground background) {
 std::uint32_t Wavelet::levels() const {
   const std::uint32_t least = std::min(size_.x, size_.y);
   std::uint32_t count = 1;
-  while (count < most_levels && (4U << count) < least) ++count;
+  while (count < max_levels && (4U << count) < least) ++count;
   return count;
 }
 
@@ -105,7 +105,7 @@ bool Wavelet::has(Stage stage) const {
 void Wavelet::forget() {
   before_ = {};
   kept_ = {};
-  recalled_ = {};
+  history_light_ = {};
   keeps_ = recalls_ = false;
 }
 
@@ -120,20 +120,20 @@ void Wavelet::make_history(glm::uvec2 size) {
     kept_.guides = make(doing);
     kept_.size = size;
   }
-  if (!recalled_) recalled_ = make(doing);
+  if (!history_light_) history_light_ = make(doing);
 }
 
 void Wavelet::remember(const PictureTextures& picture) {
   const PictureView& view = *picture.view;
   if (kept_.filled && kept_.picture != picture.picture) {
     const bool coarser = before_.filled && area(kept_.size) < area(before_.size);
-    const bool lasts = before_.view.scene == view.scene && picture.wish - before_.wish <= most_wishes;
+    const bool lasts = before_.view.scene == view.scene && picture.request - before_.request <= max_requests;
     if (!coarser || !lasts) std::swap(before_, kept_);
     kept_.filled = false;
   }
   make_history(picture.size);
   kept_.picture = picture.picture;
-  kept_.wish = picture.wish;
+  kept_.request = picture.request;
   kept_.view = view;
   kept_.surfaces = picture.guides->surfaces;
   kept_.footprint = picture.guides->footprint;
@@ -149,7 +149,7 @@ std::optional<Error> Wavelet::begin(const PictureTextures& picture) {
     guides_ = {};
     behind_ = {};
     unfiltered_ = {};
-    recalled_ = {};
+    history_light_ = {};
     size_ = glm::uvec2(0U);
     const auto make = [&](GLenum format) {
       return gl::make_texture_2d(gl_, format, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
@@ -194,14 +194,14 @@ void Wavelet::free() {
 }
 
 std::uint64_t Wavelet::bytes() const {
-  return area(size_) * (bytes_a_pixel + (recalled_ ? recalled_bytes_a_pixel : 0U)) +
-         (area(before_.size) + area(kept_.size)) * history_bytes_a_pixel;
+  return area(size_) * (bytes_per_pixel + (history_light_ ? history_light_bytes_per_pixel : 0U)) +
+         (area(before_.size) + area(kept_.size)) * history_bytes_per_pixel;
 }
 
 void Wavelet::collect() {
-  while (const auto landed = flights_.land()) {
-    const double ms = landed->ms.value_or(landed->at_most_ms);
-    landed->what.cost->learn(landed->what.slots, landed->ms ? ms : 0.0, ms);
+  while (const auto completed = dispatches_in_flight_.take_completed()) {
+    const double ms = completed->ms.value_or(completed->at_most_ms);
+    completed->what.cost->learn(completed->what.slots, completed->ms ? ms : 0.0, ms);
   }
 }
 
@@ -218,7 +218,7 @@ std::optional<double> Wavelet::left_ms(glm::uvec2 size) const {
     if ((begun && stage < stage_) || !has(stage)) continue;
     const auto ms = costs_.at(i)->most(slots_of(size, size.y));
     if (!ms) return std::nullopt;
-    sum += *ms * (stage == Stage::level ? most_levels - (begun ? level_ : 0U) : 1U);
+    sum += *ms * (stage == Stage::level ? max_levels - (begun ? level_ : 0U) : 1U);
   }
   return sum;
 }
@@ -269,15 +269,15 @@ void Wavelet::bind_history(const PictureTextures& picture, const gl::Program& pr
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_ALBEDO, picture.guides->albedo);
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_NORMAL, picture.guides->normal);
   if (stage_ == Stage::merge) {
-    gl.BindTextureUnit(core::CM_UNIT_HISTORY_LIGHT, recalled_.name());
+    gl.BindTextureUnit(core::CM_UNIT_HISTORY_LIGHT, history_light_.name());
     write(core::CM_IMAGE_HISTORY_LIGHT, kept_.light);
     write(core::CM_IMAGE_HISTORY_GUIDES, kept_.guides);
-    gl.ProgramUniform1f(program.name(), most_at, most_samples);
+    gl.ProgramUniform1f(program.name(), max_at, max_samples);
     return;
   }
   gl.BindTextureUnit(core::CM_UNIT_HISTORY_LIGHT, before_.light.name());
   gl.BindTextureUnit(core::CM_UNIT_HISTORY_GUIDES, before_.guides.name());
-  write(core::CM_IMAGE_HISTORY_LIGHT, recalled_);
+  write(core::CM_IMAGE_HISTORY_LIGHT, history_light_);
   const Motion moved = motion(kept_.view, before_.view);
   gl.ProgramUniformMatrix3fv(program.name(), to_before_at, 1, GL_FALSE, &moved.turn[0][0]);
   gl.ProgramUniform3f(program.name(), moved_at, moved.shift.x, moved.shift.y, moved.shift.z);
@@ -285,7 +285,7 @@ void Wavelet::bind_history(const PictureTextures& picture, const gl::Program& pr
                       before_.view.orthographic ? 1 : 0);
   gl.ProgramUniform2f(program.name(), footprint_before_at, before_.footprint.x, before_.footprint.y);
   gl.ProgramUniform1f(program.name(), surfaces_at, kept_.surfaces ? 1.0F : 0.0F);
-  gl.ProgramUniform1f(program.name(), most_recalled_at, most_samples);
+  gl.ProgramUniform1f(program.name(), max_history_at, max_samples);
 }
 
 void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool measured) {
@@ -294,10 +294,10 @@ void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool meas
   Dispatched what;
   what.slots = slots_of(size_, rows);
   what.cost = costs_.at(static_cast<std::size_t>(stage_));
-  what.most_ms = what.cost->most(what.slots).value_or(0.0);
-  if (measured) flights_.begin(Flights::Kind::dispatch);
+  what.max_ms = what.cost->most(what.slots).value_or(0.0);
+  if (measured) dispatches_in_flight_.begin(InFlightDispatches::Kind::dispatch);
   gl.DispatchCompute((size_.x + 7) / 8, (rows + 7) / 8, 1);
-  if (measured) flights_.end(std::move(what), 0, 0);
+  if (measured) dispatches_in_flight_.end(std::move(what), 0, 0);
   row_ += rows;
   if (row_ < size_.y) return;
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
@@ -320,21 +320,21 @@ void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool meas
 bool Wavelet::work(const PictureTextures& picture, Deadline deadline) {
   const gl::DebugGroup group(*gl_, "cumulet: denoise");
   collect();
-  flights_.order();
+  dispatches_in_flight_.order();
   double sent_ms = 0.0;
   for (bool first = true; !done_; first = false) {
-    const double left = milliseconds_until(deadline) - flights_.expected_ms() - sent_ms;
+    const double left = milliseconds_until(deadline) - dispatches_in_flight_.expected_ms() - sent_ms;
     const auto fits = [&](std::uint32_t rows) {
       const auto ms = cost(stage_, rows);
       return ms && *ms <= left;
     };
     // A stage of unknown cost is sent once at a time and measured.
-    const bool known = cost(stage_, least_rows).has_value();
-    if (!first && (known ? !fits(least_rows) : left <= 0.0 || !flights_.empty())) break;
-    std::uint32_t rows = least_rows;
+    const bool known = cost(stage_, min_rows).has_value();
+    if (!first && (known ? !fits(min_rows) : left <= 0.0 || !dispatches_in_flight_.empty())) break;
+    std::uint32_t rows = min_rows;
     while (row_ + rows < size_.y && fits(2 * rows)) rows *= 2;
     rows = std::min(rows, size_.y - row_);
-    const bool measured = !flights_.full();
+    const bool measured = !dispatches_in_flight_.full();
     if (!measured) sent_ms += cost(stage_, rows).value_or(0.0);
     const gl::Program& program = programs_->get(key(stage_, picture));
     program.use(*gl_);

@@ -37,7 +37,7 @@ class Wavelet {
   using Deadline = std::chrono::steady_clock::time_point;
 
   Wavelet(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
-      : gl_(std::move(gl)), programs_(std::move(programs)), flights_(gl_) {}
+      : gl_(std::move(gl)), programs_(std::move(programs)), dispatches_in_flight_(gl_) {}
 
   /// Requests the programs for such a picture, and returns whether they are usable. wait: waits until they are.
   bool able(const PictureTextures& picture, MeansBackground background, bool wait);
@@ -70,7 +70,7 @@ class Wavelet {
     glm::uvec2 size{0U};
     bool filled = false;
     std::uint64_t picture = 0;
-    std::uint64_t wish = 0;
+    std::uint64_t request = 0;
     PictureView view;
     bool surfaces = true;  // as PictureGuides::surfaces
     glm::vec2 footprint{0.0F};
@@ -92,7 +92,7 @@ class Wavelet {
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
-  Flights flights_;
+  InFlightDispatches dispatches_in_flight_;
   std::array<std::shared_ptr<RoundCost>, stages> costs_{std::make_shared<RoundCost>(), std::make_shared<RoundCost>(),
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>(),
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>()};
@@ -105,7 +105,7 @@ class Wavelet {
   gl::Object unfiltered_;
   History before_;  // history of an earlier picture
   History kept_;    // history of the current or last picture
-  gl::Object recalled_;
+  gl::Object history_light_;
   bool keeps_ = false;                           // this picture writes a history
   bool recalls_ = false;                         // this picture reads a history
   std::optional<glm::uvec2> no_memory_to_keep_;  // of pictures of this size

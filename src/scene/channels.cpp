@@ -84,21 +84,21 @@ class BrickSet {
 };
 
 // Far above any visible radiance, and low enough that float sums over a volume stay finite.
-constexpr double most_radiance = 1e12;
+constexpr double max_radiance = 1e12;
 
-glm::dvec3 flame_colour_of(const Emission& emission) {
-  return glm::dvec3(emission.flame_colour) * emission.flame_strength;
+glm::dvec3 flame_color_of(const Emission& emission) {
+  return glm::dvec3(emission.flame_color) * emission.flame_strength;
 }
-float intensity_of(const Emission& emission) { return static_cast<float>(std::min(emission.blackbody, most_radiance)); }
+float intensity_of(const Emission& emission) { return static_cast<float>(std::min(emission.blackbody, max_radiance)); }
 
-class Glow {
+class CellEmission {
  public:
-  explicit Glow(const Emission& emission) : emission_(emission), flame_colour_(flame_colour_of(emission)) {}
+  explicit CellEmission(const Emission& emission) : emission_(emission), flame_color_(flame_color_of(emission)) {}
 
   /// Returns the emission for these field values.
   [[nodiscard]] vec3 operator()(float temperature_value, float flame_value) const {
     const float temperature = emission_.temperature_ramp(temperature_value);
-    glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_colour_;
+    glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_color_;
     if (temperature > 0.0F && emission_.blackbody > 0.0) {
       const double kelvin =
           emission_.temperature_offset + emission_.kelvin_a_value() * static_cast<double>(temperature);
@@ -106,12 +106,12 @@ class Glow {
       const vec3 body = black_body_.emission(static_cast<float>(std::min(kelvin, hottest)), intensity_of(emission_));
       light += glm::dvec3(body) * glm::dvec3(emission_.blackbody_tint);
     }
-    return {glm::min(light, glm::dvec3(most_radiance))};
+    return {glm::min(light, glm::dvec3(max_radiance))};
   }
 
  private:
   Emission emission_;
-  glm::dvec3 flame_colour_;
+  glm::dvec3 flame_color_;
   light::BlackBody black_body_;
 };
 
@@ -124,14 +124,14 @@ void read_density(const volume::VolumeFrame& frame, const volume::Ramp& ramp, co
 // The fields of one brick that determine scattering.
 struct Scatters {
   Values density{};
-  std::array<Values, 3> colour{};
+  std::array<Values, 3> color{};
 
   void read_brick(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp, const ivec3& origin) {
     read_density(frame, density_ramp, origin, density);
-    for (std::size_t i = 0; frame.colour && i < 3; ++i) read((*frame.colour)[i], origin, colour[i]);
+    for (std::size_t i = 0; frame.color && i < 3; ++i) read((*frame.color)[i], origin, color[i]);
   }
-  [[nodiscard]] vec3 coloured(std::size_t v) const {
-    return density[v] * glm::min(vec3(colour[0][v], colour[1][v], colour[2][v]), vec3(1.0F));
+  [[nodiscard]] vec3 colored(std::size_t v) const {
+    return density[v] * glm::min(vec3(color[0][v], color[1][v], color[2][v]), vec3(1.0F));
   }
 };
 
@@ -192,8 +192,8 @@ std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, cons
 
 }  // namespace
 
-core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& body) {
-  core::CmBrickGlow glow{};
+core::CmBrickEmissive shader_emissive(const Emission& emission, const light::BlackBody& body) {
+  core::CmBrickEmissive emissive{};
   const auto put = [](const volume::Ramp& ramp, core::CmRampPart* to) {
     const std::vector<glm::vec2>& points = ramp.points();
     constexpr float largest = std::numeric_limits<float>::max();
@@ -206,21 +206,21 @@ core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& 
                static_cast<float>(std::clamp(rise.y / rise.x, -double{largest}, double{largest}))};
     }
   };
-  glow.flame_colour = flame_colour_of(emission);
-  glow.intensity = intensity_of(emission);
-  glow.tint = emission.blackbody_tint;
-  glow.unit = emission.blackbody > 0.0 ? static_cast<float>(light::black_body_radiance(1000.0, 1.0) / 1e12) : 0.0F;
-  glow.offset = static_cast<float>(emission.temperature_offset);
-  glow.scale = static_cast<float>(emission.kelvin_a_value());
-  glow.most = static_cast<float>(most_radiance);
-  put(emission.temperature_ramp, glow.ramps);
-  put(emission.flame_ramp, glow.ramps + CM_RAMP_PARTS);
-  static_assert(CM_BODY_COLOURS == std::tuple_size_v<light::BlackBody::Colours>);
-  float* to = glow.colours;
-  for (const vec3& colour : body.colours()) {
-    for (int i = 0; i < 3; ++i) *to++ = colour[i];
+  emissive.flame_color = flame_color_of(emission);
+  emissive.intensity = intensity_of(emission);
+  emissive.tint = emission.blackbody_tint;
+  emissive.unit = emission.blackbody > 0.0 ? static_cast<float>(light::black_body_radiance(1000.0, 1.0) / 1e12) : 0.0F;
+  emissive.offset = static_cast<float>(emission.temperature_offset);
+  emissive.scale = static_cast<float>(emission.kelvin_a_value());
+  emissive.most = static_cast<float>(max_radiance);
+  put(emission.temperature_ramp, emissive.ramps);
+  put(emission.flame_ramp, emissive.ramps + CM_RAMP_PARTS);
+  static_assert(CM_BODY_COLORS == std::tuple_size_v<light::BlackBody::Colors>);
+  float* to = emissive.colors;
+  for (const vec3& color : body.colors()) {
+    for (int i = 0; i < 3; ++i) *to++ = color[i];
   }
-  return glow;
+  return emissive;
 }
 
 std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
@@ -231,7 +231,7 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
   BrickSet set("temperature or flame");
   if (burns) set.add(*frame.flame);
   if (hot) set.add(*frame.temperature);
-  const Glow glow(emission);
+  const CellEmission emissive(emission);
   struct Read {
     Values flame{};
     Values temperature{};
@@ -242,20 +242,20 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
                            if (burns) read(*frame.flame, origin, read_here.flame);
                            if (hot) read(*frame.temperature, origin, read_here.temperature);
                          },
-                         [&](const Read& here, std::size_t v) { return glow(here.temperature[v], here.flame[v]); });
+                         [&](const Read& here, std::size_t v) { return emissive(here.temperature[v], here.flame[v]); });
   if (radiance[0].empty()) return std::nullopt;
   return radiance;
 }
 
 std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
                                                         const volume::Ramp& density_ramp, const Progress* progress) {
-  if (!frame.colour || frame.density.empty()) return std::nullopt;
+  if (!frame.color || frame.density.empty()) return std::nullopt;
   BrickSet set("density");
   set.add(frame.density);
   return fields_of<3, Scatters>(
       frame.density.index_to_world, set.take(), "scattering", progress,
       [&](const ivec3& origin, Scatters& here) { here.read_brick(frame, density_ramp, origin); },
-      [](const Scatters& here, std::size_t v) { return here.coloured(v); });
+      [](const Scatters& here, std::size_t v) { return here.colored(v); });
 }
 
 std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp,
@@ -274,7 +274,7 @@ std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const v
         for (std::size_t i = 0; i < 2; ++i) read((*frame.anisotropy)[i], origin, here.anisotropy[i]);
       },
       [&](const Read& here, std::size_t v) {
-        const float scatters = frame.colour ? luminance(here.scatters.coloured(v)) : here.scatters.density[v];
+        const float scatters = frame.color ? luminance(here.scatters.colored(v)) : here.scatters.density[v];
         return glm::vec1(scatters * (0.5F + 0.5F * (here.anisotropy[0][v] - here.anisotropy[1][v])));
       })[0]);
 }

@@ -12,7 +12,7 @@
 #include "volume/ramp.hpp"
 
 namespace cumulet::core {
-#include "brick_glow.glsl"
+#include "brick_emission.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {
@@ -20,7 +20,7 @@ namespace cumulet::scene {
 /// Maps a volume's fields to emission, like Blender's Principled Volume except for the default of temperature_scale.
 struct Emission {
   double flame_strength = 1.0;  ///< radiance per world unit of length where flame is 1
-  glm::vec3 flame_colour{1.0F};
+  glm::vec3 flame_color{1.0F};
   /// Kelvin = offset + scale * field value. If empty, VolumeAsset::emission_by chooses a value for the volume; the
   /// fallback is 1500.
   std::optional<double> temperature_scale = {};
@@ -34,13 +34,13 @@ struct Emission {
   [[nodiscard]] double kelvin_a_value() const { return temperature_scale.value_or(1500.0); }
 
   /// Whether a flame field emits with these settings.
-  [[nodiscard]] bool burns() const { return flame_strength > 0.0 && flame_colour != glm::vec3(0.0F); }
+  [[nodiscard]] bool burns() const { return flame_strength > 0.0 && flame_color != glm::vec3(0.0F); }
   /// Whether a temperature field emits with these settings.
   [[nodiscard]] bool is_hot() const { return blackbody > 0.0 && blackbody_tint != glm::vec3(0.0F); }
 };
 
 /// Converts the settings for shaders (glsl/brick_products.comp).
-core::CmBrickGlow shader_glow(const Emission& emission, const light::BlackBody& body);
+core::CmBrickEmissive shader_emissive(const Emission& emission, const light::BlackBody& body);
 
 /// Returns flame * strength * color + black-body emission of the temperature: radiance per world unit of length, linear
 /// Rec. 709, per voxel on the lattice of the fields. Returns nullopt if there is no such field or none of them emits.

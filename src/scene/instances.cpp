@@ -69,26 +69,26 @@ bool overlaps_another(const InstanceTable& table, const std::vector<Block>& bloc
 }
 
 // Sets the probability with which next-event estimation samples the emissive cells of each instance.
-void set_glow(InstanceTable& table, const std::vector<PlacedGlow>& glow) {
+void set_emissive(InstanceTable& table, const std::vector<PlacedEmissive>& emissive) {
   double square = 0.0;  // sum of the integrals of L^2 of the instances: length^3 = power^2 / square
   std::vector<double> power;
-  for (const PlacedGlow& of : glow) {
+  for (const PlacedEmissive& of : emissive) {
     power.push_back(of.power);
-    table.glow_power += of.power;
+    table.emissive_power += of.power;
     if (of.power > 0.0) square += of.power / of.length * (of.power / of.length) / of.length;
   }
-  if (!(table.glow_power > 1e-30)) {  // its inverse does not fit in a float
-    table.glow_power = 0.0;
+  if (!(table.emissive_power > 1e-30)) {  // its inverse does not fit in a float
+    table.emissive_power = 0.0;
     return;
   }
-  table.glow_length = std::cbrt(table.glow_power / square * table.glow_power);
-  const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.glow_power);
+  table.emissive_length = std::cbrt(table.emissive_power / square * table.emissive_power);
+  const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.emissive_power);
   for (std::size_t i = 0; i < aliases.size(); ++i) {
     CmInstance& record = table.records[i];
     record.alias = aliases[i].stays;
     record.alias_other = aliases[i].other;
-    record.glow = glow[i].looks;
-    if (glow[i].power > 0.0) record.glow.density = static_cast<float>(1.0 / table.glow_power);
+    record.emissive = emissive[i].looks;
+    if (emissive[i].power > 0.0) record.emissive.density = static_cast<float>(1.0 / table.emissive_power);
   }
 }
 
@@ -115,7 +115,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
   const bool moves = std::ranges::any_of(instances, [](const Instance& i) { return i.ends.has_value(); });
   if (moves) table.ends.resize(2 * count);
   std::vector<Block> blocks;
-  std::vector<PlacedGlow> glow;
+  std::vector<PlacedEmissive> emissive;
   std::vector<TreeBox> boxes;
   const auto refuse = [&](ErrorCode code, const char* cause) {
     throw Error(code, "instance " + std::to_string(table.records.size()) + ": " + cause);
@@ -136,7 +136,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U) |
                    (instance.ends ? core::CM_INSTANCE_MOVES : 0U);
-    glow.push_back(glow_of(instance.glow, cube.to_world, instance.place));
+    emissive.push_back(emissive_of(instance.emissive, cube.to_world, instance.place));
     dvec3 low = block.middle - reach_of(block);
     dvec3 high = block.middle + reach_of(block);
     if (instance.ends) {
@@ -160,7 +160,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     if (node.instance != core::CM_INSTANCE_NONE && overlaps_another(table, blocks, node))
       table.records[node.instance].flags |= core::CM_INSTANCE_OVERLAPS;
   }
-  set_glow(table, glow);
+  set_emissive(table, emissive);
   return table;
 }
 

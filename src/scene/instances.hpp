@@ -26,7 +26,7 @@ struct Instance {
   core::CmMedium medium{};
   bool hidden_from_camera = false;
   std::optional<PlaceEnds> ends = {};  ///< transforms at shutter open and close; empty: it does not move
-  GlowSum glow{};                      ///< emission of the source's cells
+  EmissiveSum emissive{};              ///< emission of the source's cells
 };
 
 /// The arrays are copied to buffers unchanged; `ends` follows `records`.
@@ -36,8 +36,8 @@ struct InstanceTable {
   /// moves.
   std::vector<core::CmInstance> ends;
   std::vector<core::CmInstanceNode> nodes;  ///< at least one; the box of the first contains all others
-  double glow_power = 0.0;                  ///< of all instances; see GlowSum for both
-  double glow_length = 0.0;
+  double emissive_power = 0.0;              ///< of all instances; see EmissiveSum for both
+  double emissive_length = 0.0;
 };
 
 /// Returns the origin of the scene's frame in world space, at most twice the scene size from its center. It depends

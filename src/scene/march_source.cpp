@@ -56,15 +56,15 @@ void add_brick(MarchSource& source, const grid::Statistics::Node& node, const fl
 
 // Brick traversal stores voxel coordinates in 16 bits per axis, and a table of all bricks in the box.
 void require_table(const ivec3& end, const ivec3& bricks) {
-  constexpr int most_voxels = 1 << 16;
-  constexpr std::int64_t most_bricks = std::int64_t{1} << 28U;
-  if (const int widest = std::max({end.x, end.y, end.z}); widest > most_voxels) {
+  constexpr int max_voxels = 1 << 16;
+  constexpr std::int64_t max_bricks = std::int64_t{1} << 28U;
+  if (const int widest = std::max({end.x, end.y, end.z}); widest > max_voxels) {
     throw Error(ErrorCode::unsupported, "the brick march over " + std::to_string(widest) + " voxels: the limit is " +
-                                            std::to_string(most_voxels));
+                                            std::to_string(max_voxels));
   }
-  if (const std::int64_t all = std::int64_t{bricks.x} * bricks.y * bricks.z; all > most_bricks) {
+  if (const std::int64_t all = std::int64_t{bricks.x} * bricks.y * bricks.z; all > max_bricks) {
     throw Error(ErrorCode::unsupported, "the brick march over a box of " + std::to_string(all) +
-                                            " bricks: the limit is " + std::to_string(most_bricks));
+                                            " bricks: the limit is " + std::to_string(max_bricks));
   }
 }
 
@@ -109,7 +109,7 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
   MarchSource source;
   source.cube = grid->cube;
   source.max_value = max_value;
-  source.glow = glow_table(*grid, progress);
+  source.emissive = emissive_table(*grid, progress);
   source.grid = std::move(grid);
   source.linear = linear;
   return source;

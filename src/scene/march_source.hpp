@@ -8,7 +8,7 @@
 #include "grid/lattice.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
-#include "scene/glow.hpp"
+#include "scene/emissive_cells.hpp"
 
 namespace cumulet::scene {
 
@@ -35,7 +35,7 @@ struct MarchSource {
   std::shared_ptr<const grid::TetGrid> grid;
   GridPlanPtr plan;
   bool linear = false;
-  GlowTable glow;  // of the grid; if GL builds the grid, it is known only after the build
+  EmissiveTable emissive;  // of the grid; if GL builds the grid, it is known only after the build
   // dense: GL reads from these; brick: packed by make_voxel_source
   std::shared_ptr<const volume::ScalarVolume> volume;
   std::shared_ptr<const grid::Statistics> statistics;
@@ -52,7 +52,7 @@ struct MarchSource {
     return march == other.march && linear == other.linear;
   }
   [[nodiscard]] bool emits() const { return channels.emission || (grid && !grid->emission.empty()); }
-  [[nodiscard]] bool coloured() const { return channels.scattering || (grid && !grid->colour.empty()); }
+  [[nodiscard]] bool colored() const { return channels.scattering || (grid && !grid->color.empty()); }
   [[nodiscard]] bool anisotropic() const { return channels.forward || (grid && !grid->anisotropy.empty()); }
   [[nodiscard]] bool moves() const { return channels.momentum || (grid && !grid->velocity.empty()); }
   /// Whether the density changes while the shutter is open.
@@ -60,7 +60,7 @@ struct MarchSource {
   /// Main memory in use, including voxels that may be shared with other owners.
   [[nodiscard]] std::uint64_t bytes() const {
     return (grid ? grid->bytes() : 0) + (plan ? plan->lattice->bytes() + plan->levels.size() : 0) +
-           glow.cells.size() * sizeof(GlowingCell) + (volume ? volume->bytes() : 0) +
+           emissive.cells.size() * sizeof(GlowingCell) + (volume ? volume->bytes() : 0) +
            (statistics ? statistics->bytes() : 0) + (brick_values.size() + brick_changes.size()) * 2 +
            brick_slots.size() * 4 + channels.bytes();
   }

@@ -136,10 +136,11 @@ std::uint32_t pack_vertices(std::vector<uvec4>& words, const surface::Scene& sce
   return first;
 }
 
-bool draws_rich(const surface::Scene& scene, const surface::Pose& pose) {
+bool draws_extended_bsdf(const surface::Scene& scene, const surface::Pose& pose) {
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     if (surface::is_hidden(pose, d)) continue;
-    if (surface::is_rich(surface::materials_of(scene, pose)[surface::material_of(scene, pose, d)])) return true;
+    if (surface::has_extended_bsdf(surface::materials_of(scene, pose)[surface::material_of(scene, pose, d)]))
+      return true;
   }
   return false;
 }
@@ -183,7 +184,7 @@ void pack_words(ModelSource& source, const Progress* progress) {
   }
   check(progress);
   for (ModelMesh& mesh : source.meshes) pack_emitters(source, mesh, progress);
-  source.rich = draws_rich(scene, source.pose);
+  source.extended_bsdf = draws_extended_bsdf(scene, source.pose);
 }
 
 // The part of a per-triangle array (`each` elements per triangle) that belongs to the mesh.

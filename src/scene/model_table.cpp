@@ -241,15 +241,15 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
       }
     }
     for (const surface::PunctualLight& light : source.pose.lights) {
-      table.lamps.push_back(placed(light, surface::from_origin(model.to_world, source.pose)));
-      table.lamp_groups.push_back(model.group);
+      table.analytic_lights.push_back(placed(light, surface::from_origin(model.to_world, source.pose)));
+      table.analytic_light_groups.push_back(model.group);
     }
   }
   if (low.x <= high.x) {
     table.low = low;
     table.high = high;
   }
-  table.lights = light::scene_lights(table.lamps, 0.5 * glm::length(table.high - table.low));
+  table.lights = light::scene_lights(table.analytic_lights, 0.5 * glm::length(table.high - table.low));
   share_looks(table, power);
   table.nodes = threaded_tree(boxes);
   table.ends = std::move(opens);

@@ -39,10 +39,10 @@ struct ModelTable {
   /// Follow the records in the buffer: the transforms at shutter open, then at shutter close, and for deforming meshes
   /// the tables at that end. Empty if nothing moves.
   std::vector<core::CmModel> ends;
-  std::vector<core::CmInstanceNode> nodes;    ///< at least one
-  std::vector<ModelPart> parts;               ///< of the records, in their order
-  std::vector<surface::PunctualLight> lamps;  ///< lights of all models, in world space
-  std::vector<std::uint32_t> lamp_groups;     ///< light group of each of them
+  std::vector<core::CmInstanceNode> nodes;              ///< at least one
+  std::vector<ModelPart> parts;                         ///< of the records, in their order
+  std::vector<surface::PunctualLight> analytic_lights;  ///< lights of all models, in world space
+  std::vector<std::uint32_t> analytic_light_groups;     ///< light group of each of them
   light::SceneLights lights;
   glm::dvec3 low{0.0};  ///< bounds of all triangles; both are 0 if there are none
   glm::dvec3 high{0.0};

@@ -72,9 +72,9 @@ Model counted_from(Model model, const dvec3& origin) {
   return model;
 }
 
-light::Lamps counted_from(light::Lamps lamps, const dvec3& origin) {
-  for (light::Lamp& lamp : lamps) lamp.position -= origin;
-  return lamps;
+light::AnalyticLights counted_from(light::AnalyticLights analytic_lights, const dvec3& origin) {
+  for (light::AnalyticLight& analytic_light : analytic_lights) analytic_light.position -= origin;
+  return analytic_lights;
 }
 
 std::optional<Viewpoint> counted_from(std::optional<Viewpoint> view, const dvec3& origin) {

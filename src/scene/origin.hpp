@@ -26,7 +26,7 @@ glm::dvec3 origin_of_scene(std::span<const Extent> things, const std::optional<g
 Place counted_from(Place place, const glm::dvec3& origin);
 Volume counted_from(Volume volume, const glm::dvec3& origin);
 Model counted_from(Model model, const glm::dvec3& origin);
-light::Lamps counted_from(light::Lamps lamps, const glm::dvec3& origin);
+light::AnalyticLights counted_from(light::AnalyticLights analytic_lights, const glm::dvec3& origin);
 std::optional<Viewpoint> counted_from(std::optional<Viewpoint> view, const glm::dvec3& origin);
 std::optional<ViewEnds> counted_from(std::optional<ViewEnds> ends, const glm::dvec3& origin);
 std::optional<Ground> counted_from(std::optional<Ground> ground, const glm::dvec3& origin);

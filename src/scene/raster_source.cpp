@@ -29,7 +29,7 @@ std::array<const surface::TextureUse*, core::CM_MAPS> uses_of(const surface::Mat
           &m.transmission_texture};
 }
 
-bool is_colour(std::size_t map) {
+bool is_color(std::size_t map) {
   return map == core::CM_MAP_BASE_COLOR || map == core::CM_MAP_EMISSION || map == core::CM_MAP_SPECULAR_COLOR;
 }
 
@@ -85,8 +85,8 @@ void add_maps(RasterPictures& pictures) {
       if (uses[map]->texture < 0) continue;
       const surface::Texture& texture = scene.textures.at(static_cast<std::size_t>(uses[map]->texture));
       const surface::Sampler& s = texture.sampler;
-      const std::size_t image = number_of(textures, {texture.image, is_colour(map)});
-      if (image == pictures.textures.size()) pictures.textures.push_back({texture.image, is_colour(map), {}});
+      const std::size_t image = number_of(textures, {texture.image, is_color(map)});
+      if (image == pictures.textures.size()) pictures.textures.push_back({texture.image, is_color(map), {}});
       const std::size_t sampler =
           number_of(samplers, {s.wrap_s, s.wrap_t, s.magnify, s.minify, s.mipmaps, s.between_mipmaps});
       if (sampler == pictures.samplers.size()) pictures.samplers.push_back(s);

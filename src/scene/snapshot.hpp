@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
+#include "light/analytic_lights.hpp"
 #include "light/distant_lights.hpp"
 #include "light/environment.hpp"
-#include "light/lamps.hpp"
 #include "scene/march_source.hpp"
 #include "scene/model_source.hpp"
 #include "scene/part.hpp"
@@ -115,7 +115,7 @@ struct Snapshot {
   std::vector<Model> models;  ///< positions relative to `origin`, too
   Part<light::DistantLights> lights;
   Part<light::Surroundings> surroundings;
-  Part<light::Lamps> lamps;  ///< the host's lights; models have their own
+  Part<light::AnalyticLights> analytic_lights;  ///< the host's lights; models have their own
   Part<std::optional<Ground>> ground;
   Part<std::optional<Viewpoint>> view;      ///< empty: nothing is rendered
   Part<std::optional<ViewEnds>> view_ends;  ///< empty: the camera does not move

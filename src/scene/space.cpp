@@ -12,7 +12,7 @@ namespace {
 using glm::vec3;
 
 // Returns a lower bound of the length of a transformed unit vector: 1 / (upper bound of the inverse's norm).
-double least_stretch(const glm::dmat3& linear) {
+double min_stretch(const glm::dmat3& linear) {
   const glm::dmat3 inverse = glm::inverse(linear);
   const auto widest_column = [](const glm::dmat3& m) {
     const auto sum = [](const glm::dvec3& v) { return glm::dot(glm::abs(v), glm::dvec3(1.0)); };
@@ -74,14 +74,14 @@ bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
   return std::ranges::all_of(at, [&](double t) { return side * volume(t) > bound; });
 }
 
-PlacedGlow glow_of(const GlowSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
+PlacedEmissive emissive_of(const EmissiveSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
   if (!(sum.power > 0.0)) return {};
-  PlacedGlow glow{.power = sum.power * std::abs(glm::determinant(glm::dmat3(place))),
-                  .length = sum.length * mean_stretch(place)};
-  glow.looks.density = static_cast<float>(1.0 / glow.power);
-  glow.looks.extent = static_cast<float>(glow.length);
-  glow.looks.least_stretch = static_cast<float>(least_stretch(glm::dmat3(place * cube_to_world)));
-  return glow;
+  PlacedEmissive emissive{.power = sum.power * std::abs(glm::determinant(glm::dmat3(place))),
+                          .length = sum.length * mean_stretch(place)};
+  emissive.looks.density = static_cast<float>(1.0 / emissive.power);
+  emissive.looks.extent = static_cast<float>(emissive.length);
+  emissive.looks.min_stretch = static_cast<float>(min_stretch(glm::dmat3(place * cube_to_world)));
+  return emissive;
 }
 
 }  // namespace cumulet::scene

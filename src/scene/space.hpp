@@ -5,7 +5,7 @@
 #include <glm/glm.hpp>
 
 #include "base/parameters.hpp"
-#include "scene/glow.hpp"
+#include "scene/emissive_cells.hpp"
 
 namespace cumulet::scene {
 
@@ -25,11 +25,11 @@ double max_extinction(double extent);
 bool stays_solid(const glm::dmat4& open, const glm::dmat4& close);
 
 /// The emissive-cell table of one volume instance: its emission, and the sampling parameters for shaders.
-struct PlacedGlow {
-  double power = 0.0;  ///< see GlowSum for both
+struct PlacedEmissive {
+  double power = 0.0;  ///< see EmissiveSum for both
   double length = 0.0;
-  core::CmGlow looks{};
+  core::CmEmissive looks{};
 };
-PlacedGlow glow_of(const GlowSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place);
+PlacedEmissive emissive_of(const EmissiveSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place);
 
 }  // namespace cumulet::scene

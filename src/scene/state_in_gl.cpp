@@ -14,7 +14,7 @@ namespace {
 
 using volume::Channel;
 
-constexpr std::array<Channel, 3> colours{Channel::red, Channel::green, Channel::blue};
+constexpr std::array<Channel, 3> colors{Channel::red, Channel::green, Channel::blue};
 constexpr std::array<Channel, 3> velocities{Channel::velocity_x, Channel::velocity_y, Channel::velocity_z};
 
 struct FieldsOf {
@@ -24,9 +24,9 @@ struct FieldsOf {
     if (settings.burns()) fields.push_back(Channel::flame);
     return fields;
   }
-  std::vector<Channel> operator()(const Scattering& /*unused*/) const { return with(colours); }
+  std::vector<Channel> operator()(const Scattering& /*unused*/) const { return with(colors); }
   std::vector<Channel> operator()(const Forward& forward) const {
-    std::vector<Channel> fields = forward.coloured ? with(colours) : std::vector{Channel::density};
+    std::vector<Channel> fields = forward.colored ? with(colors) : std::vector{Channel::density};
     fields.push_back(Channel::anisotropy);
     return fields;
   }
@@ -84,7 +84,7 @@ const ProductInGl* StateInGl::product(const Product& what) const {
 
 StateInGl::Scatters StateInGl::scatters() const {
   if (!any(field(Channel::density))) return {};
-  return {.coloured = std::ranges::any_of(colours, [&](Channel channel) { return field(channel) != nullptr; }),
+  return {.colored = std::ranges::any_of(colors, [&](Channel channel) { return field(channel) != nullptr; }),
           .anisotropic = field(Channel::anisotropy) != nullptr,
           .moves = std::ranges::any_of(velocities, [&](Channel channel) { return any(field(channel)); })};
 }
@@ -93,8 +93,8 @@ std::vector<Product> StateInGl::wanted(const std::vector<Emission>& settings) co
   std::vector<Product> wanted;
   std::ranges::copy_if(settings, std::back_inserter(wanted), [&](const Emission& light) { return emits(light); });
   const Scatters how = scatters();
-  if (how.coloured) wanted.emplace_back(Scattering{});
-  if (how.anisotropic) wanted.emplace_back(Forward{how.coloured});
+  if (how.colored) wanted.emplace_back(Scattering{});
+  if (how.anisotropic) wanted.emplace_back(Forward{how.colored});
   if (how.moves) wanted.emplace_back(Momentum{unit_above(fastest_of({.density = {}, .velocity = velocity()}))});
   return wanted;
 }
@@ -108,7 +108,7 @@ const ProductInGl* StateInGl::made() const {
 
 bool StateInGl::has_wanted(const std::vector<Emission>& settings) const {
   const Scatters how = scatters();
-  return (!how.coloured || made<Scattering>()) && (!how.anisotropic || made<Forward>()) &&
+  return (!how.colored || made<Scattering>()) && (!how.anisotropic || made<Forward>()) &&
          (!how.moves || made<Momentum>()) &&
          std::ranges::all_of(settings, [&](const Emission& light) { return !emits(light) || product(light); });
 }
@@ -176,10 +176,10 @@ volume::VolumeFrame StateInGl::frame() const {
   frame.temperature = volume_of(Channel::temperature);
   frame.flame = volume_of(Channel::flame);
   for (std::size_t i = 0; i < 3; ++i) {
-    auto colour = volume_of(colours[i]);
-    if (!colour) continue;
-    if (!frame.colour) frame.colour.emplace().fill(none());
-    (*frame.colour)[i] = std::move(*colour);
+    auto color = volume_of(colors[i]);
+    if (!color) continue;
+    if (!frame.color) frame.color.emplace().fill(none());
+    (*frame.color)[i] = std::move(*color);
   }
   if (auto anisotropy = volume_of(Channel::anisotropy)) frame.anisotropy = {std::move(*anisotropy), none()};
   frame.velocity = velocity();

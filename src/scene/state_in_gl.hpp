@@ -22,7 +22,7 @@ struct Scattering {
 };
 /// The product of forward_of().
 struct Forward {
-  bool coloured = false;  ///< whether the volume has a color
+  bool colored = false;  ///< whether the volume has a color
   bool operator==(const Forward&) const = default;
 };
 /// The product of momentum_of().
@@ -82,7 +82,7 @@ struct StateInGl {
  private:
   // Kinds of scattering data; all false if there is no density.
   struct Scatters {
-    bool coloured = false;
+    bool colored = false;
     bool anisotropic = false;
     bool moves = false;
   };

@@ -74,21 +74,21 @@ TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes) {
   atlas.edge = std::max(widest, std::min(square, usual_edge));
   std::ranges::stable_sort(order, [](const auto* a, const auto* b) { return a->size.y > b->size.y; });
   uvec2 at(0U);
-  std::uint32_t shelf = 0;
+  std::uint32_t cache = 0;
   for (TextureAtlas::Place* const place : order) {
     if (at.x + place->size.x > atlas.edge) {
-      at = {0U, at.y + shelf};
-      shelf = 0;
+      at = {0U, at.y + cache};
+      cache = 0;
     }
     if (at.y + place->size.y > atlas.edge) {
       at = uvec2(0U);
-      shelf = 0;
+      cache = 0;
       ++atlas.layers;
     }
     place->corner = at;
     place->layer = atlas.layers;
     at.x += place->size.x;
-    shelf = std::max(shelf, place->size.y);
+    cache = std::max(cache, place->size.y);
   }
   ++atlas.layers;
   return atlas;

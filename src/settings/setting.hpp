@@ -76,13 +76,13 @@ struct Row {
   bool logarithmic = false;
   const char* zero = "";  // text for the value 0; "": as a number
   // For colored lights, whose strength is described above:
-  const char* colour = "";
-  const char* colour_tip = "";
+  const char* color = "";
+  const char* color_tip = "";
   std::array<float, 3> hue = {1.0F, 1.0F, 1.0F};  // initial color of a light that was off
 };
 
 /// All metadata of a setting. "" means none.
-struct Facts {
+struct SettingInfo {
   const char* name;                           // of the field, in C and C++
   Range range = any_number;                   // accepted by the C API
   std::optional<Range> given = std::nullopt;  // accepted by scene files and flags, if different
@@ -98,10 +98,10 @@ struct Facts {
 
 /// One field of a descriptor.
 template <class Desc, class Value>
-struct Setting : Facts {
+struct Setting : SettingInfo {
   Value Desc::*field;
 
-  constexpr Setting(Value Desc::*at, const Facts& facts) : Facts(facts), field(at) {}
+  constexpr Setting(Value Desc::*at, const SettingInfo& info) : SettingInfo(info), field(at) {}
 
   /// Whether this setting is of that field.
   template <class Other>

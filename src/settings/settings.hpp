@@ -81,7 +81,7 @@ inline constexpr std::array navigation_choices = {
 inline constexpr std::array depth_choices = {Choice{"standard", CUMULET_DEPTH_STANDARD, "", ""},
                                              Choice{"reversed", CUMULET_DEPTH_REVERSED, "", ""}};
 
-inline constexpr std::array lamp_choices = {
+inline constexpr std::array analytic_light_choices = {
     Choice{"point", CUMULET_LAMP_POINT, "Point", "The same in all directions."},
     Choice{"spot", CUMULET_LAMP_SPOT, "Spot", "A point that shines into a cone."},
     Choice{"disc", CUMULET_LAMP_DISC, "Disc", "A round area that shines to one side."},
@@ -129,8 +129,8 @@ struct Table<cumulet_medium_desc> {
         .row = {.label = "Glow",
                 .tip = "Radiance of an opaque body of the medium, as of fire: it lights all the rest. 0: dark.",
                 .most = 1000.0,
-                .colour = "Glow colour",
-                .colour_tip = "The colour of the medium's own light, as it looks on the screen.",
+                .color = "Glow colour",
+                .color_tip = "The colour of the medium's own light, as it looks on the screen.",
                 .hue = {1.0F, 0.35F, 0.08F}}}),
       Setting(&Desc::phase, {.name = "phase", .choices = phase_choices,
         .key = "medium.phase", .flag = "--phase",
@@ -215,16 +215,16 @@ struct Table<cumulet_light_desc> {
         .row = {.label = "Sun strength",
                 .tip = "Irradiance on a surface that faces the sun; 0: no sun.",
                 .most = 1000.0,
-                .colour = "Sun colour",
-                .colour_tip = "The sun's colour, as it looks on the screen."}}),
+                .color = "Sun colour",
+                .color_tip = "The sun's colour, as it looks on the screen."}}),
       Setting(&Desc::sky_radiance, {.name = "sky_radiance", .range = light_range,
         .key = "light.sky.radiance", .flag = "--sky", .type = "R,G,B",
         .help = "Radiance, the same from everywhere",
         .row = {.label = "Sky strength",
                 .tip = "Radiance from everywhere; 0: black.",
                 .most = 100.0,
-                .colour = "Sky colour",
-                .colour_tip = "The sky's colour, as it looks on the screen."}}),
+                .color = "Sky colour",
+                .color_tip = "The sky's colour, as it looks on the screen."}}),
       Setting(&Desc::sky, {.name = "sky", .choices = sky_choices,
         .key = "light.sky.model",
         .row = {.label = "Sky",
@@ -260,7 +260,7 @@ struct Table<cumulet_lamp_desc> {
   using Desc = cumulet_lamp_desc;
   static constexpr const char* name = "cumulet_lamp_desc";
   static constexpr std::tuple rows = {
-      Setting(&Desc::kind, {.name = "kind", .choices = lamp_choices,
+      Setting(&Desc::kind, {.name = "kind", .choices = analytic_light_choices,
         .key = "kind",
         .row = {.label = "Lamp", .tip = "What shape of light it is."}}),
       Setting(&Desc::position, {.name = "position",

@@ -17,7 +17,7 @@ namespace {
 struct Header {
   std::uint64_t width = 0;
   std::uint64_t height = 0;
-  std::uint64_t least_bytes = 0;  ///< minimum file size for so many pixels
+  std::uint64_t min_bytes = 0;  ///< minimum file size for so many pixels
 };
 
 std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t count) {
@@ -34,7 +34,7 @@ Header png_header(std::span<const std::uint8_t> bytes) {
   header.width = big_endian(bytes, 16, 4);
   header.height = big_endian(bytes, 20, 4);
   // Deflate expands a byte to at most 1032 bytes, and a pixel has at least one bit.
-  header.least_bytes = header.width * header.height / 8 / 1032;
+  header.min_bytes = header.width * header.height / 8 / 1032;
   return header;
 }
 
@@ -48,7 +48,7 @@ Header jpeg_header(Bytes bytes) {
   }
   Header header{found.width, found.height, 0};
   // With Huffman coding a block of 8 x 8 has at least one bit, and a component at least one block per 32 x 32 pixels.
-  if (found.arithmetic == 0) header.least_bytes = header.width * header.height / 8192;
+  if (found.arithmetic == 0) header.min_bytes = header.width * header.height / 8192;
   return header;
 }
 
@@ -149,7 +149,7 @@ DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
       bytes.size() > std::uint64_t{INT32_MAX}) {
     malformed(size + " are too many");
   }
-  if (header.least_bytes > bytes.size())
+  if (header.min_bytes > bytes.size())
     malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
   const std::uint64_t pixels = header.width * header.height;
   budget.take(pixels, 4, "an image of " + size);

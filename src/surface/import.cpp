@@ -26,7 +26,7 @@ namespace {
 
 /// Fraction of the area of closed shapes. Modelers produce inward faces only by mistake; shapes within others are
 /// ignored.
-constexpr double most_inward = 0.25;
+constexpr double max_inward = 0.25;
 
 /// Builds the scene from meshes, nodes and all other contents.
 class Assembler {
@@ -277,7 +277,7 @@ class Assembler {
       const Winding winding = apart(progress, [positions = std::move(positions), indices = std::move(indices)] {
         return winding_of(positions, indices);
       });
-      if (!(winding.inward > most_inward * winding.area)) continue;
+      if (!(winding.inward > max_inward * winding.area)) continue;
       if (++count > 3) continue;
       const std::string called = one_line(file_.model.meshes[m].name);
       some += (some.empty() ? "" : ", ") + numbered("mesh", m) + (called.empty() ? "" : " (" + called + ")");

@@ -10,7 +10,7 @@
 #include <jerror.h>
 
 /* A legal progressive file may have one scan per coefficient and component. More scans would only take time. */
-enum { most_scans = 64 * 4 };
+enum { max_scans = 64 * 4 };
 
 /* Functions that call setjmp() only have a pointer to this struct, so its members are not clobbered. */
 struct decoder {
@@ -57,8 +57,8 @@ static void say_nothing(j_common_ptr info) { (void)info; }
 
 static void count_scans(j_common_ptr info) {
   struct decoder* const decoder = info->client_data;
-  if (decoder->info.input_scan_number <= most_scans) return;
-  (void)snprintf(decoder->report->error, sizeof decoder->report->error, "more than %d scans", (int)most_scans);
+  if (decoder->info.input_scan_number <= max_scans) return;
+  (void)snprintf(decoder->report->error, sizeof decoder->report->error, "more than %d scans", (int)max_scans);
   longjmp(decoder->failed, 1);
 }
 

@@ -17,7 +17,7 @@ namespace cumulet::surface::detail {
 
 namespace {
 
-constexpr std::size_t most_bounded = std::size_t{1} << 22U;  // instanced vertices for which bounds are computed exactly
+constexpr std::size_t max_bounded = std::size_t{1} << 22U;  // instanced vertices for which bounds are computed exactly
 
 /// The inverse transpose scaled by the determinant: det(M) * M^-T, which is finite for every M.
 glm::mat3 cofactors(const glm::mat3& m) {
@@ -337,7 +337,7 @@ void PosableScene::bound(Pose& pose) const {
     const auto prototype = std::ranges::upper_bound(prototypes, i, {}, &Prototype::first_draw) - prototypes.begin() - 1;
     const std::vector<glm::dmat4>& placed = pose.placings[static_cast<std::size_t>(prototype)];
     std::vector<glm::vec3> points;
-    if (placed.size() * count <= most_bounded) {
+    if (placed.size() * count <= max_bounded) {
       for (const PosedVertex& vertex : vertices) points.push_back(vertex.position);
     } else {
       glm::vec3 own_low(std::numeric_limits<float>::max());

@@ -19,9 +19,9 @@ std::optional<Rounding> visible_rounding(float farthest, double size) {
   constexpr float infinite = std::numeric_limits<float>::infinity();
   const double error = 0.5 * (double{std::nextafter(farthest, infinite)} - double{farthest});
   // The object may be a single point on purpose, but hardly where floats are a thousandth from each other.
-  constexpr double least_error = 5e-4;
+  constexpr double min_error = 5e-4;
   constexpr double visible = 1.0 / 4096.0;
-  if (size > 0.0 ? error < visible * size : error < least_error) return std::nullopt;
+  if (size > 0.0 ? error < visible * size : error < min_error) return std::nullopt;
   return Rounding{farthest, error, size};
 }
 

@@ -79,8 +79,8 @@ MetallicRoughness convert(const SpecularGlossiness& from) {
   const float metallic = metallic_of(brightness(diffuse), brightness(from.specular), rest);
   const glm::vec3 of_diffuse = diffuse * (rest / (1.0F - dielectric) / std::max(1.0F - metallic, tiny));
   const glm::vec3 of_specular = (from.specular - glm::vec3(dielectric * (1.0F - metallic))) / std::max(metallic, tiny);
-  const glm::vec3 colour = glm::clamp(glm::mix(of_diffuse, of_specular, metallic * metallic), 0.0F, 1.0F);
-  return {glm::vec4(colour, from.diffuse.a), metallic, 1.0F - from.glossiness};
+  const glm::vec3 color = glm::clamp(glm::mix(of_diffuse, of_specular, metallic * metallic), 0.0F, 1.0F);
+  return {glm::vec4(color, from.diffuse.a), metallic, 1.0F - from.glossiness};
 }
 
 ConvertedImages convert(const SpecularGlossiness& factors, const std::optional<Image>& diffuse,

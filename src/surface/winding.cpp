@@ -16,9 +16,9 @@ namespace {
 using glm::dvec3;
 
 // A shape with less volume relative to its area (a sphere has 0.094) is a two-sided sheet.
-constexpr double least_volume = 1e-6;
+constexpr double min_volume = 1e-6;
 // Number of the largest shapes that are tested for shapes within them.
-constexpr std::size_t most_hulls = 64;
+constexpr std::size_t max_hulls = 64;
 
 /// Numbers vertices so that vertices at the same position share a number.
 std::vector<std::uint32_t> weld(std::span<const glm::vec3> positions) {
@@ -99,7 +99,7 @@ struct Shape {
   [[nodiscard]] double inward() const { return volume > 0.0 ? area[1] : area[0]; }
   [[nodiscard]] bool solid() const {
     const double scale = std::pow(whole(), 1.5);
-    return std::isfinite(scale) && std::abs(volume) > least_volume * scale;
+    return std::isfinite(scale) && std::abs(volume) > min_volume * scale;
   }
   [[nodiscard]] bool holds(const Shape& other) const {
     return glm::all(glm::lessThan(low, other.low)) && glm::all(glm::greaterThan(high, other.high));
@@ -159,7 +159,7 @@ Winding winding_of(std::span<const glm::vec3> positions, std::span<const std::ui
   }
   std::erase_if(shapes, [](const Shape& shape) { return !shape.solid(); });
   std::ranges::sort(shapes, std::ranges::greater{}, [](const Shape& shape) { return std::abs(shape.volume); });
-  const std::span<const Shape> hulls(shapes.data(), std::min(shapes.size(), most_hulls));
+  const std::span<const Shape> hulls(shapes.data(), std::min(shapes.size(), max_hulls));
   Winding winding;
   for (const Shape& shape : shapes) {
     if (std::ranges::any_of(hulls, [&](const Shape& hull) { return hull.holds(shape); })) continue;

@@ -15,9 +15,9 @@ namespace cumulet::viewer {
 namespace {
 
 // Maximum ratio of opacities for which a grid refined by opacity can be reused.
-constexpr double most_opacity_ratio = 2.0;
+constexpr double max_opacity_ratio = 2.0;
 
-bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_opacity_ratio * a; }
+bool apart(double a, double b) { return a > max_opacity_ratio * b || b > max_opacity_ratio * a; }
 
 }  // namespace
 
@@ -82,7 +82,7 @@ void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
 }
 
 Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress,
-                 const Allowance& allowance, const scene::GridPlanPtr& before) {
+                 const ResourceLimits& resource_limits, const scene::GridPlanPtr& before) {
   Built built;
   const volume::DeviceBricksPtr& in_gl = volume->volume().on_device;
   if (in_gl && needs_values(*volume, settings)) {
@@ -113,7 +113,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   };
   if (settings.march != scene::March::tet) {
     built.source = finished(scene::make_voxel_source(settings.march, voxels, statistics, channels));
-    allowance.require(built.bytes(), volume->name());
+    resource_limits.require(built.bytes(), volume->name());
     built.seconds.records = watch.lap();
     return built;
   }
@@ -127,7 +127,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   std::optional<std::uint64_t> planned;
   if (settings.on == BuildOn::gpu && !moving) {
     lattice = volume->lattice(settings.density_ramp, channels, refine, progress);
-    planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), allowance);
+    planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), resource_limits);
     if (!planned && in_gl) {
       in_gl->ask_for_values();
       return {};
@@ -135,7 +135,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     if (!planned)
       log.info(volume->name() + ": its grid is built on the CPU: the lattice of " +
                std::to_string(lattice->device_bytes()) + " bytes leaves too little of the GL memory that is allowed, " +
-               std::to_string(allowance.gl_bytes()) + " bytes");
+               std::to_string(resource_limits.gl_bytes()) + " bytes");
   }
   if (planned) {
     std::vector<std::uint8_t> levels =
@@ -144,12 +144,12 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
     built.source =
         finished(scene::make_planned_source({lattice, std::move(levels), *planned}, voxels, statistics, channels));
-    built.most_cells = *planned;
-    allowance.require(built.bytes(), volume->name());
+    built.cell_limit = *planned;
+    resource_limits.require(built.bytes(), volume->name());
     built.seconds.refine = watch.lap();
     return built;
   }
-  refine.max_cells = built.most_cells = cells_that_fit(max_cells, carried, volume->bytes(), allowance);
+  refine.max_cells = built.cell_limit = cells_that_fit(max_cells, carried, volume->bytes(), resource_limits);
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
@@ -165,7 +165,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   if (grid->limited) log_limited(log, refine.max_cells, max_cells);
   built.source = finished(
       scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
-  allowance.require(built.bytes(), volume->name());
+  resource_limits.require(built.bytes(), volume->name());
   return built;
 }
 
@@ -180,15 +180,14 @@ void place(volume::VolumeFrame& frame, const glm::dmat4& to_world) {
 VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const { return read(log, progress, {}); }
 
 VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
-                                const std::function<void(volume::StandIn)>& take_stand_in) const {
-  const auto take = [&](volume::StandIn made) {
+                                const std::function<void(volume::Proxy)>& take_proxy) const {
+  const auto take = [&](volume::Proxy made) {
     place(made.frame, to_world);
     if (made.extent) made.extent->index_to_world = to_world * made.extent->index_to_world;
-    take_stand_in(std::move(made));
+    take_proxy(std::move(made));
   };
-  volume::VolumeFrame frame = take_stand_in
-                                  ? volume::import_frame(path, grids, log, progress, {take, least_stand_in_bricks})
-                                  : volume::import_frame(path, grids, log, progress);
+  volume::VolumeFrame frame = take_proxy ? volume::import_frame(path, grids, log, progress, {take, min_proxy_bricks})
+                                         : volume::import_frame(path, grids, log, progress);
   place(frame, to_world);
   frame.temperature_scale = temperature_scale;
   try {
@@ -199,9 +198,8 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
   }
 }
 
-void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings,
-                   std::optional<BuildSettings> stand_in) {
-  const auto load = std::make_shared<Load>(Load{std::move(settings), std::move(stand_in)});
+void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings, std::optional<BuildSettings> proxy) {
+  const auto load = std::make_shared<Load>(Load{std::move(settings), std::move(proxy)});
   const std::scoped_lock lock(mutex_);
   load_ = load;
   worker_.replace({file.path.given(), Progress::Stage::loading,
@@ -210,23 +208,22 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
                        read(file, load, progress);
                      } catch (...) {
                        const std::scoped_lock failing(mutex_);
-                       if (stand_in_ && stand_in_->load.lock() == load) stand_in_.reset();
+                       if (proxy_ && proxy_->load.lock() == load) proxy_.reset();
                        throw;
                      }
                    },
                    true});
-  drop_stand_in();
+  drop_proxy();
 }
 
 void Builder::read(const VolumeFile& file, const std::shared_ptr<Load>& load, Progress& progress) {
   Stopwatch watch;
-  std::function<void(volume::StandIn)> take_stand_in;
-  if (load->stand_in)
-    take_stand_in = [&](volume::StandIn made) { build_stand_in(file, std::move(made), load, progress); };
-  LoadedVolume loaded{file.read(log_, &progress, take_stand_in), {}};
+  std::function<void(volume::Proxy)> take_proxy;
+  if (load->proxy) take_proxy = [&](volume::Proxy made) { build_proxy(file, std::move(made), load, progress); };
+  LoadedVolume loaded{file.read(log_, &progress, take_proxy), {}};
   if (file.suggested_density_scale) loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
   const double seconds = watch.lap();
-  allowance_->require(loaded.volume->bytes(), file.path.given());
+  resource_limits_->require(loaded.volume->bytes(), file.path.given());
   {
     const std::scoped_lock handing(mutex_);
     progress.check();
@@ -239,33 +236,33 @@ void Builder::read(const VolumeFile& file, const std::shared_ptr<Load>& load, Pr
   build_of(loaded.volume, *load->settings, seconds, progress);
 }
 
-void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const std::shared_ptr<const Load>& load,
-                             const Progress& loading) {
+void Builder::build_proxy(const VolumeFile& file, volume::Proxy made, const std::shared_ptr<const Load>& load,
+                          const Progress& loading) {
   const auto progress = std::make_shared<Progress>();
   BuildSettings settings;
   {
     const std::scoped_lock lock(mutex_);
     loading.check();
-    settings = load->settings ? *load->settings : *load->stand_in;
-    stand_in_load_ = progress;
+    settings = load->settings ? *load->settings : *load->proxy;
+    proxy_load_ = progress;
   }
   settings.on = BuildOn::cpu;
   settings.refine.camera.reset();
-  StandIn stand_in;
-  stand_in.load = load;
+  Proxy proxy;
+  proxy.load = load;
   try {
     const auto volume = std::make_shared<const VolumeAsset>(std::move(made.frame), progress.get());
     if (volume->empty()) return;
-    if (file.suggested_density_scale) stand_in.density_scale = volume->coarse().suggest_density_scale();
-    if (stand_in.density_scale) settings.refine.density_scale = *stand_in.density_scale;
-    VolumeFacts facts = *volume->facts();
+    if (file.suggested_density_scale) proxy.density_scale = volume->coarse().suggest_density_scale();
+    if (proxy.density_scale) settings.refine.density_scale = *proxy.density_scale;
+    VolumeInfo volume_info = *volume->volume_info();
     if (made.extent) {
-      facts.low = made.extent->low;
-      facts.high = made.extent->high;
-      facts.index_to_world = made.extent->index_to_world;
+      volume_info.low = made.extent->low;
+      volume_info.high = made.extent->high;
+      volume_info.index_to_world = made.extent->index_to_world;
     }
-    stand_in.facts = std::make_shared<const VolumeFacts>(std::move(facts));
-    stand_in.source = build_grid({}, volume, settings, *progress, *allowance_).source;
+    proxy.volume_info = std::make_shared<const VolumeInfo>(std::move(volume_info));
+    proxy.source = build_grid({}, volume, settings, *progress, *resource_limits_).source;
   } catch (...) {
     // No message: the whole file has the same problem.
     loading.check();
@@ -274,14 +271,14 @@ void Builder::build_stand_in(const VolumeFile& file, volume::StandIn made, const
   {
     const std::scoped_lock lock(mutex_);
     loading.check();
-    stand_in_ = std::move(stand_in);
+    proxy_ = std::move(proxy);
   }
   notify_();
 }
 
-void Builder::drop_stand_in() {
-  if (const auto progress = stand_in_load_.lock()) progress->cancel();
-  stand_in_.reset();
+void Builder::drop_proxy() {
+  if (const auto progress = proxy_load_.lock()) progress->cancel();
+  proxy_.reset();
 }
 
 void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before) {
@@ -309,14 +306,14 @@ void Builder::stop(const std::function<void()>& jobs) {
   jobs();
   // Last: cancelled jobs make no new proxy.
   const std::scoped_lock lock(mutex_);
-  drop_stand_in();
+  drop_proxy();
 }
 
 void Builder::forget() {
   const std::scoped_lock lock(mutex_);
   load_.reset();
   worker_.drop();
-  drop_stand_in();
+  drop_proxy();
   loaded_.reset();
   built_.reset();
 }
@@ -345,9 +342,9 @@ std::optional<Built> Builder::take_built() {
   return std::exchange(built_, std::nullopt);
 }
 
-std::optional<StandIn> Builder::take_stand_in() {
+std::optional<Proxy> Builder::take_proxy() {
   const std::scoped_lock lock(mutex_);
-  return std::exchange(stand_in_, std::nullopt);
+  return std::exchange(proxy_, std::nullopt);
 }
 
 bool Builder::busy() const {
@@ -362,12 +359,12 @@ bool Builder::has_result() const {
 
 void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds,
                        Progress& progress, const scene::GridPlanPtr& before) {
-  Built built = build_grid(log_, volume, settings, progress, *allowance_, before);
+  Built built = build_grid(log_, volume, settings, progress, *resource_limits_, before);
   built.seconds.load = load_seconds;
   const std::scoped_lock lock(mutex_);
   progress.check();
   built_ = std::move(built);
-  stand_in_.reset();  // not displayed yet
+  proxy_.reset();  // not displayed yet
 }
 
 }  // namespace cumulet::viewer

@@ -17,7 +17,7 @@
 #include "scene/march_source.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
-#include "volume/stand_in.hpp"
+#include "volume/proxy.hpp"
 
 namespace cumulet::viewer {
 
@@ -30,13 +30,13 @@ struct VolumeFile {
   /// As VolumeFrame::temperature_scale.
   std::optional<double> temperature_scale = {};
   /// Minimum number of bricks for which a low-resolution proxy is made; tests use other values.
-  std::uint64_t least_stand_in_bricks = volume::worth_a_stand_in;
+  std::uint64_t min_proxy_bricks = volume::worth_a_proxy;
 
   /// Throws the errors of import_frame() and of VolumeAsset's constructor.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
-  /// take_stand_in: receives the low-resolution proxy from import_frame(), transformed by to_world.
+  /// take_proxy: receives the low-resolution proxy from import_frame(), transformed by to_world.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress,
-                                    const std::function<void(volume::StandIn)>& take_stand_in) const;
+                                    const std::function<void(volume::Proxy)>& take_proxy) const;
 };
 
 /// Result of loading a VolumeFile.
@@ -82,7 +82,7 @@ struct Built {
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;
-  std::uint64_t most_cells = 0;  ///< limit that applied to a tetrahedral grid
+  std::uint64_t cell_limit = 0;  ///< limit that applied to a tetrahedral grid
   BuildSeconds seconds;
 
   /// Main memory in bytes, including data shared with others.
@@ -93,8 +93,8 @@ struct Built {
 };
 
 /// Low-resolution proxy, shown for a large file until it is read and built.
-struct StandIn {
-  VolumeFactsPtr facts;  ///< with the bounds of the whole volume
+struct Proxy {
+  VolumeInfoPtr volume_info;  ///< with the bounds of the whole volume
   scene::MarchSourcePtr source;
   std::optional<double> density_scale;  ///< suggested for it, if the medium is to use the suggestion
   std::weak_ptr<const void> load;       ///< expires with the job of the load
@@ -115,7 +115,7 @@ void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 /// before: for a moving camera, the plan that is shown now. Its cells are kept where possible to avoid popping. The
 /// result has no source if GPU-resident voxels are needed in main memory first.
 [[nodiscard]] Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings,
-                               Progress& progress, const Allowance& allowance = {},
+                               Progress& progress, const ResourceLimits& resource_limits = {},
                                const scene::GridPlanPtr& before = nullptr);
 
 /// Loads volumes and builds their grids on a worker thread, one job at a time. Requests are coalesced: the latest wins.
@@ -125,14 +125,17 @@ class Builder {
  public:
   /// notify: called on the worker thread after a job ended.
   Builder(Log log, std::function<void()> notify, Trace trace = {},
-          const AllowancePtr& allowance = std::make_shared<const Allowance>())
-      : log_(std::move(log)), notify_(notify), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
+          const ResourceLimitsPtr& resource_limits = std::make_shared<const ResourceLimits>())
+      : log_(std::move(log)),
+        notify_(notify),
+        resource_limits_(resource_limits),
+        worker_(std::move(notify), trace, resource_limits) {}
 
   /// Reads a file, then builds its grid unless `settings` is empty. Replaces the running job, as Worker::replace(),
-  /// because files may take minutes. stand_in: settings for the low-resolution proxy while `settings` is empty; null:
+  /// because files may take minutes. proxy: settings for the low-resolution proxy while `settings` is empty; null:
   /// no proxy.
   void load(const VolumeFile& file, std::optional<BuildSettings> settings,
-            std::optional<BuildSettings> stand_in = std::nullopt);
+            std::optional<BuildSettings> proxy = std::nullopt);
   /// Builds a grid for this volume, after the running job. before: as in build_grid().
   void build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before = nullptr);
   /// Changes the settings of a running load. Returns false if there is none; the caller must then take the loaded
@@ -153,7 +156,7 @@ class Builder {
   /// Returns the newest result, once.
   std::optional<Built> take_built();
   /// Returns the proxy of the running load, once.
-  std::optional<StandIn> take_stand_in();
+  std::optional<Proxy> take_proxy();
 
   /// True if a job is running or a result has not been taken.
   [[nodiscard]] bool busy() const;
@@ -167,27 +170,27 @@ class Builder {
   // Settings for the build that follows a load. They may change while `open`, until the file is read.
   struct Load {
     std::optional<BuildSettings> settings;
-    std::optional<BuildSettings> stand_in;
+    std::optional<BuildSettings> proxy;
     bool open = true;
   };
   void read(const VolumeFile& file, const std::shared_ptr<Load>& load, Progress& progress);
-  void build_stand_in(const VolumeFile& file, volume::StandIn made, const std::shared_ptr<const Load>& load,
-                      const Progress& loading);
+  void build_proxy(const VolumeFile& file, volume::Proxy made, const std::shared_ptr<const Load>& load,
+                   const Progress& loading);
   // jobs: cancels the jobs.
   void stop(const std::function<void()>& jobs);
   // Drops the proxy and cancels a proxy that is being built. Such a build has its own Progress, because the load's
   // reports reading the whole file. mutex_ must be held.
-  void drop_stand_in();
+  void drop_proxy();
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress,
                 const scene::GridPlanPtr& before = nullptr);
 
   Log log_;
   std::function<void()> notify_;
-  AllowancePtr allowance_;
+  ResourceLimitsPtr resource_limits_;
   mutable std::mutex mutex_;
-  std::weak_ptr<Load> load_;               // held by its job
-  std::weak_ptr<Progress> stand_in_load_;  // of the proxy that is being built
-  std::optional<StandIn> stand_in_;
+  std::weak_ptr<Load> load_;            // held by its job
+  std::weak_ptr<Progress> proxy_load_;  // of the proxy that is being built
+  std::optional<Proxy> proxy_;
   std::optional<LoadedVolume> loaded_;
   std::optional<Built> built_;
   Worker worker_;  // last: its thread uses all of the above

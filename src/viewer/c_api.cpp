@@ -7,7 +7,7 @@
 #include "base/murmur_hash.hpp"
 #include "render/tracer.hpp"
 #include "settings/ramp.hpp"
-#include "viewer/c_lamps.hpp"
+#include "viewer/c_lights.hpp"
 #include "viewer/c_ramp.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_viewer.hpp"
@@ -33,26 +33,26 @@ std::vector<cumulet::scene::Place> places_of(const double* to_world, uint32_t co
 }
 
 // Default format of the viewer's own target texture.
-GLenum format_for(render::ColourEncoding encoding) {
-  if (encoding == render::ColourEncoding::hdr) return GL_RGBA16F;
-  return encoding == render::ColourEncoding::srgb_framebuffer ? GL_SRGB8_ALPHA8 : GL_RGBA8;
+GLenum format_for(render::ColorEncoding encoding) {
+  if (encoding == render::ColorEncoding::hdr) return GL_RGBA16F;
+  return encoding == render::ColorEncoding::srgb_framebuffer ? GL_SRGB8_ALPHA8 : GL_RGBA8;
 }
 
 void require_format(const core::Frame& f) {
   const bool is_float = f.format == GL_RGBA16F || f.format == GL_RGBA32F;
   require(f.format == GL_RGBA8 || f.format == GL_SRGB8_ALPHA8 || is_float,
           "cumulet_frame_desc.format is not GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGBA16F or GL_RGBA32F");
-  require(f.encoding != render::ColourEncoding::hdr || is_float,
-          "cumulet_frame_desc.format clamps CUMULET_COLOUR_HDR: it needs GL_RGBA16F or GL_RGBA32F");
-  require(f.encoding != render::ColourEncoding::srgb_framebuffer || f.format == GL_SRGB8_ALPHA8,
-          "cumulet_frame_desc.format is not encoded by OpenGL: CUMULET_COLOUR_SRGB_FRAMEBUFFER needs GL_SRGB8_ALPHA8");
+  require(f.encoding != render::ColorEncoding::hdr || is_float,
+          "cumulet_frame_desc.format clamps CUMULET_COLOR_HDR: it needs GL_RGBA16F or GL_RGBA32F");
+  require(f.encoding != render::ColorEncoding::srgb_framebuffer || f.format == GL_SRGB8_ALPHA8,
+          "cumulet_frame_desc.format is not encoded by OpenGL: CUMULET_COLOR_SRGB_FRAMEBUFFER needs GL_SRGB8_ALPHA8");
 }
 
 core::Frame read_frame(const cumulet_frame_desc* desc) {
   const cumulet_frame_desc d = read_desc(desc, "cumulet_frame_desc");
   require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is not up to 1e9");
   require(number(d.target) <= CUMULET_TARGET_NONE, "cumulet_frame_desc.target is unknown");
-  require(number(d.colour) <= CUMULET_COLOUR_HDR, "cumulet_frame_desc.colour is unknown");
+  require(number(d.color) <= CUMULET_COLOR_HDR, "cumulet_frame_desc.colour is unknown");
   require(number(d.blend) <= CUMULET_BLEND_REPLACE, "cumulet_frame_desc.blend is unknown");
   require(number(d.depth_source) <= CUMULET_DEPTH_SOURCE_FRAMEBUFFER, "cumulet_frame_desc.depth_source is unknown");
   require(d.width <= 16384 && d.height <= 16384, "cumulet_frame_desc.width or height is above 16384");
@@ -78,7 +78,7 @@ core::Frame read_frame(const cumulet_frame_desc* desc) {
     f.viewport = {v[0], v[1], v[2], v[3]};
   }
   f.flip_y = d.flip_y == 1;
-  f.encoding = static_cast<render::ColourEncoding>(d.colour);
+  f.encoding = static_cast<render::ColorEncoding>(d.color);
   f.format = d.format != 0 ? d.format : format_for(f.encoding);
   if (f.target == core::Target::texture) require_format(f);
   f.blend_over = d.blend == CUMULET_BLEND_OVER;
@@ -237,8 +237,8 @@ void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_
     refuse("the sequence has " + std::to_string(frames.size()) + " frames");
   cumulet_sequence_info out{};
   out.frames = static_cast<uint32_t>(frames.size());
-  out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::ready));
-  out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::failed));
+  out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameCache::State::ready));
+  out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameCache::State::failed));
   out.asked_frame = status.asked;
   out.drawn_frame = static_cast<uint32_t>(status.drawn.value_or(0.0));
   out.is_drawn = status.drawn ? 1 : 0;
@@ -248,7 +248,7 @@ void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_
   out.drawn_position = status.drawn.value_or(0.0);
   write_desc(info, out, "cumulet_sequence_info");
   if (states == nullptr) return;
-  std::ranges::transform(frames, states, [](core::FrameShelf::State state) { return static_cast<uint8_t>(state); });
+  std::ranges::transform(frames, states, [](core::FrameCache::State state) { return static_cast<uint8_t>(state); });
 }
 
 }  // namespace
@@ -447,8 +447,9 @@ cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_des
   return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
 }
 
-cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::lamps_of(lamps, count)); });
+cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* analytic_lights, uint64_t count) {
+  return guarded(viewer,
+                 [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::analytic_lights_of(analytic_lights, count)); });
 }
 
 cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path) {
@@ -716,7 +717,7 @@ cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_n
                                         float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(name != nullptr, "name is NULL");
-    require(ranks >= 1 && ranks <= render::most_matte_ranks, "ranks is not from 1 to 16");
+    require(ranks >= 1 && ranks <= render::max_matte_ranks, "ranks is not from 1 to 16");
     require(values != nullptr, "values is NULL");
     const auto id_of = [&](const core::MatteObject& object) {
       const cumulet::CallbackScope inside;
@@ -782,8 +783,8 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.steps = had.steps;
     s.noise = had.noise.value_or(unknown_noise);
     s.nonfinite_samples = had.samples_not_finite;
-    if (const auto facts = v.facts()) {
-      const core::Bounds bounds = v.bounds_of(*facts);
+    if (const auto volume_info = v.volume_info()) {
+      const core::Bounds bounds = v.bounds_of(*volume_info);
       for (int axis = 0; axis < 3; ++axis) {
         s.bounds_min[axis] = bounds.min[axis];
         s.bounds_max[axis] = bounds.max[axis];

@@ -15,11 +15,11 @@ using cumulet::viewer::FrameFiles;
 using cumulet::viewer::Sequence;
 using cumulet::viewer::SequenceState;
 
-constexpr std::uint64_t most_frames = 1'000'000;
-constexpr std::uint32_t most_subframes = 1000;
+constexpr std::uint64_t max_frames = 1'000'000;
+constexpr std::uint32_t max_subframes = 1000;
 constexpr std::uint64_t default_memory = std::uint64_t{2} << 30U;
-constexpr double most_seconds = 1e9;
-constexpr std::uint64_t most_steps = 1'000'000;
+constexpr double max_seconds = 1e9;
+constexpr std::uint64_t max_steps = 1'000'000;
 
 Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   cumulet_playback_desc d = read_settings(desc);
@@ -28,12 +28,12 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   const std::uint32_t rest = frames - d.first_frame;
   if (d.frame_count > rest) refuse("the sequence has fewer frames from " + there(d.first_frame));
   const bool steps = d.between != CUMULET_BETWEEN_NONE;
-  require(d.subframes <= most_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
+  require(d.subframes <= max_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
   // The default is lower for sequences so long that it would exceed the maximum.
   if (read_desc(desc, "cumulet_playback_desc").subframes == 0)
     d.subframes = std::min<std::uint32_t>(d.subframes,
-                                          static_cast<std::uint32_t>(std::max<std::uint64_t>(1, most_steps / frames)));
-  if (steps && std::uint64_t{frames} * d.subframes > most_steps)
+                                          static_cast<std::uint32_t>(std::max<std::uint64_t>(1, max_steps / frames)));
+  if (steps && std::uint64_t{frames} * d.subframes > max_steps)
     refuse("cumulet_playback_desc.subframes makes more than 1000000 of " + std::to_string(frames) + " frames");
   return {.frames_per_second = d.frames_per_second,
           .offset_seconds = d.offset_seconds,
@@ -53,7 +53,7 @@ Playback default_playback(std::uint32_t frames) {
 
 std::shared_ptr<Sequence> sequence_of(const cumulet_sequence_desc* desc) {
   const cumulet_sequence_desc d = read_desc(desc, "cumulet_sequence_desc");
-  require(d.count >= 1 && d.count <= most_frames, "cumulet_sequence_desc.count is not from 1 to 1000000");
+  require(d.count >= 1 && d.count <= max_frames, "cumulet_sequence_desc.count is not from 1 to 1000000");
   auto files = std::make_shared<FrameFiles>();
   for (const char* path : array_of(d.paths, d.count, 1, "paths")) {
     if (path == nullptr || *path == '\0')
@@ -73,7 +73,7 @@ std::shared_ptr<Sequence> sequence_of(const cumulet_sequence_desc* desc) {
 }
 
 void require_seconds(double seconds) {
-  require(in_range(seconds, -most_seconds, most_seconds), "seconds is not from -1e9 to 1e9");
+  require(in_range(seconds, -max_seconds, max_seconds), "seconds is not from -1e9 to 1e9");
 }
 
 }  // namespace

@@ -9,12 +9,12 @@ namespace {
 using namespace cumulet::c_abi;
 namespace core = cumulet::viewer;
 
-constexpr std::uint32_t most_slots = 16;
-constexpr std::uint64_t most_texels = std::uint64_t{1} << 27U;
+constexpr std::uint32_t max_slots = 16;
+constexpr std::uint64_t max_texels = std::uint64_t{1} << 27U;
 
 core::MapRequest request_of(const cumulet_transmittance_map_desc* desc) {
   const cumulet_transmittance_map_desc d = read_desc(desc, "cumulet_transmittance_map_desc");
-  require(d.slot < most_slots, "cumulet_transmittance_map_desc.slot is not from 0 to 15");
+  require(d.slot < max_slots, "cumulet_transmittance_map_desc.slot is not from 0 to 15");
   require(number(d.light) <= CUMULET_MAP_LIGHT_POINT, "cumulet_transmittance_map_desc.light is unknown");
   require(d.size == 0 || in_range(d.size, 16, 4096), "cumulet_transmittance_map_desc.size is not from 16 to 4096");
   require(d.slices == 0 || in_range(d.slices, 2, 256), "cumulet_transmittance_map_desc.slices is not from 2 to 256");
@@ -35,7 +35,7 @@ core::MapRequest request_of(const cumulet_transmittance_map_desc* desc) {
   }
   if (d.size != 0) request.size = d.size;
   if (d.slices != 0) request.slices = d.slices;
-  require(std::uint64_t{request.size} * request.size * request.slices <= most_texels,
+  require(std::uint64_t{request.size} * request.size * request.slices <= max_texels,
           "cumulet_transmittance_map_desc.size and slices are more than 2^27 texels");
   if (d.budget_ms > 0.0) request.budget_ms = d.budget_ms;
   return request;
@@ -63,7 +63,7 @@ cumulet_status cumulet_update_transmittance_map(cumulet_viewer* viewer, const cu
 
 cumulet_status cumulet_drop_transmittance_map(cumulet_viewer* viewer, uint32_t slot) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(slot < most_slots, "the slot is not from 0 to 15");
+    require(slot < max_slots, "the slot is not from 0 to 15");
     v.drop_map(slot);
   });
 }

@@ -10,12 +10,12 @@ namespace cumulet::viewer {
 namespace {
 
 // Includes the cell's tree node and its entry in the emission table.
-std::uint64_t bytes_a_cell(const Carried& carried) {
+std::uint64_t bytes_per_cell(const Carried& carried) {
   std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
   using grid::Channel;
   using render::channel_bytes;
   if (carried.emission) bytes += channel_bytes(Channel::emission, 1) + sizeof(scene::GlowingCell);
-  if (carried.colour) bytes += channel_bytes(Channel::colour, 1);
+  if (carried.color) bytes += channel_bytes(Channel::color, 1);
   if (carried.anisotropy) bytes += channel_bytes(Channel::anisotropy, 1);
   if (carried.velocity) bytes += channel_bytes(Channel::velocity, 1);
   if (carried.change) bytes += sizeof(glm::uvec2);
@@ -27,13 +27,13 @@ constexpr std::uint64_t tables = 4096;
 
 std::uint64_t left_of(std::uint64_t most, std::uint64_t held) { return most - std::min(most, held); }
 
-std::uint64_t fit_in_memory(const Carried& carried, std::uint64_t held, const Allowance& allowance) {
-  return left_of(allowance.memory_bytes(), held + tables) / bytes_a_cell(carried);
+std::uint64_t fit_in_memory(const Carried& carried, std::uint64_t held, const ResourceLimits& resource_limits) {
+  return left_of(resource_limits.memory_bytes(), held + tables) / bytes_per_cell(carried);
 }
 
-std::uint64_t fit_in_gl(const Carried& carried, const Allowance& allowance) {
+std::uint64_t fit_in_gl(const Carried& carried, const ResourceLimits& resource_limits) {
   // The old grid stays until the new one is uploaded, and images may grow meanwhile.
-  return left_of(allowance.gl_bytes() / 5 * 2, tables) / bytes_a_cell(carried);
+  return left_of(resource_limits.gl_bytes() / 5 * 2, tables) / bytes_per_cell(carried);
 }
 
 }  // namespace
@@ -44,41 +44,42 @@ Carried Carried::of(const grid::Channels& channels) {
 }
 
 Carried Carried::of(const scene::MarchSource& source) {
-  return {source.emits(), source.coloured(), source.anisotropic(), source.moves(), source.changes()};
+  return {source.emits(), source.colored(), source.anisotropic(), source.moves(), source.changes()};
 }
 
 std::uint64_t cells_that_fit(std::uint64_t max_cells, const Carried& carried, std::uint64_t held,
-                             const Allowance& allowance) {
-  return std::min({max_cells, fit_in_memory(carried, held, allowance), fit_in_gl(carried, allowance)});
+                             const ResourceLimits& resource_limits) {
+  return std::min({max_cells, fit_in_memory(carried, held, resource_limits), fit_in_gl(carried, resource_limits)});
 }
 
 std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, const Carried& carried,
                                                     const grid::Lattice& lattice, std::uint64_t held,
-                                                    const Allowance& allowance) {
+                                                    const ResourceLimits& resource_limits) {
   // Beside the cells this leaves room for the lattice, build buffers, the previous grid, a copy, and unused parts of
   // heap pages.
-  const std::uint64_t room = left_of(allowance.gl_bytes(), lattice.device_bytes() + tables);
-  const std::uint64_t kept = 4 * bytes_a_cell(carried);
-  const std::uint64_t in_gl = std::min(room / (kept + render::building_bytes_a_cell(carried.emission)),
+  const std::uint64_t room = left_of(resource_limits.gl_bytes(), lattice.device_bytes() + tables);
+  const std::uint64_t kept = 4 * bytes_per_cell(carried);
+  const std::uint64_t in_gl = std::min(room / (kept + render::building_bytes_per_cell(carried.emission)),
                                        left_of(room, render::building_bytes_at_least()) / kept);
   // With a small lattice the result is at least two fifths of the CPU limit.
-  if (in_gl < std::min(max_cells, fit_in_gl(carried, allowance) / 4)) return std::nullopt;
-  return std::min({max_cells, fit_in_memory(carried, held, allowance), in_gl});
+  if (in_gl < std::min(max_cells, fit_in_gl(carried, resource_limits) / 4)) return std::nullopt;
+  return std::min({max_cells, fit_in_memory(carried, held, resource_limits), in_gl});
 }
 
-bool has_cells_allowed(const Built& built, const Allowance& allowance) {
+bool has_cells_allowed(const Built& built, const ResourceLimits& resource_limits) {
   const scene::MarchSource& source = *built.source;
   const Carried carried = Carried::of(source);
   const std::uint64_t max_cells = built.settings.refine.max_cells;
   const std::uint64_t held = built.volume ? built.volume->bytes() : 0;
-  const auto planned =
-      source.plan ? planned_cells_that_fit(max_cells, carried, *source.plan->lattice, held, allowance) : std::nullopt;
-  const std::uint64_t allowed = planned ? *planned : cells_that_fit(max_cells, carried, held, allowance);
+  const auto planned = source.plan
+                           ? planned_cells_that_fit(max_cells, carried, *source.plan->lattice, held, resource_limits)
+                           : std::nullopt;
+  const std::uint64_t allowed = planned ? *planned : cells_that_fit(max_cells, carried, held, resource_limits);
   if (allowed < fewest_cells) return true;  // a coarser grid does not exist
   // Only the GPU knows the number of cells of a planned grid.
-  const std::uint64_t has = source.plan ? built.most_cells : built.cells;
+  const std::uint64_t has = source.plan ? built.cell_limit : built.cells;
   const bool wants_more = built.limited || source.plan;
-  return has <= allowed && !(wants_more && built.most_cells < allowed);
+  return has <= allowed && !(wants_more && built.cell_limit < allowed);
 }
 
 }  // namespace cumulet::viewer

@@ -6,8 +6,8 @@
 #include "grid/lattice.hpp"
 #include "scene/channels.hpp"
 #include "scene/march_source.hpp"
-#include "viewer/allowance.hpp"
 #include "viewer/builder.hpp"
+#include "viewer/resource_limits.hpp"
 
 namespace cumulet::viewer {
 
@@ -17,7 +17,7 @@ inline constexpr std::uint64_t fewest_cells = 24;
 /// Channels that cells store beside density.
 struct Carried {
   bool emission = false;
-  bool colour = false;
+  bool color = false;
   bool anisotropy = false;
   bool velocity = false;
   bool change = false;
@@ -30,14 +30,14 @@ struct Carried {
 /// Returns how many cells a CPU-built grid may have: at most max_cells, limited by GPU memory, and by main memory
 /// beside `held` bytes.
 [[nodiscard]] std::uint64_t cells_that_fit(std::uint64_t max_cells, const Carried& carried, std::uint64_t held,
-                                           const Allowance& allowance);
+                                           const ResourceLimits& resource_limits);
 /// Returns how many cells a GPU-built grid of this lattice may have. Nullopt: the lattice leaves so little memory that
 /// a CPU-built grid would be far finer.
 [[nodiscard]] std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, const Carried& carried,
                                                                   const grid::Lattice& lattice, std::uint64_t held,
-                                                                  const Allowance& allowance);
+                                                                  const ResourceLimits& resource_limits);
 /// Returns true if a tetrahedral grid has as many cells as the limits allow; else rebuilding would give a different
 /// grid.
-[[nodiscard]] bool has_cells_allowed(const Built& built, const Allowance& allowance);
+[[nodiscard]] bool has_cells_allowed(const Built& built, const ResourceLimits& resource_limits);
 
 }  // namespace cumulet::viewer

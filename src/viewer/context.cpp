@@ -13,7 +13,7 @@ namespace cumulet::viewer {
 namespace {
 
 // Fractions of a frame's budget.
-constexpr double most_of_drawing = 0.5;
+constexpr double max_of_drawing = 0.5;
 constexpr double part_to_filter = 0.4;
 
 }  // namespace
@@ -51,7 +51,7 @@ render::Deadline Context::deadline_of(const Frame& frame, render::Deadline begun
   const double keep = shares ? reserve_.of(frame.budget_ms) : 0.0;
   const double drawing =
       std::min(frame.target == Target::none ? compositor_.expected_filter_ms() : compositor_.expected_ms(),
-               most_of_drawing * frame.budget_ms);
+               max_of_drawing * frame.budget_ms);
   return deadline_after(frame.budget_ms - keep - drawing + milliseconds_until(begun));
 }
 
@@ -62,7 +62,7 @@ void Context::upload(const Shot& shot, const UploadLimits& limits, render::Deadl
   if (scene_.data() != nullptr && shot.scene->volumes.empty()) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
   const std::uint64_t others = bytes() - scene_.data_bytes() - scene_.other_bytes();
-  const std::uint64_t room = limits.most_bytes - std::min(limits.most_bytes, others);
+  const std::uint64_t room = limits.max_bytes - std::min(limits.max_bytes, others);
   const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, limits.page_texels, room}, deadline); };
   if (scene_.uploading()) {
     upload_timer_.run(update);
@@ -71,17 +71,17 @@ void Context::upload(const Shot& shot, const UploadLimits& limits, render::Deadl
   }
 }
 
-render::Obstacles Context::obstacles(const Shot& shot) {
-  render::Obstacles obstacles = scene_.obstacles(*shot.scene, shot.surfaces.light != SurfaceLight::none);
+render::TraceInputs Context::trace_inputs(const Shot& shot) {
+  render::TraceInputs trace_inputs = scene_.trace_inputs(*shot.scene, shot.surfaces.light != SurfaceLight::none);
   if (host_depth_.texture() != 0) {
-    obstacles.depth = host_depth_.texture();
-    obstacles.layers = host_depth_.layers();
-    obstacles.size = host_depth_.size();
+    trace_inputs.depth = host_depth_.texture();
+    trace_inputs.layers = host_depth_.layers();
+    trace_inputs.size = host_depth_.size();
   }
-  return obstacles;
+  return trace_inputs;
 }
 
-render::PictureParameters Context::parameters(const Shot& shot, const render::Obstacles& obstacles) const {
+render::PictureParameters Context::parameters(const Shot& shot, const render::TraceInputs& trace_inputs) const {
   core::CmIntegrator integrator{};
   integrator.seed = shot.sampling.seed;
   integrator.first_sample = shot.sampling.first_sample;
@@ -90,7 +90,7 @@ render::PictureParameters Context::parameters(const Shot& shot, const render::Ob
   integrator.sky_group = shot.sky_group;
   integrator.blurred_roughness = shot.surfaces.indirect_roughness;
   integrator.light_among_surfaces = shot.surfaces.light == SurfaceLight::full ? 1U : 0U;
-  return scene_.parameters(*shot.scene, obstacles, integrator, shot.size);
+  return scene_.parameters(*shot.scene, trace_inputs, integrator, shot.size);
 }
 
 void Context::take_host_depth(const Shot& shot, const Frame& frame) {
@@ -122,62 +122,62 @@ scene::SequenceFrames Context::uploaded_frames() const {
   return frames;
 }
 
-bool Context::owes(const scene::SequenceFrame& frame) const {
+bool Context::has_pending_frame(const scene::SequenceFrame& frame) const {
   if (scene::holds(shown_frames(), frame)) return false;
-  return scene::holds(uploaded_frames(), frame) ? progressive_.owes_picture() : scene_.uploading_volumes();
+  return scene::holds(uploaded_frames(), frame) ? progressive_.has_pending_picture() : scene_.uploading_volumes();
 }
 
-render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const {
-  render::PictureWish wish;
-  wish.parameters = parameters(shot, met);
-  wish.content.viewpoint = shot.scene->view;
-  wish.content.previous = shot.scene->previous;
-  wish.content.view_ends = shot.scene->view_ends;
-  wish.content.lights = shot.scene->lights;
-  wish.content.surroundings = shot.scene->surroundings;
-  wish.content.lamps = shot.scene->lamps;
-  wish.content.ground = shot.scene->ground;
-  wish.content.volumes = shot.scene->volumes;
-  for (scene::Volume& volume : wish.content.volumes) {
+render::PictureRequest Context::request(const Shot& shot, const Frame& frame, const render::TraceInputs& met) const {
+  render::PictureRequest request;
+  request.parameters = parameters(shot, met);
+  request.content.viewpoint = shot.scene->view;
+  request.content.previous = shot.scene->previous;
+  request.content.view_ends = shot.scene->view_ends;
+  request.content.lights = shot.scene->lights;
+  request.content.surroundings = shot.scene->surroundings;
+  request.content.analytic_lights = shot.scene->analytic_lights;
+  request.content.ground = shot.scene->ground;
+  request.content.volumes = shot.scene->volumes;
+  for (scene::Volume& volume : request.content.volumes) {
     volume.source = nullptr;
     volume.frame.reset();
   }
-  wish.frames = uploaded_frames();
-  wish.content.data = scene_.data_revision();
-  wish.content.instances = scene_.instances_revision();
-  wish.content.model = scene_.model_revision();
-  wish.content.environment = scene_.environment_revision();
-  wish.content.host_depth = host_depth_revision_;
-  wish.content.programs = programs_->revision();
-  wish.content.integrator = wish.parameters.integrator;
-  wish.content.size = shot.size;
-  wish.content.region = shot.sampling.region;
-  wish.content.view = shot.sampling.view;
-  wish.content.surfaces_traced = met.traced;
-  wish.content.preview = shot.sampling.preview;
-  wish.content.volume_alone = shot.sampling.volume_alone;
-  wish.content.light_groups = shot.sampling.light_groups;
-  wish.samples = std::max(1U, shot.sampling.samples);
-  wish.noise_target = shot.sampling.noise_target;
-  wish.content.stops_by_noise = shot.sampling.noise_target.has_value();
-  wish.content.adaptive = wish.content.stops_by_noise && shot.sampling.adaptive;
-  wish.depth = frame.write_depth;
-  wish.guides = shot.display.denoise;
-  wish.held = shot.held;
-  return wish;
+  request.frames = uploaded_frames();
+  request.content.data = scene_.data_revision();
+  request.content.instances = scene_.instances_revision();
+  request.content.model = scene_.model_revision();
+  request.content.environment = scene_.environment_revision();
+  request.content.host_depth = host_depth_revision_;
+  request.content.programs = programs_->revision();
+  request.content.integrator = request.parameters.integrator;
+  request.content.size = shot.size;
+  request.content.region = shot.sampling.region;
+  request.content.view = shot.sampling.view;
+  request.content.surfaces_traced = met.traced;
+  request.content.preview = shot.sampling.preview;
+  request.content.volume_alone = shot.sampling.volume_alone;
+  request.content.light_groups = shot.sampling.light_groups;
+  request.samples = std::max(1U, shot.sampling.samples);
+  request.noise_target = shot.sampling.noise_target;
+  request.content.stops_by_noise = shot.sampling.noise_target.has_value();
+  request.content.adaptive = request.content.stops_by_noise && shot.sampling.adaptive;
+  request.depth = frame.write_depth;
+  request.guides = shot.display.denoise;
+  request.held = shot.held;
+  return request;
 }
 
 void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadline) {
   if (!shot.view()) return;
   take_host_depth(shot, frame);
   if (scene_.data() == nullptr) return;
-  const render::Obstacles met = obstacles(shot);
-  progressive_.advance(wish(shot, frame, met), *scene_.data(), met, deadline, frame.budget_ms);
+  const render::TraceInputs met = trace_inputs(shot);
+  progressive_.advance(request(shot, frame, met), *scene_.data(), met, deadline, frame.budget_ms);
 }
 
 std::uint64_t Context::TargetKind::bytes() const {
-  const std::uint64_t colour = format == GL_RGBA32F ? 16 : (format == GL_RGBA16F ? 8 : 4);
-  return std::uint64_t{size.x} * size.y * (colour + (depth ? 4 : 0));
+  const std::uint64_t color = format == GL_RGBA32F ? 16 : (format == GL_RGBA16F ? 8 : 4);
+  return std::uint64_t{size.x} * size.y * (color + (depth ? 4 : 0));
 }
 
 void Context::make_target_textures(const Shot& shot, const Frame& frame) {
@@ -189,7 +189,7 @@ void Context::make_target_textures(const Shot& shot, const Frame& frame) {
     const int width = static_cast<int>(kind.size.x);
     const int height = static_cast<int>(kind.size.y);
     TargetTextures made;
-    made.colour = gl::make_texture_2d(functions_, kind.format, width, height, "creating the target texture");
+    made.color = gl::make_texture_2d(functions_, kind.format, width, height, "creating the target texture");
     if (kind.depth) {
       made.depth = gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, width, height, "creating the target's depth");
     }
@@ -210,7 +210,7 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
   tracer.set_background(empty_, scene_.lights(*shot.scene).sky_radiance);
   if (!able || frame.budget_ms < 0.0) return;
   alone_failed_ = shot.settings;  // reset on success
-  tracer.draw_layers(empty_, obstacles(shot),
+  tracer.draw_layers(empty_, trace_inputs(shot),
                      render::Progressive::quick_layers(tracer, shot.size, frame.budget_ms, shot.view_rests));
   alone_failed_.reset();
 }
@@ -256,11 +256,11 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   textures.holes = picture.has_holes();
   if (film.has(render::film_layers::depth)) textures.volume_z = film.texture(render::film_layers::depth);
   textures.picture = picture.begun();
-  textures.wish = &picture == progressive_.shown() ? progressive_.shown_wish() : 0;
+  textures.request = &picture == progressive_.shown() ? progressive_.shown_request() : 0;
   textures.revision = picture.revision();
   textures.rows = picture.rows();
   textures.moments = film.texture(render::film_layers::moments);
-  if (picture.view() == render::View::shaded && picture.has_facts()) textures.guides = guides_of(picture);
+  if (picture.view() == render::View::shaded && picture.has_features()) textures.guides = guides_of(picture);
   if (textures.guides && progressive_.previews()) textures.view = view_of(picture);
   if (before != nullptr) {
     textures.sum_before = before->film().texture(render::film_layers::radiance);
@@ -358,7 +358,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   const glm::uvec2 size = target_.of().size;
   target.viewport = size == frame.size ? frame.viewport : glm::ivec4(0, 0, size);
   const bool depth = frame.write_depth && target_->depth;
-  const gl::TransientFramebuffer framebuffer(functions_, target_->colour.name(), depth ? target_->depth.name() : 0);
+  const gl::TransientFramebuffer framebuffer(functions_, target_->color.name(), depth ? target_->depth.name() : 0);
   constexpr std::array<float, 4> nothing{};
   functions_->ClearNamedFramebufferfv(framebuffer.name(), GL_COLOR, 0, nothing.data());
   if (depth) {
@@ -369,7 +369,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   target.framebuffer = framebuffer.name();
   target.blend_over = false;
   display_timer_.run([&] { composite(shown->film(), picture, display, target); });
-  result.texture = target_->colour.name();
+  result.texture = target_->color.name();
 }
 
 void Context::denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown) {

@@ -21,7 +21,7 @@
 #include "render/host_depth.hpp"
 #include "render/pass_timer.hpp"
 #include "render/progressive.hpp"
-#include "render/rehearsal.hpp"
+#include "render/shader_warm_up.hpp"
 #include "render/transmittance_map.hpp"
 #include "render/voxel_transfers.hpp"
 #include "viewer/frame.hpp"
@@ -87,7 +87,7 @@ class Context {
   [[nodiscard]] render::Deadline deadline_of(const Frame& frame, render::Deadline begun, bool shares) const;
   struct UploadLimits {
     std::int64_t page_texels = 0;  ///< as in GpuScene
-    std::uint64_t most_bytes = 0;  ///< limit of all GPU memory; no volume is uploaded beyond it
+    std::uint64_t max_bytes = 0;   ///< limit of all GPU memory; no volume is uploaded beyond it
   };
   void upload(const Shot& shot, const UploadLimits& limits, render::Deadline deadline);
   void trace(const Shot& shot, const Frame& frame, render::Deadline deadline);
@@ -99,7 +99,7 @@ class Context {
   /// Displayed frames of sequences.
   [[nodiscard]] scene::SequenceFrames shown_frames() const { return progressive_.shown_frames(); }
   /// Returns true if this frame, which was uploaded last or is being uploaded, has not been displayed yet and will be.
-  [[nodiscard]] bool owes(const scene::SequenceFrame& frame) const;
+  [[nodiscard]] bool has_pending_frame(const scene::SequenceFrame& frame) const;
   /// Fills in the result after the frame.
   void tell(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Returns true if a failure should be reported. A program that fails to build fails in every frame until a setting
@@ -166,7 +166,7 @@ class Context {
     [[nodiscard]] std::uint64_t bytes() const;
   };
   struct TargetTextures {
-    gl::Object colour;
+    gl::Object color;
     gl::Object depth;
   };
 
@@ -174,21 +174,22 @@ class Context {
   [[nodiscard]] scene::SequenceFrames uploaded_frames() const;
   // Returns true if the frame draws to a target of non-zero size.
   [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
-  [[nodiscard]] render::Obstacles obstacles(const Shot& shot);
-  [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::Obstacles& obstacles) const;
+  [[nodiscard]] render::TraceInputs trace_inputs(const Shot& shot);
+  [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::TraceInputs& trace_inputs) const;
   void take_host_depth(const Shot& shot, const Frame& frame);
-  [[nodiscard]] render::PictureWish wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const;
+  [[nodiscard]] render::PictureRequest request(const Shot& shot, const Frame& frame,
+                                               const render::TraceInputs& met) const;
   [[nodiscard]] static render::Display display(const Shot& shot, const Frame& frame, const render::Picture& shown);
   [[nodiscard]] render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown) const;
   // Warms up programs. Returns true once all are warm.
-  bool rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
+  bool warm_up_step(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
   // Warms up the programs of such a frame.
-  bool rehearse_frame(const Shot& shot, const Frame& frame, render::Deadline deadline);
+  bool warm_up_frame(const Shot& shot, const Frame& frame, render::Deadline deadline);
   // Returns the result of `part`. If it throws Error(gl), the error is stored and true is returned, because other
   // programs need not wait for one that fails to build.
   template <class Part>
   bool done_or_failed(Part&& part);
-  void rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
+  void warm_up_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
   void make_target_textures(const Shot& shot, const Frame& frame);
   // The pass that draws an image's film, with the filter's inputs if denoising is on.
   static render::Pass display_pass(const char* name, const render::PictureTextures& picture,
@@ -197,8 +198,8 @@ class Context {
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
   // Computes feature buffers. Throws Error(invalid_argument) if the image is of another scene than the current one.
-  void find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts,
-                  std::uint32_t rays = render::fact_rays);
+  void find_features(const Shot& shot, render::Picture& picture, render::FeatureSet volume_info,
+                     std::uint32_t rays = render::feature_rays);
   // Returns readable(); throws for debug views.
   render::Picture& readable_shaded();
   // Throws if the displayed data differs from that of the image, or if `also` is false.
@@ -243,7 +244,7 @@ class Context {
   std::optional<std::uint64_t> alone_failed_;  // settings at which drawing surfaces without a volume failed
   Slot<TargetTextures, TargetKind> target_;
   std::map<std::uint32_t, render::TransmittanceMap> maps_;  // by slot
-  std::unique_ptr<render::Rehearsal> rehearsal_;            // in progress
+  std::unique_ptr<render::ShaderWarmUp> shader_warm_up_;    // in progress
   double warm_ = 0.0;                                       // fraction of the warm-up that was reported
   std::optional<Error> unbuilt_;                            // the first build failure of the warm-up, thrown at its end
   std::optional<std::uint64_t> tried_;                      // settings at which failed programs were retried

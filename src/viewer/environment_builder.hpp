@@ -21,8 +21,8 @@ class EnvironmentBuilder {
  public:
   /// notify: called on a worker thread after a job ended.
   explicit EnvironmentBuilder(const std::function<void()>& notify, Trace trace = {},
-                              const AllowancePtr& allowance = nullptr)
-      : files_(notify, trace, allowance), skies_(notify, trace, allowance) {}
+                              const ResourceLimitsPtr& resource_limits = nullptr)
+      : files_(notify, trace, resource_limits), skies_(notify, trace, resource_limits) {}
 
   /// Reads a file. Replaces the running load, as Worker::replace().
   void load(const FilePath& path);

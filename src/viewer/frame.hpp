@@ -23,7 +23,7 @@ struct Frame {
   glm::ivec4 viewport{0};  // not zero if `size` is not
   bool flip_y = false;
   GLenum format = GL_RGBA8;
-  render::ColourEncoding encoding = render::ColourEncoding::srgb;
+  render::ColorEncoding encoding = render::ColorEncoding::srgb;
   bool blend_over = true;
   bool write_depth = false;
   render::DepthSource depth_source = render::DepthSource::none;

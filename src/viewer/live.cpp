@@ -109,23 +109,23 @@ Live::InGl Live::in_gl() const {
   return in_gl_;
 }
 
-Live::Wish Live::want(const scene::Emission& emission) {
-  auto wish = std::make_shared<const scene::Emission>(emission);
+Live::Request Live::want(const scene::Emission& emission) {
+  auto request = std::make_shared<const scene::Emission>(emission);
   {
     const std::scoped_lock lock(mutex_);
-    std::erase_if(wishes_, [](const auto& other) { return other.expired(); });
-    wishes_.push_back(wish);
+    std::erase_if(requests_, [](const auto& other) { return other.expired(); });
+    requests_.push_back(request);
   }
-  wish_listeners_.tell();
-  return wish;
+  request_listeners_.tell();
+  return request;
 }
 
 std::vector<scene::Emission> Live::wanted() const {
   std::vector<scene::Emission> wanted;
   const std::scoped_lock lock(mutex_);
-  for (const auto& held : wishes_) {
-    const Wish wish = held.lock();
-    if (wish && std::ranges::find(wanted, *wish) == wanted.end()) wanted.push_back(*wish);
+  for (const auto& held : requests_) {
+    const Request request = held.lock();
+    if (request && std::ranges::find(wanted, *request) == wanted.end()) wanted.push_back(*request);
   }
   return wanted;
 }

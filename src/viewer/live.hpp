@@ -70,13 +70,13 @@ class Live {
   /// memory. Null: its memory is gone, and updates are refused until a complete state is submitted.
   void move_in_gl(const scene::StateInGlPtr& from, scene::StateInGlPtr to);
   /// Requests the emission of GPU-resident states with these settings, for as long as the result is held.
-  using Wish = std::shared_ptr<const scene::Emission>;
-  [[nodiscard]] Wish want(const scene::Emission& emission);
+  using Request = std::shared_ptr<const scene::Emission>;
+  [[nodiscard]] Request want(const scene::Emission& emission);
   /// Returns the requested settings without duplicates.
   [[nodiscard]] std::vector<scene::Emission> wanted() const;
   /// Calls `changed` when emission is requested (Listeners::listen()).
-  [[nodiscard]] std::shared_ptr<void> listen_to_wishes(std::function<void()> changed) {
-    return wish_listeners_.listen(std::move(changed));
+  [[nodiscard]] std::shared_ptr<void> listen_to_requests(std::function<void()> changed) {
+    return request_listeners_.listen(std::move(changed));
   }
 
   /// Throws if update() would throw for these channels. comes: channels of a complete state that is still in transfer;
@@ -142,10 +142,10 @@ class Live {
   void refuse_base(std::optional<Whole>& old);
 
   std::optional<Bounds> bounds_;
-  volume::ValuesWantedPtr values_wanted_;                     // null: states submitted from GL are copied to main
-                                                              // memory
-  InGl in_gl_;                                                // the newest; guarded by mutex_
-  std::vector<std::weak_ptr<const scene::Emission>> wishes_;  // guarded by mutex_
+  volume::ValuesWantedPtr values_wanted_;                       // null: states submitted from GL are copied to main
+                                                                // memory
+  InGl in_gl_;                                                  // the newest; guarded by mutex_
+  std::vector<std::weak_ptr<const scene::Emission>> requests_;  // guarded by mutex_
   std::atomic<std::uint64_t> newest_ = 0;
   mutable std::mutex mutex_;  // guards the following; held only briefly
   Next next_;
@@ -158,7 +158,7 @@ class Live {
   // cools.
   std::optional<double> temperature_scale_;
   Listeners listeners_;
-  Listeners wish_listeners_;
+  Listeners request_listeners_;
 };
 
 }  // namespace cumulet::viewer

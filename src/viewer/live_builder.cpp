@@ -22,7 +22,7 @@ void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings
   old = std::exchange(ready_, std::nullopt);
   std::swap(live_, live);
   huge_is_said_ = false;
-  wish_.reset();
+  request_.reset();
   settings_ = std::move(settings);
   begin();
 }
@@ -83,15 +83,15 @@ void LiveBuilder::begin() {
   job_ = job;  // not set if posting the job failed
 }
 
-void LiveBuilder::wish(Live& live, const std::optional<scene::Emission>& wanted) {
+void LiveBuilder::request(Live& live, const std::optional<scene::Emission>& wanted) {
   {
     const std::scoped_lock lock(mutex_);
-    if (wanted && wish_ && *wish_ == *wanted) return;
+    if (wanted && request_ && *request_ == *wanted) return;
   }
   // Listeners are called without the lock.
-  Live::Wish wish = wanted ? live.want(*wanted) : nullptr;
+  Live::Request request = wanted ? live.want(*wanted) : nullptr;
   const std::scoped_lock lock(mutex_);
-  if (live_.get() == &live) std::swap(wish_, wish);
+  if (live_.get() == &live) std::swap(request_, request);
 }
 
 std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeAsset& state,
@@ -100,7 +100,7 @@ std::optional<BuildSettings> LiveBuilder::settings_for(Live& live, const VolumeA
   const scene::Emission wanted = state.emission_by(settings.emission);
   const bool made_there = in_gl && !needs_values(state, settings);
   // A later state may have fire.
-  wish(live, made_there && (wanted.burns() || wanted.is_hot()) ? std::optional(wanted) : std::nullopt);
+  request(live, made_there && (wanted.burns() || wanted.is_hot()) ? std::optional(wanted) : std::nullopt);
   if (!made_there || in_gl->gone() || in_gl->has_wanted({wanted})) return settings;
   const scene::Emission* found = in_gl->some_emission();
   if (found == nullptr || !in_gl->has_wanted({})) return std::nullopt;
@@ -140,7 +140,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   std::optional<Error> failure;
   try {
     // Limits apply to each state separately: with a thread limit, other jobs run between two states.
-    allowance_->run([&] {
+    resource_limits_->run([&] {
       Stopwatch watch;
       const Live::State state = live->read(progress);
       const double load_seconds = watch.lap();
@@ -149,7 +149,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
       const std::optional<BuildSettings> settings = settings_for(*live, *state.volume, begun.settings);
       if (!settings) return;
       // Without a result the build needs voxels, which another state will bring.
-      ready = {build_grid(log_, state.volume, *settings, progress, *allowance_), state.number};
+      ready = {build_grid(log_, state.volume, *settings, progress, *resource_limits_), state.number};
       ready.built.seconds.load = load_seconds;
     });
     progress.check();

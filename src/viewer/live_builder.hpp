@@ -18,8 +18,8 @@ class LiveBuilder {
  public:
   /// notify: called on the worker thread after each state, and when a job ended.
   LiveBuilder(Log log, std::function<void()> notify, Trace trace = {},
-              AllowancePtr allowance = std::make_shared<const Allowance>())
-      : log_(std::move(log)), allowance_(std::move(allowance)), worker_(std::move(notify), trace) {}
+              ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
+      : log_(std::move(log)), resource_limits_(std::move(resource_limits)), worker_(std::move(notify), trace) {}
 
   /// Follows this volume instead of the previous one; null: none.
   void follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings);
@@ -55,7 +55,7 @@ class LiveBuilder {
   [[nodiscard]] bool is_due() const;
   void begin();
   // Sets the emission requested of GPU-resident states; nullopt: none.
-  void wish(Live& live, const std::optional<scene::Emission>& wanted);
+  void request(Live& live, const std::optional<scene::Emission>& wanted);
   // Returns the settings to build a state with. The emission of a GPU-resident state may exist for other settings;
   // these are used until that for the requested ones exists. Nullopt: required data does not exist yet.
   std::optional<BuildSettings> settings_for(Live& live, const VolumeAsset& state, const BuildSettings& settings);
@@ -65,11 +65,11 @@ class LiveBuilder {
   bool build(std::uint64_t job, Progress& progress);
 
   Log log_;
-  AllowancePtr allowance_;
+  ResourceLimitsPtr resource_limits_;
   mutable std::mutex mutex_;
   std::shared_ptr<Live> live_;
   std::optional<BuildSettings> settings_;
-  Live::Wish wish_;  // emission request for GPU-resident states
+  Live::Request request_;  // emission request for GPU-resident states
   std::optional<Begun> begun_;
   std::optional<std::uint64_t> job_;  // running or queued
   std::uint64_t last_job_ = 0;

@@ -15,9 +15,9 @@ constexpr double pi = std::numbers::pi;
 constexpr double key_orbit = pi / 12.0;
 constexpr double key_pan = 0.05;
 constexpr double wheel_step = 1.15;
-constexpr double drag_dolly = 10.0;        // factor for a drag over the image's height
-constexpr double flight_per_second = 0.5;  // fraction of the bounds' diagonal, or of the distance to the target
-constexpr double fast_flight = 4.0;
+constexpr double drag_dolly = 10.0;  // factor for a drag over the image's height
+constexpr double fly_speed = 0.5;    // fraction of the bounds' diagonal, or of the distance to the target
+constexpr double fast_speed = 4.0;
 constexpr std::string_view fly_keys = "DAEQWS";  // pairs: right and left, up and down, forward and back
 constexpr std::uint32_t none = 0;
 constexpr std::uint32_t shift = CUMULET_MODIFIER_SHIFT;
@@ -225,7 +225,7 @@ bool Navigation::key_down(const InputEvent& event, Camera& camera, double aspect
   }
 }
 
-glm::dvec3 Navigation::flight() const {
+glm::dvec3 Navigation::fly_direction() const {
   glm::dvec3 way(0.0);
   if (!settings_.fly) return way;
   for (int axis = 0; axis < 3; ++axis) {
@@ -238,20 +238,22 @@ glm::dvec3 Navigation::flight() const {
 bool Navigation::advance(double seconds, Camera& camera, const std::optional<Bounds>& bounds) {
   if (!(seconds > 0.0) || !moving()) return false;
   const std::uint64_t before = camera.revision();
-  const glm::dvec3 way = flight();
+  const glm::dvec3 way = fly_direction();
   if (way != glm::dvec3(0.0)) {
     double reach = bounds ? glm::length(bounds->max - bounds->min) : 0.0;
     if (!(reach > 0.0)) {
       const CameraPose pose = camera.pose();
       reach = glm::length(pose.target - pose.eye);
     }
-    const double step = flight_per_second * settings_.speed * (fast_ ? fast_flight : 1.0) * reach * seconds;
+    const double step = fly_speed * settings_.speed * (fast_ ? fast_speed : 1.0) * reach * seconds;
     camera.fly(step * way.x, step * way.y, step * way.z);
   }
   camera.orbit(settings_.turntable_degrees_per_second * pi / 180.0 * seconds, 0.0);
   return camera.revision() != before;
 }
 
-bool Navigation::moving() const { return settings_.turntable_degrees_per_second != 0.0 || flight() != glm::dvec3(0.0); }
+bool Navigation::moving() const {
+  return settings_.turntable_degrees_per_second != 0.0 || fly_direction() != glm::dvec3(0.0);
+}
 
 }  // namespace cumulet::viewer

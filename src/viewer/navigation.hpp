@@ -59,7 +59,7 @@ class Navigation {
   [[nodiscard]] Drag drag_of(int button, std::uint32_t modifiers) const;
   void drag_by(double dx, double dy, Camera& camera) const;
   bool key_down(const InputEvent& event, Camera& camera, double aspect, const std::optional<Subject>& subject);
-  [[nodiscard]] glm::dvec3 flight() const;
+  [[nodiscard]] glm::dvec3 fly_direction() const;
   void release();
 
   NavigationSettings settings_;

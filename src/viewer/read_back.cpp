@@ -20,32 +20,32 @@ using glm::dvec3;
 
 namespace {
 
-constexpr std::uint64_t most_denoiser_bytes = std::uint64_t{512} << 20U;
+constexpr std::uint64_t max_denoiser_bytes = std::uint64_t{512} << 20U;
 
 // Returns true if the whole image, including surfaces, consists of light samples.
 bool is_traced(const render::Picture& picture) {
   return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath;
 }
 
-std::optional<render::PixelFact> fact_of(Aov aov) {
-  using render::PixelFact;
+std::optional<render::FeatureBuffer> feature_of(Aov aov) {
+  using render::FeatureBuffer;
   switch (aov) {
     case Aov::transmittance:
-      return PixelFact::transmittance;
+      return FeatureBuffer::transmittance;
     case Aov::surface_depth:
-      return PixelFact::surface_z;
+      return FeatureBuffer::surface_z;
     case Aov::volume_depth:
-      return PixelFact::volume_z;
+      return FeatureBuffer::volume_z;
     case Aov::normal:
-      return PixelFact::normal;
+      return FeatureBuffer::normal;
     case Aov::albedo:
-      return PixelFact::albedo;
+      return FeatureBuffer::albedo;
     case Aov::velocity:
-      return PixelFact::velocity;
+      return FeatureBuffer::velocity;
     case Aov::motion:
-      return PixelFact::motion;
+      return FeatureBuffer::motion;
     case Aov::volume_motion:
-      return PixelFact::volume_motion;
+      return FeatureBuffer::volume_motion;
     case Aov::beauty:
     case Aov::volume:
     case Aov::error:
@@ -57,7 +57,7 @@ std::optional<render::PixelFact> fact_of(Aov aov) {
 // With few samples per pixel, more feature rays would take longer than more samples, for less benefit.
 std::uint32_t rays_to_denoise(const render::Picture& picture) {
   return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(2 * picture.samples_a_pixel(), render::fact_rays, render::most_fact_rays));
+      std::clamp<std::uint64_t>(2 * picture.samples_per_pixel(), render::feature_rays, render::max_feature_rays));
 }
 
 // Returns the number of floats of a four-channel image. Throws Error(invalid_argument) if the array is too small.
@@ -119,7 +119,7 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   const auto& view = shot.view();
   if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
   const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
-  const render::Obstacles met = obstacles(shot);
+  const render::TraceInputs met = trace_inputs(shot);
   const render::Tracer::Picked picked = progressive_.tracer().pick(*scene_.data(), parameters(shot, met), met, pixel);
   const double z = picked.z;
   if (!(z > 0.0)) return {};
@@ -173,7 +173,7 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   functions_->ClearTexImage(flat.name(), 0, GL_RGBA, GL_FLOAT, nullptr);
   render::Display display;
   display.transparent = transparent;
-  display.encoding = render::ColourEncoding::hdr;
+  display.encoding = render::ColorEncoding::hdr;
   render::FrameTarget target;
   target.framebuffer = framebuffer.name();
   target.viewport = {0, 0, size};
@@ -202,12 +202,12 @@ void Context::require_present(bool also) const {
 }
 
 void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t count) {
-  using render::PixelFact;
+  using render::FeatureBuffer;
   render::Picture& picture = readable_shaded();
   const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
-  const bool colour = aov == Aov::beauty || aov == Aov::volume;
-  const std::optional<PixelFact> fact = fact_of(aov);
-  const std::size_t floats = pixels * (colour ? 4 : (fact ? render::channels_of(*fact) : 1));
+  const bool color = aov == Aov::beauty || aov == Aov::volume;
+  const std::optional<FeatureBuffer> feature = feature_of(aov);
+  const std::size_t floats = pixels * (color ? 4 : (feature ? render::channels_of(*feature) : 1));
   if (values == nullptr || count < floats) {
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
   }
@@ -223,9 +223,10 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   } else if (aov == Aov::error) {
     progressive_.tracer().read_error(picture, values);
   } else {
-    const bool moves = fact == PixelFact::velocity || fact == PixelFact::motion || fact == PixelFact::volume_motion;
-    find_facts(shot, picture, moves ? render::PixelFacts::all : render::PixelFacts::guides);
-    progressive_.tracer().read_fact(picture, fact.value(), values);
+    const bool moves = feature == FeatureBuffer::velocity || feature == FeatureBuffer::motion ||
+                       feature == FeatureBuffer::volume_motion;
+    find_features(shot, picture, moves ? render::FeatureSet::all : render::FeatureSet::guides);
+    progressive_.tracer().read_feature(picture, feature.value(), values);
   }
 }
 
@@ -257,7 +258,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
     object.id = volume.id;
     ids.volumes.push_back((*volume.medium).holdout ? 0 : id_of(object));
   }
-  const render::Obstacles met = obstacles(shot);
+  const render::TraceInputs met = trace_inputs(shot);
   object = {.kind = MatteObject::Kind::surfaces};
   for (std::size_t i = 0; met.scene != nullptr && i < met.scene->models().size(); ++i) {
     const scene::Model& model = met.scene->models()[i];
@@ -268,18 +269,19 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
   progressive_.tracer().read_mattes(picture, *scene_.data(), met, ids, ranks, values);
 }
 
-void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts, std::uint32_t rays) {
+void Context::find_features(const Shot& shot, render::Picture& picture, render::FeatureSet features,
+                            std::uint32_t rays) {
   // Motion vectors refer to the current scene.
-  const bool of_now = facts != render::PixelFacts::all || progressive_.newest_is_seen_as(*shot.scene);
+  const bool of_now = features != render::FeatureSet::all || progressive_.newest_is_seen_as(*shot.scene);
   require_present(of_now);
-  render::Obstacles met = obstacles(shot);
+  render::TraceInputs met = trace_inputs(shot);
   scene::MotionTable motion;
-  if (facts == render::PixelFacts::all) {
+  if (features == render::FeatureSet::all) {
     motion = scene_.motion(*shot.scene);
     met.motion = &motion;
   }
   compositor_.begin_denoising_anew();
-  while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0), rays, facts)) {
+  while (!progressive_.tracer().find_features(picture, *scene_.data(), met, deadline_after(1000.0), rays, features)) {
   }
 }
 
@@ -294,7 +296,7 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
     throw Error(ErrorCode::unsupported, "only shaded pictures whose surfaces are traced can be denoised");
   }
   require_room(picture, rgba, count);
-  find_facts(shot, picture, render::PixelFacts::guides, rays_to_denoise(picture));
+  find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture));
   const render::Display display = shot.display.shown(false);
   const gl::Object denoised =
       network != nullptr ? by_network(shot, picture, network) : filtered(picture, display.shows_background());
@@ -321,7 +323,7 @@ gl::Object Context::by_network(const Shot& shot, const render::Picture& picture,
   denoising.known_light = !shot.scene->models.empty() || std::ranges::any_of(volumes, [](const scene::Volume& volume) {
     return volume.source->emits() || (*volume.medium).emission != glm::vec3(0.0F);
   });
-  denoising.most_bytes = most_denoiser_bytes;
+  denoising.max_bytes = max_denoiser_bytes;
   return render::denoised(functions_, programs_, picture, denoising);
 }
 

@@ -27,8 +27,8 @@ struct PosedModel {
 class SurfaceBuilder {
  public:
   /// notify: called on the worker thread after a job ended.
-  SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {}, AllowancePtr allowance = nullptr)
-      : log_(std::move(log)), worker_(std::move(notify), trace, std::move(allowance)) {}
+  SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {}, ResourceLimitsPtr resource_limits = nullptr)
+      : log_(std::move(log)), worker_(std::move(notify), trace, std::move(resource_limits)) {}
 
   /// Reads a file, then poses it. Replaces the running job, as Worker::replace().
   void load(const FilePath& path, SurfaceChoice choice);

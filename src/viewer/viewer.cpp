@@ -29,7 +29,7 @@ using Clock = std::chrono::steady_clock;
 // Maximum number of volume instances for which the camera fit uses their visible parts instead of their boxes.
 constexpr std::size_t most_looked_at = 8;
 // Maximum number of triangles that the camera fit visits individually.
-constexpr std::size_t most_vertices = std::size_t{1} << 24U;
+constexpr std::size_t max_vertices = std::size_t{1} << 24U;
 
 bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
 
@@ -82,16 +82,16 @@ void stay_with(scene::Volume& volume, const scene::Volume& was) {
 }
 
 // Metadata of a volume with unknown contents within a box.
-VolumeFactsPtr facts_of(const Bounds& bounds) {
+VolumeInfoPtr info_of(const Bounds& bounds) {
   volume::ScalarVolume box;
   box.bounds_max = box.bounds_min;
   for (int axis = 0; axis < 3; ++axis) box.index_to_world[axis][axis] = bounds.max[axis] - bounds.min[axis];
   box.index_to_world[3] = glm::dvec4(0.5 * (bounds.min + bounds.max), 1.0);
-  return std::make_shared<const VolumeFacts>(VolumeFacts{.empty = false,
-                                                         .may_emit = true,
-                                                         .index_to_world = box.index_to_world,
-                                                         .anisotropy_grid = {},
-                                                         .coarse = volume::CoarseVolume(box)});
+  return std::make_shared<const VolumeInfo>(VolumeInfo{.empty = false,
+                                                       .may_emit = true,
+                                                       .index_to_world = box.index_to_world,
+                                                       .anisotropy_grid = {},
+                                                       .coarse = volume::CoarseVolume(box)});
 }
 
 using Add = std::function<void(const dvec3&)>;
@@ -131,17 +131,17 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
       restore_state_(restore_state),
       sharing_(sharing ? std::move(sharing) : std::make_shared<Sharing>()),
       builder_(
-          log_, [this] { notify(); }, trace, allowance_),
+          log_, [this] { notify(); }, trace, resource_limits_),
       surface_builder_(
-          log_, [this] { notify(); }, trace, allowance_),
-      environment_builder_([this] { notify(); }, trace, allowance_),
-      shelf_(
-          log_, [this] { notify(); }, trace, allowance_),
-      poses_([this] { notify(); }, trace, allowance_),
+          log_, [this] { notify(); }, trace, resource_limits_),
+      environment_builder_([this] { notify(); }, trace, resource_limits_),
+      cache_(
+          log_, [this] { notify(); }, trace, resource_limits_),
+      poses_([this] { notify(); }, trace, resource_limits_),
       frames_(
-          log_, [this] { notify(); }, trace, allowance_),
+          log_, [this] { notify(); }, trace, resource_limits_),
       lives_(
-          log_, [this] { notify(); }, trace, allowance_) {
+          log_, [this] { notify(); }, trace, resource_limits_) {
   volume::initialize_readers();
   set_medium({});
   set_light({});
@@ -190,14 +190,14 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
     cuts_own_ = false;
-    wishes_due_ = true;
+    requests_due_ = true;
     if (built_.volume == volume_) {  // else it is the previous volume, for which a grid was requested
-      drop_stand_in();
+      drop_proxy();
       take_suggestion();
     }
   }
   fit_cells();
-  follow_stand_in();
+  follow_proxy();
   follow_sequence();
   follow_live();
   follow_watching();
@@ -216,23 +216,23 @@ void Viewer::sync() {
   }
 }
 
-void Viewer::follow_stand_in() {
+void Viewer::follow_proxy() {
   // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
   // read-back must only contain the requested volume.
-  if (auto made = builder_.take_stand_in(); made && sampling_.preview && !followed_ && !watched_) {
-    stand_in_ = std::move(made);
+  if (auto made = builder_.take_proxy(); made && sampling_.preview && !followed_ && !watched_) {
+    proxy_ = std::move(made);
     show_medium();
   }
   // Check in this order: a job stores its result before it ends.
-  if (!stand_in_ || !stand_in_->load.expired() || builder_.has_result()) return;
+  if (!proxy_ || !proxy_->load.expired() || builder_.has_result()) return;
   // Either the volume was loaded and the next frame requests its grid, or the load failed.
   const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !builder_.status().failure;
-  if (!waits) drop_stand_in();
+  if (!waits) drop_proxy();
 }
 
-void Viewer::drop_stand_in() {
-  if (!stand_in_) return;
-  stand_in_.reset();
+void Viewer::drop_proxy() {
+  if (!proxy_) return;
+  proxy_.reset();
   show_medium();
 }
 
@@ -244,17 +244,17 @@ void Viewer::take_suggestion() {
 
 void Viewer::take_volume(VolumeAssetPtr volume) {
   volume_ = std::move(volume);
-  facts_ = volume_ ? volume_->facts() : nullptr;
+  volume_info_ = volume_ ? volume_->volume_info() : nullptr;
   built_for_.reset();
   remark_on_anisotropy();
-  wishes_due_ = true;  // instances may use its grid, or can no longer do so
+  requests_due_ = true;  // instances may use its grid, or can no longer do so
 }
 
 bool Viewer::begin_anew(bool shows, bool showed) {
   if (!shows && !showed) return false;
   reported_failures_.retire();
   builder_.forget();
-  drop_stand_in();
+  drop_proxy();
   sync();
   leave_sequence();
   if (!shows) {
@@ -302,18 +302,18 @@ void Viewer::set_live(std::shared_ptr<Live> live) {
 Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder) {
   Watched watched;
   watched.id = ++last_followed_;
-  if (const auto& bounds = live->bounds()) watched.facts = facts_of(*bounds);
+  if (const auto& bounds = live->bounds()) watched.volume_info = info_of(*bounds);
   watched.listener = live->listen([this, &builder] {
     builder.look();
     notify();
   });
-  tend(live);
+  track_gpu_resident(live);
   watched.live = std::move(live);
   return watched;
 }
 
 bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
-  return !gl_ || !sampling_.preview || !taken || (is_rendered && !gl_->owes(*taken));
+  return !gl_ || !sampling_.preview || !taken || (is_rendered && !gl_->has_pending_frame(*taken));
 }
 
 std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
@@ -334,12 +334,12 @@ void Viewer::follow_live(bool unseen) {
   Watched& w = *watched_;
   auto ready = take_state(w, lives_, unseen);
   if (!ready) return;
-  const bool other_volume = !w.facts || w.told.ready_count == 1;
+  const bool other_volume = !w.volume_info || w.told.ready_count == 1;
   volume_ = ready->built.volume;
   built_ = std::move(ready->built);
-  facts_ = w.facts ? w.facts : volume_->facts();
+  volume_info_ = w.volume_info ? w.volume_info : volume_->volume_info();
   if (other_volume) remark_on_anisotropy();
-  if (!shown_.empty()) wishes_due_ = true;
+  if (!shown_.empty()) requests_due_ = true;
 }
 
 Viewer::Watched& Viewer::watched() {
@@ -366,55 +366,55 @@ Viewer::LiveStatus Viewer::live(const Instance& instance) {
 void Viewer::follow_sequence() {
   if (!followed_) return;
   Followed& f = *followed_;
-  if (auto judged = frames_.take_judged()) {
+  if (auto analyzed = frames_.take_analyzed()) {
     volume_ = nullptr;
-    facts_ = std::move(judged->facts);
-    wishes_due_ = true;
+    volume_info_ = std::move(analyzed->volume_info);
+    requests_due_ = true;
     remark_on_anisotropy();
-    f.density_scale = judged->density_scale;
-    if (f.sequence->files()->shown.suggested_density_scale) suggested_density_scale_ = judged->density_scale;
+    f.density_scale = analyzed->density_scale;
+    if (f.sequence->files()->shown.suggested_density_scale) suggested_density_scale_ = analyzed->density_scale;
     if (suggested_density_scale_) {
       grid_.build.refine.density_scale = *suggested_density_scale_;
       if (f.settings) f.settings->refine.density_scale = *suggested_density_scale_;
-      f.wish_due = true;
+      f.request_due = true;
     }
   }
-  tell_wish(f, frames_);
+  tell_request(f, frames_);
   if (f.take_due) take_frame();
 }
 
-void Viewer::tell_wish(Followed& f, FrameShelf& shelf) const {
+void Viewer::tell_request(Followed& f, FrameCache& cache) const {
   if (const std::uint64_t revision = f.sequence->revision(); revision != f.revision) {
     f.revision = revision;
     f.state = f.sequence->get();
-    f.wish_due = true;
+    f.request_due = true;
   }
-  if (f.wish_due) {
+  if (f.request_due) {
     std::optional<BuildSettings> settings = f.settings;
     if (settings) settings->shutter_seconds *= f.state.playback.velocity_scale;
-    shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
-                std::min(f.state.memory_bytes, allowance_->memory_bytes()), FrameShelf::Steps::of(f.state.playback),
-                &shelf == &frames_});
-    f.wish_due = false;
+    cache.request({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
+                   std::min(f.state.memory_bytes, resource_limits_->memory_bytes()),
+                   FrameCache::Steps::of(f.state.playback), &cache == &frames_});
+    f.request_due = false;
     f.take_due = true;
     f.is_wanted = false;
   }
-  if (const std::uint64_t shelved = shelf.revision(); shelved != f.shelved) {
+  if (const std::uint64_t shelved = cache.revision(); shelved != f.shelved) {
     f.shelved = shelved;
     f.take_due = true;
   }
 }
 
-std::optional<FrameShelf::Ready> Viewer::take(Followed& f, const FrameShelf& shelf) const {
+std::optional<FrameCache::Ready> Viewer::take(Followed& f, const FrameCache& cache) const {
   // Each frame that was taken is displayed, even if frames arrive faster.
   if (!is_seen(f.frame, f.is_rendered)) return std::nullopt;
   f.take_due = false;
-  auto ready = shelf.nearest();
+  auto ready = cache.nearest();
   if (ready) f.is_wanted = ready->wanted;
   return ready;
 }
 
-bool Viewer::note_taken(Followed& f, const FrameShelf::Ready& ready, const scene::MarchSourcePtr& before) {
+bool Viewer::note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before) {
   const bool same = f.frame && ready.frame == f.frame->number && ready.part == f.frame->part;
   if (same && ready.built.source == before) return false;
   f.frame = scene::SequenceFrame{ready.frame, f.id, ++last_taken_, ready.part};
@@ -429,7 +429,7 @@ void Viewer::take_frame() {
   volume_ = ready->built.volume;
   if (!note_taken(f, *ready, built_.source)) return;
   built_ = std::move(ready->built);
-  if (!shown_.empty()) wishes_due_ = true;
+  if (!shown_.empty()) requests_due_ = true;
   take_suggestion();
 }
 
@@ -439,15 +439,15 @@ Viewer::Followed& Viewer::followed() {
   return *followed_;
 }
 
-Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameShelf& shelf) const {
+Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameCache& cache) const {
   SequenceStatus status;
   status.asked = scene::frame_of(f.state.playback, f.state.moment);
   const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
-  status.asked_position = FrameShelf::Steps::of(f.state.playback).position(step);
+  status.asked_position = FrameCache::Steps::of(f.state.playback).position(step);
   // The displayed frame may belong to another sequence.
   if (const auto shown = gl_ ? frame_of(*gl_, f.id) : std::nullopt)
     status.drawn = static_cast<double>(shown->number) + shown->part;
-  status.frames = shelf.frames();
+  status.frames = cache.frames();
   status.density_scale = f.density_scale;
   return status;
 }
@@ -474,13 +474,13 @@ const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
 
 Viewer::SequenceStatus Viewer::sequence(const Instance& instance) {
   const Played& played = *shown_sequence(instance).played;
-  return status_of(played.followed, played.shelf);
+  return status_of(played.followed, played.cache);
 }
 
 std::optional<Error> Viewer::frame_failure(const Instance& instance, std::uint32_t frame) {
   const Played& played = *shown_sequence(instance).played;
   require_frame(*played.followed.sequence, frame);
-  return played.shelf.failure_of(frame);
+  return played.cache.failure_of(frame);
 }
 
 std::optional<BuildSettings> Viewer::settings_at_once() const {
@@ -518,7 +518,7 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
     // The `concerned` test is skipped, because other frames may have fields that the displayed one lacks.
     built_for_.reset();
     followed_->settings = settings;
-    followed_->wish_due = true;
+    followed_->request_due = true;
     return;
   }
   if (loads) return;
@@ -532,7 +532,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   sync();
   const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
-  drop_stand_in();
+  drop_proxy();
   builder_.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
   // A sequence or a dynamic volume is shown until the new volume is ready.
   if (followed_ || watched_) {
@@ -551,7 +551,7 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
     builder_.cancel();
   }
   builder_.take_loaded();  // drops a loaded volume that has not been shown
-  drop_stand_in();
+  drop_proxy();
   sync();
   leave_sequence();
   take_volume(std::move(volume));
@@ -570,9 +570,9 @@ VolumeAssetPtr Viewer::volume() {
   return volume_;
 }
 
-VolumeFactsPtr Viewer::facts() {
+VolumeInfoPtr Viewer::volume_info() {
   sync();
-  return facts_;
+  return volume_info_;
 }
 
 void Viewer::set_places(const std::vector<scene::Place>& places) {
@@ -603,7 +603,7 @@ void Viewer::add_instance(std::shared_ptr<Instance> instance) {
 void Viewer::remove_instance(const Instance& instance) {
   reported_failures_.retire();
   shown_.erase(look_up(instance));
-  wishes_due_ = true;
+  requests_due_ = true;
   sync();  // drops its failures
   touch();
 }
@@ -659,45 +659,45 @@ void Viewer::follow_models() {
   follow_poses();
 }
 
-std::optional<PoseShelf::Wish> Viewer::previous_pose(const ShownModel& shown) {
+std::optional<PoseCache::Request> Viewer::previous_pose(const ShownModel& shown) {
   const ModelSettings& settings = shown.settings;
   if (!settings.previous_time || *settings.previous_time == settings.choice.time) return std::nullopt;
   SurfaceChoice choice = settings.choice;
   choice.time = *settings.previous_time;
-  return PoseShelf::Wish{settings.surfaces, choice};
+  return PoseCache::Request{settings.surfaces, choice};
 }
 
 void Viewer::follow_poses() {
   const std::uint64_t posed = poses_.revision();
   if (posed == posed_ && !poses_due_) return;
   posed_ = posed;
-  std::vector<PoseShelf::Wish> wishes;
+  std::vector<PoseCache::Request> requests;
   for (ShownModel& shown : shown_models_) {
     if (!shown.is_wanted()) {
-      shown.wish.reset();
+      shown.request.reset();
       continue;
     }
-    PoseShelf::Wish wish{shown.settings.surfaces, while_open(shown.settings.choice, shown.settings.surfaces)};
-    if (shown.wish != wish) {
-      if (shown.wish && poses_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
-      shown.wish = wish;
+    PoseCache::Request request{shown.settings.surfaces, while_open(shown.settings.choice, shown.settings.surfaces)};
+    if (shown.request != request) {
+      if (shown.request && poses_.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
+      shown.request = request;
     }
-    if (std::ranges::find(wishes, wish) == wishes.end()) wishes.push_back(wish);
-    const std::optional<PoseShelf::Wish> then = previous_pose(shown);
-    if (then && std::ranges::find(wishes, *then) == wishes.end()) wishes.push_back(*then);
+    if (std::ranges::find(requests, request) == requests.end()) requests.push_back(request);
+    const std::optional<PoseCache::Request> then = previous_pose(shown);
+    if (then && std::ranges::find(requests, *then) == requests.end()) requests.push_back(*then);
   }
   // Take results before sending the requests, which may drop poses made for earlier ones.
   for (ShownModel& shown : shown_models_) {
-    if (!shown.wish) continue;
-    auto source = poses_.built(*shown.wish);
+    if (!shown.request) continue;
+    auto source = poses_.built(*shown.request);
     if (source) shown.begun.reset();  // older poses are not shown again
     // If requests change faster than poses are made, show one that was begun.
     if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
     if (source) shown.source = std::move(*source);
-    const std::optional<PoseShelf::Wish> then = previous_pose(shown);
+    const std::optional<PoseCache::Request> then = previous_pose(shown);
     shown.previous_source = then ? poses_.built(*then).value_or(nullptr) : nullptr;
   }
-  if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
+  if (std::exchange(poses_due_, false)) poses_.request(std::move(requests));
 }
 
 std::optional<scene::PlaceEnds> Viewer::while_open(const std::optional<scene::PlaceEnds>& ends) const {
@@ -742,29 +742,29 @@ void Viewer::follow_instances() {
     const bool other_live = shown.watching && shown.watching->source() != shown.settings.live;
     if (other_sequence || other_live || !shown.has_anything()) shown.forget();
     if (!shown.settings.volume) {
-      shown.wish.reset();
+      shown.request.reset();
       shown.begun.reset();
     }
-    wishes_due_ = true;
+    requests_due_ = true;
     ++settings_revision_;
   }
-  if (wishes_due_) wish_for_sequences();
+  if (requests_due_) request_for_sequences();
   follow_played();
-  const std::uint64_t built = shelf_.revision();
-  if (built != shelved_) take_grids();
-  shelved_ = built;
+  const std::uint64_t built = cache_.revision();
+  if (built != cache_revision_) take_grids();
+  cache_revision_ = built;
   // The viewer's own grid, which was to be reused, may have failed.
-  if (waits_for_own_ && !builder_.busy()) wishes_due_ = true;
-  if (!wishes_due_ || (grid_.camera_adaptive && !view_)) return;
-  wishes_due_ = false;
-  wish_for_grids();
+  if (waits_for_own_ && !builder_.busy()) requests_due_ = true;
+  if (!requests_due_ || (grid_.camera_adaptive && !view_)) return;
+  requests_due_ = false;
+  request_for_grids();
   take_grids();
 }
 
 void Viewer::Played::configure(const std::optional<BuildSettings>& wanted) {
   if (followed.settings == wanted) return;
   followed.settings = wanted;
-  followed.wish_due = true;
+  followed.request_due = true;
 }
 
 void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
@@ -776,12 +776,12 @@ void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
 Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
                                     const std::optional<BuildSettings>& settings) {
   return std::make_shared<Played>(
-      follow(sequence, settings), log_, [this] { notify(); }, trace_, allowance_);
+      follow(sequence, settings), log_, [this] { notify(); }, trace_, resource_limits_);
 }
 
 Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
   auto watching = std::make_shared<Watching>(
-      log_, [this] { notify(); }, trace_, allowance_);
+      log_, [this] { notify(); }, trace_, resource_limits_);
   watching->watched = watch(live, watching->builder);
   watching->settings = settings;
   watching->builder.follow(live, settings);
@@ -834,7 +834,7 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
   players.swap(next);  // unused players are destroyed after the lock is released
 }
 
-void Viewer::wish_for_sequences() {
+void Viewer::request_for_sequences() {
   share(played_, &Shown::played);
   share(watching_, &Shown::watching);
 }
@@ -849,13 +849,13 @@ void Viewer::follow_watching(bool unseen) {
 void Viewer::follow_played() {
   for (const PlayedPtr& played : played_) {
     Followed& f = played->followed;
-    if (auto judged = played->shelf.take_judged()) {
-      played->facts = std::move(judged->facts);
-      f.density_scale = judged->density_scale;
+    if (auto analyzed = played->cache.take_analyzed()) {
+      played->volume_info = std::move(analyzed->volume_info);
+      f.density_scale = analyzed->density_scale;
     }
-    tell_wish(f, played->shelf);
+    tell_request(f, played->cache);
     if (!f.take_due) continue;
-    auto ready = take(f, played->shelf);
+    auto ready = take(f, played->cache);
     if (!ready || !note_taken(f, *ready, played->built ? played->built->source : nullptr)) continue;
     played->built = std::move(ready->built);
   }
@@ -865,21 +865,23 @@ void Viewer::follow_played() {
   }
 }
 
-std::optional<Built> Viewer::grid_of(const GridShelf::Wish& wish) const {
-  const auto is = [&](const Built& built) { return built.volume == wish.volume && built.settings == wish.settings; };
+std::optional<Built> Viewer::grid_of(const GridCache::Request& request) const {
+  const auto is = [&](const Built& built) {
+    return built.volume == request.volume && built.settings == request.settings;
+  };
   if (built_.source && is(built_)) return built_;
   for (const Shown& shown : shown_) {
     if (shown.built && is(*shown.built) && fits(*shown.built)) return shown.built;
   }
-  return shelf_.built(wish);
+  return cache_.built(request);
 }
 
 void Viewer::take_grids() {
   for (Shown& shown : shown_) {
-    if (!shown.wish) continue;
-    auto built = grid_of(*shown.wish);
+    if (!shown.request) continue;
+    auto built = grid_of(*shown.request);
     // If requests change faster than grids are built, show one that was begun.
-    if (!built && shown.begun) built = shelf_.built(*shown.begun);
+    if (!built && shown.begun) built = cache_.built(*shown.begun);
     if (built) shown.built = std::move(built);
   }
 }
@@ -899,94 +901,94 @@ BuildSettings Viewer::settings_of(const Shown& shown) const {
   return settings;
 }
 
-void Viewer::reuse_grid(GridShelf::Wish& wish) const {
+void Viewer::reuse_grid(GridCache::Request& request) const {
   const auto serves = [&](const Built& built) {
-    return built.volume == wish.volume && built.serves(wish.settings) && fits(built);
+    return built.volume == request.volume && built.serves(request.settings) && fits(built);
   };
-  if (built_.source && built_.volume == wish.volume && built_.serves(wish.settings)) {
-    wish.settings = built_.settings;
+  if (built_.source && built_.volume == request.volume && built_.serves(request.settings)) {
+    request.settings = built_.settings;
     return;
   }
   for (const Shown& shown : shown_) {
     if (shown.built && serves(*shown.built)) {
-      wish.settings = shown.built->settings;
+      request.settings = shown.built->settings;
       return;
     }
   }
   for (const Shown& shown : shown_) {
-    if (shown.wish && shown.wish->volume == wish.volume && shown.wish->gl_bytes == wish.gl_bytes &&
-        suits(shown.wish->settings, wish.settings)) {
-      wish.settings = shown.wish->settings;
+    if (shown.request && shown.request->volume == request.volume && shown.request->gl_bytes == request.gl_bytes &&
+        suits(shown.request->settings, request.settings)) {
+      request.settings = shown.request->settings;
       return;
     }
   }
 }
 
-void Viewer::wish_for_grids() {
+void Viewer::request_for_grids() {
   // One request for all instances that can share a grid, as fine as the finest of them needs.
-  std::vector<GridShelf::Wish> wishes;
-  std::vector<std::optional<std::size_t>> wish_of(shown_.size());
+  std::vector<GridCache::Request> requests;
+  std::vector<std::optional<std::size_t>> request_of(shown_.size());
   for (std::size_t i = 0; i < shown_.size(); ++i) {
     const Shown& shown = shown_[i];
     if (!shown.is_seen() || !shown.settings.volume) continue;
     const BuildSettings settings = settings_of(shown);
-    const auto same = std::ranges::find_if(wishes, [&](const GridShelf::Wish& wish) {
-      return wish.volume == shown.settings.volume && same_but_view(wish.settings, settings);
+    const auto same = std::ranges::find_if(requests, [&](const GridCache::Request& request) {
+      return request.volume == shown.settings.volume && same_but_view(request.settings, settings);
     });
-    wish_of[i] = static_cast<std::size_t>(same - wishes.begin());
-    if (same == wishes.end()) {
-      wishes.push_back({shown.settings.volume, settings});
+    request_of[i] = static_cast<std::size_t>(same - requests.begin());
+    if (same == requests.end()) {
+      requests.push_back({shown.settings.volume, settings});
     } else {
       join(same->settings, settings);
     }
   }
   const bool own_is_apart =
-      (volume_ && std::ranges::none_of(wishes,
-                                       [&](const GridShelf::Wish& wish) {
-                                         return wish.volume == volume_ && suits(grid_.build, wish.settings);
+      (volume_ && std::ranges::none_of(requests,
+                                       [&](const GridCache::Request& request) {
+                                         return request.volume == volume_ && suits(grid_.build, request.settings);
                                        })) ||
       followed_ || watched_;
-  const std::size_t grids = wishes.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
+  const std::size_t grids = requests.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
   const std::size_t before = std::exchange(grids_, std::max<std::size_t>(grids, 1));
   share_gl();
   // The memory left by each frame always varies a little; only a change of an eighth matters.
-  const bool limited = most_gl_bytes_ != Allowance::no_limit;
-  if (limited && (grids_ != before || apart_by_an_eighth(part_of_gl_, allowance_->gl_bytes()))) share_gl_anew();
-  for (GridShelf::Wish& wish : wishes) wish.gl_bytes = part_of_gl_;
+  const bool limited = max_gl_bytes_ != ResourceLimits::no_limit;
+  if (limited && (grids_ != before || apart_by_an_eighth(part_of_gl_, resource_limits_->gl_bytes()))) share_gl_anew();
+  for (GridCache::Request& request : requests) request.gl_bytes = part_of_gl_;
   waits_for_own_ = false;
-  std::vector<GridShelf::Wish> to_build;
-  for (GridShelf::Wish& wish : wishes) {
-    reuse_grid(wish);
-    if (grid_of(wish)) continue;
-    const bool comes = builder_.busy() && !grid_.camera_adaptive && wish.volume == volume_;
-    if (comes && suits(grid_.build, wish.settings)) {
+  std::vector<GridCache::Request> to_build;
+  for (GridCache::Request& request : requests) {
+    reuse_grid(request);
+    if (grid_of(request)) continue;
+    const bool comes = builder_.busy() && !grid_.camera_adaptive && request.volume == volume_;
+    if (comes && suits(grid_.build, request.settings)) {
       waits_for_own_ = true;
     } else {
-      to_build.push_back(wish);
+      to_build.push_back(request);
     }
   }
   for (std::size_t i = 0; i < shown_.size(); ++i) {
     Shown& shown = shown_[i];
-    if (!wish_of[i] || shown.wish == wishes[*wish_of[i]]) continue;
-    if (shown.wish && shelf_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
-    shown.wish = wishes[*wish_of[i]];
+    if (!request_of[i] || shown.request == requests[*request_of[i]]) continue;
+    if (shown.request && cache_.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
+    shown.request = requests[*request_of[i]];
   }
-  shelf_.wish(std::move(to_build));
+  cache_.request(std::move(to_build));
   fit_cells();  // its share of GPU memory may have changed
 }
 
 void Viewer::rebuild() {
   reported_failures_.retire();
   for (Shown& shown : shown_) {
-    shown.wish.reset();
+    shown.request.reset();
     if (shown.built) shown.built->volume = nullptr;  // stays displayed until replaced, but cannot be reused
   }
-  shelf_.forget_failures();
-  wishes_due_ = true;
+  cache_.forget_failures();
+  requests_due_ = true;
   poses_.forget_failures();
   poses_due_ = true;
   frames_.rebuild();
-  for (const PlayedPtr& played : played_) played->shelf.rebuild();
+  for (const PlayedPtr& played : played_) played->cache.rebuild();
   for (const WatchingPtr& watching : watching_) watching->builder.rebuild();
   lives_.rebuild();
   take_medium();
@@ -995,43 +997,44 @@ void Viewer::rebuild() {
 }
 
 void Viewer::share_gl() {
-  const bool limited = most_gl_bytes_ != Allowance::no_limit;
+  const bool limited = max_gl_bytes_ != ResourceLimits::no_limit;
   // Images vary by some KiB from frame to frame. Rounding keeps the number of cells constant.
   constexpr std::uint64_t step = std::uint64_t{1} << 18U;
   const std::uint64_t beside = (gl_beside_volumes_.value_or(0) + step - 1) / step * step;
-  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, beside);
-  allowance_->set_gl(limited ? left / grids_ : Allowance::no_limit);
+  const std::uint64_t left = max_gl_bytes_ - std::min(max_gl_bytes_, beside);
+  resource_limits_->set_gl(limited ? left / grids_ : ResourceLimits::no_limit);
 }
 
 void Viewer::share_gl_anew() {
   cells_due_ = true;
-  part_of_gl_ = allowance_->gl_bytes();
+  part_of_gl_ = resource_limits_->gl_bytes();
 }
 
 bool Viewer::fits(const Built& built) const {
-  Allowance part;
+  ResourceLimits part;
   part.set_gl(part_of_gl_);
   return !is_of_cells(built) || has_cells_allowed(built, part);
 }
 
 bool Viewer::makes_room(const Shown& shown) const {
-  return shown.is_seen() && shown.wish && shown.built && shelf_.busy() && !fits(*shown.built) && !grid_of(*shown.wish);
+  return shown.is_seen() && shown.request && shown.built && cache_.busy() && !fits(*shown.built) &&
+         !grid_of(*shown.request);
 }
 
 void Viewer::set_limits(const Limits& limits) {
   // Grids are adapted here and when the number of grids changes, but not in every frame: the number of allowed cells
   // depends on the memory that each frame's images leave.
-  const bool others = limits.gl_bytes != most_gl_bytes_ || limits.memory_bytes != allowance_->memory_bytes();
-  allowance_->set(limits.threads, limits.memory_bytes);
-  most_gl_bytes_ = limits.gl_bytes;
+  const bool others = limits.gl_bytes != max_gl_bytes_ || limits.memory_bytes != resource_limits_->memory_bytes();
+  resource_limits_->set(limits.threads, limits.memory_bytes);
+  max_gl_bytes_ = limits.gl_bytes;
   share_gl();
   if (others) {
     share_gl_anew();
-    wishes_due_ = wishes_due_ || !shown_.empty();
+    requests_due_ = requests_due_ || !shown_.empty();
   }
   sync();
-  if (followed_) followed_->wish_due = true;
-  for (const PlayedPtr& played : played_) played->followed.wish_due = true;
+  if (followed_) followed_->request_due = true;
+  for (const PlayedPtr& played : played_) played->followed.request_due = true;
   touch();
 }
 
@@ -1040,7 +1043,7 @@ void Viewer::fit_cells() {
   if (!cells_due_ || builder_.busy()) return;
   cells_due_ = false;
   if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
-  cuts_own_ = !has_cells_allowed(built_, *allowance_);
+  cuts_own_ = !has_cells_allowed(built_, *resource_limits_);
   if (cuts_own_) request_build();
 }
 
@@ -1048,12 +1051,12 @@ void Viewer::cancel() {
   builder_.cancel();
   surface_builder_.cancel();
   environment_builder_.cancel();
-  shelf_.cancel();
+  cache_.cancel();
   poses_.cancel();
   frames_.cancel();
   lives_.cancel();
   const std::scoped_lock lock(played_mutex_);
-  for (const PlayedPtr& played : played_) played->shelf.cancel();
+  for (const PlayedPtr& played : played_) played->cache.cancel();
   for (const WatchingPtr& watching : watching_) watching->builder.cancel();
 }
 
@@ -1063,11 +1066,11 @@ bool Viewer::busy() const {
 }
 
 bool Viewer::builds() const {
-  const auto waits = [](const PlayedPtr& played) { return played->followed.waits(played->shelf); };
+  const auto waits = [](const PlayedPtr& played) { return played->followed.waits(played->cache); };
   const bool state_comes = (watched_ && lives_.busy()) ||
                            std::ranges::any_of(watching_, [](const WatchingPtr& w) { return w->builder.busy(); });
   const bool frame_comes = (followed_ && followed_->waits(frames_)) || std::ranges::any_of(played_, waits);
-  return frame_comes || state_comes || builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_;
+  return frame_comes || state_comes || builder_.busy() || cache_.busy() || cache_.revision() != cache_revision_;
 }
 
 void Viewer::load_surfaces(const FilePath& path) {
@@ -1148,8 +1151,8 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   const auto idle = [&] {
     return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
-           shelf_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until) &&
-           std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->shelf.wait(until); }) &&
+           cache_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until) &&
+           std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->cache.wait(until); }) &&
            std::ranges::all_of(watching_, [&](const WatchingPtr& w) { return w->builder.wait(until); });
   };
   // One result may cause further work.
@@ -1177,10 +1180,10 @@ ContentFailures Viewer::failures() const {
   first(volume, frames_.status().failure);
   first(volume, lives_.status().failure);
   std::optional<Error>& instances = failures[ContentKind::instances];
-  first(instances, shelf_.status().failure);
+  first(instances, cache_.status().failure);
   {
     const std::scoped_lock lock(played_mutex_);
-    for (const PlayedPtr& played : played_) first(instances, played->shelf.status().failure);
+    for (const PlayedPtr& played : played_) first(instances, played->cache.status().failure);
     for (const WatchingPtr& watching : watching_) first(instances, watching->builder.status().failure);
   }
   failures[ContentKind::surfaces] = surface_builder_.status().failure;
@@ -1202,13 +1205,13 @@ Viewer::Status Viewer::status() const {
   std::vector<Worker::Status> all{builder_.status(),
                                   frames_.status(),
                                   lives_.status(),
-                                  shelf_.status(),
+                                  cache_.status(),
                                   surface_builder_.status(),
                                   poses_.status(),
                                   environment_builder_.status()};
   {
     const std::scoped_lock lock(played_mutex_);
-    for (const PlayedPtr& p : played_) all.push_back(p->shelf.status());
+    for (const PlayedPtr& p : played_) all.push_back(p->cache.status());
     for (const WatchingPtr& w : watching_) all.push_back(w->builder.status());
   }
   const auto under_way =
@@ -1228,7 +1231,7 @@ Viewer::Status Viewer::status() const {
 
 void Viewer::set_grid(const GridSettings& settings) {
   grid_ = settings;
-  wishes_due_ = true;
+  requests_due_ = true;
   take_medium();
   request_build();
   touch();
@@ -1257,8 +1260,8 @@ void Viewer::set_ramps(const Ramps& ramps) {
 
 void Viewer::remark_on_anisotropy() {
   if (medium_.phase.may_vary()) remarked_anisotropy_.reset();
-  if (!facts_ || !facts_->anisotropy_grid || medium_.phase.may_vary()) return;
-  const std::string& name = *facts_->anisotropy_grid;
+  if (!volume_info_ || !volume_info_->anisotropy_grid || medium_.phase.may_vary()) return;
+  const std::string& name = *volume_info_->anisotropy_grid;
   if (remarked_anisotropy_ == name) return;
   remarked_anisotropy_ = name;
   log_.info("grid \"" + name + "\" is not shown: the Mie phase function has an anisotropy of its own");
@@ -1298,7 +1301,7 @@ bool Viewer::other_opacity() const {
 
 Medium Viewer::seen_medium() const {
   Medium medium = medium_;
-  if (stand_in_ && stand_in_->density_scale) medium.density_scale = *stand_in_->density_scale / stretch();
+  if (proxy_ && proxy_->density_scale) medium.density_scale = *proxy_->density_scale / stretch();
   return medium;
 }
 
@@ -1310,9 +1313,9 @@ void Viewer::set_light(const Light& light) {
   touch();
 }
 
-void Viewer::set_lamps(light::Lamps lamps) {
-  lamps_ = std::move(lamps);
-  lamps_due_ = true;
+void Viewer::set_lamps(light::AnalyticLights analytic_lights) {
+  analytic_lights_ = std::move(analytic_lights);
+  analytic_lights_due_ = true;
   touch();
 }
 
@@ -1394,7 +1397,7 @@ void Viewer::set_sampling(const Sampling& sampling) {
   sync();
   const bool other_shutter = sampling_.shutter_seconds != sampling.shutter_seconds;
   sampling_ = sampling;
-  if (!sampling_.preview) drop_stand_in();
+  if (!sampling_.preview) drop_proxy();
   if (other_shutter) {
     poses_due_ = true;
     const bool loads = surface_builder_.configure_load(while_open(surface_settings_.choice, nullptr));
@@ -1402,7 +1405,7 @@ void Viewer::set_sampling(const Sampling& sampling) {
       pose_surfaces();
   }
   if (grid_.build.shutter_seconds != sampling.shutter_seconds) {
-    wishes_due_ = true;
+    requests_due_ = true;
     take_medium();
     request_build([](const VolumeAsset& volume) { return volume.moves(); });
   }
@@ -1457,7 +1460,7 @@ double Viewer::stretch() const {
   return most;
 }
 
-Bounds Viewer::bounds_of(const VolumeFacts& volume) const {
+Bounds Viewer::bounds_of(const VolumeInfo& volume) const {
   Bounds all = volume.bounds(places_.front().to_world);
   for (std::size_t i = 1; i < places_.size(); ++i) all = both(all, volume.bounds(places_[i].to_world));
   return all;
@@ -1465,11 +1468,12 @@ Bounds Viewer::bounds_of(const VolumeFacts& volume) const {
 
 std::vector<Bounds> Viewer::boxes() const {
   std::vector<Bounds> boxes;
-  if (const VolumeFactsPtr& facts = seen_facts(); facts && !facts->empty) {
-    for (const scene::Place& place : places_) boxes.push_back(facts->bounds(place.to_world));
+  if (const VolumeInfoPtr& volume_info = shown_info(); volume_info && !volume_info->empty) {
+    for (const scene::Place& place : places_) boxes.push_back(volume_info->bounds(place.to_world));
   }
   for (const Shown& shown : shown_) {
-    if (shown.is_there() && !shown.facts()->empty) boxes.push_back(shown.facts()->bounds(shown.settings.to_world));
+    if (shown.is_there() && !shown.volume_info()->empty)
+      boxes.push_back(shown.volume_info()->bounds(shown.settings.to_world));
   }
   if (model_source_ && model_source_->scene->triangle_count() > 0)
     boxes.push_back({model_source_->pose.low, model_source_->pose.high});
@@ -1508,8 +1512,9 @@ void Viewer::remark_on_precision() {
 }
 
 void Viewer::count_from(const dvec3& origin) {
-  if (lamps_due_ || scene_.origin != origin) scene_.lamps.set(scene::counted_from(lamps_, origin));
-  lamps_due_ = false;
+  if (analytic_lights_due_ || scene_.origin != origin)
+    scene_.analytic_lights.set(scene::counted_from(analytic_lights_, origin));
+  analytic_lights_due_ = false;
   scene_.origin = origin;
   for (scene::Volume& volume : scene_.volumes) {
     const bool is_nothing = volume.id == 0 && built_.volume && built_.volume == empty_volume_;
@@ -1558,9 +1563,9 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     reach.resize(normals.size(), std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
   };
-  const VolumeFactsPtr& own = seen_facts();
+  const VolumeInfoPtr& own = shown_info();
   const std::size_t count = (own ? places_.size() : 0) + shown_.size();
-  const auto add_volume = [&](const VolumeFacts& volume, const glm::dmat4& to_world, const Medium& medium) {
+  const auto add_volume = [&](const VolumeInfo& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
     const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
     // With many volumes, one of them hardly extends the visible bounds.
@@ -1580,14 +1585,14 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     if (own) add_volume(*own, place.to_world, seen_medium());
   }
   for (const Shown& shown : shown_) {
-    if (shown.is_there()) add_volume(*shown.facts(), shown.settings.to_world, shown.settings.medium);
+    if (shown.is_there()) add_volume(*shown.volume_info(), shown.settings.to_world, shown.settings.medium);
   }
   for (const scene::Model& model : models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
       for (const glm::dmat4& placing : mesh.placings) {
         // For many instances the boxes are sufficient.
         vertices += mesh.triangle_count;
-        add_mesh(*model.source, mesh, model.to_world * placing, vertices > most_vertices, add);
+        add_mesh(*model.source, mesh, model.to_world * placing, vertices > max_vertices, add);
       }
     }
   }
@@ -1645,8 +1650,8 @@ bool Viewer::shows_instances() const {
 void Viewer::show_volumes() {
   std::vector<scene::Volume> volumes;
   // The empty volume for surfaces is left out if instances are displayed.
-  const scene::MarchSourcePtr& source = stand_in_ ? stand_in_->source : built_.source;
-  if (source && (seen_facts() || !shows_instances())) {
+  const scene::MarchSourcePtr& source = proxy_ ? proxy_->source : built_.source;
+  if (source && (shown_info() || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
     for (const scene::Place& place : places_)
       volumes.push_back({0, source, shown_medium_, {place.to_world, while_open(place.ends)}, frame});
@@ -1690,8 +1695,8 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
 }
 
 void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const {
-  if (most_gl_bytes_ == Allowance::no_limit) return;
-  const bool own = cuts_own_ && builder_.busy() && !builder_.loads() && !stand_in_ && !followed_ && !watched_;
+  if (max_gl_bytes_ == ResourceLimits::no_limit) return;
+  const bool own = cuts_own_ && builder_.busy() && !builder_.loads() && !proxy_ && !followed_ && !watched_;
   if (!own && std::ranges::none_of(shown_, [this](const Shown& shown) { return makes_room(shown); })) return;
   const auto was = [&](const scene::Volume& volume) {
     return std::ranges::find(scene_.volumes, volume.id, &scene::Volume::id);

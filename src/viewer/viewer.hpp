@@ -23,12 +23,12 @@
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
 #include "viewer/environment_builder.hpp"
-#include "viewer/frame_shelf.hpp"
-#include "viewer/grid_shelf.hpp"
+#include "viewer/frame_cache.hpp"
+#include "viewer/grid_cache.hpp"
 #include "viewer/instance.hpp"
 #include "viewer/live_builder.hpp"
 #include "viewer/navigation.hpp"
-#include "viewer/pose_shelf.hpp"
+#include "viewer/pose_cache.hpp"
 #include "viewer/reported_failures.hpp"
 #include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
@@ -78,14 +78,14 @@ class Viewer {
   /// Returns the newest volume; null if there is none.
   VolumeAssetPtr volume();
   /// Returns the metadata of the volume or the sequence; null if there is none.
-  VolumeFactsPtr facts();
+  VolumeInfoPtr volume_info();
   /// Shows the current frame of a sequence instead of the volume. Null: removes the sequence that is shown, if any.
   void set_sequence(std::shared_ptr<Sequence> sequence);
   struct SequenceStatus {
     std::uint32_t asked = 0;      ///< the current frame of its clock
     double asked_position = 0.0;  ///< the current step, in frames
     std::optional<double> drawn;  ///< the step that is displayed, in frames
-    FrameShelf::Status frames;
+    FrameCache::Status frames;
     std::optional<double> density_scale;  ///< suggested for all frames
   };
   /// sequence() and frame_failure() throw Error(invalid_argument) if the viewer shows no sequence.
@@ -118,7 +118,7 @@ class Viewer {
   void set_places(const std::vector<scene::Place>& places);
   [[nodiscard]] const std::vector<scene::Place>& places() const { return places_; }
   /// World bounds of all instances of a volume.
-  [[nodiscard]] Bounds bounds_of(const VolumeFacts& volume) const;
+  [[nodiscard]] Bounds bounds_of(const VolumeInfo& volume) const;
   /// Shows an instance with its current settings, beside the viewer's own volume. Throws Error(invalid_argument) if it
   /// is shown already.
   void add_instance(std::shared_ptr<Instance> instance);
@@ -131,9 +131,9 @@ class Viewer {
   void remove_model(const ModelInstance& model);
   void rebuild();
   struct Limits {
-    unsigned threads = 0;                              ///< working at a time; 0: all cores
-    std::uint64_t memory_bytes = Allowance::no_limit;  ///< for volumes and grids in main memory
-    std::uint64_t gl_bytes = Allowance::no_limit;      ///< no volume is uploaded beyond it
+    unsigned threads = 0;                                   ///< working at a time; 0: all cores
+    std::uint64_t memory_bytes = ResourceLimits::no_limit;  ///< for volumes and grids in main memory
+    std::uint64_t gl_bytes = ResourceLimits::no_limit;      ///< no volume is uploaded beyond it
   };
   /// Applies to work started after this call. Grids whose number of cells no longer suits the memory limits are
   /// rebuilt.
@@ -168,7 +168,7 @@ class Viewer {
   void set_ramps(const Ramps& ramps);
   [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   void set_light(const Light& light);
-  void set_lamps(light::Lamps lamps);
+  void set_lamps(light::AnalyticLights analytic_lights);
   void load_environment(const FilePath& path);
   /// Null: the sky of the light settings. Cancels a running load.
   void set_environment(light::EnvironmentPtr environment);
@@ -248,15 +248,15 @@ class Viewer {
   void follow_sequence();
   void take_frame();
   // Updates the sequences and dynamic volumes of instances.
-  void wish_for_sequences();
+  void request_for_sequences();
   void follow_played();
   // Takes the low-resolution proxy of a running load, and drops it when the load ends.
-  void follow_stand_in();
+  void follow_proxy();
   // Requests a rebuild if the limits allow more cells or fewer cells than the grid has.
   void fit_cells();
-  void drop_stand_in();
+  void drop_proxy();
   // Metadata of the displayed volume: that of the proxy while there is one.
-  [[nodiscard]] const VolumeFactsPtr& seen_facts() const { return stand_in_ ? stand_in_->facts : facts_; }
+  [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy_ ? proxy_->volume_info : volume_info_; }
   // Stops showing a sequence or a dynamic volume.
   void leave_sequence();
   // Takes states that are ready. unseen: also if the previous state has not been displayed.
@@ -300,7 +300,7 @@ class Viewer {
   static void follow_transfers(Context& g, double budget_ms);
   // For GPU-resident states of dynamic volumes: starts the computation of emission and the transfer to main memory, as
   // requested.
-  void tend_voxels_in_gl(Context& g);
+  void update_gpu_resident(Context& g);
   // True if such work is pending.
   [[nodiscard]] bool voxels_in_gl_wait(Context& g) const;
   static void bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels);
@@ -311,7 +311,7 @@ class Viewer {
   // Sorts and merges the scattered bricks of its newest state.
   static void gather(Context& g, Live& live);
   // Registers a dynamic volume with GPU-resident states for per-frame service (read-back, emission).
-  void tend(const std::shared_ptr<Live>& live);
+  void track_gpu_resident(const std::shared_ptr<Live>& live);
   // Updates the upload progress for status() and stats().
   void follow_upload(const Context& g);
   // Takes the cell counts of GPU-built grids once they are built.
@@ -332,7 +332,7 @@ class Viewer {
     std::optional<BuildSettings> settings;  // nullopt: waiting for a view
     SequenceState state;
     std::optional<double> density_scale;  // suggested for it, after its analysis
-    bool wish_due = true;
+    bool request_due = true;
     std::uint64_t shelved = 0;  // revision of its cache when it was last checked
     bool take_due = false;
     std::uint64_t id = 0;                       // identifies this object
@@ -341,30 +341,31 @@ class Viewer {
     bool is_rendered = false;                   // a frame has rendered it
 
     // True if there is work pending for it.
-    [[nodiscard]] bool waits(const FrameShelf& shelf) const {
-      return !is_wanted && (wish_due || shelf.busy() || shelf.revision() != shelved);
+    [[nodiscard]] bool waits(const FrameCache& cache) const {
+      return !is_wanted && (request_due || cache.busy() || cache.revision() != shelved);
     }
   };
   [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
   // Sends the newest request to the cache and checks for results.
-  void tell_wish(Followed& f, FrameShelf& shelf) const;
+  void tell_request(Followed& f, FrameCache& cache) const;
   // Marks all frames and states taken last as rendered.
   void note_rendered();
   // True if a frame or a state is ready, but waits until the previous one has been displayed.
   [[nodiscard]] bool something_waits() const;
   // Returns the data to show now, if it may have changed.
-  [[nodiscard]] std::optional<FrameShelf::Ready> take(Followed& f, const FrameShelf& shelf) const;
+  [[nodiscard]] std::optional<FrameCache::Ready> take(Followed& f, const FrameCache& cache) const;
   // Records that this data was taken. Returns false if it was taken before.
-  bool note_taken(Followed& f, const FrameShelf::Ready& ready, const scene::MarchSourcePtr& before);
-  [[nodiscard]] SequenceStatus status_of(const Followed& f, const FrameShelf& shelf) const;
+  bool note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before);
+  [[nodiscard]] SequenceStatus status_of(const Followed& f, const FrameCache& cache) const;
   // A sequence of instances. Instances whose grids are the same share one.
   struct Played {
-    Played(Followed wished, const Log& log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
-        : followed(std::move(wished)), shelf(log, std::move(notify), trace, std::move(allowance)) {}
+    Played(Followed requested, const Log& log, std::function<void()> notify, Trace trace,
+           ResourceLimitsPtr resource_limits)
+        : followed(std::move(requested)), cache(log, std::move(notify), trace, std::move(resource_limits)) {}
     Followed followed;
-    VolumeFactsPtr facts;        // set after its analysis
+    VolumeInfoPtr volume_info;   // set after its analysis
     std::optional<Built> built;  // for the frame taken last
-    FrameShelf shelf;
+    FrameCache cache;
 
     static const std::shared_ptr<Sequence>& source_of(const InstanceSettings& settings) { return settings.sequence; }
     [[nodiscard]] const std::shared_ptr<Sequence>& source() const { return followed.sequence; }
@@ -376,7 +377,7 @@ class Viewer {
   struct Watched {
     std::shared_ptr<Live> live;
     std::shared_ptr<void> listener;
-    VolumeFactsPtr facts;                       // for all states, if bounds are known
+    VolumeInfoPtr volume_info;                  // for all states, if bounds are known
     std::uint64_t id = 0;                       // identifies this object
     std::optional<scene::SequenceFrame> state;  // state taken last
     bool is_rendered = false;                   // a frame has rendered it
@@ -393,8 +394,8 @@ class Viewer {
   static void note_drawn(const Context& g, Watched& w);
   // A dynamic volume of instances. Instances whose grids are the same share one.
   struct Watching {
-    Watching(const Log& log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
-        : builder(log, std::move(notify), trace, std::move(allowance)) {}
+    Watching(const Log& log, std::function<void()> notify, Trace trace, ResourceLimitsPtr resource_limits)
+        : builder(log, std::move(notify), trace, std::move(resource_limits)) {}
     LiveBuilder builder;
     Watched watched;  // its listener notifies `builder`
     std::optional<BuildSettings> settings;
@@ -403,9 +404,9 @@ class Viewer {
     static const std::shared_ptr<Live>& source_of(const InstanceSettings& settings) { return settings.live; }
     [[nodiscard]] const std::shared_ptr<Live>& source() const { return watched.live; }
     void configure(const std::optional<BuildSettings>& wanted);
-    [[nodiscard]] VolumeFactsPtr facts() const {
-      if (watched.facts) return watched.facts;
-      return built ? built->volume->facts() : nullptr;
+    [[nodiscard]] VolumeInfoPtr volume_info() const {
+      if (watched.volume_info) return watched.volume_info;
+      return built ? built->volume->volume_info() : nullptr;
     }
   };
   using WatchingPtr = std::shared_ptr<Watching>;
@@ -423,13 +424,13 @@ class Viewer {
     std::uint64_t revision = 0;
     InstanceSettings settings;
     scene::Part<scene::Medium> medium;
-    std::optional<GridShelf::Wish> wish;
-    std::optional<GridShelf::Wish> begun;  // the last request before `wish` that was being built
-    std::optional<Built> built;            // the newest
-    PlayedPtr played;                      // its sequence; null: none
-    WatchingPtr watching;                  // its dynamic volume; null: none
+    std::optional<GridCache::Request> request;
+    std::optional<GridCache::Request> begun;  // the last request before `wish` that was being built
+    std::optional<Built> built;               // the newest
+    PlayedPtr played;                         // its sequence; null: none
+    WatchingPtr watching;                     // its dynamic volume; null: none
     void forget() {
-      wish.reset();
+      request.reset();
       begun.reset();
       built.reset();
       played.reset();
@@ -438,12 +439,12 @@ class Viewer {
     [[nodiscard]] bool has_anything() const { return settings.volume || settings.sequence || settings.live; }
     [[nodiscard]] bool is_seen() const { return has_anything() && !settings.hidden; }
     // Null: not known yet.
-    [[nodiscard]] VolumeFactsPtr facts() const {
-      if (settings.volume) return settings.volume->facts();
-      if (watching) return watching->facts();
-      return played ? played->facts : nullptr;
+    [[nodiscard]] VolumeInfoPtr volume_info() const {
+      if (settings.volume) return settings.volume->volume_info();
+      if (watching) return watching->volume_info();
+      return played ? played->volume_info : nullptr;
     }
-    [[nodiscard]] bool is_there() const { return is_seen() && facts(); }
+    [[nodiscard]] bool is_there() const { return is_seen() && volume_info(); }
     // Frame of its sequence, or state of its dynamic volume, from which its grid was built.
     [[nodiscard]] std::optional<scene::SequenceFrame> frame() const {
       const auto current = [&](const auto& player) {
@@ -460,10 +461,10 @@ class Viewer {
     std::shared_ptr<void> listener;
     std::uint64_t revision = 0;
     ModelSettings settings;
-    std::optional<PoseShelf::Wish> wish;
-    std::optional<PoseShelf::Wish> begun;   // the last request before `wish` that was being posed
-    scene::ModelSourcePtr source;           // the newest; null: none yet
-    scene::ModelSourcePtr previous_source;  // one frame ago; null: same as `source`
+    std::optional<PoseCache::Request> request;
+    std::optional<PoseCache::Request> begun;  // the last request before `wish` that was being posed
+    scene::ModelSourcePtr source;             // the newest; null: none yet
+    scene::ModelSourcePtr previous_source;    // one frame ago; null: same as `source`
     [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }
     [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
   };
@@ -474,7 +475,7 @@ class Viewer {
   // Takes the poses that are ready.
   void follow_poses();
   // Request for its pose one frame ago; nullopt: same as now.
-  [[nodiscard]] static std::optional<PoseShelf::Wish> previous_pose(const ShownModel& shown);
+  [[nodiscard]] static std::optional<PoseCache::Request> previous_pose(const ShownModel& shown);
   // Returns `ends` if the shutter has a duration.
   [[nodiscard]] std::optional<scene::PlaceEnds> while_open(const std::optional<scene::PlaceEnds>& ends) const;
   // Sets the shutter duration if the surfaces may move. surfaces: null: they are still to be read.
@@ -487,11 +488,11 @@ class Viewer {
   void follow_instances();
   // If grids depend on the view, there must be a view.
   [[nodiscard]] BuildSettings settings_of(const Shown& shown) const;
-  void wish_for_grids();
+  void request_for_grids();
   // Changes a request to the settings of an existing or requested grid that can be used for it.
-  void reuse_grid(GridShelf::Wish& wish) const;
+  void reuse_grid(GridCache::Request& request) const;
   // Returns the matching grid among all existing ones.
-  [[nodiscard]] std::optional<Built> grid_of(const GridShelf::Wish& wish) const;
+  [[nodiscard]] std::optional<Built> grid_of(const GridCache::Request& request) const;
   void take_grids();
   // True if its grid is about to be replaced by a coarser one, because more grids share the memory or the limit was
   // lowered.
@@ -561,16 +562,16 @@ class Viewer {
   std::chrono::steady_clock::time_point last_frame_time_{};
 
   VolumeAssetPtr volume_;                           // newest; of a sequence, that of the frame taken last, if in memory
-  VolumeFactsPtr facts_;                            // of the volume or the sequence
+  VolumeInfoPtr volume_info_;                       // of the volume or the sequence
   VolumeAssetPtr empty_volume_;                     // used for surfaces without a volume
   std::optional<std::string> remarked_anisotropy_;  // the ignored grid that was logged
-  std::optional<StandIn> stand_in_;                 // shown instead of the volume, and of its predecessor, while it is
+  std::optional<Proxy> proxy_;                      // shown instead of the volume, and of its predecessor, while it is
                                                     // loaded
   Built built_;                                     // newest; uploaded again after a change of context
   scene::Snapshot scene_;                           // current scene, from which snapshots are made
   scene::SnapshotPtr snapshot_;                     // newest
-  light::Lamps lamps_;                              // set by the host
-  bool lamps_due_ = false;                          // the scene's lights are outdated
+  light::AnalyticLights analytic_lights_;           // set by the host
+  bool analytic_lights_due_ = false;                // the scene's lights are outdated
   std::vector<std::weak_ptr<const surface::Scene>> remarked_scenes_;
   std::optional<std::uint64_t> remarked_picture_;  // the last image with a warning about its samples
   std::vector<scene::Place> places_{1};            // instance transforms of the volume; at least one
@@ -579,11 +580,11 @@ class Viewer {
   std::vector<ShownModel> shown_models_;           // in the order in which they were added
   std::uint64_t posed_ = 0;                        // revision of poses_ when it was last checked
   std::uint64_t last_id_ = 0;
-  std::uint64_t shelved_ = 0;    // revision of shelf_ when it was last checked
-  bool poses_due_ = false;       // the requests for poses_ are outdated
-  bool wishes_due_ = false;      // the requests for shelf_ are outdated
-  bool waits_for_own_ = false;   // an instance waits for the volume's own grid, which is being built
-  bool places_changed_ = false;  // since the last traced frame
+  std::uint64_t cache_revision_ = 0;  // revision of cache_ when it was last checked
+  bool poses_due_ = false;            // the requests for poses_ are outdated
+  bool requests_due_ = false;         // the requests for cache_ are outdated
+  bool waits_for_own_ = false;        // an instance waits for the volume's own grid, which is being built
+  bool places_changed_ = false;       // since the last traced frame
   std::uint64_t settings_revision_ = 1;
   glm::uvec2 frame_size_{0U};  // image size of the last frame
   // In the volume's own world space, for volume_. It becomes the medium's once a grid has been built for it.
@@ -630,20 +631,20 @@ class Viewer {
   std::uint64_t last_followed_ = 0;
   std::uint64_t last_taken_ = 0;
 
-  std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
-  std::uint64_t most_gl_bytes_ = Allowance::no_limit;
+  std::shared_ptr<ResourceLimits> resource_limits_ = std::make_shared<ResourceLimits>();
+  std::uint64_t max_gl_bytes_ = ResourceLimits::no_limit;
   bool cells_due_ = false;                          // limits changed, so the grid may need another number of cells
   std::optional<std::uint64_t> gl_beside_volumes_;  // GPU memory used by everything except volumes in the last frame
   bool cuts_own_ = false;                           // the running build coarsens the viewer's own grid to fit a limit
   std::size_t grids_ = 1;                           // number of grids that share the GPU memory for volumes equally
-  std::uint64_t part_of_gl_ = Allowance::no_limit;  // share of each grid when cells were last requested
+  std::uint64_t part_of_gl_ = ResourceLimits::no_limit;  // share of each grid when cells were last requested
   std::unique_ptr<Context> gl_;
   Builder builder_;  // last: their threads use the above
   SurfaceBuilder surface_builder_;
   EnvironmentBuilder environment_builder_;
-  GridShelf shelf_;
-  PoseShelf poses_;
-  FrameShelf frames_;
+  GridCache cache_;
+  PoseCache poses_;
+  FrameCache frames_;
   LiveBuilder lives_;
   mutable std::mutex played_mutex_;  // the lists change only on the host's thread; other threads read them
   std::vector<PlayedPtr> played_;

@@ -121,11 +121,11 @@ void Viewer::prepare(const Frame& frame) {
   // only.
   const bool others = std::ranges::any_of(shown_, &Shown::is_there);
   const bool watches = watched_ || !watching_.empty();  // the contents of their states may not be known yet
-  const bool scene = seen_facts() || shows_models() || others || watches;
+  const bool scene = shown_info() || shows_models() || others || watches;
   if (!scene) built_ = {};
   // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
   // last job's status is kept.
-  if (!facts_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
+  if (!volume_info_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
     Progress progress;
     built_ = build_grid(log_, empty_volume(), grid_.build, progress);
   }
@@ -138,7 +138,7 @@ void Viewer::prepare(const Frame& frame) {
   previous_view_.reset();
   if (view_ && previous_camera_)
     previous_view_ = previous_camera_->view(double(frame_size_.x) / frame_size_.y, subject());
-  if (wishes_due_) follow_instances();  // they were waiting for a view
+  if (requests_due_) follow_instances();  // they were waiting for a view
   if (frame.budget_ms < 0.0) return;
 
   last_view_ = std::exchange(traced_view_, view_);
@@ -146,7 +146,7 @@ void Viewer::prepare(const Frame& frame) {
   // A build of the previous volume would replace the queued load.
   const bool another_comes = builder_.loads();
   const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
-  if ((seen_facts() || others || watches) && built_for_another() && !waits) {
+  if ((shown_info() || others || watches) && built_for_another() && !waits) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     // GPU builds follow a moving camera, one grid after another, each of which is displayed.
     const bool follows =
@@ -159,12 +159,12 @@ void Viewer::prepare(const Frame& frame) {
         lives_.configure(settings_for_view());
       } else if (followed_) {
         followed_->settings = settings_for_view();
-        followed_->wish_due = true;
+        followed_->request_due = true;
         follow_sequence();
       } else if (volume_ && !another_comes) {
         builder_.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
       }
-      wishes_due_ = true;
+      requests_due_ = true;
       follow_instances();
       built_for_ = build_view();
       own_left_out_ = volume_ && another_comes;
@@ -263,7 +263,7 @@ FrameResult Viewer::render(const Frame& frame) {
     // This query counts against the budget: waking the driver's threads may cost the calling thread its core.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
-    if (!lives_in_gl_.empty()) attempt("cumulet: voxels in GL", [&] { tend_voxels_in_gl(g); });
+    if (!lives_in_gl_.empty()) attempt("cumulet: voxels in GL", [&] { update_gpu_resident(g); });
     if (g.transfers().busy()) {
       attempt("cumulet: live voxels", [&] { follow_transfers(g, frame.budget_ms); });
     } else {
@@ -271,7 +271,7 @@ FrameResult Viewer::render(const Frame& frame) {
     }
     attempt("cumulet: upload", [&] {
       prepare(frame);
-      if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
+      if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, max_gl_bytes_}, deadline);
     });
     note_rendered();
     follow_upload(g);
@@ -282,11 +282,12 @@ FrameResult Viewer::render(const Frame& frame) {
     g.tell(shot, frame, result);
     remark_on_samples(g);
     // Requests made before the first frame did not include the memory of images.
-    if (!gl_beside_volumes_ && most_gl_bytes_ != Allowance::no_limit) wishes_due_ = wishes_due_ || !shown_.empty();
+    if (!gl_beside_volumes_ && max_gl_bytes_ != ResourceLimits::no_limit)
+      requests_due_ = requests_due_ || !shown_.empty();
     gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
     share_gl();
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    if (busy() || stand_in_) {
+    if (busy() || proxy_) {
       result.loading = true;
       result.converged = false;
     }
@@ -310,10 +311,10 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   with_gl([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
-    tend_voxels_in_gl(g);
+    update_gpu_resident(g);
     follow_transfers(g, frame.budget_ms);
     prepare(frame);
-    g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
+    g.upload(shot(), {page_texels_, max_gl_bytes_}, deadline);
     follow_upload(g);
     result = g.warm_up(shot(), frame, all, busy(), deadline);
   });
@@ -443,22 +444,22 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
       for (render::GlVoxels& field : placed.fields) field.index_to_world = *place;
       arrival = state.changed ? stay_in_gl(live, state.name, [this, live] { gather(gl(), *live); })
                               : stay_in_gl(live, state.name, *place);
-      tend(live);
+      track_gpu_resident(live);
     }
     g.transfers().begin(placed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
   });
   notify();
 }
 
-void Viewer::tend(const std::shared_ptr<Live>& live) {
+void Viewer::track_gpu_resident(const std::shared_ptr<Live>& live) {
   if (live->values_wanted() == nullptr) return;
   if (std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; })) return;
-  lives_in_gl_.push_back(
-      {.live = live,
-       .listeners = {live->values_wanted()->listen([this] { notify(); }), live->listen_to_wishes([this] { notify(); })},
-       .brought = {},
-       .made = {},
-       .made_by = {}});
+  lives_in_gl_.push_back({.live = live,
+                          .listeners = {live->values_wanted()->listen([this] { notify(); }),
+                                        live->listen_to_requests([this] { notify(); })},
+                          .brought = {},
+                          .made = {},
+                          .made_by = {}});
 }
 
 void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels) {
@@ -529,7 +530,7 @@ bool Viewer::voxels_in_gl_wait(Context& g) const {
   });
 }
 
-void Viewer::tend_voxels_in_gl(Context& g) {
+void Viewer::update_gpu_resident(Context& g) {
   std::erase_if(lives_in_gl_, [](const InGl& in_gl) { return in_gl.live.expired(); });
   for (InGl& in_gl : lives_in_gl_) {
     const std::shared_ptr<Live> live = in_gl.live.lock();
@@ -552,8 +553,8 @@ void Viewer::tend_voxels_in_gl(Context& g) {
 void Viewer::follow_transfers(Context& g, double budget_ms) {
   // Transfers share the frame's budget with other work.
   constexpr double part = 0.5;
-  constexpr double least_ms = 2.0;
-  g.transfers().follow(deadline_after(std::max(part * budget_ms, least_ms)));
+  constexpr double min_ms = 2.0;
+  g.transfers().follow(deadline_after(std::max(part * budget_ms, min_ms)));
 }
 
 // ---- transmittance maps for the host's own drawing ----
@@ -593,7 +594,7 @@ std::uint64_t Viewer::tag_of(std::uint64_t id) const {
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
   const auto of_tagged = [&](MatteObject object) {
     // The empty volume for surfaces has no matte.
-    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !seen_facts()) return 0U;
+    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !shown_info()) return 0U;
     object.tag = tag_of(object.id);
     return id_of(object);
   };
@@ -717,7 +718,7 @@ Stats Viewer::stats() {
   }
   s.build_seconds = built_.seconds;
   s.memory_bytes = followed_ ? frames_.frames().bytes : built_.bytes();
-  for (const PlayedPtr& played : played_) s.memory_bytes += played->shelf.frames().bytes;
+  for (const PlayedPtr& played : played_) s.memory_bytes += played->cache.frames().bytes;
   s.steps = totals_.steps;
   s.noise = totals_.noise;
   if (gl_) {

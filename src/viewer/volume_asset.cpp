@@ -94,15 +94,15 @@ void VolumeAsset::begin(const Progress* progress) {
   const bool empty = all.empty();
   if (empty) shown = all = {density.bounds_min, density.bounds_max};
   cube_ = grid::fit_cube(density, all.low, all.high);
-  VolumeFacts facts{.empty = empty,
-                    .may_emit = is_there(frame_->flame) || is_there(frame_->temperature),
-                    .low = shown.low,
-                    .high = shown.high,
-                    .index_to_world = density.index_to_world,
-                    .anisotropy_grid = {},
-                    .coarse = volume::CoarseVolume(density, progress)};
-  if (frame_->anisotropy) facts.anisotropy_grid = (*frame_->anisotropy)[0].name;
-  facts_ = std::make_shared<const VolumeFacts>(std::move(facts));
+  VolumeInfo volume_info{.empty = empty,
+                         .may_emit = is_there(frame_->flame) || is_there(frame_->temperature),
+                         .low = shown.low,
+                         .high = shown.high,
+                         .index_to_world = density.index_to_world,
+                         .anisotropy_grid = {},
+                         .coarse = volume::CoarseVolume(density, progress)};
+  if (frame_->anisotropy) volume_info.anisotropy_grid = (*frame_->anisotropy)[0].name;
+  volume_info_ = std::make_shared<const VolumeInfo>(std::move(volume_info));
 }
 
 std::uint64_t VolumeAsset::bytes() const {
@@ -252,7 +252,7 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   const auto field = [&]<class Field>(std::type_identity<Field>, auto values) {
     return values ? make_left<const Field>(*std::move(values), cube_, &progress) : nullptr;
   };
-  constexpr std::type_identity<grid::RgbField> colours;
+  constexpr std::type_identity<grid::RgbField> colors;
   constexpr std::type_identity<grid::ScalarField> numbers;
   constexpr std::type_identity<grid::MomentumField> motion;
   const auto lock = patient_lock(computing_, progress);
@@ -260,13 +260,14 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   if (!glowing_ || glowing_->settings != given) {
     drop(latticed_);  // it refers to the emission
     drop(glowing_);
-    auto glow = in_gl_ ? in_gl_->emission(given) : scene::emission_of(*frame_, given, &progress);
+    auto emissive = in_gl_ ? in_gl_->emission(given) : scene::emission_of(*frame_, given, &progress);
     if (close != nullptr)
-      glow = scene::mean_of(glow, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
-    put(glowing_, Glowing{given, field(colours, std::move(glow))});
+      emissive =
+          scene::mean_of(emissive, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
+    put(glowing_, Glowing{given, field(colors, std::move(emissive))});
   }
   const auto weighs = [&](const std::shared_ptr<const volume::VolumeFrame>& frame) {
-    const bool plain = in_gl_ || !(frame->colour || frame->anisotropy || frame->velocity);
+    const bool plain = in_gl_ || !(frame->color || frame->anisotropy || frame->velocity);
     return plain ? Weighing{frame, density_ramp} : weighing(frame, density_ramp, progress);
   };
   const bool weighs_anew = !weighted_ || weighted_->density_ramp != density_ramp;
@@ -289,8 +290,8 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
                                   "density", &progress);
       momentum = mean_momentum(std::move(momentum), *at_close.frame, at_close.ramp, progress, log);
     }
-    put(weighted_, Weighted{density_ramp, field(colours, std::move(scattering)), field(motion, std::move(momentum)),
-                            std::nullopt});
+    put(weighted_,
+        Weighted{density_ramp, field(colors, std::move(scattering)), field(motion, std::move(momentum)), std::nullopt});
   }
   if (turns_anew) {
     auto forward = in_gl_ ? in_gl_->forward() : scene::forward_of(*at_open.frame, at_open.ramp, &progress);

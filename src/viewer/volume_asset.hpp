@@ -21,7 +21,7 @@
 namespace cumulet::viewer {
 
 /// Metadata of a volume that is available without its voxels, for example to place a camera.
-struct VolumeFacts {
+struct VolumeInfo {
   bool empty = true;      ///< no field has an active voxel
   bool may_emit = false;  ///< it has a field that can emit light
   glm::ivec3 low{0};      ///< of the visible voxels, inclusive
@@ -36,7 +36,7 @@ struct VolumeFacts {
     return world_bounds(low, high, place * index_to_world);
   }
 };
-using VolumeFactsPtr = std::shared_ptr<const VolumeFacts>;
+using VolumeInfoPtr = std::shared_ptr<const VolumeInfo>;
 
 /// A volume and data derived from it, shared by all viewers that show it. Immutable for its users; thread-safe.
 class VolumeAsset {
@@ -59,8 +59,8 @@ class VolumeAsset {
   [[nodiscard]] const volume::ScalarVolume& main_field() const;
   [[nodiscard]] const std::string& name() const { return main_field().name; }
   /// The metadata may outlive the asset.
-  [[nodiscard]] const VolumeFactsPtr& facts() const { return facts_; }
-  [[nodiscard]] bool may_emit() const { return facts_->may_emit; }
+  [[nodiscard]] const VolumeInfoPtr& volume_info() const { return volume_info_; }
+  [[nodiscard]] bool may_emit() const { return volume_info_->may_emit; }
   /// Kelvin at temperature 1, for media that do not set a scale.
   [[nodiscard]] double temperature_scale() const;
   [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
@@ -72,9 +72,9 @@ class VolumeAsset {
   /// (volume/advection.hpp); backwards if `seconds` is negative. Null if nothing moves. The last result is cached.
   /// Throws Error(cancelled) and Error(file).
   [[nodiscard]] std::shared_ptr<const VolumeAsset> while_open(double seconds, Progress& progress) const;
-  [[nodiscard]] bool empty() const { return facts_->empty; }
-  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const { return facts_->bounds(place); }
-  [[nodiscard]] const volume::CoarseVolume& coarse() const { return facts_->coarse; }
+  [[nodiscard]] bool empty() const { return volume_info_->empty; }
+  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const { return volume_info_->bounds(place); }
+  [[nodiscard]] const volume::CoarseVolume& coarse() const { return volume_info_->coarse; }
   /// Main memory in bytes, including data derived so far.
   [[nodiscard]] std::uint64_t bytes() const;
   /// Density for grid builds. The statistics are valid while `voxels` is held. Channels weighted by density have the
@@ -134,7 +134,7 @@ class VolumeAsset {
   scene::StateInGlPtr in_gl_;
   std::shared_ptr<const volume::VolumeFrame> frame_;
   std::shared_ptr<const volume::VolumeFrame> close_;  // null: no shutter interval
-  VolumeFactsPtr facts_;
+  VolumeInfoPtr volume_info_;
   grid::Cube cube_;
   // Results are computed under the first mutex, one at a time, and stored under the second one too, so that bytes()
   // does not wait for a computation.

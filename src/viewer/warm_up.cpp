@@ -11,20 +11,20 @@
 namespace cumulet::viewer {
 
 WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool waits, render::Deadline deadline) {
-  if (!rehearsal_) {
-    rehearsal_ = std::make_unique<render::Rehearsal>(functions_, programs_);
+  if (!shader_warm_up_) {
+    shader_warm_up_ = std::make_unique<render::ShaderWarmUp>(functions_, programs_);
     warm_ = 0.0;
     unbuilt_.reset();
   }
   WarmUp result;
   const bool known = !waits && !scene_.uploading();
   try {
-    result.more = !known || !rehearse(shot, frame, all, deadline);
+    result.more = !known || !warm_up_step(shot, frame, all, deadline);
   } catch (...) {
-    rehearsal_.reset();
+    shader_warm_up_.reset();
     throw;
   }
-  if (!result.more) rehearsal_.reset();
+  if (!result.more) shader_warm_up_.reset();
   // Progress: compiling counts for half and first use for half. Programs that are not used count fully once compiled.
   const gl::Programs::Counts counts = programs_->counts();
   const std::size_t wanted = all ? std::max(counts.asked, gl::all_programs().size()) : counts.asked;
@@ -48,9 +48,9 @@ bool Context::done_or_failed(Part&& part) {
   }
 }
 
-bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline) {
-  if (!all) return rehearse_frame(shot, frame, deadline);
-  if (!done_or_failed([&] { return rehearse_frame(shot, frame, deadline); })) return false;
+bool Context::warm_up_step(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline) {
+  if (!all) return warm_up_frame(shot, frame, deadline);
+  if (!done_or_failed([&] { return warm_up_frame(shot, frame, deadline); })) return false;
   bool there = true;
   for (const gl::ProgramKey& key : gl::all_programs()) {
     const gl::Program::State before = programs_->state(key);
@@ -62,46 +62,46 @@ bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::D
   return there;
 }
 
-bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadline deadline) {
-  rehearsal_->begin();
+bool Context::warm_up_frame(const Shot& shot, const Frame& frame, render::Deadline deadline) {
+  shader_warm_up_->begin();
   const bool drawing = draws(shot, frame);
   if (drawing) {
-    render::Picture& empty = rehearsal_->empty();
-    if (!empty.film().has(render::film_layers::radiance)) rehearsal_->tracer().clear(empty);
-    rehearsal_->tracer().set_background(empty, scene_.lights(*shot.scene).sky_radiance);
-    rehearse_drawing(shot, frame, empty);
+    render::Picture& empty = shader_warm_up_->empty();
+    if (!empty.film().has(render::film_layers::radiance)) shader_warm_up_->tracer().clear(empty);
+    shader_warm_up_->tracer().set_background(empty, scene_.lights(*shot.scene).sky_radiance);
+    warm_up_drawing(shot, frame, empty);
   }
   if (shot.view()) {
     take_host_depth(shot, frame);
     const auto draw = [&](const render::Picture& shown) {
-      if (drawing) rehearse_drawing(shot, frame, shown);
+      if (drawing) warm_up_drawing(shot, frame, shown);
     };
     if (scene_.data() != nullptr) {
-      const render::Obstacles met = obstacles(shot);
-      if (!rehearsal_->advance(wish(shot, frame, met), *scene_.data(), met, deadline, draw)) return false;
+      const render::TraceInputs met = trace_inputs(shot);
+      if (!shader_warm_up_->advance(request(shot, frame, met), *scene_.data(), met, deadline, draw)) return false;
     }
     if (host_depth_.waits_for_program()) return false;
   }
-  return !rehearsal_->lags();
+  return !shader_warm_up_->lags();
 }
 
-void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
+void Context::warm_up_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
   const render::PictureTextures picture = textures_of(shown, nullptr);
   render::FrameTarget target = Context::target(shot, frame, shown);
   target.region = {};  // a warm-up image has no render region
   if (frame.target == Target::framebuffer) {
-    rehearsal_->draw(picture, display(shot, frame, shown), target);
+    shader_warm_up_->draw(picture, display(shot, frame, shown), target);
     return;
   }
-  const gl::Object colour = gl::make_texture_2d(functions_, frame.format, 1, 1, "creating a target to rehearse with");
+  const gl::Object color = gl::make_texture_2d(functions_, frame.format, 1, 1, "creating a target to rehearse with");
   gl::Object depth;
   if (frame.write_depth) {
     depth = gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, 1, 1, "creating a target's depth to rehearse with");
   }
-  const gl::TransientFramebuffer framebuffer(functions_, colour.name(), depth.name());
+  const gl::TransientFramebuffer framebuffer(functions_, color.name(), depth.name());
   target.framebuffer = framebuffer.name();
   target.blend_over = false;
-  rehearsal_->draw(picture, display(shot, frame, shown), target);
+  shader_warm_up_->draw(picture, display(shot, frame, shown), target);
 }
 
 }  // namespace cumulet::viewer

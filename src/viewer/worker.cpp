@@ -6,10 +6,10 @@ namespace cumulet::viewer {
 
 namespace {
 
-std::optional<Error> failure_of(const Worker::Job& job, const AllowancePtr& allowance, Progress& progress) {
+std::optional<Error> failure_of(const Worker::Job& job, const ResourceLimitsPtr& resource_limits, Progress& progress) {
   try {
-    if (allowance) {
-      allowance->run([&] { job.work(progress); });
+    if (resource_limits) {
+      resource_limits->run([&] { job.work(progress); });
     } else {
       job.work(progress);
     }
@@ -120,7 +120,7 @@ void Worker::run() {
     std::optional<Error> failure;
     {
       const Trace::Span span(trace_, job->what);
-      failure = failure_of(*job, allowance_, *progress);
+      failure = failure_of(*job, resource_limits_, *progress);
     }
     job.reset();
     // A cancelled job reports only its cancellation, because its result is no longer needed.

@@ -12,7 +12,7 @@
 #include "base/library_thread.hpp"
 #include "base/progress.hpp"
 #include "base/trace.hpp"
-#include "viewer/allowance.hpp"
+#include "viewer/resource_limits.hpp"
 
 namespace cumulet::viewer {
 
@@ -36,9 +36,9 @@ class Worker {
     std::optional<Error> failure;  ///< failure of the last job, if any
   };
 
-  /// notify: called on the thread after a job ended. allowance: limits for jobs; null: none.
-  explicit Worker(std::function<void()> notify, Trace trace = {}, AllowancePtr allowance = nullptr)
-      : notify_(std::move(notify)), trace_(trace), allowance_(std::move(allowance)) {}
+  /// notify: called on the thread after a job ended. resource_limits: limits for jobs; null: none.
+  explicit Worker(std::function<void()> notify, Trace trace = {}, ResourceLimitsPtr resource_limits = nullptr)
+      : notify_(std::move(notify)), trace_(trace), resource_limits_(std::move(resource_limits)) {}
   /// Cancels the job and waits for it.
   ~Worker();
   Worker(const Worker&) = delete;
@@ -84,7 +84,7 @@ class Worker {
 
   std::function<void()> notify_;
   Trace trace_;
-  AllowancePtr allowance_;
+  ResourceLimitsPtr resource_limits_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Job> next_;

@@ -18,7 +18,7 @@ VolumeFrame like(const VolumeFrame& frame) {
   VolumeFrame out;
   if (frame.temperature) out.temperature.emplace();
   if (frame.flame) out.flame.emplace();
-  if (frame.colour) out.colour.emplace();
+  if (frame.color) out.color.emplace();
   if (frame.anisotropy) out.anisotropy.emplace();
   if (frame.velocity) out.velocity = Velocity{{}, frame.velocity->to_index};
   return out;

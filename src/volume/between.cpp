@@ -168,7 +168,7 @@ VolumeFrame blend(const VolumeFrame& before, const VolumeFrame& after, double pa
     pairs.add_matter(before.temperature, after.temperature, out.temperature);
     pairs.add_matter(before.flame, after.flame, out.flame);
     const std::size_t of_matter = pairs.out.size();
-    pairs.add_kind(before.colour, after.colour, out.colour);
+    pairs.add_kind(before.color, after.color, out.color);
     pairs.add_kind(before.anisotropy, after.anisotropy, out.anisotropy);
     if (before.velocity || after.velocity) {
       const Velocity& first = before.velocity ? *before.velocity : *after.velocity;

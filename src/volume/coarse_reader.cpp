@@ -203,7 +203,7 @@ SourceGrid CoarseReader::read(std::size_t grid, Portion /*portion*/, const Log& 
   const bool is_first = looked_.empty();
   if (is_first) first_ = grid;
   SourceGrid& whole = (is_first ? first_source_ : later_source_) = std::move(read);
-  if (is_first && whole.leaves->count() < least_bricks_) fail("is small enough to be read at once");
+  if (is_first && whole.leaves->count() < min_bricks_) fail("is small enough to be read at once");
 
   ProgressPart part(progress_, at, at, whole.leaves->count());
   Box box = active_leaf_region(*whole.leaves, part).box;
@@ -231,7 +231,7 @@ std::array<SourceGrid, 3> CoarseReader::read_vector(std::size_t /*grid*/, Portio
   fail("is of vectors");
 }
 
-std::optional<StandIn::Extent> CoarseReader::extent(const VolumeFrame& frame) const {
+std::optional<Proxy::Extent> CoarseReader::extent(const VolumeFrame& frame) const {
   std::vector<const ScalarVolume*> seen;
   if (!frame.density.empty()) seen.push_back(&frame.density);
   if (frame.flame && !frame.flame->empty()) seen.push_back(&*frame.flame);
@@ -245,7 +245,7 @@ std::optional<StandIn::Extent> CoarseReader::extent(const VolumeFrame& frame) co
     index_to_world = looked->index_to_world;
   }
   if (box.empty()) return std::nullopt;
-  return StandIn::Extent{box.min, box.max, *index_to_world};
+  return Proxy::Extent{box.min, box.max, *index_to_world};
 }
 
 SourceGrid CoarseReader::Rest::read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) {

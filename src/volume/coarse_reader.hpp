@@ -8,17 +8,17 @@
 #include <vector>
 
 #include "volume/import_detail.hpp"
-#include "volume/stand_in.hpp"
+#include "volume/proxy.hpp"
 
 namespace cumulet::volume::detail {
 
-/// Reads each scalar grid at the reduced resolution of StandIn. Keeps the tree of the first grid for the
+/// Reads each scalar grid at the reduced resolution of Proxy. Keeps the tree of the first grid for the
 /// full-resolution reader.
 class CoarseReader final : public Reader {
  public:
-  /// whole: a reader with streams(). read() throws if the first grid has fewer bricks than least_bricks.
-  CoarseReader(Reader& whole, std::uint64_t least_bricks, Progress* progress)
-      : whole_(whole), least_bricks_(least_bricks), progress_(progress) {}
+  /// whole: a reader with streams(). read() throws if the first grid has fewer bricks than min_bricks.
+  CoarseReader(Reader& whole, std::uint64_t min_bricks, Progress* progress)
+      : whole_(whole), min_bricks_(min_bricks), progress_(progress) {}
 
   [[nodiscard]] const std::vector<GridInfo>& grids() const override { return whole_.grids(); }
   [[nodiscard]] const std::vector<Metadata>& metadata() const override { return whole_.metadata(); }
@@ -30,7 +30,7 @@ class CoarseReader final : public Reader {
                                         const std::string& log_prefix) override;
 
   /// Returns the extent of a frame that was made of grids from read().
-  [[nodiscard]] std::optional<StandIn::Extent> extent(const VolumeFrame& frame) const;
+  [[nodiscard]] std::optional<Proxy::Extent> extent(const VolumeFrame& frame) const;
 
   /// The full-resolution reader, which reuses the tree of the first grid.
   class Rest final : public Reader {
@@ -61,7 +61,7 @@ class CoarseReader final : public Reader {
   };
 
   Reader& whole_;
-  std::uint64_t least_bricks_;
+  std::uint64_t min_bricks_;
   Progress* progress_;
   std::optional<std::size_t> first_;  // the grid whose tree is kept
   SourceGrid first_source_;

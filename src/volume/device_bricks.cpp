@@ -33,11 +33,11 @@ void DeviceBricks::ask_for_values() const {
 }
 
 bool DeviceBricks::scattered() const {
-  constexpr std::size_t most_memories = 16;
+  constexpr std::size_t max_memories = 16;
   constexpr std::size_t few = 1024;
   std::size_t held = 0;
   for (const DeviceMemoryPtr& memory : memories) held += memory->bricks();
-  return memories.size() > most_memories || held > 2 * origins.size() + few;
+  return memories.size() > max_memories || held > 2 * origins.size() + few;
 }
 
 std::uint64_t DeviceBricks::bytes() const {

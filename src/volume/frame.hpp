@@ -37,10 +37,10 @@ constexpr double temperature_scale_of(float max_value) { return max_value > max_
 /// The fields of one file, all on one lattice: they have the same index_to_world, and voxel (i,j,k) of each is at the
 /// same position. Bounds and bricks differ between fields.
 struct VolumeFrame {
-  ScalarVolume density;                                    ///< empty if the file has none
-  std::optional<ScalarVolume> temperature = {};            ///< in the file's unit: 0 to 3, as in simulations, or kelvin
-  std::optional<ScalarVolume> flame = {};                  ///< amount that burns
-  std::optional<std::array<ScalarVolume, 3>> colour = {};  ///< scattering color: linear Rec. 709; red, green, blue
+  ScalarVolume density;                                   ///< empty if the file has none
+  std::optional<ScalarVolume> temperature = {};           ///< in the file's unit: 0 to 3, as in simulations, or kelvin
+  std::optional<ScalarVolume> flame = {};                 ///< amount that burns
+  std::optional<std::array<ScalarVolume, 3>> color = {};  ///< scattering color: linear Rec. 709; red, green, blue
   /// The mean cosine of scattering, from -1 to 1: its positive and its negative part.
   std::optional<std::array<ScalarVolume, 2>> anisotropy = {};
   std::optional<Velocity> velocity = {};
@@ -67,7 +67,7 @@ struct GridNames {
   /// cd, color, colour: a grid of float vectors that is not staggered. Three scalar grids are read only if they are
   /// named explicitly, "color" for "color_r", "color_g" and "color_b": Mantaflow writes color times density there,
   /// because it advects them. They are used unchanged, as in Cycles.
-  std::string colour = {};
+  std::string color = {};
   /// anisotropy, scatter_anisotropy, phase_anisotropy, phase_g.
   std::string anisotropy = {};
   /// velocity, vel, v: a vector grid, staggered or not, or three scalar grids with x, y and z appended to the name,

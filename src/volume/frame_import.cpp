@@ -10,8 +10,8 @@
 #include "volume/bricks.hpp"
 #include "volume/coarse_reader.hpp"
 #include "volume/frame.hpp"
+#include "volume/proxy.hpp"
 #include "volume/resample.hpp"
-#include "volume/stand_in.hpp"
 
 namespace cumulet::volume {
 
@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::array<std::string_view, 3> temperature_names = {"temperature", "heat", "temp"};
 constexpr std::array<std::string_view, 5> flame_names = {"flame", "flames", "fire", "burn", "fuel"};
-constexpr std::array<std::string_view, 3> colour_names = {"cd", "color", "colour"};
+constexpr std::array<std::string_view, 3> color_names = {"cd", "color", "colour"};
 constexpr std::array<std::string_view, 4> anisotropy_names = {"anisotropy", "scatter_anisotropy", "phase_anisotropy",
                                                               "phase_g"};
 constexpr const char* no_grid = "none";
@@ -29,11 +29,11 @@ constexpr const char* no_grid = "none";
 /// The chosen grids, as indices into the file's list.
 struct Chosen {
   std::optional<std::size_t> density, temperature, flame, anisotropy;
-  std::vector<std::size_t> colour;    ///< empty; one vector grid; or red, green and blue
+  std::vector<std::size_t> color;     ///< empty; one vector grid; or red, green and blue
   std::vector<std::size_t> velocity;  ///< empty; one vector grid; or along x, y and z
 
   [[nodiscard]] std::vector<std::size_t> all() const {
-    std::vector<std::size_t> out = colour;
+    std::vector<std::size_t> out = color;
     out.insert(out.end(), velocity.begin(), velocity.end());
     for (const auto& field : {density, temperature, flame, anisotropy}) {
       if (field) out.push_back(*field);
@@ -57,7 +57,7 @@ std::vector<std::size_t> channels(const std::vector<GridInfo>& grids, const std:
 }
 
 /// Returns why a grid cannot hold colors; empty if it can.
-std::string colour_refusal(const GridInfo& grid) {
+std::string color_refusal(const GridInfo& grid) {
   if (grid.values != Values::lengths || grid.type == "vec3i") return "is of type " + grid.type + ", not vec3s or vec3d";
   if (grid.grid_class == "staggered") return "is staggered: velocities, not colours";
   return {};
@@ -101,11 +101,11 @@ std::vector<std::size_t> choose_velocity(const std::vector<GridInfo>& grids, con
   return {};
 }
 
-std::vector<std::size_t> choose_colour(const std::vector<GridInfo>& grids, const std::string& name) {
+std::vector<std::size_t> choose_color(const std::vector<GridInfo>& grids, const std::string& name) {
   if (name == no_grid) return {};
-  if (!by_name(name)) return choose_vectors(grids, name, colour_refusal, channels(grids, name), {"_r", "_g", "_b"});
-  for (const std::string_view likely : colour_names) {
-    const auto found = called_so(grids, likely, [](const GridInfo& grid) { return colour_refusal(grid).empty(); });
+  if (!by_name(name)) return choose_vectors(grids, name, color_refusal, channels(grids, name), {"_r", "_g", "_b"});
+  for (const std::string_view likely : color_names) {
+    const auto found = called_so(grids, likely, [](const GridInfo& grid) { return color_refusal(grid).empty(); });
     if (!found.empty()) return {found.front()};
   }
   return {};
@@ -120,9 +120,9 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
     taken.push_back(choose_grid(grids, name));
     return taken.back();
   };
-  Chosen out{asked(names.density),    asked(names.temperature),           asked(names.flame),
-             asked(names.anisotropy), choose_colour(grids, names.colour), {}};
-  if (!by_name(names.colour)) taken.insert(taken.end(), out.colour.begin(), out.colour.end());
+  Chosen out{asked(names.density),    asked(names.temperature),         asked(names.flame),
+             asked(names.anisotropy), choose_color(grids, names.color), {}};
+  if (!by_name(names.color)) taken.insert(taken.end(), out.color.begin(), out.color.end());
   out.velocity = choose_velocity(grids, names.velocity, taken);
   if (!by_name(names.velocity)) taken.insert(taken.end(), out.velocity.begin(), out.velocity.end());
   const auto find = [&](std::optional<std::size_t>& field, const std::string& name,
@@ -194,7 +194,7 @@ class FrameImport {
       remark(LogLevel::warning, file_, remark_on_choice(reader.grids(), *chosen.density, chosen.all()));
     }
     remark_on_case(reader.grids(), chosen, names);
-    if (by_name(names.colour) && chosen.colour.empty()) remark_on_colour(reader.grids());
+    if (by_name(names.color) && chosen.color.empty()) remark_on_color(reader.grids());
     const Portion whole{reader.opened(), 1.0};
     velocity_is_named_ = !by_name(names.velocity);
     read(reader, chosen, whole.part(0.0, reading));
@@ -257,8 +257,8 @@ class FrameImport {
       case Channel::red:
       case Channel::green:
       case Channel::blue:
-        if (!out_.colour) out_.colour.emplace();
-        out_.colour->at(component(Channel::red)) = numbers();
+        if (!out_.color) out_.color.emplace();
+        out_.color->at(component(Channel::red)) = numbers();
         break;
       case Channel::anisotropy:
         out_.anisotropy = signs();
@@ -304,10 +304,10 @@ class FrameImport {
       out_.anisotropy = import_signed_grid(reader, *chosen.anisotropy, file_, log_, progress_, shares.next());
       clamp_anisotropy();
     }
-    if (chosen.colour.size() == 1) {
-      out_.colour = import_vector_grid(reader, chosen.colour[0], file_, log_, progress_, shares.next());
-    } else if (!chosen.colour.empty()) {
-      std::ranges::transform(chosen.colour, out_.colour.emplace().begin(), field);
+    if (chosen.color.size() == 1) {
+      out_.color = import_vector_grid(reader, chosen.color[0], file_, log_, progress_, shares.next());
+    } else if (!chosen.color.empty()) {
+      std::ranges::transform(chosen.color, out_.color.emplace().begin(), field);
     }
     if (chosen.velocity.empty()) return;
     try_velocity([&] { out_.velocity = read_velocity(reader, chosen.velocity, shares); });
@@ -358,7 +358,7 @@ class FrameImport {
     };
     for (ScalarVolume* field : out_.beside_density()) put(*field, std::nullopt);
     if (out_.temperature) warn_if_apart({&*out_.temperature, 1});
-    if (out_.colour) warn_if_apart(*out_.colour);
+    if (out_.color) warn_if_apart(*out_.color);
     if (out_.anisotropy) warn_if_apart(*out_.anisotropy);
     if (velocity) {
       try_velocity([&] {
@@ -445,12 +445,12 @@ class FrameImport {
     remark_on_one("temperature", names.temperature, chosen.temperature);
     remark_on_one("flame", names.flame, chosen.flame);
     remark_on_one("anisotropy", names.anisotropy, chosen.anisotropy);
-    remark_on("color", names.colour, chosen.colour);
+    remark_on("color", names.color, chosen.color);
     remark_on("velocity", names.velocity, chosen.velocity);
   }
 
-  void remark_on_colour(const std::vector<GridInfo>& grids) const {
-    for (const std::string_view name : colour_names) {
+  void remark_on_color(const std::vector<GridInfo>& grids) const {
+    for (const std::string_view name : color_names) {
       const std::vector<std::size_t> found = channels(grids, std::string(name));
       if (found.empty()) continue;
       remark(LogLevel::info, file_, "colour is read from " + describe(grids, found) + " only if it is named");
@@ -493,7 +493,7 @@ std::vector<Field*> fields_beside_density(Frame& frame) {
   if (frame.temperature) fields.push_back(&*frame.temperature);
   if (frame.flame) fields.push_back(&*frame.flame);
   const auto pointer = [](Field& part) { return &part; };
-  if (frame.colour) std::ranges::transform(*frame.colour, std::back_inserter(fields), pointer);
+  if (frame.color) std::ranges::transform(*frame.color, std::back_inserter(fields), pointer);
   if (frame.anisotropy) std::ranges::transform(*frame.anisotropy, std::back_inserter(fields), pointer);
   if (frame.velocity) std::ranges::transform(frame.velocity->parts, std::back_inserter(fields), pointer);
   return fields;
@@ -533,7 +533,7 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
   } catch (const std::runtime_error&) {
     // No grid can be used as density.
   }
-  for (const std::size_t grid : chosen.colour) channels[grid] = "color";
+  for (const std::size_t grid : chosen.color) channels[grid] = "color";
   const auto name = [&](const std::optional<std::size_t>& grid, const char* field) {
     if (grid) channels[*grid] = field;
   };
@@ -552,12 +552,12 @@ VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log
 namespace {
 
 // Returns nullopt on any failure. If the full-resolution import fails too, it reports the error.
-std::optional<StandIn> stand_in_of(CoarseReader& coarse, const std::string& file, GridNames names,
-                                   const Progress* progress) {
+std::optional<Proxy> proxy_of(CoarseReader& coarse, const std::string& file, GridNames names,
+                              const Progress* progress) {
   try {
-    names.colour = names.anisotropy = names.velocity = no_grid;
+    names.color = names.anisotropy = names.velocity = no_grid;
     const Log silent;
-    StandIn made{.frame = FrameImport(file, silent, nullptr).run(coarse, names), .extent = {}};
+    Proxy made{.frame = FrameImport(file, silent, nullptr).run(coarse, names), .extent = {}};
     made.extent = coarse.extent(made.frame);
     return made;
   } catch (...) {
@@ -567,21 +567,21 @@ std::optional<StandIn> stand_in_of(CoarseReader& coarse, const std::string& file
 }
 
 // Lower bound of a brick's size in any file: two copies of its mask.
-constexpr std::uint64_t least_bytes_a_brick = 128;
+constexpr std::uint64_t min_bytes_per_brick = 128;
 
 }  // namespace
 
 VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
-                         const StandInWish& stand_in) {
+                         const ProxyRequest& proxy) {
   return naming(file.given(), [&] {
     const std::filesystem::path path = file.absolute();
     const std::unique_ptr<Reader> reader = open(path, progress);
     FrameImport import(file.given(), log, progress);
     std::error_code unknown;
-    const bool is_large = std::filesystem::file_size(path, unknown) / least_bytes_a_brick >= stand_in.least_bricks;
+    const bool is_large = std::filesystem::file_size(path, unknown) / min_bytes_per_brick >= proxy.min_bricks;
     if (!is_large || unknown || !reader->streams()) return import.run(*reader, names);
-    CoarseReader coarse(*reader, stand_in.least_bricks, progress);
-    if (auto made = stand_in_of(coarse, file.given(), names, progress)) stand_in.take(std::move(*made));
+    CoarseReader coarse(*reader, proxy.min_bricks, progress);
+    if (auto made = proxy_of(coarse, file.given(), names, progress)) proxy.take(std::move(*made));
     CoarseReader::Rest rest(coarse);
     return import.run(rest, names);
   });

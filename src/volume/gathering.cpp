@@ -179,7 +179,7 @@ void Gathering::refine(glm::ivec3 origin, int size, int depth, std::span<const I
 
 void Gathering::make_brick(const glm::ivec3& origin, std::span<const Box> needed, std::span<const Items> items,
                            std::span<const std::size_t> wanted) {
-  if (sampled_.fetch_add(1, std::memory_order_relaxed) >= most_bricks) too_large();
+  if (sampled_.fetch_add(1, std::memory_order_relaxed) >= max_bricks) too_large();
   std::vector<Window> windows;
   windows.reserve(sources_.size());
   for (std::size_t i = 0; i < sources_.size(); ++i) windows.emplace_back(source(i), needed[i], items[i]);

@@ -94,7 +94,7 @@ class Gathering {
                       std::span<Brick> bricks) const = 0;
   /// Throws for more than 2^21 bricks, which is 4 GiB of a field's values.
   [[noreturn]] virtual void too_large() const = 0;
-  static constexpr std::uint64_t most_bricks = std::uint64_t{1} << 21U;
+  static constexpr std::uint64_t max_bricks = std::uint64_t{1} << 21U;
 
  private:
   struct Placed {

@@ -145,7 +145,7 @@ Inspection::Inspection(const FilePath& file) : file_(file) {
     grids_ = reader->grids();
     channels_ = channels_by_name(grids_);
   });
-  facts_.resize(grids_.size());
+  volume_info_.resize(grids_.size());
   try {
     chosen_ = choose_grid(grids_, "");
   } catch (const std::runtime_error&) {
@@ -153,11 +153,11 @@ Inspection::Inspection(const FilePath& file) : file_(file) {
   }
 }
 
-const GridFacts& Inspection::facts(std::size_t grid) {
+const GridStatistics& Inspection::volume_info(std::size_t grid) {
   const std::scoped_lock lock(mutex_);
-  std::optional<GridFacts>& facts = facts_.at(grid);
-  if (facts) return *facts;
-  GridFacts found{.values = {}, .refusal = grids_[grid].refusal};
+  std::optional<GridStatistics>& volume_info = volume_info_.at(grid);
+  if (volume_info) return *volume_info;
+  GridStatistics found{.values = {}, .refusal = grids_[grid].refusal};
   if (grids_[grid].values != Values::none) {
     try {
       // Uses a new reader: a failed read would leave its stream in an undefined state.
@@ -171,7 +171,7 @@ const GridFacts& Inspection::facts(std::size_t grid) {
       found.refusal = one_line(e.what());
     }
   }
-  return facts.emplace(std::move(found));
+  return volume_info.emplace(std::move(found));
 }
 
 }  // namespace cumulet::volume

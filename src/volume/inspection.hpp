@@ -35,7 +35,7 @@ struct GridValues {
 /// Returns the counts of a volume's values > 0 in equal bins from 0 to max_value. O(voxels of bricks).
 std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume);
 
-struct GridFacts {
+struct GridStatistics {
   std::optional<GridValues> values;  ///< empty if they cannot be read
   std::string refusal;               ///< that of GridInfo, or the error in reading the voxels
 };
@@ -55,7 +55,7 @@ class Inspection {
   /// The grid that import_volume reads if it is given no name.
   [[nodiscard]] std::optional<std::size_t> chosen() const { return chosen_; }
   /// Reads a grid's voxels at the first call. Throws Error(out_of_memory).
-  [[nodiscard]] const GridFacts& facts(std::size_t grid);
+  [[nodiscard]] const GridStatistics& volume_info(std::size_t grid);
 
  private:
   FilePath file_;
@@ -66,7 +66,7 @@ class Inspection {
   std::vector<std::string> channels_;
   std::optional<std::size_t> chosen_;
   std::mutex mutex_;
-  std::vector<std::optional<GridFacts>> facts_;
+  std::vector<std::optional<GridStatistics>> volume_info_;
 };
 
 }  // namespace cumulet::volume

@@ -366,9 +366,9 @@ void check_fields(std::span<const MemoryField> fields, const std::string& name) 
   std::array<int, channel_count> count{};
   for (const MemoryField& field : fields) ++count.at(static_cast<std::size_t>(field.channel));
   const auto there = [&](Channel channel) { return count.at(static_cast<std::size_t>(channel)); };
-  const int colours = there(Channel::red) + there(Channel::green) + there(Channel::blue);
+  const int colors = there(Channel::red) + there(Channel::green) + there(Channel::blue);
   const int velocities = there(Channel::velocity_x) + there(Channel::velocity_y) + there(Channel::velocity_z);
-  if (colours % 3 != 0) refuse(name, "has some of red, green and blue, not all");
+  if (colors % 3 != 0) refuse(name, "has some of red, green and blue, not all");
   if (velocities % 3 != 0) refuse(name, "has some of velocity_x, velocity_y and velocity_z, not all");
   if (there(Channel::density) + there(Channel::temperature) + there(Channel::flame) == 0)
     refuse(name, "has neither density nor temperature nor flame");

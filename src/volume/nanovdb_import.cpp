@@ -272,8 +272,8 @@ class NanoReader final : public Reader {
   /// Reads and decodes a grid, validating all sizes. NanoVDB's own reader does not, and cannot be cancelled.
   Handle load(const NanoPlace& place, Portion portion) {
     // No codec exceeds zlib's ratio of 1032 to 1: a larger size is rejected before memory is allocated.
-    constexpr std::uint64_t most_expansion = 1040;
-    if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(sizes_differ);
+    constexpr std::uint64_t max_expansion = 1040;
+    if (place.memory_bytes == 0 || place.memory_bytes / max_expansion > place.file_bytes) fail(sizes_differ);
     if (place.codec == Codec::NONE && place.memory_bytes != place.file_bytes) fail(sizes_differ);
     ProgressPart& part = stream_.begin(portion.from, portion.to,
                                        place.file_bytes + (place.codec == Codec::NONE ? 0 : place.memory_bytes));
@@ -299,7 +299,7 @@ class NanoReader final : public Reader {
       }
       case Codec::BLOSC:
         for (std::uint64_t done = 0; done < place.memory_bytes;) {
-          const std::uint64_t chunk = std::min<std::uint64_t>(place.memory_bytes - done, most_chunk);
+          const std::uint64_t chunk = std::min<std::uint64_t>(place.memory_bytes - done, max_chunk);
           const std::uint64_t frame = next_frame();
           unpack_frame(frame, buffer.data() + done, chunk, part);
           done += chunk;
@@ -329,7 +329,7 @@ class NanoReader final : public Reader {
         zip.next_in = input.data();
         zip.avail_in = static_cast<uInt>(n);
       }
-      const auto room = static_cast<uInt>(std::min<std::uint64_t>(bytes - done, most_piece));
+      const auto room = static_cast<uInt>(std::min<std::uint64_t>(bytes - done, max_piece));
       zip.next_out = to + done;
       zip.avail_out = room;
       status = inflate(&zip, Z_NO_FLUSH);
@@ -356,7 +356,7 @@ class NanoReader final : public Reader {
     blosc_cbuffer_metainfo(packed.data(), &item, &flags);
     if (block == 0 || item == 0 || block % item != 0 || bytes % item != 0) fail(sizes_differ);
     // Blocks are compressed independently.
-    const std::uint64_t piece = std::max<std::uint64_t>(most_piece / block, 1) * block;
+    const std::uint64_t piece = std::max<std::uint64_t>(max_piece / block, 1) * block;
     tbb::parallel_for(std::uint64_t{0}, (bytes + piece - 1) / piece, [&](std::uint64_t i) {
       part.check();
       const std::uint64_t n = std::min(piece, bytes - i * piece);
@@ -369,8 +369,8 @@ class NanoReader final : public Reader {
 
   static constexpr const char* unreadable = "is of a type that cannot be read";
   static constexpr const char* sizes_differ = "the file is damaged: its sizes do not agree";
-  static constexpr std::uint64_t most_chunk = std::uint64_t{1} << 30U;  ///< NanoVDB's maximum per Blosc frame
-  static constexpr std::uint64_t most_piece = std::uint64_t{4} << 20U;  ///< bytes between cancellation checks
+  static constexpr std::uint64_t max_chunk = std::uint64_t{1} << 30U;  ///< NanoVDB's maximum per Blosc frame
+  static constexpr std::uint64_t max_piece = std::uint64_t{4} << 20U;  ///< bytes between cancellation checks
 
   Progress* progress_;
   SourceFile stream_;

@@ -18,7 +18,7 @@ namespace cumulet::volume {
 
 namespace {
 
-constexpr int most_cells = 96;
+constexpr int cell_limit = 96;
 constexpr double wanted_depth = 8.0;
 constexpr double visible_share = 0.05;
 constexpr double extreme_share = 0.005;
@@ -26,7 +26,7 @@ constexpr double visible_depth = 0.05129;  // optical depth of an opacity of 5 %
 constexpr int directions = 24;
 constexpr int rays_a_side = 64;
 constexpr int rays_a_side_of_view = 128;
-constexpr double most_density_scale = 1e60;  // limit of the setting
+constexpr double max_density_scale = 1e60;  // limit of the setting
 
 /// Returns directions evenly distributed over a hemisphere; opposite directions are equivalent.
 glm::dvec3 direction_of(int i) {
@@ -129,7 +129,7 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
   if (volume.empty()) return;
   const glm::ivec3 low = volume.bounds_min;
   const glm::ivec3 extent = volume.bounds_max - low + 1;
-  const int block = (std::max({extent.x, extent.y, extent.z}) - 1) / most_cells + 1;
+  const int block = (std::max({extent.x, extent.y, extent.z}) - 1) / cell_limit + 1;
   size_ = (extent - 1) / block + 1;
   means_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
                 static_cast<std::size_t>(size_.z));
@@ -279,7 +279,7 @@ std::optional<double> CoarseVolume::suggest_density_scale() const {
       std::to_chars(digits.data(), digits.data() + digits.size(), scale, std::chars_format::scientific, 2).ptr;
   double rounded = scale;
   std::from_chars(digits.data(), end, rounded);
-  return std::clamp(rounded, std::numeric_limits<double>::min(), most_density_scale);
+  return std::clamp(rounded, std::numeric_limits<double>::min(), max_density_scale);
 }
 
 std::vector<glm::dvec3> CoarseVolume::visible(const glm::dvec3& direction, double density_scale) const {

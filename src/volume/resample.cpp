@@ -11,11 +11,11 @@ namespace {
 
 // If the field's voxels are smaller by more than this factor, a voxel of the lattice is the average of several samples.
 constexpr double much_finer = 1.5;
-constexpr double most_samples = 8.0;  // per axis
+constexpr double max_samples = 8.0;  // per axis
 // Beyond the coordinates of any voxel that is used.
 constexpr double far_off = double{max_coordinate} + max_extent;
 // Beyond this factor, the input of one brick would need too much memory.
-constexpr double most_finer = 64.0;
+constexpr double max_finer = 64.0;
 
 /// Some of a field's bricks.
 class OwnLeaves final : public HeldLeaves {
@@ -59,9 +59,9 @@ class Resampling final : Gathering {
         to_field_(glm::inverse(field.index_to_world) * lattice) {
     for (int axis = 0; axis < 3; ++axis) {
       const double step = glm::length(glm::dvec3(to_field_[axis]));
-      if (!(step <= most_finer)) fail("has voxels too small for the lattice of the file's other fields");
+      if (!(step <= max_finer)) fail("has voxels too small for the lattice of the file's other fields");
       const double wanted = step > much_finer ? std::ceil(step - alike) : 1.0;
-      samples_[axis] = static_cast<int>(std::min(wanted, most_samples));
+      samples_[axis] = static_cast<int>(std::min(wanted, max_samples));
       // Distance from a voxel's center to its outermost sample.
       reach_[axis] = 0.5 * (1.0 - 1.0 / samples_[axis]);
     }
@@ -88,7 +88,7 @@ class Resampling final : Gathering {
     const double larger = 1.0 / std::abs(glm::determinant(glm::dmat3(to_field_)));
     const glm::dvec3 bricks((box.max >> 3) - (box.min >> 3) + 1);
     if (std::min(static_cast<double>(field.brick_origins.size()) * larger, bricks.x * bricks.y * bricks.z) >
-        static_cast<double>(most_bricks)) {
+        static_cast<double>(max_bricks)) {
       too_large();
     }
     return std::move(gather(box)[0]);

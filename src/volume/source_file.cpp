@@ -58,7 +58,7 @@ SourceFile::Buffer::pos_type SourceFile::Buffer::seekpos(pos_type position, std:
     if (file_.pubseekpos(target, std::ios::in) != position) return {off_type{-1}};
     setg(nullptr, nullptr, nullptr);
     end_ = target;
-    next_read_ = least_read;
+    next_read_ = min_read;
   }
   return position;
 }

@@ -49,11 +49,11 @@ class SourceFile final : public std::istream {
    private:
     [[nodiscard]] std::int64_t position() const { return end_ - (egptr() - gptr()); }
 
-    static constexpr std::size_t least_read = std::size_t{16} << 10U;
+    static constexpr std::size_t min_read = std::size_t{16} << 10U;
 
     std::filebuf file_;
     std::vector<char> bytes_;
-    std::size_t next_read_ = least_read;
+    std::size_t next_read_ = min_read;
     std::int64_t size_ = 0;
     std::int64_t end_ = 0;  ///< file position of the buffer's end, and of file_
     Progress* progress_;

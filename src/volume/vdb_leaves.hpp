@@ -183,7 +183,7 @@ class OwningTree final : public TreeT {
     };
     using RunPtr = std::shared_ptr<Run>;
     // Short runs first: a sweep that stops early has then read little ahead.
-    constexpr std::size_t most_leaves = 256;
+    constexpr std::size_t max_leaves = 256;
     std::size_t leaves_a_run = 4;
     std::size_t next = 0;
     std::vector<char> head;
@@ -201,7 +201,7 @@ class OwningTree final : public TreeT {
           run->leaves.push_back(next);
         }
       }
-      leaves_a_run = std::min(2 * leaves_a_run, most_leaves);
+      leaves_a_run = std::min(2 * leaves_a_run, max_leaves);
       return run;
     };
     const auto unpack = [&](const RunPtr& run) {

@@ -75,7 +75,7 @@ viewer::Medium medium_of(double density_scale, Burns burns) {
   medium.albedo = {0.32F, 0.3F, 0.28F};
   medium.max_bounces = 12;
   medium.field_emission.flame_strength = burns == Burns::flame || burns == Burns::both ? density_scale : 0.0;
-  medium.field_emission.flame_colour = {1.0F, 0.3F, 0.05F};
+  medium.field_emission.flame_color = {1.0F, 0.3F, 0.05F};
   medium.field_emission.blackbody =
       burns == Burns::temperature || burns == Burns::both ? 4.0 / 3.0 * density_scale : 0.0;
   return medium;
@@ -125,9 +125,9 @@ viewer::Light clear_day() {
   return light;
 }
 
-viewer::VolumeAssetPtr read(const Input& input, const std::string& colour) {
+viewer::VolumeAssetPtr read(const Input& input, const std::string& color) {
   return std::make_shared<const viewer::VolumeAsset>(
-      volume::import_frame(input.file, {.density = input.grid, .colour = colour}, Log()));
+      volume::import_frame(input.file, {.density = input.grid, .color = color}, Log()));
 }
 
 /// Position of the lights: above and to the side, directed at the center.
@@ -155,9 +155,9 @@ scene::ModelSourcePtr emitter_at(const Place& place, double side, float radiance
 
 // Disables the emission that scattered rays accumulate along their path, and adds it only at collisions (emission
 // divided by extinction).
-constexpr Edit no_way = {"flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n", ""};
+constexpr Edit no_way = {"free_flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n", ""};
 constexpr Edit where_they_collide = {
-    "flight.glsl", "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
+    "free_flight.glsl", "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
     "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
     "    if (way < left) emitted += emission.mean * (there / max(mix(e_0, e_1, way / max(span, 1e-30f)), 1e-30f));\n"};
 // Disables NEE of emissive cells: if there is no other light, or among other lights.
@@ -165,25 +165,27 @@ constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
                                  "arrived && cm.lights.any != 0u && cm.lights.cell_chance < 1.0f;"};
 constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance,",
                            "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
-constexpr Edit flights_have_all = {"flight.glsl", "cm.lights.cell_chance * cm_look_chance(", "0.0f * cm_look_chance("};
+constexpr Edit flights_have_all = {"free_flight.glsl", "cm.lights.cell_chance * cm_nee_probability(",
+                                   "0.0f * cm_nee_probability("};
 // Disables Russian roulette of shadow rays.
 constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
                             "  if (p.steps >= 0u) return 1.0f;\n"};
 
 // Samples all lights with equal probability.
-constexpr Edit any_lamp = {"light.glsl", "  if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;\n", ""};
+constexpr Edit any_analytic_light = {
+    "light.glsl", "  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;\n", ""};
 constexpr Edit all_alike = {"light.glsl", "  light.density = lamp.chance;\n",
                             "  light.density = 1.0f / float(max(cm.lamps.count, 1u));\n"};
 
 /// Lights as on a film set: a key light at the side, one with a tenth of its power opposite, and fourteen like the key
 /// light far away.
-light::Lamps sixteen_lamps(const viewer::Bounds& bounds, const Place& place, float power) {
-  light::Lamps lamps;
+light::AnalyticLights sixteen_analytic_lights(const viewer::Bounds& bounds, const Place& place, float power) {
+  light::AnalyticLights analytic_lights;
   const auto add = [&](const dvec3& at, float share) {
-    light::Lamp lamp;
-    lamp.position = at;
-    lamp.power = vec3(share * power);
-    lamps.push_back(lamp);
+    light::AnalyticLight analytic_light;
+    analytic_light.position = at;
+    analytic_light.power = vec3(share * power);
+    analytic_lights.push_back(analytic_light);
   };
   const dvec3 middle = 0.5 * (bounds.min + bounds.max);
   add(place.at, 1.0F);
@@ -192,7 +194,7 @@ light::Lamps sixteen_lamps(const viewer::Bounds& bounds, const Place& place, flo
     const double angle = 2.0 * std::numbers::pi * i / 14.0;
     add(middle + 10.0 * place.distance * dvec3(std::cos(angle), 0.3, std::sin(angle)), 1.0F);
   }
-  return lamps;
+  return analytic_lights;
 }
 
 /// A hot core in a ball of smoke, for which NEE of cells is designed.
@@ -241,9 +243,9 @@ void measure_costs(headless::Context& context, const Input& input, const Options
       rows.add("+ temperature and flame", plain, Burns::both, daylight);
     }
     if (!options.color_grid.empty() && !made) {
-      const viewer::VolumeAssetPtr coloured = read(input, options.color_grid);
-      rows.add("+ colour", coloured, Burns::no, daylight);
-      rows.add("+ all", coloured, Burns::both, daylight);
+      const viewer::VolumeAssetPtr colored = read(input, options.color_grid);
+      rows.add("+ colour", colored, Burns::no, daylight);
+      rows.add("+ all", colored, Burns::both, daylight);
     }
     print_costs("Channels", rows.get(), options);
   }
@@ -251,19 +253,19 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     const Place place = beside(plain->bounds());
     const double side = 0.5 * place.distance;
     const auto power = static_cast<float>(10.0 * place.distance * place.distance);
-    light::Lamp lamp;
-    lamp.position = place.at;
-    lamp.direction = place.direction;
-    lamp.across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), place.direction));
-    lamp.power = vec3(power);
-    lamp.width = lamp.height = side;
-    lamp.angle = std::numbers::pi / 4.0;
+    light::AnalyticLight analytic_light;
+    analytic_light.position = place.at;
+    analytic_light.direction = place.direction;
+    analytic_light.across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), place.direction));
+    analytic_light.power = vec3(power);
+    analytic_light.width = analytic_light.height = side;
+    analytic_light.angle = std::numbers::pi / 4.0;
     const viewer::Light dark = light_of(0.0F, 0.0F);
     Rows rows(context, density_scale);
-    const auto lit = [&](const char* name, light::Lamp::Kind kind, const dvec3& at) {
-      lamp.kind = kind;
-      lamp.position = at;
-      rows.add(name, plain, Burns::no, dark).viewer().set_lamps({lamp});
+    const auto lit = [&](const char* name, light::AnalyticLight::Kind kind, const dvec3& at) {
+      analytic_light.kind = kind;
+      analytic_light.position = at;
+      rows.add(name, plain, Burns::no, dark).viewer().set_lamps({analytic_light});
     };
     rows.add("constant sky", plain, Burns::no, light_of(0.0F, 1.0F));
     rows.add("sun", plain, Burns::no, light_of(1.0F, 0.0F));
@@ -276,11 +278,11 @@ void measure_costs(headless::Context& context, const Input& input, const Options
           .viewer()
           .set_environment(light::make_environment(light::read_environment(name), name));
     }
-    lit("point beside it", light::Lamp::Kind::point, place.at);
-    lit("spot", light::Lamp::Kind::spot, place.at);
-    lit("disc", light::Lamp::Kind::disc, place.at);
-    lit("rectangle", light::Lamp::Kind::rectangle, place.at);
-    lit("point in it", light::Lamp::Kind::point, place.at + place.direction * place.distance);
+    lit("point beside it", light::AnalyticLight::Kind::point, place.at);
+    lit("spot", light::AnalyticLight::Kind::spot, place.at);
+    lit("disc", light::AnalyticLight::Kind::disc, place.at);
+    lit("rectangle", light::AnalyticLight::Kind::rectangle, place.at);
+    lit("point in it", light::AnalyticLight::Kind::point, place.at + place.direction * place.distance);
     rows.add("two triangles like the rectangle", plain, Burns::no, dark)
         .viewer()
         .show_surfaces(emitter_at(place, side, power / static_cast<float>(4.0 * side * side)));
@@ -293,8 +295,8 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     looks.add("those that tell", plain, Burns::no, daylight);
     print_costs("Looks for sun and sky", looks.get(), options);
 
-    const EditedShaders alike(std::array{any_lamp, all_alike});
-    const light::Lamps sixteen = sixteen_lamps(plain->bounds(), place, power);
+    const EditedShaders alike(std::array{any_analytic_light, all_alike});
+    const light::AnalyticLights sixteen = sixteen_analytic_lights(plain->bounds(), place, power);
     Rows many(context, density_scale);
     many.add("by what arrives", plain, Burns::no, dark).viewer().set_lamps(sixteen);
     many.add("each alike", plain, Burns::no, dark, alike.programs()).viewer().set_lamps(sixteen);

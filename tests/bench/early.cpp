@@ -45,10 +45,10 @@ class Watch {
 
 class Bench {
  public:
-  explicit Bench(bool with_stand_in) {
+  explicit Bench(bool with_proxy) {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = samples;
-    sampling.preview = with_stand_in ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
+    sampling.preview = with_proxy ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
     must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
   }
 

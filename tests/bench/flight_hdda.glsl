@@ -1,10 +1,10 @@
 // Scattered rays and shadow rays through a NanoVDB grid by null collisions (Woodcock et al. 1965; Galtier et al. 2013;
 // Novak et al., "Monte Carlo Methods for Volumetric Light Transport Simulation", EG 2018), with the majorants of
-// march_hdda.glsl. It replaces flight.glsl's cm_fly for one volume without emission, triangles and equiangular
+// march_hdda.glsl. It replaces free_flight.glsl's cm_fly for one volume without emission, triangles and equiangular
 // sampling.
 //
 // Scattered rays use delta tracking: a collision is real with the probability density / majorant. With CM_RATIO, shadow
-// rays use ratio tracking: each collision keeps the fraction that is not real, down to the weight at which flight.glsl
+// rays use ratio tracking: each collision keeps the fraction that is not real, down to the weight at which free_flight.glsl
 // switches to Russian roulette; from there on they use delta tracking. Without CM_RATIO, shadow rays use delta tracking
 // throughout. Because no transmittance is known, MIS weights between shadow rays and scattered rays that may reach the
 // same sky omit it.
@@ -13,12 +13,12 @@
 #ifndef CM_FLIGHT_HDDA_GLSL
 #define CM_FLIGHT_HDDA_GLSL
 
-#define CM_LEAST_PASSED 0.135335283f  // e^-2
+#define CM_MIN_PASSED 0.135335283f  // e^-2
 
 // At most CM_CHUNK regions and collisions.
 uint cm_fly(inout CmPath p) {
   vec3 inv_d = vec3(1.0) / p.d;
-  bool looks = p.ray != CM_RAY_FLIGHT;
+  bool looks = p.ray != CM_RAY_SCATTERED;
   uint event = CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell, p.cache);
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
@@ -35,7 +35,7 @@ uint cm_fly(inout CmPath p) {
       ivec3 voxel = clamp(ivec3(floor(p.o + p.t * p.d)), low, low + cm_nano_size(cell) - 1);
       float real = cm_nano_density(cell, voxel, majorant) / majorant;
       p.depth = cm_free_depth(cm_random(p.random, p.stream));
-      if (CM_RATIO != 0 && looks && p.depth_0 > CM_LEAST_PASSED) {
+      if (CM_RATIO != 0 && looks && p.depth_0 > CM_MIN_PASSED) {
         p.depth_0 *= 1.0 - real;
         p.light *= 1.0 - real;
         if (real >= 1.0) event = CM_EVENT_COLLISION;

@@ -198,7 +198,7 @@ class Bench {
 
   /// Additional time of a call after one instance has moved. The call traces almost nothing.
   double move(cumulet_instance* instance, Place place) {
-    constexpr double least_budget = 0.01;
+    constexpr double min_budget = 0.01;
     constexpr int times = 7;
     std::vector<double> moved;
     std::vector<double> still;
@@ -206,7 +206,7 @@ class Bench {
       place[13] += 1e-3 * size_;
       if (i % 2 == 0) check(cumulet_instance_set_to_world(instance, place.data()), "");
       const double begun = processor_seconds();
-      render(least_budget);
+      render(min_budget);
       (i % 2 == 0 ? moved : still).push_back(milliseconds_since(begun));
     }
     return *std::ranges::min_element(moved) - *std::ranges::min_element(still);

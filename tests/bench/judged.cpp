@@ -28,7 +28,7 @@ struct Looks {
   cumulet_light_desc light = make_desc<cumulet_light_desc>();
   cumulet_display_desc display = make_desc<cumulet_display_desc>();
   std::optional<View> view;  ///< none: it fits
-  std::vector<cumulet_lamp_desc> lamps;
+  std::vector<cumulet_lamp_desc> analytic_lights;
   float indirect_roughness = 0.0F;
 };
 
@@ -100,19 +100,19 @@ Looks fog_looks() {
   return looks;
 }
 
-Looks lamp_looks() {
+Looks analytic_light_looks() {
   Looks looks;
   looks.medium.density_scale = 6.0;
   demo::apply(demo::Preset::smoke, looks.medium);
   set(looks.light.sky_radiance, 0.02F, 0.03F, 0.05F);
-  auto lamp = make_desc<cumulet_lamp_desc>();
-  lamp.kind = CUMULET_LAMP_POINT;
-  lamp.position[0] = 0.25;
-  lamp.position[1] = 0.2;
-  lamp.position[2] = 0.35;
-  lamp.power = 40.0F;
-  set(lamp.color, 1.0F, 0.75F, 0.45F);
-  looks.lamps = {lamp};
+  auto analytic_light = make_desc<cumulet_lamp_desc>();
+  analytic_light.kind = CUMULET_LAMP_POINT;
+  analytic_light.position[0] = 0.25;
+  analytic_light.position[1] = 0.2;
+  analytic_light.position[2] = 0.35;
+  analytic_light.power = 40.0F;
+  set(analytic_light.color, 1.0F, 0.75F, 0.45F);
+  looks.analytic_lights = {analytic_light};
   return looks;
 }
 
@@ -123,7 +123,7 @@ struct Recipe {
 constexpr std::array recipes{Recipe{"cloud", cumulus_looks}, Recipe{"full", cumulus_looks},
                              Recipe{"fire", fire_looks},     Recipe{"explosion", explosion_looks},
                              Recipe{"model", model_looks},   Recipe{"terrain", terrain_looks},
-                             Recipe{"fog", fog_looks},       Recipe{"lamp", lamp_looks}};
+                             Recipe{"fog", fog_looks},       Recipe{"lamp", analytic_light_looks}};
 
 /// A volume of a cube from -1 to 1.
 template <class Density>
@@ -164,7 +164,7 @@ float smoke(const vec3& p) {
 
 /// Quadrilaterals of one color.
 struct Quads {
-  vec3 colour{0.73F};
+  vec3 color{0.73F};
   float radiance = 0.0F;
   std::vector<float> positions = {};
 
@@ -195,18 +195,19 @@ test::SurfacesRef cornell_box() {
   white.add({-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1});
   white.add_box({-0.35F, -1.0F, -0.3F}, {0.3F, 0.6F, 0.3F}, 17.0F);
   white.add_box({0.35F, -1.0F, 0.3F}, {0.3F, 0.3F, 0.3F}, -18.0F);
-  Quads red{.colour = {0.63F, 0.065F, 0.05F}};
+  Quads red{.color = {0.63F, 0.065F, 0.05F}};
   red.add({-1, -1, 1}, {-1, -1, -1}, {-1, 1, -1}, {-1, 1, 1});
-  Quads green{.colour = {0.14F, 0.45F, 0.091F}};
+  Quads green{.color = {0.14F, 0.45F, 0.091F}};
   green.add({1, -1, -1}, {1, -1, 1}, {1, 1, 1}, {1, 1, -1});
-  Quads lamp{.colour = vec3(0.01F), .radiance = 12.0F};
-  lamp.add({-0.25F, 0.998F, -0.25F}, {0.25F, 0.998F, -0.25F}, {0.25F, 0.998F, 0.25F}, {-0.25F, 0.998F, 0.25F});
+  Quads analytic_light{.color = vec3(0.01F), .radiance = 12.0F};
+  analytic_light.add({-0.25F, 0.998F, -0.25F}, {0.25F, 0.998F, -0.25F}, {0.25F, 0.998F, 0.25F},
+                     {-0.25F, 0.998F, 0.25F});
   std::vector<cumulet_mesh_desc> meshes;
-  for (const Quads* quads : {&white, &red, &green, &lamp}) {
+  for (const Quads* quads : {&white, &red, &green, &analytic_light}) {
     auto mesh = make_desc<cumulet_mesh_desc>();
     mesh.positions = quads->positions.data();
     mesh.vertex_count = quads->positions.size() / 3;
-    for (int c = 0; c < 3; ++c) mesh.base_color[c] = quads->colour[c];
+    for (int c = 0; c < 3; ++c) mesh.base_color[c] = quads->color[c];
     mesh.base_color[3] = 1.0F;
     set(mesh.emission, quads->radiance, 0.85F * quads->radiance, 0.6F * quads->radiance);
     meshes.push_back(mesh);
@@ -272,7 +273,7 @@ Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t
   must(cumulet_set_medium(viewer(), &looks.medium));
   must(cumulet_set_light(viewer(), &light_));
   must(cumulet_set_display(viewer(), &display_));
-  must(cumulet_set_lamps(viewer(), looks.lamps.data(), looks.lamps.size()));
+  must(cumulet_set_lamps(viewer(), looks.analytic_lights.data(), looks.analytic_lights.size()));
   auto surface = make_desc<cumulet_surface_settings_desc>();
   surface.indirect_roughness = looks.indirect_roughness;
   must(cumulet_set_surface_settings(viewer(), &surface));

@@ -202,8 +202,8 @@ Measured measure_apart(const std::string& file, const viewer::BuildSettings& set
 }
 
 void plot(const std::vector<Measured>& all, const std::filesystem::path& folder) {
-  const auto series = [&](const char* label, int colour, bool dashed, const auto& value) {
-    bench::Series made{label, colour, dashed, {}};
+  const auto series = [&](const char* label, int color, bool dashed, const auto& value) {
+    bench::Series made{label, color, dashed, {}};
     for (const Measured& m : all) made.points.emplace_back(static_cast<double>(m.voxels), value(m));
     return made;
   };

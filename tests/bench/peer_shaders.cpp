@@ -26,8 +26,8 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
   const std::string after_flight = std::string("#endif\n") + fly_ends;
   const std::array edits{
       Edit{"march.glsl", march, with_type.c_str()},
-      Edit{"flight.glsl", fly_begins, with_flight.c_str()},
-      Edit{"flight.glsl", fly_ends, after_flight.c_str()},
+      Edit{"free_flight.glsl", fly_begins, with_flight.c_str()},
+      Edit{"free_flight.glsl", fly_ends, after_flight.c_str()},
       // No transmittance is known: that of a shadow ray is in its radiance, and depths are those of majorants.
       Edit{"path.glsl", "  float depth = p.depth_0 - p.depth;\n", "  float depth = 0.0f;\n"},
       Edit{"path_vertex.glsl", "#define CM_SHADOW_DEPTH 2.0f", "#define CM_SHADOW_DEPTH 0.0f"},

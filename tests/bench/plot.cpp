@@ -147,14 +147,14 @@ std::string line_plot(const std::string& title, const std::string& x_label, cons
     for (const auto& [a, b] : s.points) {
       if (!(a > 0.0) || !(b > 0.0)) continue;
       path += format("%c%.1f %.1f", path.empty() ? 'M' : 'L', x.place(a), y.place(b));
-      dots += format("<circle class=\"fill%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"3\"/>", s.colour, x.place(a), y.place(b));
+      dots += format("<circle class=\"fill%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"3\"/>", s.color, x.place(a), y.place(b));
     }
     if (!path.empty()) {
-      svg += format("<path class=\"line%d\" fill=\"none\" stroke-width=\"2\"%s d=\"", s.colour, dash) + path + "\"/>\n";
+      svg += format("<path class=\"line%d\" fill=\"none\" stroke-width=\"2\"%s d=\"", s.color, dash) + path + "\"/>\n";
     }
     svg += dots + "\n";
     svg += format("<line class=\"line%d\" stroke-width=\"2\"%s x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>\n",
-                  s.colour, dash, legend_from, legend - 4.0, legend_from + 36.0, legend - 4.0);
+                  s.color, dash, legend_from, legend - 4.0, legend_from + 36.0, legend - 4.0);
     svg += text_at(legend_from + 44.0, legend, "start", s.label);
     legend += 19.0;
   }

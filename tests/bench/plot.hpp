@@ -11,7 +11,7 @@ void write_file(const std::filesystem::path& path, const std::string& text);
 
 struct Series {
   std::string label;
-  int colour = 0;  ///< 0 to 3
+  int color = 0;  ///< 0 to 3
   bool dashed = false;
   std::vector<std::pair<double, double>> points;
 };

@@ -327,7 +327,7 @@ void write_plots(const Options& options, const std::vector<AssetResult>& assets)
     for (const SweepCurve& curve : asset.curves) {
       Series s;
       s.label = std::string(curve.kind == Kind::tet_linear ? "linear" : "constant") + ", " + name_of(curve.criterion);
-      s.colour = curve.kind == Kind::tet_linear ? 1 : 0;
+      s.color = curve.kind == Kind::tet_linear ? 1 : 0;
       s.dashed = curve.criterion == grid::Criterion::range_mean;
       for (const SweepPoint& p : curve.points) {
         s.points.emplace_back(static_cast<double>(p.cells), 100.0 * p.error.depth);

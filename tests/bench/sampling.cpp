@@ -143,7 +143,7 @@ std::vector<Technique> techniques() {
        {{"path.glsl", "if (CM_SURFACES == 0 && CM_INSTANCES == 0) glow =", "if (CM_SURFACES == 9) glow ="}},
        {"fire", "explosion"}},
       {"looks for cells that glow",
-       {{"light.glsl", "  return cm_luminance(mean) * CM_GLOW.density * CM_GLOW.extent * least * least;",
+       {{"light.glsl", "  return cm_luminance(mean) * CM_EMISSIVE.density * CM_EMISSIVE.extent * least * least;",
          "  return 0.0f * least;"},
         {"light.glsl", "  light.radiance = mean * (cm_emission_at(record, cell_class, point) *",
          "  light.radiance = 0.0f * mean * (cm_emission_at(record, cell_class, point) *"}},

@@ -175,7 +175,7 @@ void plot(const std::string& scene, const std::vector<Course>& courses, const Op
     if (course.scene != scene) continue;
     Series s;
     s.label.append(course.change).append(", denoise ").append(course.denoise);
-    s.colour = course.denoise == "off" ? 0 : 1;
+    s.color = course.denoise == "off" ? 0 : 1;
     s.dashed = course.change != "orbit";
     for (std::size_t i = 0; i < course.at.size(); ++i) s.points.emplace_back(course.at[i], median_at(course.flip, i));
     series.push_back(std::move(s));

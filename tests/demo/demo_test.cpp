@@ -58,7 +58,7 @@ TEST(RampEdit, AddsMovesAndRemovesPoints) {
 TEST(RampEdit, StaysAValidRamp) {
   Points points = {{0.0f, 0.0f}, {1.0f, 1.0f}};
   for (int i = 0; i < 40; ++i) static_cast<void>(add_point(points, {0.01f * static_cast<float>(i * 7 % 40), 0.5f}));
-  EXPECT_EQ(points.size(), cumulet::settings::most_ramp_points);
+  EXPECT_EQ(points.size(), cumulet::settings::max_ramp_points);
   for (const float to : {-1e38f, 5.0f, 0.1f, 1e38f}) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       move_point(points, i, {to, to});
@@ -71,15 +71,15 @@ TEST(RampEdit, FitsTheViewWithAMargin) {
   RampView view;
   view.chosen = 5;
   fit(view, {{0.0f, 0.0f}, {1.0f, 2.0f}}, 3.0f);
-  EXPECT_EQ(view.most_value, 3.0f);
-  EXPECT_EQ(view.most_result, 2.5f);
+  EXPECT_EQ(view.max_value, 3.0f);
+  EXPECT_EQ(view.max_result, 2.5f);
   EXPECT_EQ(view.chosen, 1u);
   fit(view, {{-2.0f, 0.0f}, {-1.0f, 0.0f}}, 0.0f);
-  EXPECT_EQ(view.most_value, 1.0f);
-  EXPECT_EQ(view.most_result, 1.25f);
+  EXPECT_EQ(view.max_value, 1.0f);
+  EXPECT_EQ(view.max_result, 1.25f);
   view.held = 0;
   fit(view, {{0.0f, 0.0f}, {9.0f, 9.0f}}, 3.0f);
-  EXPECT_EQ(view.most_value, 1.0f) << "not while it is dragged";
+  EXPECT_EQ(view.max_value, 1.0f) << "not while it is dragged";
 }
 
 TEST(RampEdit, ReleasesPointsRemovedByUndo) {
@@ -710,8 +710,8 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     model_.scene.environment = "/a/sky.hdr";
     model_.thumbnail_texture = 1;
     for (const cumulet_lamp_kind kind : {CUMULET_LAMP_SPOT, CUMULET_LAMP_RECTANGLE}) {
-      model_.scene.lamps.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
-      model_.scene.lamps.back().kind = kind;
+      model_.scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
+      model_.scene.analytic_lights.back().kind = kind;
     }
     spell_out_defaults(model_.scene);
   }

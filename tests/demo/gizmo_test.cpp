@@ -363,10 +363,10 @@ SceneOptions scene_of_all() {
   for (auto& place : scene.others[0].places) place[0] = place[5] = place[10] = place[15] = 1.0;
   scene.models.push_back({"c.glb"});
   for (const cumulet_lamp_kind kind : {CUMULET_LAMP_SUN, CUMULET_LAMP_RECTANGLE, CUMULET_LAMP_POINT}) {
-    scene.lamps.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
-    scene.lamps.back().kind = kind;
-    scene.lamps.back().width = 2.0;
-    scene.lamps.back().height = 4.0;
+    scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
+    scene.analytic_lights.back().kind = kind;
+    scene.analytic_lights.back().width = 2.0;
+    scene.analytic_lights.back().height = 4.0;
   }
   return scene;
 }
@@ -379,7 +379,7 @@ TEST(Items, AreTheObjectsWithAPosition) {
   EXPECT_EQ(names, (std::vector<std::string>{"Volume 1: a.vdb", "Volume 2, place 1: b.vdb", "Volume 2, place 2: b.vdb",
                                              "Model 1: c.glb", "Lamp 2: rectangle", "Lamp 3: point"}));
   EXPECT_TRUE(items_of(SceneOptions()).empty());
-  EXPECT_FALSE(place_of(scene, {Item::Kind::lamp, 0, 0})) << "a sun stands nowhere";
+  EXPECT_FALSE(place_of(scene, {Item::Kind::analytic_light, 0, 0})) << "a sun stands nowhere";
   EXPECT_FALSE(place_of(scene, {Item::Kind::volume, 2, 0}));
   EXPECT_FALSE(place_of(scene, {Item::Kind::volume, 1, 2}));
 }
@@ -394,7 +394,7 @@ TEST(Items, TransformsRoundTrip) {
     set_place(scene, item, place);
     const dmat4 now = place_of(scene, item).value();
     // A point light has no orientation.
-    for (int column = item == Item{Item::Kind::lamp, 2, 0} ? 3 : 0; column < 4; ++column)
+    for (int column = item == Item{Item::Kind::analytic_light, 2, 0} ? 3 : 0; column < 4; ++column)
       expect_near(dvec3(now[column]), dvec3(place[column]), 1e-12);
     for (const Item& other : items_of(before)) {
       if (other == item) continue;
@@ -406,16 +406,16 @@ TEST(Items, TransformsRoundTrip) {
 }
 
 TEST(Items, ScaledLightKeepsItsOtherSettings) {
-  const Item item{Item::Kind::lamp, 1, 0};
+  const Item item{Item::Kind::analytic_light, 1, 0};
   SceneOptions scene = scene_of_all();
   const dmat4 place = place_of(scene, item).value();
   expect_near(dvec3(place[2]), {0.0, -1.0, 0.0}, 1e-15);
   set_place(scene, item, glm::translate(dmat4(1.0), dvec3(0.0, 5.0, 0.0)) * place);
-  EXPECT_EQ(scene.lamps[1].position[1], 5.0);
-  EXPECT_EQ(scene.lamps[1].direction[1], 0.0) << "down, as it was";
+  EXPECT_EQ(scene.analytic_lights[1].position[1], 5.0);
+  EXPECT_EQ(scene.analytic_lights[1].direction[1], 0.0) << "down, as it was";
   set_place(scene, item, place_of(scene, item).value() * glm::scale(dmat4(1.0), dvec3(3.0, 0.5, 7.0)));
-  EXPECT_DOUBLE_EQ(scene.lamps[1].width, 6.0);
-  EXPECT_DOUBLE_EQ(scene.lamps[1].height, 2.0);
+  EXPECT_DOUBLE_EQ(scene.analytic_lights[1].width, 6.0);
+  EXPECT_DOUBLE_EQ(scene.analytic_lights[1].height, 2.0);
   expect_near(dvec3(place_of(scene, item).value()[2]), {0.0, -1.0, 0.0}, 1e-12);
 }
 

@@ -88,7 +88,7 @@ ViewerPtr viewer_of(Context& context, cumulet_programs* programs, cumulet_gl_sta
 
 void render(cumulet_viewer* viewer, const HostTarget& target) {
   auto frame = target.frame();
-  frame.colour = CUMULET_COLOUR_HDR;
+  frame.color = CUMULET_COLOR_HDR;
   frame.write_depth = 1;
   frame.target = CUMULET_TARGET_NONE;
   cumulet::test::converge(viewer, frame);

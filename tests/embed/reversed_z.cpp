@@ -45,7 +45,7 @@ void main() { result = vec4(colour, 1); })";
 struct Cube {
   std::array<float, 3> centre;
   float radius;
-  std::array<float, 3> colour;
+  std::array<float, 3> color;
 };
 // The ball has radius 12 about the origin; the eye is on +Z.
 constexpr Cube half_inside{{3.0F, 3.0F, 12.0F}, 3.0F, {0.2F, 0.4F, 1.0F}};
@@ -74,10 +74,10 @@ class HostScene {
         gl_.TextureStorage2D(name, 1, format, side, side);
       }
     };
-    texture(colour_, GL_RGBA8);
+    texture(color_, GL_RGBA8);
     texture(depth_, GL_DEPTH_COMPONENT32F);
     gl_.CreateFramebuffers(1, &framebuffer_);
-    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, colour_, 0);
+    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, color_, 0);
     gl_.NamedFramebufferTexture(framebuffer_, GL_DEPTH_ATTACHMENT, depth_, 0);
 
     program_ = gl_.CreateProgram();
@@ -112,7 +112,7 @@ class HostScene {
     gl_.DeleteVertexArrays(1, &vertex_array_);
     gl_.DeleteProgram(program_);
     gl_.DeleteFramebuffers(1, &framebuffer_);
-    gl_.DeleteTextures(1, &colour_);
+    gl_.DeleteTextures(1, &color_);
     gl_.DeleteTextures(1, &depth_);
   }
 
@@ -163,7 +163,7 @@ class HostScene {
     for (const Cube& cube : cubes) {
       gl_.Uniform3fv(gl_.GetUniformLocation(program_, "centre"), 1, cube.centre.data());
       gl_.Uniform1f(gl_.GetUniformLocation(program_, "radius"), cube.radius);
-      gl_.Uniform3fv(gl_.GetUniformLocation(program_, "colour"), 1, cube.colour.data());
+      gl_.Uniform3fv(gl_.GetUniformLocation(program_, "colour"), 1, cube.color.data());
       gl_.DrawArrays(GL_TRIANGLES, 0, 36);
     }
     EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
@@ -197,7 +197,7 @@ class HostScene {
   Convention convention_;
   cumulet::headless::Context context_;
   GladGLContext gl_;
-  GLuint colour_ = 0;
+  GLuint color_ = 0;
   GLuint depth_ = 0;
   GLuint framebuffer_ = 0;
   GLuint program_ = 0;

@@ -89,10 +89,10 @@ TEST_P(StateScramble, EveryCallRestoresTheState) {
   converge(v, target.frame());
 
   cumulet_frame_desc frame = target.frame();
-  for (const cumulet_colour colour :
-       {CUMULET_COLOUR_SRGB, CUMULET_COLOUR_SRGB_FRAMEBUFFER, CUMULET_COLOUR_LINEAR, CUMULET_COLOUR_HDR}) {
-    frame.colour = colour;
-    render("colour " + std::to_string(colour), frame);
+  for (const cumulet_color_encoding color :
+       {CUMULET_COLOR_SRGB, CUMULET_COLOR_SRGB_FRAMEBUFFER, CUMULET_COLOR_LINEAR, CUMULET_COLOR_HDR}) {
+    frame.color = color;
+    render("colour " + std::to_string(color), frame);
   }
   frame = target.frame();
   frame.blend = CUMULET_BLEND_REPLACE;

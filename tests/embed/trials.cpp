@@ -52,12 +52,12 @@ class RapidChanges : public testing::Test {
     ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
   }
   /// Makes a request every few milliseconds until this number of different answers was seen. Returns the number.
-  template <class Wish, class Answer>
-  std::size_t stream(std::chrono::milliseconds pause, std::size_t enough, Wish&& wish, Answer&& answer) const {
+  template <class Request, class Answer>
+  std::size_t stream(std::chrono::milliseconds pause, std::size_t enough, Request&& request, Answer&& answer) const {
     std::set<double> seen;
     const auto until = Clock::now() + patience;
     for (int i = 0; seen.size() < enough && Clock::now() < until; ++i) {
-      wish(i);
+      request(i);
       render();
       if (const double value = answer(); value != 0.0) seen.insert(value);
       std::this_thread::sleep_for(pause);
@@ -328,7 +328,7 @@ void Caller::call_all() {
   const auto triangles = make_desc<cumulet_triangles_desc>();
   const auto medium = make_desc<cumulet_medium_desc>();
   const auto light = make_desc<cumulet_light_desc>();
-  const auto lamp = make_desc<cumulet_lamp_desc>();
+  const auto analytic_light = make_desc<cumulet_lamp_desc>();
   const auto environment = make_desc<cumulet_environment_desc>();
   const auto environment_settings = make_desc<cumulet_environment_settings_desc>();
   const auto ground = make_desc<cumulet_ground_desc>();
@@ -514,7 +514,7 @@ void Caller::call_all() {
     CALL(cumulet_set_medium, v, &medium);
     CALL(cumulet_set_ramp, v, CUMULET_RAMP_DENSITY, nullptr, 0);
     CALL(cumulet_set_light, v, &light);
-    CALL(cumulet_set_lamps, v, &lamp, 1);
+    CALL(cumulet_set_lamps, v, &analytic_light, 1);
     CALL(cumulet_load_environment, v, "none.hdr");
     CALL(cumulet_set_environment, v, nullptr);
     CALL(cumulet_get_environment, v, &new_environment);

@@ -85,7 +85,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     cumulet::volume::Inspection inspection(path);
-    for (std::size_t grid = 0; grid < inspection.grids().size(); ++grid) static_cast<void>(inspection.facts(grid));
+    for (std::size_t grid = 0; grid < inspection.grids().size(); ++grid)
+      static_cast<void>(inspection.volume_info(grid));
   } catch (const cumulet::Error& error) {
     check_line(error.what(), path);
   }

@@ -28,14 +28,14 @@ int run(const char* volume) {
 
   constexpr GLsizei width = 80;
   constexpr GLsizei height = 60;
-  GLuint colour = 0;
+  GLuint color = 0;
   GLuint framebuffer = 0;
-  gl.GenRenderbuffers(1, &colour);
-  gl.BindRenderbuffer(GL_RENDERBUFFER, colour);
+  gl.GenRenderbuffers(1, &color);
+  gl.BindRenderbuffer(GL_RENDERBUFFER, color);
   gl.RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, width, height);
   gl.GenFramebuffers(1, &framebuffer);
   gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-  gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour);
+  gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, color);
 
   cumulet_viewer* viewer = panel_open(Context::get_proc, &context, volume);
   if (viewer == nullptr) return 1;

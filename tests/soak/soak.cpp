@@ -34,7 +34,7 @@ using cumulet::headless::Backend;
 using cumulet::headless::Context;
 
 constexpr unsigned kinds = 6;
-constexpr unsigned least_days = 6 * kinds;
+constexpr unsigned min_days = 6 * kinds;
 
 unsigned failures = 0;
 void expect(bool holds, const std::string& what) {
@@ -208,7 +208,7 @@ class Host {
         });
         break;
       case 13:
-        lamps(viewer, one_of(3));
+        analytic_lights(viewer, one_of(3));
         break;
       case 14:
         save(viewer);
@@ -234,13 +234,13 @@ class Host {
     if (cumulet_camera_orbit(raw, angle, 0.05) != CUMULET_OK) throw std::runtime_error("no orbit");
   }
 
-  static void lamps(cumulet_viewer* viewer, unsigned count) {
-    std::vector<cumulet_lamp_desc> lamps(count, make_desc<cumulet_lamp_desc>());
-    for (cumulet_lamp_desc& lamp : lamps) {
-      lamp.position[1] = 20.0;
-      lamp.power = 1000.0F;
+  static void analytic_lights(cumulet_viewer* viewer, unsigned count) {
+    std::vector<cumulet_lamp_desc> analytic_lights(count, make_desc<cumulet_lamp_desc>());
+    for (cumulet_lamp_desc& analytic_light : analytic_lights) {
+      analytic_light.position[1] = 20.0;
+      analytic_light.power = 1000.0F;
     }
-    ok(viewer, cumulet_set_lamps(viewer, lamps.data(), lamps.size()));
+    ok(viewer, cumulet_set_lamps(viewer, analytic_lights.data(), analytic_lights.size()));
   }
 
   /// If there is an image: saves its samples, restores them, and saves a file.
@@ -259,7 +259,7 @@ class Host {
     ok(viewer, cumulet_set_surfaces(viewer, nullptr));
     ok(viewer, cumulet_set_environment(viewer, nullptr));
     ok(viewer, cumulet_set_volume(viewer, make_ball(20).get()));
-    lamps(viewer, 0);
+    analytic_lights(viewer, 0);
     set<cumulet_medium_desc>(viewer, cumulet_set_medium, [](auto&) {});
     set<cumulet_grid_desc>(viewer, cumulet_set_grid, [](auto&) {});
     set<cumulet_display_desc>(viewer, cumulet_set_display, [](auto&) {});
@@ -312,7 +312,7 @@ int main(int argc, char** argv) {
   try {
     Host host(files);
     std::vector<Held> days;
-    while (days.size() < least_days || elapsed() < seconds) {
+    while (days.size() < min_days || elapsed() < seconds) {
       days.push_back(host.day(static_cast<unsigned>(days.size()) % kinds));
       const Held& held = days.back();
       if (days.size() % kinds == 0)

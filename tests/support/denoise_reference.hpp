@@ -32,7 +32,7 @@ class DenoiseReference {
     return std::exp((x - 9.98620152e-01) / 1.92653254e-01) - 6.26026094e-03;
   }
 
-  static double exposure(const std::vector<glm::vec4>& colour, glm::ivec2 size) {
+  static double exposure(const std::vector<glm::vec4>& color, glm::ivec2 size) {
     const glm::ivec2 bins = (size + 15) / 16;
     double sum = 0.0;
     int count = 0;
@@ -42,7 +42,7 @@ class DenoiseReference {
         int pixels = 0;
         for (int y = by * size.y / bins.y; y < (by + 1) * size.y / bins.y; ++y) {
           for (int x = bx * size.x / bins.x; x < (bx + 1) * size.x / bins.x; ++x, ++pixels) {
-            const glm::dvec3 c = sane(colour[static_cast<std::size_t>(y * size.x + x)]);
+            const glm::dvec3 c = sane(color[static_cast<std::size_t>(y * size.x + x)]);
             luminance += 0.212671 * c.r + 0.715160 * c.g + 0.072169 * c.b;
           }
         }
@@ -56,16 +56,16 @@ class DenoiseReference {
   }
 
   /// Returns the denoised image. albedo and normal are empty for networks that use only color.
-  [[nodiscard]] std::vector<glm::dvec3> denoise(const std::vector<glm::vec4>& colour,
+  [[nodiscard]] std::vector<glm::dvec3> denoise(const std::vector<glm::vec4>& color,
                                                 const std::vector<glm::vec4>& albedo,
                                                 const std::vector<glm::vec4>& normal, glm::ivec2 size) const {
-    const double exposed = exposure(colour, size);
+    const double exposed = exposure(color, size);
     Channels input((size.x + 2 * rim + 15) / 16 * 16, (size.y + 2 * rim + 15) / 16 * 16, albedo.empty() ? 3 : 9);
     for (int y = 0; y < input.height; ++y) {
       for (int x = 0; x < input.width; ++x) {
         const auto i = static_cast<std::size_t>(mirrored(y - rim, size.y) * size.x + mirrored(x - rim, size.x));
         for (int c = 0; c < 3; ++c) {
-          input.at(c, y, x) = encode(exposed * sane(colour[i])[c]);
+          input.at(c, y, x) = encode(exposed * sane(color[i])[c]);
           if (albedo.empty()) continue;
           input.at(3 + c, y, x) = std::clamp(double(albedo[i][c]), 0.0, 1.0);
           input.at(6 + c, y, x) = 0.5 + 0.5 * std::clamp(double(normal[i][c]), -1.0, 1.0);
@@ -103,11 +103,11 @@ class DenoiseReference {
   };
 
   static double most() { return 1.92653254e-01 * std::log(65504.0 + 6.26026094e-03) + 9.98620152e-01; }
-  static glm::dvec3 sane(const glm::vec4& colour) {
+  static glm::dvec3 sane(const glm::vec4& color) {
     for (int c = 0; c < 3; ++c) {
-      if (!std::isfinite(colour[c])) return glm::dvec3(0.0);
+      if (!std::isfinite(color[c])) return glm::dvec3(0.0);
     }
-    return glm::max(glm::dvec3(colour), 0.0);
+    return glm::max(glm::dvec3(color), 0.0);
   }
 
   [[nodiscard]] Channels convolve(const Channels& from, const std::string& name) const {

@@ -35,10 +35,10 @@ class Flip {
     const Features features_b = features(b.y);
     std::vector<double> differences(seen_a.size());
     for (std::size_t i = 0; i < differences.size(); ++i) {
-      const double colour = redistributed(hyab(seen_a[i], seen_b[i]));
+      const double color = redistributed(hyab(seen_a[i], seen_b[i]));
       const double feature = std::max(std::abs(features_a.edges[i] - features_b.edges[i]),
                                       std::abs(features_a.points[i] - features_b.points[i]));
-      differences[i] = std::pow(colour, 1.0 - std::sqrt(feature / std::numbers::sqrt2));
+      differences[i] = std::pow(color, 1.0 - std::sqrt(feature / std::numbers::sqrt2));
     }
     return differences;
   }

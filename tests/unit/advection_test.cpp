@@ -185,7 +185,7 @@ TEST(Advection, ColorKeepsItsValueAtTheEdgeOfTheSmoke) {
   const auto where_smoke_is = [](double value) {
     return filled([=](const dvec3& p) { return glm::length(p - centre) < 9.0 ? value : 0.0; });
   };
-  frame.colour = std::array{where_smoke_is(0.75), where_smoke_is(0.25), where_smoke_is(0.5)};
+  frame.color = std::array{where_smoke_is(0.75), where_smoke_is(0.25), where_smoke_is(0.5)};
   frame.velocity = velocity(size, low, [](const dvec3& /*p*/) { return dvec3(6.5, 3.25, -1.5); });
   const VolumeFrame after = advect(frame, 1.0);
   int seen = 0;
@@ -194,8 +194,8 @@ TEST(Advection, ColorKeepsItsValueAtTheEdgeOfTheSmoke) {
       for (p.z = after.density.bounds_min.z; p.z <= after.density.bounds_max.z; ++p.z) {
         if (value_at(after.density, p) <= 0.0F) continue;
         ++seen;
-        ASSERT_NEAR(value_at((*after.colour)[0], p), 0.75F, 1e-6F);
-        ASSERT_NEAR(value_at((*after.colour)[1], p), 0.25F, 1e-6F);
+        ASSERT_NEAR(value_at((*after.color)[0], p), 0.75F, 1e-6F);
+        ASSERT_NEAR(value_at((*after.color)[1], p), 0.25F, 1e-6F);
       }
     }
   }

@@ -18,7 +18,7 @@ namespace {
 
 using cumulet::gl::Object;
 using cumulet::gl::StateGuard;
-using cumulet::render::ColourEncoding;
+using cumulet::render::ColorEncoding;
 using cumulet::render::Display;
 using cumulet::render::FrameTarget;
 using cumulet::render::ToneMap;
@@ -67,7 +67,7 @@ class PremultipliedAlpha : public cumulet::test::GlTest {
     }
     return got;
   }
-  static Display display_of(ColourEncoding encoding, ToneMap tone_map = ToneMap::clip) {
+  static Display display_of(ColorEncoding encoding, ToneMap tone_map = ToneMap::clip) {
     Display display;
     display.encoding = encoding;
     display.tone_map = tone_map;
@@ -80,15 +80,14 @@ CUMULET_ON_BACKENDS(PremultipliedAlpha);
 
 TEST_P(PremultipliedAlpha, LinearTargetsHoldTheRadianceOverAnyBackdrop) {
   struct Case {
-    ColourEncoding encoding;
+    ColorEncoding encoding;
     GLenum format;
     float step;  // of the format
   };
-  for (const Case& c :
-       {Case{ColourEncoding::linear, GL_RGBA8, 1.0F / 255.0F}, Case{ColourEncoding::linear, GL_RGBA16F, 2e-3F},
-        Case{ColourEncoding::linear, GL_RGBA32F, 1e-5F}, Case{ColourEncoding::hdr, GL_RGBA16F, 4e-3F},
-        Case{ColourEncoding::hdr, GL_RGBA32F, 1e-5F},
-        Case{ColourEncoding::srgb_framebuffer, GL_SRGB8_ALPHA8, 1.0F / 255.0F}}) {
+  for (const Case& c : {Case{ColorEncoding::linear, GL_RGBA8, 1.0F / 255.0F},
+                        Case{ColorEncoding::linear, GL_RGBA16F, 2e-3F}, Case{ColorEncoding::linear, GL_RGBA32F, 1e-5F},
+                        Case{ColorEncoding::hdr, GL_RGBA16F, 4e-3F}, Case{ColorEncoding::hdr, GL_RGBA32F, 1e-5F},
+                        Case{ColorEncoding::srgb_framebuffer, GL_SRGB8_ALPHA8, 1.0F / 255.0F}}) {
     for (const bool over : {true, false}) {
       for (const float backdrop : {0.0F, 0.1F, 0.5F, 1.0F}) {
         SCOPED_TRACE(testing::Message() << "encoding " << int(c.encoding) << " format " << std::hex << c.format
@@ -97,7 +96,7 @@ TEST_P(PremultipliedAlpha, LinearTargetsHoldTheRadianceOverAnyBackdrop) {
         for (std::size_t i = 0; i < pixels.size(); ++i) {
           for (int k = 0; k < 4; ++k) {
             float radiance = pixels[i][k];
-            if (c.encoding != ColourEncoding::hdr) radiance = std::min(radiance, 1.0F);
+            if (c.encoding != ColorEncoding::hdr) radiance = std::min(radiance, 1.0F);
             if (over) radiance += (k == 3 ? 1.0F : backdrop) * (1.0F - pixels[i].a);
             const bool bytes = c.format == GL_RGBA8 || c.format == GL_SRGB8_ALPHA8;
             if (bytes) radiance = std::min(radiance, 1.0F);
@@ -117,7 +116,7 @@ TEST_P(PremultipliedAlpha, EncodedTargetsAreExactOverBlackAndWhite) {
     for (const float backdrop : {0.0F, 0.1F, 0.3F, 0.6F, 1.0F}) {
       SCOPED_TRACE(testing::Message() << "format " << std::hex << format << " backdrop " << backdrop);
       const auto got =
-          draw(display_of(ColourEncoding::srgb), format, true, glm::vec4(glm::vec3(encode(backdrop)), 1.0F));
+          draw(display_of(ColorEncoding::srgb), format, true, glm::vec4(glm::vec3(encode(backdrop)), 1.0F));
       const bool exact = backdrop == 0.0F || backdrop == 1.0F;
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         const bool gray = std::ranges::find(gray_pixels, i) != gray_pixels.end();
@@ -137,11 +136,11 @@ TEST_P(PremultipliedAlpha, EncodedTargetsAreExactOverBlackAndWhite) {
 
 TEST_P(PremultipliedAlpha, OverBlackEqualsTheOpaqueImage) {
   struct Case {
-    ColourEncoding encoding;
+    ColorEncoding encoding;
     GLenum format;
   };
-  for (const Case& c : {Case{ColourEncoding::srgb, GL_RGBA8}, Case{ColourEncoding::srgb_framebuffer, GL_SRGB8_ALPHA8},
-                        Case{ColourEncoding::linear, GL_RGBA16F}, Case{ColourEncoding::hdr, GL_RGBA32F}}) {
+  for (const Case& c : {Case{ColorEncoding::srgb, GL_RGBA8}, Case{ColorEncoding::srgb_framebuffer, GL_SRGB8_ALPHA8},
+                        Case{ColorEncoding::linear, GL_RGBA16F}, Case{ColorEncoding::hdr, GL_RGBA32F}}) {
     for (const ToneMap tone_map : {ToneMap::neutral, ToneMap::filmic, ToneMap::clip}) {
       for (const bool over : {true, false}) {
         Display display = display_of(c.encoding, tone_map);
@@ -158,7 +157,7 @@ TEST_P(PremultipliedAlpha, OverBlackEqualsTheOpaqueImage) {
         }
         EXPECT_GT(brightest, 0.5F);
         // Encoded targets use an alpha of their own, chosen for blending.
-        if (c.encoding != ColourEncoding::srgb) {
+        if (c.encoding != ColorEncoding::srgb) {
           EXPECT_EQ(transparent[1].a, 0.0F) << "fire covers nothing";
         }
         EXPECT_EQ(transparent[7].a, 1.0F);

@@ -10,7 +10,7 @@
 #include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
-#include "viewer/c_lamps.hpp"
+#include "viewer/c_lights.hpp"
 
 namespace {
 
@@ -25,7 +25,7 @@ using test::StillScene;
 constexpr double pi = std::numbers::pi;
 constexpr double floor_y = -10.0;
 
-cumulet_lamp_desc lamp(cumulet_lamp_kind kind, const dvec3& position, float power) {
+cumulet_lamp_desc analytic_light(cumulet_lamp_kind kind, const dvec3& position, float power) {
   cumulet_lamp_desc d{};
   d.struct_size = sizeof d;
   d.kind = kind;
@@ -34,8 +34,8 @@ cumulet_lamp_desc lamp(cumulet_lamp_kind kind, const dvec3& position, float powe
   return d;
 }
 
-light::Lamps lamps_of(const std::vector<cumulet_lamp_desc>& descs) {
-  return c_abi::lamps_of(descs.data(), descs.size());
+light::AnalyticLights analytic_lights_of(const std::vector<cumulet_lamp_desc>& descs) {
+  return c_abi::analytic_lights_of(descs.data(), descs.size());
 }
 
 class AnalyticLights : public test::ViewerTest {
@@ -47,7 +47,7 @@ class AnalyticLights : public test::ViewerTest {
     still_->set_light({});
   }
   // A model with a light and a quad far from it.
-  void show_model_with_lamp(const vec3& position, float intensity) {
+  void show_model_with_analytic_light(const vec3& position, float intensity) {
     surface::PunctualLight of_model;
     of_model.intensity = vec3(intensity);
     of_model.position = position;
@@ -57,7 +57,7 @@ class AnalyticLights : public test::ViewerTest {
     scene->rest.lights = {of_model};
     still_->viewer().show_surfaces(test::source_of(scene));
   }
-  void set_lamps(const std::vector<cumulet_lamp_desc>& descs) { still_->viewer().set_lamps(lamps_of(descs)); }
+  void set_lamps(const std::vector<cumulet_lamp_desc>& descs) { still_->viewer().set_lamps(analytic_lights_of(descs)); }
   void set_medium(double sigma, float albedo, std::uint32_t max_bounces = 0) {
     viewer::Medium medium;
     medium.density_scale = sigma;
@@ -115,9 +115,9 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
     EXPECT_NEAR(irradiance(), expected, 0.01 * expected + 1e-9) << what;
   };
   const double point = 1000.0 / (4.0 * pi) / (above * above);
-  expect(lamp(CUMULET_LAMP_POINT, place, 1000.0F), point, "point");
+  expect(analytic_light(CUMULET_LAMP_POINT, place, 1000.0F), point, "point");
 
-  auto spot = lamp(CUMULET_LAMP_SPOT, place, 1000.0F);
+  auto spot = analytic_light(CUMULET_LAMP_SPOT, place, 1000.0F);
   expect(spot, point, "spot");
   spot.direction[0] = std::tan(20.0 * pi / 180.0);
   spot.direction[1] = -1.0;
@@ -130,17 +130,17 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   const double edge = std::cos(30.0 * pi / 180.0);
   const double share = (std::cos(25.0 * pi / 180.0) - edge) / (1.0 - edge);
   expect(spot, point * share * share, "blended");
-  auto narrow = lamp(CUMULET_LAMP_SPOT, place, 1000.0F);
+  auto narrow = analytic_light(CUMULET_LAMP_SPOT, place, 1000.0F);
   narrow.angle_degrees = 4.0;
   expect(narrow, point, "narrow");
 
-  auto disc = lamp(CUMULET_LAMP_DISC, place, 1000.0F);
+  auto disc = analytic_light(CUMULET_LAMP_DISC, place, 1000.0F);
   disc.width = 30.0;
   expect(disc, 0.25 * 1000.0 / (above * above + 225.0), "disc");
   disc.direction[1] = 1.0;
   expect(disc, 0.0, "a disc's back");
 
-  auto rectangle = lamp(CUMULET_LAMP_RECTANGLE, place, 1000.0F);
+  auto rectangle = analytic_light(CUMULET_LAMP_RECTANGLE, place, 1000.0F);
   rectangle.width = 30.0;
   rectangle.height = 8.0;
   const double radiance = 1000.0 / (4.0 * 240.0);
@@ -151,7 +151,7 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   rectangle.across[1] = 100.0;
   expect(rectangle, 2.0 * radiance * quarter(30.0, 4.0, above), "rectangle beside");
   // Upright, its lower edge level with the floor.
-  rectangle = lamp(CUMULET_LAMP_RECTANGLE, {32.0, floor_y + 4.0, 32.0 + above}, 1000.0F);
+  rectangle = analytic_light(CUMULET_LAMP_RECTANGLE, {32.0, floor_y + 4.0, 32.0 + above}, 1000.0F);
   rectangle.direction[2] = -1.0;
   rectangle.width = 30.0;
   rectangle.height = 8.0;
@@ -160,7 +160,7 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   expect(rectangle, radiance * (near - slant), "upright");
 
   for (const double angle : {0.0, 1.0, 60.0}) {
-    auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
+    auto sun = analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
     sun.angle_degrees = angle;
     expect(sun, 3.0, "sun");
     sun.direction[0] = 1.0;
@@ -172,16 +172,17 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
 // Lights are sampled by their contribution, and weak ones are still unbiased.
 TEST_P(AnalyticLights, DimLightsNextToBrightOnesCount) {
   set_floor();
-  std::vector<cumulet_lamp_desc> lamps{lamp(CUMULET_LAMP_POINT, place, 1.0F)};
-  auto away = lamp(CUMULET_LAMP_SPOT, place, 1e6F);  // faces up
+  std::vector<cumulet_lamp_desc> analytic_lights{analytic_light(CUMULET_LAMP_POINT, place, 1.0F)};
+  auto away = analytic_light(CUMULET_LAMP_SPOT, place, 1e6F);  // faces up
   away.direction[1] = 1.0;
-  lamps.push_back(away);
-  set_lamps(lamps);
+  analytic_lights.push_back(away);
+  set_lamps(analytic_lights);
   const double dim = 1.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(irradiance(1024), dim, 0.03 * dim);
-  for (const float power : {10.0F, 3.0F, 100.0F}) lamps.push_back(lamp(CUMULET_LAMP_POINT, place, power));
-  lamps.erase(lamps.begin() + 1);
-  set_lamps(lamps);
+  for (const float power : {10.0F, 3.0F, 100.0F})
+    analytic_lights.push_back(analytic_light(CUMULET_LAMP_POINT, place, power));
+  analytic_lights.erase(analytic_lights.begin() + 1);
+  set_lamps(analytic_lights);
   EXPECT_NEAR(irradiance(256), 114.0 * dim, 0.01 * 114.0 * dim);
 }
 
@@ -190,10 +191,10 @@ TEST_P(AnalyticLights, CombineWithModelLightsAndHaveColors) {
   of_scene.intensity = vec3(100.0F);
   of_scene.position = vec3(place);
   set_floor({of_scene});
-  auto d = lamp(CUMULET_LAMP_POINT, place, 1000.0F);
+  auto d = analytic_light(CUMULET_LAMP_POINT, place, 1000.0F);
   d.color[0] = 0.5F;
   d.color[1] = 0.25F;
-  set_lamps({d, lamp(CUMULET_LAMP_SUN, dvec3(0.0), 0.1F), lamp(CUMULET_LAMP_POINT, place, 0.0F)});
+  set_lamps({d, analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 0.1F), analytic_light(CUMULET_LAMP_POINT, place, 0.0F)});
   const test::Picture picture = test::render(*still_, {16, 16, 1024, 1, render::View::shaded});
   const double each = 1000.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(picture.mean().x * pi, 100.0 / (above * above) + 0.5 * each + 0.1, 0.005);
@@ -208,13 +209,13 @@ TEST_P(AnalyticLights, LightRasterizedSurfaces) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lamps({lamp(CUMULET_LAMP_POINT, place, 1000.0F)});
+  set_lamps({analytic_light(CUMULET_LAMP_POINT, place, 1000.0F)});
   EXPECT_NEAR(irradiance(4) * (4.0 * pi) * above * above / 1000.0, 1.0, 0.01);
-  auto disc = lamp(CUMULET_LAMP_DISC, place, 1000.0F);
+  auto disc = analytic_light(CUMULET_LAMP_DISC, place, 1000.0F);
   disc.width = 0.1;
   set_lamps({disc});
   EXPECT_NEAR(irradiance(4) * 4.0 * above * above / 1000.0, 1.0, 0.01);
-  auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
+  auto sun = analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
   sun.angle_degrees = 60.0;
   set_lamps({sun});
   EXPECT_NEAR(irradiance(4), 3.0, 0.01) << "as bright as it says, however wide";
@@ -227,14 +228,14 @@ TEST_P(AnalyticLights, LightsOfRasterizedOnlyModelsAreNotSampled) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lamps({lamp(CUMULET_LAMP_POINT, {32.0, 32.0, 60.0}, 4e5F)});
+  set_lamps({analytic_light(CUMULET_LAMP_POINT, {32.0, 32.0, 60.0}, 4e5F)});
   const auto mean = [&] {
     still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
     return test::render(*still_, {16, 16, 256, 1, render::View::shaded}).mean().x;
   };
   const double alone = mean();
   ASSERT_GT(alone, 0.01);
-  show_model_with_lamp({10.0F, 50.0F, 40.0F}, 3e4F);
+  show_model_with_analytic_light({10.0F, 50.0F, 40.0F}, 3e4F);
   EXPECT_NEAR(mean(), alone, 0.01 * alone);
 }
 
@@ -243,7 +244,7 @@ TEST_P(AnalyticLights, ModelLightsLightTheVolumeInPreviews) {
   still_->set_volume(test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
   set_medium(0.1, 1.0F, 1);
   still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
-  show_model_with_lamp({32.0F, 32.0F, 40.0F}, 1000.0F);
+  show_model_with_analytic_light({32.0F, 32.0F, 40.0F}, 1000.0F);
   viewer::Light faint;
   faint.sky_radiance = vec3(1e-6F);
   still_->set_light(faint);
@@ -269,12 +270,12 @@ TEST_P(AnalyticLights, ExtremePowerGivesFiniteValues) {
   set_medium(2.0, 1.0F);
   still_->set_camera(test::camera_at({8.0, 8.0, 60.0}, {8.0, 8.0, 8.0}, 20.0));
   // Lights of size 0 inside the medium, so that paths scatter close to them.
-  auto spot = lamp(CUMULET_LAMP_SPOT, {8.0, 8.0, 8.0}, 9e29F);
-  auto disc = lamp(CUMULET_LAMP_DISC, {8.0, 8.0, 12.0}, 9e29F);
-  auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 9e29F);
+  auto spot = analytic_light(CUMULET_LAMP_SPOT, {8.0, 8.0, 8.0}, 9e29F);
+  auto disc = analytic_light(CUMULET_LAMP_DISC, {8.0, 8.0, 12.0}, 9e29F);
+  auto sun = analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 9e29F);
   disc.width = 1e-3;
   sun.angle_degrees = 90.0;
-  set_lamps({spot, disc, sun, lamp(CUMULET_LAMP_POINT, {7.0, 7.0, 9.0}, 9e29F)});
+  set_lamps({spot, disc, sun, analytic_light(CUMULET_LAMP_POINT, {7.0, 7.0, 9.0}, 9e29F)});
   for (const vec4& pixel : test::render(*still_, {16, 16, 64, 1, render::View::shaded}).pixels) {
     ASSERT_TRUE(std::isfinite(pixel.x)) << pixel.x;
   }
@@ -337,9 +338,9 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
       rectangle.push_back(beyond + dvec3(40.0 * (u - 0.5), 0.0, 10.0 * (v - 0.5)));
     }
   }
-  auto round = lamp(CUMULET_LAMP_DISC, within, float(power));
+  auto round = analytic_light(CUMULET_LAMP_DISC, within, float(power));
   round.width = 12.0;
-  auto wide = lamp(CUMULET_LAMP_RECTANGLE, beyond, float(power));
+  auto wide = analytic_light(CUMULET_LAMP_RECTANGLE, beyond, float(power));
   wide.width = 40.0;
   wide.height = 10.0;
   // In the thin medium, equiangular sampling is used for all lights; in the other one, only for lights inside.
@@ -353,8 +354,10 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
         const test::Picture picture = test::render(*still_, {48, 48, samples, 1, render::View::shaded});
         EXPECT_NEAR(picture.mean().x / expected, 1.0, 0.01) << what << " " << int(march) << " " << sigma;
       };
-      expect(lamp(CUMULET_LAMP_POINT, within, float(power)), scattered(sigma, {within}, point), "point inside");
-      expect(lamp(CUMULET_LAMP_POINT, beyond, float(power)), scattered(sigma, {beyond}, point), "point outside");
+      expect(analytic_light(CUMULET_LAMP_POINT, within, float(power)), scattered(sigma, {within}, point),
+             "point inside");
+      expect(analytic_light(CUMULET_LAMP_POINT, beyond, float(power)), scattered(sigma, {beyond}, point),
+             "point outside");
       expect(round, scattered(sigma, disc, area), "disc inside");
       expect(wide, scattered(sigma, rectangle, area), "rectangle outside");
     }
@@ -365,7 +368,7 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
 
 std::string refusal(const std::vector<cumulet_lamp_desc>& descs) {
   try {
-    lamps_of(descs);
+    analytic_lights_of(descs);
   } catch (const Error& error) {
     return error.what();
   }
@@ -373,7 +376,7 @@ std::string refusal(const std::vector<cumulet_lamp_desc>& descs) {
 }
 
 TEST(LightDescriptors, InvalidValuesAreRejectedByName) {
-  const auto good = lamp(CUMULET_LAMP_POINT, dvec3(0.0), 1.0F);
+  const auto good = analytic_light(CUMULET_LAMP_POINT, dvec3(0.0), 1.0F);
   EXPECT_EQ(refusal({good, good}), "");
   const auto bad = [&](const std::function<void(cumulet_lamp_desc&)>& spoil) {
     auto d = good;
@@ -395,14 +398,14 @@ TEST(LightDescriptors, InvalidValuesAreRejectedByName) {
             field + "angle_degrees of a sun is above 90");
   EXPECT_EQ(bad([](auto& d) { d.blend = 1.5; }), field + "blend is not from 0 to 1");
   EXPECT_EQ(bad([](auto& d) { d.struct_size -= 8; }), "lamp 1: cumulet_lamp_desc.struct_size is not the first one's");
-  EXPECT_THROW(c_abi::lamps_of(nullptr, 1), Error);
-  EXPECT_THROW(c_abi::lamps_of(&good, 4097), Error);
-  EXPECT_TRUE(c_abi::lamps_of(nullptr, 0).empty());
+  EXPECT_THROW(c_abi::analytic_lights_of(nullptr, 1), Error);
+  EXPECT_THROW(c_abi::analytic_lights_of(&good, 4097), Error);
+  EXPECT_TRUE(c_abi::analytic_lights_of(nullptr, 0).empty());
 }
 
 TEST(LightDescriptors, ZeroMeansTheDefault) {
-  auto d = lamp(CUMULET_LAMP_RECTANGLE, dvec3(0.0), 2.0F);
-  light::Lamp made = lamps_of({d}).at(0);
+  auto d = analytic_light(CUMULET_LAMP_RECTANGLE, dvec3(0.0), 2.0F);
+  light::AnalyticLight made = analytic_lights_of({d}).at(0);
   EXPECT_EQ(made.direction, dvec3(0.0, -1.0, 0.0));
   EXPECT_EQ(made.across, dvec3(1.0, 0.0, 0.0));
   EXPECT_EQ(made.power, vec3(2.0F));
@@ -412,11 +415,11 @@ TEST(LightDescriptors, ZeroMeansTheDefault) {
   d.direction[2] = -1e-200;
   d.across[0] = 1.0;
   d.across[2] = 5.0;
-  made = lamps_of({d}).at(0);
+  made = analytic_lights_of({d}).at(0);
   EXPECT_EQ(made.direction, dvec3(0.0, 0.0, -1.0));
   EXPECT_EQ(made.across, dvec3(1.0, 0.0, 0.0));
   d.across[0] = 0.0;  // along the direction
-  EXPECT_NEAR(glm::length(lamps_of({d}).at(0).across - dvec3(-1.0, 0.0, 0.0)), 0.0, 1e-12);
+  EXPECT_NEAR(glm::length(analytic_lights_of({d}).at(0).across - dvec3(-1.0, 0.0, 0.0)), 0.0, 1e-12);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 
 namespace {
 
-using cumulet::light::black_body_colour;
+using cumulet::light::black_body_color;
 using cumulet::light::black_body_radiance;
 using cumulet::light::BlackBody;
 
@@ -39,29 +39,29 @@ constexpr std::array<Published, 4> locus = {
 
 TEST(BlackBody, ColorsFollowPlancksLaw) {
   for (const Published& p : locus) {
-    EXPECT_LT(glm::distance(uv_of(black_body_colour(p.kelvin)), uv_of_xy(p.x, p.y)), 0.0005) << p.kelvin << " K";
+    EXPECT_LT(glm::distance(uv_of(black_body_color(p.kelvin)), uv_of_xy(p.x, p.y)), 0.0005) << p.kelvin << " K";
   }
 }
 
 TEST(BlackBody, ColorsHaveLuminanceOne) {
   for (double kelvin = 100.0; kelvin < 1.0e5; kelvin *= 1.1) {
-    const glm::dvec3 colour = black_body_colour(kelvin);
-    EXPECT_NEAR(cumulet::luminance(colour), 1.0, 1.0e-9) << kelvin << " K";
-    EXPECT_GE(std::min({colour.r, colour.g, colour.b}), 0.0) << kelvin << " K";
+    const glm::dvec3 color = black_body_color(kelvin);
+    EXPECT_NEAR(cumulet::luminance(color), 1.0, 1.0e-9) << kelvin << " K";
+    EXPECT_GE(std::min({color.r, color.g, color.b}), 0.0) << kelvin << " K";
   }
 }
 
 // At 1500 K (x = 0.58568, y = 0.39323) blue is negative. It is clipped to 0, and the ratio of red to green stays.
 TEST(BlackBody, OutOfGamutColorsAreClipped) {
-  EXPECT_GT(black_body_colour(1930.0).b, 0.0);
-  EXPECT_EQ(black_body_colour(1800.0).b, 0.0);
-  const glm::dvec3 clipped = black_body_colour(1500.0);
+  EXPECT_GT(black_body_color(1930.0).b, 0.0);
+  EXPECT_EQ(black_body_color(1800.0).b, 0.0);
+  const glm::dvec3 clipped = black_body_color(1500.0);
   const glm::dvec3 xyz = glm::dvec3(0.58568, 0.39323, 1.0 - 0.58568 - 0.39323) / 0.39323;
   const double red = glm::dot(glm::dvec3(3.2404542, -1.5371385, -0.4985314), xyz);
   const double green = glm::dot(glm::dvec3(-0.9692660, 1.8760108, 0.0415560), xyz);
   EXPECT_EQ(clipped.b, 0.0);
   EXPECT_NEAR(clipped.g / clipped.r, green / red, 0.002 * green / red);
-  EXPECT_EQ(black_body_colour(500.0).g, 0.0);
+  EXPECT_EQ(black_body_color(500.0).g, 0.0);
 }
 
 TEST(BlackBody, RadianceFollowsStefanBoltzmann) {
@@ -76,7 +76,7 @@ TEST(BlackBody, TableInterpolationIsAccurate) {
   const BlackBody table;
   for (double kelvin = 101.0; kelvin < 39999.0; kelvin *= 1.0173) {
     const glm::dvec3 fast(table.emission(static_cast<float>(kelvin), 0.7F));
-    EXPECT_LT(glm::distance(uv_of(fast), uv_of(black_body_colour(kelvin))), 0.0005) << kelvin << " K";
+    EXPECT_LT(glm::distance(uv_of(fast), uv_of(black_body_color(kelvin))), 0.0005) << kelvin << " K";
     EXPECT_NEAR(cumulet::luminance(fast) / black_body_radiance(kelvin, 0.7), 1.0, 1.0e-5) << kelvin << " K";
   }
 }

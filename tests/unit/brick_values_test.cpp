@@ -99,7 +99,7 @@ TEST_P(HalfFloatImages, AreBitIdenticalToFloatImages) {
     volume::VolumeFrame frame{.density = field};
     frame.temperature = field;
     frame.flame = field;
-    frame.colour = {field, field, field};
+    frame.color = {field, field, field};
     return std::make_shared<const viewer::VolumeAsset>(std::move(frame));
   };
   viewer::Medium medium;

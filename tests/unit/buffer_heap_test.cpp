@@ -157,7 +157,7 @@ TEST_P(BufferHeap, LargeSpanHasItsOwnPage) {
 }
 
 TEST_P(BufferHeap, ExceededLimitsAreErrorsAndLeakNothing) {
-  WordHeap heap(gl_, {.page_bytes = 1U << 14U, .largest_page = 1U << 16U, .most_bytes = 80000});
+  WordHeap heap(gl_, {.page_bytes = 1U << 14U, .largest_page = 1U << 16U, .max_bytes = 80000});
   EXPECT_EQ(code_of(heap, (1U << 16U) + 1), ErrorCode::unsupported);
   const WordHeap::Span first = filled(heap, 3000, 1);
   const WordHeap::Span second = filled(heap, 12000, 2);

@@ -107,7 +107,7 @@ std::vector<Ray> rays_at(const Mesh& mesh, std::size_t count, unsigned seed) {
 }
 
 // Expects that every hit and miss is right, except where a ray grazes an edge within float precision.
-void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed, double most_doubtful = 0.01) {
+void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed, double max_doubtful = 0.01) {
   const Bvh bvh = build(mesh);
   BvhRays rays{&bvh};
   std::size_t doubtful = 0;
@@ -149,7 +149,7 @@ void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed,
     ASSERT_NEAR(glm::distance(n, rays.cm_bvh_normal(hit.record)), 0.0, 1e-3);
     ASSERT_EQ(hit.front, glm::dot(dvec3(n), d) < 0.0);
   }
-  EXPECT_LE(double(doubtful), most_doubtful * double(count));
+  EXPECT_LE(double(doubtful), max_doubtful * double(count));
   EXPECT_GE(hits, count / 20);
 }
 

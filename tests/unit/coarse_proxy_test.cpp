@@ -22,7 +22,7 @@
 #include "support/vdb_files.hpp"
 #include "viewer/instance.hpp"
 #include "volume/bricks.hpp"
-#include "volume/stand_in.hpp"
+#include "volume/proxy.hpp"
 
 namespace {
 
@@ -84,14 +84,14 @@ double sum_of(const volume::ScalarVolume& field) {
 class CoarseProxies : public testing::Test {
  protected:
   /// Imports the file. Returns the proxy, if there was one.
-  std::optional<volume::StandIn> import(std::uint64_t least_bricks = 1, const volume::GridNames& names = {}) {
-    std::optional<volume::StandIn> taken;
-    const volume::StandInWish wish{[&](volume::StandIn made) {
-                                     EXPECT_FALSE(taken);
-                                     taken = std::move(made);
-                                   },
-                                   least_bricks};
-    whole_ = volume::import_frame(file(), names, Log(), nullptr, wish);
+  std::optional<volume::Proxy> import(std::uint64_t min_bricks = 1, const volume::GridNames& names = {}) {
+    std::optional<volume::Proxy> taken;
+    const volume::ProxyRequest request{[&](volume::Proxy made) {
+                                         EXPECT_FALSE(taken);
+                                         taken = std::move(made);
+                                       },
+                                       min_bricks};
+    whole_ = volume::import_frame(file(), names, Log(), nullptr, request);
     return taken;
   }
   [[nodiscard]] std::filesystem::path file() const { return folder_ / "large.vdb"; }
@@ -277,8 +277,8 @@ class CoarseProxyDisplay : public test::BackendTest {
     write(path_.path() / "large.vdb", {grid});
   }
   void set_sampling(bool preview) { viewer_->set_sampling({16, 0, render::View::shaded, preview}); }
-  void load(std::uint64_t least_bricks = 1) {
-    viewer_->load_volume({.path = (path_ / "large.vdb").string(), .grids = {}, .least_stand_in_bricks = least_bricks});
+  void load(std::uint64_t min_bricks = 1) {
+    viewer_->load_volume({.path = (path_ / "large.vdb").string(), .grids = {}, .min_proxy_bricks = min_bricks});
   }
   void stand_still() {
     std::unique_lock lock(mutex_);

@@ -20,7 +20,7 @@ namespace {
 
 using cumulet::gl::Object;
 using cumulet::gl::StateGuard;
-using cumulet::render::ColourEncoding;
+using cumulet::render::ColorEncoding;
 using cumulet::render::Display;
 using cumulet::render::FrameTarget;
 using cumulet::render::PictureTextures;
@@ -199,7 +199,7 @@ TEST_P(ComposedImageCache, ChangedSettingsRecompose) {
       {"exposure", [&] { display_.exposure_stops = 1.0F; }},
       {"tone map", [&] { display_.tone_map = ToneMap::filmic; }},
       {"legend", [&] { display_.legend = true; }},
-      {"encoding", [&] { display_.encoding = ColourEncoding::linear; }},
+      {"encoding", [&] { display_.encoding = ColorEncoding::linear; }},
       {"opaque", [&] { display_.transparent = false; }},
       {"backdrop", [&] { display_.backdrop = glm::vec3(0.3F, 0.1F, 0.2F); }},
       {"another backdrop", [&] { display_.backdrop = glm::vec3(0.1F, 0.4F, 0.2F); }},
@@ -219,11 +219,11 @@ TEST_P(ComposedImageCache, ChangedSettingsRecompose) {
       {"flip", [&] { frame_.flip_y = true; }},
       {"blend", [&] { frame_.blend_over = false; }},
       {"format", [&] { target_ = make_target(GL_RGBA32F); }},
-      {"hdr", [&] { display_.encoding = ColourEncoding::hdr; }},
+      {"hdr", [&] { display_.encoding = ColorEncoding::hdr; }},
       {"sRGB format",
        [&] {
          target_ = make_target(GL_SRGB8_ALPHA8);
-         display_.encoding = ColourEncoding::srgb_framebuffer;
+         display_.encoding = ColorEncoding::srgb_framebuffer;
        }},
       {"holes", [&] { ++revision_, rows_.change_all(64, revision_), picture_->set(*gl_, colors(0.4F)); }},
   };

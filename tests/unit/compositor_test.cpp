@@ -24,7 +24,7 @@ using cumulet::Error;
 using cumulet::ErrorCode;
 using cumulet::gl::Object;
 using cumulet::gl::StateGuard;
-using cumulet::render::ColourEncoding;
+using cumulet::render::ColorEncoding;
 using cumulet::render::Display;
 using cumulet::render::FrameTarget;
 using cumulet::render::PictureTextures;
@@ -94,7 +94,7 @@ TEST(Display, ReadbackBytesMatchTheTarget) {
   Display display;
   display.tone_map = ToneMap::clip;
   display.exposure_stops = 1.0F;
-  display.encoding = ColourEncoding::hdr;  // ignored
+  display.encoding = ColorEncoding::hdr;  // ignored
   render::to_display(linear, display, bytes);
   EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.4F)));
   EXPECT_EQ(bytes[1], byte(image::srgb_encode(0.2F)));
@@ -206,7 +206,7 @@ glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 p
   }
   glm::dvec3 c(value);
   if (!display.legend) c *= std::exp2(double(display.exposure_stops));
-  if (display.encoding != ColourEncoding::hdr) {
+  if (display.encoding != ColorEncoding::hdr) {
     if (!display.legend && display.tone_map == ToneMap::neutral) {
       const auto mapped = image::tone_map_neutral({float(c.x), float(c.y), float(c.z)});
       c = {mapped[0], mapped[1], mapped[2]};
@@ -215,7 +215,7 @@ glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 p
     }
     c = glm::clamp(c, 0.0, 1.0);
   }
-  if (display.encoding != ColourEncoding::srgb) return {c, value.a};
+  if (display.encoding != ColorEncoding::srgb) return {c, value.a};
   // The alpha that is exact over white for the smallest channel.
   const double least = std::min({c.x, c.y, c.z});
   const double white = image::srgb_encode(float(std::min(least + 1.0 - value.a, 1.0)));
@@ -236,19 +236,19 @@ class Compositing : public cumulet::test::GlTest {
   /// A framebuffer with a color attachment of this format (samples 0: not multisampled) and depth, cleared to known
   /// values.
   struct Target {
-    Object colour, depth, framebuffer;
+    Object color, depth, framebuffer;
   };
   [[nodiscard]] Target make_target(GLenum format, int samples, float depth = 1.0F) const {
     Target target;
     if (samples > 0) {
-      target.colour = gl::make_texture_2d_multisample(gl_, format, samples, size.x, size.y, "colour");
+      target.color = gl::make_texture_2d_multisample(gl_, format, samples, size.x, size.y, "colour");
       target.depth = gl::make_texture_2d_multisample(gl_, GL_DEPTH_COMPONENT32F, samples, size.x, size.y, "depth");
     } else {
-      target.colour = gl::make_texture_2d(gl_, format, size.x, size.y, "colour");
+      target.color = gl::make_texture_2d(gl_, format, size.x, size.y, "colour");
       target.depth = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, size.x, size.y, "depth");
     }
     target.framebuffer = gl::make_framebuffer(gl_);
-    gl_->NamedFramebufferTexture(target.framebuffer.name(), GL_COLOR_ATTACHMENT0, target.colour.name(), 0);
+    gl_->NamedFramebufferTexture(target.framebuffer.name(), GL_COLOR_ATTACHMENT0, target.color.name(), 0);
     gl_->NamedFramebufferTexture(target.framebuffer.name(), GL_DEPTH_ATTACHMENT, target.depth.name(), 0);
     gl_->ClearNamedFramebufferfv(target.framebuffer.name(), GL_COLOR, 0, &before.x);
     gl_->ClearNamedFramebufferfv(target.framebuffer.name(), GL_DEPTH, 0, &depth);
@@ -256,13 +256,13 @@ class Compositing : public cumulet::test::GlTest {
   }
   /// The stored values, neither decoded nor clamped. Multisampled targets are resolved first.
   [[nodiscard]] std::vector<glm::vec4> read(const Target& target, GLenum format, int samples) const {
-    GLuint texture = target.colour.name();
+    GLuint texture = target.color.name();
     Target resolved;
     if (samples > 0) {
       resolved = make_target(format, 0);
       gl_->BlitNamedFramebuffer(target.framebuffer.name(), resolved.framebuffer.name(), 0, 0, size.x, size.y, 0, 0,
                                 size.x, size.y, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-      texture = resolved.colour.name();
+      texture = resolved.color.name();
     }
     std::vector<glm::vec4> pixels(static_cast<std::size_t>(size.x * size.y));
     if (format == GL_RGBA8 || format == GL_SRGB8_ALPHA8) {
@@ -339,8 +339,8 @@ TEST_P(Compositing, EveryEncodingCurveAndBackground) {
   const Picture picture(gl_, 21, 13, false);
   FrameTarget target;
   target.viewport = {7, 5, 21, 13};
-  for (const ColourEncoding encoding :
-       {ColourEncoding::srgb, ColourEncoding::srgb_framebuffer, ColourEncoding::linear, ColourEncoding::hdr}) {
+  for (const ColorEncoding encoding :
+       {ColorEncoding::srgb, ColorEncoding::srgb_framebuffer, ColorEncoding::linear, ColorEncoding::hdr}) {
     for (const ToneMap curve : {ToneMap::neutral, ToneMap::filmic, ToneMap::clip}) {
       for (const bool transparent : {false, true}) {
         for (const bool over : {false, true}) {
@@ -352,11 +352,11 @@ TEST_P(Compositing, EveryEncodingCurveAndBackground) {
           display.transparent = transparent;
           display.exposure_stops = -0.5F;
           target.blend_over = over;
-          if (encoding == ColourEncoding::srgb_framebuffer) {
+          if (encoding == ColorEncoding::srgb_framebuffer) {
             check(picture, display, target, GL_SRGB8_ALPHA8, 0);
           } else {
             check(picture, display, target, GL_RGBA32F, 0);
-            if (encoding != ColourEncoding::hdr) check(picture, display, target, GL_RGBA8, 0);
+            if (encoding != ColorEncoding::hdr) check(picture, display, target, GL_RGBA8, 0);
           }
           ASSERT_FALSE(HasFatalFailure());
         }
@@ -433,7 +433,7 @@ TEST_P(Compositing, LegendsAreNotToneMapped) {
     display.transparent = transparent;
     display.exposure_stops = 3.0F;
     check(picture, display, target, GL_RGBA8, 0);
-    display.encoding = ColourEncoding::linear;
+    display.encoding = ColorEncoding::linear;
     check(picture, display, target, GL_RGBA32F, 0);
   }
 }
@@ -496,7 +496,7 @@ TEST_P(Compositing, DepthFollowsTheConvention) {
         EXPECT_EQ(gl_->IsEnabled(GL_DEPTH_TEST), GL_FALSE);
       }
       const std::vector<float> depths = read_depth(made);
-      const std::vector<glm::vec4> colours = read(made, GL_RGBA32F, 0);
+      const std::vector<glm::vec4> colors = read(made, GL_RGBA32F, 0);
       int written = 0;
       for (int y = 0; y < size.y; ++y) {
         for (int x = 0; x < size.x; ++x) {
@@ -513,7 +513,7 @@ TEST_P(Compositing, DepthFollowsTheConvention) {
           const double expected = in_front ? (orthographic ? a + b * z : a + b / z) : double(surface);
           ASSERT_NEAR(depths[i], expected, 3e-7) << x << ' ' << y;
           if (picture.counts[p].x > 0) {
-            ASSERT_NE(colours[i], before);  // hidden or not
+            ASSERT_NE(colors[i], before);  // hidden or not
           }
         }
       }
@@ -545,12 +545,12 @@ TEST_P(Compositing, DepthOutsideItsRangeIsClamped) {
 
 // The upper rows have no samples yet, more rows than neighbors can fill.
 TEST_P(Compositing, UnsampledPixelsShowThePreviousImage) {
-  const auto flat = [&](int side, const glm::vec4& colour, int empty_rows) {
+  const auto flat = [&](int side, const glm::vec4& color, int empty_rows) {
     Picture picture(gl_, side, side, false);
     picture.holes = true;
     for (int i = 0; i < side * side; ++i) {
       const unsigned samples = i / side < empty_rows ? 0U : 2U;
-      picture.sum[static_cast<std::size_t>(i)] = static_cast<float>(samples) * colour;
+      picture.sum[static_cast<std::size_t>(i)] = static_cast<float>(samples) * color;
       picture.background[static_cast<std::size_t>(i)] = glm::vec4(0.0F, 0.0F, samples == 0 ? 1.0F : 0.0F, 0.0F);
       picture.counts[static_cast<std::size_t>(i)] = {samples, 0U};
     }
@@ -569,7 +569,7 @@ TEST_P(Compositing, UnsampledPixelsShowThePreviousImage) {
   target.viewport = {0, 0, 16, 16};
   target.blend_over = false;
   Display display;
-  display.encoding = ColourEncoding::hdr;
+  display.encoding = ColorEncoding::hdr;
   for (const bool has_before : {true, false}) {
     PictureTextures textures = now.textures();
     if (has_before) {
@@ -638,13 +638,13 @@ TEST_P(Compositing, SurfacesAreUpscaledInDisplaySpace) {
   render::SurfaceLayers layers;
   layers.size = glm::uvec2(coarse);
   layers.layers = 1;
-  layers.colour = gl::make_texture_2d_array(gl_, GL_RGBA16F, coarse.x, coarse.y, 1, "colour");
+  layers.color = gl::make_texture_2d_array(gl_, GL_RGBA16F, coarse.x, coarse.y, 1, "colour");
   layers.z = gl::make_texture_2d_array(gl_, GL_R32F, coarse.x, coarse.y, 1, "z");
-  std::vector<glm::vec4> colours;
+  std::vector<glm::vec4> colors;
   for (int i = 0; i < coarse.x * coarse.y; ++i)
-    colours.emplace_back(float(i % 8) / 8.0F, float(i % 5) / 4.0F, float(i % 3) / 2.0F, 1.0F);
-  const std::vector<float> near(colours.size(), 1.0F);
-  gl_->TextureSubImage3D(layers.colour.name(), 0, 0, 0, 0, coarse.x, coarse.y, 1, GL_RGBA, GL_FLOAT, colours.data());
+    colors.emplace_back(float(i % 8) / 8.0F, float(i % 5) / 4.0F, float(i % 3) / 2.0F, 1.0F);
+  const std::vector<float> near(colors.size(), 1.0F);
+  gl_->TextureSubImage3D(layers.color.name(), 0, 0, 0, 0, coarse.x, coarse.y, 1, GL_RGBA, GL_FLOAT, colors.data());
   gl_->TextureSubImage3D(layers.z.name(), 0, 0, 0, 0, coarse.x, coarse.y, 1, GL_RED, GL_FLOAT, near.data());
   const Picture like(gl_, 3, 2, false);
   const std::vector<glm::vec4> nothing(6, glm::vec4(0.0F));
@@ -652,7 +652,7 @@ TEST_P(Compositing, SurfacesAreUpscaledInDisplaySpace) {
   PictureTextures picture = like.textures();
   picture.beneath = &layers;
   const glm::ivec4 viewport(3, 4, 31, 22);
-  for (const ColourEncoding encoding : {ColourEncoding::srgb, ColourEncoding::hdr}) {
+  for (const ColorEncoding encoding : {ColorEncoding::srgb, ColorEncoding::hdr}) {
     for (const bool flip : {false, true}) {
       SCOPED_TRACE(testing::Message() << "encoding " << int(encoding) << " flip " << flip);
       Display display;
@@ -671,10 +671,10 @@ TEST_P(Compositing, SurfacesAreUpscaledInDisplaySpace) {
       const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
       const auto shown = [&](glm::ivec2 p) {
         p = glm::clamp(p, glm::ivec2(0), coarse - 1);
-        glm::dvec4 colour(colours[static_cast<std::size_t>(p.y * coarse.x + p.x)]);
-        for (int k = 0; k < 3 && encoding == ColourEncoding::srgb; ++k)
-          colour[k] = image::srgb_encode(static_cast<float>(colour[k]));
-        return colour;
+        glm::dvec4 color(colors[static_cast<std::size_t>(p.y * coarse.x + p.x)]);
+        for (int k = 0; k < 3 && encoding == ColorEncoding::srgb; ++k)
+          color[k] = image::srgb_encode(static_cast<float>(color[k]));
+        return color;
       };
       for (int y = 0; y < viewport.w; ++y) {
         for (int x = 0; x < viewport.z; ++x) {

@@ -251,7 +251,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   check_enum("type", &cumulet_event::type, 7, event);
   check_enum("button", &cumulet_event::button, 3, event);
   check_enum("target", &cumulet_frame_desc::target, 3, frame, whole);
-  check_enum("colour", &cumulet_frame_desc::colour, 4, frame, whole);
+  check_enum("colour", &cumulet_frame_desc::color, 4, frame, whole);
   check_enum("blend", &cumulet_frame_desc::blend, 2, frame, whole);
   check_enum("depth_source", &cumulet_frame_desc::depth_source, 4, frame, whole);
   std::array<double, 16> matrix{};
@@ -781,7 +781,7 @@ TEST_F(Contract, Contract14PremultipliedAlphaAndDepthOut) {
   const HostTarget white(gl_, side, side, GL_RGBA32F);
   ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
   auto frame = black.frame();
-  frame.colour = CUMULET_COLOUR_LINEAR;
+  frame.color = CUMULET_COLOR_LINEAR;
   frame.target = CUMULET_TARGET_NONE;
   frame.write_depth = 1;
   converge(v_, frame);
@@ -827,18 +827,18 @@ TEST_F(Contract, Contract14PremultipliedAlphaAndDepthOut) {
 
 TEST_F(Contract, Contract15Colors) {
   ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
-  const auto draw = [&](cumulet_colour colour, GLenum format) {
+  const auto draw = [&](cumulet_color_encoding color, GLenum format) {
     const HostTarget target(gl_, side, side, format);
     auto frame = target.frame();
-    frame.colour = colour;
+    frame.color = color;
     converge(v_, frame);
     return target.floats();  // decoded if the format is sRGB
   };
   const auto decode = [](float e) { return e <= 0.04045F ? e / 12.92F : std::pow((e + 0.055F) / 1.055F, 2.4F); };
-  const auto linear = draw(CUMULET_COLOUR_LINEAR, GL_RGBA32F);
-  const auto encoded = draw(CUMULET_COLOUR_SRGB, GL_RGBA32F);
-  const auto by_gl = draw(CUMULET_COLOUR_SRGB_FRAMEBUFFER, GL_SRGB8_ALPHA8);
-  const auto hdr = draw(CUMULET_COLOUR_HDR, GL_RGBA32F);
+  const auto linear = draw(CUMULET_COLOR_LINEAR, GL_RGBA32F);
+  const auto encoded = draw(CUMULET_COLOR_SRGB, GL_RGBA32F);
+  const auto by_gl = draw(CUMULET_COLOR_SRGB_FRAMEBUFFER, GL_SRGB8_ALPHA8);
+  const auto hdr = draw(CUMULET_COLOR_HDR, GL_RGBA32F);
   for (std::size_t i = 0; i < linear.size(); ++i) {
     if (i % 4 == 3) continue;
     ASSERT_NEAR(decode(encoded[i]), linear[i], 1e-4F);
@@ -854,7 +854,7 @@ TEST_F(Contract, Contract15Colors) {
   ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
   const std::uint64_t samples = stats.samples;
   ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
-  const auto exposed = draw(CUMULET_COLOUR_HDR, GL_RGBA32F);
+  const auto exposed = draw(CUMULET_COLOR_HDR, GL_RGBA32F);
   for (std::size_t i = 0; i < hdr.size(); ++i) {
     const float factor = i % 4 == 3 ? 1.0F : 2.0F;
     ASSERT_NEAR(exposed[i], factor * hdr[i], 1e-4F + 1e-4F * hdr[i]);
@@ -1455,7 +1455,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForParallelCompilation) {
   target_.clear({0.2F, 0.4F, 0.6F, 1.0F});
   const Picture cleared = target_.pixels();
   auto linear = frame;
-  linear.colour = CUMULET_COLOUR_LINEAR;
+  linear.color = CUMULET_COLOR_LINEAR;
   fake_.finish_compiling(false);
   ASSERT_EQ(cumulet_render(own.get(), &linear, &result), CUMULET_OK);
   EXPECT_NE(difference(target_.pixels(), cleared), "");
@@ -1531,8 +1531,9 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
   // compiled only in the long tier.
   if (std::getenv("CUMULET_WHOLE_KERNELS") == nullptr) {
     fake_.hollow_kernels({"#define CM_CHANNELS 1", "#define CM_ENVIRONMENT 1", "#define CM_EQUIANGULAR 1",
-                          "#define CM_GROUPS 1", "#define CM_HOLDOUT 1", "#define CM_INSTANCES 1", "#define CM_LAMPS 1",
-                          "#define CM_MOTION 1", "#define CM_RICH 1", "#define CM_SECOND_LOBE 1"});
+                          "#define CM_GROUPS 1", "#define CM_HOLDOUT 1", "#define CM_INSTANCES 1",
+                          "#define CM_ANALYTIC_LIGHTS 1", "#define CM_MOTION 1", "#define CM_EXTENDED_BSDF 1",
+                          "#define CM_SECOND_LOBE 1"});
   }
   const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   const auto linked = [&] { return fake_.calls("LinkProgram"); };

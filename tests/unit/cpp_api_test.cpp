@@ -201,7 +201,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
                                              .flip_y = true,
                                              .scale = 9,
                                              .format = 10,
-                                             .colour = Colour::hdr,
+                                             .color = Color::hdr,
                                              .blend = Blend::replace,
                                              .write_depth = true,
                                              .depth_source = DepthSource::framebuffer,
@@ -218,7 +218,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
   EXPECT_EQ(frame.flip_y, 1);
   EXPECT_EQ(frame.scale, 9.0);
   EXPECT_EQ(frame.format, 10U);
-  EXPECT_EQ(frame.colour, CUMULET_COLOUR_HDR);
+  EXPECT_EQ(frame.color, CUMULET_COLOR_HDR);
   EXPECT_EQ(frame.blend, CUMULET_BLEND_REPLACE);
   EXPECT_EQ(frame.write_depth, 1);
   EXPECT_EQ(frame.depth_source, CUMULET_DEPTH_SOURCE_FRAMEBUFFER);

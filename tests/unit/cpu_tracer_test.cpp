@@ -109,9 +109,9 @@ TEST_P(CpuTracer, ClearConesEndPathsWithBitIdenticalImages) {
     return std::pair(sums, steps);
   };
   const auto [sums, steps] = trace(with);
-  const auto [wanted, most_steps] = trace(without);
+  const auto [wanted, max_steps] = trace(without);
   EXPECT_EQ(sums, wanted);
-  EXPECT_LT(static_cast<double>(steps), 0.9 * static_cast<double>(most_steps));
+  EXPECT_LT(static_cast<double>(steps), 0.9 * static_cast<double>(max_steps));
 }
 
 /// A room around a volume: a textured floor, a coated ball, a semi-transparent pane, and a light from the scene.
@@ -137,19 +137,19 @@ std::shared_ptr<StillScene> room() {
   veil.alpha_mode = surface::AlphaMode::blend;
   veil.double_sided = true;
   scene->add_quad({{{22, -8, 44}, {40, -8, 40}, {40, 14, 40}, {22, 14, 44}}}, scene->add(veil));
-  surface::PunctualLight lamp;
-  lamp.intensity = vec3(900.0F, 700.0F, 400.0F);
-  lamp.position = {44.0F, 30.0F, 30.0F};
-  scene->rest.lights = {lamp};
+  surface::PunctualLight analytic_light;
+  analytic_light.intensity = vec3(900.0F, 700.0F, 400.0F);
+  analytic_light.position = {44.0F, 30.0F, 30.0F};
+  scene->rest.lights = {analytic_light};
   return scene;
 }
 
 /// The room with an emissive triangle mesh in the air.
 std::shared_ptr<StillScene> room_with_emitters() {
   auto scene = room();
-  Material glow = test::diffuse(vec3(0.2F));
-  glow.emission = {6.0F, 2.0F, 1.0F};
-  scene->add_sphere({-4.0F, 16.0F, 12.0F}, 4.0F, scene->add(glow), 8);
+  Material emissive = test::diffuse(vec3(0.2F));
+  emissive.emission = {6.0F, 2.0F, 1.0F};
+  scene->add_sphere({-4.0F, 16.0F, 12.0F}, 4.0F, scene->add(emissive), 8);
   return scene;
 }
 
@@ -160,10 +160,10 @@ TEST(LightPassingRay, RayThatOnlyTouchesTheBoxHasAFiniteWeight) {
   twin.cm.space.to_cube_y = {0.0F, 1.0F, 0.0F};
   twin.cm.space.to_cube_z = {0.0F, 0.0F, 1.0F};
   twin.cm.space.box_max = vec3(8.0F);
-  twin.cm.lights.lamp_chance = 0.5F;
+  twin.cm.lights.analytic_light_chance = 0.5F;
   const vec3 along_an_edge = glm::normalize(vec3(1.0F, -1.0F, 0.0F));
-  const float density = twin.cm_passing_density({8.0F, 8.0F, 4.0F}, along_an_edge, {0.0F, 0.0F, 1.0F}, 2.0F);
-  EXPECT_EQ(twin.cm_passing_share(density, 3.0F), 1.0F);
+  const float density = twin.cm_equiangular_pdf({8.0F, 8.0F, 4.0F}, along_an_edge, {0.0F, 0.0F, 1.0F}, 2.0F);
+  EXPECT_EQ(twin.cm_equiangular_weight(density, 3.0F), 1.0F);
 }
 
 // The pdf must be finite: a probability of 0 times an infinite or NaN pdf would be NaN.
@@ -176,7 +176,7 @@ TEST(EmissiveBoxSampling, PdfIsDefinedFromAnywhere) {
   space.unit_volume = 1.0F;
   space.box_max = vec3(8.0F);
   const auto density = [&](const vec3& o, const vec3& w) {
-    return twin.cm_glow_pdf(twin.cm_light_hit(CM_LIGHT_GLOW, o, w, 1.0F));
+    return twin.cm_emissive_pdf(twin.cm_light_hit(CM_LIGHT_EMISSIVE, o, w, 1.0F));
   };
   const vec3 up(0.0F, 1.0F, 0.0F);
   EXPECT_GT(density(vec3(4.0F, -5.0F, 4.0F), up), 0.0F);

@@ -44,7 +44,7 @@ constexpr double whole = 1e18;  // multiplications per step: all work groups of 
 // A bright ball in front of a dark wall with noise, and its albedo and normals.
 struct Scene {
   ivec2 size;
-  std::vector<vec4> colour, albedo, normal;
+  std::vector<vec4> color, albedo, normal;
 
   explicit Scene(ivec2 s, float noise = 1.0F) : size(s) {
     std::mt19937 random(5);
@@ -56,7 +56,7 @@ struct Scene {
         const bool ball = r < 0.5F;
         const float speck = 1.0F + noise * (specks(random) - 1.0F);
         const vec3 light = (ball ? vec3(4.0F, 3.0F, 2.0F) : vec3(0.02F, 0.03F, 0.05F)) * (1.2F + p.y) * speck;
-        colour.emplace_back(light, 0.25F + 0.5F * float(ball));
+        color.emplace_back(light, 0.25F + 0.5F * float(ball));
         albedo.emplace_back(ball ? vec3(0.9F, 0.7F, 0.5F) : vec3(0.2F), 0.0F);
         normal.emplace_back(ball ? vec3(p, std::sqrt(0.25F - r * r)) * 2.0F : vec3(0.0F, 0.0F, 1.0F), 0.0F);
       }
@@ -76,15 +76,15 @@ class Denoise : public test::GlTest {
     return made;
   }
 
-  std::vector<vec4> denoised(const NetworkPtr& network, const Scene& scene, std::uint64_t most_bytes = plenty,
+  std::vector<vec4> denoised(const NetworkPtr& network, const Scene& scene, std::uint64_t max_bytes = plenty,
                              double step = whole) const {
     const gl::StateGuard guard(*gl_);
-    Denoiser denoiser(gl_, programs_, network, most_bytes);
-    const gl::Object colour = texture(scene.colour, scene.size);
+    Denoiser denoiser(gl_, programs_, network, max_bytes);
+    const gl::Object color = texture(scene.color, scene.size);
     const gl::Object albedo = texture(scene.albedo, scene.size);
     const gl::Object normal = texture(scene.normal, scene.size);
     const gl::Object result = texture({}, scene.size);
-    denoiser.begin({scene.size, colour.name(), albedo.name(), normal.name(), result.name()});
+    denoiser.begin({scene.size, color.name(), albedo.name(), normal.name(), result.name()});
     EXPECT_EQ(denoiser.progress(), 0.0);
     steps_ = 1;
     double before = 0.0;
@@ -96,7 +96,7 @@ class Denoise : public test::GlTest {
     }
     EXPECT_DOUBLE_EQ(denoiser.progress(), 1.0);
     bytes_ = denoiser.bytes();
-    std::vector<vec4> read(scene.colour.size());
+    std::vector<vec4> read(scene.color.size());
     gl_->GetTextureImage(result.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(read.size() * sizeof(vec4)),
                          read.data());
     return read;
@@ -104,11 +104,11 @@ class Denoise : public test::GlTest {
 
   // Compares encoded values, in which half floats are equally exact everywhere.
   void expect_reference(const TensorArchive& archive, const Scene& scene, const char* what, double mean_bound,
-                        double most_bound) const {
+                        double max_bound) const {
     const std::vector<vec4> ours = denoised(make_network(archive, what), scene);
-    const double exposure = DenoiseReference::exposure(scene.colour, scene.size);
+    const double exposure = DenoiseReference::exposure(scene.color, scene.size);
     const bool guided = archive.at("enc_conv0.weight").shape[1] > 3;
-    const auto theirs = DenoiseReference(archive).denoise(scene.colour, guided ? scene.albedo : std::vector<vec4>{},
+    const auto theirs = DenoiseReference(archive).denoise(scene.color, guided ? scene.albedo : std::vector<vec4>{},
                                                           guided ? scene.normal : std::vector<vec4>{}, scene.size);
     double sum = 0.0;
     double most = 0.0;
@@ -119,10 +119,10 @@ class Denoise : public test::GlTest {
         sum += difference / double(3 * ours.size());
         most = std::max(most, difference);
       }
-      EXPECT_EQ(ours[i].a, scene.colour[i].a) << what << " " << i;
+      EXPECT_EQ(ours[i].a, scene.color[i].a) << what << " " << i;
     }
     EXPECT_LT(sum, mean_bound) << what;
-    EXPECT_LT(most, most_bound) << what;
+    EXPECT_LT(most, max_bound) << what;
   }
 
   mutable int steps_ = 0;
@@ -154,7 +154,7 @@ double error_of(const std::vector<vec4>& picture, const Scene& truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < picture.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
-      const double difference = DenoiseReference::encode(picture[i][c]) - DenoiseReference::encode(truth.colour[i][c]);
+      const double difference = DenoiseReference::encode(picture[i][c]) - DenoiseReference::encode(truth.color[i][c]);
       sum += difference * difference / (3.0 * double(picture.size()));
     }
   }
@@ -168,12 +168,12 @@ TEST_P(DenoiseMore, PublishedNetworksRemoveNoiseAndKeepCleanImages) {
   const Scene clean({96, 64}, 0.0F);
   for (const char* name : {"rt_hdr_alb_nrm.tza", "rt_hdr_alb_nrm_small.tza", "rt_hdr.tza", "rt_hdr_small.tza"}) {
     const NetworkPtr network = make_network(read_tza((data / name).string()), name);
-    EXPECT_LT(error_of(denoised(network, noisy), clean), 0.1 * error_of(noisy.colour, clean)) << name;
+    EXPECT_LT(error_of(denoised(network, noisy), clean), 0.1 * error_of(noisy.color, clean)) << name;
     EXPECT_LT(error_of(denoised(network, clean), clean), 1e-4) << name;
     // A constant image stays constant at any exposure.
     for (const float value : {1e-4F, 3000.0F}) {
       Scene constant({64, 64});
-      std::ranges::fill(constant.colour, vec4(value, value, value, 1.0F));
+      std::ranges::fill(constant.color, vec4(value, value, value, 1.0F));
       std::ranges::fill(constant.albedo, vec4(0.5F));
       std::ranges::fill(constant.normal, vec4(0.0F, 0.0F, 1.0F, 0.0F));
       const std::vector<vec4> result = denoised(network, constant);
@@ -192,10 +192,10 @@ TEST_P(DenoiseMore, ResultDoesNotDependOnSizeOrSteps) {
   for (const ivec2 size : {ivec2(1, 1), ivec2(17, 3), ivec2(5, 40), ivec2(33, 31)}) {
     const Scene scene(size);
     const auto at_once = denoised(network, scene);
-    const int least_steps = steps_;
+    const int min_steps = steps_;
     for (const vec4& texel : at_once) EXPECT_TRUE(std::isfinite(texel.r));
     EXPECT_TRUE(denoised(network, scene, plenty, 1.0) == at_once) << size.x;
-    EXPECT_GT(steps_, least_steps);
+    EXPECT_GT(steps_, min_steps);
   }
   expect_reference(random_archive(small_widths, 9), Scene({17, 3}), "17x3", random_mean, random_most);
   Denoiser denoiser(gl_, programs_, network, plenty);
@@ -222,16 +222,16 @@ TEST_P(Denoise, NonFiniteValuesStayInTheirPixel) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinite = std::numeric_limits<float>::infinity();
   Scene black({32, 32});
-  black.colour[40] = black.colour[600] = black.colour[601] = vec4(0.0F, 0.0F, 0.0F, 1.0F);
+  black.color[40] = black.color[600] = black.color[601] = vec4(0.0F, 0.0F, 0.0F, 1.0F);
   Scene broken = black;
-  broken.colour[40] = vec4(1.0F, nan, 1.0F, 1.0F);
-  broken.colour[600] = vec4(infinite, 1.0F, 1.0F, 1.0F);
-  broken.colour[601] = vec4(1.0F, 1.0F, -infinite, 1.0F);
+  broken.color[40] = vec4(1.0F, nan, 1.0F, 1.0F);
+  broken.color[600] = vec4(infinite, 1.0F, 1.0F, 1.0F);
+  broken.color[601] = vec4(1.0F, 1.0F, -infinite, 1.0F);
   const auto expected = denoised(network, black);
   const auto result = denoised(network, broken);
   for (std::size_t i = 0; i < result.size(); ++i) {
     if (i == 40 || i == 600 || i == 601) {
-      EXPECT_EQ(std::memcmp(&result[i], &broken.colour[i], sizeof(vec4)), 0) << i;
+      EXPECT_EQ(std::memcmp(&result[i], &broken.color[i], sizeof(vec4)), 0) << i;
     } else {
       EXPECT_EQ(result[i], expected[i]) << i;
     }

@@ -489,7 +489,7 @@ class TemporalDenoising : public DenoisedImage {
   // The displayed image once it has all its samples.
   [[nodiscard]] std::vector<float> frame() const {
     auto desc = hdr_.frame();
-    desc.colour = CUMULET_COLOUR_HDR;
+    desc.color = CUMULET_COLOR_HDR;
     desc.budget_ms = 1000.0;  // enough for all samples at once, none of them at reduced resolution
     cumulet::test::converge(viewer_.get(), desc);
     return hdr_.floats();

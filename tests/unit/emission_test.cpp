@@ -58,16 +58,16 @@ TEST(Emission, IsTheSumOfFlameAndBlackBody) {
   frame.flame = field({8, 8, 8}, ivec3(0), 2.0F);
   frame.temperature = field({12, 8, 8}, {4, 0, 0}, 1.5F);
   const scene::Emission emission{.flame_strength = 3.0,
-                                 .flame_colour = {1.0F, 0.5F, 0.25F},
+                                 .flame_color = {1.0F, 0.5F, 0.25F},
                                  .temperature_scale = 1200.0,
                                  .temperature_offset = 200.0,
                                  .blackbody = 0.5,
                                  .blackbody_tint = {1.0F, 2.0F, 1.0F}};
   const auto radiance = scene::emission_of(frame, emission);
   ASSERT_TRUE(radiance);
-  const vec3 hot = vec3(light::black_body_colour(2000.0) * light::black_body_radiance(2000.0, 0.5)) * vec3(1, 2, 1);
+  const vec3 hot = vec3(light::black_body_color(2000.0) * light::black_body_radiance(2000.0, 0.5)) * vec3(1, 2, 1);
   for (int i = 0; i < 3; ++i) {
-    const float flame = 6.0F * emission.flame_colour[i];
+    const float flame = 6.0F * emission.flame_color[i];
     EXPECT_FLOAT_EQ(radiance_at(*radiance, i, {1, 1, 1}), flame);
     EXPECT_NEAR(radiance_at(*radiance, i, {5, 1, 1}), flame + hot[i], 2e-3F * hot[i] + 1e-6F);
     EXPECT_NEAR(radiance_at(*radiance, i, {12, 7, 7}), hot[i], 2e-3F * hot[i] + 1e-12F);
@@ -79,7 +79,7 @@ TEST(Emission, IsFiniteForAnyInput) {
   frame.flame = field(ivec3(8), ivec3(0), 1e30F);
   frame.temperature = field(ivec3(8), ivec3(0), 1e30F);
   const scene::Emission emission{.flame_strength = 1e30,
-                                 .flame_colour = vec3(1e30F, 0.0F, 1.0F),
+                                 .flame_color = vec3(1e30F, 0.0F, 1.0F),
                                  .temperature_scale = 1e30,
                                  .blackbody = 1e30,
                                  .blackbody_tint = vec3(1e30F, 0.0F, 1.0F)};
@@ -108,18 +108,18 @@ TEST(Emission, TilesAndBackgroundsEmit) {
 
 // ---- Colors
 
-std::array<ScalarVolume, 3> colours(const ivec3& size, const ivec3& low, vec3 (*colour)(const ivec3&)) {
+std::array<ScalarVolume, 3> colors(const ivec3& size, const ivec3& low, vec3 (*color)(const ivec3&)) {
   std::array<ScalarVolume, 3> fields;
   for (int i = 0; i < 3; ++i)
-    fields[static_cast<std::size_t>(i)] = test::make_volume(size, low, [=](const ivec3& p) { return colour(p)[i]; });
+    fields[static_cast<std::size_t>(i)] = test::make_volume(size, low, [=](const ivec3& p) { return color(p)[i]; });
   return fields;
 }
 
 // Constant colors and densities have no bricks, only tiles and backgrounds, and may be large.
 TEST(ColorField, MayBeConstantOverALargeBox) {
   VolumeFrame frame{.density = field(ivec3(16), ivec3(0), 1.0F)};
-  frame.colour = colours(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return vec3(2.0F, 0.5F, 0.0F); });
-  for (ScalarVolume& component : *frame.colour) {
+  frame.color = colors(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return vec3(2.0F, 0.5F, 0.0F); });
+  for (ScalarVolume& component : *frame.color) {
     component.bounds_max = ivec3(1023);
     component.background = component.max_value;
   }
@@ -133,8 +133,8 @@ TEST(ColorField, CellColorIsTheDensityWeightedMean) {
   VolumeFrame frame{.density =
                         test::make_volume(ivec3(16), ivec3(0), [](const ivec3& p) { return p.x < 5 ? 3.0F : 0.5F; })};
   EXPECT_FALSE(scene::scattering_of(frame));
-  frame.colour = colours(ivec3(16), ivec3(0),
-                         [](const ivec3& p) { return vec3(p.x < 5 ? 1.0F : 0.25F, p.y < 9 ? 0.5F : 0.0F, 0.125F); });
+  frame.color = colors(ivec3(16), ivec3(0),
+                       [](const ivec3& p) { return vec3(p.x < 5 ? 1.0F : 0.25F, p.y < 9 ? 0.5F : 0.0F, 0.125F); });
   const grid::Cube cube = grid::fit_cube(frame.density);
   const grid::Statistics statistics(frame.density, cube);
   grid::Channels channels;
@@ -145,13 +145,13 @@ TEST(ColorField, CellColorIsTheDensityWeightedMean) {
   grid::GridBuilder builder(statistics, few);
   builder.bisect();
   const grid::TetGrid grid = builder.records(grid::CellKind::constant, 1.0F, channels);
-  ASSERT_EQ(grid.colour.size(), grid.cells.size());
+  ASSERT_EQ(grid.color.size(), grid.cells.size());
   // Density-weighted color of all cells.
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     const double volume = 16.0 * 16.0 * 16.0 / 24.0;
     ASSERT_EQ(grid.cells.size(), 24U);
-    sum += volume * glm::unpackHalf2x16(grid.cells[i].data.z).x * glm::dvec3(core::cm_cell_colour(grid.colour[i]));
+    sum += volume * glm::unpackHalf2x16(grid.cells[i].data.z).x * glm::dvec3(core::cm_cell_color(grid.color[i]));
   }
   const double left = 5.0 * 256.0 * 3.0;
   const double right = 11.0 * 256.0 * 0.5;
@@ -205,10 +205,10 @@ TEST(AnisotropyField, CellAnisotropyIsTheScatteringWeightedMean) {
   frame.anisotropy = anisotropy(ivec3(size), ivec3(0), g);
   grid::RefineSettings settings;
   settings.threshold = 0.3;
-  for (const bool coloured : {false, true}) {
-    if (coloured) {
-      frame.colour = colours(ivec3(size), ivec3(0),
-                             [](const ivec3& p) { return vec3(p.z < 7 ? 1.0F : 0.25F, 0.5F, p.x < 3 ? 0.0F : 1.0F); });
+  for (const bool colored : {false, true}) {
+    if (colored) {
+      frame.color = colors(ivec3(size), ivec3(0),
+                           [](const ivec3& p) { return vec3(p.z < 7 ? 1.0F : 0.25F, 0.5F, p.x < 3 ? 0.0F : 1.0F); });
     }
     const Cells cells(frame, settings);
     const grid::TetGrid& made = cells.made;
@@ -218,11 +218,11 @@ TEST(AnisotropyField, CellAnisotropyIsTheScatteringWeightedMean) {
     std::vector<double> forward(made.cells.size());
     test::for_each_sixth(size, [&](const ivec3& p, const vec3& middle) {
       double scatters = test::value_at(frame.density, p + cells.cube.origin);
-      if (coloured) {
-        vec3 colour;
+      if (colored) {
+        vec3 color;
         for (int c = 0; c < 3; ++c)
-          colour[c] = test::value_at((*frame.colour)[static_cast<std::size_t>(c)], p + cells.cube.origin);
-        scatters *= luminance(colour);
+          color[c] = test::value_at((*frame.color)[static_cast<std::size_t>(c)], p + cells.cube.origin);
+        scatters *= luminance(color);
       }
       const std::uint32_t cell = grid::locate(made, middle);
       scattering[cell] += scatters;
@@ -283,7 +283,7 @@ TEST_P(EmissionRendering, AFlameWithoutDensityIsExact) {
   show(*viewer, std::move(frame));
   viewer::Medium medium;
   medium.field_emission.flame_strength = 0.25;
-  medium.field_emission.flame_colour = {1.0F, 0.5F, 0.0F};
+  medium.field_emission.flame_color = {1.0F, 0.5F, 0.0F};
   viewer->set_medium(medium);
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.125F)});
   for (const test::MarchKind& kind : test::march_kinds) {
@@ -524,10 +524,10 @@ TEST_P(EmissionRendering, ColorFieldIsAnAlbedo) {
     const glm::dvec4 albedo = look(*viewer, 500.0, 256).mean();
     medium.albedo = vec3(1.0F, 0.5F, 1.0F);
     viewer->set_medium(medium);
-    frame.colour = colours({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return vec3(0.5F, 0.5F, 0.75F); });
+    frame.color = colors({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return vec3(0.5F, 0.5F, 0.75F); });
     show(*viewer, std::move(frame));
-    const glm::dvec4 colour = look(*viewer, 500.0, 256).mean();
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(colour[i], albedo[i], 2e-3) << i;
+    const glm::dvec4 color = look(*viewer, 500.0, 256).mean();
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(color[i], albedo[i], 2e-3) << i;
   }
 }
 
@@ -536,7 +536,7 @@ TEST_P(EmissionRendering, ColorVariesInSpace) {
   const auto viewer = make();
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   VolumeFrame frame{.density = field(ivec3(32), ivec3(0), 1.0F)};
-  frame.colour = colours(ivec3(32), ivec3(0), [](const ivec3& p) { return p.x < 16 ? vec3(1, 0, 0) : vec3(0, 1, 0); });
+  frame.color = colors(ivec3(32), ivec3(0), [](const ivec3& p) { return p.x < 16 ? vec3(1, 0, 0) : vec3(0, 1, 0); });
   show(*viewer, std::move(frame));
   viewer::Medium medium;
   medium.density_scale = 10.0;
@@ -701,19 +701,19 @@ TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
     float quieter;  // largest ratio of the variances
     float daylight = 0.0F;
     bool ground = false;
-    float lamp = 0.0F;  // watts
+    float analytic_light = 0.0F;  // watts
     bool floor = false;
     viewer::SurfaceLight among = viewer::SurfaceLight::full;
   };
-  light::Lamp lamp;
-  lamp.position = {23.5, 80.0, 60.0};
+  light::AnalyticLight analytic_light;
+  analytic_light.position = {23.5, 80.0, 60.0};
   for (const Case& of :
        {Case{"alone", 0.3F}, Case{"in daylight", 0.3F, 0.01F},
-        Case{.name = "beside a lamp", .quieter = 0.5F, .lamp = 2000.0F},
+        Case{.name = "beside a lamp", .quieter = 0.5F, .analytic_light = 2000.0F},
         Case{.name = "over the ground", .quieter = 0.6F, .ground = true},
-        Case{.name = "over the ground beside a lamp", .quieter = 0.8F, .ground = true, .lamp = 2000.0F},
+        Case{.name = "over the ground beside a lamp", .quieter = 0.8F, .ground = true, .analytic_light = 2000.0F},
         Case{.name = "over a floor", .quieter = 0.6F, .floor = true},
-        Case{.name = "over a floor beside a lamp", .quieter = 0.8F, .lamp = 2000.0F, .floor = true},
+        Case{.name = "over a floor beside a lamp", .quieter = 0.8F, .analytic_light = 2000.0F, .floor = true},
         Case{.name = "over a floor that sends nothing back",
         .quieter = 0.8F,
         .floor = true,
@@ -722,8 +722,9 @@ TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
     viewer->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -6.0});
     if (of.ground) viewer->set_camera(test::camera_at({23.5, 130.0, 165.0}, {23.5, 23.5, 23.5}, 16.0));
     if (of.floor) viewer->set_camera(test::camera_at({23.5, 23.5, 200.0}, {23.5, 23.5, 0.0}, 10.0));
-    lamp.power = vec3(of.lamp);
-    viewer->viewer().set_lamps(of.lamp > 0.0F ? light::Lamps{lamp} : light::Lamps{});
+    analytic_light.power = vec3(of.analytic_light);
+    viewer->viewer().set_lamps(of.analytic_light > 0.0F ? light::AnalyticLights{analytic_light}
+                                                        : light::AnalyticLights{});
     viewer::SurfaceSettings among;
     among.light = of.among;
     viewer->viewer().set_surface_settings(among);

@@ -432,10 +432,10 @@ std::shared_ptr<StillScene> gallery(const Kind& kind, bool by_chance) {
   scene->add_sphere({40.0F, -2.0F, 34.0F}, 6.0F, 2, 12);
   scene->add_quad({{{20, -9, 40}, {46, -9, 40}, {46, 12, 44}, {20, 12, 44}}}, 3);
   if (kind.other_lights) {
-    surface::PunctualLight lamp;
-    lamp.intensity = vec3(200.0F);
-    lamp.position = {50.0F, 5.0F, 20.0F};
-    scene->rest.lights = {lamp};
+    surface::PunctualLight analytic_light;
+    analytic_light.intensity = vec3(200.0F);
+    analytic_light.position = {50.0F, 5.0F, 20.0F};
+    scene->rest.lights = {analytic_light};
   }
   return scene;
 }
@@ -508,9 +508,9 @@ TEST_P(EmitterRendering, NextEventEstimationReducesNoise) {
     for (const bool by_chance : {false, true}) {
       auto scene = std::make_shared<StillScene>();
       scene->add(test::diffuse(vec3(0.5F)));
-      Material lamp = by_chance ? unlit(vec3(40.0F)) : emitter(vec3(40.0F));
-      lamp.double_sided = true;
-      scene->add(lamp);
+      Material analytic_light = by_chance ? unlit(vec3(40.0F)) : emitter(vec3(40.0F));
+      analytic_light.double_sided = true;
+      scene->add(analytic_light);
       scene->add_quad(square(floor_y, 30.0F, false), 0);
       scene->add_quad(square(50.0F, 30.0F, true), 0);
       scene->add_quad(square(49.0F, 5.0F, true), 1);

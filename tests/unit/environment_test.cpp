@@ -32,7 +32,7 @@
 
 namespace cumulet::core {
 #include "ggx.glsl"
-#include "gloss.glsl"
+#include "prefiltered.glsl"
 
 /// The shaders' path tracer over voxels with an environment, compiled as C++.
 struct CpuEnvironment {
@@ -183,13 +183,13 @@ void expect_irradiance(const light::Environment& environment, double share) {
 }
 
 // Warm above, cold below, and the left half twice as bright as the right.
-vec3 two_colours(std::uint32_t x, std::uint32_t y) {
+vec3 two_colors(std::uint32_t x, std::uint32_t y) {
   return (y < 32 ? vec3(1.0F, 0.6F, 0.2F) : vec3(0.1F, 0.3F, 0.9F)) * (x < 64 ? 1.0F : 0.5F);
 }
 
 TEST(Environment, SphericalHarmonicsMatchIrradiance) {
   expect_irradiance(*made(128, 64, [](auto, auto) { return vec3(0.3F, 2.0F, 7.0F); }), 1e-3);
-  expect_irradiance(*made(128, 64, two_colours), 0.01);
+  expect_irradiance(*made(128, 64, two_colors), 0.01);
   // A smooth function of all orders up to the second: exact except for the texels.
   const auto smooth = made(128, 64, [](std::uint32_t x, std::uint32_t y) {
     const vec3 w = direction(2.0 * pi * (0.5 - (x + 0.5) / 128.0), pi * (y + 0.5) / 64.0);
@@ -240,9 +240,9 @@ TEST(Environment, DownsampledPixelsAreMeans) {
 }
 
 // Prefiltered value of a texel, with the mean added.
-double gloss_at(const light::Environment& environment, int level, int x, int y) {
-  const auto i = std::size_t(level * core::CM_GLOSS_HEIGHT + y) * core::CM_GLOSS_WIDTH + std::size_t(x);
-  return environment.mean.y + environment.gloss->at(i).y;
+double prefiltered_at(const light::Environment& environment, int level, int x, int y) {
+  const auto i = std::size_t(level * core::CM_PREFILTERED_HEIGHT + y) * core::CM_PREFILTERED_WIDTH + std::size_t(x);
+  return environment.mean.y + environment.prefiltered->at(i).y;
 }
 
 // Near the poles a texel's solid angle varies strongly inside its row.
@@ -253,7 +253,7 @@ TEST(PrefilteredEnvironment, SmallLightNearAPoleIsWeightedBySolidAngle) {
   for (const std::uint32_t row : {2U, 14U, rows - 1 - 2U}) {  // 1.8 and 10 degrees from a pole
     const auto environment = made(
         columns, rows, [&](std::uint32_t x, std::uint32_t y) { return vec3(x == column && y == row ? 1e4F : 0.0F); });
-    ASSERT_NE(environment->gloss, nullptr);
+    ASSERT_NE(environment->prefiltered, nullptr);
     const auto lobe = [](double cosine) {
       if (cosine <= 0.0) return 0.0;
       const double half = std::sqrt(0.5 - 0.5 * cosine);
@@ -263,9 +263,9 @@ TEST(PrefilteredEnvironment, SmallLightNearAPoleIsWeightedBySolidAngle) {
     };
     for (const int x : {0, 17, 40}) {
       for (int up = 0; up < 8; ++up) {
-        const int y = row < rows / 2 ? up : core::CM_GLOSS_HEIGHT - 1 - up;
-        const vec3 middle =
-            direction(2.0 * pi * (0.5 - (x + 0.5) / core::CM_GLOSS_WIDTH), pi * (y + 0.5) / core::CM_GLOSS_HEIGHT);
+        const int y = row < rows / 2 ? up : core::CM_PREFILTERED_HEIGHT - 1 - up;
+        const vec3 middle = direction(2.0 * pi * (0.5 - (x + 0.5) / core::CM_PREFILTERED_WIDTH),
+                                      pi * (y + 0.5) / core::CM_PREFILTERED_HEIGHT);
         double light = 0.0;
         double all = 0.0;
         for (std::uint32_t i = 0; i < columns * rows; ++i) {
@@ -276,7 +276,7 @@ TEST(PrefilteredEnvironment, SmallLightNearAPoleIsWeightedBySolidAngle) {
           if (i == row * columns + column) light = 1e4 * weight;
         }
         const double expected = light / all;
-        EXPECT_NEAR(gloss_at(*environment, core::CM_GLOSS_LEVELS - 1, x, y), expected, 0.03 * expected)
+        EXPECT_NEAR(prefiltered_at(*environment, core::CM_PREFILTERED_LEVELS - 1, x, y), expected, 0.03 * expected)
             << row << ' ' << x << ' ' << y;
       }
     }
@@ -289,10 +289,10 @@ TEST(PrefilteredEnvironment, SharpestLevelKeepsTheMeanRadiance) {
     std::mt19937 random(3);
     const auto environment = made(columns, rows, [&](auto, auto) { return vec3(float(random() % 1000)); });
     double mean = 0.0;
-    for (int y = 0; y < core::CM_GLOSS_HEIGHT; ++y) {
-      const double edge = pi / core::CM_GLOSS_HEIGHT;
-      const double area = (std::cos(edge * y) - std::cos(edge * (y + 1))) / (2.0 * core::CM_GLOSS_WIDTH);
-      for (int x = 0; x < core::CM_GLOSS_WIDTH; ++x) mean += area * gloss_at(*environment, 0, x, y);
+    for (int y = 0; y < core::CM_PREFILTERED_HEIGHT; ++y) {
+      const double edge = pi / core::CM_PREFILTERED_HEIGHT;
+      const double area = (std::cos(edge * y) - std::cos(edge * (y + 1))) / (2.0 * core::CM_PREFILTERED_WIDTH);
+      for (int x = 0; x < core::CM_PREFILTERED_WIDTH; ++x) mean += area * prefiltered_at(*environment, 0, x, y);
     }
     EXPECT_NEAR(mean / environment->mean.y, 1.0, 1e-5) << columns;
   }
@@ -300,8 +300,9 @@ TEST(PrefilteredEnvironment, SharpestLevelKeepsTheMeanRadiance) {
 
 TEST(PrefilteredEnvironment, IsNotBuiltForUniformOrBlackSkies) {
   for (const float value : {0.0F, 0.3F, 1e30F})
-    EXPECT_EQ(made(100, 37, [&](auto, auto) { return vec3(value, 0.5F * value, 0.0F); })->gloss, nullptr) << value;
-  EXPECT_NE(made(100, 37, [](auto x, auto) { return vec3(x == 3 ? 0.301F : 0.3F); })->gloss, nullptr);
+    EXPECT_EQ(made(100, 37, [&](auto, auto) { return vec3(value, 0.5F * value, 0.0F); })->prefiltered, nullptr)
+        << value;
+  EXPECT_NE(made(100, 37, [](auto x, auto) { return vec3(x == 3 ? 0.301F : 0.3F); })->prefiltered, nullptr);
 }
 
 TEST(PrefilteredEnvironment, CanBeCancelledBetweenRows) {
@@ -311,12 +312,12 @@ TEST(PrefilteredEnvironment, CanBeCancelledBetweenRows) {
     std::ranges::fill(row, vec3(1.0F));
     if (++rows == 100) progress.cancel();
   };
-  EXPECT_THROW(light::make_gloss({64, 16384, read}, dvec3(0.5), &progress), Error);
+  EXPECT_THROW(light::prefilter({64, 16384, read}, dvec3(0.5), &progress), Error);
   EXPECT_LT(rows, 16384 / 2);
   rows = 0;
   Progress whole;
   const auto steps = [&](std::uint32_t y, std::vector<vec3>& row) { std::ranges::fill(row, vec3(float(y % 2))); };
-  EXPECT_NE(light::make_gloss({64, 48, steps}, dvec3(0.5), &whole), nullptr);
+  EXPECT_NE(light::prefilter({64, 48, steps}, dvec3(0.5), &whole), nullptr);
   EXPECT_DOUBLE_EQ(whole.fraction(), 1.0);
 }
 
@@ -424,16 +425,16 @@ class EnvironmentLighting : public test::ViewerTest {
 CUMULET_ON_BACKENDS(EnvironmentLighting);
 
 TEST_P(EnvironmentLighting, UniformEnvironmentEqualsUniformSky) {
-  const vec3 colour(0.25F, 0.5F, 1.0F);
+  const vec3 color(0.25F, 0.5F, 1.0F);
   const auto still = ball(0.6F, vec3(0.9F, 0.8F, 1.0F));
-  still->set_light({30.0F, 20.0F, vec3(0.5F), colour});
+  still->set_light({30.0F, 20.0F, vec3(0.5F), color});
   const Seen sky = see(*still, 32);
   still->set_light({30.0F, 20.0F, vec3(0.5F), vec3(7.0F)});  // hidden by the environment
-  still->viewer().set_environment(made(16, 8, [&](std::uint32_t, std::uint32_t) { return 0.5F * colour; }));
+  still->viewer().set_environment(made(16, 8, [&](std::uint32_t, std::uint32_t) { return 0.5F * color; }));
   still->viewer().set_environment_settings({40.0F, 2.0F});
   expect_same(see(*still, 32), sky, 1e-3);
   still->viewer().set_environment(nullptr);
-  still->set_light({30.0F, 20.0F, vec3(0.5F), colour});
+  still->set_light({30.0F, 20.0F, vec3(0.5F), color});
   expect_same(see(*still, 32), sky, 0.0);
 }
 
@@ -455,7 +456,7 @@ TEST_P(EnvironmentLighting, RasterizedSpheresMatchPathTracedOnes) {
   camera.orthographic_height = 10.0;
   still->set_camera(camera);
   still->set_light({});
-  still->viewer().set_environment(made(128, 64, two_colours));
+  still->viewer().set_environment(made(128, 64, two_colors));
   still->viewer().set_environment_settings({30.0F, 1.5F});
   struct Kind {
     surface::Material material;
@@ -518,8 +519,8 @@ TEST_P(EnvironmentLighting, RasterizedReflectionsUseTheCurrentEnvironment) {
     still.viewer().set_environment(environment);
     return test::render(still, {24, 24, 4, 1});
   };
-  const light::EnvironmentPtr halves = made(128, 64, two_colours);
-  const light::EnvironmentPtr turned = made(128, 64, [](auto x, auto y) { return two_colours(127 - x, 63 - y); });
+  const light::EnvironmentPtr halves = made(128, 64, two_colors);
+  const light::EnvironmentPtr turned = made(128, 64, [](auto x, auto y) { return two_colors(127 - x, 63 - y); });
   const light::EnvironmentPtr even = made(8, 4, [](auto, auto) { return vec3(0.5F); });
   const auto still = glossy();
   std::vector<test::Picture> pictures;

@@ -24,23 +24,23 @@ using glm::ivec3;
 using glm::vec3;
 using render::March;
 
-core::CmLamp record(std::uint32_t kind, const vec3& position) {
-  core::CmLamp lamp{};
-  lamp.kind = kind;
-  lamp.position = position;
-  return lamp;
+core::CmAnalyticLight record(std::uint32_t kind, const vec3& position) {
+  core::CmAnalyticLight analytic_light{};
+  analytic_light.kind = kind;
+  analytic_light.position = position;
+  return analytic_light;
 }
 
 TEST(NearestLight, IgnoresDistantLights) {
   const light::Lit ball{dvec3(1.0, 0.0, 0.0), 2.0};
-  EXPECT_FALSE(light::nearest_lamp({}, ball));
-  std::vector<core::CmLamp> lamps{record(core::CM_LAMP_DISTANT, vec3(1.0F, 0.0F, 0.0F))};
-  EXPECT_FALSE(light::nearest_lamp(lamps, ball)) << "a sun stands nowhere";
-  lamps.push_back(record(core::CM_LAMP_DISC, vec3(9.0F, 0.0F, 0.0F)));
-  EXPECT_DOUBLE_EQ(light::nearest_lamp(lamps, ball).value(), 4.0);
-  lamps.push_back(record(core::CM_LAMP_POINT, vec3(1.0F, 3.0F, 0.0F)));
-  EXPECT_DOUBLE_EQ(light::nearest_lamp(lamps, ball).value(), 1.5);
-  EXPECT_FALSE(light::nearest_lamp(lamps, light::Lit{})) << "no medium";
+  EXPECT_FALSE(light::nearest_analytic_light({}, ball));
+  std::vector<core::CmAnalyticLight> analytic_lights{record(core::CM_ANALYTIC_LIGHT_DISTANT, vec3(1.0F, 0.0F, 0.0F))};
+  EXPECT_FALSE(light::nearest_analytic_light(analytic_lights, ball)) << "a sun stands nowhere";
+  analytic_lights.push_back(record(core::CM_ANALYTIC_LIGHT_DISC, vec3(9.0F, 0.0F, 0.0F)));
+  EXPECT_DOUBLE_EQ(light::nearest_analytic_light(analytic_lights, ball).value(), 4.0);
+  analytic_lights.push_back(record(core::CM_ANALYTIC_LIGHT_POINT, vec3(1.0F, 3.0F, 0.0F)));
+  EXPECT_DOUBLE_EQ(light::nearest_analytic_light(analytic_lights, ball).value(), 1.5);
+  EXPECT_FALSE(light::nearest_analytic_light(analytic_lights, light::Lit{})) << "no medium";
 }
 
 TEST(NearestLight, EnablesEquiangularSamplingInThinMediaOnly) {
@@ -52,11 +52,11 @@ TEST(NearestLight, EnablesEquiangularSamplingInThinMediaOnly) {
   EXPECT_FALSE(light::suits_equiangular(0.5, NAN));
 }
 
-light::Lamp lamp_at(const dvec3& position, float power) {
-  light::Lamp lamp;
-  lamp.position = position;
-  lamp.power = vec3(power);
-  return lamp;
+light::AnalyticLight analytic_light_at(const dvec3& position, float power) {
+  light::AnalyticLight analytic_light;
+  analytic_light.position = position;
+  analytic_light.power = vec3(power);
+  return analytic_light;
 }
 
 constexpr ivec3 size(32, 24, 32);
@@ -89,7 +89,7 @@ class Equiangular : public test::ViewerTest {
     const auto component = [](float low, float high) {
       return test::make_volume(size, ivec3(0), [=](const ivec3& p) { return p.y < 12 ? low : high; });
     };
-    made.colour = {component(1.0F, 0.5F), component(0.5F, 1.0F), component(0.75F, 0.75F)};
+    made.color = {component(1.0F, 0.5F), component(0.5F, 1.0F), component(0.75F, 0.75F)};
     made.anisotropy = {component(0.5F, 0.0F), component(0.0F, 0.25F)};
     return made;
   }
@@ -109,10 +109,10 @@ class Equiangular : public test::ViewerTest {
   }
 
   // extra: lights in addition to the one outside.
-  Seen see(const light::Lamps& extra, std::uint32_t samples = 128) {
-    light::Lamps lamps{lamp_at(outside, 1e5F)};
-    lamps.insert(lamps.end(), extra.begin(), extra.end());
-    still_->viewer().set_lamps(lamps);
+  Seen see(const light::AnalyticLights& extra, std::uint32_t samples = 128) {
+    light::AnalyticLights analytic_lights{analytic_light_at(outside, 1e5F)};
+    analytic_lights.insert(analytic_lights.end(), extra.begin(), extra.end());
+    still_->viewer().set_lamps(analytic_lights);
     Seen seen;
     const test::Picture a = test::render(*still_, {32, 32, samples, 1, render::View::shaded});
     const test::Picture b = test::render(*still_, {32, 32, samples, 2, render::View::shaded});
@@ -129,7 +129,7 @@ class Equiangular : public test::ViewerTest {
   // Expects the same mean with equiangular sampling and without.
   void expect_the_same(const char* what) {
     const Seen without = see({});
-    const Seen with = see({lamp_at(inside, 1e-4F)});
+    const Seen with = see({analytic_light_at(inside, 1e-4F)});
     for (int i = 0; i < 3; ++i) {
       const double error = std::hypot(without.error[i], with.error[i]);
       ASSERT_GT(without.mean[i], 20.0 * error) << what << ": too much noise to tell";

@@ -1,4 +1,4 @@
-// The BSDF of the extended-material variant (CM_RICH, glTF extensions) that shaders and C++ share. Tested by
+// The BSDF of the extended-material variant (CM_EXTENDED_BSDF, glTF extensions) that shaders and C++ share. Tested by
 // quadrature, by sampling, and with closed forms in double precision.
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 #include "surface/ggx_albedo.hpp"
 #include "surface/sheen_albedo.hpp"
 
-#define CM_RICH 1
+#define CM_EXTENDED_BSDF 1
 namespace cumulet::core {
 inline vec2 cm_ggx_albedo(float roughness, float cosine) {
   return surface::GgxAlbedo::table().towards(roughness, cosine);
@@ -49,8 +49,8 @@ CmSurface make_surface(vec3 base, float metallic, float roughness, float ior = 1
   return s;
 }
 
-CmSurface glass(float roughness, float eta, vec3 colour = vec3(1.0F)) {
-  CmSurface s = make_surface(colour, 0.0F, roughness, eta > 1.0F ? eta : 1.0F / eta);
+CmSurface glass(float roughness, float eta, vec3 color = vec3(1.0F)) {
+  CmSurface s = make_surface(color, 0.0F, roughness, eta > 1.0F ? eta : 1.0F / eta);
   s.transmission = 1.0F;
   s.eta = eta;
   return s;
@@ -307,7 +307,7 @@ TEST(ExtendedBsdf, ThinWallsTransmitWhatTheyDoNotReflect) {
     EXPECT_NEAR(mean.x + passes.x, 1.0, 4.0 * error + 2e-3) << cosine;
     s.alpha = vec2(0.1F);
     EXPECT_EQ(cm_bsdf_passes(s, wo), vec3(0.0F));
-    s.alpha = vec2(CM_LEAST_ALPHA);
+    s.alpha = vec2(CM_MIN_ALPHA);
     s.eta = 1.5F;
     EXPECT_EQ(cm_bsdf_passes(s, wo), vec3(0.0F));
   }
@@ -475,7 +475,7 @@ TEST(Dispersion, KeepsWhiteWhite) {
     const float wavelength = cm_wavelength((static_cast<float>(i) + 0.5F) / n);
     ASSERT_GE(wavelength, 402.0F);
     ASSERT_LE(wavelength, 673.0F);
-    mean += dvec3(cm_wavelength_colour(wavelength)) / double(n);
+    mean += dvec3(cm_wavelength_color(wavelength)) / double(n);
     // Triangular distributions: half of each is within 1 - 1/sqrt(2) of its half width.
     const float off = std::abs(wavelength - 611.0F);
     if (i < n / 3 && off < 62.0F * (1.0F - std::sqrt(0.5F))) ++counts[0];

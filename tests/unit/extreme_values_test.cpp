@@ -53,16 +53,16 @@ ScalarVolume times(ScalarVolume volume, double factor) {
 }
 
 // Noise multiplied by `factor`. coloured: with moving colors and an anisotropy field.
-viewer::VolumeAssetPtr noise_times(double factor, bool coloured) {
+viewer::VolumeAssetPtr noise_times(double factor, bool colored) {
   const glm::ivec3 size(40);
   volume::VolumeFrame frame{.density = times(test::noise_volume(size, glm::ivec3(0), 3), factor)};
-  if (coloured) {
+  if (colored) {
     const auto field = [&](float scale) {
       return test::make_volume(size, glm::ivec3(0),
                                [=](const glm::ivec3& p) { return scale * static_cast<float>(p.x + 2 * p.y + 1); });
     };
     const ScalarVolume none = field(0.0F);
-    frame.colour = {field(0.005F), field(0.004F), field(0.008F)};
+    frame.color = {field(0.005F), field(0.004F), field(0.008F)};
     frame.anisotropy = {field(0.005F), none};
     frame.velocity.emplace(volume::Velocity{{field(1.0F), none, field(2.0F), none, none, field(0.5F)}});
   }
@@ -85,7 +85,7 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 
 void expect_same_grid(const grid::TetGrid& a, const grid::TetGrid& b) {
   EXPECT_TRUE(same_bits(a.cells, b.cells)) << a.cells.size() << " and " << b.cells.size();
-  EXPECT_TRUE(same_bits(a.colour, b.colour));
+  EXPECT_TRUE(same_bits(a.color, b.color));
   EXPECT_TRUE(same_bits(a.anisotropy, b.anisotropy));
   EXPECT_TRUE(same_bits(a.velocity, b.velocity));
 }
@@ -93,14 +93,14 @@ void expect_same_grid(const grid::TetGrid& a, const grid::TetGrid& b) {
 // A factor that is a power of two changes no mantissa, so it changes no cell.
 TEST(ExtremeValues, GiveTheSameCellsAsOrdinaryOnes) {
   Progress progress;
-  for (const bool coloured : {false, true}) {
-    const auto plain = viewer::build_grid({}, noise_times(1.0, coloured), settings_for(1.0), progress).source;
+  for (const bool colored : {false, true}) {
+    const auto plain = viewer::build_grid({}, noise_times(1.0, colored), settings_for(1.0), progress).source;
     ASSERT_GT(plain->grid->cells.size(), 2000U);
     EXPECT_EQ(plain->value_unit, 1.0);
     for (const int exponent : {95, 60, -80, -100}) {
       SCOPED_TRACE(exponent);
       const double factor = std::exp2(exponent);
-      const auto asset = noise_times(factor, coloured);
+      const auto asset = noise_times(factor, colored);
       const auto found = viewer::build_grid({}, asset, settings_for(factor), progress).source;
       expect_same_grid(*found->grid, *plain->grid);
       EXPECT_NEAR(found->value_unit * found->max_value, factor * plain->max_value, 1e-6 * factor);

@@ -1,7 +1,7 @@
 // The frame cache of a sequence: it reads and builds ahead in the order of need, keeps as many frames as fit, and skips
 // broken ones.
 
-#include "viewer/frame_shelf.hpp"
+#include "viewer/frame_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -25,11 +25,11 @@ namespace {
 
 using cumulet::test::Clip;
 using cumulet::viewer::BuildSettings;
+using cumulet::viewer::FrameCache;
 using cumulet::viewer::FrameFiles;
 using cumulet::viewer::FrameFilesPtr;
-using cumulet::viewer::FrameShelf;
 using Frames = std::vector<std::uint32_t>;
-using State = FrameShelf::State;
+using State = FrameCache::State;
 
 constexpr std::uint64_t plenty = std::uint64_t{1} << 32U;
 
@@ -60,7 +60,7 @@ class FrameCacheTest : public testing::Test {
     return true;
   }
   [[nodiscard]] std::size_t number(State state) const {
-    return static_cast<std::size_t>(std::ranges::count(shelf_.frames().frames, state));
+    return static_cast<std::size_t>(std::ranges::count(cache_.frames().frames, state));
   }
   [[nodiscard]] std::vector<std::string> warnings() {
     const std::scoped_lock lock(mutex_);
@@ -71,7 +71,7 @@ class FrameCacheTest : public testing::Test {
   std::mutex mutex_;
   std::vector<std::string> warnings_;
   std::atomic<int> told_ = 0;
-  FrameShelf shelf_{cumulet::Log([this](cumulet::LogLevel level, const char* text) {
+  FrameCache cache_{cumulet::Log([this](cumulet::LogLevel level, const char* text) {
                       const std::scoped_lock lock(mutex_);
                       if (level == cumulet::LogLevel::warning) warnings_.emplace_back(text);
                     }),
@@ -93,25 +93,25 @@ TEST_F(FrameCacheTest, PrefetchedFramesMatchSingleLoads) {
   clip_.with_flame(5);
   clip_.empty(6);
   const FrameFilesPtr all = files();
-  shelf_.wish({all, from(3), BuildSettings{}, plenty});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  ASSERT_TRUE(shelf_.nearest());
-  EXPECT_EQ(shelf_.nearest()->frame, 3U);
-  EXPECT_TRUE(shelf_.nearest()->wanted);
+  cache_.request({all, from(3), BuildSettings{}, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  ASSERT_TRUE(cache_.nearest());
+  EXPECT_EQ(cache_.nearest()->frame, 3U);
+  EXPECT_TRUE(cache_.nearest()->wanted);
   ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
   EXPECT_GE(told_, count);
-  const std::uint64_t revision = shelf_.revision();
+  const std::uint64_t revision = cache_.revision();
   for (std::uint32_t frame = 0; frame < count; ++frame) {
     SCOPED_TRACE(frame);
-    shelf_.wish({all, from(frame), BuildSettings{}, plenty});
-    const auto ready = shelf_.nearest();
+    cache_.request({all, from(frame), BuildSettings{}, plenty});
+    const auto ready = cache_.nearest();
     ASSERT_TRUE(ready && ready->wanted);
     EXPECT_EQ(ready->frame, frame);
     cumulet::Progress progress;
     const auto alone = cumulet::viewer::build_grid({}, all->file(frame).read({}, nullptr), BuildSettings{}, progress);
     expect_same_grid(ready->built, alone);
   }
-  EXPECT_EQ(shelf_.revision(), revision);  // nothing was built twice
+  EXPECT_EQ(cache_.revision(), revision);  // nothing was built twice
 }
 
 // A fire that goes out: its last frames have only a few kelvin.
@@ -129,9 +129,9 @@ TEST_F(FrameCacheTest, AllFramesUseTheLargestFramesTemperatureScale) {
   const FrameFilesPtr all = files();
   BuildSettings glowing;
   glowing.emission.blackbody = 1.0;
-  shelf_.wish({all, from(1), glowing, plenty});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  const auto ready = shelf_.nearest();
+  cache_.request({all, from(1), glowing, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  const auto ready = cache_.nearest();
   ASSERT_TRUE(ready && ready->frame == 1U);
   EXPECT_EQ(ready->built.volume->temperature_scale(), 1.0);
   EXPECT_FALSE(ready->built.source->emits()) << "of 10 kelvin nothing glows";
@@ -140,17 +140,17 @@ TEST_F(FrameCacheTest, AllFramesUseTheLargestFramesTemperatureScale) {
 
 TEST_F(FrameCacheTest, KeepsTheNextFramesWithinItsMemory) {
   const FrameFilesPtr all = files();
-  shelf_.wish({all, from(0), BuildSettings{}, plenty});
+  cache_.request({all, from(0), BuildSettings{}, plenty});
   ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
   std::vector<std::uint64_t> sizes;
   for (std::uint32_t frame = 0; frame < count; ++frame) {
-    shelf_.wish({all, from(frame), BuildSettings{}, plenty});
-    EXPECT_TRUE(shelf_.nearest()->built.volume) << "voxels stay where there is room";
-    sizes.push_back(shelf_.nearest()->built.source->bytes());
+    cache_.request({all, from(frame), BuildSettings{}, plenty});
+    EXPECT_TRUE(cache_.nearest()->built.volume) << "voxels stay where there is room";
+    sizes.push_back(cache_.nearest()->built.source->bytes());
   }
   const std::uint64_t room = 3 * *std::ranges::max_element(sizes);
-  shelf_.wish({all, from(2), BuildSettings{}, room});
-  const auto ready = [&](std::uint32_t frame) { return shelf_.frames().frames[frame] == State::ready; };
+  cache_.request({all, from(2), BuildSettings{}, room});
+  const auto ready = [&](std::uint32_t frame) { return cache_.frames().frames[frame] == State::ready; };
   for (const std::uint32_t frame : {2U, 3U, 4U}) EXPECT_TRUE(ready(frame)) << frame;
   EXPECT_FALSE(ready(0));
   EXPECT_FALSE(ready(1));
@@ -161,14 +161,14 @@ TEST_F(FrameCacheTest, KeepsTheNextFramesWithinItsMemory) {
   };
   EXPECT_LE(takes(), room);
   // Playback moves on: frames that were evicted are read again.
-  shelf_.wish({all, from(6), BuildSettings{}, room});
+  cache_.request({all, from(6), BuildSettings{}, room});
   ASSERT_TRUE(comes([&] { return ready(6) && ready(7) && ready(0); }));
   EXPECT_LE(takes(), room);
   // With a limit of 0 bytes, exactly one frame is kept.
-  shelf_.wish({all, from(4), BuildSettings{}, 0});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.nearest()->frame, 4U);
-  EXPECT_TRUE(shelf_.nearest()->wanted);
+  cache_.request({all, from(4), BuildSettings{}, 0});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.nearest()->frame, 4U);
+  EXPECT_TRUE(cache_.nearest()->wanted);
   EXPECT_EQ(number(State::ready), 1U);
 }
 
@@ -177,22 +177,21 @@ TEST_F(FrameCacheTest, SkipsMissingOrCorruptFrames) {
   clip_.remove(3);
   clip_.corrupt(4);
   const FrameFilesPtr all = files();
-  shelf_.wish({all, from(0), BuildSettings{}, plenty});
+  cache_.request({all, from(0), BuildSettings{}, plenty});
   ASSERT_TRUE(comes([&] { return number(State::ready) == 5 && number(State::failed) == 3; }));
-  const std::vector<std::pair<std::uint32_t, std::uint32_t>> stand_ins = {{0, 1}, {1, 1}, {2, 2},
-                                                                          {3, 2}, {4, 2}, {5, 5}};
-  for (const auto& [frame, shown] : stand_ins) {
-    shelf_.wish({all, from(frame), BuildSettings{}, plenty});
-    ASSERT_TRUE(shelf_.wait(std::nullopt));
-    EXPECT_EQ(shelf_.nearest()->frame, shown) << frame;
-    EXPECT_TRUE(shelf_.nearest()->wanted) << frame;
+  const std::vector<std::pair<std::uint32_t, std::uint32_t>> proxies = {{0, 1}, {1, 1}, {2, 2}, {3, 2}, {4, 2}, {5, 5}};
+  for (const auto& [frame, shown] : proxies) {
+    cache_.request({all, from(frame), BuildSettings{}, plenty});
+    ASSERT_TRUE(cache_.wait(std::nullopt));
+    EXPECT_EQ(cache_.nearest()->frame, shown) << frame;
+    EXPECT_TRUE(cache_.nearest()->wanted) << frame;
   }
-  EXPECT_FALSE(shelf_.status().failure);
-  EXPECT_FALSE(shelf_.failure_of(2));
+  EXPECT_FALSE(cache_.status().failure);
+  EXPECT_FALSE(cache_.failure_of(2));
   ASSERT_EQ(warnings().size(), 3U);  // one per broken frame
   for (const int broken : {0, 3, 4}) {
-    ASSERT_TRUE(shelf_.failure_of(static_cast<std::uint32_t>(broken)));
-    EXPECT_EQ(std::string(shelf_.failure_of(static_cast<std::uint32_t>(broken))->what()).rfind(clip_.path(broken), 0),
+    ASSERT_TRUE(cache_.failure_of(static_cast<std::uint32_t>(broken)));
+    EXPECT_EQ(std::string(cache_.failure_of(static_cast<std::uint32_t>(broken))->what()).rfind(clip_.path(broken), 0),
               0U);
     const auto names = [&](const std::string& line) { return line.rfind(clip_.path(broken) + ": ", 0) == 0; };
     EXPECT_EQ(std::ranges::count_if(warnings(), names), 1) << broken;
@@ -201,26 +200,26 @@ TEST_F(FrameCacheTest, SkipsMissingOrCorruptFrames) {
     EXPECT_TRUE(line.ends_with(": another frame of the sequence is shown instead")) << line;
   // Once the file exists, the frame is displayed.
   cumulet::test::write_frame(clip_.path(3), {cumulet::test::clip_ball(3)});
-  shelf_.rebuild();
+  cache_.rebuild();
   ASSERT_TRUE(comes([&] { return number(State::ready) == 6 && number(State::failed) == 2; }));
 }
 
 TEST_F(FrameCacheTest, FailsWithoutAnyReadableFrame) {
   for (int frame = 0; frame < count; ++frame) clip_.remove(frame);
-  shelf_.wish({files(), from(2), BuildSettings{}, plenty});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_FALSE(shelf_.nearest());
-  ASSERT_TRUE(shelf_.status().failure);
-  EXPECT_EQ(std::string(shelf_.status().failure->what()).rfind(clip_.path(2), 0), 0U);
+  cache_.request({files(), from(2), BuildSettings{}, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_FALSE(cache_.nearest());
+  ASSERT_TRUE(cache_.status().failure);
+  EXPECT_EQ(std::string(cache_.status().failure->what()).rfind(clip_.path(2), 0), 0U);
   EXPECT_EQ(warnings().size(), std::size_t{count});
   for (const std::string& line : warnings())
     EXPECT_EQ(line.find("instead"), std::string::npos) << "there is no other frame: " << line;
   cumulet::test::write_frame(clip_.path(6), {cumulet::test::clip_ball(6)});
-  shelf_.rebuild();
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  ASSERT_TRUE(shelf_.nearest());
-  EXPECT_EQ(shelf_.nearest()->frame, 6U);
-  EXPECT_FALSE(shelf_.status().failure);
+  cache_.rebuild();
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  ASSERT_TRUE(cache_.nearest());
+  EXPECT_EQ(cache_.nearest()->frame, 6U);
+  EXPECT_FALSE(cache_.status().failure);
 }
 
 TEST_F(FrameCacheTest, SettingsComeFromTheLargestReadableFile) {
@@ -234,95 +233,95 @@ TEST_F(FrameCacheTest, SettingsComeFromTheLargestReadableFile) {
   const auto volume = all->file(largest).read({}, nullptr);
   const auto scale = volume->coarse().suggest_density_scale();
   ASSERT_TRUE(scale);
-  shelf_.wish({all, from(0), std::nullopt, plenty});  // no settings yet
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_FALSE(shelf_.nearest());
-  shelf_.wish({all, from(0), BuildSettings{}, plenty});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.nearest()->built.settings.refine.density_scale, *scale);
-  const auto judged = shelf_.take_judged();
+  cache_.request({all, from(0), std::nullopt, plenty});  // no settings yet
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_FALSE(cache_.nearest());
+  cache_.request({all, from(0), BuildSettings{}, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.nearest()->built.settings.refine.density_scale, *scale);
+  const auto judged = cache_.take_analyzed();
   ASSERT_TRUE(judged);
   EXPECT_EQ(judged->density_scale, scale);
-  EXPECT_EQ(judged->facts->bounds().max, volume->bounds().max);
-  EXPECT_FALSE(shelf_.take_judged());
+  EXPECT_EQ(judged->volume_info->bounds().max, volume->bounds().max);
+  EXPECT_FALSE(cache_.take_analyzed());
 }
 
 TEST_F(FrameCacheTest, ShowsOldFramesUntilNewSettingsAreBuilt) {
   const FrameFilesPtr all = files();
-  shelf_.wish({all, from(0), BuildSettings{}, plenty});
+  cache_.request({all, from(0), BuildSettings{}, plenty});
   ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
   BuildSettings finer;
   finer.refine.threshold = 0.01;
-  shelf_.wish({all, from(1), finer, plenty});
-  ASSERT_TRUE(shelf_.nearest());
-  EXPECT_EQ(shelf_.nearest()->frame, 1U);
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.nearest()->built.settings, finer);
+  cache_.request({all, from(1), finer, plenty});
+  ASSERT_TRUE(cache_.nearest());
+  EXPECT_EQ(cache_.nearest()->frame, 1U);
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.nearest()->built.settings, finer);
   ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
 }
 
 TEST_F(FrameCacheTest, ChangedFilesDiscardAllFrames) {
-  shelf_.wish({files(), from(0), BuildSettings{}, plenty});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  cache_.request({files(), from(0), BuildSettings{}, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
   const Clip other(3);
   const auto others = std::make_shared<const FrameFiles>(FrameFiles{other.paths(), {}});
-  shelf_.wish({others, {1, 2, 0}, BuildSettings{}, plenty});
-  EXPECT_EQ(shelf_.frames().frames.size(), 3U);
+  cache_.request({others, {1, 2, 0}, BuildSettings{}, plenty});
+  EXPECT_EQ(cache_.frames().frames.size(), 3U);
   ASSERT_TRUE(comes([&] { return number(State::ready) == 3; }));
-  shelf_.clear();
-  EXPECT_FALSE(shelf_.nearest());
-  EXPECT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_TRUE(shelf_.frames().frames.empty());
-  EXPECT_FALSE(shelf_.take_judged());
+  cache_.clear();
+  EXPECT_FALSE(cache_.nearest());
+  EXPECT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_TRUE(cache_.frames().frames.empty());
+  EXPECT_FALSE(cache_.take_analyzed());
 }
 
 // A host repairs the file as soon as the warning is logged. The earlier failure does not count.
 TEST_F(FrameCacheTest, RepairedFileIsReadAgain) {
   const Clip other(1);
   other.remove(0);
-  std::unique_ptr<FrameShelf> shelf;
+  std::unique_ptr<FrameCache> cache;
   std::atomic<int> mended = 0;
   const auto mend = [&](cumulet::LogLevel level, const char* /*text*/) {
     if (level != cumulet::LogLevel::warning || mended++ > 0) return;
     cumulet::test::write_frame(other.path(0), {cumulet::test::clip_ball(0)});
-    shelf->rebuild();
+    cache->rebuild();
   };
-  shelf = std::make_unique<FrameShelf>(cumulet::Log(mend), [] {});
+  cache = std::make_unique<FrameCache>(cumulet::Log(mend), [] {});
   const auto files = std::make_shared<const FrameFiles>(FrameFiles{other.paths(), {}});
-  shelf->wish({files, {0}, BuildSettings{}, plenty});
-  ASSERT_TRUE(comes([&] { return !shelf->busy() && mended > 0; }));
-  EXPECT_FALSE(shelf->status().failure);
-  ASSERT_TRUE(shelf->nearest());
-  EXPECT_TRUE(shelf->nearest()->wanted);
+  cache->request({files, {0}, BuildSettings{}, plenty});
+  ASSERT_TRUE(comes([&] { return !cache->busy() && mended > 0; }));
+  EXPECT_FALSE(cache->status().failure);
+  ASSERT_TRUE(cache->nearest());
+  EXPECT_TRUE(cache->nearest()->wanted);
 }
 
 TEST_F(FrameCacheTest, ReportsWhyItStopped) {
   clip_.corrupt(3);
   std::atomic<bool> throws = true;
-  FrameShelf shelf(cumulet::Log([&](cumulet::LogLevel, const char*) {
+  FrameCache cache(cumulet::Log([&](cumulet::LogLevel, const char*) {
                      if (throws) throw std::runtime_error("no room");
                    }),
                    [] {});
-  shelf.wish({files(), from(3), BuildSettings{}, plenty});
-  ASSERT_TRUE(comes([&] { return shelf.status().failure.has_value(); }));
-  EXPECT_STREQ(shelf.status().failure->what(), "internal error: no room");
-  EXPECT_TRUE(shelf.wait(std::nullopt));
+  cache.request({files(), from(3), BuildSettings{}, plenty});
+  ASSERT_TRUE(comes([&] { return cache.status().failure.has_value(); }));
+  EXPECT_STREQ(cache.status().failure->what(), "internal error: no room");
+  EXPECT_TRUE(cache.wait(std::nullopt));
   throws = false;
-  shelf.rebuild();
-  ASSERT_TRUE(shelf.wait(std::nullopt));
-  EXPECT_FALSE(shelf.status().failure);
-  EXPECT_TRUE(shelf.nearest());
+  cache.rebuild();
+  ASSERT_TRUE(cache.wait(std::nullopt));
+  EXPECT_FALSE(cache.status().failure);
+  EXPECT_TRUE(cache.nearest());
 }
 
 TEST_F(FrameCacheTest, StopsUntilTheNextRequest) {
   const FrameFilesPtr all = files();
   for (std::uint32_t round = 0; round < 6; ++round) {
-    shelf_.wish({all, from(round), BuildSettings{}, plenty});
-    shelf_.cancel();
-    ASSERT_TRUE(shelf_.wait(std::nullopt));
-    EXPECT_FALSE(shelf_.busy());
+    cache_.request({all, from(round), BuildSettings{}, plenty});
+    cache_.cancel();
+    ASSERT_TRUE(cache_.wait(std::nullopt));
+    EXPECT_FALSE(cache_.busy());
   }
-  shelf_.wish({all, from(1), BuildSettings{}, plenty});
+  cache_.request({all, from(1), BuildSettings{}, plenty});
   ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
 }
 
@@ -334,28 +333,28 @@ TEST_F(FrameCacheTest, RequestsMayChangeContinuously) {
   std::atomic<bool> ends = false;
   std::thread looks([&] {
     while (!ends) {
-      static_cast<void>(shelf_.nearest());
-      static_cast<void>(shelf_.frames());
-      static_cast<void>(shelf_.status());
-      static_cast<void>(shelf_.take_judged());
+      static_cast<void>(cache_.nearest());
+      static_cast<void>(cache_.frames());
+      static_cast<void>(cache_.status());
+      static_cast<void>(cache_.take_analyzed());
     }
   });
   for (std::uint32_t i = 0; i < 60; ++i) {
     BuildSettings settings;
     settings.refine.threshold = 0.02 + 0.01 * (i % 3);
-    shelf_.wish({i % 20 < 15 ? all : again, from(i % count), settings, i % 7 == 0 ? 0 : plenty});
-    if (i % 11 == 5) shelf_.cancel();
-    if (i % 13 == 5) shelf_.rebuild();
-    if (i % 17 == 5) shelf_.clear();
+    cache_.request({i % 20 < 15 ? all : again, from(i % count), settings, i % 7 == 0 ? 0 : plenty});
+    if (i % 11 == 5) cache_.cancel();
+    if (i % 13 == 5) cache_.rebuild();
+    if (i % 17 == 5) cache_.clear();
     if (i % 4 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(3));
   }
-  shelf_.wish({all, from(4), BuildSettings{}, plenty});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  cache_.request({all, from(4), BuildSettings{}, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
   EXPECT_TRUE(comes([&] { return number(State::ready) == count - 1; }));
   ends = true;
   looks.join();
-  EXPECT_EQ(shelf_.nearest()->frame, 4U);
-  EXPECT_EQ(shelf_.nearest()->built.settings, BuildSettings{});
+  EXPECT_EQ(cache_.nearest()->frame, 4U);
+  EXPECT_EQ(cache_.nearest()->built.settings, BuildSettings{});
 }
 
 // Quarter-frame steps, starting with `first`; earlier steps come last.
@@ -370,13 +369,13 @@ TEST_F(FrameCacheTest, SubframesInterpolateBothFrames) {
   using cumulet::scene::Between;
   const FrameFilesPtr all = files();
   for (const Between how : {Between::blend, Between::advect}) {
-    const FrameShelf::Steps steps{how, 4, how == Between::advect ? 1.0 / 24.0 : 0.0};
+    const FrameCache::Steps steps{how, 4, how == Between::advect ? 1.0 / 24.0 : 0.0};
     const std::uint32_t last = 4 * (count - 1);
     for (const std::uint32_t step : {9U, 10U, 12U}) {
       SCOPED_TRACE(step);
-      shelf_.wish({all, steps_from(step, last), BuildSettings{}, plenty, steps});
-      ASSERT_TRUE(shelf_.wait(std::nullopt));
-      const auto ready = shelf_.nearest();
+      cache_.request({all, steps_from(step, last), BuildSettings{}, plenty, steps});
+      ASSERT_TRUE(cache_.wait(std::nullopt));
+      const auto ready = cache_.nearest();
       ASSERT_TRUE(ready && ready->wanted);
       EXPECT_EQ(ready->frame, step / 4);
       EXPECT_EQ(ready->part, 0.25 * (step % 4));
@@ -395,22 +394,22 @@ TEST_F(FrameCacheTest, SubframesInterpolateBothFrames) {
     ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
   }
   // A request with other steps keeps the whole frames.
-  const std::uint64_t revision = shelf_.revision();
-  shelf_.wish({all, from(3), BuildSettings{}, plenty});
+  const std::uint64_t revision = cache_.revision();
+  cache_.request({all, from(3), BuildSettings{}, plenty});
   EXPECT_EQ(number(State::ready), static_cast<std::size_t>(count));
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.nearest()->frame, 3U);
-  EXPECT_TRUE(shelf_.nearest()->wanted);
-  EXPECT_LE(shelf_.revision(), revision + 1);  // one step may have been in progress
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.nearest()->frame, 3U);
+  EXPECT_TRUE(cache_.nearest()->wanted);
+  EXPECT_LE(cache_.revision(), revision + 1);  // one step may have been in progress
 }
 
 TEST_F(FrameCacheTest, NoSubframesNextToFailedFrames) {
   clip_.remove(0);
   clip_.corrupt(4);
   const FrameFilesPtr all = files();
-  const FrameShelf::Steps steps{cumulet::scene::Between::blend, 2, 0.0};
+  const FrameCache::Steps steps{cumulet::scene::Between::blend, 2, 0.0};
   const std::uint32_t last = 2 * (count - 1);
-  shelf_.wish({all, steps_from(0, last), BuildSettings{}, plenty, steps});
+  cache_.request({all, steps_from(0, last), BuildSettings{}, plenty, steps});
   ASSERT_TRUE(comes([&] { return number(State::ready) == count - 2 && number(State::failed) == 2; }));
   struct Case {
     std::uint32_t step;
@@ -421,9 +420,9 @@ TEST_F(FrameCacheTest, NoSubframesNextToFailedFrames) {
                                    {8, 3, 0.0}, {9, 3, 0.0}, {10, 5, 0.0}, {11, 5, 0.5}};
   for (const Case& one : cases) {
     SCOPED_TRACE(one.step);
-    shelf_.wish({all, steps_from(one.step, last), BuildSettings{}, plenty, steps});
-    ASSERT_TRUE(shelf_.wait(std::nullopt));
-    const auto ready = shelf_.nearest();
+    cache_.request({all, steps_from(one.step, last), BuildSettings{}, plenty, steps});
+    ASSERT_TRUE(cache_.wait(std::nullopt));
+    const auto ready = cache_.nearest();
     ASSERT_TRUE(ready && ready->wanted);
     EXPECT_EQ(ready->frame, one.frame);
     EXPECT_EQ(ready->part, one.part);
@@ -433,22 +432,22 @@ TEST_F(FrameCacheTest, NoSubframesNextToFailedFrames) {
 
 TEST_F(FrameCacheTest, SubframesStayWithinTheMemory) {
   const FrameFilesPtr all = files();
-  const FrameShelf::Steps steps{cumulet::scene::Between::blend, 8, 0.0};
+  const FrameCache::Steps steps{cumulet::scene::Between::blend, 8, 0.0};
   const std::uint32_t last = 8 * (count - 1);
-  shelf_.wish({all, steps_from(3, last), BuildSettings{}, 0, steps});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.nearest()->part, 0.375);
+  cache_.request({all, steps_from(3, last), BuildSettings{}, 0, steps});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.nearest()->part, 0.375);
   EXPECT_EQ(number(State::ready), 0U);
-  const std::uint64_t one = shelf_.frames().bytes;
+  const std::uint64_t one = cache_.frames().bytes;
   const std::uint64_t room = 4 * one;
-  shelf_.wish({all, steps_from(20, last), BuildSettings{}, room, steps});
-  ASSERT_TRUE(comes([&] { return shelf_.nearest()->frame == 2 && !shelf_.busy(); }));
-  EXPECT_LE(shelf_.frames().bytes, room);
+  cache_.request({all, steps_from(20, last), BuildSettings{}, room, steps});
+  ASSERT_TRUE(comes([&] { return cache_.nearest()->frame == 2 && !cache_.busy(); }));
+  EXPECT_LE(cache_.frames().bytes, room);
   // The build in progress ends, and none follows.
-  shelf_.wish({all, steps_from(40, last), BuildSettings{}, plenty, steps});
-  shelf_.cancel();
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_FALSE(shelf_.status().failure);
+  cache_.request({all, steps_from(40, last), BuildSettings{}, plenty, steps});
+  cache_.cancel();
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_FALSE(cache_.status().failure);
 }
 
 }  // namespace

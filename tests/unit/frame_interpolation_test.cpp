@@ -40,12 +40,12 @@ TEST(FrameInterpolation, DensityIsLinearAndOtherFieldsAreDensityWeighted) {
   VolumeFrame a{.density = test::noise_volume({20, 17, 12}, {-3, 2, 1}, 1)};
   VolumeFrame b{.density = test::noise_volume({14, 20, 20}, {4, -2, 0}, 2)};
   a.flame = test::noise_volume({9, 9, 9}, {0, 3, 2}, 3);
-  const auto coloured = [](const ScalarVolume& density, float value) {
+  const auto colored = [](const ScalarVolume& density, float value) {
     return test::make_volume(density.bounds_max - density.bounds_min + 1, density.bounds_min,
                              [=](const ivec3& /*p*/) { return value; });
   };
-  a.colour = std::array{coloured(a.density, 0.8F), coloured(a.density, 0.2F), coloured(a.density, 0.5F)};
-  b.colour = std::array{coloured(b.density, 0.1F), coloured(b.density, 0.6F), coloured(b.density, 0.5F)};
+  a.color = std::array{colored(a.density, 0.8F), colored(a.density, 0.2F), colored(a.density, 0.5F)};
+  b.color = std::array{colored(b.density, 0.1F), colored(b.density, 0.6F), colored(b.density, 0.5F)};
   const double part = 0.3;
   const VolumeFrame mixed = blend(a, b, part);
   for_each_voxel(ivec3(-5), ivec3(26), [&](const ivec3& p) {
@@ -54,8 +54,8 @@ TEST(FrameInterpolation, DensityIsLinearAndOtherFieldsAreDensityWeighted) {
     ASSERT_EQ(value_at(mixed.density, p), static_cast<float>(first + second));
     ASSERT_EQ(value_at(*mixed.flame, p), static_cast<float>((1.0 - part) * value_at(*a.flame, p)));
     if (first + second == 0.0) return;
-    ASSERT_NEAR(value_at((*mixed.colour)[0], p), (first * 0.8 + second * 0.1) / (first + second), 1e-6);
-    ASSERT_NEAR(value_at((*mixed.colour)[2], p), 0.5, 1e-6);
+    ASSERT_NEAR(value_at((*mixed.color)[0], p), (first * 0.8 + second * 0.1) / (first + second), 1e-6);
+    ASSERT_NEAR(value_at((*mixed.color)[2], p), 0.5, 1e-6);
   });
   test::expect_identical(blend(a, b, 0.0).density, a.density);
   test::expect_identical(blend(a, b, 1.0).density, b.density);
@@ -92,15 +92,15 @@ TEST(FrameInterpolation, UniformMotionIsExact) {
   const VolumeFrame b = frame_at(20.0);
   const VolumeFrame wanted = frame_at(17.0);
   double most = 0.0;
-  double most_blended = 0.0;
+  double max_blended = 0.0;
   const VolumeFrame found = between(a, b, 0.5, 0.25);
   const VolumeFrame blended = blend(a, b, 0.5);
   for_each_voxel(ivec3(4, 0, 0), ivec3(35, 19, 19), [&](const ivec3& p) {
     most = std::max(most, std::abs(double{value_at(found.density, p)} - value_at(wanted.density, p)));
-    most_blended = std::max(most_blended, std::abs(double{value_at(blended.density, p)} - value_at(wanted.density, p)));
+    max_blended = std::max(max_blended, std::abs(double{value_at(blended.density, p)} - value_at(wanted.density, p)));
   });
   EXPECT_LT(most, 1e-5);
-  EXPECT_GT(most_blended, 0.3);
+  EXPECT_GT(max_blended, 0.3);
   // Without a velocity, the frames are blended.
   VolumeFrame still = b;
   still.velocity.reset();

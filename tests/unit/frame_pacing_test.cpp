@@ -175,18 +175,18 @@ class MadeDevice {
 /// Traces a pass as Tracer does, with in-flight dispatches whose completion is known late.
 void trace_pass(MadeDevice& device, const std::shared_ptr<render::RoundCost>& cost, double aim_ms,
                 std::vector<render::DispatchRecord>& log) {
-  constexpr std::uint32_t most_rounds = 65536;
-  struct Flight {
+  constexpr std::uint32_t max_rounds = 65536;
+  struct InFlightDispatch {
     render::Dispatched what;
     MadeDevice::Ran ran;
   };
-  std::deque<Flight> flying;
+  std::deque<InFlightDispatch> flying;
   std::size_t from = 0;
   const auto land = [&] {
-    Flight& flight = flying.front();
+    InFlightDispatch& flight = flying.front();
     render::learn(flight.what, flight.ran.ms, flight.ran.ms, flight.ran.full_rounds);
     log.push_back({flight.what.aim_ms, flight.ran.ms, static_cast<std::uint32_t>(flight.what.blocks.size() * 1024),
-                   static_cast<std::uint32_t>(flight.what.lanes), flight.what.rounds, flight.what.most_ms > 0.0});
+                   static_cast<std::uint32_t>(flight.what.lanes), flight.what.rounds, flight.what.max_ms > 0.0});
     for (std::size_t i = 0; i < flight.what.blocks.size(); ++i) {
       device.blocks[flight.what.blocks[i]].unfinished = flight.ran.unfinished[i];
       --device.blocks[flight.what.blocks[i]].under_way;
@@ -194,9 +194,10 @@ void trace_pass(MadeDevice& device, const std::shared_ptr<render::RoundCost>& co
     flying.pop_front();
   };
   while (std::ranges::any_of(device.blocks, [](const render::Block& block) { return block.unfinished > 0; })) {
-    auto what = flying.size() < render::Flights::most ? render::choose(device.blocks, from, cost, aim_ms, most_rounds)
-                                                      : std::nullopt;
-    if (!what && flying.empty()) what = render::choose_least(device.blocks, from, cost, most_rounds);
+    auto what = flying.size() < render::InFlightDispatches::most
+                    ? render::choose(device.blocks, from, cost, aim_ms, max_rounds)
+                    : std::nullopt;
+    if (!what && flying.empty()) what = render::choose_minimum(device.blocks, from, cost, max_rounds);
     if (!what) {
       land();
       continue;

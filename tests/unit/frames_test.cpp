@@ -255,10 +255,10 @@ TEST_F(FrameSelection, PatternSelectsAllExistingFrames) {
   EXPECT_EQ(plan->frames[2].stats, "s.3.json");
   // Ordered by size, largest first; equal sizes in frame order. Independent of the requested frames.
   const std::vector<std::string> judged{folder / "f.0001.vdb", folder / "f.0002.vdb", folder / "f.0003.vdb"};
-  EXPECT_EQ(plan->judged_by, judged);
+  EXPECT_EQ(plan->analyzed_by, judged);
   options.frames = {3, 9};
   ASSERT_EQ(said(), "");
-  EXPECT_EQ(plan->judged_by, judged);
+  EXPECT_EQ(plan->analyzed_by, judged);
   ASSERT_EQ(plan->frames.size(), 2u);
   EXPECT_EQ(plan->frames[1].volume, folder / "f.0009.vdb") << "missing, which its turn tells";
 }
@@ -367,7 +367,7 @@ TEST_F(FrameSelection, NegativeFramesAreSupported) {
   EXPECT_EQ(outputs,
             (std::vector<std::string>{"out.-002.exr", "out.-001.exr", "out.0000.exr", "out.0001.exr", "out.0002.exr"}));
   EXPECT_EQ(plan->passed_over, "");
-  EXPECT_EQ(plan->judged_by.size(), 5U);
+  EXPECT_EQ(plan->analyzed_by.size(), 5U);
   EXPECT_DOUBLE_EQ(plan->frames[2].seconds, 2.0 / 24.0) << "the clock begins with the first";
   options.frames = parse_frames("-2-0x0.5");
   ASSERT_EQ(said(), "");

@@ -124,10 +124,10 @@ struct Frame {
     sum = gl::make_texture_2d(gl_, GL_RGBA32F, 8, 8, "sum");
     counts = gl::make_texture_2d(gl_, GL_RG32UI, 8, 8, "counts");
     z = gl::make_texture_2d(gl_, GL_R32F, 8, 8, "z");
-    colour = gl::make_texture_2d(gl_, GL_RGBA32F, 8, 8, "colour");
+    color = gl::make_texture_2d(gl_, GL_RGBA32F, 8, 8, "colour");
     depth_texture = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, 8, 8, "depth");
     target = gl::make_framebuffer(gl_);
-    gl_->NamedFramebufferTexture(target.name(), GL_COLOR_ATTACHMENT0, colour.name(), 0);
+    gl_->NamedFramebufferTexture(target.name(), GL_COLOR_ATTACHMENT0, color.name(), 0);
     gl_->NamedFramebufferTexture(target.name(), GL_DEPTH_ATTACHMENT, depth_texture.name(), 0);
     const glm::vec4 radiance(0.5F, 0.25F, 0.125F, 0.5F);
     const glm::uvec2 samples(2U);
@@ -141,7 +141,7 @@ struct Frame {
     const float far = 1.0F;
     const glm::vec4 grey(0.5F);
     gl_->ClearTexImage(depth_texture.name(), 0, GL_DEPTH_COMPONENT, GL_FLOAT, &far);
-    gl_->ClearTexImage(colour.name(), 0, GL_RGBA, GL_FLOAT, &grey);
+    gl_->ClearTexImage(color.name(), 0, GL_RGBA, GL_FLOAT, &grey);
     render::HostDepthInput input;
     input.source = render::DepthSource::framebuffer;
     input.name = target.name();
@@ -176,7 +176,7 @@ struct Frame {
   [[nodiscard]] std::vector<float> read() const {
     const StateGuard guard(*gl_);
     std::vector<float> pixels(64 * 5);
-    gl_->GetTextureImage(colour.name(), 0, GL_RGBA, GL_FLOAT, 64 * 16, pixels.data());
+    gl_->GetTextureImage(color.name(), 0, GL_RGBA, GL_FLOAT, 64 * 16, pixels.data());
     gl_->GetTextureImage(depth_texture.name(), 0, GL_DEPTH_COMPONENT, GL_FLOAT, 64 * 4, &pixels[64 * 4]);
     return pixels;
   }
@@ -184,7 +184,7 @@ struct Frame {
   gl::FunctionsPtr gl_;
   render::Compositor compositor;
   render::HostDepth depth;
-  Object sum, counts, z, colour, depth_texture, target;
+  Object sum, counts, z, color, depth_texture, target;
   bool denoise = false;
 };
 

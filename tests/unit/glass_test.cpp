@@ -33,10 +33,10 @@ Material glass(float ior = 1.5F, float roughness = 0.0F) {
   return m;
 }
 
-Material thin_wall(const vec3& colour) {
+Material thin_wall(const vec3& color) {
   Material m = glass();
   m.thickness = 0.0F;
-  m.base_color = glm::vec4(colour, 1.0F);
+  m.base_color = glm::vec4(color, 1.0F);
   return m;
 }
 
@@ -137,9 +137,9 @@ TEST_P(Glass, WhiteFurnaceIsOne) {
 // below.
 TEST_P(Glass, ThinWallTintsTheBackgroundAndSunlight) {
   const auto viewer = make();
-  const vec3 colour(1.0F, 0.5F, 0.25F);
+  const vec3 color(1.0F, 0.5F, 0.25F);
   const auto wall = [&](StillScene& scene, float y) {
-    const std::uint32_t material = scene.add(thin_wall(colour));
+    const std::uint32_t material = scene.add(thin_wall(color));
     scene.materials.back().double_sided = true;
     scene.add_quad({{{-168, y, 232}, {232, y, 232}, {232, y, -168}, {-168, y, -168}}}, material);
   };
@@ -149,7 +149,7 @@ TEST_P(Glass, ThinWallTintsTheBackgroundAndSunlight) {
   viewer->viewer().show_surfaces(test::source_of(alone));
   viewer->set_light(sky(1.0F));
   const test::Picture seen = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen.mean()[c], 0.04 + 0.96 * double{colour[c]}, 8e-3) << c;
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen.mean()[c], 0.04 + 0.96 * double{color[c]}, 8e-3) << c;
 
   auto floored = std::make_shared<StillScene>();
   wall(*floored, 0.0F);
@@ -164,7 +164,7 @@ TEST_P(Glass, ThinWallTintsTheBackgroundAndSunlight) {
   const test::Picture lit = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
   const double cosine = std::sin(60.0 * pi / 180.0);
   for (int c = 0; c < 3; ++c) {
-    const double tint = double{colour[c]};
+    const double tint = double{color[c]};
     const double in = tint * (1.0 - schlick(0.04, cosine));
     // Light that the wall reflects back to the floor arrives again: the hemispherical albedo of the wall.
     const double first = 0.5 * 3.0 * cosine / pi * in * 0.96 * tint;
@@ -241,7 +241,7 @@ TEST_P(Glass, TexturesMatchEqualFactors) {
     m.transmission = 1.0F;
     constexpr std::uint8_t quarter = 64;
     constexpr float a_quarter = quarter / 255.0F;
-    const float a_colour = std::pow((a_quarter + 0.055F) / 1.055F, 2.4F);
+    const float a_color = std::pow((a_quarter + 0.055F) / 1.055F, 2.4F);
     if (textured) {
       // Left: a texel that would be noticed. Right: 0.25 everywhere, or the direction (-1, 1), rotated by 135 degrees.
       const auto even = scene->add_texture(2, 1, {255, 255, 255, 255, quarter, quarter, quarter, quarter});
@@ -260,7 +260,7 @@ TEST_P(Glass, TexturesMatchEqualFactors) {
       m.film_thickness_texture = use(even, false);
       m.transmission_texture = use(even, true);
     } else {
-      m.sheen_color = vec3(a_colour);
+      m.sheen_color = vec3(a_color);
       m.sheen_roughness = a_quarter;
       m.anisotropy = a_quarter;
       m.anisotropy_rotation = static_cast<float>(0.75 * pi);

@@ -42,9 +42,10 @@ TEST(GltfVisibility, HiddenNodesAndDescendantsAreNotImported) {
   model.show(shape, {{"name", "shown"}, {"extensions", visible(true)}});
   // An invisible node hides its descendants, even visible ones, with their lights but not their cameras.
   const int child = model.show(shape, {{"translation", {0, 0, 50}}, {"extensions", visible(true)}});
-  const int lamp = model.add("nodes", {{"extensions", light}, {"camera", 0}});
-  model.show(shape,
-             {{"translation", {100, 0, 0}}, {"children", json::array({child, lamp})}, {"extensions", visible(false)}});
+  const int analytic_light = model.add("nodes", {{"extensions", light}, {"camera", 0}});
+  model.show(shape, {{"translation", {100, 0, 0}},
+                     {"children", json::array({child, analytic_light})},
+                     {"extensions", visible(false)}});
   model.add("nodes", {{"extensions", light}, {"translation", {0, 7, 0}}});
   const ScenePtr scene = imported(model);
   EXPECT_EQ(scene->triangle_count(), 1U);
@@ -390,7 +391,7 @@ TEST(GltfMaterialLayers, MissingPropertiesHaveTheExtensionsDefaults) {
   EXPECT_TRUE(lines.warnings.empty());
   Material expected;
   EXPECT_EQ(scene->materials[0], expected);
-  EXPECT_FALSE(is_rich(scene->materials[0]));
+  EXPECT_FALSE(has_extended_bsdf(scene->materials[0]));
   // An infinite or zero attenuation distance means no absorption.
   for (const char* distance : {"null", "0"}) {
     json volume = {{"thicknessFactor", 1}, {"attenuationColor", {0, 0.5, 1}}};
@@ -540,14 +541,14 @@ GltfModel variant_model() {
       json::array({{{"name", "day"}}, {{"name", "night"}}});
   model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 2, {128, 128, 255}))}});
   model.add("textures", {{"source", 0}});
-  const auto coloured = [](const std::vector<double>& colour) {
-    return json{{"pbrMetallicRoughness", {{"baseColorFactor", colour}}}};
+  const auto colored = [](const std::vector<double>& color) {
+    return json{{"pbrMetallicRoughness", {{"baseColorFactor", color}}}};
   };
-  model.add("materials", coloured({1, 0, 0, 1}));
-  json green = coloured({0, 1, 0, 1});
+  model.add("materials", colored({1, 0, 0, 1}));
+  json green = colored({0, 1, 0, 1});
   green.update({{"emissiveFactor", {0, 1, 0}}, {"alphaMode", "MASK"}, {"doubleSided", true}});
   model.add("materials", green);
-  json blue = coloured({0, 0, 1, 1});
+  json blue = colored({0, 0, 1, 1});
   blue["normalTexture"] = {{"index", 0}};
   model.add("materials", blue);
   const json attributes = {{"POSITION", model.triangle()}, {"TEXCOORD_0", model.vec2({0, 1, 1, 1, 0, 0})}};
@@ -626,10 +627,10 @@ GltfModel glossy_model(const json& glossiness) {
 }
 
 /// The specular-glossiness form of a mixture of metal and dielectric, which the conversion has to separate.
-detail::SpecularGlossiness mixture(const glm::vec3& colour, float metallic) {
-  const glm::vec3 specular = glm::mix(glm::vec3(0.04F), colour, metallic);
+detail::SpecularGlossiness mixture(const glm::vec3& color, float metallic) {
+  const glm::vec3 specular = glm::mix(glm::vec3(0.04F), color, metallic);
   const float rest = 1.0F - std::max({specular.r, specular.g, specular.b});
-  return {glm::vec4(colour * (1.0F - metallic) * 0.96F / rest, 1.0F), specular, 0.25F};
+  return {glm::vec4(color * (1.0F - metallic) * 0.96F / rest, 1.0F), specular, 0.25F};
 }
 
 TEST(GltfGlossiness, ConversionInvertsMetallicRoughness) {

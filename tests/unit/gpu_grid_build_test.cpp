@@ -265,7 +265,7 @@ struct Carrying {
         0.0F, 1.0F - glm::length((x - glm::vec3(30.0F, 50.0F, 20.0F)) / 24.0F) + 0.3F * glm::simplex(0.13F * x));
     return 200.0F * glm::vec3(hot, hot * hot, std::pow(hot, 6.0F));
   }
-  static glm::vec3 colour(const glm::ivec3& p) {
+  static glm::vec3 color(const glm::ivec3& p) {
     return glm::clamp(
         0.5F + 0.6F * glm::vec3(glm::simplex(0.05F * glm::vec3(p)), glm::simplex(0.21F * glm::vec3(p)), 0.3F),
         glm::vec3(0.0F), glm::vec3(1.0F));
@@ -282,25 +282,25 @@ struct Carrying {
     if (dense) density = test::noise_volume({60, 45, 50}, glm::ivec3(0), 1);
     const grid::Cube cube = grid::fit_cube(density, glm::ivec3(0), size - 1);
     statistics = std::make_shared<const grid::Statistics>(density, cube);
-    const auto colours = [&](const auto& function) {
+    const auto colors = [&](const auto& function) {
       const auto component = [&](int i) {
         return test::make_volume(size, glm::ivec3(0), [&](const glm::ivec3& p) { return function(p)[i]; });
       };
       return grid::RgbField::Components{component(0), component(1), component(2)};
     };
-    channels.emission = std::make_shared<const grid::RgbField>(colours(emission), cube);
+    channels.emission = std::make_shared<const grid::RgbField>(colors(emission), cube);
     if (!dense) return;
     const auto there = [&](const glm::ivec3& p) { return test::value_at(density, p); };
-    channels.scattering = std::make_shared<const grid::RgbField>(
-        colours([&](const glm::ivec3& p) { return there(p) * colour(p); }), cube);
+    channels.scattering =
+        std::make_shared<const grid::RgbField>(colors([&](const glm::ivec3& p) { return there(p) * color(p); }), cube);
     channels.forward = std::make_shared<const grid::ScalarField>(
         test::make_volume(
             size, glm::ivec3(0),
-            [&](const glm::ivec3& p) { return luminance(there(p) * colour(p)) * (0.5F + 0.5F * cosine(p)); }),
+            [&](const glm::ivec3& p) { return luminance(there(p) * color(p)) * (0.5F + 0.5F * cosine(p)); }),
         cube);
     channels.momentum = std::make_shared<const grid::MomentumField>(
-        grid::MomentumField::Values{
-            colours([&](const glm::ivec3& p) { return there(p) * (0.5F + 0.5F * velocity(p)); }), fastest},
+        grid::MomentumField::Values{colors([&](const glm::ivec3& p) { return there(p) * (0.5F + 0.5F * velocity(p)); }),
+                                    fastest},
         cube);
   }
   [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
@@ -325,7 +325,7 @@ std::vector<glm::ivec3> sixths_of(const glm::vec3& v0, std::uint32_t shape) {
 
 // Compares each channel's record with the mean over these voxels in double precision.
 void expect_means(const Carrying& of, const glm::vec3& v0, std::uint32_t shape, const glm::vec3& emission,
-                  std::uint32_t colour, std::int16_t anisotropy, const glm::uvec2& velocity) {
+                  std::uint32_t color, std::int16_t anisotropy, const glm::uvec2& velocity) {
   glm::dvec3 light(0.0);
   glm::dvec3 scattering(0.0);
   glm::dvec3 momentum(0.0);
@@ -337,16 +337,16 @@ void expect_means(const Carrying& of, const glm::vec3& v0, std::uint32_t shape, 
     if (glm::any(glm::greaterThanEqual(p, glm::ivec3(60, 70, 50)))) continue;
     light += glm::dvec3(Carrying::emission(p));
     const double density = test::value_at(of.density, p);
-    const glm::dvec3 coloured = density * glm::dvec3(Carrying::colour(p));
-    scattering += coloured;
-    scattered += luminance(coloured);
-    forward += luminance(coloured) * double(Carrying::cosine(p));
+    const glm::dvec3 colored = density * glm::dvec3(Carrying::color(p));
+    scattering += colored;
+    scattered += luminance(colored);
+    forward += luminance(colored) * double(Carrying::cosine(p));
     momentum += density * glm::dvec3(Carrying::velocity(p));
     mass += density;
   }
   light /= static_cast<double>(voxels.size());
   for (int i = 0; i < 3; ++i) ASSERT_NEAR(emission[i], light[i], 1e-4 * light[i] + 1e-35) << i;
-  const glm::vec3 shown = core::cm_cell_colour(colour);
+  const glm::vec3 shown = core::cm_cell_color(color);
   const glm::vec3 moves = core::cm_cell_velocity(velocity);
   constexpr std::array<double, 3> steps{1.0 / 2047.0, 1.0 / 2047.0, 1.0 / 1023.0};
   for (int i = 0; i < 3; ++i) {
@@ -376,7 +376,7 @@ TEST_P(GpuGridBuilds, ChannelsMatchTheVoxels) {
     const Read read = this->read(built);
     ASSERT_NO_FATAL_FAILURE(expect_same(expected, built, read, rounding)) << i;
     const auto emission = records<grid::EmissionRecord>(built, grid::Channel::emission);
-    const auto colour = records<std::uint32_t>(built, grid::Channel::colour);
+    const auto color = records<std::uint32_t>(built, grid::Channel::color);
     const auto anisotropy = records<std::int16_t>(built, grid::Channel::anisotropy);
     const auto velocity = records<glm::uvec2>(built, grid::Channel::velocity);
     for (std::size_t c = 0; c < built.count; ++c) {
@@ -386,7 +386,7 @@ TEST_P(GpuGridBuilds, ChannelsMatchTheVoxels) {
         ASSERT_NEAR(emission[c].mean[k], expected.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F) << c;
       if (emission[c].mean.x > 1.0F) {
         ++glowing;
-        if (emission[c].gradient != expected.emission[c].gradient || colour[c] != expected.colour[c] ||
+        if (emission[c].gradient != expected.emission[c].gradient || color[c] != expected.color[c] ||
             velocity[c] != expected.velocity[c] || anisotropy[c] != expected.anisotropy[c])
           ++others;
         const glm::uvec4 light(glm::floatBitsToUint(emission[c].mean), emission[c].gradient);
@@ -398,16 +398,16 @@ TEST_P(GpuGridBuilds, ChannelsMatchTheVoxels) {
       const std::uint32_t size = core::cm_shape_cube_size(shape);
       if (size > 3 || c % 7 != 0) continue;
       ASSERT_NO_FATAL_FAILURE(
-          expect_means(of, core::cm_record_v0(words), shape, emission[c].mean, colour[c], anisotropy[c], velocity[c]))
+          expect_means(of, core::cm_record_v0(words), shape, emission[c].mean, color[c], anisotropy[c], velocity[c]))
           << i << ' ' << c;
     }
     // The same emissive cells in the same order.
-    const scene::GlowTable wanted = scene::glow_table(expected);
-    ASSERT_EQ(built.glow.cells.size(), wanted.cells.size()) << i;
-    EXPECT_NEAR(built.glow.power, wanted.power, 1e-5 * wanted.power);
-    EXPECT_NEAR(built.glow.length, wanted.length, 1e-5 * wanted.length);
+    const scene::EmissiveTable wanted = scene::emissive_table(expected);
+    ASSERT_EQ(built.emissive.cells.size(), wanted.cells.size()) << i;
+    EXPECT_NEAR(built.emissive.power, wanted.power, 1e-5 * wanted.power);
+    EXPECT_NEAR(built.emissive.length, wanted.length, 1e-5 * wanted.length);
     for (std::size_t c = 0; c < wanted.cells.size(); ++c)
-      ASSERT_EQ(built.glow.cells[c].place, wanted.cells[c].place) << c;
+      ASSERT_EQ(built.emissive.cells[c].place, wanted.cells[c].place) << c;
   }
   EXPECT_GT(glowing, 1000U);
   EXPECT_LT(static_cast<double>(others), 0.02 * static_cast<double>(glowing));
@@ -426,10 +426,10 @@ TEST_P(GpuGridBuilds, FireWithoutDensityEmits) {
   Rounding rounding;
   expect_same(expected, built, read(built), rounding);
   EXPECT_GT(built.count, 1000U);
-  EXPECT_EQ(built.glow.cells.size(),
+  EXPECT_EQ(built.emissive.cells.size(),
             expected.cells.size() - static_cast<std::size_t>(std::ranges::count_if(
                                         expected.emission, [](const auto& e) { return e.mean == glm::vec3(0.0F); })));
-  EXPECT_FALSE(built.channels[static_cast<std::size_t>(grid::Channel::colour)]);
+  EXPECT_FALSE(built.channels[static_cast<std::size_t>(grid::Channel::color)]);
 }
 
 // Tolerance: half a unit in the last place of a half float, plus the float error.
@@ -544,8 +544,8 @@ struct Planned {
 
 constexpr std::uint64_t no_limit = std::numeric_limits<std::uint64_t>::max();
 
-void wait_for(render::GridBuilds& builds, const scene::MarchSourcePtr& source, std::uint64_t most_bytes = no_limit) {
-  while (!builds.advance({source}, {source}, most_bytes, Deadline::max()))
+void wait_for(render::GridBuilds& builds, const scene::MarchSourcePtr& source, std::uint64_t max_bytes = no_limit) {
+  while (!builds.advance({source}, {source}, max_bytes, Deadline::max()))
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 

@@ -133,8 +133,8 @@ volume::VolumeFrame fire() {
   frame.density = test::noise_volume({30, 40, 30}, glm::ivec3(0), 1);
   frame.density.name = "smoke";
   frame.flame = test::noise_volume({30, 30, 30}, glm::ivec3(0), 2);
-  const auto colour = [](int seed) { return test::noise_volume({30, 40, 30}, glm::ivec3(0), seed); };
-  frame.colour = {colour(3), colour(4), colour(5)};
+  const auto color = [](int seed) { return test::noise_volume({30, 40, 30}, glm::ivec3(0), seed); };
+  frame.color = {color(3), color(4), color(5)};
   return frame;
 }
 
@@ -147,7 +147,7 @@ TEST_P(GpuGrid, FiresMatchCpuBuiltGrids) {
     viewer::Medium medium;
     medium.density_scale = 0.3;
     medium.field_emission.flame_strength = 2.0;
-    medium.field_emission.flame_colour = {1.0F, 0.4F, 0.1F};
+    medium.field_emission.flame_color = {1.0F, 0.4F, 0.1F};
     still.set_medium(medium);
     still.set_camera(test::camera_at({15.0, 20.0, 110.0}, {15.0, 20.0, 15.0}, 30.0));
     still.set_light({30.0F, 30.0F, glm::vec3(0.2F), glm::vec3(0.02F)});
@@ -174,7 +174,7 @@ TEST(GpuGridBuild, FireBuildIsPlanned) {
   ASSERT_TRUE(built.source->plan);
   EXPECT_EQ(built.source->plan->lattice->channels.size(), 2U);
   EXPECT_TRUE(built.source->emits());
-  EXPECT_TRUE(built.source->coloured());
+  EXPECT_TRUE(built.source->colored());
   EXPECT_TRUE(lines.empty());
   // Different emission needs a different lattice.
   settings.emission.flame_strength = 3.0;

@@ -36,7 +36,7 @@ struct Cells {
   bool limited = false;
   // Empty if there is no such channel.
   std::vector<grid::EmissionRecord> emission;
-  std::vector<std::uint32_t> colour;
+  std::vector<std::uint32_t> color;
   std::vector<std::int16_t> anisotropy;
   std::vector<glm::uvec2> velocity;
 };
@@ -157,7 +157,7 @@ class GpuResidentStates : public test::GlTest {
     };
     get(built.cells, read.cells);
     get(channel(grid::Channel::emission), read.emission);
-    get(channel(grid::Channel::colour), read.colour);
+    get(channel(grid::Channel::color), read.color);
     get(channel(grid::Channel::anisotropy), read.anisotropy);
     get(channel(grid::Channel::velocity), read.velocity);
     return read;
@@ -242,7 +242,7 @@ TEST_P(GpuResidentStates, StatisticsMatchTheVoxels) {
     const grid::Transmittance theirs(*reference.statistics, 0.7);
     for (const std::uint32_t n : known.statistics->nodes_of_size(3)) {
       const glm::ivec3 corner = known.statistics->nodes()[n].corner;
-      for (int i = 0; i < grid::Transmittance::blocks_a_brick; ++i)
+      for (int i = 0; i < grid::Transmittance::blocks_per_brick; ++i)
         ASSERT_NEAR(ours.blocks(corner)[i], theirs.blocks(corner)[i], 1e-6);
     }
     const auto scale = volume::CoarseVolume(*known.volume).suggest_density_scale();
@@ -302,7 +302,7 @@ TEST_P(GpuResidentStates, GridsMatchTheVoxels) {
 
 // Emission settings: flame and temperature with and without ramps, only one of them, and values close to 0.
 std::vector<scene::Emission> emissions() {
-  scene::Emission plain{.flame_strength = 3.0, .flame_colour = {1.0F, 0.5F, 0.1F}, .blackbody = 1.0};
+  scene::Emission plain{.flame_strength = 3.0, .flame_color = {1.0F, 0.5F, 0.1F}, .blackbody = 1.0};
   scene::Emission curved{.flame_strength = 0.5,
                          .temperature_scale = 700.0,
                          .temperature_offset = 300.0,
@@ -310,7 +310,7 @@ std::vector<scene::Emission> emissions() {
                          .blackbody_tint = {0.2F, 1.0F, 0.7F},
                          .temperature_ramp = volume::Ramp({{0.1F, 0.0F}, {0.5F, 2.0F}, {1.2F, 3.0F}}),
                          .flame_ramp = volume::Ramp({{0.2F, 0.1F}, {0.4F, 0.0F}})};
-  scene::Emission flame_alone{.flame_strength = 1.0, .flame_colour = {0.0F, 1.0F, 0.0F}};
+  scene::Emission flame_alone{.flame_strength = 1.0, .flame_color = {0.0F, 1.0F, 0.0F}};
   scene::Emission heat_alone{.flame_strength = 0.0, .temperature_scale = 4000.0, .blackbody = 1.0};
   return {plain, curved, flame_alone, heat_alone};
 }
@@ -414,17 +414,17 @@ TEST_P(GpuResidentStates, EmissionChannelsMatchTheVoxels) {
 }
 
 // Colors and anisotropies beyond their valid range, and velocities of both signs. coloured: with colors.
-std::vector<std::pair<volume::Channel, std::vector<float>>> scattering_fields(bool coloured, int step) {
+std::vector<std::pair<volume::Channel, std::vector<float>>> scattering_fields(bool colored, int step) {
   using volume::Channel;
   std::vector<std::pair<Channel, std::vector<float>>> fields;
   for (std::size_t i = 0; i < volume::channel_count; ++i) {
     const auto channel = static_cast<Channel>(i);
-    const bool colour = channel == Channel::red || channel == Channel::green || channel == Channel::blue;
-    if (channel == Channel::temperature || channel == Channel::flame || (colour && !coloured)) continue;
+    const bool color = channel == Channel::red || channel == Channel::green || channel == Channel::blue;
+    if (channel == Channel::temperature || channel == Channel::flame || (color && !colored)) continue;
     // At other positions than the density.
     auto values = simulated(static_cast<cumulet_channel>(i), odd, channel == Channel::density ? step : step + 1);
     for (std::size_t v = 0; v < values.size(); ++v) {
-      if (colour) values[v] *= v % 7 == 0 ? -1.0F : 2.5F;
+      if (color) values[v] *= v % 7 == 0 ? -1.0F : 2.5F;
       if (channel == Channel::anisotropy) values[v] *= 4.0F;
       if (channel == Channel::velocity_y) values[v] *= v % 5 == 0 ? 1e6F : 30.0F;
     }
@@ -440,23 +440,23 @@ void expect_near(const volume::ScalarVolume& found, const volume::ScalarVolume& 
     ASSERT_NEAR(found.brick_values[i], expected.brick_values[i], 1e-6F * expected.max_value) << i;
 }
 
-glm::ivec3 colour_of(std::uint32_t packed) { return {packed & 0x7ffU, (packed >> 11U) & 0x7ffU, packed >> 22U}; }
+glm::ivec3 color_of(std::uint32_t packed) { return {packed & 0x7ffU, (packed >> 11U) & 0x7ffU, packed >> 22U}; }
 glm::vec3 velocity_of(const glm::uvec2& packed) {
   return {glm::unpackHalf2x16(packed.x), glm::unpackHalf2x16(packed.y).x};
 }
 
 void expect_same_channels(const Cells& found, const grid::TetGrid& expected, float fastest) {
-  ASSERT_EQ(found.colour.size(), expected.colour.size());
+  ASSERT_EQ(found.color.size(), expected.color.size());
   ASSERT_EQ(found.anisotropy.size(), expected.anisotropy.size());
   ASSERT_EQ(found.velocity.size(), expected.velocity.size());
-  for (std::size_t i = 0; i < expected.colour.size(); ++i) {
-    const glm::ivec3 apart = glm::abs(colour_of(found.colour[i]) - colour_of(expected.colour[i]));
+  for (std::size_t i = 0; i < expected.color.size(); ++i) {
+    const glm::ivec3 apart = glm::abs(color_of(found.color[i]) - color_of(expected.color[i]));
     ASSERT_LE(std::max({apart.x, apart.y, apart.z}), 1) << i;
   }
   for (std::size_t i = 0; i < expected.anisotropy.size(); ++i) {
     // For very low scattering the tolerance is larger, because sums over bricks are floats.
     float scatters = glm::unpackHalf2x16(expected.cells[i].data.z).x;
-    if (!expected.colour.empty()) scatters *= static_cast<float>(colour_of(expected.colour[i]).y) / 2047.0F;
+    if (!expected.color.empty()) scatters *= static_cast<float>(color_of(expected.color[i]).y) / 2047.0F;
     ASSERT_NEAR(found.anisotropy[i], expected.anisotropy[i], scatters > 0.01F ? 4 : 1000) << i;
   }
   for (std::size_t i = 0; i < expected.velocity.size(); ++i) {
@@ -466,28 +466,28 @@ void expect_same_channels(const Cells& found, const grid::TetGrid& expected, flo
 }
 
 TEST_P(GpuResidentStates, ScatteringChannelsMatchTheVoxels) {
-  for (const bool coloured : {true, false}) {
-    SCOPED_TRACE(coloured);
-    const auto fields = scattering_fields(coloured, 1);
+  for (const bool colored : {true, false}) {
+    SCOPED_TRACE(colored);
+    const auto fields = scattering_fields(colored, 1);
     std::vector<Values> handed;
     for (const auto& [channel, values] : fields) handed.push_back({channel, values, channel == volume::Channel::green});
     // With flames in addition.
     handed.push_back({volume::Channel::flame, simulated(CUMULET_CHANNEL_FLAME, odd, 3)});
     const scene::Emission burning = emissions()[2];
     const scene::StateInGl state = bring(handed, odd, place(), {burning});
-    EXPECT_EQ(state.products.size(), coloured ? 4U : 3U);
+    EXPECT_EQ(state.products.size(), colored ? 4U : 3U);
     const volume::VolumeFrame in_memory = frame_of(fields, odd);
     const volume::VolumeFrame in_gl = state.frame();
-    EXPECT_EQ(in_gl.colour.has_value(), coloured);
+    EXPECT_EQ(in_gl.color.has_value(), colored);
     ASSERT_TRUE(in_gl.anisotropy && in_gl.velocity);
     EXPECT_GE(scene::fastest_of(in_gl), scene::fastest_of(in_memory));
     const auto scattering = state.scattering();
     const auto forward = state.forward();
     const auto momentum = state.momentum();
-    ASSERT_TRUE(scattering.has_value() == coloured && forward && momentum);
+    ASSERT_TRUE(scattering.has_value() == colored && forward && momentum);
     EXPECT_GE(momentum->fastest, scene::fastest_of(in_memory));
     grid::RgbField::Components read_scattering;
-    if (coloured) {
+    if (colored) {
       const auto expected = scene::scattering_of(in_memory);
       for (std::size_t c = 0; c < 3; ++c) {
         read_scattering[c] = copied((*scattering)[c]);
@@ -514,7 +514,7 @@ TEST_P(GpuResidentStates, ScatteringChannelsMatchTheVoxels) {
     grid::Channels channels;
     known_channels.emission = std::make_shared<const grid::RgbField>(*light, cube);
     channels.emission = std::make_shared<const grid::RgbField>(read_light, cube);
-    if (coloured) {
+    if (colored) {
       known_channels.scattering = std::make_shared<const grid::RgbField>(*scattering, cube);
       channels.scattering = std::make_shared<const grid::RgbField>(read_scattering, cube);
     }

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "support/volumes.hpp"
-#include "viewer/grid_shelf.hpp"
+#include "viewer/grid_cache.hpp"
 
 namespace {
 
@@ -20,60 +20,60 @@ class GridCacheTest : public testing::Test {
         cumulet::test::noise_volume(glm::ivec3(side), glm::ivec3(0), static_cast<int>(seed)));
   }
   std::atomic<int> told_ = 0;
-  viewer::GridShelf shelf_{{}, [this] { ++told_; }};
+  viewer::GridCache cache_{{}, [this] { ++told_; }};
 };
 
 TEST_F(GridCacheTest, KeepsRequestedGrids) {
-  const viewer::GridShelf::Wish a{asset(16, 1), {}};
-  const viewer::GridShelf::Wish b{asset(16, 2), {}};
-  shelf_.wish({a, a});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  ASSERT_TRUE(shelf_.built(a));
-  const auto made = shelf_.built(a)->source;
-  EXPECT_EQ(shelf_.revision(), 1U);
-  shelf_.wish({b, a});
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.built(a)->source, made);
-  ASSERT_TRUE(shelf_.built(b));
-  EXPECT_EQ(shelf_.revision(), 2U);
-  shelf_.wish({b});
-  EXPECT_FALSE(shelf_.built(a));
-  EXPECT_TRUE(shelf_.built(b));
-  EXPECT_FALSE(shelf_.busy());
+  const viewer::GridCache::Request a{asset(16, 1), {}};
+  const viewer::GridCache::Request b{asset(16, 2), {}};
+  cache_.request({a, a});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  ASSERT_TRUE(cache_.built(a));
+  const auto made = cache_.built(a)->source;
+  EXPECT_EQ(cache_.revision(), 1U);
+  cache_.request({b, a});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.built(a)->source, made);
+  ASSERT_TRUE(cache_.built(b));
+  EXPECT_EQ(cache_.revision(), 2U);
+  cache_.request({b});
+  EXPECT_FALSE(cache_.built(a));
+  EXPECT_TRUE(cache_.built(b));
+  EXPECT_FALSE(cache_.busy());
   EXPECT_GE(told_, 2);
 }
 
 // A build in progress is finished and delivered, even if requests change meanwhile.
 TEST_F(GridCacheTest, FinishesBuildsInProgress) {
-  const viewer::GridShelf::Wish slow{asset(96, 1), {}};
-  const viewer::GridShelf::Wish next{asset(16, 2), {}};
-  shelf_.wish({slow});
-  while (!shelf_.is_under_way(slow) && !shelf_.built(slow)) std::this_thread::yield();
-  shelf_.wish({next});
-  const bool under_way = shelf_.is_under_way(slow);  // else it was already built
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
-  EXPECT_EQ(shelf_.built(slow).has_value(), under_way);
-  EXPECT_TRUE(shelf_.built(next));
-  shelf_.wish({next});
-  EXPECT_FALSE(shelf_.built(slow));
+  const viewer::GridCache::Request slow{asset(96, 1), {}};
+  const viewer::GridCache::Request next{asset(16, 2), {}};
+  cache_.request({slow});
+  while (!cache_.is_under_way(slow) && !cache_.built(slow)) std::this_thread::yield();
+  cache_.request({next});
+  const bool under_way = cache_.is_under_way(slow);  // else it was already built
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_EQ(cache_.built(slow).has_value(), under_way);
+  EXPECT_TRUE(cache_.built(next));
+  cache_.request({next});
+  EXPECT_FALSE(cache_.built(slow));
 }
 
 TEST_F(GridCacheTest, RequestsMayChangeDuringABuild) {
-  const viewer::GridShelf::Wish large{asset(96, 1), {}};
-  const viewer::GridShelf::Wish small{asset(16, 2), {}};
+  const viewer::GridCache::Request large{asset(96, 1), {}};
+  const viewer::GridCache::Request small{asset(16, 2), {}};
   for (int i = 0; i < 4; ++i) {
-    shelf_.wish({large});
-    shelf_.wish({small});
-    shelf_.wish({});
-    shelf_.wish({small, large});
-    ASSERT_TRUE(shelf_.wait(std::nullopt));
-    EXPECT_TRUE(shelf_.built(small));
-    EXPECT_TRUE(shelf_.built(large));
-    shelf_.wish({});
+    cache_.request({large});
+    cache_.request({small});
+    cache_.request({});
+    cache_.request({small, large});
+    ASSERT_TRUE(cache_.wait(std::nullopt));
+    EXPECT_TRUE(cache_.built(small));
+    EXPECT_TRUE(cache_.built(large));
+    cache_.request({});
   }
-  shelf_.wish({large});
-  shelf_.cancel();
-  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  cache_.request({large});
+  cache_.cancel();
+  ASSERT_TRUE(cache_.wait(std::nullopt));
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ TEST_F(GridNameCase, OtherFieldsFollowTheSameRule) {
   EXPECT_EQ(frame.temperature->name, "temperature");
   EXPECT_EQ(frame.flame->name, "FLAME");
   EXPECT_EQ(frame.anisotropy->at(0).name, "phase_g");
-  EXPECT_EQ(frame.colour->at(0).name, "cd");
+  EXPECT_EQ(frame.color->at(0).name, "cd");
   EXPECT_EQ(frame.velocity->parts[0].name, "vel");
   std::string all;
   for (const std::string& warning : messages.warnings) all += warning + "\n";
@@ -109,7 +109,7 @@ TEST_F(GridNameCase, OtherFieldsFollowTheSameRule) {
   GridNames names;
   names.temperature = "Temperature";
   names.flame = "Flame";
-  names.anisotropy = names.colour = names.velocity = "none";
+  names.anisotropy = names.color = names.velocity = "none";
   EXPECT_EQ(import_frame(file, names, messages.log).temperature->max_value, 2.0F);
   EXPECT_TRUE(messages.warnings.empty()) << messages.warnings[0];
 }
@@ -130,14 +130,14 @@ TEST_F(GridNameCase, ComponentGridsMustHaveTheSameCase) {
              dot("color_r", 0.5F), dot("color_g", 0.5F), dot("color_b", 0.5F)});
   GridNames names;
   for (const std::string color : {"color", "Color"}) {
-    names.colour = color;
+    names.color = color;
     const VolumeFrame frame = import_frame(file, names, messages.log);
-    EXPECT_EQ(frame.colour->at(0).name, color + "_r");
+    EXPECT_EQ(frame.color->at(0).name, color + "_r");
     EXPECT_EQ(frame.velocity->parts[0].name, "vel_x");
     EXPECT_EQ(frame.velocity->parts[4].name, "vel_z");
   }
   names.velocity = "Vel";
-  names.colour = "none";
+  names.color = "none";
   messages.warnings.clear();
   EXPECT_EQ(import_frame(file, names, messages.log).velocity->parts[0].name, "Vel_X");
 }

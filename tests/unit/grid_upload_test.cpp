@@ -51,7 +51,7 @@ class Random {
 };
 
 struct Sizes {
-  std::size_t cells = 0, emission = 0, glowing = 0, colour = 0, anisotropy = 0, velocity = 0, tree = 1;
+  std::size_t cells = 0, emission = 0, glowing = 0, color = 0, anisotropy = 0, velocity = 0, tree = 1;
 };
 
 MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
@@ -59,7 +59,7 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
   auto grid = std::make_shared<grid::TetGrid>();
   grid->cells = random.records<grid::CellRecord>(sizes.cells);
   grid->emission = random.records<grid::EmissionRecord>(sizes.emission);
-  grid->colour = random.records<std::uint32_t>(sizes.colour);
+  grid->color = random.records<std::uint32_t>(sizes.color);
   grid->anisotropy = random.records<std::int16_t>(sizes.anisotropy);
   grid->velocity = random.records<glm::uvec2>(sizes.velocity);
   grid->tree = random.records<std::uint32_t>(sizes.tree);
@@ -68,7 +68,7 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
   grid->content_min = glm::vec3(static_cast<float>(seed));
   grid->content_max = grid->content_min + 5.0F;
   auto source = std::make_shared<scene::MarchSource>();
-  source->glow.cells = random.records<scene::GlowingCell>(sizes.glowing);
+  source->emissive.cells = random.records<scene::GlowingCell>(sizes.glowing);
   source->grid = std::move(grid);
   source->linear = true;
   return source;
@@ -86,8 +86,8 @@ std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
     if (count > 0) std::memcpy(to.data(), from, count * sizeof to.front());
   };
   copy_words(words[1], grid.emission.data(), grid.emission.size());
-  copy_words(words[2], source->glow.cells.data(), source->glow.cells.size() * 2);
-  for (const std::uint32_t word : grid.colour) words[3].emplace_back(word, 0, 0, 0);
+  copy_words(words[2], source->emissive.cells.data(), source->emissive.cells.size() * 2);
+  for (const std::uint32_t word : grid.color) words[3].emplace_back(word, 0, 0, 0);
   for (const std::int16_t half : grid.anisotropy) words[4].emplace_back(static_cast<std::uint16_t>(half), 0, 0, 0);
   for (const glm::uvec2& halves : grid.velocity) words[5].emplace_back(halves, 0, 0);
   for (const std::uint32_t word : grid.tree) words[6].emplace_back(word, 0, 0, 0);
@@ -126,8 +126,8 @@ class GridSetUploads : public test::GlTest {
     const std::array<const char*, kinds.size()> values{
         "cm_record(i >> 1, i & 1u)",
         "cm_emission_record(i)",
-        "cm_glow_word(i)",
-        "uvec4(cm_colour_record(i), 0u, 0u, 0u)",
+        "cm_emissive_word(i)",
+        "uvec4(cm_color_record(i), 0u, 0u, 0u)",
         "uvec4((cm_anisotropy_record(i) >> (16u * (i & 1u))) & 65535u, 0u, 0u, 0u)",
         "uvec4(cm_velocity_record(i), 0u, 0u)",
         "uvec4(cm_tree(i), 0u, 0u, 0u)",
@@ -159,7 +159,7 @@ class GridSetUploads : public test::GlTest {
       EXPECT_EQ(grid->levels, sources[s]->grid->levels);
       EXPECT_EQ(grid->box_min, sources[s]->grid->content_min);
       EXPECT_EQ(grid->box_max, sources[s]->grid->content_max);
-      EXPECT_EQ(grid->glowing, sources[s]->glow.cells.size());
+      EXPECT_EQ(grid->glowing, sources[s]->emissive.cells.size());
       EXPECT_EQ(grid->moves, sources[s]->grid->velocity.empty() ? 0U : 1U);
       const auto expected = expected_of(sources[s]);
       for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
@@ -178,11 +178,11 @@ class GridSetUploads : public test::GlTest {
   std::unique_ptr<gl::WordHeap> heap_;
   // Odd sizes: inside one page, across two, and at the end of the last.
   const MarchSourcePtr plain_ = source_of({.cells = 1900, .tree = 301}, 1);
-  const MarchSourcePtr coloured_ = source_of(
-      {.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .velocity = 301, .tree = 99}, 2);
+  const MarchSourcePtr colored_ = source_of(
+      {.cells = 301, .emission = 301, .glowing = 31, .color = 301, .anisotropy = 301, .velocity = 301, .tree = 99}, 2);
   const MarchSourcePtr glowing_ = source_of({.cells = 399, .emission = 250, .glowing = 3, .tree = 1}, 3);
-  const MarchSourcePtr other_ = source_of({.cells = 333, .colour = 333, .tree = 55}, 4);
-  const Sources three_{plain_, coloured_, glowing_};
+  const MarchSourcePtr other_ = source_of({.cells = 333, .color = 333, .tree = 55}, 4);
+  const Sources three_{plain_, colored_, glowing_};
 };
 CUMULET_ON_BACKENDS(GridSetUploads);
 
@@ -198,9 +198,9 @@ TEST_P(GridSetUploads, ShadersReadEachGrid) {
     const MarchData data = upload(three_, texels);
     EXPECT_EQ(pages_of(data), pages);
     expect_whole(data, three_, pages);
-    const MarchData reversed = upload({glowing_, coloured_, plain_}, texels);
-    expect_whole(reversed, {glowing_, coloured_, plain_}, std::string(pages) + " reversed");
-    EXPECT_EQ(data.bytes(), bytes_of(plain_) + bytes_of(coloured_) + bytes_of(glowing_));
+    const MarchData reversed = upload({glowing_, colored_, plain_}, texels);
+    expect_whole(reversed, {glowing_, colored_, plain_}, std::string(pages) + " reversed");
+    EXPECT_EQ(data.bytes(), bytes_of(plain_) + bytes_of(colored_) + bytes_of(glowing_));
     EXPECT_EQ(data.grid(*other_), nullptr);
   }
 }
@@ -299,8 +299,8 @@ TEST_P(GridSetUploads, TooLargeGridsAreRejectedByName) {
   };
   EXPECT_EQ(refused(three_, 900),
             "2600 cells need more than 6 texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, 900 texels");
-  EXPECT_EQ(refused({coloured_}, 900), "taken");
-  EXPECT_EQ(refused({coloured_, glowing_}, 800),
+  EXPECT_EQ(refused({colored_}, 900), "taken");
+  EXPECT_EQ(refused({colored_, glowing_}, 800),
             "the channels of 700 cells need more than one texture buffer of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, "
             "800 texels");
   auto constant = std::make_shared<scene::MarchSource>(*plain_);

@@ -129,11 +129,11 @@ TEST_P(Ground, MatchesTwoTriangles) {
       light.sun_azimuth_degrees = 70.0F;
       light.sun_angle_degrees = 8.0F;
       still->set_light(light);
-      light::Lamp point;
+      light::AnalyticLight point;
       point.position = {26.0, 14.0, 20.0};
       point.power = vec3(2000.0F, 1000.0F, 500.0F);
-      light::Lamp disc = point;
-      disc.kind = light::Lamp::Kind::disc;
+      light::AnalyticLight disc = point;
+      disc.kind = light::AnalyticLight::Kind::disc;
       disc.position = {4.0, 20.0, 24.0};
       disc.width = 6.0;
       still->viewer().set_lamps({point, disc});

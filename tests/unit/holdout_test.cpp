@@ -121,11 +121,11 @@ TEST_P(Holdout, WallHidesSkyAndLights) {
     return sum;
   };
   const double without = mean();
-  auto lamp = make_desc<cumulet_lamp_desc>();
-  lamp.kind = CUMULET_LAMP_POINT;
-  lamp.position[2] = 4.0;
-  lamp.power = 1e-3F;
-  ASSERT_EQ(cumulet_set_lamps(v_, &lamp, 1), CUMULET_OK);
+  auto analytic_light = make_desc<cumulet_lamp_desc>();
+  analytic_light.kind = CUMULET_LAMP_POINT;
+  analytic_light.position[2] = 4.0;
+  analytic_light.power = 1e-3F;
+  ASSERT_EQ(cumulet_set_lamps(v_, &analytic_light, 1), CUMULET_OK);
   EXPECT_GT(without, 1.0) << "the medium before it is lit by the sky";
   EXPECT_NEAR(mean() / without, 1.0, 0.2);
 }

@@ -533,12 +533,12 @@ TEST_P(HostDepths, InvalidNamesAreReportedAndKeepTheImage) {
   const auto text = [](const char* kind, GLuint name, const std::string& rest) {
     return "the host's depth, " + std::string(kind) + " " + std::to_string(name) + ", " + rest;
   };
-  const Object colour = gl::make_texture_2d(gl_, GL_RGBA8, size.x, size.y, "colour");
+  const Object color = gl::make_texture_2d(gl_, GL_RGBA8, size.x, size.y, "colour");
   const Object array = gl::make_texture_2d_array(gl_, GL_DEPTH_COMPONENT24, 4, 4, 4, "array");
   const Object multisample = gl::make_texture_2d_multisample(gl_, GL_RGBA8, 4, size.x, size.y, "colour");
   const Object empty = gl::make_framebuffer(gl_);
   const Object no_depth = gl::make_framebuffer(gl_);
-  gl_->NamedFramebufferTexture(no_depth.name(), GL_COLOR_ATTACHMENT0, colour.name(), 0);
+  gl_->NamedFramebufferTexture(no_depth.name(), GL_COLOR_ATTACHMENT0, color.name(), 0);
   const GLuint name = host.depth.name();
   const GLuint framebuffer = host.framebuffer.name();
   for (const GLuint unknown : {0U, 4711U}) {
@@ -547,8 +547,8 @@ TEST_P(HostDepths, InvalidNamesAreReportedAndKeepTheImage) {
   EXPECT_EQ(cause(DepthSource::texture, array.name(), viewport), text("texture", array.name(), "is no GL_TEXTURE_2D"));
   EXPECT_EQ(cause(DepthSource::texture_multisample, name, viewport),
             text("texture", name, "is no GL_TEXTURE_2D_MULTISAMPLE"));
-  EXPECT_EQ(cause(DepthSource::texture, colour.name(), viewport),
-            text("texture", colour.name(), "is of no depth format, nor GL_R32F"));
+  EXPECT_EQ(cause(DepthSource::texture, color.name(), viewport),
+            text("texture", color.name(), "is of no depth format, nor GL_R32F"));
   EXPECT_EQ(cause(DepthSource::texture_multisample, multisample.name(), viewport),
             text("texture", multisample.name(), "is of no depth format"));
   EXPECT_EQ(cause(DepthSource::framebuffer, 4711, viewport),

@@ -54,12 +54,12 @@ class HostTargets : public cumulet::test::BackendTest {
     gl_.NamedRenderbufferStorage(name, format, width, height);
     return name;
   }
-  [[nodiscard]] cumulet_frame_desc frame(cumulet_colour color = CUMULET_COLOUR_SRGB) const {
+  [[nodiscard]] cumulet_frame_desc frame(cumulet_color_encoding color = CUMULET_COLOR_SRGB) const {
     auto desc = make_desc<cumulet_frame_desc>();
     desc.budget_ms = 5.0;
     desc.framebuffer = framebuffer_;
     desc.width = desc.height = side;
-    desc.colour = color;
+    desc.color = color;
     return desc;
   }
   /// The error message of a frame, "" if it is drawn.
@@ -100,18 +100,18 @@ TEST_P(HostTargets, UnsupportedColorFormatsAreRejected) {
 TEST_P(HostTargets, UnsupportedEncodingsAreRejected) {
   for (const GLenum format : {GL_RGBA8, GL_RGBA16F, GL_RGB10_A2, GL_RGBA16}) {
     attach(GL_COLOR_ATTACHMENT0, texture(format));
-    refused(frame(CUMULET_COLOUR_SRGB_FRAMEBUFFER), "CUMULET_COLOUR_SRGB_FRAMEBUFFER");
+    refused(frame(CUMULET_COLOR_SRGB_FRAMEBUFFER), "CUMULET_COLOR_SRGB_FRAMEBUFFER");
   }
   for (const GLenum format : {GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGB10_A2, GL_RGBA16}) {
     attach(GL_COLOR_ATTACHMENT0, texture(format));
-    refused(frame(CUMULET_COLOUR_HDR), "CUMULET_COLOUR_HDR");
+    refused(frame(CUMULET_COLOR_HDR), "CUMULET_COLOR_HDR");
   }
   attach(GL_COLOR_ATTACHMENT0, texture(GL_SRGB8_ALPHA8));
-  EXPECT_EQ(error_of(frame(CUMULET_COLOUR_SRGB_FRAMEBUFFER)), "");
+  EXPECT_EQ(error_of(frame(CUMULET_COLOR_SRGB_FRAMEBUFFER)), "");
   for (const GLenum format : {GL_RGBA16F, GL_RGBA32F, GL_R11F_G11F_B10F, GL_RGB16F}) {
     attach(GL_COLOR_ATTACHMENT0, texture(format));
     if (gl_.CheckNamedFramebufferStatus(framebuffer_, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) continue;
-    EXPECT_EQ(error_of(frame(CUMULET_COLOUR_HDR)), "") << format;
+    EXPECT_EQ(error_of(frame(CUMULET_COLOR_HDR)), "") << format;
   }
 }
 
@@ -203,16 +203,16 @@ TEST_P(HostTargets, TargetsAreCheckedInEachFrame) {
 
 TEST_P(HostTargets, ViewerOwnedTargetsMatchTheirEncoding) {
   struct Case {
-    cumulet_colour color;
+    cumulet_color_encoding color;
     GLenum format;
     GLenum made;  // 0: an error
   };
   for (const Case& c :
-       {Case{CUMULET_COLOUR_SRGB, 0, GL_RGBA8}, Case{CUMULET_COLOUR_LINEAR, 0, GL_RGBA8},
-        Case{CUMULET_COLOUR_SRGB_FRAMEBUFFER, 0, GL_SRGB8_ALPHA8}, Case{CUMULET_COLOUR_HDR, 0, GL_RGBA16F},
-        Case{CUMULET_COLOUR_HDR, GL_RGBA32F, GL_RGBA32F}, Case{CUMULET_COLOUR_HDR, GL_RGBA8, 0},
-        Case{CUMULET_COLOUR_HDR, GL_SRGB8_ALPHA8, 0}, Case{CUMULET_COLOUR_SRGB_FRAMEBUFFER, GL_RGBA8, 0},
-        Case{CUMULET_COLOUR_SRGB_FRAMEBUFFER, GL_RGBA16F, 0}}) {
+       {Case{CUMULET_COLOR_SRGB, 0, GL_RGBA8}, Case{CUMULET_COLOR_LINEAR, 0, GL_RGBA8},
+        Case{CUMULET_COLOR_SRGB_FRAMEBUFFER, 0, GL_SRGB8_ALPHA8}, Case{CUMULET_COLOR_HDR, 0, GL_RGBA16F},
+        Case{CUMULET_COLOR_HDR, GL_RGBA32F, GL_RGBA32F}, Case{CUMULET_COLOR_HDR, GL_RGBA8, 0},
+        Case{CUMULET_COLOR_HDR, GL_SRGB8_ALPHA8, 0}, Case{CUMULET_COLOR_SRGB_FRAMEBUFFER, GL_RGBA8, 0},
+        Case{CUMULET_COLOR_SRGB_FRAMEBUFFER, GL_RGBA16F, 0}}) {
     auto desc = frame(c.color);
     desc.target = CUMULET_TARGET_TEXTURE;
     desc.format = c.format;

@@ -156,16 +156,16 @@ TEST_P(VolumeTransforms, BoundsAreTransformed) {
 }
 
 TEST(TransformedEmission, PowerScalesWithVolume) {
-  scene::GlowTable table;
+  scene::EmissiveTable table;
   table.cells.resize(1);
   table.power = 3.0;
   table.length = 2.0;
-  const scene::PlacedGlow twice = scene::glow_of(table, dmat4(1.0), glm::scale(dmat4(1.0), dvec3(2.0)));
+  const scene::PlacedEmissive twice = scene::emissive_of(table, dmat4(1.0), glm::scale(dmat4(1.0), dvec3(2.0)));
   EXPECT_DOUBLE_EQ(twice.power, 24.0);
   EXPECT_DOUBLE_EQ(twice.length, 4.0);
   EXPECT_FLOAT_EQ(twice.looks.density, 1.0F / 24.0F);
-  EXPECT_LE(twice.looks.least_stretch, 2.0F);
-  EXPECT_GT(twice.looks.least_stretch, 1.9F);
+  EXPECT_LE(twice.looks.min_stretch, 2.0F);
+  EXPECT_GT(twice.looks.min_stretch, 1.9F);
 }
 
 }  // namespace

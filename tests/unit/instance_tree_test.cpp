@@ -510,7 +510,9 @@ TEST(InstanceTree, RecordsRoundTrip) {
 }
 
 // Sets the emitted power of the instance's source.
-void make_glow(Instance& instance, double power, double length) { instance.glow = {.power = power, .length = length}; }
+void make_emissive(Instance& instance, double power, double length) {
+  instance.emissive = {.power = power, .length = length};
+}
 
 TEST(InstanceTree, EmitterSelectionFollowsPower) {
   std::vector<Instance> instances = any_instances(40, 16);
@@ -518,12 +520,12 @@ TEST(InstanceTree, EmitterSelectionFollowsPower) {
   std::vector<double> power(instances.size());
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const double of_source = i % 3 == 0 ? 0.0 : std::exp2(static_cast<double>(i % 7));
-    make_glow(instances[i], of_source, 2.0);
+    make_emissive(instances[i], of_source, 2.0);
     power[i] = of_source * std::abs(glm::determinant(glm::dmat3(instances[i].place)));
     sum += power[i];
   }
   const InstanceTable table = scene::make_instances(instances, origin);
-  EXPECT_NEAR(table.glow_power, sum, 1e-9 * sum);
+  EXPECT_NEAR(table.emissive_power, sum, 1e-9 * sum);
   std::vector<double> chance(instances.size());
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const double stays = static_cast<double>(table.records[i].alias) / 4294967296.0;
@@ -534,11 +536,11 @@ TEST(InstanceTree, EmitterSelectionFollowsPower) {
   for (std::size_t i = 0; i < instances.size(); ++i) {
     EXPECT_NEAR(chance[i], power[i] / sum, 1e-8);
     if (power[i] > 0.0) {
-      EXPECT_FLOAT_EQ(table.records[i].glow.density, static_cast<float>(1.0 / sum));
-      EXPECT_GT(table.records[i].glow.least_stretch, 0.0F);
+      EXPECT_FLOAT_EQ(table.records[i].emissive.density, static_cast<float>(1.0 / sum));
+      EXPECT_GT(table.records[i].emissive.min_stretch, 0.0F);
       continue;
     }
-    EXPECT_EQ(table.records[i].glow, core::CmGlow{});
+    EXPECT_EQ(table.records[i].emissive, core::CmEmissive{});
     for (std::uint32_t drawn = 0; drawn < instances.size(); ++drawn) {
       for (const std::uint32_t word : {0U, 1U, 0x7fffffffU, 0xffffffffU}) {
         ASSERT_NE(rays.cm_glowing_instance(drawn, word), i) << "it has no cell to pick";
@@ -549,19 +551,19 @@ TEST(InstanceTree, EmitterSelectionFollowsPower) {
 
 TEST(InstanceTree, PowerScalesWithVolume) {
   Instance one = instance_of(glm::scale(dmat4(1.0), dvec3(2.0, 3.0, 4.0)));
-  make_glow(one, 5.0, 7.0);
+  make_emissive(one, 5.0, 7.0);
   const auto table_of = [](const std::vector<Instance>& instances) { return scene::make_instances(instances, origin); };
-  EXPECT_NEAR(table_of({one}).glow_power, 5.0 * 24.0, 1e-9);
-  EXPECT_NEAR(table_of({one}).glow_length, 7.0 * std::cbrt(24.0), 1e-9);
-  EXPECT_NEAR(table_of({one}).records[0].glow.extent, 7.0 * std::cbrt(24.0), 1e-5);
+  EXPECT_NEAR(table_of({one}).emissive_power, 5.0 * 24.0, 1e-9);
+  EXPECT_NEAR(table_of({one}).emissive_length, 7.0 * std::cbrt(24.0), 1e-9);
+  EXPECT_NEAR(table_of({one}).records[0].emissive.extent, 7.0 * std::cbrt(24.0), 1e-5);
   EXPECT_EQ(table_of({one}).records[0].alias, 0xffffffffU);
   // Two instances emit as much as one of twice the volume. A dark third one changes nothing.
   Instance dark = one;
-  make_glow(dark, 0.0, 0.0);
-  EXPECT_NEAR(table_of({one, dark, one}).glow_power, 2.0 * 5.0 * 24.0, 1e-9);
-  EXPECT_NEAR(table_of({one, dark, one}).glow_length, 7.0 * std::cbrt(2.0 * 24.0), 1e-9);
-  EXPECT_EQ(table_of({dark}).glow_power, 0.0);
-  EXPECT_EQ(table_of({dark}).records[0].glow, core::CmGlow{});
+  make_emissive(dark, 0.0, 0.0);
+  EXPECT_NEAR(table_of({one, dark, one}).emissive_power, 2.0 * 5.0 * 24.0, 1e-9);
+  EXPECT_NEAR(table_of({one, dark, one}).emissive_length, 7.0 * std::cbrt(2.0 * 24.0), 1e-9);
+  EXPECT_EQ(table_of({dark}).emissive_power, 0.0);
+  EXPECT_EQ(table_of({dark}).records[0].emissive, core::CmEmissive{});
 }
 
 void expect_refused(const Instance& instance, ErrorCode code, const char* cause) {
@@ -596,7 +598,7 @@ class GlInstanceTree : public test::GlTest {
 };
 CUMULET_ON_BACKENDS(GlInstanceTree);
 
-constexpr std::size_t most_visits = 32;
+constexpr std::size_t max_visits = 32;
 
 // GPU division is accurate to two and a half units in the last place.
 bool is_alike(const Visit& a, const Visit& b) {
@@ -625,7 +627,7 @@ void main() {
   for (const std::vector<Instance>& instances : {any_instances(200, 17), coincident(), flat(), tiles()}) {
     const InstanceTable table = scene::make_instances(instances, origin);
     const std::vector<Ray> rays = any_rays(2000, 18, table);
-    std::vector<Visit> found(rays.size() * most_visits, Visit{-1.0F, CM_INSTANCE_NONE});
+    std::vector<Visit> found(rays.size() * max_visits, Visit{-1.0F, CM_INSTANCE_NONE});
     const auto buffer = [&](const auto& values) {
       return gl::make_buffer(gl_, values.size() * sizeof(values[0]), values.data(), 0, "instances");
     };
@@ -644,8 +646,8 @@ void main() {
     for (std::size_t r = 0; r < rays.size(); ++r) {
       Visits expected = visits_of(by_cpp, rays[r]);
       visits += expected.size();
-      expected.resize(most_visits, Visit{-1.0F, CM_INSTANCE_NONE});
-      for (std::size_t i = 0; i < most_visits; ++i) others += is_alike(found[r * most_visits + i], expected[i]) ? 0 : 1;
+      expected.resize(max_visits, Visit{-1.0F, CM_INSTANCE_NONE});
+      for (std::size_t i = 0; i < max_visits; ++i) others += is_alike(found[r * max_visits + i], expected[i]) ? 0 : 1;
     }
     EXPECT_GT(visits, 1000U);
     EXPECT_EQ(others, 0U) << "of " << visits;
@@ -681,7 +683,7 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(grid.first_cell),
                                    CM_RECORD(grid.tree),
                                    CM_RECORD(grid.first_emission),
-                                   CM_RECORD(grid.first_colour),
+                                   CM_RECORD(grid.first_color),
                                    CM_RECORD(grid.first_anisotropy),
                                    CM_RECORD(grid.emission_unit),
                                    CM_RECORD(grid.first_glowing),
@@ -689,9 +691,9 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(grid.first_velocity),
                                    CM_RECORD(grid.moves),
                                    CM_RECORD(grid.first_change),
-                                   CM_RECORD(glow.density),
-                                   CM_RECORD(glow.extent),
-                                   CM_RECORD(glow.least_stretch),
+                                   CM_RECORD(emissive.density),
+                                   CM_RECORD(emissive.extent),
+                                   CM_RECORD(emissive.min_stretch),
                                    CM_RECORD(medium.albedo),
                                    CM_RECORD(medium.extinction),
                                    CM_RECORD(medium.source),
@@ -700,7 +702,7 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(medium.second_bend),
                                    CM_RECORD(medium.second_share),
                                    CM_RECORD(medium.emits),
-                                   CM_RECORD(medium.coloured),
+                                   CM_RECORD(medium.colored),
                                    CM_RECORD(medium.anisotropic),
                                    CM_RECORD(medium.group),
                                    CM_RECORD(medium.holdout),

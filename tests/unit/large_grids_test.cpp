@@ -34,7 +34,7 @@ class LargeVolumes : public test::StillTest {
 };
 CUMULET_ON_BACKENDS(LargeVolumes);
 
-double most_apart(const test::Picture& a, const test::Picture& b) {
+double max_apart(const test::Picture& a, const test::Picture& b) {
   double most = 0.0;
   for (std::size_t i = 0; i < a.pixels.size(); ++i)
     most = std::max(most, std::abs(double(a.pixels[i].a) - double(b.pixels[i].a)));
@@ -78,7 +78,7 @@ TEST_P(LargeVolumes, DistantCloudMatchesANearOne) {
     set_grid(*still_, on);
     for (const ivec3& at : {low, low + by}) {
       look(*still_, at);
-      EXPECT_LT(most_apart(test::render(*still_, opaque), alpha), 2e-3);
+      EXPECT_LT(max_apart(test::render(*still_, opaque), alpha), 2e-3);
     }
     EXPECT_GT(viewer().stats().cells, 2U * near->viewer().stats().cells - 5000U);
     const test::Picture far = test::render(*still_, image);
@@ -125,7 +125,7 @@ TEST_P(LargeVolumes, DistantFireMatchesANearOne) {
   viewer::Medium medium;
   medium.density_scale = 0.3;
   medium.field_emission.flame_strength = 2.0;
-  medium.field_emission.flame_colour = {1.0F, 0.4F, 0.1F};
+  medium.field_emission.flame_color = {1.0F, 0.4F, 0.1F};
   for (test::Still* still : {still_.get(), near.get()}) {
     still->set_medium(medium);
     still->set_light({30.0F, 30.0F, glm::vec3(0.2F), glm::vec3(0.02F)});

@@ -21,8 +21,8 @@ constexpr std::uint32_t side = 16;
 constexpr std::size_t count = std::size_t{side} * side;
 constexpr std::uint32_t sun = 1;
 constexpr std::uint32_t sky = 2;
-constexpr std::uint32_t lamp = 3;
-constexpr std::uint32_t glow = 4;
+constexpr std::uint32_t analytic_light = 3;
+constexpr std::uint32_t emissive = 4;
 constexpr std::uint32_t pane = 0;
 constexpr std::uint32_t groups = 5;
 
@@ -60,11 +60,11 @@ class LightGroups : public CViewerTest {
     near.width = 3.0;
     near.power = 3000.0F;
     near.color[1] = 1.0F;
-    near.group = lamp;
-    ASSERT_EQ(cumulet_set_lamps(v_, &near, on(lamp) ? 1 : 0), CUMULET_OK);
-    medium_.emission[0] = on(glow) ? 0.6F : 0.0F;
-    medium_.emission[2] = on(glow) ? 0.2F : 0.0F;
-    medium_.group = glow;
+    near.group = analytic_light;
+    ASSERT_EQ(cumulet_set_lamps(v_, &near, on(analytic_light) ? 1 : 0), CUMULET_OK);
+    medium_.emission[0] = on(emissive) ? 0.6F : 0.0F;
+    medium_.emission[2] = on(emissive) ? 0.2F : 0.0F;
+    medium_.group = emissive;
     ASSERT_EQ(cumulet_set_medium(v_, &medium_), CUMULET_OK);
     if (shines_ != nullptr) {
       ASSERT_EQ(cumulet_set_surfaces(v_, on(pane) ? shines_ : dark_), CUMULET_OK);
@@ -194,12 +194,12 @@ TEST_P(LightGroups, DoNotChangeTheImage) {
   const SurfacesRef panes = make_panes(4.0F);
   for (const bool surfaces : {false, true}) {
     ASSERT_EQ(cumulet_set_surfaces(v_, surfaces ? panes.get() : nullptr), CUMULET_OK);
-    for (const bool lamps : {false, true}) {
+    for (const bool analytic_lights : {false, true}) {
       auto far = make_desc<cumulet_light_desc>();
       for (float& value : far.sun_irradiance) value = 2.0F;
       for (float& value : far.sky_radiance) value = 0.4F;
       ASSERT_EQ(cumulet_set_light(v_, &far), CUMULET_OK);
-      if (!lamps) {
+      if (!analytic_lights) {
         ASSERT_EQ(cumulet_set_lamps(v_, nullptr, 0), CUMULET_OK);
       }
       set(8, 3, 0);
@@ -207,7 +207,7 @@ TEST_P(LightGroups, DoNotChangeTheImage) {
       const Rgb without = rgb_linear();
       set(8, 3, groups);
       make();
-      EXPECT_EQ(rgb_linear(), without) << (surfaces ? "surfaces" : "volume") << (lamps ? ", lamps" : "");
+      EXPECT_EQ(rgb_linear(), without) << (surfaces ? "surfaces" : "volume") << (analytic_lights ? ", lamps" : "");
       light();
     }
   }
@@ -267,11 +267,11 @@ TEST_P(LightGroups, EmissionOfInstancesFollowsTheirMediumsGroup) {
   expect_sum(all, rgb_linear());
   double green = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
-    EXPECT_EQ(all[glow][3 * i + 1], 0.0F) << "red and blue alone";
+    EXPECT_EQ(all[emissive][3 * i + 1], 0.0F) << "red and blue alone";
     green += double(all[sky][3 * i + 1]);
   }
   EXPECT_GT(green, 1.0);
-  EXPECT_GT(sum_of(all[glow]), 0.01);
+  EXPECT_GT(sum_of(all[emissive]), 0.01);
   EXPECT_EQ(sum_of(all[sun]), 0.0);
 }
 

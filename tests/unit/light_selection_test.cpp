@@ -12,7 +12,7 @@
 #include "gl/shader_sources.hpp"
 #include "grid/cell.hpp"
 #include "light/alias_table.hpp"
-#include "light/lamps.hpp"
+#include "light/analytic_lights.hpp"
 #include "light/light_table.hpp"
 #include "support/gl_compute.hpp"
 #include "support/gl_state.hpp"
@@ -49,27 +49,27 @@ struct CpuDisc {
 
 /// A tracer with so many lights that a float has few bits below their index. Of each pair, the even one has probability
 /// 0.3.
-struct CpuManyLamps {
+struct CpuManyAnalyticLights {
   static constexpr uint pairs = 1U << 21U;
   CmParameters cm{};
   float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
   float cm_voxel(ivec3 voxel) const { return 0.0F; }
-  CmLamp cm_lamp(uint i) const {
+  CmAnalyticLight cm_analytic_light(uint i) const {
     const bool even = i % 2 == 0;
-    CmLamp lamp{};
-    lamp.kind = CM_LAMP_DISTANT;
-    lamp.intensity = vec3(even ? 1.0F : 0.0F, static_cast<float>(i) / (2.0F * pairs), 0.0F);
-    lamp.chance = (even ? 0.3F : 0.7F) / pairs;
-    lamp.stays = even ? static_cast<uint>(0.6 * light::Alias::certain) : light::Alias::certain;
-    lamp.other = i + 1;
-    return lamp;
+    CmAnalyticLight analytic_light{};
+    analytic_light.kind = CM_ANALYTIC_LIGHT_DISTANT;
+    analytic_light.intensity = vec3(even ? 1.0F : 0.0F, static_cast<float>(i) / (2.0F * pairs), 0.0F);
+    analytic_light.chance = (even ? 0.3F : 0.7F) / pairs;
+    analytic_light.stays = even ? static_cast<uint>(0.6 * light::Alias::certain) : light::Alias::certain;
+    analytic_light.other = i + 1;
+    return analytic_light;
   }
 #define CM_MARCH 1
-#undef CM_LAMPS
-#define CM_LAMPS 1
+#undef CM_ANALYTIC_LIGHTS
+#define CM_ANALYTIC_LIGHTS 1
 #include "support/traced.inc"
-#undef CM_LAMPS
-#define CM_LAMPS CM_SURFACES
+#undef CM_ANALYTIC_LIGHTS
+#define CM_ANALYTIC_LIGHTS CM_SURFACES
 #undef CM_MARCH
 };
 
@@ -88,11 +88,11 @@ using light::LightTable;
 
 constexpr double pi = std::numbers::pi;
 
-light::SceneLights scene_of(std::uint32_t lamps, std::uint32_t triangles) {
+light::SceneLights scene_of(std::uint32_t analytic_lights, std::uint32_t triangles) {
   light::SceneLights scene;
-  scene.lamps = lamps;
+  scene.analytic_lights = analytic_lights;
   scene.triangles = triangles;
-  scene.lamp_flux = 3.0 * lamps;
+  scene.analytic_light_flux = 3.0 * analytic_lights;
   scene.triangle_flux = 5.0 * triangles;
   scene.cross_section = 2.0;
   return scene;
@@ -101,24 +101,24 @@ light::SceneLights scene_of(std::uint32_t lamps, std::uint32_t triangles) {
 TEST(LightSelection, ProbabilitiesSumToOneOrZeroWithoutLight) {
   for (const float sun : {0.0F, 3.0F}) {
     for (const float sky : {0.0F, 0.5F}) {
-      for (const std::uint32_t lamps : {0U, 1U, 7U}) {
+      for (const std::uint32_t analytic_lights : {0U, 1U, 7U}) {
         for (const std::uint32_t triangles : {0U, 100U}) {
           light::DistantLights distant;
           distant.sun_irradiance = vec3(sun);
           distant.sky_radiance = vec3(sky);
           for (const double power : {0.0, 2.0}) {
             const light::MediumLight fire{.aimed = true, .power = power, .length = 0.1, .radius = 3.0};
-            const LightTable table(distant, {}, scene_of(lamps, triangles), fire);
+            const LightTable table(distant, {}, scene_of(analytic_lights, triangles), fire);
             double sum = 0.0;
             for (const LightTable::Entry& entry : table.entries()) {
-              if (entry.kind != Kind::glow) sum += entry.chance;
+              if (entry.kind != Kind::emissive) sum += entry.chance;
             }
-            const bool any = sun + sky > 0.0F || lamps + triangles > 0 || power > 0.0;
+            const bool any = sun + sky > 0.0F || analytic_lights + triangles > 0 || power > 0.0;
             EXPECT_NEAR(sum, any ? 1.0 : 0.0, 1e-6);
             EXPECT_EQ(table.parameters().any, any ? 1U : 0U);
             EXPECT_EQ(table.chance(Kind::sun) > 0.0F, sun > 0.0F);
             EXPECT_EQ(table.chance(Kind::sky) > 0.0F, sky > 0.0F);
-            EXPECT_EQ(table.chance(Kind::lamp) > 0.0F, lamps > 0);
+            EXPECT_EQ(table.chance(Kind::analytic_light) > 0.0F, analytic_lights > 0);
             EXPECT_EQ(table.chance(Kind::triangle) > 0.0F, triangles > 0);
             EXPECT_EQ(table.chance(Kind::cell) > 0.0F, power > 0.0);
           }
@@ -131,12 +131,12 @@ TEST(LightSelection, ProbabilitiesSumToOneOrZeroWithoutLight) {
 TEST(LightSelection, SunAndLightsAreSelectedByIncidentFlux) {
   light::DistantLights distant;
   distant.sun_irradiance = vec3(2.0F);
-  light::SceneLights lamps = scene_of(4, 0);
+  light::SceneLights analytic_lights = scene_of(4, 0);
   const auto sun = [&](double arrives) {
-    lamps.lamps_arrive = arrives;
-    const LightTable table(distant, {}, lamps, {});
-    EXPECT_NEAR(table.chance(Kind::lamp), 1.0F - table.chance(Kind::sun), 1e-6);
-    EXPECT_EQ(table.chance(Kind::glow), 0.0F);
+    analytic_lights.analytic_lights_arrive = arrives;
+    const LightTable table(distant, {}, analytic_lights, {});
+    EXPECT_NEAR(table.chance(Kind::analytic_light), 1.0F - table.chance(Kind::sun), 1e-6);
+    EXPECT_EQ(table.chance(Kind::emissive), 0.0F);
     return table.chance(Kind::sun);
   };
   EXPECT_NEAR(sun(3.0), 0.4, 1e-6);
@@ -144,15 +144,15 @@ TEST(LightSelection, SunAndLightsAreSelectedByIncidentFlux) {
   EXPECT_NEAR(sun(1e30), 0.2, 1e-6);
 }
 
-core::CmLamp point_lamp(const glm::dvec3& at, float power) {
-  light::Lamp lamp;
-  lamp.position = at;
-  lamp.power = vec3(power);
-  return light::lamp_record(lamp, glm::dvec3(0.0));
+core::CmAnalyticLight point_analytic_light(const glm::dvec3& at, float power) {
+  light::AnalyticLight analytic_light;
+  analytic_light.position = at;
+  analytic_light.power = vec3(power);
+  return light::analytic_light_record(analytic_light, glm::dvec3(0.0));
 }
 
 // Compares each light's stored probability, and the probability that its alias table entries give.
-void expect_chances(const std::vector<core::CmLamp>& records, const std::vector<double>& expected) {
+void expect_chances(const std::vector<core::CmAnalyticLight>& records, const std::vector<double>& expected) {
   std::vector<double> drawn(records.size(), 0.0);
   for (std::size_t i = 0; i < records.size(); ++i) {
     const double part = 1.0 / static_cast<double>(records.size());
@@ -170,8 +170,9 @@ TEST(AnalyticLightSelection, LightsAreSelectedByIncidentFlux) {
   const std::vector<light::Lit> ball{{glm::dvec3(0.0), 1.0}};
   // A light at twice the distance with four times the power has the same probability. For lights inside the ball, the
   // distance is clamped to its radius.
-  std::vector<core::CmLamp> records{point_lamp({10, 0, 0}, 1.0F), point_lamp({0, 20, 0}, 4.0F),
-                                    point_lamp({0, 0, 5}, 0.5F), point_lamp({0, 0.1, 0}, 0.01F)};
+  std::vector<core::CmAnalyticLight> records{
+      point_analytic_light({10, 0, 0}, 1.0F), point_analytic_light({0, 20, 0}, 4.0F),
+      point_analytic_light({0, 0, 5}, 0.5F), point_analytic_light({0, 0.1, 0}, 0.01F)};
   const double arrives = light::share_looks(records, ball);
   EXPECT_NEAR(arrives, 0.05 / (4.0 * std::numbers::pi), 1e-6);
   expect_chances(records, {0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.4, 0.05 + 0.8 * 0.2});
@@ -188,26 +189,28 @@ TEST(AnalyticLightSelection, LightsAreSelectedByIncidentFlux) {
 }
 
 TEST(AnalyticLightSelection, SamplesMatchProbabilitiesForAnyCount) {
-  core::CpuManyLamps tracer;
-  tracer.cm.lamps.count = 2 * core::CpuManyLamps::pairs;
+  core::CpuManyAnalyticLights tracer;
+  tracer.cm.analytic_lights.count = 2 * core::CpuManyAnalyticLights::pairs;
   constexpr int n = 200'000;
   glm::dvec3 sum(0.0);
   for (int i = 0; i < n; ++i) {
-    core::CpuManyLamps::CmPath path{};
+    core::CpuManyAnalyticLights::CmPath path{};
     path.random = tracer.cm_hash3(glm::uvec3(i, 0, 7)).x;
     path.stream = 1;
     const float u = tracer.cm_random(path.random, path.stream);
-    sum += glm::dvec3(tracer.cm_lamp_sample(path, vec3(0.0F), vec3(0.5F, 0.5F, u)).radiance);
+    sum += glm::dvec3(tracer.cm_analytic_light_sample(path, vec3(0.0F), vec3(0.5F, 0.5F, u)).radiance);
   }
   EXPECT_NEAR(sum.x / n, 0.3, 5.0 * std::sqrt(0.3 * 0.7 / n));
   EXPECT_NEAR(sum.y / n, 0.5, 5.0 * std::sqrt(1.0 / 12.0 / n)) << "all along the table";
 }
 
 TEST(AnalyticLightSelection, IsUniformWithoutPowerOrReceivers) {
-  std::vector<core::CmLamp> records{point_lamp({10, 0, 0}, 1.0F), point_lamp({0, 2, 0}, 4.0F)};
+  std::vector<core::CmAnalyticLight> records{point_analytic_light({10, 0, 0}, 1.0F),
+                                             point_analytic_light({0, 2, 0}, 4.0F)};
   EXPECT_EQ(light::share_looks(records, std::vector<light::Lit>{{glm::dvec3(0.0), 0.0}}), 0.0);
   expect_chances(records, {0.5, 0.5});
-  std::vector<core::CmLamp> dark{point_lamp({10, 0, 0}, 0.0F), point_lamp({0, 2, 0}, 0.0F)};
+  std::vector<core::CmAnalyticLight> dark{point_analytic_light({10, 0, 0}, 0.0F),
+                                          point_analytic_light({0, 2, 0}, 0.0F)};
   EXPECT_EQ(light::share_looks(dark, std::vector<light::Lit>{{glm::dvec3(0.0), 1.0}}), 0.0);
   expect_chances(dark, {0.5, 0.5});
   EXPECT_EQ(light::share_looks({}, {}), 0.0);
@@ -216,10 +219,10 @@ TEST(AnalyticLightSelection, IsUniformWithoutPowerOrReceivers) {
 // A fire that fills its bounds is left to scattered rays.
 TEST(LightSelection, SmallFiresShareSamplesWithDistantLights) {
   light::SceneLights sun;
-  sun.lamps = 1;  // no flux: there is no surface
+  sun.analytic_lights = 1;  // no flux: there is no surface
   const light::MediumLight fire{.aimed = false, .power = 1.0, .length = 0.01, .radius = 1.0};
   const LightTable table({}, {}, sun, fire);
-  EXPECT_EQ(table.chance(Kind::lamp), 0.5F);
+  EXPECT_EQ(table.chance(Kind::analytic_light), 0.5F);
   EXPECT_EQ(table.chance(Kind::cell), 0.5F);
 }
 

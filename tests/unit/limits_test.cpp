@@ -14,7 +14,7 @@
 
 #include "support/c_host.hpp"
 #include "support/simulated.hpp"
-#include "viewer/allowance.hpp"
+#include "viewer/resource_limits.hpp"
 #include "viewer/worker.hpp"
 
 namespace {
@@ -34,7 +34,7 @@ using cumulet::test::make_viewer;
 using cumulet::test::picture_of;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
-using cumulet::viewer::Allowance;
+using cumulet::viewer::ResourceLimits;
 using cumulet::viewer::Worker;
 
 // Counts the maximum number of threads that are inside at the same time.
@@ -58,13 +58,13 @@ class Crowd {
 // The limit applies to all workers of a viewer together, including the tasks of their jobs.
 TEST(WorkerThreadLimit, LimitIsSharedByAllWorkers) {
   for (const unsigned threads : {1U, 2U, 3U}) {
-    const auto allowance = std::make_shared<Allowance>();
-    allowance->set(threads, Allowance::no_limit);
+    const auto resource_limits = std::make_shared<ResourceLimits>();
+    resource_limits->set(threads, ResourceLimits::no_limit);
     Crowd crowd;
     std::atomic<int> visits = 0;
     std::vector<std::unique_ptr<Worker>> workers;
     for (int i = 0; i < 4; ++i) {
-      workers.push_back(std::make_unique<Worker>([] {}, cumulet::Trace(), allowance));
+      workers.push_back(std::make_unique<Worker>([] {}, cumulet::Trace(), resource_limits));
       workers.back()->post({"crowding", Progress::Stage::refining, [&](Progress&) {
                               tbb::parallel_for(0, 40, [&](int) {
                                 crowd.visit();
@@ -80,12 +80,12 @@ TEST(WorkerThreadLimit, LimitIsSharedByAllWorkers) {
 
 // A thread of a job that waits for its other tasks does not run another job, which might need a lock that it holds.
 TEST(WorkerThreadLimit, JobsDoNotNest) {
-  const auto allowance = std::make_shared<Allowance>();
-  allowance->set(1, Allowance::no_limit);
+  const auto resource_limits = std::make_shared<ResourceLimits>();
+  resource_limits->set(1, ResourceLimits::no_limit);
   std::mutex mutex;
   std::vector<std::unique_ptr<Worker>> workers;
   for (int i = 0; i < 4; ++i) {
-    workers.push_back(std::make_unique<Worker>([] {}, cumulet::Trace(), allowance));
+    workers.push_back(std::make_unique<Worker>([] {}, cumulet::Trace(), resource_limits));
     workers.back()->post({"holding", Progress::Stage::refining, [&](Progress&) {
                             const std::scoped_lock lock(mutex);
                             tbb::parallel_for(
@@ -98,9 +98,9 @@ TEST(WorkerThreadLimit, JobsDoNotNest) {
 
 // The exception of a job is reported.
 TEST(WorkerThreadLimit, ExceptionsReachTheJob) {
-  const auto allowance = std::make_shared<Allowance>();
-  allowance->set(2, Allowance::no_limit);
-  Worker worker([] {}, cumulet::Trace(), allowance);
+  const auto resource_limits = std::make_shared<ResourceLimits>();
+  resource_limits->set(2, ResourceLimits::no_limit);
+  Worker worker([] {}, cumulet::Trace(), resource_limits);
   worker.post({"failing", Progress::Stage::refining,
                [](Progress&) { throw cumulet::Error(cumulet::ErrorCode::file, "a.vdb: is empty"); }});
   EXPECT_TRUE(worker.wait(std::nullopt));

@@ -235,7 +235,7 @@ TEST_F(CLiveVolume, StateDoesNotDependOnEarlierStates) {
 TEST_F(CLiveVolume, ChannelsMatchThoseOfFiles) {
   const VolumeRef volume = alone(fire(small, 0));
   const auto& frame = volume->asset->frame();
-  EXPECT_TRUE(frame.temperature && frame.flame && frame.colour && frame.anisotropy && frame.velocity);
+  EXPECT_TRUE(frame.temperature && frame.flame && frame.color && frame.anisotropy && frame.velocity);
   EXPECT_EQ(frame.beside_density().size(), 2U + 3U + 2U + 6U);
   const auto values = simulated(CUMULET_CHANNEL_ANISOTROPY, small, 0);
   const auto velocity = simulated(CUMULET_CHANNEL_VELOCITY_Y, small, 0);

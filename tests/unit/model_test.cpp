@@ -162,7 +162,7 @@ TEST(Models, EmissiveTrianglesAreSelectedByArea) {
       if (!(area > 0.0)) continue;
       // At a distance of 1, straight in front.
       const vec3 n(glm::normalize(cross));
-      sum += area * rays.cm_emitter_density(static_cast<core::uint>(m), entry, n, n, n);
+      sum += area * rays.cm_emitter_pdf(static_cast<core::uint>(m), entry, n, n, n);
     }
   }
   EXPECT_NEAR(sum, 1.0, 1e-4);

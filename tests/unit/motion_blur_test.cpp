@@ -239,9 +239,9 @@ TEST_P(MotionBlur, ShutterPosesEndWithTheNextCameraMove) {
 // An emissive square moves across the image and lights a floor, as does a growing fire.
 TEST_P(MotionBlur, MovingModelIsTheMeanOfStills) {
   auto scene = std::make_shared<test::StillScene>();
-  surface::Material glow = test::diffuse(vec3(0.3F));
-  glow.emission = {3.0F, 2.0F, 1.0F};
-  scene->add_quad({{{6, 14, 4}, {14, 14, 4}, {14, 14, 12}, {6, 14, 12}}}, scene->add(glow));
+  surface::Material emissive = test::diffuse(vec3(0.3F));
+  emissive.emission = {3.0F, 2.0F, 1.0F};
+  scene->add_quad({{{6, 14, 4}, {14, 14, 4}, {14, 14, 12}, {6, 14, 12}}}, scene->add(emissive));
   scene->add_sphere({12.0F, 20.0F, 14.0F}, 6.0F, scene->add(test::diffuse(vec3(0.7F, 0.5F, 0.3F))), 8);
   auto floor = std::make_shared<test::StillScene>();
   floor->add_quad({{{-30, -2, 40}, {60, -2, 40}, {60, -2, -30}, {-30, -2, -30}}},
@@ -379,12 +379,12 @@ TEST_P(MotionBlur, NormalsFollowVertexMotion) {
 // to their model.
 TEST_P(MotionBlur, DeformingModelIsTheMeanOfStills) {
   auto scene = std::make_shared<PosedScene>();
-  surface::Material glow = test::diffuse(vec3(0.3F));
-  glow.emission = {3.0F, 2.0F, 1.0F};
-  glow.double_sided = true;
+  surface::Material emissive = test::diffuse(vec3(0.3F));
+  emissive.emission = {3.0F, 2.0F, 1.0F};
+  emissive.double_sided = true;
   scene->add_quad({{{-30, -2, 40}, {60, -2, 40}, {60, -2, -30}, {-30, -2, -30}}},
                   scene->add(test::diffuse(vec3(0.6F))));
-  scene->add_quad({{{4, 12, 4}, {9, 12, 4}, {9, 12, 9}, {4, 12, 9}}}, scene->add(glow));
+  scene->add_quad({{{4, 12, 4}, {9, 12, 4}, {9, 12, 9}, {4, 12, 9}}}, scene->add(emissive));
   scene->add_sphere({0, 0, 0}, 5.0F, scene->add(test::diffuse(vec3(0.7F, 0.5F, 0.3F))), 8);
   scene->prototypes.push_back({2, 1, 2});
   const std::size_t square = 4;

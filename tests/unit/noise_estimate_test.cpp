@@ -116,8 +116,8 @@ class NoiseTarget : public Noise {
     sampling.noise_target = noise_target;
     return sampling;
   }
-  Ended end(const viewer::Sampling& wish, double budget_ms = 1e9, glm::uvec2 size = {side, side}) {
-    viewer().set_sampling(wish);
+  Ended end(const viewer::Sampling& request, double budget_ms = 1e9, glm::uvec2 size = {side, side}) {
+    viewer().set_sampling(request);
     viewer().wait(-1.0);
     double progress = 0.0;
     viewer::FrameResult result;
@@ -218,11 +218,11 @@ class AdaptiveSampling : public NoiseTarget {
   static constexpr glm::uvec2 size{36, 28};  // not a multiple of the block size
 
   static viewer::Sampling adaptive(double noise_target, std::uint32_t samples = most) {
-    viewer::Sampling wish = sampling(noise_target, samples);
-    wish.adaptive = true;
-    return wish;
+    viewer::Sampling request = sampling(noise_target, samples);
+    request.adaptive = true;
+    return request;
   }
-  Ended end_small(const viewer::Sampling& wish, double budget_ms = 1e9) { return end(wish, budget_ms, size); }
+  Ended end_small(const viewer::Sampling& request, double budget_ms = 1e9) { return end(request, budget_ms, size); }
 };
 CUMULET_ON_BACKENDS(AdaptiveSampling);
 
@@ -249,13 +249,13 @@ TEST_P(AdaptiveSampling, ImageIsTheSameForAnyTimeBudget) {
 }
 
 TEST_P(AdaptiveSampling, ResumesFromAnySavedState) {
-  const viewer::Sampling wish = adaptive(0.025);
-  const Ended whole = end_small(wish);
+  const viewer::Sampling request = adaptive(0.025);
+  const Ended whole = end_small(request);
   const auto one_frame = [&](double budget_ms) { return viewer().render(frame(size.x, size.y, budget_ms)); };
   const auto begin_anew = [&] {
     viewer().set_sampling(adaptive(0.5));
     one_frame(0.01);
-    viewer().set_sampling(wish);
+    viewer().set_sampling(request);
     one_frame(0.01);
   };
   begin_anew();
@@ -281,8 +281,8 @@ TEST_P(AdaptiveSampling, ResumesFromAnySavedState) {
 }
 
 TEST_P(AdaptiveSampling, RejectsSavedStateOfAnotherImage) {
-  const auto saved = [&](const viewer::Sampling& wish) {
-    end_small(wish);
+  const auto saved = [&](const viewer::Sampling& request) {
+    end_small(request);
     std::vector<std::byte> bytes(viewer().accumulation_bytes());
     viewer().read_accumulation(bytes);
     return bytes;

@@ -267,14 +267,14 @@ TEST(Options, LightFlagsMatchSceneFileLights) {
        "color": [1, 0.5, 0.25], "power": 300, "width": 2, "height": 0.5, "angle_degrees": 90, "blend": 0.25},
       {"kind": "point"}, {"kind": "sun", "power": 3, "angle_degrees": 0.53}]})",
                                         "a.json");
-  const auto same_lamps = [&](const SceneOptions& other) {
-    ASSERT_EQ(scene.lamps.size(), other.lamps.size());
-    for (std::size_t i = 0; i < scene.lamps.size(); ++i)
-      EXPECT_TRUE(cumulet::settings::same(scene.lamps[i], other.lamps[i])) << i;
+  const auto same_analytic_lights = [&](const SceneOptions& other) {
+    ASSERT_EQ(scene.analytic_lights.size(), other.analytic_lights.size());
+    for (std::size_t i = 0; i < scene.analytic_lights.size(); ++i)
+      EXPECT_TRUE(cumulet::settings::same(scene.analytic_lights[i], other.analytic_lights[i])) << i;
   };
-  same_lamps(file);
-  EXPECT_EQ(scene.lamps[0].struct_size, sizeof(cumulet_lamp_desc));
-  same_lamps(parse_scene(scene_text(scene, "a.json"), "a.json"));
+  same_analytic_lights(file);
+  EXPECT_EQ(scene.analytic_lights[0].struct_size, sizeof(cumulet_lamp_desc));
+  same_analytic_lights(parse_scene(scene_text(scene, "a.json"), "a.json"));
   EXPECT_EQ(scene.light.sun_irradiance[0], 0.0f) << "no light but theirs";
   EXPECT_EQ(scene.light.sky, CUMULET_SKY_CONSTANT);
   EXPECT_EQ(scene.ground.place, CUMULET_GROUND_NONE);
@@ -286,31 +286,31 @@ TEST(Options, LightFlagsAddToTheScenesLights) {
   const cumulet::test::Folder folder;
   const std::string scene = (folder.path() / "scene.json").string();
   std::ofstream(scene) << R"({"cumulet_scene": 2, "lights": [{"kind": "spot", "power": 7}]})";
-  const auto lamps = [&](const Arguments& more) {
+  const auto analytic_lights = [&](const Arguments& more) {
     Arguments all = {"--scene", scene};
     all.insert(all.end(), more.begin(), more.end());
-    return parse(all).scene.lamps;
+    return parse(all).scene.analytic_lights;
   };
-  ASSERT_EQ(lamps({}).size(), 1u);
-  const auto two = lamps({"--lamp", "disc power=3"});
+  ASSERT_EQ(analytic_lights({}).size(), 1u);
+  const auto two = analytic_lights({"--lamp", "disc power=3"});
   ASSERT_EQ(two.size(), 2u);
   EXPECT_EQ(two[0].power, 7.0f);
   EXPECT_EQ(two[1].kind, CUMULET_LAMP_DISC);
-  const auto other = lamps({"--lamp", "none", "--lamp", "disc power=3"});
+  const auto other = analytic_lights({"--lamp", "none", "--lamp", "disc power=3"});
   ASSERT_EQ(other.size(), 1u);
   EXPECT_EQ(other[0].power, 3.0f);
 }
 
 TEST(Options, AnyWhiteSpaceSeparatesWords) {
-  const auto lamps = parse({"--lamp", "\tdisc\n  power=3\r\n\twidth=2\n"}).scene.lamps;
-  ASSERT_EQ(lamps.size(), 1u);
-  EXPECT_EQ(lamps[0].kind, CUMULET_LAMP_DISC);
-  EXPECT_EQ(lamps[0].power, 3.0f);
-  EXPECT_EQ(lamps[0].width, 2.0);
+  const auto analytic_lights = parse({"--lamp", "\tdisc\n  power=3\r\n\twidth=2\n"}).scene.analytic_lights;
+  ASSERT_EQ(analytic_lights.size(), 1u);
+  EXPECT_EQ(analytic_lights[0].kind, CUMULET_LAMP_DISC);
+  EXPECT_EQ(analytic_lights[0].power, 3.0f);
+  EXPECT_EQ(analytic_lights[0].width, 2.0);
 }
 
 TEST(Options, InvalidLightGivesAOneLineError) {
-  const auto told = [](const char* lamp) { return usage_error(with({"--lamp", lamp})); };
+  const auto told = [](const char* analytic_light) { return usage_error(with({"--lamp", analytic_light})); };
   EXPECT_EQ(told(""), "--lamp: '' is none of point, spot, disc, rectangle, sun");
   EXPECT_EQ(told("bulb power=1"), "--lamp: 'bulb' is none of point, spot, disc, rectangle, sun");
   EXPECT_EQ(told("point power 1"), "--lamp: 'power' is not a key and its value, such as power=100");

@@ -140,9 +140,9 @@ TEST_P(OverlappingVolumes, MediumEmissionIsVisible) {
 
 TEST_P(OverlappingVolumes, RenderAmongSurfaces) {
   auto scene = std::make_shared<test::StillScene>();
-  surface::Material glow = test::diffuse(vec3(0.3F));
-  glow.emission = {3.0F, 2.0F, 1.0F};
-  scene->add_sphere({16.0F, 24.0F, 14.0F}, 4.0F, scene->add(glow), 8);
+  surface::Material emissive = test::diffuse(vec3(0.3F));
+  emissive.emission = {3.0F, 2.0F, 1.0F};
+  scene->add_sphere({16.0F, 24.0F, 14.0F}, 4.0F, scene->add(emissive), 8);
   scene->add_quad({{{-60, -8, 70}, {80, -8, 70}, {80, -8, -40}, {-60, -8, -40}}},
                   scene->add(test::diffuse(vec3(0.6F))));
   viewer().show_surfaces(test::source_of(scene));
@@ -197,25 +197,25 @@ TEST_P(OverlappingVolumes, AovsAndDebugViewsMatchOneMergedVolume) {
   constexpr std::size_t pixels = std::size_t{edge} * edge;
   for (const test::MarchKind& kind : {test::march_kinds[1], test::march_kinds[3]}) {
     still_->set_grid(test::settings_of(kind));
-    struct Facts {
+    struct SettingInfo {
       std::vector<float> transmittance = std::vector<float>(pixels);
       std::vector<float> z = std::vector<float>(pixels);
       test::Picture view;
       viewer::Pick pick;
     };
     const auto find = [&] {
-      Facts facts;
+      SettingInfo volume_info;
       test::render(*still_, image);
-      viewer().read_aov(viewer::Aov::transmittance, facts.transmittance.data(), pixels);
-      viewer().read_aov(viewer::Aov::volume_depth, facts.z.data(), pixels);
-      facts.pick = viewer().pick(0.5 * edge, 0.5 * edge);
-      facts.view = test::render(*still_, {edge, edge, 1, 1, render::View::density});
-      return facts;
+      viewer().read_aov(viewer::Aov::transmittance, volume_info.transmittance.data(), pixels);
+      viewer().read_aov(viewer::Aov::volume_depth, volume_info.z.data(), pixels);
+      volume_info.pick = viewer().pick(0.5 * edge, 0.5 * edge);
+      volume_info.view = test::render(*still_, {edge, edge, 1, 1, render::View::density});
+      return volume_info;
     };
     show(cloud(), std::nullopt, many);
-    const Facts several = find();
+    const SettingInfo several = find();
     show(merged(cloud(), many), std::nullopt, {ivec3(0)});
-    const Facts one = find();
+    const SettingInfo one = find();
     std::size_t opaque = 0;
     for (std::size_t i = 0; i < pixels; ++i) {
       EXPECT_NEAR(several.transmittance[i], one.transmittance[i], 2e-3) << i;

@@ -152,7 +152,7 @@ TEST(Ramp, AppliesBeforeColorsAndEmission) {
     return test::make_volume(ivec3(8), ivec3(0), [=](const ivec3& p) { return p.x < 4 ? value : 0.0F; });
   };
   VolumeFrame frame{.density = field(3.0F)};
-  frame.colour = {field(0.5F), field(0.25F), field(1.0F)};
+  frame.color = {field(0.5F), field(0.25F), field(1.0F)};
   frame.temperature = field(1.0F);
   frame.flame = field(2.0F);
   const auto scattering = scene::scattering_of(frame, Ramp({{0.0F, 9.0F}, {4.0F, 1.0F}}));
@@ -165,7 +165,7 @@ TEST(Ramp, AppliesBeforeColorsAndEmission) {
   emission.flame_ramp = Ramp({{0.0F, 1.0F}, {4.0F, 0.0F}});
   const auto radiance = scene::emission_of(frame, emission);
   ASSERT_TRUE(radiance);
-  const vec3 hot(light::black_body_colour(2250.0) * light::black_body_radiance(2250.0, 1.0));
+  const vec3 hot(light::black_body_color(2250.0) * light::black_body_radiance(2250.0, 1.0));
   for (std::size_t i = 0; i < 3; ++i) {
     const float expected = 0.5F + hot[static_cast<int>(i)];
     EXPECT_NEAR(test::value_at((*radiance)[i], {1, 1, 1}), expected, 2e-3F * expected);

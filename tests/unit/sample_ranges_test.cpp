@@ -104,12 +104,12 @@ class ResumedRendering : public SampleRanges {
     return ended;
   }
   // Restarts, so that nothing of the other process remains.
-  void begin(const viewer::Sampling& wish) {
-    viewer::Sampling other = wish;
+  void begin(const viewer::Sampling& request) {
+    viewer::Sampling other = request;
     other.seed = 99;
     viewer().set_sampling(other);
     viewer().render(frame(3, 2, 50.0));
-    viewer().set_sampling(wish);
+    viewer().set_sampling(request);
     viewer().wait(-1.0);
   }
   std::vector<std::byte> saved() {
@@ -118,16 +118,16 @@ class ResumedRendering : public SampleRanges {
     return bytes;
   }
   // Stops after various numbers of frames of a millisecond or so, each time in another state.
-  void expect_resumed_as_whole(const viewer::Sampling& wish, glm::uvec2 size) {
-    begin(wish);
+  void expect_resumed_as_whole(const viewer::Sampling& request, glm::uvec2 size) {
+    begin(request);
     const Ended whole = end(size);
     int resumed = 0;
     for (const int frames : {1, 2, 5, 9, 17, 40, 120}) {
-      begin(wish);
+      begin(request);
       bool done = false;
       for (int i = 0; i < frames && !done; ++i) done = viewer().render(frame(size.x, size.y, 2.0)).converged;
       const std::vector<std::byte> bytes = saved();
-      begin(wish);
+      begin(request);
       viewer().render(frame(size.x, size.y, 1.0));
       viewer().restore_accumulation(bytes);
       if (!done) ++resumed;

@@ -68,18 +68,18 @@ SceneOptions full_scene() {
   for (int i = 0; i < 3; ++i) scene.light.sun_irradiance[i] = 0.7f * static_cast<float>(i);
   for (int i = 0; i < 3; ++i) scene.light.sky_radiance[i] = 1e-3f * static_cast<float>(i);
   for (const cumulet_lamp_kind kind : {CUMULET_LAMP_RECTANGLE, CUMULET_LAMP_SUN}) {
-    cumulet_lamp_desc lamp{};
-    lamp.struct_size = sizeof lamp;
-    lamp.kind = kind;
-    lamp.position[1] = 0.1;
-    lamp.direction[2] = -1.0 / 3.0;
-    lamp.across[0] = 2.5;
-    lamp.color[2] = 0.3f;
-    lamp.power = 123.4f;
-    lamp.width = 1.5;
-    lamp.angle_degrees = 33.0;
-    lamp.blend = 0.25;
-    scene.lamps.push_back(lamp);
+    cumulet_lamp_desc analytic_light{};
+    analytic_light.struct_size = sizeof analytic_light;
+    analytic_light.kind = kind;
+    analytic_light.position[1] = 0.1;
+    analytic_light.direction[2] = -1.0 / 3.0;
+    analytic_light.across[0] = 2.5;
+    analytic_light.color[2] = 0.3f;
+    analytic_light.power = 123.4f;
+    analytic_light.width = 1.5;
+    analytic_light.angle_degrees = 33.0;
+    analytic_light.blend = 0.25;
+    scene.analytic_lights.push_back(analytic_light);
   }
   for (std::size_t i = 0; i < 16; ++i) scene.to_world[i] = 0.1 * static_cast<double>(i);
   scene.places.assign(2, scene.to_world);
@@ -118,7 +118,7 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.medium, scene.medium));
   EXPECT_EQ(read.ramps, scene.ramps);
   EXPECT_TRUE(same(read.light, scene.light));
-  EXPECT_TRUE(std::ranges::equal(read.lamps, scene.lamps, same<cumulet_lamp_desc>));
+  EXPECT_TRUE(std::ranges::equal(read.analytic_lights, scene.analytic_lights, same<cumulet_lamp_desc>));
   EXPECT_EQ(read.to_world, scene.to_world);
   EXPECT_EQ(read.places, scene.places);
   EXPECT_TRUE(same(read.grid, scene.grid));
@@ -205,8 +205,8 @@ TEST(SceneFile, EveryDifferenceIsDetected) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.sampling.seed = 1; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.display.exposure_stops = 0.0f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.surface.double_sided = 0; }));
-  EXPECT_TRUE(differs([](SceneOptions& s) { s.lamps[1].power = 1.0f; }));
-  EXPECT_TRUE(differs([](SceneOptions& s) { s.lamps.pop_back(); }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.analytic_lights[1].power = 1.0f; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.analytic_lights.pop_back(); }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.to_world[3] = 5.0; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.places[1][3] = 5.0; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.places.pop_back(); }));
@@ -357,7 +357,7 @@ TEST(SceneFile, VersionTwoMatchesVersionOne) {
   const std::string first = scene_text(scene, "s.json", SceneFormat::first);
   // Equal except for settings that version 1 does not have.
   EXPECT_FALSE(same_scene(parse_scene(first, "s.json"), scene));
-  scene.lamps.clear();
+  scene.analytic_lights.clear();
   scene.to_world = {};
   scene.places.clear();
   EXPECT_EQ(first.rfind("{\n  \"cumulet_scene\": 1,\n  \"volume\"", 0), 0u) << first;

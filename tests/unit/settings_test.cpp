@@ -209,7 +209,7 @@ TEST(Settings, DocumentationListsExactlyTheKeys) {
       if (*setting.key != '\0') keys.insert(setting.key);
     });
   });
-  for (const settings::RampFacts& ramp : settings::ramps) keys.insert(ramp.key);
+  for (const settings::RampInfo& ramp : settings::ramps) keys.insert(ramp.key);
   EXPECT_EQ(told, keys);
 }
 

@@ -31,7 +31,7 @@ dvec3 direction(double elevation, double azimuth) {
 Sky sky(double turbidity, double elevation, double albedo = 0.3) {
   return {{turbidity, albedo}, direction(elevation, 0.0)};
 }
-double bright(const vec3& colour) { return luminance(dvec3(colour)); }
+double bright(const vec3& color) { return luminance(dvec3(color)); }
 
 TEST(Sky, IsBlueAboveAndBrighterAtTheHorizon) {
   const Sky noon = sky(2.0, 60.0);

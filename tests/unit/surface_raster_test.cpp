@@ -94,9 +94,9 @@ class HandScene : public cumulet::test::TexturedScene {
     add_quad({-half, -half, z}, {2.0F * half, 0.0F, 0.0F}, {0.0F, 2.0F * half, 0.0F}, material);
   }
   /// A material without an interface: Lambertian.
-  surface::Material& add_matte(glm::vec3 colour) {
+  surface::Material& add_matte(glm::vec3 color) {
     surface::Material& material = materials.emplace_back();
-    material.base_color = glm::vec4(colour, 1.0F);
+    material.base_color = glm::vec4(color, 1.0F);
     material.metallic = 0.0F;
     material.specular = 0.0F;
     return material;
@@ -116,17 +116,15 @@ SurfaceView straight(glm::dvec3 eye, double tangent, double aspect = 1.0, bool o
 
 struct Picture {
   glm::uvec2 size{0U};
-  std::vector<glm::vec4> colours;
+  std::vector<glm::vec4> colors;
   std::vector<float> depths;
   std::vector<float> blended_depths;  // of the same pixels
   [[nodiscard]] std::size_t index(unsigned x, unsigned y, unsigned layer) const {
     return (std::size_t{layer} * size.y + y) * size.x + x;
   }
-  [[nodiscard]] glm::vec4 colour(unsigned x, unsigned y, unsigned layer = 0) const {
-    return colours[index(x, y, layer)];
-  }
+  [[nodiscard]] glm::vec4 color(unsigned x, unsigned y, unsigned layer = 0) const { return colors[index(x, y, layer)]; }
   [[nodiscard]] float z(unsigned x, unsigned y, unsigned layer = 0) const { return depths[index(x, y, layer)]; }
-  [[nodiscard]] glm::vec4 centre() const { return colour(size.x / 2, size.y / 2); }
+  [[nodiscard]] glm::vec4 centre() const { return color(size.x / 2, size.y / 2); }
   [[nodiscard]] float centre_z() const { return z(size.x / 2, size.y / 2); }
 };
 
@@ -171,18 +169,18 @@ class SurfaceRasters : public cumulet::test::GlTest {
     picture.size = size;
     const std::size_t count = std::size_t{size.x} * size.y * layers;
     const std::size_t all = layers_.blended ? 2 * count : count;
-    picture.colours.resize(all);
+    picture.colors.resize(all);
     picture.depths.resize(all);
-    gl_->GetTextureImage(layers_.colour.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(all * 16),
-                         picture.colours.data());
+    gl_->GetTextureImage(layers_.color.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(all * 16),
+                         picture.colors.data());
     gl_->GetTextureImage(layers_.z.name(), 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(all * 4), picture.depths.data());
     // Blended surfaces over the opaque ones.
     for (std::size_t i = 0; i < all - count; ++i) {
-      const glm::vec4 over = picture.colours[count + i];
-      picture.colours[i] = over + (1.0F - over.a) * picture.colours[i];
+      const glm::vec4 over = picture.colors[count + i];
+      picture.colors[i] = over + (1.0F - over.a) * picture.colors[i];
     }
     picture.blended_depths.assign(picture.depths.begin() + static_cast<std::ptrdiff_t>(count), picture.depths.end());
-    picture.colours.resize(count);
+    picture.colors.resize(count);
     picture.depths.resize(count);
     return picture;
   }
@@ -198,7 +196,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
 };
 CUMULET_ON_BACKENDS(SurfaceRasters);
 
-void expect_colour(glm::vec4 got, glm::vec4 expected, float relative = 2e-3F) {
+void expect_color(glm::vec4 got, glm::vec4 expected, float relative = 2e-3F) {
   for (int c = 0; c < 4; ++c) EXPECT_NEAR(got[c], expected[c], relative * std::abs(expected[c]) + 1e-4F) << c;
 }
 
@@ -224,7 +222,7 @@ TEST(SurfaceJitter, EveryRowAndColumnHasOneLayer) {
 TEST_P(SurfaceRasters, EmptyPixelsAreTransparentWithInfiniteDepth) {
   Picture picture = draw(straight({0, 0, 0}, 1.0), {}, {5U, 3U}, 3);
   for (const float z : picture.depths) EXPECT_EQ(z, infinite);
-  for (const glm::vec4& colour : picture.colours) EXPECT_EQ(colour, glm::vec4(0.0F));
+  for (const glm::vec4& color : picture.colors) EXPECT_EQ(color, glm::vec4(0.0F));
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F));
   set(scene);  // without a triangle
@@ -283,7 +281,7 @@ TEST_P(SurfaceRasters, DepthIsTheAnalyticOne) {
             ASSERT_EQ(z, infinite) << x << ',' << y;
           } else {
             ASSERT_NEAR(z, expected, slack * expected) << x << ',' << y << " layer " << layer;
-            ASSERT_EQ(picture.colour(x, y, layer).a, 1.0F);
+            ASSERT_EQ(picture.color(x, y, layer).a, 1.0F);
           }
         }
       }
@@ -328,10 +326,10 @@ TEST_P(SurfaceRasters, SunOnMatte) {
   lighting.sun_direction = glm::normalize(glm::vec3(1.0F, 2.0F, 2.0F));
   lighting.sun_irradiance = {3.0F, 2.0F, 1.0F};
   const Picture picture = draw_wall(scene, lighting);
-  expect_colour(picture.centre(), glm::vec4(glm::vec3(2.4F, 0.8F, 0.2F) * (2.0F / 3.0F / pi), 1.0F));
-  expect_colour(picture.colour(1, 30), glm::vec4(glm::vec3(2.4F, 0.8F, 0.2F) * (2.0F / 3.0F / pi), 1.0F));
+  expect_color(picture.centre(), glm::vec4(glm::vec3(2.4F, 0.8F, 0.2F) * (2.0F / 3.0F / pi), 1.0F));
+  expect_color(picture.color(1, 30), glm::vec4(glm::vec3(2.4F, 0.8F, 0.2F) * (2.0F / 3.0F / pi), 1.0F));
   lighting.sun_direction.z = -lighting.sun_direction.z;
-  expect_colour(draw(straight({0, 0, 0}, 0.5), lighting).centre(), glm::vec4(0, 0, 0, 1));
+  expect_color(draw(straight({0, 0, 0}, 0.5), lighting).centre(), glm::vec4(0, 0, 0, 1));
 }
 
 TEST_P(SurfaceRasters, WhiteFurnaceIsInvisible) {
@@ -349,13 +347,13 @@ TEST_P(SurfaceRasters, WhiteFurnaceIsInvisible) {
   SurfaceLighting lighting;
   lighting.sky_radiance = {0.5F, 1.0F, 4.0F};
   const Picture picture = draw(straight({0, 0, 0}, 1.2), lighting);
-  expect_colour(picture.colour(2, 16), glm::vec4(0.5F, 1.0F, 4.0F, 1.0F), 1e-3F);
+  expect_color(picture.color(2, 16), glm::vec4(0.5F, 1.0F, 4.0F, 1.0F), 1e-3F);
   for (const unsigned x : {12U, 16U, 28U}) {
-    expect_colour(picture.colour(x, 16), glm::vec4(0.5F, 1.0F, 4.0F, 1.0F), 0.01F);
+    expect_color(picture.color(x, 16), glm::vec4(0.5F, 1.0F, 4.0F, 1.0F), 0.01F);
   }
 }
 
-TEST_P(SurfaceRasters, EmissionVertexColoursAndUnlit) {
+TEST_P(SurfaceRasters, EmissionVertexColorsAndUnlit) {
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte({0.5F, 0.5F, 0.5F}).emission = {0.0F, 7.0F, 1.0F};
   scene->add_matte({0.5F, 2.0F, 0.5F}).unlit = true;
@@ -366,8 +364,8 @@ TEST_P(SurfaceRasters, EmissionVertexColoursAndUnlit) {
   SurfaceLighting lighting;
   lighting.sky_radiance = glm::vec3(2.0F);
   const Picture picture = draw(straight({0, 0, 0}, 0.5), lighting);
-  expect_colour(picture.colour(4, 16), glm::vec4(1.0F, 7.25F, 1.5F, 1.0F));
-  expect_colour(picture.colour(28, 16), glm::vec4(0.5F, 0.5F, 0.25F, 1.0F));
+  expect_color(picture.color(4, 16), glm::vec4(1.0F, 7.25F, 1.5F, 1.0F));
+  expect_color(picture.color(28, 16), glm::vec4(0.5F, 0.5F, 0.25F, 1.0F));
 }
 
 TEST_P(SurfaceRasters, PunctualLights) {
@@ -411,7 +409,7 @@ TEST_P(SurfaceRasters, PunctualLights) {
     scene->add_wall(-2.0F, 3.0F, 0);
     set(scene);
     const Picture picture = draw(straight({0, 0, 0}, 0.01), {});
-    expect_colour(picture.centre(), glm::vec4(glm::vec3(1.0F, 0.5F, 0.0F) * (c.irradiance / pi), 1.0F));
+    expect_color(picture.centre(), glm::vec4(glm::vec3(1.0F, 0.5F, 0.0F) * (c.irradiance / pi), 1.0F));
   }
   // All of them together, three times.
   const auto scene = std::make_shared<HandScene>();
@@ -425,7 +423,7 @@ TEST_P(SurfaceRasters, PunctualLights) {
   }
   scene->add_wall(-2.0F, 3.0F, 0);
   set(scene);
-  expect_colour(draw(straight({0, 0, 0}, 0.01), {}).centre(), glm::vec4(glm::vec3(sum / pi), 1.0F));
+  expect_color(draw(straight({0, 0, 0}, 0.01), {}).centre(), glm::vec4(glm::vec3(sum / pi), 1.0F));
 }
 
 TEST_P(SurfaceRasters, AlphaMasksCutOut) {
@@ -441,23 +439,23 @@ TEST_P(SurfaceRasters, AlphaMasksCutOut) {
   SurfaceLighting lighting;
   lighting.sky_radiance = glm::vec3(1.0F);
   const Picture picture = draw_wall(scene, lighting);
-  EXPECT_EQ(picture.colour(8, 16), glm::vec4(0.0F));
+  EXPECT_EQ(picture.color(8, 16), glm::vec4(0.0F));
   EXPECT_EQ(picture.z(8, 16), infinite);
-  expect_colour(picture.colour(24, 16), glm::vec4(1.0F));
+  expect_color(picture.color(24, 16), glm::vec4(1.0F));
   EXPECT_NEAR(picture.z(24, 16), 2.0F, 1e-6F);
 }
 
 TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndKeepTheNearestDepth) {
   const auto scene = std::make_shared<HandScene>();
-  const auto glow = [&](glm::vec3 colour, float alpha) {
+  const auto emissive = [&](glm::vec3 color, float alpha) {
     surface::Material& material = scene->add_matte(glm::vec3(0.0F));
     material.base_color.a = alpha;
-    material.emission = colour;
+    material.emission = color;
     material.alpha_mode = alpha < 1.0F ? surface::AlphaMode::blend : surface::AlphaMode::opaque;
   };
-  glow({8, 0, 0}, 0.5F);
-  glow({0, 8, 0}, 0.25F);
-  glow({0, 0, 8}, 1.0F);
+  emissive({8, 0, 0}, 0.5F);
+  emissive({0, 8, 0}, 0.25F);
+  emissive({0, 0, 8}, 1.0F);
   scene->add_wall(-2.0F, 5.0F, 0);  // the nearer one is first in the file
   scene->add_wall(-3.0F, 5.0F, 1);
   scene->add_wall(-4.0F, 5.0F, 2);
@@ -466,7 +464,7 @@ TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndKeepTheNearestDepth) {
   const Picture front = draw(straight({0, 0, 0}, 0.5), {}, {16U, 16U}, 2);
   EXPECT_NEAR(front.z(3, 3, 1), 4.0F, 1e-5F);
   EXPECT_NEAR(front.blended_depths.at(front.index(3, 3, 1)), 2.0F, 1e-5F);
-  expect_colour(front.colour(3, 3, 1), {4.0F, 0.5F * 2.0F, 0.5F * 0.75F * 8.0F, 1.0F});
+  expect_color(front.color(3, 3, 1), {4.0F, 0.5F * 2.0F, 0.5F * 0.75F * 8.0F, 1.0F});
   // From behind, single-sided surfaces are invisible. From the front without the wall, alphas combine, and there is no
   // depth.
   EXPECT_EQ(draw(straight({0, 0, -20}, 0.1), {}).centre(), glm::vec4(0.0F));
@@ -478,11 +476,11 @@ TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndKeepTheNearestDepth) {
   set(thin);
   const Picture alone = draw(straight({0, 0, 0}, 0.5), {});
   EXPECT_EQ(alone.centre_z(), infinite);
-  expect_colour(alone.centre(), {4.0F, 1.0F, 0.0F, 0.625F});
+  expect_color(alone.centre(), {4.0F, 1.0F, 0.0F, 0.625F});
   SurfaceView back = straight({0, 0, -6}, 0.5);
   back.forward = {0, 0, 1};
   back.right = -back.right;
-  expect_colour(draw(back, {}).centre(), {4.0F * 0.75F, 2.0F, 0.0F, 0.625F});
+  expect_color(draw(back, {}).centre(), {4.0F * 0.75F, 2.0F, 0.0F, 0.625F});
 }
 
 TEST_P(SurfaceRasters, TransmissionLetsTheBackgroundThrough) {
@@ -491,7 +489,7 @@ TEST_P(SurfaceRasters, TransmissionLetsTheBackgroundThrough) {
   SurfaceLighting lighting;
   lighting.sky_radiance = glm::vec3(1.0F);
   const Picture picture = draw_wall(scene, lighting);
-  expect_colour(picture.centre(), glm::vec4(0.25F));
+  expect_color(picture.centre(), glm::vec4(0.25F));
   EXPECT_EQ(picture.centre_z(), infinite);
 }
 
@@ -517,13 +515,13 @@ TEST_P(SurfaceRasters, SidesAndMirroring) {
       for (const SurfaceView& view : {front, mirrored_front}) {
         const Picture picture = draw(view, lighting);
         EXPECT_NEAR(picture.centre_z(), 2.0F, 1e-6F);
-        expect_colour(picture.centre(), glm::vec4(0, 0, 0, 1));
+        expect_color(picture.centre(), glm::vec4(0, 0, 0, 1));
       }
       for (const SurfaceView& view : {back, mirrored_back}) {
         const Picture picture = draw(view, lighting);
         if (double_sided) {
           EXPECT_NEAR(picture.centre_z(), 4.0F, 1e-6F);
-          expect_colour(picture.centre(), glm::vec4(0.5F, 0.5F, 0.5F, 1.0F));
+          expect_color(picture.centre(), glm::vec4(0.5F, 0.5F, 0.5F, 1.0F));
         } else {
           EXPECT_EQ(picture.centre_z(), infinite);
         }
@@ -566,7 +564,7 @@ TEST_P(SurfaceRasters, TexturesWrapAndTransform) {
   // 2 x 2 distinct colors; the wall shows uv from -1 to 2.
   const std::vector<std::uint8_t> texels{255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 128, 128, 128, 255};
   const float grey = std::pow((128.0F / 255.0F + 0.055F) / 1.055F, 2.4F);
-  const std::array<glm::vec3, 4> colours{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(grey)};
+  const std::array<glm::vec3, 4> colors{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(grey)};
   using surface::Wrap;
   const auto wrapped = [](double t, Wrap wrap) {
     if (wrap == Wrap::clamp) return std::clamp(t, 0.0, 0.999);
@@ -600,7 +598,7 @@ TEST_P(SurfaceRasters, TexturesWrapAndTransform) {
             const double at_t = 2.0 * wrapped(-1.0 + 3.0 * v, t);
             if (std::abs(at_s - std::round(at_s)) < 0.01 || std::abs(at_t - std::round(at_t)) < 0.01) continue;
             const auto texel = static_cast<std::size_t>(at_t) * 2 + static_cast<std::size_t>(at_s);
-            expect_colour(picture.colour(x, y), glm::vec4(colours[texel], 1.0F), 5e-3F);
+            expect_color(picture.color(x, y), glm::vec4(colors[texel], 1.0F), 5e-3F);
           }
         }
         ASSERT_FALSE(HasFailure());
@@ -623,7 +621,7 @@ TEST_P(SurfaceRasters, MipmapsAverageDistantTextures) {
   SurfaceLighting lighting;
   lighting.sky_radiance = glm::vec3(1.0F);
   const Picture picture = draw(straight({0, 0, 0}, 0.5), lighting, {8U, 8U});
-  for (const glm::vec4& colour : picture.colours) expect_colour(colour, glm::vec4(0.5F, 0.5F, 0.5F, 1.0F), 0.02F);
+  for (const glm::vec4& color : picture.colors) expect_color(color, glm::vec4(0.5F, 0.5F, 0.5F, 1.0F), 0.02F);
 }
 
 TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
@@ -649,14 +647,14 @@ TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
     use->texture = texture;
   }
   scene->materials.push_back(material);
-  const glm::vec3 colour(sample(0.2F), sample(0.4F), sample(0.8F));
+  const glm::vec3 color(sample(0.2F), sample(0.4F), sample(0.8F));
   core::CmSurface s{};
-  s.base_color = colour;
+  s.base_color = color;
   s.metallic = 0.5F * 0.8F;
   s.roughness = 0.9F * 0.4F;
   s.normal = {0.0F, 0.0F, 1.0F};
   s.matte_normal = s.smooth_normal = s.normal;
-  s.f0 = core::cm_dielectric_f0(1.8F, 0.9F * 0.6F, colour);
+  s.f0 = core::cm_dielectric_f0(1.8F, 0.9F * 0.6F, color);
   s.specular = 0.9F * 0.6F;
   s.clearcoat = 0.8F * 0.2F;
   s.clearcoat_roughness = 0.7F * 0.4F;
@@ -667,9 +665,9 @@ TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
   set(scene);
   const SurfaceView view = straight({0, 0, 0}, 0.001);
   const glm::vec3 wo(0.0F, 0.0F, 1.0F);
-  const glm::vec3 lit = core::cm_bsdf_eval(s, wo, lighting.sun_direction) * 5.0F + colour * 2.0F;
+  const glm::vec3 lit = core::cm_bsdf_eval(s, wo, lighting.sun_direction) * 5.0F + color * 2.0F;
   const glm::vec4 dark = draw(view, lighting).centre();
-  expect_colour(dark, glm::vec4(lit, 1.0F), 0.01F);
+  expect_color(dark, glm::vec4(lit, 1.0F), 0.01F);
   lighting.sky_radiance = glm::vec3(10.0F);
   const glm::vec4 with_sky = draw(view, lighting).centre();
   scene->materials[0].occlusion_strength = 0.0F;
@@ -809,7 +807,7 @@ TEST_P(SurfaceRasters, SphereShadingMatchesTheBsdf) {
           continue;  // the highlight shows the facets
         }
         const glm::vec3 expected = core::cm_bsdf_eval(s, {0, 0, 1}, lighting.sun_direction) * 3.0F;
-        const glm::vec4 got = picture.colour(x, y);
+        const glm::vec4 got = picture.color(x, y);
         for (int c = 0; c < 3; ++c) {
           ASSERT_NEAR(got[c], expected[c], 0.03F * expected[c] + 4e-3F) << x << ',' << y << " sphere " << i;
         }
@@ -825,10 +823,10 @@ TEST_P(SurfaceRasters, SphereShadingMatchesTheBsdf) {
     lighting.sky_radiance = {0.25F, 0.35F, 0.5F};
     const Picture layered = draw(straight({0, 0, 12}, 0.31, 7.0 / 3.0), lighting, size, 8);
     cumulet::image::Image out{size.x, size.y, std::vector<float>(std::size_t{size.x} * size.y * 4)};
-    for (std::size_t i = 0; i < layered.colours.size(); ++i) {
+    for (std::size_t i = 0; i < layered.colors.size(); ++i) {
       const std::size_t pixel = i % (std::size_t{size.x} * size.y);
       for (std::size_t c = 0; c < 4; ++c) {
-        out.rgba[pixel * 4 + c] += layered.colours[i][static_cast<int>(c)] / 8.0F;
+        out.rgba[pixel * 4 + c] += layered.colors[i][static_cast<int>(c)] / 8.0F;
       }
     }
     const char* backend = GetParam() == cumulet::headless::Backend::egl ? "egl" : "osmesa";
@@ -853,7 +851,7 @@ TEST_P(SurfaceRasters, PreviewsAreSharp) {
   scene->add_wall(-2.0F, 3.0F, 0);
   set(scene);
   const StateGuard guard(*gl_);
-  Obstacles surfaces;
+  TraceInputs surfaces;
   surfaces.raster = raster_.get();
   surfaces.view = straight({0, 0, 0}, 0.5);
   PictureSettings settings;
@@ -885,21 +883,21 @@ TEST_P(SurfaceRasters, ImageIsSharpWhenTheCameraStops) {
   set(scene);
   const StateGuard guard(*gl_);
   const glm::uvec2 size(1068U, 901U);
-  Obstacles surfaces;
+  TraceInputs surfaces;
   surfaces.raster = raster_.get();
   surfaces.view = straight({0, 0, 0}, 0.5);
-  PictureWish wish;
-  wish.content.size = wish.parameters.view.size = size;
-  wish.samples = 4;
-  wish.held = true;
+  PictureRequest request;
+  request.content.size = request.parameters.view.size = size;
+  request.samples = 4;
+  request.held = true;
   Progressive progressive(gl_, programs_);
   const MarchData nothing;
   const auto step = [&](bool moves) {
     if (moves) {
       surfaces.view.eye.x += 0.01;
-      wish.content.viewpoint.set(surfaces.view);
+      request.content.viewpoint.set(surfaces.view);
     }
-    progressive.advance(wish, nothing, surfaces, std::chrono::steady_clock::now(), 0.1);
+    progressive.advance(request, nothing, surfaces, std::chrono::steady_clock::now(), 0.1);
   };
   for (int i = 0; i < 200; ++i) {  // two calls per frame, as some hosts do
     step(i % 2 == 0);
@@ -907,7 +905,7 @@ TEST_P(SurfaceRasters, ImageIsSharpWhenTheCameraStops) {
   }
   ASSERT_NE(progressive.shown(), nullptr);
   EXPECT_EQ(progressive.shown()->layers().size, (size + 1U) / 2U);
-  wish.held = false;
+  request.held = false;
   const SurfaceLayers* sharp = nullptr;
   const auto* last = progressive.shown();
   int shown = 0;
@@ -971,7 +969,7 @@ TEST_P(SurfaceRasters, GlStateIsRestoredAndNotRead) {
     set(scene);
     const Picture picture = draw(straight({0, 0, 0}, 0.5), lighting, {16U, 16U}, 2);
     ASSERT_EQ(cumulet::test::state_differences(before, cumulet::test::read_gl_state(*gl_)), "") << seed;
-    ASSERT_EQ(picture.colours, expected.colours) << seed;
+    ASSERT_EQ(picture.colors, expected.colors) << seed;
     ASSERT_EQ(picture.depths, expected.depths) << seed;
   }
 }

@@ -206,11 +206,11 @@ TEST_P(SurfaceTrace, TexturedMaterialMatchesGltfAppendixB) {
     viewer->set_camera(camera);
     const test::Picture picture = test::render(*viewer, {side, side, 4, 1, render::View::shaded});
     for (std::uint32_t k = 0; k < tiles * tiles; ++k) {
-      const std::uint8_t* colour = &texels[0][4 * std::size_t{k}];
+      const std::uint8_t* color = &texels[0][4 * std::size_t{k}];
       const std::uint8_t* rough = &texels[1][4 * std::size_t{k}];
       const std::uint8_t* coat = &texels[2][4 * std::size_t{k}];
       test::AppendixB reference;
-      for (int c = 0; c < 3; ++c) reference.base[c] = std::pow((part(colour[c]) + 0.055) / 1.055, 2.4);
+      for (int c = 0; c < 3; ++c) reference.base[c] = std::pow((part(color[c]) + 0.055) / 1.055, 2.4);
       reference.dielectric.roughness = part(rough[1]);
       reference.metallic = part(rough[2]);
       reference.clearcoat = part(coat[0]);
@@ -370,10 +370,10 @@ TEST_P(SurfaceTrace, LightsFollowTheInverseSquareLaw) {
     // Above the slab, inside it, and below.
     for (const float height : {40.0F, 3.5F, -4.0F}) {
       auto scene = floor_scene(test::diffuse(vec3(1.0F)));
-      surface::PunctualLight lamp;
-      lamp.intensity = vec3(1000.0F);
-      lamp.position = {32.0F, height, 32.0F};
-      scene->rest.lights = {lamp};
+      surface::PunctualLight analytic_light;
+      analytic_light.intensity = vec3(1000.0F);
+      analytic_light.position = {32.0F, height, 32.0F};
+      scene->rest.lights = {analytic_light};
       viewer->viewer().show_surfaces(test::source_of(scene));
       const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
       const double through = height > 10.0F ? 8.0 : (height > 0.0F ? 4.0 : 0.0);

@@ -60,10 +60,10 @@ class SurfacesInVolumes : public test::ViewerTest {
 
   static std::shared_ptr<StillScene> scene(float brightness = 1.0F) {
     auto made = std::make_shared<StillScene>();
-    for (const vec3 colour : {vec3(2, 0, 0), vec3(0, 1.5F, 0), vec3(1), vec3(0, 0, 1)}) {
+    for (const vec3 color : {vec3(2, 0, 0), vec3(0, 1.5F, 0), vec3(1), vec3(0, 0, 1)}) {
       Material material;
       material.unlit = true;
-      material.base_color = glm::vec4(brightness * colour, 1.0F);
+      material.base_color = glm::vec4(brightness * color, 1.0F);
       made->add(material);
     }
     const auto wall = [&](float x_0, float x_1, float y_0, float y_1, float z, std::uint32_t material) {
@@ -176,9 +176,9 @@ TEST_P(SurfacesInVolumes, SilhouettesHaveNoHalo) {
     const test::Picture picture = render(5, 512);
     const double through = std::exp(-sigma * 32.0);
     const double to_inside = std::exp(-sigma * (box_high - 15.5));
-    for (const auto& [edge, colour, share] :
+    for (const auto& [edge, color, share] :
          {std::tuple(double(front_edge), 0, 1.0), std::tuple(double(inside_low), 1, to_inside)}) {
-      const bool front = colour == 0;
+      const bool front = color == 0;
       const int middle = static_cast<int>((edge - left) / scale);
       for (int x = middle - 3; x <= middle + 3; ++x) {
         // Rows above the wall behind.
@@ -187,7 +187,7 @@ TEST_P(SurfacesInVolumes, SilhouettesHaveNoHalo) {
         const int rows = 30;
         for (int y = 0; y < rows; ++y) {
           const glm::vec4& p = picture.pixels[static_cast<std::size_t>(y) * side + static_cast<std::size_t>(x)];
-          radiance += p[colour] / rows;
+          radiance += p[color] / rows;
           alpha += p.w / rows;
         }
         const double before = std::clamp((edge - left) / scale - x, 0.0, 1.0);  // part of the pixel left of the edge
@@ -313,7 +313,7 @@ TEST_P(SurfacesInVolumes, AovsMatchAnalyticValues) {
       double x, y, depth, z;
       vec3 albedo;
     };
-    for (const auto& [x, y, depth, z, colour] :
+    for (const auto& [x, y, depth, z, color] :
          {Expected{6.0, 20.0, 0.0, 160.0, {2, 0, 0}}, Expected{15.0, 20.0, 16.0, 184.5, {0, 1.5F, 0}},
           Expected{10.0, 6.0, 32.0, 210.0, {1, 1, 1}}, Expected{23.1, 18.1, 13.5, 182.0, {0, 0, 1}},
           Expected{10.0, 20.0, 32.0, infinite, {0, 0, 0}}}) {
@@ -330,7 +330,7 @@ TEST_P(SurfacesInVolumes, AovsMatchAnalyticValues) {
       } else {
         EXPECT_EQ(volume_z[i], infinite) << x << " " << y;
       }
-      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(albedo[3 * i + c], colour[static_cast<int>(c)], 1e-3);
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(albedo[3 * i + c], color[static_cast<int>(c)], 1e-3);
       EXPECT_NEAR(normal[3 * i + 2], std::isinf(z) ? 0.0 : 1.0, 0.02) << x << " " << y;
       EXPECT_NEAR(volume[4 * i + 3], 1.0 - std::exp(-sigma * depth), 0.2);
     }
@@ -385,7 +385,7 @@ TEST_P(SurfacesInVolumes, SurfacesAreShownBeforeTheVolumeIsLoaded) {
   viewer::Frame frame;
   frame.target = viewer::Target::texture;
   frame.format = GL_RGBA32F;
-  frame.encoding = render::ColourEncoding::hdr;
+  frame.encoding = render::ColorEncoding::hdr;
   frame.size = {side, side};
   frame.viewport = {0, 0, side, side};
   frame.flip_y = true;
@@ -421,7 +421,7 @@ TEST_P(SurfacesInVolumes, PreviewsShowSurfacesAtFullResolution) {
   viewer::Frame frame;
   frame.target = viewer::Target::texture;
   frame.format = GL_RGBA32F;
-  frame.encoding = render::ColourEncoding::hdr;
+  frame.encoding = render::ColorEncoding::hdr;
   frame.size = {fine, fine};
   frame.viewport = {0, 0, fine, fine};
   frame.flip_y = true;

@@ -142,7 +142,7 @@ TEST(Velocity, IsReusedWhenEmissionChanges) {
   VolumeFrame frame{.density = test::slab(), .flame = test::slab(0.5F)};
   const ivec3 size(64, 8, 64);
   frame.velocity = velocity(size, ivec3(0), [](const ivec3& /*p*/) { return vec3(1.0F); });
-  frame.colour = {test::slab(), test::slab(0.5F), test::slab(0.25F)};
+  frame.color = {test::slab(), test::slab(0.5F), test::slab(0.25F)};
   const viewer::VolumeAsset asset(std::move(frame));
   Progress progress;
   const volume::Ramp ramp({{0.0F, 0.0F}, {1.0F, 0.5F}});

@@ -371,14 +371,14 @@ TEST_P(ViewerSlab, BackgroundColorIsVisibleOnlyBehindEverything) {
   display.backdrop = vec3(3.0F, 0.5F, 0.125F);
   viewer().set_display(display);
   EXPECT_TRUE(viewer().render(frame(size.x, size.y, -1.0)).converged);
-  const std::vector<float> colour = read(size);
+  const std::vector<float> color = read(size);
   std::size_t mirrored = 0;
-  for (std::size_t i = 0; i < colour.size(); ++i) {
+  for (std::size_t i = 0; i < color.size(); ++i) {
     const float alpha = transparent[i - i % 4 + 3];
     const float behind = i % 4 == 3 ? 0.0F : (1.0F - alpha) * (*display.backdrop)[static_cast<int>(i % 4)];
-    ASSERT_NEAR(colour[i], transparent[i] + behind, 1e-6F);
+    ASSERT_NEAR(color[i], transparent[i] + behind, 1e-6F);
     if (alpha < 1.0F) continue;
-    EXPECT_EQ(colour[i], sky[i]);
+    EXPECT_EQ(color[i], sky[i]);
     if (i % 4 == 2 && sky[i] > 0.1F) ++mirrored;
   }
   EXPECT_GT(mirrored, 20U);

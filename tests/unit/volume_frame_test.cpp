@@ -87,7 +87,7 @@ TEST_F(VolumeFrameImport, FieldNamesAreCaseInsensitive) {
     EXPECT_EQ(frame.temperature ? frame.temperature->name : "", c.temperature);
     EXPECT_EQ(frame.flame ? frame.flame->name : "", c.flame);
     EXPECT_EQ(frame.density.empty(), c.density.empty());
-    EXPECT_FALSE(frame.colour);
+    EXPECT_FALSE(frame.color);
   }
 }
 
@@ -120,7 +120,7 @@ TEST_F(VolumeFrameImport, NamesSelectAndExcludeFields) {
 TEST_F(VolumeFrameImport, MissingRequestedFieldIsNamed) {
   const auto file = write({dot("density", 1.0F), dot("temperature", 2.0F)});
   for (const GridNames& names : {naming({{&GridNames::density, "nope"}}), naming({{&GridNames::temperature, "nope"}}),
-                                 naming({{&GridNames::flame, "nope"}}), naming({{&GridNames::colour, "nope"}})}) {
+                                 naming({{&GridNames::flame, "nope"}}), naming({{&GridNames::color, "nope"}})}) {
     const std::string what = refusal(file, names);
     EXPECT_HAS(what, "\"nope\"");
     EXPECT_HAS(what, "\"density\" (float, fog volume), \"temperature\" (float, fog volume)");
@@ -135,19 +135,19 @@ TEST_F(VolumeFrameImport, MissingRequestedFieldIsNamed) {
 TEST_F(VolumeFrameImport, ColorFromThreeGrids) {
   const auto file = write(
       {dot("density", 1.0F), dot("color_r", 0.25F), dot("color_g", 0.5F), dot("color_b", 0.75F), dot("x_r", 1.0F)});
-  const VolumeFrame frame = import_frame(file, naming({{&GridNames::colour, "color"}}), {});
-  ASSERT_TRUE(frame.colour);
-  EXPECT_EQ((*frame.colour)[0].max_value, 0.25F);
-  EXPECT_EQ((*frame.colour)[1].max_value, 0.5F);
-  EXPECT_EQ((*frame.colour)[2].max_value, 0.75F);
+  const VolumeFrame frame = import_frame(file, naming({{&GridNames::color, "color"}}), {});
+  ASSERT_TRUE(frame.color);
+  EXPECT_EQ((*frame.color)[0].max_value, 0.25F);
+  EXPECT_EQ((*frame.color)[1].max_value, 0.5F);
+  EXPECT_EQ((*frame.color)[2].max_value, 0.75F);
   Messages messages;
-  EXPECT_FALSE(import_frame(file, {}, messages.log).colour);
+  EXPECT_FALSE(import_frame(file, {}, messages.log).color);
   ASSERT_EQ(messages.hints.size(), 1U);
   EXPECT_HAS(messages.hints[0], "colour is read from \"color_r\"");
-  EXPECT_HAS(refusal(file, naming({{&GridNames::colour, "x"}})), "\"x_g\"");
+  EXPECT_HAS(refusal(file, naming({{&GridNames::color, "x"}})), "\"x_g\"");
 }
 
-openvdb::Vec3SGrid::Ptr colours(const std::string& name) {
+openvdb::Vec3SGrid::Ptr colors(const std::string& name) {
   auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
   grid->setName(name);
   for (int i = 0; i < 100; ++i) {
@@ -158,10 +158,10 @@ openvdb::Vec3SGrid::Ptr colours(const std::string& name) {
   return grid;
 }
 
-void expect_colours(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
-  ASSERT_TRUE(frame.colour);
+void expect_colors(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
+  ASSERT_TRUE(frame.color);
   for (int axis = 0; axis < 3; ++axis) {
-    const ScalarVolume& v = (*frame.colour)[static_cast<std::size_t>(axis)];
+    const ScalarVolume& v = (*frame.color)[static_cast<std::size_t>(axis)];
     EXPECT_EQ(v.active_voxels, grid.activeVoxelCount());
     for (auto it = grid.cbeginValueOn(); it; ++it) {
       const Coord c = it.getCoord();
@@ -172,16 +172,16 @@ void expect_colours(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
 
 TEST_F(VolumeFrameImport, ColorFromAVectorGrid) {
   for (const bool half : {false, true}) {
-    const auto grid = colours("Cd");
+    const auto grid = colors("Cd");
     grid->setSaveFloatAsHalf(half);
-    auto velocity = colours("color");
+    auto velocity = colors("color");
     velocity->setGridClass(openvdb::GRID_STAGGERED);
     const auto file = write({dot("density", 1.0F), velocity, grid, dot("Cd_r", 1.0F)});
-    expect_colours(import_frame(file, {}, {}), *grid);
-    expect_colours(import_frame(file, naming({{&GridNames::colour, "Cd"}}), {}), *grid);
-    EXPECT_FALSE(import_frame(file, naming({{&GridNames::colour, "none"}}), {}).colour);
-    EXPECT_HAS(refusal(file, naming({{&GridNames::colour, "color"}})), "grid \"color\" is staggered");
-    EXPECT_HAS(refusal(file, naming({{&GridNames::colour, "density"}})), "is of type float, not vec3s");
+    expect_colors(import_frame(file, {}, {}), *grid);
+    expect_colors(import_frame(file, naming({{&GridNames::color, "Cd"}}), {}), *grid);
+    EXPECT_FALSE(import_frame(file, naming({{&GridNames::color, "none"}}), {}).color);
+    EXPECT_HAS(refusal(file, naming({{&GridNames::color, "color"}})), "grid \"color\" is staggered");
+    EXPECT_HAS(refusal(file, naming({{&GridNames::color, "density"}})), "is of type float, not vec3s");
   }
 }
 
@@ -192,10 +192,10 @@ TEST_F(VolumeFrameImport, VelocityGridsAreRecognized) {
   };
   using Channels = std::vector<std::string>;
   for (const char* name : {"vel", "V", "velocity"})
-    EXPECT_EQ(told({colours(name), dot("density", 1.0F)}), (Channels{"velocity", "density"})) << name;
-  auto staggered = colours("motion");
+    EXPECT_EQ(told({colors(name), dot("density", 1.0F)}), (Channels{"velocity", "density"})) << name;
+  auto staggered = colors("motion");
   staggered->setGridClass(openvdb::GRID_STAGGERED);
-  EXPECT_EQ(told({staggered, colours("Cd"), dot("soot", 1.0F)}), (Channels{"velocity", "color", "density"}));
+  EXPECT_EQ(told({staggered, colors("Cd"), dot("soot", 1.0F)}), (Channels{"velocity", "color", "density"}));
   for (const std::string name : {"vel", "vel.", "v_", "Velocity_"}) {
     const openvdb::GridPtrVec parts{dot(name + "x", 3.0F), dot(name + "y", 3.0F), dot(name + "z", 3.0F)};
     openvdb::GridPtrVec grids = parts;
@@ -297,17 +297,17 @@ TEST_F(VolumeFrameImport, AnisotropyIsResampled) {
 }
 
 TEST_F(VolumeFrameImport, BlackAndEmptyColors) {
-  auto black = colours("Cd");
+  auto black = colors("Cd");
   black->tree().clear();
   black->tree().setValue(Coord(1, 2, 3), openvdb::Vec3f(0.0F));
   VolumeFrame frame = import_frame(write({dot("density", 1.0F), black}), {}, {});
-  ASSERT_TRUE(frame.colour);
-  EXPECT_EQ((*frame.colour)[1].max_value, 0.0F);
+  ASSERT_TRUE(frame.color);
+  EXPECT_EQ((*frame.color)[1].max_value, 0.0F);
   black->tree().clear();
   Messages messages;
   frame = import_frame(write({dot("density", 1.0F), black}), {}, messages.log);
-  ASSERT_TRUE(frame.colour);
-  EXPECT_TRUE((*frame.colour)[2].empty());
+  ASSERT_TRUE(frame.color);
+  EXPECT_TRUE((*frame.color)[2].empty());
   EXPECT_EQ(messages.warnings.size(), 1U);
 }
 
@@ -315,12 +315,12 @@ TEST_F(VolumeFrameImport, NanoVdbHasTheSameFields) {
   const auto density = dot("density", 1.0F);
   const auto heat = dot("heat", 2.5F);
   const auto flame = dot("Flame", 0.5F);
-  const auto colour = colours("Cd");
-  const VolumeFrame truth = import_frame(write({density, heat, flame, colour}), {}, {});
+  const auto color = colors("Cd");
+  const VolumeFrame truth = import_frame(write({density, heat, flame, color}), {}, {});
   for (const auto codec : {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP, nanovdb::io::Codec::BLOSC}) {
     std::vector<nanovdb::GridHandle<>> handles;
     for (const auto& grid : {density, heat, flame}) handles.push_back(nanovdb::openToNanoVDB(*grid));
-    handles.push_back(nanovdb::openToNanoVDB(*colour));
+    handles.push_back(nanovdb::openToNanoVDB(*color));
     const auto file = folder_ / "frame.nvdb";
     nanovdb::io::writeGrids(file.string(), handles, codec);
     const VolumeFrame frame = import_frame(file, {}, {});
@@ -328,12 +328,12 @@ TEST_F(VolumeFrameImport, NanoVdbHasTheSameFields) {
     ASSERT_TRUE(frame.temperature && frame.flame);
     cumulet::test::expect_same_voxels(*frame.temperature, *truth.temperature);
     cumulet::test::expect_same_voxels(*frame.flame, *truth.flame);
-    expect_colours(frame, *colour);
+    expect_colors(frame, *color);
   }
 }
 
 TEST_F(VolumeFrameImport, FilesWithoutOffsetsHaveTheSameFields) {
-  const auto grid = colours("Cd");
+  const auto grid = colors("Cd");
   {
     std::ofstream out(path(), std::ios::binary);
     openvdb::io::Stream(out).write(openvdb::GridCPtrVec{dot("temperature", 2.0F), grid, dot("density", 1.0F)});
@@ -342,7 +342,7 @@ TEST_F(VolumeFrameImport, FilesWithoutOffsetsHaveTheSameFields) {
   const VolumeFrame frame = import_frame(path(), {}, {}, &progress);
   EXPECT_EQ(frame.density.max_value, 1.0F);
   EXPECT_EQ(frame.temperature->max_value, 2.0F);
-  expect_colours(frame, *grid);
+  expect_colors(frame, *grid);
 }
 
 TEST_F(VolumeFrameImport, UnusedFieldsAreReported) {
@@ -526,12 +526,12 @@ TEST_F(VolumeFrameImport, WithoutDensityTheFinestFieldSetsTheResolution) {
 
 TEST_F(VolumeFrameImport, AdditionalFieldsAreKeptAndReported) {
   const auto ones = [](const Vec3d&) { return 1.0F; };
-  auto colour = colours("Cd");
-  colour->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1.0, Vec3d(100.0))));
+  auto color = colors("Cd");
+  color->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1.0, Vec3d(100.0))));
   const openvdb::GridPtrVec grids = {box("density", scaled(1.0), 10, ones),
                                      box("flame", scaled(1.0, Vec3d(100.0)), 10, ones),
                                      box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones),
-                                     colour,
+                                     color,
                                      box("anisotropy", scaled(1.0, Vec3d(100.0)), 10, ones),
                                      box("vel_x", scaled(1.0, Vec3d(100.0)), 10, ones),
                                      box("vel_y", scaled(1.0, Vec3d(100.0)), 10, ones),
@@ -601,7 +601,7 @@ TEST_F(VolumeFrameImport, VelocityFromAVectorGrid) {
                  "has no grid of vectors \"nope\", nor all of \"nopex\", \"nopey\" and \"nopez\"; it has \"density\"");
       EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, "density"}})),
                  "grid \"density\" is of type float, not of vectors");
-      EXPECT_FALSE(import_frame(file, naming({{&GridNames::colour, name}}), {}).velocity) << "it is the colour";
+      EXPECT_FALSE(import_frame(file, naming({{&GridNames::color, name}}), {}).velocity) << "it is the colour";
     }
   }
   // If there are several, a priority order of names decides. Any other grid can be named.
@@ -904,12 +904,12 @@ TEST_F(VolumeFrameImport, SimulatedFiresAreReadUnchanged) {
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
   const auto smoke = data / "mantaflow_fire/fluid_data_0015.vdb";
   Messages messages;
-  VolumeFrame frame = import_frame(smoke, naming({{&GridNames::colour, "color"}}), messages.log);
+  VolumeFrame frame = import_frame(smoke, naming({{&GridNames::color, "color"}}), messages.log);
   cumulet::test::expect_same_voxels(frame.density, import_volume(smoke, "density", {}));
-  ASSERT_TRUE(frame.temperature && frame.flame && frame.colour);
+  ASSERT_TRUE(frame.temperature && frame.flame && frame.color);
   cumulet::test::expect_same_voxels(*frame.temperature, import_volume(smoke, "temperature", {}));
   cumulet::test::expect_same_voxels(*frame.flame, import_volume(smoke, "flame", {}));
-  cumulet::test::expect_same_voxels((*frame.colour)[2], import_volume(smoke, "color_b", {}));
+  cumulet::test::expect_same_voxels((*frame.color)[2], import_volume(smoke, "color_b", {}));
   EXPECT_EQ(messages.warnings, std::vector<std::string>{});
 
   const auto fire = data / "embergen_fire_a/embergen_fire_a_0050.vdb";
@@ -919,7 +919,7 @@ TEST_F(VolumeFrameImport, SimulatedFiresAreReadUnchanged) {
   cumulet::test::expect_same_voxels(*frame.temperature, import_volume(fire, "temperature", {}));
   cumulet::test::expect_same_voxels(*frame.flame, import_volume(fire, "flames", {}));
   EXPECT_EQ(frame.density.index_to_world, frame.flame->index_to_world);
-  EXPECT_FALSE(frame.colour);
+  EXPECT_FALSE(frame.color);
 
   // A first frame in which nothing burns yet.
   frame = import_frame(data / "embergen_fire_a/embergen_fire_a_0000.vdb", {}, {});

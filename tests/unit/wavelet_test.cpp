@@ -48,7 +48,7 @@ struct Pixel {
 
 using Scene = std::function<Pixel(int x, int y)>;
 
-float luminance_of(const glm::vec3& colour) { return static_cast<float>(cumulet::luminance(glm::dvec3(colour))); }
+float luminance_of(const glm::vec3& color) { return static_cast<float>(cumulet::luminance(glm::dvec3(color))); }
 
 // A pixel's side at depth 1.
 constexpr float pixel_at_1 = 0.01F;
@@ -139,7 +139,7 @@ class Samples {
     picture.counts = textures[2].name();
     picture.moments = textures[3].name();
     picture.size = glm::uvec2(size_);
-    picture.picture = picture.wish = number_;
+    picture.picture = picture.request = number_;
     picture.view = view;
     picture.guides = cumulet::render::PictureGuides{textures[4].name(),
                                                     textures[5].name(),
@@ -302,20 +302,20 @@ TEST_P(WaveletFilter, CloudEdgesStaySharp) {
 
 // A light in a wall of the same plane: its emission is fifty times the wall's radiance, and its albedo is low.
 TEST_P(WaveletFilter, BrightLightsDoNotLeak) {
-  const auto is_lamp = [](int x, int y) { return x >= 20 && x < 28 && y >= 20 && y < 24; };
+  const auto is_analytic_light = [](int x, int y) { return x >= 20 && x < 28 && y >= 20 && y < 24; };
   const auto scene = [&](int x, int y) {
-    const bool lamp = is_lamp(x, y);
-    return Pixel{.front = glm::vec3(lamp ? 0.01F : 0.7F),
+    const bool analytic_light = is_analytic_light(x, y);
+    return Pixel{.front = glm::vec3(analytic_light ? 0.01F : 0.7F),
                  .normal = {0.0F, 0.0F, 1.0F},
-                 .albedo = glm::vec3(lamp ? 0.01F : 0.7F),
+                 .albedo = glm::vec3(analytic_light ? 0.01F : 0.7F),
                  .z = 4.0F,
-                 .emission = glm::vec3(lamp ? 35.0F : 0.0F)};
+                 .emission = glm::vec3(analytic_light ? 35.0F : 0.0F)};
   };
   const Samples samples(gl_, {48, 48}, 1, scene);
   const auto clean = samples.filtered(programs_);
   for (int i = 0; i < 48 * 48; ++i) {
-    const bool lamp = is_lamp(i % 48, i / 48);
-    EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, lamp ? 35.01F : 0.7F, lamp ? 1.2F : 0.4F)
+    const bool analytic_light = is_analytic_light(i % 48, i / 48);
+    EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, analytic_light ? 35.01F : 0.7F, analytic_light ? 1.2F : 0.4F)
         << i % 48 << ", " << i / 48;
   }
   EXPECT_LT(error_of(clean, samples.truth()), 0.3 * error_of(samples.raw(), samples.truth()));

@@ -117,23 +117,23 @@ cumulet::Matrix multiply(const cumulet::Matrix& a, const cumulet::Matrix& b) {
 /// A framebuffer with color and depth textures, recreated when the panel's size changes.
 struct SceneTarget {
   int width = 0, height = 0;
-  GLuint framebuffer = 0, colour = 0, depth = 0;
+  GLuint framebuffer = 0, color = 0, depth = 0;
 
   void release() {
     glDeleteFramebuffers(1, &framebuffer);
-    glDeleteTextures(1, &colour);
+    glDeleteTextures(1, &color);
     glDeleteTextures(1, &depth);
   }
   void resize(int w, int h) {
     if (w == width && h == height) return;
     release();
     width = w, height = h;
-    glCreateTextures(GL_TEXTURE_2D, 1, &colour);
-    glTextureStorage2D(colour, 1, GL_RGBA8, w, h);
+    glCreateTextures(GL_TEXTURE_2D, 1, &color);
+    glTextureStorage2D(color, 1, GL_RGBA8, w, h);
     glCreateTextures(GL_TEXTURE_2D, 1, &depth);
     glTextureStorage2D(depth, 1, GL_DEPTH_COMPONENT32F, w, h);
     glCreateFramebuffers(1, &framebuffer);
-    glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, colour, 0);
+    glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, color, 0);
     glNamedFramebufferTexture(framebuffer, GL_DEPTH_ATTACHMENT, depth, 0);
   }
 };
@@ -172,19 +172,19 @@ void draw_scene(const SceneTarget& target, GLuint program, GLuint vertex_array, 
   set_matrix("to_shadow_map", shadow.to_map);
   glUniform3fv(glGetUniformLocation(program, "to_sun"), 1, to_sun.data());
   glBindTextureUnit(0, shadow.texture);
-  const auto box = [&](float x, float y, float z, float rx, float ry, float rz, const std::array<float, 3>& colour,
+  const auto box = [&](float x, float y, float z, float rx, float ry, float rz, const std::array<float, 3>& color,
                        float tile) {
     glUniform3f(glGetUniformLocation(program, "low"), x - rx, y - ry, z - rz);
     glUniform3f(glGetUniformLocation(program, "high"), x + rx, y + ry, z + rz);
-    glUniform3fv(glGetUniformLocation(program, "colour"), 1, colour.data());
+    glUniform3fv(glGetUniformLocation(program, "colour"), 1, color.data());
     glUniform1f(glGetUniformLocation(program, "tile"), tile);
     glDrawArrays(GL_TRIANGLES, 0, 36);
   };
   const float ground = static_cast<float>(bounds.min[1]) - 0.15F * size[1];
   const float side = 0.13F * std::max({size[0], size[1], size[2]});
   box(centre[0], ground, centre[2], 1.5F * size[0], 0.01F * size[1], 1.5F * size[2], {0.7F, 0.7F, 0.66F}, side);
-  const auto cube = [&](float x, float y, float z, const std::array<float, 3>& colour) {
-    box(centre[0] + x * size[0], centre[1] + y * size[1], centre[2] + z * size[2], side, side, side, colour, 0.0F);
+  const auto cube = [&](float x, float y, float z, const std::array<float, 3>& color) {
+    box(centre[0] + x * size[0], centre[1] + y * size[1], centre[2] + z * size[2], side, side, side, color, 0.0F);
   };
   cube(-0.25F, -0.25F, 0.75F, {0.9F, 0.25F, 0.2F});
   cube(0.2F, 0.1F, 0.3F, {0.95F, 0.75F, 0.2F});
@@ -333,7 +333,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
                                         .height = static_cast<std::uint32_t>(panel.height),
                                         .depth_source = cumulet::DepthSource::texture,
                                         .depth_name = target.depth}));
-      panel.show(target.colour, false);
+      panel.show(target.color, false);
       // The map contains the data uploaded by render(), and is used for the scene of the next frame.
       shadow = must(scene_viewer.update_transmittance_map({}));
     }

@@ -442,9 +442,9 @@ void play(const std::string& record, const std::string& folder, const Options& o
     const auto by_red = [&](std::size_t a, std::size_t b) { return linear[4 * a] < linear[4 * b]; };
     std::size_t hottest = 0;
     for (std::size_t i = 0; i < std::size_t{width} * height; ++i) hottest = std::max(hottest, i, by_red);
-    const float* colour = &linear[4 * hottest];
-    std::printf("hottest %.3f, %.3f, %.3f\n", double{colour[0]}, double{colour[1]}, double{colour[2]});
-    if (!(colour[0] > 1.0F && colour[0] > 3.0F * colour[2])) fail("nothing glows");
+    const float* color = &linear[4 * hottest];
+    std::printf("hottest %.3f, %.3f, %.3f\n", double{color[0]}, double{color[1]}, double{color[2]});
+    if (!(color[0] > 1.0F && color[0] > 3.0F * color[2])) fail("nothing glows");
   }
   must(viewer.set_ground({.place = cumulet::Ground::below}));
   while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {

@@ -3333,23 +3333,23 @@ typedef enum cumulet_target {
  * gives CUMULET_ERROR_INVALID_ARGUMENT. For windows (framebuffer 0) this is not checked, because drivers other than
  * Mesa do not report reliably whether they are sRGB.
  */
-typedef enum cumulet_colour {
-  CUMULET_COLOUR_SRGB = 0,             /**< sRGB, encoded by the library, for formats that store values unchanged
+typedef enum cumulet_color_encoding {
+  CUMULET_COLOR_SRGB = 0,             /**< sRGB, encoded by the library, for formats that store values unchanged
                                             (GL_RGBA8). */
-  CUMULET_COLOUR_SRGB_FRAMEBUFFER = 1, /**< sRGB, encoded by GL (GL_FRAMEBUFFER_SRGB), for sRGB formats
+  CUMULET_COLOR_SRGB_FRAMEBUFFER = 1, /**< sRGB, encoded by GL (GL_FRAMEBUFFER_SRGB), for sRGB formats
                                             (GL_SRGB8_ALPHA8). */
-  CUMULET_COLOUR_LINEAR = 2,           /**< Tone-mapped but not encoded: the host encodes later. */
-  CUMULET_COLOUR_HDR = 3               /**< Radiance x exposure, neither tone-mapped nor encoded, for float formats. */
-} cumulet_colour;
+  CUMULET_COLOR_LINEAR = 2,           /**< Tone-mapped but not encoded: the host encodes later. */
+  CUMULET_COLOR_HDR = 3               /**< Radiance x exposure, neither tone-mapped nor encoded, for float formats. */
+} cumulet_color_encoding;
 
 /**
  * How the image is combined with the target's content. Color and alpha are premultiplied: exposure, tone map and
  * encoding are applied to the premultiplied radiance, so that over black a transparent image has the colors of the
  * opaque one.
  *
- * - With CUMULET_COLOUR_LINEAR, CUMULET_COLOUR_HDR and CUMULET_COLOUR_SRGB_FRAMEBUFFER, blending adds light. Alpha is
+ * - With CUMULET_COLOR_LINEAR, CUMULET_COLOR_HDR and CUMULET_COLOR_SRGB_FRAMEBUFFER, blending adds light. Alpha is
  *   the coverage of the pixel, 0 where it only emits, and color + (1 - alpha) x target is correct over any target.
- * - With CUMULET_COLOUR_SRGB, blending adds encoded values. Alpha is then the weight with which the blend is correct
+ * - With CUMULET_COLOR_SRGB, blending adds encoded values. Alpha is then the weight with which the blend is correct
  *   over black and over white. In between it is correct within 0.1 for gray pixels; colored flames are up to 0.3 too
  *   bright in a channel over middle gray.
  */
@@ -3390,10 +3390,10 @@ typedef struct cumulet_frame_desc {
   double scale;        /**< Physical pixels per logical pixel, 0.1 to 16, for widths of lines and clicks. 0: 1. */
   /**
    * Internal format of the viewer's own textures: GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGBA16F or GL_RGBA32F, which must suit
-   * colour. 0: GL_RGBA16F for CUMULET_COLOUR_HDR, GL_SRGB8_ALPHA8 for CUMULET_COLOUR_SRGB_FRAMEBUFFER, else GL_RGBA8.
+   * colour. 0: GL_RGBA16F for CUMULET_COLOR_HDR, GL_SRGB8_ALPHA8 for CUMULET_COLOR_SRGB_FRAMEBUFFER, else GL_RGBA8.
    */
   uint32_t format;
-  cumulet_colour colour;
+  cumulet_color_encoding color;
   cumulet_blend blend;
   int32_t write_depth; /**< 1: where the volume is at least half opaque, its depth is written to the target's depth, in
                             the camera's convention and with a depth test. */

@@ -24,10 +24,10 @@ class BusyHost {
     gl_.CreateProgramPipelines(1, &pipeline_);
     gl_.UseProgramStages(pipeline_, GL_VERTEX_SHADER_BIT, programs_[0]);
     gl_.UseProgramStages(pipeline_, GL_FRAGMENT_SHADER_BIT, programs_[1]);
-    gl_.CreateTextures(GL_TEXTURE_2D, 1, &colour_);
-    gl_.TextureStorage2D(colour_, 1, GL_RGBA8, side, side);
+    gl_.CreateTextures(GL_TEXTURE_2D, 1, &color_);
+    gl_.TextureStorage2D(color_, 1, GL_RGBA8, side, side);
     gl_.CreateFramebuffers(1, &framebuffer_);
-    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, colour_, 0);
+    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, color_, 0);
     gl_.CreateVertexArrays(1, &vertices_);
     // The first draw compiles the program. The loop then draws more and more until the time is long enough to measure.
     draw(1);
@@ -48,7 +48,7 @@ class BusyHost {
   ~BusyHost() {
     gl_.DeleteVertexArrays(1, &vertices_);
     gl_.DeleteFramebuffers(1, &framebuffer_);
-    gl_.DeleteTextures(1, &colour_);
+    gl_.DeleteTextures(1, &color_);
     gl_.DeleteProgramPipelines(1, &pipeline_);
     for (const GLuint program : programs_) gl_.DeleteProgram(program);
   }
@@ -71,7 +71,7 @@ class BusyHost {
   const GladGLContext& gl_;
   GLuint programs_[2] = {};
   GLuint pipeline_ = 0;
-  GLuint colour_ = 0;
+  GLuint color_ = 0;
   GLuint framebuffer_ = 0;
   GLuint vertices_ = 0;
   int rounds_ = 1;

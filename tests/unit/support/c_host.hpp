@@ -202,12 +202,12 @@ class HostTarget {
  public:
   HostTarget(const GladGLContext& gl, int width, int height, GLenum format = GL_RGBA8)
       : gl_(gl), width_(width), height_(height) {
-    gl_.CreateTextures(GL_TEXTURE_2D, 1, &colour_);
-    gl_.TextureStorage2D(colour_, 1, format, width, height);
+    gl_.CreateTextures(GL_TEXTURE_2D, 1, &color_);
+    gl_.TextureStorage2D(color_, 1, format, width, height);
     gl_.CreateTextures(GL_TEXTURE_2D, 1, &depth_);
     gl_.TextureStorage2D(depth_, 1, GL_DEPTH_COMPONENT32F, width, height);
     gl_.CreateFramebuffers(1, &framebuffer_);
-    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, colour_, 0);
+    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, color_, 0);
     gl_.NamedFramebufferTexture(framebuffer_, GL_DEPTH_ATTACHMENT, depth_, 0);
     clear({0.0F, 0.0F, 0.0F, 0.0F}, 1.0F);
   }
@@ -215,12 +215,12 @@ class HostTarget {
   HostTarget& operator=(const HostTarget&) = delete;
   ~HostTarget() {
     gl_.DeleteFramebuffers(1, &framebuffer_);
-    gl_.DeleteTextures(1, &colour_);
+    gl_.DeleteTextures(1, &color_);
     gl_.DeleteTextures(1, &depth_);
   }
 
-  void clear(const std::array<float, 4>& colour, float depth = 1.0F) const {
-    gl_.ClearNamedFramebufferfv(framebuffer_, GL_COLOR, 0, colour.data());
+  void clear(const std::array<float, 4>& color, float depth = 1.0F) const {
+    gl_.ClearNamedFramebufferfv(framebuffer_, GL_COLOR, 0, color.data());
     gl_.ClearNamedFramebufferfv(framebuffer_, GL_DEPTH, 0, &depth);
   }
   /// A frame descriptor that covers the whole framebuffer.
@@ -234,12 +234,12 @@ class HostTarget {
   }
   [[nodiscard]] std::vector<std::uint8_t> pixels() const {
     std::vector<std::uint8_t> bytes(std::size_t(width_) * std::size_t(height_) * 4);
-    gl_.GetTextureImage(colour_, 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(bytes.size()), bytes.data());
+    gl_.GetTextureImage(color_, 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(bytes.size()), bytes.data());
     return bytes;
   }
   [[nodiscard]] std::vector<float> floats() const {
     std::vector<float> values(std::size_t(width_) * std::size_t(height_) * 4);
-    gl_.GetTextureImage(colour_, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(values.size() * sizeof(float)),
+    gl_.GetTextureImage(color_, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(values.size() * sizeof(float)),
                         values.data());
     return values;
   }
@@ -250,14 +250,14 @@ class HostTarget {
     return values;
   }
   [[nodiscard]] GLuint framebuffer() const { return framebuffer_; }
-  [[nodiscard]] GLuint colour_texture() const { return colour_; }
+  [[nodiscard]] GLuint color_texture() const { return color_; }
   [[nodiscard]] GLuint depth_texture() const { return depth_; }
 
  private:
   const GladGLContext& gl_;
   int width_;
   int height_;
-  GLuint colour_ = 0;
+  GLuint color_ = 0;
   GLuint depth_ = 0;
   GLuint framebuffer_ = 0;
 };

@@ -7,7 +7,7 @@
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
 #include "light/alias_table.hpp"
-#include "light/lamps.hpp"
+#include "light/analytic_lights.hpp"
 #include "render/parameters.hpp"
 #include "scene/model_table.hpp"
 #include "support/volumes.hpp"
@@ -73,11 +73,11 @@ struct CpuSurfaceData {
   }
 
   uvec4 cm_words(uint word) const { return shown_words.at(word); }
-  CmLamp cm_lamp(uint i) const {
-    CmLamp lamp = light::lamp_record(shown_source->pose.lights.at(i), dvec3(0.0));
-    lamp.chance = 1.0F / static_cast<float>(shown_source->pose.lights.size());
-    lamp.stays = light::Alias::certain;
-    return lamp;
+  CmAnalyticLight cm_analytic_light(uint i) const {
+    CmAnalyticLight analytic_light = light::analytic_light_record(shown_source->pose.lights.at(i), dvec3(0.0));
+    analytic_light.chance = 1.0F / static_cast<float>(shown_source->pose.lights.size());
+    analytic_light.stays = light::Alias::certain;
+    return analytic_light;
   }
   vec4 cm_atlas_value(ivec3 at) const {
     for (std::size_t i = 0; i < shown_atlas.places[0].size(); ++i) {
@@ -92,21 +92,21 @@ struct CpuSurfaceData {
     throw std::out_of_range("no image there");
   }
   // Camera rays do not end at the surface pass, which is only used where paths do not intersect triangles.
-  static float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, vec4& colour) { return 3.0e38F; }
+  static float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, vec4& color) { return 3.0e38F; }
 };
 
 #undef CM_EQUIANGULAR
 #define CM_EQUIANGULAR 1
-#undef CM_LAMPS
-#define CM_LAMPS 1
+#undef CM_ANALYTIC_LIGHTS
+#define CM_ANALYTIC_LIGHTS 1
 struct CpuTetPassing : CpuTetData {
-  static CmLamp cm_lamp(uint) { return {}; }
+  static CmAnalyticLight cm_analytic_light(uint) { return {}; }
 #include "support/traced.inc"
 };
 #undef CM_EQUIANGULAR
 #define CM_EQUIANGULAR 0
-#undef CM_LAMPS
-#define CM_LAMPS CM_SURFACES
+#undef CM_ANALYTIC_LIGHTS
+#define CM_ANALYTIC_LIGHTS CM_SURFACES
 
 #undef CM_SURFACES
 #define CM_SURFACES 1

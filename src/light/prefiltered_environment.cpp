@@ -1,4 +1,4 @@
-#include "light/gloss.hpp"
+#include "light/prefiltered_environment.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -13,7 +13,7 @@
 
 namespace cumulet::core {
 #include "ggx.glsl"
-#include "gloss.glsl"
+#include "prefiltered.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::light {
@@ -22,8 +22,8 @@ namespace {
 
 using glm::vec3;
 
-constexpr int width = core::CM_GLOSS_WIDTH;
-constexpr int height = core::CM_GLOSS_HEIGHT;
+constexpr int width = core::CM_PREFILTERED_WIDTH;
+constexpr int height = core::CM_PREFILTERED_HEIGHT;
 
 vec3 direction(int x, int y) {
   const double azimuth = 2.0 * std::numbers::pi * (0.5 - (x + 0.5) / width);
@@ -64,7 +64,7 @@ struct Cells {
 };
 
 /// Returns a row of cells: means over the solid angle that each cell covers.
-std::array<glm::dvec3, width> row_of(const GlossSource& source, int y, const ProgressPart& part) {
+std::array<glm::dvec3, width> row_of(const PrefilterSource& source, int y, const ProgressPart& part) {
   const auto turn = [](std::uint64_t at, std::uint64_t of) {
     return std::cos(std::numbers::pi * static_cast<double>(at) / static_cast<double>(of));
   };
@@ -94,7 +94,7 @@ std::array<glm::dvec3, width> row_of(const GlossSource& source, int y, const Pro
   return means;
 }
 
-Cells cells_of(const GlossSource& source, const glm::dvec3& mean, ProgressPart& part) {
+Cells cells_of(const PrefilterSource& source, const glm::dvec3& mean, ProgressPart& part) {
   Cells cells;
   cells.light.resize(height);
   for (int y = 0; y < height; ++y) {
@@ -141,29 +141,29 @@ std::array<vec3, width> seen(const Cells& cells, const Lobe& lobe, int y) {
 
 }  // namespace
 
-GlossPtr make_gloss(const GlossSource& source, const glm::dvec3& mean, Progress* progress) {
+PrefilteredEnvironmentPtr prefilter(const PrefilterSource& source, const glm::dvec3& mean, Progress* progress) {
   constexpr std::size_t texels = std::size_t{width} * height;
-  ProgressPart part(progress, 0.95, 1.0, core::CM_GLOSS_LEVELS * height);
+  ProgressPart part(progress, 0.95, 1.0, core::CM_PREFILTERED_LEVELS * height);
   const Cells cells = cells_of(source, mean, part);
   if (even(cells, mean)) return nullptr;
-  auto gloss = std::make_shared<Gloss>();
-  gloss->reserve(core::CM_GLOSS_LEVELS * texels);
+  auto prefiltered = std::make_shared<PrefilteredEnvironment>();
+  prefiltered->reserve(core::CM_PREFILTERED_LEVELS * texels);
   // The smoothest level is not filtered.
   for (const auto& row : cells.light) {
-    for (std::size_t x = 0; x < width; ++x) gloss->emplace_back(row.at(x), 0.0F);
+    for (std::size_t x = 0; x < width; ++x) prefiltered->emplace_back(row.at(x), 0.0F);
   }
-  for (int level = 1; level < core::CM_GLOSS_LEVELS; ++level) {
-    const Lobe lobe(static_cast<float>(level) / (core::CM_GLOSS_LEVELS - 1));
-    const std::size_t first = gloss->size();
-    gloss->resize(first + texels);
+  for (int level = 1; level < core::CM_PREFILTERED_LEVELS; ++level) {
+    const Lobe lobe(static_cast<float>(level) / (core::CM_PREFILTERED_LEVELS - 1));
+    const std::size_t first = prefiltered->size();
+    prefiltered->resize(first + texels);
     tbb::parallel_for(0, height, [&](int y) {
       const std::array<vec3, width> row = seen(cells, lobe, y);
       for (std::size_t x = 0; x < width; ++x)
-        (*gloss)[first + static_cast<std::size_t>(y) * width + x] = glm::vec4(row.at(x), 0.0F);
+        (*prefiltered)[first + static_cast<std::size_t>(y) * width + x] = glm::vec4(row.at(x), 0.0F);
       part.add(1);
     });
   }
-  return gloss;
+  return prefiltered;
 }
 
 }  // namespace cumulet::light

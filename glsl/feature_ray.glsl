@@ -1,10 +1,10 @@
 // Feature rays: a fixed, deterministic set of rays per pixel, spread uniformly over the pixel, the lens and, with
 // CM_MOTION, the shutter interval. The includer has buffers.glsl and ray.glsl before this, and with CM_SURFACES
 // surface.glsl.
-#ifndef CM_FACT_RAY_GLSL
-#define CM_FACT_RAY_GLSL
+#ifndef CM_FEATURE_RAY_GLSL
+#define CM_FEATURE_RAY_GLSL
 
-struct CmFactRay {
+struct CmFeatureRay {
   vec3 o;         // cube space
   vec3 w;         // world, unit
   vec3 d;         // w in cube space
@@ -14,13 +14,13 @@ struct CmFactRay {
 
 // Returns ray i, by Roberts's R sequences. Ray 0 is at the center of pixel and lens, at mid-shutter. Rays hit the
 // triangles visible to cameras; partial coverage uses a random number per ray.
-CmFactRay cm_fact_ray(uvec2 pixel, int i) {
+CmFeatureRay cm_feature_ray(uvec2 pixel, int i) {
   vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
   vec2 lens = fract(0.5 + float(i) * vec2(0.6287067210, 0.5385972572));
 #if CM_MOTION
   cm_now = fract(0.5 + float(i) * 0.8566748839);
 #endif
-  CmFactRay ray;
+  CmFeatureRay ray;
   ray.t_per_z = cm_lens_ray(pixel, within, cm_on_disc(lens), ray.o, ray.w);
   ray.d = cm_to_cube(ray.w);
   ray.end = ray.t_per_z * cm_surface_z(pixel, within, uint(i));

@@ -11,7 +11,7 @@
 namespace cumulet::viewer {
 
 /// Resource limits of a viewer: threads, main memory and GPU memory. All calls are thread-safe.
-class Allowance {
+class ResourceLimits {
  public:
   static constexpr std::uint64_t no_limit = std::numeric_limits<std::uint64_t>::max();
 
@@ -38,6 +38,6 @@ class Allowance {
   std::atomic<std::uint64_t> memory_bytes_ = no_limit;
   std::atomic<std::uint64_t> gl_bytes_ = no_limit;
 };
-using AllowancePtr = std::shared_ptr<const Allowance>;
+using ResourceLimitsPtr = std::shared_ptr<const ResourceLimits>;
 
 }  // namespace cumulet::viewer

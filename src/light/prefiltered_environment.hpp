@@ -1,7 +1,7 @@
 #pragma once
 
-// Prefiltered environment maps: the environment convolved with GGX lobes, for rasterized reflections (glsl/gloss.glsl).
-// No GL.
+// Prefiltered environment maps: the environment convolved with GGX lobes, for rasterized reflections
+// (glsl/prefiltered.glsl). No GL.
 
 #include <cstdint>
 #include <functional>
@@ -15,11 +15,11 @@ namespace cumulet::light {
 
 /// Prefiltered radiance without the mean over all directions: one map per roughness, the smoothest first, in rows from
 /// +Y down. Immutable and shared.
-using Gloss = std::vector<glm::vec4>;
-using GlossPtr = std::shared_ptr<const Gloss>;
+using PrefilteredEnvironment = std::vector<glm::vec4>;
+using PrefilteredEnvironmentPtr = std::shared_ptr<const PrefilteredEnvironment>;
 
 /// An equirectangular image, oriented as EnvironmentPixels.
-struct GlossSource {
+struct PrefilterSource {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::function<void(std::uint32_t y, std::vector<glm::vec3>& row)> read;  ///< writes `width` texels; any thread
@@ -28,6 +28,7 @@ struct GlossSource {
 /// Prefilters an environment. Returns null if the source is constant except for rounding. O(texels), plus some millions
 /// of products, on TBB threads; the result does not depend on their number. Reports the last twentieth of a load's
 /// progress. Throws Error(cancelled).
-GlossPtr make_gloss(const GlossSource& source, const glm::dvec3& mean, Progress* progress = nullptr);
+PrefilteredEnvironmentPtr prefilter(const PrefilterSource& source, const glm::dvec3& mean,
+                                    Progress* progress = nullptr);
 
 }  // namespace cumulet::light

@@ -15,9 +15,9 @@ namespace cumulet::volume {
 /// because it comes from the file's tree. Values come from a sixteenth of the bricks: a voxel is the mean of the active
 /// voxels that were read around it, times its own active fraction. Overall means are thus preserved, but details
 /// smaller than about 32 voxels are lost.
-struct StandIn {
+struct Proxy {
   VolumeFrame frame;
-  /// The extent of the visible voxels at full resolution, as in VolumeFacts.
+  /// The extent of the visible voxels at full resolution, as in VolumeInfo.
   struct Extent {
     glm::ivec3 low;
     glm::ivec3 high;  ///< both inclusive
@@ -27,18 +27,18 @@ struct StandIn {
 };
 
 /// A file with this many bricks takes about a second of one core to load.
-inline constexpr std::uint64_t worth_a_stand_in = 50'000;
+inline constexpr std::uint64_t worth_a_proxy = 50'000;
 
-struct StandInWish {
+struct ProxyRequest {
   /// Called on the import's thread, at most once, before the full-resolution import. Its exceptions propagate.
-  std::function<void(StandIn)> take;
-  std::uint64_t least_bricks = worth_a_stand_in;  ///< minimum bricks of the first field; smaller files get no proxy
+  std::function<void(Proxy)> take;
+  std::uint64_t min_bricks = worth_a_proxy;  ///< minimum bricks of the first field; smaller files get no proxy
 };
 
 /// Like the other import_frame, but makes a proxy first for a .vdb file of many bricks, which takes about a twentieth
 /// of the time. There is no proxy for files from before OpenVDB 3, or if making it fails: errors of a file are reported
 /// by the full-resolution import.
 VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
-                         const StandInWish& stand_in);
+                         const ProxyRequest& proxy);
 
 }  // namespace cumulet::volume

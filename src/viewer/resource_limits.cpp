@@ -1,4 +1,4 @@
-#include "viewer/allowance.hpp"
+#include "viewer/resource_limits.hpp"
 
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
@@ -10,14 +10,14 @@
 
 namespace cumulet::viewer {
 
-struct Allowance::Arena {
+struct ResourceLimits::Arena {
   explicit Arena(int count) : threads(count), arena(count) {}
   int threads;
   tbb::task_arena arena;
   std::mutex alone;  // used with one thread: a second job's thread would be additional
 };
 
-void Allowance::set(unsigned threads, std::uint64_t memory_bytes) {
+void ResourceLimits::set(unsigned threads, std::uint64_t memory_bytes) {
   std::shared_ptr<Arena> arena;  // the previous one is destroyed after the lock is released
   // TBB would print a warning for more threads than cores.
   if (threads > 0)
@@ -29,14 +29,14 @@ void Allowance::set(unsigned threads, std::uint64_t memory_bytes) {
   std::swap(arena_, arena);
 }
 
-void Allowance::require(std::uint64_t bytes, const std::string& what) const {
+void ResourceLimits::require(std::uint64_t bytes, const std::string& what) const {
   const std::uint64_t most = memory_bytes_;
   if (bytes <= most) return;
   throw Error(ErrorCode::out_of_memory, one_line(what + " takes " + std::to_string(bytes) + " bytes of memory; " +
                                                  std::to_string(most) + " are allowed"));
 }
 
-void Allowance::run(const std::function<void()>& work) const {
+void ResourceLimits::run(const std::function<void()>& work) const {
   std::shared_ptr<Arena> arena;
   {
     const std::scoped_lock lock(mutex_);

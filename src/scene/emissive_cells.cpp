@@ -1,4 +1,4 @@
-#include "scene/glow.hpp"
+#include "scene/emissive_cells.hpp"
 
 #include <cmath>
 #include <utility>
@@ -20,8 +20,8 @@ double brightness_of(const grid::EmissionRecord& emission) { return luminance(gl
 
 }  // namespace
 
-GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, const Progress* progress) {
-  GlowTable table;
+EmissiveTable emissive_table(std::vector<GlowingCell> cells, const grid::Cube& cube, const Progress* progress) {
+  EmissiveTable table;
   const double unit_volume = std::abs(glm::determinant(glm::dmat3(cube.to_world)));
   std::erase_if(cells, [](const GlowingCell& cell) { return !(brightness_of(cell.emission) > 0.0); });
   std::vector<double> power;
@@ -43,14 +43,14 @@ GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, con
   return table;
 }
 
-GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress) {
+EmissiveTable emissive_table(const grid::TetGrid& grid, const Progress* progress) {
   std::vector<GlowingCell> cells;
   for (std::size_t i = 0; i < grid.emission.size(); ++i) {
     if (i % 65536 == 0) check(progress);
     const glm::uvec4& data = grid.cells[i].data;
     if (brightness_of(grid.emission[i]) > 0.0) cells.push_back({{}, glm::uvec2(data.x, data.y), grid.emission[i]});
   }
-  return glow_table(std::move(cells), grid.cube, progress);
+  return emissive_table(std::move(cells), grid.cube, progress);
 }
 
 }  // namespace cumulet::scene

@@ -1,4 +1,4 @@
-// The current volume, which a path traverses or has an event in: CM_GRID, its data; CM_MEDIUM; CM_GLOW. With
+// The current volume, which a path traverses or has an event in: CM_GRID, its data; CM_MEDIUM; CM_EMISSIVE. With
 // CM_INSTANCES it is an entry of a table, with index cm_here. Then cube space means the scene's frame in all other
 // code, and that volume has its own cube space. Shared by GLSL and C++; the includer has parameters.glsl before this,
 // and with CM_INSTANCES
@@ -11,11 +11,11 @@
 
 #undef CM_GRID
 #undef CM_MEDIUM
-#undef CM_GLOW
+#undef CM_EMISSIVE
 #if CM_INSTANCES
 #define CM_GRID cm_instances[cm_here].grid
 #define CM_MEDIUM cm_instances[cm_here].medium
-#define CM_GLOW cm_instances[cm_here].glow
+#define CM_EMISSIVE cm_instances[cm_here].emissive
 #ifndef __cplusplus
 #include "instance_table.glsl"
 uint cm_here = 0u;
@@ -28,7 +28,7 @@ CM_FN vec3 cm_in_volume_point(vec3 p) { return cm_in_instance_point(cm_here, p);
 #else
 #define CM_GRID cm.grid
 #define CM_MEDIUM cm.medium
-#define CM_GLOW cm.glow
+#define CM_EMISSIVE cm.emissive
 
 CM_FN vec3 cm_in_volume(vec3 v) { return v; }
 CM_FN vec3 cm_in_volume_point(vec3 p) { return p; }

@@ -21,20 +21,21 @@ struct GlowingCell {
 static_assert(sizeof(GlowingCell) == 32);
 
 /// Total emission of the cells of a grid.
-struct GlowSum {
+struct EmissiveSum {
   double power = 0.0;   ///< luminance emitted per steradian: the integral of L over the volume, in world units
   double length = 0.0;  ///< world: cube root of power^2 / integral of L^2, the volume of a uniform emitter with the
                         ///< same two integrals
 };
 
 /// Samples cells in proportion to the luminance that they emit (light/alias_table.hpp).
-struct GlowTable : GlowSum {
+struct EmissiveTable : EmissiveSum {
   std::vector<GlowingCell> cells;
 };
 
 /// Keeps the emissive cells and builds their alias table; the aliases of the input are ignored. O(n). Throws
 /// Error(cancelled).
-GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, const Progress* progress = nullptr);
-GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress = nullptr);
+EmissiveTable emissive_table(std::vector<GlowingCell> cells, const grid::Cube& cube,
+                             const Progress* progress = nullptr);
+EmissiveTable emissive_table(const grid::TetGrid& grid, const Progress* progress = nullptr);
 
 }  // namespace cumulet::scene

@@ -2,13 +2,13 @@
 
 // Lights of the C ABI.
 
-#include "light/lamps.hpp"
+#include "light/analytic_lights.hpp"
 #include "viewer/c_settings.hpp"
 
 namespace cumulet::c_abi {
 
 /// Converts light descriptors; lights without power are left out. Throws Error(invalid_argument) with the light and the
 /// field.
-light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count);
+light::AnalyticLights analytic_lights_of(const cumulet_lamp_desc* analytic_lights, uint64_t count);
 
 }  // namespace cumulet::c_abi

@@ -1,9 +1,9 @@
-#include "viewer/c_lamps.hpp"
+#include "viewer/c_lights.hpp"
 
 #include <cmath>
 #include <numbers>
 
-#include "settings/lamp_limits.hpp"
+#include "settings/analytic_light_limits.hpp"
 
 namespace cumulet::c_abi {
 
@@ -26,28 +26,28 @@ dvec3 across_of(const dvec3& wanted, const dvec3& direction) {
   return glm::normalize(glm::length(upright) > 1e-6 ? upright : otherwise);
 }
 
-light::Lamp lamp_of(const cumulet_lamp_desc& d) {
-  light::Lamp lamp;
-  lamp.kind = static_cast<light::Lamp::Kind>(d.kind);
-  lamp.position = to_dvec3(d.position);
-  if (to_dvec3(d.direction) != dvec3(0.0)) lamp.direction = unit(to_dvec3(d.direction));
-  lamp.across = across_of(to_dvec3(d.across), lamp.direction);
-  lamp.power = to_vec3(d.color) * d.power;
-  lamp.width = d.width;
-  lamp.height = d.height;
+light::AnalyticLight analytic_light_of(const cumulet_lamp_desc& d) {
+  light::AnalyticLight analytic_light;
+  analytic_light.kind = static_cast<light::AnalyticLight::Kind>(d.kind);
+  analytic_light.position = to_dvec3(d.position);
+  if (to_dvec3(d.direction) != dvec3(0.0)) analytic_light.direction = unit(to_dvec3(d.direction));
+  analytic_light.across = across_of(to_dvec3(d.across), analytic_light.direction);
+  analytic_light.power = to_vec3(d.color) * d.power;
+  analytic_light.width = d.width;
+  analytic_light.height = d.height;
   const double degrees = d.kind == CUMULET_LAMP_SPOT && d.angle_degrees == 0.0 ? 45.0 : d.angle_degrees;
-  lamp.angle = degrees * std::numbers::pi / 180.0;
-  lamp.blend = d.blend;
-  lamp.group = d.group;
-  return lamp;
+  analytic_light.angle = degrees * std::numbers::pi / 180.0;
+  analytic_light.blend = d.blend;
+  analytic_light.group = d.group;
+  return analytic_light;
 }
 
 }  // namespace
 
-light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count) {
-  light::Lamps made;
-  if (const std::string why = settings::lamp_count_refusal(count); !why.empty()) refuse(why);
-  for_each_desc(lamps, count, "cumulet_lamp_desc", "lamp",
+light::AnalyticLights analytic_lights_of(const cumulet_lamp_desc* analytic_lights, uint64_t count) {
+  light::AnalyticLights made;
+  if (const std::string why = settings::analytic_light_count_refusal(count); !why.empty()) refuse(why);
+  for_each_desc(analytic_lights, count, "cumulet_lamp_desc", "lamp",
                 [&](const cumulet_lamp_desc& given, const std::string& what) {
                   cumulet_lamp_desc d{};
                   try {
@@ -55,10 +55,10 @@ light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count) {
                   } catch (const Error& error) {
                     refuse(what + ": " + error.what());
                   }
-                  if (const auto refusal = settings::lamp_refusal(d))
+                  if (const auto refusal = settings::analytic_light_refusal(d))
                     refuse(what + ": cumulet_lamp_desc." + refusal->name + " " + refusal->cause);
-                  const light::Lamp lamp = lamp_of(d);
-                  if (lamp.power != glm::vec3(0.0F)) made.push_back(lamp);
+                  const light::AnalyticLight analytic_light = analytic_light_of(d);
+                  if (analytic_light.power != glm::vec3(0.0F)) made.push_back(analytic_light);
                 });
   return made;
 }

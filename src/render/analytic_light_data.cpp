@@ -1,4 +1,4 @@
-#include "render/lamp_data.hpp"
+#include "render/analytic_light_data.hpp"
 
 #include <string>
 
@@ -7,18 +7,19 @@
 
 namespace cumulet::render {
 
-LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
-                        std::span<const surface::PunctualLight> of_scene, std::span<const std::uint32_t> groups,
-                        std::span<const light::Lit> lit) {
-  std::vector<core::CmLamp> records = light::lamp_records(of_host, of_scene, glm::dvec3(0.0));
+AnalyticLightData AnalyticLightData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits,
+                                          const light::AnalyticLights& of_host,
+                                          std::span<const surface::PunctualLight> of_scene,
+                                          std::span<const std::uint32_t> groups, std::span<const light::Lit> lit) {
+  std::vector<core::CmAnalyticLight> records = light::analytic_light_records(of_host, of_scene, glm::dvec3(0.0));
   for (std::size_t i = 0; i < groups.size(); ++i) records[of_host.size() + i].group = groups[i];
-  LampData data;
+  AnalyticLightData data;
   data.arrives_ = light::share_looks(records, lit);
-  if (!lit.empty()) data.nearest_ = light::nearest_lamp(records, lit.front());
+  if (!lit.empty()) data.nearest_ = light::nearest_analytic_light(records, lit.front());
   data.count_ = static_cast<std::uint32_t>(records.size());
   // Kernels need a buffer to be bound, even if they read no light.
   if (records.empty()) records.emplace_back();
-  const std::size_t bytes = records.size() * sizeof(core::CmLamp);
+  const std::size_t bytes = records.size() * sizeof(core::CmAnalyticLight);
   if (static_cast<std::int64_t>(bytes) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(records.size()) +
                                             " lamps are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
@@ -28,8 +29,8 @@ LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, co
   return data;
 }
 
-void LampData::bind(const gl::Functions& gl) const {
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, records_.name());
+void AnalyticLightData::bind(const gl::Functions& gl) const {
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_ANALYTIC_LIGHTS, records_.name());
 }
 
 }  // namespace cumulet::render

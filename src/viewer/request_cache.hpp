@@ -15,29 +15,29 @@ namespace cumulet::viewer {
 
 /// Asynchronous cache: makes one value per request on a worker thread, one after another, and keeps it while it is
 /// requested. All calls are thread-safe.
-template <class WishOf, class Made>
-class Shelf {
+template <class RequestOf, class Made>
+class RequestCache {
  public:
-  using Wish = WishOf;
-  using Make = std::function<Made(const Wish&, Progress&)>;
+  using Request = RequestOf;
+  using Make = std::function<Made(const Request&, Progress&)>;
 
   /// what, stage: description of the work in failures and in Worker::status(). notify: called on the worker thread
   /// after each value, and when a job ended.
-  Shelf(const char* what, Progress::Stage stage, Make make, std::function<void()> notify, Trace trace = {},
-        AllowancePtr allowance = std::make_shared<const Allowance>())
+  RequestCache(const char* what, Progress::Stage stage, Make make, std::function<void()> notify, Trace trace = {},
+               ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
       : what_(what),
         stage_(stage),
         make_(std::move(make)),
         notify_(notify),
-        allowance_(std::move(allowance)),
+        resource_limits_(std::move(resource_limits)),
         worker_(std::move(notify), trace) {}
 
   /// Replaces all requests. Running work is finished and its value kept until the next call, so that with fast-changing
   /// requests every value that was begun can be displayed. Failed requests are not retried.
-  void wish(std::vector<Wish> wishes);
+  void request(std::vector<Request> requests);
   /// Returns the value of a request; nullopt if it is not made yet or failed. O(requests).
-  [[nodiscard]] std::optional<Made> built(const Wish& wish) const;
-  [[nodiscard]] bool is_under_way(const Wish& wish) const;
+  [[nodiscard]] std::optional<Made> built(const Request& request) const;
+  [[nodiscard]] bool is_under_way(const Request& request) const;
   /// Failed requests are retried with the next call of wish().
   void forget_failures();
   /// Changes after each value that was made.
@@ -52,13 +52,13 @@ class Shelf {
 
  private:
   struct Shelved {
-    Wish wish;
+    Request request;
     std::optional<Made> built;
     std::optional<Error> failure;
     bool wanted = true;  // false: it was running when the requests were last replaced
     [[nodiscard]] bool is_missing() const { return wanted && !built && !failure; }
   };
-  typename std::vector<Shelved>::iterator find(const Wish& wish);
+  typename std::vector<Shelved>::iterator find(const Request& request);
   void build_missing(Progress& progress);
 
   const char* what_;
@@ -66,37 +66,39 @@ class Shelf {
   Make make_;
   std::function<void()> notify_;
   mutable std::mutex mutex_;
-  std::vector<Shelved> shelf_;
-  std::optional<Wish> under_way_;
+  std::vector<Shelved> cache_;
+  std::optional<Request> under_way_;
   std::atomic<std::uint64_t> revision_ = 0;
-  AllowancePtr allowance_;  // applied to each value separately: with a thread limit, other jobs run between two values
-  Worker worker_;           // last: its thread uses all of the above
+  ResourceLimitsPtr
+      resource_limits_;  // applied to each value separately: with a thread limit, other jobs run between two values
+  Worker worker_;        // last: its thread uses all of the above
 };
 
-template <class Wish, class Made>
-typename std::vector<typename Shelf<Wish, Made>::Shelved>::iterator Shelf<Wish, Made>::find(const Wish& wish) {
-  return std::ranges::find_if(shelf_, [&](const Shelved& shelved) { return shelved.wish == wish; });
+template <class Request, class Made>
+typename std::vector<typename RequestCache<Request, Made>::Shelved>::iterator RequestCache<Request, Made>::find(
+    const Request& request) {
+  return std::ranges::find_if(cache_, [&](const Shelved& shelved) { return shelved.request == request; });
 }
 
-template <class Wish, class Made>
-void Shelf<Wish, Made>::wish(std::vector<Wish> wishes) {
+template <class Request, class Made>
+void RequestCache<Request, Made>::request(std::vector<Request> requests) {
   bool missing = false;
   bool failed = false;
   std::vector<Shelved> before;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
-    before = std::exchange(shelf_, {});
-    for (Wish& wish : wishes) {
-      if (find(wish) != shelf_.end()) continue;
-      const auto was = std::ranges::find_if(before, [&](const Shelved& shelved) { return shelved.wish == wish; });
-      shelf_.push_back({std::move(wish), {}, {}});
+    before = std::exchange(cache_, {});
+    for (Request& request : requests) {
+      if (find(request) != cache_.end()) continue;
+      const auto was = std::ranges::find_if(before, [&](const Shelved& shelved) { return shelved.request == request; });
+      cache_.push_back({std::move(request), {}, {}});
       if (was == before.end()) continue;
-      shelf_.back().built = std::move(was->built);
-      shelf_.back().failure = was->failure;
+      cache_.back().built = std::move(was->built);
+      cache_.back().failure = was->failure;
     }
-    if (under_way_ && find(*under_way_) == shelf_.end()) shelf_.push_back({*under_way_, {}, {}, false});
-    missing = std::ranges::any_of(shelf_, &Shelved::is_missing);
-    failed = std::ranges::any_of(shelf_, [](const Shelved& shelved) { return shelved.failure.has_value(); });
+    if (under_way_ && find(*under_way_) == cache_.end()) cache_.push_back({*under_way_, {}, {}, false});
+    missing = std::ranges::any_of(cache_, &Shelved::is_missing);
+    failed = std::ranges::any_of(cache_, [](const Shelved& shelved) { return shelved.failure.has_value(); });
   }
   if (missing) {
     worker_.post({what_, stage_, [this](Progress& progress) { build_missing(progress); }});
@@ -105,38 +107,38 @@ void Shelf<Wish, Made>::wish(std::vector<Wish> wishes) {
   }
 }
 
-template <class Wish, class Made>
-std::optional<Made> Shelf<Wish, Made>::built(const Wish& wish) const {
+template <class Request, class Made>
+std::optional<Made> RequestCache<Request, Made>::built(const Request& request) const {
   const std::scoped_lock lock(mutex_);
-  const auto found = std::ranges::find_if(shelf_, [&](const Shelved& shelved) { return shelved.wish == wish; });
-  return found == shelf_.end() ? std::nullopt : found->built;
+  const auto found = std::ranges::find_if(cache_, [&](const Shelved& shelved) { return shelved.request == request; });
+  return found == cache_.end() ? std::nullopt : found->built;
 }
 
-template <class Wish, class Made>
-bool Shelf<Wish, Made>::is_under_way(const Wish& wish) const {
+template <class Request, class Made>
+bool RequestCache<Request, Made>::is_under_way(const Request& request) const {
   const std::scoped_lock lock(mutex_);
-  return under_way_ == wish;
+  return under_way_ == request;
 }
 
-template <class Wish, class Made>
-void Shelf<Wish, Made>::forget_failures() {
+template <class Request, class Made>
+void RequestCache<Request, Made>::forget_failures() {
   const std::scoped_lock lock(mutex_);
-  for (Shelved& shelved : shelf_) shelved.failure.reset();
+  for (Shelved& shelved : cache_) shelved.failure.reset();
 }
 
-template <class Wish, class Made>
-void Shelf<Wish, Made>::build_missing(Progress& progress) {
+template <class Request, class Made>
+void RequestCache<Request, Made>::build_missing(Progress& progress) {
   // Must be called on every exit.
   const auto rest = [this] {
     const std::scoped_lock lock(mutex_);
     under_way_.reset();
   };
   for (;;) {
-    std::optional<Wish> next;
+    std::optional<Request> next;
     {
       const std::scoped_lock lock(mutex_);
-      const auto missing = std::ranges::find_if(shelf_, &Shelved::is_missing);
-      if (missing != shelf_.end()) next = missing->wish;
+      const auto missing = std::ranges::find_if(cache_, &Shelved::is_missing);
+      if (missing != cache_.end()) next = missing->request;
       under_way_ = next;
     }
     if (!next) break;
@@ -144,7 +146,7 @@ void Shelf<Wish, Made>::build_missing(Progress& progress) {
     std::optional<Error> failure;
     try {
       progress.begin(stage_);
-      allowance_->run([&] { built = make_(*next, progress); });
+      resource_limits_->run([&] { built = make_(*next, progress); });
       progress.check();
     } catch (...) {
       failure = caught(what_);
@@ -157,7 +159,7 @@ void Shelf<Wish, Made>::build_missing(Progress& progress) {
       const std::scoped_lock lock(mutex_);
       under_way_.reset();
       const auto place = find(*next);
-      if (place != shelf_.end()) {
+      if (place != cache_.end()) {
         place->built = std::move(built);
         place->failure = std::move(failure);
         ++revision_;
@@ -166,7 +168,7 @@ void Shelf<Wish, Made>::build_missing(Progress& progress) {
     notify_();
   }
   const std::scoped_lock lock(mutex_);
-  for (const Shelved& shelved : shelf_) {
+  for (const Shelved& shelved : cache_) {
     if (shelved.failure && shelved.wanted) throw Error(*shelved.failure);
   }
 }

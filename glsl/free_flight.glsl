@@ -7,7 +7,7 @@
 // between them); and the next cell. next.x is CM_NONE outside the grid, or where nothing lies ahead. The third word of
 // a cell is a cache of the traversal, CM_NONE if it is empty. With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
-//   vec3 cm_march_colour(uvec2 cell)              scattering color
+//   vec3 cm_march_color(uvec2 cell)              scattering color
 //   float cm_march_anisotropy(uvec2 cell)         mean cosine of scattering
 //
 // Free-flight distances are sampled exactly ("regular tracking" in Novak et al., "Monte Carlo Methods for Volumetric
@@ -23,8 +23,8 @@
 // that of their sum. Free flights are memoryless, so the depth left after one volume continues in the next. A new depth
 // is drawn only after a collision, which becomes the new end of the ray. A shadow ray uses up one depth through all
 // volumes.
-#ifndef CM_FLIGHT_GLSL
-#define CM_FLIGHT_GLSL
+#ifndef CM_FREE_FLIGHT_GLSL
+#define CM_FREE_FLIGHT_GLSL
 
 #include "path_state.glsl"
 #if CM_EQUIANGULAR
@@ -57,14 +57,14 @@ CM_FN void cm_weigh(CM_INOUT(CmPath) p) {
   cm_here = there.instance;
 #endif
   vec3 to_light = cm_to_world(p.d);
-  float density = cm_passing_density(p.o, p.w, to_light, p.reach);
+  float pdf = cm_equiangular_pdf(p.o, p.w, to_light, p.reach);
   vec3 share = CM_MEDIUM.albedo;
   float anisotropy = CM_MEDIUM.anisotropy;
 #if CM_CHANNELS
-  if (CM_MEDIUM.coloured != 0u) share *= cm_march_colour(there.cell);
+  if (CM_MEDIUM.colored != 0u) share *= cm_march_color(there.cell);
   if (CM_MEDIUM.anisotropic != 0u) anisotropy = cm_march_anisotropy(there.cell);
 #endif
-  p.light *= share * (there.extinction * cm_passing_share(density, there.extinction) *
+  p.light *= share * (there.extinction * cm_equiangular_weight(pdf, there.extinction) *
                       cm_medium_phase(anisotropy, dot(p.w, to_light)));
   if (!(there.extinction > 0.0f)) {
     p.reach = 0.0f;
@@ -107,7 +107,7 @@ CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
   if (over) {
     bool met = p.met != CM_INSTANCE_NONE;
     what = met ? CM_EVENT_COLLISION : CM_EVENT_ESCAPE;
-    if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_FLIGHT && p.gathers == 0u) {
+    if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_SCATTERED && p.gathers == 0u) {
       what = CM_EVENT_NONE;
       p.gathers = 1u;
       cm_begin_visits(p);
@@ -117,7 +117,7 @@ CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
       p.cache = CM_NONE;
       p.instance = p.met;
     }
-  } else if (event == CM_EVENT_COLLISION && p.ray == CM_RAY_FLIGHT) {
+  } else if (event == CM_EVENT_COLLISION && p.ray == CM_RAY_SCATTERED) {
     p.met = p.instance;
     p.met_cell = p.cell;
     p.t_end = p.t;
@@ -177,8 +177,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   CmEmission emission;
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
   // MIS: NEE samples the same cells.
-  float flights = p.bounces > 0u ? p.density : 1.0f;
-  float looks = p.bounces > 0u ? cm.lights.cell_chance * cm_look_chance(p, CM_LIGHT_CELL, p.density, 0.0f) : 0.0f;
+  float scattering_pdf = p.bounces > 0u ? p.pdf : 1.0f;
+  float nee_pdf = p.bounces > 0u ? cm.lights.cell_chance * cm_nee_probability(p, CM_LIGHT_CELL, p.pdf, 0.0f) : 0.0f;
 #endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
@@ -186,7 +186,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     cm_march_step(cell, ray, p.t, t_1, r_0, r_1, next);
 #if CM_CHANNELS
     emission = cm_march_emission(cell, o, d);
-    emission.mean *= cm_balance(flights, looks * cm_cell_pdf(emission));
+    emission.mean *= cm_balance(scattering_pdf, nee_pdf * cm_cell_pdf(emission));
 #endif
     p.steps += 1u;
     span = t_1 - p.t;
@@ -223,7 +223,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
   }
 #if CM_CHANNELS
-  bool takes = p.ray == CM_RAY_FLIGHT && !cm_is_dark(p);
+  bool takes = p.ray == CM_RAY_SCATTERED && !cm_is_dark(p);
 #if CM_INSTANCES
   // In overlapping volumes another one may end the ray earlier. Their emission waits for the second sweep.
   takes = takes && (p.gathers != 0u || (cm_instances[cm_here].flags & CM_INSTANCE_OVERLAPS) == 0u);
@@ -240,12 +240,12 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 }
 
 // What the path does once its ray has come to an event. Returns the next stage.
-CM_FN uint cm_after_flight(CmPath p) {
-  if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_FLIGHT) {
+CM_FN uint cm_stage_after_ray(CmPath p) {
+  if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_SCATTERED) {
     return p.found == CM_FOUND_TRIANGLE && p.event == CM_EVENT_ESCAPE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
   }
   if (cm_asks(p)) return CM_STAGE_MEET;
-  return p.ray != CM_RAY_FLIGHT && p.start == CM_ON_TRIANGLE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
+  return p.ray != CM_RAY_SCATTERED && p.start == CM_ON_TRIANGLE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
 }
 
 // Runs the stages in the medium: handles the last event and continues until the path needs triangles, its sample is
@@ -272,7 +272,7 @@ CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
       p.event = cm_fly(p);
 #endif
       marches += 1u;
-      if (p.event != CM_EVENT_NONE) p.stage = cm_after_flight(p);
+      if (p.event != CM_EVENT_NONE) p.stage = cm_stage_after_ray(p);
     }
   }
   return marches;

@@ -1,4 +1,4 @@
-#include "render/rehearsal.hpp"
+#include "render/shader_warm_up.hpp"
 
 #include <bit>
 #include <utility>
@@ -15,26 +15,26 @@ constexpr double coarse_ms = 0.05;
 
 }  // namespace
 
-bool Rehearsal::advance(PictureWish wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                        const std::function<void(const Picture&)>& draw) {
-  const glm::uvec2 size = wish.content.size;
-  wish.content.size = wish.parameters.view.size = {edge_like(size.x), edge_like(size.y)};
-  wish.samples = wish.noise_target ? Picture::first_measured + 1 : 1;  // enough that the noise is measured
-  wish.held = false;
+bool ShaderWarmUp::advance(PictureRequest request, const MarchData& data, const TraceInputs& trace_inputs,
+                           Deadline deadline, const std::function<void(const Picture&)>& draw) {
+  const glm::uvec2 size = request.content.size;
+  request.content.size = request.parameters.view.size = {edge_like(size.x), edge_like(size.y)};
+  request.samples = request.noise_target ? Picture::first_measured + 1 : 1;  // enough that the noise is measured
+  request.held = false;
   const auto now = [] { return std::chrono::steady_clock::now(); };
   do {
     // The deadline is now, so that one picture is made at a time and each is drawn.
-    progressive_.advance(wish, data, obstacles, now(), coarse_ms);
+    progressive_.advance(request, data, trace_inputs, now(), coarse_ms);
     if (progressive_.shown() != nullptr) draw(*progressive_.shown());
     if (!progressive_.more() && !lags_) {
-      if (!std::exchange(picked_, true)) tracer().pick(data, wish.parameters, obstacles, glm::uvec2(0U));
+      if (!std::exchange(picked_, true)) tracer().pick(data, request.parameters, trace_inputs, glm::uvec2(0U));
       return true;
     }
   } while (now() < deadline);
   return false;
 }
 
-void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarget target) {
+void ShaderWarmUp::draw(PictureTextures picture, const Display& display, FrameTarget target) {
   picture.revision.reset();
   picture.may_lag = false;
   target.wait = Wait::never;

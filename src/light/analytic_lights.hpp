@@ -20,7 +20,7 @@ namespace cumulet::core {
 namespace cumulet::light {
 
 /// A light of the host. Colors are linear Rec. 709.
-struct Lamp {
+struct AnalyticLight {
   enum class Kind : std::uint8_t { point, spot, disc, rectangle, sun };
   Kind kind = Kind::point;
   glm::dvec3 position{0.0};              ///< world, center; unused for a sun
@@ -32,20 +32,21 @@ struct Lamp {
   double angle = 0.0;                ///< radians: full cone angle of a spot; angular diameter of a sun, < pi
   double blend = 0.0;                ///< spot: fraction of the half angle over which it falls off, 0 to 1
   std::uint32_t group = 0;           ///< light group
-  bool operator==(const Lamp&) const = default;
+  bool operator==(const AnalyticLight&) const = default;
 };
-using Lamps = std::vector<Lamp>;
+using AnalyticLights = std::vector<AnalyticLight>;
 
 /// Converts a glTF light; candela and lux are used as radiometric units (surface::PunctualLight). origin: positions
 /// become relative to it.
-core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& origin);
+core::CmAnalyticLight analytic_light_record(const surface::PunctualLight& light, const glm::dvec3& origin);
 /// Converts a light of the host. Power is defined as in Blender: a point emits power / (4 pi) per steradian, a spot the
 /// same inside of its cone. A disk and a rectangle emit a radiance of power / (4 x area) on their front side.
-core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin);
+core::CmAnalyticLight analytic_light_record(const AnalyticLight& analytic_light, const glm::dvec3& origin);
 
 /// Returns the records of the host's lights, followed by those of the scene.
-std::vector<core::CmLamp> lamp_records(const Lamps& of_host, std::span<const surface::PunctualLight> of_scene,
-                                       const glm::dvec3& origin);
+std::vector<core::CmAnalyticLight> analytic_light_records(const AnalyticLights& of_host,
+                                                          std::span<const surface::PunctualLight> of_scene,
+                                                          const glm::dvec3& origin);
 
 /// Bounding ball of an object that is lit.
 struct Lit {
@@ -58,17 +59,17 @@ struct Lit {
 /// ball's center, or at the ball's surface if the light is inside. With several balls, probabilities are averaged. A
 /// fifth of the samples is distributed uniformly, for places where the bright lights are occluded. Returns the maximum
 /// total irradiance. lit: balls of radius 0 are ignored.
-double share_looks(std::span<core::CmLamp> records, std::span<const Lit> lit);
+double share_looks(std::span<core::CmAnalyticLight> records, std::span<const Lit> lit);
 
 /// Returns the distance of the nearest non-distant light from a ball's center, divided by the radius. Returns nullopt
 /// if there is no such light or no ball.
-std::optional<double> nearest_lamp(std::span<const core::CmLamp> records, const Lit& ball);
+std::optional<double> nearest_analytic_light(std::span<const core::CmAnalyticLight> records, const Lit& ball);
 
 /// Whether equiangular sampling of lights (glsl/equiangular.glsl) is worth its time in a medium of this mean optical
 /// depth. Measured: docs/architecture.md.
 bool suits_equiangular(std::optional<double> nearest, double optical_depth);
 
 /// Adds these lights to the counts.
-void add_lamps(SceneLights& lights, const Lamps& lamps);
+void add_analytic_lights(SceneLights& lights, const AnalyticLights& analytic_lights);
 
 }  // namespace cumulet::light

@@ -1,9 +1,9 @@
 // Parameters of the emission of temperature and flame fields. Shared by GLSL and C++.
-#ifndef CM_BRICK_GLOW_GLSL
-#define CM_BRICK_GLOW_GLSL
+#ifndef CM_BRICK_EMISSIVE_GLSL
+#define CM_BRICK_EMISSIVE_GLSL
 
 #define CM_RAMP_PARTS 64u
-#define CM_BODY_COLOURS 1024
+#define CM_BODY_COLORS 1024
 
 // A part of a ramp, which begins at value `from`: its result there, and its slope.
 struct CmRampPart {
@@ -12,8 +12,8 @@ struct CmRampPart {
   float slope;
 };
 
-struct CmBrickGlow {
-  vec3 flame_colour;  // color times strength
+struct CmBrickEmissive {
+  vec3 flame_color;  // color times strength
   float intensity;    // of black-body emission
   vec3 tint;          // of black-body emission
   float unit;         // radiance of a black body at 1 kelvin; 0: no black-body emission
@@ -21,7 +21,7 @@ struct CmBrickGlow {
   float scale;
   float most;  // maximum radiance
   CmRampPart ramps[2 * CM_RAMP_PARTS];  // of temperature, then of flame; the first part has any value, unused ones none
-  float colours[3 * CM_BODY_COLOURS];  // of black bodies, uniform in the temperature's logarithm
+  float colors[3 * CM_BODY_COLORS];  // of black bodies, uniform in the temperature's logarithm
 };
 
 #endif

@@ -27,7 +27,7 @@ namespace cumulet::viewer {
 /// The sequence is analyzed first, with the largest readable file that is not empty. The result has the bounds for
 /// cameras and ground, and one density scale for all frames, so that nothing jumps. A frame that cannot be read is
 /// logged once and replaced by the nearest earlier readable frame, or else by the nearest later one.
-class FrameShelf {
+class FrameCache {
  public:
   struct Steps {
     scene::Between between = scene::Between::none;
@@ -51,7 +51,7 @@ class FrameShelf {
     [[nodiscard]] double part(std::uint32_t step) const { return static_cast<double>(step % a_frame) / a_frame; }
     [[nodiscard]] double position(std::uint32_t step) const { return frame(step) + part(step); }
   };
-  struct Wish {
+  struct Request {
     FrameFilesPtr files;
     std::vector<std::uint32_t> order;       ///< required steps without duplicates, the soonest first; at least one
     std::optional<BuildSettings> settings;  ///< nullopt: analyze the sequence, build nothing yet
@@ -61,8 +61,8 @@ class FrameShelf {
   };
 
   /// Results of analyzing the whole sequence.
-  struct Judged {
-    VolumeFactsPtr facts;
+  struct AnalyzedFrame {
+    VolumeInfoPtr volume_info;
     std::optional<double> density_scale;  ///< suggested for the sequence
   };
 
@@ -80,12 +80,12 @@ class FrameShelf {
   };
 
   /// notify: called on a worker thread after each frame, and when a job ended.
-  FrameShelf(Log log, std::function<void()> notify, Trace trace = {},
-             AllowancePtr allowance = std::make_shared<const Allowance>());
+  FrameCache(Log log, std::function<void()> notify, Trace trace = {},
+             ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>());
 
   /// Replaces the request. Running frames are finished, so that with fast-changing requests every frame that was begun
   /// can be displayed. Other files: everything cached is dropped.
-  void wish(Wish wish);
+  void request(Request request);
   /// Removes the request and everything cached.
   void clear();
   /// Rebuilds all frames, also failed ones. The old ones are available until then.
@@ -94,7 +94,7 @@ class FrameShelf {
   void cancel();
 
   /// Returns the result of the analysis, once.
-  std::optional<Judged> take_judged();
+  std::optional<AnalyzedFrame> take_analyzed();
   /// Returns the cached data of the first requested step, or of the nearest step that has any.
   [[nodiscard]] std::optional<Ready> nearest() const;
   /// Changes after each frame that was built or failed.
@@ -131,10 +131,10 @@ class FrameShelf {
     std::uint32_t frame = 0;
     VolumeAssetPtr before, after;
   };
-  enum class Judging { due, done, in_vain };
+  enum class Analysis { due, done, in_vain };
 
   void work(Progress& progress);
-  void judge(const FrameFilesPtr& files, Progress& progress);
+  void analyze(const FrameFilesPtr& files, Progress& progress);
   void settle_temperature(const FrameFiles& files, const VolumeAsset& volume);
   void build(const Which& which, const BuildSettings& settings, std::optional<Ends>& ends, Progress& progress);
   // Returns the volume of a step. reading: receives the frame whose file is at fault on failure; nullopt for the
@@ -152,22 +152,22 @@ class FrameShelf {
 
   // mutex_ must be held for all of these.
   void start();
-  [[nodiscard]] bool is_wished(const FrameFilesPtr& files) const { return wish_ && wish_->files == files; }
-  [[nodiscard]] bool is_wished(const Which& which) const {
-    return is_wished(which.files) && wish_->steps == which.steps;
+  [[nodiscard]] bool is_requested(const FrameFilesPtr& files) const { return request_ && request_->files == files; }
+  [[nodiscard]] bool is_requested(const Which& which) const {
+    return is_requested(which.files) && request_->steps == which.steps;
   }
   // Entry of a file frame.
-  [[nodiscard]] Shelved& own(std::uint32_t frame) { return shelf_[wish_->steps.own(frame)]; }
-  [[nodiscard]] const Shelved& own(std::uint32_t frame) const { return shelf_[wish_->steps.own(frame)]; }
+  [[nodiscard]] Shelved& own(std::uint32_t frame) { return cache_[request_->steps.own(frame)]; }
+  [[nodiscard]] const Shelved& own(std::uint32_t frame) const { return cache_[request_->steps.own(frame)]; }
   [[nodiscard]] bool is_possible(std::uint32_t step) const;
   // Changes the cache to other steps; entries of file frames are kept. The caller must free the result without the
   // lock.
   [[nodiscard]] std::vector<Shelved> take_other_steps(const Steps& steps);
   [[nodiscard]] bool is_ready(const Shelved& shelved) const;
-  [[nodiscard]] bool is_judged() const { return judging_ != Judging::due; }
+  [[nodiscard]] bool is_analyzed() const { return analysis_ != Analysis::due; }
   // Must be called when the set of possible steps has changed.
-  void find_stand_ins();
-  [[nodiscard]] std::optional<std::uint32_t> first() const { return stand_ins_[wish_->order.front()]; }
+  void find_substitutes();
+  [[nodiscard]] std::optional<std::uint32_t> first() const { return substitutes_[request_->order.front()]; }
   // Returns the steps to keep: as many as the memory holds, by their known or estimated sizes.
   [[nodiscard]] std::vector<std::uint32_t> kept() const;
   [[nodiscard]] std::optional<std::uint32_t> next() const;
@@ -179,16 +179,16 @@ class FrameShelf {
   Log log_;
   std::function<void()> notify_;
   Trace trace_;
-  AllowancePtr allowance_;
+  ResourceLimitsPtr resource_limits_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
-  std::optional<Wish> wish_;
-  std::vector<Shelved> shelf_;  // one per step
+  std::optional<Request> request_;
+  std::vector<Shelved> cache_;  // one per step
   // Per step: the step that is shown for it. It is the step itself if possible, else a fallback frame; nullopt if no
   // frame can be shown.
-  std::vector<std::optional<std::uint32_t>> stand_ins_;
-  Judging judging_ = Judging::due;
-  std::optional<Judged> judged_;  // not taken yet
+  std::vector<std::optional<std::uint32_t>> substitutes_;
+  Analysis analysis_ = Analysis::due;
+  std::optional<AnalyzedFrame> analyzed_;  // not taken yet
   // VolumeFrame::temperature_scale of all frames, from the first frame with a temperature that is read. The largest
   // file is read first.
   std::optional<double> temperature_scale_;

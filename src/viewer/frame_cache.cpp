@@ -1,4 +1,4 @@
-#include "viewer/frame_shelf.hpp"
+#include "viewer/frame_cache.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -31,38 +31,38 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 
 }  // namespace
 
-FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
+FrameCache::FrameCache(Log log, std::function<void()> notify, Trace trace, ResourceLimitsPtr resource_limits)
     : log_(std::move(log)),
       notify_(std::move(notify)),
       trace_(trace),
-      allowance_(std::move(allowance)),
+      resource_limits_(std::move(resource_limits)),
       worker_([this] { tell(); }, trace) {}
 
-void FrameShelf::wish(Wish wish) {
+void FrameCache::request(Request request) {
   std::vector<Shelved> old;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
-    const bool other_files = !is_wished(wish.files);
-    const bool other_steps = other_files || wish.steps != wish_->steps;
+    const bool other_files = !is_requested(request.files);
+    const bool other_steps = other_files || request.steps != request_->steps;
     if (other_steps) {
       worker_.cancel();
-      stand_ins_.reserve(wish.steps.count(wish.files->count()));  // so that nothing throws after the request has been
-                                                                  // replaced
+      substitutes_.reserve(request.steps.count(request.files->count()));  // so that nothing throws after the request
+                                                                          // has been replaced
     }
     if (other_files) {
-      old = std::exchange(shelf_, std::vector<Shelved>(wish.steps.count(wish.files->count())));
-      judging_ = Judging::due;
-      judged_.reset();
+      old = std::exchange(cache_, std::vector<Shelved>(request.steps.count(request.files->count())));
+      analysis_ = Analysis::due;
+      analyzed_.reset();
       temperature_scale_.reset();
       said_.clear();
     } else if (other_steps) {
-      old = take_other_steps(wish.steps);
+      old = take_other_steps(request.steps);
     }
-    const bool suggested = wish.takes_suggested && wish.files->shown.suggested_density_scale;
-    if (suggested && judged_ && judged_->density_scale && wish.settings)
-      wish.settings->refine.density_scale = *judged_->density_scale;
-    wish_ = std::move(wish);
-    if (other_steps) find_stand_ins();
+    const bool suggested = request.takes_suggested && request.files->shown.suggested_density_scale;
+    if (suggested && analyzed_ && analyzed_->density_scale && request.settings)
+      request.settings->refine.density_scale = *analyzed_->density_scale;
+    request_ = std::move(request);
+    if (other_steps) find_substitutes();
     cancelled_ = false;
     std::ranges::move(take_excess(), std::back_inserter(old));
     start();
@@ -70,36 +70,36 @@ void FrameShelf::wish(Wish wish) {
   changed_.notify_all();
 }
 
-void FrameShelf::clear() {
+void FrameCache::clear() {
   std::vector<Shelved> old;
   {
     const std::scoped_lock lock(mutex_);
     worker_.cancel();
-    wish_.reset();
-    judged_.reset();
-    old = std::exchange(shelf_, {});
+    request_.reset();
+    analyzed_.reset();
+    old = std::exchange(cache_, {});
   }
   changed_.notify_all();
 }
 
-void FrameShelf::rebuild() {
+void FrameCache::rebuild() {
   std::vector<Shelved> old;
   const std::scoped_lock lock(mutex_);
-  if (!wish_) return;
-  for (Shelved& shelved : shelf_) {
+  if (!request_) return;
+  for (Shelved& shelved : cache_) {
     if (shelved.volume) old.emplace_back().volume = std::exchange(shelved.volume, nullptr);
     shelved.stale = true;
     shelved.failure.reset();
   }
-  find_stand_ins();
+  find_substitutes();
   // The running job began before the call.
   worker_.cancel();
-  if (judging_ == Judging::in_vain) judging_ = Judging::due;
+  if (analysis_ == Analysis::in_vain) analysis_ = Analysis::due;
   cancelled_ = false;
   start();
 }
 
-void FrameShelf::cancel() {
+void FrameCache::cancel() {
   {
     const std::scoped_lock lock(mutex_);
     cancelled_ = true;
@@ -108,72 +108,72 @@ void FrameShelf::cancel() {
   changed_.notify_all();
 }
 
-std::optional<FrameShelf::Judged> FrameShelf::take_judged() {
+std::optional<FrameCache::AnalyzedFrame> FrameCache::take_analyzed() {
   const std::scoped_lock lock(mutex_);
-  return std::exchange(judged_, std::nullopt);
+  return std::exchange(analyzed_, std::nullopt);
 }
 
-std::optional<FrameShelf::Ready> FrameShelf::nearest() const {
+std::optional<FrameCache::Ready> FrameCache::nearest() const {
   const std::scoped_lock lock(mutex_);
-  if (!wish_) return std::nullopt;
+  if (!request_) return std::nullopt;
   const auto wanted = first();
-  const std::uint32_t target = wanted.value_or(wish_->order.front());
-  const auto steps_there = static_cast<std::uint32_t>(shelf_.size());
+  const std::uint32_t target = wanted.value_or(request_->order.front());
+  const auto steps_there = static_cast<std::uint32_t>(cache_.size());
   std::optional<std::uint32_t> found;
   // At equal distances the earlier step is preferred.
   for (std::uint32_t away = 0; !found && (away <= target || away < steps_there - target); ++away) {
-    if (away <= target && shelf_[target - away].built) {
+    if (away <= target && cache_[target - away].built) {
       found = target - away;
-    } else if (away < steps_there - target && shelf_[target + away].built) {
+    } else if (away < steps_there - target && cache_[target + away].built) {
       found = target + away;
     }
   }
   if (!found) return std::nullopt;
-  const Steps& steps = wish_->steps;
-  Ready ready{steps.frame(*found), steps.part(*found), *shelf_[*found].built,
-              found == wanted && is_ready(shelf_[*found])};
-  ready.built.volume = shelf_[*found].volume;
+  const Steps& steps = request_->steps;
+  Ready ready{steps.frame(*found), steps.part(*found), *cache_[*found].built,
+              found == wanted && is_ready(cache_[*found])};
+  ready.built.volume = cache_[*found].volume;
   return ready;
 }
 
-FrameShelf::Status FrameShelf::frames() const {
+FrameCache::Status FrameCache::frames() const {
   const std::scoped_lock lock(mutex_);
   Status status;
-  for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
-    const Shelved& shelved = shelf_[step];
-    if (!wish_->steps.is_between(step))
+  for (std::uint32_t step = 0; step < cache_.size(); ++step) {
+    const Shelved& shelved = cache_[step];
+    if (!request_->steps.is_between(step))
       status.frames.push_back(shelved.failure ? State::failed : is_ready(shelved) ? State::ready : State::waiting);
     status.bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
   }
   return status;
 }
 
-std::optional<Error> FrameShelf::failure_of(std::uint32_t frame) const {
+std::optional<Error> FrameCache::failure_of(std::uint32_t frame) const {
   const std::scoped_lock lock(mutex_);
-  return wish_ && frame < wish_->files->count() ? own(frame).failure : std::nullopt;
+  return request_ && frame < request_->files->count() ? own(frame).failure : std::nullopt;
 }
 
-bool FrameShelf::busy() const {
+bool FrameCache::busy() const {
   const std::scoped_lock lock(mutex_);
   return waits();
 }
 
-Worker::Status FrameShelf::status() const {
+Worker::Status FrameCache::status() const {
   const std::scoped_lock lock(mutex_);
   const Worker::Status work = worker_.status();
   Worker::Status status;
   if (waits()) status = work;
   status.failure.reset();
-  if (!wish_) return status;
-  if (is_judged() && !first()) {
-    status.failure = own(wish_->steps.frame(wish_->order.front())).failure;
+  if (!request_) return status;
+  if (is_analyzed() && !first()) {
+    status.failure = own(request_->steps.frame(request_->order.front())).failure;
   } else if (work.failure && work.failure->code() != ErrorCode::cancelled) {
     status.failure = work.failure;  // not caused by a file; building failed
   }
   return status;
 }
 
-bool FrameShelf::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
+bool FrameCache::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return !waits(); };
   if (until) return changed_.wait_until(lock, *until, ready);
@@ -181,7 +181,7 @@ bool FrameShelf::wait(std::optional<std::chrono::steady_clock::time_point> until
   return true;
 }
 
-void FrameShelf::tell() {
+void FrameCache::tell() {
   {
     const std::scoped_lock lock(mutex_);  // so that a waiting thread has either not checked its condition yet, or is
                                           // waiting
@@ -192,59 +192,60 @@ void FrameShelf::tell() {
 
 // ---- mutex_ is held ----
 
-void FrameShelf::start() {
-  if (is_judged() && !next()) {
+void FrameCache::start() {
+  if (is_analyzed() && !next()) {
     worker_.forget_failure();
     return;
   }
   worker_.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
 }
 
-bool FrameShelf::is_ready(const Shelved& shelved) const {
-  return shelved.built && !shelved.stale && wish_->settings && shelved.built->serves(*wish_->settings);
+bool FrameCache::is_ready(const Shelved& shelved) const {
+  return shelved.built && !shelved.stale && request_->settings && shelved.built->serves(*request_->settings);
 }
 
-bool FrameShelf::is_possible(std::uint32_t step) const {
-  const Steps& steps = wish_->steps;
+bool FrameCache::is_possible(std::uint32_t step) const {
+  const Steps& steps = request_->steps;
   const std::uint32_t frame = steps.frame(step);
-  if (shelf_[step].failure || own(frame).failure) return false;
+  if (cache_[step].failure || own(frame).failure) return false;
   return !steps.is_between(step) || !own(frame + 1).failure;
 }
 
-void FrameShelf::find_stand_ins() {
-  stand_ins_.assign(shelf_.size(), std::nullopt);
+void FrameCache::find_substitutes() {
+  substitutes_.assign(cache_.size(), std::nullopt);
   std::uint32_t last = 0;
-  while (last < shelf_.size() && shelf_[last].failure) last += wish_->steps.a_frame;
-  if (last >= shelf_.size()) return;
-  for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
+  while (last < cache_.size() && cache_[last].failure) last += request_->steps.a_frame;
+  if (last >= cache_.size()) return;
+  for (std::uint32_t step = 0; step < cache_.size(); ++step) {
     const bool possible = is_possible(step);
-    if (possible && !wish_->steps.is_between(step)) last = step;
-    stand_ins_[step] = possible ? step : last;
+    if (possible && !request_->steps.is_between(step)) last = step;
+    substitutes_[step] = possible ? step : last;
   }
 }
 
-std::vector<FrameShelf::Shelved> FrameShelf::take_other_steps(const Steps& steps) {
-  std::vector<Shelved> other(steps.count(wish_->files->count()));
-  for (std::uint32_t frame = 0; frame < wish_->files->count(); ++frame) std::swap(other[steps.own(frame)], own(frame));
-  return std::exchange(shelf_, std::move(other));
+std::vector<FrameCache::Shelved> FrameCache::take_other_steps(const Steps& steps) {
+  std::vector<Shelved> other(steps.count(request_->files->count()));
+  for (std::uint32_t frame = 0; frame < request_->files->count(); ++frame)
+    std::swap(other[steps.own(frame)], own(frame));
+  return std::exchange(cache_, std::move(other));
 }
 
-std::vector<std::uint32_t> FrameShelf::kept() const {
+std::vector<std::uint32_t> FrameCache::kept() const {
   std::uint64_t known = 0;
   std::uint64_t known_bytes = 0;
-  for (const Shelved& shelved : shelf_) {
+  for (const Shelved& shelved : cache_) {
     known += shelved.grid_bytes > 0 ? 1U : 0U;
     known_bytes += shelved.grid_bytes;
   }
   const std::uint64_t likely = known > 0 ? known_bytes / known : 0;
   std::vector<std::uint32_t> frames;
-  std::vector<bool> taken(shelf_.size());
+  std::vector<bool> taken(cache_.size());
   std::uint64_t bytes = 0;
-  for (const std::uint32_t wished : wish_->order) {
-    const auto frame = stand_ins_[wished];
+  for (const std::uint32_t requested : request_->order) {
+    const auto frame = substitutes_[requested];
     if (!frame || taken[*frame]) continue;
-    const std::uint64_t takes = shelf_[*frame].grid_bytes > 0 ? shelf_[*frame].grid_bytes : likely;
-    if (!frames.empty() && bytes + takes > wish_->memory_bytes) break;
+    const std::uint64_t takes = cache_[*frame].grid_bytes > 0 ? cache_[*frame].grid_bytes : likely;
+    if (!frames.empty() && bytes + takes > request_->memory_bytes) break;
     bytes += takes;
     taken[*frame] = true;
     frames.push_back(*frame);
@@ -252,48 +253,48 @@ std::vector<std::uint32_t> FrameShelf::kept() const {
   return frames;
 }
 
-std::optional<std::uint32_t> FrameShelf::next() const {
-  if (!wish_ || !wish_->settings || cancelled_ || judging_ != Judging::done) return std::nullopt;
+std::optional<std::uint32_t> FrameCache::next() const {
+  if (!request_ || !request_->settings || cancelled_ || analysis_ != Analysis::done) return std::nullopt;
   for (const std::uint32_t frame : kept()) {
-    if (!is_ready(shelf_[frame])) return frame;
+    if (!is_ready(cache_[frame])) return frame;
   }
   return std::nullopt;
 }
 
-bool FrameShelf::waits() const {
-  if (!wish_ || cancelled_ || !worker_.busy()) return false;
-  if (!is_judged()) return true;
+bool FrameCache::waits() const {
+  if (!request_ || cancelled_ || !worker_.busy()) return false;
+  if (!is_analyzed()) return true;
   const auto wanted = first();
-  return wanted && !is_ready(shelf_[*wanted]);
+  return wanted && !is_ready(cache_[*wanted]);
 }
 
-std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
+std::vector<FrameCache::Shelved> FrameCache::take_excess() {
   std::uint64_t bytes = 0;
-  for (const Shelved& shelved : shelf_)
+  for (const Shelved& shelved : cache_)
     bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
   std::vector<Shelved> excess;
-  if (bytes <= wish_->memory_bytes) return excess;
+  if (bytes <= request_->memory_bytes) return excess;
   // Orders by need; the first needed step always stays.
   constexpr std::size_t not_needed = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> rank(shelf_.size(), not_needed);
+  std::vector<std::size_t> rank(cache_.size(), not_needed);
   const std::vector<std::uint32_t> needed = kept();
   for (std::size_t i = 0; i < needed.size(); ++i) rank[needed[i]] = i;
   std::vector<std::uint32_t> frames;
-  for (std::uint32_t frame = 0; frame < shelf_.size(); ++frame) {
+  for (std::uint32_t frame = 0; frame < cache_.size(); ++frame) {
     const bool is_first = !needed.empty() && frame == needed.front();
-    if (!is_first && (shelf_[frame].built || shelf_[frame].volume)) frames.push_back(frame);
+    if (!is_first && (cache_[frame].built || cache_[frame].volume)) frames.push_back(frame);
   }
   std::ranges::sort(frames, [&](std::uint32_t a, std::uint32_t b) { return rank[a] > rank[b]; });
-  const auto fits = [&] { return bytes <= wish_->memory_bytes; };
+  const auto fits = [&] { return bytes <= request_->memory_bytes; };
   for (const std::uint32_t frame : frames) {
-    Shelved& shelved = shelf_[frame];
+    Shelved& shelved = cache_[frame];
     if (fits()) return excess;
     if (!shelved.volume) continue;
     bytes -= shelved.volume_bytes;
     excess.emplace_back().volume = std::exchange(shelved.volume, nullptr);
   }
   for (const std::uint32_t frame : frames) {
-    Shelved& shelved = shelf_[frame];
+    Shelved& shelved = cache_[frame];
     if (fits()) return excess;
     if (!shelved.built) continue;
     bytes -= shelved.grid_bytes;
@@ -304,28 +305,28 @@ std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
 
 // ---- on the worker thread ----
 
-void FrameShelf::work(Progress& progress) {
+void FrameCache::work(Progress& progress) {
   std::optional<Ends> ends;
   for (;;) {
     std::optional<Which> step;
     BuildSettings settings;
-    FrameFilesPtr to_judge;
+    FrameFilesPtr to_analyze;
     {
       const std::scoped_lock lock(mutex_);
-      if (!wish_ || cancelled_) return;
-      if (judging_ == Judging::due) {
-        to_judge = wish_->files;
+      if (!request_ || cancelled_) return;
+      if (analysis_ == Analysis::due) {
+        to_analyze = request_->files;
       } else if (const auto found = next()) {
-        step = Which{wish_->files, wish_->steps, *found};
-        settings = *wish_->settings;
+        step = Which{request_->files, request_->steps, *found};
+        settings = *request_->settings;
       } else {
         return;
       }
     }
     // Limits apply to each step separately: with a thread limit, other jobs run between two steps.
-    allowance_->run([&] {
-      if (to_judge) {
-        judge(to_judge, progress);
+    resource_limits_->run([&] {
+      if (to_analyze) {
+        analyze(to_analyze, progress);
       } else {
         build(*step, settings, ends, progress);
       }
@@ -334,7 +335,7 @@ void FrameShelf::work(Progress& progress) {
   }
 }
 
-Log FrameShelf::log_of(const std::string& path) {
+Log FrameCache::log_of(const std::string& path) {
   return Log([this, path](LogLevel level, const char* message) {
     std::string said(message);
     if (const auto at = said.find(path); at != std::string::npos) said.erase(at, path.size());
@@ -346,43 +347,44 @@ Log FrameShelf::log_of(const std::string& path) {
   });
 }
 
-void FrameShelf::say_failures(std::span<const Error> failures, bool another_is_shown) const {
+void FrameCache::say_failures(std::span<const Error> failures, bool another_is_shown) const {
   for (const Error& failure : failures) {
     const std::string cause = failure.what();
     log_.warning(another_is_shown ? cause + ": another frame of the sequence is shown instead" : cause);
   }
 }
 
-bool FrameShelf::fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure,
+bool FrameCache::fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure,
                       const Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
     progress.check();  // cancellation for a rebuild also happens under the lock
-    if (!is_wished(which)) return false;
-    (frame ? own(*frame) : shelf_[which.step]).failure = failure;
-    find_stand_ins();
+    if (!is_requested(which)) return false;
+    (frame ? own(*frame) : cache_[which.step]).failure = failure;
+    find_substitutes();
     ++revision_;
   }
   return true;
 }
 
-void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
-  Judged judged;
+void FrameCache::analyze(const FrameFilesPtr& files, Progress& progress) {
+  AnalyzedFrame analyzed;
   Steps steps;
   {
     const std::scoped_lock lock(mutex_);
-    if (!is_wished(files)) return;
-    steps = wish_->steps;
+    if (!is_requested(files)) return;
+    steps = request_->steps;
   }
-  const auto end = [&](Judging how) {
+  const auto end = [&](Analysis how) {
     const std::scoped_lock lock(mutex_);
-    if (!is_wished(files)) return;
-    if (how != Judging::due) progress.check();
-    judging_ = how;
-    if (how != Judging::done) return;
-    if (wish_->takes_suggested && files->shown.suggested_density_scale && judged.density_scale && wish_->settings)
-      wish_->settings->refine.density_scale = *judged.density_scale;
-    judged_ = judged;
+    if (!is_requested(files)) return;
+    if (how != Analysis::due) progress.check();
+    analysis_ = how;
+    if (how != Analysis::done) return;
+    if (request_->takes_suggested && files->shown.suggested_density_scale && analyzed.density_scale &&
+        request_->settings)
+      request_->settings->refine.density_scale = *analyzed.density_scale;
+    analyzed_ = analyzed;
     ++revision_;
   };
   std::vector<Error> failures;
@@ -396,11 +398,11 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
         const std::uint64_t bytes = volume->bytes();
         {
           const std::scoped_lock lock(mutex_);
-          if (!is_wished(files)) throw Error(ErrorCode::cancelled, "cancelled");
+          if (!is_requested(files)) throw Error(ErrorCode::cancelled, "cancelled");
           own(frame).volume = volume;
           own(frame).volume_bytes = bytes;
         }
-        if (!judged.facts || !volume->empty()) judged.facts = volume->facts();
+        if (!analyzed.volume_info || !volume->empty()) analyzed.volume_info = volume->volume_info();
         settle_temperature(*files, *volume);
         if (!volume->empty()) break;
       } catch (...) {
@@ -409,33 +411,34 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
         if (fail({files, steps, 0}, frame, failure, progress)) failures.push_back(failure);
       }
     }
-    if (judged.facts) judged.density_scale = judged.facts->coarse.suggest_density_scale();
+    if (analyzed.volume_info) analyzed.density_scale = analyzed.volume_info->coarse.suggest_density_scale();
   } catch (...) {
-    say_failures(failures, judged.facts != nullptr);
-    end(Judging::due);
+    say_failures(failures, analyzed.volume_info != nullptr);
+    end(Analysis::due);
     throw;
   }
   // Only now it is known whether another frame can be shown.
-  say_failures(failures, judged.facts != nullptr);
-  end(judged.facts ? Judging::done : Judging::in_vain);
+  say_failures(failures, analyzed.volume_info != nullptr);
+  end(analyzed.volume_info ? Analysis::done : Analysis::in_vain);
 }
 
-void FrameShelf::settle_temperature(const FrameFiles& files, const VolumeAsset& volume) {
+void FrameCache::settle_temperature(const FrameFiles& files, const VolumeAsset& volume) {
   const auto& temperature = volume.frame().temperature;
   if (!temperature || !(temperature->max_value > 0.0F)) return;
   const std::scoped_lock lock(mutex_);
-  if (wish_ && wish_->files.get() == &files && !temperature_scale_) temperature_scale_ = volume.temperature_scale();
+  if (request_ && request_->files.get() == &files && !temperature_scale_)
+    temperature_scale_ = volume.temperature_scale();
 }
 
-VolumeAssetPtr FrameShelf::read_frame(const Which& which, std::uint32_t frame, Progress& progress) {
+VolumeAssetPtr FrameCache::read_frame(const Which& which, std::uint32_t frame, Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
-    if (is_wished(which) && own(frame).volume) return own(frame).volume;
+    if (is_requested(which) && own(frame).volume) return own(frame).volume;
   }
   VolumeFile file = which.files->file(frame);
   {
     const std::scoped_lock lock(mutex_);
-    if (is_wished(which)) file.temperature_scale = temperature_scale_;
+    if (is_requested(which)) file.temperature_scale = temperature_scale_;
   }
   progress.begin(Progress::Stage::loading);
   VolumeAssetPtr volume = file.read(log_of(file.path.given()), &progress);
@@ -444,7 +447,7 @@ VolumeAssetPtr FrameShelf::read_frame(const Which& which, std::uint32_t frame, P
   std::vector<Shelved> old;
   const std::scoped_lock lock(mutex_);
   progress.check();
-  if (is_wished(which)) {
+  if (is_requested(which)) {
     own(frame).volume = volume;
     own(frame).volume_bytes = bytes;
     old = take_excess();
@@ -452,7 +455,7 @@ VolumeAssetPtr FrameShelf::read_frame(const Which& which, std::uint32_t frame, P
   return volume;
 }
 
-VolumeAssetPtr FrameShelf::read(const Which& which, std::optional<Ends>& ends, std::optional<std::uint32_t>& reading,
+VolumeAssetPtr FrameCache::read(const Which& which, std::optional<Ends>& ends, std::optional<std::uint32_t>& reading,
                                 Progress& progress) {
   const auto frame_there = [&](std::uint32_t frame) {
     reading = frame;
@@ -472,7 +475,7 @@ VolumeAssetPtr FrameShelf::read(const Which& which, std::optional<Ends>& ends, s
   reading.reset();
   {
     const std::scoped_lock lock(mutex_);
-    if (is_wished(which) && shelf_[which.step].volume) return shelf_[which.step].volume;
+    if (is_requested(which) && cache_[which.step].volume) return cache_[which.step].volume;
   }
   progress.begin(Progress::Stage::loading);
   const double part = which.steps.part(which.step);
@@ -490,7 +493,7 @@ VolumeAssetPtr FrameShelf::read(const Which& which, std::optional<Ends>& ends, s
   }
 }
 
-void FrameShelf::build(const Which& which, const BuildSettings& settings, std::optional<Ends>& ends,
+void FrameCache::build(const Which& which, const BuildSettings& settings, std::optional<Ends>& ends,
                        Progress& progress) {
   const std::string& path = which.files->paths[which.steps.frame(which.step)];
   const Trace::Span span(trace_, path);
@@ -501,7 +504,7 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, std::o
     Stopwatch watch;
     made.volume = read(which, ends, reading, progress);
     const double load_seconds = watch.lap();
-    made.built = build_grid(log_of(path), made.volume, settings, progress, *allowance_);
+    made.built = build_grid(log_of(path), made.volume, settings, progress, *resource_limits_);
     made.built->seconds.load = load_seconds;
     made.built->volume = nullptr;
     made.grid_bytes = made.built->source->bytes();
@@ -515,7 +518,7 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, std::o
   if (failure && !cancelled && fail(which, reading, *failure, progress)) {
     const bool another = [&] {
       const std::scoped_lock lock(mutex_);
-      return is_wished(which) && stand_ins_[which.step].has_value();
+      return is_requested(which) && substitutes_[which.step].has_value();
     }();
     say_failures({&*failure, 1}, another);
   }
@@ -523,8 +526,8 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, std::o
   {
     const std::scoped_lock lock(mutex_);
     if (!failure) progress.check();
-    if (!failure && is_wished(which)) {
-      old.push_back(std::exchange(shelf_[which.step], std::move(made)));
+    if (!failure && is_requested(which)) {
+      old.push_back(std::exchange(cache_[which.step], std::move(made)));
       ++revision_;
       std::ranges::move(take_excess(), std::back_inserter(old));
     }

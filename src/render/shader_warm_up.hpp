@@ -11,14 +11,14 @@ namespace cumulet::render {
 /// Shader warm-up: renders a picture of few pixels as frames do, and draws it invisibly. Afterwards each program that
 /// frames need has been used once, so that the driver has nothing left to compile. All calls need a current context and
 /// an active StateGuard.
-class Rehearsal {
+class ShaderWarmUp {
  public:
-  Rehearsal(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
+  ShaderWarmUp(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(gl), progressive_(gl, programs), compositor_(std::move(gl), std::move(programs)) {}
 
   /// Continues until about the deadline, but uses at least one program. draw: is called with each picture, and must
   /// call draw() for it. Returns whether all is done.
-  bool advance(PictureWish wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+  bool advance(PictureRequest request, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                const std::function<void(const Picture&)>& draw);
   /// True if something could not be drawn since begin() because a program was still compiling.
   [[nodiscard]] bool lags() const { return lags_; }

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "viewer/builder.hpp"
+#include "viewer/request_cache.hpp"
+
+namespace cumulet::viewer {
+
+struct GridRequest {
+  VolumeAssetPtr volume;
+  BuildSettings settings;
+  std::uint64_t gl_bytes = ResourceLimits::no_limit;  ///< its share of the GPU memory for volumes
+  bool operator==(const GridRequest&) const = default;
+};
+
+/// Asynchronous cache of the grids of several volumes.
+class GridCache : public RequestCache<GridRequest, Built> {
+ public:
+  GridCache(const Log& log, std::function<void()> notify, Trace trace = {},
+            ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
+      : RequestCache(
+            "building the grids of several volumes", Progress::Stage::refining,
+            [log](const Request& request, Progress& progress) {
+              ResourceLimits part;
+              part.set_gl(request.gl_bytes);
+              return build_grid(log, request.volume, request.settings, progress, part);
+            },
+            std::move(notify), trace, std::move(resource_limits)) {}
+};
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "viewer/request_cache.hpp"
+#include "viewer/surface_asset.hpp"
+
+namespace cumulet::viewer {
+
+struct PoseRequest {
+  SurfaceAssetPtr surfaces;
+  SurfaceChoice choice;
+  bool operator==(const PoseRequest&) const = default;
+};
+
+/// Asynchronous cache of the poses of several models.
+class PoseCache : public RequestCache<PoseRequest, scene::ModelSourcePtr> {
+ public:
+  explicit PoseCache(std::function<void()> notify, Trace trace = {},
+                     ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
+      : RequestCache(
+            "posing several models", Progress::Stage::loading,
+            [](const Request& request, Progress& progress) {
+              return request.surfaces->posed(request.choice, progress);
+            },
+            std::move(notify), trace, std::move(resource_limits)) {}
+};
+
+}  // namespace cumulet::viewer
