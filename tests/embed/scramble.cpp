@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -88,13 +89,17 @@ TEST_P(StateScramble, EveryCallRestoresTheState) {
   }
   converge(v, target.frame());
 
-  cumulet_frame_desc frame = target.frame();
-  for (const cumulet_color_encoding color :
-       {CUMULET_COLOR_SRGB, CUMULET_COLOR_SRGB_FRAMEBUFFER, CUMULET_COLOR_LINEAR, CUMULET_COLOR_HDR}) {
+  for (const auto& [color, format] : std::initializer_list<std::pair<cumulet_color_encoding, GLenum>>{
+           {CUMULET_COLOR_SRGB, GL_RGBA8},
+           {CUMULET_COLOR_SRGB_FRAMEBUFFER, GL_SRGB8_ALPHA8},
+           {CUMULET_COLOR_LINEAR, GL_RGBA16F},
+           {CUMULET_COLOR_HDR, GL_RGBA16F}}) {
+    const HostTarget encoded(*gl_, side, side, format);
+    cumulet_frame_desc frame = encoded.frame();
     frame.color = color;
-    render("colour " + std::to_string(color), frame);
+    render("color encoding " + std::to_string(color), frame);
   }
-  frame = target.frame();
+  cumulet_frame_desc frame = target.frame();
   frame.blend = CUMULET_BLEND_REPLACE;
   frame.flip_y = 1;
   render("replace, flipped", frame);
