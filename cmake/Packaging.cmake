@@ -94,8 +94,12 @@ file(RELATIVE_PATH pc_to_prefix ${CMAKE_INSTALL_PREFIX}/${pkgconfig_dir} ${CMAKE
 configure_file(${CMAKE_CURRENT_LIST_DIR}/cumulet.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
 
-# The README links to these files in the same folder.
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md DESTINATION ${doc_dir} COMPONENT programs)
+# These pages link to each other; tests/package/install_test.sh follows the links.
+set(pages)
+foreach(page LICENSE README.md CHANGELOG.md CONTRIBUTING.md)
+  list(APPEND pages ${PROJECT_SOURCE_DIR}/${page})
+endforeach()
+install(FILES ${pages} DESTINATION ${doc_dir} COMPONENT programs)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/third_party_notes DESTINATION ${doc_dir}
         COMPONENT programs PATTERN man EXCLUDE)
 

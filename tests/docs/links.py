@@ -1,6 +1,7 @@
 """Every internal link, heading anchor and path of a repository file in the documents leads to something.
 
-usage: links.py ROOT
+usage: links.py [--links-only] ROOT
+--links-only: without paths in code spans, for installed pages.
 """
 
 import os
@@ -17,7 +18,7 @@ FOLDERS = "cmake|demo|docs|glsl|scripts|src|tests|third_party_notes"
 PATH = re.compile(rf"(?:{FOLDERS})/[\w./*-]*")
 
 
-def check(root):
+def check(root, with_paths=True):
     """Problems, and the number of links and paths."""
     root = pathlib.Path(root)
     files = source_tree.files(root)
@@ -37,7 +38,7 @@ def check(root):
             elif anchor and anchor not in (known[path].anchors() if path in known else ()):
                 problems.append(f"{page.path}:{line}: link to '{target}': '{path}' has no such heading")
         for line, text in page.spans():
-            if not PATH.fullmatch(text):
+            if not with_paths or not PATH.fullmatch(text):
                 continue
             checked += 1
             path = text.rstrip("/")
@@ -47,6 +48,8 @@ def check(root):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    words = sys.argv[1:]
+    links_only = words[:1] == ["--links-only"]
+    if len(words) != 1 + links_only:
         sys.exit(__doc__)
-    report("links and paths", *check(sys.argv[1]))
+    report("links" if links_only else "links and paths", *check(words[-1], not links_only))
