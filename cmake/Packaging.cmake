@@ -1,5 +1,5 @@
 # `cmake --install` installs the library, its headers, a CMake package, a pkg-config file, the programs with their
-# manual pages, completions and desktop files, the documents and the licenses.
+# manual pages, completions and desktop files, the documents and the licenses, and the reference if it was built.
 # `cpack -G TGZ` adds every shared library that the programs need and packs one portable .tar.gz (bundle.cmake).
 # `cpack -G DEB` makes three Debian packages that depend on Debian's own libraries (debian.cmake). A host's package
 # depends on libcumulet0, which has none of the programs' dependencies (windowing). libcumulet-dev has the files for
@@ -94,10 +94,16 @@ file(RELATIVE_PATH pc_to_prefix ${CMAKE_INSTALL_PREFIX}/${pkgconfig_dir} ${CMAKE
 configure_file(${CMAKE_CURRENT_LIST_DIR}/cumulet.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
 
-# The README links to these files in the same folder.
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md DESTINATION ${doc_dir} COMPONENT programs)
+# These pages link to each other; tests/package/install_test.sh follows the links.
+set(pages)
+foreach(page LICENSE README.md CHANGELOG.md CONTRIBUTING.md)
+  list(APPEND pages ${PROJECT_SOURCE_DIR}/${page})
+endforeach()
+install(FILES ${pages} DESTINATION ${doc_dir} COMPONENT programs)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/third_party_notes DESTINATION ${doc_dir}
         COMPONENT programs PATTERN man EXCLUDE)
+
+include(Reference)
 
 # --- cpack -----------------------------------------------------------------------------------------------------
 if(PROJECT_IS_TOP_LEVEL)

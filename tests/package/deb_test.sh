@@ -31,7 +31,8 @@ for deb in "${debs[@]}"; do
   rm -r "$work/unpacked"
 done
 for file in usr/bin/cumulet-{render,merge,farm,demo,scene} usr/share/man/man1/cumulet-render.1.gz \
-  usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet}/copyright; do
+  usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet}/copyright \
+  usr/share/doc/cumulet/{README,CHANGELOG,CONTRIBUTING}.md; do
   [ -s "$root/$file" ] || fail "no package has $file"
 done
 apt-get --simulate --no-download --no-install-recommends install "${debs[@]}" >"$work/apt.log" 2>&1 ||

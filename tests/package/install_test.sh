@@ -29,10 +29,11 @@ while read -r file; do
   esac
 done < <(find "$tree" -type f \( -path '*/bin/*' -o -name '*.so*' \))
 
-# --- documents: each link of the README leads to an installed file ----------------------------------------------------
-while read -r link; do
-  [ -e "$share/doc/cumulet/$link" ] || fail "the README's $link is not installed"
-done < <(grep -oE '\bdocs/[a-z_]+\.[a-z]+' "$source/README.md" | sort -u)
+# --- documents: each link leads to an installed file or heading -------------------------------------------------------
+for page in README.md CHANGELOG.md CONTRIBUTING.md LICENSE docs/README.md; do
+  [ -s "$share/doc/cumulet/$page" ] || fail "$page is not installed"
+done
+python3 -B "$source/tests/docs/links.py" --links-only "$share/doc/cumulet" || fail "links of installed pages are broken"
 
 # --- manual pages and completions -------------------------------------------------------------------------------------
 complete_bash() { # PROGRAM WORD...: prints the completions of the last word

@@ -16,7 +16,7 @@ if grep -E '/lib(c|m|pthread|dl|rt|GL|GLX|EGL|OSMesa|X11|xcb|gbm|drm)(-[0-9.]+)?
 fi
 for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/LICENSE include/cumulet/cumulet.h \
   include/cumulet/cumulet.hpp include/cumulet/cumulet_descriptors.hpp include/cumulet/cumulet_openvdb.hpp \
-  share/doc/cumulet/docs/scene_file.md \
+  share/doc/cumulet/README.md share/doc/cumulet/CHANGELOG.md share/doc/cumulet/docs/scene_file.md \
   share/man/man1/cumulet-render.1 share/applications/cumulet-demo.desktop; do
   grep -q "/$wanted\$" "$work/list" || fail "the tarball lacks $wanted"
 done

@@ -1,0 +1,2 @@
+// Names of the reader's host in docs/howto/gl_state.md.
+#include "host.h"

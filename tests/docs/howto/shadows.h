@@ -1,0 +1,2 @@
+// Names of the reader's host in docs/howto/shadows.md.
+#include "host.h"
