@@ -54,7 +54,7 @@ ANY = "any"
 
 # Home-made words, as parts of identifiers in snake case. docs/glossary.md explains those that remain.
 WORDS = re.compile(
-    r"(?:^|_)(?:looks?_for|cm_look|flights?|facts?|wish(?:es)?|shel(?:f|ves)|allowance|obstacles?|rehears\w*|standings?|"
+    r"(?:^|_)(?:looks?_for|cm_look|(?<!in_)(?<!free_)flights?|facts?|wish(?:es)?|shel(?:f|ves)|allowance|obstacles?|rehears\w*|standings?|"
     r"stand_ins?|lamps?|glow|tend|owes|believed|recalled|closed_ranks|ranks_closed|there_and_back|judg\w*|hasty?e?|rich|"
     r"gloss|most_\w+|least_\w+|\w+_a_(?:brick|cell|frame|level|mesh|million|path|pixel|ray|second|step|vertex|volume|voxel)|"
     r"colour\w*|riddle|house)(?:_|$)")
