@@ -16,7 +16,7 @@ layout(binding = CM_UNIT_LAYER_COLOR) uniform sampler2DArray cm_layer_color;
 layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
 
 // The surface at which a camera ray ends: the layer's opaque surface, or, with their coverage as probability, the
-// blended ones in front of it, which count as one at the nearest. Returns its view depth. colour: radiance, with alpha
+// blended ones in front of it, which count as one at the nearest. Returns its view depth. color: radiance, with alpha
 // 1; alpha 0 if there is no surface.
 float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 color) {
   vec2 at = (vec2(pixel) + within) * vec2(cm.layers.size) / vec2(cm.view.size.xy);

@@ -7,8 +7,8 @@
 // as far as t with a probability equal to the transmittance, so a point sampled up to the ray's end needs no other
 // weight (as for emission: free_flight.glsl). NEE after a collision can find the same light, with pdf extinction x
 // transmittance x probability of picking these lights. The MIS weights depend only on the line, the point and the
-// light, without the transmittance, which both pdfs contain. An equi-angular sample has weight cm_equiangular_weight, NEE
-// after a collision has the rest.
+// light, without the transmittance, which both pdfs contain. An equi-angular sample has weight cm_equiangular_weight,
+// NEE after a collision has the rest.
 #ifndef CM_EQUIANGULAR_GLSL
 #define CM_EQUIANGULAR_GLSL
 

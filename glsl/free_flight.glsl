@@ -20,7 +20,7 @@
 //
 // With CM_INSTANCES the ray traverses the volumes one by one, in the order in which it enters their boxes, up to t_end.
 // Extinctions add where volumes overlap, so the nearest of their independent free-flight distances is distributed as
-// that of their sum. Free flights are memoryless, so the depth left after one volume continues in the next. A new depth
+// that of their sum. Free-flight sampling is memoryless, so the depth left after one volume continues in the next. A new depth
 // is drawn only after a collision, which becomes the new end of the ray. A shadow ray uses up one depth through all
 // volumes.
 #ifndef CM_FREE_FLIGHT_GLSL

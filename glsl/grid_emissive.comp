@@ -1,5 +1,6 @@
 #version 450
-// Lists the emissive cells of a grid, in no order. The CPU makes a table of lights from them (src/scene/emissive_cells.hpp).
+// Lists the emissive cells of a grid, in no order. The CPU makes a light table from them
+// (src/scene/emissive_cells.hpp).
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"

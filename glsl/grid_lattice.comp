@@ -25,7 +25,7 @@ layout(location = 1) uniform uint cm_end;
 layout(std430, binding = CM_STORAGE_GRID_NODES) readonly buffer CmNodes { uint cm_nodes[]; };    // three words per node
 layout(std430, binding = CM_STORAGE_GRID_LEVELS) readonly buffer CmLevels { uint cm_levels[]; };  // one byte per node
 layout(std430, binding = CM_STORAGE_GRID_OWN) readonly buffer CmOwn { uint cm_own[]; };           // two per word
-layout(std140, binding = CM_UNIFORM_BRICK_POINTS) uniform CmPoints { uvec4 cm_points[(CM_BRICK_POINTS + 3u) / 4u]; };     // four per uvec4
+layout(std140, binding = CM_UNIFORM_BRICK_POINTS) uniform CmPoints { uvec4 cm_points[(CM_BRICK_POINTS + 3u) / 4u]; };  // four per uvec4
 const uint cm_points_of_levels[10] = uint[10](CM_POINTS_OF_LEVELS);
 
 void main() {

@@ -16,18 +16,18 @@
 
 #include "luminance.glsl"
 
-#define CM_LIGHT_SKY 0u       // uniform; sampled in the direction of a scattered ray
-#define CM_LIGHT_SUN 1u       // distant: a disk, or without extent
-#define CM_LIGHT_TRIANGLE 2u  // emissive triangles
-#define CM_LIGHT_ANALYTIC_LIGHT 3u      // lights of punctual.glsl
-#define CM_LIGHT_EMISSIVE 4u      // emission of the medium: rays scattered at surfaces are aimed at its bounds
-#define CM_LIGHT_OTHER 5u     // kinds of CM_MORE_LIGHTS
-#define CM_LIGHT_ENVIRONMENT 6u  // environment map, instead of the sky
-#define CM_LIGHT_CELL 7u  // emissive cells
+#define CM_LIGHT_SKY 0u             // uniform; sampled in the direction of a scattered ray
+#define CM_LIGHT_SUN 1u             // distant: a disk, or without extent
+#define CM_LIGHT_TRIANGLE 2u        // emissive triangles
+#define CM_LIGHT_ANALYTIC_LIGHT 3u  // analytic lights (punctual.glsl)
+#define CM_LIGHT_EMISSIVE 4u        // emission of the medium: rays scattered at surfaces are aimed at its bounds
+#define CM_LIGHT_OTHER 5u           // kinds of CM_MORE_LIGHTS
+#define CM_LIGHT_ENVIRONMENT 6u     // environment map, instead of the sky
+#define CM_LIGHT_CELL 7u            // emissive cells
 
 #if CM_GROUPS
-uint cm_nee_group = 0u;           // group of the light, triangle or cell that was picked last
-uint cm_group_lane = 0u;           // glsl/groups.glsl
+uint cm_nee_group = 0u;   // group of the light, triangle or cell that was picked last
+uint cm_group_lane = 0u;  // glsl/groups.glsl
 void cm_add_to_group(uint group, vec3 radiance);
 
 // Light group of a light of that kind. For kinds with a group per light, it is the group of the light that NEE picked
@@ -45,18 +45,18 @@ struct CmLightSample {
   vec3 radiance;   // arriving radiance; for kinds without extent an irradiance
   vec3 direction;  // world, unit
   float distance;  // 3e38: distant
-  float pdf;   // solid-angle pdf; without extent, the selection probability
+  float pdf;       // solid-angle pdf; without extent, the selection probability
 };
 
 // The light that a ray reaches.
 struct CmLightHit {
   uint kind;
-  vec3 o;         // cube space: origin of the ray
-  vec3 w;         // world, unit: its direction
-  float scattering_pdf;   // solid-angle pdf of the scattered ray's direction
-  uint triangle;  // triangle that was hit
-  vec3 point;     // world: point on that triangle
-  vec3 normal;    // world, unit: normal of that triangle
+  vec3 o;                // cube space: origin of the ray
+  vec3 w;                // world, unit: its direction
+  float scattering_pdf;  // solid-angle pdf of the scattered ray's direction
+  uint triangle;         // triangle that was hit
+  vec3 point;            // world: point on that triangle
+  vec3 normal;           // world, unit: normal of that triangle
 };
 
 CM_FN CmLightHit cm_light_hit(uint kind, vec3 o, vec3 w, float scattering_pdf) {
@@ -130,8 +130,8 @@ CM_FN CmLightSample cm_sun_sample(vec3 u) {
 // NEE picks an emissive cell by its power and samples a point in it; scattered rays accumulate the emission of all
 // cells that they cross. Both are combined by the balance heuristic. For scattered rays the pdf is that of their
 // direction. For NEE it is the cell's volume pdf times a lower bound of the squared distance. The latter depends only
-// on the cell and on the ray's origin, not on the sampled point. CmEmissive.extent, a length, converts the volume pdf to a
-// solid-angle pdf.
+// on the cell and on the ray's origin, not on the sampled point. CmEmissive.extent, a length, converts the volume pdf
+// to a solid-angle pdf.
 
 CM_FN float cm_emissive_pdf_of(vec3 mean, float distance) {
   float least = distance * CM_EMISSIVE.min_stretch;
@@ -196,7 +196,7 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #if CM_ANALYTIC_LIGHTS
 
-// ---- Punctual and area lights; no scattered ray hits them. The includer provides CmAnalyticLight cm_analytic_light(uint i)
+// ---- Analytic lights; no scattered ray hits them. The includer provides CmAnalyticLight cm_analytic_light(uint i)
 
 #include "punctual.glsl"
 
@@ -410,8 +410,8 @@ CM_FN float cm_nee_even_probability(CmPath p) {
 }
 
 // Probability of tracing the shadow ray of a light sample. In media, samples with a small expected contribution are
-// skipped by Russian roulette; tests/bench/README.md has measurements. density: pdf of the light sample, including the
-// probability of its kind. flight: pdf of the same direction by the phase function.
+// skipped by Russian roulette; tests/bench/README.md has measurements. pdf: that of the light sample, including the
+// probability of its kind. scattering_pdf: pdf of the same direction by the phase function.
 CM_FN float cm_nee_probability(CmPath p, uint kind, float scattering_pdf, float pdf) {
   if (p.start != CM_IN_MEDIUM) return 1.0f;
   if (kind == CM_LIGHT_SKY) return cm_nee_even_probability(p);

@@ -107,7 +107,7 @@ CM_BLOCK(CmGrid) {
   uint first_cell;        // first record in its page, or, with several pages, in all of them together
   uint tree;              // first word of the point-location tree in its page, in 4-byte words; its roots are before it
   uint first_emission;    // first emission record in its page
-  uint first_color;      // first color record, in 4-byte words
+  uint first_color;       // first color record, in 4-byte words
   uint first_anisotropy;  // first record of scattering's mean cosine, in 4-byte words
   float emission_unit;    // radiance per world unit of length of the stored value 1 of voxels
   uint first_glowing;     // first entry of the table of emissive cells in the page of their channels
@@ -120,13 +120,13 @@ CM_BLOCK(CmGrid) {
 
 // NEE of a volume's emissive cells, depending on the instance transform. Written by scene::emissive_of.
 CM_BLOCK(CmEmissive) {
-  float density;        // volume pdf over a cell's luminance: 1 / power of all cells
-  float extent;         // world: approximate length of a ray among the brightest cells
+  float density;      // volume pdf over a cell's luminance: 1 / power of all cells
+  float extent;       // world: approximate length of a ray among the brightest cells
   float min_stretch;  // world: minimum length of a vector that has length 1 in cube space
   CM_EQUALITY(CmEmissive)
 };
 
-// The participating medium. With several, emits, coloured and anisotropic are 1 if they are 1 for any. Written by
+// The participating medium. With several, emits, colored and anisotropic are 1 if they are 1 for any. Written by
 // render::GpuScene.
 CM_BLOCK(CmMedium) {
   CM_ALIGN(16) vec3 albedo;  // single-scattering albedo
@@ -136,8 +136,8 @@ CM_BLOCK(CmMedium) {
   float second_anisotropy;
   float second_bend;
   float second_share;
-  uint emits;     // 1: its cells emit light; this and the next two only with CM_CHANNELS
-  uint colored;  // 1: cells have a scattering color
+  uint emits;        // 1: its cells emit light; this and the next two only with CM_CHANNELS
+  uint colored;      // 1: cells have a scattering color
   uint anisotropic;  // 1: cells have an anisotropy, which replaces the one above
   uint group;        // light group of its emission; only with CM_GROUPS
   uint holdout;      // 1: holdout; only with CM_HOLDOUT
@@ -153,9 +153,9 @@ CM_BLOCK(CmLights) {
   float sky_chance;
   CM_ALIGN(16) vec3 sky_radiance;  // for an environment map its mean, which lights the surfaces of previews
   float triangle_chance;
-  float analytic_light_chance;  // of all lights of punctual.glsl together; the sun has the rest
-  float emissive_chance;  // probability that a ray from a surface is aimed at the medium's emission
-  float cell_chance;  // of emissive cells
+  float analytic_light_chance;  // of all analytic lights together; the sun has the rest
+  float emissive_chance;        // probability that a ray from a surface is aimed at the medium's emission
+  float cell_chance;            // of emissive cells
   float environment_chance;
   float environment_strength;        // factor on the environment map's radiance
   CM_ALIGN(8) vec2 environment_turn;  // cosine and sine of its rotation
@@ -171,12 +171,12 @@ CM_BLOCK(CmSurfaceTables) {
   CM_ALIGN(16) vec3 high;
   uint ggx_albedo;  // word index of the table of src/surface/ggx_albedo.hpp
   uint ggx_albedo_averages;
-  uint sheen_albedo;  // word index of the table of src/surface/sheen_albedo.hpp
+  uint sheen_albedo;   // word index of the table of src/surface/sheen_albedo.hpp
   uint extended_bsdf;  // 1: some materials need CM_EXTENDED_BSDF, and paths keep CM_PATH_WITHIN
   CM_EQUALITY(CmSurfaceTables)
 };
 
-// Lights of the scene and the host (glsl/punctual.glsl). Written by render::AnalyticLightData, through Tracer.
+// Analytic lights of the scene and the host (glsl/punctual.glsl). Written by render::AnalyticLightData, through Tracer.
 CM_BLOCK(CmAnalyticLights) {
   uint count;  // number of lights for NEE
   CM_EQUALITY(CmAnalyticLights)
@@ -203,7 +203,7 @@ CM_BLOCK(CmLayers) {
   uint count;              // 0: none
   uint blended;            // 1: blended surfaces have their own layers after the others
   CM_ALIGN(8) uvec2 size;  // pixels
-  uint colored;           // 1: paths that end at it get its color
+  uint colored;            // 1: paths that end at it get its color
   CM_EQUALITY(CmLayers)
 };
 

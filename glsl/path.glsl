@@ -4,14 +4,14 @@
 //   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface in that pixel
 //
 // The stages are functions. This file has cm_camera, cm_handle (which calls cm_end_ray, cm_nee and cm_scatter) and
-// cm_finish. glsl/path_vertex.glsl has cm_meet and the code that differs with triangles. glsl/free_flight.glsl has cm_aim
-// and cm_fly, which traverse the grid. Either one megakernel runs all stages (glsl/trace.comp), or a wavefront of
-// kernels runs one stage each over a queue of paths (glsl/path_queue.glsl).
+// cm_finish. glsl/path_vertex.glsl has cm_meet and the code that differs with triangles. glsl/free_flight.glsl has
+// cm_aim and cm_fly, which traverse the grid. Either one megakernel runs all stages (glsl/trace.comp), or a wavefront
+// of kernels runs one stage each over a queue of paths (glsl/path_queue.glsl).
 //
 // CM_SURFACES 1: rays also end and scatter at triangles; the includer has surface.glsl before this file. CM_SURFACES 2:
 // next-event estimation (NEE) also samples emissive triangles. CM_LAYERS 1 (implied by CM_SURFACES): camera rays may
 // end at the surface pass instead. The includer then provides
-//   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour)   its view depth
+//   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 color)   its view depth
 // CM_AOVS 1: samples whose camera ray scattered in the volume are also summed separately.
 #ifndef CM_PATH_GLSL
 #define CM_PATH_GLSL

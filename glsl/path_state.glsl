@@ -54,7 +54,7 @@
 //   throughput      of the path
 //   light           radiance that an unblocked ray adds. Shadow ray: the light's. Camera ray: the layer's color or the
 //                   background
-//   density         pdf. Scattered ray: solid-angle pdf of its direction. Shadow ray to a distant light: scattering pdf
+//   pdf             Scattered ray: solid-angle pdf of its direction. Shadow ray to a distant light: scattering pdf
 //                   over light pdf, for MIS. Other shadow rays: 0
 //   random, stream  state of the random generator; its stream, which belongs to the pixel
 // CM_PATH_ENDS, the two ends of the ray:

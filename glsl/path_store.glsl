@@ -10,13 +10,13 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;  // x: full rounds of traversal, or visits of trace_travel.comp; y, z: bits of the tile's changed
                    // bands of rows; w: number of samples whose radiance was not finite
-  uvec4 cm_blocks[CM_MAX_BLOCKS];    // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
-                                      // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
-                                      // dispatch
-  uint cm_next_place;                 // first unused pixel slot
-  uint cm_squares[CM_MAX_SQUARES];   // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
+  uvec4 cm_blocks[CM_MAX_BLOCKS];   // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
+                                    // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
+                                    // dispatch
+  uint cm_next_place;               // first unused pixel slot
+  uint cm_squares[CM_MAX_SQUARES];  // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
   uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];  // per list and block: number of lanes with a path
-  uint cm_active_paths[];                    // per list: lanes of all blocks; in each block the active lanes come first
+  uint cm_active_paths[];  // per list: lanes of all blocks; in each block the active lanes come first
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);

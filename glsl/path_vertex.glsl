@@ -43,11 +43,11 @@ CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool to_light) {
 
 // Scattering of light at a vertex along a direction: value, pdf and weight of the BSDF or phase function.
 struct CmScatterSample {
-  vec3 share;          // value: the phase function, or the BSDF times the cosine
+  vec3 share;      // value: the phase function, or the BSDF times the cosine
   float pdf;       // solid-angle pdf with which scattered rays take the direction
   float lobe_pdf;  // the same, only of the lobes
-  vec3 weight;         // share / density
-  bool lifted;         // the ray's origin is above its triangle (cm_lift)
+  vec3 weight;     // share / pdf
+  bool lifted;     // the ray's origin is above its triangle (cm_lift)
 #if CM_EXTENDED_BSDF
   bool through;        // the ray's origin is behind its triangle
   bool disperses;      // the path has a single wavelength from here on
@@ -113,8 +113,8 @@ struct CmVertex {
   bool on_triangle;
   CmSurfacePoint surface;  // valid only if on_triangle
 #if CM_EXTENDED_BSDF
-  uint bounds;   // first word of the material whose volume the triangle bounds, plus one; 0: none
-  bool leaves;   // the path comes from inside
+  uint bounds;  // first word of the material whose volume the triangle bounds, plus one; 0: none
+  bool leaves;  // the path comes from inside
   vec3 color;   // color of the path's wavelength if it is chosen at this vertex; else white
   bool disperses;
 #endif

@@ -1,6 +1,6 @@
 // Environment map prefiltered by GGX lobes, for rasterized surfaces: images over direction for a few roughnesses.
-// src/light/gloss.cpp makes them, and shaders look them up in the lobe's dominant direction (Karis, "Real Shading in
-// Unreal Engine 4", SIGGRAPH 2013 courses). Shared by GLSL and C++.
+// src/light/prefiltered_environment.cpp makes them. Shaders look them up in the lobe's dominant direction (Karis, "Real
+// Shading in Unreal Engine 4", SIGGRAPH 2013 courses). Shared by GLSL and C++.
 #ifndef CM_PREFILTERED_GLSL
 #define CM_PREFILTERED_GLSL
 

@@ -1,4 +1,4 @@
-// Punctual and area lights: those of KHR_lights_punctual and of the host. Shared by GLSL and C++.
+// Analytic lights (punctual and area lights): those of KHR_lights_punctual and of the host. Shared by GLSL and C++.
 #ifndef CM_PUNCTUAL_GLSL
 #define CM_PUNCTUAL_GLSL
 

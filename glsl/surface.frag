@@ -35,7 +35,8 @@ layout(location = 5) in float cm_z;
 
 layout(binding = CM_UNIT_PREFILTERED) uniform sampler2DArray cm_prefiltered;  // of light/prefiltered_environment.hpp
 layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
-layout(std430, binding = CM_STORAGE_ANALYTIC_LIGHTS) readonly buffer CmAnalyticLightRecords { CmAnalyticLight cm_analytic_lights[]; };  // relative to the eye
+// Relative to the eye.
+layout(std430, binding = CM_STORAGE_ANALYTIC_LIGHTS) readonly buffer CmAnalyticLightRecords { CmAnalyticLight cm_analytic_lights[]; };
 
 layout(location = 0) out vec4 cm_color;
 layout(location = 1) out float cm_depth_z;

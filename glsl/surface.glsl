@@ -405,8 +405,8 @@ CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent
 
 #endif
 
-// Shading data of the point of a triangle that a path along w (world) has hit, on its back or front. With CM_EXTENDED_BSDF a
-// volume boundary is assumed to be in air; cm_bound (path_vertex.glsl) corrects that.
+// Shading data of the point of a triangle that a path along w (world) has hit, on its back or front. With
+// CM_EXTENDED_BSDF a volume boundary is assumed to be in air; cm_bound (path_vertex.glsl) corrects that.
 CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
   uint model = cm_model_of(triangle);

@@ -1,5 +1,6 @@
 // Deterministic traversal of a ray through the volume, or through all volumes together, segment by segment. Extinction
-// is linear in each segment. Used for feature rays and transmittance; paths traverse volumes one by one (free_flight.glsl).
+// is linear in each segment. Used for feature rays and transmittance; paths traverse volumes one by one
+// (free_flight.glsl).
 // The includer has march.glsl and ray.glsl before this.
 #ifndef CM_WALK_GLSL
 #define CM_WALK_GLSL

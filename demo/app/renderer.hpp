@@ -38,7 +38,7 @@ class Renderer {
   /// Cancels running work and stops the thread.
   ~Renderer();
 
-  /// Sends a request. Only the latest `wish` is processed; inputs and requests are all processed, in order.
+  /// Sends a request. Only the latest `desired` is processed; all inputs and requests are processed, in order.
   void ask(DesiredState desired, std::vector<ViewerInput> inputs, std::vector<Request> requests);
   /// Returns the answer since the last call, and switches to its image. Rethrows the error that ended the thread.
   [[nodiscard]] std::optional<Answer> take();

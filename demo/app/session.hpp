@@ -27,7 +27,7 @@ struct ViewerInput {
   int key = 0;
 };
 
-/// A one-time request, in addition to the state in Wish.
+/// A one-time request, in addition to DesiredState.
 struct Request {
   enum class Type { frame_all, save_png, save_exr, forget_saves, suggest_density, pick };
   Type type = Type::frame_all;

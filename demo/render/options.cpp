@@ -307,7 +307,7 @@ cumulet_lamp_desc parse_analytic_light(std::string_view text) {
   return analytic_light;
 }
 
-/// Adds --lamp: lights in addition to those of a scene file. "none" removes all lights before it.
+/// Adds --lamp: analytic lights in addition to those of a scene file. "none" removes the lights given before it.
 void add_analytic_lights(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>& analytic_lights) {
   const auto take = [&analytic_lights](const std::vector<std::string>& texts) {
     try {

@@ -18,7 +18,7 @@ struct Pictures {
   GLuint color = 0;     ///< rgba: radiance, linear Rec. 709, any exposure; alpha is passed through
   GLuint albedo = 0;    ///< rgb, 0 to 1; only for networks with nine inputs
   GLuint normal = 0;    ///< xyz, -1 to 1; only for networks with nine inputs
-  GLuint denoised = 0;  ///< GL_RGBA32F, written: denoised rgb and the alpha of `colour`
+  GLuint denoised = 0;  ///< GL_RGBA32F, written: denoised rgb and the alpha of `color`
 };
 
 /// Runs a network of Open Image Denoise in compute shaders: values are stored as halves and summed as floats. A

@@ -1,7 +1,7 @@
 #pragma once
 
-// Lights of glTF files and of the host, and glsl/punctual.glsl as C++. The raster pass and the path tracer use the same
-// records.
+// Analytic lights (point, spot, disk, rectangle, distant) of glTF files and of the host, and glsl/punctual.glsl as C++.
+// The raster pass and the path tracer use the same records.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -19,7 +19,7 @@ namespace cumulet::core {
 
 namespace cumulet::light {
 
-/// A light of the host. Colors are linear Rec. 709.
+/// An analytic light of the host. Colors are linear Rec. 709.
 struct AnalyticLight {
   enum class Kind : std::uint8_t { point, spot, disc, rectangle, sun };
   Kind kind = Kind::point;

@@ -39,8 +39,8 @@ class LightTable {
   /// All lights of a kind.
   struct Entry {
     Kind kind = Kind::sky;
-    /// Probability of sampling this kind at a vertex. Probabilities sum to 1 unless there is no light. For Kind::glow:
-    /// the fraction of rays scattered at surfaces that is aimed at the medium.
+    /// Probability of sampling this kind at a vertex. Probabilities sum to 1 unless there is no light. For
+    /// Kind::emissive: the fraction of rays scattered at surfaces that is aimed at the medium.
     float chance = 0.0F;
   };
 

@@ -9,7 +9,7 @@
 
 namespace cumulet::render {
 
-/// The lights that paths sample by NEE, on the GPU. All calls need a current context and an active StateGuard.
+/// The analytic lights that paths sample by NEE, on the GPU. All calls need a current context and an active StateGuard.
 class AnalyticLightData {
  public:
   /// groups: light groups of the scene's lights. lit: bounds of the objects that the lights may light. Throws

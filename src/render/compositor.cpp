@@ -248,7 +248,7 @@ const gl::Program* Compositor::color_program(const Kind& kind, const Display& di
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
                                    kind.encoding == ColorEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   if (kind.layered) defines.emplace_back("CM_LAYERS 1");
-  const bool serves = color_ != nullptr && color_kind_ == kind;  // colour_ can be used meanwhile
+  const bool serves = color_ != nullptr && color_kind_ == kind;  // color_ can be used meanwhile
   const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
   if (wanted.usable()) {
     color_ = &wanted;

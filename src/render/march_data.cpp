@@ -103,7 +103,7 @@ static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
 // Byte sizes and offsets of the channels of a grid's cells.
 struct ChannelBytes {
-  // cells, glowing: counts for grids with a plan.
+  // cells, glowing: numbers of cells and of emissive cells, for grids with a plan.
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing)
       : emissive(glowing * sizeof(scene::GlowingCell)) {
     using grid::Channel;

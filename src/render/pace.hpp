@@ -165,7 +165,7 @@ class InFlightDispatches {
   void give_up();
   /// Returns the oldest dispatch if it is finished. Never waits.
   std::optional<Completed> take_completed();
-  /// Waits until all are finished; land() returns them.
+  /// Waits until all are finished; take_completed() returns them.
   void finish() const;
   /// Makes later commands of this context run after the dispatches, whichever context sent them.
   void order() const;

@@ -17,7 +17,8 @@ struct PassSeconds {
   double display = 0.0;
 };
 
-/// Times passes on the GPU as Flights times dispatches, without waiting. A pass is not timed if too many are in flight.
+/// Times passes on the GPU without waiting, as InFlightDispatches times dispatches. A pass is not timed if too many are
+/// in flight.
 class PassTimer {
  public:
   explicit PassTimer(gl::FunctionsPtr gl) : dispatches_in_flight_(std::move(gl)) {}

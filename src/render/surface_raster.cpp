@@ -447,7 +447,7 @@ void SurfaceRaster::upload_prefiltered(const light::PrefilteredEnvironmentPtr& p
   if (!prefiltered_)
     prefiltered_ =
         gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
-  // Without gloss the shader does not read it.
+  // Without a prefiltered environment the shader does not read it.
   if (!prefiltered || uploaded_prefiltered_ == prefiltered) return;
   gl_->TextureSubImage3D(prefiltered_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT,
                          prefiltered->data());

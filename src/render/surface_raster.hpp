@@ -18,7 +18,7 @@ namespace cumulet::render {
 
 using SurfaceView = scene::Viewpoint;
 
-/// Lights of the surface pass in addition to those of the pose. Disc and rectangle lights emit from their center.
+/// Lights of the surface pass in addition to those of the pose. Disk and rectangle lights emit from their center.
 struct SurfaceLighting {
   glm::vec3 sun_direction{0.0F, 1.0F, 0.0F};  ///< unit, towards the sun
   glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
@@ -26,7 +26,7 @@ struct SurfaceLighting {
   light::Harmonics sky{};                     ///< difference to the mean, before rotation
   light::PrefilteredEnvironmentPtr
       prefiltered;                    ///< environment prefiltered for glossy reflection, before rotation; null: none
-  float prefiltered_strength = 1.0F;  ///< factor on gloss
+  float prefiltered_strength = 1.0F;  ///< factor on its radiance
   glm::vec2 sky_turn{1.0F, 0.0F};     ///< rotation, as light::turn_of()
   light::AnalyticLights analytic_lights;
   bool operator==(const SurfaceLighting&) const = default;
@@ -191,7 +191,7 @@ class SurfaceRaster {
   gl::Object albedo_table_;
   gl::Object table_sampler_;
   gl::Object prefiltered_;
-  light::PrefilteredEnvironmentPtr uploaded_prefiltered_;  // null: gloss_ has no content
+  light::PrefilteredEnvironmentPtr uploaded_prefiltered_;  // null: prefiltered_ has no content
   gl::Object prefiltered_sampler_;
   gl::Object view_block_;
   gl::Object light_buffer_;

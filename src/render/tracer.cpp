@@ -251,7 +251,7 @@ void Picture::end_tile() {
   const bool all_begun = has_lanes_for_all();
   if (all_begun && empty <= rest) complete_ = true;
   holes_ = all_begun ? empty > 0 : previews_first_ && pass_ < 2;
-  // With PictureSettings::hasty, the first pass leaves its last few pixels to the second.
+  // With PictureSettings::previews_first, the first pass leaves its last few pixels to the second.
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
   if (measures()) {
@@ -967,7 +967,7 @@ bool Tracer::find_features(Picture& picture, const MarchData& data, const TraceI
     picture.feature_row_ = picture.feature_rays_ = 0;
   }
   if (picture.feature_rays_ >= rays && picture.film_.has(normal)) return true;
-  // Motion vectors need Obstacles::motion. Without it only guides are refined.
+  // Motion vectors need TraceInputs::motion. Without it only guides are refined.
   const FeatureSet found = trace_inputs.motion != nullptr ? picture.features_ : FeatureSet::guides;
   std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
   if (found == FeatureSet::all) written.insert(written.end(), {velocity, motion});

@@ -146,7 +146,7 @@ class Picture {
   /// Samples per pixel to reach.
   [[nodiscard]] std::uint32_t target_samples() const { return target_samples_; }
   [[nodiscard]] View view() const { return view_; }
-  /// True if every pixel has a sample; with PictureSettings::hasty, nearly every pixel.
+  /// True if every pixel has a sample; with PictureSettings::previews_first, nearly every pixel.
   [[nodiscard]] bool complete() const { return complete_; }
   /// True if every pixel has its target samples, or the noise has reached its target.
   [[nodiscard]] bool done() const { return done_; }
@@ -329,18 +329,18 @@ class Tracer {
   /// Reads the standard error of each pixel's luminance, background included; infinity for pixels with fewer than two
   /// samples.
   void read_error(const Picture& picture, float* errors) const;
-  /// Renders the feature buffers of a picture until about the deadline. data, obstacles: those that the picture was
+  /// Renders the feature buffers of a picture until about the deadline. data, trace_inputs: those that the picture was
   /// started with. rays: minimum rays per pixel; beyond feature_rays it applies only to pixels whose rays differ.
   /// Returns whether they are ready. The next call continues.
   bool find_features(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                      std::uint32_t rays, FeatureSet features = FeatureSet::guides);
   /// Like able(), for find_features() of guides.
   bool able_to_find(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs);
-  /// Reads a feature buffer, channels_of(fact) floats per pixel, after find_features() has rendered it.
+  /// Reads a feature buffer, channels_of(feature) floats per pixel, after find_features() has rendered it.
   void read_feature(const Picture& picture, FeatureBuffer feature, float* values) const;
   /// Renders and reads Cryptomatte (glsl/cryptomatte.comp): width * height * ranks pairs of floats, sorted by
   /// descending coverage. A pair is an ID as a float's bits and its coverage of the pixel. ranks: 1 to
-  /// max_matte_ranks. data, obstacles: those that the picture was started with.
+  /// max_matte_ranks. data, trace_inputs: those that the picture was started with.
   void read_mattes(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, const MatteIds& ids,
                    std::uint32_t ranks, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
@@ -458,7 +458,7 @@ class Tracer {
   gl::Object uniforms_;
   gl::Object pick_;        // depth of a pick...
   gl::Object pick_place_;  // ...and the object that it hit
-  gl::Object motion_;      // Obstacles::motion, for the feature pass in progress
+  gl::Object motion_;      // TraceInputs::motion, for the feature pass in progress
   gl::Object errors_;      // errors of a tile
   InFlightDispatches dispatches_in_flight_;
   InFlightDispatches rasters_;

@@ -69,7 +69,7 @@ struct StateInGl {
   [[nodiscard]] std::vector<const volume::DeviceBricks*> all() const;
   /// Whether any of them was lost with its context.
   [[nodiscard]] bool gone() const;
-  /// Whether it may emit with these settings, judged by the fields.
+  /// Whether it may emit with these settings, according to its fields.
   [[nodiscard]] bool emits(const Emission& settings) const;
   /// Returns the volume fields; their voxels are not in main memory. For signed fields, only the magnitude is present.
   [[nodiscard]] volume::VolumeFrame frame() const;

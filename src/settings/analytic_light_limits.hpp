@@ -1,6 +1,6 @@
 #pragma once
 
-// Limits of lights (cumulet_set_lamps) beyond the range of each single setting.
+// Limits of analytic lights (cumulet_set_lamps) beyond the range of each single setting.
 
 #include <cumulet/cumulet.h>
 

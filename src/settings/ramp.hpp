@@ -24,7 +24,7 @@ using RampPoints = std::vector<RampPoint>;
 /// Returns the points in the form that cumulet_set_ramp takes.
 inline const float* numbers_of(const RampPoints& points) { return points.empty() ? nullptr : points.front().data(); }
 
-/// The names and texts of a ramp; fields as in Facts.
+/// The names and texts of a ramp; fields as in SettingInfo.
 struct RampInfo {
   const char* name;
   const char* key;

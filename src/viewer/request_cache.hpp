@@ -38,7 +38,7 @@ class RequestCache {
   /// Returns the value of a request; nullopt if it is not made yet or failed. O(requests).
   [[nodiscard]] std::optional<Made> built(const Request& request) const;
   [[nodiscard]] bool is_under_way(const Request& request) const;
-  /// Failed requests are retried with the next call of wish().
+  /// Failed requests are retried with the next call of request().
   void forget_failures();
   /// Changes after each value that was made.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }

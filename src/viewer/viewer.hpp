@@ -425,7 +425,7 @@ class Viewer {
     InstanceSettings settings;
     scene::Part<scene::Medium> medium;
     std::optional<GridCache::Request> request;
-    std::optional<GridCache::Request> begun;  // the last request before `wish` that was being built
+    std::optional<GridCache::Request> begun;  // the last request before `request` that was being built
     std::optional<Built> built;               // the newest
     PlayedPtr played;                         // its sequence; null: none
     WatchingPtr watching;                     // its dynamic volume; null: none
@@ -462,7 +462,7 @@ class Viewer {
     std::uint64_t revision = 0;
     ModelSettings settings;
     std::optional<PoseCache::Request> request;
-    std::optional<PoseCache::Request> begun;  // the last request before `wish` that was being posed
+    std::optional<PoseCache::Request> begun;  // the last request before `request` that was being posed
     scene::ModelSourcePtr source;             // the newest; null: none yet
     scene::ModelSourcePtr previous_source;    // one frame ago; null: same as `source`
     [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }

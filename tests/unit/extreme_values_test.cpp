@@ -52,7 +52,7 @@ ScalarVolume times(ScalarVolume volume, double factor) {
   return volume;
 }
 
-// Noise multiplied by `factor`. coloured: with moving colors and an anisotropy field.
+// Noise multiplied by `factor`. colored: with moving colors and an anisotropy field.
 viewer::VolumeAssetPtr noise_times(double factor, bool colored) {
   const glm::ivec3 size(40);
   volume::VolumeFrame frame{.density = times(test::noise_volume(size, glm::ivec3(0), 3), factor)};

@@ -413,7 +413,7 @@ TEST_P(GpuResidentStates, EmissionChannelsMatchTheVoxels) {
   }
 }
 
-// Colors and anisotropies beyond their valid range, and velocities of both signs. coloured: with colors.
+// Colors and anisotropies beyond their valid range, and velocities of both signs. colored: with colors.
 std::vector<std::pair<volume::Channel, std::vector<float>>> scattering_fields(bool colored, int step) {
   using volume::Channel;
   std::vector<std::pair<Channel, std::vector<float>>> fields;

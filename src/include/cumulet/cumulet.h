@@ -1922,11 +1922,12 @@ CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumul
 typedef enum cumulet_surface_light {
   CUMULET_SURFACE_LIGHT_FULL = 0,    /**< Global illumination: light travels between surfaces, and between them and the
                                           volume. */
-  CUMULET_SURFACE_LIGHT_SHADOWS = 1, /**< Direct light: surfaces are lit only by sun, sky, lamps and emissive triangles,
-                                          with shadows of surfaces and volume. */
+  CUMULET_SURFACE_LIGHT_SHADOWS = 1, /**< Direct light: surfaces are lit only by sun, sky, analytic lights and
+                                          emissive triangles, with shadows of surfaces and volume. */
   /**
-   * Rasterized: surfaces are lit by sun, sky and lamps without shadows, and occlude the content behind them. The volume
-   * is lit only by sun and sky. This is the fastest mode, and previews use it in every mode if there is sun or sky.
+   * Rasterized: surfaces are lit by sun, sky and analytic lights without shadows, and occlude the content behind them.
+   * The volume is lit only by sun and sky. This is the fastest mode, and previews use it in every mode if there is sun
+   * or sky.
    * Surfaces of alphaMode BLEND are sorted among each other. In front of the volume, inside and behind it they count as
    * one layer, at the nearest depth of a pixel.
    */
@@ -1950,7 +1951,7 @@ typedef struct cumulet_surface_settings_desc {
                              files that are wound inside out; a warning reports those. 0: as the file says. */
   uint32_t variant;     /**< Material variant with index variant - 1 (cumulet_surfaces_get_variant). 0, or one that does
                              not exist: the materials without a variant. */
-  uint32_t group;       /**< Light group of their emissive triangles and lamps, below CUMULET_LIGHT_GROUPS. */
+  uint32_t group;       /**< Light group of their emissive triangles and analytic lights, below CUMULET_LIGHT_GROUPS. */
   int32_t holdout;      /**< 1: camera rays see a holdout, see cumulet_medium_desc.holdout. Rasterization leaves them
                              out. */
 } cumulet_surface_settings_desc;
@@ -2367,7 +2368,8 @@ typedef struct cumulet_sampling_desc {
    * Moving objects are: cameras (cumulet_camera_set_shutter); instance transforms (cumulet_set_volume_shutter,
    * cumulet_instance_desc, cumulet_model_desc); surfaces with an animation; host meshes with velocities; and volumes
    * with velocities (docs/motion_blur.md). These are not motion-blurred and use the frame time: AOVs, picks, debug
-   * views, transmittance maps, rasterized surfaces (CUMULET_SURFACE_LIGHT_NONE), lamps of models, and the host's depth.
+   * views, transmittance maps, rasterized surfaces (CUMULET_SURFACE_LIGHT_NONE), analytic lights of models, and the
+   * host's depth.
    */
   float shutter_seconds;
   /**
@@ -2689,7 +2691,8 @@ CUMULET_API cumulet_status cumulet_get_instance_live_info(cumulet_viewer* viewer
  * - A viewer follows changes in its next call. A new transform uploads a matrix and no triangle. A new time poses the
  *   surfaces on a worker, and the last pose is shown until then.
  * - Models take part in light transport like the viewer's own surfaces, previews draw them, and their emissive
- *   triangles and lamps move with them. Intensities of lamps do not depend on the scale of the transform.
+ *   triangles and analytic lights move with them. Intensities of analytic lights do not depend on the scale of the
+ *   transform.
  */
 typedef struct cumulet_model cumulet_model;
 
@@ -2707,7 +2710,7 @@ typedef struct cumulet_model_desc {
   /** 1: invisible to cameras, picks and AOVs. It still casts shadows, reflects light and emits. */
   int32_t shadow_only;
   uint64_t tag;   /**< The host's own number, which cumulet_pick returns. */
-  uint32_t group; /**< Light group of its emissive triangles and lamps, below CUMULET_LIGHT_GROUPS. */
+  uint32_t group; /**< Light group of its emissive triangles and analytic lights, below CUMULET_LIGHT_GROUPS. */
   /** 1: camera rays see a holdout, see cumulet_medium_desc.holdout. Rasterization leaves it out. */
   int32_t holdout;
   double open_to_world[16];  /**< Transform at shutter open, see cumulet_set_volume_shutter. All zero: to_world. The
@@ -2832,9 +2835,9 @@ CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* view
  */
 CUMULET_API cumulet_status cumulet_set_ground(cumulet_viewer* viewer, const cumulet_ground_desc* desc);
 
-/* ---- Lamps ------------------------------------------------------------------------------------------------------- */
+/* ---- Analytic lights --------------------------------------------------------------------------------------------- */
 
-/** The shape of a lamp. */
+/** The shape of an analytic light. */
 typedef enum cumulet_lamp_kind {
   CUMULET_LAMP_POINT = 0,     /**< Point light: the same in all directions. */
   CUMULET_LAMP_SPOT = 1,      /**< Spot light: a point light limited to a cone. */
@@ -2844,14 +2847,14 @@ typedef enum cumulet_lamp_kind {
 } cumulet_lamp_kind;
 
 /**
- * A light. It lights volume and surfaces, casts shadows, and is invisible to the camera and in mirrors.
+ * An analytic light. It lights volume and surfaces, casts shadows, and is invisible to the camera and in mirrors.
  *
  * Its power is radiant, as in Blender. A point light of 4 pi I watts equals a glTF point light of I candela, which
  * Cumulet reads as I W/sr. A spot light has the power of the point light that it is cut out of. A disk or rectangle has
  * radiance power / (4 x area), and so emits pi / 4 of its power.
  */
 typedef struct cumulet_lamp_desc {
-  size_t struct_size; /**< Equal for all lamps of an array: the distance between them in bytes. */
+  size_t struct_size; /**< Equal for all lights of an array: the distance between them in bytes. */
   cumulet_lamp_kind kind;
   double position[3];   /**< World position of its center, within 1e30. Not used by a sun. */
   double direction[3];  /**< World direction in which it shines, of any length. Not used by a point. Zero: down, -Y. */
@@ -2867,16 +2870,16 @@ typedef struct cumulet_lamp_desc {
 } cumulet_lamp_desc;
 
 /**
- * Replaces the viewer's lamps. Lamps of its surfaces' file stay beside them. Rasterized surfaces (of previews, and with
- * CUMULET_SURFACE_LIGHT_NONE) are lit without shadows, and from the centers of disks and rectangles. Restarts
- * accumulation.
+ * Replaces the viewer's analytic lights. Those of its surfaces' file stay beside them. Rasterized surfaces (of
+ * previews, and with CUMULET_SURFACE_LIGHT_NONE) are lit without shadows, and from the centers of disks and rectangles.
+ * Restarts accumulation.
  *
  * Threads: one call per viewer at a time. No GL.
  *
  * @param viewer The viewer.
- * @param lamps  The lamps, which are copied. May be NULL if count is 0.
- * @param count  Number of lamps, up to 4096. 0: none.
- * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT; the line names the lamp.
+ * @param lamps  The lights, which are copied. May be NULL if count is 0.
+ * @param count  Number of lights, up to 4096. 0: none.
+ * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT; the line names the light.
  */
 CUMULET_API cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count);
 
@@ -3390,7 +3393,7 @@ typedef struct cumulet_frame_desc {
   double scale;        /**< Physical pixels per logical pixel, 0.1 to 16, for widths of lines and clicks. 0: 1. */
   /**
    * Internal format of the viewer's own textures: GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGBA16F or GL_RGBA32F, which must suit
-   * colour. 0: GL_RGBA16F for CUMULET_COLOR_HDR, GL_SRGB8_ALPHA8 for CUMULET_COLOR_SRGB_FRAMEBUFFER, else GL_RGBA8.
+   * color. 0: GL_RGBA16F for CUMULET_COLOR_HDR, GL_SRGB8_ALPHA8 for CUMULET_COLOR_SRGB_FRAMEBUFFER, else GL_RGBA8.
    */
   uint32_t format;
   cumulet_color_encoding color;

@@ -1447,7 +1447,7 @@ class Viewer {
     return result(cumulet_use_surface_camera(handle(), index));
   }
   [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
-  /// Replaces the lamps; an empty span removes all.
+  /// Replaces the analytic lights; an empty span removes all.
   [[nodiscard]] Result<> set_lamps(std::span<const LampDesc> lamps) noexcept {
     const std::unique_ptr<cumulet_lamp_desc[]> c(new (std::nothrow) cumulet_lamp_desc[lamps.size()]);
     if (!c) return Error{StatusCode::out_of_memory, Text<512>("out of memory")};
