@@ -999,7 +999,7 @@ bool Tracer::find_features(Picture& picture, const MarchData& data, const TraceI
     if (picture.feature_rays_ != before) picture.revision_ = ++revision_;
     return done;
   };
-  return run(gl_, picture.film_, {"cumulet: facts", {}, written, work}, deadline);
+  return run(gl_, picture.film_, {"cumulet: feature buffers", {}, written, work}, deadline);
 }
 
 void Tracer::upload_motion(const scene::MotionTable& motion) {

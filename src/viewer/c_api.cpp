@@ -52,7 +52,7 @@ core::Frame read_frame(const cumulet_frame_desc* desc) {
   const cumulet_frame_desc d = read_desc(desc, "cumulet_frame_desc");
   require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is not up to 1e9");
   require(number(d.target) <= CUMULET_TARGET_NONE, "cumulet_frame_desc.target is unknown");
-  require(number(d.color) <= CUMULET_COLOR_HDR, "cumulet_frame_desc.colour is unknown");
+  require(number(d.color) <= CUMULET_COLOR_HDR, "cumulet_frame_desc.color is unknown");
   require(number(d.blend) <= CUMULET_BLEND_REPLACE, "cumulet_frame_desc.blend is unknown");
   require(number(d.depth_source) <= CUMULET_DEPTH_SOURCE_FRAMEBUFFER, "cumulet_frame_desc.depth_source is unknown");
   require(d.width <= 16384 && d.height <= 16384, "cumulet_frame_desc.width or height is above 16384");

@@ -174,8 +174,8 @@ constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return
 // Samples all lights with equal probability.
 constexpr Edit any_analytic_light = {
     "light.glsl", "  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;\n", ""};
-constexpr Edit all_alike = {"light.glsl", "  light.density = lamp.chance;\n",
-                            "  light.density = 1.0f / float(max(cm.lamps.count, 1u));\n"};
+constexpr Edit all_alike = {"light.glsl", "  light.pdf = analytic_light.chance;\n",
+                            "  light.pdf = 1.0f / float(max(cm.analytic_lights.count, 1u));\n"};
 
 /// Lights as on a film set: a key light at the side, one with a tenth of its power opposite, and fourteen like the key
 /// light far away.

@@ -18,7 +18,7 @@
 // At most CM_CHUNK regions and collisions.
 uint cm_fly(inout CmPath p) {
   vec3 inv_d = vec3(1.0) / p.d;
-  bool looks = p.ray != CM_RAY_SCATTERED;
+  bool to_light = p.ray != CM_RAY_SCATTERED;
   uint event = CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell, p.cache);
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
@@ -35,7 +35,7 @@ uint cm_fly(inout CmPath p) {
       ivec3 voxel = clamp(ivec3(floor(p.o + p.t * p.d)), low, low + cm_nano_size(cell) - 1);
       float real = cm_nano_density(cell, voxel, majorant) / majorant;
       p.depth = cm_free_depth(cm_random(p.random, p.stream));
-      if (CM_RATIO != 0 && looks && p.depth_0 > CM_MIN_PASSED) {
+      if (CM_RATIO != 0 && to_light && p.depth_0 > CM_MIN_PASSED) {
         p.depth_0 *= 1.0 - real;
         p.light *= 1.0 - real;
         if (real >= 1.0) event = CM_EVENT_COLLISION;

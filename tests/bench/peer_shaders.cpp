@@ -32,7 +32,7 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
       Edit{"path.glsl", "  float depth = p.depth_0 - p.depth;\n", "  float depth = 0.0f;\n"},
       Edit{"path_vertex.glsl", "#define CM_SHADOW_DEPTH 2.0f", "#define CM_SHADOW_DEPTH 0.0f"},
       Edit{"path.glsl", "  p.depth = p.depth_0;\n  float ground = ",
-           "  p.depth = p.depth_0;\n  if (looks) p.depth_0 = 1.0f;\n  float ground = "},
+           "  p.depth = p.depth_0;\n  if (to_light) p.depth_0 = 1.0f;\n  float ground = "},
   };
   const std::array<std::filesystem::path, 3> files{
       std::filesystem::path(CUMULET_BENCH_DIR) / "march_hdda.glsl",
