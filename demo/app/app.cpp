@@ -440,15 +440,15 @@ void App::execute(const Command& command) {
       display.exposure_stops = std::max(display.exposure_stops - third, -10.0f);
       break;
     case Action::next_march:
-      model_.scene.grid.march = static_cast<cumulet_march>((static_cast<int>(model_.scene.grid.march) + 1) % 3);
+      model_.scene.grid.type = static_cast<cumulet_grid_type>((static_cast<int>(model_.scene.grid.type) + 1) % 3);
       break;
     case Action::view:
-      model_.scene.sampling.view = static_cast<cumulet_view>(command.value);
+      model_.scene.sampling.view = static_cast<cumulet_view_mode>(command.value);
       break;
     case Action::grids_dialog:
-      panel_.picker().open(
-          model_.status.play ? model_.status.play->row.file(model_.status.play->info.asked_frame) : model_.scene.volume,
-          Window::wake);
+      panel_.picker().open(model_.status.play ? model_.status.play->row.file(model_.status.play->info.requested_frame)
+                                              : model_.scene.volume,
+                           Window::wake);
       break;
     case Action::choose_grid:
       suggest_next_ = model_.scene.grid_name != command.text;
@@ -523,7 +523,8 @@ void App::step(int frames) {
   if (!play) return;
   model_.playing = false;
   const auto last = static_cast<std::int64_t>(play->row.count()) - 1;
-  go_to(static_cast<std::uint32_t>(std::clamp<std::int64_t>(std::int64_t{play->info.asked_frame} + frames, 0, last)));
+  go_to(
+      static_cast<std::uint32_t>(std::clamp<std::int64_t>(std::int64_t{play->info.requested_frame} + frames, 0, last)));
 }
 
 void App::play_or_pause() {
@@ -531,7 +532,7 @@ void App::play_or_pause() {
   if (!play) return;
   model_.playing = !model_.playing;
   const cumulet_playback_desc playback = playback_of(model_.scene.sequence, play->row);
-  const bool at_end = play->info.asked_frame >= playback.first_frame + playback.frame_count - 1;
+  const bool at_end = play->info.requested_frame >= playback.first_frame + playback.frame_count - 1;
   if (model_.playing && playback.repeat == CUMULET_REPEAT_HOLD && at_end) go_to(playback.first_frame);
 }
 
@@ -569,7 +570,7 @@ void App::follow_playback() {
   const bool known = std::exchange(known_sequence_, play->sequence.get()) == play->sequence.get();
   if (known && settings::same(now, playback_of(desired_.scene.sequence, play->row))) return;
   // After a change of the playback settings the clock is set so that the displayed frame stays.
-  model_.clock = now.offset_seconds + (double(play->info.asked_frame) - now.first_frame) / now.frames_per_second;
+  model_.clock = now.offset_seconds + (double(play->info.requested_frame) - now.first_frame) / now.frames_per_second;
 }
 
 void App::open(const std::string& path) {
@@ -821,7 +822,7 @@ bool App::draw() {
 void App::take_frame_time(const std::vector<Event>& events, bool drawn, bool picture) {
   for (const Event& event : events)
     if (event.time > 0.0) frame_times_.hand(event.time);
-  const bool refines = (model_.status.frame.flags & CUMULET_RENDER_MORE) != 0;
+  const bool refines = (model_.status.frame.flags & CUMULET_RENDER_INCOMPLETE) != 0;
   const bool due = !desired_.paused && (refines || !settled());
   if (!drawn) {
     if (!has_pending_frame_ && !due) frame_times_.rest();
@@ -851,7 +852,7 @@ void App::take_statistics() {
   device_seconds_ = device;
 
   constexpr double rate_period = 0.5;
-  const bool more = (status.frame.flags & CUMULET_RENDER_MORE) != 0;
+  const bool more = (status.frame.flags & CUMULET_RENDER_INCOMPLETE) != 0;
   const double elapsed = now_ - rate_since_;
   // A decreasing count means that the image was restarted.
   if (status.stats.samples < rate_samples_ || !more) {
@@ -922,8 +923,8 @@ void App::write_report(const std::string& path) const {
   json["grid"] = status.grid;
   if (status.play) {
     const auto& [sequence, row, info, states, failure] = *status.play;
-    json["sequence"] = {{"frame", row.number(info.asked_frame)},
-                        {"drawn", info.is_drawn != 0 ? Json(row.number(info.drawn_frame)) : Json()},
+    json["sequence"] = {{"frame", row.number(info.requested_frame)},
+                        {"drawn", info.is_displayed != 0 ? Json(row.number(info.displayed_frame)) : Json()},
                         {"first", row.number(0)},
                         {"count", row.count()},
                         {"ready", info.ready_frames},

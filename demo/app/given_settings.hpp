@@ -22,10 +22,11 @@ class GivenSettings {
   }
 
  private:
-  std::tuple<std::optional<cumulet_medium_desc>, std::optional<cumulet_ground_desc>, std::optional<cumulet_light_desc>,
-             std::optional<cumulet_environment_settings_desc>, std::optional<cumulet_sampling_desc>,
-             std::optional<cumulet_display_desc>, std::optional<cumulet_grid_desc>,
-             std::optional<cumulet_surface_settings_desc>, std::optional<cumulet_navigation_desc>>
+  std::tuple<std::optional<cumulet_medium_desc>, std::optional<cumulet_ground_desc>,
+             std::optional<cumulet_sun_sky_desc>, std::optional<cumulet_environment_settings_desc>,
+             std::optional<cumulet_sampling_desc>, std::optional<cumulet_display_desc>,
+             std::optional<cumulet_grid_desc>, std::optional<cumulet_surface_settings_desc>,
+             std::optional<cumulet_navigation_desc>>
       last_;
 };
 

@@ -61,7 +61,7 @@ void GridPicker::Reader::read() {
     if (cumulet_inspection_get_grid(opened, i, &info) != CUMULET_OK) continue;
     Grid grid{info.name,
               std::string(info.type) + ", " + info.grid_class + (*info.channel != '\0' ? ": " : "") + info.channel,
-              info.refusal,
+              info.unsupported_reason,
               info.active_voxels,
               info.min_value,
               info.max_value,

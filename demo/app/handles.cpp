@@ -113,7 +113,7 @@ void draw_box(const Pen& pen, const dmat4& place, const Box& box) {
 }
 
 /// Draws the outline of a light: its size and the direction of its emission.
-void draw_analytic_light(const Pen& pen, const cumulet_lamp_desc& analytic_light, const dmat4& place) {
+void draw_analytic_light(const Pen& pen, const cumulet_light_desc& analytic_light, const dmat4& place) {
   const auto at = [&](double x, double y, double z) { return dvec3(place * dvec4(x, y, z, 1.0)); };
   const double far = handle_reach * static_cast<double>(pen.scale()) * pen.sight().pixel_at(at(0.0, 0.0, 0.0));
   const auto round = [&](double radius, double z) {
@@ -124,7 +124,7 @@ void draw_analytic_light(const Pen& pen, const cumulet_lamp_desc& analytic_light
     };
     for (int i = 0; i < parts; ++i) pen.line(point(i), point(i + 1), chosen_color, thin);
   };
-  if (analytic_light.kind == CUMULET_LAMP_SPOT) {
+  if (analytic_light.kind == CUMULET_LIGHT_SPOT) {
     // The cone is drawn with a constant size on the screen.
     const double half = std::min(0.5 * analytic_light.angle_degrees, 85.0) * std::numbers::pi / 180.0;
     const double radius = far * std::sin(half);
@@ -134,8 +134,8 @@ void draw_analytic_light(const Pen& pen, const cumulet_lamp_desc& analytic_light
       pen.line(at(0.0, 0.0, 0.0), at(radius * x, radius * y, depth), chosen_color, thin);
     return;
   }
-  if (analytic_light.kind == CUMULET_LAMP_DISC) round(0.5 * analytic_light.width, 0.0);
-  if (analytic_light.kind == CUMULET_LAMP_RECTANGLE) {
+  if (analytic_light.kind == CUMULET_LIGHT_DISK) round(0.5 * analytic_light.width, 0.0);
+  if (analytic_light.kind == CUMULET_LIGHT_RECT) {
     const double x = 0.5 * analytic_light.width;
     const double y = 0.5 * analytic_light.height;
     pen.line(at(-x, -y, 0.0), at(x, -y, 0.0), chosen_color, thin);
@@ -143,7 +143,7 @@ void draw_analytic_light(const Pen& pen, const cumulet_lamp_desc& analytic_light
     pen.line(at(x, y, 0.0), at(-x, y, 0.0), chosen_color, thin);
     pen.line(at(-x, y, 0.0), at(-x, -y, 0.0), chosen_color, thin);
   }
-  if (analytic_light.kind != CUMULET_LAMP_POINT)
+  if (analytic_light.kind != CUMULET_LIGHT_POINT)
     pen.line(at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.7 * far), chosen_color, thin);
 }
 

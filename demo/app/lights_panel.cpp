@@ -13,7 +13,7 @@ namespace cumulet::demo {
 
 namespace {
 
-using Desc = cumulet_lamp_desc;
+using Desc = cumulet_light_desc;
 
 constexpr double sun_at_noon = 4.0;  // W/m²
 
@@ -35,14 +35,14 @@ Desc new_analytic_light(const cumulet_camera_desc& camera) {
 
 /// Returns true if lights of this kind have the setting.
 template <class Setting>
-bool has(const Setting& setting, cumulet_lamp_kind kind) {
-  const bool area = kind == CUMULET_LAMP_DISC || kind == CUMULET_LAMP_RECTANGLE;
-  if (setting.is(&Desc::position)) return kind != CUMULET_LAMP_SUN;
-  if (setting.is(&Desc::direction)) return kind != CUMULET_LAMP_POINT;
+bool has(const Setting& setting, cumulet_light_kind kind) {
+  const bool area = kind == CUMULET_LIGHT_DISK || kind == CUMULET_LIGHT_RECT;
+  if (setting.is(&Desc::position)) return kind != CUMULET_LIGHT_DISTANT;
+  if (setting.is(&Desc::direction)) return kind != CUMULET_LIGHT_POINT;
   if (setting.is(&Desc::width)) return area;
-  if (setting.is(&Desc::across) || setting.is(&Desc::height)) return kind == CUMULET_LAMP_RECTANGLE;
-  if (setting.is(&Desc::angle_degrees)) return kind == CUMULET_LAMP_SPOT || kind == CUMULET_LAMP_SUN;
-  return !setting.is(&Desc::blend) || kind == CUMULET_LAMP_SPOT;
+  if (setting.is(&Desc::tangent) || setting.is(&Desc::height)) return kind == CUMULET_LIGHT_RECT;
+  if (setting.is(&Desc::angle_degrees)) return kind == CUMULET_LIGHT_SPOT || kind == CUMULET_LIGHT_DISTANT;
+  return !setting.is(&Desc::blend) || kind == CUMULET_LIGHT_SPOT;
 }
 
 }  // namespace
@@ -63,12 +63,12 @@ void Panel::analytic_lights(Model& model) {
         ui_.numbers(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
       } else if (rows_.draw(setting, value) && setting.is(&Desc::kind)) {
         // Changing the kind sets values that suit it: a sun's power is in W/m², and a spot needs a cone angle.
-        if (analytic_light.kind == CUMULET_LAMP_SUN) analytic_light.power = static_cast<float>(sun_at_noon);
-        if (analytic_light.kind == CUMULET_LAMP_SPOT && analytic_light.angle_degrees == 0.0)
+        if (analytic_light.kind == CUMULET_LIGHT_DISTANT) analytic_light.power = static_cast<float>(sun_at_noon);
+        if (analytic_light.kind == CUMULET_LIGHT_SPOT && analytic_light.angle_degrees == 0.0)
           analytic_light.angle_degrees = 45.0;
       }
     });
-    if (analytic_light.kind == CUMULET_LAMP_SUN)
+    if (analytic_light.kind == CUMULET_LIGHT_DISTANT)
       analytic_light.angle_degrees = std::min(analytic_light.angle_degrees, 90.0);
     if (ui_.button(("Remove lamp" + number).c_str(), "Takes this lamp away.", {-1.0f, 0.0f})) removed = i;
   }

@@ -137,19 +137,19 @@ void open_surfaces(Model& model, const std::string& path) {
   model.scene.surface.struct_size = sizeof model.scene.surface;
   model.scene.surface_variant.clear();
   model.scene.surface_camera = -1;
-  if (std::exchange(model.unchosen_ground, false) && model.scene.ground.place == CUMULET_GROUND_BELOW)
-    model.scene.ground.place = CUMULET_GROUND_NONE;
+  if (std::exchange(model.unchosen_ground, false) && model.scene.ground.mode == CUMULET_GROUND_BELOW)
+    model.scene.ground.mode = CUMULET_GROUND_NONE;
 }
 
 namespace {
 
-cumulet_light_desc spelled_out(const SceneOptions& given) {
+cumulet_sun_sky_desc spelled_out(const SceneOptions& given) {
   SceneOptions scene = given;
   spell_out_defaults(scene);
   return scene.light;
 }
 
-cumulet_light_desc daylight() {
+cumulet_sun_sky_desc daylight() {
   SceneOptions day;
   day.set_daylight();
   return spelled_out(day);
@@ -188,7 +188,7 @@ void spell_out_defaults(SceneOptions& scene) {
     settings::spell_out_zeros(other.medium);
     if (other.auto_density_scale) other.medium.density_scale = scale;
   }
-  for (cumulet_lamp_desc& analytic_light : scene.analytic_lights) settings::spell_out_zeros(analytic_light);
+  for (cumulet_light_desc& analytic_light : scene.analytic_lights) settings::spell_out_zeros(analytic_light);
   scene.grid.criterion = settings::criterion_of(scene.grid);
   if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
 }
@@ -203,7 +203,7 @@ const char* stage_text(cumulet_stage stage) {
       return "Measuring the voxels";
     case CUMULET_STAGE_REFINING:
       return "Refining the grid";
-    case CUMULET_STAGE_RECORDS:
+    case CUMULET_STAGE_PACKING:
       return "Fitting the cells";
     case CUMULET_STAGE_UPLOADING:
       return "Uploading";

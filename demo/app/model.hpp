@@ -53,7 +53,7 @@ enum class Action {
   brighter,
   darker,
   next_march,
-  view,  // value: a cumulet_view
+  view,  // value: a cumulet_view_mode
   grids_dialog,
   choose_grid,   // text: the grid's name
   choose_up,     // value: an UpAxis
@@ -151,7 +151,7 @@ struct Play {
   std::vector<std::uint8_t> states;  // a cumulet_frame_state per frame
   std::string failure;               // error of the current frame
 
-  [[nodiscard]] Frame frame() const { return row.number(info.asked_frame); }
+  [[nodiscard]] Frame frame() const { return row.number(info.requested_frame); }
 };
 
 /// State of the viewer in the last answer.

@@ -194,7 +194,7 @@ void Panel::display(Model& model) {
 }
 
 void Panel::light(Model& model) {
-  cumulet_light_desc& light = model.scene.light;
+  cumulet_sun_sky_desc& light = model.scene.light;
   const auto& camera = model.scene.camera;
   const double azimuth =
       std::atan2(camera.eye[0] - camera.target[0], camera.eye[2] - camera.target[2]) * 180.0 / std::numbers::pi;
@@ -202,7 +202,7 @@ void Panel::light(Model& model) {
                "Drag the sun: the direction is its azimuth, the rim the horizon, the centre overhead. By keyboard: "
                "Space, then the arrows, then Space. The triangle is the camera.",
                light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
-  using Desc = cumulet_light_desc;
+  using Desc = cumulet_sun_sky_desc;
   const bool physical = light.sky == CUMULET_SKY_PHYSICAL;
   settings::for_each<Desc>([&](const auto& setting) {
     const bool of_constant = setting.is(&Desc::sun_irradiance) || setting.is(&Desc::sky_radiance);
@@ -222,15 +222,15 @@ void Panel::ground(Model& model) {
   cumulet_ground_desc& ground = model.scene.ground;
   using Desc = cumulet_ground_desc;
   settings::for_each<Desc>([&](const auto& setting) {
-    ImGui::BeginDisabled((setting.is(&Desc::albedo) && ground.place == CUMULET_GROUND_NONE) ||
-                         (setting.is(&Desc::height) && ground.place != CUMULET_GROUND_AT_HEIGHT));
+    ImGui::BeginDisabled((setting.is(&Desc::albedo) && ground.mode == CUMULET_GROUND_NONE) ||
+                         (setting.is(&Desc::height) && ground.mode != CUMULET_GROUND_AT_HEIGHT));
     const bool chosen = rows_.draw(setting, ground.*setting.field);
-    if (chosen && setting.is(&Desc::place)) model.unchosen_ground = false;
+    if (chosen && setting.is(&Desc::mode)) model.unchosen_ground = false;
     ImGui::EndDisabled();
   });
 }
 
-void Panel::sun_angle(const settings::SettingInfo& info, cumulet_light_desc& light) {
+void Panel::sun_angle(const settings::SettingInfo& info, cumulet_sun_sky_desc& light) {
   const float given = light.sun_angle_degrees;
   double shown = given != 0.0F ? std::max(0.0F, given) : settings::default_sun_angle(light.sky);
   if (rows_.draw(info, shown)) light.sun_angle_degrees = shown > 0.0 ? static_cast<float>(shown) : -1.0F;
@@ -292,7 +292,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   if (ui_.choose("Preset", "A medium: sets all of it but the density scale and the ramps.", presets, chosen))
     apply(static_cast<Preset>(chosen), medium);
   settings::for_each<Desc>([&](const auto& setting) {
-    const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_share);
+    const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight);
     ImGui::BeginDisabled((of_lobes && medium.phase != CUMULET_PHASE_TWO_LOBE) ||
                          (setting.is(&Desc::droplet_diameter) && medium.phase != CUMULET_PHASE_MIE) ||
                          (setting.is(&Desc::anisotropy) && medium.phase == CUMULET_PHASE_MIE));
@@ -324,8 +324,8 @@ void Panel::grid(Model& model) {
   using Desc = cumulet_grid_desc;
   Desc& grid = model.scene.grid;
   settings::for_each<Desc>([&](const auto& setting) {
-    const bool of_cells = !setting.is(&Desc::march);
-    ImGui::BeginDisabled((of_cells && grid.march != CUMULET_MARCH_TET) ||
+    const bool of_cells = !setting.is(&Desc::type);
+    ImGui::BeginDisabled((of_cells && grid.type != CUMULET_GRID_TETRAHEDRAL) ||
                          (setting.is(&Desc::pixel_size) && grid.camera_adaptive == 0));
     if (setting.is(&Desc::threshold)) {
       threshold(setting, grid);
@@ -336,7 +336,7 @@ void Panel::grid(Model& model) {
   });
 
   const cumulet_stats& stats = model.status.stats;
-  if (grid.march == CUMULET_MARCH_TET) {
+  if (grid.type == CUMULET_GRID_TETRAHEDRAL) {
     const std::string limited = stats.limited != 0 ? " (at the budget)" : "";
     ui_.value_row("Live cells",
                   model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
@@ -568,7 +568,7 @@ void Panel::state_line(const Model& model) {
     text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / pixels));
     if (!converged) text += print(" (%.0f %%)", std::floor(100.0 * part));
   }
-  const cumulet_view shown = model.scene.sampling.view;
+  const cumulet_view_mode shown = model.scene.sampling.view;
   for (const auto& view : settings::view_choices)
     if (view.value == shown && shown != CUMULET_VIEW_SHADED) text = view.name;
   if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0)

@@ -66,7 +66,7 @@ class Panel {
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::SettingInfo info, cumulet_grid_desc& grid);
   void ground(Model& model);
-  void sun_angle(const settings::SettingInfo& info, cumulet_light_desc& light);
+  void sun_angle(const settings::SettingInfo& info, cumulet_sun_sky_desc& light);
 
   void hint() const;
   void loading(const Model& model, std::vector<Command>& commands);

@@ -29,7 +29,8 @@ bool has(const SceneOptions& scene, const Item& item) {
     case Item::Kind::model:
       return item.index < scene.models.size();
     case Item::Kind::analytic_light:
-      return item.index < scene.analytic_lights.size() && scene.analytic_lights[item.index].kind != CUMULET_LAMP_SUN;
+      return item.index < scene.analytic_lights.size() &&
+             scene.analytic_lights[item.index].kind != CUMULET_LIGHT_DISTANT;
   }
   return false;
 }
@@ -42,15 +43,15 @@ Numbers numbers_of(const dmat4& matrix) {
   return numbers;
 }
 
-dmat4 place_of(const cumulet_lamp_desc& analytic_light) {
+dmat4 place_of(const cumulet_light_desc& analytic_light) {
   dmat4 place(1.0);
   const dvec3 down(0.0, -1.0, 0.0);
   const dvec3 shines = glm::make_vec3(analytic_light.direction);
   const dvec3 direction = glm::length(shines) > 0.0 ? glm::normalize(shines) : down;
-  dvec3 across = glm::make_vec3(analytic_light.across);
+  dvec3 tangent = glm::make_vec3(analytic_light.tangent);
   across -= glm::dot(across, direction) * direction;
   constexpr double least = 1e-9;
-  // Default of cumulet_lamp_desc: horizontal, or +X.
+  // Default of cumulet_light_desc: horizontal, or +X.
   if (!(glm::length(across) > least)) across = glm::cross(-down, direction);
   if (!(glm::length(across) > least)) across = dvec3(1.0, 0.0, 0.0);
   across = glm::normalize(across);
@@ -61,12 +62,12 @@ dmat4 place_of(const cumulet_lamp_desc& analytic_light) {
   return place;
 }
 
-void set_place(cumulet_lamp_desc& analytic_light, const dmat4& place) {
+void set_place(cumulet_light_desc& analytic_light, const dmat4& place) {
   const dmat4 before = place_of(analytic_light);
   std::copy_n(glm::value_ptr(place[3]), 3, analytic_light.position);
   // Unchanged directions keep their exact numbers.
   if (place[2] != before[2]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[2]))), 3, analytic_light.direction);
-  if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, analytic_light.across);
+  if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, analytic_light.tangent);
   const auto stretched = [](double length, double by) {
     double longer = length;
     if (std::abs(by - 1.0) > 1e-9) longer *= by;
@@ -74,22 +75,22 @@ void set_place(cumulet_lamp_desc& analytic_light, const dmat4& place) {
   };
   const double wider = glm::length(dvec3(place[0]));
   const double higher = glm::length(dvec3(place[1]));
-  const bool is_disc = analytic_light.kind == CUMULET_LAMP_DISC;
+  const bool is_disc = analytic_light.kind == CUMULET_LIGHT_DISK;
   analytic_light.width = stretched(analytic_light.width, is_disc ? std::sqrt(wider * higher) : wider);
   if (!is_disc) analytic_light.height = stretched(analytic_light.height, higher);
 }
 
-const char* kind_name(cumulet_lamp_kind kind) {
+const char* kind_name(cumulet_light_kind kind) {
   switch (kind) {
-    case CUMULET_LAMP_POINT:
+    case CUMULET_LIGHT_POINT:
       return "point";
-    case CUMULET_LAMP_SPOT:
+    case CUMULET_LIGHT_SPOT:
       return "spot";
-    case CUMULET_LAMP_DISC:
+    case CUMULET_LIGHT_DISK:
       return "disc";
-    case CUMULET_LAMP_RECTANGLE:
+    case CUMULET_LIGHT_RECT:
       return "rectangle";
-    case CUMULET_LAMP_SUN:
+    case CUMULET_LIGHT_DISTANT:
       break;
   }
   return "sun";
@@ -206,9 +207,9 @@ std::optional<Box> box_of(const SceneOptions& scene, const Boxes& boxes, const I
     case Item::Kind::analytic_light:
       break;
   }
-  const cumulet_lamp_desc& analytic_light = scene.analytic_lights[item.index];
-  const bool is_disc = analytic_light.kind == CUMULET_LAMP_DISC;
-  if (!is_disc && analytic_light.kind != CUMULET_LAMP_RECTANGLE) return std::nullopt;
+  const cumulet_light_desc& analytic_light = scene.analytic_lights[item.index];
+  const bool is_disc = analytic_light.kind == CUMULET_LIGHT_DISK;
+  if (!is_disc && analytic_light.kind != CUMULET_LIGHT_RECT) return std::nullopt;
   const dvec3 half = 0.5 * dvec3(analytic_light.width, is_disc ? analytic_light.width : analytic_light.height, 0.0);
   return Box{-half, half};
 }

@@ -82,7 +82,7 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
     desc.trace_user = timeline;
   }
   const auto programs = make_programs(shader_cache, shaders);
-  desc.programs = programs.get();
+  desc.shader_cache = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
@@ -145,7 +145,7 @@ void Session::follow(const DesiredState& desired) {
   give(&SceneOptions::medium, cumulet_set_medium);
   follow_ramps();
   give(&SceneOptions::ground, cumulet_set_ground);  // before the light, because the sky is computed for the ground
-  give(&SceneOptions::light, cumulet_set_light);
+  give(&SceneOptions::light, cumulet_set_sun_sky);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   follow_environment();
   follow_analytic_lights();
@@ -285,9 +285,9 @@ void Session::follow_ramps() {
 }
 
 void Session::follow_analytic_lights() {
-  if (std::ranges::equal(known_->analytic_lights, scene_.analytic_lights, settings::same<cumulet_lamp_desc>)) return;
+  if (std::ranges::equal(known_->analytic_lights, scene_.analytic_lights, settings::same<cumulet_light_desc>)) return;
   known_->analytic_lights = scene_.analytic_lights;
-  check(cumulet_set_lamps(viewer_.get(), scene_.analytic_lights.data(), scene_.analytic_lights.size()));
+  check(cumulet_set_lights(viewer_.get(), scene_.analytic_lights.data(), scene_.analytic_lights.size()));
 }
 
 void Session::follow_environment() {
@@ -488,12 +488,12 @@ void Session::see_sequence() {
   if (cumulet_get_sequence_info(viewer_.get(), &play.info, play.states.data(), play.states.size()) != CUMULET_OK)
     return;
   std::array<char, 512> cause{};
-  static_cast<void>(cumulet_get_sequence_frame(viewer_.get(), play.info.asked_frame, cause.data(), cause.size()));
+  static_cast<void>(cumulet_get_sequence_frame(viewer_.get(), play.info.requested_frame, cause.data(), cause.size()));
   play.failure = cause.data();
   // The other sequences use the same clock.
   const cumulet_playback_desc playback = playback_of(scene_.sequence, *row_);
   others_.go_to(playback.offset_seconds +
-                (play.info.asked_position - playback.first_frame) / playback.frames_per_second);
+                (play.info.requested_position - playback.first_frame) / playback.frames_per_second);
   status_.play = std::move(play);
 }
 
@@ -532,7 +532,7 @@ cumulet_frame_desc Session::frame() const {
 
 bool Session::has_news() const {
   const cumulet_frame_result& frame = status_.frame;
-  return frame.width == 0 || (frame.flags & CUMULET_RENDER_UNDRAWN) != 0 || drawn_width_ != desired_.width ||
+  return frame.width == 0 || (frame.flags & CUMULET_RENDER_NEW_IMAGE) != 0 || drawn_width_ != desired_.width ||
          drawn_height_ != desired_.height || !same(drawn_display_, scene_.display);
 }
 
@@ -563,7 +563,7 @@ void Session::warm_up(unsigned framebuffer) {
   result.struct_size = sizeof result;
   const bool works = check(cumulet_warm_up(viewer_.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
   status_.compiled.reset();
-  if (works && result.more != 0) status_.compiled = result.progress;
+  if (works && result.incomplete != 0) status_.compiled = result.progress;
   see_work();
   // If the volume takes long to load, loaded surfaces are shown before it. After a failed load the next scene counts as
   // the first.
@@ -716,7 +716,7 @@ void Session::see_boxes() {
 bool Session::more() const {
   const bool compiles =
       status_.compiled && (status_.work.stage == CUMULET_STAGE_IDLE || status_.work.stage == CUMULET_STAGE_UPLOADING);
-  return !desired_.paused && (compiles || (status_.frame.flags & CUMULET_RENDER_MORE) != 0);
+  return !desired_.paused && (compiles || (status_.frame.flags & CUMULET_RENDER_INCOMPLETE) != 0);
 }
 
 Answer Session::answer() {
@@ -781,9 +781,9 @@ void Session::finish_load() {
   }
   status_.fields = {};
   for (std::size_t i = 0; volume && i < status_.fields.size(); ++i) {
-    cumulet_values_info values{};
+    cumulet_histogram_info values{};
     values.struct_size = sizeof values;
-    if (cumulet_volume_get_values(volume.get(), static_cast<cumulet_ramp>(i), &values) == CUMULET_OK &&
+    if (cumulet_volume_get_histogram(volume.get(), static_cast<cumulet_ramp>(i), &values) == CUMULET_OK &&
         values.max_value > 0.0f)
       status_.fields[i] = {values.max_value, heights(values.histogram)};
   }
@@ -839,11 +839,11 @@ void Session::pick(double x, double y) {
   picked_ = Picked{};
   // Fails before the first image.
   if (cumulet_pick_at(viewer_.get(), x, y, &pick) != CUMULET_OK || pick.hit == 0) return;
-  if (pick.met_surface != 0 && pick.tag > 0)
+  if (pick.hit_surface != 0 && pick.tag > 0)
     picked_->item = Item{Item::Kind::model, static_cast<std::size_t>(pick.tag) - 1, 0};
-  else if (pick.met_volume != 0 && pick.tag == 0)
-    picked_->item = Item{Item::Kind::volume, 0, pick.place};
-  else if (pick.met_volume != 0)
+  else if (pick.hit_volume != 0 && pick.tag == 0)
+    picked_->item = Item{Item::Kind::volume, 0, pick.transform_index};
+  else if (pick.hit_volume != 0)
     picked_->item = item_of(others_.find_tag(pick.tag));
 }
 
@@ -939,7 +939,7 @@ void Session::measure_noise() {
   constexpr double period = 1.0;
   const cumulet_frame_result& frame = status_.frame;
   const std::uint64_t samples = status_.stats.samples;
-  const bool refining = (frame.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_CONVERGED)) != 0 && !desired_.held &&
+  const bool refining = (frame.flags & (CUMULET_RENDER_INCOMPLETE | CUMULET_RENDER_CONVERGED)) != 0 && !desired_.held &&
                         !desired_.paused && frame.width > 0 && frame.progress > 0.0 &&
                         (frame.flags & CUMULET_RENDER_PREVIEW) == 0 && scene_.sampling.view == CUMULET_VIEW_SHADED;
   // A decreasing count means another image.

@@ -58,8 +58,8 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
   if (ui_.button("On", "A frame on (full stop).", size)) commands.push_back({Action::step, {}, 1});
   ImGui::SameLine();
   std::string text = "Frame " + std::to_string(play.frame());
-  const bool other = play.info.is_drawn != 0 && play.info.drawn_frame != play.info.asked_frame;
-  if (other) text += ", shown is " + std::to_string(play.row.number(play.info.drawn_frame));
+  const bool other = play.info.is_displayed != 0 && play.info.displayed_frame != play.info.requested_frame;
+  if (other) text += ", shown is " + std::to_string(play.row.number(play.info.displayed_frame));
   if (!play.failure.empty()) text += ": " + play.failure;
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(text.c_str());
@@ -95,10 +95,10 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
     if (play.states[i] == CUMULET_FRAME_FAILED) bar(from, to, 0.72f, 1.0f, IM_COL32(200, 90, 75, 255));
     i = end;
   }
-  const auto asked = static_cast<float>(play.info.asked_frame);
+  const auto asked = static_cast<float>(play.info.requested_frame);
   bar(asked, asked + 1.0f, 0.0f, 1.0f, IM_COL32(236, 236, 236, 200));
   if (other) {
-    const auto drawn = static_cast<float>(play.info.drawn_frame);
+    const auto drawn = static_cast<float>(play.info.displayed_frame);
     bar(drawn, drawn + 1.0f, 0.0f, 0.72f, IM_COL32(236, 200, 120, 160));
   }
   ImGui::End();

@@ -14,9 +14,9 @@ constexpr double coldest_fire = 800.0;
 constexpr double hottest_fire = 6000.0;
 
 double max_of(const cumulet_volume* volume, cumulet_ramp ramp) {
-  cumulet_values_info info{};
+  cumulet_histogram_info info{};
   info.struct_size = sizeof info;
-  return cumulet_volume_get_values(volume, ramp, &info) == CUMULET_OK ? double{info.max_value} : 0.0;
+  return cumulet_volume_get_histogram(volume, ramp, &info) == CUMULET_OK ? double{info.max_value} : 0.0;
 }
 
 cumulet_volume_info info_of(const cumulet_volume* volume) {

@@ -99,7 +99,7 @@ Viewer create_viewer(Context& context, cumulet::demo::Messages& messages, Timeli
     desc.trace_user = timeline;
   }
   const auto programs = cumulet::demo::make_programs(shader_cache, {});
-  desc.programs = programs.get();
+  desc.shader_cache = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK)
@@ -255,9 +255,9 @@ void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progr
     progress.stage("compiling shaders", result.progress);
     check_frame(viewer, options, cumulet_warm_up(viewer.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
     // A camera-adaptive grid is built when the image size is known.
-    if (result.more != 0) wait(viewer, progress);
+    if (result.incomplete != 0) wait(viewer, progress);
     check_not_interrupted();
-  } while (result.more != 0);
+  } while (result.incomplete != 0);
   progress.stage("compiling shaders", 1.0);
 }
 
@@ -352,7 +352,7 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const cum
 
 /// Scripts rely on these names and units: keys may be added, never renamed. Values that do not apply are omitted.
 void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend) {
-  const bool tet = options.scene.grid.march == CUMULET_MARCH_TET;
+  const bool tet = options.scene.grid.type == CUMULET_GRID_TETRAHEDRAL;
   Json json;
   if (tet) {
     json["cells"] = stats.cells;
@@ -368,7 +368,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   add_stage("load", stats.build_seconds_load);
   add_stage("statistics", stats.build_seconds_statistics);
   add_stage("refine", stats.build_seconds_refine);
-  add_stage("records", stats.build_seconds_records);
+  add_stage("records", stats.build_seconds_packing);
   add_stage("upload", stats.build_seconds_upload);
   json["trace_seconds"] = stats.trace_seconds;
   Json& passes = json["pass_seconds"];
@@ -390,7 +390,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
     json["peak_rss_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
   json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
   json["backend"] = backend;
-  json["march"] = cumulet::demo::march_name(options.scene.grid.march);
+  json["march"] = cumulet::demo::march_name(options.scene.grid.type);
   if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
   // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   cumulet::image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -578,7 +578,7 @@ class Studio {
     info.struct_size = sizeof info;
     check(viewer_, cumulet_get_sequence_info(viewer_.get(), &info, nullptr, 0));
     const double position = static_cast<double>(next.part) / next.parts;
-    if (info.is_drawn == 0 || std::abs(info.drawn_position - position) > 0.5 / next.parts)
+    if (info.is_displayed == 0 || std::abs(info.displayed_position - position) > 0.5 / next.parts)
       throw std::runtime_error(next.volume +
                                ": the moment before it could not be made, and another would stand for it");
   }
@@ -634,7 +634,8 @@ class Studio {
     playback.first_frame = 0;
     playback.frame_count = 0;
     playback.subframes = next.parts;
-    if (playback.between == CUMULET_BETWEEN_NONE) playback.between = CUMULET_BETWEEN_ADVECT;
+    if (playback.interpolation == CUMULET_FRAME_INTERPOLATION_NONE)
+      playback.interpolation = CUMULET_FRAME_INTERPOLATION_ADVECT;
     const auto sequence = cumulet::demo::open_sequence({scene.volume, next.volume}, file, what_it_takes);
     const double position = static_cast<double>(next.part) / next.parts;
     if (cumulet_sequence_set_playback(sequence.get(), &playback) != CUMULET_OK ||
@@ -703,7 +704,7 @@ class Studio {
     check(viewer_, cumulet_set_limits(viewer_.get(), &limits));
     cumulet_sampling_desc sampling = scene.sampling;
     sampling.preview = CUMULET_PREVIEW_OFF;
-    if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;
+    if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.separate_volume_aov = 1;
     if (options.format == OutputFormat::exr)
       sampling.light_groups = static_cast<std::uint32_t>(scene.light_groups.size());
     check(viewer_, cumulet_set_grid(viewer_.get(), &scene.grid));
@@ -715,8 +716,8 @@ class Studio {
     }
     // The ground is set first, because the sky is computed for it.
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
-    check(viewer_, cumulet_set_light(viewer_.get(), &scene.light));
-    check(viewer_, cumulet_set_lamps(viewer_.get(), scene.analytic_lights.data(), scene.analytic_lights.size()));
+    check(viewer_, cumulet_set_sun_sky(viewer_.get(), &scene.light));
+    check(viewer_, cumulet_set_lights(viewer_.get(), scene.analytic_lights.data(), scene.analytic_lights.size()));
     check(viewer_, set_places(viewer_.get(), scene));
     if (!scene.environment.empty()) {
       check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
@@ -786,7 +787,7 @@ bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, cam
 bool is_settled(const SceneOptions& scene) {
   const bool placed = scene.surface_camera >= 0 || !fits(scene.camera);
   const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
-  return placed && !heated && !scene.auto_density_scale && scene.ground.place != CUMULET_GROUND_BELOW;
+  return placed && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
 }
 
 /// Returns the height of a ground plane below all objects. With models it is slightly lower, because many models
@@ -817,8 +818,8 @@ void settle(const Viewer& viewer, RenderOptions& options) {
     scene.medium.temperature_scale = cumulet::demo::temperature_scale_of(volume_of(viewer).get()).value_or(0.0F);
     check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   }
-  if (scene.ground.place == CUMULET_GROUND_BELOW) {
-    scene.ground.place = CUMULET_GROUND_AT_HEIGHT;
+  if (scene.ground.mode == CUMULET_GROUND_BELOW) {
+    scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
     scene.ground.height = ground_below(viewer, scene);
     check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
   }

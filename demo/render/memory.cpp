@@ -26,7 +26,7 @@ PictureMemory picture_memory(const RenderOptions& options) {
   // Accumulated per pixel: four floats and four counters. Without light between surfaces, surfaces are separate layers.
   std::uint64_t gl = 32;
   if ((!options.scene.surfaces.empty() || !options.scene.models.empty()) &&
-      options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
+      options.scene.surface.lighting == CUMULET_SURFACE_LIGHTING_RASTERIZED)
     gl += 24;
   // Both are read back, also for measuring the noise.
   std::uint64_t main = 32;

@@ -208,7 +208,7 @@ void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
   camera.fovy_degrees = fovy;
 }
 
-void parse_sun(std::string_view text, cumulet_light_desc& light) {
+void parse_sun(std::string_view text, cumulet_sun_sky_desc& light) {
   const std::vector<std::string_view> parts = words(text);
   if (parts.empty() || parts.size() > 2) throw UsageError(in_quotes(text) + " is not \"azimuth,elevation r,g,b\"");
   const std::vector<double> angles = parse_numbers(parts[0], 2);
@@ -219,17 +219,17 @@ void parse_sun(std::string_view text, cumulet_light_desc& light) {
   light.sun_elevation_degrees = static_cast<float>(angles[1]);
 }
 
-void parse_sky_model(std::string_view text, cumulet_light_desc& light) {
+void parse_sky_model(std::string_view text, cumulet_sun_sky_desc& light) {
   const std::vector<double> numbers = parse_numbers(text, 2);
-  const auto take = [&](float cumulet_light_desc::*field, double number) {
+  const auto take = [&](float cumulet_sun_sky_desc::*field, double number) {
     settings::with(field, [&](const auto& setting) {
       if (!setting.given_range().holds(number))
         throw UsageError("the " + std::string(setting.row.label) + " " + setting.given_range().refusal());
     });
     light.*field = static_cast<float>(number);
   };
-  take(&cumulet_light_desc::turbidity, numbers[0]);
-  take(&cumulet_light_desc::ground_albedo, numbers[1]);
+  take(&cumulet_sun_sky_desc::turbidity, numbers[0]);
+  take(&cumulet_sun_sky_desc::ground_albedo, numbers[1]);
   light.sky = CUMULET_SKY_PHYSICAL;
 }
 
@@ -255,9 +255,9 @@ std::vector<std::string> parse_light_groups(std::string_view text) {
 }
 
 /// Sets one field of a light by its scene file key. Returns false if there is no such key.
-bool take_analytic_light_key(cumulet_lamp_desc& analytic_light, std::string_view key, const std::string& text) {
+bool take_analytic_light_key(cumulet_light_desc& analytic_light, std::string_view key, const std::string& text) {
   bool known = false;
-  settings::for_each<cumulet_lamp_desc>([&](const auto& setting) {
+  settings::for_each<cumulet_light_desc>([&](const auto& setting) {
     auto& value = analytic_light.*setting.field;
     using Value = std::remove_reference_t<decltype(value)>;
     if (key != setting.key) return;
@@ -276,16 +276,16 @@ bool take_analytic_light_key(cumulet_lamp_desc& analytic_light, std::string_view
 }
 
 /// Parses a light such as "point position=0,1,2 power=100": a kind, then keys and values as in scene files.
-cumulet_lamp_desc parse_analytic_light(std::string_view text) {
+cumulet_light_desc parse_analytic_light(std::string_view text) {
   const std::vector<std::string_view> parts = words(text);
-  cumulet_lamp_desc analytic_light{};
+  cumulet_light_desc analytic_light{};
   analytic_light.struct_size = sizeof analytic_light;
   const std::string_view kind = parts.empty() ? std::string_view{} : parts.front();
   const auto* const named =
       std::ranges::find_if(settings::analytic_light_choices, [&](const auto& choice) { return kind == choice.name; });
   if (named == settings::analytic_light_choices.end())
     throw UsageError(in_quotes(kind) + " is none of " + list_names(settings::analytic_light_choices, ", "));
-  analytic_light.kind = static_cast<cumulet_lamp_kind>(named->value);
+  analytic_light.kind = static_cast<cumulet_light_kind>(named->value);
   std::set<std::string_view> given;
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::size_t equals = parts[i].find('=');
@@ -308,7 +308,7 @@ cumulet_lamp_desc parse_analytic_light(std::string_view text) {
 }
 
 /// Adds --lamp: analytic lights in addition to those of a scene file. "none" removes the lights given before it.
-void add_analytic_lights(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>& analytic_lights) {
+void add_analytic_lights(CLI::App& app, const char* group, std::vector<cumulet_light_desc>& analytic_lights) {
   const auto take = [&analytic_lights](const std::vector<std::string>& texts) {
     try {
       for (const std::string& text : texts) {
@@ -642,17 +642,17 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
   const bool analytic_lights_alone = !scene.analytic_lights.empty() && app.count("--sky-model") == 0;
   if (!files.scene && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
       app.count("--env") == 0 && !analytic_lights_alone) {
-    const cumulet_light_desc given = scene.light;
+    const cumulet_sun_sky_desc given = scene.light;
     scene.set_daylight();
     if (app.count("--sky-model") > 0) {
       scene.light.turbidity = given.turbidity;
       scene.light.ground_albedo = given.ground_albedo;
     } else if (app.count("--ground") == 0 && scene.surfaces.empty() && !files.model) {
-      scene.ground.place = CUMULET_GROUND_BELOW;
+      scene.ground.mode = CUMULET_GROUND_BELOW;
     }
   }
-  if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.place = CUMULET_GROUND_AT_HEIGHT;
-  if (app.count("--ground-height") > 0 && scene.ground.place != CUMULET_GROUND_AT_HEIGHT)
+  if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
+  if (app.count("--ground-height") > 0 && scene.ground.mode != CUMULET_GROUND_AT_HEIGHT)
     throw UsageError("--ground-height needs a ground at a height, which it makes without --ground");
 }
 
@@ -709,7 +709,7 @@ void check_together(const RenderOptions& options, bool part) {
     throw UsageError("--aovs needs the shaded view");
   if (options.denoise != Denoise::off && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--denoise needs the shaded view");
-  if (options.denoise != Denoise::off && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
+  if (options.denoise != Denoise::off && options.scene.surface.lighting == CUMULET_SURFACE_LIGHTING_RASTERIZED)
     throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
   check_part(options, part);
   if (!options.checkpoint.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)

@@ -10,7 +10,7 @@ namespace cumulet::demo {
 cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
   const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
   const cumulet_status status =
-      cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
+      cumulet_set_volume_transforms(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
   if (status != CUMULET_OK || !scene.shutter.moves()) return status;
   const std::size_t count = std::max<std::size_t>(scene.places.size(), 1);
   std::vector<double> open;
@@ -24,7 +24,7 @@ cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
     open.insert(open.end(), at_open, at_open + 16);
     close.insert(close.end(), at_close, at_close + 16);
   }
-  return cumulet_set_volume_shutter(viewer, open.data(), close.data(), static_cast<std::uint32_t>(count));
+  return cumulet_set_volume_shutter_transforms(viewer, open.data(), close.data(), static_cast<std::uint32_t>(count));
 }
 
 cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene) {

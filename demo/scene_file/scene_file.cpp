@@ -451,10 +451,10 @@ void read_settings(Reader& reader, Desc& desc, const std::string& where = "") {
   });
 }
 
-void read_analytic_lights(Reader& reader, std::vector<cumulet_lamp_desc>& analytic_lights) {
+void read_analytic_lights(Reader& reader, std::vector<cumulet_light_desc>& analytic_lights) {
   analytic_lights.resize(reader.list("lights", settings::max_analytic_lights));
   for (std::size_t i = 0; i < analytic_lights.size(); ++i) {
-    cumulet_lamp_desc& analytic_light = analytic_lights[i];
+    cumulet_light_desc& analytic_light = analytic_lights[i];
     analytic_light.struct_size = sizeof analytic_light;
     const std::string where = "lights[" + std::to_string(i) + "].";
     if (!reader.has(where + "kind")) reader.wrong(where + "kind", "is missing");

@@ -124,8 +124,8 @@ struct SceneOptions : SceneVolume, SceneCamera {
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
-  cumulet_light_desc light{};
-  std::vector<cumulet_lamp_desc> analytic_lights;
+  cumulet_sun_sky_desc light{};
+  std::vector<cumulet_light_desc> analytic_lights;
   std::string environment;  // .hdr or .exr file; "": the sky of `light`
   cumulet_environment_settings_desc environment_settings{};
   cumulet_ground_desc ground{};

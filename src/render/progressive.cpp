@@ -56,7 +56,7 @@ bool PictureRequest::Content::shows_same(const Content& other) const {
   seen.size = size;
   seen.region = region;
   seen.preview = preview;
-  seen.volume_alone = volume_alone;
+  seen.separate_volume_aov = separate_volume_aov;
   seen.light_groups = light_groups;
   seen.stops_by_noise = stops_by_noise;
   seen.adaptive = adaptive;
@@ -136,7 +136,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const TraceInputs& 
   settings.previews_first = request_.content.preview;
   settings.region = request_.content.region;
   settings.margin = margin_of(divisor);
-  settings.volume_alone = request_.content.volume_alone && divisor == finest_;
+  settings.separate_volume_aov = request_.content.separate_volume_aov && divisor == finest_;
   if (divisor == finest_) settings.light_groups = request_.content.light_groups;
   if (divisor == finest_) settings.noise_target = request_.noise_target;
   settings.adaptive = request_.content.adaptive;

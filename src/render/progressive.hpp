@@ -39,9 +39,10 @@ struct PictureRequest {
     glm::uvec2 size{0U};  // at full resolution
     Region region;        // render region
     View view = View::shaded;
-    bool surfaces_traced = true;     // paths hit triangles
-    bool preview = true;             // coarse pictures first; else only at full resolution
-    bool volume_alone = false;       // at full resolution, samples that hit the volume first are also summed separately
+    bool surfaces_traced = true;  // paths hit triangles
+    bool preview = true;          // coarse pictures first; else only at full resolution
+    bool separate_volume_aov =
+        false;                       // at full resolution, samples that hit the volume first are also summed separately
     std::uint32_t light_groups = 0;  // at full resolution, number of light groups with separate sums
     bool stops_by_noise = false;     // there is a noise target
     bool adaptive = false;           // adaptive sampling

@@ -430,7 +430,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.model_holdout_ = shaded && picture.traced_ > 0 && trace_inputs.model_holdout;
   picture.motion_ = shaded && parameters.shutter.lasts != 0U;
   picture.layered_ = shaded && trace_inputs.raster != nullptr ? settings.layered : Layered::no;
-  picture.volume_alone_ = shaded && settings.volume_alone;
+  picture.volume_alone_ = shaded && settings.separate_volume_aov;
   picture.light_groups_ = shaded ? settings.light_groups : 0;
   if (picture.light_groups_ > 0 && picture.traced_ > 0) picture.traced_ = 2;
   // Equiangular sampling is off in these cases. The separate volume AOV depends on the first hit of a path, but such

@@ -80,7 +80,7 @@ struct PictureSettings {
   glm::uvec2 layer_size{0U};
   unsigned layers = 1;
   /// Samples that hit the volume before any surface are also summed separately.
-  bool volume_alone = false;
+  bool separate_volume_aov = false;
   /// The picture is done once its noise (Totals::noise) reaches this; nullopt: once it has its samples.
   std::optional<double> noise_target;
   /// Pixels are sampled only as much as the noise target needs (Allotment); else all equally.
@@ -167,7 +167,7 @@ class Picture {
   /// The surface pass that camera rays ended at. Do not call it with Layered::no.
   [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }
-  [[nodiscard]] bool volume_alone() const { return volume_alone_; }
+  [[nodiscard]] bool separate_volume_aov() const { return volume_alone_; }
   /// Number of light groups with separate sums.
   [[nodiscard]] std::uint32_t light_groups() const { return light_groups_; }
   /// True if there are feature buffers that the denoiser can use (Tracer::find_features).

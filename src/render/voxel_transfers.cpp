@@ -300,7 +300,8 @@ void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vect
   const Source& source = transfer.sources[field];
   const glm::ivec3 bricks = bricks_of(source.size);
   const std::uint64_t layer = std::uint64_t(bricks.x) * std::uint64_t(bricks.y);
-  const std::size_t each = std::max(brick_bytes(source.format), transfer.stays_in_gl() ? kept_bytes(source.format) : 0);
+  const std::size_t each =
+      std::max(brick_bytes(source.format), transfer.gpu_resident() ? kept_bytes(source.format) : 0);
   const auto fits = [&](std::uint64_t count, glm::ivec2 layers) {
     if (count * each > max_bytes_) return false;
     if (source.buffer == 0) return true;
@@ -428,14 +429,14 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   for (Piece& piece : transfer.pieces) {
     const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
     piece.room = take_room(piece.count, piece.count * each);
-    if (transfer.stays_in_gl()) continue;
+    if (transfer.gpu_resident()) continue;
     // A plume grows little from one state to the next.
     const std::size_t expected = piece.room.expected + piece.room.expected / 4;
     piece.copied = std::min<std::size_t>(expected, piece.count);
     make_room_back(piece.room, piece.copied * each);
   }
   // The driver can compile the programs while bricks are packed.
-  if (transfer.stays_in_gl()) {
+  if (transfer.gpu_resident()) {
     for (const Piece& piece : transfer.pieces) programs_->ask(summaries_of(transfer, piece).program());
   }
   if (state.wait != nullptr) gl.WaitSync(state.wait, 0, GL_TIMEOUT_IGNORED);
@@ -470,7 +471,7 @@ std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* w
   const auto found = std::find_if(transfers_.rbegin(), transfers_.rend(),
                                   [&](const Transfer& t) { return t.whose == whose && t.whole; });
   if (found == transfers_.rend()) return std::nullopt;
-  Announced announced{{}, found->stays_in_gl(), index_to_world_of(found->fields[0])};
+  Announced announced{{}, found->gpu_resident(), index_to_world_of(found->fields[0])};
   for (const volume::FieldCopy& field : found->fields) announced.channels.push_back(field.channel);
   return announced;
 }
@@ -742,7 +743,7 @@ void VoxelTransfers::copy_rest(Transfer& transfer) const {
 
 bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
   if (transfer.back) return take_back(transfer, deadline);
-  if (transfer.stays_in_gl()) return take_in_gl(transfer, deadline);
+  if (transfer.gpu_resident()) return take_in_gl(transfer, deadline);
   if (!transfer.fence.passed()) return false;
   if (!transfer.counted) {
     copy_rest(transfer);
@@ -815,7 +816,7 @@ void VoxelTransfers::follow(Deadline deadline) {
     std::exception_ptr failure;
     try {
       if (!take(first, deadline)) return;
-      if (first.stays_in_gl()) {
+      if (first.gpu_resident()) {
         if (!arrive_in_gl(first)) continue;
       } else {
         if (!first.finite) {

@@ -101,7 +101,7 @@ class VoxelTransfers {
   /// The newest complete state of a volume in flight.
   struct Announced {
     std::vector<volume::Channel> channels;
-    bool stays_in_gl = false;
+    bool gpu_resident = false;
     glm::dmat4 index_to_world{1.0};  ///< of the first field
   };
   /// nullopt: there is none.
@@ -190,7 +190,7 @@ class VoxelTransfers {
     std::optional<Return> back;
     std::optional<Staying> staying;  // set when its fields have arrived
 
-    [[nodiscard]] bool stays_in_gl() const { return std::holds_alternative<StayInGl>(arrival); }
+    [[nodiscard]] bool gpu_resident() const { return std::holds_alternative<StayInGl>(arrival); }
     // True for make_products().
     [[nodiscard]] bool makes() const { return sources.empty() && !back; }
   };

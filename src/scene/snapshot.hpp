@@ -59,7 +59,7 @@ struct Ground {
   bool operator==(const Ground&) const = default;
 };
 
-/// Identifies the frame of a sequence, or the update of a live volume, that a source shows.
+/// Identifies the frame of a sequence, or the update of a dynamic volume, that a source shows.
 struct SequenceFrame {
   std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< differs for each sequence that is set
@@ -81,7 +81,7 @@ struct Volume {
   MarchSourcePtr source;  ///< not null; all in a scene have the same grid type
   Part<Medium> medium;
   Place place;
-  std::optional<SequenceFrame> frame = {};  ///< if it is of a sequence or a live volume
+  std::optional<SequenceFrame> frame = {};  ///< if it is of a sequence or a dynamic volume
   std::optional<Place> previous = {};       ///< transform in the previous frame; empty: unchanged
   bool operator==(const Volume&) const = default;
 };

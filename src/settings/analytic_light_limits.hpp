@@ -1,6 +1,6 @@
 #pragma once
 
-// Limits of analytic lights (cumulet_set_lamps) beyond the range of each single setting.
+// Limits of analytic lights (cumulet_set_lights) beyond the range of each single setting.
 
 #include <cumulet/cumulet.h>
 
@@ -32,11 +32,11 @@ struct AnalyticLightRefusal {
 };
 
 /// Checks a light whose settings are each within their range.
-inline std::optional<AnalyticLightRefusal> analytic_light_refusal(const cumulet_lamp_desc& analytic_light) {
+inline std::optional<AnalyticLightRefusal> analytic_light_refusal(const cumulet_light_desc& analytic_light) {
   if (!std::all_of(std::begin(analytic_light.position), std::end(analytic_light.position),
                    [](double x) { return std::abs(x) <= farthest_analytic_light; }))
     return AnalyticLightRefusal{"position", "is beyond 1e30"};
-  if (analytic_light.kind == CUMULET_LAMP_SUN && analytic_light.angle_degrees > widest_sun_analytic_light)
+  if (analytic_light.kind == CUMULET_LIGHT_DISTANT && analytic_light.angle_degrees > widest_sun_analytic_light)
     return AnalyticLightRefusal{"angle_degrees", "of a sun is above 90"};
   if (!(*std::max_element(std::begin(analytic_light.color), std::end(analytic_light.color)) * analytic_light.power <=
         brightest_analytic_light))

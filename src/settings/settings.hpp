@@ -14,9 +14,9 @@
 namespace cumulet::settings {
 
 inline constexpr std::array march_choices = {
-    Choice{"tet", CUMULET_MARCH_TET, "Tetrahedra", "The adaptive grid."},
-    Choice{"dense", CUMULET_MARCH_DENSE, "Dense voxels", "Every voxel: the reference."},
-    Choice{"brick", CUMULET_MARCH_BRICK, "Bricks", "Voxels, with empty 8x8x8 bricks skipped."}};
+    Choice{"tet", CUMULET_GRID_TETRAHEDRAL, "Tetrahedra", "The adaptive grid."},
+    Choice{"dense", CUMULET_GRID_DENSE, "Dense voxels", "Every voxel: the reference."},
+    Choice{"brick", CUMULET_GRID_BRICKS, "Bricks", "Voxels, with empty 8x8x8 bricks skipped."}};
 inline constexpr std::array cells_choices = {
     Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "The mean."},
     Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
@@ -30,10 +30,10 @@ inline constexpr std::array build_choices = {
     Choice{"cpu", CUMULET_BUILD_CPU, "CPU", "A worker builds the cells."},
     Choice{"gpu", CUMULET_BUILD_GPU, "GPU", "Compute shaders build the cells, within frames' budgets."}};
 inline constexpr std::array surface_light_choices = {
-    Choice{"full", CUMULET_SURFACE_LIGHT_FULL, "Full", "To each other and to the volume, and back."},
-    Choice{"shadows", CUMULET_SURFACE_LIGHT_SHADOWS, "Shadows",
+    Choice{"full", CUMULET_SURFACE_LIGHTING_GLOBAL, "Full", "To each other and to the volume, and back."},
+    Choice{"shadows", CUMULET_SURFACE_LIGHTING_DIRECT, "Shadows",
            "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
-    Choice{"none", CUMULET_SURFACE_LIGHT_NONE, "None", "Rasterised, without shadows: the fastest."}};
+    Choice{"none", CUMULET_SURFACE_LIGHTING_RASTERIZED, "None", "Rasterised, without shadows: the fastest."}};
 inline constexpr std::array phase_choices = {
     Choice{"hg", CUMULET_PHASE_HG, "One lobe", "Henyey-Greenstein's."},
     Choice{"two-lobe", CUMULET_PHASE_TWO_LOBE, "Two lobes", "Of Henyey-Greenstein: say, one forward and one back."},
@@ -50,9 +50,9 @@ inline constexpr std::array repeat_choices = {
     Choice{"loop", CUMULET_REPEAT_LOOP, "Loop", "After the last frame the first."},
     Choice{"ping-pong", CUMULET_REPEAT_PING_PONG, "Ping-pong", "Back, and forth again."}};
 inline constexpr std::array between_choices = {
-    Choice{"none", CUMULET_BETWEEN_NONE, "Nothing", "The frame that came last stays until the next."},
-    Choice{"blend", CUMULET_BETWEEN_BLEND, "Blended", "A frame fades into the next."},
-    Choice{"advect", CUMULET_BETWEEN_ADVECT, "Advected",
+    Choice{"none", CUMULET_FRAME_INTERPOLATION_NONE, "Nothing", "The frame that came last stays until the next."},
+    Choice{"blend", CUMULET_FRAME_INTERPOLATION_BLEND, "Blended", "A frame fades into the next."},
+    Choice{"advect", CUMULET_FRAME_INTERPOLATION_ADVECT, "Advected",
            "Frames move along their velocity; those without fade into the next."}};
 inline constexpr std::array view_choices = {
     Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
@@ -82,11 +82,11 @@ inline constexpr std::array depth_choices = {Choice{"standard", CUMULET_DEPTH_ST
                                              Choice{"reversed", CUMULET_DEPTH_REVERSED, "", ""}};
 
 inline constexpr std::array analytic_light_choices = {
-    Choice{"point", CUMULET_LAMP_POINT, "Point", "The same in all directions."},
-    Choice{"spot", CUMULET_LAMP_SPOT, "Spot", "A point that shines into a cone."},
-    Choice{"disc", CUMULET_LAMP_DISC, "Disc", "A round area that shines to one side."},
-    Choice{"rectangle", CUMULET_LAMP_RECTANGLE, "Rectangle", "An area that shines to one side."},
-    Choice{"sun", CUMULET_LAMP_SUN, "Sun", "Far away: the same everywhere."}};
+    Choice{"point", CUMULET_LIGHT_POINT, "Point", "The same in all directions."},
+    Choice{"spot", CUMULET_LIGHT_SPOT, "Spot", "A point that shines into a cone."},
+    Choice{"disc", CUMULET_LIGHT_DISK, "Disc", "A round area that shines to one side."},
+    Choice{"rectangle", CUMULET_LIGHT_RECT, "Rectangle", "An area that shines to one side."},
+    Choice{"sun", CUMULET_LIGHT_DISTANT, "Sun", "Far away: the same everywhere."}};
 
 /// Valid light group numbers.
 inline constexpr Range group_range = {0.0, double{CUMULET_LIGHT_GROUPS} - 1.0};
@@ -142,7 +142,7 @@ struct Table<cumulet_medium_desc> {
         .row = {.label = "Second anisotropy",
                 .tip = "Of two lobes the second one's Henyey-Greenstein g.",
                 .least = -0.99, .most = 0.99}}),
-      Setting(&Desc::second_share, {.name = "second_share", .range = {0.0, 1.0}, .given = Range{0.01, 1.0}, .zero = 0.5,
+      Setting(&Desc::second_weight, {.name = "second_weight", .range = {0.0, 1.0}, .given = Range{0.01, 1.0}, .zero = 0.5,
         .key = "medium.second_share", .flag = "--second-share", .type = "S",
         .help = "Part of the light in the second of two lobes, from 0.01 to 1 (default: 0.5)",
         .row = {.label = "Second share",
@@ -196,9 +196,9 @@ struct Table<cumulet_medium_desc> {
 };
 
 template <>
-struct Table<cumulet_light_desc> {
-  using Desc = cumulet_light_desc;
-  static constexpr const char* name = "cumulet_light_desc";
+struct Table<cumulet_sun_sky_desc> {
+  using Desc = cumulet_sun_sky_desc;
+  static constexpr const char* name = "cumulet_sun_sky_desc";
   static constexpr std::tuple rows = {
       Setting(&Desc::sun_azimuth_degrees, {.name = "sun_azimuth_degrees", .given = Range{-360.0, 360.0},
         .key = "light.sun.azimuth_degrees",
@@ -256,9 +256,9 @@ struct Table<cumulet_light_desc> {
 
 /// The settings of one light in a list: keys are those of its object in a scene file.
 template <>
-struct Table<cumulet_lamp_desc> {
-  using Desc = cumulet_lamp_desc;
-  static constexpr const char* name = "cumulet_lamp_desc";
+struct Table<cumulet_light_desc> {
+  using Desc = cumulet_light_desc;
+  static constexpr const char* name = "cumulet_light_desc";
   static constexpr std::tuple rows = {
       Setting(&Desc::kind, {.name = "kind", .choices = analytic_light_choices,
         .key = "kind",
@@ -269,7 +269,7 @@ struct Table<cumulet_lamp_desc> {
       Setting(&Desc::direction, {.name = "direction",
         .key = "direction",
         .row = {.label = "Direction", .tip = "Where it shines."}}),
-      Setting(&Desc::across, {.name = "across",
+      Setting(&Desc::tangent, {.name = "tangent",
         .key = "across",
         .row = {.label = "Across", .tip = "Along a rectangle's width."}}),
       Setting(&Desc::color, {.name = "color", .range = light_range, .zero = 1.0,
@@ -328,7 +328,7 @@ struct Table<cumulet_ground_desc> {
   using Desc = cumulet_ground_desc;
   static constexpr const char* name = "cumulet_ground_desc";
   static constexpr std::tuple rows = {
-      Setting(&Desc::place, {.name = "place", .choices = ground_choices,
+      Setting(&Desc::mode, {.name = "mode", .choices = ground_choices,
         .key = "ground.place", .flag = "--ground",
         .help = "A level plane that catches light and shadows (default: below, without a model or a word of light; "
                 "else none)",
@@ -359,7 +359,7 @@ struct Table<cumulet_surface_settings_desc> {
       Setting(&Desc::animation, {.name = "animation",
         .key = "surfaces.animation", .flag = "--gltf-animation", .type = "N",
         .help = "Which animation of the file, from 0 (default: 0)"}),
-      Setting(&Desc::light, {.name = "light", .choices = surface_light_choices,
+      Setting(&Desc::lighting, {.name = "lighting", .choices = surface_light_choices,
         .key = "surfaces.light", .flag = "--surface-light",
         .help = "Light between surfaces and volume (default: full), or only from sun, sky, lamps and what glows",
         .row = {.label = "Surface light",
@@ -392,7 +392,7 @@ struct Table<cumulet_grid_desc> {
   using Desc = cumulet_grid_desc;
   static constexpr const char* name = "cumulet_grid_desc";
   static constexpr std::tuple rows = {
-      Setting(&Desc::march, {.name = "march", .choices = march_choices,
+      Setting(&Desc::type, {.name = "type", .choices = march_choices,
         .key = "grid.march", .flag = "--march",
         .help = "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks",
         .row = {.label = "March",
@@ -430,7 +430,7 @@ struct Table<cumulet_grid_desc> {
         .row = {.label = "Pixel size",
                 .tip = "Pixels that a cell's longest edge must cover to be split.",
                 .least = 0.25, .most = 32.0, .format = "%.2f", .logarithmic = true}}),
-      Setting(&Desc::build, {.name = "build", .choices = build_choices,
+      Setting(&Desc::build_device, {.name = "build_device", .choices = build_choices,
         .key = "grid.build", .flag = "--build",
         .help = "Who builds the cells (default: cpu); what GL has no room for the CPU does",
         .row = {.label = "Built by",
@@ -470,7 +470,7 @@ struct Table<cumulet_sampling_desc> {
         .row = {.label = "View",
                 .tip = "The picture, or a look at the grid that makes it (keys 1 to 5)."}}),
       Setting(&Desc::preview, {.name = "preview", .choices = preview_choices}),
-      Setting(&Desc::volume_alone, {.name = "volume_alone"}),
+      Setting(&Desc::separate_volume_aov, {.name = "separate_volume_aov"}),
       Setting(&Desc::first_sample, {.name = "first_sample"}),
       Setting(&Desc::region, {.name = "region", .range = {0.0, 1.0},
         .key = "picture.region", .flag = "--region", .type = "X,Y,W,H",
@@ -543,7 +543,7 @@ struct Table<cumulet_playback_desc> {
         .row = {.label = "Repeat", .tip = "What follows the last frame."}}),
       Setting(&Desc::first_frame, {.name = "first_frame"}),
       Setting(&Desc::frame_count, {.name = "frame_count"}),
-      Setting(&Desc::between, {.name = "between", .choices = between_choices,
+      Setting(&Desc::interpolation, {.name = "interpolation", .choices = between_choices,
         .key = "sequence.between", .flag = "--between",
         .help = "What --frames 1-10x0.5 makes between two frames (default: advect)",
         .row = {.label = "In between", .tip = "What is shown between two frames."}}),
@@ -615,13 +615,13 @@ struct Table<cumulet_navigation_desc> {
 
 /// Returns the refinement criterion of a grid. A descriptor of zeros selects the default, not the criterion that has
 /// the value 0.
-[[nodiscard]] constexpr cumulet_criterion criterion_of(const cumulet_grid_desc& desc) {
+[[nodiscard]] constexpr cumulet_refinement_criterion criterion_of(const cumulet_grid_desc& desc) {
   const bool zeros = desc.criterion == CUMULET_CRITERION_DEVIATION && desc.threshold == 0.0;
   return zeros ? CUMULET_CRITERION_TRANSMITTANCE : desc.criterion;
 }
 
 /// Returns the threshold that 0 means, for a criterion from criterion_of().
-[[nodiscard]] constexpr double default_threshold(cumulet_criterion criterion) {
+[[nodiscard]] constexpr double default_threshold(cumulet_refinement_criterion criterion) {
   switch (criterion) {
     case CUMULET_CRITERION_TRANSMITTANCE:
       return 0.15;
@@ -638,6 +638,8 @@ constexpr void name_criterion(cumulet_grid_desc& desc) {
 }
 
 /// Returns the angular diameter of the sun that 0 means, in degrees.
-[[nodiscard]] constexpr float default_sun_angle(cumulet_sky sky) { return sky == CUMULET_SKY_PHYSICAL ? 0.53F : 0.0F; }
+[[nodiscard]] constexpr float default_sun_angle(cumulet_sky_model sky) {
+  return sky == CUMULET_SKY_PHYSICAL ? 0.53F : 0.0F;
+}
 
 }  // namespace cumulet::settings

@@ -137,7 +137,7 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     auto viewer = std::make_unique<cumulet_viewer>();
     viewer->viewer = std::make_unique<core::Viewer>(
         std::move(log), std::move(update), d.gl_state == CUMULET_GL_STATE_RESTORE,
-        cumulet::Trace(d.trace, d.trace_user), d.programs == nullptr ? nullptr : d.programs->asset);
+        cumulet::Trace(d.trace, d.trace_user), d.shader_cache == nullptr ? nullptr : d.shader_cache->asset);
     cumulet_grid_desc grid{};
     cumulet::settings::spell_out_zeros(grid);
     viewer->viewer->set_grid(core::GridSettings::of(grid));
@@ -146,10 +146,10 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
   });
 }
 
-cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumulet_programs** out, char* error,
-                                       size_t error_size) {
+cumulet_status cumulet_shader_cache_create(const cumulet_shader_cache_desc* desc, cumulet_shader_cache** out,
+                                           char* error, size_t error_size) {
   return cumulet::c_abi::make_handle(out, error, error_size, [&] {
-    const cumulet_programs_desc d = read_desc(desc, "cumulet_programs_desc");
+    const cumulet_shader_cache_desc d = read_desc(desc, "cumulet_shader_cache_desc");
     const bool kept = d.folder != nullptr && *d.folder != '\0';
     std::shared_ptr<cumulet::gl::ShaderFolder> shaders;
     if (d.shaders != nullptr && *d.shaders != '\0') {
@@ -164,9 +164,11 @@ cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumule
   });
 }
 
-cumulet_programs* cumulet_programs_retain(cumulet_programs* programs) { return cumulet::c_abi::retain(programs); }
+cumulet_shader_cache* cumulet_shader_cache_retain(cumulet_shader_cache* programs) {
+  return cumulet::c_abi::retain(programs);
+}
 
-void cumulet_programs_release(cumulet_programs* programs) { cumulet::c_abi::release(programs); }
+void cumulet_shader_cache_release(cumulet_shader_cache* programs) { cumulet::c_abi::release(programs); }
 
 void cumulet_destroy(cumulet_viewer* viewer) {
   if (viewer == nullptr || cumulet::CallbackScope::inside() || viewer->process != getpid()) return;
@@ -220,14 +222,14 @@ cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_sequence* se
 
 namespace {
 
-void tell_live(const core::Viewer::LiveStatus& status, cumulet_live_info* info) {
-  cumulet_live_info out{};
-  out.handed_state = status.handed;
-  out.ready_state = status.ready;
-  out.drawn_state = status.drawn;
+void tell_live(const core::Viewer::LiveStatus& status, cumulet_dynamic_volume_info* info) {
+  cumulet_dynamic_volume_info out{};
+  out.submitted_update = status.handed;
+  out.ready_update = status.ready;
+  out.displayed_update = status.drawn;
   out.ready_count = status.ready_count;
-  out.drawn_count = status.drawn_count;
-  write_desc(info, out, "cumulet_live_info");
+  out.displayed_count = status.displayed_count;
+  write_desc(info, out, "cumulet_dynamic_volume_info");
 }
 
 void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_info* info, uint8_t* states,
@@ -239,13 +241,13 @@ void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_
   out.frames = static_cast<uint32_t>(frames.size());
   out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameCache::State::ready));
   out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameCache::State::failed));
-  out.asked_frame = status.asked;
-  out.drawn_frame = static_cast<uint32_t>(status.drawn.value_or(0.0));
-  out.is_drawn = status.drawn ? 1 : 0;
+  out.requested_frame = status.asked;
+  out.displayed_frame = static_cast<uint32_t>(status.drawn.value_or(0.0));
+  out.is_displayed = status.drawn ? 1 : 0;
   out.bytes = status.frames.bytes;
   out.suggested_density_scale = status.density_scale.value_or(0.0);
-  out.asked_position = status.asked_position;
-  out.drawn_position = status.drawn.value_or(0.0);
+  out.requested_position = status.requested_position;
+  out.displayed_position = status.drawn.value_or(0.0);
   write_desc(info, out, "cumulet_sequence_info");
   if (states == nullptr) return;
   std::ranges::transform(frames, states, [](core::FrameCache::State state) { return static_cast<uint8_t>(state); });
@@ -288,22 +290,22 @@ cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumul
   });
 }
 
-cumulet_status cumulet_set_live(cumulet_viewer* viewer, cumulet_live* live) {
+cumulet_status cumulet_set_dynamic_volume(cumulet_viewer* viewer, cumulet_dynamic_volume* live) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_live(live == nullptr ? nullptr : live->asset); });
 }
 
-cumulet_status cumulet_get_live_info(cumulet_viewer* viewer, cumulet_live_info* info) {
+cumulet_status cumulet_get_dynamic_volume_info(cumulet_viewer* viewer, cumulet_dynamic_volume_info* info) {
   return guarded(viewer, [&](core::Viewer& v) {
-    read_desc(info, "cumulet_live_info");
+    read_desc(info, "cumulet_dynamic_volume_info");
     tell_live(v.live(), info);
   });
 }
 
-cumulet_status cumulet_get_instance_live_info(cumulet_viewer* viewer, cumulet_instance* instance,
-                                              cumulet_live_info* info) {
+cumulet_status cumulet_get_instance_dynamic_volume_info(cumulet_viewer* viewer, cumulet_instance* instance,
+                                                        cumulet_dynamic_volume_info* info) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
-    read_desc(info, "cumulet_live_info");
+    read_desc(info, "cumulet_dynamic_volume_info");
     tell_live(v.live(*instance->asset), info);
   });
 }
@@ -320,7 +322,7 @@ cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_d
   });
 }
 
-cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
+cumulet_status cumulet_set_volume_transforms(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::Place> places = places_of(to_world, count);
     if (places.empty()) places.emplace_back();
@@ -328,12 +330,12 @@ cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* t
   });
 }
 
-cumulet_status cumulet_set_previous_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
+cumulet_status cumulet_set_previous_volume_transforms(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_previous_places(places_of(to_world, count)); });
 }
 
-cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, const double* open, const double* close,
-                                          uint32_t count) {
+cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, const double* open, const double* close,
+                                                     uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::Place> places = v.places();
     const bool ends = open != nullptr || close != nullptr;
@@ -443,11 +445,11 @@ cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const
   });
 }
 
-cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {
+cumulet_status cumulet_set_sun_sky(cumulet_viewer* viewer, const cumulet_sun_sky_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
 }
 
-cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* analytic_lights, uint64_t count) {
+cumulet_status cumulet_set_lights(cumulet_viewer* viewer, const cumulet_light_desc* analytic_lights, uint64_t count) {
   return guarded(viewer,
                  [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::analytic_lights_of(analytic_lights, count)); });
 }
@@ -602,12 +604,12 @@ cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* 
     if (result == nullptr) return;
     cumulet_frame_result out{};
     const auto flag = [&out](bool set, std::uint32_t bit) { out.flags |= set ? bit : 0U; };
-    flag(r.more, CUMULET_RENDER_MORE);
+    flag(r.more, CUMULET_RENDER_INCOMPLETE);
     flag(r.converged, CUMULET_RENDER_CONVERGED);
     flag(r.loading, CUMULET_RENDER_LOADING);
     flag(r.failed, CUMULET_RENDER_FAILED);
     flag(r.preview, CUMULET_RENDER_PREVIEW);
-    flag(r.undrawn, CUMULET_RENDER_UNDRAWN);
+    flag(r.undrawn, CUMULET_RENDER_NEW_IMAGE);
     out.progress = r.progress;
     out.width = r.size.x;
     out.height = r.size.y;
@@ -627,7 +629,7 @@ cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet_frame_desc*
     const core::WarmUp done = v.warm_up(f, number(scope) == CUMULET_WARM_UP_ALL);
     if (result == nullptr) return;
     cumulet_warm_up_result out{};
-    out.more = done.more ? 1 : 0;
+    out.incomplete = done.more ? 1 : 0;
     out.progress = done.progress;
     write_desc(result, out, "cumulet_warm_up_result");
   });
@@ -642,11 +644,11 @@ cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumul
     out.hit = p.hit ? 1 : 0;
     for (int axis = 0; axis < 3; ++axis) out.position[axis] = p.position[axis];
     out.distance = p.distance;
-    out.met_volume = p.place ? 1 : 0;
-    out.place = p.place.value_or(0);
+    out.hit_volume = p.place ? 1 : 0;
+    out.transform_index = p.place.value_or(0);
     out.tag = p.tag;
     if (p.surface) {
-      out.met_surface = 1;
+      out.hit_surface = 1;
       out.material = p.surface->material;
       copy_text(p.surface->material_name, out.material_name, sizeof out.material_name);
       for (int axis = 0; axis < 3; ++axis) out.normal[axis] = p.surface->normal[axis];
@@ -769,7 +771,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.build_seconds_load = seconds.load;
     s.build_seconds_statistics = seconds.statistics;
     s.build_seconds_refine = seconds.refine;
-    s.build_seconds_records = seconds.records;
+    s.build_seconds_packing = seconds.records;
     s.build_seconds_upload = seconds.upload;
     s.build_seconds_total = seconds.load + seconds.statistics + seconds.refine + seconds.records + seconds.upload;
     s.trace_seconds = had.trace_seconds;

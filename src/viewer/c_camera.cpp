@@ -58,8 +58,8 @@ CameraPose pose_of(const cumulet_camera_desc* desc) {
   return pose;
 }
 
-ClipDepth clip_of(const cumulet_clip& clip) {
-  require(number(clip) <= CUMULET_CLIP_ZERO_TO_ONE, "the cumulet_clip is unknown");
+ClipDepth clip_of(const cumulet_clip_space& clip) {
+  require(number(clip) <= CUMULET_CLIP_ZERO_TO_ONE, "the cumulet_clip_space is unknown");
   return static_cast<ClipDepth>(number(clip));
 }
 
@@ -96,7 +96,7 @@ cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_d
     d.orthographic_height = pose.orthographic_height;
     d.near_plane = pose.near_plane;
     d.far_plane = pose.far_plane;
-    d.depth = static_cast<cumulet_depth>(pose.depth);
+    d.depth = static_cast<cumulet_depth_convention>(pose.depth);
     d.lens_radius = pose.lens_radius;
     d.focus_distance = pose.focus_distance;
     write_desc(desc, d, "cumulet_camera_desc");
@@ -104,7 +104,7 @@ cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_d
 }
 
 cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double view[16], const double projection[16],
-                                           cumulet_clip clip) {
+                                           cumulet_clip_space clip) {
   return on(camera, "camera", [&](Camera& c) {
     require(view != nullptr && projection != nullptr, "view or projection is NULL");
     c.set_matrices(glm::make_mat4(view), glm::make_mat4(projection), clip_of(clip));
@@ -121,7 +121,7 @@ cumulet_status cumulet_camera_set_shutter(cumulet_camera* camera, const cumulet_
   });
 }
 
-cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect, cumulet_clip clip,
+cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect, cumulet_clip_space clip,
                                            double view[16], double projection[16]) {
   return on(camera, "camera", [&](const Camera& c) {
     require(view != nullptr && projection != nullptr, "view or projection is NULL");

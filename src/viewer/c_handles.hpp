@@ -45,12 +45,12 @@ struct cumulet_sequence {
   std::atomic<int> references = 1;
 };
 
-struct cumulet_live {
+struct cumulet_dynamic_volume {
   std::shared_ptr<cumulet::viewer::Live> asset;
   std::atomic<int> references = 1;
 };
 
-struct cumulet_programs {
+struct cumulet_shader_cache {
   std::shared_ptr<cumulet::viewer::Sharing> asset;
   std::atomic<int> references = 1;
 };

@@ -20,11 +20,11 @@ InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   const cumulet_instance_desc d = read_desc(desc, "cumulet_instance_desc");
   require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
   InstanceSettings settings;
-  require((d.volume != nullptr) + (d.sequence != nullptr) + (d.live != nullptr) <= 1,
-          "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
+  require((d.volume != nullptr) + (d.sequence != nullptr) + (d.dynamic_volume != nullptr) <= 1,
+          "cumulet_instance_desc has more than one of a volume, a sequence and a dynamic volume");
   if (d.volume != nullptr) settings.volume = d.volume->asset;
   if (d.sequence != nullptr) settings.sequence = d.sequence->asset;
-  if (d.live != nullptr) settings.live = d.live->asset;
+  if (d.dynamic_volume != nullptr) settings.live = d.dynamic_volume->asset;
   settings.to_world = matrix_or_identity(d.to_world);
   require_place(settings.to_world, "cumulet_instance_desc.");
   settings.ends = place_ends(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_instance_desc.");

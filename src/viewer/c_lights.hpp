@@ -9,6 +9,6 @@ namespace cumulet::c_abi {
 
 /// Converts descriptors of analytic lights; lights without power are left out. Throws Error(invalid_argument) with the
 /// light and the field.
-light::AnalyticLights analytic_lights_of(const cumulet_lamp_desc* analytic_lights, uint64_t count);
+light::AnalyticLights analytic_lights_of(const cumulet_light_desc* analytic_lights, uint64_t count);
 
 }  // namespace cumulet::c_abi

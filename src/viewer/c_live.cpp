@@ -37,7 +37,7 @@ class HostMemory {
 };
 
 struct HandedState {
-  cumulet_state_desc desc{};
+  cumulet_volume_fields_desc desc{};
   std::string name;
   std::vector<MemoryField> fields;
 };
@@ -51,9 +51,9 @@ MemoryField field_of(const cumulet_field& field, const std::string& what) {
   return {channel, to_sparse(f.sparse, what)};
 }
 
-HandedState state_of(const cumulet_state_desc* desc) {
+HandedState state_of(const cumulet_volume_fields_desc* desc) {
   HandedState state;
-  state.desc = read_desc(desc, "cumulet_state_desc");
+  state.desc = read_desc(desc, "cumulet_volume_fields_desc");
   state.name = name_or(state.desc.name, "state");
   for_each_desc(
       state.desc.fields, state.desc.field_count, "cumulet_field", state.name + ": field",
@@ -62,7 +62,7 @@ HandedState state_of(const cumulet_state_desc* desc) {
 }
 
 void require_no_release(const HandedState& state) {
-  require(state.desc.release == nullptr, "cumulet_state_desc.release is for cumulet_live_set alone");
+  require(state.desc.release == nullptr, "cumulet_volume_fields_desc.release is for cumulet_dynamic_volume_set alone");
 }
 
 render::GlVoxels gl_voxels_of(const cumulet_gl_field& field, const std::string& what) {
@@ -84,8 +84,8 @@ render::GlVoxels gl_voxels_of(const cumulet_gl_field& field, const std::string& 
   return voxels;
 }
 
-render::GlState gl_state_of(const cumulet_gl_state_desc* desc) {
-  const cumulet_gl_state_desc d = read_desc(desc, "cumulet_gl_state_desc");
+render::GlState gl_state_of(const cumulet_gl_volume_desc* desc) {
+  const cumulet_gl_volume_desc d = read_desc(desc, "cumulet_gl_volume_desc");
   render::GlState state;
   state.name = name_or(d.name, "state");
   for_each_desc(d.fields, d.field_count, "cumulet_gl_field", state.name + ": field",
@@ -100,25 +100,26 @@ render::GlState gl_state_of(const cumulet_gl_state_desc* desc) {
   return state;
 }
 
-std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
-  const cumulet_live_desc d = read_desc(desc, "cumulet_live_desc");
+std::shared_ptr<Live> live_of(const cumulet_dynamic_volume_desc* desc) {
+  const cumulet_dynamic_volume_desc d = read_desc(desc, "cumulet_dynamic_volume_desc");
   const auto moderate = [](double x) { return in_range(x, -1e15, 1e15); };
   require(std::ranges::all_of(d.bounds_min, moderate) && std::ranges::all_of(d.bounds_max, moderate),
-          "cumulet_live_desc's bounds are not within +-1e15");
+          "cumulet_dynamic_volume_desc's bounds are not within +-1e15");
   const cumulet::viewer::Bounds bounds{to_dvec3(d.bounds_min), to_dvec3(d.bounds_max)};
-  require(d.stays_in_gl == 0 || d.stays_in_gl == 1, "cumulet_live_desc.stays_in_gl is neither 0 nor 1");
-  const bool stays = d.stays_in_gl == 1;
+  require(d.gpu_resident == 0 || d.gpu_resident == 1, "cumulet_dynamic_volume_desc.gpu_resident is neither 0 nor 1");
+  const bool stays = d.gpu_resident == 1;
   if (bounds.min == glm::dvec3(0.0) && bounds.max == glm::dvec3(0.0))
     return std::make_shared<Live>(std::nullopt, stays);
-  require(glm::all(glm::lessThan(bounds.min, bounds.max)), "cumulet_live_desc.bounds_min is not below bounds_max");
+  require(glm::all(glm::lessThan(bounds.min, bounds.max)),
+          "cumulet_dynamic_volume_desc.bounds_min is not below bounds_max");
   return std::make_shared<Live>(bounds, stays);
 }
 
 // Like on(), for calls with an error buffer.
 template <class Call>
-cumulet_status on_live(cumulet_live* live, char* error, size_t error_size, Call&& call) noexcept {
+cumulet_status on_live(cumulet_dynamic_volume* live, char* error, size_t error_size, Call&& call) noexcept {
   return guarded(error, error_size, [&] {
-    require(live != nullptr, "the live volume is NULL");
+    require(live != nullptr, "the dynamic volume is NULL");
     const auto kept = live->asset;  // the callbacks of this call may release the handle
     call(*kept);
   });
@@ -126,8 +127,8 @@ cumulet_status on_live(cumulet_live* live, char* error, size_t error_size, Call&
 
 }  // namespace
 
-cumulet_status cumulet_volume_from_state(const cumulet_state_desc* desc, cumulet_volume** out, char* error,
-                                         size_t error_size) {
+cumulet_status cumulet_volume_from_fields(const cumulet_volume_fields_desc* desc, cumulet_volume** out, char* error,
+                                          size_t error_size) {
   return make_handle(out, error, error_size, [&] {
     const HandedState state = state_of(desc);
     require_no_release(state);
@@ -136,15 +137,17 @@ cumulet_status cumulet_volume_from_state(const cumulet_state_desc* desc, cumulet
   });
 }
 
-cumulet_status cumulet_live_create(const cumulet_live_desc* desc, cumulet_live** out, char* error, size_t error_size) {
+cumulet_status cumulet_dynamic_volume_create(const cumulet_dynamic_volume_desc* desc, cumulet_dynamic_volume** out,
+                                             char* error, size_t error_size) {
   return make_handle(out, error, error_size, [&] { return live_of(desc); });
 }
 
-cumulet_live* cumulet_live_retain(cumulet_live* live) { return retain(live); }
+cumulet_dynamic_volume* cumulet_dynamic_volume_retain(cumulet_dynamic_volume* live) { return retain(live); }
 
-void cumulet_live_release(cumulet_live* live) { release(live); }
+void cumulet_dynamic_volume_release(cumulet_dynamic_volume* live) { release(live); }
 
-cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_state_desc* desc, char* error, size_t error_size) {
+cumulet_status cumulet_dynamic_volume_set(cumulet_dynamic_volume* live, const cumulet_volume_fields_desc* desc,
+                                          char* error, size_t error_size) {
   return on_live(live, error, error_size, [&](Live& l) {
     HandedState state = state_of(desc);
     cumulet::viewer::MakeLease lease;
@@ -154,7 +157,8 @@ cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_state_desc* de
   });
 }
 
-cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc* desc, char* error, size_t error_size) {
+cumulet_status cumulet_dynamic_volume_update(cumulet_dynamic_volume* live, const cumulet_volume_fields_desc* desc,
+                                             char* error, size_t error_size) {
   return on_live(live, error, error_size, [&](Live& l) {
     HandedState state = state_of(desc);
     require_no_release(state);
@@ -170,14 +174,16 @@ cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc*
   });
 }
 
-cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live, const cumulet_gl_state_desc* desc) {
+cumulet_status cumulet_dynamic_volume_set_gl(cumulet_viewer* viewer, cumulet_dynamic_volume* live,
+                                             const cumulet_gl_volume_desc* desc) {
   return guarded(viewer, [&](cumulet::viewer::Viewer& v) {
-    require(live != nullptr, "the live volume is NULL");
+    require(live != nullptr, "the dynamic volume is NULL");
     v.set_live_gl(live->asset, gl_state_of(desc));
   });
 }
 
-cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out, char* error, size_t error_size) {
+cumulet_status cumulet_dynamic_volume_get_volume(cumulet_dynamic_volume* live, cumulet_volume** out, char* error,
+                                                 size_t error_size) {
   if (out != nullptr) *out = nullptr;
   return on_live(live, error, error_size, [&](Live& l) {
     require(out != nullptr, "out is NULL");

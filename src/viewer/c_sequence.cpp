@@ -27,7 +27,7 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   if (d.first_frame >= frames) refuse("the sequence has no frame " + there(d.first_frame));
   const std::uint32_t rest = frames - d.first_frame;
   if (d.frame_count > rest) refuse("the sequence has fewer frames from " + there(d.first_frame));
-  const bool steps = d.between != CUMULET_BETWEEN_NONE;
+  const bool steps = d.interpolation != CUMULET_FRAME_INTERPOLATION_NONE;
   require(d.subframes <= max_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
   // The default is lower for sequences so long that it would exceed the maximum.
   if (read_desc(desc, "cumulet_playback_desc").subframes == 0)
@@ -40,7 +40,7 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
           .repeat = static_cast<cumulet::scene::Repeat>(d.repeat),
           .first = d.first_frame,
           .count = d.frame_count == 0 ? rest : d.frame_count,
-          .between = static_cast<cumulet::scene::Between>(d.between),
+          .between = static_cast<cumulet::scene::Between>(d.interpolation),
           .steps = steps ? d.subframes : 1,
           .velocity_scale = d.velocity_scale};
 }

@@ -53,7 +53,7 @@ cumulet_status cumulet_update_transmittance_map(cumulet_viewer* viewer, const cu
     out.texture = made.texture;
     out.size = made.size;
     out.slices = made.slices;
-    out.more = made.more ? 1 : 0;
+    out.incomplete = made.more ? 1 : 0;
     for (int i = 0; i < 16; ++i) out.to_map[i] = made.to_map[i / 4][i % 4];
     out.near_distance = made.range.x;
     out.far_distance = made.range.y;
@@ -61,7 +61,7 @@ cumulet_status cumulet_update_transmittance_map(cumulet_viewer* viewer, const cu
   });
 }
 
-cumulet_status cumulet_drop_transmittance_map(cumulet_viewer* viewer, uint32_t slot) {
+cumulet_status cumulet_destroy_transmittance_map(cumulet_viewer* viewer, uint32_t slot) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(slot < max_slots, "the slot is not from 0 to 15");
     v.drop_map(slot);

@@ -135,19 +135,20 @@ cumulet_status cumulet_volume_suggest_density_scale(const cumulet_volume* volume
   });
 }
 
-cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_ramp ramp, cumulet_values_info* info) {
+cumulet_status cumulet_volume_get_histogram(const cumulet_volume* volume, cumulet_ramp ramp,
+                                            cumulet_histogram_info* info) {
   return guarded(nullptr, 0, [&] {
     require(volume != nullptr, "volume is NULL");
     require(number(ramp) <= CUMULET_RAMP_FLAME, "ramp is unknown");
     const volume::VolumeFrame& frame = volume->asset->frame();
     const auto pointer = [](const std::optional<volume::ScalarVolume>& field) { return field ? &*field : nullptr; };
     const std::array fields = {&frame.density, pointer(frame.temperature), pointer(frame.flame)};
-    cumulet_values_info out{};
+    cumulet_histogram_info out{};
     if (const volume::ScalarVolume* field = fields.at(number(ramp))) {
       out.max_value = field->max_value;
       std::ranges::copy(volume::histogram(*field), out.histogram);
     }
-    write_desc(info, out, "cumulet_values_info");
+    write_desc(info, out, "cumulet_histogram_info");
   });
 }
 
@@ -201,12 +202,13 @@ cumulet_status cumulet_inspection_get_grid(cumulet_inspection* inspection, uint3
     out.name = entry.unique_name.c_str();
     out.type = entry.type.c_str();
     out.grid_class = entry.grid_class.c_str();
-    out.refusal = volume_info.refusal.c_str();
+    out.unsupported_reason = volume_info.refusal.c_str();
     out.metadata_count = static_cast<uint32_t>(entry.metadata.size());
     out.channel = file.channels()[grid].c_str();
     if (volume_info.values) {
       const volume::GridValues& values = *volume_info.values;
-      out.values = entry.values == volume::Values::scalars ? CUMULET_GRID_VALUES_SCALARS : CUMULET_GRID_VALUES_LENGTHS;
+      out.values =
+          entry.values == volume::Values::scalars ? CUMULET_GRID_VALUES_SCALARS : CUMULET_GRID_VALUES_MAGNITUDES;
       for (int i = 0; i < 16; ++i) out.index_to_world[i] = values.index_to_world[i / 4][i % 4];
       out.active_voxels = values.active_voxels;
       const viewer::Bounds box = values.active_voxels > 0

@@ -155,7 +155,7 @@ render::PictureRequest Context::request(const Shot& shot, const Frame& frame, co
   request.content.view = shot.sampling.view;
   request.content.surfaces_traced = met.traced;
   request.content.preview = shot.sampling.preview;
-  request.content.volume_alone = shot.sampling.volume_alone;
+  request.content.separate_volume_aov = shot.sampling.separate_volume_aov;
   request.content.light_groups = shot.sampling.light_groups;
   request.samples = std::max(1U, shot.sampling.samples);
   request.noise_target = shot.sampling.noise_target;

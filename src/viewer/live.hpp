@@ -27,9 +27,9 @@ using MakeLease = std::function<Lease()>;
 /// reads it. All calls are thread-safe. Calls by the host do not wait for reading.
 class Live {
  public:
-  /// stays_in_gl: density submitted as GL textures stays GPU-resident until its voxels are needed in main memory.
-  explicit Live(const std::optional<Bounds>& bounds, bool stays_in_gl = false)
-      : bounds_(bounds), values_wanted_(stays_in_gl ? std::make_shared<volume::ValuesWanted>() : nullptr) {}
+  /// gpu_resident: density submitted as GL textures stays GPU-resident until its voxels are needed in main memory.
+  explicit Live(const std::optional<Bounds>& bounds, bool gpu_resident = false)
+      : bounds_(bounds), values_wanted_(gpu_resident ? std::make_shared<volume::ValuesWanted>() : nullptr) {}
 
   /// Submits a complete new state. lease: called after all checks that may fail; the voxels are then read in place
   /// until it is destroyed. Null: they are copied. Throws the errors of check_fields(), and for copied voxels those of
@@ -59,7 +59,7 @@ class Live {
   [[nodiscard]] const volume::ValuesWantedPtr& values_wanted() const { return values_wanted_; }
   /// True if states submitted from GL stay GPU-resident. It becomes false for good once voxels are needed in main
   /// memory.
-  [[nodiscard]] bool stays_in_gl() const { return values_wanted_ && !values_wanted_->asked(); }
+  [[nodiscard]] bool gpu_resident() const { return values_wanted_ && !values_wanted_->asked(); }
   /// The state submitted last, if it is GPU-resident, else null.
   struct InGl {
     scene::StateInGlPtr state;

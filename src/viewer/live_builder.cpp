@@ -9,7 +9,7 @@ namespace cumulet::viewer {
 
 namespace {
 
-constexpr const char* what = "building a live volume";
+constexpr const char* what = "building a dynamic volume";
 
 }  // namespace
 

@@ -214,10 +214,11 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   if (aov == Aov::beauty) {
     read_means(picture, false, values);
   } else if (aov == Aov::volume) {
-    if (!picture.volume_alone()) {
-      throw Error(ErrorCode::invalid_argument,
-                  "the volume alone was not gathered: set volume_alone of cumulet_sampling_desc, and wait for the full "
-                  "resolution");
+    if (!picture.separate_volume_aov()) {
+      throw Error(
+          ErrorCode::invalid_argument,
+          "the volume alone was not gathered: set separate_volume_aov of cumulet_sampling_desc, and wait for the full "
+          "resolution");
     }
     progressive_.tracer().read_volume(picture, values);
   } else if (aov == Aov::error) {

@@ -33,11 +33,11 @@ struct GridSettings {
 
   static GridSettings of(const cumulet_grid_desc& d) {
     GridSettings s;
-    s.build.march = static_cast<scene::March>(d.march);
-    s.build.on = static_cast<BuildOn>(d.build);
+    s.build.march = static_cast<scene::March>(d.type);
+    s.build.on = static_cast<BuildOn>(d.build_device);
     grid::RefineSettings& refine = s.build.refine;
     refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
-    const cumulet_criterion criterion = settings::criterion_of(d);
+    const cumulet_refinement_criterion criterion = settings::criterion_of(d);
     refine.criterion = static_cast<grid::Criterion>(criterion);
     refine.threshold = d.threshold != 0.0 ? d.threshold : settings::default_threshold(criterion);
     refine.max_cells = d.max_cells;
@@ -72,7 +72,7 @@ struct Medium {
   static scene::Phase phase_of(const cumulet_medium_desc& d) {
     switch (d.phase) {
       case CUMULET_PHASE_TWO_LOBE:
-        return {d.anisotropy, d.second_anisotropy, 0.0F, d.second_share};
+        return {d.anisotropy, d.second_anisotropy, 0.0F, d.second_weight};
       case CUMULET_PHASE_MIE:
         return scene::mie_phase(d.droplet_diameter);
       default:
@@ -98,7 +98,7 @@ struct Light {
   std::uint32_t sun_group = 0;  ///< light group
   std::uint32_t sky_group = 0;  ///< light group of the sky or the environment
 
-  static Light of(const cumulet_light_desc& d) {
+  static Light of(const cumulet_sun_sky_desc& d) {
     Light light{d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
                 glm::make_vec3(d.sky_radiance), std::nullopt};
     if (d.sky == CUMULET_SKY_PHYSICAL) light.sky = {.turbidity = d.turbidity, .ground_albedo = d.ground_albedo};
@@ -125,7 +125,7 @@ struct GroundSettings {
   glm::vec3 albedo{0.3F};
 
   static GroundSettings of(const cumulet_ground_desc& d) {
-    return {static_cast<GroundPlace>(d.place), d.height, glm::make_vec3(d.albedo)};
+    return {static_cast<GroundPlace>(d.mode), d.height, glm::make_vec3(d.albedo)};
   }
 };
 
@@ -140,7 +140,7 @@ struct SurfaceSettings {
 
   static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
     return {{d.time, d.animation, d.double_sided == 1, d.variant},
-            static_cast<SurfaceLight>(d.light),
+            static_cast<SurfaceLight>(d.lighting),
             d.indirect_roughness,
             d.group,
             d.holdout == 1};
@@ -152,7 +152,7 @@ struct Sampling {
   std::uint32_t seed = 0;
   render::View view = render::View::shaded;
   bool preview = true;
-  bool volume_alone = false;
+  bool separate_volume_aov = false;
   std::optional<double> noise_target = std::nullopt;  ///< relative
   std::uint32_t first_sample = 0;
   render::Region region = {};
@@ -162,7 +162,7 @@ struct Sampling {
 
   static Sampling of(const cumulet_sampling_desc& d) {
     Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
-                      d.volume_alone == 1};
+                      d.separate_volume_aov == 1};
     if (d.noise_target_percent > 0.0F) sampling.noise_target = 0.01 * double(d.noise_target_percent);
     sampling.first_sample = d.first_sample;
     sampling.region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}};

@@ -344,7 +344,7 @@ void Viewer::follow_live(bool unseen) {
 
 Viewer::Watched& Viewer::watched() {
   sync();
-  if (!watched_) throw Error(ErrorCode::invalid_argument, "the viewer shows no live volume");
+  if (!watched_) throw Error(ErrorCode::invalid_argument, "the viewer shows no dynamic volume");
   return *watched_;
 }
 
@@ -359,7 +359,7 @@ Viewer::LiveStatus Viewer::live() { return watched().status(); }
 Viewer::LiveStatus Viewer::live(const Instance& instance) {
   const Shown& shown = *look_up(instance);
   if (!shown.is_seen() || !shown.watching)
-    throw Error(ErrorCode::invalid_argument, "the instance shows no live volume");
+    throw Error(ErrorCode::invalid_argument, "the instance shows no dynamic volume");
   return shown.watching->watched.status();
 }
 
@@ -443,7 +443,7 @@ Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameCache& ca
   SequenceStatus status;
   status.asked = scene::frame_of(f.state.playback, f.state.moment);
   const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
-  status.asked_position = FrameCache::Steps::of(f.state.playback).position(step);
+  status.requested_position = FrameCache::Steps::of(f.state.playback).position(step);
   // The displayed frame may belong to another sequence.
   if (const auto shown = gl_ ? frame_of(*gl_, f.id) : std::nullopt)
     status.drawn = static_cast<double>(shown->number) + shown->part;

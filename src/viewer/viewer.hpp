@@ -82,9 +82,9 @@ class Viewer {
   /// Shows the current frame of a sequence instead of the volume. Null: removes the sequence that is shown, if any.
   void set_sequence(std::shared_ptr<Sequence> sequence);
   struct SequenceStatus {
-    std::uint32_t asked = 0;      ///< the current frame of its clock
-    double asked_position = 0.0;  ///< the current step, in frames
-    std::optional<double> drawn;  ///< the step that is displayed, in frames
+    std::uint32_t asked = 0;          ///< the current frame of its clock
+    double requested_position = 0.0;  ///< the current step, in frames
+    std::optional<double> drawn;      ///< the step that is displayed, in frames
     FrameCache::Status frames;
     std::optional<double> density_scale;  ///< suggested for all frames
   };
@@ -103,11 +103,11 @@ class Viewer {
   /// a complete state, or the changes to the last one.
   void set_live_gl(std::shared_ptr<Live> live, const render::GlState& state);
   struct LiveStatus {
-    std::uint64_t handed = 0;       ///< number of the newest submitted state; 0: none
-    std::uint64_t ready = 0;        ///< number of the state taken last
-    std::uint64_t drawn = 0;        ///< number of the displayed state
-    std::uint64_t ready_count = 0;  ///< how many were taken
-    std::uint64_t drawn_count = 0;  ///< how many of them were displayed
+    std::uint64_t handed = 0;           ///< number of the newest submitted state; 0: none
+    std::uint64_t ready = 0;            ///< number of the state taken last
+    std::uint64_t drawn = 0;            ///< number of the displayed state
+    std::uint64_t ready_count = 0;      ///< how many were taken
+    std::uint64_t displayed_count = 0;  ///< how many of them were displayed
   };
   /// Throws Error(invalid_argument) if the viewer shows no dynamic volume.
   LiveStatus live();

@@ -211,7 +211,7 @@ void Viewer::note_drawn(const Context& g, Watched& w) {
   if (!shown || shown->taken == w.seen_last) return;
   w.seen_last = shown->taken;
   w.told.drawn = shown->number;
-  ++w.told.drawn_count;
+  ++w.told.displayed_count;
 }
 
 void Viewer::note_rendered() {
@@ -418,14 +418,14 @@ std::optional<glm::dmat4> Viewer::place_in_gl(Context& g, const std::shared_ptr<
                                               const render::GlState& state) {
   const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
   if (!lattice) return std::nullopt;
-  if (!state.changed) return live->stays_in_gl() ? lattice : std::nullopt;
+  if (!state.changed) return live->gpu_resident() ? lattice : std::nullopt;
   // Changed boxes go to where the rest of the state is.
   const auto announced = g.transfers().announced(live.get());
   const scene::StateInGlPtr rest = live->in_gl().state;
-  if (announced ? !announced->stays_in_gl : !rest) return std::nullopt;
+  if (announced ? !announced->gpu_resident : !rest) return std::nullopt;
   if (!announced && !g.has(*rest))
     throw Error(ErrorCode::invalid_argument, one_line(state.name + ": the rest of it is in another viewer's context"));
-  if (live->stays_in_gl()) return announced ? announced->index_to_world : rest->index_to_world;
+  if (live->gpu_resident()) return announced ? announced->index_to_world : rest->index_to_world;
   bring_back(g, live, announced ? announced->channels : channels_of(*rest));
   return std::nullopt;
 }
@@ -510,14 +510,14 @@ void Viewer::gather(Context& g, Live& live) {
 
 bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) const {
   const std::shared_ptr<Live> of = live.lock();
-  if (!of || of->stays_in_gl() || brought.lock() == state) return false;
+  if (!of || of->gpu_resident() || brought.lock() == state) return false;
   const auto announced = g.transfers().announced(of.get());
-  return !announced || announced->stays_in_gl;
+  return !announced || announced->gpu_resident;
 }
 
 bool Viewer::InGl::needs_products(const scene::StateInGlPtr& state) const {
   const std::shared_ptr<Live> of = live.lock();
-  if (!of || !of->stays_in_gl()) return false;
+  if (!of || !of->gpu_resident()) return false;
   const std::vector<scene::Emission> wanted = of->wanted();
   return !state->has_wanted(wanted) && (made.lock() != state || made_by != wanted);
 }

@@ -12,8 +12,8 @@ inline void must(cumulet_viewer* viewer, cumulet_status status) {
   if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
 }
 
-inline cumulet_light_desc daylight() {
-  auto light = test::make_desc<cumulet_light_desc>();
+inline cumulet_sun_sky_desc daylight() {
+  auto light = test::make_desc<cumulet_sun_sky_desc>();
   light.sun_elevation_degrees = 40.0F;
   for (float& value : light.sun_irradiance) value = 2.5F;
   for (float& value : light.sky_radiance) value = 0.3F;
@@ -26,8 +26,8 @@ inline test::ViewerPtr make_viewer(headless::Context& context) {
   create.get_proc = headless::Context::get_proc;
   create.get_proc_user = &context;
   test::ViewerPtr viewer = test::make_plain_viewer(create);
-  const cumulet_light_desc light = daylight();
-  must(viewer.get(), cumulet_set_light(viewer.get(), &light));
+  const cumulet_sun_sky_desc light = daylight();
+  must(viewer.get(), cumulet_set_sun_sky(viewer.get(), &light));
   return viewer;
 }
 

@@ -69,10 +69,10 @@ std::vector<Place> layer(int count, double size) {
 class Bench {
  public:
   explicit Bench(const char* path) {
-    auto desc = make_desc<cumulet_programs_desc>();
-    cumulet_programs* programs = nullptr;
+    auto desc = make_desc<cumulet_shader_cache_desc>();
+    cumulet_shader_cache* programs = nullptr;
     std::array<char, 256> error{};
-    check(cumulet_programs_create(&desc, &programs, error.data(), error.size()), error.data());
+    check(cumulet_shader_cache_create(&desc, &programs, error.data(), error.size()), error.data());
     programs_.reset(programs);
     auto file = make_desc<cumulet_volume_file_desc>();
     file.path = path;
@@ -129,15 +129,15 @@ class Bench {
     auto create = make_desc<cumulet_create_desc>();
     create.get_proc = Context::get_proc;
     create.get_proc_user = &context_;
-    create.programs = programs_.get();
+    create.shader_cache = programs_.get();
     viewer_ = cumulet::test::make_plain_viewer(create);
-    light_ = make_desc<cumulet_light_desc>();
+    light_ = make_desc<cumulet_sun_sky_desc>();
     light_.sky = CUMULET_SKY_PHYSICAL;
     light_.sun_azimuth_degrees = 110.0F;
     light_.sun_elevation_degrees = 30.0F;
-    must(viewer_.get(), cumulet_set_light(viewer_.get(), &light_));
+    must(viewer_.get(), cumulet_set_sun_sky(viewer_.get(), &light_));
     auto ground = make_desc<cumulet_ground_desc>();
-    ground.place = CUMULET_GROUND_BELOW;
+    ground.mode = CUMULET_GROUND_BELOW;
     must(viewer_.get(), cumulet_set_ground(viewer_.get(), &ground));
     auto display = make_desc<cumulet_display_desc>();
     display.denoise = CUMULET_DENOISE_FAST;
@@ -186,7 +186,7 @@ class Bench {
   /// Samples per second of CPU time.
   double rate() {
     light_.sun_azimuth_degrees += 0.25F;  // restarts the image
-    must(viewer_.get(), cumulet_set_light(viewer_.get(), &light_));
+    must(viewer_.get(), cumulet_set_sun_sky(viewer_.get(), &light_));
     must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
     const double begun = processor_seconds();
     while ((render(1000.0).flags & CUMULET_RENDER_CONVERGED) == 0) continue;
@@ -231,7 +231,7 @@ class Bench {
   cumulet::test::VolumeRef volume_;
   cumulet_medium_desc medium_{};
   double size_ = 0.0;
-  cumulet_light_desc light_{};
+  cumulet_sun_sky_desc light_{};
   cumulet::test::ViewerPtr viewer_;
 };
 

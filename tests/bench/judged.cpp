@@ -25,10 +25,10 @@ struct View {
 /// Settings of a scene except its files.
 struct Looks {
   cumulet_medium_desc medium = make_desc<cumulet_medium_desc>();
-  cumulet_light_desc light = make_desc<cumulet_light_desc>();
+  cumulet_sun_sky_desc light = make_desc<cumulet_sun_sky_desc>();
   cumulet_display_desc display = make_desc<cumulet_display_desc>();
   std::optional<View> view;  ///< none: it fits
-  std::vector<cumulet_lamp_desc> analytic_lights;
+  std::vector<cumulet_light_desc> analytic_lights;
   float indirect_roughness = 0.0F;
 };
 
@@ -105,8 +105,8 @@ Looks analytic_light_looks() {
   looks.medium.density_scale = 6.0;
   demo::apply(demo::Preset::smoke, looks.medium);
   set(looks.light.sky_radiance, 0.02F, 0.03F, 0.05F);
-  auto analytic_light = make_desc<cumulet_lamp_desc>();
-  analytic_light.kind = CUMULET_LAMP_POINT;
+  auto analytic_light = make_desc<cumulet_light_desc>();
+  analytic_light.kind = CUMULET_LIGHT_POINT;
   analytic_light.position[0] = 0.25;
   analytic_light.position[1] = 0.2;
   analytic_light.position[2] = 0.35;
@@ -262,7 +262,7 @@ std::vector<JudgedScene> judged_scenes(const Options& options, std::vector<std::
   return scenes;
 }
 
-Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size, cumulet_programs* programs)
+Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size, cumulet_shader_cache* programs)
     : size_(size),
       gl_(test::load_gl(headless::Context::get_proc, &context)),
       target_(gl_, static_cast<int>(size), static_cast<int>(size)),
@@ -271,9 +271,9 @@ Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t
   light_ = looks.light;
   display_ = looks.display;
   must(cumulet_set_medium(viewer(), &looks.medium));
-  must(cumulet_set_light(viewer(), &light_));
+  must(cumulet_set_sun_sky(viewer(), &light_));
   must(cumulet_set_display(viewer(), &display_));
-  must(cumulet_set_lamps(viewer(), looks.analytic_lights.data(), looks.analytic_lights.size()));
+  must(cumulet_set_lights(viewer(), looks.analytic_lights.data(), looks.analytic_lights.size()));
   auto surface = make_desc<cumulet_surface_settings_desc>();
   surface.indirect_roughness = looks.indirect_roughness;
   must(cumulet_set_surface_settings(viewer(), &surface));
@@ -352,7 +352,7 @@ bool Stage::turn_sun(float degrees) {
                     !(light_.sun_irradiance[0] + light_.sun_irradiance[1] + light_.sun_irradiance[2] > 0.0F);
   if (dark) return false;
   light_.sun_azimuth_degrees += degrees;
-  must(cumulet_set_light(viewer(), &light_));
+  must(cumulet_set_sun_sky(viewer(), &light_));
   return true;
 }
 
@@ -364,7 +364,7 @@ double Stage::frame(double budget_ms, bool& more) {
   const auto start = std::chrono::steady_clock::now();
   must(cumulet_render(viewer(), &desc, &result));
   gl_.Finish();
-  more = (result.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_LOADING)) != 0;
+  more = (result.flags & (CUMULET_RENDER_INCOMPLETE | CUMULET_RENDER_LOADING)) != 0;
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -32,7 +32,8 @@ std::vector<JudgedScene> judged_scenes(const Options& options, std::vector<std::
 class Stage {
  public:
   /// programs: if null, the viewer uses its own.
-  Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size, cumulet_programs* programs = nullptr);
+  Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size,
+        cumulet_shader_cache* programs = nullptr);
 
   [[nodiscard]] cumulet_viewer* viewer() { return viewer_.get(); }
   /// Restarts sampling, unless only the number of samples grows.
@@ -77,7 +78,7 @@ class Stage {
   test::HostTarget target_;
   test::ViewerPtr viewer_;
   test::CameraRef camera_;
-  cumulet_light_desc light_;
+  cumulet_sun_sky_desc light_;
   cumulet_display_desc display_;
 };
 

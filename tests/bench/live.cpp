@@ -137,7 +137,7 @@ class Textures {
 
 class Bench {
  public:
-  explicit Bench(double density_scale, cumulet_build build = CUMULET_BUILD_CPU, bool stays_in_gl = false)
+  explicit Bench(double density_scale, cumulet_build_device build = CUMULET_BUILD_CPU, bool gpu_resident = false)
       : gl_(cumulet::test::load_gl(Context::get_proc, &context_)), target_(gl_, 640, 360) {
     viewer_ = cumulet::bench::make_viewer(context_);
     auto medium = make_desc<cumulet_medium_desc>();
@@ -148,45 +148,45 @@ class Bench {
     sampling.samples = 1;  // so that no other work is pending when the next state arrives
     must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.build = build;
+    grid.build_device = build;
     must(viewer_.get(), cumulet_set_grid(viewer_.get(), &grid));
-    auto desc = make_desc<cumulet_live_desc>();
-    desc.stays_in_gl = stays_in_gl ? 1 : 0;
+    auto desc = make_desc<cumulet_dynamic_volume_desc>();
+    desc.gpu_resident = gpu_resident ? 1 : 0;
     for (double& x : desc.bounds_min) x = -8.0;
     for (double& x : desc.bounds_max) x = 8.0;
     live_ = cumulet::test::make_live(desc);
-    must(viewer_.get(), cumulet_set_live(viewer_.get(), live_.get()));
+    must(viewer_.get(), cumulet_set_dynamic_volume(viewer_.get(), live_.get()));
     frame_ = target_.frame();
     frame_.budget_ms = 16.0;
   }
 
   void warm_up(const State& state) {
-    hand_over(state, cumulet_live_set, false);
+    hand_over(state, cumulet_dynamic_volume_set, false);
     must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
     auto result = make_desc<cumulet_warm_up_result>();
     do must(viewer_.get(), cumulet_warm_up(viewer_.get(), &frame_, CUMULET_WARM_UP_SCENE, &result));
-    while (result.more != 0);
+    while (result.incomplete != 0);
     settle();
   }
 
-  Spent show(const State& state, decltype(cumulet_live_set)* how, bool held) {
+  Spent show(const State& state, decltype(cumulet_dynamic_volume_set)* how, bool held) {
     return show([&] { hand_over(state, how, held); });
   }
   // hand_over: submits a state, or starts to; meanwhile: work of the host between frames.
   Spent show(
       const std::function<void()>& hand_over, const std::function<void()>& meanwhile = [] {}) {
-    auto before = make_desc<cumulet_live_info>();
-    must(viewer_.get(), cumulet_get_live_info(viewer_.get(), &before));
+    auto before = make_desc<cumulet_dynamic_volume_info>();
+    must(viewer_.get(), cumulet_get_dynamic_volume_info(viewer_.get(), &before));
     const auto begun = Clock::now();
     hand_over();
     Spent spent;
     spent.copy = milliseconds_since(begun);
-    auto info = make_desc<cumulet_live_info>();
+    auto info = make_desc<cumulet_dynamic_volume_info>();
     for (;;) {
       meanwhile();
       must(viewer_.get(), cumulet_render(viewer_.get(), &frame_, nullptr));
-      must(viewer_.get(), cumulet_get_live_info(viewer_.get(), &info));
-      if (info.handed_state > before.handed_state && info.drawn_state == info.handed_state) break;
+      must(viewer_.get(), cumulet_get_dynamic_volume_info(viewer_.get(), &info));
+      if (info.submitted_update > before.submitted_update && info.displayed_update == info.submitted_update) break;
       std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     spent.all = milliseconds_since(begun);
@@ -195,7 +195,7 @@ class Bench {
     spent.read = 1e3 * stats.build_seconds_load;
     spent.statistics = 1e3 * stats.build_seconds_statistics;
     spent.refine = 1e3 * stats.build_seconds_refine;
-    spent.records = 1e3 * stats.build_seconds_records;
+    spent.records = 1e3 * stats.build_seconds_packing;
     spent.upload = 1e3 * stats.build_seconds_upload;
     spent.rest = spent.all - spent.copy - spent.read - spent.statistics - spent.refine - spent.records - spent.upload;
     cells_ = stats.cells;
@@ -212,7 +212,7 @@ class Bench {
     return show([&] {
       std::vector<cumulet_gl_field> fields;
       for (const cumulet_channel channel : channels) fields.push_back(textures.field(channel));
-      auto desc = make_desc<cumulet_gl_state_desc>();
+      auto desc = make_desc<cumulet_gl_volume_desc>();
       desc.fields = fields.data();
       desc.field_count = fields.size();
       const cumulet_voxel_box box = textures.tenth();
@@ -220,7 +220,7 @@ class Bench {
         desc.changed = &box;
         desc.changed_count = 1;
       }
-      must(viewer_.get(), cumulet_live_set_gl(viewer_.get(), live_.get(), &desc));
+      must(viewer_.get(), cumulet_dynamic_volume_set_gl(viewer_.get(), live_.get(), &desc));
     });
   }
   // A host that reads back the texture itself without waiting.
@@ -235,19 +235,20 @@ class Bench {
       textures.describe(dense);
       auto field = make_desc<cumulet_field>();
       field.dense = &dense;
-      auto desc = make_desc<cumulet_state_desc>();
+      auto desc = make_desc<cumulet_volume_fields_desc>();
       desc.fields = &field;
       desc.field_count = 1;
       desc.release = [](void*) {};
       char error[256];
-      if (cumulet_live_set(live_.get(), &desc, error, sizeof error) != CUMULET_OK) throw std::runtime_error(error);
+      if (cumulet_dynamic_volume_set(live_.get(), &desc, error, sizeof error) != CUMULET_OK)
+        throw std::runtime_error(error);
     };
     return show(begin, look);
   }
   [[nodiscard]] const GladGLContext& gl() const { return gl_; }
 
  private:
-  void hand_over(const State& state, decltype(cumulet_live_set)* how, bool held) {
+  void hand_over(const State& state, decltype(cumulet_dynamic_volume_set)* how, bool held) {
     auto desc = state.desc("plume");
     if (held) desc.release = [](void*) {};
     char error[256];
@@ -286,23 +287,22 @@ void measure(int side, int count) {
     std::fflush(stdout);
   };
   const auto rows = [&](const char* what, const std::function<Spent(int)>& show) { rows_of(bench, what, show); };
-  const auto row = [&](const char* what, const State(&states)[2], decltype(cumulet_live_set)* how, bool held) {
-    rows(what, [&](int i) { return bench.show(states[i % 2], how, held); });
-  };
+  const auto row = [&](const char* what, const State(&states)[2], decltype(cumulet_dynamic_volume_set)* how,
+                       bool held) { rows(what, [&](int i) { return bench.show(states[i % 2], how, held); }); };
   {
     const State states[] = {dense(0), dense(1)};
     bench.warm_up(states[0]);
-    row("dense, copied", states, cumulet_live_set, false);
-    row("dense, held", states, cumulet_live_set, true);
+    row("dense, copied", states, cumulet_dynamic_volume_set, false);
+    row("dense, held", states, cumulet_dynamic_volume_set, true);
   }
   const auto bricks = [&](int i) { return State::bricks(size, values[i]); };
   const State states[] = {sparse(values[0], bricks(0)), sparse(values[1], bricks(1))};
-  row("bricks", states, cumulet_live_set, false);
+  row("bricks", states, cumulet_dynamic_volume_set, false);
   // Bricks around the middle of the height.
   std::vector<Sides> tenth = bricks(0);
   std::erase_if(tenth, [&](const Sides& origin) { return std::abs(origin[1] - side / 2) > side / 20; });
   const State parts[] = {sparse(values[1], tenth), sparse(values[0], tenth)};
-  row("a tenth of the bricks", parts, cumulet_live_update, false);
+  row("a tenth of the bricks", parts, cumulet_dynamic_volume_update, false);
   const Textures floats(bench.gl(), side, GL_R32F, values);
   rows("in GL, R32F, read back by the host", [&](int i) { return bench.show_read_back(floats, i); });
   rows("in GL, R32F", [&](int i) { return bench.show(floats, i, false); });

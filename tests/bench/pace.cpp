@@ -79,11 +79,11 @@ class Bench {
 
   void pace(const Scenario& scenario, double budget_ms) {
     const auto viewer = open(4096, scenario.preview);
-    cumulet_light_desc light = cumulet::bench::daylight();
+    cumulet_sun_sky_desc light = cumulet::bench::daylight();
     const std::vector<double> taken = times(scenario.busy, [&](int i) {
       if (scenario.drags) {
         light.sun_azimuth_degrees = static_cast<float>(i);
-        must(viewer.get(), cumulet_set_light(viewer.get(), &light));
+        must(viewer.get(), cumulet_set_sun_sky(viewer.get(), &light));
       }
       return [&] { frame(viewer.get(), budget_ms); };
     });
@@ -105,7 +105,7 @@ class Bench {
     do {
       result = frame(viewer.get(), 10.0);
       ++frames;
-    } while ((result.flags & CUMULET_RENDER_MORE) != 0 && frames < 3000 && ms_since(start) < 30e3);
+    } while ((result.flags & CUMULET_RENDER_INCOMPLETE) != 0 && frames < 3000 && ms_since(start) < 30e3);
     std::printf("README's loop, 1280x720, 1 sample, 10 ms: %s after %d frames, %.1f s, progress %.3f\n",
                 (result.flags & CUMULET_RENDER_CONVERGED) != 0 ? "converged" : "NOT converged", frames,
                 1e-3 * ms_since(start), result.progress);

@@ -66,7 +66,7 @@ class Bench {
     must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
     auto result = make_desc<cumulet_warm_up_result>();
     do must(viewer_.get(), cumulet_warm_up(viewer_.get(), &frame_, CUMULET_WARM_UP_SCENE, &result));
-    while (result.more != 0);
+    while (result.incomplete != 0);
   }
 
   void wait_for_all() {
@@ -97,7 +97,7 @@ class Bench {
       must(viewer_.get(), cumulet_render(viewer_.get(), &frame_, nullptr));
       calls.push_back(1e3 * seconds_since(begun));
       const cumulet_sequence_info told = info();
-      if (!drawn && told.is_drawn != 0 && told.drawn_frame == told.asked_frame) {
+      if (!drawn && told.is_displayed != 0 && told.displayed_frame == told.requested_frame) {
         drawn = true;
         ++hit;
         waited.push_back(since);

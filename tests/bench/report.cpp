@@ -301,7 +301,7 @@ std::string csv(const Machine& machine, const std::vector<AssetResult>& assets, 
     stage("build_seconds_load", b.load);
     stage("build_seconds_statistics", b.statistics);
     stage("build_seconds_refine", b.refine);
-    stage("build_seconds_records", b.records);
+    stage("build_seconds_packing", b.records);
     stage("build_seconds_upload", b.upload);
     stage("build_peak_bytes", b.peak_bytes);
   }

@@ -131,13 +131,11 @@ std::vector<Technique> techniques() {
       {"what flights find of far light (looks alone)",
        {{"path.glsl", "if (p.bounces > 0u) p.radiance += p.throughput * cm_far_light(p, transmittance);",
          "if (p.bounces > 0xfffffff0u) p.radiance += p.throughput * cm_far_light(p, transmittance);"},
-        {"path.glsl",
-         "    p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.pdf)));\n#if",
+        {"path.glsl", "    p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.pdf)));\n#if",
          "    p.radiance += p.light * (transmittance / survival);\n#if"}},
        {"cloud", "full", "explosion"}},
       {"looks from points of flights (equi-angular)",
-       {{"equiangular.glsl", "  return cm_balance(pdf * pdf, collided * collided);",
-         "  return 0.0f * collided;"}},
+       {{"equiangular.glsl", "  return cm_balance(pdf * pdf, collided * collided);", "  return 0.0f * collided;"}},
        {"lamp"}},
       {"light of its own by depth (by collisions)",
        {{"path.glsl", "if (CM_SURFACES == 0 && CM_INSTANCES == 0) emissive =", "if (CM_SURFACES == 9) emissive ="}},
@@ -198,7 +196,7 @@ void measure_techniques(headless::Context& context, const Options& options) {
         continue;
       progress(scene.name + ", off: " + technique.name);
       const EditedShaders edited(technique.off);
-      cumulet_programs programs{edited.programs()};
+      cumulet_shader_cache programs{edited.programs()};
       Stage without_it(context, scene, options.size, &programs);
       const Measured without = measured(without_it, options.reference_samples, 1);
       const glm::uvec2 whole(options.size);

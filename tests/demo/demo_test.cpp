@@ -579,10 +579,10 @@ TEST(DemoModel, ModelRemovesTheDefaultGround) {
     Model model;
     model.scene = options->scene;
     model.unchosen_ground = options->unchosen_ground;
-    EXPECT_NE(model.scene.ground.place, CUMULET_GROUND_NONE);
+    EXPECT_NE(model.scene.ground.mode, CUMULET_GROUND_NONE);
     open_surfaces(model, "town.glb");
     EXPECT_EQ(model.scene.surfaces, "town.glb");
-    return model.scene.ground.place;
+    return model.scene.ground.mode;
   };
   EXPECT_EQ(ground_with({}), CUMULET_GROUND_NONE);
   EXPECT_EQ(ground_with({"--ground", "below"}), CUMULET_GROUND_BELOW);
@@ -651,9 +651,9 @@ TEST(SavedPicture, PreviewIsNotSaved) {
   EXPECT_TRUE(is_whole(shown, 640, 480));
   EXPECT_FALSE(is_whole(shown, 800, 480)) << "the window has grown";
   EXPECT_FALSE(is_whole(shown, 640, 481));
-  shown.flags = CUMULET_RENDER_PREVIEW | CUMULET_RENDER_MORE;
+  shown.flags = CUMULET_RENDER_PREVIEW | CUMULET_RENDER_INCOMPLETE;
   EXPECT_FALSE(is_whole(shown, 640, 480));
-  shown.flags = CUMULET_RENDER_MORE;
+  shown.flags = CUMULET_RENDER_INCOMPLETE;
   EXPECT_TRUE(is_whole(shown, 640, 480));
 }
 
@@ -709,8 +709,8 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     model_.preferences.recent = {"/a/cloud.vdb"};
     model_.scene.environment = "/a/sky.hdr";
     model_.thumbnail_texture = 1;
-    for (const cumulet_lamp_kind kind : {CUMULET_LAMP_SPOT, CUMULET_LAMP_RECTANGLE}) {
-      model_.scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
+    for (const cumulet_light_kind kind : {CUMULET_LIGHT_SPOT, CUMULET_LIGHT_RECT}) {
+      model_.scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_light_desc);
       model_.scene.analytic_lights.back().kind = kind;
     }
     spell_out_defaults(model_.scene);

@@ -88,7 +88,7 @@ class RenderedExr : public testing::TestWithParam<Backend> {
     ASSERT_EQ(cumulet_camera_set(camera, &scene_.camera), CUMULET_OK);
     cumulet_camera_release(camera);
     ASSERT_EQ(cumulet_set_medium(viewer_.get(), &scene_.medium), CUMULET_OK);
-    ASSERT_EQ(cumulet_set_light(viewer_.get(), &scene_.light), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_sun_sky(viewer_.get(), &scene_.light), CUMULET_OK);
     ASSERT_EQ(cumulet_set_sampling(viewer_.get(), &scene_.sampling), CUMULET_OK);
     ASSERT_EQ(cumulet_wait(viewer_.get(), -1.0), CUMULET_OK);
     cumulet_frame_desc frame{};
@@ -201,7 +201,7 @@ TEST_P(RenderedExr, MetadataDescribesTheRendering) {
 
 // Compared with the renderer's own image. (merge_test compares with samples.)
 TEST_P(RenderedExr, SevenMergedPartsEqualTheFullRendering) {
-  scene_.sampling.volume_alone = 1;
+  scene_.sampling.separate_volume_aov = 1;
   aovs_ = {CUMULET_AOV_VOLUME, CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_VOLUME_DEPTH, CUMULET_AOV_VELOCITY,
            CUMULET_AOV_ERROR};
   std::vector<std::string> parts;
@@ -284,7 +284,7 @@ TEST_P(RenderedExr, LightGroupLayersSumToTheImage) {
 // As Cryptomatte's specification requires, read with OpenEXR's library and a JSON parser.
 TEST_P(RenderedExr, HasCryptomattesByName) {
   scene_.name = "a \"cloud\" of \xc3\xa4ther";
-  scene_.ground.place = CUMULET_GROUND_AT_HEIGHT;
+  scene_.ground.mode = CUMULET_GROUND_AT_HEIGHT;
   scene_.ground.height = -3.0;
   ASSERT_EQ(cumulet_set_ground(viewer_.get(), &scene_.ground), CUMULET_OK);
   mattes_ = true;

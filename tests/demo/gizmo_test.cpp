@@ -362,8 +362,8 @@ SceneOptions scene_of_all() {
   scene.others[0].places.resize(2);
   for (auto& place : scene.others[0].places) place[0] = place[5] = place[10] = place[15] = 1.0;
   scene.models.push_back({"c.glb"});
-  for (const cumulet_lamp_kind kind : {CUMULET_LAMP_SUN, CUMULET_LAMP_RECTANGLE, CUMULET_LAMP_POINT}) {
-    scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
+  for (const cumulet_light_kind kind : {CUMULET_LIGHT_DISTANT, CUMULET_LIGHT_RECT, CUMULET_LIGHT_POINT}) {
+    scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_light_desc);
     scene.analytic_lights.back().kind = kind;
     scene.analytic_lights.back().width = 2.0;
     scene.analytic_lights.back().height = 4.0;

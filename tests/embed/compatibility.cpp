@@ -71,18 +71,19 @@ struct Scene {
   SurfacesRef wall = make_wall();
 };
 
-ViewerPtr viewer_of(Context& context, cumulet_programs* programs, cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE,
+ViewerPtr viewer_of(Context& context, cumulet_shader_cache* programs,
+                    cumulet_gl_state_policy gl_state = CUMULET_GL_STATE_RESTORE,
                     cumulet_get_proc_fn get_proc = Context::get_proc) {
   ViewerPtr viewer = cumulet::test::make_viewer(
       {.get_proc = get_proc, .user = &context, .gl_state = gl_state, .samples = 2, .programs = programs});
   auto display = make_desc<cumulet_display_desc>();
   display.background = CUMULET_BACKGROUND_TRANSPARENT;
   EXPECT_EQ(cumulet_set_display(viewer.get(), &display), CUMULET_OK);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sun_elevation_degrees = 40.0F;
   for (float& value : light.sun_irradiance) value = 40.0F;  // radiance above 1, which clamping would change
   for (float& value : light.sky_radiance) value = 0.5F;
-  EXPECT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
+  EXPECT_EQ(cumulet_set_sun_sky(viewer.get(), &light), CUMULET_OK);
   return viewer;
 }
 
@@ -98,9 +99,9 @@ void render(cumulet_viewer* viewer, const HostTarget& target) {
 
 /// Renders with a new viewer. before and after: called around each call of the viewer, but not around the host's own
 /// reads.
-Pictures pictures_of(Context& context, const GladGLContext& gl, const Scene& scene, cumulet_programs* programs,
+Pictures pictures_of(Context& context, const GladGLContext& gl, const Scene& scene, cumulet_shader_cache* programs,
                      const std::function<void()>& before, const std::function<void()>& after,
-                     cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE) {
+                     cumulet_gl_state_policy gl_state = CUMULET_GL_STATE_RESTORE) {
   const HostTarget target(gl, side, side, GL_RGBA32F);
   Pictures pictures;
   pictures.linear.resize(std::size_t{side} * side * 4);
@@ -117,7 +118,7 @@ Pictures pictures_of(Context& context, const GladGLContext& gl, const Scene& sce
     target.clear({}, 1.0F);
     before();
     auto settings = make_desc<cumulet_surface_settings_desc>();
-    settings.light = CUMULET_SURFACE_LIGHT_NONE;
+    settings.lighting = CUMULET_SURFACE_LIGHTING_RASTERIZED;
     EXPECT_EQ(cumulet_set_surface_settings(viewer.get(), &settings), CUMULET_OK);
     render(viewer.get(), target);
   }
@@ -143,7 +144,7 @@ class Compatibility : public testing::Test {
   }
 
   /// Expects the same images with this state set around each call of the viewer.
-  void expect_pictures(const Pictures& expected, const Case& one, cumulet_gl_state gl_state) {
+  void expect_pictures(const Pictures& expected, const Case& one, cumulet_gl_state_policy gl_state) {
     SCOPED_TRACE(one.name);
     // The library is called inside the host's glPushAttrib.
     const Pictures is = pictures_of(
@@ -182,7 +183,7 @@ class Compatibility : public testing::Test {
              [&] { return cumulet_warm_up(v, &frame, CUMULET_WARM_UP_SCENE, &warm); },
              [&] { return cumulet_pick_at(v, 1.0, 1.0, &pick); },
              [&] { return cumulet_update_transmittance_map(v, &map_desc, &map); },
-             [&] { return cumulet_drop_transmittance_map(v, 0); },
+             [&] { return cumulet_destroy_transmittance_map(v, 0); },
              [&] { return cumulet_read_linear(v, rgba.data(), rgba.size()); },
              [&] { return cumulet_read_display(v, bytes.data(), bytes.size()); },
              [&] { return cumulet_read_aov(v, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
@@ -305,9 +306,9 @@ class Compatibility : public testing::Test {
   LegacyGl legacy_{context_};
   HostTarget target_{gl_, side, side, GL_RGBA32F};
   cumulet::test::ProgramsRef programs_{[] {
-    const auto desc = make_desc<cumulet_programs_desc>();
-    cumulet_programs* programs = nullptr;
-    EXPECT_EQ(cumulet_programs_create(&desc, &programs, nullptr, 0), CUMULET_OK);
+    const auto desc = make_desc<cumulet_shader_cache_desc>();
+    cumulet_shader_cache* programs = nullptr;
+    EXPECT_EQ(cumulet_shader_cache_create(&desc, &programs, nullptr, 0), CUMULET_OK);
     return programs;
   }()};
   ViewerPtr viewer_ = viewer_of(context_, programs_.get());

@@ -72,13 +72,13 @@ TEST_P(StateScramble, EveryCallRestoresTheState) {
   };
   render("nothing", target.frame());
   // Each grid type and view mode: their uploads, their first frames, and frames that only draw.
-  for (const cumulet_march march : {CUMULET_MARCH_TET, CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK}) {
+  for (const cumulet_grid_type march : {CUMULET_GRID_TETRAHEDRAL, CUMULET_GRID_DENSE, CUMULET_GRID_BRICKS}) {
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.march = march;
+    grid.type = march;
     ASSERT_EQ(cumulet_set_grid(v, &grid), CUMULET_OK);
-    ASSERT_EQ(cumulet_set_volume(v, march == CUMULET_MARCH_DENSE ? large.get() : small.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_volume(v, march == CUMULET_GRID_DENSE ? large.get() : small.get()), CUMULET_OK);
     ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
-    for (const cumulet_view view :
+    for (const cumulet_view_mode view :
          {CUMULET_VIEW_CELLS, CUMULET_VIEW_STEPS, CUMULET_VIEW_DENSITY, CUMULET_VIEW_WIREFRAME, CUMULET_VIEW_SHADED}) {
       auto sampling = make_desc<cumulet_sampling_desc>();
       sampling.samples = 2;
@@ -146,7 +146,7 @@ TEST_P(StateScramble, EveryCallRestoresTheState) {
       desc.light = light;
       expect_kept(host, ++seed, "transmittance map", [&] { return cumulet_update_transmittance_map(v, &desc, &map); });
     }
-    expect_kept(host, ++seed, "drop it", [&] { return cumulet_drop_transmittance_map(v, 0); });
+    expect_kept(host, ++seed, "drop it", [&] { return cumulet_destroy_transmittance_map(v, 0); });
     expect_kept(host, ++seed, "pick_at", [&] { return cumulet_pick_at(v, side / 2.0, side / 2.0, &pick); });
     expect_kept(host, ++seed, "read_linear", [&] { return cumulet_read_linear(v, rgba.data(), rgba.size()); });
     expect_kept(host, ++seed, "read_display", [&] { return cumulet_read_display(v, bytes.data(), bytes.size()); });
@@ -196,17 +196,17 @@ TEST_P(StateScramble, EveryCallWithSurfacesRestoresTheState) {
   std::vector<std::uint8_t> bytes(rgba.size());
   auto pick = make_desc<cumulet_pick>();
   double noise = 0.0;
-  for (const cumulet_surface_light light :
-       {CUMULET_SURFACE_LIGHT_NONE, CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_SHADOWS}) {
+  for (const cumulet_surface_lighting light :
+       {CUMULET_SURFACE_LIGHTING_RASTERIZED, CUMULET_SURFACE_LIGHTING_GLOBAL, CUMULET_SURFACE_LIGHTING_DIRECT}) {
     const std::string name = "light " + std::to_string(light);
     auto settings = make_desc<cumulet_surface_settings_desc>();
-    settings.light = light;
+    settings.lighting = light;
     ASSERT_EQ(cumulet_set_surface_settings(v, &settings), CUMULET_OK);
     for (const cumulet_preview preview : {CUMULET_PREVIEW_AUTO, CUMULET_PREVIEW_OFF}) {
       auto sampling = make_desc<cumulet_sampling_desc>();
       sampling.samples = 1;
       sampling.preview = preview;
-      sampling.volume_alone = 1;
+      sampling.separate_volume_aov = 1;
       ASSERT_EQ(cumulet_set_sampling(v, &sampling), CUMULET_OK);
       cumulet_frame_desc frame = target.frame();
       frame.write_depth = 1;
@@ -225,12 +225,12 @@ TEST_P(StateScramble, EveryCallWithSurfacesRestoresTheState) {
       render(name + " into its own texture", frame);
       render(name, target.frame());
     }
-    for (const cumulet_view view : {CUMULET_VIEW_CELLS, CUMULET_VIEW_SHADED}) {
+    for (const cumulet_view_mode view : {CUMULET_VIEW_CELLS, CUMULET_VIEW_SHADED}) {
       auto sampling = make_desc<cumulet_sampling_desc>();
       sampling.samples = 1;
       sampling.preview = CUMULET_PREVIEW_OFF;
       sampling.view = view;
-      sampling.volume_alone = 1;
+      sampling.separate_volume_aov = 1;
       ASSERT_EQ(cumulet_set_sampling(v, &sampling), CUMULET_OK);
       render(name + " view " + std::to_string(view), target.frame());
     }
@@ -274,15 +274,15 @@ TEST_P(StateScramble, EveryCallWithAnEnvironmentRestoresTheState) {
       expect_kept(host, ++seed, "render " + what, [&] { return cumulet_render(v, &frame, nullptr); });
     }
   };
-  const auto ground = [&](cumulet_ground place) {
+  const auto ground = [&](cumulet_ground_mode mode) {
     auto desc = make_desc<cumulet_ground_desc>();
-    desc.place = place;
+    desc.mode = mode;
     ASSERT_EQ(cumulet_set_ground(v, &desc), CUMULET_OK);
   };
-  for (const cumulet_surface_light light : {CUMULET_SURFACE_LIGHT_NONE, CUMULET_SURFACE_LIGHT_FULL}) {
+  for (const cumulet_surface_lighting light : {CUMULET_SURFACE_LIGHTING_RASTERIZED, CUMULET_SURFACE_LIGHTING_GLOBAL}) {
     const std::string name = ", light " + std::to_string(light);
     auto settings = make_desc<cumulet_surface_settings_desc>();
-    settings.light = light;
+    settings.lighting = light;
     ASSERT_EQ(cumulet_set_surface_settings(v, &settings), CUMULET_OK);
     ASSERT_EQ(cumulet_set_environment(v, large.get()), CUMULET_OK);
     render("a large environment" + name);
@@ -296,10 +296,10 @@ TEST_P(StateScramble, EveryCallWithAnEnvironmentRestoresTheState) {
     ground(CUMULET_GROUND_BELOW);
     render("over a ground" + name);
     ASSERT_EQ(cumulet_set_environment(v, nullptr), CUMULET_OK);
-    auto day = make_desc<cumulet_light_desc>();
+    auto day = make_desc<cumulet_sun_sky_desc>();
     day.sky = CUMULET_SKY_PHYSICAL;
     day.sun_elevation_degrees = 40.0F;
-    ASSERT_EQ(cumulet_set_light(v, &day), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_sun_sky(v, &day), CUMULET_OK);
     render("while a sky is computed" + name);
     ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
     render("a sky" + name);

@@ -27,7 +27,7 @@ void measure(int frames, int side) {
   const GladGLContext gl = cumulet::test::load_gl(Context::get_proc, &context);
   const cumulet::test::HostTarget target(gl, side, side);
   const auto volume = cumulet::test::make_ball(16);
-  const auto viewer = [&](cumulet_gl_state state) {
+  const auto viewer = [&](cumulet_gl_state_policy state) {
     auto made = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = &context, .gl_state = state});
     cumulet::test::picture_of(made.get(), volume.get(), target);
     return made;

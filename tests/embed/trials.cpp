@@ -207,7 +207,7 @@ class NoContext : public RapidChanges {
                [&] { return cumulet_render(v_, &frame, nullptr); },
                [&] { return cumulet_pick_at(v_, 1.0, 1.0, &pick); },
                [&] { return cumulet_update_transmittance_map(v_, &map_desc, &map); },
-               [&] { return cumulet_drop_transmittance_map(v_, 0); },
+               [&] { return cumulet_destroy_transmittance_map(v_, 0); },
                [&] { return cumulet_read_linear(v_, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
                [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
@@ -327,8 +327,8 @@ void Caller::call_all() {
   const auto sparse = make_desc<cumulet_sparse_desc>();
   const auto triangles = make_desc<cumulet_triangles_desc>();
   const auto medium = make_desc<cumulet_medium_desc>();
-  const auto light = make_desc<cumulet_light_desc>();
-  const auto analytic_light = make_desc<cumulet_lamp_desc>();
+  const auto light = make_desc<cumulet_sun_sky_desc>();
+  const auto analytic_light = make_desc<cumulet_light_desc>();
   const auto environment = make_desc<cumulet_environment_desc>();
   const auto environment_settings = make_desc<cumulet_environment_settings_desc>();
   const auto ground = make_desc<cumulet_ground_desc>();
@@ -349,7 +349,7 @@ void Caller::call_all() {
   denoise.network = "none.tza";
   auto progress = make_desc<cumulet_progress>();
   auto volume_info = make_desc<cumulet_volume_info>();
-  auto values_info = make_desc<cumulet_values_info>();
+  auto values_info = make_desc<cumulet_histogram_info>();
   auto surfaces_info = make_desc<cumulet_surfaces_info>();
   auto animation = make_desc<cumulet_animation_info>();
   const auto volume_file = make_desc<cumulet_volume_file_desc>();
@@ -362,14 +362,14 @@ void Caller::call_all() {
   cumulet_volume* new_volume = nullptr;
   cumulet_surfaces* new_surfaces = nullptr;
   cumulet_environment* new_environment = nullptr;
-  cumulet_programs* new_programs = nullptr;
+  cumulet_shader_cache* new_programs = nullptr;
   cumulet_instance* new_instance = nullptr;
   auto instance = make_desc<cumulet_instance_desc>();
-  cumulet_live* new_live = nullptr;
-  const auto live = make_desc<cumulet_live_desc>();
-  const auto state = make_desc<cumulet_state_desc>();
-  const auto gl_state = make_desc<cumulet_gl_state_desc>();
-  auto live_info = make_desc<cumulet_live_info>();
+  cumulet_dynamic_volume* new_live = nullptr;
+  const auto live = make_desc<cumulet_dynamic_volume_desc>();
+  const auto state = make_desc<cumulet_volume_fields_desc>();
+  const auto gl_state = make_desc<cumulet_gl_volume_desc>();
+  auto live_info = make_desc<cumulet_dynamic_volume_info>();
   const auto limits = make_desc<cumulet_limits_desc>();
   cumulet_model* new_model = nullptr;
   const auto model = make_desc<cumulet_model_desc>();
@@ -379,7 +379,7 @@ void Caller::call_all() {
   auto sequence_info = make_desc<cumulet_sequence_info>();
   auto variant = make_desc<cumulet_variant_info>();
   std::uint32_t at = 0;
-  auto programs = make_desc<cumulet_programs_desc>();
+  auto programs = make_desc<cumulet_shader_cache_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
   std::array<float, 3> rgb{};
   const auto object_name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
@@ -392,23 +392,39 @@ void Caller::call_all() {
   const std::array<float, 4> region{};
   std::array<std::uint32_t, 4> pixels{};
   answer("cumulet_region_pixels", cumulet_region_pixels(region.data(), 1, 1, pixels.data()), CUMULET_OK);
-  names.insert({"cumulet_cancel",           "cumulet_status_text",        "cumulet_version",
-                "cumulet_volume_retain",    "cumulet_volume_release",     "cumulet_surfaces_retain",
-                "cumulet_surfaces_release", "cumulet_programs_retain",    "cumulet_programs_release",
-                "cumulet_camera_release",   "cumulet_environment_retain", "cumulet_environment_release",
-                "cumulet_instance_retain",  "cumulet_instance_release",   "cumulet_live_retain",
-                "cumulet_live_release",     "cumulet_model_retain",       "cumulet_model_release",
-                "cumulet_sequence_retain",  "cumulet_sequence_release",   "cumulet_inspection_release",
-                "cumulet_destroy",          "cumulet_last_error",         "cumulet_transmittance_map_glsl",
+  names.insert({"cumulet_cancel",
+                "cumulet_status_text",
+                "cumulet_version",
+                "cumulet_volume_retain",
+                "cumulet_volume_release",
+                "cumulet_surfaces_retain",
+                "cumulet_surfaces_release",
+                "cumulet_shader_cache_retain",
+                "cumulet_shader_cache_release",
+                "cumulet_camera_release",
+                "cumulet_environment_retain",
+                "cumulet_environment_release",
+                "cumulet_instance_retain",
+                "cumulet_instance_release",
+                "cumulet_dynamic_volume_retain",
+                "cumulet_dynamic_volume_release",
+                "cumulet_model_retain",
+                "cumulet_model_release",
+                "cumulet_sequence_retain",
+                "cumulet_sequence_release",
+                "cumulet_inspection_release",
+                "cumulet_destroy",
+                "cumulet_last_error",
+                "cumulet_transmittance_map_glsl",
                 "cumulet_cryptomatte_id"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
-  cumulet_programs_release(cumulet_programs_retain(nullptr));
+  cumulet_shader_cache_release(cumulet_shader_cache_retain(nullptr));
   cumulet_camera_release(nullptr);
   cumulet_environment_release(cumulet_environment_retain(nullptr));
   cumulet_inspection_release(nullptr);
   cumulet_instance_release(cumulet_instance_retain(nullptr));
-  cumulet_live_release(cumulet_live_retain(nullptr));
+  cumulet_dynamic_volume_release(cumulet_dynamic_volume_retain(nullptr));
   cumulet_model_release(cumulet_model_retain(nullptr));
   cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
@@ -420,7 +436,7 @@ void Caller::call_all() {
   if (std::string(cumulet_last_error(viewer)).empty()) wrong.push_back("cumulet_last_error");
 
   CALL(cumulet_create, &create, &new_viewer, nullptr, 0);
-  CALL(cumulet_programs_create, &programs, &new_programs, nullptr, 0);
+  CALL(cumulet_shader_cache_create, &programs, &new_programs, nullptr, 0);
   CALL(cumulet_volume_open, "none.vdb", nullptr, &new_volume, nullptr, 0);
   CALL(cumulet_volume_from_dense, &dense, &new_volume, nullptr, 0);
   CALL(cumulet_volume_from_sparse, &sparse, &new_volume, nullptr, 0);
@@ -431,7 +447,7 @@ void Caller::call_all() {
   CALL(cumulet_inspection_get_grid, new_inspection, 0, &grid_info);
   CALL(cumulet_inspection_get_metadata, new_inspection, 0, 0, &metadata);
   CALL(cumulet_volume_get_info, volume, &volume_info);
-  CALL(cumulet_volume_get_values, volume, CUMULET_RAMP_DENSITY, &values_info);
+  CALL(cumulet_volume_get_histogram, volume, CUMULET_RAMP_DENSITY, &values_info);
   CALL(
       cumulet_list_grids, "none.vdb", [](void*, const char*, const char*, const char*) {}, nullptr, nullptr, 0);
   CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
@@ -449,11 +465,11 @@ void Caller::call_all() {
   CALL(cumulet_model_set_to_world, new_model, m.data());
   CALL(cumulet_model_set_time, new_model, 1.0);
   CALL(cumulet_model_set_previous, new_model, nullptr, nullptr);
-  CALL(cumulet_volume_from_state, &state, &new_volume, nullptr, 0);
-  CALL(cumulet_live_create, &live, &new_live, nullptr, 0);
-  CALL(cumulet_live_set, new_live, &state, nullptr, 0);
-  CALL(cumulet_live_update, new_live, &state, nullptr, 0);
-  CALL(cumulet_live_get_volume, new_live, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_from_fields, &state, &new_volume, nullptr, 0);
+  CALL(cumulet_dynamic_volume_create, &live, &new_live, nullptr, 0);
+  CALL(cumulet_dynamic_volume_set, new_live, &state, nullptr, 0);
+  CALL(cumulet_dynamic_volume_update, new_live, &state, nullptr, 0);
+  CALL(cumulet_dynamic_volume_get_volume, new_live, &new_volume, nullptr, 0);
   CALL(cumulet_sequence_create, &sequence, &new_sequence, nullptr, 0);
   CALL(cumulet_sequence_set_playback, new_sequence, &playback);
   CALL(cumulet_sequence_set_time, new_sequence, 0.0);
@@ -485,24 +501,24 @@ void Caller::call_all() {
     CALL(cumulet_load_volume, v, "none.vdb", nullptr);
     CALL(cumulet_load_volume_file, v, &volume_file);
     CALL(cumulet_set_volume, v, nullptr);
-    CALL(cumulet_set_volume_places, v, nullptr, 0);
-    CALL(cumulet_set_previous_volume_places, v, nullptr, 0);
-    CALL(cumulet_set_volume_shutter, v, nullptr, nullptr, 1);
+    CALL(cumulet_set_volume_transforms, v, nullptr, 0);
+    CALL(cumulet_set_previous_volume_transforms, v, nullptr, 0);
+    CALL(cumulet_set_volume_shutter_transforms, v, nullptr, nullptr, 1);
     CALL(cumulet_get_volume, v, &new_volume);
     CALL(cumulet_add_model, v, new_model);
     CALL(cumulet_remove_model, v, new_model);
     CALL(cumulet_add_instance, v, new_instance);
     CALL(cumulet_remove_instance, v, new_instance);
     CALL(cumulet_set_sequence, v, nullptr);
-    CALL(cumulet_set_live, v, nullptr);
-    CALL(cumulet_get_live_info, v, &live_info);
-    CALL(cumulet_live_set_gl, v, new_live, &gl_state);
+    CALL(cumulet_set_dynamic_volume, v, nullptr);
+    CALL(cumulet_get_dynamic_volume_info, v, &live_info);
+    CALL(cumulet_dynamic_volume_set_gl, v, new_live, &gl_state);
     CALL(cumulet_set_limits, v, &limits);
     CALL(cumulet_get_sequence_info, v, &sequence_info, nullptr, 0);
     CALL(cumulet_get_sequence_frame, v, 0, nullptr, 0);
     CALL(cumulet_get_instance_sequence_info, v, new_instance, &sequence_info, nullptr, 0);
     CALL(cumulet_get_instance_sequence_frame, v, new_instance, 0, nullptr, 0);
-    CALL(cumulet_get_instance_live_info, v, new_instance, &live_info);
+    CALL(cumulet_get_instance_dynamic_volume_info, v, new_instance, &live_info);
     CALL(cumulet_load_surfaces, v, "none.glb");
     CALL(cumulet_set_surfaces, v, nullptr);
     CALL(cumulet_get_surfaces, v, &new_surfaces);
@@ -513,8 +529,8 @@ void Caller::call_all() {
     CALL(cumulet_set_grid, v, &grid);
     CALL(cumulet_set_medium, v, &medium);
     CALL(cumulet_set_ramp, v, CUMULET_RAMP_DENSITY, nullptr, 0);
-    CALL(cumulet_set_light, v, &light);
-    CALL(cumulet_set_lamps, v, &analytic_light, 1);
+    CALL(cumulet_set_sun_sky, v, &light);
+    CALL(cumulet_set_lights, v, &analytic_light, 1);
     CALL(cumulet_load_environment, v, "none.hdr");
     CALL(cumulet_set_environment, v, nullptr);
     CALL(cumulet_get_environment, v, &new_environment);
@@ -532,7 +548,7 @@ void Caller::call_all() {
     CALL(cumulet_warm_up, v, &frame, CUMULET_WARM_UP_SCENE, &warm_up);
     CALL(cumulet_pick_at, v, 0.0, 0.0, &pick);
     CALL(cumulet_update_transmittance_map, v, &map_desc, &map);
-    CALL(cumulet_drop_transmittance_map, v, 0U);
+    CALL(cumulet_destroy_transmittance_map, v, 0U);
     CALL(cumulet_get_bounds, v, low.data(), high.data());
     CALL(cumulet_read_linear, v, one.data(), one.size());
     CALL(cumulet_read_display, v, bytes.data(), bytes.size());
@@ -611,8 +627,8 @@ TEST(Callbacks, EveryFunctionIsRejectedInsideWithoutDeadlock) {
   };
   expect_returns("a frame", make_way);
   trigger("setting", [&] {
-    const auto light = make_desc<cumulet_light_desc>();
-    EXPECT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
+    const auto light = make_desc<cumulet_sun_sky_desc>();
+    EXPECT_EQ(cumulet_set_sun_sky(viewer.get(), &light), CUMULET_OK);
   });
   expect_returns("a job", [&] {
     EXPECT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);

@@ -43,9 +43,9 @@ struct Library {
   each(cumulet_create) each(cumulet_destroy) each(cumulet_last_error) each(cumulet_wait) each(cumulet_set_grid) \
       each(cumulet_load_volume) each(cumulet_set_volume) each(cumulet_volume_from_dense) each(cumulet_rebuild)  \
           each(cumulet_load_surfaces) each(cumulet_set_surface_settings) each(cumulet_sequence_create)          \
-              each(cumulet_sequence_set_frame) each(cumulet_set_sequence) each(cumulet_live_create)             \
-                  each(cumulet_live_set) each(cumulet_set_live) each(cumulet_render) each(cumulet_frame_all)    \
-                      each(cumulet_load_environment)
+              each(cumulet_sequence_set_frame) each(cumulet_set_sequence) each(cumulet_dynamic_volume_create)   \
+                  each(cumulet_dynamic_volume_set) each(cumulet_set_dynamic_volume) each(cumulet_render)        \
+                      each(cumulet_frame_all) each(cumulet_load_environment)
 #define CUMULET_MEMBER(name) decltype(&::name) name = nullptr;
   CUMULET_FUNCTIONS(CUMULET_MEMBER)
   void* handle = nullptr;
@@ -191,10 +191,10 @@ class Host {
     const cumulet_dense_desc voxels = dense();
     auto field = make_desc<cumulet_field>();
     field.dense = &voxels;
-    auto state = make_desc<cumulet_state_desc>();
+    auto state = make_desc<cumulet_volume_fields_desc>();
     state.fields = &field;
     state.field_count = 1;
-    of.cumulet_live_set(live_, &state, nullptr, 0);
+    of.cumulet_dynamic_volume_set(live_, &state, nullptr, 0);
   }
 
   void begin() {
@@ -220,10 +220,10 @@ class Host {
       require(of.cumulet_set_sequence(viewer, sequence_));
     }
     if (work_ == "live") {
-      auto desc = make_desc<cumulet_live_desc>();
-      require(of.cumulet_live_create(&desc, &live_, nullptr, 0));
+      auto desc = make_desc<cumulet_dynamic_volume_desc>();
+      require(of.cumulet_dynamic_volume_create(&desc, &live_, nullptr, 0));
       set_live();
-      require(of.cumulet_set_live(viewer, live_));
+      require(of.cumulet_set_dynamic_volume(viewer, live_));
     }
   }
 
@@ -232,7 +232,7 @@ class Host {
   std::string folder_;
   std::vector<float> voxels_;
   cumulet_sequence* sequence_ = nullptr;
-  cumulet_live* live_ = nullptr;
+  cumulet_dynamic_volume* live_ = nullptr;
   int steps_ = 0;
 #ifndef CUMULET_EXIT_LOADS
   std::optional<cumulet::headless::Context> context_;

@@ -57,7 +57,7 @@ class Program {
     desc.struct_size = sizeof desc;
     draws_ = data_.ConsumeIntegralInRange(0, 7) == 7;
     make_programs();
-    desc.programs = programs_.get();
+    desc.shader_cache = programs_.get();
     desc.trace = [](void*, const char* name, double begin, double end) {
       check_line(name);
       if (!(begin <= end)) fail("a span that ends before it begins");
@@ -147,11 +147,11 @@ class Program {
   }
 
   void make_programs() {
-    auto desc = described<cumulet_programs_desc>();
+    auto desc = described<cumulet_shader_cache_desc>();
     desc.folder = data_.ConsumeBool() ? "/dev/null/nowhere" : nullptr;
     desc.shaders = data_.ConsumeIntegralInRange(0, 7) == 7 ? "/dev/null/nowhere" : nullptr;
-    cumulet_programs* programs = nullptr;
-    made([&](char* error, std::size_t size) { return cumulet_programs_create(&desc, &programs, error, size); });
+    cumulet_shader_cache* programs = nullptr;
+    made([&](char* error, std::size_t size) { return cumulet_shader_cache_create(&desc, &programs, error, size); });
     programs_.reset(programs);
   }
 
@@ -282,12 +282,12 @@ class Program {
       return places;
     };
     const auto count = data_.ConsumeIntegralInRange(0U, most);
-    told(cumulet_set_volume_places(viewer_.get(), all().data(), count));
+    told(cumulet_set_volume_transforms(viewer_.get(), all().data(), count));
     const auto open = all();
     const auto close = all();
-    told(cumulet_set_volume_shutter(viewer_.get(), data_.ConsumeBool() ? open.data() : nullptr,
-                                    data_.ConsumeBool() ? close.data() : nullptr,
-                                    data_.ConsumeBool() ? count : most - count));
+    told(cumulet_set_volume_shutter_transforms(viewer_.get(), data_.ConsumeBool() ? open.data() : nullptr,
+                                               data_.ConsumeBool() ? close.data() : nullptr,
+                                               data_.ConsumeBool() ? count : most - count));
   }
 
   void change_instances() {
@@ -299,7 +299,7 @@ class Program {
     put_place(desc[0].close_to_world);
     desc[0].volume = volume_.get();
     desc[0].sequence = volume_ ? nullptr : sequence_.get();
-    desc[0].live = volume_ || sequence_ ? nullptr : live_.get();
+    desc[0].dynamic_volume = volume_ || sequence_ ? nullptr : live_.get();
     desc[0].medium = data_.ConsumeBool() ? &medium : nullptr;
     if (medium.struct_size > sizeof medium) medium.struct_size = sizeof medium;
     switch (data_.ConsumeIntegralInRange(0, 4)) {
@@ -364,12 +364,12 @@ class Program {
     std::array<cumulet_dense_desc, 3> dense{};
     std::array<cumulet_sparse_desc, 3> sparse{};
     std::array<cumulet_field, 3> fields{};
-    cumulet_state_desc desc{};
+    cumulet_volume_fields_desc desc{};
   };
 
   std::unique_ptr<State> make_state() {
     auto state = std::make_unique<State>();
-    state->desc = described<cumulet_state_desc>();
+    state->desc = described<cumulet_volume_fields_desc>();
     const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 3);
     for (std::size_t i = 0; i < count; ++i) {
       cumulet_field& field = state->fields[i];
@@ -402,9 +402,9 @@ class Program {
       state->desc.release = [](void* user) { delete static_cast<State*>(user); };
       state->desc.release_user = state.get();
     }
-    const cumulet_state_desc desc = state->desc;
+    const cumulet_volume_fields_desc desc = state->desc;
     std::array<char, 256> error{};
-    if (cumulet_live_set(live_.get(), &desc, error.data(), error.size()) != CUMULET_OK)
+    if (cumulet_dynamic_volume_set(live_.get(), &desc, error.data(), error.size()) != CUMULET_OK)
       check_line(error.data());
     else if (desc.release != nullptr)
       static_cast<void>(state.release());  // owned by the library, or already released
@@ -426,14 +426,14 @@ class Program {
       for (std::int32_t& at : box.min) at = data_.ConsumeIntegral<std::int32_t>();
       for (std::int32_t& at : box.max) at = data_.ConsumeIntegral<std::int32_t>();
     }
-    auto desc = described<cumulet_gl_state_desc>();
+    auto desc = described<cumulet_gl_volume_desc>();
     desc.fields = fields.data();
     desc.field_count = data_.ConsumeIntegralInRange<std::uint64_t>(0, fields.size());
     desc.changed = data_.ConsumeBool() ? boxes.data() : nullptr;
     desc.changed_count = desc.changed != nullptr ? data_.ConsumeIntegralInRange<std::uint64_t>(0, boxes.size()) : 0;
     desc.wait = nullptr;
     desc.name = data_.ConsumeBool() ? "a state\nof lines" : nullptr;
-    told(cumulet_live_set_gl(viewer_.get(), live_.get(), &desc));
+    told(cumulet_dynamic_volume_set_gl(viewer_.get(), live_.get(), &desc));
   }
 
   void change_live() {
@@ -445,24 +445,27 @@ class Program {
       case 3:
       case 4: {
         const auto state = make_state();
-        return made(
-            [&](char* error, std::size_t size) { return cumulet_live_update(live_.get(), &state->desc, error, size); });
+        return made([&](char* error, std::size_t size) {
+          return cumulet_dynamic_volume_update(live_.get(), &state->desc, error, size);
+        });
       }
       case 5: {
         cumulet_volume* volume = nullptr;
-        made([&](char* error, std::size_t size) { return cumulet_live_get_volume(live_.get(), &volume, error, size); });
+        made([&](char* error, std::size_t size) {
+          return cumulet_dynamic_volume_get_volume(live_.get(), &volume, error, size);
+        });
         if (volume != nullptr) volume_.reset(volume);
         return;
       }
       case 6:
-        return told(cumulet_set_live(viewer_.get(), data_.ConsumeBool() ? live_.get() : nullptr));
+        return told(cumulet_set_dynamic_volume(viewer_.get(), data_.ConsumeBool() ? live_.get() : nullptr));
       case 7:
-        return get<cumulet_live_info>(cumulet_get_live_info);
+        return get<cumulet_dynamic_volume_info>(cumulet_get_dynamic_volume_info);
       case 8: {
         const auto state = make_state();
         cumulet_volume* volume = nullptr;
         made([&](char* error, std::size_t size) {
-          return cumulet_volume_from_state(&state->desc, &volume, error, size);
+          return cumulet_volume_from_fields(&state->desc, &volume, error, size);
         });
         if (volume != nullptr) volume_.reset(volume);
         return;
@@ -470,10 +473,10 @@ class Program {
       case 9:
         return set_live_gl();
       default: {
-        const auto desc = described<cumulet_live_desc>();
-        cumulet_live* live = nullptr;
+        const auto desc = described<cumulet_dynamic_volume_desc>();
+        cumulet_dynamic_volume* live = nullptr;
         made([&](char* error, std::size_t size) {
-          return cumulet_live_create(data_.ConsumeBool() ? &desc : nullptr, &live, error, size);
+          return cumulet_dynamic_volume_create(data_.ConsumeBool() ? &desc : nullptr, &live, error, size);
         });
         if (live != nullptr) live_.reset(live);
       }
@@ -627,7 +630,7 @@ class Program {
                                              values.data(), values.size()));
       }
       case 8:
-        return told(cumulet_drop_transmittance_map(viewer_.get(), data_.ConsumeIntegralInRange(0U, 17U)));
+        return told(cumulet_destroy_transmittance_map(viewer_.get(), data_.ConsumeIntegralInRange(0U, 17U)));
       case 7: {
         const auto desc = described<cumulet_transmittance_map_desc>();
         std::array<cumulet_transmittance_map, 2> map{};
@@ -664,7 +667,7 @@ class Program {
     for (double& value : view) value = bits<double>(number());
     for (double& value : projection) value = bits<double>(number());
     const auto desc = described<cumulet_camera_desc>();
-    const auto clip = static_cast<cumulet_clip>(data_.ConsumeIntegralInRange(0, 1));
+    const auto clip = static_cast<cumulet_clip_space>(data_.ConsumeIntegralInRange(0, 1));
     switch (data_.ConsumeIntegralInRange(0, 10)) {
       case 0:
         cumulet_camera_orbit(camera.get(), a, b);
@@ -764,7 +767,7 @@ class Program {
       case 6:
         return set<cumulet_medium_desc>(cumulet_set_medium);
       case 7:
-        return set<cumulet_light_desc>(cumulet_set_light);
+        return set<cumulet_sun_sky_desc>(cumulet_set_sun_sky);
       case 8:
         return set<cumulet_sampling_desc>(cumulet_set_sampling);
       case 9:

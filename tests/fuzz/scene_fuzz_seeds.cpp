@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   scene.camera.eye[2] = 90.0;
   scene.camera.up[1] = 1.0;
   folder.write("first.json", cumulet::demo::scene_text(scene, "/nowhere/full.json", cumulet::demo::SceneFormat::first));
-  scene.analytic_lights.emplace_back().kind = CUMULET_LAMP_SPOT;
+  scene.analytic_lights.emplace_back().kind = CUMULET_LIGHT_SPOT;
   scene.cameras.emplace_back().name = "front";
   scene.cameras.back().camera = scene.camera;
   folder.write("full.json", cumulet::demo::scene_text(scene, "/nowhere/full.json"));

@@ -42,7 +42,7 @@ int run(const char* volume) {
   uint32_t flags = 0;
   do {
     flags = panel_draw(viewer, framebuffer, width, height);
-  } while ((flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_LOADING)) != 0);
+  } while ((flags & (CUMULET_RENDER_INCOMPLETE | CUMULET_RENDER_LOADING)) != 0);
   std::vector<std::uint8_t> pixels(std::size_t{width} * height * 4);
   gl.ReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
   cumulet_destroy(viewer);

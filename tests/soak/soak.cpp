@@ -94,10 +94,10 @@ struct Held {
 class Host {
  public:
   explicit Host(const Files& files) : files_(files) {
-    auto desc = make_desc<cumulet_programs_desc>();
-    cumulet_programs* programs = nullptr;
+    auto desc = make_desc<cumulet_shader_cache_desc>();
+    cumulet_shader_cache* programs = nullptr;
     std::array<char, 256> error{};
-    if (cumulet_programs_create(&desc, &programs, error.data(), error.size()) != CUMULET_OK)
+    if (cumulet_shader_cache_create(&desc, &programs, error.data(), error.size()) != CUMULET_OK)
       throw std::runtime_error(error.data());
     programs_.reset(programs);
     stays_ = viewer(programs_.get());
@@ -133,11 +133,11 @@ class Host {
     return count;
   }
 
-  [[nodiscard]] ViewerPtr viewer(cumulet_programs* programs) {
+  [[nodiscard]] ViewerPtr viewer(cumulet_shader_cache* programs) {
     auto desc = make_desc<cumulet_create_desc>();
     desc.get_proc = FakeGl::get_proc;
     desc.get_proc_user = &fake_;
-    desc.programs = programs;
+    desc.shader_cache = programs;
     return make_plain_viewer(desc);
   }
 
@@ -193,7 +193,7 @@ class Host {
         break;
       case 10:
         set<cumulet_grid_desc>(viewer, cumulet_set_grid, [&](auto& desc) {
-          desc.march = static_cast<cumulet_march>(one_of(3));
+          desc.type = static_cast<cumulet_grid_type>(one_of(3));
           desc.threshold = 0.05 * (1 + one_of(4));
         });
         break;
@@ -204,7 +204,7 @@ class Host {
       case 12:
         set<cumulet_sampling_desc>(viewer, cumulet_set_sampling, [&](auto& desc) {
           desc.samples = 4;
-          desc.view = static_cast<cumulet_view>(one_of(3) == 0 ? one_of(5) : 0);
+          desc.view = static_cast<cumulet_view_mode>(one_of(3) == 0 ? one_of(5) : 0);
         });
         break;
       case 13:
@@ -235,12 +235,12 @@ class Host {
   }
 
   static void analytic_lights(cumulet_viewer* viewer, unsigned count) {
-    std::vector<cumulet_lamp_desc> analytic_lights(count, make_desc<cumulet_lamp_desc>());
-    for (cumulet_lamp_desc& analytic_light : analytic_lights) {
+    std::vector<cumulet_light_desc> analytic_lights(count, make_desc<cumulet_light_desc>());
+    for (cumulet_light_desc& analytic_light : analytic_lights) {
       analytic_light.position[1] = 20.0;
       analytic_light.power = 1000.0F;
     }
-    ok(viewer, cumulet_set_lamps(viewer, analytic_lights.data(), analytic_lights.size()));
+    ok(viewer, cumulet_set_lights(viewer, analytic_lights.data(), analytic_lights.size()));
   }
 
   /// If there is an image: saves its samples, restores them, and saves a file.

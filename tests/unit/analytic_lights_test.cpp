@@ -25,8 +25,8 @@ using test::StillScene;
 constexpr double pi = std::numbers::pi;
 constexpr double floor_y = -10.0;
 
-cumulet_lamp_desc analytic_light(cumulet_lamp_kind kind, const dvec3& position, float power) {
-  cumulet_lamp_desc d{};
+cumulet_light_desc analytic_light(cumulet_light_kind kind, const dvec3& position, float power) {
+  cumulet_light_desc d{};
   d.struct_size = sizeof d;
   d.kind = kind;
   for (int i = 0; i < 3; ++i) d.position[i] = position[i];
@@ -34,7 +34,7 @@ cumulet_lamp_desc analytic_light(cumulet_lamp_kind kind, const dvec3& position, 
   return d;
 }
 
-light::AnalyticLights analytic_lights_of(const std::vector<cumulet_lamp_desc>& descs) {
+light::AnalyticLights analytic_lights_of(const std::vector<cumulet_light_desc>& descs) {
   return c_abi::analytic_lights_of(descs.data(), descs.size());
 }
 
@@ -57,7 +57,9 @@ class AnalyticLights : public test::ViewerTest {
     scene->rest.lights = {of_model};
     still_->viewer().show_surfaces(test::source_of(scene));
   }
-  void set_lamps(const std::vector<cumulet_lamp_desc>& descs) { still_->viewer().set_lamps(analytic_lights_of(descs)); }
+  void set_lamps(const std::vector<cumulet_light_desc>& descs) {
+    still_->viewer().set_lamps(analytic_lights_of(descs));
+  }
   void set_medium(double sigma, float albedo, std::uint32_t max_bounces = 0) {
     viewer::Medium medium;
     medium.density_scale = sigma;
@@ -110,14 +112,14 @@ double quarter(double a, double b, double h) {
 
 TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   set_floor();
-  const auto expect = [&](const cumulet_lamp_desc& d, double expected, const char* what) {
+  const auto expect = [&](const cumulet_light_desc& d, double expected, const char* what) {
     set_lamps({d});
     EXPECT_NEAR(irradiance(), expected, 0.01 * expected + 1e-9) << what;
   };
   const double point = 1000.0 / (4.0 * pi) / (above * above);
-  expect(analytic_light(CUMULET_LAMP_POINT, place, 1000.0F), point, "point");
+  expect(analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F), point, "point");
 
-  auto spot = analytic_light(CUMULET_LAMP_SPOT, place, 1000.0F);
+  auto spot = analytic_light(CUMULET_LIGHT_SPOT, place, 1000.0F);
   expect(spot, point, "spot");
   spot.direction[0] = std::tan(20.0 * pi / 180.0);
   spot.direction[1] = -1.0;
@@ -130,28 +132,28 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   const double edge = std::cos(30.0 * pi / 180.0);
   const double share = (std::cos(25.0 * pi / 180.0) - edge) / (1.0 - edge);
   expect(spot, point * share * share, "blended");
-  auto narrow = analytic_light(CUMULET_LAMP_SPOT, place, 1000.0F);
+  auto narrow = analytic_light(CUMULET_LIGHT_SPOT, place, 1000.0F);
   narrow.angle_degrees = 4.0;
   expect(narrow, point, "narrow");
 
-  auto disc = analytic_light(CUMULET_LAMP_DISC, place, 1000.0F);
+  auto disc = analytic_light(CUMULET_LIGHT_DISK, place, 1000.0F);
   disc.width = 30.0;
   expect(disc, 0.25 * 1000.0 / (above * above + 225.0), "disc");
   disc.direction[1] = 1.0;
   expect(disc, 0.0, "a disc's back");
 
-  auto rectangle = analytic_light(CUMULET_LAMP_RECTANGLE, place, 1000.0F);
+  auto rectangle = analytic_light(CUMULET_LIGHT_RECT, place, 1000.0F);
   rectangle.width = 30.0;
   rectangle.height = 8.0;
   const double radiance = 1000.0 / (4.0 * 240.0);
   expect(rectangle, 4.0 * radiance * quarter(15.0, 4.0, above), "rectangle");
   // The point is below the rectangle's edge: half of it is above, to one side.
   rectangle.position[2] += 15.0;
-  rectangle.across[2] = -3.0;
-  rectangle.across[1] = 100.0;
+  rectangle.tangent[2] = -3.0;
+  rectangle.tangent[1] = 100.0;
   expect(rectangle, 2.0 * radiance * quarter(30.0, 4.0, above), "rectangle beside");
   // Upright, its lower edge level with the floor.
-  rectangle = analytic_light(CUMULET_LAMP_RECTANGLE, {32.0, floor_y + 4.0, 32.0 + above}, 1000.0F);
+  rectangle = analytic_light(CUMULET_LIGHT_RECT, {32.0, floor_y + 4.0, 32.0 + above}, 1000.0F);
   rectangle.direction[2] = -1.0;
   rectangle.width = 30.0;
   rectangle.height = 8.0;
@@ -160,7 +162,7 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   expect(rectangle, radiance * (near - slant), "upright");
 
   for (const double angle : {0.0, 1.0, 60.0}) {
-    auto sun = analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
+    auto sun = analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 3.0F);
     sun.angle_degrees = angle;
     expect(sun, 3.0, "sun");
     sun.direction[0] = 1.0;
@@ -172,15 +174,15 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
 // Lights are sampled by their contribution, and weak ones are still unbiased.
 TEST_P(AnalyticLights, DimLightsNextToBrightOnesCount) {
   set_floor();
-  std::vector<cumulet_lamp_desc> analytic_lights{analytic_light(CUMULET_LAMP_POINT, place, 1.0F)};
-  auto away = analytic_light(CUMULET_LAMP_SPOT, place, 1e6F);  // faces up
+  std::vector<cumulet_light_desc> analytic_lights{analytic_light(CUMULET_LIGHT_POINT, place, 1.0F)};
+  auto away = analytic_light(CUMULET_LIGHT_SPOT, place, 1e6F);  // faces up
   away.direction[1] = 1.0;
   analytic_lights.push_back(away);
   set_lamps(analytic_lights);
   const double dim = 1.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(irradiance(1024), dim, 0.03 * dim);
   for (const float power : {10.0F, 3.0F, 100.0F})
-    analytic_lights.push_back(analytic_light(CUMULET_LAMP_POINT, place, power));
+    analytic_lights.push_back(analytic_light(CUMULET_LIGHT_POINT, place, power));
   analytic_lights.erase(analytic_lights.begin() + 1);
   set_lamps(analytic_lights);
   EXPECT_NEAR(irradiance(256), 114.0 * dim, 0.01 * 114.0 * dim);
@@ -191,10 +193,11 @@ TEST_P(AnalyticLights, CombineWithModelLightsAndHaveColors) {
   of_scene.intensity = vec3(100.0F);
   of_scene.position = vec3(place);
   set_floor({of_scene});
-  auto d = analytic_light(CUMULET_LAMP_POINT, place, 1000.0F);
+  auto d = analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F);
   d.color[0] = 0.5F;
   d.color[1] = 0.25F;
-  set_lamps({d, analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 0.1F), analytic_light(CUMULET_LAMP_POINT, place, 0.0F)});
+  set_lamps(
+      {d, analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 0.1F), analytic_light(CUMULET_LIGHT_POINT, place, 0.0F)});
   const test::Picture picture = test::render(*still_, {16, 16, 1024, 1, render::View::shaded});
   const double each = 1000.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(picture.mean().x * pi, 100.0 / (above * above) + 0.5 * each + 0.1, 0.005);
@@ -209,13 +212,13 @@ TEST_P(AnalyticLights, LightRasterizedSurfaces) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lamps({analytic_light(CUMULET_LAMP_POINT, place, 1000.0F)});
+  set_lamps({analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F)});
   EXPECT_NEAR(irradiance(4) * (4.0 * pi) * above * above / 1000.0, 1.0, 0.01);
-  auto disc = analytic_light(CUMULET_LAMP_DISC, place, 1000.0F);
+  auto disc = analytic_light(CUMULET_LIGHT_DISK, place, 1000.0F);
   disc.width = 0.1;
   set_lamps({disc});
   EXPECT_NEAR(irradiance(4) * 4.0 * above * above / 1000.0, 1.0, 0.01);
-  auto sun = analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
+  auto sun = analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 3.0F);
   sun.angle_degrees = 60.0;
   set_lamps({sun});
   EXPECT_NEAR(irradiance(4), 3.0, 0.01) << "as bright as it says, however wide";
@@ -228,7 +231,7 @@ TEST_P(AnalyticLights, LightsOfRasterizedOnlyModelsAreNotSampled) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lamps({analytic_light(CUMULET_LAMP_POINT, {32.0, 32.0, 60.0}, 4e5F)});
+  set_lamps({analytic_light(CUMULET_LIGHT_POINT, {32.0, 32.0, 60.0}, 4e5F)});
   const auto mean = [&] {
     still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
     return test::render(*still_, {16, 16, 256, 1, render::View::shaded}).mean().x;
@@ -270,12 +273,12 @@ TEST_P(AnalyticLights, ExtremePowerGivesFiniteValues) {
   set_medium(2.0, 1.0F);
   still_->set_camera(test::camera_at({8.0, 8.0, 60.0}, {8.0, 8.0, 8.0}, 20.0));
   // Lights of size 0 inside the medium, so that paths scatter close to them.
-  auto spot = analytic_light(CUMULET_LAMP_SPOT, {8.0, 8.0, 8.0}, 9e29F);
-  auto disc = analytic_light(CUMULET_LAMP_DISC, {8.0, 8.0, 12.0}, 9e29F);
-  auto sun = analytic_light(CUMULET_LAMP_SUN, dvec3(0.0), 9e29F);
+  auto spot = analytic_light(CUMULET_LIGHT_SPOT, {8.0, 8.0, 8.0}, 9e29F);
+  auto disc = analytic_light(CUMULET_LIGHT_DISK, {8.0, 8.0, 12.0}, 9e29F);
+  auto sun = analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 9e29F);
   disc.width = 1e-3;
   sun.angle_degrees = 90.0;
-  set_lamps({spot, disc, sun, analytic_light(CUMULET_LAMP_POINT, {7.0, 7.0, 9.0}, 9e29F)});
+  set_lamps({spot, disc, sun, analytic_light(CUMULET_LIGHT_POINT, {7.0, 7.0, 9.0}, 9e29F)});
   for (const vec4& pixel : test::render(*still_, {16, 16, 64, 1, render::View::shaded}).pixels) {
     ASSERT_TRUE(std::isfinite(pixel.x)) << pixel.x;
   }
@@ -338,9 +341,9 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
       rectangle.push_back(beyond + dvec3(40.0 * (u - 0.5), 0.0, 10.0 * (v - 0.5)));
     }
   }
-  auto round = analytic_light(CUMULET_LAMP_DISC, within, float(power));
+  auto round = analytic_light(CUMULET_LIGHT_DISK, within, float(power));
   round.width = 12.0;
-  auto wide = analytic_light(CUMULET_LAMP_RECTANGLE, beyond, float(power));
+  auto wide = analytic_light(CUMULET_LIGHT_RECT, beyond, float(power));
   wide.width = 40.0;
   wide.height = 10.0;
   // In the thin medium, equiangular sampling is used for all lights; in the other one, only for lights inside.
@@ -348,15 +351,15 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
     set_medium(sigma, 1.0F, 1);
     for (const March march : {March::tet, March::dense, March::brick}) {
       set_march(march);
-      const auto expect = [&](const cumulet_lamp_desc& d, double expected, const char* what) {
+      const auto expect = [&](const cumulet_light_desc& d, double expected, const char* what) {
         set_lamps({d});
         const std::uint32_t samples = sigma < 0.01 ? 64 : 256;
         const test::Picture picture = test::render(*still_, {48, 48, samples, 1, render::View::shaded});
         EXPECT_NEAR(picture.mean().x / expected, 1.0, 0.01) << what << " " << int(march) << " " << sigma;
       };
-      expect(analytic_light(CUMULET_LAMP_POINT, within, float(power)), scattered(sigma, {within}, point),
+      expect(analytic_light(CUMULET_LIGHT_POINT, within, float(power)), scattered(sigma, {within}, point),
              "point inside");
-      expect(analytic_light(CUMULET_LAMP_POINT, beyond, float(power)), scattered(sigma, {beyond}, point),
+      expect(analytic_light(CUMULET_LIGHT_POINT, beyond, float(power)), scattered(sigma, {beyond}, point),
              "point outside");
       expect(round, scattered(sigma, disc, area), "disc inside");
       expect(wide, scattered(sigma, rectangle, area), "rectangle outside");
@@ -366,7 +369,7 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
 
 // ---- the C API ----
 
-std::string refusal(const std::vector<cumulet_lamp_desc>& descs) {
+std::string refusal(const std::vector<cumulet_light_desc>& descs) {
   try {
     analytic_lights_of(descs);
   } catch (const Error& error) {
@@ -376,15 +379,15 @@ std::string refusal(const std::vector<cumulet_lamp_desc>& descs) {
 }
 
 TEST(LightDescriptors, InvalidValuesAreRejectedByName) {
-  const auto good = analytic_light(CUMULET_LAMP_POINT, dvec3(0.0), 1.0F);
+  const auto good = analytic_light(CUMULET_LIGHT_POINT, dvec3(0.0), 1.0F);
   EXPECT_EQ(refusal({good, good}), "");
-  const auto bad = [&](const std::function<void(cumulet_lamp_desc&)>& spoil) {
+  const auto bad = [&](const std::function<void(cumulet_light_desc&)>& spoil) {
     auto d = good;
     spoil(d);
     return refusal({good, d});
   };
-  const std::string field = "lamp 1: cumulet_lamp_desc.";
-  EXPECT_EQ(bad([](auto& d) { d.kind = static_cast<cumulet_lamp_kind>(5); }), field + "kind is unknown");
+  const std::string field = "lamp 1: cumulet_light_desc.";
+  EXPECT_EQ(bad([](auto& d) { d.kind = static_cast<cumulet_light_kind>(5); }), field + "kind is unknown");
   EXPECT_EQ(bad([](auto& d) { d.power = -1.0F; }), field + "power is not from 0 to 1e30");
   EXPECT_EQ(bad([](auto& d) { d.position[2] = NAN; }), field + "position is not finite");
   EXPECT_EQ(bad([](auto& d) { d.position[2] = 1e300; }), field + "position is beyond 1e30");
@@ -394,17 +397,17 @@ TEST(LightDescriptors, InvalidValuesAreRejectedByName) {
   EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 20.0F; }), field + "power times color is above 1e30");
   EXPECT_EQ(bad([](auto& d) { d.width = -1.0; }), field + "width is not from 0 to 1e30");
   EXPECT_EQ(bad([](auto& d) { d.angle_degrees = 181.0; }), field + "angle_degrees is not from 0 to 180");
-  EXPECT_EQ(bad([](auto& d) { d.kind = CUMULET_LAMP_SUN, d.angle_degrees = 91.0; }),
+  EXPECT_EQ(bad([](auto& d) { d.kind = CUMULET_LIGHT_DISTANT, d.angle_degrees = 91.0; }),
             field + "angle_degrees of a sun is above 90");
   EXPECT_EQ(bad([](auto& d) { d.blend = 1.5; }), field + "blend is not from 0 to 1");
-  EXPECT_EQ(bad([](auto& d) { d.struct_size -= 8; }), "lamp 1: cumulet_lamp_desc.struct_size is not the first one's");
+  EXPECT_EQ(bad([](auto& d) { d.struct_size -= 8; }), "lamp 1: cumulet_light_desc.struct_size is not the first one's");
   EXPECT_THROW(c_abi::analytic_lights_of(nullptr, 1), Error);
   EXPECT_THROW(c_abi::analytic_lights_of(&good, 4097), Error);
   EXPECT_TRUE(c_abi::analytic_lights_of(nullptr, 0).empty());
 }
 
 TEST(LightDescriptors, ZeroMeansTheDefault) {
-  auto d = analytic_light(CUMULET_LAMP_RECTANGLE, dvec3(0.0), 2.0F);
+  auto d = analytic_light(CUMULET_LIGHT_RECT, dvec3(0.0), 2.0F);
   light::AnalyticLight made = analytic_lights_of({d}).at(0);
   EXPECT_EQ(made.direction, dvec3(0.0, -1.0, 0.0));
   EXPECT_EQ(made.across, dvec3(1.0, 0.0, 0.0));
@@ -413,12 +416,12 @@ TEST(LightDescriptors, ZeroMeansTheDefault) {
   EXPECT_EQ(made.height, 1.0);
   // A direction of any length, and a tangent that is not perpendicular to it.
   d.direction[2] = -1e-200;
-  d.across[0] = 1.0;
-  d.across[2] = 5.0;
+  d.tangent[0] = 1.0;
+  d.tangent[2] = 5.0;
   made = analytic_lights_of({d}).at(0);
   EXPECT_EQ(made.direction, dvec3(0.0, 0.0, -1.0));
   EXPECT_EQ(made.across, dvec3(1.0, 0.0, 0.0));
-  d.across[0] = 0.0;  // along the direction
+  d.tangent[0] = 0.0;  // along the direction
   EXPECT_NEAR(glm::length(analytic_lights_of({d}).at(0).across - dvec3(-1.0, 0.0, 0.0)), 0.0, 1e-12);
 }
 

@@ -139,13 +139,13 @@ TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   EXPECT_NE(error().find("struct_size"), std::string::npos);
   grid.struct_size = 0;
   EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_ERROR_INVALID_ARGUMENT);
-  grid.struct_size = sizeof(size_t) + sizeof(cumulet_march);  // an older, shorter struct
+  grid.struct_size = sizeof(size_t) + sizeof(cumulet_grid_type);  // an older, shorter struct
   EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_OK);
   grid = make_desc<cumulet_grid_desc>();
   for (const int wrong : {3, 77}) {
-    std::memcpy(&grid.march, &wrong, sizeof wrong);
+    std::memcpy(&grid.type, &wrong, sizeof wrong);
     EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_ERROR_INVALID_ARGUMENT);
-    EXPECT_NE(error().find("march"), std::string::npos);
+    EXPECT_NE(error().find("type"), std::string::npos);
   }
   grid = make_desc<cumulet_grid_desc>();
   grid.threshold = std::nan("");
@@ -161,9 +161,9 @@ TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   medium.emission[2] = -1.0F;
   EXPECT_EQ(cumulet_set_medium(viewer_, &medium), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_NE(error().find("emission"), std::string::npos);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sky_radiance[2] = -1.0F;
-  EXPECT_EQ(cumulet_set_light(viewer_, &light), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_set_sun_sky(viewer_, &light), CUMULET_ERROR_INVALID_ARGUMENT);
   cumulet_camera* view = nullptr;
   ASSERT_EQ(cumulet_get_camera(viewer_, &view), CUMULET_OK);
   auto camera = make_desc<cumulet_camera_desc>();
@@ -340,7 +340,7 @@ TEST_F(CApiSurfaces, LoadPoseLookAndRemove) {
   EXPECT_EQ(cumulet_set_surface_settings(viewer_, &surfaces), CUMULET_ERROR_INVALID_ARGUMENT);
   surfaces = make_desc<cumulet_surface_settings_desc>();
   const unsigned unknown = 7;
-  std::memcpy(&surfaces.light, &unknown, sizeof unknown);
+  std::memcpy(&surfaces.lighting, &unknown, sizeof unknown);
   EXPECT_EQ(cumulet_set_surface_settings(viewer_, &surfaces), CUMULET_ERROR_INVALID_ARGUMENT);
   for (const float roughness : {-0.1F, 1.1F, std::nanf("")}) {
     surfaces = make_desc<cumulet_surface_settings_desc>();
@@ -399,10 +399,10 @@ TEST_F(CApiSurfaces, DoubleSidedShowsEmissiveBackFaces) {
     const std::vector<float> rgba = picture(viewer_);
     return std::pair(rgba[4 * (8 * 16 + 8)], rgba[4 * (8 * 16 + 8) + 3]);
   };
-  for (const cumulet_surface_light light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
+  for (const cumulet_surface_lighting light : {CUMULET_SURFACE_LIGHTING_GLOBAL, CUMULET_SURFACE_LIGHTING_RASTERIZED}) {
     SCOPED_TRACE(light);
     auto settings = make_desc<cumulet_surface_settings_desc>();
-    settings.light = light;
+    settings.lighting = light;
     for (const int32_t both : {0, 1, 0}) {
       settings.double_sided = both;
       ASSERT_EQ(cumulet_set_surface_settings(viewer_, &settings), CUMULET_OK);
@@ -661,9 +661,9 @@ TEST_F(CApiSurfaces, HostTrianglesAreLit) {
   cumulet_surfaces* surfaces = nullptr;
   ASSERT_EQ(make_triangles({mesh}, &surfaces), CUMULET_OK);
   look(viewer_);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   for (float& c : light.sky_radiance) c = 1.0F;
-  ASSERT_EQ(cumulet_set_light(viewer_, &light), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sun_sky(viewer_, &light), CUMULET_OK);
   ASSERT_EQ(cumulet_set_surfaces(viewer_, surfaces), CUMULET_OK);
   cumulet_surfaces_release(surfaces);
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
@@ -784,12 +784,13 @@ TEST_F(CApiSurfaces, WithoutTrianglesThePictureConvergesAndIsEmpty) {
   double low[3];
   double high[3];
   EXPECT_EQ(cumulet_get_bounds(viewer_, low, high), CUMULET_ERROR_INVALID_ARGUMENT);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sky_radiance[0] = 0.25F;
-  ASSERT_EQ(cumulet_set_light(viewer_, &light), CUMULET_OK);
-  for (const cumulet_surface_light surface_light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
+  ASSERT_EQ(cumulet_set_sun_sky(viewer_, &light), CUMULET_OK);
+  for (const cumulet_surface_lighting surface_light :
+       {CUMULET_SURFACE_LIGHTING_GLOBAL, CUMULET_SURFACE_LIGHTING_RASTERIZED}) {
     auto settings = make_desc<cumulet_surface_settings_desc>();
-    settings.light = surface_light;
+    settings.lighting = surface_light;
     ASSERT_EQ(cumulet_set_surface_settings(viewer_, &settings), CUMULET_OK);
     const std::vector<float> rgba = picture(viewer_);
     for (std::size_t i = 0; i < rgba.size(); ++i) EXPECT_EQ(rgba[i], i % 4 == 0 ? 0.25F : 0.0F) << i;

@@ -180,11 +180,12 @@ TEST_F(CVolumeInstance, VolumeTransformsMoveUntilSetAgain) {
   ASSERT_EQ(cumulet_set_sampling(shows.get(), &sampling), CUMULET_OK);
   const Picture sharp = picture(shows.get());
   const auto there = at(0.0, 2.0, 0.0);
-  ASSERT_EQ(cumulet_set_volume_shutter(shows.get(), nullptr, there.data(), 1), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_shutter_transforms(shows.get(), nullptr, there.data(), 1), CUMULET_OK);
   EXPECT_NE(picture(shows.get()), sharp);
-  EXPECT_EQ(cumulet_set_volume_shutter(shows.get(), nullptr, there.data(), 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_set_volume_shutter_transforms(shows.get(), nullptr, there.data(), 2),
+            CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(cumulet_last_error(shows.get()), "the shutter's places are not as many as the volume has");
-  ASSERT_EQ(cumulet_set_volume_places(shows.get(), nullptr, 0), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_transforms(shows.get(), nullptr, 0), CUMULET_OK);
   EXPECT_EQ(difference(picture(shows.get()), sharp), "");
 }
 

@@ -274,8 +274,8 @@ TEST_F(CModelInstance, PickReturnsItsTag) {
   picture(shows.get());
   const cumulet_pick found = pick(shows.get(), 16, 16);
   EXPECT_EQ(found.hit, 1);
-  EXPECT_EQ(found.met_surface, 1);
-  EXPECT_EQ(found.met_volume, 0);
+  EXPECT_EQ(found.hit_surface, 1);
+  EXPECT_EQ(found.hit_volume, 0);
   EXPECT_EQ(found.tag, 77U);
   EXPECT_EQ(found.material, 0U);
   EXPECT_STREQ(found.material_name, "triangles: mesh 0");
@@ -324,21 +324,21 @@ TEST_F(CModelInstance, ShadowOnlyModelIsInvisibleButCastsShadows) {
 // Rasterized previews show models where the path tracer does. The image is only the rasterized layers.
 TEST_F(CModelInstance, RasterizationMatchesPathTracing) {
   const SurfacesRef own = surfaces_of({at(0, 0, 0)}, Box(), 1.0F);
-  const auto silhouette = [&](cumulet_surface_light light) {
+  const auto silhouette = [&](cumulet_surface_lighting light) {
     const ViewerPtr shows = make(16);
     auto settings = make_desc<cumulet_surface_settings_desc>();
-    settings.light = light;
+    settings.lighting = light;
     EXPECT_EQ(cumulet_set_surface_settings(shows.get(), &settings), CUMULET_OK);
-    auto dark = make_desc<cumulet_light_desc>();
-    EXPECT_EQ(cumulet_set_light(shows.get(), &dark), CUMULET_OK);
+    auto dark = make_desc<cumulet_sun_sky_desc>();
+    EXPECT_EQ(cumulet_set_sun_sky(shows.get(), &dark), CUMULET_OK);
     const ModelRef left = make_model(own.get(), at(-4, 0, 0));
     const ModelRef right = make_model(own.get(), askew);
     EXPECT_EQ(cumulet_add_model(shows.get(), left.get()), CUMULET_OK);
     EXPECT_EQ(cumulet_add_model(shows.get(), right.get()), CUMULET_OK);
     return picture(shows.get());
   };
-  const Picture traced = silhouette(CUMULET_SURFACE_LIGHT_SHADOWS);
-  const Picture drawn = silhouette(CUMULET_SURFACE_LIGHT_NONE);
+  const Picture traced = silhouette(CUMULET_SURFACE_LIGHTING_DIRECT);
+  const Picture drawn = silhouette(CUMULET_SURFACE_LIGHTING_RASTERIZED);
   EXPECT_GT(mean_of(drawn), 60.0);
   EXPECT_NEAR(mean_of(drawn), mean_of(traced), 2.0);
 }

@@ -158,7 +158,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   };
   const std::function grid = [&](const cumulet_grid_desc* d) { return cumulet_set_grid(v_, d); };
   const std::function medium = [&](const cumulet_medium_desc* d) { return cumulet_set_medium(v_, d); };
-  const std::function light = [&](const cumulet_light_desc* d) { return cumulet_set_light(v_, d); };
+  const std::function light = [&](const cumulet_sun_sky_desc* d) { return cumulet_set_sun_sky(v_, d); };
   const std::function sampling = [&](const cumulet_sampling_desc* d) { return cumulet_set_sampling(v_, d); };
   const std::function display = [&](const cumulet_display_desc* d) { return cumulet_set_display(v_, d); };
   const std::function navigation = [&](const cumulet_navigation_desc* d) { return cumulet_set_navigation(v_, d); };
@@ -196,7 +196,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   check_sizes("create", make_desc<cumulet_create_desc>(), create);
   check_sizes("grid", make_desc<cumulet_grid_desc>(), grid);
   check_sizes("medium", make_desc<cumulet_medium_desc>(), medium);
-  check_sizes("light", make_desc<cumulet_light_desc>(), light);
+  check_sizes("light", make_desc<cumulet_sun_sky_desc>(), light);
   check_sizes("sampling", make_desc<cumulet_sampling_desc>(), sampling);
   check_sizes("display", make_desc<cumulet_display_desc>(), display);
   check_sizes("navigation", make_desc<cumulet_navigation_desc>(), navigation);
@@ -232,13 +232,14 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
          [&](cumulet_transmittance_map* m) { return cumulet_update_transmittance_map(v_, &map, m); });
   filled(make_desc<cumulet_volume_info>(),
          [&](cumulet_volume_info* i) { return cumulet_volume_get_info(volume_.get(), i); });
-  filled(make_desc<cumulet_values_info>(),
-         [&](cumulet_values_info* i) { return cumulet_volume_get_values(volume_.get(), CUMULET_RAMP_DENSITY, i); });
+  filled(make_desc<cumulet_histogram_info>(), [&](cumulet_histogram_info* i) {
+    return cumulet_volume_get_histogram(volume_.get(), CUMULET_RAMP_DENSITY, i);
+  });
   const cumulet_frame_desc whole = target_.frame();
   filled(make_desc<cumulet_frame_result>(), [&](cumulet_frame_result* r) { return cumulet_render(v_, &whole, r); });
 
   check_enum("gl_state", &cumulet_create_desc::gl_state, 2, create);
-  check_enum("march", &cumulet_grid_desc::march, 3, grid);
+  check_enum("type", &cumulet_grid_desc::type, 3, grid);
   check_enum("cells", &cumulet_grid_desc::cells, 2, grid);
   check_enum("criterion", &cumulet_grid_desc::criterion, 3, grid);
   check_enum("view", &cumulet_sampling_desc::view, 5, sampling);
@@ -262,7 +263,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
     return made;
   }());
   for (const int clip : {-1, 2}) {
-    cumulet_clip value{};
+    cumulet_clip_space value{};
     std::memcpy(&value, &clip, sizeof clip);
     EXPECT_EQ(cumulet_camera_get_matrices(owner.get(), 1.0, value, matrix.data(), matrix.data()),
               CUMULET_ERROR_INVALID_ARGUMENT);
@@ -653,9 +654,9 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.samples = 4;
   sampling.preview = CUMULET_PREVIEW_OFF;
-  sampling.volume_alone = 2;
+  sampling.separate_volume_aov = 2;
   EXPECT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_ERROR_INVALID_ARGUMENT);
-  sampling.volume_alone = 1;
+  sampling.separate_volume_aov = 1;
   ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
   picture_of(v_, volume_.get(), target_);
   for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VOLUME_MOTION; ++aov) {
@@ -682,7 +683,7 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_SURFACE_DEPTH, passes.data(), passes.size()), CUMULET_OK);
   // AOVs of an image are not read with another grid type's data.
   auto grid = make_desc<cumulet_grid_desc>();
-  grid.march = CUMULET_MARCH_DENSE;
+  grid.type = CUMULET_GRID_DENSE;
   ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK);
   frame.budget_ms = 1e3;
@@ -751,7 +752,7 @@ TEST_F(Contract, Contract13HostDepthHidesWhatIsBehindIt) {
   show(v_, CUMULET_BACKGROUND_TRANSPARENT);
   const Picture picture = picture_of(v_, volume_.get(), target_);
   const Picture nothing(picture.size(), 0);
-  for (const cumulet_depth convention : {CUMULET_DEPTH_STANDARD, CUMULET_DEPTH_REVERSED}) {
+  for (const cumulet_depth_convention convention : {CUMULET_DEPTH_STANDARD, CUMULET_DEPTH_REVERSED}) {
     cumulet_camera* camera = nullptr;
     ASSERT_EQ(cumulet_get_camera(v_, &camera), CUMULET_OK);
     const CameraRef owner(camera);
@@ -915,7 +916,7 @@ TEST_F(Contract, Contract18ProgressiveWithinTheTimeBudget) {
     const auto begin = std::chrono::steady_clock::now();
     ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
     spent.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-    EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U);
+    EXPECT_NE(result.flags & CUMULET_RENDER_INCOMPLETE, 0U);
     EXPECT_EQ(result.flags & CUMULET_RENDER_CONVERGED, 0U);
     progress = result.progress;
   }
@@ -954,11 +955,11 @@ TEST_F(Contract, Contract19FlagsReportPendingWork) {
   unseen.target = CUMULET_TARGET_NONE;
   ASSERT_EQ(cumulet_render(v_, &unseen, &result), CUMULET_OK);
   EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED}) << "drawn already";
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sun_irradiance[0] = 3.0F;
   light.sun_elevation_degrees = 30.0F;
-  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
-  EXPECT_EQ(converge(v_, unseen).flags, unsigned{CUMULET_RENDER_CONVERGED | CUMULET_RENDER_UNDRAWN});
+  ASSERT_EQ(cumulet_set_sun_sky(v_, &light), CUMULET_OK);
+  EXPECT_EQ(converge(v_, unseen).flags, unsigned{CUMULET_RENDER_CONVERGED | CUMULET_RENDER_NEW_IMAGE});
   auto drawing = frame;
   drawing.budget_ms = -1.0;
   ASSERT_EQ(cumulet_render(v_, &drawing, &result), CUMULET_OK);
@@ -1146,13 +1147,13 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   cumulet_camera_release(camera);
   ASSERT_EQ(cumulet_attach(raw, FakeGl::get_proc, &fake_), CUMULET_OK);
 
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sky = CUMULET_SKY_PHYSICAL;
   light.ground_albedo = 0.3F;
   const auto at = [&](cumulet_viewer* v, float elevation) {
     light.sun_elevation_degrees = elevation;
     light.sun_azimuth_degrees = 2.0F * elevation;
-    ASSERT_EQ(cumulet_set_light(v, &light), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_sun_sky(v, &light), CUMULET_OK);
   };
   at(v_, 45.0F);
   const Picture alone = picture_of(v_, volume_.get(), target_);
@@ -1175,9 +1176,9 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   at(raw, 45.0F);
   EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
   // A constant sky between two physical skies. cumulet_cancel and cumulet_wait do not affect physical skies.
-  auto constant = make_desc<cumulet_light_desc>();
+  auto constant = make_desc<cumulet_sun_sky_desc>();
   constant.sky_radiance[0] = 1.0F;
-  ASSERT_EQ(cumulet_set_light(raw, &constant), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sun_sky(raw, &constant), CUMULET_OK);
   EXPECT_NE(difference(picture_of(raw, volume_.get(), target_), alone), "");
   at(raw, 45.0F);
   cumulet_cancel(raw);
@@ -1335,8 +1336,8 @@ std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& fr
   do {
     EXPECT_EQ(cumulet_warm_up(viewer, &frame, scope, &result), CUMULET_OK) << cumulet_last_error(viewer);
     told.push_back(result.progress);
-  } while (result.more != 0 && told.size() < 10000);
-  EXPECT_EQ(result.more, 0);
+  } while (result.incomplete != 0 && told.size() < 10000);
+  EXPECT_EQ(result.incomplete, 0);
   return told;
 }
 
@@ -1367,7 +1368,7 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = 2;
     sampling.preview = preview;
-    sampling.volume_alone = surfaces ? 1 : 0;
+    sampling.separate_volume_aov = surfaces ? 1 : 0;
     ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
     ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
     auto frame = target_.frame();
@@ -1413,7 +1414,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForParallelCompilation) {
   auto result = make_desc<cumulet_frame_result>();
   // Without a warm-up, the first frame waits for programs that draw, because there is no image to show instead.
   ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);
-  EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_INCOMPLETE, 0U);
   EXPECT_GT(fake_.waits(), 0U);
   fake_.finish_compiling(true);
   ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
@@ -1425,7 +1426,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForParallelCompilation) {
     const auto linked = fake_.calls("LinkProgram");
     for (int i = 0; i < 5; ++i) {
       ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK) << cumulet_last_error(own.get());
-      EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U);
+      EXPECT_NE(result.flags & CUMULET_RENDER_INCOMPLETE, 0U);
       EXPECT_EQ(result.flags & CUMULET_RENDER_CONVERGED, 0U);
     }
     EXPECT_EQ(fake_.waits(), waited);
@@ -1434,13 +1435,13 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForParallelCompilation) {
   };
   stalls("the first picture");
   converge(own.get(), frame);
-  const Picture volume_alone = target_.pixels();
+  const Picture separate_volume_aov = target_.pixels();
   ASSERT_EQ(cumulet_set_surfaces(own.get(), panes.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
   stalls("surfaces");
-  EXPECT_EQ(difference(target_.pixels(), volume_alone), "") << "the last picture shows until then";
+  EXPECT_EQ(difference(target_.pixels(), separate_volume_aov), "") << "the last picture shows until then";
   converge(own.get(), frame);
-  EXPECT_NE(difference(target_.pixels(), volume_alone), "");
+  EXPECT_NE(difference(target_.pixels(), separate_volume_aov), "");
   // Another tone map: meanwhile, the old program is used.
   auto display = make_desc<cumulet_display_desc>();
   display.tone_map = CUMULET_TONE_MAP_CLIP;
@@ -1469,7 +1470,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForParallelCompilation) {
   auto warm = make_desc<cumulet_warm_up_result>();
   for (int i = 0; i < 5; ++i) {
     ASSERT_EQ(cumulet_warm_up(own.get(), &frame, CUMULET_WARM_UP_SCENE, &warm), CUMULET_OK);
-    EXPECT_EQ(warm.more, 1);
+    EXPECT_EQ(warm.incomplete, 1);
   }
   EXPECT_EQ(fake_.waits(), waited);
   fake_.finish_compiling(true);
@@ -1517,11 +1518,11 @@ TEST_F(Contract, Contract26dWarmUpWithHostDepthEnds) {
   frame.depth_source = CUMULET_DEPTH_SOURCE_FRAMEBUFFER;
   frame.depth_name = large.framebuffer();
   auto result = make_desc<cumulet_warm_up_result>();
-  result.more = 1;
-  for (int i = 0; i < 200 && result.more != 0; ++i) {
+  result.incomplete = 1;
+  for (int i = 0; i < 200 && result.incomplete != 0; ++i) {
     ASSERT_EQ(cumulet_warm_up(own.get(), &frame, CUMULET_WARM_UP_SCENE, &result), CUMULET_OK);
   }
-  EXPECT_EQ(result.more, 0);
+  EXPECT_EQ(result.incomplete, 0);
 }
 
 // Checks that the warm-up proceeds under any budget, and that a program that does not build does not stop the others.
@@ -1554,17 +1555,17 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
     cumulet_status status = CUMULET_OK;
     for (int i = 0; i < 10000; ++i) {
       status = step(budget_ms);
-      if (status != CUMULET_OK || result.more == 0) return status;
+      if (status != CUMULET_OK || result.incomplete == 0) return status;
     }
     ADD_FAILURE() << "it never ends";
     return status;
   };
   ASSERT_EQ(step(1e-3), CUMULET_OK) << cumulet_last_error(own.get());
-  EXPECT_EQ(result.more, 1) << "piece by piece";
+  EXPECT_EQ(result.incomplete, 1) << "piece by piece";
   EXPECT_LT(result.progress, 0.5);
   for (int i = 0; i < 10000 && result.progress < 0.2; ++i) {
     ASSERT_EQ(step(1e-3), CUMULET_OK) << cumulet_last_error(own.get());
-    ASSERT_EQ(result.more, 1);
+    ASSERT_EQ(result.incomplete, 1);
   }
   ASSERT_GE(result.progress, 0.2);
   fake_.fail_linking(true);
@@ -1595,8 +1596,8 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
   };
   expect_nothing_compiled("the volume");
   auto grid = make_desc<cumulet_grid_desc>();
-  for (const cumulet_march march : {CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK, CUMULET_MARCH_TET}) {
-    grid.march = march;
+  for (const cumulet_grid_type march : {CUMULET_GRID_DENSE, CUMULET_GRID_BRICKS, CUMULET_GRID_TETRAHEDRAL}) {
+    grid.type = march;
     ASSERT_EQ(cumulet_set_grid(own.get(), &grid), CUMULET_OK);
     expect_nothing_compiled("another march");
   }
@@ -1604,7 +1605,7 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
   expect_nothing_compiled("surfaces");
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.samples = 2;
-  for (const cumulet_view view : {CUMULET_VIEW_CELLS, CUMULET_VIEW_STEPS, CUMULET_VIEW_SHADED}) {
+  for (const cumulet_view_mode view : {CUMULET_VIEW_CELLS, CUMULET_VIEW_STEPS, CUMULET_VIEW_SHADED}) {
     sampling.view = view;
     ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
     expect_nothing_compiled("another view");

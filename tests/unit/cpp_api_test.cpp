@@ -99,23 +99,23 @@ TEST(CppResult, TextIsCutToFit) {
 }
 
 TEST(CppDescs, ConvertToTheCStructs) {
-  const cumulet_grid_desc grid = GridDesc{.march = March::brick,
-                                          .cells = Cells::constant,
-                                          .criterion = Criterion::range_mean,
+  const cumulet_grid_desc grid = GridDesc{.type = GridType::bricks,
+                                          .cells = CellDensity::constant,
+                                          .criterion = RefinementCriterion::range_mean,
                                           .threshold = 1.5,
                                           .max_cells = 7,
                                           .camera_adaptive = true,
                                           .pixel_size = 2.5,
-                                          .build = Build::gpu};
+                                          .build_device = BuildDevice::gpu};
   EXPECT_EQ(grid.struct_size, sizeof grid);
-  EXPECT_EQ(grid.march, CUMULET_MARCH_BRICK);
+  EXPECT_EQ(grid.type, CUMULET_GRID_BRICKS);
   EXPECT_EQ(grid.cells, CUMULET_CELLS_CONSTANT);
   EXPECT_EQ(grid.criterion, CUMULET_CRITERION_RANGE_MEAN);
   EXPECT_EQ(grid.threshold, 1.5);
   EXPECT_EQ(grid.max_cells, 7U);
   EXPECT_EQ(grid.camera_adaptive, 1);
   EXPECT_EQ(grid.pixel_size, 2.5);
-  EXPECT_EQ(grid.build, CUMULET_BUILD_GPU);
+  EXPECT_EQ(grid.build_device, CUMULET_BUILD_GPU);
 
   const cumulet_medium_desc medium = MediumDesc{
       .density_scale = 2, .coalbedo = {0.1F, 0.2F, 0.3F}, .anisotropy = 0.5F, .max_bounces = 9, .emission = {4, 5, 6}};
@@ -126,7 +126,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
   EXPECT_EQ(medium.max_bounces, 9U);
   expect_same(medium.emission, std::array{4.0F, 5.0F, 6.0F});
 
-  const cumulet_light_desc light = LightDesc{
+  const cumulet_sun_sky_desc light = SunSkyDesc{
       .sun_azimuth_degrees = 1, .sun_elevation_degrees = 2, .sun_irradiance = {3, 4, 5}, .sky_radiance = {6, 7, 8}};
   EXPECT_EQ(light.struct_size, sizeof light);
   EXPECT_EQ(light.sun_azimuth_degrees, 1.0F);
@@ -135,7 +135,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
   expect_same(light.sky_radiance, Rgb{6, 7, 8});
 
   const cumulet_sampling_desc sampling =
-      SamplingDesc{.samples = 3, .seed = 4, .view = View::wireframe, .preview = Preview::off};
+      SamplingDesc{.samples = 3, .seed = 4, .view = ViewMode::wireframe, .preview = Preview::off};
   EXPECT_EQ(sampling.struct_size, sizeof sampling);
   EXPECT_EQ(sampling.samples, 3U);
   EXPECT_EQ(sampling.seed, 4U);
@@ -156,7 +156,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
                                                 .orthographic_height = 11,
                                                 .near_plane = 12,
                                                 .far_plane = 13,
-                                                .depth = Depth::reversed};
+                                                .depth = DepthConvention::reversed};
   EXPECT_EQ(camera.struct_size, sizeof camera);
   expect_same(camera.eye, Vector{1, 2, 3});
   expect_same(camera.target, Vector{4, 5, 6});
@@ -193,7 +193,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
   EXPECT_EQ(static_cast<int>(Key::keypad_7), CUMULET_KEY_KEYPAD_0 + 7);
 
   const cumulet_frame_desc frame = FrameDesc{.budget_ms = 1,
-                                             .target = Target::texture,
+                                             .target = FrameTarget::texture,
                                              .framebuffer = 2,
                                              .width = 3,
                                              .height = 4,
@@ -201,8 +201,8 @@ TEST(CppDescs, ConvertToTheCStructs) {
                                              .flip_y = true,
                                              .scale = 9,
                                              .format = 10,
-                                             .color = Color::hdr,
-                                             .blend = Blend::replace,
+                                             .color = ColorEncoding::hdr,
+                                             .blend = BlendMode::replace,
                                              .write_depth = true,
                                              .depth_source = DepthSource::framebuffer,
                                              .depth_name = 11,
@@ -284,12 +284,12 @@ TEST(CppVolume, IsSharedByCopies) {
   EXPECT_EQ(info.bounds.min, (Vector{0.5, 0.5, 0.5}));
   EXPECT_EQ(info.bounds.max, (Vector{15.5, 15.5, 15.5}));
   EXPECT_EQ(info.max_value, 1.0F);
-  const ValuesInfo density = copy.values(Ramp::density).value();
+  const HistogramInfo density = copy.histogram(Ramp::density).value();
   EXPECT_EQ(density.max_value, 1.0F);
   EXPECT_EQ(density.histogram.back(), info.active_voxels);
   EXPECT_EQ(density.histogram.front(), 0U);
-  EXPECT_EQ(copy.values(Ramp::flame).value().max_value, 0.0F);
-  EXPECT_EQ(copy.values(static_cast<Ramp>(7)).error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(copy.histogram(Ramp::flame).value().max_value, 0.0F);
+  EXPECT_EQ(copy.histogram(static_cast<Ramp>(7)).error().status, StatusCode::invalid_argument);
 
   cumulet_volume* raw = copy.release();
   EXPECT_FALSE(copy);
@@ -335,8 +335,8 @@ TEST(CppSequence, IsSharedByCopies) {
   std::array<std::uint8_t, 3> states{};
   const SequenceInfo info = viewer.get_sequence_info(states).value();
   EXPECT_EQ(info.frames, 3U);
-  EXPECT_EQ(info.asked_frame, 1U);
-  EXPECT_FALSE(info.is_drawn);
+  EXPECT_EQ(info.requested_frame, 1U);
+  EXPECT_FALSE(info.is_displayed);
   EXPECT_EQ(states[1], static_cast<std::uint8_t>(FrameState::failed));
   EXPECT_EQ(viewer.get_sequence_frame(1)->view(), "not-there.vdb: no such file");
   EXPECT_TRUE(sequence.set_frame(2.5 - 0.5));
@@ -387,7 +387,7 @@ TEST(CppCamera, IsSetAndMoved) {
   const CameraDesc desc = camera.get().value();
   EXPECT_EQ(desc.eye, (Vector{0, 0, 10}));
   EXPECT_EQ(desc.fovy_degrees, 30.0);
-  const CameraMatrices matrices = camera.get_matrices(1.0, Clip::zero_to_one).value();
+  const CameraMatrices matrices = camera.get_matrices(1.0, ClipSpace::zero_to_one).value();
   EXPECT_NEAR(matrices.view[14], -10.0, 1e-12);
 
   // Each method moves the camera as documented.
@@ -417,8 +417,8 @@ TEST(CppCamera, IsSetAndMoved) {
   camera.frame({.min = {9, 9, 9}, .max = {11, 11, 11}}, 1.0).value();
   EXPECT_NEAR(camera.get()->target[0], 10.0, 1e-9);
 
-  camera.set_matrices(matrices, Clip::zero_to_one).value();
-  const CameraMatrices again = camera.get_matrices(1.0, Clip::zero_to_one).value();
+  camera.set_matrices(matrices, ClipSpace::zero_to_one).value();
+  const CameraMatrices again = camera.get_matrices(1.0, ClipSpace::zero_to_one).value();
   for (int i = 0; i < 16; ++i) {
     EXPECT_NEAR(again.view[i], matrices.view[i], 1e-9) << i;
     EXPECT_NEAR(again.projection[i], matrices.projection[i], 1e-9) << i;
@@ -439,8 +439,8 @@ class CppViewer : public testing::Test {
     viewer.wait().value();
     FrameResult frame;
     do {
-      frame = viewer.render({.budget_ms = 1000, .target = Target::none, .width = width, .height = height}).value();
-    } while (frame.has(RenderFlags::more | RenderFlags::loading));
+      frame = viewer.render({.budget_ms = 1000, .target = FrameTarget::none, .width = width, .height = height}).value();
+    } while (frame.has(RenderFlags::incomplete | RenderFlags::loading));
     return frame;
   }
 
@@ -457,7 +457,7 @@ TEST_F(CppViewer, ShowsAVolume) {
   viewer.set_ramp(Ramp::flame, {}).value();
   EXPECT_EQ(viewer.set_ramp(Ramp::flame, std::to_array<std::array<float, 2>>({{0, 0}})).error().status,
             StatusCode::invalid_argument);
-  viewer.set_light({.sun_elevation_degrees = 45, .sun_irradiance = {2, 2, 2}, .sky_radiance = {1, 0.5F, 0.25F}})
+  viewer.set_sun_sky({.sun_elevation_degrees = 45, .sun_irradiance = {2, 2, 2}, .sky_radiance = {1, 0.5F, 0.25F}})
       .value();
   viewer.set_display({.exposure_stops = 1, .tone_map = ToneMap::clip}).value();
   viewer.load_volume(file.path(), "density").value();
@@ -529,7 +529,7 @@ TEST_F(CppViewer, ShowsAVolume) {
   EXPECT_TRUE(converge(viewer, 24, 16).has(RenderFlags::converged));
 
   const FrameResult textured =
-      viewer.render({.target = Target::texture, .width = 24, .height = 16, .write_depth = true}).value();
+      viewer.render({.target = FrameTarget::texture, .width = 24, .height = 16, .write_depth = true}).value();
   EXPECT_NE(textured.texture, 0U);
   EXPECT_NE(textured.depth_texture, 0U);
 }
@@ -540,7 +540,7 @@ TEST_F(CppViewer, ReportsWhyACallFailed) {
   EXPECT_FALSE(context_of_nothing.error().message.empty());
 
   Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
-  EXPECT_EQ(viewer.set_grid({.march = March{77}}).error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(viewer.set_grid({.type = GridType{77}}).error().status, StatusCode::invalid_argument);
   const auto refused = viewer.set_medium({.anisotropy = 1.0F});
   EXPECT_EQ(refused.error().message.view(), cumulet_last_error(viewer.handle()));
   EXPECT_NE(refused.error().message.view().find("anisotropy"), std::string_view::npos);
@@ -679,7 +679,7 @@ TEST_F(CppViewer, AttachesAndDetachesContexts) {
 }
 
 TEST_F(CppViewer, UsesASharedCamera) {
-  Viewer viewer = Viewer::create({.get_proc = get_proc(), .gl_state = GlState::host_resets}).value();
+  Viewer viewer = Viewer::create({.get_proc = get_proc(), .gl_state = GlStatePolicy::host_resets}).value();
   viewer.set_volume(ball_volume()).value();
   Camera camera = Camera::create({.eye = {8, 8, 50}, .target = {8, 8, 8}}).value();
   viewer.set_camera(camera).value();
@@ -788,7 +788,7 @@ TEST_F(CppViewer, SharesSurfaces) {
   EXPECT_FALSE(one.get_surfaces().value());
   for (Viewer* viewer : {&one, &two}) {
     viewer->set_sampling({.samples = 4}).value();
-    viewer->set_surface_settings({.time = 1.0, .light = SurfaceLight::shadows}).value();
+    viewer->set_surface_settings({.time = 1.0, .lighting = SurfaceLighting::direct}).value();
     viewer->set_surfaces(surfaces).value();
     EXPECT_EQ(viewer->get_surfaces()->handle(), surfaces.handle());
     EXPECT_TRUE(converge(*viewer, 8, 8).has(RenderFlags::converged));
@@ -855,7 +855,7 @@ TEST_F(CppViewer, ShowsModels) {
   };
   const Pick pick = picked();
   EXPECT_TRUE(pick.hit);
-  EXPECT_TRUE(pick.met_surface);
+  EXPECT_TRUE(pick.hit_surface);
   EXPECT_EQ(pick.tag, 7U);
   EXPECT_NEAR(pick.distance, 5.0, 1e-2);
   EXPECT_EQ(viewer.get_bounds()->max, (Vector{1, 1, 0}));
@@ -870,35 +870,35 @@ TEST_F(CppViewer, ShowsModels) {
   EXPECT_TRUE(viewer.get_bounds());
 }
 
-TEST(CppLive, IsSharedByCopies) {
-  Live live = Live::create({.bounds_min = {0, 0, 0}, .bounds_max = {4, 4, 4}}).value();
-  const Live copy = live;
-  Live moved = std::move(live);
+TEST(CppDynamicVolume, IsSharedByCopies) {
+  DynamicVolume live = DynamicVolume::create({.bounds_min = {0, 0, 0}, .bounds_max = {4, 4, 4}}).value();
+  const DynamicVolume copy = live;
+  DynamicVolume moved = std::move(live);
   EXPECT_FALSE(live);  // NOLINT(bugprone-use-after-move): that is what is tested
-  live = Live::adopt(moved.release());
+  live = DynamicVolume::adopt(moved.release());
   EXPECT_EQ(live.handle(), copy.handle());
-  EXPECT_EQ(Live().get_volume().error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(DynamicVolume().get_volume().error().status, StatusCode::invalid_argument);
   Viewer viewer = Viewer::create({}).value();
-  EXPECT_FALSE(viewer.get_live_info()) << "none is shown";
-  viewer.set_live(copy).value();
+  EXPECT_FALSE(viewer.get_dynamic_volume_info()) << "none is shown";
+  viewer.set_dynamic_volume(copy).value();
   const std::vector<float> values(4 * 4 * 4, 0.5F);
   const Field field(Channel::density, DenseDesc{.values = values, .size = {4, 4, 4}});
   live.set({.fields = {&field, 1}}).value();
   viewer.wait().value();
-  EXPECT_EQ(viewer.get_live_info()->handed_state, 1U);
-  viewer.set_live({}).value();
-  EXPECT_FALSE(viewer.get_live_info());
+  EXPECT_EQ(viewer.get_dynamic_volume_info()->submitted_update, 1U);
+  viewer.set_dynamic_volume({}).value();
+  EXPECT_FALSE(viewer.get_dynamic_volume_info());
 }
 
-TEST(CppLive, StatesAreSubmitted) {
+TEST(CppDynamicVolume, StatesAreSubmitted) {
   const std::vector<float> values(8 * 8 * 8, 0.5F);
   const cumulet::DenseDesc dense{.values = values, .size = {8, 8, 8}};
   const std::array<cumulet::Field, 2> fields{cumulet::Field(cumulet::Channel::density, dense),
                                              cumulet::Field(cumulet::Channel::flame, dense)};
-  const auto volume = cumulet::volume_from_state({.fields = fields, .name = "fire"});
+  const auto volume = cumulet::volume_from_fields({.fields = fields, .name = "fire"});
   ASSERT_TRUE(volume);
   EXPECT_EQ(volume.value().info().value().active_voxels, 512U);
-  const auto live = cumulet::Live::create();
+  const auto live = cumulet::DynamicVolume::create();
   ASSERT_TRUE(live);
   EXPECT_FALSE(live.value().get_volume().value());
   ASSERT_TRUE(live.value().set({.fields = fields}));

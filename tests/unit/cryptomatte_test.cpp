@@ -123,9 +123,9 @@ class Cryptomatte : public CViewerTest {
     EXPECT_EQ(cumulet_add_instance(v_, made.get()), CUMULET_OK);
     return made;
   }
-  void march(cumulet_march march) {
+  void march(cumulet_grid_type march) {
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.march = march;
+    grid.type = march;
     grid.cells = CUMULET_CELLS_CONSTANT;
     grid.criterion = CUMULET_CRITERION_DEVIATION;
     grid.threshold = 1e-6F;
@@ -213,7 +213,7 @@ TEST_P(Cryptomatte, CoverageOfOverlappingVolumes) {
   const double last = std::exp(-4.0 * one);
   const double of_other = 1.0 - first + first * (1.0 - both) * other / (one + other);
   const double of_one = first * (1.0 - both) * one / (one + other) + first * both * (1.0 - last);
-  for (const cumulet_march kind : {CUMULET_MARCH_TET, CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK}) {
+  for (const cumulet_grid_type kind : {CUMULET_GRID_TETRAHEDRAL, CUMULET_GRID_DENSE, CUMULET_GRID_BRICKS}) {
     SCOPED_TRACE(kind);
     march(kind);
     make();
@@ -235,7 +235,7 @@ TEST_P(Cryptomatte, AddsUpToAlpha) {
   const SurfacesRef panes = make_panes(4.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, panes.get()), CUMULET_OK);
   auto ground = make_desc<cumulet_ground_desc>();
-  ground.place = CUMULET_GROUND_AT_HEIGHT;
+  ground.mode = CUMULET_GROUND_AT_HEIGHT;
   ground.height = -6.0;
   ASSERT_EQ(cumulet_set_ground(v_, &ground), CUMULET_OK);
   auto stand = make_desc<cumulet_camera_desc>();
@@ -277,7 +277,7 @@ TEST_P(Cryptomatte, ObjectsWithOneNameShareAMatte) {
             {{CUMULET_OBJECT_VOLUME, 2}, "smoke"},
             {{CUMULET_OBJECT_VOLUME, 3}, "hole"},
             {{CUMULET_OBJECT_SURFACES, 4}, "wall"}};
-  march(CUMULET_MARCH_DENSE);
+  march(CUMULET_GRID_DENSE);
   make();
   EXPECT_NEAR(coverage("smoke")[middle], 1.0 - std::exp(-16.0 * extinction), 2e-5);
   EXPECT_EQ(read(6)[6 * middle + 1].first, 0U) << "one matte";
@@ -328,7 +328,7 @@ TEST_P(Cryptomatte, InstancesOfTheVolumeAreSeparate) {
     const auto place = at(x, 0.0, 0.0);
     places.insert(places.end(), place.begin(), place.end());
   }
-  ASSERT_EQ(cumulet_set_volume_places(v_, places.data(), 2), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, places.data(), 2), CUMULET_OK);
   names_[{CUMULET_OBJECT_VOLUME, 0}] = "block";
   make();
   const std::vector<float> covered = coverage("block");

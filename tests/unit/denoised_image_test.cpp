@@ -40,11 +40,11 @@ double distance(const std::vector<float>& a, const std::vector<float>& b) {
 class DenoisedImage : public testing::Test {
  protected:
   DenoisedImage() {
-    auto light = make_desc<cumulet_light_desc>();
+    auto light = make_desc<cumulet_sun_sky_desc>();
     light.sun_elevation_degrees = 40.0F;
     std::ranges::fill(light.sun_irradiance, 3.0F);
     std::ranges::fill(light.sky_radiance, 0.3F);
-    EXPECT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
     sample(4);
     write_network(cumulet::test::random_archive(cumulet::test::small_widths, 9));
   }
@@ -55,7 +55,7 @@ class DenoisedImage : public testing::Test {
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
 
-  void sample(std::uint32_t samples, cumulet_view view = CUMULET_VIEW_SHADED,
+  void sample(std::uint32_t samples, cumulet_view_mode view = CUMULET_VIEW_SHADED,
               cumulet_preview preview = CUMULET_PREVIEW_OFF) const {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = samples;
@@ -191,7 +191,7 @@ TEST_F(DenoisedImage, FramesWithoutATargetFilterToo) {
   const auto is_news = [&] {
     auto result = make_desc<cumulet_frame_result>();
     EXPECT_EQ(cumulet_render(viewer_.get(), &undrawn, &result), CUMULET_OK) << error();
-    return (result.flags & CUMULET_RENDER_UNDRAWN) != 0;
+    return (result.flags & CUMULET_RENDER_NEW_IMAGE) != 0;
   };
   cumulet::test::converge(viewer_.get(), undrawn);
   EXPECT_TRUE(is_news());
@@ -230,7 +230,7 @@ TEST_F(DenoisedImage, SwitchingOffWithoutATargetLeavesNoPendingWork) {
   auto result = make_desc<cumulet_frame_result>();
   ASSERT_EQ(cumulet_render(viewer_.get(), &frame, &result), CUMULET_OK) << error();
   EXPECT_NE(result.flags & CUMULET_RENDER_CONVERGED, 0U);
-  EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_INCOMPLETE, 0U);
   EXPECT_LT(bytes(), without + 112U * side * side);
 }
 
@@ -249,7 +249,7 @@ TEST_F(DenoisedImage, DebugViewsAreNotDenoised) {
 // Filtering does not reduce the alpha of the ground plane.
 TEST_F(DenoisedImage, GroundKeepsItsAlpha) {
   auto ground = make_desc<cumulet_ground_desc>();
-  ground.place = CUMULET_GROUND_AT_HEIGHT;
+  ground.mode = CUMULET_GROUND_AT_HEIGHT;
   ground.height = -14.0;
   std::ranges::fill(ground.albedo, 0.3F);
   ASSERT_EQ(cumulet_set_ground(viewer_.get(), &ground), CUMULET_OK);
@@ -278,11 +278,11 @@ class NoiseFreeLight : public DenoisedImage {
   }
 
   void shine(float sky) const {
-    auto light = make_desc<cumulet_light_desc>();
+    auto light = make_desc<cumulet_sun_sky_desc>();
     light.sun_elevation_degrees = 90.0F;
     std::ranges::fill(light.sun_irradiance, 3.0F);
     std::ranges::fill(light.sky_radiance, sky);
-    ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
   }
 
   // Renders one sample per pixel. floor, lath: settings of the two.
@@ -503,12 +503,12 @@ class TemporalDenoising : public DenoisedImage {
     filter(true);
   }
   void turn_sun(float azimuth) const {
-    auto light = make_desc<cumulet_light_desc>();
+    auto light = make_desc<cumulet_sun_sky_desc>();
     light.sun_elevation_degrees = 40.0F;
     light.sun_azimuth_degrees = azimuth;
     std::ranges::fill(light.sun_irradiance, 3.0F);
     std::ranges::fill(light.sky_radiance, 0.3F);
-    ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
   }
 
   HostTarget hdr_{gl_, side, side, GL_RGBA32F};

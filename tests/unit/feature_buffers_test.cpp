@@ -59,14 +59,14 @@ TEST_P(FeatureBuffers, RaysThroughThousandsOfVoxelsAreComplete) {
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = depth / length;
   ASSERT_EQ(cumulet_set_medium(v_, &medium), CUMULET_OK);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sun_elevation_degrees = -1.0F;
   light.sun_azimuth_degrees = 0.0F;
-  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
-  for (const cumulet_march march : {CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK, CUMULET_MARCH_TET}) {
+  ASSERT_EQ(cumulet_set_sun_sky(v_, &light), CUMULET_OK);
+  for (const cumulet_grid_type march : {CUMULET_GRID_DENSE, CUMULET_GRID_BRICKS, CUMULET_GRID_TETRAHEDRAL}) {
     SCOPED_TRACE(march);
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.march = march;
+    grid.type = march;
     grid.threshold = 1e-6F;
     ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
     make();

@@ -27,11 +27,11 @@ class Holdout : public CViewerTest {
     ASSERT_EQ(cumulet_set_volume(v_, ball_.get()), CUMULET_OK);
   }
 
-  void samples(std::uint32_t number, std::uint32_t light_groups = 0, bool volume_alone = true) {
+  void samples(std::uint32_t number, std::uint32_t light_groups = 0, bool separate_volume_aov = true) {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = number;
     sampling.preview = CUMULET_PREVIEW_OFF;
-    sampling.volume_alone = volume_alone ? 1 : 0;
+    sampling.separate_volume_aov = separate_volume_aov ? 1 : 0;
     sampling.light_groups = light_groups;
     ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
   }
@@ -109,9 +109,9 @@ TEST_P(Holdout, WallHidesSkyAndLights) {
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
   hold_out_surfaces(true);
   set_medium(0.005, false);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   for (float& value : light.sky_radiance) value = 1000.0F;
-  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sun_sky(v_, &light), CUMULET_OK);
   samples(64, 0, false);
   const auto mean = [&] {
     make();
@@ -121,22 +121,22 @@ TEST_P(Holdout, WallHidesSkyAndLights) {
     return sum;
   };
   const double without = mean();
-  auto analytic_light = make_desc<cumulet_lamp_desc>();
-  analytic_light.kind = CUMULET_LAMP_POINT;
+  auto analytic_light = make_desc<cumulet_light_desc>();
+  analytic_light.kind = CUMULET_LIGHT_POINT;
   analytic_light.position[2] = 4.0;
   analytic_light.power = 1e-3F;
-  ASSERT_EQ(cumulet_set_lamps(v_, &analytic_light, 1), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_lights(v_, &analytic_light, 1), CUMULET_OK);
   EXPECT_GT(without, 1.0) << "the medium before it is lit by the sky";
   EXPECT_NEAR(mean() / without, 1.0, 0.2);
 }
 
 // The noise-free light that a denoiser subtracts and adds again has no emission of a holdout volume.
 TEST_P(Holdout, AnEmissiveVolumeIsDenoisedToBlack) {
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   for (float& value : light.sun_irradiance) value = 1e-20F;
   for (float& value : light.sky_radiance) value = 0.0F;
   light.sky = CUMULET_SKY_CONSTANT;
-  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sun_sky(v_, &light), CUMULET_OK);
   set_medium(0.2, true, 5.0F);
   samples(8, 0, false);
   make();
@@ -184,9 +184,9 @@ TEST_P(Holdout, CastsShadows) {
 // Only the background remains, attenuated by the medium.
 TEST_P(Holdout, VolumeAttenuatesTheBackground) {
   std::vector<float> clear(count);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   for (float& value : light.sky_radiance) value = 1.0F;
-  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sun_sky(v_, &light), CUMULET_OK);
   for (const float emission : {0.0F, 2.0F}) {
     set_medium(0.15, true, emission);
     samples(512);

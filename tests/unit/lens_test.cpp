@@ -56,9 +56,9 @@ class Lens : public testing::Test {
  protected:
   Lens() {
     viewer_ = make_viewer({.get_proc = FakeGl::get_proc, .user = &fake_});
-    auto light = make_desc<cumulet_light_desc>();
+    auto light = make_desc<cumulet_sun_sky_desc>();
     light.sky = CUMULET_SKY_CONSTANT;
-    EXPECT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = 256;
     sampling.preview = CUMULET_PREVIEW_OFF;
@@ -152,10 +152,10 @@ TEST_F(Lens, BlursVolumesForEveryGridType) {
   medium.density_scale = 1000.0;  // opaque
   ASSERT_EQ(cumulet_set_medium(viewer_.get(), &medium), CUMULET_OK);
   ASSERT_EQ(cumulet_set_volume(viewer_.get(), speck.get()), CUMULET_OK);
-  for (const cumulet_march march : {CUMULET_MARCH_TET, CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK}) {
+  for (const cumulet_grid_type march : {CUMULET_GRID_TETRAHEDRAL, CUMULET_GRID_DENSE, CUMULET_GRID_BRICKS}) {
     SCOPED_TRACE(march);
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.march = march;
+    grid.type = march;
     ASSERT_EQ(cumulet_set_grid(viewer_.get(), &grid), CUMULET_OK);
     desc_.lens_radius = 0.0;
     const Spot sharp = spot(picture(), 3, 10.0);
@@ -195,7 +195,7 @@ TEST_F(Lens, SurvivesHostMatrices) {
   const Spot own = spot(picture(), 0, 10.0);
   std::array<double, 16> view{};
   std::array<double, 16> projection{};
-  constexpr cumulet_clip clip = CUMULET_CLIP_NEGATIVE_ONE_TO_ONE;
+  constexpr cumulet_clip_space clip = CUMULET_CLIP_NEGATIVE_ONE_TO_ONE;
   ASSERT_EQ(cumulet_camera_get_matrices(camera_.get(), 1.0, clip, view.data(), projection.data()), CUMULET_OK);
   ASSERT_EQ(cumulet_camera_set_matrices(camera_.get(), view.data(), projection.data(), clip), CUMULET_OK);
   auto told = make_desc<cumulet_camera_desc>();

@@ -43,7 +43,7 @@ class LightGroups : public CViewerTest {
   // Enables all lights, or only those of one group.
   void light(std::optional<std::uint32_t> alone = std::nullopt) {
     const auto on = [&](std::uint32_t group) { return !alone || *alone == group; };
-    auto far = make_desc<cumulet_light_desc>();
+    auto far = make_desc<cumulet_sun_sky_desc>();
     far.sun_azimuth_degrees = 200.0F;
     far.sun_elevation_degrees = 20.0F;
     far.sun_angle_degrees = sun_angle_;
@@ -51,9 +51,9 @@ class LightGroups : public CViewerTest {
     for (float& value : far.sky_radiance) value = on(sky) ? 0.4F : 0.0F;
     far.sun_group = sun;
     far.sky_group = sky;
-    ASSERT_EQ(cumulet_set_light(v_, &far), CUMULET_OK);
-    auto near = make_desc<cumulet_lamp_desc>();
-    near.kind = CUMULET_LAMP_DISC;
+    ASSERT_EQ(cumulet_set_sun_sky(v_, &far), CUMULET_OK);
+    auto near = make_desc<cumulet_light_desc>();
+    near.kind = CUMULET_LIGHT_DISK;
     near.position[0] = 9.0;
     near.direction[0] = -1.0;
     near.direction[1] = 0.0;
@@ -61,7 +61,7 @@ class LightGroups : public CViewerTest {
     near.power = 3000.0F;
     near.color[1] = 1.0F;
     near.group = analytic_light;
-    ASSERT_EQ(cumulet_set_lamps(v_, &near, on(analytic_light) ? 1 : 0), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_lights(v_, &near, on(analytic_light) ? 1 : 0), CUMULET_OK);
     medium_.emission[0] = on(emissive) ? 0.6F : 0.0F;
     medium_.emission[2] = on(emissive) ? 0.2F : 0.0F;
     medium_.group = emissive;
@@ -195,12 +195,12 @@ TEST_P(LightGroups, DoNotChangeTheImage) {
   for (const bool surfaces : {false, true}) {
     ASSERT_EQ(cumulet_set_surfaces(v_, surfaces ? panes.get() : nullptr), CUMULET_OK);
     for (const bool analytic_lights : {false, true}) {
-      auto far = make_desc<cumulet_light_desc>();
+      auto far = make_desc<cumulet_sun_sky_desc>();
       for (float& value : far.sun_irradiance) value = 2.0F;
       for (float& value : far.sky_radiance) value = 0.4F;
-      ASSERT_EQ(cumulet_set_light(v_, &far), CUMULET_OK);
+      ASSERT_EQ(cumulet_set_sun_sky(v_, &far), CUMULET_OK);
       if (!analytic_lights) {
-        ASSERT_EQ(cumulet_set_lamps(v_, nullptr, 0), CUMULET_OK);
+        ASSERT_EQ(cumulet_set_lights(v_, nullptr, 0), CUMULET_OK);
       }
       set(8, 3, 0);
       make();
@@ -259,8 +259,8 @@ TEST_P(LightGroups, EmissionOfInstancesFollowsTheirMediumsGroup) {
   const InstanceRef instance = cumulet::test::make_instance(desc);
   cumulet_instance* const made = instance.get();
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
-  auto far = make_desc<cumulet_light_desc>();
-  ASSERT_EQ(cumulet_set_light(v_, &far), CUMULET_OK);
+  auto far = make_desc<cumulet_sun_sky_desc>();
+  ASSERT_EQ(cumulet_set_sun_sky(v_, &far), CUMULET_OK);
   set(16, 0, groups);
   make();
   const std::vector<Rgb> all = all_groups();

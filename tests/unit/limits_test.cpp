@@ -218,7 +218,7 @@ TEST_F(Limits, MemoryLimitHoldsForVoxelGrids) {
   const VolumeRef ball = make_ball(40);
   const ViewerPtr viewer = make();
   auto grid = make_desc<cumulet_grid_desc>();
-  grid.march = CUMULET_MARCH_BRICK;
+  grid.type = CUMULET_GRID_BRICKS;
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
   picture_of(viewer.get(), ball.get(), target_);
   const std::uint64_t all = stats_of(viewer).memory_bytes;
@@ -231,10 +231,10 @@ TEST_F(Limits, MemoryLimitHoldsForVoxelGrids) {
 }
 
 // Refines to the voxels: so many cells that a page of the heap is small in comparison.
-void split_to_the_voxel(const ViewerPtr& viewer, cumulet_build build) {
+void split_to_the_voxel(const ViewerPtr& viewer, cumulet_build_device build) {
   auto grid = make_desc<cumulet_grid_desc>();
   grid.threshold = -1.0;
-  grid.build = build;
+  grid.build_device = build;
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
 }
 
@@ -243,7 +243,7 @@ TEST_F(Limits, GpuMemoryLimitCoarsensCells) {
   const auto keep = [](void* user, cumulet_log_level /*level*/, const char* line) {
     static_cast<std::vector<std::string>*>(user)->emplace_back(line);
   };
-  for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
+  for (const cumulet_build_device build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
     SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
     const ViewerPtr viewer =
         make_viewer({.get_proc = Context::get_proc, .user = &context_, .log = keep, .log_user = &lines, .samples = 1});
@@ -283,7 +283,7 @@ TEST_F(Limits, GpuMemoryLimitCoarsensCells) {
 // A smaller limit rebuilds existing grids automatically and without an error. A larger one refines them again.
 TEST_F(Limits, CellCountFollowsTheGpuMemoryLimit) {
   const VolumeRef ball = make_ball(56);
-  for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
+  for (const cumulet_build_device build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
     SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
     const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
     split_to_the_voxel(viewer, build);
@@ -303,7 +303,7 @@ TEST_F(Limits, InstancesShareTheGpuMemoryLimit) {
     for (const int size : {24, 56, 48, 40}) made.push_back(make_ball(size));
     return made;
   }();
-  for (const cumulet_build build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
+  for (const cumulet_build_device build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
     SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
     const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
     split_to_the_voxel(viewer, build);
@@ -375,7 +375,7 @@ TEST_F(Limits, CpuBuildsWhenALatticeLeavesNoMemoryForCells) {
   const auto keep = [](void* user, cumulet_log_level /*level*/, const char* line) {
     static_cast<std::vector<std::string>*>(user)->emplace_back(line);
   };
-  const auto cells_under = [&](cumulet_build build, std::uint64_t room) {
+  const auto cells_under = [&](cumulet_build_device build, std::uint64_t room) {
     const ViewerPtr viewer =
         make_viewer({.get_proc = Context::get_proc, .user = &context_, .log = keep, .log_user = &lines, .samples = 1});
     split_to_the_voxel(viewer, build);
@@ -422,7 +422,7 @@ TEST_F(Limits, GpuMemoryLimitHolds) {
   const VolumeRef large = make_ball(96);
   const ViewerPtr viewer = make();
   auto grid = make_desc<cumulet_grid_desc>();
-  grid.march = CUMULET_MARCH_DENSE;  // memory in proportion to the voxels
+  grid.type = CUMULET_GRID_DENSE;  // memory in proportion to the voxels
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
   const auto before = picture_of(viewer.get(), small.get(), target_);
   const std::uint64_t room = stats_of(viewer).gl_bytes + 100'000;

@@ -1,4 +1,4 @@
-// Live volumes from a host's textures and buffers: bit-identical to the same values from main memory.
+// Dynamic volumes from a host's textures and buffers: bit-identical to the same values from main memory.
 
 #include <gtest/gtest.h>
 
@@ -164,8 +164,8 @@ cumulet_gl_field in_buffer(cumulet_channel channel, const Sides& size, GLuint na
   return field;
 }
 
-cumulet_gl_state_desc state_of(const std::vector<cumulet_gl_field>& fields) {
-  auto desc = make_desc<cumulet_gl_state_desc>();
+cumulet_gl_volume_desc state_of(const std::vector<cumulet_gl_field>& fields) {
+  auto desc = make_desc<cumulet_gl_volume_desc>();
   desc.fields = fields.data();
   desc.field_count = fields.size();
   desc.name = "smoke";
@@ -191,30 +191,30 @@ State dense(const Sides& size, const std::vector<float>& values) {
   return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, values));
 }
 
-/// A host whose viewer uses a FakeGl and shows a live volume without a state.
+/// A host whose viewer uses a FakeGl and shows a dynamic volume without a state.
 class LiveStatesFromGl : public testing::Test {
  protected:
-  ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
+  ViewerPtr make(cumulet_build_device build = CUMULET_BUILD_CPU) {
     return test::make_viewer({.get_proc = test::FakeGl::get_proc, .user = &fake_, .samples = 2, .build = build});
   }
   void hand_over(const std::vector<cumulet_gl_field>& fields) {
-    const cumulet_gl_state_desc desc = state_of(fields);
-    ASSERT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+    const cumulet_gl_volume_desc desc = state_of(fields);
+    ASSERT_EQ(cumulet_dynamic_volume_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
   }
   void hand_over(const std::vector<cumulet_gl_field>& fields, const std::vector<cumulet_voxel_box>& changed) {
-    cumulet_gl_state_desc desc = state_of(fields);
+    cumulet_gl_volume_desc desc = state_of(fields);
     desc.changed = changed.data();
     desc.changed_count = changed.size();
-    ASSERT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+    ASSERT_EQ(cumulet_dynamic_volume_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
   }
-  std::string refusal(const cumulet_gl_state_desc& desc, cumulet_status status) {
-    EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), status);
+  std::string refusal(const cumulet_gl_volume_desc& desc, cumulet_status status) {
+    EXPECT_EQ(cumulet_dynamic_volume_set_gl(v_, live_.get(), &desc), status);
     return cumulet_last_error(v_);
   }
   std::uint64_t handed() {
-    auto info = make_desc<cumulet_live_info>();
-    EXPECT_EQ(cumulet_get_live_info(v_, &info), CUMULET_OK) << cumulet_last_error(v_);
-    return info.handed_state;
+    auto info = make_desc<cumulet_dynamic_volume_info>();
+    EXPECT_EQ(cumulet_get_dynamic_volume_info(v_, &info), CUMULET_OK) << cumulet_last_error(v_);
+    return info.submitted_update;
   }
   // Renders until `count` states have arrived, and some more frames. Returns the number of arrived states.
   std::uint64_t arrive(std::uint64_t count = 1) {
@@ -250,7 +250,7 @@ class LiveStatesFromGl : public testing::Test {
   ViewerPtr viewer_ = make();
   cumulet_viewer* v_ = viewer_.get();
 
-  void SetUp() override { ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK); }
+  void SetUp() override { ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK); }
 };
 
 TEST_F(LiveStatesFromGl, EveryFormatMatchesUploadFromMemory) {
@@ -284,18 +284,18 @@ TEST_F(LiveStatesFromGl, EveryFormatMatchesUploadFromMemory) {
 // Values that are far from 1 are scaled in main memory, even if the volume is resident in GL.
 TEST_F(LiveStatesFromGl, ValuesFarFromOneArrive) {
   for (const bool resident : {false, true}) {
-    auto settings = make_desc<cumulet_live_desc>();
-    settings.stays_in_gl = resident ? 1 : 0;
+    auto settings = make_desc<cumulet_dynamic_volume_desc>();
+    settings.gpu_resident = resident ? 1 : 0;
     const LiveRef live = make_live(settings);
-    ASSERT_EQ(cumulet_set_live(v_, live.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_dynamic_volume(v_, live.get()), CUMULET_OK);
     for (const float scale : {1e-30F, 1e25F, 1.0F}) {
       SCOPED_TRACE(std::to_string(scale) + (resident ? " resident" : ""));
       auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
       for (float& value : values) value *= scale;
       const Array array(CUMULET_VOXEL_FORMAT_R32F, values);
       const auto fields = std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], array))};
-      const cumulet_gl_state_desc desc = state_of(fields);
-      ASSERT_EQ(cumulet_live_set_gl(v_, live.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+      const cumulet_gl_volume_desc desc = state_of(fields);
+      ASSERT_EQ(cumulet_dynamic_volume_set_gl(v_, live.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
       EXPECT_EQ(arrive(), 1U);
       expect_same(newest(live), alone(dense(odd, array.values)));
     }
@@ -399,8 +399,8 @@ TEST_F(LiveStatesFromGl, PartialUpdatesEqualAFullState) {
       const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
       if (from_memory) {
         const State whole = dense(odd, before.values);
-        const cumulet_state_desc desc = whole.desc();
-        ASSERT_EQ(cumulet_live_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
+        const cumulet_volume_fields_desc desc = whole.desc();
+        ASSERT_EQ(cumulet_dynamic_volume_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
       } else {
         hand_over(fields);  // boxes follow while the state is in transfer
         ++on_their_way;
@@ -446,8 +446,8 @@ TEST_F(LiveStatesFromGl, BricksMayComeFromMemory) {
   State changes;
   changes.sparse(CUMULET_CHANNEL_DENSITY, odd, now, State::bricks(odd, now, before.values));
   changes.last_sparse().brick_active = nullptr;
-  const cumulet_state_desc desc = changes.desc();
-  ASSERT_EQ(cumulet_live_update(live_.get(), &desc, nullptr, 0), CUMULET_OK);
+  const cumulet_volume_fields_desc desc = changes.desc();
+  ASSERT_EQ(cumulet_dynamic_volume_update(live_.get(), &desc, nullptr, 0), CUMULET_OK);
   expect_same(newest(live_), alone(dense(odd, now)));
 }
 
@@ -475,10 +475,10 @@ TEST_F(LiveStatesFromGl, NewestStateIsShownAndNoneStarves) {
                         simulated(CUMULET_CHANNEL_DENSITY, step % 2 == 0 ? odd : small, step));
     names.push_back(objects_.texture(step % 2 == 0 ? odd : small, types[0], arrays.back()));
   }
-  const LiveRef other = make_live();  // this live volume's state must not be lost
+  const LiveRef other = make_live();  // this dynamic volume's state must not be lost
   const auto fields = std::vector{in_texture(CUMULET_CHANNEL_DENSITY, odd, names[2])};
-  const cumulet_gl_state_desc desc = state_of(fields);
-  ASSERT_EQ(cumulet_live_set_gl(v_, other.get(), &desc), CUMULET_OK);
+  const cumulet_gl_volume_desc desc = state_of(fields);
+  ASSERT_EQ(cumulet_dynamic_volume_set_gl(v_, other.get(), &desc), CUMULET_OK);
   std::vector<std::uint64_t> bytes;
   for (int round = 0; round < 6; ++round) {
     for (std::size_t step = 0; step < 6; ++step)
@@ -495,14 +495,14 @@ TEST_F(LiveStatesFromGl, NewestStateIsShownAndNoneStarves) {
   EXPECT_LT(bytes[5], bytes[3] + 100'000) << "memory grows with states";
   // While states are submitted between all frames, images are still drawn.
   cumulet_frame_desc frame = target_.frame();
-  auto info = make_desc<cumulet_live_info>();
+  auto info = make_desc<cumulet_dynamic_volume_info>();
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  for (int i = 0; info.drawn_count < 3 && std::chrono::steady_clock::now() < until; ++i) {
+  for (int i = 0; info.displayed_count < 3 && std::chrono::steady_clock::now() < until; ++i) {
     hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, names[2 * (std::size_t(i) % 3)])});
     ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
-    ASSERT_EQ(cumulet_get_live_info(v_, &info), CUMULET_OK);
+    ASSERT_EQ(cumulet_get_dynamic_volume_info(v_, &info), CUMULET_OK);
   }
-  EXPECT_GE(info.drawn_count, 3U);
+  EXPECT_GE(info.displayed_count, 3U);
 }
 
 TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
@@ -580,7 +580,7 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   const std::vector<cumulet_gl_field> twice{texture, buffer};
   EXPECT_EQ(refusal(state_of(twice), CUMULET_ERROR_INVALID_ARGUMENT), "smoke: has density twice");
   const std::vector<cumulet_gl_field> fine{texture};
-  cumulet_gl_state_desc desc = state_of(fine);
+  cumulet_gl_volume_desc desc = state_of(fine);
   int word = 0;
   desc.wait = &word;
   EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: what is to be waited for is no sync object");
@@ -591,15 +591,15 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
   desc.changed = nullptr;
   EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: changed boxes are NULL");
-  EXPECT_EQ(cumulet_live_set_gl(v_, nullptr, &desc), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_dynamic_volume_set_gl(v_, nullptr, &desc), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_dynamic_volume_set_gl(v_, live_.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(handed(), 0U);
 
   // Errors do not affect later valid states. A partial update may only have channels of the state.
   hand_over(fine);
   std::vector<cumulet_gl_field> flame{texture};
   flame[0].channel = CUMULET_CHANNEL_FLAME;
-  cumulet_gl_state_desc update = state_of(flame);
+  cumulet_gl_volume_desc update = state_of(flame);
   update.changed = &box;
   update.changed_count = 1;
   EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
@@ -609,13 +609,13 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   desc = state_of(fine);
   const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
   desc.wait = fence;
-  ASSERT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
+  ASSERT_EQ(cumulet_dynamic_volume_set_gl(v_, live_.get(), &desc), CUMULET_OK) << cumulet_last_error(v_);
   EXPECT_EQ(fake_.calls("WaitSync"), 1U);
   gl_.DeleteSync(fence);
   EXPECT_EQ(arrive(), 1U);
   // While detached.
   ASSERT_EQ(cumulet_detach(v_), CUMULET_OK);
-  EXPECT_EQ(cumulet_live_set_gl(v_, live_.get(), &desc), CUMULET_ERROR_DETACHED);
+  EXPECT_EQ(cumulet_dynamic_volume_set_gl(v_, live_.get(), &desc), CUMULET_ERROR_DETACHED);
 }
 
 TEST_F(LiveStatesFromGl, NonFiniteValuesKeepTheLastValidState) {
@@ -669,7 +669,7 @@ TEST_F(LiveStatesFromGl, SecondFailureInAFrameIsLogged) {
                                .log_user = &warnings,
                                .samples = 2});
   v_ = viewer_.get();
-  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
   auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 0);
   values[State::at({3, 20, 11}, odd)] = std::numeric_limits<float>::quiet_NaN();
   const Array bad(CUMULET_VOXEL_FORMAT_R32F, values);
@@ -707,7 +707,7 @@ TEST_F(LiveStatesFromGl, PartialUpdatesOfARejectedStateAreDiscarded) {
   expect_same(newest(live_), alone(dense(odd, good.values)));
   const std::vector fields{field(next)};
   const cumulet_voxel_box box{{0, 0, 0}, {7, 7, 7}};
-  cumulet_gl_state_desc update = state_of(fields);
+  cumulet_gl_volume_desc update = state_of(fields);
   update.changed = &box;
   update.changed_count = 1;
   EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no state to update");
@@ -748,7 +748,7 @@ TEST_F(LiveStatesFromGl, IsReleasedWithItsContext) {
   EXPECT_FALSE(alive.empty());
 }
 
-// The context is lost at various GL calls inside cumulet_live_set_gl.
+// The context is lost at various GL calls inside cumulet_dynamic_volume_set_gl.
 TEST_F(LiveStatesFromGl, ContextLossDuringACallIsReported) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const GLuint name = objects_.texture(odd, types[1], array);
@@ -756,12 +756,13 @@ TEST_F(LiveStatesFromGl, ContextLossDuringACallIsReported) {
     test::FakeGl fake(headless::Context::get_proc, &context_);
     const ViewerPtr viewer = test::make_viewer({.get_proc = test::FakeGl::get_proc, .user = &fake, .samples = 2});
     const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
-    const cumulet_gl_state_desc desc = state_of(fields);
-    ASSERT_EQ(cumulet_live_set_gl(viewer.get(), live_.get(), &desc), CUMULET_OK) << cumulet_last_error(viewer.get());
+    const cumulet_gl_volume_desc desc = state_of(fields);
+    ASSERT_EQ(cumulet_dynamic_volume_set_gl(viewer.get(), live_.get(), &desc), CUMULET_OK)
+        << cumulet_last_error(viewer.get());
     fake.lose_context(call);
-    cumulet_status status = cumulet_live_set_gl(viewer.get(), live_.get(), &desc);
+    cumulet_status status = cumulet_dynamic_volume_set_gl(viewer.get(), live_.get(), &desc);
     if (!fake.lost()) continue;
-    if (status == CUMULET_OK) status = cumulet_live_set_gl(viewer.get(), live_.get(), &desc);
+    if (status == CUMULET_OK) status = cumulet_dynamic_volume_set_gl(viewer.get(), live_.get(), &desc);
     EXPECT_TRUE(status == CUMULET_ERROR_CONTEXT_LOST || status == CUMULET_ERROR_DETACHED ||
                 status == CUMULET_ERROR_INVALID_ARGUMENT)
         << call << ": " << cumulet_last_error(viewer.get());
@@ -776,7 +777,7 @@ TEST_F(LiveStatesFromGl, OutOfMemoryKeepsTheLastState) {
   const Array large(CUMULET_VOXEL_FORMAT_R32F, std::vector<float>(96 * 96 * 96, 1.0F));
   const std::vector larger{
       in_texture(CUMULET_CHANNEL_DENSITY, {96, 96, 96}, objects_.texture({96, 96, 96}, types[0], large))};
-  const cumulet_gl_state_desc desc = state_of(larger);
+  const cumulet_gl_volume_desc desc = state_of(larger);
   fake_.fail_storage(true);
   EXPECT_EQ(refusal(desc, CUMULET_ERROR_OUT_OF_MEMORY).rfind("the GL driver is out of memory: creating ", 0), 0U)
       << cumulet_last_error(v_);
@@ -839,7 +840,7 @@ TEST_F(LiveStatesFromGl, ReadsBackOnlyOccupiedBricks) {
 TEST_F(LiveStatesFromGl, GpuBuiltGridsMatch) {
   viewer_ = make(CUMULET_BUILD_GPU);
   v_ = viewer_.get();
-  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], array))});
   EXPECT_EQ(arrive(), 1U);
@@ -847,16 +848,16 @@ TEST_F(LiveStatesFromGl, GpuBuiltGridsMatch) {
   EXPECT_EQ(difference(picture(), test::picture_of(single.get(), alone(dense(odd, array.values)).get(), target_)), "");
 }
 
-/// A GPU-resident live volume and a viewer that builds grids on the GPU.
+/// A GPU-resident dynamic volume and a viewer that builds grids on the GPU.
 class LiveStatesOnGpu : public LiveStatesFromGl {
  protected:
   void SetUp() override {
-    auto desc = make_desc<cumulet_live_desc>();
-    desc.stays_in_gl = 1;
+    auto desc = make_desc<cumulet_dynamic_volume_desc>();
+    desc.gpu_resident = 1;
     live_ = make_live(desc);
     viewer_ = make(CUMULET_BUILD_GPU);
     v_ = viewer_.get();
-    ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
   }
   // The image of the same values from main memory, made by another viewer.
   Picture reference(const std::vector<float>& values) {
@@ -869,7 +870,7 @@ class LiveStatesOnGpu : public LiveStatesFromGl {
   std::string get_volume(cumulet_status status) {
     std::array<char, 256> error{};
     cumulet_volume* volume = nullptr;
-    EXPECT_EQ(cumulet_live_get_volume(live_.get(), &volume, error.data(), error.size()), status);
+    EXPECT_EQ(cumulet_dynamic_volume_get_volume(live_.get(), &volume, error.data(), error.size()), status);
     EXPECT_EQ(volume, nullptr);
     return error.data();
   }
@@ -981,7 +982,7 @@ TEST_F(LiveStatesOnGpu, IsReadBackWhenNeededInMemory) {
       {"a build of the processor's",
        [&] {
          auto grid = make_desc<cumulet_grid_desc>();
-         grid.build = CUMULET_BUILD_CPU;
+         grid.build_device = CUMULET_BUILD_CPU;
          EXPECT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
        }},
   };
@@ -1020,7 +1021,7 @@ TEST_F(LiveStatesOnGpu, RejectedStateKeepsTheLastValidState) {
     EXPECT_EQ(handed(), 1U);
     // Boxes after a rejected state have no state to update.
     const std::vector fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[1], good))};
-    cumulet_gl_state_desc boxes = state_of(fields);
+    cumulet_gl_volume_desc boxes = state_of(fields);
     const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
     boxes.changed = &box;
     boxes.changed_count = 1;
@@ -1030,9 +1031,10 @@ TEST_F(LiveStatesOnGpu, RejectedStateKeepsTheLastValidState) {
   EXPECT_EQ(arrive(), 1U);
   State changes;
   changes.sparse(CUMULET_CHANNEL_DENSITY, odd, good.values, {{0, 0, 0}});
-  const cumulet_state_desc desc = changes.desc();
+  const cumulet_volume_fields_desc desc = changes.desc();
   std::array<char, 256> error{};
-  EXPECT_EQ(cumulet_live_update(live_.get(), &desc, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_dynamic_volume_update(live_.get(), &desc, error.data(), error.size()),
+            CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(error.data(), "smoke: density is in GL, and takes what changes from there alone");
   EXPECT_EQ(difference(picture(), before), "");
 }
@@ -1061,8 +1063,8 @@ TEST_F(LiveStatesOnGpu, MixesWithStatesFromMemory) {
   EXPECT_EQ(difference(picture(), expected), "");
   EXPECT_FALSE(shows_voxels());
   const State whole = dense(odd, array.values);
-  const cumulet_state_desc desc = whole.desc();
-  ASSERT_EQ(cumulet_live_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
+  const cumulet_volume_fields_desc desc = whole.desc();
+  ASSERT_EQ(cumulet_dynamic_volume_set(live_.get(), &desc, nullptr, 0), CUMULET_OK);
   EXPECT_EQ(difference(picture(), expected), "");
   EXPECT_TRUE(shows_voxels());
 }
@@ -1114,14 +1116,14 @@ class LiveFireOnGpu : public LiveStatesOnGpu {
   }
   // The image of the same GPU-resident fields, made by another viewer.
   Picture by_gl(const Fire& fire, float strength, float blackbody = 0.0F) {
-    auto desc = make_desc<cumulet_live_desc>();
-    desc.stays_in_gl = 1;
+    auto desc = make_desc<cumulet_dynamic_volume_desc>();
+    desc.gpu_resident = 1;
     const LiveRef live = make_live(desc);
     const ViewerPtr other = make(CUMULET_BUILD_GPU);
     burn(other.get(), strength, blackbody);
-    const cumulet_gl_state_desc state = state_of(fire.fields);
-    EXPECT_EQ(cumulet_set_live(other.get(), live.get()), CUMULET_OK);
-    EXPECT_EQ(cumulet_live_set_gl(other.get(), live.get(), &state), CUMULET_OK);
+    const cumulet_gl_volume_desc state = state_of(fire.fields);
+    EXPECT_EQ(cumulet_set_dynamic_volume(other.get(), live.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_dynamic_volume_set_gl(other.get(), live.get(), &state), CUMULET_OK);
     return settled(other.get());
   }
   // Renders until nothing changes any more.
@@ -1230,11 +1232,11 @@ TEST_P(LiveChannelsOnGpu, IsReadBackWhenNeededInMemory) {
   EXPECT_EQ(difference(found, by_memory(burning, 2.0F)), "");
 }
 
-// Viewers that share a live volume each compute the emission for their own medium.
+// Viewers that share a dynamic volume each compute the emission for their own medium.
 TEST_F(LiveFireOnGpu, EachViewerUsesItsOwnMedium) {
-  cumulet_programs* programs = nullptr;
-  const auto programs_desc = make_desc<cumulet_programs_desc>();
-  ASSERT_EQ(cumulet_programs_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
+  cumulet_shader_cache* programs = nullptr;
+  const auto programs_desc = make_desc<cumulet_shader_cache_desc>();
+  ASSERT_EQ(cumulet_shader_cache_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
   const test::ProgramsRef kept(programs);
   std::array<ViewerPtr, 2> viewers;
   for (std::size_t i = 0; i < viewers.size(); ++i) {
@@ -1244,12 +1246,12 @@ TEST_F(LiveFireOnGpu, EachViewerUsesItsOwnMedium) {
                                     .programs = programs,
                                     .build = CUMULET_BUILD_GPU});
     burn(viewers[i].get(), i == 0 ? 1.0F : 4.0F);
-    ASSERT_EQ(cumulet_set_live(viewers[i].get(), live_.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_dynamic_volume(viewers[i].get(), live_.get()), CUMULET_OK);
   }
   for (const int step : {1, 2}) {
     const Fire burning = fire(step);
-    const cumulet_gl_state_desc state = state_of(burning.fields);
-    ASSERT_EQ(cumulet_live_set_gl(viewers[0].get(), live_.get(), &state), CUMULET_OK);
+    const cumulet_gl_volume_desc state = state_of(burning.fields);
+    ASSERT_EQ(cumulet_dynamic_volume_set_gl(viewers[0].get(), live_.get(), &state), CUMULET_OK);
     settled(viewers[0].get());
     settled(viewers[1].get());
     EXPECT_EQ(difference(settled(viewers[0].get()), by_gl(burning, 1.0F)), "");
@@ -1292,19 +1294,19 @@ TEST_F(LiveFireOnGpu, AnyFailedAllocationKeepsTheState) {
   int successes = 0;  // since the last failure; other allocations of a frame are among them
   for (int allocation = 0; successes < 8 && !HasFailure(); ++allocation) {
     SCOPED_TRACE(allocation);
-    auto desc = make_desc<cumulet_live_desc>();
-    desc.stays_in_gl = 1;
+    auto desc = make_desc<cumulet_dynamic_volume_desc>();
+    desc.gpu_resident = 1;
     live_ = make_live(desc);
     viewer_ = make(CUMULET_BUILD_GPU);
     v_ = viewer_.get();
     burn(v_, 2.0F);
-    ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
     hand_over(first.fields);
     settled(v_);
     const std::uint64_t before = handed();
-    const cumulet_gl_state_desc state = state_of(second.fields);
+    const cumulet_gl_volume_desc state = state_of(second.fields);
     fake_.fail_allocation(allocation);
-    cumulet_status status = cumulet_live_set_gl(v_, live_.get(), &state);
+    cumulet_status status = cumulet_dynamic_volume_set_gl(v_, live_.get(), &state);
     for (int i = 0; i < 1000 && status == CUMULET_OK && handed() == before; ++i)
       status = cumulet_render(v_, &frame, nullptr);
     fake_.fail_allocation(-1);
@@ -1332,7 +1334,7 @@ TEST_F(LiveFireOnGpu, PartialUpdatesAfterARejectedStateAreRejected) {
   EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
   burn(v_, 4.0F);
   EXPECT_EQ(difference(settled(v_), by_gl(fire(0), 4.0F)), "");
-  cumulet_gl_state_desc boxes = state_of(bad.fields);
+  cumulet_gl_volume_desc boxes = state_of(bad.fields);
   const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
   boxes.changed = &box;
   boxes.changed_count = 1;
@@ -1357,7 +1359,7 @@ TEST_F(LiveFireOnGpu, CanBeCancelledFromCallbacks) {
                                .samples = 2,
                                .build = CUMULET_BUILD_GPU});
   v_ = viewer_.get();
-  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
   host.viewer = v_;
   cumulet_frame_desc frame = target_.frame();
   frame.target = CUMULET_TARGET_NONE;
@@ -1399,7 +1401,7 @@ TEST_F(LiveStatesOnGpu, IsShownInOtherContexts) {
   ViewerPtr viewer = test::make_viewer(
       {.get_proc = headless::Context::get_proc, .user = &other, .samples = 2, .build = CUMULET_BUILD_GPU});
   std::optional<test::HostTarget> target(std::in_place, gl, 32, 32);
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live_.get()), CUMULET_OK);
   const cumulet_frame_desc frame = target->frame();
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(cumulet_wait(viewer.get(), 10.0), CUMULET_OK);
@@ -1448,19 +1450,19 @@ TEST_F(LiveStatesOnGpu, PartialUpdatesThroughAnotherViewerAreRejected) {
     frame.target = CUMULET_TARGET_NONE;
     EXPECT_EQ(cumulet_render(viewer, &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer);
   };
-  const cumulet_gl_state_desc whole = state_of(fields);
-  ASSERT_EQ(cumulet_set_live(v_, nullptr), CUMULET_OK);
+  const cumulet_gl_volume_desc whole = state_of(fields);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, nullptr), CUMULET_OK);
   for (cumulet_viewer* viewer : {other.get(), v_}) {
-    ASSERT_EQ(cumulet_live_set_gl(viewer, live_.get(), &whole), CUMULET_OK);
+    ASSERT_EQ(cumulet_dynamic_volume_set_gl(viewer, live_.get(), &whole), CUMULET_OK);
     for (int i = 0; i < 10; ++i) render(viewer);
   }
-  ASSERT_EQ(cumulet_set_live(v_, live_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
   EXPECT_EQ(handed(), 2U);
   const cumulet_voxel_box box{{0, 0, 0}, {9, 9, 9}};
-  cumulet_gl_state_desc boxes = state_of(fields);
+  cumulet_gl_volume_desc boxes = state_of(fields);
   boxes.changed = &box;
   boxes.changed_count = 1;
-  EXPECT_EQ(cumulet_live_set_gl(other.get(), live_.get(), &boxes), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_dynamic_volume_set_gl(other.get(), live_.get(), &boxes), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(cumulet_last_error(other.get()), "smoke: the rest of it is in another viewer's context");
   render(other.get());
   EXPECT_EQ(difference(picture(), expected), "");
@@ -1475,9 +1477,9 @@ TEST_F(LiveStatesOnGpu, IsSharedByViewersWithSharedPrograms) {
   const Type& type = types[1];
   const Array before(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 0));
   const Array now(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
-  cumulet_programs* programs = nullptr;
-  const auto programs_desc = make_desc<cumulet_programs_desc>();
-  ASSERT_EQ(cumulet_programs_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
+  cumulet_shader_cache* programs = nullptr;
+  const auto programs_desc = make_desc<cumulet_shader_cache_desc>();
+  ASSERT_EQ(cumulet_shader_cache_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
   const test::ProgramsRef kept(programs);
   const auto sharing = [&] {
     ViewerPtr viewer = test::make_viewer({.get_proc = test::FakeGl::get_proc,
@@ -1485,7 +1487,7 @@ TEST_F(LiveStatesOnGpu, IsSharedByViewersWithSharedPrograms) {
                                           .samples = 2,
                                           .programs = programs,
                                           .build = CUMULET_BUILD_GPU});
-    EXPECT_EQ(cumulet_set_live(viewer.get(), live_.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_dynamic_volume(viewer.get(), live_.get()), CUMULET_OK);
     return viewer;
   };
   viewer_ = sharing();
@@ -1529,9 +1531,9 @@ TEST_F(LiveStatesOnGpu, PartialUpdatesApplyToAnotherViewersReadBack) {
   Array now(type.format, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
   std::fill_n(now.values.begin(), now.values.size() / 2, 0.0F);  // empties bricks, too
   now = Array(type.format, now.values);
-  cumulet_programs* programs = nullptr;
-  const auto programs_desc = make_desc<cumulet_programs_desc>();
-  ASSERT_EQ(cumulet_programs_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
+  cumulet_shader_cache* programs = nullptr;
+  const auto programs_desc = make_desc<cumulet_shader_cache_desc>();
+  ASSERT_EQ(cumulet_shader_cache_create(&programs_desc, &programs, nullptr, 0), CUMULET_OK);
   const test::ProgramsRef kept(programs);
   std::array<ViewerPtr, 2> viewers;
   for (ViewerPtr& viewer : viewers) {
@@ -1540,7 +1542,7 @@ TEST_F(LiveStatesOnGpu, PartialUpdatesApplyToAnotherViewersReadBack) {
                                 .samples = 2,
                                 .programs = programs,
                                 .build = CUMULET_BUILD_GPU});
-    ASSERT_EQ(cumulet_set_live(viewer.get(), live_.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live_.get()), CUMULET_OK);
   }
   const GLuint name = objects_.texture(odd, type, before);
   const std::vector<cumulet_gl_field> fields{in_texture(CUMULET_CHANNEL_DENSITY, odd, name)};
@@ -1689,12 +1691,12 @@ TEST_P(GpuTransfers, RestoreTheHostsGlState) {
     const std::vector fields{seed % 2 == 0
                                  ? in_texture(CUMULET_CHANNEL_DENSITY, odd, texture)
                                  : in_buffer(CUMULET_CHANNEL_DENSITY, odd, buffer, CUMULET_VOXEL_FORMAT_R16F)};
-    cumulet_gl_state_desc desc = state_of(fields);
+    cumulet_gl_volume_desc desc = state_of(fields);
     if (seed % 4 > 1) {
       desc.changed = &box;
       desc.changed_count = 1;
     }
-    kept(2 * seed, [&] { return cumulet_live_set_gl(viewer.get(), live.get(), &desc); });
+    kept(2 * seed, [&] { return cumulet_dynamic_volume_set_gl(viewer.get(), live.get(), &desc); });
     kept(2 * seed + 1, [&] { return cumulet_render(viewer.get(), &frame, nullptr); });
   }
   expect_same(newest(live), alone(dense(odd, array.values)));

@@ -1,4 +1,4 @@
-// Live volumes in the C API: each state gives the same image as alone, the newest state is always displayed, and
+// Dynamic volumes in the C API: each state gives the same image as alone, the newest state is always displayed, and
 // rejected states leave the last good one.
 
 #include <gtest/gtest.h>
@@ -43,16 +43,16 @@ using Picture = std::vector<std::uint8_t>;
 constexpr Sides small = {24, 24, 24};
 constexpr Sides odd = {23, 31, 17};
 
-using HandOver = cumulet_status (*)(cumulet_live*, const cumulet_state_desc*, char*, std::size_t);
+using HandOver = cumulet_status (*)(cumulet_dynamic_volume*, const cumulet_volume_fields_desc*, char*, std::size_t);
 
-void hand_over(const LiveRef& live, const State& state, HandOver how = cumulet_live_set) {
+void hand_over(const LiveRef& live, const State& state, HandOver how = cumulet_dynamic_volume_set) {
   std::array<char, 256> error{};
-  const cumulet_state_desc desc = state.desc();
+  const cumulet_volume_fields_desc desc = state.desc();
   ASSERT_EQ(how(live.get(), &desc, error.data(), error.size()), CUMULET_OK) << error.data();
 }
 
-std::string refusal(const LiveRef& live, const cumulet_state_desc& desc, cumulet_status status,
-                    HandOver how = cumulet_live_set) {
+std::string refusal(const LiveRef& live, const cumulet_volume_fields_desc& desc, cumulet_status status,
+                    HandOver how = cumulet_dynamic_volume_set) {
   std::array<char, 256> error{};
   EXPECT_EQ(how(live.get(), &desc, error.data(), error.size()), status);
   return error.data();
@@ -90,9 +90,9 @@ class CLiveVolume : public cumulet::test::CPlaybackTest {
     const ViewerPtr viewer = make();
     return picture_of(viewer.get(), alone(state).get(), target_);
   }
-  static cumulet_live_info info_of(const ViewerPtr& viewer) {
-    auto info = make_desc<cumulet_live_info>();
-    EXPECT_EQ(cumulet_get_live_info(viewer.get(), &info), CUMULET_OK) << cumulet_last_error(viewer.get());
+  static cumulet_dynamic_volume_info info_of(const ViewerPtr& viewer) {
+    auto info = make_desc<cumulet_dynamic_volume_info>();
+    EXPECT_EQ(cumulet_get_dynamic_volume_info(viewer.get(), &info), CUMULET_OK) << cumulet_last_error(viewer.get());
     return info;
   }
   // Renders until this state is displayed. Returns the displayed states in order.
@@ -100,9 +100,9 @@ class CLiveVolume : public cumulet::test::CPlaybackTest {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     const auto frame = target_.frame();
     std::vector<std::uint64_t> seen;
-    while (info_of(viewer).drawn_state != state) {
+    while (info_of(viewer).displayed_update != state) {
       EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
-      const std::uint64_t drawn = info_of(viewer).drawn_state;
+      const std::uint64_t drawn = info_of(viewer).displayed_update;
       if (seen.empty() || seen.back() != drawn) seen.push_back(drawn);
       if (std::chrono::steady_clock::now() > until) {
         ADD_FAILURE() << "state " << state << " is never seen";
@@ -114,23 +114,23 @@ class CLiveVolume : public cumulet::test::CPlaybackTest {
 };
 
 TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
-  auto desc = make_desc<cumulet_live_desc>();
+  auto desc = make_desc<cumulet_dynamic_volume_desc>();
   desc.bounds_max[0] = 1.0;
-  cumulet_live* out = nullptr;
+  cumulet_dynamic_volume* out = nullptr;
   std::array<char, 256> error{};
-  EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_live_desc.bounds_min is not below bounds_max");
+  EXPECT_EQ(cumulet_dynamic_volume_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_dynamic_volume_desc.bounds_min is not below bounds_max");
   EXPECT_EQ(out, nullptr);
   for (int i = 0; i < 3; ++i) {
     desc.bounds_min[i] = -1e308;
     desc.bounds_max[i] = 1e308;
   }
-  EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_live_desc's bounds are not within +-1e15");
-  desc = make_desc<cumulet_live_desc>();
-  desc.stays_in_gl = 2;
-  EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_live_desc.stays_in_gl is neither 0 nor 1");
+  EXPECT_EQ(cumulet_dynamic_volume_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_dynamic_volume_desc's bounds are not within +-1e15");
+  desc = make_desc<cumulet_dynamic_volume_desc>();
+  desc.gpu_resident = 2;
+  EXPECT_EQ(cumulet_dynamic_volume_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_dynamic_volume_desc.gpu_resident is neither 0 nor 1");
 
   const LiveRef live = make_live();
   const auto refused = [&](const State& state, const char* cause) {
@@ -158,7 +158,7 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   astray.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{4, 8, 8}});
   EXPECT_EQ(refusal(live, astray.desc(), CUMULET_ERROR_FILE),
             "smoke: density: its brick origin (4, 8, 8) is no multiple of 8");
-  EXPECT_EQ(cumulet_live_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_dynamic_volume_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
   // No state was submitted.
   EXPECT_EQ(newest(live), nullptr);
 
@@ -166,26 +166,26 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}});
   const auto no_update = [&](const State& state, const char* cause) {
-    EXPECT_EQ(refusal(live, state.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_live_update), cause);
+    EXPECT_EQ(refusal(live, state.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_dynamic_volume_update), cause);
   };
   no_update(bricks, "smoke: there is no state to update");
   hand_over(live, smoke(small, 0));
   no_update(smoke(small, 0), "smoke: density is dense: an update has bricks");
   no_update(std::move(State().sparse(CUMULET_CHANNEL_FLAME, small, values, {{8, 8, 8}})),
             "smoke: there is no flame to update");
-  hand_over(live, bricks, cumulet_live_update);
+  hand_over(live, bricks, cumulet_dynamic_volume_update);
 
   const ViewerPtr viewer = make();
-  auto info = make_desc<cumulet_live_info>();
-  EXPECT_EQ(cumulet_get_live_info(viewer.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer shows no live volume");
+  auto info = make_desc<cumulet_dynamic_volume_info>();
+  EXPECT_EQ(cumulet_get_dynamic_volume_info(viewer.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer shows no dynamic volume");
 }
 
 // GPU-built grids of states with and without channels and of changing sizes. Each image equals that of the state alone.
 TEST_F(CLiveVolume, StatesMatchWithGpuBuiltGrids) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make(CUMULET_BUILD_GPU);
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   Picture before;
   for (int step = 0; step < 4; ++step) {
     const Sides& size = step == 2 ? odd : small;
@@ -202,7 +202,7 @@ TEST_F(CLiveVolume, StatesMatchWithGpuBuiltGrids) {
 TEST_F(CLiveVolume, StateDoesNotDependOnEarlierStates) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   std::uint64_t number = 0;
   Picture before;
   const auto check = [&](const State& state, const char* what) {
@@ -213,8 +213,8 @@ TEST_F(CLiveVolume, StateDoesNotDependOnEarlierStates) {
     EXPECT_NE(found, std::exchange(before, found));
     EXPECT_EQ(difference(found, picture_alone(state)), "");
     expect_same(newest(live), alone(state));
-    EXPECT_EQ(info_of(viewer).handed_state, number);
-    EXPECT_EQ(info_of(viewer).drawn_state, number);
+    EXPECT_EQ(info_of(viewer).submitted_update, number);
+    EXPECT_EQ(info_of(viewer).displayed_update, number);
   };
   check(smoke(small, 0), "smoke");
   check(smoke(odd, 1), "an odd size");
@@ -282,13 +282,13 @@ TEST_F(CLiveVolume, PartialUpdatesEqualAFullState) {
           changes.sparse(CUMULET_CHANNEL_TEMPERATURE, odd, heat, State::bricks(odd, heat, heat_before));
           heat_before = heat;
         }
-        hand_over(live, changes, cumulet_live_update);
+        hand_over(live, changes, cumulet_dynamic_volume_update);
         before = now;
       }
       expect_same(newest(live), alone(whole(before, heat_before)));
       // The image is equal too.
       const ViewerPtr viewer = make();
-      ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+      ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
       EXPECT_EQ(difference(picture(viewer.get()), picture_alone(whole(before, heat_before))), "");
     }
   }
@@ -297,7 +297,7 @@ TEST_F(CLiveVolume, PartialUpdatesEqualAFullState) {
 TEST_F(CLiveVolume, RejectedStateKeepsTheLastValidState) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   hand_over(live, smoke(small, 0));
   const Picture good = picture(viewer.get());
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
@@ -308,11 +308,11 @@ TEST_F(CLiveVolume, RejectedStateKeepsTheLastValidState) {
     EXPECT_EQ(refusal(live, state.desc(), CUMULET_ERROR_FILE), "smoke: density: its voxel (3, 20, 11) is not finite");
     State bricks;
     bricks.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}, {0, 16, 8}});
-    EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_FILE, cumulet_live_update),
+    EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_FILE, cumulet_dynamic_volume_update),
               "smoke: density: its voxel (3, 20, 11) is not finite");
   }
   EXPECT_EQ(difference(picture(viewer.get()), good), "");
-  EXPECT_EQ(info_of(viewer).handed_state, 1U);
+  EXPECT_EQ(info_of(viewer).submitted_update, 1U);
   // Errors that appear only when the grid is built: the voxels are too far from each other for one volume.
   State far;
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, small, 1);
@@ -338,11 +338,11 @@ TEST_F(CLiveVolume, RejectedStateKeepsTheLastValidState) {
   ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
   EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
   EXPECT_EQ(difference(target_.pixels(), good), "");
-  EXPECT_EQ(info_of(viewer).drawn_state, 1U);
+  EXPECT_EQ(info_of(viewer).displayed_update, 1U);
   // It cannot be updated; the next whole state works.
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}});
-  EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_live_update),
+  EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_dynamic_volume_update),
             "smoke: there is no state to update");
   hand_over(live, smoke(small, 1));
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(smoke(small, 1))), "");
@@ -352,7 +352,7 @@ struct Releases {
   std::atomic<int> count = 0;
   static void add(void* user) {
     // Calls from inside the callback are rejected.
-    EXPECT_EQ(cumulet_live_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(cumulet_dynamic_volume_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
     ++static_cast<Releases*>(user)->count;
   }
 };
@@ -369,11 +369,11 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
   std::array<char, 256> error{};
   const State first = fire(odd, 0);
   const State second = fire(odd, 1);
-  const cumulet_state_desc one = held(first);
-  ASSERT_EQ(cumulet_live_set(live.get(), &one, error.data(), error.size()), CUMULET_OK) << error.data();
+  const cumulet_volume_fields_desc one = held(first);
+  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &one, error.data(), error.size()), CUMULET_OK) << error.data();
   EXPECT_EQ(releases.count, 0);
-  const cumulet_state_desc two = held(second);
-  ASSERT_EQ(cumulet_live_set(live.get(), &two, error.data(), error.size()), CUMULET_OK) << error.data();
+  const cumulet_volume_fields_desc two = held(second);
+  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &two, error.data(), error.size()), CUMULET_OK) << error.data();
   EXPECT_EQ(releases.count, 1);  // the first state was not read yet
   expect_same(newest(live), alone(second));
   EXPECT_EQ(releases.count, 2);
@@ -387,21 +387,21 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
   values[State::at({22, 30, 16}, odd)] = std::numeric_limits<float>::quiet_NaN();
   State bad;
   bad.dense(CUMULET_CHANNEL_DENSITY, odd, values);
-  const cumulet_state_desc three = held(bad);
-  ASSERT_EQ(cumulet_live_set(live.get(), &three, error.data(), error.size()), CUMULET_OK);
+  const cumulet_volume_fields_desc three = held(bad);
+  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &three, error.data(), error.size()), CUMULET_OK);
   cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_ERROR_FILE);
+  EXPECT_EQ(cumulet_dynamic_volume_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_ERROR_FILE);
   EXPECT_STREQ(error.data(), "smoke: density: its voxel (22, 30, 16) is not finite");
   EXPECT_EQ(releases.count, 3);
   expect_same(newest(live), alone(second));
   // The library keeps no voxels of it.
-  ASSERT_EQ(cumulet_live_set(live.get(), &two, error.data(), error.size()), CUMULET_OK);
+  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &two, error.data(), error.size()), CUMULET_OK);
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 3), {{8, 8, 8}});
-  EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_live_update),
+  EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_dynamic_volume_update),
             "smoke: density takes no bricks: it was handed over with tiles, or with a release");
   EXPECT_EQ(releases.count, 3);
-  cumulet_live_release(cumulet_live_retain(live.get()));
+  cumulet_dynamic_volume_release(cumulet_dynamic_volume_retain(live.get()));
   EXPECT_EQ(releases.count, 3);
 }
 
@@ -411,7 +411,7 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedWithTheHandle) {
   auto desc = state.desc();
   desc.release = Releases::add;
   desc.release_user = &releases;
-  ASSERT_EQ(cumulet_live_set(make_live().get(), &desc, nullptr, 0), CUMULET_OK);
+  ASSERT_EQ(cumulet_dynamic_volume_set(make_live().get(), &desc, nullptr, 0), CUMULET_OK);
   EXPECT_EQ(releases.count, 1);
 }
 
@@ -429,13 +429,13 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedWithoutALock) {
       std::unique_lock lock(pool, std::defer_lock);
       if (locks) lock.lock();
       cumulet_volume* out = nullptr;
-      EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, nullptr, 0), CUMULET_OK);
+      EXPECT_EQ(cumulet_dynamic_volume_get_volume(live.get(), &out, nullptr, 0), CUMULET_OK);
       cumulet_volume_release(out);
     }
   };
   std::thread first(reads, true);
   std::thread second(reads, false);
-  for (int i = 0; i < 50; ++i) EXPECT_EQ(cumulet_live_set(live.get(), &desc, nullptr, 0), CUMULET_OK);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(cumulet_dynamic_volume_set(live.get(), &desc, nullptr, 0), CUMULET_OK);
   stop = true;
   first.join();
   second.join();
@@ -450,7 +450,7 @@ TEST_F(CLiveVolume, ViewersMayBeDestroyedDuringUpdates) {
   });
   for (int i = 0; i < 30; ++i) {
     const ViewerPtr viewer = make();
-    EXPECT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
     std::this_thread::sleep_for(std::chrono::milliseconds(i % 5));
   }
   stop = true;
@@ -465,7 +465,7 @@ TEST_F(CLiveVolume, NewestStateIsShownAndNoViewerStarves) {
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.samples = 2;
   ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   std::vector<State> states;
   states.reserve(8);
   for (int step = 0; step < 8; ++step) states.push_back(smoke(small, step));
@@ -486,9 +486,9 @@ TEST_F(CLiveVolume, NewestStateIsShownAndNoViewerStarves) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (seen.size() < 12 && std::chrono::steady_clock::now() < until) {
     EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
-    const cumulet_live_info info = info_of(viewer);
-    if (seen.empty() || seen.back() != info.drawn_state) seen.push_back(info.drawn_state);
-    EXPECT_LE(info.ready_count - info.drawn_count, 1U);
+    const cumulet_dynamic_volume_info info = info_of(viewer);
+    if (seen.empty() || seen.back() != info.displayed_update) seen.push_back(info.displayed_update);
+    EXPECT_LE(info.ready_count - info.displayed_count, 1U);
   }
   stop = true;
   host.join();
@@ -496,9 +496,9 @@ TEST_F(CLiveVolume, NewestStateIsShownAndNoViewerStarves) {
   EXPECT_TRUE(std::ranges::is_sorted(seen));
   const auto last = show(viewer, handed);
   EXPECT_TRUE(std::ranges::is_sorted(last));
-  const cumulet_live_info info = info_of(viewer);
-  EXPECT_EQ(info.drawn_count, info.ready_count);
-  EXPECT_EQ(info.handed_state, handed);
+  const cumulet_dynamic_volume_info info = info_of(viewer);
+  EXPECT_EQ(info.displayed_count, info.ready_count);
+  EXPECT_EQ(info.submitted_update, handed);
   // The final image is that of the last state.
   sampling.preview = CUMULET_PREVIEW_OFF;
   ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
@@ -511,20 +511,20 @@ TEST_F(CLiveVolume, EachStateIsShownIfThereIsTime) {
   const ViewerPtr viewer = make();
   auto sampling = make_desc<cumulet_sampling_desc>();
   ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   for (std::uint64_t state = 1; state < 8; ++state) {
     hand_over(live, smoke(odd, static_cast<int>(state)));
     show(viewer, state);
-    EXPECT_EQ(info_of(viewer).drawn_count, state);
+    EXPECT_EQ(info_of(viewer).displayed_count, state);
   }
 }
 
-InstanceRef stand(const ViewerPtr& viewer, const std::variant<cumulet_volume*, cumulet_live*>& of, double x) {
+InstanceRef stand(const ViewerPtr& viewer, const std::variant<cumulet_volume*, cumulet_dynamic_volume*>& of, double x) {
   auto desc = make_desc<cumulet_instance_desc>();
   if (of.index() == 0) {
     desc.volume = std::get<0>(of);
   } else {
-    desc.live = std::get<1>(of);
+    desc.dynamic_volume = std::get<1>(of);
   }
   std::ranges::copy(at(x, 0, 0), desc.to_world);
   InstanceRef made = cumulet::test::make_instance(desc);
@@ -532,33 +532,33 @@ InstanceRef stand(const ViewerPtr& viewer, const std::variant<cumulet_volume*, c
   return made;
 }
 
-cumulet_live_info told_of(const ViewerPtr& viewer, const InstanceRef& instance) {
-  auto info = make_desc<cumulet_live_info>();
-  EXPECT_EQ(cumulet_get_instance_live_info(viewer.get(), instance.get(), &info), CUMULET_OK)
+cumulet_dynamic_volume_info told_of(const ViewerPtr& viewer, const InstanceRef& instance) {
+  auto info = make_desc<cumulet_dynamic_volume_info>();
+  EXPECT_EQ(cumulet_get_instance_dynamic_volume_info(viewer.get(), instance.get(), &info), CUMULET_OK)
       << cumulet_last_error(viewer.get());
   return info;
 }
 
-// Instances of a live volume look like instances of the state's own volume, beside the viewer's own live volume.
+// Instances of a dynamic volume look like instances of the state's own volume, beside the viewer's own dynamic volume.
 TEST_F(CLiveVolume, InstancesShowItsNewestState) {
   const LiveRef live = make_live();
   const LiveRef own = make_live();
   const ViewerPtr viewer = make();
   hand_over(own, smoke(small, 5));
-  ASSERT_EQ(cumulet_set_live(viewer.get(), own.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), own.get()), CUMULET_OK);
   const InstanceRef left = stand(viewer, live.get(), -20.0);
   const InstanceRef right = stand(viewer, live.get(), 30.0);
-  EXPECT_EQ(told_of(viewer, left).ready_state, 0U);
+  EXPECT_EQ(told_of(viewer, left).ready_update, 0U);
   for (std::uint64_t number = 1; number < 4; ++number) {
     SCOPED_TRACE(number);
     const State state = fire(odd, static_cast<int>(number));
     hand_over(live, state);
     const Picture shown = picture(viewer.get());
     for (const InstanceRef* instance : {&left, &right}) {
-      const cumulet_live_info info = told_of(viewer, *instance);
-      EXPECT_EQ(info.handed_state, number);
-      EXPECT_EQ(info.drawn_state, number);
-      EXPECT_EQ(info.drawn_count, number) << "one grid for both";
+      const cumulet_dynamic_volume_info info = told_of(viewer, *instance);
+      EXPECT_EQ(info.submitted_update, number);
+      EXPECT_EQ(info.displayed_update, number);
+      EXPECT_EQ(info.displayed_count, number) << "one grid for both";
     }
     const ViewerPtr other = make();
     const VolumeRef beside = alone(smoke(small, 5));
@@ -570,7 +570,7 @@ TEST_F(CLiveVolume, InstancesShowItsNewestState) {
   }
   // After it was hidden, an instance shows the newest state.
   auto hidden = make_desc<cumulet_instance_desc>();
-  hidden.live = live.get();
+  hidden.dynamic_volume = live.get();
   std::ranges::copy(at(-20, 0, 0), hidden.to_world);
   hidden.hidden = 1;
   const Picture both = picture(viewer.get());
@@ -588,17 +588,17 @@ TEST_F(CLiveVolume, InvalidInstancesGiveAOneLineError) {
   auto desc = make_desc<cumulet_instance_desc>();
   const VolumeRef volume = alone(smoke(small, 1));
   desc.volume = volume.get();
-  desc.live = live.get();
+  desc.dynamic_volume = live.get();
   std::array<char, 256> error{};
   cumulet_instance* out = nullptr;
   EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a dynamic volume");
   const InstanceRef still = stand(viewer, volume.get(), 0.0);
-  auto info = make_desc<cumulet_live_info>();
-  EXPECT_EQ(cumulet_get_instance_live_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance shows no live volume");
+  auto info = make_desc<cumulet_dynamic_volume_info>();
+  EXPECT_EQ(cumulet_get_instance_dynamic_volume_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance shows no dynamic volume");
   ASSERT_EQ(cumulet_remove_instance(viewer.get(), still.get()), CUMULET_OK);
-  EXPECT_EQ(cumulet_get_instance_live_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_get_instance_dynamic_volume_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer does not show the instance");
 }
 
@@ -624,9 +624,9 @@ TEST_F(CLiveVolume, InstanceShowsStatesDuringFastUpdates) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (seen.size() < 4 && std::chrono::steady_clock::now() < until) {
       EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
-      const cumulet_live_info info = told_of(viewer, instance);
-      if (seen.empty() || seen.back() != info.drawn_state) seen.push_back(info.drawn_state);
-      EXPECT_LE(info.ready_count - info.drawn_count, 1U);
+      const cumulet_dynamic_volume_info info = told_of(viewer, instance);
+      if (seen.empty() || seen.back() != info.displayed_update) seen.push_back(info.displayed_update);
+      EXPECT_LE(info.ready_count - info.displayed_count, 1U);
     }
     EXPECT_GE(seen.size(), 4U);
     EXPECT_TRUE(std::ranges::is_sorted(seen));
@@ -636,30 +636,30 @@ TEST_F(CLiveVolume, InstanceShowsStatesDuringFastUpdates) {
   stop = true;
   host.join();
   picture(viewer.get());
-  const cumulet_live_info info = told_of(viewer, instance);
-  EXPECT_EQ(info.drawn_state, info.handed_state);
+  const cumulet_dynamic_volume_info info = told_of(viewer, instance);
+  EXPECT_EQ(info.displayed_update, info.submitted_update);
 }
 
 TEST_F(CLiveVolume, WorksWithSeveralViewersAndThreads) {
   const LiveRef live = make_live();
   const ViewerPtr first = make();
   const ViewerPtr second = make();
-  ASSERT_EQ(cumulet_set_live(first.get(), live.get()), CUMULET_OK);
-  ASSERT_EQ(cumulet_set_live(second.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(first.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(second.get(), live.get()), CUMULET_OK);
   const State whole = smoke(small, 0);
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, small, 5);
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}, {16, 8, 8}});
   std::atomic<bool> stop = false;
   const auto hands_over = [&](const State& state, HandOver how) {
-    const cumulet_state_desc desc = state.desc();
+    const cumulet_volume_fields_desc desc = state.desc();
     while (!stop) {
       how(live.get(), &desc, nullptr, 0);  // partial updates may precede the first state
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   };
-  std::thread a(hands_over, std::cref(whole), cumulet_live_set);
-  std::thread b(hands_over, std::cref(bricks), cumulet_live_update);
+  std::thread a(hands_over, std::cref(whole), cumulet_dynamic_volume_set);
+  std::thread b(hands_over, std::cref(bricks), cumulet_dynamic_volume_update);
   std::thread c([&] {
     while (!stop) {
       newest(live);
@@ -680,7 +680,7 @@ TEST_F(CLiveVolume, WorksWithSeveralViewersAndThreads) {
   const Picture wanted = picture_alone(smoke(small, 3));
   EXPECT_EQ(difference(picture(first.get()), wanted), "");
   EXPECT_EQ(difference(picture(second.get()), wanted), "");
-  EXPECT_EQ(info_of(second).drawn_state, info_of(second).handed_state);
+  EXPECT_EQ(info_of(second).displayed_update, info_of(second).submitted_update);
 }
 
 TEST_F(CLiveVolume, VolumeAndLiveVolumeReplaceEachOther) {
@@ -688,7 +688,7 @@ TEST_F(CLiveVolume, VolumeAndLiveVolumeReplaceEachOther) {
   LiveRef live = make_live();
   const VolumeRef ball = make_ball(20);
   const Picture of_ball = picture_of(viewer.get(), ball.get(), target_);
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   // The previous volume stays until the first state arrives.
   EXPECT_EQ(difference(picture(viewer.get()), of_ball), "");
   hand_over(live, smoke(small, 1));
@@ -700,11 +700,11 @@ TEST_F(CLiveVolume, VolumeAndLiveVolumeReplaceEachOther) {
   ASSERT_EQ(cumulet_set_volume(viewer.get(), ball.get()), CUMULET_OK);
   hand_over(live, smoke(small, 2));
   EXPECT_EQ(difference(picture(viewer.get()), of_ball), "");
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(smoke(small, 2))), "");
   live.reset();  // the viewer keeps a reference
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(smoke(small, 2))), "");
-  ASSERT_EQ(cumulet_set_live(viewer.get(), nullptr), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), nullptr), CUMULET_OK);
   double box[6];
   EXPECT_EQ(cumulet_get_bounds(viewer.get(), box, box + 3), CUMULET_ERROR_INVALID_ARGUMENT);
 }
@@ -712,7 +712,7 @@ TEST_F(CLiveVolume, VolumeAndLiveVolumeReplaceEachOther) {
 TEST_F(CLiveVolume, ChangedSettingsApplyToTheNewestState) {
   const LiveRef live = make_live();
   const ViewerPtr viewer = make();
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   hand_over(live, fire(small, 1));
   picture(viewer.get());
   auto grid = make_desc<cumulet_grid_desc>();
@@ -720,7 +720,7 @@ TEST_F(CLiveVolume, ChangedSettingsApplyToTheNewestState) {
   grid.cells = CUMULET_CELLS_CONSTANT;
   for (int i = 0; i < 3; ++i) {
     if (i == 1) grid.camera_adaptive = 1;  // camera-adaptive grids need a camera
-    if (i == 2) grid.march = CUMULET_MARCH_BRICK;
+    if (i == 2) grid.type = CUMULET_GRID_BRICKS;
     ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
     hand_over(live, fire(small, 2 + i));
     const Picture found = picture(viewer.get());
@@ -732,12 +732,12 @@ TEST_F(CLiveVolume, ChangedSettingsApplyToTheNewestState) {
 
 // Fitted cameras and the ground plane use the declared bounds, not those of the current state.
 TEST_F(CLiveVolume, CameraAndGroundUseTheDeclaredBounds) {
-  auto desc = make_desc<cumulet_live_desc>();
+  auto desc = make_desc<cumulet_dynamic_volume_desc>();
   for (double& x : desc.bounds_min) x = -8.0;
   for (double& x : desc.bounds_max) x = 8.0;
   const LiveRef live = make_live(desc);
   const ViewerPtr viewer = make();
-  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
   for (const int step : {0, 4}) {
     hand_over(live, smoke(small, step));
     picture(viewer.get());

@@ -193,10 +193,10 @@ TEST_F(Loading, SettingAKindClearsItsFailure) {
   }
 }
 
-// An instance whose file is missing, and a live volume that does not fit.
+// An instance whose file is missing, and a dynamic volume that does not fit.
 TEST_F(Loading, LiveVolumesAndInstancesReportFailuresAlike) {
-  const auto live_desc = make_desc<cumulet_live_desc>();
-  const LiveRef live = test::made_by<LiveRef>(cumulet_live_create, live_desc);
+  const auto live_desc = make_desc<cumulet_dynamic_volume_desc>();
+  const LiveRef live = test::made_by<LiveRef>(cumulet_dynamic_volume_create, live_desc);
   const auto limit = [&](std::uint64_t bytes) {
     auto limits = make_desc<cumulet_limits_desc>();
     limits.memory_bytes = bytes;
@@ -228,15 +228,15 @@ TEST_F(Loading, LiveVolumesAndInstancesReportFailuresAlike) {
   for (int32_t& size : dense.size) size = 8;
   auto field = make_desc<cumulet_field>();
   field.dense = &dense;
-  auto state = make_desc<cumulet_state_desc>();
+  auto state = make_desc<cumulet_volume_fields_desc>();
   state.fields = &field;
   state.field_count = 1;
-  ASSERT_EQ(cumulet_live_set(live.get(), &state, nullptr, 0), CUMULET_OK);
-  ASSERT_EQ(cumulet_set_live(v_, live.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &state, nullptr, 0), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live.get()), CUMULET_OK);
   expect_too_large();
   ASSERT_EQ(cumulet_load_surfaces(v_, path("triangle.gltf").c_str()), CUMULET_OK);
   expect_none();
-  ASSERT_EQ(cumulet_set_live(v_, nullptr), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, nullptr), CUMULET_OK);
   EXPECT_EQ(progress().volume_status, CUMULET_OK);
 }
 

@@ -578,7 +578,7 @@ TEST_F(OpenVdbVolume, CanBeInspected) {
   ASSERT_EQ(cumulet_inspection_get_grid(inspection, 1, &found), CUMULET_OK);
   EXPECT_STREQ(found.name, "density");
   EXPECT_STREQ(found.type, "float");
-  EXPECT_STREQ(found.refusal, "");
+  EXPECT_STREQ(found.unsupported_reason, "");
   EXPECT_EQ(found.values, CUMULET_GRID_VALUES_SCALARS);
   const Volume volume = open(file);
   EXPECT_EQ(found.active_voxels, inside(volume).active_voxels);
@@ -602,7 +602,7 @@ TEST_F(OpenVdbVolume, CanBeInspected) {
   }
   EXPECT_TRUE(author);
   ASSERT_EQ(cumulet_inspection_get_grid(inspection, 0, &found), CUMULET_OK);
-  EXPECT_STREQ(found.refusal, "is a level set, not a fog volume");
+  EXPECT_STREQ(found.unsupported_reason, "is a level set, not a fog volume");
   EXPECT_EQ(cumulet_inspection_get_grid(inspection, 2, &found), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_inspection_get_grid(inspection, 0, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_inspection_get_metadata(inspection, 1, 1000, &entry), CUMULET_ERROR_INVALID_ARGUMENT);
@@ -718,7 +718,7 @@ TEST(VolumeHandle, IsCountedByManyThreads) {
   EXPECT_TRUE(asset.expired());
 }
 
-// Grids of a host's own OpenVDB as a state of a live volume. The density equals that of a volume made from it.
+// Grids of a host's own OpenVDB as a state of a dynamic volume. The density equals that of a volume made from it.
 TEST(LiveOpenVdb, LiveStateMatchesTheVolume) {
   const auto density = openvdb::FloatGrid::create();
   const auto heat = openvdb::DoubleGrid::create();
@@ -728,18 +728,21 @@ TEST(LiveOpenVdb, LiveStateMatchesTheVolume) {
   }
   density->fill(openvdb::CoordBBox(Coord(32), Coord(47)), 0.5F);
   density->setName("smoke");
-  const auto desc =
-      cumulet_live_desc{.struct_size = sizeof(cumulet_live_desc), .bounds_min = {}, .bounds_max = {}, .stays_in_gl = 0};
-  cumulet_live* live = nullptr;
-  ASSERT_EQ(cumulet_live_create(&desc, &live, nullptr, 0), CUMULET_OK);
-  const std::unique_ptr<cumulet_live, decltype(&cumulet_live_release)> owner(live, cumulet_live_release);
+  const auto desc = cumulet_dynamic_volume_desc{
+      .struct_size = sizeof(cumulet_dynamic_volume_desc), .bounds_min = {}, .bounds_max = {}, .gpu_resident = 0};
+  cumulet_dynamic_volume* live = nullptr;
+  ASSERT_EQ(cumulet_dynamic_volume_create(&desc, &live, nullptr, 0), CUMULET_OK);
+  const std::unique_ptr<cumulet_dynamic_volume, decltype(&cumulet_dynamic_volume_release)> owner(
+      live, cumulet_dynamic_volume_release);
   char error[256] = "";
-  ASSERT_EQ(cumulet::live_set_openvdb(live, {{CUMULET_CHANNEL_TEMPERATURE, heat}, {CUMULET_CHANNEL_DENSITY, density}},
-                                      "fire", error, sizeof error),
-            CUMULET_OK)
+  ASSERT_EQ(
+      cumulet::dynamic_volume_set_openvdb(
+          live, {{CUMULET_CHANNEL_TEMPERATURE, heat}, {CUMULET_CHANNEL_DENSITY, density}}, "fire", error, sizeof error),
+      CUMULET_OK)
       << error;
-  const Volume state =
-      made([&](auto** out, char* line, std::size_t size) { return cumulet_live_get_volume(live, out, line, size); });
+  const Volume state = made([&](auto** out, char* line, std::size_t size) {
+    return cumulet_dynamic_volume_get_volume(live, out, line, size);
+  });
   const Volume alone = made(
       [&](auto** out, char* line, std::size_t size) { return cumulet::volume_from_openvdb(density, out, line, size); });
   ScalarVolume wanted = inside(alone);
@@ -750,8 +753,9 @@ TEST(LiveOpenVdb, LiveStateMatchesTheVolume) {
   const auto level_set = openvdb::FloatGrid::create();
   level_set->setGridClass(openvdb::GRID_LEVEL_SET);
   level_set->setName("surface");
-  EXPECT_EQ(cumulet::live_set_openvdb(live, {{CUMULET_CHANNEL_DENSITY, level_set}}, "fire", error, sizeof error),
-            CUMULET_ERROR_FILE);
+  EXPECT_EQ(
+      cumulet::dynamic_volume_set_openvdb(live, {{CUMULET_CHANNEL_DENSITY, level_set}}, "fire", error, sizeof error),
+      CUMULET_ERROR_FILE);
   EXPECT_STREQ(error, "fire: surface: is a level set, not a fog volume");
 }
 

@@ -101,12 +101,12 @@ VolumeRef make_plate(const dvec3& velocity) {
         i == 0 ? CUMULET_CHANNEL_DENSITY : static_cast<cumulet_channel>(CUMULET_CHANNEL_VELOCITY_X + i - 1);
     fields.at(i).dense = &descs.at(i);
   }
-  auto state = make_desc<cumulet_state_desc>();
+  auto state = make_desc<cumulet_volume_fields_desc>();
   state.fields = fields.data();
   state.field_count = velocity == dvec3(0.0) ? 1 : 4;
   cumulet_volume* out = nullptr;
   std::array<char, 256> error{};
-  if (cumulet_volume_from_state(&state, &out, error.data(), error.size()) != CUMULET_OK)
+  if (cumulet_volume_from_fields(&state, &out, error.data(), error.size()) != CUMULET_OK)
     throw std::runtime_error(error.data());
   return VolumeRef(out);
 }
@@ -250,7 +250,7 @@ TEST_P(MotionVectors, FollowCameraMotion) {
 
 TEST_P(MotionVectors, OfTheGroundFollowTheCamera) {
   auto ground = make_desc<cumulet_ground_desc>();
-  ground.place = CUMULET_GROUND_AT_HEIGHT;
+  ground.mode = CUMULET_GROUND_AT_HEIGHT;
   ground.height = -8.0;
   ASSERT_EQ(cumulet_set_ground(v_, &ground), CUMULET_OK);
   const VolumeRef ball = make_ball(8, 1.0F);
@@ -279,7 +279,7 @@ TEST_P(MotionVectors, OfTheMediumFollowItsVelocity) {
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * v)), "and the camera");
   // With a rotated instance transform, the motion is rotated too.
   const dmat4 place = glm::rotate(dmat4(1.0), 0.5, dvec3(0.0, 1.0, 0.0));
-  ASSERT_EQ(cumulet_set_volume_places(v_, glm::value_ptr(place), 1), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(place), 1), CUMULET_OK);
   const dvec3 there = glm::dmat3(place) * v;
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * there), place), "turned", 2e-2);
 }
@@ -289,18 +289,18 @@ TEST_P(MotionVectors, OfInstancesFollowTheirPreviousTransforms) {
   ASSERT_EQ(cumulet_set_volume(v_, plate.get()), CUMULET_OK);
   const dmat4 place = glm::rotate(dmat4(1.0), 0.3, dvec3(1.0, 0.0, 0.0));
   const dmat4 was = turned * place;
-  ASSERT_EQ(cumulet_set_volume_places(v_, glm::value_ptr(place), 1), CUMULET_OK);
-  ASSERT_EQ(cumulet_set_previous_volume_places(v_, glm::value_ptr(was), 1), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(place), 1), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_previous_volume_transforms(v_, glm::value_ptr(was), 1), CUMULET_OK);
   then(std::nullopt);
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, place), "a place", 2e-2);
   // Several transforms move separately. One far away stays fixed.
   std::array<dmat4, 2> places{place, glm::translate(dmat4(1.0), dvec3(0.0, 0.0, -500.0))};
-  ASSERT_EQ(cumulet_set_volume_places(v_, glm::value_ptr(places[0]), 2), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(places[0]), 2), CUMULET_OK);
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 1e5;
   ASSERT_EQ(cumulet_set_medium(v_, &medium), CUMULET_OK);
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, place), "the first of two", 2e-2);
-  ASSERT_EQ(cumulet_set_previous_volume_places(v_, nullptr, 0), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_previous_volume_transforms(v_, nullptr, 0), CUMULET_OK);
   expect_none(CUMULET_AOV_VOLUME_MOTION);
 }
 

@@ -63,11 +63,11 @@ TEST(Options, DefaultsMatchTheLibrary) {
   EXPECT_EQ(scene.grid_name, "");
   EXPECT_EQ(scene.grid.struct_size, sizeof(cumulet_grid_desc));
   EXPECT_EQ(scene.medium.struct_size, sizeof(cumulet_medium_desc));
-  EXPECT_EQ(scene.light.struct_size, sizeof(cumulet_light_desc));
+  EXPECT_EQ(scene.light.struct_size, sizeof(cumulet_sun_sky_desc));
   EXPECT_EQ(scene.camera.struct_size, sizeof(cumulet_camera_desc));
   EXPECT_EQ(scene.sampling.struct_size, sizeof(cumulet_sampling_desc));
   EXPECT_EQ(scene.display.struct_size, sizeof(cumulet_display_desc));
-  EXPECT_EQ(scene.grid.march, CUMULET_MARCH_TET);
+  EXPECT_EQ(scene.grid.type, CUMULET_GRID_TETRAHEDRAL);
   EXPECT_EQ(scene.grid.cells, CUMULET_CELLS_LINEAR);
   EXPECT_EQ(scene.grid.threshold, 0.0);
   EXPECT_EQ(scene.grid.max_cells, 0u);
@@ -145,7 +145,7 @@ TEST(Options, ParsesEveryFlag) {
   EXPECT_EQ(scene.camera.target[0], -4.0);
   EXPECT_EQ(scene.camera.target[1], 0.5);
   EXPECT_EQ(scene.camera.fovy_degrees, 35.5);
-  EXPECT_EQ(scene.grid.march, CUMULET_MARCH_BRICK);
+  EXPECT_EQ(scene.grid.type, CUMULET_GRID_BRICKS);
   EXPECT_EQ(scene.grid.cells, CUMULET_CELLS_CONSTANT);
   EXPECT_EQ(scene.grid.criterion, CUMULET_CRITERION_RANGE_MEAN);
   EXPECT_EQ(scene.grid.threshold, 0.25);
@@ -273,11 +273,11 @@ TEST(Options, LightFlagsMatchSceneFileLights) {
       EXPECT_TRUE(cumulet::settings::same(scene.analytic_lights[i], other.analytic_lights[i])) << i;
   };
   same_analytic_lights(file);
-  EXPECT_EQ(scene.analytic_lights[0].struct_size, sizeof(cumulet_lamp_desc));
+  EXPECT_EQ(scene.analytic_lights[0].struct_size, sizeof(cumulet_light_desc));
   same_analytic_lights(parse_scene(scene_text(scene, "a.json"), "a.json"));
   EXPECT_EQ(scene.light.sun_irradiance[0], 0.0f) << "no light but theirs";
   EXPECT_EQ(scene.light.sky, CUMULET_SKY_CONSTANT);
-  EXPECT_EQ(scene.ground.place, CUMULET_GROUND_NONE);
+  EXPECT_EQ(scene.ground.mode, CUMULET_GROUND_NONE);
   EXPECT_EQ(parse({"--lamp", "point", "--sky-model", "3,0.3"}).scene.light.sky, CUMULET_SKY_PHYSICAL);
   EXPECT_EQ(parse({"--lamp", "point", "--lamp", "none"}).scene.light.sky, CUMULET_SKY_PHYSICAL) << "a day without";
 }
@@ -295,7 +295,7 @@ TEST(Options, LightFlagsAddToTheScenesLights) {
   const auto two = analytic_lights({"--lamp", "disc power=3"});
   ASSERT_EQ(two.size(), 2u);
   EXPECT_EQ(two[0].power, 7.0f);
-  EXPECT_EQ(two[1].kind, CUMULET_LAMP_DISC);
+  EXPECT_EQ(two[1].kind, CUMULET_LIGHT_DISK);
   const auto other = analytic_lights({"--lamp", "none", "--lamp", "disc power=3"});
   ASSERT_EQ(other.size(), 1u);
   EXPECT_EQ(other[0].power, 3.0f);
@@ -304,7 +304,7 @@ TEST(Options, LightFlagsAddToTheScenesLights) {
 TEST(Options, AnyWhiteSpaceSeparatesWords) {
   const auto analytic_lights = parse({"--lamp", "\tdisc\n  power=3\r\n\twidth=2\n"}).scene.analytic_lights;
   ASSERT_EQ(analytic_lights.size(), 1u);
-  EXPECT_EQ(analytic_lights[0].kind, CUMULET_LAMP_DISC);
+  EXPECT_EQ(analytic_lights[0].kind, CUMULET_LIGHT_DISK);
   EXPECT_EQ(analytic_lights[0].power, 3.0f);
   EXPECT_EQ(analytic_lights[0].width, 2.0);
 }
@@ -445,7 +445,7 @@ TEST(Options, SurfacesNeedNoVolume) {
   EXPECT_EQ(options->scene.surface.animation, 2U);
   EXPECT_EQ(options->scene.surface_variant, "by night");
   EXPECT_EQ(options->scene.surface_camera, 1);
-  EXPECT_EQ(options->scene.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
+  EXPECT_EQ(options->scene.surface.lighting, CUMULET_SURFACE_LIGHTING_DIRECT);
   EXPECT_EQ(options->scene.surface.indirect_roughness, 0.25F);
   EXPECT_EQ(options->scene.surface.double_sided, 0);
   EXPECT_EQ(parse({"--gltf", "a.glb", "--double-sided"}).scene.surface.double_sided, 1);
@@ -490,7 +490,7 @@ TEST(Options, ParsesSequenceFrames) {
   EXPECT_EQ(parse({"--frames", "-4-4x2"}).frames, (std::vector<Moment>{-4, -2, 0, 2, 4}));
   EXPECT_EQ(parse({"--frames", "-3"}).frames, (std::vector<Moment>{-3}));
   EXPECT_EQ(parse({"--frames", "1-2x0.5"}).frames, (std::vector<Moment>{1, {1, 500}, 2}));
-  EXPECT_EQ(parse({"--between", "blend"}).scene.sequence.playback.between, CUMULET_BETWEEN_BLEND);
+  EXPECT_EQ(parse({"--between", "blend"}).scene.sequence.playback.interpolation, CUMULET_FRAME_INTERPOLATION_BLEND);
   EXPECT_EQ(parse({"--velocity-scale", "24"}).scene.sequence.playback.velocity_scale, 24.0);
   EXPECT_TRUE(parse({}).frames.empty());
   EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' runs backwards");
@@ -742,7 +742,7 @@ TEST(Options, UsageErrorsAreOneLineAndNameTheFlag) {
 TEST(Options, LastValueOfAFlagWins) {
   EXPECT_EQ(parse({"--spp", "1", "--spp", "2"}).scene.sampling.samples, 2u);
   EXPECT_EQ(parse({"--volume", "b.vdb"}).scene.volume, "b.vdb");
-  EXPECT_EQ(parse({"--march", "dense", "--march", "tet"}).scene.grid.march, CUMULET_MARCH_TET);
+  EXPECT_EQ(parse({"--march", "dense", "--march", "tet"}).scene.grid.type, CUMULET_GRID_TETRAHEDRAL);
 }
 
 TEST(Options, TheDensityScaleIsAutoUnlessSaid) {

@@ -1,4 +1,4 @@
-// Shader programs: shared by all viewers of a cumulet_programs, compiled once, and cached in files.
+// Shader programs: shared by all viewers of a cumulet_shader_cache, compiled once, and cached in files.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -62,11 +62,11 @@ class ProgramsTest : public testing::Test {
   [[nodiscard]] std::uint64_t compiled() const { return fake_.calls("CompileShader") + fake_.calls("LinkProgram"); }
   [[nodiscard]] std::shared_ptr<ProgramFiles> files() const { return std::make_shared<ProgramFiles>(folder_.path()); }
   // Creates a viewer as a host would, for one image.
-  [[nodiscard]] ViewerPtr viewer(cumulet_programs* programs) {
+  [[nodiscard]] ViewerPtr viewer(cumulet_shader_cache* programs) {
     auto desc = make_desc<cumulet_create_desc>();
     desc.get_proc = FakeGl::get_proc;
     desc.get_proc_user = &fake_;
-    desc.programs = programs;
+    desc.shader_cache = programs;
     return make_plain_viewer(desc);
   }
 
@@ -132,14 +132,14 @@ TEST_F(ProgramsTest, AreSharedBetweenSharingContexts) {
 }
 
 TEST_F(ProgramsTest, ASecondViewerCompilesNothing) {
-  auto desc = make_desc<cumulet_programs_desc>();
-  cumulet_programs* programs = nullptr;
-  ASSERT_EQ(cumulet_programs_create(&desc, &programs, nullptr, 0), CUMULET_OK);
+  auto desc = make_desc<cumulet_shader_cache_desc>();
+  cumulet_shader_cache* programs = nullptr;
+  ASSERT_EQ(cumulet_shader_cache_create(&desc, &programs, nullptr, 0), CUMULET_OK);
   const VolumeRef volume = make_ball(16, 2.0F);
   const HostTarget target(fake_.real(), 32, 32);
   const ViewerPtr first = viewer(programs);
   ViewerPtr second = viewer(programs);
-  cumulet_programs_release(programs);
+  cumulet_shader_cache_release(programs);
   const auto picture = picture_of(first.get(), volume.get(), target);
   const auto before = compiled();
   EXPECT_GT(before, 0U);
@@ -155,9 +155,9 @@ TEST_F(ProgramsTest, ASecondViewerCompilesNothing) {
 }
 
 TEST_F(ProgramsTest, ProgramsEndWithTheLastViewer) {
-  auto desc = make_desc<cumulet_programs_desc>();
-  cumulet_programs* programs = nullptr;
-  ASSERT_EQ(cumulet_programs_create(&desc, &programs, nullptr, 0), CUMULET_OK);
+  auto desc = make_desc<cumulet_shader_cache_desc>();
+  cumulet_shader_cache* programs = nullptr;
+  ASSERT_EQ(cumulet_shader_cache_create(&desc, &programs, nullptr, 0), CUMULET_OK);
   const VolumeRef volume = make_ball(16, 2.0F);
   {
     const HostTarget target(fake_.real(), 32, 32);
@@ -168,7 +168,7 @@ TEST_F(ProgramsTest, ProgramsEndWithTheLastViewer) {
   }
   EXPECT_TRUE(fake_.alive().empty()) << fake_.alive().begin()->first;
   EXPECT_EQ(fake_.wrong_deletes(), 0U);
-  cumulet_programs_release(programs);
+  cumulet_shader_cache_release(programs);
 }
 
 TEST_F(ProgramsTest, BinariesOfAnEarlierRunAreUsed) {

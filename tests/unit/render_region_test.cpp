@@ -134,7 +134,7 @@ class RenderRegion : public CViewerTest {
     auto desc = make_desc<cumulet_sampling_desc>();
     desc.samples = 6;
     desc.preview = CUMULET_PREVIEW_OFF;
-    desc.volume_alone = 1;
+    desc.separate_volume_aov = 1;
     return desc;
   }();
 };
@@ -322,11 +322,11 @@ TEST_P(RenderRegion, IsDenoisedSeparately) {
 TEST_P(RenderRegion, PreviewCoversTheRegionToItsEdges) {
   sampling_.preview = CUMULET_PREVIEW_AUTO;
   sampling_.samples = 4;
-  sampling_.volume_alone = 0;
+  sampling_.separate_volume_aov = 0;
   set(part);
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   for (float& value : light.sky_radiance) value = 1.0F;
-  ASSERT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 1e-6;
   ASSERT_EQ(cumulet_set_medium(viewer_.get(), &medium), CUMULET_OK);

@@ -72,9 +72,9 @@ Picture shown(const Host& host, cumulet_viewer* viewer, cumulet_status* status =
   return host.target.pixels();
 }
 
-void light_surfaces(cumulet_viewer* viewer, cumulet_surface_light light) {
+void light_surfaces(cumulet_viewer* viewer, cumulet_surface_lighting light) {
   auto settings = make_desc<cumulet_surface_settings_desc>();
-  settings.light = light;
+  settings.lighting = light;
   ASSERT_EQ(cumulet_set_surface_settings(viewer, &settings), CUMULET_OK);
 }
 
@@ -162,7 +162,7 @@ TEST(ResourceLeaks, ChangingVolumesSizesAndSettingsLeaksNoObjects) {
   const auto round = [&](int i) {
     picture_of(viewer.get(), i % 2 == 0 ? a.get() : b.get(), host.target);
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.march = i % 3 == 0 ? CUMULET_MARCH_TET : i % 3 == 1 ? CUMULET_MARCH_DENSE : CUMULET_MARCH_BRICK;
+    grid.type = i % 3 == 0 ? CUMULET_GRID_TETRAHEDRAL : i % 3 == 1 ? CUMULET_GRID_DENSE : CUMULET_GRID_BRICKS;
     ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
     cumulet_frame_desc frame = host.target.frame();
     frame.width = static_cast<std::uint32_t>(8 + i % 5);
@@ -186,7 +186,7 @@ TEST(ResourceLeaks, SurfacesLeakNothing) {
       const VolumeRef volume = make_ball(12);
       const Picture without = picture_of(viewer.get(), volume.get(), host.target);
       ASSERT_EQ(cumulet_set_surfaces(viewer.get(), panes.get()), CUMULET_OK);
-      for (const auto light : {CUMULET_SURFACE_LIGHT_NONE, CUMULET_SURFACE_LIGHT_FULL}) {
+      for (const auto light : {CUMULET_SURFACE_LIGHTING_RASTERIZED, CUMULET_SURFACE_LIGHTING_GLOBAL}) {
         light_surfaces(viewer.get(), light);
         ASSERT_TRUE(converges(viewer.get(), host.target));
       }
@@ -263,12 +263,12 @@ TEST_F(OutOfMemory, NewVolumeThatDoesNotFitKeepsTheOldOne) {
   EXPECT_GT(refusals, 2);
 }
 
-// Previews and CUMULET_SURFACE_LIGHT_NONE allocate textures of their own.
+// Previews and CUMULET_SURFACE_LIGHTING_RASTERIZED allocate textures of their own.
 TEST_F(OutOfMemory, SurfacesThatDoNotFitKeepTheVolume) {
   const SurfacesRef panes = cumulet::test::make_panes(4.0F);
   for (const auto mode : {CUMULET_PREVIEW_OFF, CUMULET_PREVIEW_AUTO}) {
     preview(viewer_.get(), mode);
-    for (const auto light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
+    for (const auto light : {CUMULET_SURFACE_LIGHTING_GLOBAL, CUMULET_SURFACE_LIGHTING_RASTERIZED}) {
       light_surfaces(viewer_.get(), light);
       ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), panes.get()), CUMULET_OK);
       ASSERT_TRUE(converges(viewer_.get(), host_.target));
@@ -314,7 +314,7 @@ TEST_F(OutOfMemory, SurfacesThatDoNotFitKeepTheVolume) {
 TEST_F(OutOfMemory, WithoutStorageTheOldVolumeStays) {
   // A voxel grid, because cells could fit into memory left by other volumes.
   auto dense = make_desc<cumulet_grid_desc>();
-  dense.march = CUMULET_MARCH_DENSE;
+  dense.type = CUMULET_GRID_DENSE;
   const ViewerPtr other = host_.viewer();
   ASSERT_EQ(cumulet_set_grid(other.get(), &dense), CUMULET_OK);
   const Picture picture_dense = picture_of(other.get(), b_.get(), host_.target);
@@ -345,7 +345,7 @@ TEST_F(OutOfMemory, VolumeThatFitsExistingBuffersAllocatesNothing) {
 
 TEST_F(OutOfMemory, ResizeThatDoesNotFitStillShowsTheImage) {
   const HostTarget larger(host_.fake.real(), 2 * side, 2 * side);
-  for (const cumulet_target kind : {CUMULET_TARGET_FRAMEBUFFER, CUMULET_TARGET_TEXTURE}) {
+  for (const cumulet_frame_target kind : {CUMULET_TARGET_FRAMEBUFFER, CUMULET_TARGET_TEXTURE}) {
     cumulet_frame_desc small = host_.target.frame();
     cumulet_frame_desc large = larger.frame();
     small.target = large.target = kind;
@@ -510,7 +510,7 @@ TEST_F(ContextLossAt, AnyCallWhileRendering) {
 TEST_F(ContextLossAt, AnyCallWithSurfaces) {
   const SurfacesRef panes = cumulet::test::make_panes(4.0F);
   ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), panes.get()), CUMULET_OK);
-  light_surfaces(viewer_.get(), CUMULET_SURFACE_LIGHT_NONE);
+  light_surfaces(viewer_.get(), CUMULET_SURFACE_LIGHTING_RASTERIZED);
   measure();
   const std::uint64_t step = std::max<std::uint64_t>(1, calls_ / (sanitized ? 10 : 100));
   for (std::uint64_t n = attach_calls_; n < calls_ && !HasFatalFailure(); n += step) lose(n);
@@ -586,7 +586,8 @@ TEST(FrameSizes, AnySizeFrom0To16384PerFrame) {
     for (const auto& [width, height] : sizes) {
       SCOPED_TRACE(std::to_string(width) + " x " + std::to_string(height));
       const HostTarget target(host.fake.real(), std::max(width, 1), std::max(height, 1));
-      for (const cumulet_target kind : {CUMULET_TARGET_FRAMEBUFFER, CUMULET_TARGET_TEXTURE, CUMULET_TARGET_NONE}) {
+      for (const cumulet_frame_target kind :
+           {CUMULET_TARGET_FRAMEBUFFER, CUMULET_TARGET_TEXTURE, CUMULET_TARGET_NONE}) {
         cumulet_frame_desc frame = target.frame();
         frame.width = static_cast<std::uint32_t>(width);
         frame.height = static_cast<std::uint32_t>(height);
@@ -712,7 +713,7 @@ TEST_F(FileErrors, RandomCallsFromTwoThreads) {
             break;
           case 5:
             grid.threshold = 0.001 + 0.1 * double(random() % 10);
-            grid.march = static_cast<cumulet_march>(random() % 3);
+            grid.type = static_cast<cumulet_grid_type>(random() % 3);
             status = cumulet_set_grid(viewer.get(), &grid);
             break;
           case 6:
@@ -790,7 +791,7 @@ TEST(UpdateCallback, IsCoalescedAndNotReentrant) {
   EXPECT_EQ(updates.refused, 5);
   EXPECT_EQ(updates.accepted, 0);
 
-  const auto light = make_desc<cumulet_light_desc>();
+  const auto light = make_desc<cumulet_sun_sky_desc>();
   const auto display = make_desc<cumulet_display_desc>();
   auto grid = make_desc<cumulet_grid_desc>();
   grid.threshold = 0.5;
@@ -798,7 +799,7 @@ TEST(UpdateCallback, IsCoalescedAndNotReentrant) {
   ASSERT_EQ(cumulet_get_camera(viewer.get(), &out), CUMULET_OK);
   const cumulet::test::CameraRef camera(out);
   settle();
-  EXPECT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
+  EXPECT_EQ(cumulet_set_sun_sky(viewer.get(), &light), CUMULET_OK);
   EXPECT_EQ(updates.count, 1) << "light";
   settle();
   auto exposed = display;

@@ -76,7 +76,7 @@ class ResumedRendering : public SampleRanges {
     sampling.samples = samples;
     sampling.seed = 3;
     sampling.preview = false;
-    sampling.volume_alone = true;
+    sampling.separate_volume_aov = true;
     sampling.noise_target = noise_target;
     return sampling;
   }

@@ -41,7 +41,7 @@ SceneOptions full_scene() {
   scene.surface_variant = "by \"night\"";
   scene.surface.time = 1.25;
   scene.surface.animation = 3;
-  scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
+  scene.surface.lighting = CUMULET_SURFACE_LIGHTING_DIRECT;
   scene.surface.indirect_roughness = 0.3f;
   scene.surface.double_sided = 1;
   scene.surface_camera = 2;
@@ -67,13 +67,13 @@ SceneOptions full_scene() {
   scene.light.sun_elevation_degrees = -5.6f;
   for (int i = 0; i < 3; ++i) scene.light.sun_irradiance[i] = 0.7f * static_cast<float>(i);
   for (int i = 0; i < 3; ++i) scene.light.sky_radiance[i] = 1e-3f * static_cast<float>(i);
-  for (const cumulet_lamp_kind kind : {CUMULET_LAMP_RECTANGLE, CUMULET_LAMP_SUN}) {
-    cumulet_lamp_desc analytic_light{};
+  for (const cumulet_light_kind kind : {CUMULET_LIGHT_RECT, CUMULET_LIGHT_DISTANT}) {
+    cumulet_light_desc analytic_light{};
     analytic_light.struct_size = sizeof analytic_light;
     analytic_light.kind = kind;
     analytic_light.position[1] = 0.1;
     analytic_light.direction[2] = -1.0 / 3.0;
-    analytic_light.across[0] = 2.5;
+    analytic_light.tangent[0] = 2.5;
     analytic_light.color[2] = 0.3f;
     analytic_light.power = 123.4f;
     analytic_light.width = 1.5;
@@ -84,7 +84,7 @@ SceneOptions full_scene() {
   for (std::size_t i = 0; i < 16; ++i) scene.to_world[i] = 0.1 * static_cast<double>(i);
   scene.places.assign(2, scene.to_world);
   scene.places[1][12] = -7.5;
-  scene.grid.march = CUMULET_MARCH_BRICK;
+  scene.grid.type = CUMULET_GRID_BRICKS;
   scene.grid.cells = CUMULET_CELLS_CONSTANT;
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
   scene.grid.threshold = -1.0;
@@ -118,7 +118,7 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.medium, scene.medium));
   EXPECT_EQ(read.ramps, scene.ramps);
   EXPECT_TRUE(same(read.light, scene.light));
-  EXPECT_TRUE(std::ranges::equal(read.analytic_lights, scene.analytic_lights, same<cumulet_lamp_desc>));
+  EXPECT_TRUE(std::ranges::equal(read.analytic_lights, scene.analytic_lights, same<cumulet_light_desc>));
   EXPECT_EQ(read.to_world, scene.to_world);
   EXPECT_EQ(read.places, scene.places);
   EXPECT_TRUE(same(read.grid, scene.grid));
@@ -318,8 +318,8 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
         Case{R"("camera": {"eye": [1, 2, 3], "target": [1, 2, 3]})", "camera.target"},
         Case{R"("camera": {"up": [0, 0, 0]})", "camera.up"},
         Case{R"("camera": {"fovy_degrees": 180})", "camera.fovy_degrees"},
-        Case{R"("grid": {"march": "fast"})", "grid.march"},
-        Case{R"("grid": {"march": 1})", "grid.march"},
+        Case{R"("grid": {"march": "fast"})", "grid.type"},
+        Case{R"("grid": {"march": 1})", "grid.type"},
         Case{R"("grid": {"threshold": -1})", "grid.threshold"},
         Case{R"("grid": {"max_cells": 0})", "grid.max_cells"},
         Case{R"("grid": {"camera_adaptive": 1})", "grid.camera_adaptive"},
@@ -695,7 +695,7 @@ TEST(SceneFile, EachVolumeMayBeASequence) {
   ASSERT_EQ(scene.others.size(), 1U);
   const SceneSequence& sequence = scene.others[0].sequence;
   EXPECT_EQ(sequence.playback.frames_per_second, 12.0);
-  EXPECT_EQ(sequence.playback.between, CUMULET_BETWEEN_ADVECT);
+  EXPECT_EQ(sequence.playback.interpolation, CUMULET_FRAME_INTERPOLATION_ADVECT);
   EXPECT_EQ(sequence.playback.subframes, 8U);
   EXPECT_EQ(sequence.frame, Moment(3, 500));
   EXPECT_EQ(scene.sequence, SceneSequence());
@@ -714,7 +714,7 @@ TEST(SceneFile, EachVolumeMayBeASequence) {
 TEST(SceneFile, ModelsRoundTrip) {
   SceneOptions scene;
   scene.surfaces = "/data/town.glb";
-  scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
+  scene.surface.lighting = CUMULET_SURFACE_LIGHTING_DIRECT;
   scene.models.push_back({"/data/tree.glb"});
   SceneModel& fox = scene.models.emplace_back();
   fox.file = "/elsewhere/fox.glb";
@@ -754,7 +754,7 @@ TEST(SceneFile, ModelsRoundTrip) {
   const SceneOptions alone = parse_scene(scene_text(scene, path), path);
   EXPECT_TRUE(alone.surfaces.empty());
   EXPECT_EQ(alone.models, scene.models);
-  EXPECT_EQ(alone.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
+  EXPECT_EQ(alone.surface.lighting, CUMULET_SURFACE_LIGHTING_DIRECT);
 }
 
 TEST(SceneFile, ModelTransformIsTranslationRotationScale) {

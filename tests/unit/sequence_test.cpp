@@ -141,9 +141,9 @@ TEST_F(CSequence, PlaybackSettingsControlInterpolation) {
     EXPECT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_ERROR_INVALID_ARGUMENT) << what;
   };
   constexpr int none_of_them = 7;
-  std::memcpy(&playback.between, &none_of_them, sizeof playback.between);
+  std::memcpy(&playback.interpolation, &none_of_them, sizeof playback.interpolation);
   refused("an unknown way");
-  playback.between = CUMULET_BETWEEN_BLEND;
+  playback.interpolation = CUMULET_FRAME_INTERPOLATION_BLEND;
   playback.subframes = 1001;
   refused("too many");
   playback.subframes = 4;
@@ -169,13 +169,13 @@ TEST_F(CSequence, PlaybackSettingsControlInterpolation) {
   const Picture half = at(2.5);
   EXPECT_NE(difference(half, second), "");
   cumulet_sequence_info info = info_of(viewer.get());
-  EXPECT_EQ(info.asked_frame, 2U);
-  EXPECT_EQ(info.asked_position, 2.5);
-  EXPECT_EQ(info.drawn_frame, 2U);
-  EXPECT_EQ(info.drawn_position, 2.5);
+  EXPECT_EQ(info.requested_frame, 2U);
+  EXPECT_EQ(info.requested_position, 2.5);
+  EXPECT_EQ(info.displayed_frame, 2U);
+  EXPECT_EQ(info.displayed_position, 2.5);
   // The image stays until the next step. It is the same when played, scrubbed to or rebuilt.
   EXPECT_EQ(difference(at(2.7), half), "");
-  EXPECT_EQ(info_of(viewer.get()).asked_position, 2.5);
+  EXPECT_EQ(info_of(viewer.get()).requested_position, 2.5);
   EXPECT_NE(difference(at(2.75), half), "");
   ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), 2.5 / 24.0), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), half), "");
@@ -183,10 +183,10 @@ TEST_F(CSequence, PlaybackSettingsControlInterpolation) {
   EXPECT_EQ(difference(picture(viewer.get()), half), "");
   // Whole frames are not interpolated.
   for (const int frame : {0, 3, 6}) EXPECT_EQ(difference(at(frame), alone(frame)), "") << frame;
-  playback.between = CUMULET_BETWEEN_NONE;
+  playback.interpolation = CUMULET_FRAME_INTERPOLATION_NONE;
   ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
   EXPECT_EQ(difference(at(2.5), second), "");
-  EXPECT_EQ(info_of(viewer.get()).asked_position, 2.0);
+  EXPECT_EQ(info_of(viewer.get()).requested_position, 2.0);
 }
 
 // Played, scrubbed to, or loaded separately: bit-identical.
@@ -201,9 +201,9 @@ TEST_F(CSequence, FrameIsBitIdenticalHoweverItWasReached) {
     const Picture found = picture(viewer.get());
     EXPECT_EQ(difference(found, alone(frame)), "") << frame;
     const cumulet_sequence_info info = info_of(viewer.get());
-    EXPECT_EQ(info.asked_frame, std::uint32_t(frame));
-    EXPECT_EQ(info.is_drawn, 1);
-    EXPECT_EQ(info.drawn_frame, std::uint32_t(frame));
+    EXPECT_EQ(info.requested_frame, std::uint32_t(frame));
+    EXPECT_EQ(info.is_displayed, 1);
+    EXPECT_EQ(info.displayed_frame, std::uint32_t(frame));
   }
   EXPECT_TRUE(is_cached(viewer.get()));
   EXPECT_EQ(info_of(viewer.get()).ready_frames, std::uint32_t(count));
@@ -240,8 +240,8 @@ TEST_F(CSequence, ReportsSkippedFrames) {
   for (const int frame : {1, 2, 3}) {
     ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), frame), CUMULET_OK);
     EXPECT_EQ(difference(picture(viewer.get()), before), "") << frame;
-    EXPECT_EQ(info_of(viewer.get()).drawn_frame, 1U);
-    EXPECT_EQ(info_of(viewer.get()).asked_frame, std::uint32_t(frame));
+    EXPECT_EQ(info_of(viewer.get()).displayed_frame, 1U);
+    EXPECT_EQ(info_of(viewer.get()).requested_frame, std::uint32_t(frame));
   }
   ASSERT_TRUE(is_cached(viewer.get()));
   std::array<std::uint8_t, count> states{};
@@ -276,7 +276,7 @@ TEST_F(CSequence, SequenceWithoutReadableFramesKeepsTheOldVolume) {
   ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
   EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
   EXPECT_EQ(difference(target_.pixels(), before), "");
-  EXPECT_EQ(info_of(viewer.get()).is_drawn, 0);
+  EXPECT_EQ(info_of(viewer.get()).is_displayed, 0);
   // The next request clears the failure.
   ASSERT_EQ(cumulet_load_volume(viewer.get(), clip_.path(0).c_str(), nullptr), CUMULET_OK);
   EXPECT_EQ(difference(picture(viewer.get()), before), "");
@@ -305,7 +305,7 @@ TEST_F(CSequence, ScaleCameraAndGroundAreTheSameForAllFrames) {
     const CameraRef owner(fits);
     EXPECT_EQ(cumulet_set_camera(viewer, fits), CUMULET_OK);
     auto ground = make_desc<cumulet_ground_desc>();
-    ground.place = CUMULET_GROUND_BELOW;
+    ground.mode = CUMULET_GROUND_BELOW;
     EXPECT_EQ(cumulet_set_ground(viewer, &ground), CUMULET_OK);
   };
   const ViewerPtr single = make();
@@ -380,7 +380,7 @@ TEST_F(CSequence, ContinuesAfterAnUnreadableVolume) {
   ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 4.0), CUMULET_OK);
   auto frame = target_.frame();
   int calls = 0;
-  while (info_of(viewer.get()).drawn_frame != 4U && ++calls < 2000)
+  while (info_of(viewer.get()).displayed_frame != 4U && ++calls < 2000)
     ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
   EXPECT_LT(calls, 2000);
   // A changed setting applies to all frames and clears the failure.
@@ -403,7 +403,7 @@ TEST_F(CSequence, ContinuesAfterAnUnreadableVolume) {
   ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 2.0), CUMULET_OK);
   ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(2).c_str(), nullptr), CUMULET_OK);
   calls = 0;
-  while (info_of(viewer.get()).drawn_frame != 2U && ++calls < 2000)
+  while (info_of(viewer.get()).displayed_frame != 2U && ++calls < 2000)
     ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
   auto stats = make_desc<cumulet_stats>();
   auto wanted = make_desc<cumulet_stats>();
@@ -462,7 +462,7 @@ TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
     int calls = 0;
     do {
       ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
-    } while (info_of(viewer.get()).drawn_frame != std::uint32_t(i % count) && ++calls < 200);
+    } while (info_of(viewer.get()).displayed_frame != std::uint32_t(i % count) && ++calls < 200);
     EXPECT_LT(calls, 200) << i;
   }
 }
@@ -491,7 +491,7 @@ TEST_F(CSequence, PlaysWhileTheCameraMoves) {
     int calls = 0;
     do {
       ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
-    } while (info_of(viewer.get()).drawn_frame != std::uint32_t(i % count) && ++calls < 2000);
+    } while (info_of(viewer.get()).displayed_frame != std::uint32_t(i % count) && ++calls < 2000);
     ASSERT_LT(calls, 2000) << i;
   }
 }
@@ -502,13 +502,13 @@ TEST_F(CSequence, DrawnFrameIgnoresOtherSequences) {
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), all.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_sequence_set_frame(all.get(), 5.0), CUMULET_OK);
   picture(viewer.get());
-  ASSERT_EQ(info_of(viewer.get()).drawn_frame, 5U);
+  ASSERT_EQ(info_of(viewer.get()).displayed_frame, 5U);
   const SequenceRef two = make_sequence({clip_.path(1), clip_.path(2)});
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), two.get()), CUMULET_OK);
-  EXPECT_EQ(info_of(viewer.get()).is_drawn, 0);
+  EXPECT_EQ(info_of(viewer.get()).is_displayed, 0);
   picture(viewer.get());
-  EXPECT_EQ(info_of(viewer.get()).is_drawn, 1);
-  EXPECT_EQ(info_of(viewer.get()).drawn_frame, 0U);
+  EXPECT_EQ(info_of(viewer.get()).is_displayed, 1);
+  EXPECT_EQ(info_of(viewer.get()).displayed_frame, 0U);
 }
 
 TEST_F(CSequence, TimeMayBeSetFromAnyThread) {
@@ -615,8 +615,8 @@ TEST_F(PlayedInstances, FrameMatchesThatOfASingleVolume) {
     ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), frame / 24.0), CUMULET_OK);
     EXPECT_EQ(difference(picture(viewer.get()), still(frame, {0.0, 25.0})), "") << frame;
     const cumulet_sequence_info info = instance_info(viewer.get(), second.get());
-    EXPECT_EQ(info.drawn_frame, std::uint32_t(frame));
-    EXPECT_EQ(info.is_drawn, 1);
+    EXPECT_EQ(info.displayed_frame, std::uint32_t(frame));
+    EXPECT_EQ(info.is_displayed, 1);
   }
   // Both instances share one grid. Separate grids would have twice the cells.
   auto stats = make_desc<cumulet_stats>();
@@ -639,8 +639,8 @@ TEST_F(PlayedInstances, InstancesPlayIndependently) {
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), early.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_add_instance(viewer.get(), instance.get()), CUMULET_OK);
   const Picture both = picture(viewer.get());
-  EXPECT_EQ(info_of(viewer.get()).drawn_frame, 1U);
-  EXPECT_EQ(instance_info(viewer.get(), instance.get()).drawn_frame, 5U);
+  EXPECT_EQ(info_of(viewer.get()).displayed_frame, 1U);
+  EXPECT_EQ(instance_info(viewer.get(), instance.get()).displayed_frame, 5U);
   EXPECT_NE(difference(both, still(1, {0.0})), "");
   // Hidden instances do not follow their sequence and have no state.
   auto desc = make_desc<cumulet_instance_desc>();
@@ -666,7 +666,7 @@ TEST_F(PlayedInstances, MissingFramesAreReportedAndSkipped) {
   for (const int frame : {1, 2, 3}) {
     ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), frame), CUMULET_OK);
     EXPECT_EQ(difference(picture(viewer.get()), before), "") << frame;
-    EXPECT_EQ(instance_info(viewer.get(), instance.get()).drawn_frame, 1U);
+    EXPECT_EQ(instance_info(viewer.get(), instance.get()).displayed_frame, 1U);
   }
   std::array<char, 512> cause{};
   ASSERT_EQ(cumulet_get_instance_sequence_frame(viewer.get(), instance.get(), 3, cause.data(), cause.size()),
@@ -693,7 +693,7 @@ TEST_F(PlayedInstances, VolumeAndSequenceTogetherAreRejected) {
   cumulet_instance* out = nullptr;
   std::array<char, 256> error{};
   EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a dynamic volume");
   // From volume to sequence and back, and to neither.
   const ViewerPtr viewer = make();
   see_all(viewer.get());

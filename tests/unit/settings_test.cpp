@@ -29,7 +29,7 @@ using settings::Setting;
 template <class Visit>
 void for_each_descriptor(Visit&& visit) {
   visit(&SceneOptions::medium, cumulet_set_medium);
-  visit(&SceneOptions::light, cumulet_set_light);
+  visit(&SceneOptions::light, cumulet_set_sun_sky);
   visit(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   visit(&SceneOptions::ground, cumulet_set_ground);
   visit(&SceneOptions::grid, cumulet_set_grid);
@@ -128,9 +128,9 @@ void expect_all_fields() {
 
 TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_medium_desc>();
-  expect_all_fields<cumulet_light_desc>();
+  expect_all_fields<cumulet_sun_sky_desc>();
   expect_all_fields<cumulet_environment_settings_desc>();
-  expect_all_fields<cumulet_lamp_desc>();
+  expect_all_fields<cumulet_light_desc>();
   expect_all_fields<cumulet_ground_desc>();
   expect_all_fields<cumulet_grid_desc>();
   expect_all_fields<cumulet_surface_settings_desc>();
@@ -163,7 +163,8 @@ TEST(Settings, SceneFilesRoundTripEachSetting) {
     });
   });
   // Settings that scene files do not contain, or contain by name (surfaces.variant).
-  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "light_groups", "preview", "variant", "volume_alone"}));
+  EXPECT_EQ(without,
+            (std::set<std::string>{"first_sample", "light_groups", "preview", "variant", "separate_volume_aov"}));
 }
 
 TEST(Settings, DocumentationListsExactlyTheKeys) {
@@ -238,7 +239,7 @@ TEST(Settings, EachSettingHasAFlag) {
   // --sun and --sky-model set three settings at once.
   EXPECT_EQ(without, (std::set<std::string>{"first_sample", "ground_albedo", "light_groups", "preview", "sky",
                                             "sun_azimuth_degrees", "sun_elevation_degrees", "sun_irradiance",
-                                            "turbidity", "variant", "volume_alone"}));
+                                            "turbidity", "variant", "separate_volume_aov"}));
 }
 
 TEST(Settings, LibraryAcceptsEachAndNamesInvalidValues) {

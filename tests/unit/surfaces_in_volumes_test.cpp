@@ -373,7 +373,7 @@ TEST_P(SurfacesInVolumes, UnavailableAovsGiveAOneLineError) {
     return std::string();
   };
   EXPECT_EQ(message(Aov::normal, values.size()), "");
-  EXPECT_NE(message(Aov::volume, values.size()).find("volume_alone"), std::string::npos);
+  EXPECT_NE(message(Aov::volume, values.size()).find("separate_volume_aov"), std::string::npos);
   EXPECT_NE(message(Aov::normal, 7).find("6912 floats"), std::string::npos);
 }
 

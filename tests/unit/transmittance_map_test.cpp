@@ -101,14 +101,14 @@ class TransmittanceMaps : public testing::Test {
     auto medium = make_desc<cumulet_medium_desc>();
     medium.density_scale = density;
     EXPECT_EQ(cumulet_set_medium(viewer_.get(), &medium), CUMULET_OK);
-    use_march(CUMULET_MARCH_DENSE);
+    use_march(CUMULET_GRID_DENSE);
     desc_.size = 67;
     desc_.slices = 41;
     desc_.budget_ms = 1000.0;
   }
-  void use_march(cumulet_march march) const {
+  void use_march(cumulet_grid_type march) const {
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.march = march;
+    grid.type = march;
     grid.cells = CUMULET_CELLS_CONSTANT;
     grid.threshold = 1e-6;
     EXPECT_EQ(cumulet_set_grid(viewer_.get(), &grid), CUMULET_OK);
@@ -120,12 +120,12 @@ class TransmittanceMaps : public testing::Test {
   }
   cumulet_transmittance_map update() {
     auto map = make_desc<cumulet_transmittance_map>();
-    map.more = 1;
-    for (int i = 0; i < 100 && map.more != 0; ++i) {
+    map.incomplete = 1;
+    for (int i = 0; i < 100 && map.incomplete != 0; ++i) {
       EXPECT_EQ(cumulet_update_transmittance_map(viewer_.get(), &desc_, &map), CUMULET_OK)
           << cumulet_last_error(viewer_.get());
     }
-    EXPECT_EQ(map.more, 0);
+    EXPECT_EQ(map.incomplete, 0);
     return map;
   }
   [[nodiscard]] dvec3 from() const { return {desc_.position[0], desc_.position[1], desc_.position[2]}; }
@@ -261,7 +261,7 @@ dvec3 sun() {
 
 TEST_F(TransmittanceMaps, FollowTheSunForEveryGridType) {
   show();
-  for (const cumulet_march march : {CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK, CUMULET_MARCH_TET}) {
+  for (const cumulet_grid_type march : {CUMULET_GRID_DENSE, CUMULET_GRID_BRICKS, CUMULET_GRID_TETRAHEDRAL}) {
     SCOPED_TRACE(march);
     use_march(march);
     converge(viewer_.get(), target_.frame());
@@ -328,8 +328,8 @@ TEST_F(TransmittanceMaps, AreReusedWhileNothingChanges) {
   auto stats = make_desc<cumulet_stats>();
   ASSERT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
   const std::uint64_t both = stats.gl_bytes;
-  ASSERT_EQ(cumulet_drop_transmittance_map(viewer_.get(), 3), CUMULET_OK);
-  ASSERT_EQ(cumulet_drop_transmittance_map(viewer_.get(), 3), CUMULET_OK);
+  ASSERT_EQ(cumulet_destroy_transmittance_map(viewer_.get(), 3), CUMULET_OK);
+  ASSERT_EQ(cumulet_destroy_transmittance_map(viewer_.get(), 3), CUMULET_OK);
   ASSERT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
   EXPECT_EQ(both - stats.gl_bytes, 2U * 67 * 67 * 41);
   EXPECT_EQ(fake_.real().IsTexture(other.texture), GL_FALSE);
@@ -400,7 +400,7 @@ TEST_F(TransmittanceMaps, InvalidInputGivesAOneLineError) {
   refused([](auto& d) { d.budget_ms = -1.0; }, (of + "budget_ms is not from 0 to 1e9").c_str());
   auto desc = make_desc<cumulet_transmittance_map_desc>();
   EXPECT_EQ(cumulet_update_transmittance_map(viewer_.get(), &desc, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(cumulet_drop_transmittance_map(viewer_.get(), 16), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_destroy_transmittance_map(viewer_.get(), 16), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_update_transmittance_map(nullptr, &desc, &map), CUMULET_ERROR_INVALID_ARGUMENT);
   ASSERT_EQ(cumulet_detach(viewer_.get()), CUMULET_OK);
   EXPECT_EQ(cumulet_update_transmittance_map(viewer_.get(), &desc, &map), CUMULET_ERROR_DETACHED);

@@ -74,13 +74,13 @@ int main(int argc, char** argv) {
   cumulet_viewer* viewer = NULL;
   const cumulet_create_desc create = {.struct_size = sizeof create, .get_proc = get_proc};
   if (cumulet_create(&create, &viewer, error, sizeof error) != CUMULET_OK) fail(error);
-  const cumulet_light_desc light = {.struct_size = sizeof light,
-                                    .sun_azimuth_degrees = 60,
-                                    .sun_elevation_degrees = 40,
-                                    .sun_irradiance = {2.6f, 2.5f, 2.3f},
-                                    .sky_radiance = {0.2f, 0.3f, 0.5f}};
+  const cumulet_sun_sky_desc light = {.struct_size = sizeof light,
+                                      .sun_azimuth_degrees = 60,
+                                      .sun_elevation_degrees = 40,
+                                      .sun_irradiance = {2.6f, 2.5f, 2.3f},
+                                      .sky_radiance = {0.2f, 0.3f, 0.5f}};
   const cumulet_sampling_desc sampling = {.struct_size = sizeof sampling, .samples = 16};
-  if (cumulet_set_light(viewer, &light) != CUMULET_OK || cumulet_set_sampling(viewer, &sampling) != CUMULET_OK ||
+  if (cumulet_set_sun_sky(viewer, &light) != CUMULET_OK || cumulet_set_sampling(viewer, &sampling) != CUMULET_OK ||
       cumulet_load_volume(viewer, volume, NULL) != CUMULET_OK || cumulet_wait(viewer, -1.0) != CUMULET_OK)
     fail(cumulet_last_error(viewer));
 

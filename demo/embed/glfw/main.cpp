@@ -116,11 +116,11 @@ void run(GLFWwindow* window, Host& host, const std::string& volume, bool test) {
   host.viewer =
       must(cumulet::Viewer::create({.get_proc = glfwGetProcAddress,
                                     .update = [] { glfwPostEmptyEvent(); },  // from any thread: wakes the loop
-                                    .gl_state = cumulet::GlState::host_resets}));
-  must(host.viewer.set_light({.sun_azimuth_degrees = 60.0F,
-                              .sun_elevation_degrees = 40.0F,
-                              .sun_irradiance = {2.6F, 2.5F, 2.3F},
-                              .sky_radiance = {0.2F, 0.3F, 0.5F}}));
+                                    .gl_state = cumulet::GlStatePolicy::host_resets}));
+  must(host.viewer.set_sun_sky({.sun_azimuth_degrees = 60.0F,
+                                .sun_elevation_degrees = 40.0F,
+                                .sun_irradiance = {2.6F, 2.5F, 2.3F},
+                                .sky_radiance = {0.2F, 0.3F, 0.5F}}));
   must(host.viewer.set_sampling({.samples = test ? 4U : 0U}));
   must(host.viewer.load_volume(volume));
 
@@ -141,7 +141,7 @@ void run(GLFWwindow* window, Host& host, const std::string& volume, bool test) {
     float scale = 1.0F;
     glfwGetFramebufferSize(window, &width, &height);
     glfwGetWindowContentScale(window, &scale, nullptr);
-    glDisable(GL_SCISSOR_TEST);  // GlState::host_resets: the host sets all state that it uses
+    glDisable(GL_SCISSOR_TEST);  // GlStatePolicy::host_resets: the host sets all state that it uses
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glClear(GL_COLOR_BUFFER_BIT);
@@ -155,7 +155,7 @@ void run(GLFWwindow* window, Host& host, const std::string& volume, bool test) {
       write_picture(host, width, height);
     }
     glfwSwapBuffers(window);
-    if (frame.has(cumulet::RenderFlags::more)) {
+    if (frame.has(cumulet::RenderFlags::incomplete)) {
       glfwPollEvents();
     } else {
       glfwWaitEvents();

@@ -132,7 +132,7 @@ static gboolean on_render(GtkGLArea* area, GdkGLContext* context, gpointer user)
     g_printerr("cumulet-embed-gtk: OpenGL error 0x%04x after a frame\n", error);
   }
   /* gtk_gl_area_queue_render has no effect during a frame, so the next frame is requested by a tick callback. */
-  if ((host->result.flags & CUMULET_RENDER_MORE) && !host->tick)
+  if ((host->result.flags & CUMULET_RENDER_INCOMPLETE) && !host->tick)
     host->tick = gtk_widget_add_tick_callback(widget, on_tick, host, NULL);
   return TRUE;
 }
@@ -340,13 +340,13 @@ static gboolean make_host(Host* host, GtkApplication* application) {
     g_printerr("cumulet-embed-gtk: %s\n", error);
     return FALSE;
   }
-  cumulet_light_desc light = {.struct_size = sizeof light,
-                              .sun_azimuth_degrees = 60.0F,
-                              .sun_elevation_degrees = 40.0F,
-                              .sun_irradiance = {2.6F, 2.5F, 2.3F},
-                              .sky_radiance = {0.1F, 0.15F, 0.25F}};
+  cumulet_sun_sky_desc light = {.struct_size = sizeof light,
+                                .sun_azimuth_degrees = 60.0F,
+                                .sun_elevation_degrees = 40.0F,
+                                .sun_irradiance = {2.6F, 2.5F, 2.3F},
+                                .sky_radiance = {0.1F, 0.15F, 0.25F}};
   host->status = GTK_LABEL(gtk_label_new(""));
-  ok(host, cumulet_set_light(host->viewer, &light));
+  ok(host, cumulet_set_sun_sky(host->viewer, &light));
 
   host->window = GTK_WINDOW(gtk_application_window_new(application));
   gtk_window_set_title(host->window, "Cumulet in GTK 4");

@@ -262,10 +262,10 @@ void write_picture(const std::string& path, int width, int height) {
 
 cumulet::Viewer make_viewer(cumulet::Background background, bool test) {
   auto viewer = must(cumulet::Viewer::create({.get_proc = glfwGetProcAddress, .update = [] { glfwPostEmptyEvent(); }}));
-  must(viewer.set_light({.sun_azimuth_degrees = 60.0F,
-                         .sun_elevation_degrees = 40.0F,
-                         .sun_irradiance = {2.6F, 2.5F, 2.3F},
-                         .sky_radiance = {0.2F, 0.3F, 0.5F}}));
+  must(viewer.set_sun_sky({.sun_azimuth_degrees = 60.0F,
+                           .sun_elevation_degrees = 40.0F,
+                           .sun_irradiance = {2.6F, 2.5F, 2.3F},
+                           .sky_radiance = {0.2F, 0.3F, 0.5F}}));
   must(viewer.set_sampling({.samples = test ? 2U : 0U}));
   must(viewer.set_display({.background = background}));
   return viewer;
@@ -305,7 +305,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
       if (!progress.message.empty()) ImGui::TextWrapped("%s", progress.message.c_str());
       if (progress.stage != cumulet::Stage::idle) ImGui::ProgressBar(static_cast<float>(progress.fraction));
       const Panel panel(image_viewer);
-      image = must(image_viewer.render({.target = cumulet::Target::texture,
+      image = must(image_viewer.render({.target = cumulet::FrameTarget::texture,
                                         .width = static_cast<std::uint32_t>(panel.width),
                                         .height = static_cast<std::uint32_t>(panel.height),
                                         .flip_y = true}));
@@ -326,7 +326,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
       const Panel panel(scene_viewer);
       target.resize(panel.width, panel.height);
       const auto [view, projection] =
-          must(camera.get_matrices(double(panel.width) / panel.height, cumulet::Clip::negative_one_to_one));
+          must(camera.get_matrices(double(panel.width) / panel.height, cumulet::ClipSpace::negative_one_to_one));
       draw_scene(target, program, vertex_array, multiply(projection, view), must(scene_viewer.get_bounds()), shadow);
       scene = must(scene_viewer.render({.framebuffer = target.framebuffer,
                                         .width = static_cast<std::uint32_t>(panel.width),
@@ -350,13 +350,13 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     picture_wanted = picture_wanted || (p_down && !p_was_down);
     p_was_down = p_down;
     if (picture_wanted && image.has(cumulet::RenderFlags::converged) && scene.has(cumulet::RenderFlags::converged) &&
-        !shadow.more) {
+        !shadow.incomplete) {
       write_picture(folder + "/imgui-" + std::to_string(++pictures) + ".ppm", width, height);
       picture_wanted = false;
     }
     glfwSwapBuffers(window);
-    if (image.has(cumulet::RenderFlags::more) || scene.has(cumulet::RenderFlags::more) || shadow.more ||
-        picture_wanted) {
+    if (image.has(cumulet::RenderFlags::incomplete) || scene.has(cumulet::RenderFlags::incomplete) ||
+        shadow.incomplete || picture_wanted) {
       glfwPollEvents();
     } else {
       glfwWaitEventsTimeout(0.1);

@@ -130,7 +130,7 @@ class Viewer final : public QOpenGLWidget {
     ++frames_;
     if (const GLenum error = gl->glGetError(); error != GL_NO_ERROR)
       emit problem(QString("OpenGL error 0x%1 after a frame").arg(error, 4, 16, QChar('0')));
-    if ((result_.flags & CUMULET_RENDER_MORE) != 0) update();
+    if ((result_.flags & CUMULET_RENDER_INCOMPLETE) != 0) update();
   }
 
   void mousePressEvent(QMouseEvent* event) override { pointer(CUMULET_EVENT_BUTTON_DOWN, *event); }
@@ -329,7 +329,7 @@ class Window final : public QMainWindow {
     elevation = add_slider(*form, "Sun elevation", -90.0, 90.0, 40.0, [this] { set_light(); });
     for (QDoubleSpinBox* box : {azimuth, elevation}) box->setSuffix("\u00b0");
     march = new QComboBox;
-    march->addItems({"Tetrahedra", "Dense voxels", "Bricks"});  // in the order of cumulet_march
+    march->addItems({"Tetrahedra", "Dense voxels", "Bricks"});  // in the order of cumulet_grid_type
     connect(march, &QComboBox::currentIndexChanged, this, [this] { set_grid(); });
     form->addRow("March", march);
     threshold = add_slider(*form, "Cell threshold", -4.0, 0.0, std::log10(0.15), [this] { set_grid(); });
@@ -378,17 +378,17 @@ class Window final : public QMainWindow {
   }
 
   void set_light() const {
-    auto desc = make<cumulet_light_desc>();
+    auto desc = make<cumulet_sun_sky_desc>();
     desc.sun_azimuth_degrees = static_cast<float>(azimuth->value());
     desc.sun_elevation_degrees = static_cast<float>(elevation->value());
     std::ranges::copy(std::array{2.6F, 2.5F, 2.3F}, desc.sun_irradiance);
     std::ranges::copy(std::array{0.1F, 0.15F, 0.25F}, desc.sky_radiance);
-    each(cumulet_set_light, desc);
+    each(cumulet_set_sun_sky, desc);
   }
 
   void set_grid() const {
     auto desc = make<cumulet_grid_desc>();
-    desc.march = static_cast<cumulet_march>(march->currentIndex());
+    desc.type = static_cast<cumulet_grid_type>(march->currentIndex());
     desc.criterion = CUMULET_CRITERION_TRANSMITTANCE;
     desc.threshold = std::pow(10.0, threshold->value());
     each(cumulet_set_grid, desc);
@@ -505,10 +505,10 @@ class SelfTest {
     settle();
     shoot("apart");
 
-    window_.march->setCurrentIndex(CUMULET_MARCH_BRICK);
+    window_.march->setCurrentIndex(CUMULET_GRID_BRICKS);
     settle();
     shoot("bricks");
-    window_.march->setCurrentIndex(CUMULET_MARCH_TET);
+    window_.march->setCurrentIndex(CUMULET_GRID_TETRAHEDRAL);
     window_.threshold->setValue(-1.0);
     window_.density->setValue(-1.0);
     window_.azimuth->setValue(-120.0);

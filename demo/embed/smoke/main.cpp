@@ -216,7 +216,7 @@ struct Mouse {
 
 struct Options {
   int voxels = 64;
-  cumulet::Build build = cumulet::Build::cpu;
+  cumulet::BuildDevice build = cumulet::BuildDevice::cpu;
   bool fire = false;
 };
 
@@ -228,31 +228,31 @@ class Host {
         solver_(voxels_),
         viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
     if (fire_) {
-      must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
-                              .sun_elevation_degrees = 4.0F,
-                              .sun_irradiance = {0.4F, 0.2F, 0.1F},
-                              .sky_radiance = {0.05F, 0.07F, 0.12F}}));
+      must(viewer_.set_sun_sky({.sun_azimuth_degrees = 60.0F,
+                                .sun_elevation_degrees = 4.0F,
+                                .sun_irradiance = {0.4F, 0.2F, 0.1F},
+                                .sky_radiance = {0.05F, 0.07F, 0.12F}}));
       must(viewer_.set_medium({.density_scale = 9.0,
                                .coalbedo = {0.3F, 0.3F, 0.3F},
                                .temperature_scale = 3000.0F,
                                .blackbody = 1.0F,
                                .blackbody_tint = {12.0F, 12.0F, 12.0F}}));
     } else {
-      must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
-                              .sun_elevation_degrees = 50.0F,
-                              .sun_irradiance = {3.0F, 2.8F, 2.5F},
-                              .sky_radiance = {0.25F, 0.35F, 0.5F}}));
+      must(viewer_.set_sun_sky({.sun_azimuth_degrees = 60.0F,
+                                .sun_elevation_degrees = 50.0F,
+                                .sun_irradiance = {3.0F, 2.8F, 2.5F},
+                                .sky_radiance = {0.25F, 0.35F, 0.5F}}));
       must(viewer_.set_medium({.density_scale = 9.0, .coalbedo = {0.03F, 0.03F, 0.03F}}));
     }
-    must(viewer_.set_ground({.place = cumulet::Ground::below}));
+    must(viewer_.set_ground({.mode = cumulet::GroundMode::below}));
     must(viewer_.set_display({.denoise = cumulet::Denoise::fast}));
     must(viewer_.set_sampling({.samples = test ? 8U : 64U}));
     // The bounding box is fixed, so that neither the camera nor the ground moves while the smoke rises.
-    live_ = must(cumulet::Live::create({.bounds_min = {-1.0, -1.0, -1.0},
-                                        .bounds_max = {1.0, 1.0, 1.0},
-                                        .stays_in_gl = options.build == cumulet::Build::gpu}));
-    must(viewer_.set_grid({.build = options.build}));
-    must(viewer_.set_live(live_));
+    live_ = must(cumulet::DynamicVolume::create({.bounds_min = {-1.0, -1.0, -1.0},
+                                                 .bounds_max = {1.0, 1.0, 1.0},
+                                                 .gpu_resident = options.build == cumulet::BuildDevice::gpu}));
+    must(viewer_.set_grid({.build_device = options.build}));
+    must(viewer_.set_dynamic_volume(live_));
   }
 
   [[nodiscard]] cumulet::Viewer& viewer() { return viewer_; }
@@ -270,7 +270,7 @@ class Host {
     heat.channel = cumulet::Channel::temperature;
     heat.texture = solver_.heat();
     const std::array fields{smoke, heat};
-    must(viewer_.live_set_gl(live_, {.fields = {fields.data(), fire_ ? 2U : 1U}, .name = "smoke"}));
+    must(viewer_.dynamic_volume_set_gl(live_, {.fields = {fields.data(), fire_ ? 2U : 1U}, .name = "smoke"}));
   }
 
   /// Returns the projected center of mass of the last step's smoke in the image, 0 to 1, from the top left.
@@ -303,7 +303,8 @@ class Host {
     double half_height = 0.0;
   };
   [[nodiscard]] Seen look(double aspect) {
-    const auto matrices = must(must(viewer_.get_camera()).get_matrices(aspect, cumulet::Clip::negative_one_to_one));
+    const auto matrices =
+        must(must(viewer_.get_camera()).get_matrices(aspect, cumulet::ClipSpace::negative_one_to_one));
     return {matrices.view, 1.0 / matrices.projection[0], 1.0 / matrices.projection[5]};
   }
 
@@ -330,7 +331,7 @@ class Host {
   bool fire_;
   Solver solver_;
   std::optional<Mouse> mouse_;  // mouse state of the last frame while the button is pressed
-  cumulet::Live live_;
+  cumulet::DynamicVolume live_;
   cumulet::Viewer viewer_;
 };
 
@@ -387,16 +388,16 @@ void play(const std::string& record, const std::string& folder, const Options& o
   Host host([](const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }, options, true);
   cumulet::Viewer& viewer = host.viewer();
   const cumulet::FrameDesc frame{
-      .budget_ms = 30.0, .target = cumulet::Target::texture, .width = width, .height = height};
+      .budget_ms = 30.0, .target = cumulet::FrameTarget::texture, .width = width, .height = height};
   Mouse mouse;
   std::size_t next = 0;
   std::uint64_t drawn = 0;
   const int frames = moves.back().frame + 1;
   const auto follow = [&] {
-    const auto info = must(viewer.get_live_info());
-    if (info.drawn_state < drawn) fail("a state was drawn after a newer one");
-    if (info.ready_count > info.drawn_count + 1) fail("a state was built and never drawn");
-    drawn = info.drawn_state;
+    const auto info = must(viewer.get_dynamic_volume_info());
+    if (info.displayed_update < drawn) fail("a state was drawn after a newer one");
+    if (info.ready_count > info.displayed_count + 1) fail("a state was built and never drawn");
+    drawn = info.displayed_update;
     return info;
   };
   for (int i = 0; i < frames; ++i) {
@@ -408,15 +409,15 @@ void play(const std::string& record, const std::string& folder, const Options& o
   // Returns true if no work is pending and the latest state is drawn.
   const auto rests = [&] {
     return must(viewer.render(frame)).has(cumulet::RenderFlags::converged) &&
-           follow().drawn_state == follow().handed_state;
+           follow().displayed_update == follow().submitted_update;
   };
   for (int more = 0; !rests(); ++more) {
     if (more == 1000) fail("the newest state is never drawn");
   }
   const auto info = follow();
-  std::printf("%d frames, %llu states, %llu drawn\n", frames, static_cast<unsigned long long>(info.handed_state),
-              static_cast<unsigned long long>(info.drawn_count));
-  if (info.drawn_count * 20 < info.handed_state) fail("states starve");
+  std::printf("%d frames, %llu states, %llu drawn\n", frames, static_cast<unsigned long long>(info.submitted_update),
+              static_cast<unsigned long long>(info.displayed_count));
+  if (info.displayed_count * 20 < info.submitted_update) fail("states starve");
 
   // Checks that the image shows the latest state: the center of the smoke must agree.
   must(viewer.set_ground({}));
@@ -446,7 +447,7 @@ void play(const std::string& record, const std::string& folder, const Options& o
     std::printf("hottest %.3f, %.3f, %.3f\n", double{color[0]}, double{color[1]}, double{color[2]});
     if (!(color[0] > 1.0F && color[0] > 3.0F * color[2])) fail("nothing glows");
   }
-  must(viewer.set_ground({.place = cumulet::Ground::below}));
+  must(viewer.set_ground({.mode = cumulet::GroundMode::below}));
   while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {
   }
   std::vector<std::uint8_t> picture(std::size_t{4} * width * height);
@@ -529,7 +530,7 @@ int main(int argc, char** argv) {
     if (std::strcmp(argv[i], "--build") == 0) built = argv[i + 1];
     if (std::strcmp(argv[i], "--fire") == 0) fire = argv[i + 1];
   }
-  options.build = built == "gpu" ? cumulet::Build::gpu : cumulet::Build::cpu;
+  options.build = built == "gpu" ? cumulet::BuildDevice::gpu : cumulet::BuildDevice::cpu;
   options.fire = fire == "on";
   if (argc % 2 == 0 || (built != "cpu" && built != "gpu") || (fire != "on" && fire != "off") ||
       folder.empty() != mouse.empty() || options.voxels < 8 || options.voxels > 256)

@@ -19,7 +19,7 @@
  *
  * The library creates no window and no context, and does not link OpenGL: GL functions come from the host's get_proc
  * callback. No result depends on global state. Viewers are independent of each other, in one context or several and on
- * one thread or several, unless they share shader programs (cumulet_programs).
+ * one thread or several, unless they share shader programs (cumulet_shader_cache).
  *
  * @section cumulet_life_cycle Life cycle
  *
@@ -41,8 +41,8 @@
  * - Functions marked [GL] need the attached context, or a context that shares objects with it, current on the calling
  *   thread. Otherwise each call returns CUMULET_ERROR_GL and changes nothing; the next call with the context current
  *   works again. No other function uses GL.
- * - Functions of camera, volume, sequence, live, surfaces, model, instance, environment and programs handles may be
- *   called on any thread at any time.
+ * - Functions of camera, volume, sequence, dynamic volume, surfaces, model, instance, environment and shader cache
+ *   handles may be called on any thread at any time.
  * - The viewer's worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render
  *   uploads the results within its time budget, and shows the last complete image until then.
  * - Requests are coalesced: each kind of work has at most one running and one queued request, and a new request
@@ -57,9 +57,9 @@
  *   that retain or release handles, cumulet_status_text, cumulet_version, cumulet_cryptomatte_id, cumulet_region_pixels
  *   and cumulet_transmittance_map_glsl. Other calls inside a callback, for any viewer or handle, return
  *   CUMULET_ERROR_INVALID_ARGUMENT; cumulet_destroy does nothing.
- * - Callbacks may be called while [GL] calls of other viewers with the same programs wait for their turn. Take no lock
- *   in a callback that is also held around a [GL] call.
- * - A call that changes a camera, an instance, a model, a sequence or a live volume runs the update callbacks of all
+ * - Callbacks may be called while [GL] calls of other viewers with the same shader cache wait for their turn. Take no
+ *   lock in a callback that is also held around a [GL] call.
+ * - A call that changes a camera, an instance, a model, a sequence or a dynamic volume runs the update callbacks of all
  *   viewers that show it. Other calls for that handle wait meanwhile. Take no lock in a callback that is also held
  *   around calls for such handles.
  *
@@ -108,7 +108,7 @@
  *
  * and the contents of the frame's own target. It never changes queries, transform feedback, the debug callback and its
  * filters, sync objects of the host, or any other object. The one sync object that it uses is the one in
- * cumulet_gl_state_desc, for which the device waits. Do not call the library inside transform feedback, conditional
+ * cumulet_gl_volume_desc, for which the device waits. Do not call the library inside transform feedback, conditional
  * rendering or a query of the host.
  *
  * With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: after a call the state listed above is undefined.
@@ -164,8 +164,8 @@
  *
  * - cumulet_wait, cumulet_progress.status and CUMULET_RENDER_FAILED report work that fails on a worker thread.
  *   CUMULET_RENDER_FAILED leaves out CUMULET_ERROR_CANCELLED.
- * - There are five kinds of content, in this order: the volume (from a file, a cumulet_volume, a sequence or a live
- *   volume), the volumes of instances, the surfaces, the models, and the environment or physical sky.
+ * - There are five kinds of content, in this order: the volume (from a file, a cumulet_volume, a sequence or a
+ *   dynamic volume), the volumes of instances, the surfaces, the models, and the environment or physical sky.
  * - Each kind keeps the failure of its last work until the next call that loads or sets this kind, including with NULL.
  *   Work that such a call ends counts as cancelled. For instances and models, the failure is kept as long as a failed
  *   one is shown.
@@ -227,14 +227,16 @@ extern "C" {
 #define CUMULET_VERSION_MINOR 2
 #define CUMULET_VERSION_PATCH 0
 
-typedef struct cumulet_viewer cumulet_viewer;           /**< Renders a scene. Ended by cumulet_destroy. */
-typedef struct cumulet_volume cumulet_volume;           /**< Immutable voxels. Ended by cumulet_volume_release. */
-typedef struct cumulet_surfaces cumulet_surfaces;       /**< Immutable meshes. Ended by cumulet_surfaces_release. */
-typedef struct cumulet_camera cumulet_camera;           /**< Ended by cumulet_camera_release. */
-typedef struct cumulet_programs cumulet_programs;       /**< Shader programs. Ended by cumulet_programs_release. */
+typedef struct cumulet_viewer cumulet_viewer;     /**< Renders a scene. Ended by cumulet_destroy. */
+typedef struct cumulet_volume cumulet_volume;     /**< Immutable voxels. Ended by cumulet_volume_release. */
+typedef struct cumulet_surfaces cumulet_surfaces; /**< Immutable meshes. Ended by cumulet_surfaces_release. */
+typedef struct cumulet_camera cumulet_camera;     /**< Ended by cumulet_camera_release. */
+/** Shader programs. Ended by cumulet_shader_cache_release. */
+typedef struct cumulet_shader_cache cumulet_shader_cache;
 typedef struct cumulet_environment cumulet_environment; /**< Environment map. Ended by cumulet_environment_release. */
 typedef struct cumulet_sequence cumulet_sequence;       /**< One volume per frame. Ended by cumulet_sequence_release. */
-typedef struct cumulet_live cumulet_live;               /**< A dynamic volume. Ended by cumulet_live_release. */
+/** A volume whose content the host replaces. Ended by cumulet_dynamic_volume_release. */
+typedef struct cumulet_dynamic_volume cumulet_dynamic_volume;
 
 /** The result of a call. Zero is success; errors are negative. */
 typedef enum cumulet_status {
@@ -288,7 +290,7 @@ typedef enum cumulet_log_level {
 
 /**
  * Returns the address of a GL function, or NULL. It is called only during cumulet_create and cumulet_attach. The
- * library calls the returned functions as long as this viewer is attached, or any viewer that shares its programs.
+ * library calls the returned functions as long as this viewer is attached, or any viewer that shares its shader cache.
  *
  * @param user cumulet_create_desc.get_proc_user, or the argument of cumulet_attach.
  * @param name The function's name, for example "glDispatchCompute".
@@ -325,13 +327,13 @@ typedef void (*cumulet_update_fn)(void* user);
 typedef void (*cumulet_trace_fn)(void* user, const char* name, double begin, double end);
 
 /** Whether [GL] calls save and restore the host's GL state; see @ref cumulet_gl. */
-typedef enum cumulet_gl_state {
+typedef enum cumulet_gl_state_policy {
   CUMULET_GL_STATE_RESTORE = 0,    /**< [GL] calls leave the state as they found it. */
   CUMULET_GL_STATE_HOST_RESETS = 1 /**< They do not: the host sets all that it needs afterwards, as Qt and GTK do. */
-} cumulet_gl_state;
+} cumulet_gl_state_policy;
 
-/** How shader programs are cached; see cumulet_programs_create. */
-typedef struct cumulet_programs_desc {
+/** How shader programs are cached; see cumulet_shader_cache_create. */
+typedef struct cumulet_shader_cache_desc {
   size_t struct_size;
   /**
    * UTF-8 path of the folder that keeps program binaries between runs, so that the driver need not compile again. NULL
@@ -352,14 +354,14 @@ typedef struct cumulet_programs_desc {
    * own shaders.
    */
   const char* shaders;
-} cumulet_programs_desc;
+} cumulet_shader_cache_desc;
 
 /**
- * Creates a cache of GL programs that viewers share (cumulet_create_desc.programs). Viewers that are attached to one
- * context, or to contexts that share objects, compile each program only once among them.
+ * Creates a cache of shader programs that viewers share (cumulet_create_desc.shader_cache). Viewers that are attached
+ * to one context, or to contexts that share objects, compile each program only once among them.
  *
  * - The programs are deleted with the last viewer that is attached to them; the files in the folder stay.
- * - These viewers also share the GL memory of live volumes.
+ * - These viewers also share the GL memory of dynamic volumes.
  * - [GL] calls of viewers that share programs wait for each other if they come from several threads. Callbacks may be
  *   called meanwhile: take no lock in them that is held around a [GL] call.
  * - The functions that get_proc returned for one of these viewers must stay callable until none of them is attached.
@@ -372,21 +374,21 @@ typedef struct cumulet_programs_desc {
  * @param error_size Bytes at error.
  * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or CUMULET_ERROR_UNSUPPORTED for shaders in a release build.
  */
-CUMULET_API cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumulet_programs** out,
-                                                   char* error, size_t error_size);
+CUMULET_API cumulet_status cumulet_shader_cache_create(const cumulet_shader_cache_desc* desc,
+                                                       cumulet_shader_cache** out, char* error, size_t error_size);
 /**
  * Adds a reference. Threads: any thread, also inside callbacks.
  *
- * @param programs May be NULL.
- * @return programs.
+ * @param cache May be NULL.
+ * @return cache.
  */
-CUMULET_API cumulet_programs* cumulet_programs_retain(cumulet_programs* programs);
+CUMULET_API cumulet_shader_cache* cumulet_shader_cache_retain(cumulet_shader_cache* cache);
 /**
  * Removes a reference; the last one ends the handle. Threads: any thread, also inside callbacks.
  *
- * @param programs May be NULL.
+ * @param cache May be NULL.
  */
-CUMULET_API void cumulet_programs_release(cumulet_programs* programs);
+CUMULET_API void cumulet_shader_cache_release(cumulet_shader_cache* cache);
 
 /** How a viewer is created; all callbacks are optional. */
 typedef struct cumulet_create_desc {
@@ -397,10 +399,10 @@ typedef struct cumulet_create_desc {
   void* log_user;
   cumulet_update_fn update; /**< Is called when there is something to render. NULL: none. */
   void* update_user;
-  cumulet_gl_state gl_state;
+  cumulet_gl_state_policy gl_state;
   cumulet_trace_fn trace; /**< Receives timeline intervals. NULL: none. */
   void* trace_user;
-  cumulet_programs* programs; /**< Shared programs, retained. NULL: the viewer's own, without a folder. */
+  cumulet_shader_cache* shader_cache; /**< Shared programs, retained. NULL: the viewer's own, without a folder. */
 } cumulet_create_desc;
 
 /**
@@ -552,8 +554,8 @@ typedef struct cumulet_volume_file_desc {
   /**
    * Velocity in world units per second: a grid of vectors, or three scalar grids whose names end in x, y and z after
    * this name. to_world rotates and scales it. It is used for CUMULET_AOV_VELOCITY, motion vectors, motion blur and
-   * CUMULET_BETWEEN_ADVECT. "none" saves the reading, up to 36 bytes per voxel of main memory, and 8 bytes per cell of
-   * main memory and of GL memory.
+   * CUMULET_FRAME_INTERPOLATION_ADVECT. "none" saves the reading, up to 36 bytes per voxel of main memory, and 8 bytes
+   * per cell of main memory and of GL memory.
    *
    * A grid that is named here must be valid. One that is found by its name is left out, with a warning, if it cannot be
    * read.
@@ -672,7 +674,7 @@ typedef struct cumulet_field {
 /**
  * Gives memory back to the host. Called on any thread; must not call the library, except to retain and release handles.
  *
- * @param user cumulet_state_desc.release_user.
+ * @param user cumulet_volume_fields_desc.release_user.
  */
 typedef void (*cumulet_release_fn)(void* user);
 
@@ -681,7 +683,7 @@ typedef void (*cumulet_release_fn)(void* user);
  * density, temperature and flame. A field with other voxels than density's is resampled to them, as described in
  * docs/grids.md. Hosts that submit many states should give all fields the same size and index_to_world.
  */
-typedef struct cumulet_state_desc {
+typedef struct cumulet_volume_fields_desc {
   size_t struct_size;
   const cumulet_field* fields;
   uint64_t field_count;
@@ -689,12 +691,12 @@ typedef struct cumulet_state_desc {
   /**
    * NULL: the call copies the voxels. Otherwise they are read later, in place, and must not change until the library
    * calls this function with release_user. It is called once, possibly within the call, when the voxels were read or
-   * are no longer needed. It is not called if the call fails. Only cumulet_live_set accepts it, and
-   * cumulet_live_update cannot follow.
+   * are no longer needed. It is not called if the call fails. Only cumulet_dynamic_volume_set accepts it, and
+   * cumulet_dynamic_volume_update cannot follow.
    */
   cumulet_release_fn release;
   void* release_user;
-} cumulet_state_desc;
+} cumulet_volume_fields_desc;
 
 /**
  * Creates a volume with several channels, which are copied.
@@ -708,8 +710,8 @@ typedef struct cumulet_state_desc {
  * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for channels that occur twice or are incomplete, for counts that
  *         do not agree, and for a release; or CUMULET_ERROR_FILE for unsuitable matrices, bricks or tiles.
  */
-CUMULET_API cumulet_status cumulet_volume_from_state(const cumulet_state_desc* desc, cumulet_volume** out, char* error,
-                                                     size_t error_size);
+CUMULET_API cumulet_status cumulet_volume_from_fields(const cumulet_volume_fields_desc* desc, cumulet_volume** out,
+                                                      char* error, size_t error_size);
 
 /**
  * Adds a reference. Threads: any thread, also inside callbacks.
@@ -771,9 +773,9 @@ CUMULET_API cumulet_status cumulet_volume_suggest_density_scale(const cumulet_vo
  * @param user    The argument of cumulet_list_grids.
  * @param name    The grid's name, "name[1]" if the file repeats one.
  * @param type    Its value type as in the file.
- * @param refusal "" if the grid can be shown, otherwise the reason why not.
+ * @param unsupported_reason "" if the grid can be shown, otherwise the reason why not.
  */
-typedef void (*cumulet_grid_fn)(void* user, const char* name, const char* type, const char* refusal);
+typedef void (*cumulet_grid_fn)(void* user, const char* name, const char* type, const char* unsupported_reason);
 /**
  * Calls fn for each grid of a .vdb or .nvdb file, on the calling thread, without reading voxels.
  *
@@ -842,18 +844,18 @@ enum { CUMULET_HISTOGRAM_BINS = 64 };
 
 /** The values that the statistics of a cumulet_grid_info are about. */
 typedef enum cumulet_grid_values {
-  CUMULET_GRID_VALUES_NONE = 0,    /**< Voxels of a type that is not read, or damaged: the statistics are 0. */
-  CUMULET_GRID_VALUES_SCALARS = 1, /**< Scalars. */
-  CUMULET_GRID_VALUES_LENGTHS = 2  /**< Magnitudes of vectors. */
+  CUMULET_GRID_VALUES_NONE = 0,      /**< Voxels of a type that is not read, or damaged: the statistics are 0. */
+  CUMULET_GRID_VALUES_SCALARS = 1,   /**< Scalars. */
+  CUMULET_GRID_VALUES_MAGNITUDES = 2 /**< Magnitudes of vectors. */
 } cumulet_grid_values;
 
 /** Properties of one grid of a file. The fields after `values`, except `channel`, need the grid's voxels. */
 typedef struct cumulet_grid_info {
   size_t struct_size;
-  const char* name;       /**< "name[1]" if the file repeats one. */
-  const char* type;       /**< As in the file: "float", "half", "vec3s", ... */
-  const char* grid_class; /**< "fog volume", "level set", "unknown", ... */
-  const char* refusal;    /**< "" if the grid can be shown, otherwise the reason why not. */
+  const char* name;               /**< "name[1]" if the file repeats one. */
+  const char* type;               /**< As in the file: "float", "half", "vec3s", ... */
+  const char* grid_class;         /**< "fog volume", "level set", "unknown", ... */
+  const char* unsupported_reason; /**< "" if the grid can be shown, otherwise the reason why not. */
   uint32_t metadata_count;
   cumulet_grid_values values;
   double index_to_world[16]; /**< To the file's own world space. */
@@ -983,18 +985,18 @@ typedef enum cumulet_repeat {
  * same worker and within the same memory. If one cannot be made because one of the two files cannot be read, the frame
  * before it is shown.
  */
-typedef enum cumulet_between {
-  CUMULET_BETWEEN_NONE = 0, /**< No interpolation: the frame before the position is shown. */
+typedef enum cumulet_frame_interpolation {
+  CUMULET_FRAME_INTERPOLATION_NONE = 0, /**< No interpolation: the frame before the position is shown. */
   /** Weighted mean of both frames, field by field. Color, anisotropy and velocity are weighted by density, too. */
-  CUMULET_BETWEEN_BLEND = 1,
+  CUMULET_FRAME_INTERPOLATION_BLEND = 1,
   /**
    * Both frames are advected to the position along their own velocities (semi-Lagrangian, midpoint rule), one forward
    * and one backward, and then blended. Smoke then moves, where blending would fade it from one place to another. The
    * velocities are the files' own (docs/grids.md), in world units per second. If one of the frames has none, the frames
    * are only blended.
    */
-  CUMULET_BETWEEN_ADVECT = 2
-} cumulet_between;
+  CUMULET_FRAME_INTERPOLATION_ADVECT = 2
+} cumulet_frame_interpolation;
 
 /** How time maps to frames. */
 typedef struct cumulet_playback_desc {
@@ -1004,11 +1006,11 @@ typedef struct cumulet_playback_desc {
   cumulet_repeat repeat;
   uint32_t first_frame; /**< First frame that is played. */
   uint32_t frame_count; /**< Number of frames that are played; 0: all from first_frame on. */
-  cumulet_between between;
+  cumulet_frame_interpolation interpolation;
   /**
    * Positions per frame at which an interpolated volume is made, including the frame itself. Each is shown until the
    * next one, so that built volumes can be reused. 1 to 1000, and at most 1,000,000 in the whole sequence; 0: 4. Not
-   * used with CUMULET_BETWEEN_NONE.
+   * used with CUMULET_FRAME_INTERPOLATION_NONE.
    */
   uint32_t subframes;
   /**
@@ -1081,30 +1083,30 @@ CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* 
 
 /** @} */
 
-/* ---- Live volumes ------------------------------------------------------------------------------------------------ */
+/* ---- Dynamic volumes --------------------------------------------------------------------------------------------- */
 
 /**
- * @defgroup cumulet_live_volumes Live volumes
+ * @defgroup cumulet_dynamic_volumes Dynamic volumes
  *
- * A cumulet_live is a dynamic volume: the host submits one state after another as its simulation steps, and viewers
- * that show it (cumulet_set_live, cumulet_instance_desc.live) display the newest one. It is reference-counted and
- * independent of GL, and any number of viewers may show it. Because cumulet_volume objects are immutable, each state
- * becomes a new one behind this handle.
+ * A cumulet_dynamic_volume is a volume of changing content: the host submits one state after another as its simulation
+ * steps, and viewers that show it (cumulet_set_dynamic_volume, cumulet_instance_desc.dynamic_volume) display the newest
+ * one. It is reference-counted and independent of GL, and any number of viewers may show it. Because cumulet_volume
+ * objects are immutable, each state becomes a new one behind this handle.
  *
  * - No call of this group waits for a build. A call copies the voxels and returns, or does not copy them (see
- *   cumulet_state_desc.release).
+ *   cumulet_volume_fields_desc.release).
  * - A state whose build has not begun is dropped when the next one is submitted: at every rate, at most one is being
  *   built and one is queued.
- * - States are numbered from 1, and each call of cumulet_live_set, cumulet_live_update or cumulet_live_set_gl makes
- *   one.
- * - cumulet_live_set_gl takes voxels from OpenGL textures or buffers.
+ * - States are numbered from 1, and each call of cumulet_dynamic_volume_set, cumulet_dynamic_volume_update or
+ *   cumulet_dynamic_volume_set_gl makes one.
+ * - cumulet_dynamic_volume_set_gl takes voxels from OpenGL textures or buffers.
  *
  * docs/howto/dynamic_volumes.md has the steps.
  * @{
  */
 
-/** How a live volume is created. */
-typedef struct cumulet_live_desc {
+/** How a dynamic volume is created. */
+typedef struct cumulet_dynamic_volume_desc {
   size_t struct_size;
   /**
    * World-space bounding box of everything that the simulation will ever fill, each number within 1e15. Camera fitting,
@@ -1114,51 +1116,51 @@ typedef struct cumulet_live_desc {
   double bounds_min[3];
   double bounds_max[3];
   /**
-   * 1: voxels of cumulet_live_set_gl stay in GL memory, and the grid is built there. Main memory gets only half a
-   * kilobyte of statistics per brick of 8^3 voxels and field. 0: the voxels are copied to main memory.
+   * 1: voxels of cumulet_dynamic_volume_set_gl stay in GL memory, and the grid is built there. Main memory gets only
+   * half a kilobyte of statistics per brick of 8^3 voxels and field. 0: the voxels are copied to main memory.
    * docs/howto/dynamic_volumes.md lists the features that end this.
    */
-  int32_t stays_in_gl;
-} cumulet_live_desc;
+  int32_t gpu_resident;
+} cumulet_dynamic_volume_desc;
 
 /**
- * Creates a live volume without a state.
+ * Creates a dynamic volume without a state.
  *
  * Threads: any thread. No GL.
  *
  * @param desc       Bounds and residency.
- * @param out        Receives the live volume, which the caller releases; NULL on failure.
+ * @param out        Receives the dynamic volume, which the caller releases; NULL on failure.
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
  * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT if bounds_min is not below bounds_max on each axis.
  */
-CUMULET_API cumulet_status cumulet_live_create(const cumulet_live_desc* desc, cumulet_live** out, char* error,
-                                               size_t error_size);
+CUMULET_API cumulet_status cumulet_dynamic_volume_create(const cumulet_dynamic_volume_desc* desc,
+                                                         cumulet_dynamic_volume** out, char* error, size_t error_size);
 /**
  * Adds a reference. Threads: any thread, also inside callbacks.
  *
- * @param live May be NULL.
- * @return live.
+ * @param volume May be NULL.
+ * @return volume.
  */
-CUMULET_API cumulet_live* cumulet_live_retain(cumulet_live* live);
+CUMULET_API cumulet_dynamic_volume* cumulet_dynamic_volume_retain(cumulet_dynamic_volume* volume);
 /**
  * Removes a reference; the last one ends the handle. Threads: any thread, also inside callbacks.
  *
- * @param live May be NULL.
+ * @param volume May be NULL.
  */
-CUMULET_API void cumulet_live_release(cumulet_live* live);
+CUMULET_API void cumulet_dynamic_volume_release(cumulet_dynamic_volume* volume);
 
 /**
  * Submits a complete state, with any channels and sizes. Fields that it does not have are gone. The result is the same
  * grid, bit for bit, and with the same samples the same image, as of a cumulet_volume with the same fields.
  *
  * Negative values count as 0, except in anisotropy and velocity. If the state is refused, the previous one stays and
- * another may be submitted. With cumulet_state_desc.release the values are checked later, when they are read. Then a
- * warning in the log, cumulet_get_progress and CUMULET_RENDER_FAILED report a refused state.
+ * another may be submitted. With cumulet_volume_fields_desc.release the values are checked later, when they are read.
+ * Then a warning in the log, cumulet_get_progress and CUMULET_RENDER_FAILED report a refused state.
  *
- * Threads: any thread; runs update callbacks of viewers that show the live volume. No GL.
+ * Threads: any thread; runs update callbacks of viewers that show the dynamic volume. No GL.
  *
- * @param live       The live volume.
+ * @param volume     The dynamic volume.
  * @param desc       The fields.
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
@@ -1166,8 +1168,9 @@ CUMULET_API void cumulet_live_release(cumulet_live* live);
  *         that do not agree; or CUMULET_ERROR_FILE for a value that is not finite (the line names state, channel and
  *         voxel), and for unsuitable matrices, bricks or tiles.
  */
-CUMULET_API cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_state_desc* desc, char* error,
-                                            size_t error_size);
+CUMULET_API cumulet_status cumulet_dynamic_volume_set(cumulet_dynamic_volume* volume,
+                                                      const cumulet_volume_fields_desc* desc, char* error,
+                                                      size_t error_size);
 /**
  * Submits a state that is the last submitted one with some bricks replaced. The result is the same, bit for bit, as if
  * the complete state had been submitted.
@@ -1178,28 +1181,29 @@ CUMULET_API cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_st
  * - The bricks of a dense field begin at voxel 0. Fields and bricks that are not given stay.
  * - A channel without changes may be left out, or be given with no bricks.
  *
- * Threads: any thread; runs update callbacks of viewers that show the live volume. No GL.
+ * Threads: any thread; runs update callbacks of viewers that show the dynamic volume. No GL.
  *
- * @param live       The live volume.
+ * @param volume     The dynamic volume.
  * @param desc       The changed bricks; release must be NULL.
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
  * @return CUMULET_OK; CUMULET_ERROR_FILE for a value that is not finite or a misplaced brick; or
  *         CUMULET_ERROR_INVALID_ARGUMENT
- *         - before the first cumulet_live_set, and after a state that was refused when it was read
+ *         - before the first cumulet_dynamic_volume_set, and after a state that was refused when it was read
  *         - for a dense field, and for a channel that the state does not have, or has with tiles
  *         - after a state that was submitted with release (the library keeps no voxels of it) or stays in GL
  *         - if another call submits a state at the same time
  */
-CUMULET_API cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc* desc, char* error,
-                                               size_t error_size);
+CUMULET_API cumulet_status cumulet_dynamic_volume_update(cumulet_dynamic_volume* volume,
+                                                         const cumulet_volume_fields_desc* desc, char* error,
+                                                         size_t error_size);
 /**
  * Returns the newest state as a volume, for its properties and for instances. If no worker has read the state yet, this
- * call does, which takes as long as cumulet_volume_from_state.
+ * call does, which takes as long as cumulet_volume_from_fields.
  *
  * Threads: any thread. No GL.
  *
- * @param live       The live volume.
+ * @param volume     The dynamic volume.
  * @param out        Receives the volume, which the caller releases; NULL before the first state and on failure.
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
@@ -1207,8 +1211,8 @@ CUMULET_API cumulet_status cumulet_live_update(cumulet_live* live, const cumulet
  *         or CUMULET_ERROR_UNSUPPORTED if its voxels are only in GL memory. In the last case the call requests a copy
  *         to main memory, and a later call returns it.
  */
-CUMULET_API cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out, char* error,
-                                                   size_t error_size);
+CUMULET_API cumulet_status cumulet_dynamic_volume_get_volume(cumulet_dynamic_volume* volume, cumulet_volume** out,
+                                                             char* error, size_t error_size);
 
 /** @} */
 
@@ -1569,7 +1573,7 @@ CUMULET_API cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const cha
 CUMULET_API cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, const cumulet_volume_file_desc* desc);
 /**
  * Shows a volume: builds its grid on the worker, and displays it when it is ready. A running build is finished and
- * displayed first. A running load is cancelled. A sequence or live volume is no longer shown.
+ * displayed first. A running load is cancelled. A sequence or dynamic volume is no longer shown.
  *
  * Threads: one call per viewer at a time. No GL.
  *
@@ -1601,11 +1605,12 @@ CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_vo
  *         the driver supports (at least 200,000), and for one that is 1e12 away from the others; then the previous
  *         transforms stay.
  */
-CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count);
+CUMULET_API cumulet_status cumulet_set_volume_transforms(cumulet_viewer* viewer, const double* to_world,
+                                                         uint32_t count);
 /**
  * Sets the instance transforms at shutter open and shutter close, for motion blur
  * (cumulet_sampling_desc.shutter_seconds). Each point moves straight between them. They hold until
- * cumulet_set_volume_places is called.
+ * cumulet_set_volume_transforms is called.
  *
  * While an instance transform, an instance or a model moves, the tables of all of them take three times the memory, and
  * drivers support a third as many.
@@ -1616,11 +1621,12 @@ CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, con
  * @param open   count matrices at shutter open. NULL, or a matrix of zeros: the transform at the frame time.
  * @param close  count matrices at shutter close, with the same meaning of NULL and zeros.
  * @param count  Number of transforms of the volume. Not used if open and close are NULL.
- * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT for another count, for a matrix that cumulet_set_volume_places
- *         refuses, and for a motion that flattens the volume in between, such as a rotation by 180 degrees.
+ * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT for another count, for a matrix that
+ *         cumulet_set_volume_transforms refuses, and for a motion that flattens the volume in between, such as a
+ *         rotation by 180 degrees.
  */
-CUMULET_API cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, const double* open, const double* close,
-                                                      uint32_t count);
+CUMULET_API cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, const double* open,
+                                                                 const double* close, uint32_t count);
 /**
  * Shows a sequence in place of a volume, and follows its position. The previous content stays until a frame is ready.
  *
@@ -1629,7 +1635,7 @@ CUMULET_API cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, co
  * - A file that cannot be read is skipped: the log has one warning, and a neighboring frame is shown instead.
  * - Camera fitting, a ground below, bounds and the suggested density scale are shared by all frames, so that they do
  *   not jump.
- * - cumulet_set_volume, cumulet_set_live and a successful cumulet_load_volume end the sequence.
+ * - cumulet_set_volume, cumulet_set_dynamic_volume and a successful cumulet_load_volume end the sequence.
  *
  * docs/howto/sequences.md has the rules of reading ahead, waiting, cancelling and failures.
  *
@@ -1647,15 +1653,15 @@ typedef struct cumulet_sequence_info {
   uint32_t frames;                /**< Frames of the sequence. */
   uint32_t ready_frames;          /**< Frames in main memory that are built for the present settings. */
   uint32_t failed_frames;         /**< Frames that are replaced by others, as far as known. */
-  uint32_t asked_frame;           /**< Frame at the sequence's position. */
-  uint32_t drawn_frame;           /**< Frame in the image that the last cumulet_render drew, if is_drawn. */
-  int32_t is_drawn;               /**< 0: that image shows no frame of the sequence. */
+  uint32_t requested_frame;       /**< Frame at the sequence's position. */
+  uint32_t displayed_frame;       /**< Frame in the image that the last cumulet_render drew, if is_displayed. */
+  int32_t is_displayed;           /**< 0: that image shows no frame of the sequence. */
   uint64_t bytes;                 /**< Main memory of the ready frames. */
   double suggested_density_scale; /**< cumulet_volume_suggest_density_scale of the largest file that can be read.
                                        0: not known yet, or none. */
-  double asked_position;          /**< The position in frames: 2.25 is a quarter of the way from frame 2 to 3. */
-  /** Position in frames of the image that the last cumulet_render drew, if is_drawn. */
-  double drawn_position;
+  double requested_position;      /**< The position in frames: 2.25 is a quarter of the way from frame 2 to 3. */
+  /** Position in frames of the image that the last cumulet_render drew, if is_displayed. */
+  double displayed_position;
 } cumulet_sequence_info;
 
 /**
@@ -1690,8 +1696,8 @@ typedef enum cumulet_frame_state {
  */
 CUMULET_API cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame, char* cause, size_t size);
 /**
- * Shows a live volume in place of a volume, and follows its newest state. The previous content stays until a state is
- * ready.
+ * Shows a dynamic volume in place of a volume, and follows its newest state. The previous content stays until a state
+ * is ready.
  *
  * - States are read and built on a worker, which begins with the newest as soon as it is submitted, or as soon as
  *   cumulet_render has taken the previous one. A build that has begun is finished and displayed. So a host that submits
@@ -1702,25 +1708,26 @@ CUMULET_API cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, ui
  *   setting changes.
  * - The first state with other channels than before compiles the programs that it needs (cumulet_warm_up).
  * - cumulet_stats has the build times of the last state; build_seconds_load is its reading.
- * - cumulet_set_volume, cumulet_set_sequence and a successful cumulet_load_volume end the live volume.
+ * - cumulet_set_volume, cumulet_set_sequence and a successful cumulet_load_volume end the dynamic volume.
  *
  * Threads: one call per viewer at a time. No GL.
  *
  * @param viewer The viewer.
- * @param live   The live volume, which is retained. NULL: none; if one was shown, nothing is shown.
+ * @param volume The dynamic volume, which is retained. NULL: none; if one was shown, nothing is shown.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
-CUMULET_API cumulet_status cumulet_set_live(cumulet_viewer* viewer, cumulet_live* live);
+CUMULET_API cumulet_status cumulet_set_dynamic_volume(cumulet_viewer* viewer, cumulet_dynamic_volume* volume);
 
-/** State numbers of a live volume in one viewer. */
-typedef struct cumulet_live_info {
+/** Update numbers of a dynamic volume in one viewer. */
+typedef struct cumulet_dynamic_volume_info {
   size_t struct_size;
-  uint64_t handed_state; /**< Number of the newest submitted state. 0: none yet. */
-  uint64_t ready_state;  /**< Number of the last state that was taken from the worker, to be uploaded and rendered. */
-  uint64_t drawn_state;  /**< Number of the state in the image that the last cumulet_render drew. 0: none. */
-  uint64_t ready_count;  /**< Number of states taken since the live volume was set. */
-  uint64_t drawn_count;  /**< Number of those that have been drawn. */
-} cumulet_live_info;
+  uint64_t submitted_update; /**< Update number of the newest submitted state. 0: none yet. */
+  uint64_t ready_update;     /**< Update number of the last state that was taken from the worker, to be uploaded and
+                                rendered. */
+  uint64_t displayed_update; /**< Update number of the state in the image that the last cumulet_render drew. 0: none. */
+  uint64_t ready_count;      /**< Number of states taken since the dynamic volume was set. */
+  uint64_t displayed_count;  /**< Number of those that have been drawn. */
+} cumulet_dynamic_volume_info;
 
 /** Format of the numbers in a buffer, named as in GL and packed one after another. R16 and R8 are 0 to 1. */
 typedef enum cumulet_voxel_format {
@@ -1758,8 +1765,8 @@ typedef struct cumulet_voxel_box {
   int32_t max[3]; /**< Highest voxel, inclusive. */
 } cumulet_voxel_box;
 
-/** The fields of a simulation state in GL; see cumulet_live_set_gl. */
-typedef struct cumulet_gl_state_desc {
+/** The fields of a simulation state in GL; see cumulet_dynamic_volume_set_gl. */
+typedef struct cumulet_gl_volume_desc {
   size_t struct_size;
   const cumulet_gl_field* fields; /**< At least one of density, temperature and flame; each channel at most once. */
   uint64_t field_count;
@@ -1772,19 +1779,19 @@ typedef struct cumulet_gl_state_desc {
   uint64_t changed_count;
   void* wait;       /**< A GLsync that the device waits for before it reads; belongs to the host. NULL: none. */
   const char* name; /**< Name in messages. NULL: "state". */
-} cumulet_gl_state_desc;
+} cumulet_gl_volume_desc;
 
 /**
- * [GL] Submits a state of a live volume from OpenGL textures or buffers: a complete state, or changed boxes of the last
- * one. Voxels do not pass through the host's memory. The viewer need not show the live volume; its context does the
- * work for all viewers that show it.
+ * [GL] Submits a state of a dynamic volume from OpenGL textures or buffers: a complete state, or changed boxes of the
+ * last one. Voxels do not pass through the host's memory. The viewer need not show the dynamic volume; its context does
+ * the work for all viewers that show it.
  *
  * - The call queues a copy on the device and returns. Later GL commands may overwrite or delete the host's objects.
  *   Shader writes in the same context need no glMemoryBarrier; for writes of another context there is `wait`.
  * - A later cumulet_render or cumulet_warm_up of this viewer takes the finished copy, without waiting. Only then does
- *   the state get its number and is built. Until then cumulet_render sets CUMULET_RENDER_MORE. cumulet_wait does not
- *   wait for it.
- * - The result equals, bit for bit, that of cumulet_live_set with the same numbers in a dense array.
+ *   the state get its number and is built. Until then cumulet_render sets CUMULET_RENDER_INCOMPLETE. cumulet_wait does
+ *   not wait for it.
+ * - The result equals, bit for bit, that of cumulet_dynamic_volume_set with the same numbers in a dense array.
  * - A value that is not finite is found when the copy is taken: that cumulet_render returns CUMULET_ERROR_FILE once,
  *   and draws the previous state.
  * - The first call of a kind (texture or buffer, complete or boxes) compiles a small program, unless cumulet_warm_up
@@ -1793,12 +1800,12 @@ typedef struct cumulet_gl_state_desc {
  *   not limit. Cells get the rest.
  *
  * docs/howto/dynamic_volumes.md has the order of states, the cases in which they are dropped, and GPU residency
- * (cumulet_live_desc.stays_in_gl).
+ * (cumulet_dynamic_volume_desc.gpu_resident).
  *
  * Threads: one call per viewer at a time.
  *
  * @param viewer An attached viewer.
- * @param live   The live volume.
+ * @param volume The dynamic volume.
  * @param desc   The fields.
  * @return CUMULET_OK or a [GL] error; CUMULET_ERROR_FILE for an unsuitable matrix; CUMULET_ERROR_UNSUPPORTED for more
  *         than 2^36 voxels, and if a layer of bricks is larger than the driver's storage blocks; or
@@ -1810,23 +1817,23 @@ typedef struct cumulet_gl_state_desc {
  *         - with changed: before the first state, for a channel that the state does not have, after a refused complete
  *           state, or if the state is in another viewer's context
  */
-CUMULET_API cumulet_status cumulet_live_set_gl(cumulet_viewer* viewer, cumulet_live* live,
-                                               const cumulet_gl_state_desc* desc);
+CUMULET_API cumulet_status cumulet_dynamic_volume_set_gl(cumulet_viewer* viewer, cumulet_dynamic_volume* volume,
+                                                         const cumulet_gl_volume_desc* desc);
 
 /**
- * Returns the state numbers of the viewer's live volume.
+ * Returns the update numbers of the viewer's dynamic volume.
  *
  * Threads: one call per viewer at a time. No GL.
  *
  * @param viewer The viewer.
  * @param info   Receives the numbers; its struct_size must be set.
- * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT if the viewer shows no live volume.
+ * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT if the viewer shows no dynamic volume.
  */
-CUMULET_API cumulet_status cumulet_get_live_info(cumulet_viewer* viewer, cumulet_live_info* info);
+CUMULET_API cumulet_status cumulet_get_dynamic_volume_info(cumulet_viewer* viewer, cumulet_dynamic_volume_info* info);
 
 /**
  * Returns the volume that was last loaded or set. For a sequence it is the frame taken last, or NULL if its voxels are
- * not kept. For a live volume it is the state taken last, or NULL if its voxels are only in GL memory.
+ * not kept. For a dynamic volume it is the state taken last, or NULL if its voxels are only in GL memory.
  *
  * Threads: one call per viewer at a time. No GL.
  *
@@ -1893,12 +1900,12 @@ CUMULET_API cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_
  */
 CUMULET_API cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path);
 /**
- * Uses an environment in place of the sky of cumulet_light_desc: it lights volume and surfaces, and is the background.
- * The next frames upload it. The sun of cumulet_light_desc stays. A running load is cancelled.
+ * Uses an environment in place of the sky of cumulet_sun_sky_desc: it lights volume and surfaces, and is the
+ * background. The next frames upload it. The sun of cumulet_sun_sky_desc stays. A running load is cancelled.
  *
- * Rasterized surfaces (of previews, and with CUMULET_SURFACE_LIGHT_NONE) are lit by the environment, and by a physical
- * sky, without shadows and from a prefiltered map. Diffuse surfaces are accurate to a few per cent; mirrors look
- * blurred.
+ * Rasterized surfaces (of previews, and with CUMULET_SURFACE_LIGHTING_RASTERIZED) are lit by the environment, and by a
+ * physical sky, without shadows and from a prefiltered map. Diffuse surfaces are accurate to a few per cent; mirrors
+ * look blurred.
  *
  * Threads: one call per viewer at a time. No GL.
  *
@@ -1919,10 +1926,10 @@ CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumul
 CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out);
 
 /** How surfaces are lit, and how light travels between them and the volume. */
-typedef enum cumulet_surface_light {
-  CUMULET_SURFACE_LIGHT_FULL = 0,    /**< Global illumination: light travels between surfaces, and between them and the
-                                          volume. */
-  CUMULET_SURFACE_LIGHT_SHADOWS = 1, /**< Direct light: surfaces are lit only by sun, sky, analytic lights and
+typedef enum cumulet_surface_lighting {
+  CUMULET_SURFACE_LIGHTING_GLOBAL = 0, /**< Global illumination: light travels between surfaces, and between them and
+                                       the volume. */
+  CUMULET_SURFACE_LIGHTING_DIRECT = 1, /**< Direct light: surfaces are lit only by sun, sky, analytic lights and
                                           emissive triangles, with shadows of surfaces and volume. */
   /**
    * Rasterized: surfaces are lit by sun, sky and analytic lights without shadows, and occlude the content behind them.
@@ -1931,15 +1938,15 @@ typedef enum cumulet_surface_light {
    * Surfaces of alphaMode BLEND are sorted among each other. In front of the volume, inside and behind it they count as
    * one layer, at the nearest depth of a pixel.
    */
-  CUMULET_SURFACE_LIGHT_NONE = 2
-} cumulet_surface_light;
+  CUMULET_SURFACE_LIGHTING_RASTERIZED = 2
+} cumulet_surface_lighting;
 
 /** How a viewer shows its own surfaces. */
 typedef struct cumulet_surface_settings_desc {
   size_t struct_size;
   double time;        /**< Seconds into the animation; past its end it starts again. */
   uint32_t animation; /**< Number of the animation in the file. One that does not exist: no animation. */
-  cumulet_surface_light light;
+  cumulet_surface_lighting lighting;
   /**
    * Path-space regularization (Kaplanyan, Dachsbacher 2013; "Filter Glossy" in Cycles): minimum roughness of surfaces,
    * 0 to 1, once a path was scattered more widely than such a surface reflects. It softens caustics on walls and
@@ -1986,7 +1993,7 @@ typedef enum cumulet_stage {
   CUMULET_STAGE_LOADING = 1,    /**< Reading the file. */
   CUMULET_STAGE_STATISTICS = 2, /**< Computing exact statistics of the voxels. */
   CUMULET_STAGE_REFINING = 3,   /**< Evaluating the refinement criterion, and bisecting cells. */
-  CUMULET_STAGE_RECORDS = 4,    /**< Packing the cell data. */
+  CUMULET_STAGE_PACKING = 4,    /**< Packing the cell data. */
   CUMULET_STAGE_UPLOADING = 5   /**< Uploading to GL, within cumulet_render. */
 } cumulet_stage;
 
@@ -2053,7 +2060,7 @@ typedef struct cumulet_limits_desc {
    *
    * Cells are coarsened to fit (cumulet_stats.limited). If even the coarsest do not fit, the load or build fails with
    * CUMULET_ERROR_OUT_OF_MEMORY and one line, and the displayed content stays. Not counted: temporary memory of builds,
-   * surfaces, environments, instances, copies of a live volume for updates, and handles that the host retains.
+   * surfaces, environments, instances, copies of a dynamic volume for updates, and handles that the host retains.
    */
   uint64_t memory_bytes;
   /**
@@ -2070,7 +2077,7 @@ typedef struct cumulet_limits_desc {
 
 /**
  * Sets the limits of a viewer. They apply to work started after this call. Exception: the grid of a static volume (not
- * of a sequence or live volume) is rebuilt for new memory limits.
+ * of a sequence or dynamic volume) is rebuilt for new memory limits.
  *
  * Threads: one call per viewer at a time. No GL.
  *
@@ -2099,20 +2106,20 @@ CUMULET_API cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumu
 enum { CUMULET_LIGHT_GROUPS = 8 };
 
 /** The grid type: the acceleration structure that rays traverse. All are traversed exactly, without a step size. */
-typedef enum cumulet_march {
-  CUMULET_MARCH_TET = 0,   /**< The adaptive tetrahedral grid. */
-  CUMULET_MARCH_DENSE = 1, /**< 3D DDA over every voxel of the bounds (the paper's reference). */
-  CUMULET_MARCH_BRICK = 2  /**< Two-level 3D DDA that skips empty bricks of 8^3 voxels. */
-} cumulet_march;
+typedef enum cumulet_grid_type {
+  CUMULET_GRID_TETRAHEDRAL = 0, /**< The adaptive tetrahedral grid. */
+  CUMULET_GRID_DENSE = 1,       /**< 3D DDA over every voxel of the bounds (the paper's reference). */
+  CUMULET_GRID_BRICKS = 2       /**< Two-level 3D DDA that skips empty bricks of 8^3 voxels. */
+} cumulet_grid_type;
 
 /** The density inside a tetrahedral cell. */
-typedef enum cumulet_cells {
+typedef enum cumulet_cell_density {
   CUMULET_CELLS_LINEAR = 0,  /**< Linear least-squares fit, non-negative, with the exact mean. */
   CUMULET_CELLS_CONSTANT = 1 /**< The mean. */
-} cumulet_cells;
+} cumulet_cell_density;
 
 /** The refinement criterion: the error indicator that decides which cells are split. */
-typedef enum cumulet_criterion {
+typedef enum cumulet_refinement_criterion {
   /** Standard deviation x edge length > threshold x mean optical depth. With a threshold of 0, the default,
       CUMULET_CRITERION_TRANSMITTANCE is used instead. */
   CUMULET_CRITERION_DEVIATION = 0,
@@ -2127,10 +2134,10 @@ typedef enum cumulet_criterion {
    * then they stay, and cumulet_rebuild builds them for the present value.
    */
   CUMULET_CRITERION_TRANSMITTANCE = 2
-} cumulet_criterion;
+} cumulet_refinement_criterion;
 
 /** The device that builds the tetrahedral grid. */
-typedef enum cumulet_build {
+typedef enum cumulet_build_device {
   CUMULET_BUILD_CPU = 0, /**< A worker builds it; supports all features. */
   /**
    * Compute shaders build it, within the budgets of frames, while the old cells are shown. The cells are the same, and
@@ -2142,14 +2149,14 @@ typedef enum cumulet_build {
    * moves while the shutter is open.
    */
   CUMULET_BUILD_GPU = 1
-} cumulet_build;
+} cumulet_build_device;
 
 /** How the grid is built. A change rebuilds it on the worker; the old one is shown meanwhile. */
 typedef struct cumulet_grid_desc {
   size_t struct_size;
-  cumulet_march march; /**< The grid type. */
-  cumulet_cells cells;
-  cumulet_criterion criterion;
+  cumulet_grid_type type; /**< The grid type. */
+  cumulet_cell_density cells;
+  cumulet_refinement_criterion criterion;
   /**
    * Cells above it are split. 0: 0.15 by transmittance, 1 for range-mean. Negative: cells are split down to the voxel.
    */
@@ -2160,16 +2167,16 @@ typedef struct cumulet_grid_desc {
    * grid is rebuilt when the camera rests at another view. 0: off.
    */
   int32_t camera_adaptive;
-  double pixel_size;   /**< Pixels that a cell's longest edge must cover to be split, up to 1e6. 0: 1. */
-  cumulet_build build; /**< The device that builds CUMULET_MARCH_TET. */
+  double pixel_size;                 /**< Pixels that a cell's longest edge must cover to be split, up to 1e6. 0: 1. */
+  cumulet_build_device build_device; /**< The device that builds CUMULET_GRID_TETRAHEDRAL. */
 } cumulet_grid_desc;
 
 /** The phase function: the distribution of scattered directions. */
-typedef enum cumulet_phase {
+typedef enum cumulet_phase_function {
   CUMULET_PHASE_HG = 0,       /**< One Henyey-Greenstein lobe. */
   CUMULET_PHASE_TWO_LOBE = 1, /**< Two Henyey-Greenstein lobes. */
   CUMULET_PHASE_MIE = 2       /**< Water droplets: a fit of Mie theory (Jendersie and d'Eon 2023). */
-} cumulet_phase;
+} cumulet_phase_function;
 
 /**
  * The participating medium. A change restarts accumulation. The cells stay, unless they were built for another
@@ -2197,12 +2204,12 @@ typedef struct cumulet_medium_desc {
   /**
    * Source radiance, up to 1e30: each point emits extinction x emission per world unit of length. So a body of the
    * medium that is opaque and does not scatter has this radiance. The emission lights the medium and the surfaces
-   * (CUMULET_SURFACE_LIGHT_FULL). 0: none.
+   * (CUMULET_SURFACE_LIGHTING_GLOBAL). 0: none.
    */
   float emission[3];
-  cumulet_phase phase;
+  cumulet_phase_function phase;
   float second_anisotropy; /**< Two lobes: g of the second one, in (-1, 1). 0: isotropic. */
-  float second_share;      /**< Two lobes: weight of the second one, in [0, 1]. 0: 0.5. */
+  float second_weight;     /**< Two lobes: weight of the second one, in [0, 1]. 0: 0.5. */
   float droplet_diameter;  /**< Mie: droplet diameter in micrometers, in [5, 50]. 0: 20, as in a cloud. */
   /**
    * Emission of flame and temperature grids: radiance per world unit of length, independent of the density,
@@ -2220,7 +2227,7 @@ typedef struct cumulet_medium_desc {
   float flame_color[3];     /**< Linear Rec. 709, up to 1e30. All 0: white. */
   float temperature_scale;  /**< Kelvin per unit. 0: 1 if the grid exceeds 20, as kelvin do, else 1500 (see
                                  cumulet_volume_info). All frames of a sequence use the scale for its largest file. A
-                                 live volume keeps 1 once a state had it. */
+                                 dynamic volume keeps 1 once a state had it. */
   float temperature_offset; /**< Kelvin, -1e6 to 1e6. */
   /** Intensity, up to 1e30. 0: none, except 1 for a volume that has a temperature and neither density nor flame. */
   float blackbody;
@@ -2242,7 +2249,7 @@ typedef enum cumulet_ramp {
 } cumulet_ramp;
 
 /** The model of sun and sky. */
-typedef enum cumulet_sky {
+typedef enum cumulet_sky_model {
   CUMULET_SKY_CONSTANT = 0, /**< The sun has sun_irradiance, and the sky has sky_radiance in all directions. */
   /**
    * The sky of a clear day with the sun at its position (Hillaire 2020), seen from the ground at sea level.
@@ -2257,27 +2264,27 @@ typedef enum cumulet_sky {
    *   the newest last. cumulet_cancel does not cancel it.
    */
   CUMULET_SKY_PHYSICAL = 1
-} cumulet_sky;
+} cumulet_sky_model;
 
 /** A distant sun and a sky. A change restarts accumulation. */
-typedef struct cumulet_light_desc {
+typedef struct cumulet_sun_sky_desc {
   size_t struct_size;
   float sun_azimuth_degrees;   /**< Direction towards the sun, from +Z towards +X. */
   float sun_elevation_degrees; /**< Angle above the horizon, -90 to 90. */
   float sun_irradiance[3];     /**< On a surface that faces the sun, up to 1e30. 0: no sun. */
   float sky_radiance[3];       /**< Up to 1e30. 0: black. */
-  cumulet_sky sky;
+  cumulet_sky_model sky;
   /** Physical: Linke turbidity, in [1, 10]: 1 no aerosols, 2 very clear, 3 clear, 6 hazy. 0: 3. */
   float turbidity;
   float ground_albedo; /**< Physical: albedo of the ground below the atmosphere, in [0, 1]. 0: black. */
   /**
-   * Angular diameter of the sun, -180 to 180 degrees: above 0 it gives soft shadows and a visible disc. The irradiance
-   * does not depend on it. 0: a direction without a visible disc, but 0.53 for a physical sky. Negative: a direction.
+   * Angular diameter of the sun, -180 to 180 degrees: above 0 it gives soft shadows and a visible disk. The irradiance
+   * does not depend on it. 0: a direction without a visible disk, but 0.53 for a physical sky. Negative: a direction.
    */
   float sun_angle_degrees;
   uint32_t sun_group; /**< Light group of the sun, below CUMULET_LIGHT_GROUPS. */
   uint32_t sky_group; /**< Light group of the sky, or of the environment that replaces it. */
-} cumulet_light_desc;
+} cumulet_sun_sky_desc;
 
 /** How the viewer uses its environment (cumulet_set_environment). A change restarts accumulation. */
 typedef struct cumulet_environment_settings_desc {
@@ -2287,11 +2294,11 @@ typedef struct cumulet_environment_settings_desc {
 } cumulet_environment_settings_desc;
 
 /** Whether there is a ground plane, and its height. */
-typedef enum cumulet_ground {
+typedef enum cumulet_ground_mode {
   CUMULET_GROUND_NONE = 0,
   CUMULET_GROUND_BELOW = 1,    /**< At the lowest point of volume and surfaces. */
   CUMULET_GROUND_AT_HEIGHT = 2 /**< At cumulet_ground_desc.height. */
-} cumulet_ground;
+} cumulet_ground_mode;
 
 /**
  * An infinite horizontal diffuse plane that receives shadows. It is invisible from
@@ -2300,19 +2307,19 @@ typedef enum cumulet_ground {
  */
 typedef struct cumulet_ground_desc {
   size_t struct_size;
-  cumulet_ground place;
+  cumulet_ground_mode mode;
   double height;   /**< World y, for CUMULET_GROUND_AT_HEIGHT; within 1e30. */
   float albedo[3]; /**< Each in [0, 1]. All 0: 0.3. */
 } cumulet_ground_desc;
 
 /** The rendered view: the path-traced image, or a debug view of the grid. */
-typedef enum cumulet_view {
+typedef enum cumulet_view_mode {
   CUMULET_VIEW_SHADED = 0,   /**< The path-traced image. */
   CUMULET_VIEW_CELLS = 1,    /**< The cells on a slice through the middle, colored by level, with their edges. */
   CUMULET_VIEW_STEPS = 2,    /**< Number of cells or voxels that the camera ray crosses, as a heat map. */
   CUMULET_VIEW_DENSITY = 3,  /**< Opacity along the camera ray, 1 - exp(-optical depth), in gray. */
   CUMULET_VIEW_WIREFRAME = 4 /**< The edges of the cells that hold density, over the density. */
-} cumulet_view;
+} cumulet_view_mode;
 
 /** Whether frames may be coarser than the target. */
 typedef enum cumulet_preview {
@@ -2325,9 +2332,9 @@ typedef struct cumulet_sampling_desc {
   size_t struct_size;
   uint32_t samples; /**< Samples per pixel. 0: 256. */
   uint32_t seed;    /**< The same seed, samples, size and driver give the same image, bit for bit. */
-  cumulet_view view;
+  cumulet_view_mode view;
   cumulet_preview preview;
-  int32_t volume_alone; /**< 1: at full resolution, also accumulate CUMULET_AOV_VOLUME. */
+  int32_t separate_volume_aov; /**< 1: at full resolution, also accumulate CUMULET_AOV_VOLUME. */
   /**
    * Noise target in per cent, 0 to 100: an image at full resolution is converged when its noise (cumulet_measure_noise)
    * is at most this, and `samples` is then the maximum. 0: no target.
@@ -2365,11 +2372,11 @@ typedef struct cumulet_sampling_desc {
    * default. 0: none. Each path has one uniformly distributed time (Cook, Porter and Carpenter, "Distributed Ray
    * Tracing", 1984).
    *
-   * Moving objects are: cameras (cumulet_camera_set_shutter); instance transforms (cumulet_set_volume_shutter,
-   * cumulet_instance_desc, cumulet_model_desc); surfaces with an animation; host meshes with velocities; and volumes
-   * with velocities (docs/motion_blur.md). These are not motion-blurred and use the frame time: AOVs, picks, debug
-   * views, transmittance maps, rasterized surfaces (CUMULET_SURFACE_LIGHT_NONE), analytic lights of models, and the
-   * host's depth.
+   * Moving objects are: cameras (cumulet_camera_set_shutter); instance transforms
+   * (cumulet_set_volume_shutter_transforms, cumulet_instance_desc, cumulet_model_desc); surfaces with an animation;
+   * host meshes with velocities; and volumes with velocities (docs/motion_blur.md). These are not motion-blurred and
+   * use the frame time: AOVs, picks, debug views, transmittance maps, rasterized surfaces
+   * (CUMULET_SURFACE_LIGHTING_RASTERIZED), analytic lights of models, and the host's depth.
    */
   float shutter_seconds;
   /**
@@ -2395,7 +2402,7 @@ typedef enum cumulet_tone_map {
 typedef enum cumulet_background {
   CUMULET_BACKGROUND_SKY = 0,         /**< The sky's radiance or the environment; opaque. */
   CUMULET_BACKGROUND_TRANSPARENT = 1, /**< Premultiplied color and alpha: the framebuffer's content shows through, and
-                                           light without alpha, as of flames, is added to it; see cumulet_blend. */
+                                           light without alpha, as of flames, is added to it; see cumulet_blend_mode. */
   CUMULET_BACKGROUND_COLOR = 2        /**< background_color; opaque. */
 } cumulet_background;
 
@@ -2425,7 +2432,7 @@ typedef struct cumulet_display_desc {
    * - It needs unlit feature rays: four per pixel at first, two more per sample, and beyond sixteen up to 64 where they
    *   differ.
    * - Until the filter is done, frames draw the last image of the same scene and camera, or else the unfiltered image.
-   *   Frames with CUMULET_TARGET_NONE continue the filter, and set CUMULET_RENDER_UNDRAWN when there is a new image.
+   *   Frames with CUMULET_TARGET_NONE continue the filter, and set CUMULET_RENDER_NEW_IMAGE when there is a new image.
    * - Without memory for the filter or its history, frames are drawn without it, and cumulet_render returns
    *   CUMULET_ERROR_OUT_OF_MEMORY once.
    * - Debug views are not filtered.
@@ -2482,12 +2489,12 @@ CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumu
 CUMULET_API cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points,
                                             uint64_t count);
 /** Histogram of a volume's grid, before its ramp: for a panel that draws the ramp over it. */
-typedef struct cumulet_values_info {
+typedef struct cumulet_histogram_info {
   size_t struct_size;
   float max_value; /**< 0: the volume has no such grid. */
   /** Counts of the voxels above 0, in equal steps from 0 to max_value. */
   uint64_t histogram[CUMULET_HISTOGRAM_BINS];
-} cumulet_values_info;
+} cumulet_histogram_info;
 
 /**
  * Returns the histogram of a volume's grid. Takes some milliseconds per million voxels.
@@ -2499,8 +2506,8 @@ typedef struct cumulet_values_info {
  * @param info   Receives the histogram; its struct_size must be set.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
-CUMULET_API cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_ramp ramp,
-                                                     cumulet_values_info* info);
+CUMULET_API cumulet_status cumulet_volume_get_histogram(const cumulet_volume* volume, cumulet_ramp ramp,
+                                                        cumulet_histogram_info* info);
 
 /** @} */
 
@@ -2523,13 +2530,13 @@ CUMULET_API cumulet_status cumulet_volume_get_values(const cumulet_volume* volum
  *   also with the viewer's own volume. Grids are built as cumulet_set_grid says, one after another in the background,
  *   and each is shown as soon as it is ready.
  * - To move an instance uploads a table of some 600 bytes per instance, and no grid. A camera-adaptive grid is rebuilt.
- * - The rules of cumulet_set_volume_places on units, on the number of overlapping volumes and on limits apply.
- * - With CUMULET_MARCH_DENSE and CUMULET_MARCH_BRICK all displayed volumes must share one grid. Otherwise
+ * - The rules of cumulet_set_volume_transforms on units, on the number of overlapping volumes and on limits apply.
+ * - With CUMULET_GRID_DENSE and CUMULET_GRID_BRICKS all displayed volumes must share one grid. Otherwise
  *   cumulet_render returns CUMULET_ERROR_UNSUPPORTED, and the previous content stays.
  */
 typedef struct cumulet_instance cumulet_instance;
 
-/** Content, transform and medium of an instance. At most one of volume, sequence and live is set. */
+/** Content, transform and medium of an instance. At most one of volume, sequence and dynamic_volume is set. */
 typedef struct cumulet_instance_desc {
   size_t struct_size;
   cumulet_volume* volume; /**< Retained. NULL: none. */
@@ -2547,11 +2554,12 @@ typedef struct cumulet_instance_desc {
    */
   cumulet_sequence* sequence;
   /**
-   * Shows a live volume and follows its newest state, with the rules of cumulet_set_live. Retained. NULL: none.
-   * Instances of one live volume whose media need the same grids share them; others have their own.
+   * Shows a dynamic volume and follows its newest state, with the rules of cumulet_set_dynamic_volume. Retained. NULL:
+   * none. Instances of one dynamic volume whose media need the same grids share them; others have their own.
    */
-  cumulet_live* live;
-  double open_to_world[16];  /**< Transform at shutter open, see cumulet_set_volume_shutter. All zero: to_world. */
+  cumulet_dynamic_volume* dynamic_volume;
+  double open_to_world[16];  /**< Transform at shutter open, see cumulet_set_volume_shutter_transforms. All zero:
+                                to_world. */
   double close_to_world[16]; /**< Transform at shutter close. All zero: to_world. */
 } cumulet_instance_desc;
 
@@ -2668,7 +2676,7 @@ CUMULET_API cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* vi
 CUMULET_API cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumulet_instance* instance,
                                                                uint32_t frame, char* cause, size_t size);
 /**
- * Returns the state numbers of an instance's live volume in a viewer.
+ * Returns the update numbers of an instance's dynamic volume in a viewer.
  *
  * Threads: one call per viewer at a time. No GL.
  *
@@ -2676,10 +2684,10 @@ CUMULET_API cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* v
  * @param instance The instance.
  * @param info     Receives the numbers; its struct_size must be set.
  * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT if the viewer does not show the instance, or it is hidden or
- *         has no live volume.
+ *         has no dynamic volume.
  */
-CUMULET_API cumulet_status cumulet_get_instance_live_info(cumulet_viewer* viewer, cumulet_instance* instance,
-                                                          cumulet_live_info* info);
+CUMULET_API cumulet_status cumulet_get_instance_dynamic_volume_info(cumulet_viewer* viewer, cumulet_instance* instance,
+                                                                    cumulet_dynamic_volume_info* info);
 
 /* ---- Models: surfaces beside the viewer's own -------------------------------------------------------------------- */
 
@@ -2713,8 +2721,8 @@ typedef struct cumulet_model_desc {
   uint32_t group; /**< Light group of its emissive triangles and analytic lights, below CUMULET_LIGHT_GROUPS. */
   /** 1: camera rays see a holdout, see cumulet_medium_desc.holdout. Rasterization leaves it out. */
   int32_t holdout;
-  double open_to_world[16];  /**< Transform at shutter open, see cumulet_set_volume_shutter. All zero: to_world. The
-                                  animation continues meanwhile. */
+  double open_to_world[16];  /**< Transform at shutter open, see cumulet_set_volume_shutter_transforms. All zero:
+                                to_world. The animation continues meanwhile. */
   double close_to_world[16]; /**< Transform at shutter close. All zero: to_world. */
 } cumulet_model_desc;
 
@@ -2812,7 +2820,7 @@ CUMULET_API cumulet_status cumulet_remove_model(cumulet_viewer* viewer, cumulet_
  * @param desc   The light.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
-CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
+CUMULET_API cumulet_status cumulet_set_sun_sky(cumulet_viewer* viewer, const cumulet_sun_sky_desc* desc);
 /**
  * Sets the rotation and strength of the viewer's environment.
  *
@@ -2838,13 +2846,13 @@ CUMULET_API cumulet_status cumulet_set_ground(cumulet_viewer* viewer, const cumu
 /* ---- Analytic lights --------------------------------------------------------------------------------------------- */
 
 /** The shape of an analytic light. */
-typedef enum cumulet_lamp_kind {
-  CUMULET_LAMP_POINT = 0,     /**< Point light: the same in all directions. */
-  CUMULET_LAMP_SPOT = 1,      /**< Spot light: a point light limited to a cone. */
-  CUMULET_LAMP_DISC = 2,      /**< Disk-shaped area light: uniform radiance on one side. */
-  CUMULET_LAMP_RECTANGLE = 3, /**< Rectangular area light: uniform radiance on one side. */
-  CUMULET_LAMP_SUN = 4        /**< Distant (directional) light. */
-} cumulet_lamp_kind;
+typedef enum cumulet_light_kind {
+  CUMULET_LIGHT_POINT = 0,  /**< Point light: the same in all directions. */
+  CUMULET_LIGHT_SPOT = 1,   /**< Spot light: a point light limited to a cone. */
+  CUMULET_LIGHT_DISK = 2,   /**< Disk-shaped area light: uniform radiance on one side. */
+  CUMULET_LIGHT_RECT = 3,   /**< Rectangular area light: uniform radiance on one side. */
+  CUMULET_LIGHT_DISTANT = 4 /**< Distant (directional) light. */
+} cumulet_light_kind;
 
 /**
  * An analytic light. It lights volume and surfaces, casts shadows, and is invisible to the camera and in mirrors.
@@ -2853,13 +2861,13 @@ typedef enum cumulet_lamp_kind {
  * Cumulet reads as I W/sr. A spot light has the power of the point light that it is cut out of. A disk or rectangle has
  * radiance power / (4 x area), and so emits pi / 4 of its power.
  */
-typedef struct cumulet_lamp_desc {
+typedef struct cumulet_light_desc {
   size_t struct_size; /**< Equal for all lights of an array: the distance between them in bytes. */
-  cumulet_lamp_kind kind;
+  cumulet_light_kind kind;
   double position[3];   /**< World position of its center, within 1e30. Not used by a sun. */
   double direction[3];  /**< World direction in which it shines, of any length. Not used by a point. Zero: down, -Y. */
-  double across[3];     /**< Tangent of a rectangle: the direction of its width, projected perpendicular to direction.
-                             Zero or parallel to direction: horizontal, or +X if it shines up or down. */
+  double tangent[3];    /**< Tangent of a rectangle: the direction of its width, projected perpendicular to direction.
+                            Zero or parallel to direction: horizontal, or +X if it shines up or down. */
   float color[3];       /**< Linear Rec. 709, multiplied by power; the product is at most 1e30. All 0: white. */
   float power;          /**< Watts; for a sun W/m^2 on a surface that faces it. 0: dark. */
   double width;         /**< World units: width of a rectangle, diameter of a disk; up to 1e30. 0: 1. */
@@ -2867,21 +2875,21 @@ typedef struct cumulet_lamp_desc {
   double angle_degrees; /**< Spot: full cone angle, up to 180; 0: 45. Sun: angular diameter, up to 90. */
   double blend;         /**< Spot: fraction of the cone, from its edge inward, over which it fades; 0 to 1. */
   uint32_t group;       /**< Light group, below CUMULET_LIGHT_GROUPS. */
-} cumulet_lamp_desc;
+} cumulet_light_desc;
 
 /**
  * Replaces the viewer's analytic lights. Those of its surfaces' file stay beside them. Rasterized surfaces (of
- * previews, and with CUMULET_SURFACE_LIGHT_NONE) are lit without shadows, and from the centers of disks and rectangles.
- * Restarts accumulation.
+ * previews, and with CUMULET_SURFACE_LIGHTING_RASTERIZED) are lit without shadows, and from the centers of disks and
+ * rectangles. Restarts accumulation.
  *
  * Threads: one call per viewer at a time. No GL.
  *
  * @param viewer The viewer.
- * @param lamps  The lights, which are copied. May be NULL if count is 0.
+ * @param lights  The lights, which are copied. May be NULL if count is 0.
  * @param count  Number of lights, up to 4096. 0: none.
  * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT; the line names the light.
  */
-CUMULET_API cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count);
+CUMULET_API cumulet_status cumulet_set_lights(cumulet_viewer* viewer, const cumulet_light_desc* lights, uint64_t count);
 
 /**
  * Sets how images are sampled.
@@ -2932,16 +2940,16 @@ CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cum
  */
 
 /** The meaning of depth buffers. */
-typedef enum cumulet_depth {
+typedef enum cumulet_depth_convention {
   CUMULET_DEPTH_STANDARD = 0, /**< 0 at the near plane, 1 at the far plane. */
   CUMULET_DEPTH_REVERSED = 1  /**< 1 at the near plane, 0 at the far plane. */
-} cumulet_depth;
+} cumulet_depth_convention;
 
 /** The range of clip-space z. */
-typedef enum cumulet_clip {
+typedef enum cumulet_clip_space {
   CUMULET_CLIP_NEGATIVE_ONE_TO_ONE = 0, /**< OpenGL's default. */
   CUMULET_CLIP_ZERO_TO_ONE = 1          /**< As with glClipControl(..., GL_ZERO_TO_ONE). */
-} cumulet_clip;
+} cumulet_clip_space;
 
 /**
  * A perspective or orthographic camera, with a pinhole or a thin lens.
@@ -2956,8 +2964,8 @@ typedef enum cumulet_clip {
  *
  * With a lens, a point at depth z is blurred to a disk of radius lens_radius x |z - focus| / z in the focal plane.
  * Path-traced images and AOVs have depth of field. Rasterized surfaces (of previews, and with
- * CUMULET_SURFACE_LIGHT_NONE), debug views, picks and depths use the center of the lens. The host's depth ends rays as
- * if they came from there.
+ * CUMULET_SURFACE_LIGHTING_RASTERIZED), debug views, picks and depths use the center of the lens. The host's depth ends
+ * rays as if they came from there.
  */
 typedef struct cumulet_camera_desc {
   size_t struct_size;
@@ -2970,7 +2978,7 @@ typedef struct cumulet_camera_desc {
                                    perspective, 0 for orthographic. */
   double far_plane;           /**< Beyond the near plane. 0: infinite for perspective, 1000 x orthographic_height for
                                    orthographic. */
-  cumulet_depth depth;
+  cumulet_depth_convention depth;
   double lens_radius;    /**< World units, 0 to 1e30: a round thin lens. 0: a pinhole, everything is sharp. */
   double focus_distance; /**< From the eye along the axis to the focal plane, 0 to 1e30. 0: the target's distance. */
 } cumulet_camera_desc;
@@ -3028,7 +3036,7 @@ CUMULET_API cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_ca
  */
 CUMULET_API cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds);
 /**
- * Sets the instance transforms of the viewer's volume (cumulet_set_volume_places) in the previous frame, for motion
+ * Sets the instance transforms of the viewer's volume (cumulet_set_volume_transforms) in the previous frame, for motion
  * vectors.
  *
  * Threads: one call per viewer at a time. No GL.
@@ -3036,10 +3044,10 @@ CUMULET_API cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, c
  * @param viewer   The viewer.
  * @param to_world count matrices, for the first count transforms; the others have not moved.
  * @param count    Number of matrices. 0: none has moved.
- * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT for a matrix that cumulet_set_volume_places refuses.
+ * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT for a matrix that cumulet_set_volume_transforms refuses.
  */
-CUMULET_API cumulet_status cumulet_set_previous_volume_places(cumulet_viewer* viewer, const double* to_world,
-                                                              uint32_t count);
+CUMULET_API cumulet_status cumulet_set_previous_volume_transforms(cumulet_viewer* viewer, const double* to_world,
+                                                                  uint32_t count);
 /**
  * Sets the transform of an instance in the previous frame, for motion vectors. It holds until cumulet_instance_set.
  *
@@ -3098,7 +3106,7 @@ CUMULET_API cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumu
  *         that is singular, rotates the image or has an oblique near plane, and for entries beyond 1e30.
  */
 CUMULET_API cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double view[16],
-                                                       const double projection[16], cumulet_clip clip);
+                                                       const double projection[16], cumulet_clip_space clip);
 /**
  * Sets a camera at shutter open and shutter close, for motion blur (cumulet_sampling_desc.shutter_seconds). Both hold
  * until another call moves the camera. In between the eye moves straight, the axes rotate evenly about one axis
@@ -3128,8 +3136,8 @@ CUMULET_API cumulet_status cumulet_camera_set_shutter(cumulet_camera* camera, co
  * @param projection Receives eye to clip space.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
-CUMULET_API cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect, cumulet_clip clip,
-                                                       double view[16], double projection[16]);
+CUMULET_API cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect,
+                                                       cumulet_clip_space clip, double view[16], double projection[16]);
 
 /**
  * Rotates the eye about the target.
@@ -3325,11 +3333,11 @@ CUMULET_API cumulet_status cumulet_input(cumulet_viewer* viewer, const cumulet_e
  */
 
 /** The target of a frame. */
-typedef enum cumulet_target {
+typedef enum cumulet_frame_target {
   CUMULET_TARGET_FRAMEBUFFER = 0, /**< The host's framebuffer cumulet_frame_desc.framebuffer. */
   CUMULET_TARGET_TEXTURE = 1,     /**< Textures of the viewer, returned in cumulet_frame_result. */
   CUMULET_TARGET_NONE = 2         /**< Nothing is drawn: for readback. */
-} cumulet_target;
+} cumulet_frame_target;
 
 /**
  * The encoding of the target's colors. The first three take tone-mapped colors. A format that cannot hold the encoding
@@ -3356,10 +3364,10 @@ typedef enum cumulet_color_encoding {
  *   over black and over white. In between it is correct within 0.1 for gray pixels; colored flames are up to 0.3 too
  *   bright in a channel over middle gray.
  */
-typedef enum cumulet_blend {
+typedef enum cumulet_blend_mode {
   CUMULET_BLEND_OVER = 0,   /**< Premultiplied over the target's content. */
   CUMULET_BLEND_REPLACE = 1 /**< Color and alpha replace it, for a host that composites by itself. */
-} cumulet_blend;
+} cumulet_blend_mode;
 
 /** The GL object that holds the depth of the host's scene. */
 typedef enum cumulet_depth_source {
@@ -3375,7 +3383,7 @@ typedef struct cumulet_frame_desc {
   double budget_ms; /**< Milliseconds for uploads, tracing and drawing, up to 1e9. 0: 10. Negative: draw the present
                          image, trace nothing. */
 
-  cumulet_target target;
+  cumulet_frame_target target;
   /**
    * GL name of a framebuffer; 0 is the context's default framebuffer. Its draw buffer 0 is drawn to. These give
    * CUMULET_ERROR_INVALID_ARGUMENT:
@@ -3397,7 +3405,7 @@ typedef struct cumulet_frame_desc {
    */
   uint32_t format;
   cumulet_color_encoding color;
-  cumulet_blend blend;
+  cumulet_blend_mode blend;
   int32_t write_depth; /**< 1: where the volume is at least half opaque, its depth is written to the target's depth, in
                             the camera's convention and with a depth test. */
 
@@ -3415,16 +3423,16 @@ typedef struct cumulet_frame_desc {
 
 /** Bits of cumulet_frame_result.flags. */
 enum {
-  CUMULET_RENDER_MORE = 1,      /**< Work is left, on the image or in transfer: render again soon. */
-  CUMULET_RENDER_CONVERGED = 2, /**< Every pixel has its samples, at full resolution, for the newest settings. */
-  CUMULET_RENDER_LOADING = 4,   /**< Workers are busy, see cumulet_get_progress. */
-  CUMULET_RENDER_FAILED = 8,    /**< A load or build failed, see @ref cumulet_errors and cumulet_get_progress. */
-  CUMULET_RENDER_PREVIEW = 16,  /**< The displayed image is coarser than the frame. */
+  CUMULET_RENDER_INCOMPLETE = 1, /**< Work is left, on the image or in transfer: render again soon. */
+  CUMULET_RENDER_CONVERGED = 2,  /**< Every pixel has its samples, at full resolution, for the newest settings. */
+  CUMULET_RENDER_LOADING = 4,    /**< Workers are busy, see cumulet_get_progress. */
+  CUMULET_RENDER_FAILED = 8,     /**< A load or build failed, see @ref cumulet_errors and cumulet_get_progress. */
+  CUMULET_RENDER_PREVIEW = 16,   /**< The displayed image is coarser than the frame. */
   /**
    * After a frame with CUMULET_TARGET_NONE: there is a newer image than the one drawn last. If it is not set, drawing
    * again gives the same image unless display settings changed.
    */
-  CUMULET_RENDER_UNDRAWN = 32
+  CUMULET_RENDER_NEW_IMAGE = 32
 };
 
 /** The result of a frame. */
@@ -3484,16 +3492,17 @@ typedef enum cumulet_warm_up_scope {
 /** The result of one cumulet_warm_up call. */
 typedef struct cumulet_warm_up_result {
   size_t struct_size;
-  int32_t more;    /**< 1: call again. */
-  double progress; /**< 0 to 1, never decreasing within one warm-up (until more is 0); 1 when more is 0. */
+  int32_t incomplete; /**< 1: call again. */
+  double progress; /**< 0 to 1, never decreasing within one warm-up (until incomplete is 0); 1 when incomplete is 0. */
 } cumulet_warm_up_result;
 
 /**
  * [GL] Compiles the shader programs for frames like this one, and uses each once for a tiny image, so that no later
  * frame waits for the driver's compiler. Without it, the frame that first needs a program compiles it. Call it after
- * cumulet_wait, or once per frame, until more is 0:
+ * cumulet_wait, or once per frame, until incomplete is 0:
  *
- *     while (cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result) == CUMULET_OK && result.more) show_bar();
+ *     while (cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result) == CUMULET_OK && result.incomplete)
+ *       show_bar();
  *
  * - It takes results of the workers and uploads them, as cumulet_render does, so that all programs of the scene are
  *   known. It draws nothing into the frame's target, and reads the frame's depth. For navigation and for
@@ -3504,8 +3513,8 @@ typedef struct cumulet_warm_up_result {
  * - With parallel compilation, cumulet_render does not wait for programs either: until one is ready it shows the last
  *   image, a coarser one, or only the surfaces. Two cases wait: a viewer's first [GL] call in a context, for one small
  *   program; and a frame that has nothing to show instead (the first one, or one of another encoding).
- * - A failed call ends the warm-up, and the next one starts again. A failed load ends it with more 0.
- * - Programs of other viewers (cumulet_programs) and binaries in a folder are not compiled again.
+ * - A failed call ends the warm-up, and the next one starts again. A failed load ends it with incomplete 0.
+ * - Programs of other viewers (cumulet_shader_cache) and binaries in a folder are not compiled again.
  *
  * Threads: one call per viewer at a time.
  *
@@ -3531,7 +3540,7 @@ CUMULET_API cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet
 
 /** The light of a transmittance map. */
 typedef enum cumulet_map_light {
-  CUMULET_MAP_LIGHT_SUN = 0,       /**< The viewer's sun (cumulet_light_desc), as parallel light. */
+  CUMULET_MAP_LIGHT_SUN = 0,       /**< The viewer's sun (cumulet_sun_sky_desc), as parallel light. */
   CUMULET_MAP_LIGHT_DIRECTION = 1, /**< Parallel light of the host. */
   CUMULET_MAP_LIGHT_POINT = 2      /**< A point light of the host, outside or inside volumes. */
 } cumulet_map_light;
@@ -3555,7 +3564,7 @@ typedef struct cumulet_transmittance_map {
                          the next call for this slot, or detach. */
   uint32_t size;    /**< Its width and height in texels; smaller than requested while the scene changes. */
   uint32_t slices;
-  int32_t more;         /**< 1: the map is older than the scene, or coarser than requested: call again. */
+  int32_t incomplete;   /**< 1: the map is older than the scene, or coarser than requested: call again. */
   double to_map[16];    /**< Affine. Parallel light: world to texture coordinates. Point light: world to the vector from
                              the light, in world units. Far from the origin, multiply it in double precision with your
                              own matrix to the world, not in the shader. */
@@ -3601,7 +3610,7 @@ CUMULET_API cumulet_status cumulet_update_transmittance_map(cumulet_viewer* view
  * @param slot   The map, 0 to 15.
  * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or a [GL] error.
  */
-CUMULET_API cumulet_status cumulet_drop_transmittance_map(cumulet_viewer* viewer, uint32_t slot);
+CUMULET_API cumulet_status cumulet_destroy_transmittance_map(cumulet_viewer* viewer, uint32_t slot);
 /**
  * Returns GLSL (1.30 and later) for the host's shaders. Put it after the #version line and before its use. It defines
  * `float cumulet_transmittance(sampler3D map, mat4 to_map, vec2 range, vec3 world)`, the transmittance, 0 to 1, from
@@ -3628,19 +3637,19 @@ CUMULET_API const char* cumulet_transmittance_map_glsl(void);
 /** The point of the scene under a pixel. */
 typedef struct cumulet_pick {
   size_t struct_size;
-  int32_t hit;        /**< 1: along the pixel's ray a surface is hit, or the volume reaches half opacity. */
-  double position[3]; /**< The hit point in world space. */
-  double distance;    /**< From the ray's origin. */
-  int32_t met_volume; /**< 1: the hit is in the volume. 0: on a surface, or no hit. */
-  uint32_t place;     /**< If met_volume: index of the instance transform (cumulet_set_volume_places) with the highest
-                           extinction at the hit point. 0 if there is only one. */
+  int32_t hit;              /**< 1: along the pixel's ray a surface is hit, or the volume reaches half opacity. */
+  double position[3];       /**< The hit point in world space. */
+  double distance;          /**< From the ray's origin. */
+  int32_t hit_volume;       /**< 1: the hit is in the volume. 0: on a surface, or no hit. */
+  uint32_t transform_index; /**< If hit_volume: index of the instance transform (cumulet_set_volume_transforms) with the
+                       highest extinction at the hit point. 0 if there is only one. */
   /**
    * cumulet_instance_desc.tag of the instance with the highest extinction, or cumulet_model_desc.tag of the model that
    * is hit. 0 for the viewer's own volume and surfaces.
    */
   uint64_t tag;
-  int32_t met_surface;     /**< 1: a triangle of the viewer's surfaces, or of a model, is hit. */
-  uint32_t material;       /**< If met_surface: number of the material in the file, or of the host's mesh. */
+  int32_t hit_surface;     /**< 1: a triangle of the viewer's surfaces, or of a model, is hit. */
+  uint32_t material;       /**< If hit_surface: number of the material in the file, or of the host's mesh. */
   char material_name[128]; /**< "" if it has none. */
   double normal[3];        /**< Unit normal in world space, interpolated from the vertices, on the ray's side. */
 } cumulet_pick;
@@ -3753,7 +3762,7 @@ typedef enum cumulet_aov {
                                surfaces. */
   /**
    * 4 floats: premultiplied linear radiance and alpha of paths that hit the volume first. Needs
-   * cumulet_sampling_desc.volume_alone. Beauty minus this is the surfaces as seen through the volume.
+   * cumulet_sampling_desc.separate_volume_aov. Beauty minus this is the surfaces as seen through the volume.
    */
   CUMULET_AOV_VOLUME = 1,
   CUMULET_AOV_TRANSMITTANCE = 2, /**< 1 float: transmittance of the volume, up to the nearest surface or to infinity. */
@@ -3813,14 +3822,14 @@ typedef enum cumulet_aov {
  * @param values Receives width x height x the AOV's number of floats, first pixel top left.
  * @param count  Floats at values.
  * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for debug views, if count is too small, if the image still shows
- *         the previous volume, or for CUMULET_AOV_VOLUME without volume_alone; or a [GL] error.
+ *         the previous volume, or for CUMULET_AOV_VOLUME without separate_volume_aov; or a [GL] error.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /**
  * [GL] Reads the contribution of one light group to the image, as if there were no other lights. The background counts
- * in the group of the sky or environment and of the sun's disc, unless it is transparent or a color. The sum of all
+ * in the group of the sky or environment and of the sun's disk, unless it is transparent or a color. The sum of all
  * groups is the radiance of cumulet_read_linear, except for rounding and a background color. Rasterized surfaces
- * (CUMULET_SURFACE_LIGHT_NONE) count in group 0. Previews have no light groups.
+ * (CUMULET_SURFACE_LIGHTING_RASTERIZED) count in group 0. Previews have no light groups.
  *
  * Threads: one call per viewer at a time.
  *
@@ -3847,10 +3856,11 @@ typedef enum cumulet_object_kind {
  * @param user  The argument of cumulet_read_cryptomatte.
  * @param kind  The kind of the object.
  * @param tag   cumulet_instance_desc.tag or cumulet_model_desc.tag; 0 for the viewer's own objects and the ground.
- * @param place Index of the transform (cumulet_set_volume_places); 0 for other objects.
+ * @param transform_index Index of the transform (cumulet_set_volume_transforms); 0 for other objects.
  * @return Zero-terminated UTF-8, used only during cumulet_read_cryptomatte. NULL or "": the object is in no matte.
  */
-typedef const char* (*cumulet_object_name_fn)(void* user, cumulet_object_kind kind, uint64_t tag, uint32_t place);
+typedef const char* (*cumulet_object_name_fn)(void* user, cumulet_object_kind kind, uint64_t tag,
+                                              uint32_t transform_index);
 
 /**
  * [GL] Reads Cryptomatte ID mattes of the image (Friedman and Jones 2015; specification 1.2 of
@@ -3920,8 +3930,8 @@ CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double*
  * @param viewer An attached viewer.
  * @param bytes  Receives the bytes. NULL: only *size is written.
  * @param size   In: bytes of space at bytes. Out: bytes of the accumulation: 32 + 44 per pixel, or 60 with
- *               volume_alone, and 16 per pixel for each light group and two more. Adaptive images have 4 more per
- *               pixel, and 1 for each block of 8 x 8 pixels.
+ *               separate_volume_aov, and 16 per pixel for each light group and two more. Adaptive images have 4 more
+ *               per pixel, and 1 for each block of 8 x 8 pixels.
  * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for other images, for too little space, and before the first
  *         cumulet_render; or a [GL] error.
  */
@@ -3954,7 +3964,7 @@ typedef struct cumulet_stats {
   double build_seconds_load;
   double build_seconds_statistics;
   double build_seconds_refine;
-  double build_seconds_records; /**< Packing the cell data. */
+  double build_seconds_packing; /**< Packing the cell data. */
   double build_seconds_upload;
   double trace_seconds; /**< For the image in progress. */
   uint64_t samples;     /**< Camera paths of the image that were finished at the last cumulet_render. */

@@ -110,12 +110,12 @@ enum class Modifiers : std::uint32_t {
 /// CUMULET_RENDER_* bits, combined with |.
 enum class RenderFlags : std::uint32_t {
   none = 0,
-  more = CUMULET_RENDER_MORE,
+  incomplete = CUMULET_RENDER_INCOMPLETE,
   converged = CUMULET_RENDER_CONVERGED,
   loading = CUMULET_RENDER_LOADING,
   failed = CUMULET_RENDER_FAILED,
   preview = CUMULET_RENDER_PREVIEW,
-  undrawn = CUMULET_RENDER_UNDRAWN
+  new_image = CUMULET_RENDER_NEW_IMAGE
 };
 
 [[nodiscard]] constexpr Modifiers operator|(Modifiers a, Modifiers b) noexcept {
@@ -372,11 +372,11 @@ class Volume {
     if (auto done = detail::result(cumulet_volume_get_info(handle_, &c)); !done) return done.error();
     return VolumeInfo::of(c);
   }
-  [[nodiscard]] Result<ValuesInfo> values(Ramp ramp) const noexcept {
-    auto c = detail::sized<cumulet_values_info>();
-    const cumulet_status status = cumulet_volume_get_values(handle_, static_cast<cumulet_ramp>(ramp), &c);
+  [[nodiscard]] Result<HistogramInfo> histogram(Ramp ramp) const noexcept {
+    auto c = detail::sized<cumulet_histogram_info>();
+    const cumulet_status status = cumulet_volume_get_histogram(handle_, static_cast<cumulet_ramp>(ramp), &c);
     if (auto done = detail::result(status); !done) return done.error();
-    return ValuesInfo::of(c);
+    return HistogramInfo::of(c);
   }
   [[nodiscard]] Result<double> suggest_density_scale() const noexcept {
     double scale = 0.0;
@@ -400,12 +400,12 @@ class Volume {
   cumulet_volume* handle_ = nullptr;
 };
 
-/// Calls visit(name, type, refusal) with three const char* for each grid of the file.
+/// Calls visit(name, type, unsupported_reason) with three const char* for each grid of the file.
 template <class Visit>
 [[nodiscard]] Result<> list_grids(const std::string& path, Visit&& visit) noexcept {
   std::array<char, 512> cause{};
-  const auto call = [](void* user, const char* name, const char* type, const char* refusal) noexcept {
-    (*static_cast<std::remove_reference_t<Visit>*>(user))(name, type, refusal);
+  const auto call = [](void* user, const char* name, const char* type, const char* unsupported_reason) noexcept {
+    (*static_cast<std::remove_reference_t<Visit>*>(user))(name, type, unsupported_reason);
   };
   void* user = const_cast<void*>(static_cast<const void*>(std::addressof(visit)));
   const cumulet_status status = cumulet_list_grids(path.c_str(), call, user, cause.data(), cause.size());
@@ -719,7 +719,8 @@ class Sequence {
   cumulet_sequence* handle_ = nullptr;
 };
 
-// ---- Live volumes ---------------------------------------------------------------------------------------------------
+// ---- Dynamic volumes
+// ---------------------------------------------------------------------------------------------------
 
 /// The voxels of one channel: a dense array, or bricks.
 class Field {
@@ -743,7 +744,7 @@ class Field {
 };
 
 /// The fields of a simulation state. They are used only during the call.
-struct StateDesc {
+struct VolumeFieldsDesc {
   std::span<const Field> fields{};
   const char* name = nullptr;
   cumulet_release_fn release = nullptr;
@@ -780,7 +781,7 @@ struct GlField {
 
 /// The fields of a simulation state in GL. changed: boxes of voxels (both ends inclusive) that differ from the last
 /// state; nullopt: a complete state.
-struct GlStateDesc {
+struct GlVolumeDesc {
   std::span<const GlField> fields{};
   std::optional<std::span<const cumulet_voxel_box>> changed{};
   void* wait = nullptr;  ///< A GLsync, or null.
@@ -791,87 +792,92 @@ namespace detail {
 
 /// Calls `call` with the C descriptor of a state.
 template <class Call>
-auto with_state(const StateDesc& desc, Call&& call) {
+auto with_fields(const VolumeFieldsDesc& desc, Call&& call) {
   // One more than there are channels: with more fields one channel occurs twice, which the library refuses.
   constexpr std::size_t most = CUMULET_CHANNEL_VELOCITY_Z + 2;
   std::array<cumulet_field, most> fields{};
   const std::size_t count = std::min(desc.fields.size(), most);
   for (std::size_t i = 0; i < count; ++i) fields[i] = desc.fields[i];
-  const cumulet_state_desc c{.struct_size = sizeof c,
-                             .fields = fields.data(),
-                             .field_count = count,
-                             .name = desc.name,
-                             .release = desc.release,
-                             .release_user = desc.release_user};
+  const cumulet_volume_fields_desc c{.struct_size = sizeof c,
+                                     .fields = fields.data(),
+                                     .field_count = count,
+                                     .name = desc.name,
+                                     .release = desc.release,
+                                     .release_user = desc.release_user};
   return call(c);
 }
 
 } /* namespace detail */
 
 /// Creates a volume with several channels, which are copied.
-[[nodiscard]] inline Result<Volume> volume_from_state(const StateDesc& desc) noexcept {
-  return detail::with_state(desc, [](const cumulet_state_desc& c) {
+[[nodiscard]] inline Result<Volume> volume_from_fields(const VolumeFieldsDesc& desc) noexcept {
+  return detail::with_fields(desc, [](const cumulet_volume_fields_desc& c) {
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
-      return cumulet_volume_from_state(&c, out, error, size);
+      return cumulet_volume_from_fields(&c, out, error, size);
     });
   });
 }
 
 /// A reference to a dynamic volume; a copy adds a reference to the same volume. Any thread.
-class Live {
+class DynamicVolume {
  public:
-  Live() noexcept = default;
-  Live(const Live& other) noexcept : handle_(cumulet_live_retain(other.handle_)) {}
-  Live(Live&& other) noexcept : handle_(other.release()) {}
-  Live& operator=(Live other) noexcept {
+  DynamicVolume() noexcept = default;
+  DynamicVolume(const DynamicVolume& other) noexcept : handle_(cumulet_dynamic_volume_retain(other.handle_)) {}
+  DynamicVolume(DynamicVolume&& other) noexcept : handle_(other.release()) {}
+  DynamicVolume& operator=(DynamicVolume other) noexcept {
     std::swap(handle_, other.handle_);
     return *this;
   }
-  ~Live() { cumulet_live_release(handle_); }
+  ~DynamicVolume() { cumulet_dynamic_volume_release(handle_); }
 
-  [[nodiscard]] static Result<Live> create(const LiveDesc& desc = {}) noexcept {
-    const cumulet_live_desc c = desc;
-    return detail::made<Live>(
-        [&](cumulet_live** out, char* error, std::size_t size) { return cumulet_live_create(&c, out, error, size); });
+  [[nodiscard]] static Result<DynamicVolume> create(const DynamicVolumeDesc& desc = {}) noexcept {
+    const cumulet_dynamic_volume_desc c = desc;
+    return detail::made<DynamicVolume>([&](cumulet_dynamic_volume** out, char* error, std::size_t size) {
+      return cumulet_dynamic_volume_create(&c, out, error, size);
+    });
   }
   /// Submits a complete state.
-  [[nodiscard]] Result<> set(const StateDesc& desc) const noexcept { return hand_over(desc, cumulet_live_set); }
+  [[nodiscard]] Result<> set(const VolumeFieldsDesc& desc) const noexcept {
+    return hand_over(desc, cumulet_dynamic_volume_set);
+  }
   /// Submits the last state with these bricks replaced.
-  [[nodiscard]] Result<> update(const StateDesc& desc) const noexcept { return hand_over(desc, cumulet_live_update); }
+  [[nodiscard]] Result<> update(const VolumeFieldsDesc& desc) const noexcept {
+    return hand_over(desc, cumulet_dynamic_volume_update);
+  }
   /// Returns the newest state; an empty object before the first one.
   [[nodiscard]] Result<Volume> get_volume() const noexcept {
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
-      return cumulet_live_get_volume(handle_, out, error, size);
+      return cumulet_dynamic_volume_get_volume(handle_, out, error, size);
     });
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
   /// Returns the handle, which this object still owns.
-  [[nodiscard]] cumulet_live* handle() const noexcept { return handle_; }
+  [[nodiscard]] cumulet_dynamic_volume* handle() const noexcept { return handle_; }
   /// Returns the handle, which the caller owns now.
-  [[nodiscard]] cumulet_live* release() noexcept { return std::exchange(handle_, nullptr); }
+  [[nodiscard]] cumulet_dynamic_volume* release() noexcept { return std::exchange(handle_, nullptr); }
   /// Takes over the caller's reference.
-  [[nodiscard]] static Live adopt(cumulet_live* handle) noexcept {
-    Live live;
-    live.handle_ = handle;
-    return live;
+  [[nodiscard]] static DynamicVolume adopt(cumulet_dynamic_volume* handle) noexcept {
+    DynamicVolume volume;
+    volume.handle_ = handle;
+    return volume;
   }
 
  private:
   template <class Call>
-  Result<> hand_over(const StateDesc& desc, Call* call) const noexcept {
-    return detail::with_state(desc, [&](const cumulet_state_desc& c) {
+  Result<> hand_over(const VolumeFieldsDesc& desc, Call* call) const noexcept {
+    return detail::with_fields(desc, [&](const cumulet_volume_fields_desc& c) {
       std::array<char, 512> cause{};
       const cumulet_status status = call(handle_, &c, cause.data(), cause.size());
       return detail::result(status, cause.data());
     });
   }
-  cumulet_live* handle_ = nullptr;
+  cumulet_dynamic_volume* handle_ = nullptr;
 };
 
 // ---- Instances ------------------------------------------------------------------------------------------------------
 
-/// Content, transform and medium of an instance. At most one of volume, sequence and live is set.
+/// Content, transform and medium of an instance. At most one of volume, sequence and dynamic_volume is set.
 struct InstanceDesc {
   Volume volume;
   std::array<double, 16> to_world{};
@@ -879,7 +885,7 @@ struct InstanceDesc {
   bool hidden = false;
   std::uint64_t tag = 0;
   Sequence sequence = {};
-  Live live = {};
+  DynamicVolume dynamic_volume = {};
   std::array<double, 16> open_to_world{};
   std::array<double, 16> close_to_world{};
 };
@@ -941,7 +947,7 @@ class Instance {
                             .hidden = desc.hidden ? 1 : 0,
                             .tag = desc.tag,
                             .sequence = desc.sequence.handle(),
-                            .live = desc.live.handle(),
+                            .dynamic_volume = desc.dynamic_volume.handle(),
                             .open_to_world = {},
                             .close_to_world = {}};
     std::ranges::copy(desc.to_world, c.to_world);
@@ -1068,9 +1074,9 @@ class Camera {
     if (auto done = detail::result(cumulet_camera_get(handle(), &c)); !done) return done.error();
     return CameraDesc::of(c);
   }
-  [[nodiscard]] Result<> set_matrices(const CameraMatrices& matrices, Clip clip) noexcept {
+  [[nodiscard]] Result<> set_matrices(const CameraMatrices& matrices, ClipSpace clip) noexcept {
     return detail::result(cumulet_camera_set_matrices(handle(), matrices.view.data(), matrices.projection.data(),
-                                                      static_cast<cumulet_clip>(clip)));
+                                                      static_cast<cumulet_clip_space>(clip)));
   }
   /// Sets the camera at shutter open and close. Null: as at the frame time.
   [[nodiscard]] Result<> set_shutter(const CameraDesc* open, const CameraDesc* close) noexcept {
@@ -1079,9 +1085,9 @@ class Camera {
     return detail::result(cumulet_camera_set_shutter(handle(), open != nullptr ? &at_open : nullptr,
                                                      close != nullptr ? &at_close : nullptr));
   }
-  [[nodiscard]] Result<CameraMatrices> get_matrices(double aspect, Clip clip) const noexcept {
+  [[nodiscard]] Result<CameraMatrices> get_matrices(double aspect, ClipSpace clip) const noexcept {
     CameraMatrices matrices;
-    if (auto done = detail::result(cumulet_camera_get_matrices(handle(), aspect, static_cast<cumulet_clip>(clip),
+    if (auto done = detail::result(cumulet_camera_get_matrices(handle(), aspect, static_cast<cumulet_clip_space>(clip),
                                                                matrices.view.data(), matrices.projection.data()));
         !done) {
       return done.error();
@@ -1197,58 +1203,58 @@ class GetProc {
   std::function<void*(const char*)> find_;
 };
 
-struct ProgramsDesc {
+struct ShaderCacheDesc {
   const char* folder = nullptr;
   const char* shaders = nullptr;
 
-  operator cumulet_programs_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_programs_desc), .folder = folder, .shaders = shaders};
+  operator cumulet_shader_cache_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_shader_cache_desc), .folder = folder, .shaders = shaders};
   }
 };
 
 /// A reference to shared programs; a copy adds a reference. Empty: the viewer has its own.
-class Programs {
+class ShaderCache {
  public:
-  Programs() noexcept = default;
-  Programs(const Programs& other) noexcept : handle_(cumulet_programs_retain(other.handle_)) {}
-  Programs(Programs&& other) noexcept : handle_(other.release()) {}
-  Programs& operator=(Programs other) noexcept {
+  ShaderCache() noexcept = default;
+  ShaderCache(const ShaderCache& other) noexcept : handle_(cumulet_shader_cache_retain(other.handle_)) {}
+  ShaderCache(ShaderCache&& other) noexcept : handle_(other.release()) {}
+  ShaderCache& operator=(ShaderCache other) noexcept {
     std::swap(handle_, other.handle_);
     return *this;
   }
-  ~Programs() { cumulet_programs_release(handle_); }
+  ~ShaderCache() { cumulet_shader_cache_release(handle_); }
 
-  [[nodiscard]] static Result<Programs> create(const ProgramsDesc& desc = {}) noexcept {
-    const cumulet_programs_desc c = desc;
-    return detail::made<Programs>([&](cumulet_programs** out, char* error, std::size_t size) {
-      return cumulet_programs_create(&c, out, error, size);
+  [[nodiscard]] static Result<ShaderCache> create(const ShaderCacheDesc& desc = {}) noexcept {
+    const cumulet_shader_cache_desc c = desc;
+    return detail::made<ShaderCache>([&](cumulet_shader_cache** out, char* error, std::size_t size) {
+      return cumulet_shader_cache_create(&c, out, error, size);
     });
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
   /// Returns the handle, which this object still owns.
-  [[nodiscard]] cumulet_programs* handle() const noexcept { return handle_; }
+  [[nodiscard]] cumulet_shader_cache* handle() const noexcept { return handle_; }
   /// Returns the handle, which the caller owns now.
-  [[nodiscard]] cumulet_programs* release() noexcept { return std::exchange(handle_, nullptr); }
+  [[nodiscard]] cumulet_shader_cache* release() noexcept { return std::exchange(handle_, nullptr); }
   /// Takes over the caller's reference.
-  [[nodiscard]] static Programs adopt(cumulet_programs* handle) noexcept {
-    Programs programs;
-    programs.handle_ = handle;
-    return programs;
+  [[nodiscard]] static ShaderCache adopt(cumulet_shader_cache* handle) noexcept {
+    ShaderCache cache;
+    cache.handle_ = handle;
+    return cache;
   }
 
  private:
-  cumulet_programs* handle_ = nullptr;
+  cumulet_shader_cache* handle_ = nullptr;
 };
 
 struct CreateDesc {
   GetProc get_proc{};
   std::function<void(LogLevel, std::string_view)> log{};
   std::function<void()> update{};
-  GlState gl_state{};
+  GlStatePolicy gl_state{};
   /// Receives name, begin and end in seconds, see cumulet_trace_fn.
   std::function<void(std::string_view, double, double)> trace{};
-  Programs programs{};
+  ShaderCache shader_cache{};
 };
 
 /// A viewer. Move-only.
@@ -1277,10 +1283,10 @@ class Viewer {
                                 .log_user = callbacks.get(),
                                 .update = callbacks->update ? Callbacks::call_update : nullptr,
                                 .update_user = callbacks.get(),
-                                .gl_state = static_cast<cumulet_gl_state>(desc.gl_state),
+                                .gl_state = static_cast<cumulet_gl_state_policy>(desc.gl_state),
                                 .trace = callbacks->trace ? Callbacks::call_trace : nullptr,
                                 .trace_user = callbacks.get(),
-                                .programs = desc.programs.handle()};
+                                .shader_cache = desc.shader_cache.handle()};
     auto viewer = detail::made<Viewer>(
         [&](cumulet_viewer** out, char* error, std::size_t size) { return cumulet_create(&c, out, error, size); });
     if (viewer) viewer->callbacks_ = std::move(callbacks);
@@ -1305,17 +1311,18 @@ class Viewer {
     return result(cumulet_set_volume(handle(), volume.handle()));
   }
   /// Sets the instance transforms of the volume, column-major and affine; an empty span is one identity.
-  [[nodiscard]] Result<> set_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
+  [[nodiscard]] Result<> set_volume_transforms(std::span<const std::array<double, 16>> to_world) noexcept {
     const double* first = to_world.empty() ? nullptr : to_world.front().data();
-    return result(cumulet_set_volume_places(handle(), first, static_cast<uint32_t>(to_world.size())));
+    return result(cumulet_set_volume_transforms(handle(), first, static_cast<uint32_t>(to_world.size())));
   }
   /// Sets the transforms at shutter open and close, one per instance transform; empty: as at the frame time.
-  [[nodiscard]] Result<> set_volume_shutter(std::span<const std::array<double, 16>> open,
-                                            std::span<const std::array<double, 16>> close) noexcept {
+  [[nodiscard]] Result<> set_volume_shutter_transforms(std::span<const std::array<double, 16>> open,
+                                                       std::span<const std::array<double, 16>> close) noexcept {
     const auto first = [](const auto& matrices) { return matrices.empty() ? nullptr : matrices.front().data(); };
     const bool differ = !open.empty() && !close.empty() && open.size() != close.size();  // the library refuses 0
     const std::size_t count = differ ? 0 : std::max(open.size(), close.size());
-    return result(cumulet_set_volume_shutter(handle(), first(open), first(close), static_cast<uint32_t>(count)));
+    return result(
+        cumulet_set_volume_shutter_transforms(handle(), first(open), first(close), static_cast<uint32_t>(count)));
   }
   /// Shows a sequence; an empty object shows none.
   [[nodiscard]] Result<> set_sequence(const Sequence& sequence) noexcept {
@@ -1341,31 +1348,31 @@ class Viewer {
   [[nodiscard]] Result<> remove_model(const Model& model) noexcept {
     return result(cumulet_remove_model(handle(), model.handle()));
   }
-  /// Shows a live volume; an empty object shows none.
-  [[nodiscard]] Result<> set_live(const Live& live) noexcept {
-    return result(cumulet_set_live(handle(), live.handle()));
+  /// Shows a dynamic volume; an empty object shows none.
+  [[nodiscard]] Result<> set_dynamic_volume(const DynamicVolume& dynamic_volume) noexcept {
+    return result(cumulet_set_dynamic_volume(handle(), dynamic_volume.handle()));
   }
-  /// [GL] Submits a state of a live volume from voxels in GL.
-  [[nodiscard]] Result<> live_set_gl(const Live& live, const GlStateDesc& desc) noexcept {
+  /// [GL] Submits a state of a dynamic volume from voxels in GL.
+  [[nodiscard]] Result<> dynamic_volume_set_gl(const DynamicVolume& dynamic_volume, const GlVolumeDesc& desc) noexcept {
     constexpr std::size_t most = CUMULET_CHANNEL_VELOCITY_Z + 2;
     constexpr cumulet_voxel_box none{};
     std::array<cumulet_gl_field, most> fields{};
     const std::size_t count = std::min(desc.fields.size(), most);
     for (std::size_t i = 0; i < count; ++i) fields[i] = desc.fields[i];
     const bool some = desc.changed && !desc.changed->empty();
-    const cumulet_gl_state_desc c{.struct_size = sizeof c,
-                                  .fields = fields.data(),
-                                  .field_count = count,
-                                  .changed = some ? desc.changed->data() : (desc.changed ? &none : nullptr),
-                                  .changed_count = some ? desc.changed->size() : 0,
-                                  .wait = desc.wait,
-                                  .name = desc.name};
-    return result(cumulet_live_set_gl(handle(), live.handle(), &c));
+    const cumulet_gl_volume_desc c{.struct_size = sizeof c,
+                                   .fields = fields.data(),
+                                   .field_count = count,
+                                   .changed = some ? desc.changed->data() : (desc.changed ? &none : nullptr),
+                                   .changed_count = some ? desc.changed->size() : 0,
+                                   .wait = desc.wait,
+                                   .name = desc.name};
+    return result(cumulet_dynamic_volume_set_gl(handle(), dynamic_volume.handle(), &c));
   }
-  [[nodiscard]] Result<LiveInfo> get_live_info() noexcept {
-    auto c = detail::sized<cumulet_live_info>();
-    if (auto done = result(cumulet_get_live_info(handle(), &c)); !done) return done.error();
-    return LiveInfo::of(c);
+  [[nodiscard]] Result<DynamicVolumeInfo> get_dynamic_volume_info() noexcept {
+    auto c = detail::sized<cumulet_dynamic_volume_info>();
+    if (auto done = result(cumulet_get_dynamic_volume_info(handle(), &c)); !done) return done.error();
+    return DynamicVolumeInfo::of(c);
   }
   /// Sets limits on threads and memory.
   [[nodiscard]] Result<> set_limits(const LimitsDesc& desc) noexcept {
@@ -1398,11 +1405,12 @@ class Viewer {
     }
     return Text<512>(cause.data());
   }
-  /// Returns the state numbers of an instance's live volume.
-  [[nodiscard]] Result<LiveInfo> get_instance_live_info(const Instance& instance) noexcept {
-    auto c = detail::sized<cumulet_live_info>();
-    if (auto done = result(cumulet_get_instance_live_info(handle(), instance.handle(), &c)); !done) return done.error();
-    return LiveInfo::of(c);
+  /// Returns the state numbers of an instance's dynamic volume.
+  [[nodiscard]] Result<DynamicVolumeInfo> get_instance_dynamic_volume_info(const Instance& instance) noexcept {
+    auto c = detail::sized<cumulet_dynamic_volume_info>();
+    if (auto done = result(cumulet_get_instance_dynamic_volume_info(handle(), instance.handle(), &c)); !done)
+      return done.error();
+    return DynamicVolumeInfo::of(c);
   }
   /// Returns the volume; an empty object if there is none.
   [[nodiscard]] Result<Volume> get_volume() noexcept {
@@ -1446,13 +1454,13 @@ class Viewer {
   [[nodiscard]] Result<> use_surface_camera(std::uint32_t index) noexcept {
     return result(cumulet_use_surface_camera(handle(), index));
   }
-  [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
+  [[nodiscard]] Result<> set_sun_sky(const SunSkyDesc& desc) noexcept { return set(cumulet_set_sun_sky, desc); }
   /// Replaces the analytic lights; an empty span removes all.
-  [[nodiscard]] Result<> set_lamps(std::span<const LampDesc> lamps) noexcept {
-    const std::unique_ptr<cumulet_lamp_desc[]> c(new (std::nothrow) cumulet_lamp_desc[lamps.size()]);
+  [[nodiscard]] Result<> set_lights(std::span<const LightDesc> lights) noexcept {
+    const std::unique_ptr<cumulet_light_desc[]> c(new (std::nothrow) cumulet_light_desc[lights.size()]);
     if (!c) return Error{StatusCode::out_of_memory, Text<512>("out of memory")};
-    std::ranges::copy(lamps, c.get());
-    return result(cumulet_set_lamps(handle(), c.get(), lamps.size()));
+    std::ranges::copy(lights, c.get());
+    return result(cumulet_set_lights(handle(), c.get(), lights.size()));
   }
   [[nodiscard]] Result<> load_environment(const std::string& path) noexcept {
     return result(cumulet_load_environment(handle(), path.c_str()));
@@ -1481,9 +1489,9 @@ class Viewer {
   [[nodiscard]] Result<> set_previous_camera(const Camera& camera, double seconds) noexcept {
     return result(cumulet_set_previous_camera(handle(), camera.handle(), seconds));
   }
-  [[nodiscard]] Result<> set_previous_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
+  [[nodiscard]] Result<> set_previous_volume_transforms(std::span<const std::array<double, 16>> to_world) noexcept {
     const double* first = to_world.empty() ? nullptr : to_world.front().data();
-    return result(cumulet_set_previous_volume_places(handle(), first, static_cast<std::uint32_t>(to_world.size())));
+    return result(cumulet_set_previous_volume_transforms(handle(), first, static_cast<std::uint32_t>(to_world.size())));
   }
   [[nodiscard]] Result<Camera> get_camera() noexcept {
     cumulet_camera* out = nullptr;
@@ -1528,8 +1536,8 @@ class Viewer {
     if (auto done = result(cumulet_update_transmittance_map(handle(), &wanted, &c)); !done) return done.error();
     return TransmittanceMap::of(c);
   }
-  [[nodiscard]] Result<> drop_transmittance_map(std::uint32_t slot) noexcept {
-    return result(cumulet_drop_transmittance_map(handle(), slot));
+  [[nodiscard]] Result<> destroy_transmittance_map(std::uint32_t slot) noexcept {
+    return result(cumulet_destroy_transmittance_map(handle(), slot));
   }
   [[nodiscard]] Result<Pick> pick_at(double x, double y) noexcept {
     auto c = detail::sized<cumulet_pick>();
@@ -1563,13 +1571,13 @@ class Viewer {
   [[nodiscard]] Result<> read_light_group(std::uint32_t group, std::span<float> rgb) noexcept {
     return result(cumulet_read_light_group(handle(), group, rgb.data(), rgb.size()));
   }
-  /// `name` is called as name(ObjectKind, tag, place) and returns const char*, see cumulet_object_name_fn. It must not
-  /// throw.
+  /// `name` is called as name(ObjectKind, tag, transform_index) and returns const char*, see cumulet_object_name_fn. It
+  /// must not throw.
   template <class Name>
   [[nodiscard]] Result<> read_cryptomatte(Name&& name, std::uint32_t ranks, std::span<float> values) noexcept {
     const auto call = [](void* user, cumulet_object_kind kind, std::uint64_t tag,
-                         std::uint32_t place) noexcept -> const char* {
-      return (*static_cast<std::remove_reference_t<Name>*>(user))(static_cast<ObjectKind>(kind), tag, place);
+                         std::uint32_t transform_index) noexcept -> const char* {
+      return (*static_cast<std::remove_reference_t<Name>*>(user))(static_cast<ObjectKind>(kind), tag, transform_index);
     };
     void* user = const_cast<void*>(static_cast<const void*>(std::addressof(name)));
     return result(cumulet_read_cryptomatte(handle(), call, user, ranks, values.data(), values.size()));

@@ -167,21 +167,22 @@ struct OpenVdbField {
 };
 
 /**
- * Submits a complete state of a live volume from OpenVDB grids (cumulet_live_set). The grids are copied during the
- * call. Grids with tiles keep them, and such a state takes no cumulet_live_update.
+ * Submits a complete state of a dynamic volume from OpenVDB grids (cumulet_dynamic_volume_set). The grids are copied
+ * during the call. Grids with tiles keep them, and such a state takes no cumulet_dynamic_volume_update.
  *
- * Threads: any thread; runs update callbacks of viewers that show the live volume. No GL.
+ * Threads: any thread; runs update callbacks of viewers that show the dynamic volume. No GL.
  *
- * @param live       The live volume.
+ * @param volume     The dynamic volume.
  * @param fields     The grids and their channels.
  * @param name       Name in messages. NULL or "": "openvdb".
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
- * @return The status of cumulet_live_set; CUMULET_ERROR_INVALID_ARGUMENT for a null grid; or CUMULET_ERROR_FILE for a
- *         level set, another value type or a frustum transform.
+ * @return The status of cumulet_dynamic_volume_set; CUMULET_ERROR_INVALID_ARGUMENT for a null grid; or
+ * CUMULET_ERROR_FILE for a level set, another value type or a frustum transform.
  */
-inline cumulet_status live_set_openvdb(cumulet_live* live, const std::vector<OpenVdbField>& fields, const char* name,
-                                       char* error = nullptr, size_t error_size = 0) {
+inline cumulet_status dynamic_volume_set_openvdb(cumulet_dynamic_volume* volume,
+                                                 const std::vector<OpenVdbField>& fields, const char* name,
+                                                 char* error = nullptr, size_t error_size = 0) {
   std::string what = name != nullptr && *name != '\0' ? name : "openvdb";
   const auto refuse = [&](cumulet_status status, const std::string& cause) {
     return openvdb_detail::refuse(status, what, cause, error, error_size);
@@ -197,12 +198,12 @@ inline cumulet_status live_set_openvdb(cumulet_live* live, const std::vector<Ope
       given[i].channel = fields[i].channel;
       given[i].sparse = &sparse[i].desc;
     }
-    cumulet_state_desc desc{};
+    cumulet_volume_fields_desc desc{};
     desc.struct_size = sizeof desc;
     desc.fields = given.data();
     desc.field_count = given.size();
     desc.name = what.c_str();
-    return cumulet_live_set(live, &desc, error, error_size);
+    return cumulet_dynamic_volume_set(volume, &desc, error, error_size);
   } catch (const std::bad_alloc&) {
     return refuse(CUMULET_ERROR_OUT_OF_MEMORY, "not enough memory to copy it");
   } catch (const std::exception& e) {

@@ -57,13 +57,13 @@ struct ReleaseSequence {
 };
 using SequenceRef = std::unique_ptr<cumulet_sequence, ReleaseSequence>;
 struct ReleaseLive {
-  void operator()(cumulet_live* live) const { cumulet_live_release(live); }
+  void operator()(cumulet_dynamic_volume* live) const { cumulet_dynamic_volume_release(live); }
 };
-using LiveRef = std::unique_ptr<cumulet_live, ReleaseLive>;
+using LiveRef = std::unique_ptr<cumulet_dynamic_volume, ReleaseLive>;
 struct ReleasePrograms {
-  void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
+  void operator()(cumulet_shader_cache* programs) const { cumulet_shader_cache_release(programs); }
 };
-using ProgramsRef = std::unique_ptr<cumulet_programs, ReleasePrograms>;
+using ProgramsRef = std::unique_ptr<cumulet_shader_cache, ReleasePrograms>;
 struct ReleaseCamera {
   void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
 };
@@ -269,10 +269,10 @@ struct ViewerOptions {
   void* update_user = nullptr;
   cumulet_log_fn log = nullptr;
   void* log_user = nullptr;
-  cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE;
+  cumulet_gl_state_policy gl_state = CUMULET_GL_STATE_RESTORE;
   std::uint32_t samples = 4;
-  cumulet_programs* programs = nullptr;
-  cumulet_build build = CUMULET_BUILD_CPU;
+  cumulet_shader_cache* programs = nullptr;
+  cumulet_build_device build = CUMULET_BUILD_CPU;
 };
 
 /// A viewer with the default settings of the library.
@@ -307,10 +307,10 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   create.log = options.log;
   create.log_user = options.log_user;
   create.gl_state = options.gl_state;
-  create.programs = options.programs;
+  create.shader_cache = options.programs;
   ViewerPtr viewer = make_plain_viewer(create);
   cumulet_viewer* const out = viewer.get();
-  auto light = make_desc<cumulet_light_desc>();
+  auto light = make_desc<cumulet_sun_sky_desc>();
   light.sun_azimuth_degrees = 60.0F;
   light.sun_elevation_degrees = 40.0F;
   for (float& value : light.sun_irradiance) value = 2.5F;
@@ -322,8 +322,8 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   stand.eye[1] = 6.0;
   stand.eye[2] = 32.0;
   auto grid = make_desc<cumulet_grid_desc>();
-  grid.build = options.build;
-  if (cumulet_set_light(out, &light) != CUMULET_OK || cumulet_set_sampling(out, &sampling) != CUMULET_OK ||
+  grid.build_device = options.build;
+  if (cumulet_set_sun_sky(out, &light) != CUMULET_OK || cumulet_set_sampling(out, &sampling) != CUMULET_OK ||
       cumulet_set_grid(out, &grid) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(out));
   look(out, stand);
@@ -333,7 +333,7 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
 /// Renders until the image has all its samples. Throws std::runtime_error after an error or after two minutes.
 inline cumulet_frame_result converge(cumulet_viewer* viewer, const cumulet_frame_desc& frame) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
-  constexpr std::uint32_t moving = CUMULET_RENDER_MORE | CUMULET_RENDER_LOADING | CUMULET_RENDER_CONVERGED;
+  constexpr std::uint32_t moving = CUMULET_RENDER_INCOMPLETE | CUMULET_RENDER_LOADING | CUMULET_RENDER_CONVERGED;
   auto result = make_desc<cumulet_frame_result>();
   if (cumulet_wait(viewer, -1.0) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
   do {

@@ -27,7 +27,7 @@ struct Warnings {
 /// Makes any number of viewers of one context, with two samples per pixel, and draws them into one target.
 class CPlaybackTest : public testing::Test {
  protected:
-  [[nodiscard]] ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
+  [[nodiscard]] ViewerPtr make(cumulet_build_device build = CUMULET_BUILD_CPU) {
     return make_viewer({.get_proc = headless::Context::get_proc,
                         .user = &context_,
                         .log = Warnings::add,

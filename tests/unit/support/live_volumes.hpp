@@ -1,6 +1,6 @@
 #pragma once
 
-// Makes volumes from live volumes and from states.
+// Makes volumes from dynamic volumes and from states.
 
 #include <gtest/gtest.h>
 
@@ -11,12 +11,12 @@
 
 namespace cumulet::test {
 
-/// Makes a volume from one state, without a live volume.
+/// Makes a volume from one state, without a dynamic volume.
 inline VolumeRef alone(const State& state) {
   std::array<char, 256> error{};
   cumulet_volume* out = nullptr;
-  const cumulet_state_desc desc = state.desc();
-  EXPECT_EQ(cumulet_volume_from_state(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
+  const cumulet_volume_fields_desc desc = state.desc();
+  EXPECT_EQ(cumulet_volume_from_fields(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
   return VolumeRef(out);
 }
 
@@ -24,7 +24,8 @@ inline VolumeRef alone(const State& state) {
 inline VolumeRef newest(const LiveRef& live) {
   std::array<char, 256> error{};
   cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_OK) << error.data();
+  EXPECT_EQ(cumulet_dynamic_volume_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_OK)
+      << error.data();
   return VolumeRef(out);
 }
 

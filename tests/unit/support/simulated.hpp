@@ -109,8 +109,8 @@ class State {
     fields_.push_back(field);
     return *this;
   }
-  [[nodiscard]] cumulet_state_desc desc(const char* name = "smoke") const {
-    auto desc = make_desc<cumulet_state_desc>();
+  [[nodiscard]] cumulet_volume_fields_desc desc(const char* name = "smoke") const {
+    auto desc = make_desc<cumulet_volume_fields_desc>();
     desc.fields = fields_.data();
     desc.field_count = fields_.size();
     desc.name = name;
@@ -153,8 +153,8 @@ class State {
   std::vector<cumulet_field> fields_;
 };
 
-inline LiveRef make_live(const cumulet_live_desc& desc = make_desc<cumulet_live_desc>()) {
-  return made_by<LiveRef>(cumulet_live_create, desc);
+inline LiveRef make_live(const cumulet_dynamic_volume_desc& desc = make_desc<cumulet_dynamic_volume_desc>()) {
+  return made_by<LiveRef>(cumulet_dynamic_volume_create, desc);
 }
 
 }  // namespace cumulet::test
