@@ -439,7 +439,7 @@ void App::execute(const Command& command) {
     case Action::darker:
       display.exposure_stops = std::max(display.exposure_stops - third, -10.0f);
       break;
-    case Action::next_march:
+    case Action::next_grid_type:
       model_.scene.grid.type = static_cast<cumulet_grid_type>((static_cast<int>(model_.scene.grid.type) + 1) % 3);
       break;
     case Action::view:
@@ -951,9 +951,9 @@ void App::write_report(const std::string& path) const {
   json["turntable"] = model_.navigation.turntable_degrees_per_second;
   json["fly"] = model_.navigation.fly != 0;
   json["scene"] = Json::parse(scene_text(model_.scene, path, SceneFormat::first));
-  const Json second = Json::parse(scene_text(model_.scene, path));
+  const Json current = Json::parse(scene_text(model_.scene, path));
   // Version 1 has no such sections.
-  for (const char* key : {"volumes", "models", "lights"}) json[key] = second.value(key, Json::array());
+  for (const char* key : {"volumes", "models", "lights"}) json[key] = current.value(key, Json::array());
   image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -21,7 +21,7 @@ std::string surfaces_row(const SceneOptions& scene) {
 void Panel::items(Model& model) {
   int tool = static_cast<int>(model.tool);
   const std::vector<Choice> tools = {
-      {"None", static_cast<int>(Tool::none), "The picture alone: no outlines, handles and lamps' marks (Q)."},
+      {"None", static_cast<int>(Tool::none), "The picture alone: no outlines, handles and lights' marks (Q)."},
       {"Move", static_cast<int>(Tool::move), "Along an axis, in a plane, or freely in the picture's (W)."},
       {"Rotate", static_cast<int>(Tool::rotate), "About an axis, or about the sight (E)."},
       {"Scale", static_cast<int>(Tool::scale), "Along its own axes, two, or all alike (R)."}};

@@ -62,7 +62,8 @@ void Panel::analytic_lights(Model& model) {
         const double length = std::hypot(value[0], value[1], value[2]);
         ui_.numbers(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
       } else if (rows_.draw(setting, value) && setting.is(&Desc::kind)) {
-        // Changing the kind sets values that suit it: a sun's power is in W/m², and a spot needs a cone angle.
+        // Changing the kind sets values that suit it: a distant light's power is in W/m², and a spot needs a cone
+        // angle.
         if (analytic_light.kind == CUMULET_LIGHT_DISTANT) analytic_light.power = static_cast<float>(sun_at_noon);
         if (analytic_light.kind == CUMULET_LIGHT_SPOT && analytic_light.angle_degrees == 0.0)
           analytic_light.angle_degrees = 45.0;
@@ -70,13 +71,13 @@ void Panel::analytic_lights(Model& model) {
     });
     if (analytic_light.kind == CUMULET_LIGHT_DISTANT)
       analytic_light.angle_degrees = std::min(analytic_light.angle_degrees, 90.0);
-    if (ui_.button(("Remove lamp" + number).c_str(), "Takes this lamp away.", {-1.0f, 0.0f})) removed = i;
+    if (ui_.button(("Remove light" + number).c_str(), "Removes this light.", {-1.0f, 0.0f})) removed = i;
   }
   if (removed) {
     analytic_lights.erase(analytic_lights.begin() + static_cast<std::ptrdiff_t>(*removed));
     forget(model.chosen, Item::Kind::analytic_light, *removed);
   }
-  if (!ui_.button("Add lamp", "A point of light above what the camera looks at.", {-1.0f, 0.0f})) return;
+  if (!ui_.button("Add light", "A point of light above what the camera looks at.", {-1.0f, 0.0f})) return;
   analytic_lights.push_back(new_analytic_light(model.scene.camera));
   model.chosen = Item{Item::Kind::analytic_light, analytic_lights.size() - 1, 0};
 }

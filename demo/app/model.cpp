@@ -63,7 +63,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_3, 0, {Action::view, "", CUMULET_VIEW_STEPS}, "", ""},
       {GLFW_KEY_4, 0, {Action::view, "", CUMULET_VIEW_DENSITY}, "", ""},
       {GLFW_KEY_5, 0, {Action::view, "", CUMULET_VIEW_WIREFRAME}, "", ""},
-      {GLFW_KEY_M, 0, {Action::next_march}, "M", "Next march"},
+      {GLFW_KEY_M, 0, {Action::next_grid_type}, "M", "Next grid type"},
       {GLFW_KEY_SPACE, 0, {Action::play}, "Space", "Play a sequence, and pause"},
       {GLFW_KEY_COMMA, 0, {Action::step, "", -1}, ",  .", "A frame back, a frame on"},
       {GLFW_KEY_PERIOD, 0, {Action::step, "", 1}, "", ""},

@@ -52,7 +52,7 @@ enum class Action {
   toggle_axes,  // axes of the handles: world or local
   brighter,
   darker,
-  next_march,
+  next_grid_type,
   view,  // value: a cumulet_view_mode
   grids_dialog,
   choose_grid,   // text: the grid's name

@@ -87,9 +87,9 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   if (model.status.play || model.status.neighbours) section("Sequence", true, [&] { sequence(model, commands); });
   section("Scene", true, [&] { items(model); });
   section("Display", true, [&] { display(model); });
-  section("Light", true, [&] { light(model); });
+  section("Sun & sky", true, [&] { light(model); });
   section("Environment", true, [&] { environment(model, commands); });
-  section("Lamps", true, [&] { analytic_lights(model); });
+  section("Lights", true, [&] { analytic_lights(model); });
   section("Medium", true, [&] { medium(model, commands); });
   section("Volumes", true, [&] { volumes(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
@@ -342,7 +342,7 @@ void Panel::grid(Model& model) {
                   model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
     ui_.value_row("Levels", model.status.has_volume ? std::to_string(stats.levels) : "-");
   }
-  ui_.value_row("March data", model.status.has_volume ? short_bytes(static_cast<double>(stats.cell_bytes)) : "-");
+  ui_.value_row("Grid data", model.status.has_volume ? short_bytes(static_cast<double>(stats.cell_bytes)) : "-");
 }
 
 void Panel::threshold(settings::SettingInfo info, cumulet_grid_desc& grid) {

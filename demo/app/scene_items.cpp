@@ -123,7 +123,7 @@ std::string title_of(const SceneOptions& scene, const Item& item) {
     case Item::Kind::analytic_light:
       break;
   }
-  return "Lamp " + number;
+  return "Light " + number;
 }
 
 std::string name_of(const SceneOptions& scene, const Item& item) {

@@ -11,7 +11,7 @@ namespace cumulet::image::attributes {
 inline constexpr std::string_view comments = "comments";
 inline constexpr std::string_view version = "cumulet:version";
 inline constexpr std::string_view scene = "cumulet:scene";
-inline constexpr std::string_view march = "cumulet:march";
+inline constexpr std::string_view grid_type = "cumulet:grid_type";
 inline constexpr std::string_view background = "cumulet:background";
 inline constexpr std::string_view samples = "cumulet:samples";
 inline constexpr std::string_view first_sample = "cumulet:first_sample";

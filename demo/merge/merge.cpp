@@ -90,7 +90,7 @@ void check_together(const Part& a, const Part& b) {
   if (of_a != of_b) refuse(b.path, "is of another region than " + a.path);
   check_same<std::string>(a, b, attributes::version, "another version of Cumulet");
   check_same<double>(a, b, attributes::seed, "another seed");
-  check_same<std::string>(a, b, attributes::march, "another march");
+  check_same<std::string>(a, b, attributes::grid_type, "another grid type");
   check_same<std::string>(a, b, attributes::scene, "another scene");
   if (a.contents.channels != b.contents.channels) refuse(b.path, "has other layers than " + a.path);
   if (manifest_of(a) != manifest_of(b)) refuse(b.path, "has mattes of other names than " + a.path);

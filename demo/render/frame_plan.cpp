@@ -97,7 +97,7 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   std::optional<FramePattern> volume = volume_pattern(options);
   if (!volume) {
     if (options.overwrite) throw UsageError("--overwrite is of a sequence: one picture replaces what is there");
-    if (!options.settled.empty()) throw UsageError("--settled is of a sequence, and this is one picture");
+    if (!options.sequence_cache.empty()) throw UsageError("--sequence-cache is of a sequence, and this is one picture");
     return std::nullopt;
   }
   if (options.info) throw UsageError("--info is of one file, and '" + volume->text() + "' are many");

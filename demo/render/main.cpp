@@ -390,7 +390,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
     json["peak_rss_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
   json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
   json["backend"] = backend;
-  json["march"] = cumulet::demo::march_name(options.scene.grid.type);
+  json["grid_type"] = cumulet::demo::grid_type_name(options.scene.grid.type);
   if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
   // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   cumulet::image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
@@ -835,9 +835,9 @@ void settle(const Viewer& viewer, RenderOptions& options) {
 /// Creates a studio for the whole sequence, and sets the options shared by all frames.
 std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
   const SceneOptions given = options.scene;
-  const bool kept = !options.settled.empty() && !is_settled(given);
-  const bool known = kept && cumulet::demo::read_settled(options.settled, options.scene, plan.analyzed_by);
-  if (kept && !known) cumulet::image::check_writable(options.settled);
+  const bool kept = !options.sequence_cache.empty() && !is_settled(given);
+  const bool known = kept && cumulet::demo::read_settled(options.sequence_cache, options.scene, plan.analyzed_by);
+  if (kept && !known) cumulet::image::check_writable(options.sequence_cache);
   auto studio = std::make_unique<Studio>(options);
   wait(studio->viewer(), studio->progress());
   studio->choose_in_surfaces(options);
@@ -855,7 +855,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
     }
     studio->remark(probe);
     settle(studio->viewer(), options);
-    if (kept) cumulet::demo::write_settled(options.settled, given, options.scene, state);
+    if (kept) cumulet::demo::write_settled(options.sequence_cache, given, options.scene, state);
     break;
   }
   return studio;

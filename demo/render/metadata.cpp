@@ -43,7 +43,7 @@ const char* name_of(const Choices& choices, Value value) {
 
 }  // namespace
 
-const char* march_name(cumulet_grid_type march) { return name_of(settings::march_choices, march); }
+const char* grid_type_name(cumulet_grid_type type) { return name_of(settings::grid_type_choices, type); }
 
 std::vector<image::Attribute> camera_metadata(const double view[16], const double projection[16]) {
   Matrix eye{};
@@ -92,7 +92,7 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   add(names::comments, names::comments_text(version_text(), samples));
   add(names::version, version_text());
   add(names::scene, scene_hash(scene));
-  add(names::march, std::string(march_name(scene.grid.type)));
+  add(names::grid_type, std::string(grid_type_name(scene.grid.type)));
   add(names::background, std::string(name_of(settings::background_choices, scene.display.background)));
   add(names::samples, samples);
   // True only if every pixel has all samples: no pixel has more than the requested number.

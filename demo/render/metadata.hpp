@@ -21,6 +21,6 @@ namespace cumulet::demo {
 [[nodiscard]] std::vector<image::Attribute> camera_metadata(const double view[16], const double projection[16]);
 
 /// Returns the name of the grid type in flags and scene files.
-[[nodiscard]] const char* march_name(cumulet_grid_type march);
+[[nodiscard]] const char* grid_type_name(cumulet_grid_type type);
 
 }  // namespace cumulet::demo

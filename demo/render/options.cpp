@@ -20,6 +20,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "old_flags.hpp"
 #include "option_table.hpp"
 
 namespace cumulet::demo {
@@ -82,19 +83,30 @@ CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, cons
   return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group)->take_last();
 }
 
+/// Returns the value with this name; null if there is none. Reports a name of an earlier version. of: what precedes the
+/// name on the command line.
+template <class Names>
+auto* find_choice(const CLI::App& app, const std::string& of, const Names& names, std::string_view text) {
+  for (const auto& name : names) {
+    if (text == name.name) return &name;
+    if constexpr (requires { name.old; }) {
+      if (text.empty() || text != name.old) continue;
+      report_renamed(app, of + ' ' + name.old, of + ' ' + name.name);
+      return &name;
+    }
+  }
+  return static_cast<decltype(&*std::begin(names))>(nullptr);
+}
+
 template <class Names, class Target>
 CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& flag, const Names& names, Target& target,
                         const std::string& help) {
   return add(
       app, group, flag, list_names(names, "|"),
-      [names, &target](const std::string& text) {
-        for (const auto& name : names) {
-          if (text == name.name) {
-            target = static_cast<Target>(name.value);
-            return;
-          }
-        }
-        throw UsageError(in_quotes(text) + " is none of " + list_names(names, ", "));
+      [&app, flag, names, &target](const std::string& text) {
+        const auto* const found = find_choice(app, flag, names, text);
+        if (found == nullptr) throw UsageError(in_quotes(text) + " is none of " + list_names(names, ", "));
+        target = static_cast<Target>(found->value);
       },
       help);
 }
@@ -276,14 +288,13 @@ bool take_analytic_light_key(cumulet_light_desc& analytic_light, std::string_vie
 }
 
 /// Parses a light such as "point position=0,1,2 power=100": a kind, then keys and values as in scene files.
-cumulet_light_desc parse_analytic_light(std::string_view text) {
+cumulet_light_desc parse_analytic_light(const CLI::App& app, std::string_view text) {
   const std::vector<std::string_view> parts = words(text);
   cumulet_light_desc analytic_light{};
   analytic_light.struct_size = sizeof analytic_light;
   const std::string_view kind = parts.empty() ? std::string_view{} : parts.front();
-  const auto* const named =
-      std::ranges::find_if(settings::analytic_light_choices, [&](const auto& choice) { return kind == choice.name; });
-  if (named == settings::analytic_light_choices.end())
+  const auto* const named = find_choice(app, "--light", settings::analytic_light_choices, kind);
+  if (named == nullptr)
     throw UsageError(in_quotes(kind) + " is none of " + list_names(settings::analytic_light_choices, ", "));
   analytic_light.kind = static_cast<cumulet_light_kind>(named->value);
   std::set<std::string_view> given;
@@ -291,7 +302,11 @@ cumulet_light_desc parse_analytic_light(std::string_view text) {
     const std::size_t equals = parts[i].find('=');
     if (equals == std::string_view::npos)
       throw UsageError(in_quotes(parts[i]) + " is not a key and its value, such as power=100");
-    const std::string_view key = parts[i].substr(0, equals);
+    std::string_view key = parts[i].substr(0, equals);
+    if (key == "across") {
+      key = "tangent";
+      report_renamed(app, "--light across", "--light tangent");
+    }
     const std::string value(parts[i].substr(equals + 1));
     if (!given.insert(key).second) throw UsageError(std::string(key) + " is given twice");
     bool known = false;
@@ -300,36 +315,35 @@ cumulet_light_desc parse_analytic_light(std::string_view text) {
     } catch (const UsageError& error) {
       throw UsageError(std::string(key) + ": " + error.what());
     }
-    if (!known) throw UsageError("lamps have no " + in_quotes(key));
+    if (!known) throw UsageError("lights have no " + in_quotes(key));
   }
   if (const auto refusal = settings::analytic_light_refusal(analytic_light))
     throw UsageError(std::string(refusal->name) + " " + refusal->cause);
   return analytic_light;
 }
 
-/// Adds --lamp: analytic lights in addition to those of a scene file. "none" removes the lights given before it.
+/// Adds --light: analytic lights in addition to those of a scene file. "none" removes the lights given before it.
 void add_analytic_lights(CLI::App& app, const char* group, std::vector<cumulet_light_desc>& analytic_lights) {
-  const auto take = [&analytic_lights](const std::vector<std::string>& texts) {
+  const auto take = [&app, &analytic_lights](const std::vector<std::string>& texts) {
     try {
       for (const std::string& text : texts) {
         if (text == "none")
           analytic_lights.clear();
         else
-          analytic_lights.push_back(parse_analytic_light(text));
+          analytic_lights.push_back(parse_analytic_light(app, text));
       }
       if (const std::string why = settings::analytic_light_count_refusal(analytic_lights.size()); !why.empty())
         throw UsageError(why);
     } catch (const UsageError& error) {
-      throw CLI::ValidationError("--lamp", error.what());
+      throw CLI::ValidationError("--light", error.what());
     }
   };
   app.add_option_function<std::vector<std::string>>(
-         "--lamp", take,
-         "A lamp, as often as there are lamps: a point, spot, disc, rectangle or sun, such as \"disc position=0,30,10 "
-         "power=20000 width=4\"; the keys are those of a scene file's lights: position, direction, across, color, "
-         "power (watts; of a sun W/m2), width, height, angle_degrees, blend, group. Beside a scene's own; none: "
-         "without "
-         "those before")
+         "--light", take,
+         "A light, as often as there are lights: point, spot, disk, rect or distant, such as \"disk position=0,30,10 "
+         "power=20000 width=4\"; the keys are those of a scene file's lights: position, direction, tangent, color, "
+         "power (watts; of a distant light W/m2), width, height, angle_degrees, blend, group. Added to the scene's; "
+         "none: removes those before it")
       ->type_name("\"KIND KEY=VALUE ...\"|none")
       ->group(group)
       ->expected(1)
@@ -530,7 +544,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
   }
 
-  group = "Light (default: a clear day; given sun, sky, environment or lamps, the others are dark)";
+  group = "Light (default: a clear day; given sun, sky, environment or lights, the others are dark)";
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
@@ -665,6 +679,7 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
     out << option_table(app);
     return false;
   }
+  replace_old_flags(app, arguments);
   try {
     std::vector<std::string> reversed = glue_negative_fractions(std::move(arguments));
     std::reverse(reversed.begin(), reversed.end());  // CLI11 expects them in reverse order
@@ -710,7 +725,7 @@ void check_together(const RenderOptions& options, bool part) {
   if (options.denoise != Denoise::off && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--denoise needs the shaded view");
   if (options.denoise != Denoise::off && options.scene.surface.lighting == CUMULET_SURFACE_LIGHTING_RASTERIZED)
-    throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
+    throw UsageError("--denoise needs surfaces that paths meet, not --surface-lighting rasterized");
   check_part(options, part);
   if (!options.checkpoint.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--checkpoint needs the shaded view");
@@ -723,7 +738,8 @@ void check_together(const RenderOptions& options, bool part) {
                                    {"--stats", options.stats},
                                    {"--trace", options.trace},
                                    {"--checkpoint", options.checkpoint}}) {
-    if (same_file(options.settled, file)) throw UsageError("--settled and " + std::string(flag) + " are the same file");
+    if (same_file(options.sequence_cache, file))
+      throw UsageError("--sequence-cache and " + std::string(flag) + " are the same file");
   }
   if (same_file(options.stats, options.output)) throw UsageError("--stats and --output are the same file");
   if (same_file(options.trace, options.output)) throw UsageError("--trace and --output are the same file");
@@ -771,10 +787,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   app.add_flag("--overwrite", options.overwrite, "Make frames anew that are there already, which are kept else")
       ->group(group);
   add(
-      app, group, "--settled", "FILE",
+      app, group, "--sequence-cache", "FILE",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
-        options.settled = text;
+        options.sequence_cache = text;
       },
       "Keep what all frames of a sequence have in common, and flags do not say, in this file: later runs need not read "
       "the volume that it is taken from, as long as that is the same by size and time");

@@ -30,7 +30,7 @@ struct NamedFiles {
 void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedFiles& files);
 
 /// Parses the arguments. For --help, --version and --option-table (option_table.hpp) it writes the text to `out` and
-/// returns false. Throws UsageError.
+/// returns false. Flags of earlier versions are accepted and reported (old_flags.hpp). Throws UsageError.
 [[nodiscard]] bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out);
 
 enum class OutputFormat { png, exr, pfm };
@@ -47,9 +47,10 @@ struct RenderOptions {
   std::string shader_cache;    // a folder; empty: none
   std::vector<Moment> frames;  // of the sequence; empty: the frame of the scene, else all
   bool overwrite = false;      // re-render frames whose output exists
-  std::string settled;  // sequence cache: file with the settings shared by all frames; empty: derive them in each run
-  bool info = false;    // print the content of the files, render nothing
-  bool json = false;    // print `info` as JSON
+  std::string
+      sequence_cache;  // sequence cache: file with the settings shared by all frames; empty: derive them in each run
+  bool info = false;   // print the content of the files, render nothing
+  bool json = false;   // print `info` as JSON
   std::string checkpoint;            // empty: none
   double checkpoint_every = 300.0;   // seconds
   std::optional<double> time_limit;  // seconds from the first sample

@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "keys.hpp"
 #include "matrix.hpp"
 #include "names.hpp"
 
@@ -36,26 +37,6 @@ namespace fs = std::filesystem;
 using settings::number_text;
 using settings::Range;
 using settings::Spelling;
-
-/// A section of version 1 and its path in version 2.
-struct Moved {
-  std::string_view first;
-  std::string_view second;
-};
-constexpr std::array moved = {Moved{"volume", "volumes[]"}, Moved{"medium", "volumes[].medium"},
-                              Moved{"surfaces", "models[0]"}, Moved{"light", "environment"}};
-
-/// Translates a version 1 key to the key in `format`. volume: index of the volume that the key belongs to.
-std::string key_in(SceneFormat format, const std::string& key, std::size_t volume) {
-  const std::string section = key.substr(0, key.find('.'));
-  if (section == "sequence" && volume > 0) return "volumes[" + std::to_string(volume) + "]." + key;
-  const auto* const found = std::ranges::find(moved, section, &Moved::first);
-  if (format == SceneFormat::first || found == moved.end()) return key;
-  std::string path(found->second);
-  if (const auto bracket = path.find("[]"); bracket != std::string::npos)
-    path.insert(bracket + 1, std::to_string(volume));
-  return path + key.substr(section.size());
-}
 
 constexpr double max_u32 = 4294967295.0;
 // Largest integer up to which JSON numbers (doubles) are exact.
@@ -103,9 +84,9 @@ struct PlaceParts {
   }
 };
 
-/// Reads a scene file. Keys are paths such as "environment.sun.irradiance" or "lights[0].power". Each key is removed
+/// Reads a scene file. Keys are paths such as "sun_sky.sun.irradiance" or "lights[0].power". Each key is removed
 /// when it is read, and leftover keys are an error, because a misspelled key would otherwise go unnoticed. Callers use
-/// the version 1 names of keys that moved; errors use the names of the file's version.
+/// the names of keys.hpp; errors use the names of the file's version.
 class Reader {
  public:
   Reader(std::string file, Json json) : file_(std::move(file)), json_(std::move(json)) {
@@ -160,13 +141,17 @@ class Reader {
     if (!has(key)) return;
     std::string chosen;
     text(key, chosen);
+    std::string list;
     for (const auto& name : names) {
-      if (chosen == name.name) {
+      const std::string_view spelled = value_in(format_, name);
+      if (chosen == spelled) {
         out = static_cast<Value>(name.value);
         return;
       }
+      if (chosen == value_in(SceneFormat::second, name)) wrong(key, "'" + chosen + "' is now '" + name.name + "'");
+      list += (list.empty() ? "" : ", ") + std::string(spelled);
     }
-    wrong(key, "'" + chosen + "' is none of " + list_names(names, ", "));
+    wrong(key, "'" + chosen + "' is none of " + list);
   }
 
   /// Returns true if the key exists. The range is also checked after conversion, because a float may be rounded.
@@ -202,7 +187,7 @@ class Reader {
   }
 
   /// Reads a list of transforms, each 16 numbers or an object with translate, rotate_degrees and scale.
-  void places(const std::string& key, std::vector<Matrix>& out) {
+  void transforms(const std::string& key, std::vector<Matrix>& out) {
     const std::optional<Json> value = take(key);
     if (!value) return;
     if (!value->is_array()) wrong(key, "is not a list");
@@ -314,7 +299,8 @@ class Reader {
     const Place place = find(key);
     if (place.value == nullptr) return std::nullopt;
     Json taken = std::move(*place.value);
-    place.object->erase(key.substr(key.rfind('.') + 1));  // the last part of a key is the same in all versions
+    const std::string path = key_in(format_, key, volume_);
+    place.object->erase(path.substr(path.rfind('.') + 1));
     return taken;
   }
 
@@ -322,7 +308,10 @@ class Reader {
     for (const auto& item : rest.items()) {
       const std::string key =
           rest.is_array() ? where + "[" + item.key() + "]" : where + (where.empty() ? "" : ".") + item.key();
-      if (!sections_.contains(key)) fail(file_, key + ": there is no such setting");
+      if (!sections_.contains(key)) {
+        const std::string now = format_ == SceneFormat::third ? replacement_of(key) : "";
+        fail(file_, key + ": there is no such setting" + (now.empty() ? "" : ": it is now " + now));
+      }
       refuse_rest(item.value(), key);
     }
   }
@@ -403,12 +392,12 @@ void read_named_cameras(Reader& reader, std::vector<NamedCamera>& cameras) {
     reader.text(of + "name", name);
     if (name.empty()) reader.wrong(of + "name", "is empty");
     if (!known.insert(name).second) reader.wrong(of + "name", "\"" + name + "\" is another camera's, too");
-    read_camera(reader, SceneFormat::second, of, cameras[i]);
+    read_camera(reader, SceneFormat::third, of, cameras[i]);
   }
 }
 
 void read_cameras(Reader& reader, SceneFormat format, SceneOptions& scene) {
-  if (format == SceneFormat::second) read_named_cameras(reader, scene.cameras);
+  if (format != SceneFormat::first) read_named_cameras(reader, scene.cameras);
   if (format == SceneFormat::first || !reader.is_text("camera")) return read_camera(reader, format, "camera.", scene);
   std::string name;
   reader.text("camera", name);
@@ -498,8 +487,8 @@ SceneFormat read_version(Reader& reader) {
   int version = 0;
   if (!reader.has("cumulet_scene")) reader.wrong("cumulet_scene", "is missing: not a Cumulet scene");
   reader.integer("cumulet_scene", version, 0.0, max_u32);
-  if (version != 1 && version != 2)
-    reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1 and 2");
+  if (version < 1 || version > 3)
+    reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1 to 3");
   return static_cast<SceneFormat>(version);
 }
 
@@ -517,7 +506,7 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, volume.ramps[i]);
   if (format == SceneFormat::first) return;
   read_place(reader, "volume.", volume.to_world);
-  reader.places("volume.places", volume.places);
+  reader.transforms("volume.transforms", volume.places);
   read_shutter(reader, "volume.", volume.shutter);
   reader.text("volume.name", volume.name);
   volume.visible = read_visible(reader, "volume.");
@@ -585,9 +574,8 @@ void read_sequence(Reader& reader, SceneSequence& sequence) {
     reader.wrong("sequence.last_frame", "comes before sequence.first_frame");
 }
 
-/// Reads the sections that exist only in version 2.
-void read_second(Reader& reader, SceneOptions& scene) {
-  reader.set_format(SceneFormat::second);
+/// Reads the sections that version 1 does not have.
+void read_lists(Reader& reader, SceneFormat format, SceneOptions& scene) {
   const std::size_t volumes = reader.list("volumes", max_volumes);
   read_models(reader, scene);
   read_analytic_lights(reader, scene.analytic_lights);
@@ -595,7 +583,7 @@ void read_second(Reader& reader, SceneOptions& scene) {
     SceneVolume& volume = scene.others.emplace_back();
     reader.of_volume(i);
     if (!reader.has("volume.file")) reader.wrong("volume.file", "is missing");
-    read_volume(reader, SceneFormat::second, volume);
+    read_volume(reader, format, volume);
     if (volume.volume.empty()) reader.wrong("volume.file", "is empty");
     read_settings(reader, volume.medium);
     if (volume.medium.max_bounces != 0) reader.wrong("medium.max_bounces", "is the first volume's, for all of them");
@@ -607,17 +595,18 @@ void read_second(Reader& reader, SceneOptions& scene) {
 
 void read_scene(Reader& reader, SceneOptions& scene) {
   const SceneFormat format = read_version(reader);
-  const bool second = format == SceneFormat::second;
-  if (second) read_second(reader, scene);
+  const bool has_lists = format != SceneFormat::first;
+  reader.set_format(format);
+  if (has_lists) read_lists(reader, format, scene);
   read_volume(reader, format, scene);
   read_cameras(reader, format, scene);
   reader.text("surfaces.file", scene.surfaces);
   reader.text("surfaces.variant", scene.surface_variant);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
   reader.text("environment.file", scene.environment);
-  if (second) {
-    if (!reader.has("environment") && !reader.has("lights")) scene.set_daylight();
-  } else if (!reader.has("light") && scene.environment.empty()) {
+  if (has_lists) {
+    if (!reader.has("sun_sky") && !reader.has("environment") && !reader.has("lights")) scene.set_daylight();
+  } else if (!reader.has("sun_sky") && scene.environment.empty()) {
     scene.set_daylight_of_version_1();
   }
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
@@ -657,17 +646,17 @@ double albedo_of(float coalbedo) {
 Json three(const double (&xyz)[3]) { return {xyz[0], xyz[1], xyz[2]}; }
 
 template <class Names, class Value>
-const char* name_of(const Names& names, Value value) {
+std::string name_of(SceneFormat format, const Names& names, Value value) {
   for (const auto& name : names)
-    if (static_cast<Value>(name.value) == value) return name.name;
+    if (static_cast<Value>(name.value) == value) return std::string(value_in(format, name));
   throw std::logic_error("a setting has no name");
 }
 
 /// Returns the JSON value of a setting; nullopt if it is left to the library's default.
 template <class Desc, class Value>
-std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const Value& value) {
+std::optional<Json> json_of(SceneFormat format, const settings::Setting<Desc, Value>& setting, const Value& value) {
   if constexpr (settings::Enumerated<Value>) {
-    return name_of(setting.choices, value);
+    return name_of(format, setting.choices, value);
   } else if constexpr (settings::Switch<Value>) {
     return value != 0;
   } else if constexpr (settings::Rectangle<Value>) {
@@ -719,7 +708,7 @@ class Writer {
   void put_settings(const Desc& desc, const std::string& where = "") {
     settings::for_each<Desc>([&](const auto& setting) {
       if (*setting.key == '\0') return;
-      const std::optional<Json> value = json_of(setting, desc.*setting.field);
+      const std::optional<Json> value = json_of(format_, setting, desc.*setting.field);
       if (value) put(where + setting.key, *value);
     });
   }
@@ -759,7 +748,7 @@ Json camera_json(const SceneCamera& view, SceneFormat format) {
 }
 
 void put_cameras(Writer& writer, SceneFormat format, const SceneOptions& scene) {
-  const NamedCamera* const named = format == SceneFormat::second ? looked_through(scene) : nullptr;
+  const NamedCamera* const named = format != SceneFormat::first ? looked_through(scene) : nullptr;
   writer.put("camera", named != nullptr ? Json(named->name) : camera_json(scene, format));
   if (format == SceneFormat::first) return;
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
@@ -770,13 +759,14 @@ void put_cameras(Writer& writer, SceneFormat format, const SceneOptions& scene) 
 }
 
 void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, const std::string& file) {
-  if (format == SceneFormat::second) writer.put_text("volume.name", volume.name);
+  const bool has_lists = format != SceneFormat::first;
+  if (has_lists) writer.put_text("volume.name", volume.name);
   writer.put("volume.file", file);
   writer.put_text("volume.grid", volume.grid_name);
-  if (volume.up != UpAxis::y) writer.put("volume.up", name_of(up_names, volume.up));
-  if (format == SceneFormat::second) {
+  if (volume.up != UpAxis::y) writer.put("volume.up", name_of(format, up_names, volume.up));
+  if (has_lists) {
     if (volume.to_world != Matrix{}) writer.put("volume.to_world", volume.to_world);
-    if (!volume.places.empty()) writer.put("volume.places", volume.places);
+    if (!volume.places.empty()) writer.put("volume.transforms", volume.places);
     put_shutter(writer, "volume.", volume.shutter);
     if (!volume.visible) writer.put("volume.visible", false);
   }
@@ -830,22 +820,22 @@ void put_sequence(Writer& writer, const SceneSequence& sequence) {
 template <class Named>
 Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) {
   Writer writer(format);
-  const bool second = format == SceneFormat::second;
+  const bool has_lists = format != SceneFormat::first;
   put_volume(writer, format, scene, named(scene.volume));
-  for (std::size_t i = 0; second && i < scene.others.size(); ++i) {
+  for (std::size_t i = 0; has_lists && i < scene.others.size(); ++i) {
     writer.of_volume(i + 1);
     put_volume(writer, format, scene.others[i], named(scene.others[i].volume));
     put_sequence(writer, scene.others[i].sequence);
   }
   writer.of_volume(0);
-  if (second) put_sequence(writer, scene.sequence);
+  if (has_lists) put_sequence(writer, scene.sequence);
 
   if (!scene.surfaces.empty()) {
     writer.put("surfaces.file", named(scene.surfaces));
     if (!scene.surface_variant.empty()) writer.put("surfaces.variant", scene.surface_variant);
     if (scene.surface_camera >= 0) writer.put("surfaces.camera", scene.surface_camera);
   }
-  const bool models = second && !scene.models.empty();
+  const bool models = has_lists && !scene.models.empty();
   if (!scene.surfaces.empty() || models) writer.put_settings(scene.surface);
   for (std::size_t i = 0; models && i < scene.models.size(); ++i)
     put_model(writer, i + (scene.surfaces.empty() ? 0 : 1), scene.models[i], named(scene.models[i].file));
@@ -857,7 +847,7 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
     writer.put("environment.file", named(scene.environment));
     writer.put_settings(scene.environment_settings);
   }
-  for (std::size_t i = 0; second && i < scene.analytic_lights.size(); ++i)
+  for (std::size_t i = 0; has_lists && i < scene.analytic_lights.size(); ++i)
     writer.put_settings(scene.analytic_lights[i], "lights[" + std::to_string(i) + "].");
   writer.put_settings(scene.ground);
   writer.put_settings(scene.grid);
@@ -973,9 +963,9 @@ void look_through(SceneOptions& scene, const std::string& name) {
 }
 
 const NamedCamera* looked_through(const SceneOptions& scene) {
-  const Json shown = camera_json(scene, SceneFormat::second);
+  const Json shown = camera_json(scene, SceneFormat::third);
   const auto found = std::ranges::find_if(
-      scene.cameras, [&](const NamedCamera& camera) { return camera_json(camera, SceneFormat::second) == shown; });
+      scene.cameras, [&](const NamedCamera& camera) { return camera_json(camera, SceneFormat::third) == shown; });
   return found == scene.cameras.end() ? nullptr : &*found;
 }
 
@@ -1081,7 +1071,7 @@ void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat 
 bool same_scene(const SceneOptions& a, const SceneOptions& b) {
   const auto all = [](SceneOptions s) {
     s.sequence.frame.reset();
-    return to_json(s, SceneFormat::second, [](const std::string& file) { return file; });
+    return to_json(s, SceneFormat::third, [](const std::string& file) { return file; });
   };
   return all(a) == all(b);
 }
@@ -1110,7 +1100,7 @@ std::string scene_hash(const SceneOptions& scene) {
   for (SceneModel& model : shown.models) model.name.clear();
   shown.cameras.clear();
   const std::string text =
-      to_json(shown, SceneFormat::second, named).dump(-1, ' ', false, Json::error_handler_t::replace);
+      to_json(shown, SceneFormat::third, named).dump(-1, ' ', false, Json::error_handler_t::replace);
   std::array<char, 17> digits{};
   std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(fnv1a(text)));
   return digits.data();

@@ -202,14 +202,15 @@ void end_shutter(SceneOptions& scene);
 [[nodiscard]] SceneOptions load_scene(const std::string& path);
 
 /// Versions of the file format. Version 1 has one volume without transform and no lights; saving in it drops the rest.
-enum class SceneFormat { first = 1, second = 2 };
+/// Version 3 is version 2 with other names (keys.cpp).
+enum class SceneFormat { first = 1, second = 2, third = 3 };
 
 /// Returns the text for parse_scene. All settings are written except those left to the library's default. Files in the
 /// scene file's folder or below it get relative names.
 [[nodiscard]] std::string scene_text(const SceneOptions& scene, const std::string& path,
-                                     SceneFormat format = SceneFormat::second);
+                                     SceneFormat format = SceneFormat::third);
 /// Writes the file atomically: on failure the old file remains. Throws as parse_scene.
-void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format = SceneFormat::second);
+void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format = SceneFormat::third);
 
 /// Returns true if both scenes have the same content. The displayed frame is ignored.
 [[nodiscard]] bool same_scene(const SceneOptions& a, const SceneOptions& b);

@@ -22,10 +22,10 @@ AnalyticLightData AnalyticLightData::make(const gl::FunctionsPtr& gl, const gl::
   const std::size_t bytes = records.size() * sizeof(core::CmAnalyticLight);
   if (static_cast<std::int64_t>(bytes) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(records.size()) +
-                                            " lamps are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
+                                            " lights are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
                                             std::to_string(limits.storage_block_bytes) + ", holds");
   }
-  data.records_ = gl::make_buffer(gl, bytes, records.data(), 0, "creating the lamps");
+  data.records_ = gl::make_buffer(gl, bytes, records.data(), 0, "creating the lights");
   return data;
 }
 

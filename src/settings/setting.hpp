@@ -57,6 +57,7 @@ struct Choice {
   int value;
   const char* label;  // in the demo
   const char* tip;
+  const char* old = "";  // its name in scene files of versions 1 and 2, and in older flags; "": the same
 };
 
 /// How a value is presented to users.

@@ -13,10 +13,10 @@
 
 namespace cumulet::settings {
 
-inline constexpr std::array march_choices = {
-    Choice{"tet", CUMULET_GRID_TETRAHEDRAL, "Tetrahedra", "The adaptive grid."},
+inline constexpr std::array grid_type_choices = {
+    Choice{"tetrahedral", CUMULET_GRID_TETRAHEDRAL, "Tetrahedra", "The adaptive grid.", "tet"},
     Choice{"dense", CUMULET_GRID_DENSE, "Dense voxels", "Every voxel: the reference."},
-    Choice{"brick", CUMULET_GRID_BRICKS, "Bricks", "Voxels, with empty 8x8x8 bricks skipped."}};
+    Choice{"bricks", CUMULET_GRID_BRICKS, "Bricks", "Voxels, with empty 8x8x8 bricks skipped.", "brick"}};
 inline constexpr std::array cells_choices = {
     Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "The mean."},
     Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
@@ -26,14 +26,14 @@ inline constexpr std::array criterion_choices = {
     Choice{"range-mean", CUMULET_CRITERION_RANGE_MEAN, "Range / mean", "(max - min) / mean, as in the paper."},
     Choice{"deviation", CUMULET_CRITERION_DEVIATION, "Deviation",
            "Standard deviation x edge length, against the mean depth."}};
-inline constexpr std::array build_choices = {
+inline constexpr std::array build_device_choices = {
     Choice{"cpu", CUMULET_BUILD_CPU, "CPU", "A worker builds the cells."},
     Choice{"gpu", CUMULET_BUILD_GPU, "GPU", "Compute shaders build the cells, within frames' budgets."}};
-inline constexpr std::array surface_light_choices = {
-    Choice{"full", CUMULET_SURFACE_LIGHTING_GLOBAL, "Full", "To each other and to the volume, and back."},
-    Choice{"shadows", CUMULET_SURFACE_LIGHTING_DIRECT, "Shadows",
-           "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
-    Choice{"none", CUMULET_SURFACE_LIGHTING_RASTERIZED, "None", "Rasterised, without shadows: the fastest."}};
+inline constexpr std::array surface_lighting_choices = {
+    Choice{"global", CUMULET_SURFACE_LIGHTING_GLOBAL, "Global", "To each other and to the volume, and back.", "full"},
+    Choice{"direct", CUMULET_SURFACE_LIGHTING_DIRECT, "Direct",
+           "Sun, sky, lights and emissive surfaces only, and the shadows of all: faster.", "shadows"},
+    Choice{"rasterized", CUMULET_SURFACE_LIGHTING_RASTERIZED, "Rasterized", "Without shadows: the fastest.", "none"}};
 inline constexpr std::array phase_choices = {
     Choice{"hg", CUMULET_PHASE_HG, "One lobe", "Henyey-Greenstein's."},
     Choice{"two-lobe", CUMULET_PHASE_TWO_LOBE, "Two lobes", "Of Henyey-Greenstein: say, one forward and one back."},
@@ -49,7 +49,7 @@ inline constexpr std::array repeat_choices = {
     Choice{"hold", CUMULET_REPEAT_HOLD, "Hold", "The first and the last frame stay."},
     Choice{"loop", CUMULET_REPEAT_LOOP, "Loop", "After the last frame the first."},
     Choice{"ping-pong", CUMULET_REPEAT_PING_PONG, "Ping-pong", "Back, and forth again."}};
-inline constexpr std::array between_choices = {
+inline constexpr std::array interpolation_choices = {
     Choice{"none", CUMULET_FRAME_INTERPOLATION_NONE, "Nothing", "The frame that came last stays until the next."},
     Choice{"blend", CUMULET_FRAME_INTERPOLATION_BLEND, "Blended", "A frame fades into the next."},
     Choice{"advect", CUMULET_FRAME_INTERPOLATION_ADVECT, "Advected",
@@ -84,9 +84,9 @@ inline constexpr std::array depth_choices = {Choice{"standard", CUMULET_DEPTH_ST
 inline constexpr std::array analytic_light_choices = {
     Choice{"point", CUMULET_LIGHT_POINT, "Point", "The same in all directions."},
     Choice{"spot", CUMULET_LIGHT_SPOT, "Spot", "A point that shines into a cone."},
-    Choice{"disc", CUMULET_LIGHT_DISK, "Disc", "A round area that shines to one side."},
-    Choice{"rectangle", CUMULET_LIGHT_RECT, "Rectangle", "An area that shines to one side."},
-    Choice{"sun", CUMULET_LIGHT_DISTANT, "Sun", "Far away: the same everywhere."}};
+    Choice{"disk", CUMULET_LIGHT_DISK, "Disk", "A round area that shines to one side.", "disc"},
+    Choice{"rect", CUMULET_LIGHT_RECT, "Rectangle", "An area that shines to one side.", "rectangle"},
+    Choice{"distant", CUMULET_LIGHT_DISTANT, "Distant", "Far away: the same everywhere.", "sun"}};
 
 /// Valid light group numbers.
 inline constexpr Range group_range = {0.0, double{CUMULET_LIGHT_GROUPS} - 1.0};
@@ -143,9 +143,9 @@ struct Table<cumulet_medium_desc> {
                 .tip = "Of two lobes the second one's Henyey-Greenstein g.",
                 .least = -0.99, .most = 0.99}}),
       Setting(&Desc::second_weight, {.name = "second_weight", .range = {0.0, 1.0}, .given = Range{0.01, 1.0}, .zero = 0.5,
-        .key = "medium.second_share", .flag = "--second-share", .type = "S",
-        .help = "Part of the light in the second of two lobes, from 0.01 to 1 (default: 0.5)",
-        .row = {.label = "Second share",
+        .key = "medium.second_weight", .flag = "--second-weight", .type = "W",
+        .help = "Weight of the second of two lobes, from 0.01 to 1 (default: 0.5)",
+        .row = {.label = "Lobe mix",
                 .tip = "Of two lobes the part of the light that is in the second one.",
                 .least = 0.01, .most = 1.0}}),
       Setting(&Desc::droplet_diameter, {.name = "droplet_diameter", .range = {5.0, 50.0}, .zero = 20.0,
@@ -201,24 +201,24 @@ struct Table<cumulet_sun_sky_desc> {
   static constexpr const char* name = "cumulet_sun_sky_desc";
   static constexpr std::tuple rows = {
       Setting(&Desc::sun_azimuth_degrees, {.name = "sun_azimuth_degrees", .given = Range{-360.0, 360.0},
-        .key = "light.sun.azimuth_degrees",
+        .key = "sun_sky.sun.azimuth_degrees",
         .row = {.label = "Sun azimuth",
                 .tip = "From +Z towards +X.",
                 .least = -180.0, .most = 180.0, .format = "%.1f°"}}),
       Setting(&Desc::sun_elevation_degrees, {.name = "sun_elevation_degrees", .range = {-90.0, 90.0},
-        .key = "light.sun.elevation_degrees",
+        .key = "sun_sky.sun.elevation_degrees",
         .row = {.label = "Sun elevation",
                 .tip = "Above the horizon.",
                 .least = -90.0, .most = 90.0, .format = "%.1f°"}}),
       Setting(&Desc::sun_irradiance, {.name = "sun_irradiance", .range = light_range,
-        .key = "light.sun.irradiance",
+        .key = "sun_sky.sun.irradiance",
         .row = {.label = "Sun strength",
                 .tip = "Irradiance on a surface that faces the sun; 0: no sun.",
                 .most = 1000.0,
                 .color = "Sun colour",
                 .color_tip = "The sun's colour, as it looks on the screen."}}),
       Setting(&Desc::sky_radiance, {.name = "sky_radiance", .range = light_range,
-        .key = "light.sky.radiance", .flag = "--sky", .type = "R,G,B",
+        .key = "sun_sky.sky.radiance", .flag = "--sky", .type = "R,G,B",
         .help = "Radiance, the same from everywhere",
         .row = {.label = "Sky strength",
                 .tip = "Radiance from everywhere; 0: black.",
@@ -226,31 +226,31 @@ struct Table<cumulet_sun_sky_desc> {
                 .color = "Sky colour",
                 .color_tip = "The sky's colour, as it looks on the screen."}}),
       Setting(&Desc::sky, {.name = "sky", .choices = sky_choices,
-        .key = "light.sky.model",
+        .key = "sun_sky.sky.model",
         .row = {.label = "Sky",
                 .tip = "Where sun and sky have their light from."}}),
       Setting(&Desc::turbidity, {.name = "turbidity", .range = {1.0, 10.0}, .zero = 3.0,
-        .key = "light.sky.turbidity",
+        .key = "sun_sky.sky.turbidity",
         .row = {.label = "Turbidity",
                 .tip = "Of a physical sky: 2 is very clear, 3 clear, 6 hazy.",
                 .least = 1.0, .most = 10.0, .format = "%.1f"}}),
       Setting(&Desc::ground_albedo, {.name = "ground_albedo", .range = {0.0, 1.0},
-        .key = "light.sky.ground_albedo",
+        .key = "sun_sky.sky.ground_albedo",
         .row = {.label = "Ground albedo",
                 .tip = "Of a physical sky: what the ground sends back.",
                 .most = 1.0}}),
       Setting(&Desc::sun_angle_degrees, {.name = "sun_angle_degrees", .range = {-180.0, 180.0}, .given = Range{0.0, 180.0},
         .spelling = Spelling::zero_is_negative,
-        .key = "light.sun.angle_degrees", .flag = "--sun-angle", .type = "DEG",
+        .key = "sun_sky.sun.angle_degrees", .flag = "--sun-angle", .type = "DEG",
         .help = "That the sun's disc takes, up to 180; 0: none, and hard shadows (default: 0, of a --sky-model 0.53)",
         .row = {.label = "Sun angle",
                 .tip = "That the sun's disc takes: larger is softer.",
                 .most = 30.0, .format = "%.2f°"}}),
       Setting(&Desc::sun_group, {.name = "sun_group", .range = group_range,
-        .key = "light.sun.group", .flag = "--sun-group", .type = "N",
+        .key = "sun_sky.sun.group", .flag = "--sun-group", .type = "N",
         .help = "Group of lights that the sun is in, from 0 to 7 (default: 0); see --light-groups"}),
       Setting(&Desc::sky_group, {.name = "sky_group", .range = group_range,
-        .key = "light.sky.group", .flag = "--sky-group", .type = "N",
+        .key = "sun_sky.sky.group", .flag = "--sky-group", .type = "N",
         .help = "Likewise, of the sky or the environment"})};
 };
 
@@ -262,7 +262,7 @@ struct Table<cumulet_light_desc> {
   static constexpr std::tuple rows = {
       Setting(&Desc::kind, {.name = "kind", .choices = analytic_light_choices,
         .key = "kind",
-        .row = {.label = "Lamp", .tip = "What shape of light it is."}}),
+        .row = {.label = "Light", .tip = "What shape of light it is."}}),
       Setting(&Desc::position, {.name = "position",
         .key = "position",
         .row = {.label = "Position", .tip = "In the world, of its middle."}}),
@@ -270,20 +270,20 @@ struct Table<cumulet_light_desc> {
         .key = "direction",
         .row = {.label = "Direction", .tip = "Where it shines."}}),
       Setting(&Desc::tangent, {.name = "tangent",
-        .key = "across",
-        .row = {.label = "Across", .tip = "Along a rectangle's width."}}),
+        .key = "tangent",
+        .row = {.label = "Tangent", .tip = "Along a rectangle's width."}}),
       Setting(&Desc::color, {.name = "color", .range = light_range, .zero = 1.0,
         .key = "color",
-        .row = {.label = "Lamp colour", .tip = "Times its power."}}),
+        .row = {.label = "Light colour", .tip = "Times its power."}}),
       Setting(&Desc::power, {.name = "power", .range = light_range,
         .key = "power",
         .row = {.label = "Power",
-                .tip = "Watts, as Blender's; of a sun W/m² on what faces it.",
+                .tip = "Watts, as Blender's; of a distant light W/m² on what faces it.",
                 .most = 1e6, .format = "%.4g", .logarithmic = true}}),
       Setting(&Desc::width, {.name = "width", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
         .key = "width",
         .row = {.label = "Width",
-                .tip = "Of a rectangle; a disc's diameter.",
+                .tip = "Of a rectangle; a disk's diameter.",
                 .least = 1e-3, .most = 1e4, .format = "%.4g", .logarithmic = true}}),
       Setting(&Desc::height, {.name = "height", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
         .key = "height",
@@ -293,7 +293,7 @@ struct Table<cumulet_light_desc> {
       Setting(&Desc::angle_degrees, {.name = "angle_degrees", .range = {0.0, 180.0},
         .key = "angle_degrees",
         .row = {.label = "Angle",
-                .tip = "Of a spot's whole cone; what a sun covers of the sky.",
+                .tip = "Of a spot's whole cone; what a distant light covers of the sky.",
                 .most = 180.0, .format = "%.1f°"}}),
       Setting(&Desc::blend, {.name = "blend", .range = {0.0, 1.0},
         .key = "blend",
@@ -329,7 +329,7 @@ struct Table<cumulet_ground_desc> {
   static constexpr const char* name = "cumulet_ground_desc";
   static constexpr std::tuple rows = {
       Setting(&Desc::mode, {.name = "mode", .choices = ground_choices,
-        .key = "ground.place", .flag = "--ground",
+        .key = "ground.mode", .flag = "--ground",
         .help = "A level plane that catches light and shadows (default: below, without a model or a word of light; "
                 "else none)",
         .row = {.label = "Ground", .tip = "A level plane that catches light and shadows."}}),
@@ -359,10 +359,10 @@ struct Table<cumulet_surface_settings_desc> {
       Setting(&Desc::animation, {.name = "animation",
         .key = "surfaces.animation", .flag = "--gltf-animation", .type = "N",
         .help = "Which animation of the file, from 0 (default: 0)"}),
-      Setting(&Desc::lighting, {.name = "lighting", .choices = surface_light_choices,
-        .key = "surfaces.light", .flag = "--surface-light",
-        .help = "Light between surfaces and volume (default: full), or only from sun, sky, lamps and what glows",
-        .row = {.label = "Surface light",
+      Setting(&Desc::lighting, {.name = "lighting", .choices = surface_lighting_choices,
+        .key = "surfaces.lighting", .flag = "--surface-lighting",
+        .help = "Light between surfaces and volume (default: global), or only from sun, sky, lights and emissive surfaces",
+        .row = {.label = "Surface lighting",
                 .tip = "What light the surfaces pass on."}}),
       Setting(&Desc::indirect_roughness, {.name = "indirect_roughness", .range = {0.0, 1.0},
         .key = "surfaces.indirect_roughness", .flag = "--indirect-roughness", .type = "R",
@@ -380,7 +380,7 @@ struct Table<cumulet_surface_settings_desc> {
       Setting(&Desc::variant, {.name = "variant"}),
       Setting(&Desc::group, {.name = "group", .range = group_range,
         .key = "surfaces.group", .flag = "--gltf-group", .type = "N",
-        .help = "Group of lights that what its surfaces and lamps give off is in, from 0 to 7 (default: 0); see "
+        .help = "Group of lights that what its surfaces and lights give off is in, from 0 to 7 (default: 0); see "
                 "--light-groups"}),
       Setting(&Desc::holdout, {.name = "holdout",
         .key = "surfaces.holdout", .flag = "--gltf-holdout",
@@ -392,10 +392,10 @@ struct Table<cumulet_grid_desc> {
   using Desc = cumulet_grid_desc;
   static constexpr const char* name = "cumulet_grid_desc";
   static constexpr std::tuple rows = {
-      Setting(&Desc::type, {.name = "type", .choices = march_choices,
-        .key = "grid.march", .flag = "--march",
+      Setting(&Desc::type, {.name = "type", .choices = grid_type_choices,
+        .key = "grid.type", .flag = "--grid-type",
         .help = "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks",
-        .row = {.label = "March",
+        .row = {.label = "Grid type",
                 .tip = "What rays step through (key M)."}}),
       Setting(&Desc::cells, {.name = "cells", .choices = cells_choices,
         .key = "grid.cells", .flag = "--cells",
@@ -430,11 +430,11 @@ struct Table<cumulet_grid_desc> {
         .row = {.label = "Pixel size",
                 .tip = "Pixels that a cell's longest edge must cover to be split.",
                 .least = 0.25, .most = 32.0, .format = "%.2f", .logarithmic = true}}),
-      Setting(&Desc::build_device, {.name = "build_device", .choices = build_choices,
-        .key = "grid.build", .flag = "--build",
-        .help = "Who builds the cells (default: cpu); what GL has no room for the CPU does",
-        .row = {.label = "Built by",
-                .tip = "Who builds the cells. On the GPU a camera that moves has its cells sooner."}})};
+      Setting(&Desc::build_device, {.name = "build_device", .choices = build_device_choices,
+        .key = "grid.build_device", .flag = "--build-device",
+        .help = "Device that builds the cells (default: cpu); the CPU builds grids for which GL has no room",
+        .row = {.label = "Build on",
+                .tip = "Device that builds the cells. On the GPU a camera that moves has its cells sooner."}})};
 };
 
 template <>
@@ -543,10 +543,10 @@ struct Table<cumulet_playback_desc> {
         .row = {.label = "Repeat", .tip = "What follows the last frame."}}),
       Setting(&Desc::first_frame, {.name = "first_frame"}),
       Setting(&Desc::frame_count, {.name = "frame_count"}),
-      Setting(&Desc::interpolation, {.name = "interpolation", .choices = between_choices,
-        .key = "sequence.between", .flag = "--between",
+      Setting(&Desc::interpolation, {.name = "interpolation", .choices = interpolation_choices,
+        .key = "sequence.interpolation", .flag = "--frame-interpolation",
         .help = "What --frames 1-10x0.5 makes between two frames (default: advect)",
-        .row = {.label = "In between", .tip = "What is shown between two frames."}}),
+        .row = {.label = "Interpolation", .tip = "What is shown between two frames."}}),
       Setting(&Desc::subframes, {.name = "subframes", .given = Range{1.0, 1000.0}, .zero = 4.0,
         .key = "sequence.subframes",
         .row = {.label = "Sub-frames",

@@ -47,7 +47,7 @@ light::AnalyticLight analytic_light_of(const cumulet_light_desc& d) {
 light::AnalyticLights analytic_lights_of(const cumulet_light_desc* analytic_lights, uint64_t count) {
   light::AnalyticLights made;
   if (const std::string why = settings::analytic_light_count_refusal(count); !why.empty()) refuse(why);
-  for_each_desc(analytic_lights, count, "cumulet_light_desc", "lamp",
+  for_each_desc(analytic_lights, count, "cumulet_light_desc", "light",
                 [&](const cumulet_light_desc& given, const std::string& what) {
                   cumulet_light_desc d{};
                   try {

@@ -92,7 +92,7 @@ def alone_as_among_others(sequence, out):
 
 
 def settled(sequence, out):
-    """Settings common to all frames are computed once and stored (--settled). The images are the same to the bit, and
+    """Settings common to all frames are computed once and stored (--sequence-cache). The images are the same to the bit, and
     the volume that the settings came from is not read again. A stored file that is damaged or of another scene is
     computed again."""
     wanted, pictures = empty(out / "unsettled"), empty(out / "settled")
@@ -104,7 +104,7 @@ def settled(sequence, out):
     largest = max(common.folder.iterdir(), key=lambda path: path.stat().st_size)
     assert largest.name not in ("explosion_0012.vdb", "explosion_0014.vdb", "explosion_0016.vdb")
     kept = pictures / "common"
-    run = lambda frame, *more: common.run(pictures / "p.####.exr", "--frames", str(frame), "--settled", str(kept), *more)
+    run = lambda frame, *more: common.run(pictures / "p.####.exr", "--frames", str(frame), "--sequence-cache", str(kept), *more)
     assert run(12)[0] == 0 and kept.exists()
     before = kept.read_bytes()
     was, voxels = largest.stat(), largest.read_bytes()
@@ -129,7 +129,7 @@ def settled(sequence, out):
     kept.write_bytes(before[: len(before) // 2])
     status, frames, _ = run(12, "--overwrite")
     assert status == 0 and frames[0][1] == "done" and len(kept.read_bytes()) > len(before) // 2
-    nowhere = common.run(pictures / "q.####.exr", "--frames", "12", "--settled", str(out / "none" / "common"))
+    nowhere = common.run(pictures / "q.####.exr", "--frames", "12", "--sequence-cache", str(out / "none" / "common"))
     assert nowhere[0] == 1 and "none/common" in nowhere[2].splitlines()[-1], nowhere
 
 
@@ -210,7 +210,7 @@ def refused(sequence, out):
         return done.returncode, done.stderr
     for arguments in (["p.exr"], ["p.##.##.exr"], ["p.####.exr", "--frames", "9-1"], ["p.####.exr", "--frames", "a"],
                       ["p.####.exr", "--stats", "s.json"], ["p.####.exr", "--info"],
-                      ["p.####.exr", "--settled", ""], ["p.####.exr", "--settled", "c", "--trace", "c"]):
+                      ["p.####.exr", "--sequence-cache", ""], ["p.####.exr", "--sequence-cache", "c", "--trace", "c"]):
         status, line = said(*arguments)
         assert status == 2, (arguments, status, line)
     status, line = said(out / "none" / "p.####.exr")

@@ -269,12 +269,12 @@ def test_handles(s):
             *tell("scaled"),
             'click "Scene/Volume 2, place 2"', "key w", *tell("place"), 'drag "Handle free" to viewport 0.8 0.6', *tell("place_moved"),
             'click "Scene/Model 1"', *tell("model"), "press ctrl", 'drag "Handle Y" to viewport 0.45 0.2', "release ctrl", *tell("model_moved"),
-            'click "Scene/Lamp 1"', *tell("lamp"), "key x", "key e", "frames 2", 'drag "Handle Z" to viewport 0.6 0.4', *tell("lamp_turned"),
+            'click "Scene/Light 1"', *tell("lamp"), "key x", "key e", "frames 2", 'drag "Handle Z" to viewport 0.6 0.4', *tell("lamp_turned"),
             "click viewport 0.02 0.05", *tell("nothing"), "key q", *there, *shot("none")],
            "--scene", "all.json", "--spp", "2", "--max-bounces", "2", size=["--size", "1000x560"])
     report = lambda name: s.report(name)
     steps = lambda name: s.report(name)["undo_steps"]
-    places = lambda name, i: s.report(name)["volumes"][i].get("places", [])
+    places = lambda name, i: s.report(name)["volumes"][i].get("transforms", [])
     assert report("first")["chosen"] is None and steps("first") == 0
     assert report("clicked")["chosen"] == "Volume 1" and steps("clicked") == 0, "choosing is no change"
     area = look(s, "first")[2]
@@ -305,7 +305,7 @@ def test_handles(s):
     way = [a - b for a, b in zip(model_moved["to_world"], model_before["to_world"])]
     assert way[13] > 5 and abs(2 * way[13] - round(2 * way[13])) < 1e-6 and sum(map(abs, way)) == abs(way[13]), "by steps"
     (lamp_before,), (lamp_turned,) = (report(name)["lights"] for name in ("lamp", "lamp_turned"))
-    assert report("lamp")["chosen"] == "Lamp 1" and steps("lamp_turned") == 5
+    assert report("lamp")["chosen"] == "Light 1" and steps("lamp_turned") == 5
     assert lamp_turned["position"] == lamp_before["position"] and lamp_turned["width"] == lamp_before["width"]
     assert abs(lamp_turned["direction"][0]) > 0.1 and abs(lamp_turned["direction"][2]) < 1e-9, lamp_turned
     assert report("nothing")["chosen"] is None and steps("nothing") == 5
@@ -453,10 +453,10 @@ def test_lamps(s):
     """A light is added, made a spot light, dimmed and removed. Each is a step that can be undone and redone."""
     there = ["frames 3", "wait loaded", "frames 2"]
     # Hides handles and icons, because the images are compared.
-    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add lamp"', *SETTLE, *shot("point"), 'click "Lamp 1"', "frames 2",
-                      'click "Lamp 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
+    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', *SETTLE, *shot("point"), 'click "Light 1"', "frames 2",
+                      'click "Light 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
                       *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
-                      'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), 'click "Remove lamp 1"',
+                      'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), 'click "Remove light 1"',
                       *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"'],
            "--volume", s.cumulus, "--sky", "0.05,0.05,0.05", "--spp", "4")
     day, report, area = look(s, "day")
@@ -619,7 +619,7 @@ def test_ramps(s):
 def test_surfaces(s):
     mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
     s.play("replay", [*SETTLE, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
-                      *shot("soft"), 'click "Surface light"', "frames 2", 'click "Surface light/None"', *SETTLE, *shot("none"),
+                      *shot("soft"), 'click "Surface lighting"', "frames 2", 'click "Surface lighting/Rasterized"', *SETTLE, *shot("none"),
                       'click "Remove surfaces"', *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
            "--volume", s.cumulus, "--gltf", mountains, "--spp", "2")
     first, report, area = look(s, "first")
@@ -884,7 +884,7 @@ def test_status(s):
     (s.out / "bad.replay").write_text("frames 1\nclick nowhere\n")
     (s.out / "gone.replay").write_text('click "No such control"\n')
     (s.out / "bad.json").write_text("{")
-    cases = [(["--march", "fast"], 2, "--march"), (["--ui-scale", "9"], 2, "--ui-scale"), (["a", "b"], 2, "b"),
+    cases = [(["--grid-type", "fast"], 2, "--grid-type"), (["--ui-scale", "9"], 2, "--ui-scale"), (["a", "b"], 2, "b"),
              (["a.vdb", "--volume", "b.vdb"], 2, "a.vdb"), (["--replay", "bad.replay"], 1, "bad.replay:2"),
              (["--replay", "gone.replay"], 1, "No such control"), (["--replay", "missing"], 1, "missing"),
              (["--scene", "bad.json"], 1, "bad.json")]

@@ -85,5 +85,5 @@ assert render("posed", [volume(cloud, 0.8)], camera=pose) == above
 
 missing = run("missing", [volume(cloud, 0.8), volume("/nowhere.vdb", 1)])
 assert missing.returncode != 0 and missing.stderr.count("\n") == 1 and "/nowhere.vdb" in missing.stderr, missing.stderr
-dense = run("dense", [volume(cloud, 0.8), volume(fire, 1)], "--march", "dense")
+dense = run("dense", [volume(cloud, 0.8), volume(fire, 1)], "--grid-type", "dense")
 assert dense.returncode != 0 and dense.stderr.count("\n") == 1 and "dense" in dense.stderr, dense.stderr

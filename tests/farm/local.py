@@ -191,7 +191,7 @@ def apart(farm, out):
     assert done.returncode == 0 and not (made / "p.0012.exr").exists(), done
     assert not (folder / "settled").exists() and not (folder / "slurm.json").exists() and (folder / "shaders").exists()
     # The user's own files for the flags, as one word or two.
-    for words in ([f"--settled={made / 'mine'}", f"--shader-cache={made / 'own'}"],
+    for words in ([f"--sequence-cache={made / 'mine'}", f"--shader-cache={made / 'own'}"],
                   ["--settled", str(made / "mine"), "--shader-cache", str(made / "own")]):
         done = subprocess.run([*farm.command("describe", made, "--frames", "12", "--overwrite"), *words],
                               capture_output=True, text=True, timeout=60)

@@ -99,12 +99,12 @@ def main():
     render = [f"{programs}/cumulet-render", volumes / "explosion_####.vdb", *LOOK]
     cached = ["--shader-cache", out / "shaders"]
     picture = ["--frames", "12", "--overwrite", "-o", out / "p.####.exr"]
-    settled = ["--settled", out / "settled"]
+    settled = ["--sequence-cache", out / "settled"]
     subprocess.run([*render, *cached, *settled, *picture], check=True, capture_output=True, timeout=600)
     if not check:
         times("shaders compiled anew", [*render, *picture], out, {"MESA_SHADER_CACHE_DISABLE": "true"})
         times("--shader-cache", [*render, *cached, *picture], out, {})
-        times("--shader-cache, --settled", [*render, *cached, *settled, *picture], out, {})
+        times("--shader-cache, --sequence-cache", [*render, *cached, *settled, *picture], out, {})
     roots = [str(volumes), str(out)]
     costs = {}
     for name, more in {"a frame": [*picture], "a frame, settled": [*settled, *picture],

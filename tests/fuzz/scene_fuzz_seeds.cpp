@@ -22,6 +22,8 @@ int main(int argc, char** argv) {
   scene.analytic_lights.emplace_back().kind = CUMULET_LIGHT_SPOT;
   scene.cameras.emplace_back().name = "front";
   scene.cameras.back().camera = scene.camera;
+  folder.write("second.json",
+               cumulet::demo::scene_text(scene, "/nowhere/full.json", cumulet::demo::SceneFormat::second));
   folder.write("full.json", cumulet::demo::scene_text(scene, "/nowhere/full.json"));
   return 0;
 }

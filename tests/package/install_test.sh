@@ -79,17 +79,17 @@ for program in "$tree"/bin/*; do
     grep -qE -- "['{,*]${flag}[]=[},]" "$share/zsh/site-functions/_$program" || fail "zsh: _$program lacks $flag"
   done
 done
-expect "brick dense tet " "$(complete_bash cumulet-render --march "")" "bash: --march"
-expect "dense " "$(complete_bash cumulet-render --march = d)" "bash: --march=d"
+expect "bricks dense tetrahedral " "$(complete_bash cumulet-render --grid-type "")" "bash: --grid-type"
+expect "dense " "$(complete_bash cumulet-render --grid-type = d)" "bash: --grid-type=d"
 expect "cloud.vdb folder smoke.nvdb " "$(complete_bash cumulet-render --volume "")" "bash: --volume"
 expect "scene.json " "$(complete_bash cumulet-demo --scene s)" "bash: --scene s"
 expect "cloud.vdb folder model.glb scene.json smoke.nvdb " "$(complete_bash cumulet-demo "")" "bash: cumulet-demo"
 expect "folder " "$(complete_bash cumulet-scene f)" "bash: cumulet-scene f"
 expect " " "$(complete_bash cumulet-render --spp "")" "bash: --spp"
-expect "cumulet-render --march dense" "$(complete_zsh "cumulet-render --march d")" "zsh: --march d"
+expect "cumulet-render --grid-type dense" "$(complete_zsh "cumulet-render --grid-type d")" "zsh: --grid-type d"
 expect "cumulet-render --volume cloud.vdb" "$(complete_zsh "cumulet-render --volume c")" "zsh: --volume c"
 expect "cumulet-demo --replay=" "$(complete_zsh "cumulet-demo --rep")" "zsh: --rep"
-expect "cumulet-render --lamp point --lamp=" "$(complete_zsh "cumulet-render --lamp point --la")" "zsh: --lamp again"
+expect "cumulet-render --light point --light" "$(complete_zsh "cumulet-render --light point --lig")" "zsh: --light again"
 expect "cumulet-scene folder/" "$(complete_zsh "cumulet-scene f")" "zsh: cumulet-scene f"
 
 # --- the desktop files ------------------------------------------------------------------------------------------------

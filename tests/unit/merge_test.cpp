@@ -34,7 +34,7 @@ struct Description {
   std::uint32_t width = ::width;
   std::string version = "0.2.0";
   std::string scene = "00c0ffee00c0ffee";
-  std::string march = "tet";
+  std::string grid_type = "tetrahedral";
   std::string background = "sky";
   double seed = 3.0;
   bool error = true;
@@ -96,7 +96,7 @@ class Merge : public ::testing::Test {
                                        {std::string(attributes::comments), attributes::comments_text(of.version, n)},
                                        {std::string(attributes::version), of.version},
                                        {std::string(attributes::scene), of.scene},
-                                       {std::string(attributes::march), of.march},
+                                       {std::string(attributes::grid_type), of.grid_type},
                                        {std::string(attributes::background), of.background},
                                        {std::string(attributes::seed), of.seed},
                                        {std::string(attributes::samples), of.whole ? n : n - 0.25}};
@@ -218,7 +218,7 @@ TEST_F(Merge, PartsOfOtherImagesAreRejected) {
   EXPECT_EQ(refusal({a, part(4, 4, {.version = "0.3.0"})}),
             "part2.exr: is of another version of Cumulet than part0.exr");
   EXPECT_EQ(refusal({a, part(4, 4, {.seed = 4.0})}), "part3.exr: is of another seed than part0.exr");
-  EXPECT_EQ(refusal({a, part(4, 4, {.march = "dense"})}), "part4.exr: is of another march than part0.exr");
+  EXPECT_EQ(refusal({a, part(4, 4, {.grid_type = "dense"})}), "part4.exr: is of another grid type than part0.exr");
   EXPECT_EQ(refusal({a, part(4, 4, {.scene = "0"})}), "part5.exr: is of another scene than part0.exr");
   EXPECT_EQ(refusal({a, part(4, 4, {.error = false})}), "part6.exr: has other layers than part0.exr");
 }

@@ -96,8 +96,8 @@ TEST(Options, ParsesEveryFlag) {
                                        "4294967295",
                                        "--camera",
                                        "1,2,3 -4,5e-1,-6 35.5",
-                                       "--march",
-                                       "brick",
+                                       "--grid-type",
+                                       "bricks",
                                        "--cells",
                                        "constant",
                                        "--criterion",
@@ -257,15 +257,15 @@ TEST(Options, RampIsAListOfPoints) {
 
 // Compares each key with the same words in a scene file.
 TEST(Options, LightFlagsMatchSceneFileLights) {
-  const SceneOptions scene = parse({"--lamp",
-                                    "rectangle  position=-1,.5,2e1 direction=0,-.5,1 across=1,0,0 color=1,0.5,.25 "
+  const SceneOptions scene = parse({"--light",
+                                    "rect  position=-1,.5,2e1 direction=0,-.5,1 tangent=1,0,0 color=1,0.5,.25 "
                                     "power=+300 width=2 height=.5 angle_degrees=90 blend=0.25",
-                                    "--lamp", "point", "--lamp", "sun power=3 angle_degrees=0.53"})
+                                    "--light", "point", "--light", "distant power=3 angle_degrees=0.53"})
                                  .scene;
-  const SceneOptions file = parse_scene(R"({"cumulet_scene": 2, "lights": [
-      {"kind": "rectangle", "position": [-1, 0.5, 20], "direction": [0, -0.5, 1], "across": [1, 0, 0],
+  const SceneOptions file = parse_scene(R"({"cumulet_scene": 3, "lights": [
+      {"kind": "rect", "position": [-1, 0.5, 20], "direction": [0, -0.5, 1], "tangent": [1, 0, 0],
        "color": [1, 0.5, 0.25], "power": 300, "width": 2, "height": 0.5, "angle_degrees": 90, "blend": 0.25},
-      {"kind": "point"}, {"kind": "sun", "power": 3, "angle_degrees": 0.53}]})",
+      {"kind": "point"}, {"kind": "distant", "power": 3, "angle_degrees": 0.53}]})",
                                         "a.json");
   const auto same_analytic_lights = [&](const SceneOptions& other) {
     ASSERT_EQ(scene.analytic_lights.size(), other.analytic_lights.size());
@@ -278,8 +278,8 @@ TEST(Options, LightFlagsMatchSceneFileLights) {
   EXPECT_EQ(scene.light.sun_irradiance[0], 0.0f) << "no light but theirs";
   EXPECT_EQ(scene.light.sky, CUMULET_SKY_CONSTANT);
   EXPECT_EQ(scene.ground.mode, CUMULET_GROUND_NONE);
-  EXPECT_EQ(parse({"--lamp", "point", "--sky-model", "3,0.3"}).scene.light.sky, CUMULET_SKY_PHYSICAL);
-  EXPECT_EQ(parse({"--lamp", "point", "--lamp", "none"}).scene.light.sky, CUMULET_SKY_PHYSICAL) << "a day without";
+  EXPECT_EQ(parse({"--light", "point", "--sky-model", "3,0.3"}).scene.light.sky, CUMULET_SKY_PHYSICAL);
+  EXPECT_EQ(parse({"--light", "point", "--light", "none"}).scene.light.sky, CUMULET_SKY_PHYSICAL) << "a day without";
 }
 
 TEST(Options, LightFlagsAddToTheScenesLights) {
@@ -292,17 +292,17 @@ TEST(Options, LightFlagsAddToTheScenesLights) {
     return parse(all).scene.analytic_lights;
   };
   ASSERT_EQ(analytic_lights({}).size(), 1u);
-  const auto two = analytic_lights({"--lamp", "disc power=3"});
+  const auto two = analytic_lights({"--light", "disk power=3"});
   ASSERT_EQ(two.size(), 2u);
   EXPECT_EQ(two[0].power, 7.0f);
   EXPECT_EQ(two[1].kind, CUMULET_LIGHT_DISK);
-  const auto other = analytic_lights({"--lamp", "none", "--lamp", "disc power=3"});
+  const auto other = analytic_lights({"--light", "none", "--light", "disk power=3"});
   ASSERT_EQ(other.size(), 1u);
   EXPECT_EQ(other[0].power, 3.0f);
 }
 
 TEST(Options, AnyWhiteSpaceSeparatesWords) {
-  const auto analytic_lights = parse({"--lamp", "\tdisc\n  power=3\r\n\twidth=2\n"}).scene.analytic_lights;
+  const auto analytic_lights = parse({"--light", "\tdisk\n  power=3\r\n\twidth=2\n"}).scene.analytic_lights;
   ASSERT_EQ(analytic_lights.size(), 1u);
   EXPECT_EQ(analytic_lights[0].kind, CUMULET_LIGHT_DISK);
   EXPECT_EQ(analytic_lights[0].power, 3.0f);
@@ -310,23 +310,23 @@ TEST(Options, AnyWhiteSpaceSeparatesWords) {
 }
 
 TEST(Options, InvalidLightGivesAOneLineError) {
-  const auto told = [](const char* analytic_light) { return usage_error(with({"--lamp", analytic_light})); };
-  EXPECT_EQ(told(""), "--lamp: '' is none of point, spot, disc, rectangle, sun");
-  EXPECT_EQ(told("bulb power=1"), "--lamp: 'bulb' is none of point, spot, disc, rectangle, sun");
-  EXPECT_EQ(told("point power 1"), "--lamp: 'power' is not a key and its value, such as power=100");
-  EXPECT_EQ(told("point watts=1"), "--lamp: lamps have no 'watts'");
-  EXPECT_EQ(told("point kind=spot"), "--lamp: lamps have no 'kind'");
-  EXPECT_EQ(told("point power=1 power=2"), "--lamp: power is given twice");
-  EXPECT_EQ(told("point power=-1"), "--lamp: power: '-1' is not from 0 to 1e30");
-  EXPECT_EQ(told("point power="), "--lamp: power: '' is not a finite number");
-  EXPECT_EQ(told("point position=1,2"), "--lamp: position: '1,2' is not 3 numbers between commas");
-  EXPECT_EQ(told("point position=1,2,1e31"), "--lamp: position is beyond 1e30");
-  EXPECT_EQ(told("point color=0,0,0"), "--lamp: color: '0,0,0' is black");
-  EXPECT_EQ(told("point color=1,-1,0"), "--lamp: color: '1,-1,0' has a negative number");
-  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--lamp: power times color is above 1e30");
-  EXPECT_EQ(told("disc width=0"), "--lamp: width: '0' is not above 0");
-  EXPECT_EQ(told("sun angle_degrees=100"), "--lamp: angle_degrees of a sun is above 90");
-  EXPECT_EQ(told("spot blend=2"), "--lamp: blend: '2' is not from 0 to 1");
+  const auto told = [](const char* analytic_light) { return usage_error(with({"--light", analytic_light})); };
+  EXPECT_EQ(told(""), "--light: '' is none of point, spot, disk, rect, distant");
+  EXPECT_EQ(told("bulb power=1"), "--light: 'bulb' is none of point, spot, disk, rect, distant");
+  EXPECT_EQ(told("point power 1"), "--light: 'power' is not a key and its value, such as power=100");
+  EXPECT_EQ(told("point watts=1"), "--light: lights have no 'watts'");
+  EXPECT_EQ(told("point kind=spot"), "--light: lights have no 'kind'");
+  EXPECT_EQ(told("point power=1 power=2"), "--light: power is given twice");
+  EXPECT_EQ(told("point power=-1"), "--light: power: '-1' is not from 0 to 1e30");
+  EXPECT_EQ(told("point power="), "--light: power: '' is not a finite number");
+  EXPECT_EQ(told("point position=1,2"), "--light: position: '1,2' is not 3 numbers between commas");
+  EXPECT_EQ(told("point position=1,2,1e31"), "--light: position is beyond 1e30");
+  EXPECT_EQ(told("point color=0,0,0"), "--light: color: '0,0,0' is black");
+  EXPECT_EQ(told("point color=1,-1,0"), "--light: color: '1,-1,0' has a negative number");
+  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--light: power times color is above 1e30");
+  EXPECT_EQ(told("disk width=0"), "--light: width: '0' is not above 0");
+  EXPECT_EQ(told("distant angle_degrees=100"), "--light: angle_degrees of a distant light is above 90");
+  EXPECT_EQ(told("spot blend=2"), "--light: blend: '2' is not from 0 to 1");
 }
 
 TEST(Options, ViewNames) {
@@ -436,7 +436,7 @@ TEST(Options, SurfacesNeedNoVolume) {
   std::ostringstream out;
   const auto options = parse_render_options(
       {"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2", "--gltf-camera", "1", "--gltf-variant",
-       "by night", "--surface-light", "shadows", "--indirect-roughness", "0.25", "-o", "a.png"},
+       "by night", "--surface-lighting", "direct", "--indirect-roughness", "0.25", "-o", "a.png"},
       out);
   ASSERT_TRUE(options.has_value());
   EXPECT_EQ(options->scene.surfaces, "a.glb");
@@ -450,7 +450,7 @@ TEST(Options, SurfacesNeedNoVolume) {
   EXPECT_EQ(options->scene.surface.double_sided, 0);
   EXPECT_EQ(parse({"--gltf", "a.glb", "--double-sided"}).scene.surface.double_sided, 1);
   EXPECT_EQ(parse({"--gltf", "a.glb", "--double-sided=off"}).scene.surface.double_sided, 0);
-  EXPECT_NE(usage_error(with({"--surface-light", "some"})).find("shadows"), std::string::npos);
+  EXPECT_NE(usage_error(with({"--surface-lighting", "some"})).find("direct"), std::string::npos);
   for (const char* bad : {"-0.1", "1.1", "nan", "x"}) EXPECT_NE(usage_error(with({"--indirect-roughness", bad})), "");
 }
 
@@ -490,7 +490,8 @@ TEST(Options, ParsesSequenceFrames) {
   EXPECT_EQ(parse({"--frames", "-4-4x2"}).frames, (std::vector<Moment>{-4, -2, 0, 2, 4}));
   EXPECT_EQ(parse({"--frames", "-3"}).frames, (std::vector<Moment>{-3}));
   EXPECT_EQ(parse({"--frames", "1-2x0.5"}).frames, (std::vector<Moment>{1, {1, 500}, 2}));
-  EXPECT_EQ(parse({"--between", "blend"}).scene.sequence.playback.interpolation, CUMULET_FRAME_INTERPOLATION_BLEND);
+  EXPECT_EQ(parse({"--frame-interpolation", "blend"}).scene.sequence.playback.interpolation,
+            CUMULET_FRAME_INTERPOLATION_BLEND);
   EXPECT_EQ(parse({"--velocity-scale", "24"}).scene.sequence.playback.velocity_scale, 24.0);
   EXPECT_TRUE(parse({}).frames.empty());
   EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' runs backwards");
@@ -672,10 +673,10 @@ TEST(Options, UsageErrorsAreOneLineAndNameTheFlag) {
                                         {"--camera", "0,0,1 0,0,0 180"},
                                         {"--camera", "0,0,nan 0,0,0 40"},
                                         {"--camera", "0,0 0,0,0 40"},
-                                        {"--march", "fast"},
+                                        {"--grid-type", "fast"},
                                         {"--aovs", "all"},  // with a .png
                                         {"--aovs", "cryptomatte"},
-                                        {"--march", ""},
+                                        {"--grid-type", ""},
                                         {"--cells", "Linear"},
                                         {"--criterion", "best"},
                                         {"--threshold", "-1"},
@@ -739,10 +740,56 @@ TEST(Options, UsageErrorsAreOneLineAndNameTheFlag) {
   EXPECT_NE(usage_error(with({"--trace", "s.json", "--stats", "s.json"})), "");
 }
 
+// Flags and values of earlier versions are accepted, and reported once each.
+TEST(Options, OldFlagsAreAccepted) {
+  struct Case {
+    Arguments old;
+    Arguments now;
+    std::string told;
+  };
+  const std::string start = "cumulet-render: ";
+  for (const Case& c :
+       {Case{{"--march", "dense"}, {"--grid-type", "dense"}, "--march is now --grid-type\n"},
+        Case{{"--march=dense", "--march", "dense"}, {"--grid-type", "dense"}, "--march is now --grid-type\n"},
+        Case{{"--grid-type", "brick"}, {"--grid-type", "bricks"}, "--grid-type brick is now --grid-type bricks\n"},
+        Case{{"--grid-type", "tet"}, {}, "--grid-type tet is now --grid-type tetrahedral\n"},
+        Case{{"--build", "gpu"}, {"--build-device", "gpu"}, "--build is now --build-device\n"},
+        Case{{"--lamp", "point power=3"}, {"--light", "point power=3"}, "--lamp is now --light\n"},
+        Case{{"--light", "disc power=3"}, {"--light", "disk power=3"}, "--light disc is now --light disk\n"},
+        Case{{"--light", "rect power=3 across=0,0,1"},
+             {"--light", "rect power=3 tangent=0,0,1"},
+             "--light across is now --light tangent\n"},
+        Case{{"--surface-light", "direct"},
+             {"--surface-lighting", "direct"},
+             "--surface-light is now --surface-lighting\n"},
+        Case{{"--surface-lighting", "none"},
+             {"--surface-lighting", "rasterized"},
+             "--surface-lighting none is now --surface-lighting rasterized\n"},
+        Case{{"--second-share", "0.25"}, {"--second-weight", "0.25"}, "--second-share is now --second-weight\n"},
+        Case{{"--between", "blend"}, {"--frame-interpolation", "blend"}, "--between is now --frame-interpolation\n"}}) {
+    testing::internal::CaptureStderr();
+    const SceneOptions old = parse(c.old).scene;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), start + c.told);
+    testing::internal::CaptureStderr();
+    const SceneOptions now = parse(c.now).scene;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_TRUE(same_scene(old, now)) << c.told;
+  }
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(parse({"--settled", "frames.txt"}).sequence_cache, "frames.txt");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), start + "--settled is now --sequence-cache\n");
+  // Help does not list them.
+  std::ostringstream help;
+  EXPECT_FALSE(parse_render_options({"--help"}, help).has_value());
+  for (const char* old :
+       {"--march", "--build ", "--lamp", "--surface-light ", "--second-share", "--between", "--settled"})
+    EXPECT_EQ(help.str().find(old), std::string::npos) << old;
+}
+
 TEST(Options, LastValueOfAFlagWins) {
   EXPECT_EQ(parse({"--spp", "1", "--spp", "2"}).scene.sampling.samples, 2u);
   EXPECT_EQ(parse({"--volume", "b.vdb"}).scene.volume, "b.vdb");
-  EXPECT_EQ(parse({"--march", "dense", "--march", "tet"}).scene.grid.type, CUMULET_GRID_TETRAHEDRAL);
+  EXPECT_EQ(parse({"--grid-type", "dense", "--grid-type", "tetrahedral"}).scene.grid.type, CUMULET_GRID_TETRAHEDRAL);
 }
 
 TEST(Options, TheDensityScaleIsAutoUnlessSaid) {
@@ -792,7 +839,8 @@ TEST(Options, FilesNeedNoFlag) {
 TEST(Options, HelpAndVersionNeedNoOtherFlags) {
   std::ostringstream help;
   EXPECT_FALSE(parse_render_options({"--help"}, help).has_value());
-  for (const char* flag : {"--volume", "--march", "--sun", "--stats", "--exposure", "--view", "--scene", "--tone-map"})
+  for (const char* flag :
+       {"--volume", "--grid-type", "--sun", "--stats", "--exposure", "--view", "--scene", "--tone-map"})
     EXPECT_NE(help.str().find(flag), std::string::npos) << flag;
   std::ostringstream version;
   EXPECT_FALSE(parse_render_options({"--version"}, version).has_value());

@@ -318,8 +318,8 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
         Case{R"("camera": {"eye": [1, 2, 3], "target": [1, 2, 3]})", "camera.target"},
         Case{R"("camera": {"up": [0, 0, 0]})", "camera.up"},
         Case{R"("camera": {"fovy_degrees": 180})", "camera.fovy_degrees"},
-        Case{R"("grid": {"march": "fast"})", "grid.type"},
-        Case{R"("grid": {"march": 1})", "grid.type"},
+        Case{R"("grid": {"march": "fast"})", "grid.march"},
+        Case{R"("grid": {"march": 1})", "grid.march"},
         Case{R"("grid": {"threshold": -1})", "grid.threshold"},
         Case{R"("grid": {"max_cells": 0})", "grid.max_cells"},
         Case{R"("grid": {"camera_adaptive": 1})", "grid.camera_adaptive"},
@@ -362,9 +362,116 @@ TEST(SceneFile, VersionTwoMatchesVersionOne) {
   scene.places.clear();
   EXPECT_EQ(first.rfind("{\n  \"cumulet_scene\": 1,\n  \"volume\"", 0), 0u) << first;
   EXPECT_TRUE(same_scene(parse_scene(first, "s.json"), scene));
-  const std::string second = scene_text(scene, "s.json");
+  const std::string second = scene_text(scene, "s.json", SceneFormat::second);
   EXPECT_EQ(second.rfind("{\n  \"cumulet_scene\": 2,\n  \"volumes\": [", 0), 0u) << second;
   EXPECT_TRUE(same_scene(parse_scene(second, "s.json"), scene));
+}
+
+TEST(SceneFile, VersionThreeMatchesVersionTwo) {
+  // Every key and value that version 3 renamed.
+  const SceneOptions second = parse_scene(R"({"cumulet_scene": 2,
+      "volumes": [
+        {"file": "a.vdb", "places": [{"translate": [1, 2, 3]}, {}],
+         "medium": {"phase": "two-lobe", "second_share": 0.25}},
+        {"file": "b.####.vdb", "places": [{"scale": [2, 2, 2]}], "medium": {"second_share": 0.75},
+         "sequence": {"between": "blend"}}],
+      "sequence": {"between": "advect"},
+      "models": [{"file": "m.glb", "light": "shadows"}],
+      "environment": {"sun": {"azimuth_degrees": 10, "irradiance": [1, 2, 3], "group": 2},
+                      "sky": {"radiance": [0.1, 0.2, 0.3], "group": 1},
+                      "file": "e.hdr", "rotation_degrees": 30, "strength": 2},
+      "lights": [{"kind": "point", "power": 1}, {"kind": "spot", "power": 2}, {"kind": "disc", "power": 3},
+                 {"kind": "rectangle", "across": [0, 0, 1], "power": 4}, {"kind": "sun", "power": 5}],
+      "ground": {"place": "at-height", "height": -3},
+      "grid": {"march": "brick", "build": "gpu"}})",
+                                          "dir/s.json");
+  const SceneOptions third = parse_scene(R"({"cumulet_scene": 3,
+      "volumes": [
+        {"file": "a.vdb", "transforms": [{"translate": [1, 2, 3]}, {}],
+         "medium": {"phase": "two-lobe", "second_weight": 0.25}},
+        {"file": "b.####.vdb", "transforms": [{"scale": [2, 2, 2]}], "medium": {"second_weight": 0.75},
+         "sequence": {"interpolation": "blend"}}],
+      "sequence": {"interpolation": "advect"},
+      "models": [{"file": "m.glb", "lighting": "direct"}],
+      "sun_sky": {"sun": {"azimuth_degrees": 10, "irradiance": [1, 2, 3], "group": 2},
+                  "sky": {"radiance": [0.1, 0.2, 0.3], "group": 1}},
+      "environment": {"file": "e.hdr", "rotation_degrees": 30, "strength": 2},
+      "lights": [{"kind": "point", "power": 1}, {"kind": "spot", "power": 2}, {"kind": "disk", "power": 3},
+                 {"kind": "rect", "tangent": [0, 0, 1], "power": 4}, {"kind": "distant", "power": 5}],
+      "ground": {"mode": "at-height", "height": -3},
+      "grid": {"type": "bricks", "build_device": "gpu"}})",
+                                         "dir/s.json");
+  EXPECT_TRUE(same_scene(second, third));
+  EXPECT_EQ(scene_hash(second), scene_hash(third));
+  EXPECT_EQ(third.places, second.places);
+  ASSERT_EQ(third.places.size(), 2U);
+  EXPECT_EQ(third.places[0][13], 2.0);
+  EXPECT_EQ(third.others[0].places, second.others[0].places);
+  EXPECT_EQ(third.medium.second_weight, 0.25F);
+  EXPECT_EQ(third.others[0].medium.second_weight, 0.75F);
+  EXPECT_EQ(third.sequence, second.sequence);
+  EXPECT_EQ(third.sequence.playback.interpolation, CUMULET_FRAME_INTERPOLATION_ADVECT);
+  EXPECT_EQ(third.others[0].sequence.playback.interpolation, CUMULET_FRAME_INTERPOLATION_BLEND);
+  EXPECT_EQ(third.surface.lighting, CUMULET_SURFACE_LIGHTING_DIRECT);
+  EXPECT_EQ(third.light.sun_irradiance[1], 2.0F);
+  EXPECT_EQ(third.environment, "dir/e.hdr");
+  using cumulet::settings::same;
+  EXPECT_TRUE(same(second.light, third.light));
+  EXPECT_TRUE(same(second.environment_settings, third.environment_settings));
+  EXPECT_TRUE(std::ranges::equal(second.analytic_lights, third.analytic_lights, same<cumulet_light_desc>));
+  ASSERT_EQ(third.analytic_lights.size(), 5U);
+  EXPECT_EQ(third.analytic_lights[3].tangent[2], 1.0);
+  EXPECT_EQ(third.analytic_lights[4].kind, CUMULET_LIGHT_DISTANT);
+  EXPECT_EQ(third.ground.mode, CUMULET_GROUND_AT_HEIGHT);
+  EXPECT_EQ(third.grid.type, CUMULET_GRID_BRICKS);
+  EXPECT_EQ(third.grid.build_device, CUMULET_BUILD_GPU);
+  // Each version is written with its own names, and read again.
+  for (const SceneFormat format : {SceneFormat::second, SceneFormat::third}) {
+    const std::string text = scene_text(third, "dir/s.json", format);
+    EXPECT_TRUE(same_scene(parse_scene(text, "dir/s.json"), third)) << text;
+  }
+  const std::string text = scene_text(third, "dir/s.json");
+  EXPECT_EQ(text.rfind("{\n  \"cumulet_scene\": 3,\n  \"volumes\": [", 0), 0U) << text;
+  for (const char* old :
+       {"places", "between", "second_share", "\"light\"", "across", "march", "\"build\"", "disc", "brick\""})
+    EXPECT_EQ(text.find(old), std::string::npos) << old;
+}
+
+TEST(SceneFile, VersionThreeErrorsNameTheNewKey) {
+  const auto third = [](const std::string& sections) { return error_of(R"({"cumulet_scene": 3, )" + sections + "}"); };
+  struct Case {
+    const char* section;
+    const char* key;
+    const char* now;
+  };
+  for (const Case& c :
+       {Case{R"("light": {})", "light", "sun_sky"}, Case{R"("volume": {})", "volume", "volumes[0]"},
+        Case{R"("medium": {})", "medium", "volumes[0].medium"}, Case{R"("surfaces": {})", "surfaces", "models[0]"},
+        Case{R"("environment": {"sun": {}})", "environment.sun", "sun_sky.sun"},
+        Case{R"("environment": {"sky": {}})", "environment.sky", "sun_sky.sky"},
+        Case{R"("grid": {"march": "dense"})", "grid.march", "grid.type"},
+        Case{R"("grid": {"build": "cpu"})", "grid.build", "grid.build_device"},
+        Case{R"("ground": {"place": "none"})", "ground.place", "ground.mode"},
+        Case{R"("sequence": {"between": "none"})", "sequence.between", "sequence.interpolation"},
+        Case{R"("volumes": [{}, {"file": "b.vdb", "places": []}])", "volumes[1].places", "volumes[1].transforms"},
+        Case{R"("volumes": [{"medium": {"second_share": 1}}])", "volumes[0].medium.second_share",
+             "volumes[0].medium.second_weight"},
+        Case{R"("volumes": [{}, {"file": "b.vdb", "sequence": {"between": "none"}}])", "volumes[1].sequence.between",
+             "volumes[1].sequence.interpolation"},
+        Case{R"("models": [{"file": "a.glb", "light": "none"}])", "models[0].light", "models[0].lighting"},
+        Case{R"("lights": [{"kind": "point"}, {"kind": "rect", "across": [1, 0, 0]}])", "lights[1].across",
+             "lights[1].tangent"}}) {
+    EXPECT_EQ(third(c.section), std::string("dir/s.json: ") + c.key + ": there is no such setting: it is now " + c.now);
+  }
+  EXPECT_EQ(third(R"("grid": {"marsh": "dense"})"), "dir/s.json: grid.marsh: there is no such setting");
+  EXPECT_EQ(third(R"("grid": {"type": "tet"})"), "dir/s.json: grid.type: 'tet' is now 'tetrahedral'");
+  EXPECT_EQ(third(R"("grid": {"type": "fast"})"),
+            "dir/s.json: grid.type: 'fast' is none of tetrahedral, dense, bricks");
+  EXPECT_EQ(third(R"("lights": [{"kind": "disc"}])"), "dir/s.json: lights[0].kind: 'disc' is now 'disk'");
+  // Versions 1 and 2 keep their names.
+  EXPECT_EQ(told(R"("grid": {"type": "dense"})"), "dir/s.json: grid.type: there is no such setting");
+  EXPECT_EQ(told(R"("grid": {"march": "bricks"})"), "dir/s.json: grid.march: 'bricks' is none of tet, dense, brick");
+  EXPECT_EQ(told(R"("sun_sky": {})"), "dir/s.json: sun_sky: there is no such setting");
 }
 
 TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
@@ -425,13 +532,13 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "watts": 1}])"), start + "lights[0].watts: there is no such setting");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "power": -1}])"), start + "lights[0].power: -1 is not from 0 to 1e30");
   EXPECT_EQ(told(R"("lights": [{"kind": "sun", "angle_degrees": 91}])"),
-            start + "lights[0].angle_degrees: of a sun is above 90");
+            start + "lights[0].angle_degrees: of a distant light is above 90");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "position": [0, 1e31, 0]}])"),
             start + "lights[0].position: is beyond 1e30");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "color": [1e20, 1, 1], "power": 1e20}])"),
             start + "lights[0].power: times color is above 1e30");
-  EXPECT_EQ(error_of(R"({"cumulet_scene": 3})"),
-            start + "cumulet_scene: version 3 is not known: this program reads 1 and 2");
+  EXPECT_EQ(error_of(R"({"cumulet_scene": 4})"),
+            start + "cumulet_scene: version 4 is not known: this program reads 1 to 3");
   EXPECT_EQ(error_of(with(R"("lights": [])")), start + "lights: there is no such setting");
 }
 
@@ -587,12 +694,16 @@ TEST(SceneFile, CameraNamesAreUnique) {
 
 TEST(SceneFile, DefaultLightIsDaylight) {
   const auto lit = [](const std::string& more) {
-    const SceneOptions scene = parse_scene(R"({"cumulet_scene": 2)" + more + "}", "s.json");
+    const SceneOptions scene = parse_scene(R"({"cumulet_scene": )" + more + "}", "s.json");
     return scene.light.sky == CUMULET_SKY_PHYSICAL;
   };
-  EXPECT_TRUE(lit(""));
-  EXPECT_FALSE(lit(R"(, "environment": {})"));
-  EXPECT_FALSE(lit(R"(, "lights": [])"));
+  EXPECT_TRUE(lit("2"));
+  EXPECT_FALSE(lit(R"(2, "environment": {})"));
+  EXPECT_FALSE(lit(R"(2, "lights": [])"));
+  EXPECT_TRUE(lit("3"));
+  EXPECT_FALSE(lit(R"(3, "sun_sky": {})"));
+  EXPECT_FALSE(lit(R"(3, "environment": {})"));
+  EXPECT_FALSE(lit(R"(3, "lights": [])"));
 }
 
 TEST(SceneFile, FilesAreWrittenAtomically) {

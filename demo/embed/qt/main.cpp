@@ -298,7 +298,7 @@ class Window final : public QMainWindow {
   QDoubleSpinBox* azimuth = nullptr;
   QDoubleSpinBox* elevation = nullptr;
   QDoubleSpinBox* threshold = nullptr;
-  QComboBox* march = nullptr;
+  QComboBox* grid_type = nullptr;
   QCheckBox* one_camera = nullptr;
   QStringList problems;
 
@@ -328,10 +328,10 @@ class Window final : public QMainWindow {
     azimuth = add_slider(*form, "Sun azimuth", -180.0, 180.0, 60.0, [this] { set_light(); });
     elevation = add_slider(*form, "Sun elevation", -90.0, 90.0, 40.0, [this] { set_light(); });
     for (QDoubleSpinBox* box : {azimuth, elevation}) box->setSuffix("\u00b0");
-    march = new QComboBox;
-    march->addItems({"Tetrahedra", "Dense voxels", "Bricks"});  // in the order of cumulet_grid_type
-    connect(march, &QComboBox::currentIndexChanged, this, [this] { set_grid(); });
-    form->addRow("March", march);
+    grid_type = new QComboBox;
+    grid_type->addItems({"Tetrahedra", "Dense voxels", "Bricks"});  // in the order of cumulet_grid_type
+    connect(grid_type, &QComboBox::currentIndexChanged, this, [this] { set_grid(); });
+    form->addRow("Grid type", grid_type);
     threshold = add_slider(*form, "Cell threshold", -4.0, 0.0, std::log10(0.15), [this] { set_grid(); });
     threshold->setPrefix("10 ^ ");
     one_camera = new QCheckBox("One camera for both");
@@ -388,7 +388,7 @@ class Window final : public QMainWindow {
 
   void set_grid() const {
     auto desc = make<cumulet_grid_desc>();
-    desc.type = static_cast<cumulet_grid_type>(march->currentIndex());
+    desc.type = static_cast<cumulet_grid_type>(grid_type->currentIndex());
     desc.criterion = CUMULET_CRITERION_TRANSMITTANCE;
     desc.threshold = std::pow(10.0, threshold->value());
     each(cumulet_set_grid, desc);
@@ -505,10 +505,10 @@ class SelfTest {
     settle();
     shoot("apart");
 
-    window_.march->setCurrentIndex(CUMULET_GRID_BRICKS);
+    window_.grid_type->setCurrentIndex(CUMULET_GRID_BRICKS);
     settle();
     shoot("bricks");
-    window_.march->setCurrentIndex(CUMULET_GRID_TETRAHEDRAL);
+    window_.grid_type->setCurrentIndex(CUMULET_GRID_TETRAHEDRAL);
     window_.threshold->setValue(-1.0);
     window_.density->setValue(-1.0);
     window_.azimuth->setValue(-120.0);
