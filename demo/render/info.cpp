@@ -73,7 +73,7 @@ Json volume_info(const std::string& path) {
     entry["class"] = grid.grid_class;
     entry["shown_by_default"] = file.default_grid == static_cast<std::int32_t>(i);
     if (*grid.channel != '\0') entry["channel"] = grid.channel;
-    if (*grid.unsupported_reason != '\0') entry["refusal"] = grid.unsupported_reason;
+    if (*grid.unsupported_reason != '\0') entry["unsupported_reason"] = grid.unsupported_reason;
     if (grid.values != CUMULET_GRID_VALUES_NONE) {
       entry["values"] = grid.values == CUMULET_GRID_VALUES_SCALARS ? "scalars" : "lengths";
       entry["active_voxels"] = grid.active_voxels;

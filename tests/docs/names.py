@@ -19,7 +19,7 @@ MEMBER = re.compile(r"(?<![\w.\"])\.([a-z_]\w*)\b(?!\()|(?<=[\w)\]])(?:\.|->)([a
 OF_STRUCT = re.compile(r"`(\w+)`(?: =? ?\S+)? of `(cumulet_\w+)`")
 IN_STRUCT = re.compile(r"(cumulet_\w+)(?:\.|::)(\w+)")
 CODE = ("c", "cpp", "glsl")
-FREE_SECTIONS = ("Breaking", "Words", "Public names that will change before 1.0")  # their prose names the past, or examples
+FREE_SECTIONS = ("Breaking", "Words")  # their prose names the past, or examples
 FREE_PAGES = ("docs/migration.md",)
 
 

@@ -1,14 +1,14 @@
 // A live simulation: smoke that the user stirs with the mouse. It is computed in the host's own context. Each step is
 // passed to Cumulet as a texture and path-traced while it moves.
 //
-//     cumulet-embed-smoke [--voxels N] [--build cpu|gpu] [--fire on|off] [--record FILE]
-//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N] [--build cpu|gpu] [--fire on|off]
+//     cumulet-embed-smoke [--voxels N] [--build-device cpu|gpu] [--fire on|off] [--record FILE]
+//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N] [--build-device cpu|gpu] [--fire on|off]
 //
-// --build gpu: the smoke stays on the GPU, and its grids are built there. --fire on: the smoke is hot at its source and
-// emits light until it has cooled; the scene is in evening light.
-// The left button stirs; the other buttons and the wheel move the camera; Escape quits. --record writes the mouse
-// input, one line per change: frame, x, y (0 to 1, from the top left), pressed. --test plays such a file without a
-// window, checks that images follow the smoke and that states are drawn often enough, and writes OUT_DIR/smoke.ppm.
+// --build-device gpu: the smoke stays on the GPU, and its grids are built there. --fire on: the smoke is hot at its
+// source and emits light until it has cooled; the scene is in evening light. The left button stirs; the other buttons
+// and the wheel move the camera; Escape quits. --record writes the mouse input, one line per change: frame, x, y (0 to
+// 1, from the top left), pressed. --test plays such a file without a window, checks that images follow the smoke and
+// that states are drawn often enough, and writes OUT_DIR/smoke.ppm.
 #include <cumulet/cumulet.hpp>
 
 #define GL_GLEXT_PROTOTYPES
@@ -527,7 +527,7 @@ int main(int argc, char** argv) {
     if (std::strcmp(argv[i], "--mouse") == 0) mouse = argv[i + 1];
     if (std::strcmp(argv[i], "--test") == 0) folder = argv[i + 1];
     if (std::strcmp(argv[i], "--voxels") == 0) options.voxels = std::atoi(argv[i + 1]);
-    if (std::strcmp(argv[i], "--build") == 0) built = argv[i + 1];
+    if (std::strcmp(argv[i], "--build-device") == 0) built = argv[i + 1];
     if (std::strcmp(argv[i], "--fire") == 0) fire = argv[i + 1];
   }
   options.build = built == "gpu" ? cumulet::BuildDevice::gpu : cumulet::BuildDevice::cpu;
@@ -535,7 +535,8 @@ int main(int argc, char** argv) {
   if (argc % 2 == 0 || (built != "cpu" && built != "gpu") || (fire != "on" && fire != "off") ||
       folder.empty() != mouse.empty() || options.voxels < 8 || options.voxels > 256)
     fail(
-        "usage: cumulet-embed-smoke [--voxels 8..256] [--build cpu|gpu] [--fire on|off] [--record FILE | --mouse FILE "
+        "usage: cumulet-embed-smoke [--voxels 8..256] [--build-device cpu|gpu] [--fire on|off] [--record FILE | "
+        "--mouse FILE "
         "--test OUT_DIR]");
   if (!folder.empty()) {
     play(mouse, folder, options);
