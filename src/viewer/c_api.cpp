@@ -23,11 +23,11 @@ constexpr double unknown_noise = std::numeric_limits<double>::infinity();
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
 
 std::vector<cumulet::scene::Place> places_of(const double* to_world, uint32_t count) {
-  const std::span<const double> values = array_of(to_world, count, 16, "places");
+  const std::span<const double> values = array_of(to_world, count, 16, "transforms");
   std::vector<cumulet::scene::Place> places(count);
   for (size_t i = 0; i < count; ++i) {
     places[i].to_world = matrix_or_identity(values.subspan(16 * i).first<16>());
-    require_place(places[i].to_world, "place " + std::to_string(i) + ": ");
+    require_place(places[i].to_world, "transform " + std::to_string(i) + ": ");
   }
   return places;
 }
@@ -339,14 +339,15 @@ cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, con
   return guarded(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::Place> places = v.places();
     const bool ends = open != nullptr || close != nullptr;
-    require(!ends || count == places.size(), "the shutter's places are not as many as the volume has");
+    require(!ends || count == places.size(), "the shutter transforms are not as many as those of the volume");
     constexpr std::array<double, 16> as_it_is{};
     const auto at = [&](const double* matrices, size_t i) {
       return matrices != nullptr ? std::span<const double, 16>(matrices + 16 * i, 16)
                                  : std::span<const double, 16>(as_it_is);
     };
     for (size_t i = 0; i < places.size(); ++i) {
-      places[i].ends = place_ends(at(open, i), at(close, i), places[i].to_world, "place " + std::to_string(i) + ": ");
+      places[i].ends =
+          place_ends(at(open, i), at(close, i), places[i].to_world, "transform " + std::to_string(i) + ": ");
     }
     v.set_places(places);
   });

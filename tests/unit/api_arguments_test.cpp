@@ -95,10 +95,10 @@ TEST_F(ApiArguments, NonFinitePositionsAndTimesAreRejected) {
   expect_refused("event", cumulet_input(v_, nullptr, nullptr), "cumulet_event is NULL");
   std::array<double, 16> matrix{};
   matrix.fill(nan);
-  expect_refused("places", cumulet_set_volume_transforms(v_, matrix.data(), 1), "place 0: to_world is not finite");
-  expect_refused("places", cumulet_set_volume_transforms(v_, nullptr, 1), "places are NULL");
+  expect_refused("places", cumulet_set_volume_transforms(v_, matrix.data(), 1), "transform 0: to_world is not finite");
+  expect_refused("places", cumulet_set_volume_transforms(v_, nullptr, 1), "transforms are NULL");
   expect_refused("shutter", cumulet_set_volume_shutter_transforms(v_, matrix.data(), nullptr, 1),
-                 "place 0: open_to_world is not finite");
+                 "transform 0: open_to_world is not finite");
   auto frame = target_.frame();
   frame.budget_ms = nan;
   expect_refused("budget", cumulet_render(v_, &frame, nullptr), "cumulet_frame_desc.budget_ms is not up to 1e9");

@@ -184,7 +184,7 @@ TEST_F(CVolumeInstance, VolumeTransformsMoveUntilSetAgain) {
   EXPECT_NE(picture(shows.get()), sharp);
   EXPECT_EQ(cumulet_set_volume_shutter_transforms(shows.get(), nullptr, there.data(), 2),
             CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(shows.get()), "the shutter's places are not as many as the volume has");
+  EXPECT_STREQ(cumulet_last_error(shows.get()), "the shutter transforms are not as many as those of the volume");
   ASSERT_EQ(cumulet_set_volume_transforms(shows.get(), nullptr, 0), CUMULET_OK);
   EXPECT_EQ(difference(picture(shows.get()), sharp), "");
 }
