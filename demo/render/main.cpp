@@ -368,7 +368,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   add_stage("load", stats.build_seconds_load);
   add_stage("statistics", stats.build_seconds_statistics);
   add_stage("refine", stats.build_seconds_refine);
-  add_stage("records", stats.build_seconds_packing);
+  add_stage("packing", stats.build_seconds_packing);
   add_stage("upload", stats.build_seconds_upload);
   json["trace_seconds"] = stats.trace_seconds;
   Json& passes = json["pass_seconds"];

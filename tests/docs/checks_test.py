@@ -162,6 +162,27 @@ class Checks(unittest.TestCase):
     def test_a_replacement_of_nothing(self):
         self.assertIn("'use(3)' occurs 0 times", self.c_file("--whole", "--replace", "use(3)", "use")[1])
 
+    def test_migration(self):
+        checkout = HERE.parent.parent
+        for name in ("docs/migration.md", "cmake/descriptors.py", "cmake/c_header.py", "demo/render/old_flags.cpp",
+                     "demo/render/options.cpp", "demo/scene_file/keys.cpp", "src/settings/settings.hpp",
+                     *(f"src/include/cumulet/cumulet{end}" for end in (".h", ".hpp", "_openvdb.hpp"))):
+            self.write({name: (checkout / name).read_text(encoding="utf-8")})
+        status, output = self.check("migration.py")
+        self.assertEqual(status, 0, output)
+        page = (self.root / "docs/migration.md").read_text()
+        for old, new, expected in (
+                ("`cumulet_grid_type` |", "`cumulet_grid_kind` |", "cumulet.h has no 'cumulet_grid_kind'"),
+                ("| `cumulet_march` |", "| `cumulet_volume` |", "cumulet.h has still 'cumulet_volume'"),
+                ("| `across` | `tangent` |", "| `across` | `u_axis` |", "cumulet_light_desc has no 'u_axis'"),
+                ("`GridType::bricks` |", "`GridType::brick_grid` |", "the C++ headers have no 'GridType::brick_grid'"),
+                ("| `--lamp` | `--light` |\n", "", "the flags are not those"),
+                ("| `lights[].kind` | `disc` | `disk` |\n", "", "the values under 'Scene files' are not those"),
+                ("| `grid.march` | `grid.march` | `grid.type` |\n", "", "the keys are not those")):
+            self.replace("docs/migration.md", old, new)
+            self.reported("migration.py", expected)
+            self.write({"docs/migration.md": page})
+
 
 if __name__ == "__main__":
     unittest.main()
