@@ -80,10 +80,10 @@ TEST_F(Contract, Contract01OpaqueHandlesAndAThinLayerOverThem) {
   auto made = cumulet::Viewer::create({.get_proc = {FakeGl::get_proc, &fake_}});
   ASSERT_TRUE(made);
   cumulet::Viewer& viewer = *made;
-  ASSERT_TRUE(viewer.set_light({.sun_azimuth_degrees = 60.0F,
-                                .sun_elevation_degrees = 40.0F,
-                                .sun_irradiance = {2.5F, 2.5F, 2.5F},
-                                .sky_radiance = {0.3F, 0.3F, 0.3F}}));
+  ASSERT_TRUE(viewer.set_sun_sky({.sun_azimuth_degrees = 60.0F,
+                                  .sun_elevation_degrees = 40.0F,
+                                  .sun_irradiance = {2.5F, 2.5F, 2.5F},
+                                  .sky_radiance = {0.3F, 0.3F, 0.3F}}));
   ASSERT_TRUE(viewer.set_sampling({.samples = 4, .preview = cumulet::Preview::off}));
   const auto camera = cumulet::Camera::create({.eye = {0.0, 6.0, 32.0}});
   ASSERT_TRUE(viewer.set_camera(*camera));
