@@ -87,13 +87,13 @@ const char* kind_name(cumulet_light_kind kind) {
     case CUMULET_LIGHT_SPOT:
       return "spot";
     case CUMULET_LIGHT_DISK:
-      return "disc";
+      return "disk";
     case CUMULET_LIGHT_RECT:
       return "rectangle";
     case CUMULET_LIGHT_DISTANT:
       break;
   }
-  return "sun";
+  return "distant";
 }
 
 }  // namespace
