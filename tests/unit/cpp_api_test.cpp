@@ -201,7 +201,7 @@ TEST(CppDescs, ConvertToTheCStructs) {
                                              .flip_y = true,
                                              .scale = 9,
                                              .format = 10,
-                                             .color = Color::hdr,
+                                             .color = ColorEncoding::hdr,
                                              .blend = Blend::replace,
                                              .write_depth = true,
                                              .depth_source = DepthSource::framebuffer,
