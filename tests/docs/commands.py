@@ -20,7 +20,7 @@ import source_tree
 RENDER, FARM, BENCH = "cumulet-render", "cumulet-farm", "cumulet-bench"
 RUN_WITHOUT_FILES = (RENDER, "cumulet-merge")
 SCENE = '{ "cumulet_scene": 2, "volumes": [ { "file": "none.vdb" } ] }\n'
-FREE_SECTIONS = ("Breaking",)  # their prose names the past
+FREE_SECTIONS = ("Breaking", "Public names that will change before 1.0")  # they name the past, or what is planned
 FREE_PAGES = ("docs/migration.md",)
 SECONDS = 120
 
