@@ -246,6 +246,15 @@ VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::
   return {make_left<const volume::VolumeFrame>(std::move(copy)), {}};
 }
 
+namespace {
+
+// True if the frame's voxels are in main memory and have channels that are averaged with the density as weight.
+bool is_weighted(const volume::VolumeFrame& frame, bool in_gl) {
+  return !in_gl && (frame.color || frame.anisotropy || frame.velocity);
+}
+
+}  // namespace
+
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
                                      bool anisotropic, Progress& progress, const Log& log) const {
   const scene::Emission given = emission_by(emission);
@@ -267,8 +276,8 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
     put(glowing_, Glowing{given, field(colors, std::move(emissive))});
   }
   const auto weighs = [&](const std::shared_ptr<const volume::VolumeFrame>& frame) {
-    const bool plain = in_gl_ || !(frame->color || frame->anisotropy || frame->velocity);
-    return plain ? Weighing{frame, density_ramp} : weighing(frame, density_ramp, progress);
+    const bool weighted = is_weighted(*frame, static_cast<bool>(in_gl_));
+    return weighted ? weighing(frame, density_ramp, progress) : Weighing{frame, density_ramp};
   };
   const bool weighs_anew = !weighted_ || weighted_->density_ramp != density_ramp;
   const bool turns_anew = anisotropic && (weighs_anew || !weighted_->forward);
