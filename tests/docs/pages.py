@@ -11,6 +11,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support
 import source_tree  # noqa: E402
 
 NOT_OURS = "third_party_notes/*"
+# The prose of these sections names the past, or what is planned.
+FREE_SECTIONS = ("Breaking", "Public names that will change before 1.0")
 
 # A fenced block has the language of its fence, an indented one "indented". line: of its first line of text.
 Block = collections.namedtuple("Block", "language line text")
