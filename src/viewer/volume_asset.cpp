@@ -28,6 +28,11 @@ struct Box {
   [[nodiscard]] bool empty() const { return low.x > high.x; }
 };
 
+// True if the frame's voxels are in main memory and have channels that are averaged with the density as weight.
+bool is_weighted(const volume::VolumeFrame& frame, bool in_gl) {
+  return !in_gl && (frame.color || frame.anisotropy || frame.velocity);
+}
+
 // Returns the mean with the momentum of another frame; nullopt if either has none.
 std::optional<grid::MomentumField::Values> mean_momentum(std::optional<grid::MomentumField::Values> momentum,
                                                          const volume::VolumeFrame& other, const volume::Ramp& ramp,
@@ -245,15 +250,6 @@ VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::
   copy.density = volume::in_units_of(unit, volume::apply(ramp, frame->density, &progress), &progress);
   return {make_left<const volume::VolumeFrame>(std::move(copy)), {}};
 }
-
-namespace {
-
-// True if the frame's voxels are in main memory and have channels that are averaged with the density as weight.
-bool is_weighted(const volume::VolumeFrame& frame, bool in_gl) {
-  return !in_gl && (frame.color || frame.anisotropy || frame.velocity);
-}
-
-}  // namespace
 
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
                                      bool anisotropic, Progress& progress, const Log& log) const {
