@@ -216,29 +216,29 @@ class LiveStatesFromGl : public testing::Test {
     EXPECT_EQ(cumulet_get_live_info(v_, &info), CUMULET_OK) << cumulet_last_error(v_);
     return info.handed_state;
   }
-  // Renders until `count` states have arrived, and some more frames. Returns the number of arrived states.
-  std::uint64_t arrive(std::uint64_t count = 1) {
-    const std::uint64_t before = handed();
+  // Renders frames that draw nothing until `done` returns true, at most 30 s.
+  void render_until(const std::function<bool()>& done) {
     cumulet_frame_desc frame = target_.frame();
     frame.target = CUMULET_TARGET_NONE;
     frame.budget_ms = 5.0;
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    for (int more = 0; more < 3 && std::chrono::steady_clock::now() < until;) {
+    while (!done() && std::chrono::steady_clock::now() < until)
       EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
+  }
+  // Renders until `count` states have arrived, and some more frames. Returns the number of arrived states.
+  std::uint64_t arrive(std::uint64_t count = 1) {
+    const std::uint64_t before = handed();
+    int more = 0;
+    render_until([&] {
       if (handed() >= before + count) ++more;
-    }
+      return more == 3;
+    });
     return handed() - before;
   }
-  // Renders frames until main memory has the voxels of the newest state, at most 30 s.
+  // Renders until main memory has the voxels of the newest state.
   void wait_for_voxels(const LiveRef& live) {
-    cumulet_frame_desc frame = target_.frame();
-    frame.target = CUMULET_TARGET_NONE;
     cumulet_volume* volume = nullptr;
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (cumulet_live_get_volume(live.get(), &volume, nullptr, 0) != CUMULET_OK &&
-           std::chrono::steady_clock::now() < until) {
-      EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
-    }
+    render_until([&] { return cumulet_live_get_volume(live.get(), &volume, nullptr, 0) == CUMULET_OK; });
     cumulet_volume_release(volume);
   }
   Picture picture() { return test::drawn_once(v_, target_); }
