@@ -447,8 +447,8 @@ cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_des
   return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
 }
 
-cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::analytic_lights_of(lamps, count)); });
+cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lights, uint64_t count) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::analytic_lights_of(lights, count)); });
 }
 
 cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path) {

@@ -2877,11 +2877,11 @@ typedef struct cumulet_lamp_desc {
  * Threads: one call per viewer at a time. No GL.
  *
  * @param viewer The viewer.
- * @param lamps  The lights, which are copied. May be NULL if count is 0.
+ * @param lights The lights, which are copied. May be NULL if count is 0.
  * @param count  Number of lights, up to 4096. 0: none.
  * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT; the line names the light.
  */
-CUMULET_API cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count);
+CUMULET_API cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lights, uint64_t count);
 
 /**
  * Sets how images are sampled.

@@ -1448,11 +1448,11 @@ class Viewer {
   }
   [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
   /// Replaces the analytic lights; an empty span removes all.
-  [[nodiscard]] Result<> set_lamps(std::span<const LampDesc> lamps) noexcept {
-    const std::unique_ptr<cumulet_lamp_desc[]> c(new (std::nothrow) cumulet_lamp_desc[lamps.size()]);
+  [[nodiscard]] Result<> set_lamps(std::span<const LampDesc> lights) noexcept {
+    const std::unique_ptr<cumulet_lamp_desc[]> c(new (std::nothrow) cumulet_lamp_desc[lights.size()]);
     if (!c) return Error{StatusCode::out_of_memory, Text<512>("out of memory")};
-    std::ranges::copy(lamps, c.get());
-    return result(cumulet_set_lamps(handle(), c.get(), lamps.size()));
+    std::ranges::copy(lights, c.get());
+    return result(cumulet_set_lamps(handle(), c.get(), lights.size()));
   }
   [[nodiscard]] Result<> load_environment(const std::string& path) noexcept {
     return result(cumulet_load_environment(handle(), path.c_str()));
