@@ -55,16 +55,16 @@ std::string save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cu
   png.tone_mapping = image::ToneMapping::none;
   const float(&region)[4] = scene.sampling.region;
   const bool part = std::ranges::any_of(region, [](float value) { return value != 0.0f; });
-  png.keep_alpha = part || scene.display.background == CUMULET_BACKGROUND_TRANSPARENT;
-  image::write_png(path, read_display(viewer, shown), png);
   const bool transparent = scene.display.background == CUMULET_BACKGROUND_TRANSPARENT;
+  png.keep_alpha = part || transparent;
+  image::write_png(path, read_display(viewer, shown), png);
   if (!transparent || scene.sampling.view != CUMULET_VIEW_SHADED) return {};
   const std::vector<float> linear = read_linear(viewer, shown);
   return image::raised_alpha_note(path, image::pixels_brighter_than_alpha(linear, scene.display.exposure_stops));
 }
 
-std::string save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-                     const std::string& path) {
+void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+              const std::string& path) {
   require_picture(shown);
   const std::vector<float> rgba = read_linear(viewer, shown);
   // All AOVs except the separate volume, which would slow down every frame.
@@ -74,7 +74,6 @@ std::string save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cu
   const bool shaded = scene.sampling.view == CUMULET_VIEW_SHADED;
   write_exr(viewer, path, windows_of(scene.sampling.region, shown.width, shown.height), {rgba},
             std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer, scene, shown.width, shown.height));
-  return {};
 }
 
 }  // namespace cumulet::demo

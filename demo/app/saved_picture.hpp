@@ -13,12 +13,12 @@ namespace cumulet::demo {
 
 /// Writes the shown picture to a PNG file, as it is displayed. Returns a note of one line if pixels are brighter than
 /// PNG's straight alpha can hold, else "". Throws std::runtime_error, one line.
-std::string save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-                     const std::string& path);
+[[nodiscard]] std::string save_png(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+                                   const std::string& path);
 
 /// Writes the shown picture to an EXR file in linear radiance, with the layers that docs/aovs.md lists. Debug views
-/// have no layers. Returns "". Throws std::runtime_error, one line.
-std::string save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
-                     const std::string& path);
+/// have no layers. Throws std::runtime_error, one line.
+void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+              const std::string& path);
 
 }  // namespace cumulet::demo

@@ -916,8 +916,12 @@ void Session::finish_saves() {
 
 void Session::save(const Request& request) {
   try {
-    const auto write = request.type == Request::Type::save_exr ? save_exr : save_png;
-    const std::string note = write(viewer_.get(), scene_, status_.frame, request.path);
+    std::string note;
+    if (request.type == Request::Type::save_exr) {
+      save_exr(viewer_.get(), scene_, status_.frame, request.path);
+    } else {
+      note = save_png(viewer_.get(), scene_, status_.frame, request.path);
+    }
     files_.push_back({request.path, Answer::File::Fate::saved});
     tell(false, "Saved " + request.path + ", " + std::to_string(status_.frame.width) + "x" +
                     std::to_string(status_.frame.height));

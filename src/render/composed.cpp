@@ -23,7 +23,7 @@ bool Composed::is_kept(const Of& of, bool always) {
 
 std::vector<RowRange> Composed::stale_rows(const Of& of, const RowRevisions* rows) const {
   const auto height = static_cast<std::uint32_t>(of.size.y);
-  const std::vector<RowRange> all{{0, height}};
+  std::vector<RowRange> all{{0, height}};
   if (!of_) return all;
   if (of.means.revision && *of_ == of) return {};
   Of same = *of_;

@@ -450,9 +450,8 @@ cumulet_status cumulet_set_sun_sky(cumulet_viewer* viewer, const cumulet_sun_sky
   return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
 }
 
-cumulet_status cumulet_set_lights(cumulet_viewer* viewer, const cumulet_light_desc* analytic_lights, uint64_t count) {
-  return guarded(viewer,
-                 [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::analytic_lights_of(analytic_lights, count)); });
+cumulet_status cumulet_set_lights(cumulet_viewer* viewer, const cumulet_light_desc* lights, uint64_t count) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_lights(cumulet::c_abi::analytic_lights_of(lights, count)); });
 }
 
 cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path) {

@@ -31,8 +31,7 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   require(d.subframes <= max_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
   // The default is lower for sequences so long that it would exceed the maximum.
   if (read_desc(desc, "cumulet_playback_desc").subframes == 0)
-    d.subframes = std::min<std::uint32_t>(d.subframes,
-                                          static_cast<std::uint32_t>(std::max<std::uint64_t>(1, max_steps / frames)));
+    d.subframes = std::min(d.subframes, static_cast<std::uint32_t>(max_steps / frames));
   if (steps && std::uint64_t{frames} * d.subframes > max_steps)
     refuse("cumulet_playback_desc.subframes makes more than 1000000 of " + std::to_string(frames) + " frames");
   return {.frames_per_second = d.frames_per_second,

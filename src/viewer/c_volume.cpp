@@ -197,16 +197,16 @@ cumulet_status cumulet_inspection_get_grid(cumulet_inspection* inspection, uint3
     require(grid < file.grids().size(), "there is no such grid");
     read_desc(info, "cumulet_grid_info");
     const volume::GridInfo& entry = file.grids()[grid];
-    const volume::GridStatistics& volume_info = file.volume_info(grid);
+    const volume::GridStatistics& statistics = file.statistics(grid);
     cumulet_grid_info out{};
     out.name = entry.unique_name.c_str();
     out.type = entry.type.c_str();
     out.grid_class = entry.grid_class.c_str();
-    out.unsupported_reason = volume_info.refusal.c_str();
+    out.unsupported_reason = statistics.refusal.c_str();
     out.metadata_count = static_cast<uint32_t>(entry.metadata.size());
     out.channel = file.channels()[grid].c_str();
-    if (volume_info.values) {
-      const volume::GridValues& values = *volume_info.values;
+    if (statistics.values) {
+      const volume::GridValues& values = *statistics.values;
       out.values =
           entry.values == volume::Values::scalars ? CUMULET_GRID_VALUES_SCALARS : CUMULET_GRID_VALUES_MAGNITUDES;
       for (int i = 0; i < 16; ++i) out.index_to_world[i] = values.index_to_world[i / 4][i % 4];

@@ -198,7 +198,7 @@ class Context {
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
   // Computes feature buffers. Throws Error(invalid_argument) if the image is of another scene than the current one.
-  void find_features(const Shot& shot, render::Picture& picture, render::FeatureSet volume_info,
+  void find_features(const Shot& shot, render::Picture& picture, render::FeatureSet features,
                      std::uint32_t rays = render::feature_rays);
   // Returns readable(); throws for debug views.
   render::Picture& readable_shaded();

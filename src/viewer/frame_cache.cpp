@@ -39,7 +39,7 @@ FrameCache::FrameCache(Log log, std::function<void()> notify, Trace trace, Resou
       worker_([this] { tell(); }, trace) {}
 
 void FrameCache::request(Request request) {
-  std::vector<Shelved> old;  // destroyed after the lock is released, because its contents may be large
+  std::vector<Entry> old;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
     const bool other_files = !is_requested(request.files);
@@ -50,7 +50,7 @@ void FrameCache::request(Request request) {
                                                                           // has been replaced
     }
     if (other_files) {
-      old = std::exchange(cache_, std::vector<Shelved>(request.steps.count(request.files->count())));
+      old = std::exchange(cache_, std::vector<Entry>(request.steps.count(request.files->count())));
       analysis_ = Analysis::due;
       analyzed_.reset();
       temperature_scale_.reset();
@@ -71,7 +71,7 @@ void FrameCache::request(Request request) {
 }
 
 void FrameCache::clear() {
-  std::vector<Shelved> old;
+  std::vector<Entry> old;
   {
     const std::scoped_lock lock(mutex_);
     worker_.cancel();
@@ -83,13 +83,13 @@ void FrameCache::clear() {
 }
 
 void FrameCache::rebuild() {
-  std::vector<Shelved> old;
+  std::vector<Entry> old;
   const std::scoped_lock lock(mutex_);
   if (!request_) return;
-  for (Shelved& shelved : cache_) {
-    if (shelved.volume) old.emplace_back().volume = std::exchange(shelved.volume, nullptr);
-    shelved.stale = true;
-    shelved.failure.reset();
+  for (Entry& entry : cache_) {
+    if (entry.volume) old.emplace_back().volume = std::exchange(entry.volume, nullptr);
+    entry.stale = true;
+    entry.failure.reset();
   }
   find_substitutes();
   // The running job began before the call.
@@ -140,10 +140,10 @@ FrameCache::Status FrameCache::frames() const {
   const std::scoped_lock lock(mutex_);
   Status status;
   for (std::uint32_t step = 0; step < cache_.size(); ++step) {
-    const Shelved& shelved = cache_[step];
+    const Entry& entry = cache_[step];
     if (!request_->steps.is_between(step))
-      status.frames.push_back(shelved.failure ? State::failed : is_ready(shelved) ? State::ready : State::waiting);
-    status.bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
+      status.frames.push_back(entry.failure ? State::failed : is_ready(entry) ? State::ready : State::waiting);
+    status.bytes += (entry.built ? entry.grid_bytes : 0) + (entry.volume ? entry.volume_bytes : 0);
   }
   return status;
 }
@@ -200,8 +200,8 @@ void FrameCache::start() {
   worker_.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
 }
 
-bool FrameCache::is_ready(const Shelved& shelved) const {
-  return shelved.built && !shelved.stale && request_->settings && shelved.built->serves(*request_->settings);
+bool FrameCache::is_ready(const Entry& entry) const {
+  return entry.built && !entry.stale && request_->settings && entry.built->serves(*request_->settings);
 }
 
 bool FrameCache::is_possible(std::uint32_t step) const {
@@ -223,8 +223,8 @@ void FrameCache::find_substitutes() {
   }
 }
 
-std::vector<FrameCache::Shelved> FrameCache::take_other_steps(const Steps& steps) {
-  std::vector<Shelved> other(steps.count(request_->files->count()));
+std::vector<FrameCache::Entry> FrameCache::take_other_steps(const Steps& steps) {
+  std::vector<Entry> other(steps.count(request_->files->count()));
   for (std::uint32_t frame = 0; frame < request_->files->count(); ++frame)
     std::swap(other[steps.own(frame)], own(frame));
   return std::exchange(cache_, std::move(other));
@@ -233,9 +233,9 @@ std::vector<FrameCache::Shelved> FrameCache::take_other_steps(const Steps& steps
 std::vector<std::uint32_t> FrameCache::kept() const {
   std::uint64_t known = 0;
   std::uint64_t known_bytes = 0;
-  for (const Shelved& shelved : cache_) {
-    known += shelved.grid_bytes > 0 ? 1U : 0U;
-    known_bytes += shelved.grid_bytes;
+  for (const Entry& entry : cache_) {
+    known += entry.grid_bytes > 0 ? 1U : 0U;
+    known_bytes += entry.grid_bytes;
   }
   const std::uint64_t likely = known > 0 ? known_bytes / known : 0;
   std::vector<std::uint32_t> frames;
@@ -268,11 +268,11 @@ bool FrameCache::waits() const {
   return wanted && !is_ready(cache_[*wanted]);
 }
 
-std::vector<FrameCache::Shelved> FrameCache::take_excess() {
+std::vector<FrameCache::Entry> FrameCache::take_excess() {
   std::uint64_t bytes = 0;
-  for (const Shelved& shelved : cache_)
-    bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
-  std::vector<Shelved> excess;
+  for (const Entry& entry : cache_)
+    bytes += (entry.built ? entry.grid_bytes : 0) + (entry.volume ? entry.volume_bytes : 0);
+  std::vector<Entry> excess;
   if (bytes <= request_->memory_bytes) return excess;
   // Orders by need; the first needed step always stays.
   constexpr std::size_t not_needed = std::numeric_limits<std::size_t>::max();
@@ -287,18 +287,18 @@ std::vector<FrameCache::Shelved> FrameCache::take_excess() {
   std::ranges::sort(frames, [&](std::uint32_t a, std::uint32_t b) { return rank[a] > rank[b]; });
   const auto fits = [&] { return bytes <= request_->memory_bytes; };
   for (const std::uint32_t frame : frames) {
-    Shelved& shelved = cache_[frame];
+    Entry& entry = cache_[frame];
     if (fits()) return excess;
-    if (!shelved.volume) continue;
-    bytes -= shelved.volume_bytes;
-    excess.emplace_back().volume = std::exchange(shelved.volume, nullptr);
+    if (!entry.volume) continue;
+    bytes -= entry.volume_bytes;
+    excess.emplace_back().volume = std::exchange(entry.volume, nullptr);
   }
   for (const std::uint32_t frame : frames) {
-    Shelved& shelved = cache_[frame];
+    Entry& entry = cache_[frame];
     if (fits()) return excess;
-    if (!shelved.built) continue;
-    bytes -= shelved.grid_bytes;
-    excess.emplace_back().built = std::exchange(shelved.built, std::nullopt);
+    if (!entry.built) continue;
+    bytes -= entry.grid_bytes;
+    excess.emplace_back().built = std::exchange(entry.built, std::nullopt);
   }
   return excess;
 }
@@ -444,7 +444,7 @@ VolumeAssetPtr FrameCache::read_frame(const Which& which, std::uint32_t frame, P
   VolumeAssetPtr volume = file.read(log_of(file.path.given()), &progress);
   settle_temperature(*which.files, *volume);
   const std::uint64_t bytes = volume->bytes();
-  std::vector<Shelved> old;
+  std::vector<Entry> old;
   const std::scoped_lock lock(mutex_);
   progress.check();
   if (is_requested(which)) {
@@ -497,7 +497,7 @@ void FrameCache::build(const Which& which, const BuildSettings& settings, std::o
                        Progress& progress) {
   const std::string& path = which.files->paths[which.steps.frame(which.step)];
   const Trace::Span span(trace_, path);
-  Shelved made;
+  Entry made;
   std::optional<Error> failure;
   std::optional<std::uint32_t> reading;
   try {
@@ -522,7 +522,7 @@ void FrameCache::build(const Which& which, const BuildSettings& settings, std::o
     }();
     say_failures({&*failure, 1}, another);
   }
-  std::vector<Shelved> old;
+  std::vector<Entry> old;
   {
     const std::scoped_lock lock(mutex_);
     if (!failure) progress.check();

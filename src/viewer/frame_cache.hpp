@@ -112,7 +112,7 @@ class FrameCache {
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
 
  private:
-  struct Shelved {
+  struct Entry {
     std::optional<Built> built;    // without its volume
     VolumeAssetPtr volume;         // its source volume, if kept
     std::uint64_t grid_bytes = 0;  // set once it has been built
@@ -157,13 +157,13 @@ class FrameCache {
     return is_requested(which.files) && request_->steps == which.steps;
   }
   // Entry of a file frame.
-  [[nodiscard]] Shelved& own(std::uint32_t frame) { return cache_[request_->steps.own(frame)]; }
-  [[nodiscard]] const Shelved& own(std::uint32_t frame) const { return cache_[request_->steps.own(frame)]; }
+  [[nodiscard]] Entry& own(std::uint32_t frame) { return cache_[request_->steps.own(frame)]; }
+  [[nodiscard]] const Entry& own(std::uint32_t frame) const { return cache_[request_->steps.own(frame)]; }
   [[nodiscard]] bool is_possible(std::uint32_t step) const;
   // Changes the cache to other steps; entries of file frames are kept. The caller must free the result without the
   // lock.
-  [[nodiscard]] std::vector<Shelved> take_other_steps(const Steps& steps);
-  [[nodiscard]] bool is_ready(const Shelved& shelved) const;
+  [[nodiscard]] std::vector<Entry> take_other_steps(const Steps& steps);
+  [[nodiscard]] bool is_ready(const Entry& entry) const;
   [[nodiscard]] bool is_analyzed() const { return analysis_ != Analysis::due; }
   // Must be called when the set of possible steps has changed.
   void find_substitutes();
@@ -174,7 +174,7 @@ class FrameCache {
   [[nodiscard]] bool waits() const;
   // Evicts entries that do not fit: voxels first, then grids, the least needed first. The caller must free the result
   // without the lock.
-  [[nodiscard]] std::vector<Shelved> take_excess();
+  [[nodiscard]] std::vector<Entry> take_excess();
 
   Log log_;
   std::function<void()> notify_;
@@ -183,7 +183,7 @@ class FrameCache {
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Request> request_;
-  std::vector<Shelved> cache_;  // one per step
+  std::vector<Entry> cache_;  // one per step
   // Per step: the step that is shown for it. It is the step itself if possible, else a fallback frame; nullopt if no
   // frame can be shown.
   std::vector<std::optional<std::uint32_t>> substitutes_;

@@ -51,14 +51,14 @@ class RequestCache {
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  struct Shelved {
+  struct Entry {
     Request request;
     std::optional<Made> built;
     std::optional<Error> failure;
     bool wanted = true;  // false: it was running when the requests were last replaced
     [[nodiscard]] bool is_missing() const { return wanted && !built && !failure; }
   };
-  typename std::vector<Shelved>::iterator find(const Request& request);
+  typename std::vector<Entry>::iterator find(const Request& request);
   void build_missing(Progress& progress);
 
   const char* what_;
@@ -66,7 +66,7 @@ class RequestCache {
   Make make_;
   std::function<void()> notify_;
   mutable std::mutex mutex_;
-  std::vector<Shelved> cache_;
+  std::vector<Entry> cache_;
   std::optional<Request> under_way_;
   std::atomic<std::uint64_t> revision_ = 0;
   ResourceLimitsPtr
@@ -75,30 +75,30 @@ class RequestCache {
 };
 
 template <class Request, class Made>
-typename std::vector<typename RequestCache<Request, Made>::Shelved>::iterator RequestCache<Request, Made>::find(
+typename std::vector<typename RequestCache<Request, Made>::Entry>::iterator RequestCache<Request, Made>::find(
     const Request& request) {
-  return std::ranges::find_if(cache_, [&](const Shelved& shelved) { return shelved.request == request; });
+  return std::ranges::find_if(cache_, [&](const Entry& entry) { return entry.request == request; });
 }
 
 template <class Request, class Made>
 void RequestCache<Request, Made>::request(std::vector<Request> requests) {
   bool missing = false;
   bool failed = false;
-  std::vector<Shelved> before;  // destroyed after the lock is released, because its contents may be large
+  std::vector<Entry> before;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
     before = std::exchange(cache_, {});
     for (Request& request : requests) {
       if (find(request) != cache_.end()) continue;
-      const auto was = std::ranges::find_if(before, [&](const Shelved& shelved) { return shelved.request == request; });
+      const auto was = std::ranges::find_if(before, [&](const Entry& entry) { return entry.request == request; });
       cache_.push_back({std::move(request), {}, {}});
       if (was == before.end()) continue;
       cache_.back().built = std::move(was->built);
       cache_.back().failure = was->failure;
     }
     if (under_way_ && find(*under_way_) == cache_.end()) cache_.push_back({*under_way_, {}, {}, false});
-    missing = std::ranges::any_of(cache_, &Shelved::is_missing);
-    failed = std::ranges::any_of(cache_, [](const Shelved& shelved) { return shelved.failure.has_value(); });
+    missing = std::ranges::any_of(cache_, &Entry::is_missing);
+    failed = std::ranges::any_of(cache_, [](const Entry& entry) { return entry.failure.has_value(); });
   }
   if (missing) {
     worker_.post({what_, stage_, [this](Progress& progress) { build_missing(progress); }});
@@ -110,7 +110,7 @@ void RequestCache<Request, Made>::request(std::vector<Request> requests) {
 template <class Request, class Made>
 std::optional<Made> RequestCache<Request, Made>::built(const Request& request) const {
   const std::scoped_lock lock(mutex_);
-  const auto found = std::ranges::find_if(cache_, [&](const Shelved& shelved) { return shelved.request == request; });
+  const auto found = std::ranges::find_if(cache_, [&](const Entry& entry) { return entry.request == request; });
   return found == cache_.end() ? std::nullopt : found->built;
 }
 
@@ -123,7 +123,7 @@ bool RequestCache<Request, Made>::is_under_way(const Request& request) const {
 template <class Request, class Made>
 void RequestCache<Request, Made>::forget_failures() {
   const std::scoped_lock lock(mutex_);
-  for (Shelved& shelved : cache_) shelved.failure.reset();
+  for (Entry& entry : cache_) entry.failure.reset();
 }
 
 template <class Request, class Made>
@@ -137,7 +137,7 @@ void RequestCache<Request, Made>::build_missing(Progress& progress) {
     std::optional<Request> next;
     {
       const std::scoped_lock lock(mutex_);
-      const auto missing = std::ranges::find_if(cache_, &Shelved::is_missing);
+      const auto missing = std::ranges::find_if(cache_, &Entry::is_missing);
       if (missing != cache_.end()) next = missing->request;
       under_way_ = next;
     }
@@ -168,8 +168,8 @@ void RequestCache<Request, Made>::build_missing(Progress& progress) {
     notify_();
   }
   const std::scoped_lock lock(mutex_);
-  for (const Shelved& shelved : cache_) {
-    if (shelved.failure && shelved.wanted) throw Error(*shelved.failure);
+  for (const Entry& entry : cache_) {
+    if (entry.failure && entry.wanted) throw Error(*entry.failure);
   }
 }
 

@@ -399,8 +399,8 @@ void Viewer::tell_request(Followed& f, FrameCache& cache) const {
     f.take_due = true;
     f.is_wanted = false;
   }
-  if (const std::uint64_t shelved = cache.revision(); shelved != f.shelved) {
-    f.shelved = shelved;
+  if (const std::uint64_t cache_revision = cache.revision(); cache_revision != f.cache_revision) {
+    f.cache_revision = cache_revision;
     f.take_due = true;
   }
 }
@@ -1313,7 +1313,7 @@ void Viewer::set_light(const Light& light) {
   touch();
 }
 
-void Viewer::set_lamps(light::AnalyticLights analytic_lights) {
+void Viewer::set_lights(light::AnalyticLights analytic_lights) {
   analytic_lights_ = std::move(analytic_lights);
   analytic_lights_due_ = true;
   touch();

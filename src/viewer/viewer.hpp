@@ -168,7 +168,7 @@ class Viewer {
   void set_ramps(const Ramps& ramps);
   [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   void set_light(const Light& light);
-  void set_lamps(light::AnalyticLights analytic_lights);
+  void set_lights(light::AnalyticLights analytic_lights);
   void load_environment(const FilePath& path);
   /// Null: the sky of the light settings. Cancels a running load.
   void set_environment(light::EnvironmentPtr environment);
@@ -333,7 +333,7 @@ class Viewer {
     SequenceState state;
     std::optional<double> density_scale;  // suggested for it, after its analysis
     bool request_due = true;
-    std::uint64_t shelved = 0;  // revision of its cache when it was last checked
+    std::uint64_t cache_revision = 0;  // revision of its cache when it was last checked
     bool take_due = false;
     std::uint64_t id = 0;                       // identifies this object
     std::optional<scene::SequenceFrame> frame;  // frame taken last
@@ -342,7 +342,7 @@ class Viewer {
 
     // True if there is work pending for it.
     [[nodiscard]] bool waits(const FrameCache& cache) const {
-      return !is_wanted && (request_due || cache.busy() || cache.revision() != shelved);
+      return !is_wanted && (request_due || cache.busy() || cache.revision() != cache_revision);
     }
   };
   [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);

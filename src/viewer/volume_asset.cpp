@@ -28,6 +28,11 @@ struct Box {
   [[nodiscard]] bool empty() const { return low.x > high.x; }
 };
 
+// True if the frame's voxels are in main memory and have channels that are averaged with the density as weight.
+bool is_weighted(const volume::VolumeFrame& frame, bool in_gl) {
+  return !in_gl && (frame.color || frame.anisotropy || frame.velocity);
+}
+
 // Returns the mean with the momentum of another frame; nullopt if either has none.
 std::optional<grid::MomentumField::Values> mean_momentum(std::optional<grid::MomentumField::Values> momentum,
                                                          const volume::VolumeFrame& other, const volume::Ramp& ramp,
@@ -267,8 +272,8 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
     put(glowing_, Glowing{given, field(colors, std::move(emissive))});
   }
   const auto weighs = [&](const std::shared_ptr<const volume::VolumeFrame>& frame) {
-    const bool plain = in_gl_ || !(frame->color || frame->anisotropy || frame->velocity);
-    return plain ? Weighing{frame, density_ramp} : weighing(frame, density_ramp, progress);
+    const bool weighted = is_weighted(*frame, static_cast<bool>(in_gl_));
+    return weighted ? weighing(frame, density_ramp, progress) : Weighing{frame, density_ramp};
   };
   const bool weighs_anew = !weighted_ || weighted_->density_ramp != density_ramp;
   const bool turns_anew = anisotropic && (weighs_anew || !weighted_->forward);

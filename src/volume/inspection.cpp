@@ -145,7 +145,7 @@ Inspection::Inspection(const FilePath& file) : file_(file) {
     grids_ = reader->grids();
     channels_ = channels_by_name(grids_);
   });
-  volume_info_.resize(grids_.size());
+  statistics_.resize(grids_.size());
   try {
     chosen_ = choose_grid(grids_, "");
   } catch (const std::runtime_error&) {
@@ -153,10 +153,10 @@ Inspection::Inspection(const FilePath& file) : file_(file) {
   }
 }
 
-const GridStatistics& Inspection::volume_info(std::size_t grid) {
+const GridStatistics& Inspection::statistics(std::size_t grid) {
   const std::scoped_lock lock(mutex_);
-  std::optional<GridStatistics>& volume_info = volume_info_.at(grid);
-  if (volume_info) return *volume_info;
+  std::optional<GridStatistics>& statistics = statistics_.at(grid);
+  if (statistics) return *statistics;
   GridStatistics found{.values = {}, .refusal = grids_[grid].refusal};
   if (grids_[grid].values != Values::none) {
     try {
@@ -171,7 +171,7 @@ const GridStatistics& Inspection::volume_info(std::size_t grid) {
       found.refusal = one_line(e.what());
     }
   }
-  return volume_info.emplace(std::move(found));
+  return statistics.emplace(std::move(found));
 }
 
 }  // namespace cumulet::volume

@@ -55,7 +55,7 @@ class Inspection {
   /// The grid that import_volume reads if it is given no name.
   [[nodiscard]] std::optional<std::size_t> chosen() const { return chosen_; }
   /// Reads a grid's voxels at the first call. Throws Error(out_of_memory).
-  [[nodiscard]] const GridStatistics& volume_info(std::size_t grid);
+  [[nodiscard]] const GridStatistics& statistics(std::size_t grid);
 
  private:
   FilePath file_;
@@ -66,7 +66,7 @@ class Inspection {
   std::vector<std::string> channels_;
   std::optional<std::size_t> chosen_;
   std::mutex mutex_;
-  std::vector<std::optional<GridStatistics>> volume_info_;
+  std::vector<std::optional<GridStatistics>> statistics_;
 };
 
 }  // namespace cumulet::volume

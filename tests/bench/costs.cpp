@@ -265,7 +265,7 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     const auto lit = [&](const char* name, light::AnalyticLight::Kind kind, const dvec3& at) {
       analytic_light.kind = kind;
       analytic_light.position = at;
-      rows.add(name, plain, Burns::no, dark).viewer().set_lamps({analytic_light});
+      rows.add(name, plain, Burns::no, dark).viewer().set_lights({analytic_light});
     };
     rows.add("constant sky", plain, Burns::no, light_of(0.0F, 1.0F));
     rows.add("sun", plain, Burns::no, light_of(1.0F, 0.0F));
@@ -298,8 +298,8 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     const EditedShaders alike(std::array{any_analytic_light, all_alike});
     const light::AnalyticLights sixteen = sixteen_analytic_lights(plain->bounds(), place, power);
     Rows many(context, density_scale);
-    many.add("by what arrives", plain, Burns::no, dark).viewer().set_lamps(sixteen);
-    many.add("each alike", plain, Burns::no, dark, alike.programs()).viewer().set_lamps(sixteen);
+    many.add("by what arrives", plain, Burns::no, dark).viewer().set_lights(sixteen);
+    many.add("each alike", plain, Burns::no, dark, alike.programs()).viewer().set_lights(sixteen);
     print_costs("Sixteen lamps", many.get(), options);
   }
   const EditedShaders without_looks(std::array{no_looks_alone, no_looks, flights_have_all});

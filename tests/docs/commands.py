@@ -20,8 +20,6 @@ import source_tree
 RENDER, FARM, BENCH = "cumulet-render", "cumulet-farm", "cumulet-bench"
 RUN_WITHOUT_FILES = (RENDER, "cumulet-merge")
 SCENE = '{ "cumulet_scene": 3, "volumes": [ { "file": "none.vdb" } ] }\n'
-FREE_SECTIONS = ("Breaking",)  # their prose names the past
-FREE_PAGES = ("docs/migration.md",)
 SECONDS = 120
 
 
@@ -116,10 +114,8 @@ def check(root, paths):
     elsewhere = other_flags(root)
     problems, checked = [], 0
     for page in pages(root):
-        if page.path in FREE_PAGES:
-            continue
         in_blocks = list(block_commands(page, list(programs)))
-        in_prose = [c for c in span_commands(page, list(programs)) if page.section_of(c.line) not in FREE_SECTIONS]
+        in_prose = [c for c in span_commands(page, list(programs)) if not page.is_of_earlier_versions(c.line)]
         for command in in_blocks + in_prose:
             wrong = list(check_flags(command, programs))
             if not wrong and command in in_blocks:
@@ -132,7 +128,7 @@ def check(root, paths):
             checked += len(read)
         for line, text in page.spans():
             flag = re.match(r"--[a-z][a-z-]*\*?", text)
-            if not flag or page.section_of(line) in FREE_SECTIONS:
+            if not flag or page.is_of_earlier_versions(line):
                 continue
             checked += 1
             if not any(p.has(flag.group(0)) for p in programs.values()) and flag.group(0) not in elsewhere:

@@ -2,7 +2,7 @@
 
 In code blocks, names of `cumulet_*` and `CUMULET_*` are those of the public headers, and so are the members of structs.
 In prose such a name may also be one of the build, of a test or of an internal function. `FIELD` of `STRUCT`, and
-`STRUCT.FIELD`, are fields of that struct. Breaking changes and migrations may name the past.
+`STRUCT.FIELD`, are fields of that struct. Breaking changes may name the past.
 
 usage: names.py ROOT
 """
@@ -11,7 +11,7 @@ import pathlib
 import re
 import sys
 
-from pages import pages, report
+from pages import blank, pages, report
 import source_tree
 
 NAME = re.compile(r"\b(?:cumulet|CUMULET)_\w+")
@@ -19,8 +19,7 @@ MEMBER = re.compile(r"(?<![\w.\"])\.([a-z_]\w*)\b(?!\()|(?<=[\w)\]])(?:\.|->)([a
 OF_STRUCT = re.compile(r"`(\w+)`(?: =? ?\S+)? of `(cumulet_\w+)`")
 IN_STRUCT = re.compile(r"(cumulet_\w+)(?:\.|::)(\w+)")
 CODE = ("c", "cpp", "glsl")
-FREE_SECTIONS = ("Breaking", "Words")  # their prose names the past, or examples
-FREE_PAGES = ("docs/migration.md",)
+EXAMPLES = "Words"  # a section whose prose has examples of names
 
 
 def without_comments(text):
@@ -37,13 +36,13 @@ def structs_of(header):
 
 class Names:
     def __init__(self, root):
-        headers = [(root / path).read_text(encoding="utf-8") for path in source_tree.files(root)
-                   if path.startswith("src/include/")]
+        files = source_tree.files(root)
+        headers = [(root / path).read_text(encoding="utf-8") for path in files if path.startswith("src/include/")]
         self.structs = {name: fields for header in headers for name, fields in structs_of(header).items()}
         self.public = {word for header in headers for word in re.findall(r"[A-Za-z_]\w*", without_comments(header))}
         self.fields = set().union(*self.structs.values()) if self.structs else set()
         self.all = set(self.public)
-        for path in source_tree.files(root):
+        for path in files:
             if not path.endswith((".md", ".png", ".webp", ".exr")) and not path.startswith("docs/"):
                 text = (root / path).read_text(encoding="utf-8", errors="ignore")
                 self.all.update(NAME.findall(text))
@@ -62,7 +61,7 @@ def own_fields(page):
 def check_block(page, block, names):
     fields = names.fields | own_fields(page)
     code = re.sub(r"#include[^\n]*|/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\n])*\"",
-                  lambda m: re.sub(r"[^\n]", " ", m.group(0)), block.text, flags=re.S)
+                  lambda m: blank(m.group(0)), block.text, flags=re.S)
     for offset, line in enumerate(code.split("\n")):
         where = f"{page.path}:{block.line + offset}"
         for name in NAME.findall(line):
@@ -74,9 +73,14 @@ def check_block(page, block, names):
                 yield field if field not in fields else None, f"{where}: no struct of the headers has '{field}'"
 
 
+def is_free(page, line):
+    """Returns whether prose there may have names that do not exist."""
+    return page.is_of_earlier_versions(line) or page.section_of(line) == EXAMPLES
+
+
 def check_prose(page, names):
     for line, text in page.spans():
-        if page.section_of(line) in FREE_SECTIONS:
+        if is_free(page, line):
             continue
         where = f"{page.path}:{line}"
         for name in NAME.findall(text):
@@ -87,7 +91,7 @@ def check_prose(page, names):
     for match in OF_STRUCT.finditer(page.prose):
         line = page.prose.count("\n", 0, match.start()) + 1
         field, struct = match.groups()
-        if page.section_of(line) not in FREE_SECTIONS and struct in names.structs:
+        if not is_free(page, line) and struct in names.structs:
             wrong = field not in names.structs[struct]
             yield field if wrong else None, f"{page.path}:{line}: {struct} has no '{field}'"
 
@@ -98,8 +102,6 @@ def check(root):
     names = Names(root)
     results = []
     for page in pages(root):
-        if page.path in FREE_PAGES:
-            continue
         for block in page.blocks:
             if block.language in CODE:
                 results += check_block(page, block, names)

@@ -11,6 +11,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support
 import source_tree  # noqa: E402
 
 NOT_OURS = "third_party_notes/*"
+# The prose of these pages and sections has names of earlier versions.
+EARLIER_PAGES = ("docs/migration.md",)
+EARLIER_SECTIONS = ("Breaking",)
 
 # A fenced block has the language of its fence, an indented one "indented". line: of its first line of text.
 Block = collections.namedtuple("Block", "language line text")
@@ -66,6 +69,10 @@ class Page:
     def section_of(self, line):
         """The heading above a line."""
         return self.sections[line - 1]
+
+    def is_of_earlier_versions(self, line):
+        """Returns whether the prose of a line may have names that no longer exist."""
+        return self.path in EARLIER_PAGES or self.section_of(line) in EARLIER_SECTIONS
 
     def anchors(self):
         """The fragments that GitHub gives to the headings, and those of HTML anchors."""

@@ -85,8 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     cumulet::volume::Inspection inspection(path);
-    for (std::size_t grid = 0; grid < inspection.grids().size(); ++grid)
-      static_cast<void>(inspection.volume_info(grid));
+    for (std::size_t grid = 0; grid < inspection.grids().size(); ++grid) static_cast<void>(inspection.statistics(grid));
   } catch (const cumulet::Error& error) {
     check_line(error.what(), path);
   }

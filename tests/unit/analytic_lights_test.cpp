@@ -57,8 +57,8 @@ class AnalyticLights : public test::ViewerTest {
     scene->rest.lights = {of_model};
     still_->viewer().show_surfaces(test::source_of(scene));
   }
-  void set_lamps(const std::vector<cumulet_light_desc>& descs) {
-    still_->viewer().set_lamps(analytic_lights_of(descs));
+  void set_lights(const std::vector<cumulet_light_desc>& descs) {
+    still_->viewer().set_lights(analytic_lights_of(descs));
   }
   void set_medium(double sigma, float albedo, std::uint32_t max_bounces = 0) {
     viewer::Medium medium;
@@ -113,7 +113,7 @@ double quarter(double a, double b, double h) {
 TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   set_floor();
   const auto expect = [&](const cumulet_light_desc& d, double expected, const char* what) {
-    set_lamps({d});
+    set_lights({d});
     EXPECT_NEAR(irradiance(), expected, 0.01 * expected + 1e-9) << what;
   };
   const double point = 1000.0 / (4.0 * pi) / (above * above);
@@ -178,13 +178,13 @@ TEST_P(AnalyticLights, DimLightsNextToBrightOnesCount) {
   auto away = analytic_light(CUMULET_LIGHT_SPOT, place, 1e6F);  // faces up
   away.direction[1] = 1.0;
   analytic_lights.push_back(away);
-  set_lamps(analytic_lights);
+  set_lights(analytic_lights);
   const double dim = 1.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(irradiance(1024), dim, 0.03 * dim);
   for (const float power : {10.0F, 3.0F, 100.0F})
     analytic_lights.push_back(analytic_light(CUMULET_LIGHT_POINT, place, power));
   analytic_lights.erase(analytic_lights.begin() + 1);
-  set_lamps(analytic_lights);
+  set_lights(analytic_lights);
   EXPECT_NEAR(irradiance(256), 114.0 * dim, 0.01 * 114.0 * dim);
 }
 
@@ -196,14 +196,14 @@ TEST_P(AnalyticLights, CombineWithModelLightsAndHaveColors) {
   auto d = analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F);
   d.color[0] = 0.5F;
   d.color[1] = 0.25F;
-  set_lamps(
+  set_lights(
       {d, analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 0.1F), analytic_light(CUMULET_LIGHT_POINT, place, 0.0F)});
   const test::Picture picture = test::render(*still_, {16, 16, 1024, 1, render::View::shaded});
   const double each = 1000.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(picture.mean().x * pi, 100.0 / (above * above) + 0.5 * each + 0.1, 0.005);
   EXPECT_NEAR(picture.mean().y * pi, 100.0 / (above * above) + 0.25 * each + 0.1, 0.005);
   EXPECT_NEAR(picture.mean().z * pi, 100.0 / (above * above) + 0.1, 0.005);
-  set_lamps({});
+  set_lights({});
   EXPECT_NEAR(irradiance(), 100.0 / (above * above), 1e-3);
 }
 
@@ -212,15 +212,15 @@ TEST_P(AnalyticLights, LightRasterizedSurfaces) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lamps({analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F)});
+  set_lights({analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F)});
   EXPECT_NEAR(irradiance(4) * (4.0 * pi) * above * above / 1000.0, 1.0, 0.01);
   auto disc = analytic_light(CUMULET_LIGHT_DISK, place, 1000.0F);
   disc.width = 0.1;
-  set_lamps({disc});
+  set_lights({disc});
   EXPECT_NEAR(irradiance(4) * 4.0 * above * above / 1000.0, 1.0, 0.01);
   auto sun = analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 3.0F);
   sun.angle_degrees = 60.0;
-  set_lamps({sun});
+  set_lights({sun});
   EXPECT_NEAR(irradiance(4), 3.0, 0.01) << "as bright as it says, however wide";
 }
 
@@ -231,7 +231,7 @@ TEST_P(AnalyticLights, LightsOfRasterizedOnlyModelsAreNotSampled) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lamps({analytic_light(CUMULET_LIGHT_POINT, {32.0, 32.0, 60.0}, 4e5F)});
+  set_lights({analytic_light(CUMULET_LIGHT_POINT, {32.0, 32.0, 60.0}, 4e5F)});
   const auto mean = [&] {
     still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
     return test::render(*still_, {16, 16, 256, 1, render::View::shaded}).mean().x;
@@ -278,7 +278,7 @@ TEST_P(AnalyticLights, ExtremePowerGivesFiniteValues) {
   auto sun = analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 9e29F);
   disc.width = 1e-3;
   sun.angle_degrees = 90.0;
-  set_lamps({spot, disc, sun, analytic_light(CUMULET_LIGHT_POINT, {7.0, 7.0, 9.0}, 9e29F)});
+  set_lights({spot, disc, sun, analytic_light(CUMULET_LIGHT_POINT, {7.0, 7.0, 9.0}, 9e29F)});
   for (const vec4& pixel : test::render(*still_, {16, 16, 64, 1, render::View::shaded}).pixels) {
     ASSERT_TRUE(std::isfinite(pixel.x)) << pixel.x;
   }
@@ -352,7 +352,7 @@ TEST_P(AnalyticLights, SingleScatteringMatchesQuadrature) {
     for (const March march : {March::tet, March::dense, March::brick}) {
       set_march(march);
       const auto expect = [&](const cumulet_light_desc& d, double expected, const char* what) {
-        set_lamps({d});
+        set_lights({d});
         const std::uint32_t samples = sigma < 0.01 ? 64 : 256;
         const test::Picture picture = test::render(*still_, {48, 48, samples, 1, render::View::shaded});
         EXPECT_NEAR(picture.mean().x / expected, 1.0, 0.01) << what << " " << int(march) << " " << sigma;

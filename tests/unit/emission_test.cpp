@@ -723,8 +723,8 @@ TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
     if (of.ground) viewer->set_camera(test::camera_at({23.5, 130.0, 165.0}, {23.5, 23.5, 23.5}, 16.0));
     if (of.floor) viewer->set_camera(test::camera_at({23.5, 23.5, 200.0}, {23.5, 23.5, 0.0}, 10.0));
     analytic_light.power = vec3(of.analytic_light);
-    viewer->viewer().set_lamps(of.analytic_light > 0.0F ? light::AnalyticLights{analytic_light}
-                                                        : light::AnalyticLights{});
+    viewer->viewer().set_lights(of.analytic_light > 0.0F ? light::AnalyticLights{analytic_light}
+                                                         : light::AnalyticLights{});
     viewer::SurfaceSettings among;
     among.light = of.among;
     viewer->viewer().set_surface_settings(among);

@@ -148,7 +148,7 @@ TEST(Environment, SamplingPdfIntegratesToOneAndMatchesSamples) {
     const auto column = std::min(columns - 1, static_cast<std::size_t>(azimuth * columns));
     const auto row = std::min(rows - 1, static_cast<std::size_t>(down * rows));
     drawn[row * columns + column] += 1.0;
-    mean += sample.radiance.y / sample.density / draws;
+    mean += sample.radiance.y / sample.pdf / draws;
   }
   for (std::size_t bin = 0; bin < expected.size(); ++bin) {
     const double count = expected[bin] * draws;

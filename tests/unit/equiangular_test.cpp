@@ -112,7 +112,7 @@ class Equiangular : public test::ViewerTest {
   Seen see(const light::AnalyticLights& extra, std::uint32_t samples = 128) {
     light::AnalyticLights analytic_lights{analytic_light_at(outside, 1e5F)};
     analytic_lights.insert(analytic_lights.end(), extra.begin(), extra.end());
-    still_->viewer().set_lamps(analytic_lights);
+    still_->viewer().set_lights(analytic_lights);
     Seen seen;
     const test::Picture a = test::render(*still_, {32, 32, samples, 1, render::View::shaded});
     const test::Picture b = test::render(*still_, {32, 32, samples, 2, render::View::shaded});

@@ -65,7 +65,7 @@ class FarFromOrigin : public test::ViewerTest {
     light::AnalyticLight analytic_light;
     analytic_light.position = at + dvec3(6.0, 14.0, 12.0);
     analytic_light.power = vec3(2000.0F);
-    viewer.set_lamps({analytic_light});
+    viewer.set_lights({analytic_light});
     viewer.set_ground({.place = viewer::GroundPlace::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
     const dmat4 turned = glm::rotate(moved(at + dvec3(12.0, 1.0, 2.0)), 0.7, dvec3(0.3, 0.9, 0.1));
     if (kind.volume) {
@@ -185,7 +185,7 @@ TEST_P(FarFromOrigin, SceneMayMoveAwayAndReturn) {
     light::AnalyticLight analytic_light;
     analytic_light.position = at + dvec3(6.0, 14.0, 12.0);
     analytic_light.power = vec3(2000.0F);
-    still->viewer().set_lamps({analytic_light});
+    still->viewer().set_lights({analytic_light});
     return test::render(*still, image);
   };
   expect_alike(shift(ecef), near, "there");

@@ -422,7 +422,7 @@ TEST(GltfMaterialLayers, UnusedMaterialsDoNotSelectTheExtendedShaders) {
     GltfModel model = layered_model(extensions);
     if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
     const ScenePtr scene = imported(model);
-    return scene::make_model_source(scene, scene->pose(0.0), &progress)->rich;
+    return scene::make_model_source(scene, scene->pose(0.0), &progress)->extended_bsdf;
   };
   const json sheen = {{"KHR_materials_sheen", {{"sheenColorFactor", {0, 0.1, 0}}}}};
   EXPECT_TRUE(rich(sheen, true));

@@ -136,7 +136,7 @@ TEST_P(Ground, MatchesTwoTriangles) {
       disc.kind = light::AnalyticLight::Kind::disc;
       disc.position = {4.0, 20.0, 24.0};
       disc.width = 6.0;
-      still->viewer().set_lamps({point, disc});
+      still->viewer().set_lights({point, disc});
       still->set_camera(test::camera_at({12.0, 40.0, 70.0}, {14.0, 0.0, 10.0}, 40.0));
       if (model || floor) still->viewer().show_surfaces(test::source_of(scene(floor)));
       if (!floor) still->viewer().set_ground({GroundPlace::at_height, height, albedo});

@@ -197,25 +197,25 @@ TEST_P(OverlappingVolumes, AovsAndDebugViewsMatchOneMergedVolume) {
   constexpr std::size_t pixels = std::size_t{edge} * edge;
   for (const test::MarchKind& kind : {test::march_kinds[1], test::march_kinds[3]}) {
     still_->set_grid(test::settings_of(kind));
-    struct SettingInfo {
+    struct Outputs {
       std::vector<float> transmittance = std::vector<float>(pixels);
       std::vector<float> z = std::vector<float>(pixels);
       test::Picture view;
       viewer::Pick pick;
     };
     const auto find = [&] {
-      SettingInfo volume_info;
+      Outputs outputs;
       test::render(*still_, image);
-      viewer().read_aov(viewer::Aov::transmittance, volume_info.transmittance.data(), pixels);
-      viewer().read_aov(viewer::Aov::volume_depth, volume_info.z.data(), pixels);
-      volume_info.pick = viewer().pick(0.5 * edge, 0.5 * edge);
-      volume_info.view = test::render(*still_, {edge, edge, 1, 1, render::View::density});
-      return volume_info;
+      viewer().read_aov(viewer::Aov::transmittance, outputs.transmittance.data(), pixels);
+      viewer().read_aov(viewer::Aov::volume_depth, outputs.z.data(), pixels);
+      outputs.pick = viewer().pick(0.5 * edge, 0.5 * edge);
+      outputs.view = test::render(*still_, {edge, edge, 1, 1, render::View::density});
+      return outputs;
     };
     show(cloud(), std::nullopt, many);
-    const SettingInfo several = find();
+    const Outputs several = find();
     show(merged(cloud(), many), std::nullopt, {ivec3(0)});
-    const SettingInfo one = find();
+    const Outputs one = find();
     std::size_t opaque = 0;
     for (std::size_t i = 0; i < pixels; ++i) {
       EXPECT_NEAR(several.transmittance[i], one.transmittance[i], 2e-3) << i;

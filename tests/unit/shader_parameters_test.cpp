@@ -100,7 +100,7 @@ const std::array fields{
     CM_FIELD(surfaces, ggx_albedo),
     CM_FIELD(surfaces, ggx_albedo_averages),
     CM_FIELD(surfaces, sheen_albedo),
-    CM_FIELD(surfaces, rich),
+    CM_FIELD(surfaces, extended_bsdf),
     CM_FIELD(analytic_lights, count),
     CM_FIELD(environment, size),
     CM_FIELD(environment, words),

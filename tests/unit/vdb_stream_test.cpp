@@ -160,14 +160,14 @@ TEST_F(VdbStream, InspectionSeesEveryLeaf) {
   const auto grid = scattered<openvdb::FloatGrid>(0.0F);
   through_file(grid, openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK, true);
   volume::Inspection inspection(file());
-  const volume::GridStatistics& volume_info = inspection.volume_info(0);
-  ASSERT_TRUE(volume_info.values);
+  const volume::GridStatistics& statistics = inspection.statistics(0);
+  ASSERT_TRUE(statistics.values);
   double sum = 0.0;
   for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) sum += double{*voxel};
   const auto count = static_cast<double>(grid->activeVoxelCount());
-  EXPECT_NEAR(volume_info.values->mean, sum / count, 1e-12);
+  EXPECT_NEAR(statistics.values->mean, sum / count, 1e-12);
   std::uint64_t counted = 0;
-  for (const std::uint64_t bin : volume_info.values->histogram) counted += bin;
+  for (const std::uint64_t bin : statistics.values->histogram) counted += bin;
   EXPECT_EQ(counted, grid->activeVoxelCount());
 }
 

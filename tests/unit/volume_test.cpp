@@ -621,7 +621,7 @@ TEST_F(VolumeImport, DamagedCompressedLengthsAreReported) {
         try {
           cumulet::volume::Inspection inspection(write_bytes(bytes, "damaged.vdb"));
           for (std::size_t i = 0; i < inspection.grids().size(); ++i) {
-            if (inspection.volume_info(i).refusal.find("not as long as it says") != std::string::npos) ++told;
+            if (inspection.statistics(i).refusal.find("not as long as it says") != std::string::npos) ++told;
           }
         } catch (const cumulet::Error&) {  // the patched bytes were another field of the file
         }
@@ -775,10 +775,10 @@ TEST_F(VolumeImport, InspectionReportsGridsValuesAndMetadata) {
   ASSERT_NE(odd, metadata.end());
   EXPECT_EQ(odd->value, "v\xff");
 
-  const auto& volume_info = inspection.volume_info(1);
-  EXPECT_EQ(volume_info.refusal, "");
-  ASSERT_TRUE(volume_info.values);
-  const cumulet::volume::GridValues& values = *volume_info.values;
+  const auto& statistics = inspection.statistics(1);
+  EXPECT_EQ(statistics.refusal, "");
+  ASSERT_TRUE(statistics.values);
+  const cumulet::volume::GridValues& values = *statistics.values;
   EXPECT_EQ(values.active_voxels, 516U);
   EXPECT_EQ(values.bounds_min, glm::ivec3(-1, 0, 0));
   EXPECT_EQ(values.bounds_max, glm::ivec3(71, 7, 8));
@@ -798,10 +798,10 @@ TEST_F(VolumeImport, InspectionReportsGridsValuesAndMetadata) {
   const auto volume = import_volume(file, "density", {});
   EXPECT_GE(values.memory_bytes, volume.brick_values.size() * sizeof(float));
 
-  ASSERT_TRUE(inspection.volume_info(0).values);
-  EXPECT_EQ(inspection.volume_info(0).values->max, 5.0F) << "a vector's length";
-  EXPECT_HAS(inspection.volume_info(0).refusal, "of type vec3s");
-  EXPECT_FALSE(inspection.volume_info(2).values);
+  ASSERT_TRUE(inspection.statistics(0).values);
+  EXPECT_EQ(inspection.statistics(0).values->max, 5.0F) << "a vector's length";
+  EXPECT_HAS(inspection.statistics(0).refusal, "of type vec3s");
+  EXPECT_FALSE(inspection.statistics(2).values);
 
   // Errors in damaged voxels name the grid, and the other grids can still be read.
   std::string bytes = bytes_of(file);
@@ -812,13 +812,13 @@ TEST_F(VolumeImport, InspectionReportsGridsValuesAndMetadata) {
   nanovdb::io::writeGrid(nano.string(), nanovdb::openToNanoVDB(*density), nanovdb::io::Codec::ZIP);
   Inspection of_nano(nano);
   EXPECT_HAS(of_nano.format(), "NanoVDB 3");
-  ASSERT_TRUE(of_nano.volume_info(0).values);
-  EXPECT_EQ(of_nano.volume_info(0).values->histogram, histogram);
+  ASSERT_TRUE(of_nano.statistics(0).values);
+  EXPECT_EQ(of_nano.statistics(0).values->histogram, histogram);
   bytes = bytes_of(nano);
   for (std::size_t i = bytes.size() - 60; i < bytes.size(); ++i) bytes[i] = '\x5a';
   Inspection damaged(write_bytes(bytes, "damaged.nvdb"));
-  EXPECT_FALSE(damaged.volume_info(0).values);
-  EXPECT_HAS(damaged.volume_info(0).refusal, "damaged");
+  EXPECT_FALSE(damaged.statistics(0).values);
+  EXPECT_HAS(damaged.statistics(0).refusal, "damaged");
 }
 
 // --- optical depth of a volume seen from outside ---

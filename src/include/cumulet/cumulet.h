@@ -2885,7 +2885,7 @@ typedef struct cumulet_light_desc {
  * Threads: one call per viewer at a time. No GL.
  *
  * @param viewer The viewer.
- * @param lights  The lights, which are copied. May be NULL if count is 0.
+ * @param lights The lights, which are copied. May be NULL if count is 0.
  * @param count  Number of lights, up to 4096. 0: none.
  * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT; the line names the light.
  */

@@ -361,7 +361,12 @@ class LegacyHost {
     GLint unpack = 0;
     gl_.GetIntegerv(GL_PIXEL_UNPACK_BUFFER_BINDING, &unpack);
     gl_.BindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+    // With skipped pixels that are no multiple of 8, Mesa 22 writes a byte beyond its copy of the pattern.
+    GLint skipped = 0;
+    gl_.GetIntegerv(GL_UNPACK_SKIP_PIXELS, &skipped);
+    gl_.PixelStorei(GL_UNPACK_SKIP_PIXELS, 0);
     legacy_->PolygonStipple(pattern.data());
+    gl_.PixelStorei(GL_UNPACK_SKIP_PIXELS, skipped);
     gl_.BindBuffer(GL_PIXEL_UNPACK_BUFFER, static_cast<GLuint>(unpack));
     legacy_->LineStipple(1 + static_cast<GLint>(below(4)), static_cast<GLushort>(below(65536)));
     const auto clamp = [this] {
