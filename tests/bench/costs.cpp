@@ -53,8 +53,8 @@ std::vector<Cost> take_turns(std::vector<Row>& rows, const Options& options) {
 void print_costs(const char* title, std::vector<Row>& rows, const Options& options) {
   const std::vector<Cost> costs = take_turns(rows, options);
   std::printf(
-      "\n| %s | Cells | Steps a path | A step, x | A sample, x | Noise of a sample, %% | Time to the same noise, x |\n"
-      "|---|--:|--:|--:|--:|--:|--:|\n",
+      "\n| %s | Cells | Steps per path | A step, x | A sample, x | Noise of a sample, %% | Time to the same "
+      "noise, x |\n|---|--:|--:|--:|--:|--:|--:|\n",
       title);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double sample = ratio_of(costs[i].sample, costs[0].sample).median;
@@ -339,7 +339,7 @@ void measure_equal_error(headless::Context& context, const Input& input, const O
   std::printf("\n%s: %u x %u pixels, %d x %u samples, density scale %.3g\n\n", asset.name.c_str(), options.size,
               options.size, options.repeats, options.fewest_samples, density_scale);
   std::printf(
-      "| March | Cells | Steps a path | A step, ns | Samples/s, x dense | x brick | Noise of a sample, %% | "
+      "| Grid type | Cells | Steps per path | A step, ns | Samples/s, x dense | x brick | Noise of a sample, %% | "
       "Grid's error, %% |");
   for (const double target : options.targets)
     std::printf(" To %g %%: time, x dense | x brick | steps, x dense |", 100.0 * target);

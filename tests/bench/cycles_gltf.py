@@ -7,7 +7,7 @@ animations, lights, transmission, unlit materials, images that are neither PNG n
 get a white one. Cycles has no single-sided surfaces, so all surfaces are made double-sided.
 
 The peer renderer runs cycles.py, with lambert.py next to it. It needs Blender 3.4 and, in Blender's Python, numpy.
-README.md in this folder lists the results.
+results/cycles_models.csv lists the results.
 """
 
 import argparse
@@ -279,7 +279,7 @@ def main():
     parser.add_argument("models", type=pathlib.Path, nargs="+", help=".gltf, .glb or folders of them")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for scenes and pictures")
     parser.add_argument("--size", default="128x128")
-    parser.add_argument("--spp", type=int, default=32, help="samples a pixel and seed")
+    parser.add_argument("--spp", type=int, default=32, help="samples per pixel and seed")
     parser.add_argument("--peer-spp", type=int, default=64, help="Cycles', whose samples are cheaper")
     parser.add_argument("--bounces", type=int, default=8, help="at least 2")
     parser.add_argument("--nearest", action="store_true",

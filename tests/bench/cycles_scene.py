@@ -1,8 +1,8 @@
 """Renders a scene of three overlapping volumes and two models inside them with cumulet-render and with Blender's
-Cycles. All materials are matte; each renderer renders two seeds. Prints a row of a Markdown table for README.md in this
-folder and writes scene.png (ours, Cycles', eight times the difference) to the folder --out. With --moving some objects
-and the camera move while the shutter is open. With --flow the scene is only a Mantaflow file with motion blur from its
-velocity grid. With --deform it is only a model with motion blur from its animation.
+Cycles. All materials are matte; each renderer renders two seeds. Prints a row of a Markdown table with the columns of
+results/cycles_scenes.csv and writes scene.png (ours, Cycles', eight times the difference) to the folder --out. With
+--moving some objects and the camera move while the shutter is open. With --flow the scene is only a Mantaflow file with
+motion blur from its velocity grid. With --deform it is only a model with motion blur from its animation.
 
 The peer renderer runs cycles.py, after cycles_objects.py adds the features that cycles.py lacks. It needs Blender 3.4
 and numpy.
@@ -134,7 +134,7 @@ def main():
                              "Mantaflow's, with --deform a model")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for scenes and pictures")
     parser.add_argument("--size", default="128x96")
-    parser.add_argument("--spp", type=int, default=64, help="samples a pixel and seed")
+    parser.add_argument("--spp", type=int, default=64, help="samples per pixel and seed")
     parser.add_argument("--peer-spp", type=int, default=64)
     parser.add_argument("--step", type=float, default=0.5, help="Cycles' volume step rate: it marches by steps of so many voxels")
     parser.add_argument("--threshold", type=float, help="of our grids")

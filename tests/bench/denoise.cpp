@@ -236,8 +236,8 @@ void print(const std::vector<Judgement>& judgements, const Options& options) {
       "16 | Flicker, %% |\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   for (const Judgement& judgement : judgements) std::printf("%s", quality_rows(judgement).c_str());
   std::printf(
-      "\n| Scene | FLIP of the reference's halves | A sample a pixel, ms | fast, ms | high, ms |\n"
-      "|---|--:|--:|--:|--:|\n");
+      "\n| Scene | FLIP of the reference's halves | A sample per pixel, ms | fast, ms | high, ms "
+      "|\n|---|--:|--:|--:|--:|\n");
   for (const Judgement& judgement : judgements) {
     std::printf("| %s | %.3f |", judgement.name.c_str(), judgement.floor);
     for (const std::vector<double>& seconds : judgement.seconds) {
@@ -267,9 +267,9 @@ void plot(const Judgement& judgement, const Options& options) {
     flips.push_back(series(curve.flip));
   }
   write_file(options.out / ("denoise-" + judgement.name + "-relmse.svg"),
-             line_plot(judgement.name + ": relMSE", "samples a pixel", "relMSE", relative));
+             line_plot(judgement.name + ": relMSE", "samples per pixel", "relMSE", relative));
   write_file(options.out / ("denoise-" + judgement.name + "-flip.svg"),
-             line_plot(judgement.name + ": FLIP", "samples a pixel", "FLIP", flips));
+             line_plot(judgement.name + ": FLIP", "samples per pixel", "FLIP", flips));
 }
 
 /// All scenes in one plot: the number of samples that noisy images would need.
@@ -284,7 +284,7 @@ void plot_all(const std::vector<Judgement>& judgements, const Options& options) 
     groups.push_back(std::move(group));
   }
   const std::vector<std::string> bars(method_names.begin(), method_names.end());
-  write_file(options.out / "denoise.svg", bar_plot("16 samples a pixel, raw and denoised", "FLIP", bars, groups));
+  write_file(options.out / "denoise.svg", bar_plot("16 samples per pixel, raw and denoised", "FLIP", bars, groups));
 }
 
 /// The network's path; "" after a message if there is none.

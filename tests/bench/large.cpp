@@ -7,7 +7,7 @@
 // --enlarge: upsamples the first grid of a file by N along each axis. It interpolates, and adds detail of a few voxels,
 // because the file has none at that scale. It writes halves compressed with Blosc, as productions do.
 //
-// Otherwise it prints one line per file, as in the table of README.md. --plots: also writes large-time.svg and
+// Otherwise it prints one line per file, as in results/large_volumes.csv. --plots: also writes large-time.svg and
 // large-memory.svg. Each file has its own process. Seconds are CPU time of all threads, with wall time in brackets,
 // because other programs may use the cores. The peak is that of the process (VmHWM) after each stage.
 #include <openvdb/openvdb.h>

@@ -130,7 +130,7 @@ ParseResult parse(int argc, char** argv) {
   auto* seconds =
       app.add_option("--seconds", o.seconds_a_run, "About, for one run of one march (default: 10; quick: 1)");
   auto* error_samples =
-      app.add_option("--error-samples", o.error_samples, "Samples a pixel in each part of the error's estimate");
+      app.add_option("--error-samples", o.error_samples, "Samples per pixel in each part of the error's estimate");
   error_samples->check(CLI::Range(1U, 4096U));
   app.add_option("--error-parts", o.error_parts, "Its independent parts: more are less noise (default: 2)")
       ->check(CLI::Range(2U, 1000U));

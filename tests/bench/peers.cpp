@@ -100,8 +100,8 @@ void print(const std::vector<Entry>& entries, const Options& options) {
   std::vector<Cost> costs;
   for (const Entry& entry : entries) costs.push_back(cost_of(entry.runs, pixels, options.fewest_samples));
   std::printf(
-      "| March | Cells | MB | Steps a path | A step, ns | Samples/s, x dense | Noise of a sample, %% | Error, %% | "
-      "Time to equal variance, x tet |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+      "| Grid type | Cells | MB | Steps per path | A step, ns | Samples/s, x dense | Noise of a sample, %% | Error, "
+      "%% | Time to equal variance, x tet |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   const auto tets = static_cast<std::size_t>(
       std::ranges::find_if(entries, [](const Entry& entry) { return entry.error.has_value(); }) - entries.begin());
   for (std::size_t i = 0; i < entries.size(); ++i) {

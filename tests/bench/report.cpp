@@ -62,11 +62,11 @@ std::string conditions(const Machine& machine, const Options& options) {
 
 std::string error_definition(const Options& options) {
   return format(
-      "Image error: root mean square difference from the voxels' shaded picture (by the brick march, whose medium is "
-      "the dense one's), relative to the mean radiance over the medium's pixels. Its square is the mean of "
-      "(A1 - B1)(A2 - B2) over two independent halves of %u samples a pixel, which Monte Carlo noise does not bias; "
-      "+- is its standard error. Depth and opacity error: the same of the camera rays' optical depth and of "
-      "1 - exp(-depth), which are deterministic.\n",
+      "Image error: root mean square difference from the voxels' shaded picture (by the brick grid, whose medium "
+      "is the dense one's), relative to the mean radiance over the medium's pixels. Its square is the mean of (A1 "
+      "- B1)(A2 - B2) over two independent halves of %u samples per pixel, which Monte Carlo noise does not bias; "
+      "+- is its standard error. Depth and opacity error: the same of the camera rays' optical depth and of 1 - "
+      "exp(-depth), which are deterministic.\n",
       options.error_samples);
 }
 
@@ -99,7 +99,7 @@ std::string aim_line(const std::vector<AssetResult>& assets) {
 
 std::string tracing_table(const std::vector<AssetResult>& assets, bool full) {
   std::string text =
-      "| Asset | March | Image error | Cells | MB | of dense | Steps/path | Samples/s | x dense | x brick |\n"
+      "| Asset | Grid type | Image error | Cells | MB | of dense | Steps/path | Samples/s | x dense | x brick |\n"
       "|---|---|---|--:|--:|--:|--:|--:|--:|--:|\n";
   for (const AssetResult& asset : assets) {
     for (const TargetResult& target : asset.targets) {
@@ -119,7 +119,7 @@ std::string tracing_table(const std::vector<AssetResult>& assets, bool full) {
 
 std::string detail_table(const std::vector<AssetResult>& assets) {
   std::string text =
-      "| Asset | March | Threshold | Depth error | Opacity error | Msteps/s in paths | Steps/camera ray | Camera "
+      "| Asset | Grid type | Threshold | Depth error | Opacity error | Msteps/s in paths | Steps/camera ray | Camera "
       "rays/s | x "
       "dense | x brick |\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|\n";
   for (const AssetResult& asset : assets) {
@@ -394,7 +394,7 @@ void write_report(const Machine& machine, const Options& options, const std::vec
         number(static_cast<double>(asset.active_voxels)) +
         format(" active, in %.0f %% of the pixels; density scale %.4g", 100.0 * asset.coverage, asset.density_scale);
     for (const TargetResult& target : asset.targets) {
-      report += "; " + percent(target.target) + format(": %u samples a pixel a run", target.samples);
+      report += "; " + percent(target.target) + format(": %u samples per pixel a run", target.samples);
     }
     report += "\n";
   }
@@ -419,7 +419,7 @@ void write_report(const Machine& machine, const Options& options, const std::vec
                        surface_table(assets, false) +
                        "\nThe triangle tree, beside Embree 3 on the same triangles:\n\n" + tree_table(trees, false) +
                        "\n" + build_line(assets) + "\n" + aim_line(assets) + "\n" + conditions(machine, options) +
-                       "`tests/bench/README.md` says what holds which march back.\n";
+                       "`docs/architecture/experiments.md` lists the limits of each grid type.\n";
     update_readme(options.readme, part);
   }
 }
