@@ -30,14 +30,14 @@ case " $* " in
   *" --denoise "* | *" --denoise="*) ;;
   *)
     set -- "$@" --denoise fast
-    say "the pictures are denoised by a filter (--denoise fast); --denoise off shows the samples as they are"
+    say "the images are denoised by a filter (--denoise fast); --denoise off disables this"
     ;;
 esac
 for picture in sample:cumulet sample_explosion:explosion; do
   say "rendering $scene/${picture%:*}.json"
   "$bin/cumulet-render" --scene "$scene/${picture%:*}.json" "$@" -o "${picture#*:}.png" || die "cumulet-render failed"
 done
-say "the pictures are cumulet.png and explosion.png in $root"
+say "the images are cumulet.png and explosion.png in $root"
 
 if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ] && [ -x "$bin/cumulet-demo" ]; then
   say "opening the demo"

@@ -410,8 +410,8 @@ CM_FN float cm_nee_even_probability(CmPath p) {
 }
 
 // Probability of tracing the shadow ray of a light sample. In media, samples with a small expected contribution are
-// skipped by Russian roulette; tests/bench/README.md has measurements. pdf: that of the light sample, including the
-// probability of its kind. scattering_pdf: pdf of the same direction by the phase function.
+// skipped by Russian roulette; tests/bench/results/shadow_rays.csv has measurements. pdf: that of the light sample,
+// including the probability of its kind. scattering_pdf: pdf of the same direction by the phase function.
 CM_FN float cm_nee_probability(CmPath p, uint kind, float scattering_pdf, float pdf) {
   if (p.start != CM_IN_MEDIUM) return 1.0f;
   if (kind == CM_LIGHT_SKY) return cm_nee_even_probability(p);

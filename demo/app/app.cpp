@@ -347,20 +347,20 @@ void App::execute(const Command& command) {
       open(command.text);
       break;
     case Action::add_volume_dialog:
-      panel_.dialog().open("Add a volume", Action::add_volume, {".vdb", ".nvdb"}, model_.preferences.folder);
+      panel_.dialog().open("Add volume", Action::add_volume, {".vdb", ".nvdb"}, model_.preferences.folder);
       break;
     case Action::add_volume:
       model_.scene.others.emplace_back().volume = command.text;
       spell_out_defaults(model_.scene);
       break;
     case Action::add_model_dialog:
-      panel_.dialog().open("Add a model", Action::add_model, {".gltf", ".glb"}, model_.preferences.folder);
+      panel_.dialog().open("Add model", Action::add_model, {".gltf", ".glb"}, model_.preferences.folder);
       break;
     case Action::add_model:
       model_.scene.models.push_back({command.text});
       break;
     case Action::environment_dialog:
-      panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, model_.preferences.folder);
+      panel_.dialog().open("Open environment map", Action::open, {".hdr", ".exr"}, model_.preferences.folder);
       break;
     case Action::clear_environment:
       model_.scene.environment.clear();
@@ -373,14 +373,14 @@ void App::execute(const Command& command) {
       }
       [[fallthrough]];
     case Action::save_scene_dialog:
-      panel_.dialog().open("Save the scene", Action::save_scene_as, {".json"}, suggest_path(model_, ".json"));
+      panel_.dialog().open("Save scene", Action::save_scene_as, {".json"}, suggest_path(model_, ".json"));
       break;
     case Action::save_scene_as:
       save_scene(command.text);
       break;
     case Action::png_dialog:
       if (model_.status.has_content)
-        panel_.dialog().open("Save the picture", Action::save_png, {".png"}, suggest_path(model_, ".png"));
+        panel_.dialog().open("Save image", Action::save_png, {".png"}, suggest_path(model_, ".png"));
       break;
     case Action::exr_dialog:
       if (model_.status.has_content)

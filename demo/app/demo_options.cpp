@@ -12,13 +12,13 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
   DemoOptions options;
   // More samples than for a file, because the image is viewed while it refines.
   options.scene.sampling.samples = 256;
-  CLI::App app("Shows volumes in a window: path-traced, as they are turned and changed.", "cumulet-demo");
+  CLI::App app("Interactive viewer for path-traced volumes.", "cumulet-demo");
   app.footer(
-      "Here --size is the window's, --volume may be left out, and --spp is 256 unless said.\n"
-      "Settings are kept in $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config.\n"
-      "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.");
+      "In this program --size is the size of the window, --volume is optional, and --spp defaults to 256.\n"
+      "Preferences are stored in $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config.\n"
+      "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.");
   app.add_option("file", options.open,
-                 "A volume (.vdb, .nvdb), surfaces (.gltf, .glb), an environment (.hdr, .exr) or a scene (.json)")
+                 "Volume (.vdb, .nvdb), surfaces (.gltf, .glb), environment (.hdr, .exr) or scene (.json)")
       ->type_name("FILE");
   add_scene_options(app, options.scene);
 
@@ -34,15 +34,15 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
     if (options.ui_scale < least || options.ui_scale > most)
       throw CLI::ValidationError("--ui-scale", "'" + text + "' is not from 0.5 to 4");
   };
-  app.add_option_function<std::string>("--ui-scale", scale, "Size of the controls (default: as the screen asks)")
+  app.add_option_function<std::string>("--ui-scale", scale, "Scale of the user interface (default: that of the screen)")
       ->type_name("FACTOR")
       ->group(group);
-  app.add_option("--replay", options.replay, "Play recorded events, then quit: see docs/replay.md")
+  app.add_option("--replay", options.replay, "Play recorded events and quit; see docs/replay.md")
       ->type_name("FILE")
       ->group(group);
-  app.add_option("--record", options.record, "Record what is done, for --replay")->type_name("FILE")->group(group);
+  app.add_option("--record", options.record, "Record the session for --replay")->type_name("FILE")->group(group);
   app.add_option("--trace", options.trace,
-                 "Write when frames, their passes and jobs ran, for chrome://tracing and Perfetto")
+                 "Write a trace of frames, passes and worker jobs for chrome://tracing and Perfetto")
       ->type_name("FILE.json")
       ->group(group);
   const auto add_folder = [&](const char* name, std::string& folder, const char* help) {
@@ -52,17 +52,16 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
     };
     app.add_option_function<std::string>(name, set, help)->type_name("DIR")->group(group);
   };
-  add_folder("--shader-cache", options.shader_cache,
-             "Keep what the driver made of shaders in this folder, for the next run");
+  add_folder("--shader-cache", options.shader_cache, "Cache compiled shaders in this folder");
   add_folder("--shaders", options.shaders,
-             "Take the shaders of this folder (a copy of glsl/), anew as they change: in debug builds");
+             "Load shaders from this folder (a copy of glsl/) and reload them when they change; debug builds only");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
   options.sized = app.count("--size") > 0;
   if (!options.open.empty() && (!options.scene.volume.empty() || app.count("--scene") > 0))
-    throw UsageError("'" + options.open + "' is given as well as --volume or --scene");
+    throw UsageError("'" + options.open + "' cannot be combined with --volume or --scene");
   return options;
 }
 

@@ -14,26 +14,29 @@ void Panel::environment(Model& model, std::vector<Command>& commands) {
   const std::string& file = model.scene.environment;
   using Desc = cumulet_environment_settings_desc;
   Desc& settings = model.scene.environment_settings;
-  ui_.value_row("Picture",
-                file.empty() ? "none: drop a .hdr or .exr here" : std::filesystem::path(file).filename().string());
+  ui_.value_row(
+      "Image", file.empty() ? "none: drop an .hdr or .exr file here" : std::filesystem::path(file).filename().string());
   ImGui::BeginDisabled(file.empty());
   if (model.thumbnail_texture != 0) {
     const auto& camera = model.scene.camera;
     const double ahead =
         std::atan2(camera.target[0] - camera.eye[0], camera.target[2] - camera.eye[2]) * 180.0 / std::numbers::pi;
     ui_.environment("Environment view",
-                    "All that is far away: +Z is in the middle. Drag to turn it, double click to turn it back. The "
-                    "triangle is where the camera looks.",
+                    "The environment map; +Z is in the middle. Drag to rotate, double-click to reset. The triangle "
+                    "marks the viewing direction.",
                     model.thumbnail_texture, settings.rotation_degrees, ahead);
   }
   settings::for_each<Desc>([&](const auto& setting) { rows_.draw(setting, settings.*setting.field); });
   ImGui::EndDisabled();
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
-  if (ui_.button("Open environment", "A Radiance (.hdr) or OpenEXR (.exr) picture, equirectangular.", {width, 0.0f}))
+  if (ui_.button("Open environment",
+                 "Opens an equirectangular Radiance (.hdr) or OpenEXR (.exr) image, or an .exr cube map.",
+                 {width, 0.0f}))
     commands.push_back({Action::environment_dialog});
   ImGui::SameLine();
   ImGui::BeginDisabled(file.empty());
-  if (ui_.button("Remove environment", "Light comes from sun and sky again.", {width, 0.0f}))
+  if (ui_.button("Remove environment", "Removes the environment map; sun and sky light the scene again.",
+                 {width, 0.0f}))
     commands.push_back({Action::clear_environment});
   ImGui::EndDisabled();
 }

@@ -69,10 +69,10 @@ void FileDialog::choose(std::vector<Command>& commands) {
   if (saving()) {
     if (!takes(path_)) path_ += endings_.front();
   } else if (!fs::exists(path_, error)) {
-    trouble_ = path_ + ": there is no such file";
+    trouble_ = path_ + ": file not found";
     return;
   } else if (!takes(path_)) {
-    trouble_ = path_ + ": its name ends in none of these: " + endings_text();
+    trouble_ = path_ + ": unsupported extension; expected one of: " + endings_text();
     return;
   }
   commands.push_back({done_, path_});
@@ -97,7 +97,7 @@ void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
       else
         path_ = path.string();
     }
-    ui.remember(shown.c_str(), entry.folder ? "Open the folder." : "Choose; a double click takes it.");
+    ui.remember(shown.c_str(), entry.folder ? "Opens the folder." : "Selects the file; double-click to open.");
     if (!entry.folder && ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(0)) choose(commands);
   }
   ImGui::EndChild();
@@ -147,8 +147,8 @@ void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Comman
   if (opening_) ImGui::SetKeyboardFocusHere();
   opening_ = false;
   const std::string endings = endings_text();
-  if (ui.text("Path", ("The file's full path: " + endings + ". Enter takes it.").c_str(),
-              saving() ? "Where to save" : "Type, or choose below", path_))
+  if (ui.text("Path", ("Full path of the file: " + endings + ". Press Enter to accept.").c_str(),
+              saving() ? "File name" : "Type a path or select a file below", path_))
     choose(commands);
   ImGui::Spacing();
   recent(ui, preferences, commands);
@@ -165,10 +165,10 @@ void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Comman
     Ui::heading(endings.c_str());
   }
   ImGui::Spacing();
-  if (ui.button(saving() ? "Save file" : "Open file", "Takes the path above.", {ui.px(110.0f), 0.0f})) choose(commands);
+  if (ui.button(saving() ? "Save file" : "Open file", "Uses the path above.", {ui.px(110.0f), 0.0f})) choose(commands);
   ImGui::SameLine();
   const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) && !ImGui::IsAnyItemActive();
-  if (ui.button("Close", "Escape does the same.", {ui.px(110.0f), 0.0f}) || escape) close();
+  if (ui.button("Close", "Closes the dialog (Escape).", {ui.px(110.0f), 0.0f}) || escape) close();
   ImGui::EndPopup();
 }
 

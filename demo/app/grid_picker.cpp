@@ -91,7 +91,7 @@ bool GridPicker::draw_grid(Ui& ui, const Grid& grid) {
   const bool chosen = ImGui::Selectable("##grid", false, ImGuiSelectableFlags_DontClosePopups, {0.0f, height});
   ImGui::EndDisabled();
   ui.remember(("Grids/" + grid.name).c_str(),
-              grid.refusal.empty() ? "Shows this grid's values as the medium's density." : grid.refusal.c_str());
+              grid.refusal.empty() ? "Uses this grid as the density." : grid.refusal.c_str());
   ImGui::PopID();
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const ImU32 bright = ImGui::GetColorU32(grid.refusal.empty() ? ImGuiCol_Text : ImGuiCol_TextDisabled);
@@ -141,8 +141,8 @@ void GridPicker::draw(Ui& ui, std::vector<Command>& commands) {
   if (!found.trouble.empty()) ImGui::TextWrapped("%s", found.trouble.c_str());
   ImGui::EndChild();
   const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) && !ImGui::IsAnyItemActive();
-  if (ui.button("Keep", "Closes this; the grid that is shown stays (Escape).", {ui.px(110.0f), 0.0f}) || escape ||
-      done) {
+  if (ui.button("Keep current", "Closes the window and keeps the current grid (Escape).", {ui.px(124.0f), 0.0f}) ||
+      escape || done) {
     open_ = false;
     for (const auto& reader : readers_) reader->stop();
     ImGui::CloseCurrentPopup();

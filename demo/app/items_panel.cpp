@@ -21,22 +21,22 @@ std::string surfaces_row(const SceneOptions& scene) {
 void Panel::items(Model& model) {
   int tool = static_cast<int>(model.tool);
   const std::vector<Choice> tools = {
-      {"None", static_cast<int>(Tool::none), "The picture alone: no outlines, handles and lights' marks (Q)."},
-      {"Move", static_cast<int>(Tool::move), "Along an axis, in a plane, or freely in the picture's (W)."},
-      {"Rotate", static_cast<int>(Tool::rotate), "About an axis, or about the sight (E)."},
-      {"Scale", static_cast<int>(Tool::scale), "Along its own axes, two, or all alike (R)."}};
-  if (ui_.choose("Handles", "What dragging the chosen thing's handles does. Ctrl: by steps.", tools, tool))
+      {"None", static_cast<int>(Tool::none), "No outlines, handles or light icons (Q)."},
+      {"Move", static_cast<int>(Tool::move), "Move along an axis, in a plane, or in the image plane (W)."},
+      {"Rotate", static_cast<int>(Tool::rotate), "Rotate about an axis or the viewing direction (E)."},
+      {"Scale", static_cast<int>(Tool::scale), "Scale along one or two of the object's axes, or uniformly (R)."}};
+  if (ui_.choose("Handles", "Transform tool for the selected object. Hold Ctrl to snap.", tools, tool))
     model.tool = static_cast<Tool>(tool);
   int axes = static_cast<int>(model.axes);
-  if (ui_.choose("Axes", "Along which handles move and turn (X). Scaling is along the thing's own.",
-                 {{"World", static_cast<int>(Axes::world), "The world's."},
-                  {"Local", static_cast<int>(Axes::local), "The thing's own."}},
+  if (ui_.choose("Axes", "Axes for moving and rotating (X). Scaling always uses the object's own axes.",
+                 {{"World", static_cast<int>(Axes::world), "World axes."},
+                  {"Local", static_cast<int>(Axes::local), "The object's own axes."}},
                  axes))
     model.axes = static_cast<Axes>(axes);
   if (!model.scene.surfaces.empty()) {
     ImGui::Indent(ui_.px(6.0f));
     ImGui::TextUnformatted(surfaces_row(model.scene).c_str());
-    ui_.remember("Scene/Surfaces", "Stands as its file has it. One that is added under Models can be moved.");
+    ui_.remember("Scene/Surfaces", "Cannot be moved. Add the file under Models to move it.");
     ImGui::Unindent(ui_.px(6.0f));
   }
   const std::vector<Item> items = items_of(model.scene);
@@ -58,7 +58,8 @@ void Panel::items(Model& model) {
       else
         model.chosen = item;
     }
-    ui_.remember(label.c_str(), "Shows its outline and its handles in the picture, where a click chooses it, too.");
+    ui_.remember(label.c_str(),
+                 "Selects the object and shows its outline and handles. Objects can also be clicked in the image.");
     ImGui::PopID();
   }
   ImGui::PopStyleColor();

@@ -77,7 +77,7 @@ void Panel::analytic_lights(Model& model) {
     analytic_lights.erase(analytic_lights.begin() + static_cast<std::ptrdiff_t>(*removed));
     forget(model.chosen, Item::Kind::analytic_light, *removed);
   }
-  if (!ui_.button("Add light", "A point of light above what the camera looks at.", {-1.0f, 0.0f})) return;
+  if (!ui_.button("Add light", "Adds a point light above the camera's target.", {-1.0f, 0.0f})) return;
   analytic_lights.push_back(new_analytic_light(model.scene.camera));
   model.chosen = Item{Item::Kind::analytic_light, analytic_lights.size() - 1, 0};
 }

@@ -36,14 +36,14 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
       {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
-      {GLFW_KEY_F12, 0, {Action::png_dialog}, "F12", "Save the picture as PNG"},
-      {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the picture as linear OpenEXR"},
+      {GLFW_KEY_F12, 0, {Action::png_dialog}, "F12", "Save the image as PNG"},
+      {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the image as linear OpenEXR"},
       {GLFW_KEY_Z, ctrl, {Action::undo}, "Ctrl+Z", "Undo"},
       {GLFW_KEY_Z, ctrl | shift, {Action::redo}, "Ctrl+Shift+Z, Ctrl+Y", "Redo"},
       {GLFW_KEY_Y, ctrl, {Action::redo}, "", ""},
       {GLFW_KEY_F, 0, {Action::frame_all}, "F, Home", "Frame all"},
       {GLFW_KEY_HOME, 0, {Action::frame_all}, "", ""},
-      {GLFW_KEY_G, 0, {Action::toggle_fly}, "G", "Fly, and back"},
+      {GLFW_KEY_G, 0, {Action::toggle_fly}, "G", "Toggle fly mode"},
       {GLFW_KEY_T, 0, {Action::toggle_turntable}, "T", "Turntable"},
       {GLFW_KEY_W,
        0,
@@ -53,7 +53,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_E, 0, {Action::tool, "", static_cast<int>(Tool::rotate)}, "", ""},
       {GLFW_KEY_R, 0, {Action::tool, "", static_cast<int>(Tool::scale)}, "", ""},
       {GLFW_KEY_Q, 0, {Action::tool, "", static_cast<int>(Tool::none)}, "", ""},
-      {GLFW_KEY_X, 0, {Action::toggle_axes}, "X", "Handles along the world's axes, or the thing's own"},
+      {GLFW_KEY_X, 0, {Action::toggle_axes}, "X", "Handles along world or local axes"},
       {GLFW_KEY_1,
        0,
        {Action::view, "", CUMULET_VIEW_SHADED},
@@ -64,23 +64,27 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_4, 0, {Action::view, "", CUMULET_VIEW_DENSITY}, "", ""},
       {GLFW_KEY_5, 0, {Action::view, "", CUMULET_VIEW_WIREFRAME}, "", ""},
       {GLFW_KEY_M, 0, {Action::next_grid_type}, "M", "Next grid type"},
-      {GLFW_KEY_SPACE, 0, {Action::play}, "Space", "Play a sequence, and pause"},
-      {GLFW_KEY_COMMA, 0, {Action::step, "", -1}, ",  .", "A frame back, a frame on"},
+      {GLFW_KEY_SPACE, 0, {Action::play}, "Space", "Play or pause a sequence"},
+      {GLFW_KEY_COMMA, 0, {Action::step, "", -1}, ",  .", "Previous frame, next frame"},
       {GLFW_KEY_PERIOD, 0, {Action::step, "", 1}, "", ""},
-      {GLFW_KEY_I, 0, {Action::begin_here}, "I  O", "Play from this frame, to this frame"},
+      {GLFW_KEY_I, 0, {Action::begin_here}, "I  O", "Set the first, the last played frame"},
       {GLFW_KEY_O, 0, {Action::end_here}, "", ""},
-      {GLFW_KEY_B, ctrl, {Action::draw_region}, "Ctrl+B", "Make a part of the picture alone: drag it out"},
-      {GLFW_KEY_B, ctrl | modifier_alt, {Action::clear_region}, "Ctrl+Alt+B", "Make all of the picture"},
-      {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure, a third of a stop"},
+      {GLFW_KEY_B, ctrl, {Action::draw_region}, "Ctrl+B", "Drag a render region (crop)"},
+      {GLFW_KEY_B, ctrl | modifier_alt, {Action::clear_region}, "Ctrl+Alt+B", "Clear the render region"},
+      {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure down, up by a third of a stop"},
       {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
       {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel"},
-      {GLFW_KEY_F2, 0, {Action::focus_panel}, "F2", "Keyboard to the panel: arrows, Space, Enter; Escape leaves"},
+      {GLFW_KEY_F2,
+       0,
+       {Action::focus_panel},
+       "F2",
+       "Keyboard focus to the panel (arrows, Space, Enter; Escape leaves)"},
       {GLFW_KEY_F1, 0, {Action::toggle_help}, "F1", "This help"},
       {GLFW_KEY_ESCAPE,
        0,
        {Action::cancel},
        "Escape",
-       "Let go of a handle, close the help, dismiss a message, cancel a load, choose nothing"},
+       "Release a handle, close the help, dismiss a message, cancel loading, clear the selection"},
       {GLFW_KEY_Q, ctrl, {Action::quit}, "Ctrl+Q", "Quit"},
   };
   return all;
@@ -200,11 +204,11 @@ const char* stage_text(cumulet_stage stage) {
     case CUMULET_STAGE_LOADING:
       return "Reading the file";
     case CUMULET_STAGE_STATISTICS:
-      return "Measuring the voxels";
+      return "Computing voxel statistics";
     case CUMULET_STAGE_REFINING:
       return "Refining the grid";
     case CUMULET_STAGE_PACKING:
-      return "Fitting the cells";
+      return "Packing the cells";
     case CUMULET_STAGE_UPLOADING:
       return "Uploading";
     case CUMULET_STAGE_IDLE:

@@ -113,15 +113,15 @@ void Panel::toolbar(Model& model, std::vector<Command>& commands) {
   if (focus_) ImGui::SetKeyboardFocusHere();
   focus_ = false;
   button("Open",
-         "Open a volume, surfaces, an environment or a scene (Ctrl+O). Files can be dropped on the window, too.",
+         "Open a volume, surfaces, an environment or a scene (Ctrl+O). Files can also be dropped on the window.",
          Action::open_dialog, true);
   ImGui::SameLine();
-  button("Save", "Save the scene: every setting and the camera (Ctrl+S; under another name: Ctrl+Shift+S).",
-         Action::save_scene, true);
+  button("Save", "Save the scene: all settings and the camera (Ctrl+S; save as: Ctrl+Shift+S).", Action::save_scene,
+         true);
   ImGui::SameLine();
-  button("Undo", "Take back the last change (Ctrl+Z).", Action::undo, model.can_undo);
+  button("Undo", "Undo the last change (Ctrl+Z).", Action::undo, model.can_undo);
   ImGui::SameLine();
-  button("Redo", "Make it again (Ctrl+Shift+Z).", Action::redo, model.can_redo);
+  button("Redo", "Redo the last undone change (Ctrl+Shift+Z).", Action::redo, model.can_redo);
   ImGui::SameLine();
   button("Help", "All keys and mouse buttons (F1).", Action::toggle_help, true);
 }
@@ -129,8 +129,8 @@ void Panel::toolbar(Model& model, std::vector<Command>& commands) {
 void Panel::file(Model& model, std::vector<Command>& commands) {
   if (path_of_ != model.scene.volume) path_ = path_of_ = model.scene.volume;
   if (ui_.text("Volume",
-               "The file to show: .vdb or .nvdb, surfaces' .gltf or .glb, or a scene's .json. Enter opens it.",
-               "A file's path", path_))
+               "File to open: volume (.vdb, .nvdb), surfaces (.gltf, .glb) or scene (.json). Press Enter to open it.",
+               "Path of a file", path_))
     commands.push_back({Action::open, path_});
 
   std::vector<Choice> recent;
@@ -141,7 +141,7 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
     recent.push_back({names[i].c_str(), static_cast<int>(i), model.preferences.recent[i].c_str()});
   int chosen = -1;
   ImGui::BeginDisabled(recent.empty());
-  if (ui_.choose("Recent", "The files opened last.", recent, chosen))
+  if (ui_.choose("Recent", "Recently opened files.", recent, chosen))
     commands.push_back({Action::open, model.preferences.recent[static_cast<std::size_t>(chosen)]});
   ImGui::EndDisabled();
 
@@ -156,28 +156,28 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
     if (grid.name == model.status.grid) now = static_cast<int>(i);
   }
   ImGui::BeginDisabled(grids.empty());
-  if (ui_.choose("Grid name", "Which of the file's grids is shown: it must be a scalar fog volume.", grids, now))
+  if (ui_.choose("Grid name", "Density grid: a scalar fog volume of the file.", grids, now))
     model.scene.grid_name = model.grids[static_cast<std::size_t>(now)].name;
   ImGui::EndDisabled();
 
   ImGui::BeginDisabled(!model.status.has_volume);
   int up = static_cast<int>(model.scene.up);
-  if (ui_.choose("Up axis", "The volume's up axis. The file is read again, and framed.",
-                 {{"Y", static_cast<int>(UpAxis::y), "As pictures have it."},
-                  {"Z", static_cast<int>(UpAxis::z), "As Blender and Mantaflow write it: turned to Y."}},
+  if (ui_.choose("Up axis", "Up axis of the volume. The file is loaded again and framed.",
+                 {{"Y", static_cast<int>(UpAxis::y), "Y is up."},
+                  {"Z", static_cast<int>(UpAxis::z), "Z is up, as in files of Blender and Mantaflow."}},
                  up))
     commands.push_back({Action::choose_up, {}, up});
-  if (ui_.button("Look into the grids", "Each grid's type, voxels, range and histogram, and one to choose.",
+  if (ui_.button("Inspect grids", "Shows type, voxels, range and histogram of each grid, and lets you select one.",
                  {-1.0f, 0.0f}))
     commands.push_back({Action::grids_dialog});
   ImGui::EndDisabled();
   const float spacing = ImGui::GetStyle().ItemSpacing.x;
   const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
   ImGui::BeginDisabled(!model.status.has_content);
-  if (ui_.button("Save PNG", "Save the picture as it is shown, at its full size (F12).", {width, 0.0f}))
+  if (ui_.button("Save PNG", "Save the displayed image at full resolution (F12).", {width, 0.0f}))
     commands.push_back({Action::png_dialog});
   ImGui::SameLine();
-  if (ui_.button("Save EXR", "Save the picture's linear radiance as OpenEXR (Shift+F12).", {width, 0.0f}))
+  if (ui_.button("Save EXR", "Save the linear radiance and AOVs as OpenEXR (Shift+F12).", {width, 0.0f}))
     commands.push_back({Action::exr_dialog});
   ImGui::EndDisabled();
 }
@@ -199,8 +199,8 @@ void Panel::light(Model& model) {
   const double azimuth =
       std::atan2(camera.eye[0] - camera.target[0], camera.eye[2] - camera.target[2]) * 180.0 / std::numbers::pi;
   ui_.sun_dial("Sun dial",
-               "Drag the sun: the direction is its azimuth, the rim the horizon, the centre overhead. By keyboard: "
-               "Space, then the arrows, then Space. The triangle is the camera.",
+               "Drag to set the sun's direction. The angle is the azimuth, the rim the horizon, the center the zenith. "
+               "Keyboard: Space, then the arrow keys, then Space. The triangle marks the camera.",
                light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
   using Desc = cumulet_sun_sky_desc;
   const bool physical = light.sky == CUMULET_SKY_PHYSICAL;
@@ -241,7 +241,7 @@ void Panel::surfaces(Model& model) {
   Desc& surface = model.scene.surface;
   const cumulet_surfaces_info& info = model.status.surfaces;
   const bool any = !model.scene.surfaces.empty();
-  ui_.value_row("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb here");
+  ui_.value_row("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb file here");
   ImGui::BeginDisabled(!any);
   settings::for_each<Desc>([&](const auto& setting) {
     if (!setting.is(&Desc::time)) rows_.draw(setting, surface.*setting.field);
@@ -258,7 +258,7 @@ void Panel::surfaces(Model& model) {
   ImGui::EndDisabled();
   variant(model);
   if (any) ui_.value_row("Triangles", short_count(double(info.triangles)));
-  if (ui_.button("Remove surfaces", "Shows the volume alone.")) model.scene.surfaces.clear();
+  if (ui_.button("Remove surfaces", "Removes the surfaces.")) model.scene.surfaces.clear();
   ImGui::EndDisabled();
 }
 
@@ -266,14 +266,14 @@ void Panel::variant(Model& model) {
   const std::vector<std::string>& names = model.status.variants;
   if (names.empty()) return;
   std::string& wanted = model.scene.surface_variant;
-  std::vector<Choice> choices = {{"none", 0, "The materials that the file has without a choice."}};
+  std::vector<Choice> choices = {{"none", 0, "The default materials of the file."}};
   int chosen = wanted.empty() ? 0 : -1;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const int number = static_cast<int>(i) + 1;
-    choices.push_back({names[i].c_str(), number, "A variant of the file's materials."});
+    choices.push_back({names[i].c_str(), number, "A material variant of the file."});
     if (chosen < 0 && (names[i] == wanted || std::to_string(i) == wanted)) chosen = number;
   }
-  if (!ui_.choose("Variant", "Which of the model's variants of materials is shown.", choices, chosen)) return;
+  if (!ui_.choose("Variant", "Material variant of the model.", choices, chosen)) return;
   const auto index = static_cast<std::size_t>(chosen - 1);
   wanted = chosen == 0 ? "" : names[index];
   // If names are empty or ambiguous, the variant is stored by number.
@@ -289,7 +289,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   for (const settings::Choice& preset : preset_choices) presets.push_back({preset.label, preset.value, preset.tip});
   const std::optional<Preset> now = preset_of(medium);
   int chosen = now ? static_cast<int>(*now) : -1;
-  if (ui_.choose("Preset", "A medium: sets all of it but the density scale and the ramps.", presets, chosen))
+  if (ui_.choose("Preset", "Preset of the medium; does not change the density scale and the ramps.", presets, chosen))
     apply(static_cast<Preset>(chosen), medium);
   settings::for_each<Desc>([&](const auto& setting) {
     const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight);
@@ -300,8 +300,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
     ImGui::EndDisabled();
     if (setting.is(&Desc::density_scale)) {
       ImGui::BeginDisabled(!model.status.has_volume);
-      if (ui_.button("Auto density", "A scale at which the volume is a body: a mean optical depth of 8.",
-                     {-1.0f, 0.0f}))
+      if (ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f}))
         commands.push_back({Action::auto_density});
       ImGui::EndDisabled();
     }
@@ -314,8 +313,8 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
 void Panel::absorption(float (&coalbedo)[3]) {
   float mean = (coalbedo[0] + coalbedo[1] + coalbedo[2]) / 3.0f;
   const float before = mean;
-  if (!ui_.slider("Absorption", "The mean part of light that is lost at a collision: 1 - albedo.", mean, 0.0f, 1.0f,
-                  "%.4g", ImGuiSliderFlags_Logarithmic))
+  if (!ui_.slider("Absorption", "Mean fraction of light that is absorbed: 1 - albedo.", mean, 0.0f, 1.0f, "%.4g",
+                  ImGuiSliderFlags_Logarithmic))
     return;
   for (float& one : coalbedo) one = before > 0.0f ? std::min(one * mean / before, 1.0f) : mean;
 }
@@ -337,8 +336,8 @@ void Panel::grid(Model& model) {
 
   const cumulet_stats& stats = model.status.stats;
   if (grid.type == CUMULET_GRID_TETRAHEDRAL) {
-    const std::string limited = stats.limited != 0 ? " (at the budget)" : "";
-    ui_.value_row("Live cells",
+    const std::string limited = stats.limited != 0 ? " (limit reached)" : "";
+    ui_.value_row("Cell count",
                   model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
     ui_.value_row("Levels", model.status.has_volume ? std::to_string(stats.levels) : "-");
   }
@@ -347,8 +346,7 @@ void Panel::grid(Model& model) {
 
 void Panel::threshold(settings::SettingInfo info, cumulet_grid_desc& grid) {
   bool to_voxel = grid.threshold < 0.0;
-  if (ui_.checkbox("To the voxel", "Splits wherever the density varies at all, until the cells tile the voxels.",
-                   to_voxel))
+  if (ui_.checkbox("Refine to voxels", "Splits cells wherever the density varies, down to the voxels.", to_voxel))
     grid.threshold = to_voxel ? -1.0 : settings::default_threshold(grid.criterion);
   const bool range = grid.criterion == CUMULET_CRITERION_RANGE_MEAN;
   info.row.least = range ? 1e-2 : 1e-4;
@@ -366,23 +364,22 @@ void Panel::cameras(Model& model) {
   std::vector<Choice> choices;
   choices.reserve(cameras.size());
   for (const NamedCamera& camera : cameras)
-    choices.push_back({camera.name.c_str(), static_cast<int>(choices.size()), "A camera that the scene keeps."});
+    choices.push_back({camera.name.c_str(), static_cast<int>(choices.size()), "A saved camera of the scene."});
   ImGui::BeginDisabled(cameras.empty());
-  if (ui_.choose("Look through", "Which of the scene's cameras is looked through, as long as nobody moves it.", choices,
-                 chosen))
+  if (ui_.choose("Saved camera", "The saved camera that is shown, until the camera is moved.", choices, chosen))
     look_through(model.scene, cameras[static_cast<std::size_t>(chosen)].name);
   ImGui::EndDisabled();
-  bool keep = ui_.text("Camera name", "What the present view is called once it is kept.", "a name", camera_name_);
+  bool keep = ui_.text("Camera name", "Name for saving the current view.", "name", camera_name_);
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const bool can_keep = !camera_name_.empty() && !is_unplaced(model.scene.camera);
   ImGui::BeginDisabled(!can_keep);
-  keep |= ui_.button("Keep camera", "Makes the present view one of the scene's cameras; one of that name becomes it.",
-                     {width, 0.0f});
+  keep |=
+      ui_.button("Save camera", "Saves the current view as a camera of the scene; replaces a camera of the same name.",
+                 {width, 0.0f});
   ImGui::EndDisabled();
   ImGui::SameLine();
   ImGui::BeginDisabled(chosen < 0);
-  const bool remove =
-      ui_.button("Remove camera", "Takes the one that is looked through from the scene's cameras.", {width, 0.0f});
+  const bool remove = ui_.button("Remove camera", "Removes the current camera from the saved cameras.", {width, 0.0f});
   ImGui::EndDisabled();
   if (remove && chosen >= 0) cameras.erase(cameras.begin() + chosen);
   if (!keep || !can_keep) return;
@@ -397,7 +394,7 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
   Desc& navigation = model.navigation;
   const auto turn = [&](const settings::SettingInfo& info) {
     bool on = navigation.turntable_degrees_per_second != 0.0;
-    if (ui_.checkbox("Turntable", "The camera circles the target (T).", on))
+    if (ui_.checkbox("Turntable", "Rotates the camera around the target (T).", on))
       commands.push_back({Action::toggle_turntable});
     ImGui::BeginDisabled(!on);
     double speed = navigation.turntable_degrees_per_second;
@@ -423,7 +420,7 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
                  [&](const auto& focus) { rows_.draw(focus, view.focus_distance); });
   ImGui::EndDisabled();
   bool orthographic = view.orthographic_height > 0.0;
-  if (ui_.checkbox("Orthographic", "Parallel rays.", orthographic)) {
+  if (ui_.checkbox("Orthographic", "Parallel projection.", orthographic)) {
     const double distance =
         std::hypot(view.eye[0] - view.target[0], view.eye[1] - view.target[1], view.eye[2] - view.target[2]);
     const double half = std::tan(view.fovy_degrees * std::numbers::pi / 360.0);
@@ -434,7 +431,7 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
   }
   if (other) end_shutter(model.scene);
   ImGui::BeginDisabled(!model.status.has_content);
-  if (ui_.button("Frame all", "The whole scene in the picture (F, Home).", {-1.0f, 0.0f}))
+  if (ui_.button("Frame all", "Fits the whole scene into the image (F, Home).", {-1.0f, 0.0f}))
     commands.push_back({Action::frame_all});
   ImGui::EndDisabled();
   cameras(model);
@@ -445,7 +442,7 @@ void Panel::sampling(Model& model) {
   settings::for_each<Desc>([&](const auto& setting) {
     if (!setting.is(&Desc::view)) rows_.draw(setting, model.scene.sampling.*setting.field);
   });
-  ui_.checkbox("Fast preview", "Coarser pictures while things change, then finer and finer. Off: always full size.",
+  ui_.checkbox("Fast preview", "Renders at a lower resolution during changes. Off: always full resolution.",
                model.adaptive_resolution);
 }
 
@@ -453,16 +450,16 @@ void Panel::statistics(const Model& model) {
   const Status& status = model.status;
   const cumulet_stats& stats = status.stats;
   const Charts& charts = model.charts;
-  ui_.plot("Frame time", "Milliseconds from a picture to the next; at rest from an event to the window that shows it.",
+  ui_.plot("Frame time", "Milliseconds between images; when idle, from an input event to its display.",
            charts.frame_ms.values(), print("%.1f ms", static_cast<double>(charts.frame_ms.latest())));
-  ui_.plot("Picture latency", "Milliseconds from a change to the picture that was drawn next, on the window.",
-           charts.picture_ms.values(), print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));
-  ui_.plot("Samples per second", "Camera paths finished.", charts.samples_per_second.values(),
+  ui_.plot("Image latency", "Milliseconds from a change to the next displayed image.", charts.picture_ms.values(),
+           print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));
+  ui_.plot("Samples per second", "Completed camera paths per second.", charts.samples_per_second.values(),
            short_count(static_cast<double>(charts.samples_per_second.latest())) + "/s");
-  ui_.plot("Noise", "Relative standard error of the picture, measured each second while it refines.",
+  ui_.plot("Noise", "Relative standard error of the image, measured once per second while it refines.",
            charts.noise_percent.values(), status.noise ? print("%.2f %%", 100.0 * *status.noise) : std::string("-"));
-  ui_.plot("Device time", "Milliseconds of the GPU that the library's passes took, from frame to frame.",
-           charts.device_ms.values(), print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
+  ui_.plot("GPU time", "GPU milliseconds of the library's passes per frame.", charts.device_ms.values(),
+           print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
   if (const double all = device_seconds(stats); all > 0.0) {
     const auto share = [all](double seconds) { return 100.0 * seconds / all; };
     ui_.value_row("Trace, surfaces", print("%.0f %%, ", share(stats.pass_seconds_trace)) +
@@ -478,8 +475,9 @@ void Panel::statistics(const Model& model) {
   }
   ui_.value_row("Trace", print("%.1f s", stats.trace_seconds));
   if (stats.steps > 0 && stats.samples > 0)
-    ui_.value_row("Steps a path", print("%.1f", static_cast<double>(stats.steps) / static_cast<double>(stats.samples)));
-  ui_.value_row("OpenGL memory", short_bytes(static_cast<double>(stats.gl_bytes)));
+    ui_.value_row("Steps per path",
+                  print("%.1f", static_cast<double>(stats.steps) / static_cast<double>(stats.samples)));
+  ui_.value_row("GPU memory", short_bytes(static_cast<double>(stats.gl_bytes)));
   ui_.value_row("Renderer", stats.gl_renderer);
 }
 
@@ -515,7 +513,7 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
   ImGui::ProgressBar(static_cast<float>(work.part), {-std::max(right, 1.0f), ImGui::GetFrameHeight()});
   if (work.stops) {
     ImGui::SameLine();
-    if (ui_.button("Cancel", "Stops; what is shown stays (Escape).", {button, 0.0f}))
+    if (ui_.button("Cancel", "Cancels loading and keeps the current scene (Escape).", {button, 0.0f}))
       commands.push_back({Action::cancel_load});
   }
   ImGui::End();
@@ -577,7 +575,7 @@ void Panel::state_line(const Model& model) {
     text += print("   %ux%u", status.frame.width, status.frame.height);
   if (status.noise) text += print("   noise %.2f %%", 100.0 * *status.noise);
   if (model.navigation.fly != 0) text += "   flying";
-  if (!status.saving.empty()) text += "   saving " + file_name(status.saving) + " once the picture is whole";
+  if (!status.saving.empty()) text += "   saving " + file_name(status.saving) + " when all pixels are sampled";
   state_ = text;
   ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
                           {0.0f, 1.0f});
@@ -611,16 +609,16 @@ void Panel::help(Model& model) {
   };
   for (const Shortcut& shortcut : shortcuts())
     if (shortcut.keys[0] != '\0') row(shortcut.keys, shortcut.what);
-  row("Arrows,  -  =", "Orbit and dolly, when the picture has the keyboard");
+  row("Arrows,  -  =", "Orbit and dolly, when the image has the keyboard focus");
   ImGui::Spacing();
   ImGui::Separator();
   ImGui::Spacing();
   if (model.navigation.fly != 0) {
     row("Any button", "Look around");
-    row("W A S D  E Q", "Move, rise and sink; Shift is faster");
+    row("W A S D  E Q", "Move, up and down; Shift: faster");
   } else if (model.navigation.style == CUMULET_NAVIGATION_BLENDER) {
     row("Middle", "Orbit;  Shift: pan,  Ctrl: dolly");
-    row("Keypad 1 3 7", "Front, right, top;  Ctrl: the opposite");
+    row("Keypad 1 3 7", "Front, right, top;  Ctrl: opposite side");
     row("Keypad 5", "Perspective or orthographic");
   } else if (model.navigation.style == CUMULET_NAVIGATION_MAYA) {
     row("Alt+left", "Orbit");
@@ -632,7 +630,7 @@ void Panel::help(Model& model) {
     row("Right", "Dolly");
   }
   row("Wheel", "Dolly");
-  row("Click", "Choose what is there, for its handles;  Ctrl: by steps");
+  row("Click", "Select an object;  drag its handles, Ctrl: snap");
   row("Ctrl+click", "Type a number into a slider");
   ImGui::End();
 }

@@ -24,11 +24,10 @@ void Panel::ramps(Model& model) {
     fit(view, points, field.most);
     if (points.empty()) continue;
     ui_.curve((std::string(info.label) + " curve").c_str(),
-              "Drag a point. A click adds one; a right click on one, or Delete, takes it away.", points, view,
-              field.heights, field.most);
+              "Drag to move a point. Click to add one. Right-click or Delete removes it.", points, view, field.heights,
+              field.most);
     double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
-    if (ui_.numbers(info.point, "Of the point last touched: the value, and what it becomes.", chosen,
-                    0.005f * view.max_value))
+    if (ui_.numbers(info.point, "Input and output value of the selected point.", chosen, 0.005f * view.max_value))
       move_point(points, view.chosen, {static_cast<float>(chosen[0]), static_cast<float>(chosen[1])});
   }
 }

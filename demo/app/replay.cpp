@@ -27,13 +27,13 @@ class Line {
 
   std::string word() {
     std::string text;
-    if (!(words_ >> text)) fail("something is missing at the end");
+    if (!(words_ >> text)) fail("an argument is missing at the end");
     return text;
   }
 
   std::string quoted() {
     std::string text;
-    if (ended()) fail("something is missing at the end");
+    if (ended()) fail("an argument is missing at the end");
     if (!(words_ >> std::quoted(text))) fail("the quotes do not match");
     return text;
   }
@@ -53,7 +53,7 @@ class Line {
 
   int button() {
     const int code = ended() ? 0 : button_of(word());
-    if (code < 0) fail("a button is left, right or middle");
+    if (code < 0) fail("the button must be left, right or middle");
     return code;
   }
 
@@ -64,7 +64,7 @@ class Line {
   }
 
   Place place() {
-    if (ended()) fail("a place is missing");
+    if (ended()) fail("a position is missing");
     Place place;
     if (words_.peek() == '"') {
       place.of = Place::Of::control;
@@ -73,7 +73,7 @@ class Line {
       const int next = ended() ? 0 : words_.peek();
       if ((next < '0' || next > '9') && next != '.' && next != '-') return place;
     } else if (words_.peek() == 'v') {
-      if (word() != "viewport") fail("a place is \"a control\", viewport X Y, or X Y");
+      if (word() != "viewport") fail("a position must be \"a control\", viewport X Y, or X Y");
       place.of = Place::Of::viewport;
     }
     place.x = number();
@@ -111,14 +111,14 @@ class Parser {
     const std::string command = line.word();
     if (command == "wait") {
       const std::string what = line.word();
-      if (what != "loaded" && what != "converged") line.fail("wait for loaded or for converged");
+      if (what != "loaded" && what != "converged") line.fail("wait needs loaded or converged");
       add(what == "loaded" ? Type::wait_loaded : Type::wait_converged);
     } else if (command == "frames") {
       add(Type::frames).count = line.integer(1, max_frames);
     } else if (command == "idle") {
       ReplayStep& step = add(Type::idle);
       step.seconds = line.number();
-      if (!(step.seconds > 0.0 && step.seconds <= 60.0)) line.fail("idle for up to 60 seconds");
+      if (!(step.seconds > 0.0 && step.seconds <= 60.0)) line.fail("idle needs a time of up to 60 seconds");
     } else if (command == "move") {
       move(line.place());
     } else if (command == "down" || command == "up") {
@@ -130,7 +130,7 @@ class Parser {
       event(button_event(button, false));
     } else if (command == "drag") {
       const Place from = line.place();
-      if (line.word() != "to") line.fail("drag PLACE to PLACE [BUTTON]");
+      if (line.word() != "to") line.fail("expected: drag POSITION to POSITION [BUTTON]");
       const Place to = line.place();
       const int button = line.button();
       move(from);
@@ -175,7 +175,7 @@ class Parser {
     } else {
       line.fail("there is no command '" + command + "'");
     }
-    if (!line.ended()) line.fail("there is something left at the end");
+    if (!line.ended()) line.fail("unexpected text at the end");
   }
 
  private:
@@ -293,7 +293,8 @@ bool Player::wait_over(const ReplayHost& host) {
   constexpr int settle = 3;
   const bool loaded = step.type == ReplayStep::Type::wait_loaded;
   if (frames_ > settle && !host.loading && (loaded || host.converged)) return true;
-  if (Clock::now() - since_ > patience) fail(loaded ? "the loading does not end" : "the picture does not converge");
+  if (Clock::now() - since_ > patience)
+    fail(loaded ? "loading did not finish in time" : "the image did not converge in time");
   return false;
 }
 

@@ -19,7 +19,7 @@ void check(cumulet_viewer* viewer, cumulet_status status) {
 }
 
 void require_picture(const cumulet_frame_result& shown) {
-  if (shown.width == 0) throw std::runtime_error("there is no picture yet");
+  if (shown.width == 0) throw std::runtime_error("there is no image yet");
 }
 
 /// Reads the displayed image as linear values that encode to the same bytes with the sRGB curve.

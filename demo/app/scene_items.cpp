@@ -49,14 +49,14 @@ dmat4 place_of(const cumulet_light_desc& analytic_light) {
   const dvec3 shines = glm::make_vec3(analytic_light.direction);
   const dvec3 direction = glm::length(shines) > 0.0 ? glm::normalize(shines) : down;
   dvec3 tangent = glm::make_vec3(analytic_light.tangent);
-  across -= glm::dot(across, direction) * direction;
+  tangent -= glm::dot(tangent, direction) * direction;
   constexpr double least = 1e-9;
   // Default of cumulet_light_desc: horizontal, or +X.
-  if (!(glm::length(across) > least)) across = glm::cross(-down, direction);
-  if (!(glm::length(across) > least)) across = dvec3(1.0, 0.0, 0.0);
-  across = glm::normalize(across);
-  place[0] = dvec4(across, 0.0);
-  place[1] = dvec4(glm::cross(direction, across), 0.0);
+  if (!(glm::length(tangent) > least)) tangent = glm::cross(-down, direction);
+  if (!(glm::length(tangent) > least)) tangent = dvec3(1.0, 0.0, 0.0);
+  tangent = glm::normalize(tangent);
+  place[0] = dvec4(tangent, 0.0);
+  place[1] = dvec4(glm::cross(direction, tangent), 0.0);
   place[2] = dvec4(direction, 0.0);
   place[3] = dvec4(glm::make_vec3(analytic_light.position), 1.0);
   return place;
@@ -117,7 +117,7 @@ std::string title_of(const SceneOptions& scene, const Item& item) {
   switch (item.kind) {
     case Item::Kind::volume:
       if (volume_at(scene, item.index).places.size() < 2) return "Volume " + number;
-      return "Volume " + number + ", place " + std::to_string(item.place + 1);
+      return "Volume " + number + ", instance " + std::to_string(item.place + 1);
     case Item::Kind::model:
       return "Model " + number;
     case Item::Kind::analytic_light:

@@ -24,7 +24,7 @@ struct Item {
 
 /// Returns all items in the order of the panel.
 [[nodiscard]] std::vector<Item> items_of(const SceneOptions& scene);
-/// Returns the title of an item: "Volume 2", "Volume 1, place 3", "Model 1", "Light 1".
+/// Returns the title of an item: "Volume 2", "Volume 1, instance 3", "Model 1", "Light 1".
 [[nodiscard]] std::string title_of(const SceneOptions& scene, const Item& item);
 /// Returns the title with the item's name or kind, for lists.
 [[nodiscard]] std::string name_of(const SceneOptions& scene, const Item& item);

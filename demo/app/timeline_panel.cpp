@@ -12,8 +12,7 @@ void Panel::sequence(Model& model, std::vector<Command>& commands) {
   if (!model.status.play) {
     const FrameRow& row = *model.status.neighbours;
     ui_.value_row("Frames", std::to_string(row.number(0)) + " to " + std::to_string(row.number(row.count() - 1)));
-    if (ui_.button("Play the sequence", "The volume is one of several files that are numbered: plays them all.",
-                   {-1.0f, 0.0f}))
+    if (ui_.button("Play the sequence", "The file is part of a numbered sequence: plays the sequence.", {-1.0f, 0.0f}))
       commands.push_back({Action::play_row});
     return;
   }
@@ -26,10 +25,9 @@ void Panel::sequence(Model& model, std::vector<Command>& commands) {
   const cumulet_playback_desc played = playback_of(sequence, play.row);
   Frame first = play.row.number(played.first_frame);
   Frame last = play.row.number(played.first_frame + played.frame_count - 1);
-  if (ui_.slider("First played", "The frame that playing begins with (I: the one that is shown).", first, least, most,
-                 "%d"))
+  if (ui_.slider("First played", "First frame of playback (I: set to the current frame).", first, least, most, "%d"))
     sequence.first = std::min(first, last);
-  if (ui_.slider("Last played", "The one that it ends with (O: the one that is shown).", last, least, most, "%d"))
+  if (ui_.slider("Last played", "Last frame of playback (O: set to the current frame).", last, least, most, "%d"))
     sequence.last = std::max(first, last);
   ui_.value_row("Ready", std::to_string(play.info.ready_frames) + " of " + std::to_string(play.info.frames) + ", " +
                              short_bytes(static_cast<double>(play.info.bytes)));
@@ -49,17 +47,16 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
                    ImGuiWindowFlags_NoScrollWithMouse);
   ImGui::PopStyleVar(2);
-  const ImVec2 size(ui_.px(62.0f), 0.0f);
-  if (ui_.button("Back", "A frame back (comma).", size)) commands.push_back({Action::step, {}, -1});
+  const ImVec2 size(ui_.px(84.0f), 0.0f);
+  if (ui_.button("Previous", "Previous frame (comma).", size)) commands.push_back({Action::step, {}, -1});
   ImGui::SameLine();
-  if (ui_.button(model.playing ? "Pause" : "Play", "Plays the frames, and pauses (Space).", size))
-    commands.push_back({Action::play});
+  if (ui_.button(model.playing ? "Pause" : "Play", "Play or pause (Space).", size)) commands.push_back({Action::play});
   ImGui::SameLine();
-  if (ui_.button("On", "A frame on (full stop).", size)) commands.push_back({Action::step, {}, 1});
+  if (ui_.button("Next", "Next frame (period).", size)) commands.push_back({Action::step, {}, 1});
   ImGui::SameLine();
   std::string text = "Frame " + std::to_string(play.frame());
   const bool other = play.info.is_displayed != 0 && play.info.displayed_frame != play.info.requested_frame;
-  if (other) text += ", shown is " + std::to_string(play.row.number(play.info.displayed_frame));
+  if (other) text += ", displayed: " + std::to_string(play.row.number(play.info.displayed_frame));
   if (!play.failure.empty()) text += ": " + play.failure;
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(text.c_str());
@@ -75,7 +72,7 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
     const auto index = static_cast<std::uint32_t>(std::clamp(std::floor(part * count), 0.0f, count - 1.0f));
     commands.push_back({Action::go_to, {}, static_cast<int>(index)});
   }
-  ui_.remember("Playhead", "Drag to a frame. Bright are those that are ready, red those that cannot be read.");
+  ui_.remember("Playhead", "Drag to select a frame. Blue: ready; red: cannot be read.");
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const auto x_of = [&](float index) { return corner.x + room.x * index / count; };
   const auto bar = [&](float from, float to, float high, float low, ImU32 color) {

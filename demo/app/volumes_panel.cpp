@@ -49,7 +49,7 @@ std::optional<Stand> stand_of(const Matrix& m) {
 void Panel::stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number) {
   auto& places = volume.places;
   if (places.size() > 1) {
-    ui_.value_row(("Places" + number).c_str(), std::to_string(places.size()));
+    ui_.value_row(("Instances" + number).c_str(), std::to_string(places.size()));
     if (!place || *place >= places.size()) return;
     if (const auto moved = stand_at(places[*place], number)) places[*place] = *moved;
     return;
@@ -64,13 +64,13 @@ std::optional<Matrix> Panel::stand_at(const std::optional<Matrix>& place, const 
   const std::optional<Stand> upright = stand_of(now);
   Stand stand = upright.value_or(Stand{{now[12], now[13], now[14]}});
   const double far = std::hypot(stand.position[0], stand.position[1], stand.position[2]);
-  bool moved = ui_.numbers(("Position" + number).c_str(), "How far it stands from where its file has it.",
+  bool moved = ui_.numbers(("Position" + number).c_str(), "Translation, in addition to the transform of the file.",
                            stand.position, static_cast<float>(0.01 * std::max(1.0, far)));
   ImGui::BeginDisabled(!upright);
-  moved |=
-      ui_.slider(("Turn" + number).c_str(), "Degrees about the vertical.", stand.turn_degrees, -180.0, 180.0, "%.1f");
-  moved |= ui_.slider(("Scale" + number).c_str(), "How many times as large as its file has it.", stand.scale, 0.01,
-                      100.0, "%.3g", ImGuiSliderFlags_Logarithmic);
+  moved |= ui_.slider(("Rotation" + number).c_str(), "Rotation about the vertical axis, in degrees.",
+                      stand.turn_degrees, -180.0, 180.0, "%.1f");
+  moved |= ui_.slider(("Scale" + number).c_str(), "Uniform scale.", stand.scale, 0.01, 100.0, "%.3g",
+                      ImGuiSliderFlags_Logarithmic);
   ImGui::EndDisabled();
   if (!moved) return std::nullopt;
   if (upright) return matrix_of(stand);
@@ -90,22 +90,23 @@ void Panel::models(Model& model, std::vector<Command>& commands) {
     ui_.value_row(("Model " + std::to_string(i + 1)).c_str(), one.label());
     std::string& typed = model_names_[i];
     if (!ImGui::IsAnyItemActive()) typed = one.name;
-    if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
+    if (ui_.text(("Name" + number).c_str(), "Name in the scene file. Press Enter to accept.", "name of the file",
+                 typed))
       one.name = typed;
-    ui_.checkbox(("Visible" + number).c_str(), "Whether it is there at all: its shadow goes with it.", one.visible);
-    ui_.checkbox(("Shadow alone" + number).c_str(), "It is not seen, but casts shadows and is in mirrors.",
-                 one.shadow_only);
-    ui_.checkbox(("Holdout" + number).c_str(), "The picture has a hole in its place, without alpha.", one.holdout);
+    ui_.checkbox(("Visible" + number).c_str(), "If off, the object is hidden and casts no shadow.", one.visible);
+    ui_.checkbox(("Shadow only" + number).c_str(),
+                 "Invisible to the camera, but casts shadows and appears in reflections.", one.shadow_only);
+    ui_.checkbox(("Holdout" + number).c_str(), "Leaves a hole with alpha 0 in the image.", one.holdout);
     std::optional<Matrix> place;
     if (one.to_world != Matrix{}) place = one.to_world;
     if (const auto moved = stand_at(place, number)) one.to_world = *moved;
     const float spacing = ImGui::GetStyle().ItemSpacing.x;
     const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
     const std::string plain = " model " + std::to_string(i + 1);
-    if (ui_.button(("Copy" + plain).c_str(), "Another of it in its place, of the same triangles.", {width, 0.0f}))
+    if (ui_.button(("Copy" + plain).c_str(), "Duplicates this model; both share their triangles.", {width, 0.0f}))
       copied = i;
     ImGui::SameLine();
-    if (ui_.button(("Remove" + plain).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
+    if (ui_.button(("Remove" + plain).c_str(), "Removes it from the scene.", {width, 0.0f})) removed = i;
   }
   if (copied) {
     models.insert(models.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneModel(models[*copied]));
@@ -115,8 +116,7 @@ void Panel::models(Model& model, std::vector<Command>& commands) {
     models.erase(models.begin() + static_cast<std::ptrdiff_t>(*removed));
     forget(model.chosen, Item::Kind::model, *removed);
   }
-  if (ui_.button("Add model", "Opens another model beside those that are there.", {-1.0f, 0.0f}))
-    commands.push_back({Action::add_model_dialog});
+  if (ui_.button("Add model", "Adds another model.", {-1.0f, 0.0f})) commands.push_back({Action::add_model_dialog});
 }
 
 void Panel::volumes(Model& model, std::vector<Command>& commands) {
@@ -126,9 +126,10 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     ui_.value_row(("Volume" + number).c_str(), volume.label());
     std::string& typed = names_[i];
     if (!ImGui::IsAnyItemActive()) typed = volume.name;
-    if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
+    if (ui_.text(("Name" + number).c_str(), "Name in the scene file. Press Enter to accept.", "name of the file",
+                 typed))
       volume.name = typed;
-    ui_.checkbox(("Visible" + number).c_str(), "Whether it is there at all: its shadow goes with it.", volume.visible);
+    ui_.checkbox(("Visible" + number).c_str(), "If off, the object is hidden and casts no shadow.", volume.visible);
     const auto& chosen = model.chosen;
     const bool is_chosen = chosen && chosen->kind == Item::Kind::volume && chosen->index + 1 == i;
     stand(volume, is_chosen ? std::optional(chosen->place) : std::nullopt, number);
@@ -152,10 +153,10 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     });
     const float spacing = ImGui::GetStyle().ItemSpacing.x;
     const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
-    if (ui_.button(("Copy volume" + number).c_str(), "Another of it in its place, of the same grid.", {width, 0.0f}))
+    if (ui_.button(("Copy volume" + number).c_str(), "Duplicates this volume; both share one grid.", {width, 0.0f}))
       copied = i;
     ImGui::SameLine();
-    if (ui_.button(("Remove volume" + number).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
+    if (ui_.button(("Remove volume" + number).c_str(), "Removes it from the scene.", {width, 0.0f})) removed = i;
   }
   // Indices of `others` do not include the scene's first volume.
   if (copied) {
@@ -166,8 +167,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(*removed));
     forget(model.chosen, Item::Kind::volume, *removed + 1);
   }
-  if (ui_.button("Add volume", "Opens another volume beside those that are there.", {-1.0f, 0.0f}))
-    commands.push_back({Action::add_volume_dialog});
+  if (ui_.button("Add volume", "Adds another volume.", {-1.0f, 0.0f})) commands.push_back({Action::add_volume_dialog});
 }
 
 }  // namespace cumulet::demo

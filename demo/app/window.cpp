@@ -255,7 +255,7 @@ Window::Context Window::make_shared_context() const {
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
   Context context(glfwCreateWindow(1, 1, "Cumulet", nullptr, window_.get()));
   glfwWindowHint(GLFW_VISIBLE, GLFW_TRUE);
-  if (context == nullptr) throw std::runtime_error("no OpenGL context for the pictures: " + glfw_error());
+  if (context == nullptr) throw std::runtime_error("no OpenGL context for the viewer: " + glfw_error());
   return context;
 }
 

@@ -73,7 +73,7 @@ void check_version(Context::Driver& driver) {
   get_integer(gl_major_version_enum, &major);
   get_integer(gl_minor_version_enum, &minor);
   if (major < gl_major || (major == gl_major && minor < gl_minor))
-    fail("only OpenGL " + std::to_string(major) + "." + std::to_string(minor));
+    fail("the context has only OpenGL " + std::to_string(major) + "." + std::to_string(minor));
 }
 
 // ---------------------------------------------------------------------------------------------------------- EGL
@@ -147,7 +147,7 @@ class EglDriver final : public Context::Driver {
     if (egl_.BindAPI(EGL_OPENGL_API) == EGL_FALSE) fail("no desktop OpenGL");
     const char* extensions = egl_.QueryString(display_, EGL_EXTENSIONS);
     if (major == 1 && minor < 5 && !has_extension(extensions, "EGL_KHR_create_context"))
-      fail("EGL cannot make a core context");
+      fail("EGL cannot create a core context");
 
     const std::array<EGLint, 5> wanted = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
                                           EGL_NONE};
@@ -174,7 +174,7 @@ class EglDriver final : public Context::Driver {
     }
     try {
       if (!has_extension(extensions, "EGL_KHR_surfaceless_context")) {
-        if (config == EGL_NO_CONFIG_KHR) fail("neither a surfaceless context nor a pixel buffer");
+        if (config == EGL_NO_CONFIG_KHR) fail("neither surfaceless contexts nor pixel buffers are supported");
         const std::array<EGLint, 5> size = {EGL_WIDTH, 1, EGL_HEIGHT, 1, EGL_NONE};
         surface_ = egl_.CreatePbufferSurface(display_, config, size.data());
         if (surface_ == EGL_NO_SURFACE) egl_.fail_with_error("eglCreatePbufferSurface");

@@ -26,7 +26,7 @@ inline constexpr std::string_view sky_background = "sky";
   std::array<char, 32> number{};
   char* const end =
       std::to_chars(number.data(), number.data() + number.size(), a_pixel, std::chars_format::general, 6).ptr;
-  return "Cumulet " + of_version + ", " + std::string(number.data(), end) + " samples a pixel";
+  return "Cumulet " + of_version + ", " + std::string(number.data(), end) + " samples per pixel";
 }
 
 }  // namespace cumulet::image::attributes

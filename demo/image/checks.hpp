@@ -17,7 +17,7 @@ inline constexpr std::int64_t max_side = 16384;
 
 inline void check_size(const std::string& path, std::int64_t width, std::int64_t height) {
   if (width < 1 || height < 1 || width > max_side || height > max_side)
-    fail(path, "the picture's size " + std::to_string(width) + "x" + std::to_string(height) + " is not supported");
+    fail(path, "the image size " + std::to_string(width) + "x" + std::to_string(height) + " is not supported");
 }
 
 /// Checks the size. A number of pixels that does not match the size is a bug of the caller (std::logic_error).

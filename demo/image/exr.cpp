@@ -178,7 +178,7 @@ void write_exr(const std::string& path, const Windows& windows, std::span<const 
   for (const Layer& layer : layers) {
     const std::size_t channels = layer.name.channels.size();
     if (layer.values.size() != channels * width * height)
-      throw std::logic_error(path + ": the picture's size and the pixels of layer \"" + std::string(layer.name.name) +
+      throw std::logic_error(path + ": the image size and the pixels of layer \"" + std::string(layer.name.name) +
                              "\" disagree");
     // OpenEXR requires a mutable pointer, but only reads. The base is the address of pixel (0, 0).
     const std::size_t stride = channels * sizeof(float);
@@ -187,7 +187,7 @@ void write_exr(const std::string& path, const Windows& windows, std::span<const 
     for (std::size_t c = 0; c < channels; ++c) {
       const std::string name = full_name(layer.name, c);
       if (header.channels().findChannel(name) != nullptr)
-        throw std::logic_error(std::string(path).append(": two channels are called ").append(name));
+        throw std::logic_error(std::string(path).append(": two channels have the name ").append(name));
       header.channels().insert(name, Imf::Channel(Imf::FLOAT));
       frame.insert(name, Imf::Slice(Imf::FLOAT, base + sizeof(float) * c, stride, stride * width));
     }

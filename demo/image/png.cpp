@@ -76,7 +76,7 @@ void write_bytes(const std::string& path, std::uint32_t width, std::uint32_t hei
   const auto row = static_cast<int>(width);
   if (stbi_write_png_to_func(append, &file, row, static_cast<int>(height), static_cast<int>(channels), bytes.data(),
                              row * static_cast<int>(channels)) == 0)
-    fail(path, "the PNG encoder failed: the picture may be too large for it");
+    fail(path, "the PNG encoder failed; the image may be too large");
   constexpr std::size_t after_header = 8 + 25;  // signature and IHDR
   file.insert(after_header, color_chunks());
   replace_file(path, file);

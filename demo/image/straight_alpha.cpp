@@ -20,8 +20,8 @@ std::size_t pixels_brighter_than_alpha(std::span<const float> rgba, double expos
 std::string raised_alpha_note(const std::string& path, std::size_t pixels) {
   if (pixels == 0) return {};
   return path + ": " + std::to_string(pixels) + (pixels == 1 ? " pixel is" : " pixels are") +
-         " brighter than PNG's straight alpha can hold: alpha is raised there, and hides more of the background (.exr "
-         "keeps color and alpha)";
+         " brighter than straight alpha in a PNG allows: alpha is increased there and hides more of the background "
+         "(use .exr to keep color and alpha)";
 }
 
 }  // namespace cumulet::image

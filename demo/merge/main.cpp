@@ -25,21 +25,19 @@ struct Wanted {
 /// Parses the arguments; nullopt after --help or --version.
 std::optional<Wanted> parse(std::vector<std::string> arguments) {
   Wanted wanted;
-  CLI::App app(
-      "Puts parts of a picture together, each of which cumulet-render made of some of its samples (--first-sample).",
-      "cumulet-merge");
-  app.footer("Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.");
+  CLI::App app("Merges partial renders of cumulet-render (--first-sample) into one image.", "cumulet-merge");
+  app.footer("Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.");
   app.add_option("parts", wanted.parts, "OpenEXR files (.exr) of cumulet-render, in any order")
       ->required()
       ->type_name("FILE");
-  app.add_option("-o,--output", wanted.output, "The picture (.exr)")->required()->take_last()->type_name("FILE");
+  app.add_option("-o,--output", wanted.output, "Merged image (.exr)")->required()->take_last()->type_name("FILE");
   if (!cumulet::demo::parse_arguments(app, std::move(arguments), std::cout)) return std::nullopt;
   if (std::filesystem::path(wanted.output).extension() != ".exr")
     throw UsageError("--output: '" + wanted.output + "' does not end in .exr");
   std::error_code ignored;
   for (const std::string& part : wanted.parts) {
     if (std::filesystem::equivalent(part, wanted.output, ignored))
-      throw UsageError("--output: '" + wanted.output + "' is one of the parts");
+      throw UsageError("--output: '" + wanted.output + "' is also an input");
   }
   return wanted;
 }
@@ -52,10 +50,11 @@ int main(int argc, char** argv) {
     if (!wanted) return;
     cumulet::image::check_writable(wanted->output);
     const cumulet::demo::Merged merged = cumulet::demo::merge(wanted->parts, wanted->output);
-    if (merged.without_denoised) std::cerr << "warning: layer denoised is left out: it is no mean of samples\n";
+    if (merged.without_denoised) std::cerr << "warning: the layer denoised is dropped, because it cannot be merged\n";
     if (merged.without_error)
-      std::cerr << "warning: layer error is left out: it counts the sky in, which these pictures do not show\n";
-    std::cout << wanted->output << ": " << merged.samples << " samples a pixel, " << merged.first << " to "
+      std::cerr
+          << "warning: the layer error is dropped, because it includes the sky, which these images do not contain\n";
+    std::cout << wanted->output << ": " << merged.samples << " samples per pixel, " << merged.first << " to "
               << merged.first + merged.samples - 1 << ", of " << wanted->parts.size()
               << (wanted->parts.size() == 1 ? " part" : " parts") << '\n';
   });

@@ -48,8 +48,8 @@ std::uint64_t whole(const Part& part, std::string_view name) {
   const auto number = find<double>(part.contents, name);
   constexpr double most = 4294967296.0;
   if (!number || !(*number >= 0.0) || *number > most || *number != std::floor(*number)) {
-    refuse(part.path, "is no part of a picture: it does not say which samples all its pixels have (" +
-                          std::string(name) + "), as when it was stopped before its end");
+    refuse(part.path, "is not a partial render: it has no valid sample range (" + std::string(name) +
+                          "); it may have been interrupted");
   }
   return static_cast<std::uint64_t>(*number);
 }
@@ -58,10 +58,10 @@ Part open(const std::string& path) {
   Part part{path, image::read_contents(path)};
   for (const std::string_view name : {attributes::version, attributes::scene})
     if (!find<std::string>(part.contents, name))
-      refuse(path, "is no picture of cumulet-render: no " + std::string(name));
+      refuse(path, "is not an image of cumulet-render: it has no attribute " + std::string(name));
   part.first = whole(part, attributes::first_sample);
   part.samples = whole(part, attributes::samples);
-  if (part.samples == 0) refuse(path, "is no part of a picture: it has no samples");
+  if (part.samples == 0) refuse(path, "is not a partial render: it has no samples");
   return part;
 }
 
@@ -77,7 +77,7 @@ std::string manifest_of(const Part& part) {
 template <class Value>
 void check_same(const Part& a, const Part& b, std::string_view name, const char* what) {
   if (find<Value>(a.contents, name) != find<Value>(b.contents, name))
-    refuse(b.path, std::string("is of ") + what + " than " + a.path);
+    refuse(b.path, std::string("has ") + what + " than " + a.path);
 }
 
 void check_together(const Part& a, const Part& b) {
@@ -86,19 +86,19 @@ void check_together(const Part& a, const Part& b) {
   const auto size = [](const image::Windows& windows) {
     return std::to_string(windows.width) + "x" + std::to_string(windows.height);
   };
-  if (size(of_a) != size(of_b)) refuse(b.path, "is of " + size(of_b) + " pixels, and " + a.path + " of " + size(of_a));
-  if (of_a != of_b) refuse(b.path, "is of another region than " + a.path);
+  if (size(of_a) != size(of_b)) refuse(b.path, "has " + size(of_b) + " pixels, but " + a.path + " has " + size(of_a));
+  if (of_a != of_b) refuse(b.path, "has another render region than " + a.path);
   check_same<std::string>(a, b, attributes::version, "another version of Cumulet");
   check_same<double>(a, b, attributes::seed, "another seed");
   check_same<std::string>(a, b, attributes::grid_type, "another grid type");
   check_same<std::string>(a, b, attributes::scene, "another scene");
   if (a.contents.channels != b.contents.channels) refuse(b.path, "has other layers than " + a.path);
-  if (manifest_of(a) != manifest_of(b)) refuse(b.path, "has mattes of other names than " + a.path);
+  if (manifest_of(a) != manifest_of(b)) refuse(b.path, "has other Cryptomatte names than " + a.path);
 }
 
 /// Opens all files and sorts them by sample range. Throws if they do not belong together.
 std::vector<Part> open_all(const std::vector<std::string>& paths) {
-  if (paths.empty()) throw std::runtime_error("there is no part to merge");
+  if (paths.empty()) throw std::runtime_error("there are no files to merge");
   std::vector<Part> parts;
   parts.reserve(paths.size());
   for (const std::string& path : paths) {
@@ -110,11 +110,11 @@ std::vector<Part> open_all(const std::vector<std::string>& paths) {
     const Part& before = parts[i - 1];
     const Part& after = parts[i];
     if (after.first < before.end()) {
-      refuse(after.path, "has " + range_text(after.first, after.end()) + ", some of which " + before.path +
-                             " has as well: " + range_text(before.first, before.end()));
+      refuse(after.path, "has " + range_text(after.first, after.end()) + ", overlapping those of " + before.path +
+                             ": " + range_text(before.first, before.end()));
     }
     if (after.first > before.end()) {
-      throw std::runtime_error("between " + before.path + " and " + after.path + " no part has " +
+      throw std::runtime_error("between " + before.path + " and " + after.path + " no file has " +
                                range_text(before.end(), after.first));
     }
   }

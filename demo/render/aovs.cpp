@@ -105,7 +105,7 @@ std::vector<float> cut(const image::Windows& windows, std::span<const float> who
 image::Windows windows_of(const float (&region)[4], std::uint32_t width, std::uint32_t height) {
   std::uint32_t pixels[4] = {};
   if (cumulet_region_pixels(region, width, height, pixels) != CUMULET_OK)
-    throw std::logic_error("a region or a size that is none");
+    throw std::logic_error("the region or the size is invalid");
   return {pixels[2], pixels[3], pixels[0], pixels[1], width, height};
 }
 

@@ -81,8 +81,8 @@ CheckpointOf checkpoint_of(const RenderOptions& options) {
           {"first sample", std::to_string(sampling.first_sample)},
           {"number of samples", std::to_string(sampling.samples)},
           {"noise target", number_text(sampling.noise_target_percent)},
-          {"way of sampling", sampling.adaptive == 1 ? "adaptive" : "even"},
-          {"choice of the layer volume", volume ? "with" : "without"},
+          {"sampling mode", sampling.adaptive == 1 ? "adaptive" : "even"},
+          {"volume AOV", volume ? "with" : "without"},
           {"scene", scene_hash(options.scene)}};
 }
 
@@ -105,10 +105,10 @@ std::optional<Checkpoint> read_checkpoint(const std::string& path, const Checkpo
   std::error_code error;
   if (!std::filesystem::exists(path, error) && !error) return std::nullopt;
   auto checkpoint = parse(image::read_file(path));
-  if (!checkpoint) refuse(path, "is no checkpoint of cumulet-render, or damaged: without it the picture begins anew");
+  if (!checkpoint) refuse(path, "is not a checkpoint of cumulet-render, or is damaged; delete it to start over");
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (i >= checkpoint->of.size() || checkpoint->of[i] != wanted[i])
-      refuse(path, "is the checkpoint of another picture: the " + wanted[i].first + " differs");
+      refuse(path, "is the checkpoint of another image: the " + wanted[i].first + " differs");
   }
   return checkpoint;
 }

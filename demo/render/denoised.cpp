@@ -21,11 +21,10 @@ std::string denoiser_folder() {
 
 std::string find_network(const std::string& folder) {
   const std::string in = folder.empty() ? denoiser_folder() : folder;
-  if (in.empty()) throw std::runtime_error("no folder of Open Image Denoise's networks: see --oidn-weights");
+  if (in.empty()) throw std::runtime_error("no folder with Open Image Denoise networks: see --oidn-weights");
   std::string file = in + "/" + network_name;
   if (!std::filesystem::is_regular_file(file)) {
-    throw std::runtime_error(file +
-                             ": there is no such network: see --oidn-weights and scripts/install_oidn_weights.sh");
+    throw std::runtime_error(file + ": network not found: see --oidn-weights and scripts/install_oidn_weights.sh");
   }
   return file;
 }

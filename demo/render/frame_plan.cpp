@@ -24,10 +24,10 @@ std::optional<FramePattern> volume_pattern(const RenderOptions& options) {
     if (volume.empty() || fs::exists(volume, error)) return std::nullopt;
     return FramePattern::parse(volume);
   }
-  if (volume.empty()) throw UsageError("--frames counts volumes, and the scene has none");
+  if (volume.empty()) throw UsageError("--frames needs a volume, but the scene has none");
   if (auto pattern = FramePattern::parse(volume)) return pattern;
   if (auto pattern = FramePattern::of_file(volume)) return pattern;
-  throw UsageError("--frames: the name '" + volume + "' has neither a number nor a place for one, such as ####");
+  throw UsageError("--frames: the name '" + volume + "' has no frame number and no placeholder such as ####");
 }
 
 /// Name of an output file per frame. All names have the same number of decimals, so that they sort in playback order.
@@ -43,9 +43,9 @@ class Written {
     }
     if (count > 1 && !name.empty() && !pattern_) {
       const fs::path path(name);
-      throw UsageError(std::string(flag) + ": the name '" + name + "' is that of " + std::to_string(count) +
-                       " frames, and needs a place for their numbers, such as " + path.stem().string() + ".####" +
-                       path.extension().string());
+      throw UsageError(std::string(flag) + ": the name '" + name + "' is used for " + std::to_string(count) +
+                       " frames and needs a placeholder for the frame number, such as " + path.stem().string() +
+                       ".####" + path.extension().string());
     }
   }
   [[nodiscard]] std::string of(const Moment& moment) const {
@@ -77,7 +77,7 @@ PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, con
   const std::int64_t common = std::gcd(way, length);
   if (length / common > max_parts)
     throw UsageError("frame " + moment.text() + ": the files are " + std::to_string(grid.step) +
-                     " frames apart, of which this is no thousandth");
+                     " frames apart, and this is not a multiple of 1/1000 of that");
   return {volume.file(before + grid.step), static_cast<std::uint32_t>(way / common),
           static_cast<std::uint32_t>(length / common), static_cast<std::uint32_t>(grid.step)};
 }
@@ -96,14 +96,15 @@ double seconds_of(const Moment& moment, const SceneSequence& sequence, const Gri
 std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   std::optional<FramePattern> volume = volume_pattern(options);
   if (!volume) {
-    if (options.overwrite) throw UsageError("--overwrite is of a sequence: one picture replaces what is there");
-    if (!options.sequence_cache.empty()) throw UsageError("--sequence-cache is of a sequence, and this is one picture");
+    if (options.overwrite) throw UsageError("--overwrite needs a sequence; a single image always replaces the file");
+    if (!options.sequence_cache.empty())
+      throw UsageError("--sequence-cache needs a sequence, but this is a single image");
     return std::nullopt;
   }
-  if (options.info) throw UsageError("--info is of one file, and '" + volume->text() + "' are many");
+  if (options.info) throw UsageError("--info needs a single file, but '" + volume->text() + "' is a sequence");
   volume->adopt_padding();
   const std::vector<Frame> there = volume->frames_there();
-  if (there.empty()) throw std::runtime_error(volume->text() + ": no file of such a name is there");
+  if (there.empty()) throw std::runtime_error(volume->text() + ": no matching file exists");
   std::vector<Moment> frames = options.frames;
   if (frames.empty() && options.scene.sequence.frame) frames = {*options.scene.sequence.frame};
   if (frames.empty()) frames.assign(there.begin(), there.end());
@@ -130,7 +131,7 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
     planned.checkpoint = checkpoint.of(frame);
     if (same_file(planned.checkpoint, planned.output) || same_file(planned.checkpoint, planned.stats) ||
         same_file(planned.stats, planned.output)) {
-      throw UsageError("frame " + frame.text() + ": --output, --stats and --checkpoint shall be files of their own");
+      throw UsageError("frame " + frame.text() + ": --output, --stats and --checkpoint must be different files");
     }
   }
   std::vector<std::string> files;

@@ -199,7 +199,7 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
 
 std::optional<std::string> up_hint(const SceneVolume& volume) {
   if (!volume.is_shown() || volume.up != UpAxis::y || !is_z_up(volume.volume)) return std::nullopt;
-  return volume.volume + ": its metadata says Blender or Mantaflow, whose up axis is Z: try --up z";
+  return volume.volume + ": written by Blender or Mantaflow, whose up axis is Z: try --up z";
 }
 
 }  // namespace cumulet::demo

@@ -126,7 +126,7 @@ Backend backend_of(cumulet::demo::BackendChoice choice) {
 }
 
 void check_not_interrupted() {
-  if (interrupted) throw std::runtime_error("interrupted before the first sample: nothing is written");
+  if (interrupted) throw std::runtime_error("interrupted before the first sample: no file is written");
 }
 
 void show_camera(const Viewer& viewer, const SceneOptions& scene) {
@@ -134,7 +134,7 @@ void show_camera(const Viewer& viewer, const SceneOptions& scene) {
   check(viewer, cumulet_get_camera(viewer.get(), &camera));
   const cumulet_status status = set_camera(camera, scene);
   cumulet_camera_release(camera);
-  if (status != CUMULET_OK) throw std::runtime_error("the camera is not usable");
+  if (status != CUMULET_OK) throw std::runtime_error("the camera is invalid");
 }
 
 /// Waits until the library's worker thread is done. Throws its error.
@@ -177,17 +177,16 @@ void tell_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
   if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) return;  // nothing visible
   std::array<char, 32> digits{};
   std::snprintf(digits.data(), digits.size(), "%g", scale);
-  tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8" +
+  tell(progress, std::string("density scale ") + digits.data() + " for a mean optical depth of 8" +
                      (ramped ? " before the ramp" : "") + " (--density-scale)");
 }
 
 void tell_fire(const cumulet_medium_desc& medium, Progress& progress) {
   std::array<char, 160> line{};
-  std::snprintf(line.data(), line.size(),
-                "it burns: shown as --preset %s with --flame-strength %g --blackbody %g (a medium that is not the "
-                "default ends that)",
-                medium.density_scale > 0.0 ? "explosion" : "fire", double{medium.flame_strength},
-                double{medium.blackbody});
+  std::snprintf(
+      line.data(), line.size(),
+      "the volume burns: using --preset %s --flame-strength %g --blackbody %g (set any medium option to disable this)",
+      medium.density_scale > 0.0 ? "explosion" : "fire", double{medium.flame_strength}, double{medium.blackbody});
   tell(progress, line.data());
 }
 
@@ -427,7 +426,7 @@ void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& p
   try {
     keep(viewer, options);
   } catch (const std::exception& error) {
-    tell(progress, std::string("warning: no checkpoint now: ") + error.what());
+    tell(progress, std::string("warning: the checkpoint was not written: ") + error.what());
   }
 }
 
@@ -443,10 +442,11 @@ void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint
   if (cumulet_restore_accumulation(viewer.get(), from.accumulation.data(), from.accumulation.size()) != CUMULET_OK)
     throw std::runtime_error(options.checkpoint + ": " + cumulet_last_error(viewer.get()));
   const std::string driver = driver_of(viewer);
-  tell(progress, options.output + ": goes on from " + options.checkpoint +
-                     (driver == from.driver ? ""
-                                            : ", which another driver made (" + from.driver +
-                                                  "): it will not be the same bits as of one alone"));
+  tell(progress,
+       options.output + ": resuming from " + options.checkpoint +
+           (driver == from.driver ? ""
+                                  : ", made with another driver (" + from.driver +
+                                        "); the result will not be bit-identical to an uninterrupted render"));
 }
 
 /// Renders until the image has all samples, the time limit is reached, or a signal interrupts it.
@@ -497,7 +497,7 @@ std::string network_of(const RenderOptions& options, Progress& progress) {
   try {
     return cumulet::demo::find_network(options.denoiser);
   } catch (const std::exception& error) {
-    tell(progress, std::string("denoised by --denoise fast: ") + error.what());
+    tell(progress, std::string("using --denoise fast: ") + error.what());
     return "";
   }
 }
@@ -579,8 +579,7 @@ class Studio {
     check(viewer_, cumulet_get_sequence_info(viewer_.get(), &info, nullptr, 0));
     const double position = static_cast<double>(next.part) / next.parts;
     if (info.is_displayed == 0 || std::abs(info.displayed_position - position) > 0.5 / next.parts)
-      throw std::runtime_error(next.volume +
-                               ": the moment before it could not be made, and another would stand for it");
+      throw std::runtime_error(next.volume + ": the interpolated frame before it could not be built");
   }
 
   void write(const RenderOptions& options) {
@@ -609,7 +608,7 @@ class Studio {
       std::array<char, 128> text{};
       std::snprintf(text.data(), text.size(), "%llu of %.0f samples", static_cast<unsigned long long>(stats.samples),
                     pixels * sampling.samples);
-      throw std::runtime_error(options.output + ": interrupted: holds the first " + text.data());
+      throw std::runtime_error(options.output + ": interrupted: contains the first " + text.data());
     }
     if (options.time_limit || sampling.noise_target_percent > 0.0f)
       tell_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress_);
@@ -640,7 +639,7 @@ class Studio {
     const double position = static_cast<double>(next.part) / next.parts;
     if (cumulet_sequence_set_playback(sequence.get(), &playback) != CUMULET_OK ||
         cumulet_sequence_set_frame(sequence.get(), position) != CUMULET_OK) {
-      throw std::runtime_error(scene.volume + ": cannot be played");
+      throw std::runtime_error(scene.volume + ": invalid playback settings");
     }
     check(viewer_, cumulet_set_sequence(viewer_.get(), sequence.get()));
   }
@@ -770,7 +769,8 @@ void render(const RenderOptions& options) {
   studio.choose_in_surfaces(options);
   const Traced traced = studio.trace(options, from);
   if (traced == Traced::stopped && !options.checkpoint.empty())
-    throw std::runtime_error(options.output + ": interrupted: the same command goes on from " + options.checkpoint);
+    throw std::runtime_error(options.output + ": interrupted: run the same command to resume from " +
+                             options.checkpoint);
   studio.write(options);
   if (traced == Traced::late && !options.checkpoint.empty()) {
     studio.keep_samples(options);
@@ -875,7 +875,7 @@ class Report {
   [[nodiscard]] std::string not_made(std::size_t place) const {
     std::vector<Moment> rest;
     for (std::size_t i = place; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
-    return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not made";
+    return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not rendered";
   }
   /// Throws if any frame failed.
   void end() const {

@@ -69,14 +69,14 @@ void check_memory(const RenderOptions& options, std::string_view renderer, std::
   });
   const std::uint64_t needed = memory.main + (software ? memory.gl : 0);
   if (!available || needed <= *available) return;
-  throw std::runtime_error(needs_text(options) + ": " + gib(*available) + " of main memory are free" +
-                           (software ? ", and this driver has no other" : ""));
+  throw std::runtime_error(needs_text(options) + ": " + gib(*available) + " of main memory are available" +
+                           (software ? ", and this software driver uses main memory" : ""));
 }
 
 std::string needs_text(const RenderOptions& options) {
   const PictureMemory memory = picture_memory(options);
-  return "a picture of " + std::to_string(options.scene.width) + "x" + std::to_string(options.scene.height) +
-         " needs " + gib(memory.gl) + " of OpenGL's memory and " + gib(memory.main) + " of main memory";
+  return "an image of " + std::to_string(options.scene.width) + "x" + std::to_string(options.scene.height) + " needs " +
+         gib(memory.gl) + " of GPU memory and " + gib(memory.main) + " of main memory";
 }
 
 }  // namespace cumulet::demo

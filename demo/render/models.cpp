@@ -94,7 +94,7 @@ void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models)
         check(cumulet_add_model(viewer, made), cumulet_last_error(viewer));
         shown_.push_back({std::move(model), {}, nullptr});
       } else {
-        check(cumulet_model_set(shown_[count].model.get(), &desc), (scene.file + ": its place cannot be").c_str());
+        check(cumulet_model_set(shown_[count].model.get(), &desc), (scene.file + ": its transform is invalid").c_str());
       }
     } catch (const std::runtime_error& error) {
       refusal = error.what();

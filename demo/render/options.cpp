@@ -105,7 +105,7 @@ CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& fla
       app, group, flag, list_names(names, "|"),
       [&app, flag, names, &target](const std::string& text) {
         const auto* const found = find_choice(app, flag, names, text);
-        if (found == nullptr) throw UsageError(in_quotes(text) + " is none of " + list_names(names, ", "));
+        if (found == nullptr) throw UsageError(in_quotes(text) + " is not one of " + list_names(names, ", "));
         target = static_cast<Target>(found->value);
       },
       help);
@@ -139,7 +139,7 @@ Value parse_count(const settings::Setting<Desc, Value>& setting, const std::stri
 template <class Desc, class Value>
 void parse_triple(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
   const std::array<double, 3> given = parse_three(text, setting.given_range());
-  if (setting.zero != 0.0 && settings::all_zero(given)) throw UsageError(in_quotes(text) + " is black");
+  if (setting.zero != 0.0 && settings::all_zero(given)) throw UsageError(in_quotes(text) + " must not be black");
   const bool complement = setting.spelling == settings::Spelling::complement;
   for (std::size_t i = 0; i < 3; ++i)
     value[i] = static_cast<std::remove_extent_t<Value>>(complement ? 1.0 - given[i] : given[i]);
@@ -236,7 +236,7 @@ void parse_sky_model(std::string_view text, cumulet_sun_sky_desc& light) {
   const auto take = [&](float cumulet_sun_sky_desc::*field, double number) {
     settings::with(field, [&](const auto& setting) {
       if (!setting.given_range().holds(number))
-        throw UsageError("the " + std::string(setting.row.label) + " " + setting.given_range().refusal());
+        throw UsageError(std::string(setting.row.label) + " " + setting.given_range().refusal());
     });
     light.*field = static_cast<float>(number);
   };
@@ -250,7 +250,7 @@ settings::RampPoints parse_ramp(std::string_view text) {
   if (text == "none") return points;
   for (const std::string_view point : split(text, ',')) {
     const std::vector<std::string_view> pair = split(point, ':');
-    if (pair.size() != 2) throw UsageError(in_quotes(point) + " is not a value and what it becomes, such as 0.5:1");
+    if (pair.size() != 2) throw UsageError(in_quotes(point) + " is not a pair INPUT:OUTPUT, such as 0.5:1");
     points.push_back({static_cast<float>(parse_number(pair[0])), static_cast<float>(parse_number(pair[1]))});
   }
   const std::string why = settings::ramp_refusal(points);
@@ -295,13 +295,13 @@ cumulet_light_desc parse_analytic_light(const CLI::App& app, std::string_view te
   const std::string_view kind = parts.empty() ? std::string_view{} : parts.front();
   const auto* const named = find_choice(app, "--light", settings::analytic_light_choices, kind);
   if (named == nullptr)
-    throw UsageError(in_quotes(kind) + " is none of " + list_names(settings::analytic_light_choices, ", "));
+    throw UsageError(in_quotes(kind) + " is not one of " + list_names(settings::analytic_light_choices, ", "));
   analytic_light.kind = static_cast<cumulet_light_kind>(named->value);
   std::set<std::string_view> given;
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::size_t equals = parts[i].find('=');
     if (equals == std::string_view::npos)
-      throw UsageError(in_quotes(parts[i]) + " is not a key and its value, such as power=100");
+      throw UsageError(in_quotes(parts[i]) + " is not KEY=VALUE, such as power=100");
     std::string_view key = parts[i].substr(0, equals);
     if (key == "across") {
       key = "tangent";
@@ -315,7 +315,7 @@ cumulet_light_desc parse_analytic_light(const CLI::App& app, std::string_view te
     } catch (const UsageError& error) {
       throw UsageError(std::string(key) + ": " + error.what());
     }
-    if (!known) throw UsageError("lights have no " + in_quotes(key));
+    if (!known) throw UsageError("lights have no setting " + in_quotes(key));
   }
   if (const auto refusal = settings::analytic_light_refusal(analytic_light))
     throw UsageError(std::string(refusal->name) + " " + refusal->cause);
@@ -340,10 +340,10 @@ void add_analytic_lights(CLI::App& app, const char* group, std::vector<cumulet_l
   };
   app.add_option_function<std::vector<std::string>>(
          "--light", take,
-         "A light, as often as there are lights: point, spot, disk, rect or distant, such as \"disk position=0,30,10 "
-         "power=20000 width=4\"; the keys are those of a scene file's lights: position, direction, tangent, color, "
-         "power (watts; of a distant light W/m2), width, height, angle_degrees, blend, group. Added to the scene's; "
-         "none: removes those before it")
+         "Add a light: point, spot, disk, rect or distant, such as \"disk position=0,30,10 power=20000 width=4\"; can "
+         "be repeated. Keys as in scene files: position, direction, tangent, color, power (watts; for a distant light "
+         "W/m2), width, height, angle_degrees, blend, group. Lights are added to those of the scene; none removes all "
+         "lights so far")
       ->type_name("\"KIND KEY=VALUE ...\"|none")
       ->group(group)
       ->expected(1)
@@ -380,7 +380,7 @@ OutputFormat format_of(const std::string& path) {
   if (ending == "png") return OutputFormat::png;
   if (ending == "exr") return OutputFormat::exr;
   if (ending == "pfm") return OutputFormat::pfm;
-  throw UsageError(in_quotes(path) + " ends in none of .png, .exr, .pfm");
+  throw UsageError(in_quotes(path) + " does not end in .png, .exr or .pfm");
 }
 
 /// Formats help for a terminal of 100 columns, with line breaks between words.
@@ -436,7 +436,7 @@ double parse_number(std::string_view text) {
 std::vector<double> parse_numbers(std::string_view text, std::size_t count) {
   const std::vector<std::string_view> parts = split(text, ',');
   if (parts.size() != count)
-    throw UsageError(in_quotes(text) + " is not " + std::to_string(count) + " numbers between commas");
+    throw UsageError(in_quotes(text) + " is not " + std::to_string(count) + " numbers separated by commas");
   std::vector<double> values;
   values.reserve(parts.size());
   for (const std::string_view part : parts) values.push_back(parse_number(part));
@@ -458,7 +458,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   // This flag must be added first: flags take effect in the order of addition, and all others override the file.
   add(
       app, group, "--scene", "FILE.json", [&](const std::string& text) { scene = load_scene(text); },
-      "Scene file, as cumulet-demo saves it; the other flags override what it says");
+      "Scene file, for example saved by cumulet-demo; other flags override its settings");
   add(
       app, group, "--scene-camera", "NAME",
       [&](const std::string& text) {
@@ -468,49 +468,50 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
           throw UsageError(error.what());
         }
       },
-      "Look through this one of the scene's cameras");
+      "Use this camera of the scene");
   add(
       app, group, "--volume", "FILE",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
         scene.volume = text;
       },
-      "OpenVDB or NanoVDB file (.vdb, .nvdb); cumulet-render: or a sequence of them, name.####.vdb");
+      "OpenVDB or NanoVDB file (.vdb, .nvdb), or a sequence such as name.####.vdb");
   add(
       app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
-      "Grid to show (default: density, else the likeliest)");
+      "Density grid (default: density, else the most likely grid)");
   add(
       app, group, "--temperature-grid", "NAME", [&](const std::string& text) { scene.temperature_grid = text; },
-      "Its temperature (default: by name; none)");
+      "Temperature grid; none: not used (default: found by name)");
   add(
       app, group, "--flame-grid", "NAME", [&](const std::string& text) { scene.flame_grid = text; },
-      "Its flame (default: by name; none)");
+      "Flame grid; none: not used (default: found by name)");
   add(
       app, group, "--color-grid", "NAME", [&](const std::string& text) { scene.color_grid = text; },
-      "What colours it (default: by name; none)");
+      "Color grid; none: not used (default: found by name)");
   add(
       app, group, "--anisotropy-grid", "NAME", [&](const std::string& text) { scene.anisotropy_grid = text; },
-      "Its anisotropy, in place of --anisotropy (default: by name; none)");
+      "Anisotropy grid, replaces --anisotropy; none: not used (default: found by name)");
   add(
       app, group, "--velocity-grid", "NAME", [&](const std::string& text) { scene.velocity_grid = text; },
-      "How it moves, for --aovs velocity and --shutter (default: by name; none)");
-  add_choice(app, group, "--up", up_names, scene.up, "The volume's up axis (default: y; Blender's and Mantaflow's: z)");
+      "Velocity grid, for --aovs velocity and --shutter; none: not used (default: found by name)");
+  add_choice(app, group, "--up", up_names, scene.up,
+             "Up axis of the volume (default: y; use z for Blender and Mantaflow)");
   add(
       app, group, "--gltf", "FILE",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
         scene.surfaces = text;
       },
-      "glTF 2.0 scene (.gltf, .glb) around and in the volume");
+      "Surfaces: a glTF 2.0 file (.gltf, .glb)");
   add(
       app, group, "--gltf-variant", "NAME|N", [&](const std::string& text) { scene.surface_variant = text; },
-      "Which variant of its materials, by name or from 0 (default: none); --info lists them");
+      "Material variant, by name or index from 0 (default: none); --info lists them");
   add(
       app, group, "--gltf-camera", "N",
       [&](const std::string& text) {
         scene.surface_camera = static_cast<std::int32_t>(parse_integer(text, 0, 1000000));
       },
-      "Look through this camera of the file, from 0");
+      "Use this camera of the glTF file, by index from 0");
   add_settings(app, group, scene.surface);
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
@@ -533,10 +534,10 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         const auto* found = std::find_if(preset_choices.begin(), preset_choices.end(),
                                          [&](const settings::Choice& choice) { return text == choice.name; });
         if (found == preset_choices.end())
-          throw UsageError(in_quotes(text) + " is none of " + list_names(preset_choices, ", "));
+          throw UsageError(in_quotes(text) + " is not one of " + list_names(preset_choices, ", "));
         apply(static_cast<Preset>(found->value), scene.medium);
       },
-      "A medium, but for its density scale; the other flags override what it says");
+      "Medium preset; does not set the density scale; other flags override its settings");
   add_settings(app, "Medium", scene.medium, take_auto);
   for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
     add(
@@ -544,11 +545,11 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
   }
 
-  group = "Light (default: a clear day; given sun, sky, environment or lights, the others are dark)";
+  group = "Light (default: a clear day; if sun, sky, environment or lights are given, the others are off)";
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
-      "Degrees from +Z towards +X and above the horizon; irradiance, which a --sky-model gives by itself");
+      "Sun: azimuth from +Z towards +X and elevation in degrees; irradiance, which can be omitted with --sky-model");
   add_settings(app, group, scene.light);
   add(
       app, group, "--env", "FILE",
@@ -556,13 +557,13 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         if (text.empty()) throw UsageError("the file's name is empty");
         scene.set_environment(text);
       },
-      "Environment, an equirectangular .hdr or .exr picture or an .exr cube map, instead of the sky; +Y is up, its "
-      "middle is +Z");
+      "Environment map (HDRI) instead of the sky: an equirectangular .hdr or .exr image, or an .exr cube map; +Y is "
+      "up, the center is +Z");
   add_settings(app, group, scene.environment_settings);
   add(
       app, group, "--sky-model", "\"turbidity,ground_albedo\"",
       [&](const std::string& text) { parse_sky_model(text, scene.light); },
-      "A clear day's sun and sky: from 1 (no aerosols) over 3 (clear) to 10, and what the ground sends back, 0 to 1");
+      "Physical sun and sky: turbidity from 1 (no aerosols) to 10, 3 is clear; and ground albedo from 0 to 1");
   add_analytic_lights(app, group, scene.analytic_lights);
   add_settings(app, group, scene.ground);
   add_settings(app, "Grid", scene.grid);
@@ -570,13 +571,13 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   group = "Picture";
   add(
       app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
-      "Pixels (default: 1280x720)");
+      "Image size in pixels (default: 1280x720)");
   add_settings(app, group, scene.sampling);
   add(
       app, group, "--light-groups", "NAME,...|none",
       [&](const std::string& text) { scene.light_groups = parse_light_groups(text); },
-      "Keep what groups of lights bring apart, named from group 0 on, up to 8: layers Combined_NAME of an .exr, which "
-      "together are the picture; lights of other groups count in the first (default: none)");
+      "Names of up to 8 light groups, starting with group 0. Each is written as a layer Combined_NAME of an .exr; "
+      "their sum is the image. Lights of unnamed groups are added to group 0 (default: none)");
   const auto choose_color = [&scene](std::string_view flag, const std::string&) {
     if (flag == "--background-color") scene.display.background = CUMULET_BACKGROUND_COLOR;
     return false;
@@ -602,7 +603,7 @@ FileKind kind_of(const std::string& path) {
   if (head.rfind("glTF", 0) == 0) return FileKind::surfaces;
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
-  throw UsageError(in_quotes(path) + " is no volume (.vdb, .nvdb), no glTF (.gltf, .glb) and no scene (.json)");
+  throw UsageError(in_quotes(path) + " is not a volume (.vdb, .nvdb), glTF file (.gltf, .glb) or scene (.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
@@ -612,7 +613,9 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
       std::array<std::string, 3> of_kind;
       for (const std::string& file : files) {
         std::string& place = of_kind[static_cast<std::size_t>(kind_of(file))];
-        if (!place.empty()) throw UsageError(in_quotes(file) + " is given as well as " + in_quotes(place));
+        if (!place.empty())
+          throw UsageError(in_quotes(place) + " and " + in_quotes(file) +
+                           " are files of the same kind; only one is allowed");
         place = file;
       }
       const auto& [volume, surfaces, scene_file] = of_kind;
@@ -625,7 +628,7 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
     }
   };
   app.add_option_function<std::vector<std::string>>(
-         "files", take, "A volume (.vdb, .nvdb), surfaces (.gltf, .glb), a scene (.json): one of each")
+         "files", take, "Volume (.vdb, .nvdb), surfaces (.gltf, .glb) or scene (.json); at most one of each")
       ->type_name("FILE");
 }
 
@@ -651,7 +654,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
   if (app.count("--sky") > 0) scene.light.sky = CUMULET_SKY_CONSTANT;
   if (app.count("--sun") > 0 && scene.light.sky == CUMULET_SKY_CONSTANT) {
     const std::string sun = app.get_option("--sun")->results().back();
-    if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
+    if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " needs an irradiance, or --sky-model");
   }
   const bool analytic_lights_alone = !scene.analytic_lights.empty() && app.count("--sky-model") == 0;
   if (!files.scene && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
@@ -667,12 +670,12 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
   }
   if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
   if (app.count("--ground-height") > 0 && scene.ground.mode != CUMULET_GROUND_AT_HEIGHT)
-    throw UsageError("--ground-height needs a ground at a height, which it makes without --ground");
+    throw UsageError("--ground-height needs --ground at-height");
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {
   const std::string version = app.get_name() + " " + version_text();
-  app.set_help_flag("-h,--help", "Show this and exit");
+  app.set_help_flag("-h,--help", "Show this help and exit");
   app.set_version_flag("--version", version, "Show the version and exit");
   app.formatter(std::make_shared<HelpFormatter>());
   if (arguments == std::vector<std::string>{"--option-table"}) {
@@ -704,28 +707,28 @@ constexpr std::uint32_t max_samples = 65536;
 // Checks that an image with --first-sample can be merged with others.
 void check_part(const RenderOptions& options, bool part) {
   if (!part) return;
-  if (options.format != OutputFormat::exr) throw UsageError("--first-sample needs an .exr to write to");
+  if (options.format != OutputFormat::exr) throw UsageError("--first-sample needs an .exr output");
   if (options.scene.sampling.view != CUMULET_VIEW_SHADED) throw UsageError("--first-sample needs the shaded view");
-  if (options.denoise != Denoise::off) throw UsageError("--first-sample makes a part, which --denoise is not of");
+  if (options.denoise != Denoise::off) throw UsageError("--first-sample cannot be combined with --denoise");
   if (options.time_limit || options.scene.sampling.noise_target_percent > 0.0f)
-    throw UsageError("--first-sample needs as many samples as --spp says: no time limit, no noise target");
+    throw UsageError("--first-sample cannot be combined with --time-limit or --noise-target");
   const auto last = std::uint64_t{options.scene.sampling.first_sample} + options.scene.sampling.samples;
-  if (last > std::uint64_t{1} << 32U) throw UsageError("--first-sample: the samples go beyond number 4294967295");
+  if (last > std::uint64_t{1} << 32U) throw UsageError("--first-sample: the last sample number exceeds 4294967295");
 }
 
 // Checks combinations of flags. part: --first-sample is given.
 void check_together(const RenderOptions& options, bool part) {
   if (is_empty(options.scene)) throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
-  if (options.json && !options.info) throw UsageError("--json is for --info");
+  if (options.json && !options.info) throw UsageError("--json needs --info");
   if (options.info) return;
   if (options.output.empty()) throw UsageError("--output is required");
-  if (options.has_layers() && options.format != OutputFormat::exr) throw UsageError("--aovs needs an .exr to write to");
+  if (options.has_layers() && options.format != OutputFormat::exr) throw UsageError("--aovs needs an .exr output");
   if (options.has_layers() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--aovs needs the shaded view");
   if (options.denoise != Denoise::off && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--denoise needs the shaded view");
   if (options.denoise != Denoise::off && options.scene.surface.lighting == CUMULET_SURFACE_LIGHTING_RASTERIZED)
-    throw UsageError("--denoise needs surfaces that paths meet, not --surface-lighting rasterized");
+    throw UsageError("--denoise cannot be combined with --surface-lighting rasterized");
   check_part(options, part);
   if (!options.checkpoint.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--checkpoint needs the shaded view");
@@ -759,12 +762,13 @@ bool same_file(const std::string& a, const std::string& b) {
 
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
   RenderOptions options;
-  CLI::App app("Path-traces a volume into a picture, without a display.", "cumulet-render");
+  CLI::App app("Path-traces a volume to an image file, without a display.", "cumulet-render");
   app.footer(
-      "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.\n"
-      "Ctrl-C writes the samples so far and exits 1; a second one stops at once.\n"
-      "Of a sequence each frame is told in a line: frame 12 (3 of 20) done|kept|failed FILE...; those that\n"
-      "cannot be read fail, the others are made, and it exits 1. Ctrl-C leaves the one under way unwritten.");
+      "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.\n"
+      "Ctrl-C writes the samples so far and exits with 1; a second Ctrl-C stops at once.\n"
+      "For a sequence, one line per frame is printed: frame 12 (3 of 20) done|kept|failed FILE...\n"
+      "Frames that cannot be read fail, and the others are rendered; the exit status is then 1.\n"
+      "Ctrl-C does not write the current frame of a sequence.");
   // Added before the flags, which override the scene.
   bool lit = false;
   add_files(app, options.scene, lit);
@@ -777,14 +781,15 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.format = format_of(text);
         options.output = text;
       },
-      ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance; of a sequence name.####.exr");
+      "Output file. .png is exposed and tone-mapped; .exr and .pfm contain linear radiance. For a sequence: "
+      "name.####.exr");
   add(
       app, group, "--frames", "A-BxS,...", [&](const std::string& text) { options.frames = parse_frames(text); },
-      "Frames of the sequence that the volume's name stands for, by ####, %04d, $F4 or <frame04>, or is a file of: "
-      "such as 5, 1-100, 1-100x2, -2-2, 1-3,7 or 1-10x0.5, with what is between two of them (default: all that are "
-      "there)");
+      "Frames of the sequence, such as 5, 1-100, 1-100x2, -2-2, 1-3,7 or 1-10x0.5 (fractional frames are interpolated; "
+      "default: the frame of the scene, else all existing files). The volume's name is a pattern with ####, %04d, $F4 "
+      "or <frame04>, or a file of the sequence");
   add_settings(app, group, options.scene.sequence.playback);
-  app.add_flag("--overwrite", options.overwrite, "Make frames anew that are there already, which are kept else")
+  app.add_flag("--overwrite", options.overwrite, "Re-render frames whose output exists (default: skip them)")
       ->group(group);
   add(
       app, group, "--sequence-cache", "FILE",
@@ -792,10 +797,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         if (text.empty()) throw UsageError("the file's name is empty");
         options.sequence_cache = text;
       },
-      "Keep what all frames of a sequence have in common, and flags do not say, in this file: later runs need not read "
-      "the volume that it is taken from, as long as that is the same by size and time");
-  app.add_flag("--info", options.info, "Tell what is in the files, and render nothing")->group(group);
-  app.add_flag("--json", options.json, "The same as JSON")->group(group);
+      "Cache values shared by all frames (density scale, camera, ground height) in this file, so that later runs need "
+      "not read the reference frame; it is read again if its size or modification time has changed");
+  app.add_flag("--info", options.info, "Describe the contents of the files; render nothing")->group(group);
+  app.add_flag("--json", options.json, "Write --info as JSON")->group(group);
   add(
       app, group, "--aovs", "NAME,...|all",
       [&](const std::string& text) {
@@ -810,26 +815,26 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
           }
           const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.name; });
           if (!known && !mattes)
-            throw UsageError(in_quotes(part) + " is none of all, " + list_names(aov_names, ", ") + ", " +
+            throw UsageError(in_quotes(part) + " is not one of all, " + list_names(aov_names, ", ") + ", " +
                              cryptomatte_name);
         }
       },
-      "Layers that an .exr gets beside the picture: volume, transmittance, depth, volume_depth, normal, albedo, "
-      "error, velocity, backward, volume_backward, cryptomatte");
+      "Additional layers (AOVs) of an .exr: volume, transmittance, depth, volume_depth, normal, albedo, error, "
+      "velocity, backward and volume_backward (motion vectors), cryptomatte");
   add(
       app, group, "--stats", "FILE.json",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
         options.stats = text;
       },
-      "What was built and how long it took, in SI units");
+      "Write statistics and timings in SI units");
   add(
       app, group, "--trace", "FILE.json",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
         options.trace = text;
       },
-      "When frames, their passes and the workers' jobs ran, for chrome://tracing and Perfetto");
+      "Write a trace of frames, passes and worker jobs for chrome://tracing and Perfetto");
   add(
       app, group, "--time-limit", "SECONDS",
       [&](const std::string& text) {
@@ -837,62 +842,63 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         if (!(seconds > 0.0)) throw UsageError(text + " is not above 0");
         options.time_limit = seconds;
       },
-      "Stop after this long, loading left out, but not before each pixel has a sample");
+      "Stop after this time (loading does not count), but not before each pixel has a sample");
   add(
       app, group, "--gpu-memory", "MIB",
       [&](const std::string& text) {
         constexpr unsigned mebibyte = 20;
         options.gpu_memory = parse_integer(text, 1, std::uint64_t{1} << 40U) << mebibyte;
       },
-      "GL memory: grids are as coarse as it takes beside what there is (default: no limit)");
+      "GPU memory limit in MiB; grids are coarsened to fit (default: no limit)");
   add(
       app, group, "--first-sample", "N",
       [&](const std::string& text) {
         options.scene.sampling.first_sample =
             static_cast<std::uint32_t>(parse_integer(text, 0, std::numeric_limits<std::uint32_t>::max()));
       },
-      "Make a part of a picture: of each pixel the --spp samples from number N on, from 0; cumulet-merge puts the .exr "
-      "files of parts together");
+      "Render only the samples N to N + SPP - 1 of each pixel, counted from 0; cumulet-merge joins the .exr files");
   add(
       app, group, "--checkpoint", "FILE",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
         options.checkpoint = text;
       },
-      "Keep what samples have come to in this file, when stopped and now and then: the same command goes on from "
-      "there, and removes it when the picture is written; of a sequence name.####");
+      "Save the accumulated samples to FILE periodically and on interruption; the same command resumes from it and "
+      "deletes it when the image is written. For a sequence: name.####");
   add(
       app, group, "--checkpoint-every", "SECONDS",
       [&](const std::string& text) {
         options.checkpoint_every = parse_number(text);
         if (!(options.checkpoint_every > 0.0)) throw UsageError(text + " is not above 0");
       },
-      "How often (default: 300)");
+      "Seconds between checkpoints (default: 300)");
   // The scene's own setting is for interactive windows.
   app.remove_option(app.get_option("--denoise"));
   add_choice(app, group, "--denoise",
              std::array{Name{"off", Denoise::off}, Name{"fast", Denoise::fast}, Name{"high", Denoise::high}},
              options.denoise,
-             "Take the noise away: fast by a filter, high by a network of Open Image Denoise, or fast without one; an "
-             ".exr gets a layer `denoised` (default: off)");
+             "Denoise: fast (filter) or high (Open Image Denoise network; fast if there is no network). An .exr gets "
+             "an additional layer `denoised` (default: off)");
   add(
       app, group, "--oidn-weights", "DIR",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the folder's name is empty");
         options.denoiser = text;
       },
-      "Where its networks are (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below $XDG_DATA_HOME)");
+      "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
+      "$XDG_DATA_HOME)");
   add(
       app, group, "--shader-cache", "DIR",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the folder's name is empty");
         options.shader_cache = text;
       },
-      "Keep what the driver made of shaders in this folder, for the next run");
+      "Cache compiled shaders in this folder");
   add_choice(app, group, "--backend",
              std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
                         Name{"osmesa", BackendChoice::osmesa}},
-             options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
+             options.backend,
+             "How to create the OpenGL context without a display (default: auto, which tries EGL, then OSMesa)");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});
@@ -901,7 +907,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = max_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
-    throw UsageError("--light-groups needs an .exr to write to");
+    throw UsageError("--light-groups needs an .exr output");
   check_together(options, app.count("--first-sample") > 0);
   // Like every scene setting, it changes the scene hash in the file.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;

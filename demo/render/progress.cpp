@@ -87,9 +87,9 @@ std::string ending_line(Ending ending, std::optional<double> noise, double sampl
   };
   std::string line = "noise " + (noise ? number("%.3g", 100.0 * *noise) + " %" : std::string("unknown"));
   if (target_percent > 0.0) line += " (target " + number("%g", target_percent) + " %)";
-  line += " after " + number("%.4g", samples) + (samples == 1.0 ? " sample a pixel" : " samples a pixel");
-  if (ending == Ending::samples) line += ", the most that one may have";
-  if (ending == Ending::time && limit) line += ", at the time limit of " + number("%g", *limit) + " s";
+  line += " after " + number("%.4g", samples) + (samples == 1.0 ? " sample per pixel" : " samples per pixel");
+  if (ending == Ending::samples) line += ", the maximum";
+  if (ending == Ending::time && limit) line += ", stopped at the time limit of " + number("%g", *limit) + " s";
   return line;
 }
 

@@ -130,28 +130,29 @@ struct Wanted {
 std::optional<Wanted> parse(std::vector<std::string> arguments) {
   Wanted wanted;
   CLI::App app(
-      "Writes Cumulet's sample scene: cumulus.vdb (density), mountains.glb (the ground, a tower) and sample.json, "
-      "which shows both; and explosion_0001.vdb to explosion_0020.vdb (density, temperature, flame) and "
-      "sample_explosion.json, which shows one of them.",
+      "Writes Cumulet's sample scenes. sample.json shows cumulus.vdb (density) and mountains.glb (landscape and "
+      "tower); sample_explosion.json shows a frame of explosion_0001.vdb to explosion_0020.vdb (density, temperature, "
+      "flame).",
       "cumulet-scene");
-  app.footer("Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.");
-  app.add_option("OUT_DIR", wanted.folder, "Folder to write to, made if it is missing")->required()->type_name("DIR");
-  app.add_flag("--full", wanted.full, "The detailed setting: over 20 million active voxels in the cumulus");
-  app.add_option("--voxels", wanted.voxels, "About how many active voxels, in place of the setting's")
+  app.footer("Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.");
+  app.add_option("OUT_DIR", wanted.folder, "Output folder; created if it does not exist")->required()->type_name("DIR");
+  app.add_flag("--full", wanted.full, "High detail: over 20 million active voxels in the cumulus");
+  app.add_option("--voxels", wanted.voxels, "Approximate number of active voxels; overrides --full")
       ->check(CLI::Range(1000.0, 1e9).description(""))
       ->type_name("N");
-  app.add_option("--seed", wanted.seed, "Another cloud, other mountains, another explosion (default: 1)")
+  app.add_option("--seed", wanted.seed, "Random seed for the shapes of cloud, mountains and explosion (default: 1)")
       ->type_name("S");
-  app.add_option("--only", wanted.only, "Write one of them")
+  app.add_option("--only", wanted.only, "Write only this part of the sample scenes")
       ->check(CLI::IsMember({"cumulus", "mountains", "explosion"}).description(""))
       ->type_name("cumulus|mountains|explosion");
   app.add_option("--frame", wanted.frame,
-                 "Write this frame of the explosion alone (the scene file then shows it, else 12)")
+                 "Write only this frame of the explosion; the scene file shows it (default: all frames; the scene file "
+                 "shows 12)")
       ->check(CLI::Range(1, cumulet::scene::explosion_frames).description(""))
       ->type_name("N");
   if (!cumulet::demo::parse_arguments(app, std::move(arguments), std::cout)) return std::nullopt;
   if (wanted.frame > 0 && !wanted.only.empty() && wanted.only != "explosion")
-    throw cumulet::demo::UsageError("--frame is of the explosion, which --only " + wanted.only + " leaves out");
+    throw cumulet::demo::UsageError("--frame needs the explosion, but --only " + wanted.only + " excludes it");
   return wanted;
 }
 

@@ -11,14 +11,15 @@ namespace cumulet::demo {
 enum class Preset { cumulus, smoke, fire, explosion, ground_fog };
 
 inline constexpr std::array preset_choices = {
-    settings::Choice{"cumulus", static_cast<int>(Preset::cumulus), "Cumulus", "Droplets that absorb nothing: white."},
-    settings::Choice{"smoke", static_cast<int>(Preset::smoke), "Smoke", "Grey, a little forward."},
+    settings::Choice{"cumulus", static_cast<int>(Preset::cumulus), "Cumulus",
+                     "Water droplets without absorption: white."},
+    settings::Choice{"smoke", static_cast<int>(Preset::smoke), "Smoke", "Gray smoke with slight forward scattering."},
     settings::Choice{"fire", static_cast<int>(Preset::fire), "Fire",
-                     "Bright flames by the flame and temperature grids, thin smoke."},
+                     "Bright flames from the flame and temperature grids, thin smoke."},
     settings::Choice{"explosion", static_cast<int>(Preset::explosion), "Explosion",
-                     "Dark soot, and what glows in its seams."},
+                     "Dark soot with emission from its seams."},
     settings::Choice{"ground-fog", static_cast<int>(Preset::ground_fog), "Ground fog",
-                     "Small droplets: soft and pale."}};
+                     "Small water droplets: soft and pale."}};
 
 /// Sets all of the medium except the density scale, which belongs to the volume. The emission suits volumes of about
 /// ten world units.

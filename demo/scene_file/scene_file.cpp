@@ -90,7 +90,7 @@ struct PlaceParts {
 class Reader {
  public:
   Reader(std::string file, Json json) : file_(std::move(file)), json_(std::move(json)) {
-    if (!json_.is_object()) fail(file_, "the file is not an object");
+    if (!json_.is_object()) fail(file_, "the file is not a JSON object");
   }
 
   void set_format(SceneFormat format) { format_ = format; }
@@ -103,7 +103,7 @@ class Reader {
     if (found == json_.end()) return 0;
     if (!found->is_array()) wrong(key, "is not a list");
     if (found->size() > most)
-      wrong(key, "are " + std::to_string(found->size()) + ": this program shows " + std::to_string(most));
+      wrong(key, "has " + std::to_string(found->size()) + " elements; the limit is " + std::to_string(most));
     sections_.insert(key);
     return found->size();
   }
@@ -111,9 +111,9 @@ class Reader {
   void text(const std::string& key, std::string& out) {
     const std::optional<Json> value = take(key);
     if (!value) return;
-    if (!value->is_string()) wrong(key, "is not a text");
+    if (!value->is_string()) wrong(key, "is not a string");
     out = value->get<std::string>();
-    if (out.find('\0') != std::string::npos) wrong(key, "holds a zero byte");
+    if (out.find('\0') != std::string::npos) wrong(key, "contains a zero byte");
   }
 
   [[nodiscard]] bool is_text(const std::string& key) {
@@ -151,7 +151,7 @@ class Reader {
       if (chosen == value_in(SceneFormat::second, name)) wrong(key, "'" + chosen + "' is now '" + name.name + "'");
       list += (list.empty() ? "" : ", ") + std::string(spelled);
     }
-    wrong(key, "'" + chosen + "' is none of " + list);
+    wrong(key, "'" + chosen + "' is not one of " + list);
   }
 
   /// Returns true if the key exists. The range is also checked after conversion, because a float may be rounded.
@@ -191,9 +191,9 @@ class Reader {
     const std::optional<Json> value = take(key);
     if (!value) return;
     if (!value->is_array()) wrong(key, "is not a list");
-    if (value->empty()) wrong(key, "is empty: without it the volume stands once");
+    if (value->empty()) wrong(key, "is empty: remove it for a single instance");
     if (value->size() > max_places)
-      wrong(key, "are " + std::to_string(value->size()) + ": this program shows " + std::to_string(max_places));
+      wrong(key, "has " + std::to_string(value->size()) + " elements; the limit is " + std::to_string(max_places));
     for (std::size_t i = 0; i < value->size(); ++i) {
       const Json& one = (*value)[i];
       const std::string where = key + "[" + std::to_string(i) + "]";
@@ -226,7 +226,7 @@ class Reader {
     if (!value->is_array()) wrong(key, "is not a list of names");
     out.clear();
     for (const Json& name : *value) {
-      if (!name.is_string()) wrong(key, "has a name that is not a text");
+      if (!name.is_string()) wrong(key, "has a name that is not a string");
       out.push_back(name.get<std::string>());
     }
   }
@@ -358,7 +358,7 @@ bool read_pose(Reader& reader, const std::string& of, bool is_end, cumulet_camer
   if ((eye || target) && std::equal(desc.eye, desc.eye + 3, desc.target))
     reader.wrong(of + "target", "is the same point as the eye");
   if (reader.three(of + "up", desc.up) && std::equal(desc.up, desc.up + 3, std::array{0.0, 0.0, 0.0}.begin()))
-    reader.wrong(of + "up", "has no direction");
+    reader.wrong(of + "up", "is zero");
   reader.number(of + "fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
   reader.number(of + "orthographic_height", desc.orthographic_height, settings::not_negative);
   return eye;
@@ -372,11 +372,11 @@ void read_camera(Reader& reader, SceneFormat format, const std::string& of, Scen
   if (format == SceneFormat::first) return;
   const auto end = [&](const std::string& key, std::optional<cumulet_camera_desc>& pose) {
     if (!reader.has(key)) return;
-    if (!placed) reader.wrong(key, "is of a camera that has no eye and no target");
+    if (!placed) reader.wrong(key, "needs a camera with eye and target");
     pose = out.camera;
     read_pose(reader, key + ".", true, *pose);
     if ((pose->orthographic_height > 0.0) != (out.camera.orthographic_height > 0.0))
-      reader.wrong(key + ".orthographic_height", "is of another projection than the camera's");
+      reader.wrong(key + ".orthographic_height", "has another projection than the camera");
   };
   end(of + "open", out.camera_open);
   end(of + "close", out.camera_close);
@@ -391,7 +391,7 @@ void read_named_cameras(Reader& reader, std::vector<NamedCamera>& cameras) {
     if (!reader.has(of + "name")) reader.wrong(of + "name", "is missing");
     reader.text(of + "name", name);
     if (name.empty()) reader.wrong(of + "name", "is empty");
-    if (!known.insert(name).second) reader.wrong(of + "name", "\"" + name + "\" is another camera's, too");
+    if (!known.insert(name).second) reader.wrong(of + "name", "\"" + name + "\" is also the name of another camera");
     read_camera(reader, SceneFormat::third, of, cameras[i]);
   }
 }
@@ -428,7 +428,7 @@ void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting,
     if (!reader.three(key, complement, range)) return;
     for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(1.0 - complement[i]);
   } else if (reader.three(key, value, range) && setting.zero != 0.0 && settings::all_zero(value)) {
-    reader.wrong(key, "is black");
+    reader.wrong(key, "must not be black");
   }
 }
 
@@ -460,7 +460,7 @@ void read_place(Reader& reader, const std::string& of, Matrix& to_world) {
   bool parts = reader.three(of + "translate", place.translate);
   parts = reader.three(of + "rotate_degrees", place.degrees) || parts;
   parts = reader.three(of + "scale", place.scale, settings::above_zero) || parts;
-  if (whole && parts) reader.wrong(of + "to_world", "is given beside translate, rotate_degrees or scale");
+  if (whole && parts) reader.wrong(of + "to_world", "cannot be combined with translate, rotate_degrees or scale");
   if (parts) to_world = place.matrix();
 }
 
@@ -488,7 +488,8 @@ SceneFormat read_version(Reader& reader) {
   if (!reader.has("cumulet_scene")) reader.wrong("cumulet_scene", "is missing: not a Cumulet scene");
   reader.integer("cumulet_scene", version, 0.0, max_u32);
   if (version < 1 || version > 3)
-    reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1 to 3");
+    reader.wrong("cumulet_scene",
+                 "version " + std::to_string(version) + " is not supported: this program reads 1 to 3");
   return static_cast<SceneFormat>(version);
 }
 
@@ -552,7 +553,7 @@ void read_models(Reader& reader, SceneOptions& scene) {
     const std::string of = "models[" + std::to_string(i) + "].";
     if (i == 0 && !is_placed(reader, of)) continue;
     if (i == 0 && reader.has(of + "camera"))
-      reader.wrong(of + "camera", "is of a model that stands as its file has it");
+      reader.wrong(of + "camera", "is only supported for a model without transform and name");
     scene.models.push_back(read_model(reader, of));
   }
 }
@@ -571,7 +572,7 @@ void read_sequence(Reader& reader, SceneSequence& sequence) {
   if (reader.number("sequence.frame", position, {double{first_frame}, double{last_frame}}))
     sequence.frame = Moment::of_thousandths(std::llround(1000.0 * position));
   if (sequence.first && sequence.last && *sequence.first > *sequence.last)
-    reader.wrong("sequence.last_frame", "comes before sequence.first_frame");
+    reader.wrong("sequence.last_frame", "is less than sequence.first_frame");
 }
 
 /// Reads the sections that version 1 does not have.
@@ -586,7 +587,8 @@ void read_lists(Reader& reader, SceneFormat format, SceneOptions& scene) {
     read_volume(reader, format, volume);
     if (volume.volume.empty()) reader.wrong("volume.file", "is empty");
     read_settings(reader, volume.medium);
-    if (volume.medium.max_bounces != 0) reader.wrong("medium.max_bounces", "is the first volume's, for all of them");
+    if (volume.medium.max_bounces != 0)
+      reader.wrong("medium.max_bounces", "can only be set for the first volume and applies to all");
     read_sequence(reader, volume.sequence);
   }
   reader.of_volume(0);
@@ -934,7 +936,7 @@ std::string light_groups_refusal(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
     if (name.empty() || name.find_first_not_of(letters) != std::string::npos)
-      return "has a name that is not of letters, digits, _ and -";
+      return "has a name with characters other than letters, digits, _ and -";
     if (!known.insert(name).second) return "has a name twice";
   }
   return "";
@@ -956,7 +958,7 @@ void look_through(SceneOptions& scene, const std::string& name) {
   if (found == scene.cameras.end()) {
     std::vector<std::string> names;
     for (const NamedCamera& camera : scene.cameras) names.push_back(camera.name);
-    throw std::runtime_error("there is no camera \"" + name + "\": the scene has " + list_quoted(names));
+    throw std::runtime_error("no camera \"" + name + "\"; the scene has " + list_quoted(names));
   }
   static_cast<SceneCamera&>(scene) = *found;
   scene.surface_camera = -1;
@@ -976,7 +978,7 @@ void end_shutter(SceneOptions& scene) {
 
 std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {
   if (wanted == 0 || wanted < animations) return {};  // 0 is the default, also for a file without animations
-  return file + ": there is no animation " + std::to_string(wanted) + ": the file has " + std::to_string(animations);
+  return file + ": no animation " + std::to_string(wanted) + "; the file has " + std::to_string(animations);
 }
 
 std::uint32_t variant_number(const std::string& file, const std::string& wanted,
@@ -988,7 +990,7 @@ std::uint32_t variant_number(const std::string& file, const std::string& wanted,
   const char* const end = wanted.data() + wanted.size();
   const auto [rest, error] = std::from_chars(wanted.data(), end, number);
   if (error == std::errc() && rest == end && number < names.size()) return number + 1;
-  throw std::runtime_error(file + ": there is no variant \"" + wanted + "\": the file has " + list_quoted(names));
+  throw std::runtime_error(file + ": no material variant \"" + wanted + "\"; the file has " + list_quoted(names));
 }
 
 void SceneOptions::set_daylight() {
@@ -1053,7 +1055,7 @@ SceneOptions load_scene(const std::string& path) {
   constexpr std::uintmax_t largest = 1 << 20;
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
-  if (!error && size > largest) fail(path, "too large for a scene");
+  if (!error && size > largest) fail(path, "too large for a scene file");
   return parse_scene(image::read_file(path), path);
 }
 

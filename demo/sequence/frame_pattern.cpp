@@ -66,7 +66,7 @@ std::optional<FramePattern> FramePattern::parse(const std::string& path) {
   std::optional<Place> found;
   for (std::size_t at = name_begin(path); at < path.size();) {
     const std::optional<Place> place = place_at(path, at);
-    if (place && found) throw UsageError("'" + path + "' has two places for a frame's number");
+    if (place && found) throw UsageError("'" + path + "' has two placeholders for the frame number");
     if (place) found = place;
     at += place ? place->length : 1;
   }
@@ -191,7 +191,7 @@ std::string FramePattern::passed_over() const {
     if (number_in(path) && !frame_of(path)) names.push_back(path.substr(name_begin(path)));
   if (names.empty()) return "";
   std::ranges::sort(names);
-  std::string line = text() + ": passed over, for their numbers are written otherwise: ";
+  std::string line = text() + ": files ignored because their frame numbers have another padding: ";
   for (std::size_t i = 0; i < std::min(names.size(), max_named); ++i) line += (i > 0 ? ", " : "") + names[i];
   if (names.size() > max_named) line += " and " + std::to_string(names.size() - max_named) + " more";
   return line;

@@ -46,10 +46,10 @@ std::optional<FrameRow> FrameRow::of_name(const std::string& name) {
   if (!pattern) return std::nullopt;
   pattern->adopt_padding();
   const std::vector<Frame> there = pattern->frames_there();
-  if (there.empty()) throw std::runtime_error(pattern->text() + ": no file of such a name is there");
+  if (there.empty()) throw std::runtime_error(pattern->text() + ": no matching file exists");
   const FrameRow row(*pattern, there);
   if (row.count() > max_played)
-    throw std::runtime_error(pattern->text() + ": from the first to the last file there are more than " +
+    throw std::runtime_error(pattern->text() + ": the range from the first to the last file has more than " +
                              std::to_string(max_played) + " frames");
   return row;
 }

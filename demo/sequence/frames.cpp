@@ -17,7 +17,8 @@ constexpr std::int64_t whole = 1000;  // thousandths
 constexpr std::int64_t max_moments = std::int64_t{last_frame} + 1;
 
 [[noreturn]] void refuse_number(std::string_view part, bool negative) {
-  refuse(part, "goes beyond frame " + std::to_string(negative ? first_frame : last_frame));
+  refuse(part, (negative ? "has a frame below " : "has a frame above ") +
+                   std::to_string(negative ? first_frame : last_frame));
 }
 
 std::int64_t parse_digits(std::string_view digits, std::string_view part, bool negative) {
@@ -101,15 +102,15 @@ std::vector<Moment> parse_frames(std::string_view text) {
     const std::size_t sign = range.starts_with('-') ? 1 : 0;
     const bool ranges = range.find('-', sign) != std::string_view::npos;
     const auto [first_text, last_text] = cut(range, '-', sign);
-    if (steps && !ranges) refuse(part, "has a step, but is no range");
+    if (steps && !ranges) refuse(part, "has a step, but is not a range");
     const std::int64_t first = parse_moment(first_text, part);
     const std::int64_t last = ranges ? parse_moment(last_text, part) : first;
     const std::int64_t step = steps ? parse_moment(step_text, part) : whole;
-    if (last < first) refuse(part, "runs backwards");
+    if (last < first) refuse(part, "is a descending range");
     if (step == 0) refuse(part, "has a step of 0");
     if (step < 0) refuse(part, "has a negative step");
     if ((last - first) / step + static_cast<std::int64_t>(moments.size()) >= max_moments)
-      refuse(part, "makes more than " + std::to_string(max_moments) + " frames");
+      refuse(part, "gives more than " + std::to_string(max_moments) + " frames");
     for (std::int64_t moment = first; moment <= last; moment += step)
       if (known.insert(moment).second) moments.push_back(Moment::of_thousandths(moment));
   }

@@ -240,7 +240,7 @@ void Denoiser::set_convolution(GLuint program, const Tile& tile, std::size_t ind
 
 bool Denoiser::step(double multiply_adds) {
   if (stage_ == stages_.size()) return true;
-  const gl::DebugGroup group(*gl_, "cumulet: denoise");
+  const gl::DebugGroup group(*gl_, "cumulet: denoise network");
   const Stage& stage = stages_[stage_];
   const gl::Program& program = programs_->ask(key_of(stage));
   if (!program.usable()) return false;

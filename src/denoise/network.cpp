@@ -54,7 +54,7 @@ class Maker {
     const Tensor& first = tensor("enc_conv0.weight", "oihw");
     network->inputs = first.shape.at(1);
     if (network->inputs != colors && network->inputs != 3 * colors) {
-      fail("enc_conv0.weight", first, "of 3 or 9 inputs");
+      fail("enc_conv0.weight", first, "with 3 or 9 inputs");
     }
     for (Convolution& convolution : network->convolutions) {
       for (const Source& source : convolution.sources) {
@@ -64,7 +64,7 @@ class Maker {
       fill(convolution);
     }
     const Convolution& last = network->convolutions.back();
-    if (last.outputs != colors) fail("dec_conv0.weight", tensor("dec_conv0.weight", "oihw"), "of 3 outputs");
+    if (last.outputs != colors) fail("dec_conv0.weight", tensor("dec_conv0.weight", "oihw"), "with 3 outputs");
     return network;
   }
 
@@ -87,7 +87,7 @@ class Maker {
     const std::string name(convolution.name);
     const Tensor& weights = tensor(name + ".weight", "oihw");
     convolution.outputs = weights.shape.at(0);
-    if (convolution.outputs > max_channels) fail(name + ".weight", weights, "of at most 512 outputs");
+    if (convolution.outputs > max_channels) fail(name + ".weight", weights, "with at most 512 outputs");
     const std::vector<std::uint32_t> shape{convolution.outputs, convolution.inputs, 3, 3};
     if (weights.shape != shape) fail(name + ".weight", weights, text(shape));
     const Tensor& biases = tensor(name + ".bias", "x");

@@ -25,13 +25,13 @@ class Reader {
   Reader(std::span<const std::uint8_t> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
   TensorArchive read() {
-    if (bytes_.size() < 2 || number(2) != magic) fail("no tensor archive (.tza) of Open Image Denoise");
-    if (bytes_.size() < header_bytes) fail("is cut short in its header");
+    if (bytes_.size() < 2 || number(2) != magic) fail("is not a tensor archive (.tza) of Open Image Denoise");
+    if (bytes_.size() < header_bytes) fail("is truncated: incomplete header");
     const std::uint64_t major = number(1);
     number(1);  // the minor version is irrelevant for readers
     if (major != version) fail("is a tensor archive of version " + std::to_string(major) + ", not 2");
     const std::uint64_t table = number(8);
-    if (table > bytes_.size()) fail("is cut short before its table");
+    if (table > bytes_.size()) fail("is truncated: no tensor table");
     at_ = static_cast<std::size_t>(table);
     TensorArchive archive;
     for (std::uint64_t left = number(4); left > 0; --left) add(archive);
@@ -42,7 +42,7 @@ class Reader {
   [[noreturn]] void fail(const std::string& cause) const { throw Error(ErrorCode::file, name_ + ": " + cause); }
 
   std::span<const std::uint8_t> take(std::size_t size) {
-    if (size > bytes_.size() - at_) fail("is cut short in its table");
+    if (size > bytes_.size() - at_) fail("is truncated: incomplete tensor table");
     at_ += size;
     return bytes_.subspan(at_ - size, size);
   }
@@ -77,18 +77,18 @@ class Reader {
     }
     tensor.layout = text(static_cast<std::size_t>(dimensions));
     const auto type = static_cast<char>(number(1));
-    if (type != 'h' && type != 'f') fail(tensor_ + "is neither of half ('h') nor of float ('f')");
+    if (type != 'h' && type != 'f') fail(tensor_ + "has a data type other than half ('h') or float ('f')");
     const std::uint64_t offset = number(8);
     const std::uint64_t value_bytes = type == 'h' ? 2 : 4;
     if (count == 0) fail(tensor_ + "is empty");
     if (offset > bytes_.size() || count > (bytes_.size() - offset) / value_bytes) {
-      fail(tensor_ + "goes beyond the file's end");
+      fail(tensor_ + "exceeds the end of the file");
     }
     // Otherwise a small file with overlapping tensors could request any amount of memory.
     used_ += count * value_bytes;
-    if (used_ > bytes_.size()) fail(tensor_ + "lies over others");
+    if (used_ > bytes_.size()) fail(tensor_ + "overlaps another tensor");
     tensor.values = values(bytes_.subspan(static_cast<std::size_t>(offset)), static_cast<std::size_t>(count), type);
-    if (!archive.emplace(tensor_name, std::move(tensor)).second) fail(tensor_ + "is there twice");
+    if (!archive.emplace(tensor_name, std::move(tensor)).second) fail(tensor_ + "occurs twice");
   }
 
   [[nodiscard]] std::vector<float> values(std::span<const std::uint8_t> from, std::size_t count, char type) const {
@@ -103,7 +103,7 @@ class Reader {
       }
     }
     if (!std::ranges::all_of(result, [](float value) { return std::isfinite(value); })) {
-      fail(tensor_ + "has a value that is not finite");
+      fail(tensor_ + "contains a non-finite value");
     }
     return result;
   }
@@ -127,7 +127,7 @@ TensorArchive read_tza(const FilePath& path) {
   if (!file) fail(std::strerror(errno));
   std::vector<std::uint8_t> bytes;
   read_rest(file, bytes, [&](std::size_t /*count*/) {
-    if (bytes.size() > max_tza_bytes) fail("is larger than 64 MiB, which no network of Open Image Denoise is");
+    if (bytes.size() > max_tza_bytes) fail("is larger than 64 MiB, the maximum for a network");
   });
   if (file.bad()) fail(std::strerror(errno));
   return read_tza(bytes, path.given());

@@ -41,7 +41,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   const int version = gladLoadGLContextUserPtr(gl.get(), load_one, &loader);
   if (version == 0) {
     if (is_between_begin_and_end(*gl, get_proc, user)) throw Error(ErrorCode::gl, between_begin_and_end_message);
-    throw Error(ErrorCode::unsupported, "no OpenGL: get_proc gave no glGetString, or no context is current");
+    throw Error(ErrorCode::unsupported, "no OpenGL: get_proc returned no glGetString, or no context is current");
   }
   if (version < GLAD_MAKE_VERSION(4, 5)) {
     throw Error(ErrorCode::unsupported, "OpenGL 4.5 is needed; the context has " +
@@ -50,7 +50,8 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   }
   gl->GetStringi = reinterpret_cast<PFNGLGETSTRINGIPROC>(get_proc(user, "glGetStringi"));
   if (gl->DispatchCompute == nullptr || gl->CreateBuffers == nullptr || gl->TextureBuffer == nullptr) {
-    throw Error(ErrorCode::unsupported, "the context says OpenGL 4.5 but get_proc lacks functions of it");
+    throw Error(ErrorCode::unsupported,
+                "the context reports OpenGL 4.5, but get_proc does not return all of its functions");
   }
   GLint draw_buffers = 0;
   gl->GetIntegerv(GL_MAX_DRAW_BUFFERS, &draw_buffers);

@@ -76,8 +76,9 @@ template <class Function>
 void load(Function& function, CompatibilityFunctions::GetProc get_proc, void* user, const char* name) {
   function = reinterpret_cast<Function>(get_proc(user, name));
   if (function != nullptr) return;
-  throw Error(ErrorCode::unsupported, std::string("the context is of the compatibility profile, but get_proc lacks ") +
-                                          name + ", which resets state that changes pictures");
+  throw Error(ErrorCode::unsupported,
+              std::string("the context has the compatibility profile, but get_proc does not return ") + name +
+                  ", which is needed to reset state that affects the image");
 }
 
 }  // namespace
@@ -130,7 +131,7 @@ void require_rendering(const Functions& gl) {
   if (mode == render_mode_render) return;
   throw Error(ErrorCode::gl, std::string("the render mode is ") +
                                  (mode == render_mode_select ? "GL_SELECT" : "GL_FEEDBACK") +
-                                 ", in which nothing is drawn: call glRenderMode(GL_RENDER) first");
+                                 ", which draws nothing: call glRenderMode(GL_RENDER) first");
 }
 
 // ---- fragments ----

@@ -43,7 +43,7 @@ struct BetweenBeginAndEnd {
 };
 BetweenBeginAndEnd between_begin_and_end(const Functions& gl);
 inline constexpr const char* between_begin_and_end_message =
-    "this call came between glBegin and glEnd, where OpenGL allows no such call: make it after glEnd";
+    "the function was called between glBegin and glEnd, which OpenGL does not allow: call it after glEnd";
 
 /// Throws Error(gl) if a display list is open, or if glRenderMode is GL_SELECT or GL_FEEDBACK. Does nothing in a core
 /// context.

@@ -130,7 +130,7 @@ void ReadBack::map(const FunctionsPtr& gl, std::size_t bytes, const void* values
   data_ =
       static_cast<const std::byte*>(gl->MapNamedBufferRange(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), access));
   check(*gl, what);
-  if (data_ == nullptr) throw Error(ErrorCode::gl, std::string("GL maps no buffer: ") + what);
+  if (data_ == nullptr) throw Error(ErrorCode::gl, std::string("the GL buffer cannot be mapped: ") + what);
 }
 
 void memory_barrier(const Functions& gl, GLbitfield barriers) {

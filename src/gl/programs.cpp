@@ -38,7 +38,7 @@ std::string source_of(const ShaderFolder* folder, const std::string& name, const
   if (names_variants && !shader->has_variant(defines)) {
     std::string all;
     for (const std::string& define : defines) all.append(all.empty() ? "" : ", ").append(define);
-    throw Error(ErrorCode::internal, name + " names no variant with [" + all + "]");
+    throw Error(ErrorCode::internal, name + " has no variant with [" + all + "]");
   }
   if (folder == nullptr) return shader->with(defines);
   const std::string text = folder->source(name);
@@ -72,7 +72,7 @@ Programs::Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files, std
   gl.GetIntegerv(GL_NUM_PROGRAM_BINARY_FORMATS, &formats);
   if (formats > 0) files_ = std::move(files);
   for (const GLenum name : {GL_VENDOR, GL_RENDERER, GL_VERSION}) driver_.append(string_of(gl, name)).append(1, '\n');
-  check(gl, "asking what the driver can do with programs");
+  check(gl, "querying the driver's program capabilities");
 }
 
 Programs::~Programs() {
@@ -231,7 +231,7 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
   try {
     files_->keep(driver_, sources_of(shaders_.get(), key), binary);
   } catch (const Error& error) {
-    if (log_ != nullptr) log_->warning(std::string("no program binaries are kept: ") + error.what());
+    if (log_ != nullptr) log_->warning(std::string("the shader cache is disabled: ") + error.what());
     files_.reset();  // log the failure only once
   }
 }
@@ -267,7 +267,7 @@ std::vector<ProgramKey> all_programs() {
 }
 
 void find_out_dispatches(const FunctionsPtr& gl, Programs& programs) {
-  const ReadBack seen(gl, 4, "creating a buffer to look at");
+  const ReadBack seen(gl, 4, "creating a read-back buffer");
   programs.get({"sign.comp", {}}).use(*gl);
   gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_SIGN, seen.name());
   gl->DispatchCompute(1, 1, 1);
@@ -275,7 +275,7 @@ void find_out_dispatches(const FunctionsPtr& gl, Programs& programs) {
   std::uint32_t sign = 0;
   std::memcpy(&sign, seen.data(), sizeof(sign));
   gl->dispatches_in_call = sign != 0;
-  check(*gl, "the first dispatch");
+  check(*gl, "executing the first dispatch");
 }
 
 ProgramsPtr ProgramPool::of_current(const Functions& gl) {

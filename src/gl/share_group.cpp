@@ -32,10 +32,9 @@ void ShareGroup::require() const {
   check_reset(*gl_);
   const BetweenBeginAndEnd between = between_begin_and_end(*gl_);
   if (between.certain) throw Error(ErrorCode::gl, between_begin_and_end_message);
-  throw Error(ErrorCode::gl,
-              std::string("no OpenGL context is current on this thread, or one that does not share objects with the "
-                          "viewer's") +
-                  (between.possible ? ", or the call came between glBegin and glEnd" : ""));
+  throw Error(ErrorCode::gl, std::string("no OpenGL context is current on this thread, or the current one does not "
+                                         "share objects with the viewer's context") +
+                                 (between.possible ? ", or the function was called between glBegin and glEnd" : ""));
 }
 
 }  // namespace cumulet::gl

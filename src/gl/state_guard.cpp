@@ -94,7 +94,7 @@ GLboolean as_boolean(bool value) { return value ? GL_TRUE : GL_FALSE; }
 
 /// Checks against the ranges that cumulet.h documents for a frame.
 void require_within(GLuint index, GLuint count, const char* what) {
-  if (index >= count) throw Error(ErrorCode::internal, std::string(what) + " beyond those that are saved");
+  if (index >= count) throw Error(ErrorCode::internal, std::string(what) + " is not among the saved ones");
 }
 
 }  // namespace
@@ -223,7 +223,7 @@ void StateGuard::buffer(GLenum target) {
       pixels(false);
       break;
     default:
-      throw Error(ErrorCode::internal, "a buffer binding that is not saved");
+      throw Error(ErrorCode::internal, "an unsaved buffer binding");
   }
 }
 
@@ -315,7 +315,7 @@ void StateGuard::set_raster() {
 void StateGuard::capability(GLenum name, bool on) {
   raster();
   const auto* found = std::ranges::find(capability_table, name, &Capability::name);
-  if (found == capability_table.end()) throw Error(ErrorCode::internal, "a capability that is not saved");
+  if (found == capability_table.end()) throw Error(ErrorCode::internal, "an unsaved capability");
   enabled_[static_cast<std::size_t>(found - capability_table.begin())] = on;
   if (on && name == GL_DEPTH_TEST) depth();
   if (on && name == GL_CULL_FACE) cull();

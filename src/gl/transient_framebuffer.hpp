@@ -12,7 +12,7 @@ class TransientFramebuffer {
     label(*gl, Object::Kind::framebuffer, name(), "framebuffer of one call");
     gl->NamedFramebufferTexture(name(), GL_COLOR_ATTACHMENT0, color, 0);
     if (depth != 0) gl->NamedFramebufferTexture(name(), GL_DEPTH_ATTACHMENT, depth, 0);
-    check(*gl, "making a framebuffer for one call");
+    check(*gl, "creating a temporary framebuffer");
   }
   [[nodiscard]] GLuint name() const { return framebuffer_.name(); }
 

@@ -70,7 +70,7 @@ WordHeap::Span WordHeap::take_of_new_page(std::size_t units, std::size_t usual, 
   const std::uint64_t room = sizes_.max_bytes - std::min<std::uint64_t>(bytes(), sizes_.max_bytes);
   if (needed > room) {
     throw Error(ErrorCode::out_of_memory, std::string(what) + " needs " + std::to_string(needed) + " bytes; " +
-                                              std::to_string(room) + " are left of " +
+                                              std::to_string(room) + " are available of " +
                                               std::to_string(sizes_.max_bytes));
   }
   const std::size_t most = std::min<std::uint64_t>(sizes_.largest_page, room) / alignment;

@@ -14,7 +14,7 @@ bool Cube::wide() const { return core::cm_is_wide(static_cast<std::uint32_t>(log
 Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max) {
   const double determinant = glm::determinant(glm::dmat3(volume.index_to_world));
   if (!std::isfinite(determinant) || determinant == 0.0) {
-    throw Error(ErrorCode::file, "grid '" + volume.name + "' has a transform that flattens space");
+    throw Error(ErrorCode::file, "grid '" + volume.name + "' has a singular transform");
   }
   Cube cube;
   std::int64_t extent = 1;

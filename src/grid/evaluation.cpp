@@ -49,7 +49,7 @@ Weights Weights::of_density(double depth, const RefineSettings& settings) {
 
 // A deviation is weighted relative to the strongest component, or by its effect on the luminance if that is larger: in
 // a red fire, green has most of the luminance. The factor is one fifth above that of density, because scattering blurs
-// density. It was chosen so that fires have the same image error as clouds (tests/bench/README.md, Grids by default).
+// density. It was chosen so that fires have the same image error as clouds (tests/bench/results/default_grids.csv).
 Weights Weights::of_emission(const dvec3& depth, int component, const RefineSettings& settings) {
   const double most = std::max({depth.r, depth.g, depth.b});
   if (!(most > 0.0)) return {};

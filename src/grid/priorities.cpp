@@ -99,8 +99,8 @@ void find(const Evaluations& evaluations, const CubeKey& cube, int log2_size, fl
 
 constexpr std::uint64_t max_values = std::uint64_t{1} << 32U;
 [[noreturn]] void refuse_values(std::size_t bricks) {
-  throw Error(ErrorCode::unsupported,
-              "priorities of " + std::to_string(bricks) + " bricks: the limit is 2^32 of them; raise the threshold");
+  throw Error(ErrorCode::unsupported, "refinement criteria for " + std::to_string(bricks) +
+                                          " bricks: the limit is 2^32 values; raise the threshold");
 }
 
 }  // namespace

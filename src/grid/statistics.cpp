@@ -376,7 +376,7 @@ Moments Statistics::moments(const vec3& v0, std::uint32_t shape) const {
     const Node& node = node_at(voxel, exponent);
     if (node.is_uniform()) return uniform_moments(v0, shape, node.uniform);
     if (node.log2_size == exponent) return kuhn(node, permutation_of(shape));
-    throw Error(ErrorCode::internal, "statistics of a cell inside a brick");
+    throw Error(ErrorCode::internal, "no statistics for a cell smaller than a brick node");
   }
   Moments sum = moments(v0, core::cm_child_shape(shape, 0));
   sum += moments(child_v0(v0, shape, 1), core::cm_child_shape(shape, 1));

@@ -106,7 +106,7 @@ void GridBuilder::bisect(Progress* progress) {
   }
   level_first_.pop_back();
   if (level_first_.back() != count)
-    throw Error(ErrorCode::internal, "bisection missed diamonds: the set is not closed");
+    throw Error(ErrorCode::internal, "bisection missed diamonds: the refinement set is not conforming");
   order(progress);
 }
 
@@ -183,7 +183,8 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressP
     n = next;
     next += 2 * here;
   }
-  if (next > nodes_.size()) throw Error(ErrorCode::internal, "bisection overran its count: the set is not closed");
+  if (next > nodes_.size())
+    throw Error(ErrorCode::internal, "bisection exceeded its count: the refinement set is not conforming");
   tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
     std::uint32_t child = splits[c];
     for (std::uint32_t i = begin_of(c); i < end_of(c); ++i) {

@@ -142,8 +142,8 @@ void for_each_row(std::uint32_t rows, const Visit& visit) {
 void check_environment_size(const std::string& name, std::int64_t width, std::int64_t height) {
   const std::int64_t most = Environment::max_side;
   if (width >= 1 && height >= 1 && width <= most && height <= most) return;
-  const std::string limit = width < 1 || height < 1 ? "" : "; at most " + std::to_string(most) + " a side";
-  throw Error(ErrorCode::file, one_line(name) + ": an environment of " + std::to_string(width) + "x" +
+  const std::string limit = width < 1 || height < 1 ? "" : "; the limit is " + std::to_string(most) + " per side";
+  throw Error(ErrorCode::file, one_line(name) + ": the environment has " + std::to_string(width) + "x" +
                                    std::to_string(height) + " pixels" + limit);
 }
 
@@ -151,9 +151,9 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
   check_environment_size(name, pixels.width, pixels.height);
   const std::size_t texels = std::size_t{pixels.width} * pixels.height;
   if (pixels.values.size() != texels) {
-    throw Error(ErrorCode::file, one_line(name) + ": an environment of " + std::to_string(pixels.width) + "x" +
-                                     std::to_string(pixels.height) + " pixels has " +
-                                     std::to_string(pixels.values.size()));
+    throw Error(ErrorCode::file, one_line(name) + ": the environment size is " + std::to_string(pixels.width) + "x" +
+                                     std::to_string(pixels.height) + " pixels, but it has " +
+                                     std::to_string(pixels.values.size()) + " values");
   }
   const auto made = make_left<Environment>();
   made->name = name;

@@ -11,7 +11,7 @@ void convert_rows(EnvironmentPixels& pixels, const glm::dmat3& matrix, const std
     outside += convert(row_of(pixels, y), matrix);
   }
   std::string remark = "converted from " + from + " to linear Rec. 709";
-  if (outside > 0) remark += ", in whose gamut " + std::to_string(outside) + " pixels lose saturation";
+  if (outside > 0) remark += ", which desaturates " + std::to_string(outside) + " pixels outside its gamut";
   pixels.remarks.push_back(remark);
 }
 

@@ -52,7 +52,7 @@ class ByteStream : public Imf::IStream {
 
   bool read(char to[], int count) override {
     const auto wanted = static_cast<std::size_t>(count);
-    if (at_ > bytes_.size() || wanted > bytes_.size() - at_) throw std::runtime_error("the file is cut short");
+    if (at_ > bytes_.size() || wanted > bytes_.size() - at_) throw std::runtime_error("the file is truncated");
     std::memcpy(to, bytes_.data() + at_, wanted);
     at_ += wanted;
     return at_ < bytes_.size();
@@ -197,16 +197,16 @@ class ExrPicture {
       chosen = p;
       description_.channels = std::move(*found);
     }
-    if (!first_flat) fail(path_, "a deep OpenEXR picture, of which Cumulet reads none");
+    if (!first_flat) fail(path_, "deep OpenEXR images are not supported");
     if (!chosen) fail(path_, "has no channel " + missing_channel(file_.header(*first_flat).channels()));
     if (file_.parts() > 1) {
       const Imf::Header& header = file_.header(*chosen);
       const std::string name = header.hasName() ? " (" + one_line(header.name(), 60) + ")" : "";
       pixels_.remarks.push_back("part " + std::to_string(*chosen + 1) + name + " of " + std::to_string(file_.parts()) +
-                                " is read");
+                                " is used");
     }
     const std::string& layer = description_.channels.layer;
-    if (!layer.empty()) pixels_.remarks.push_back("the layer " + one_line(layer, 60) + " is read");
+    if (!layer.empty()) pixels_.remarks.push_back("layer " + one_line(layer, 60) + " is used");
     return *chosen;
   }
 
@@ -225,11 +225,11 @@ class ExrPicture {
       if (fits(data)) description_.display = data;
       const Window& whole = description_.display;
       if (!fits(whole)) {
-        fail(path_, "a cube map of " + std::to_string(whole.width) + "x" + std::to_string(whole.height) +
-                        " pixels, not six square faces");
+        fail(path_, "the cube map has " + std::to_string(whole.width) + "x" + std::to_string(whole.height) +
+                        " pixels, which are not six square faces");
       }
       if (whole.width > CubeMap::max_side) {
-        fail(path_, "a cube map with faces of " + std::to_string(whole.width) + " pixels a side; at most " +
+        fail(path_, "the cube map has faces of " + std::to_string(whole.width) + " pixels per side; the limit is " +
                         std::to_string(CubeMap::max_side));
       }
       if (data != whole) check_environment_size(path_, data.width, data.height);
@@ -237,7 +237,8 @@ class ExrPicture {
       check_environment_size(path_, data.width, data.height);
       check_environment_size(path_, description_.display.width, description_.display.height);
       if (fits(description_.display)) {
-        pixels_.remarks.emplace_back("has the shape of a cube map, and no envmap attribute that says so");
+        pixels_.remarks.emplace_back(
+            "has the shape of a cube map, but no envmap attribute; it is read as equirectangular");
       }
     }
     if (header.hasTileDescription()) {
@@ -300,7 +301,7 @@ EnvironmentPixels placed(EnvironmentPixels from, const Window& data, const Windo
   to.height = static_cast<std::uint32_t>(display.height);
   to.remarks = std::move(from.remarks);
   if (right - left < display.width || bottom - top < display.height) {
-    to.remarks.emplace_back("its data window is smaller than its display window, and what is outside is black");
+    to.remarks.emplace_back("its data window is smaller than its display window; pixels outside are black");
   }
   resize(to.values, std::size_t{to.width} * to.height, progress);
   for (std::int64_t y = top; y < bottom; ++y) {
@@ -321,7 +322,7 @@ EnvironmentPixels to_rec709(EnvironmentPixels pixels, const Description& descrip
              !similar(description.primaries, Primaries{})) {
     matrix = rec709_matrix(description.primaries);
     from = name_of(description.primaries);
-    if (!matrix) pixels.remarks.emplace_back("its chromaticities are no color space's, and Rec. 709 is assumed");
+    if (!matrix) pixels.remarks.emplace_back("its chromaticities are invalid; Rec. 709 is assumed");
   }
   if (matrix) {
     convert_rows(pixels, *matrix, from, progress);

@@ -54,7 +54,7 @@ bool similar(const Primaries& a, const Primaries& b) {
 std::string name_of(const Primaries& primaries) {
   const auto* const found =
       std::ranges::find_if(known, [&](const Known& one) { return similar(one.primaries, primaries); });
-  return found == std::end(known) ? "other primaries" : std::string(found->name) + " primaries";
+  return found == std::end(known) ? "custom primaries" : std::string(found->name) + " primaries";
 }
 
 std::optional<dmat3> xyz_matrix(const Primaries& primaries) {

@@ -33,14 +33,14 @@ class RadianceLines {
     const bool coded = length >= 8 && length < 32768 && left() >= 4 && bytes_[at_] == 2 && bytes_[at_ + 1] == 2 &&
                        bytes_[at_ + 2] < 128;
     if (!coded) return read_old(line);
-    if ((std::size_t{bytes_[at_ + 2]} << 8U | bytes_[at_ + 3]) != length) fail(name_, "a row of another width");
+    if ((std::size_t{bytes_[at_ + 2]} << 8U | bytes_[at_ + 3]) != length) fail(name_, "a row has the wrong width");
     at_ += 4;
     for (std::size_t c = 0; c < 4; ++c) {
       for (std::size_t x = 0; x < length;) {
         const std::uint8_t count = next();
         const bool run = count > 128;
         const std::size_t pixels = run ? count - 128U : count;
-        if (pixels == 0 || pixels > length - x) fail(name_, "a run beyond its row");
+        if (pixels == 0 || pixels > length - x) fail(name_, "a run exceeds its row");
         std::uint8_t value = run ? next() : std::uint8_t{0};
         for (std::size_t i = 0; i < pixels; ++i) {
           if (!run) value = next();
@@ -61,7 +61,7 @@ class RadianceLines {
 
  private:
   std::uint8_t next() {
-    if (at_ >= bytes_.size()) fail(name_, "a Radiance picture that is cut short");
+    if (at_ >= bytes_.size()) fail(name_, "truncated Radiance file");
     return bytes_[at_++];
   }
 
@@ -78,7 +78,7 @@ class RadianceLines {
         continue;
       }
       const std::size_t length = shift < 24 ? std::size_t{pixel[3]} << shift : line.size();
-      if (x == 0 || length > line.size() - x) fail(name_, "a run beyond its row");
+      if (x == 0 || length > line.size() - x) fail(name_, "a run exceeds its row");
       for (std::size_t i = 0; i < length; ++i, ++x) line[x] = line[x - 1];
       shift += 8;
     }
@@ -101,7 +101,7 @@ class RadianceReader {
     check_environment_size(name_, header_.width, header_.height);
     // Minimum size of a line in any coding.
     const std::size_t least = std::min<std::size_t>(header_.line_length(), 4);
-    if (data_.size() / least < header_.lines()) fail(name_, "a Radiance picture that is cut short");
+    if (data_.size() / least < header_.lines()) fail(name_, "truncated Radiance file");
     decode();
     turn();
     EnvironmentPixels pixels{header_.width, header_.height, std::move(values_), std::move(header_.remarks)};

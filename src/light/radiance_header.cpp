@@ -84,7 +84,7 @@ class HeaderReader {
   std::string_view line() {
     const std::string_view rest(reinterpret_cast<const char*>(bytes_.data()) + at_, bytes_.size() - at_);
     const std::size_t end = rest.find('\n');
-    if (end == std::string_view::npos) fail("a Radiance picture that is cut short");
+    if (end == std::string_view::npos) fail("truncated Radiance file");
     at_ += end + 1;
     return rest.substr(0, end);
   }
@@ -101,7 +101,7 @@ class HeaderReader {
     } else if (key == "COLORCORR") {
       const auto factors = positive<3>("COLORCORR", value);
       header_.exposure *= glm::dvec3(factors[0], factors[1], factors[2]);
-      header_.remarks.push_back("COLORCORR " + one_line(value, 60) + " is divided out of its colors");
+      header_.remarks.push_back("COLORCORR " + one_line(value, 60) + " is removed from the colors");
     } else if (key == "PRIMARIES") {
       primaries(value);
     } else if (key == "GAMMA" && number_of<double>(value) != 1.0) {
@@ -112,7 +112,7 @@ class HeaderReader {
   void format(std::string_view value) {
     header_.xyz = value == "32-bit_rle_xyze";
     if (!header_.xyz && value != "32-bit_rle_rgbe") {
-      fail("is of FORMAT=" + one_line(value, 60) + ", not 32-bit_rle_rgbe or 32-bit_rle_xyze");
+      fail("has FORMAT=" + one_line(value, 60) + ", not 32-bit_rle_rgbe or 32-bit_rle_xyze");
     }
   }
 
@@ -134,13 +134,15 @@ class HeaderReader {
     }
     if (n && rec709_matrix(*header_.primaries)) return;
     header_.primaries.reset();
-    header_.remarks.emplace_back("its PRIMARIES are no color space's, and Rec. 709 is assumed");
+    header_.remarks.emplace_back("its PRIMARIES are invalid; Rec. 709 is assumed");
   }
 
   /// Parses "-Y HEIGHT +X WIDTH", with any signs and order.
   void resolution(std::string_view text) {
     const std::string_view whole = trimmed(text);
-    const auto refuse = [&] { fail("a resolution of " + quoted(whole) + ", not '-Y HEIGHT +X WIDTH' or the like"); };
+    const auto refuse = [&] {
+      fail("has the resolution " + quoted(whole) + ", which is not of a form such as '-Y HEIGHT +X WIDTH'");
+    };
     for (int i = 0; i < 2; ++i) {
       const std::string_view axis = take_word(text);
       const auto side = number_of<std::uint32_t>(take_word(text));

@@ -34,7 +34,7 @@ gl::Object make_brick_tree(const gl::FunctionsPtr& gl, const std::array<float, C
   for (std::size_t i = 0; i < 512; ++i)
     words.cells[512 + i] = centroid({tree.centroid[0][i], tree.centroid[1][i], tree.centroid[2][i]});
   std::ranges::copy(edges_squared, words.edges.begin());
-  return gl::make_buffer(gl, sizeof words, &words, 0, "creating the tree of a brick's cells");
+  return gl::make_buffer(gl, sizeof words, &words, 0, "creating the cell tree of a brick");
 }
 
 std::uint32_t bricks_per_step(const gl::Functions& gl) {

@@ -15,14 +15,15 @@ void BrickMoves::plan(Upload& upload, const volume::DeviceBricks& bricks, std::s
     if (moves[m].empty()) continue;
     const volume::DeviceMemory& memory = *bricks.memories[m];
     copies.from = memories_ ? memories_->find(memory) : nullptr;
-    if (copies.from == nullptr) throw Error(ErrorCode::unsupported, "the volume's voxels are in another context");
+    if (copies.from == nullptr)
+      throw Error(ErrorCode::unsupported, "the volume's voxels belong to another OpenGL context");
     copies.from_halves = memory.halves;
     const auto count = static_cast<std::uint32_t>(moves[m].size());
     gl::Object& list = lists_.emplace_back();
     copies.moved = &list;
     upload.add([this, &list, words = std::move(moves[m])] {
       list = gl::make_buffer(gl_, words.size() * sizeof(MovedBrick), words.data(), 0,
-                             "creating the list of a volume's bricks");
+                             "creating the brick list of a volume");
     });
     upload.add_dispatches(programs_, copies.program(), count, a_step,
                           [this, copies](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
@@ -36,8 +37,7 @@ void BrickMoves::plan_together(Upload& upload, std::span<const volume::DeviceBri
   constexpr std::size_t at_a_time = 1024;
   const std::size_t bytes = std::min(origins.size(), at_a_time) * volume::brick_voxels * fields.size() * sizeof(float);
   if (bytes == 0) return;
-  upload.add(
-      [this, bytes] { together_ = gl::make_buffer(gl_, bytes, nullptr, 0, "creating room for fields' bricks"); });
+  upload.add([this, bytes] { together_ = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the bricks of fields"); });
   for (std::size_t first = 0; first < origins.size(); first += at_a_time) {
     const auto part = origins.subspan(first, std::min(at_a_time, origins.size() - first));
     std::vector<std::vector<MovedBrick>> moved(fields.size());

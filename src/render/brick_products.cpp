@@ -36,7 +36,7 @@ BrickProducts::BrickProducts(gl::FunctionsPtr gl, gl::ProgramsPtr programs, Devi
       product_(std::move(product)),
       values_wanted_(state.fields.front().bricks->wanted),
       moves_(gl_, programs_, memories_),
-      upload_(gl_, "finding what volumes have beside density") {
+      upload_(gl_, "computing derived brick data") {
   const auto* light = std::get_if<scene::Emission>(&product_);
   if (light != nullptr) {
     fields_ = {light->is_hot() ? state.field(volume::Channel::temperature) : nullptr,
@@ -98,7 +98,7 @@ void BrickProducts::prepare(const light::BlackBody& body, const glm::dmat4& inde
         core::CmBrickEmissive emissive;
       };
       const Block block{scene::shader_emissive(*light, body)};
-      emissive_ = gl::make_buffer(gl_, sizeof block, &block, 0, "creating what bricks give off by");
+      emissive_ = gl::make_buffer(gl_, sizeof block, &block, 0, "creating the emission data of bricks");
     }
     tree_ = make_brick_tree(gl_, grid::brick_edges(index_to_world));
   });
@@ -141,12 +141,12 @@ void BrickProducts::make(Part& part) {
     const glm::ivec3 brick = origins_[part.first + i] / volume::brick_size;
     places.push_back(static_cast<std::uint32_t>((brick.z * bricks_.y + brick.y) * bricks_.x + brick.x));
   }
-  part.places = gl::make_buffer(gl_, places.size() * 4, places.data(), 0, "creating the places of bricks");
+  part.places = gl::make_buffer(gl_, places.size() * 4, places.data(), 0, "creating the brick index");
   const std::size_t bytes = part.count * sizeof(volume::BrickSummary);
   for (std::size_t c = 0; c < components(); ++c) {
     part.kept.push_back(memories_->make(part.count, false));
-    part.summaries.push_back(gl::make_buffer(gl_, bytes, nullptr, 0, "creating what is known of bricks"));
-    part.back.push_back(gl::ReadBack::unfilled(gl_, bytes, "creating what is known of bricks in memory"));
+    part.summaries.push_back(gl::make_buffer(gl_, bytes, nullptr, 0, "creating the brick statistics"));
+    part.back.push_back(gl::ReadBack::unfilled(gl_, bytes, "creating the read-back of brick statistics"));
   }
 }
 

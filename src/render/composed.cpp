@@ -50,7 +50,7 @@ GLuint Composed::update(const Of& of, const RowRevisions* rows,
     drop();
     try {
       texture_ =
-          gl::make_texture_2d(gl_, of.format, of.size.x, of.size.y, "creating the texture of the composed picture");
+          gl::make_texture_2d(gl_, of.format, of.size.x, of.size.y, "creating the texture of the composed image");
     } catch (const Error& error) {
       // The image is composed in every frame then.
       if (error.code() == ErrorCode::out_of_memory) no_memory_for_ = of.size;

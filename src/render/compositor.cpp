@@ -55,7 +55,7 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool over
   Means& means = *means_.back();
   const auto make = [&] {
     return gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
-                               "creating the texture of means");
+                               "creating the mean texture");
   };
   if (!means.texture || means.of.size != size) {
     means.texture = {};
@@ -188,7 +188,7 @@ void Compositor::denoise(const PictureTextures& picture, const Display& display,
   FrameTarget target;
   target.filter_ms = filter_ms;
   go_on_filtering(picture, background_of(picture, display), display, target);
-  gl::check(*gl_, "denoising the picture");
+  gl::check(*gl_, "denoising the image");
   if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);
 }
 
@@ -428,7 +428,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
   if (!small_ || small_kind_ != kind) {
     small_ = {};
     try {
-      small_ = gl::make_texture_2d(gl_, kind.format, size.x, size.y, "creating the texture to enlarge");
+      small_ = gl::make_texture_2d(gl_, kind.format, size.x, size.y, "creating the upscaling texture");
     } catch (const Error& error) {
       if (error.code() == ErrorCode::out_of_memory) no_memory_for_small_ = kind;
       throw;
@@ -504,7 +504,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool reads_means = resolved && composed_rows_ != 0U;
   if (reads_means && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
-  gl::check(gl, "drawing the picture");
+  gl::check(gl, "drawing the image");
   if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);
 }
 

@@ -20,18 +20,18 @@ gl::ProgramKey guides_key(const Denoising& denoising) {
 
 gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const Picture& picture,
                     const Denoising& denoising) {
-  const gl::DebugGroup group(*gl, "cumulet: denoised picture");
+  const gl::DebugGroup group(*gl, "cumulet: denoised image");
   const glm::uvec2 size = picture.box().size;
   const glm::ivec2 first(picture.box().first);
   const auto make = [&](const char* what) {
     return gl::make_texture_2d(gl, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y), what);
   };
-  const gl::Object color = make("creating the picture to denoise");
+  const gl::Object color = make("creating the denoiser's input");
   const gl::Object albedo = make("creating the denoiser's albedo");
   const gl::Object normal = make("creating the denoiser's normals");
-  gl::Object result = make("creating the denoised picture");
+  gl::Object result = make("creating the denoised image");
   gl::Object missing;
-  if (denoising.known_light) missing = make("creating what the picture to denoise lacks");
+  if (denoising.known_light) missing = make("creating the negative residual for the denoiser");
 
   const Film& film = picture.film();
   const auto read = [&](GLint unit, const FilmLayer& layer) {
@@ -62,7 +62,7 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   const glm::vec3 medium = denoising.medium_albedo;
   gl->ProgramUniform3f(guides.name(), 0, medium.x, medium.y, medium.z);
   gl->ProgramUniform2i(guides.name(), 1, first.x, first.y);
-  dispatch(guides, "making the denoiser's guides");
+  dispatch(guides, "computing the denoiser's guides");
 
   denoise::Denoiser denoiser(gl, programs, denoising.network, denoising.max_bytes);
   const auto denoise = [&](const gl::Object& from, const gl::Object& to) {
@@ -81,7 +81,7 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   read(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
   write(core::CM_IMAGE_DENOISED, result, GL_READ_WRITE);
   gl->ProgramUniform2i(known.name(), 0, first.x, first.y);
-  dispatch(known, "putting light that is known back");
+  dispatch(known, "adding the noise-free component");
   return result;
 }
 

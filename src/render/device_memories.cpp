@@ -61,7 +61,7 @@ volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, const
   for (std::size_t m = 0; m < moves.size(); ++m) {
     if (moves[m].empty()) continue;
     const gl::Object list = gl::make_buffer(gl, moves[m].size() * sizeof(MovedBrick), moves[m].data(), 0,
-                                            "creating the list of a volume's bricks");
+                                            "creating the brick list of a volume");
     const volume::DeviceMemory& from = *bricks.memories[m];
     const BrickCopies copies{find(from), from.halves, find(*memory), memory->halves, 0, &list};
     copies.dispatch(*gl, programs_->ask(copies.program()), 0, static_cast<std::uint32_t>(moves[m].size()));

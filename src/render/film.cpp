@@ -37,7 +37,7 @@ void Film::make(const gl::FunctionsPtr& gl, const FilmLayer& layer) {
     }
     held_.erase(found);
   }
-  const std::string what = std::string("creating the picture's layer ") + layer.name;
+  const std::string what = std::string("creating the image layer ") + layer.name;
   const glm::ivec2 size(size_);
   gl::Object texture = layer.slices > 0 ? gl::make_texture_2d_array(gl, layer.format, size.x, size.y,
                                                                     static_cast<int>(layer.slices), what.c_str())
@@ -65,7 +65,7 @@ bool run(const gl::FunctionsPtr& gl, Film& film, const Pass& pass, std::chrono::
   for (const FilmLayer& layer : pass.reads) {
     if (!film.has(layer)) {
       throw Error(ErrorCode::internal, std::string("the pass ") + pass.name + " reads the layer " + layer.name +
-                                           ", which nothing has written");
+                                           ", which no pass has written");
     }
   }
   for (const FilmLayer& layer : pass.writes) film.make(gl, layer);

@@ -515,8 +515,8 @@ void GpuScene::require_room(std::uint64_t bytes, std::uint64_t max_bytes) const 
   const std::uint64_t room = max_bytes - std::min(max_bytes, held);
   if (bytes <= room) return;
   throw Error(ErrorCode::out_of_memory, "uploading the volume needs " + std::to_string(bytes) +
-                                            " bytes of GL memory; " + std::to_string(room) +
-                                            " are left of those allowed");
+                                            " bytes of GPU memory; " + std::to_string(room) +
+                                            " are left within the limit");
 }
 
 double GpuScene::progress() const {

@@ -117,10 +117,10 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
     plan_buffer(buffer, from.size() * sizeof(T), from.data(), what);
   };
   plan(data_->nodes_, l.own.nodes, "creating the lattice's nodes");
-  plan_buffer(data_->own_, l.own.all_values() * 2, nullptr, "creating the splits' own priorities");
+  plan_buffer(data_->own_, l.own.all_values() * 2, nullptr, "creating the split priorities");
   plan_bytes(data_->own_, l.own.values.size() * 2, l.own.values.data());
   plan(data_->blocks_, l.blocks, "creating the lattice's blocks");
-  plan(data_->places_, l.places, "creating the lattice's places");
+  plan(data_->places_, l.places, "creating the lattice index");
   plan(data_->coarse_, l.coarse, "creating the coefficients of coarse cells");
   plan_bricks();
   plan_channels();
@@ -133,8 +133,8 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   plan_buffer(data_->bins_, std::uint64_t{CM_PRIORITIES} * 4, nullptr, "creating the priorities' histogram");
   plan_buffer(data_->state_, sizeof(core::CmGridState), nullptr, "creating the grid's state");
   static const BrickPointWords points = brick_point_words();
-  plan_buffer(data_->points_, sizeof points, points.data(), "creating the points of bricks");
-  plan_buffer(data_->parts_, sizeof(grid::CellParts), grid::cell_parts().data(), "creating the parts of cells");
+  plan_buffer(data_->points_, sizeof points, points.data(), "creating the sample points of bricks");
+  plan_buffer(data_->parts_, sizeof(grid::CellParts), grid::cell_parts().data(), "creating the cell parts");
 }
 
 void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what) {
@@ -228,11 +228,11 @@ void LatticeUpload::plan_priorities() {
       return gl::make_buffer(gl_, std::max<std::size_t>(from.size() * sizeof from[0], 4),
                              from.empty() ? nullptr : from.data(), 0, what);
     };
-    scratch_.lit = make(rated.lit, "creating the light of bricks");
+    scratch_.lit = make(rated.lit, "creating the emission of bricks");
     scratch_.tree = make_brick_tree(gl_, rated.edges_squared);
     std::array<std::uint32_t, (std::tuple_size_v<grid::PlacesOfBrickPoints> + 3) / 4 * 4> places{};
     std::ranges::copy(grid::places_of_brick_points(), places.begin());
-    scratch_.points = make(places, "creating the places of a brick's points");
+    scratch_.points = make(places, "creating the index of a brick's sample points");
     gl_->ClearNamedBufferSubData(data_->own_.name(), GL_R32UI, static_cast<GLintptr>(l.own.values.size() * 2),
                                  static_cast<GLsizeiptr>(rated.values * 2), GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   });
@@ -264,7 +264,7 @@ void LatticeUpload::plan_priorities(const grid::Statistics& field, const grid::B
     if (!of_density) {
       upload_.add([this, bytes = moved.size() * volume::brick_voxels * sizeof(float)] {
         scratch_.values = {};
-        scratch_.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the values of bricks to rate");
+        scratch_.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the values of bricks for the criterion");
       });
       moves_.plan(upload_, *field.on_device(), moved, {.to = &scratch_.values});
       upload_.add([this] { gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT); });
@@ -278,8 +278,8 @@ void LatticeUpload::plan_priorities(const std::vector<glm::uvec2>& list, bool of
   const grid::Lattice& l = *data_->lattice_;
   const auto count = static_cast<std::uint32_t>(list.size());
   upload_.add([this, list] {
-    scratch_.to_rate =
-        gl::make_buffer(gl_, list.size() * sizeof list[0], list.data(), 0, "creating the list of bricks to rate");
+    scratch_.to_rate = gl::make_buffer(gl_, list.size() * sizeof list[0], list.data(), 0,
+                                       "creating the list of bricks for the criterion");
   });
   const gl::Object& values = of_density ? data_->bricks_ : scratch_.values;
   const gl::ProgramKey key{"own_priorities.comp",
@@ -314,7 +314,7 @@ void LatticeUpload::plan_channels() {
     const grid::LatticeChannel& channel = channels[i];
     LatticeData::Channel& data = data_->channels_[i];
     plan_buffer(data.places, channel.places.size() * sizeof(grid::LatticePlace), channel.places.data(),
-                "creating a channel's places");
+                "creating a channel's index");
     plan_buffer(data.coarse, channel.coarse.size() * 4, channel.coarse.data(), "creating a channel's coarse cells");
     const auto fill = [&channel, &fields = fields_[i]](std::size_t brick, std::byte* to) {
       std::vector<float> numbers(volume::brick_voxels * channel.numbers);
@@ -327,7 +327,7 @@ void LatticeUpload::plan_channels() {
     };
     const std::size_t bricks = channel.even_bricks.size() + channel.bricks.size();
     const std::size_t brick_bytes = volume::brick_voxels * channel.numbers * sizeof(float);
-    plan_buffer(data.bricks, bricks * brick_bytes, nullptr, "creating a channel's values of bricks");
+    plan_buffer(data.bricks, bricks * brick_bytes, nullptr, "creating a channel's brick values");
     const bool on_device = fields_[i].statistics()[0]->on_device() != nullptr;
     plan_values(data.bricks, on_device ? channel.even_bricks.size() : bricks, brick_bytes, fill);
     if (on_device) plan_device_bricks(channel, fields_[i], data.bricks);
@@ -401,7 +401,7 @@ GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Li
       max_cells_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(max_cells, CM_ROOTS, std::uint64_t{1} << 30U))),
       max_bytes_(max_bytes),
       pace_(std::move(pace)),
-      decision_(gl_, "deciding which cells split") {
+      decision_(gl_, "selecting the cells to split") {
   levels_.resize(std::max<std::size_t>((levels_.size() + 3) / 4 * 4, 4));
   plan_decision();
 }
@@ -441,8 +441,8 @@ void GridBuild::bind_storage(std::initializer_list<std::pair<GLint, const gl::Ob
 void GridBuild::require_room(std::uint64_t bytes) const {
   if (bytes <= max_bytes_ - std::min(max_bytes_, bytes_)) return;
   throw Error(ErrorCode::out_of_memory, "building the grid needs " + std::to_string(bytes_ + bytes) +
-                                            " bytes of GL memory; " + std::to_string(max_bytes_) +
-                                            " are left of those allowed");
+                                            " bytes of GPU memory; " + std::to_string(max_bytes_) +
+                                            " are left within the limit");
 }
 
 double GridBuild::aim_ms() const {
@@ -530,7 +530,7 @@ void GridBuild::plan_clear(Upload& upload, const gl::Object& buffer, std::uint64
 
 void GridBuild::plan_decision() {
   const grid::Lattice& l = data_->lattice();
-  decision_.add([this] { level_bytes_ = make_storage(levels_.size(), "creating the levels that a view allows"); });
+  decision_.add([this] { level_bytes_ = make_storage(levels_.size(), "creating the maximum levels of a view"); });
   decision_.add_bytes([this] { return Upload::Place{level_bytes_.name(), 0}; }, levels_.data(), levels_.size());
   plan_clear(decision_, data_->priorities_, std::uint64_t{l.blocks.size()} * CM_BLOCK_POINTS * 4);
   plan_clear(decision_, data_->bins_, std::uint64_t{CM_PRIORITIES} * 4);
@@ -590,7 +590,8 @@ std::vector<GridBuild::Level> GridBuild::levels_of_tree() const {
   }
   levels.push_back(level);
   if (level.splits_end != state_.cells - CM_ROOTS)
-    throw Error(ErrorCode::internal, "splits of a level without those above: the set is not closed");
+    throw Error(ErrorCode::internal,
+                "a level has splits without those of the level above: the refinement set is not conforming");
   return levels;
 }
 
@@ -611,11 +612,11 @@ void GridBuild::plan_cells() {
   cells_->add([this, count] {
     tree_cells_ = make_storage(std::uint64_t{count} * sizeof(TreeCell), "creating the tree's cells");
     links_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec4), "creating the tree's links");
-    below_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec2), "creating what is below the tree's cells");
+    below_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec2), "creating the child data of the tree");
     list_ = make_storage(std::uint64_t{count} * sizeof(std::uint32_t), "creating the list of the tree's cells");
   });
   cells_->add([this] {
-    built_.cells = make_storage(std::uint64_t{built_.count} * sizeof(grid::CellRecord), "creating cell records");
+    built_.cells = make_storage(std::uint64_t{built_.count} * sizeof(grid::CellRecord), "creating the cell data");
     built_.tree = make_storage((roots_words + built_.count - CM_ROOTS) * 4, "creating the point-location tree");
   });
   cells_->add([this] {
@@ -687,7 +688,7 @@ void GridBuild::plan_records() {
 }
 
 void GridBuild::plan_clear_cones() {
-  cells_->add([this] { clear_ = make_storage(clear_bytes, "creating the map of what is clear"); });
+  cells_->add([this] { clear_ = make_storage(clear_bytes, "creating the empty-space cones"); });
   plan_clear(*cells_, clear_, full_bytes);
   const auto bind = [this](GLuint /*program*/) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
@@ -708,7 +709,7 @@ void GridBuild::plan_channels() {
                            [](const auto& channel) { return channel.channel == grid::Channel::emission; }))
     return;
   cells_->add([this] {
-    glowing_ = make_storage(std::uint64_t{built_.count} * glowing_words * 4, "creating the list of cells that glow");
+    glowing_ = make_storage(std::uint64_t{built_.count} * glowing_words * 4, "creating the list of emissive cells");
   });
   const auto bind = [this, &emission](GLuint /*program*/) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
@@ -723,7 +724,7 @@ void GridBuild::plan_channel(std::size_t index) {
   const grid::LatticeChannel& channel = data_->lattice().channels[index];
   gl::Object& records = built_.channels[static_cast<std::size_t>(channel.channel)];
   const std::uint64_t bytes = (channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
-  cells_->add([this, &records, bytes] { records = make_storage(bytes, "creating a channel's records"); });
+  cells_->add([this, &records, bytes] { records = make_storage(bytes, "creating a channel's cell data"); });
   // Two cells share a word.
   if (channel.channel == grid::Channel::anisotropy) plan_clear(*cells_, records, bytes);
   const auto bind = [this, &channel, &data = data_->channels_[index], &records](GLuint program) {
@@ -745,11 +746,11 @@ void GridBuild::plan_channel(std::size_t index) {
 }
 
 void GridBuild::plan_emissive() {
-  emissive_.emplace(gl_, "reading what glows");
+  emissive_.emplace(gl_, "reading the emissive cells");
   if (state_.glowing == 0) return;
   const std::size_t bytes = std::size_t{state_.glowing} * glowing_words * 4;
   emissive_->add([this, bytes] {
-    emissive_read_back_ = gl::ReadBack(gl_, bytes, "creating the read-back of what glows");
+    emissive_read_back_ = gl::ReadBack(gl_, bytes, "creating the read-back of emissive cells");
     emissive_words_.resize(bytes / 4);
   });
   emissive_->add_pieces(bytes, [this](std::size_t first, std::size_t count) {
@@ -800,7 +801,7 @@ std::future<Made> make_apart(const char* what, Work work) {
 
 void GridBuild::begin_emissive_table() {
   emissive_table_ = make_apart<scene::EmissiveTable>(
-      "the table of what glows", [words = std::move(emissive_words_), cube = data_->lattice().cube] {
+      "building the emissive-cell distribution", [words = std::move(emissive_words_), cube = data_->lattice().cube] {
         return scene::emissive_table(in_order(words), cube);
       });
 }
@@ -904,9 +905,9 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t max_by
     BuiltGrid& made = built_.emplace(source, nothing_of(*source)).first->second;
     try {
       elsewhere->ask_for_values();
-      made.why_not = "nothing of it, for its voxels are in another context; they are brought to main memory";
+      made.why_not = "it is empty, because its voxels belong to another OpenGL context; they are copied to main memory";
     } catch (const Error& error) {
-      made.why_not = std::string("nothing of it: ") + error.what();
+      made.why_not = std::string("it is empty: ") + error.what();
     }
     return true;
   }
@@ -923,7 +924,7 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t max_by
         std::erase_if(lattices_, [&](const auto& data) { return &data->lattice() == source->plan->lattice.get(); });
       if (in_gl) {
         in_gl->ask_for_values();
-        throw Error(error.code(), std::string(error.what()) + "; its voxels are brought to main memory");
+        throw Error(error.code(), std::string(error.what()) + "; its voxels are copied to main memory");
       }
       on_cpu_ = std::make_unique<CpuGridBuild>(source, error.what());
     }
@@ -940,8 +941,8 @@ void GridBuilds::begin_upload(const scene::MarchSource& source, std::uint64_t ma
                                             source.channels, memories_);
   const std::uint64_t needs = bytes();
   if (needs <= max_bytes) return;
-  throw Error(ErrorCode::out_of_memory, "the lattice needs " + std::to_string(needs) + " bytes of GL memory; " +
-                                            std::to_string(max_bytes) + " are left of those allowed");
+  throw Error(ErrorCode::out_of_memory, "the lattice needs " + std::to_string(needs) + " bytes of GPU memory; " +
+                                            std::to_string(max_bytes) + " are left within the limit");
 }
 
 bool GridBuilds::build_there(const scene::MarchSourcePtr& source, std::uint64_t max_bytes, Deadline deadline) {

@@ -15,7 +15,7 @@ constexpr int max_layers = 8;
 
 [[noreturn]] void refuse(const HostDepthInput& input, const std::string& cause) {
   const char* kind = input.source == DepthSource::framebuffer ? "framebuffer " : "texture ";
-  throw Error(ErrorCode::invalid_argument, "the host's depth, " + (kind + std::to_string(input.name)) + ", " + cause);
+  throw Error(ErrorCode::invalid_argument, "host depth, " + (kind + std::to_string(input.name)) + ", " + cause);
 }
 
 /// Returns the corner of the viewport in a depth image of that size.
@@ -26,7 +26,7 @@ glm::ivec2 origin_in(const HostDepthInput& input, glm::ivec2 size) {
   const glm::ivec2 end = corner + extent;
   if (std::min(corner.x, corner.y) < 0 || end.x > size.x || end.y > size.y) {
     const auto text = [](glm::ivec2 v) { return std::to_string(v.x) + "x" + std::to_string(v.y); };
-    refuse(input, "is " + text(size) + " and does not hold the viewport, " + text(extent) + " at " +
+    refuse(input, "is " + text(size) + " and does not contain the viewport, " + text(extent) + " at " +
                       std::to_string(corner.x) + "," + std::to_string(corner.y));
   }
   return corner;
@@ -114,11 +114,11 @@ HostDepth::Source HostDepth::open_texture(const HostDepthInput& input) {
     gl.BindTextureUnit(core::CM_UNIT_DEPTH_SOURCE, input.name);
     gl.GetIntegerv(multisample ? GL_TEXTURE_BINDING_2D_MULTISAMPLE : GL_TEXTURE_BINDING_2D, &bound);
   }
-  if (bound == 0) refuse(input, multisample ? "is no GL_TEXTURE_2D_MULTISAMPLE" : "is no GL_TEXTURE_2D");
+  if (bound == 0) refuse(input, multisample ? "is not a GL_TEXTURE_2D_MULTISAMPLE" : "is not a GL_TEXTURE_2D");
   const TextureLevel level = level_of(gl, input.name, 0);
   const bool depth = level.bits.depth > 0;
   if (!depth && (multisample || level.red_type != GL_FLOAT)) {
-    refuse(input, multisample ? "is of no depth format" : "is of no depth format, nor GL_R32F");
+    refuse(input, multisample ? "does not have a depth format" : "has neither a depth format nor GL_R32F");
   }
   Source source{input.name, 0, origin_in(input, level.size)};
   if (multisample) gl.GetTextureLevelParameteriv(input.name, 0, GL_TEXTURE_SAMPLES, &source.samples);
@@ -134,7 +134,8 @@ HostDepth::Source HostDepth::open_texture(const HostDepthInput& input) {
 HostDepth::Source HostDepth::open_framebuffer(const HostDepthInput& input) {
   const auto& gl = *gl_;
   const GLuint framebuffer = input.name;
-  if (framebuffer != 0 && gl.IsFramebuffer(framebuffer) == GL_FALSE) refuse(input, "is none of the current context");
+  if (framebuffer != 0 && gl.IsFramebuffer(framebuffer) == GL_FALSE)
+    refuse(input, "does not exist in the current context");
   if (gl.CheckNamedFramebufferStatus(framebuffer, GL_READ_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
     refuse(input, "is not complete");
   }
@@ -148,7 +149,7 @@ HostDepth::Source HostDepth::open_framebuffer(const HostDepthInput& input) {
   DepthBits bits;
   glm::ivec2 size(input.target_size);
   if (type != GL_NONE) bits.depth = attachment(point, GL_FRAMEBUFFER_ATTACHMENT_DEPTH_SIZE);
-  if (bits.depth == 0) refuse(input, "has no depth");
+  if (bits.depth == 0) refuse(input, "has no depth buffer");
   if (type == GL_TEXTURE) {
     const auto texture = static_cast<GLuint>(attachment(point, GL_FRAMEBUFFER_ATTACHMENT_OBJECT_NAME));
     const TextureLevel level = level_of(gl, texture, attachment(point, GL_FRAMEBUFFER_ATTACHMENT_TEXTURE_LEVEL));
@@ -211,8 +212,8 @@ bool HostDepth::update(const HostDepthInput& input) {
   waits_ = !program.usable();
   if (waits_) return earlier;
   if (!sampler_) sampler_ = gl::make_sampler(gl_);
-  if (!changed_) changed_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the depth's flag");
-  if (!answers_) answers_ = gl::ReadBack(gl_, max_asked * 4, "creating the depth's flags");
+  if (!changed_) changed_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the depth flag");
+  if (!answers_) answers_ = gl::ReadBack(gl_, max_asked * 4, "creating the depth flags");
   const bool fits = z_ && size == size_ && layers == layers_;
   gl::Object made;
   if (!fits) {

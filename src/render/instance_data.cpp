@@ -23,8 +23,8 @@ InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& li
   }
   InstanceData data;
   data.origin_ = origin;
-  data.records_ = gl::make_buffer(gl, record_bytes, table.records.data(), 0, "creating the table of volumes");
-  data.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the tree of volumes");
+  data.records_ = gl::make_buffer(gl, record_bytes, table.records.data(), 0, "creating the volume table");
+  data.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the volume BVH");
   const core::CmInstanceNode& all = table.nodes.front();
   data.space_ = scene::space_of(glm::translate(glm::dmat4(1.0), origin), all.low, all.high);
   data.space_.volumes = static_cast<std::uint32_t>(instances.size());

@@ -175,7 +175,7 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
   data_.linear_ = source_->linear;
   for (const scene::MarchSourcePtr& source : sources) {
     if (!source->goes_with(*source_)) {
-      throw Error(ErrorCode::unsupported, "grids of different marches are not shown together");
+      throw Error(ErrorCode::unsupported, "grids of different types cannot be shown together");
     }
     MarchData::Part& part = data_.parts_.emplace_back();
     part.source = source;
@@ -187,8 +187,8 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
   }
   if (sources.size() > 1) {
     throw Error(ErrorCode::unsupported, std::string("the ") + (source_->march == March::dense ? "dense" : "brick") +
-                                            " march shows one grid, not " + std::to_string(sources.size()) +
-                                            ": only that of tetrahedra shows several");
+                                            " grid type supports one grid, not " + std::to_string(sources.size()) +
+                                            "; only tetrahedral grids support several");
   }
   source_->march == March::dense ? plan_dense() : plan_brick();
   plan_channel_voxels();
@@ -421,27 +421,27 @@ void MarchUpload::plan_trees(gl::WordHeap& heap) {
 
 void MarchUpload::plan_dense() {
   const ivec3 size = source_->box_size;
-  require_3d(limits_, size, "the dense march");
+  require_3d(limits_, size, "the dense grid");
   plan_voxels(data_.textures_[0], {&*source_->statistics}, GL_R16F, GL_RED, source_->density_a_value(),
               "creating the dense texture");
 }
 
 void MarchUpload::plan_channel_voxels() {
   const auto plan = [this](gl::Object& texture, const grid::RgbField& field, float unit, const char* what) {
-    require_3d(limits_, source_->box_size, "colour a voxel");
+    require_3d(limits_, source_->box_size, "creating the voxel colors");
     plan_voxels(texture, {&field.component(0), &field.component(1), &field.component(2), nullptr}, GL_RGBA16F, GL_RGBA,
                 1.0F / unit, what);
   };
   if (const grid::RgbField* emission = source_->channels.emission.get()) {
     data_.parts_[0].grid.emission_unit = emission->max_value();
-    plan(data_.emission_voxels_, *emission, data_.parts_[0].grid.emission_unit, "creating what voxels give off");
+    plan(data_.emission_voxels_, *emission, data_.parts_[0].grid.emission_unit, "creating the voxel emission");
   }
   // The unit is that of density 1, so that the color is this value divided by the density.
   if (const grid::RgbField* scattering = source_->channels.scattering.get())
-    plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating what voxels scatter");
+    plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating the voxel scattering data");
   if (const grid::ScalarField* forward = source_->channels.forward.get()) {
-    require_3d(limits_, source_->box_size, "anisotropy a voxel");
-    plan_slabs(data_.anisotropy_voxels_, {GL_R16_SNORM, GL_RED, GL_SHORT, 1}, "creating voxels' anisotropy",
+    require_3d(limits_, source_->box_size, "creating the voxel anisotropy");
+    plan_slabs(data_.anisotropy_voxels_, {GL_R16_SNORM, GL_RED, GL_SHORT, 1}, "creating the voxel anisotropy",
                [this, forward](std::span<std::uint16_t> slab, int first, int last) {
                  const std::vector<float> scattering = scattering_slab(*source_, slab.size(), first, last);
                  for_slab(*source_, forward->statistics(), first, last, [&](std::size_t at, float value) {
@@ -450,8 +450,8 @@ void MarchUpload::plan_channel_voxels() {
                });
   }
   if (const grid::DensityEnds* ends = source_->channels.ends.get(); ends != nullptr && source_->march == March::dense) {
-    require_3d(limits_, source_->box_size, "density that changes");
-    plan_slabs(data_.changes_, {GL_R16F, GL_RED, GL_HALF_FLOAT, 1}, "creating how voxels change",
+    require_3d(limits_, source_->box_size, "creating the voxel changes");
+    plan_slabs(data_.changes_, {GL_R16F, GL_RED, GL_HALF_FLOAT, 1}, "creating the voxel changes",
                [this, ends](std::span<std::uint16_t> slab, int first, int last) {
                  std::vector<float> changes(slab.size());
                  const float half = 0.5F * source_->density_a_value();
@@ -467,7 +467,7 @@ void MarchUpload::plan_channel_voxels() {
   const bool shows_motion = holds_motion(limits_, source_->box_size);
   if (!shows_motion) data_.parts_[0].grid.moves = 0;
   if (const grid::MomentumField* momentum = source_->channels.momentum.get(); momentum != nullptr && shows_motion) {
-    plan_slabs(data_.velocity_voxels_, {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating voxels' velocities",
+    plan_slabs(data_.velocity_voxels_, {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating the voxel velocities",
                [this, momentum](std::span<std::uint16_t> slab, int first, int last) {
                  std::vector<glm::dvec3> sums(slab.size() / 4);
                  for (std::size_t i = 0; i < 3; ++i) {
@@ -522,9 +522,9 @@ void MarchUpload::plan_slabs(gl::Object& texture, const Texels& texels, const ch
 
 void MarchUpload::plan_brick() {
   const ivec3 bricks = source_->brick_count;
-  require_3d(limits_, bricks, "the brick march");
+  require_3d(limits_, bricks, "the brick grid");
   if (static_cast<std::int64_t>(source_->brick_values.size()) > limits_.texture_buffer_texels) {
-    throw Error(ErrorCode::unsupported, "the brick march needs " + std::to_string(source_->brick_values.size()) +
+    throw Error(ErrorCode::unsupported, "the brick grid needs " + std::to_string(source_->brick_values.size()) +
                                             " texels; this driver's GL_MAX_TEXTURE_BUFFER_SIZE is " +
                                             std::to_string(limits_.texture_buffer_texels));
   }
@@ -543,7 +543,7 @@ void MarchUpload::plan_brick() {
   if (const std::size_t changes = source_->brick_changes.size() * 2; changes > 0) {
     data_.bytes_ += changes;
     upload_.add([this, changes] {
-      const char* what = "creating the buffer of how bricks change";
+      const char* what = "creating the buffer of brick changes";
       data_.brick_changes_ = gl::make_buffer(gl_, changes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
       data_.changes_ = gl::make_texture_buffer(gl_, GL_R16F, data_.brick_changes_, what);
     });

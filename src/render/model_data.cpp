@@ -146,7 +146,7 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
                                             std::to_string(limits.storage_block_bytes) + ", holds");
   }
   placed.records_ = gl::make_buffer(gl, record_bytes, records.data(), 0, "creating the table of models");
-  placed.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the tree of models");
+  placed.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the model BVH");
   placed.tables_.low = glm::prevFloat(glm::vec3(table.low));
   placed.tables_.high = glm::nextFloat(glm::vec3(table.high));
   placed.tables_.models = static_cast<std::uint32_t>(table.records.size());

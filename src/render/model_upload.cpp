@@ -15,7 +15,7 @@ ModelUpload::ModelUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, c
       sources_(std::move(sources)),
       last_raster_(std::move(last_raster)),
       paths_(gl, "uploading the surfaces"),
-      raster_(gl, "uploading the surfaces of previews"),
+      raster_(gl, "uploading the preview surfaces"),
       raster_due_(parts != ModelParts::paths) {
   if (parts != ModelParts::raster) data_ = ModelData::plan(gl_, limits_, heap, paths_, sources_, last_data);
 }

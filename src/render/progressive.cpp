@@ -364,7 +364,7 @@ void Progressive::settle() {
 Picture& Progressive::accumulating() {
   if (!working_ || request_.content.preview || working_->divisor != 1 || working_->picture->view() != View::shaded) {
     throw Error(ErrorCode::invalid_argument,
-                "there is no shaded picture under way without previews: set CUMULET_PREVIEW_OFF, and render");
+                "no shaded render without previews is in progress: set CUMULET_PREVIEW_OFF and call cumulet_render");
   }
   return *working_->picture;
 }

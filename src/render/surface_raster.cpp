@@ -36,7 +36,8 @@ glm::dmat3 to_view(const SurfaceView& view) {
   const glm::dmat3 inverse = glm::inverse(basis);
   for (int c = 0; c < 3; ++c) {
     for (int r = 0; r < 3; ++r) {
-      if (!std::isfinite(inverse[c][r])) throw Error(ErrorCode::internal, "the surfaces' view spans no space");
+      if (!std::isfinite(inverse[c][r]))
+        throw Error(ErrorCode::internal, "the view matrix of the surfaces is singular");
     }
   }
   return inverse;
@@ -227,7 +228,7 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
                                                          const gl::Limits& limits, Upload& upload, Input input,
                                                          const RasterContent* last) {
   if (input.pose->vertices.size() != input.scene->scene->attributes.size()) {
-    throw Error(ErrorCode::internal, "a pose of another scene");
+    throw Error(ErrorCode::internal, "the pose belongs to another scene");
   }
   if (static_cast<std::int64_t>(input.pose->lights.size() * sizeof(CmAnalyticLight)) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(input.pose->lights.size()) +
@@ -381,7 +382,7 @@ void SurfaceRaster::upload_places(const SurfaceView& view) {
         {glm::vec3(place[0]), glm::vec3(place[1]), glm::vec3(place[2]), high, glm::vec3(from_eye - glm::dvec3(high))});
   }
   fill(place_buffer_, place_bytes_, records.data(), records.size() * sizeof(PlaceRecord),
-       "creating the surfaces' places");
+       "creating the surfaces' transforms");
 }
 
 void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into) {
@@ -397,7 +398,7 @@ void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers
   into = {};
   SurfaceLayers made;
   const auto depth = static_cast<int>(blended ? 2 * layers : layers);
-  made.color = gl::make_texture_2d_array(gl_, GL_RGBA16F, width, height, depth, "creating the surfaces' colour");
+  made.color = gl::make_texture_2d_array(gl_, GL_RGBA16F, width, height, depth, "creating the surfaces' color");
   made.z = gl::make_texture_2d_array(gl_, GL_R32F, width, height, depth, "creating the surfaces' depth");
   made.size = size;
   made.layers = layers;
@@ -446,7 +447,7 @@ void SurfaceRaster::upload_prefiltered(const light::PrefilteredEnvironmentPtr& p
   constexpr int levels = core::CM_PREFILTERED_LEVELS;
   if (!prefiltered_)
     prefiltered_ =
-        gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
+        gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating the prefiltered environment map");
   // Without a prefiltered environment the shader does not read it.
   if (!prefiltered || uploaded_prefiltered_ == prefiltered) return;
   gl_->TextureSubImage3D(prefiltered_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT,

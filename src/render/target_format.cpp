@@ -89,10 +89,11 @@ bool tells_encoding(const gl::Functions& gl, const FrameTarget& target) {
 void check_encoding(const gl::Functions& gl, const FrameTarget& target, const TargetFormat& format,
                     ColorEncoding encoding) {
   if (encoding == ColorEncoding::srgb_framebuffer && !format.is_srgb && tells_encoding(gl, target)) {
-    refuse(target, "has no sRGB format: OpenGL would not encode what CUMULET_COLOR_SRGB_FRAMEBUFFER gives it");
+    refuse(target,
+           "has no sRGB format, which CUMULET_COLOR_SRGB_FRAMEBUFFER needs: OpenGL would not encode the colors");
   }
   if (encoding == ColorEncoding::hdr && !format.is_float) {
-    refuse(target, "has no float format: it would clamp what CUMULET_COLOR_HDR gives it");
+    refuse(target, "has no float format, which CUMULET_COLOR_HDR needs: colors would be clamped");
   }
 }
 
@@ -107,11 +108,11 @@ TargetFormat check_color(const gl::Functions& gl, const FrameTarget& target, Col
     refuse(target, "has no color attachment at its draw buffer 0");
   }
   const auto type = static_cast<GLenum>(color.get(GL_FRAMEBUFFER_ATTACHMENT_COMPONENT_TYPE));
-  if (type == GL_INT || type == GL_UNSIGNED_INT) refuse(target, "has a color attachment of integers");
+  if (type == GL_INT || type == GL_UNSIGNED_INT) refuse(target, "has an integer color attachment");
   if (color.get(GL_FRAMEBUFFER_ATTACHMENT_GREEN_SIZE) == 0 || color.get(GL_FRAMEBUFFER_ATTACHMENT_BLUE_SIZE) == 0)
     refuse(target, "has a color attachment without green or blue");
   if (color.is_layered())
-    refuse(target, "has a color attachment with layers: attach one of them (glFramebufferTextureLayer)");
+    refuse(target, "has a layered color attachment: attach a single layer (glFramebufferTextureLayer)");
   check_size(target, color, "color");
   const TargetFormat format{color.get(GL_FRAMEBUFFER_ATTACHMENT_RED_SIZE), type == GL_FLOAT,
                             color.get(GL_FRAMEBUFFER_ATTACHMENT_COLOR_ENCODING) == GL_SRGB};
@@ -136,7 +137,7 @@ TargetFormat check_target(const gl::Functions& gl, const FrameTarget& target, Co
   const GLuint framebuffer = target.framebuffer;
   if (framebuffer != 0 && gl.IsFramebuffer(framebuffer) == GL_FALSE) {
     throw Error(ErrorCode::invalid_argument,
-                "the target, " + std::to_string(framebuffer) + ", is no framebuffer of the current context");
+                "the target, " + std::to_string(framebuffer) + ", is not a framebuffer of the current context");
   }
   if (gl.CheckNamedFramebufferStatus(framebuffer, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
     refuse(target, "is not complete");

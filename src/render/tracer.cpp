@@ -28,11 +28,12 @@ constexpr std::uint32_t lanes_at_once = 128 * block_lanes;
 constexpr std::uint32_t lanes_of_stages = PathKernels::max_lanes;
 constexpr std::uint32_t lanes_in_call = 32 * block_lanes;
 static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_MAX_SQUARES);
-static_assert(CM_MAX_SQUARES <= InFlightDispatches::max_words, "told at once");
+static_assert(CM_MAX_SQUARES <= InFlightDispatches::max_words, "the squares must fit into one read-back");
 static_assert(CM_MAX_SQUARES <= 1U << CM_SQUARE_ROWS);
 static_assert(tile_edge <= CM_BAND_ROWS * CM_BANDS);
 constexpr double preview_rest = 0.03;  // fraction of a tile's pixels
-static_assert(lanes_in_call > preview_rest * tile_edge * tile_edge, "those that no lane has had are no rest");
+static_assert(lanes_in_call > preview_rest * tile_edge * tile_edge,
+              "the paths that have not started must exceed the remainder");
 // llvmpipe silently ends a shader's loops after 65,535 iterations in total. These constants bound the iterations of a
 // dispatch: a round takes some hundred iterations, and a ray some thousand. Cryptomatte rays take more than feature
 // rays.
@@ -506,7 +507,7 @@ void Tracer::empty(Picture& picture, const glm::vec3& background, std::uint32_t 
     gl::check(*gl_, "clearing the accumulation");
     return true;
   };
-  run(gl_, picture.film_, {"cumulet: begin a picture", {}, accumulated(picture), clear}, Deadline::max());
+  run(gl_, picture.film_, {"cumulet: begin image", {}, accumulated(picture), clear}, Deadline::max());
 }
 
 void Tracer::drop_unused_layers() {
@@ -818,7 +819,7 @@ void Tracer::measure(Picture& picture, const TraceInputs& trace_inputs) {
   program({}, noise_kernel).object->use(*gl_);
   if (!errors_)
     errors_ = gl::make_buffer(gl_, InFlightDispatches::max_words * sizeof(glm::vec4), nullptr, 0,
-                              "creating the squares' errors");
+                              "creating the errors of adaptive-sampling blocks");
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_ERRORS, errors_.name());
   Dispatched what;
   what.errors = picture.tile_errors_ = std::make_shared<SquareErrors>();
@@ -901,7 +902,7 @@ bool Tracer::inspect(const PixelBox& box, const core::CmParameters& parameters, 
   send_rows(dispatches_in_flight_, cost, size, row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
                                GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-  gl::check(*gl_, "looking at the pixels");
+  gl::check(*gl_, "checking the pixels");
   return row >= size.y;
 }
 
@@ -1006,7 +1007,7 @@ void Tracer::upload_motion(const scene::MotionTable& motion) {
   std::vector<std::byte> bytes(sizeof motion.frame + motion.maps.size() * sizeof(core::CmMotion));
   std::memcpy(bytes.data(), &motion.frame, sizeof motion.frame);
   std::memcpy(bytes.data() + sizeof motion.frame, motion.maps.data(), bytes.size() - sizeof motion.frame);
-  motion_ = gl::make_buffer(gl_, bytes.size(), bytes.data(), 0, "creating the table of motions");
+  motion_ = gl::make_buffer(gl_, bytes.size(), bytes.data(), 0, "creating the motion table");
 }
 
 void Tracer::read_feature(const Picture& picture, FeatureBuffer feature, float* values) const {
@@ -1025,19 +1026,19 @@ void Tracer::read_feature(const Picture& picture, FeatureBuffer feature, float* 
   const std::size_t floats = std::size_t{picture.size_.x} * picture.size_.y * channels;
   gl_->GetTextureImage(picture.film_.texture(layer), 0, channels == 1 ? GL_RED : GL_RGB, GL_FLOAT,
                        static_cast<GLsizei>(floats * sizeof(float)), values);
-  gl::check(*gl_, "reading what is known of pixels");
+  gl::check(*gl_, "reading the feature buffers");
 }
 
 void Tracer::read_mattes(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs,
                          const MatteIds& ids, std::uint32_t ranks, float* values) {
-  const gl::DebugGroup group(*gl_, "cumulet: mattes");
+  const gl::DebugGroup group(*gl_, "cumulet: Cryptomatte");
   std::vector<std::uint32_t> table{ids.ground};
   table.insert(table.end(), ids.volumes.begin(), ids.volumes.end());
   if (trace_inputs.scene != nullptr) {
     for (const scene::ModelPart& part : trace_inputs.scene->table().parts) table.push_back(ids.models.at(part.model));
   }
   const gl::Object buffer =
-      gl::make_buffer(gl_, table.size() * sizeof(std::uint32_t), table.data(), 0, "creating the table of mattes");
+      gl::make_buffer(gl_, table.size() * sizeof(std::uint32_t), table.data(), 0, "creating the Cryptomatte table");
   make_shared_objects();
   dispatches_in_flight_.order();
   const Program& program = matte_program(picture, data, trace_inputs);
@@ -1052,7 +1053,7 @@ void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Tr
   const glm::uvec2 size(box.size.x, std::min(box.size.y, rows_at_once));
   const gl::Object mattes =
       gl::make_texture_2d_array(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y), matte_slices,
-                                "creating the texture of mattes");
+                                "creating the Cryptomatte texture");
   const std::size_t slices = (ranks + 1) / 2;
   std::vector<glm::vec2> pairs(size.x * size.y * 2 * slices);
   for (std::uint32_t from = 0; from < box.size.y; from += size.y) {
@@ -1069,7 +1070,7 @@ void Tracer::read_mattes(const Picture& picture, const MarchData& data, const Tr
     gl_->GetTextureSubImage(mattes.name(), 0, 0, 0, 0, static_cast<GLsizei>(size.x), static_cast<GLsizei>(size.y),
                             static_cast<GLsizei>(slices), GL_RGBA, GL_FLOAT,
                             static_cast<GLsizei>(pairs.size() * sizeof(glm::vec2)), pairs.data());
-    gl::check(*gl_, "reading mattes");
+    gl::check(*gl_, "reading Cryptomatte");
     for (std::uint32_t y = 0; y < part.size.y; ++y) {
       for (std::uint32_t x = 0; x < part.size.x; ++x) {
         const std::size_t pixel = std::size_t{part.first.y + y} * picture.size_.x + part.first.x + x;
@@ -1087,8 +1088,8 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
                             glm::uvec2 pixel) {
   make_shared_objects();
   dispatches_in_flight_.order();
-  if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
-  if (!pick_place_) pick_place_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the texture of what is picked");
+  if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the pick texture");
+  if (!pick_place_) pick_place_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the pick result");
   core::CmParameters p = assemble(parameters, trace_inputs);
   p.dispatch.tile_corner = pixel;
   p.dispatch.tile_size = glm::uvec2(1U);
@@ -1118,7 +1119,7 @@ std::vector<Texel> Tracer::texels(const Picture& picture, const FilmLayer& layer
   std::vector<Texel> texels(std::size_t{picture.size_.x} * picture.size_.y);
   gl_->GetTextureImage(picture.film_.texture(layer), 0, format, type,
                        static_cast<GLsizei>(texels.size() * sizeof(Texel)), texels.data());
-  gl::check(*gl_, "reading the picture back");
+  gl::check(*gl_, "reading back the image");
   return texels;
 }
 
@@ -1139,7 +1140,7 @@ void Tracer::read_means(const Picture& picture, const FilmLayer& sum, float* rgb
   const std::vector<glm::uvec2> counts = read_counts(picture);
   gl_->GetTextureImage(picture.film_.texture(sum), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(counts.size() * 16),
                        rgba);
-  gl::check(*gl_, "reading the picture back");
+  gl::check(*gl_, "reading back the image");
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const float scale = counts[i].x > 0 ? 1.0F / static_cast<float>(counts[i].x) : 0.0F;
     for (std::size_t c = 0; c < 4; ++c) rgba[4 * i + c] *= scale;
@@ -1163,7 +1164,7 @@ void Tracer::read_light_group(const Picture& picture, std::uint32_t group, bool 
   const auto is_of = [&](std::uint32_t other) { return group == (other < groups ? other : 0); };
   if (with_background && is_of(integrator.sky_group)) add(groups);
   if (with_background && is_of(integrator.sun_group)) add(groups + 1);
-  gl::check(*gl_, "reading a group of lights back");
+  gl::check(*gl_, "reading back a light group");
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const glm::vec3 mean = sums[i] / static_cast<float>(std::max(1U, counts[i].x));
     std::memcpy(rgb + 3 * i, &mean, sizeof mean);
@@ -1197,7 +1198,7 @@ std::uint32_t saved_pass(std::span<const std::byte> saved, std::uint32_t target_
   SavedPass pass;
   std::memcpy(&pass, saved.data(), sizeof pass);
   if (pass.target < 1 || pass.target > target_samples)
-    throw Error(ErrorCode::invalid_argument, "the accumulation is of a pass that the picture does not have");
+    throw Error(ErrorCode::invalid_argument, "the accumulation was saved with another number of samples");
   return pass.target;
 }
 
@@ -1266,7 +1267,8 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
   SavedHeader header;
   if (saved.size() >= sizeof header) std::memcpy(&header, saved.data(), sizeof header);
   if (saved.size() != saved_bytes(picture) || header != wanted)
-    throw Error(ErrorCode::invalid_argument, "these bytes are no accumulation of a picture of this size and region");
+    throw Error(ErrorCode::invalid_argument,
+                "the data is not an accumulation of an image with this size, region and layers");
   std::vector<glm::uvec2> counts(std::size_t{picture.size_.x} * picture.size_.y);
   for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t size) {
     if (layer == film_layers::counts) std::memcpy(counts.data(), saved.data() + at, size);
@@ -1280,10 +1282,10 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
   std::optional<std::uint32_t> pass;
   if (picture.adaptive_) pass = saved_pass(saved.last(squares + sizeof(SavedPass)), picture.target_samples_);
   if (pass && std::ranges::any_of(saved.last(squares), [](std::byte live) { return live > std::byte{3}; }))
-    throw Error(ErrorCode::invalid_argument, "these bytes are no accumulation: what of it is sampled on is damaged");
+    throw Error(ErrorCode::invalid_argument, "the accumulation is corrupt: adaptive-sampling mask");
   if (told.most > picture.target_samples_) {
-    throw Error(ErrorCode::invalid_argument, "the accumulation has pixels of " + std::to_string(told.most) +
-                                                 " samples, and the picture shall have " +
+    throw Error(ErrorCode::invalid_argument, "the accumulation has pixels with " + std::to_string(told.most) +
+                                                 " samples, but the image is limited to " +
                                                  std::to_string(picture.target_samples_));
   }
   if (picture.done_) return;

@@ -47,8 +47,7 @@ TransmittanceMap::Made TransmittanceMap::make(const gl::FunctionsPtr& gl, std::u
   made.size = size;
   made.slices = slices;
   const int side = static_cast<int>(size);
-  made.texture =
-      gl::make_texture_3d(gl, GL_R16F, side, side, static_cast<int>(slices), "creating a map of transmittances");
+  made.texture = gl::make_texture_3d(gl, GL_R16F, side, side, static_cast<int>(slices), "creating a transmittance map");
   gl->TextureParameteri(made.texture.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   gl->TextureParameteri(made.texture.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
@@ -136,7 +135,7 @@ void TransmittanceMap::show_clear() {
   Made clear = make(gl_, 1, 1);
   const float all = 1.0F;
   gl_->ClearTexImage(clear.texture.name(), 0, GL_RED, GL_FLOAT, &all);
-  gl::check(*gl_, "clearing a map of transmittances");
+  gl::check(*gl_, "clearing a transmittance map");
   shown_ = std::move(clear);
   shown_of_.reset();
 }
@@ -203,7 +202,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
   };
   send_rows(dispatches_in_flight_, cost_, size, work.row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  gl::check(*gl_, "making a map of transmittances");
+  gl::check(*gl_, "rendering a transmittance map");
   if (work.row < size.y) return;
   shown_ = std::move(work.made);
   shown_of_ = std::move(work.of);

@@ -22,7 +22,7 @@ using volume::brick_voxels;
 
 constexpr int longest_side = 1 << 20;  // limit of all volumes
 constexpr std::uint64_t max_bricks = std::uint64_t{1} << 27U;
-constexpr const char* what_step = "copying a host's voxels";
+constexpr const char* what_step = "copying the host's voxels";
 
 [[noreturn]] void refuse(ErrorCode code, const std::string& what, const std::string& cause) {
   throw Error(code, one_line(what + ", " + cause));
@@ -153,9 +153,9 @@ void require_finite(const volume::DeviceBricks& bricks, volume::Channel channel,
   while (bad < bricks.origins.size() && (bricks.summary(bad).voxels & CM_BRICK_NOT_FINITE) == 0) ++bad;
   if (bad == bricks.origins.size()) return;
   const glm::ivec3 origin = bricks.origins[bad];
-  throw Error(ErrorCode::file,
-              one_line(name + ": " + name_of(channel) + ": a voxel of the 8x8x8 from (" + std::to_string(origin.x) +
-                       ", " + std::to_string(origin.y) + ", " + std::to_string(origin.z) + ") on is not finite"));
+  throw Error(ErrorCode::file, one_line(name + ": " + name_of(channel) + ": non-finite value in the 8x8x8 brick at (" +
+                                        std::to_string(origin.x) + ", " + std::to_string(origin.y) + ", " +
+                                        std::to_string(origin.z) + ")"));
 }
 
 }  // namespace
@@ -166,7 +166,7 @@ class VoxelTransfers::PackedPlaces {
   /// Throws Error if there are more filled bricks than `room`.
   PackedPlaces(const gl::ReadBack& words, std::uint32_t room, glm::ivec3 size, const std::string& name)
       : words_(words.data()), room_(room), bricks_(bricks_of(size)), filled_(word(0)) {
-    if (filled_ > room) throw Error(ErrorCode::gl, one_line(name + ": the driver packed no bricks"));
+    if (filled_ > room) throw Error(ErrorCode::gl, one_line(name + ": the driver did not pack the bricks correctly"));
   }
   [[nodiscard]] std::uint32_t filled() const { return filled_; }
   /// Number of bricks including empty ones.
@@ -211,7 +211,7 @@ VoxelTransfers::Source VoxelTransfers::open_texture(const VoxelTexture& texture,
     gl.BindTextureUnit(core::CM_UNIT_HOST_VOXELS, texture.name);
     gl.GetIntegerv(GL_TEXTURE_BINDING_3D, &bound);
   }
-  if (bound == 0) refuse(name, "is no GL_TEXTURE_3D of this context's group");
+  if (bound == 0) refuse(name, "is not a GL_TEXTURE_3D of this context's share group");
   const auto level = [&](GLenum parameter) {
     GLint value = 0;
     gl.GetTextureLevelParameteriv(texture.name, 0, parameter, &value);
@@ -233,7 +233,7 @@ VoxelTransfers::Source VoxelTransfers::open_texture(const VoxelTexture& texture,
   if (level(bits) == 0) refuse(name, "has no component " + std::to_string(texture.component));
   const auto kind = static_cast<GLenum>(level(type));
   if (kind != GL_FLOAT && kind != GL_UNSIGNED_NORMALIZED && kind != GL_SIGNED_NORMALIZED)
-    refuse(name, "is of whole numbers");
+    refuse(name, "has an integer format");
   source.format = format_of(level(GL_TEXTURE_INTERNAL_FORMAT));
   return source;
 }
@@ -241,7 +241,7 @@ VoxelTransfers::Source VoxelTransfers::open_texture(const VoxelTexture& texture,
 VoxelTransfers::Source VoxelTransfers::open_buffer(const VoxelBuffer& buffer, const std::string& what) const {
   const auto& gl = *gl_;
   const std::string name = what + ": buffer " + std::to_string(buffer.name);
-  if (gl.IsBuffer(buffer.name) == GL_FALSE) refuse(name, "is none of this context's group");
+  if (gl.IsBuffer(buffer.name) == GL_FALSE) refuse(name, "is not a buffer of this context's share group");
   if (glm::any(glm::lessThanEqual(buffer.size, glm::ivec3(0))) ||
       glm::any(glm::greaterThan(buffer.size, glm::ivec3(longest_side))))
     refuse(name, "has voxels of size " + text(buffer.size));
@@ -265,12 +265,13 @@ VoxelTransfers::Source VoxelTransfers::open_buffer(const VoxelBuffer& buffer, co
   }
   const auto there = static_cast<std::uint64_t>(bytes);
   if (source.offset % number != 0 || source.strides % number != glm::u64vec3(0))
-    refuse(name, "has an offset or strides that are no multiples of a number's " + std::to_string(number) + " bytes");
+    refuse(name, "has an offset or strides that are not multiples of the component size, " + std::to_string(number) +
+                     " bytes");
   // Overlapping voxels could be more than the buffer holds; such strides are rejected.
   const bool more = size.x * size.y > there || size.x * size.y * size.z > there / number;
   const bool beyond = more || source.offset > there || glm::any(glm::greaterThan(source.strides, glm::u64vec3(there)));
   if (beyond || range_of(source, {0, bricks_of(source.size).z}).y > there)
-    refuse(name, "has " + std::to_string(there) + " bytes, and does not hold the words of its voxels");
+    refuse(name, "has " + std::to_string(there) + " bytes, which is too small for its voxels");
   return source;
 }
 
@@ -319,7 +320,7 @@ void VoxelTransfers::plan(Transfer& transfer, std::size_t field, const std::vect
     int end = z + 1;
     if (!fits(before(end) - first, {z, end})) {
       refuse(ErrorCode::unsupported, what,
-             "a layer of bricks of it takes more than the driver's storage blocks of " + std::to_string(max_bytes_) +
+             "a layer of its bricks exceeds the driver's maximum storage block size of " + std::to_string(max_bytes_) +
                  " bytes");
     }
     while (end < bricks.z && fits(before(end + 1) - first, {z, end + 1})) ++end;
@@ -346,10 +347,10 @@ VoxelTransfers::Room VoxelTransfers::take_room(std::size_t bricks, std::size_t b
     return room;
   }
   Room room;
-  room.places = gl::make_buffer(gl_, places_bytes(bricks), nullptr, 0, "creating the places of a host's bricks");
-  room.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating a copy of a host's bricks");
+  room.places = gl::make_buffer(gl_, places_bytes(bricks), nullptr, 0, "creating the index of the host's bricks");
+  room.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating a copy of the host's bricks");
   room.places_back =
-      gl::ReadBack::unfilled(gl_, places_bytes(bricks), "creating the places of a host's bricks in memory");
+      gl::ReadBack::unfilled(gl_, places_bytes(bricks), "creating the read-back of the host's brick index");
   room.bricks = bricks;
   room.bytes = bytes;
   return room;
@@ -357,7 +358,7 @@ VoxelTransfers::Room VoxelTransfers::take_room(std::size_t bricks, std::size_t b
 
 void VoxelTransfers::make_room_back(Room& room, std::size_t bytes) const {
   if (room.back_bytes >= bytes) return;
-  room.values_back = gl::ReadBack::unfilled(gl_, bytes, "creating a host's bricks in memory");
+  room.values_back = gl::ReadBack::unfilled(gl_, bytes, "creating the read-back of the host's bricks");
   room.back_bytes = bytes;
 }
 
@@ -401,9 +402,9 @@ gl::Fence VoxelTransfers::fence() const { return gl_->dispatches_in_call ? gl::F
 
 void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arrival, Refuse refuse) {
   const auto& gl = *gl_;
-  const gl::DebugGroup group(gl, "cumulet: live voxels");
+  const gl::DebugGroup group(gl, "cumulet: dynamic voxels");
   if (state.wait != nullptr && gl.IsSync(state.wait) == GL_FALSE)
-    throw Error(ErrorCode::invalid_argument, one_line(state.name + ": what is to be waited for is no sync object"));
+    throw Error(ErrorCode::invalid_argument, one_line(state.name + ": `wait` is not a valid GLsync"));
   Transfer transfer;
   transfer.whose = whose;
   transfer.whole = !state.changed;
@@ -424,7 +425,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
     plan(transfer, i, &chosen, what);
     if (chosen.empty()) continue;
     choices[i] = gl::make_buffer(gl_, chosen.size() * sizeof(std::uint32_t), chosen.data(), 0,
-                                 "creating the list of a host's bricks");
+                                 "creating the list of the host's bricks");
   }
   for (Piece& piece : transfer.pieces) {
     const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
@@ -502,7 +503,7 @@ bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
     for (const scene::StateInGl::Field& field : there->fields) {
       auto& memories = back.memories.emplace_back();
       for (const volume::DeviceMemoryPtr& memory : field.bricks->memories) {
-        memories.push_back(gl::ReadBack::unfilled(gl_, memory->bytes(), "creating a host's bricks in memory"));
+        memories.push_back(gl::ReadBack::unfilled(gl_, memory->bytes(), "creating the read-back of the host's bricks"));
         gl_->CopyNamedBufferSubData(memories_->find(*memory)->name(), memories.back().name(), 0, 0,
                                     static_cast<GLsizeiptr>(memory->bytes()));
       }
@@ -556,8 +557,9 @@ void VoxelTransfers::begin_summaries(Transfer& transfer) {
     if (room.summed < piece.filled) {
       const std::size_t with_more = std::min<std::size_t>(piece.filled + piece.filled / 4, piece.count);
       const std::size_t bytes = with_more * sizeof(volume::BrickSummary);
-      room.summaries = gl::make_buffer(gl_, bytes, nullptr, 0, "creating what is known of a host's bricks");
-      room.summaries_back = gl::ReadBack::unfilled(gl_, bytes, "creating what is known of a host's bricks in memory");
+      room.summaries = gl::make_buffer(gl_, bytes, nullptr, 0, "creating the statistics of the host's bricks");
+      room.summaries_back =
+          gl::ReadBack::unfilled(gl_, bytes, "creating the read-back of the statistics of the host's bricks");
       room.summed = with_more;
     }
     piece.kept = memories_->make(piece.filled, transfer.sources[piece.field].format == VoxelFormat::halves);
@@ -655,7 +657,8 @@ void VoxelTransfers::join(Transfer& transfer, std::vector<scene::StateInGl::Fiel
   if (!std::ranges::all_of(std::as_const(*staying.state).all(), is_here)) {
     staying.state.reset();
     if (transfer.makes()) return;
-    refuse(transfer.name, "the rest of it is in another viewer's context");
+    throw Error(ErrorCode::invalid_argument,
+                one_line(transfer.name + ": other fields of it belong to another viewer's context"));
   }
   // The products are computed in main memory then.
   if (stay.values_wanted && stay.values_wanted->asked()) return;

@@ -113,7 +113,7 @@ void Wavelet::make_history(glm::uvec2 size) {
   const auto make = [&](const char* what) {
     return gl::make_texture_2d(gl_, GL_RGBA32UI, static_cast<int>(size.x), static_cast<int>(size.y), what);
   };
-  constexpr const char* doing = "creating what the denoiser remembers of pictures, so that each begins anew";
+  constexpr const char* doing = "creating the denoiser's history; denoising continues without it";
   if (kept_.size != size) {
     kept_ = {};
     kept_.light = make(doing);
@@ -153,7 +153,7 @@ std::optional<Error> Wavelet::begin(const PictureTextures& picture) {
     size_ = glm::uvec2(0U);
     const auto make = [&](GLenum format) {
       return gl::make_texture_2d(gl_, format, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
-                                 "creating the denoiser's textures, so that the picture is shown with its noise");
+                                 "creating the denoiser's textures; the image is shown without denoising");
     };
     std::array<gl::Object, 2> front{make(GL_RGBA32F), make(GL_RGBA32F)};
     std::array<gl::Object, 2> spread{make(GL_RGBA32F), make(GL_RGBA32F)};
@@ -342,12 +342,12 @@ bool Wavelet::work(const PictureTextures& picture, Deadline deadline) {
     dispatch(program, rows, measured);
     collect();
   }
-  gl::check(*gl_, "denoising the picture");
+  gl::check(*gl_, "denoising the image");
   return done_;
 }
 
 void Wavelet::give(const PictureTextures& picture, MeansBackground background, GLuint means, GLuint background_means) {
-  const gl::DebugGroup group(*gl_, "cumulet: denoised means");
+  const gl::DebugGroup group(*gl_, "cumulet: denoised mean");
   const auto& gl = *gl_;
   const PictureGuides& guides = *picture.guides;
   const gl::Program& program = programs_->get(output_key(background));
@@ -371,7 +371,7 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
   program.use(gl);
   gl.DispatchCompute((size_.x + 7) / 8, (size_.y + 7) / 8, 1);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
-  gl::check(gl, "writing the denoised picture");
+  gl::check(gl, "writing the denoised image");
   of_.reset();
 }
 

@@ -69,7 +69,7 @@ class BrickSet {
     constexpr std::int64_t most = std::int64_t{1} << 18;
     if (filled_ > most) {
       throw Error(ErrorCode::unsupported,
-                  std::string(what_) + " without detail fills more than " + std::to_string(most) + " bricks");
+                  std::string(what_) + " with constant values covers more than " + std::to_string(most) + " bricks");
     }
     for (int x = 0; x < count.x; ++x) {
       for (int y = 0; y < count.y; ++y) {
@@ -363,7 +363,7 @@ std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame
     set.add(frame.density);
   } catch (const Error& error) {
     // A missing velocity only disables motion blur and motion vectors.
-    log.warning(one_line("grid \"" + parts[0].name + "\": the velocity is left out: " + error.what()));
+    log.warning(one_line("grid \"" + parts[0].name + "\": the velocity is ignored: " + error.what()));
     return std::nullopt;
   }
   struct Read {

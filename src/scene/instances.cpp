@@ -126,7 +126,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
       const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * place * cube.to_world;
       record.space = space_of(to_scene, instance.grid.box_min, instance.grid.box_max);
       if (!is_sound(record.space))
-        refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+        refuse(ErrorCode::invalid_argument, "its transform is not finite, is singular, or is too large");
       return block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max));
     };
     CmInstance record{};
@@ -150,7 +150,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     }
     const dvec3 most = glm::max(glm::abs(low), glm::abs(high));
     const double size = std::max({most.x, most.y, most.z});
-    if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the scene");
+    if (!(size < farthest)) refuse(ErrorCode::unsupported, "it extends 1e12 or more from the scene");
     // Enlarged for rounding, so that it holds every ray point that the instance's own box counts as inside.
     boxes.push_back({vec3(low - 2e-6 * size), vec3(high + 2e-6 * size), is_solid(instance.grid)});
     table.records.push_back(record);

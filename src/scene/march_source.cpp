@@ -59,11 +59,11 @@ void require_table(const ivec3& end, const ivec3& bricks) {
   constexpr int max_voxels = 1 << 16;
   constexpr std::int64_t max_bricks = std::int64_t{1} << 28U;
   if (const int widest = std::max({end.x, end.y, end.z}); widest > max_voxels) {
-    throw Error(ErrorCode::unsupported, "the brick march over " + std::to_string(widest) + " voxels: the limit is " +
-                                            std::to_string(max_voxels));
+    throw Error(ErrorCode::unsupported,
+                "the brick grid for " + std::to_string(widest) + " voxels: the limit is " + std::to_string(max_voxels));
   }
   if (const std::int64_t all = std::int64_t{bricks.x} * bricks.y * bricks.z; all > max_bricks) {
-    throw Error(ErrorCode::unsupported, "the brick march over a box of " + std::to_string(all) +
+    throw Error(ErrorCode::unsupported, "the brick grid for a box of " + std::to_string(all) +
                                             " bricks: the limit is " + std::to_string(max_bricks));
   }
 }

@@ -200,7 +200,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
       throw Error(code, "model " + std::to_string(m) + ": " + cause);
     };
     if (!can_stand(model.to_world))
-      refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+      refuse(ErrorCode::invalid_argument, "its transform is not finite, is singular, or is too large");
     const ModelSource& source = *model.source;
     const ModelWords at = words(source);
     for (std::size_t i = 0; i < source.meshes.size(); ++i) {
@@ -216,7 +216,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         record.first = static_cast<std::uint32_t>(triangles);
         triangles += mesh.triangle_count;
         if (triangles >= std::numeric_limits<std::uint32_t>::max())
-          refuse(ErrorCode::unsupported, "with it there are more than 2^32 triangles, each counted wherever it stands");
+          refuse(ErrorCode::unsupported, "the total exceeds 2^32 triangles, counted per instance");
         const PlaceEnds ends = ends_of(model, mesh, k);
         if (any_moves) {
           opens.push_back(record_of_end(ends.open, mesh, &MeshEnds::open, at.first));
@@ -226,7 +226,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         TreeBox box{vec3(0.0F), vec3(0.0F), solid};
         if (solid) {
           const Way way = way_of({to_world, ends.open, ends.close}, own_low, own_high);
-          if (!(way.size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the world's origin");
+          if (!(way.size < farthest)) refuse(ErrorCode::unsupported, "it extends 1e12 or more from the world origin");
           // Enlarged for rounding, so that it holds every hit in the mesh's own space.
           box.low = vec3(way.low - 2e-6 * way.size);
           box.high = vec3(way.high + 2e-6 * way.size);

@@ -23,7 +23,7 @@ inline constexpr double widest_sun_analytic_light = 90.0;  ///< degrees
 /// Returns why that many lights are rejected; "" if they are accepted.
 inline std::string analytic_light_count_refusal(std::uint64_t count) {
   if (count <= max_analytic_lights) return "";
-  return std::to_string(count) + " lights are more than " + std::to_string(max_analytic_lights);
+  return std::to_string(count) + " lights exceed the limit of " + std::to_string(max_analytic_lights);
 }
 
 struct AnalyticLightRefusal {
@@ -35,12 +35,12 @@ struct AnalyticLightRefusal {
 inline std::optional<AnalyticLightRefusal> analytic_light_refusal(const cumulet_light_desc& analytic_light) {
   if (!std::all_of(std::begin(analytic_light.position), std::end(analytic_light.position),
                    [](double x) { return std::abs(x) <= farthest_analytic_light; }))
-    return AnalyticLightRefusal{"position", "is beyond 1e30"};
+    return AnalyticLightRefusal{"position", "exceeds 1e30"};
   if (analytic_light.kind == CUMULET_LIGHT_DISTANT && analytic_light.angle_degrees > widest_sun_analytic_light)
-    return AnalyticLightRefusal{"angle_degrees", "of a distant light is above 90"};
+    return AnalyticLightRefusal{"angle_degrees", "is above 90, the maximum for a distant light"};
   if (!(*std::max_element(std::begin(analytic_light.color), std::end(analytic_light.color)) * analytic_light.power <=
         brightest_analytic_light))
-    return AnalyticLightRefusal{"power", "times color is above 1e30"};
+    return AnalyticLightRefusal{"power", "times color exceeds 1e30"};
   return std::nullopt;
 }
 

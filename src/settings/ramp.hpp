@@ -38,16 +38,19 @@ struct RampInfo {
 /// Indexed by the ramp enum of cumulet.h.
 inline constexpr std::array ramps = {
     RampInfo{"density", "medium.density_ramp", "--density-ramp",
-             "What densities become, straight between points: \"0:0,0.1:0,1:1\" takes thin smoke away; none (default)",
-             "Density ramp", "A curve: what the density grid's values become before the density scale. 0 stays 0.",
+             "Remaps the density (transfer function), linear between points: \"0:0,0.1:0,1:1\" removes thin smoke "
+             "(default: none)",
+             "Density ramp",
+             "Remap curve (transfer function) of the density grid, before the density scale. 0 stays 0.",
              "Density point"},
     RampInfo{"temperature", "medium.temperature_ramp", "--temperature-ramp",
-             "What the temperature grid's values become, before scale and offset (default: none)", "Temperature ramp",
-             "A curve: what the temperature grid's values become before scale and offset. 0 stays 0.",
+             "Remaps the temperature grid, before scale and offset (default: none)", "Temperature ramp",
+             "Remap curve (transfer function) of the temperature grid, before scale and offset. 0 stays 0.",
              "Temperature point"},
     RampInfo{"flame", "medium.flame_ramp", "--flame-ramp",
-             "What the flame grid's values become, before the strength (default: none)", "Flame ramp",
-             "A curve: what the flame grid's values become before the flame strength. 0 stays 0.", "Flame point"}};
+             "Remaps the flame grid, before the flame strength (default: none)", "Flame ramp",
+             "Remap curve (transfer function) of the flame grid, before the flame strength. 0 stays 0.",
+             "Flame point"}};
 static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
 
 inline constexpr std::size_t max_ramp_points = 32;
@@ -56,7 +59,7 @@ inline constexpr float max_ramp_value = 1e30F;  ///< maximum of values and of ma
 /// Returns why that many points are rejected; "" if they are accepted.
 inline std::string ramp_count_refusal(std::uint64_t count) {
   if (count == 0 || (count >= 2 && count <= max_ramp_points)) return "";
-  return "has " + std::to_string(count) + (count == 1 ? " point" : " points") + ", not none or 2 to " +
+  return "has " + std::to_string(count) + (count == 1 ? " point" : " points") + "; it must have 0 or 2 to " +
          std::to_string(max_ramp_points);
 }
 
@@ -67,11 +70,11 @@ inline std::string ramp_refusal(std::span<const RampPoint> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto [value, result] = points[i];
     if (!(std::abs(value) <= max_ramp_value))
-      return "has a point " + text(points[i]) + " whose value is not from -1e30 to 1e30";
+      return "has a point " + text(points[i]) + " whose input is not from -1e30 to 1e30";
     if (!(result >= 0.0F && result <= max_ramp_value))
-      return "has a point " + text(points[i]) + ", but values become 0 to 1e30";
+      return "has a point " + text(points[i]) + " whose output is not from 0 to 1e30";
     if (i > 0 && !(value > points[i - 1][0]))
-      return "has a point " + text(points[i]) + " that does not come after " + text(points[i - 1]);
+      return "has a point " + text(points[i]) + " whose input is not above that of " + text(points[i - 1]);
   }
   return "";
 }

@@ -83,8 +83,7 @@ std::span<const std::uint8_t> Accessors::view(int index, std::uint64_t offset, s
                                               const std::string& what) const {
   const auto bytes = naming(what, [&] { return file_.view(index); });
   if (offset > bytes.size() || size > bytes.size() - offset) {
-    malformed(what + " reaches beyond the " + std::to_string(bytes.size()) + " bytes of buffer view " +
-              std::to_string(index));
+    malformed(what + " exceeds the " + std::to_string(bytes.size()) + " bytes of buffer view " + std::to_string(index));
   }
   return bytes.subspan(offset, size);
 }
@@ -93,9 +92,9 @@ Accessors::Layout Accessors::layout(const tinygltf::Accessor& accessor, const st
   Layout layout;
   const std::size_t component_size = size_of(accessor.componentType);
   if (reader(accessor.componentType) == nullptr || component_size == 0) {
-    malformed(what + ": component type " + std::to_string(accessor.componentType) + " is none of glTF's");
+    malformed(what + ": component type " + std::to_string(accessor.componentType) + " is unknown");
   }
-  if (accessor.type < 0) malformed(what + " has a type of element that is none of glTF's");
+  if (accessor.type < 0) malformed(what + " has an unknown element type");
   layout.components =
       static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type)));
   layout.size = layout.components * component_size;
@@ -104,7 +103,7 @@ Accessors::Layout Accessors::layout(const tinygltf::Accessor& accessor, const st
   if (count > std::numeric_limits<std::uint32_t>::max()) malformed(what + " has more than 2^32 elements");
   if (accessor.bufferView < 0) {
     if (count > budget_.limits().unbacked) {
-      malformed(what + ": " + std::to_string(count) + " elements without a buffer view are too many");
+      malformed(what + ": " + std::to_string(count) + " elements without a buffer view exceed the limit");
     }
   } else {
     const auto index = static_cast<std::size_t>(accessor.bufferView);
@@ -118,7 +117,7 @@ Accessors::Layout Accessors::layout(const tinygltf::Accessor& accessor, const st
     const auto& sparse = accessor.sparse;
     const std::size_t index_size = unsigned_size(sparse.indices.componentType);
     if (index_size == 0 || sparse.count < 0 || static_cast<std::uint64_t>(sparse.count) > count) {
-      malformed(what + " is malformed where it is sparse");
+      malformed(what + " has malformed sparse storage");
     }
     layout.sparse_count = static_cast<std::size_t>(sparse.count);
     layout.sparse_index_type = sparse.indices.componentType;
@@ -141,7 +140,7 @@ void Accessors::each(const tinygltf::Accessor& accessor, const std::vector<std::
   for (std::size_t i = 0; i < replaced.size(); ++i) {
     replaced[i] = load_unsigned(from.sparse_indices + i * index_size, index_size);
     if (replaced[i] >= accessor.count || (i > 0 && replaced[i] <= replaced[i - 1])) {
-      malformed(what + ": sparse indices do not rise within the count");
+      malformed(what + ": sparse indices are not increasing or exceed the count");
     }
   }
   const std::size_t count = which != nullptr ? which->size() : accessor.count;
@@ -186,7 +185,7 @@ std::vector<float> Accessors::scalars(int accessor, const std::string& what) con
 std::vector<glm::mat4> Accessors::matrices(int accessor, const std::string& what) const {
   const std::size_t n = count(accessor, what);
   // Smaller component types have padded columns.
-  if (at(accessor, what).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) malformed(what + " is not of floats");
+  if (at(accessor, what).componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) malformed(what + " does not contain floats");
   budget_.take(n, sizeof(glm::mat4), what);
   std::vector<glm::mat4> result(n);
   read(accessor, TINYGLTF_TYPE_MAT4, glm::value_ptr(result[0]), 16, nullptr, what);
@@ -199,7 +198,7 @@ std::vector<std::uint32_t> Accessors::integers(int accessor, std::size_t compone
   const tinygltf::Accessor& from = at(accessor, what);
   const std::size_t size = unsigned_size(from.componentType);
   const int expected = components == 1 ? TINYGLTF_TYPE_SCALAR : static_cast<int>(components);
-  if (from.type != expected || size == 0 || from.normalized) malformed(what + " is not of unsigned integers");
+  if (from.type != expected || size == 0 || from.normalized) malformed(what + " does not contain unsigned integers");
   budget_.take(n, components * sizeof(std::uint32_t), what);
   std::vector<std::uint32_t> result(n * components);
   each(from, which, what, [&](std::size_t i, const std::uint8_t* bytes) {

@@ -149,8 +149,8 @@ class Bvh::Builder {
       if (any) outside.store(true, std::memory_order_relaxed);
     });
     if (outside.load()) {
-      throw Error(ErrorCode::invalid_argument,
-                  "triangles: an index is not below the " + std::to_string(vertices.size()) + " vertices");
+      throw Error(ErrorCode::invalid_argument, "triangles: an index is not less than " +
+                                                   std::to_string(vertices.size()) + ", the number of vertices");
     }
   }
 
@@ -568,7 +568,7 @@ Bvh Bvh::build(std::span<const PosedVertex> vertices, std::span<const std::uint3
   }
   if (triangles > max_triangles) {
     throw Error(ErrorCode::unsupported, std::to_string(triangles) + " triangles: at most " +
-                                            std::to_string(max_triangles) + " fit a ray tracer's tree");
+                                            std::to_string(max_triangles) + " fit into the BVH");
   }
   Builder::check_indices(vertices, indices);
   Bvh bvh;
@@ -607,7 +607,7 @@ void Bvh::refit(std::span<const PosedVertex> vertices, std::span<const std::uint
                 const Progress* progress) {
   if (indices.size() != 3 * triangles_) {
     throw Error(ErrorCode::invalid_argument, "triangles: " + std::to_string(indices.size() / 3) +
-                                                 ", but the tree is over " + std::to_string(triangles_));
+                                                 ", but the BVH was built for " + std::to_string(triangles_));
   }
   Builder::check_indices(vertices, indices);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, records_.size(), grain), [&](const auto& range) {

@@ -52,7 +52,7 @@ void check_extensions(const json& root, const Log& log, const std::string& name)
   for (const json& required : root.value("extensionsRequired", json::array())) {
     const auto extension = required.get<std::string>();
     if (known(extension)) continue;
-    throw Error(ErrorCode::unsupported, "needs the extension " + one_line(extension) + ", which Cumulet does not read");
+    throw Error(ErrorCode::unsupported, "needs the extension " + one_line(extension) + ", which is not supported");
   }
   std::set<std::string> ignored;
   for (const json& used : root.value("extensionsUsed", json::array())) {
@@ -62,7 +62,7 @@ void check_extensions(const json& root, const Log& log, const std::string& name)
   if (ignored.empty()) return;
   std::string list;
   for (const std::string& extension : ignored) list += (list.empty() ? "" : ", ") + extension;
-  log.warning(name + ": drawn without " + one_line(list));
+  log.warning(name + ": rendered without " + one_line(list));
 }
 
 /// glTF 2.x: a minor version adds only features that an older reader may ignore.
@@ -79,7 +79,7 @@ void check_version(const json& root, const Log& log, const std::string& name) {
   for (const std::string& one : {version, oldest}) {
     if (!of_version_2(one)) throw Error(ErrorCode::unsupported, "is glTF " + one_line(one) + ", not 2.0");
   }
-  if (oldest != "2.0") log.warning(name + ": is written for glTF " + one_line(oldest) + " and read as 2.0");
+  if (oldest != "2.0") log.warning(name + ": requires glTF " + one_line(oldest) + "; it is read as 2.0");
 }
 
 struct Container {
@@ -109,7 +109,7 @@ Container unpack(std::span<const std::uint8_t> bytes) {
   if (version != 2) throw Error(ErrorCode::unsupported, "is binary glTF " + std::to_string(version) + ", not 2");
   const std::uint32_t length = little_endian(bytes, 8);
   if (length > bytes.size()) {
-    malformed("is cut short: " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
+    malformed("is truncated: " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
   }
   bytes = bytes.first(std::max<std::size_t>(length, 12));
   Container container;
@@ -122,12 +122,12 @@ Container unpack(std::span<const std::uint8_t> bytes) {
     at += 8;
     if (size > bytes.size() - at) malformed("ends within chunk " + std::to_string(chunk));
     const auto content = bytes.subspan(at, size);
-    if (chunk == 0 && type != json_chunk) malformed("does not begin with a chunk of JSON");
+    if (chunk == 0 && type != json_chunk) malformed("does not begin with a JSON chunk");
     if (chunk == 0) container.json = text(content);
     if (chunk == 1 && type == binary_chunk) container.binary = content;
     at += size;
   }
-  if (container.json.empty()) malformed("has no chunk of JSON");
+  if (container.json.empty()) malformed("has no JSON chunk");
   return container;
 }
 
@@ -337,7 +337,7 @@ class Loader {
     }
     const auto& [data, size] = buffers_[static_cast<std::size_t>(buffer)];
     if (offset > size || length > size - offset) {
-      malformed(what + " reaches beyond the " + std::to_string(size) + " bytes of buffer " + std::to_string(buffer));
+      malformed(what + " exceeds the " + std::to_string(size) + " bytes of buffer " + std::to_string(buffer));
     }
     const auto* bytes = std::get_if<Bytes>(&data);
     return bytes != nullptr ? Data(bytes->subspan(offset, length)) : data;
@@ -385,7 +385,7 @@ void Budget::take(std::uint64_t count, std::uint64_t size, std::string_view what
   cumulet::check(progress_);
   if (size != 0 && count > left_ / size) {
     malformed(std::string(what) + " would need more than the " + std::to_string(limits_.memory >> 20U) +
-              " MiB that a glTF file may take");
+              " MiB limit of a glTF file");
   }
   left_ -= count * size;
 }
@@ -481,7 +481,7 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
   check_extensions(root, log, name);
   SetAside aside = set_aside(root);
   if (aside.channels > 0) {
-    log.warning(name + ": " + std::to_string(aside.channels) + " animation channels that move no node are ignored");
+    log.warning(name + ": " + std::to_string(aside.channels) + " animation channels without a target node are ignored");
   }
 
   file.model = apart(budget.progress_for(length), [root = std::move(root)] { return parse_model(root); });

@@ -233,7 +233,7 @@ class Schema {
 
   std::string check(json& root) {
     visit(root, {}, "the file");
-    if (outside_ > 1) remark_ += ", and " + std::to_string(outside_ - 1) + " more such numbers";
+    if (outside_ > 1) remark_ += ", and " + std::to_string(outside_ - 1) + " more numbers are out of range";
     return remark_;
   }
 
@@ -312,7 +312,7 @@ class Schema {
     if (number >= range.least && number <= range.most) return;
     const bool below = number < range.least;
     if (outside_++ == 0) {
-      remark_ = where + " is " + general_text(number) + ", " + (below ? "less" : "more") + " than glTF's " +
+      remark_ = where + " is " + general_text(number) + ", " + (below ? "less" : "more") + " than the glTF limit of " +
                 general_text(below ? range.least : range.most);
     }
   }

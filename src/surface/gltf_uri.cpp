@@ -146,7 +146,7 @@ std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optiona
   const std::string quoted = std::string("\"").append(one_line(uri)).append("\"");
   const std::vector<std::string> paths = paths_of(uri);
   if (!std::ranges::all_of(paths, is_relative)) malformed(quoted + " is not a relative path");
-  if (!folder && !has_scheme(uri)) malformed(quoted + " is a file of its own, and there is no folder to look in");
+  if (!folder && !has_scheme(uri)) malformed(quoted + " is an external file, but the glTF data has no folder");
   const auto there = [&](bool (*is)(const fs::path&, std::error_code&)) {
     return std::ranges::find_if(paths, [&](const std::string& path) {
       std::error_code unknown;

@@ -29,7 +29,7 @@ std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at, st
 constexpr std::array<std::uint8_t, 8> png_signature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
 
 Header png_header(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() < 33) malformed("is a PNG cut short");
+  if (bytes.size() < 33) malformed("is a truncated PNG");
   Header header;
   header.width = big_endian(bytes, 16, 4);
   header.height = big_endian(bytes, 20, 4);
@@ -63,9 +63,9 @@ bool is_webp(Bytes bytes) {
 Header webp_header(Bytes bytes) {
   WebPBitstreamFeatures features{};
   const VP8StatusCode status = WebPGetFeatures(bytes.data(), bytes.size(), &features);
-  if (status == VP8_STATUS_NOT_ENOUGH_DATA) malformed("is a WebP cut short");
+  if (status == VP8_STATUS_NOT_ENOUGH_DATA) malformed("is a truncated WebP");
   if (status != VP8_STATUS_OK) malformed("is a malformed WebP");
-  if (features.has_animation != 0) malformed("is an animated WebP, of which Cumulet reads none");
+  if (features.has_animation != 0) malformed("is an animated WebP, which is not supported");
   return {static_cast<std::uint64_t>(features.width), static_cast<std::uint64_t>(features.height), 0};
 }
 
@@ -77,7 +77,7 @@ Header read_header(std::span<const std::uint8_t> bytes) {
   if (is_webp(bytes)) return webp_header(bytes);
   constexpr std::array<std::uint8_t, 4> ktx2 = {0xAB, 'K', 'T', 'X'};
   if (bytes.size() >= ktx2.size() && std::equal(ktx2.begin(), ktx2.end(), bytes.begin())) {
-    malformed("is a KTX2 image, of which Cumulet reads none");
+    malformed("is a KTX2 image, which is not supported");
   }
   malformed("is neither PNG, JPEG nor WebP");
 }
@@ -147,7 +147,7 @@ DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
   if (header.width == 0 || header.height == 0) malformed("has no pixels");
   if (header.width > side || header.height > side || header.width * header.height * 8 > std::uint64_t{INT32_MAX} ||
       bytes.size() > std::uint64_t{INT32_MAX}) {
-    malformed(size + " are too many");
+    malformed(size + " exceed the limit");
   }
   if (header.min_bytes > bytes.size())
     malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");

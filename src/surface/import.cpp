@@ -284,8 +284,9 @@ class Assembler {
     }
     if (count == 0) return;
     if (count > 3) some += " and " + std::to_string(count - 3) + " more";
-    log_.warning(name_ + ": much of " + some + " faces into its closed shape, and is not seen from outside: " +
-                 "double_sided of the surface settings shows it");
+    log_.warning(
+        name_ + ": triangles of " + some +
+        " appear to be wound inside out and are invisible from outside; use double_sided of the surface settings");
   }
 
   /// Checks the float precision of mesh positions, of instance transforms, and of animated translations.
@@ -332,42 +333,43 @@ class Assembler {
   void remark() const {
     if (remarks_.not_triangles > 0) {
       log_.info(name_ + ": " + std::to_string(remarks_.not_triangles) +
-                " primitives of points or lines, or without positions, are not drawn");
+                " primitives with points or lines, or without positions, are ignored");
     }
     if (remarks_.incomplete > 0) {
-      log_.warning(name_ + ": " + std::to_string(remarks_.incomplete) + " primitives end within a triangle");
+      log_.warning(name_ + ": " + std::to_string(remarks_.incomplete) + " primitives have an incomplete last triangle");
     }
     if (remarks_.not_finite > 0) {
       log_.warning(name_ + ": " + std::to_string(remarks_.not_finite) +
-                   " primitives have numbers that are not finite, taken as 0");
+                   " primitives have non-finite numbers, which are read as 0");
     }
     if (remarks_.without_data > 0) {
       log_.warning(name_ + ": " + std::to_string(remarks_.without_data) +
-                   " primitives are not drawn: their buffer has no data");
+                   " primitives are ignored: their buffer has no data");
     }
     if (remarks_.without_elements > 0) {
       log_.warning(name_ + ": " + std::to_string(remarks_.without_elements) +
-                   " primitives are not drawn: an accessor of theirs has a count of 0");
+                   " primitives are ignored: an accessor has a count of 0");
     }
     if (remarks_.unbound > 0) {
       log_.warning(name_ + ": " + std::to_string(remarks_.unbound) +
-                   " primitives have a skin and no joints, and stand still");
+                   " primitives have a skin but no joints, and are not animated");
     }
     if (absent_joints_ > 0) {
-      log_.warning(name_ + ": " + std::to_string(absent_joints_) + " nodes have a skin whose joints are in no scene");
+      log_.warning(name_ + ": " + std::to_string(absent_joints_) +
+                   " nodes have a skin with joints that are in no scene");
     }
     if (skinned_instances_ > 0) {
       log_.warning(name_ + ": " + std::to_string(skinned_instances_) +
-                   " nodes have instances and a skin, and are drawn once");
+                   " nodes have instances and a skin; only one instance is rendered");
     }
     if (without_instances_ > 0) {
       log_.warning(name_ + ": " + std::to_string(without_instances_) +
-                   " nodes are not drawn: an accessor of their instances has a count of 0");
+                   " nodes are ignored: an accessor of their instances has a count of 0");
     }
     if (!own_attributes_.empty()) {
       std::string list;
       for (const std::string& attribute : own_attributes_) list += (list.empty() ? "" : ", ") + attribute;
-      log_.warning(name_ + ": instances are drawn without " + one_line(list));
+      log_.warning(name_ + ": instances are rendered without " + one_line(list));
     }
     if (scene_->indices.empty()) log_.warning(name_ + ": has no triangles");
   }
@@ -404,7 +406,7 @@ ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& label,
     if (error.code() != ErrorCode::file && error.code() != ErrorCode::unsupported) throw;
     throw Error(error.code(), name + ": " + error.what());
   } catch (const std::bad_alloc&) {
-    throw Error(ErrorCode::out_of_memory, name + ": there is not enough memory for it");
+    throw Error(ErrorCode::out_of_memory, name + ": not enough memory");
   } catch (const std::exception& error) {
     throw Error(ErrorCode::file, name + ": " + detail::one_line(error.what()));
   }
@@ -420,7 +422,7 @@ ScenePtr import_gltf(const FilePath& path, const Log& log, Progress* progress) {
   } catch (const Error& error) {
     throw Error(error.code(), path.given() + ": " + error.what());
   } catch (const std::bad_alloc&) {
-    throw Error(ErrorCode::out_of_memory, path.given() + ": there is not enough memory for it");
+    throw Error(ErrorCode::out_of_memory, path.given() + ": not enough memory");
   }
   return import_gltf(std::move(bytes), path.given(), file.parent_path(), log, progress);
 }

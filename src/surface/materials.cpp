@@ -27,7 +27,7 @@ std::vector<double> numbers(const tinygltf::Value& object, const char* key, std:
   if (!object.Has(key)) return otherwise;
   const tinygltf::Value& array = object.Get(key);
   if (array.ArrayLen() != otherwise.size()) {
-    malformed(what + ": " + key + " has not " + std::to_string(otherwise.size()) + " numbers");
+    malformed(what + ": " + key + " does not have " + std::to_string(otherwise.size()) + " numbers");
   }
   for (std::size_t i = 0; i < otherwise.size(); ++i) otherwise[i] = array.Get(static_cast<int>(i)).GetNumberAsDouble();
   return otherwise;
@@ -87,9 +87,8 @@ class Materials {
     movable.emplace_back();
     for (const MovableMaterial& material : movable) scene_.materials.push_back(material.now);
     if (approximated_ > 0) {
-      log_.warning(
-          name_ +
-          ": KHR_materials_pbrSpecularGlossiness is read as the metallic-roughness material that looks like it");
+      log_.warning(name_ +
+                   ": KHR_materials_pbrSpecularGlossiness is converted to a similar metallic-roughness material");
     }
     return movable;
   }
@@ -100,7 +99,7 @@ class Materials {
     Material& to = movable.now;
     to.name = one_line(from.name);
     const auto& pbr = from.pbrMetallicRoughness;
-    if (pbr.baseColorFactor.size() != 4) malformed(what + ": baseColorFactor has not 4 numbers");
+    if (pbr.baseColorFactor.size() != 4) malformed(what + ": baseColorFactor does not have 4 numbers");
     to.base_color = glm::vec4(color(pbr.baseColorFactor), unit(pbr.baseColorFactor[3]));
     const bool glossy = find(from.extensions, "KHR_materials_pbrSpecularGlossiness") != nullptr;
     if (!glossy) texture(TextureSlot::base_color, use_of(pbr.baseColorTexture), what, movable);
@@ -120,7 +119,7 @@ class Materials {
     } else if (from.alphaMode == "BLEND") {
       to.alpha_mode = AlphaMode::blend;
     } else if (from.alphaMode != "OPAQUE") {
-      malformed(what + ": alphaMode \"" + one_line(from.alphaMode) + "\" is none of glTF's");
+      malformed(what + ": alphaMode \"" + one_line(from.alphaMode) + "\" is unknown");
     }
     extensions(from.extensions, what, movable);
     return movable;
@@ -215,9 +214,9 @@ class Materials {
     if (!at) at = other;
     if (!at) return;
     if (other && (other->uv_set != at->uv_set || other->transform != at->transform)) {
-      log_.warning(
-          name_ + ": " + what +
-          " has its specular-glossiness texture in another place than its diffuse one: " + "it is drawn where that is");
+      log_.warning(name_ + ": " + what +
+                   " has different UV sets or texture transforms for specular-glossiness and diffuse; those of diffuse "
+                   "are used");
     }
     movable.transforms[static_cast<std::size_t>(TextureSlot::metallic_roughness)] =
         movable.transforms[static_cast<std::size_t>(TextureSlot::base_color)];
@@ -248,7 +247,7 @@ class Materials {
       images = convert(f, diffuse_image, specular_image, budget_);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::file) throw;
-      log_.warning(name_ + ": " + what + " is drawn without textures: " + error.what());
+      log_.warning(name_ + ": " + what + " is rendered without textures: " + error.what());
       return made;
     }
     const int main = diffuse_image ? diffuse.index : specular.index;
@@ -304,7 +303,7 @@ class Materials {
     }
     if (uv_set > 1) {
       log_.warning(name_ + ": " + what + " uses TEXCOORD_" + std::to_string(uv_set) +
-                   " for a texture: only sets 0 and 1 are read, and it is drawn without");
+                   " for a texture, which is ignored: only sets 0 and 1 are supported");
       return std::nullopt;
     }
     to.uv_set = static_cast<std::uint32_t>(uv_set);
@@ -338,8 +337,8 @@ class Materials {
   void remark_on(const tinygltf::Texture& from, std::size_t index) {
     for (const auto& [extension, value] : from.extensions) {
       if (extension == "EXT_texture_webp") continue;  // already logged
-      log_.warning(name_ + ": " + numbered("texture", index) + " has only an image of " + one_line(extension) +
-                   ", and is left out");
+      log_.warning(name_ + ": " + numbered("texture", index) + " has only an image with " + one_line(extension) +
+                   ", and is ignored");
       return;
     }
   }
@@ -370,13 +369,13 @@ class Materials {
     try {
       DecodedImage decoded = load(image);
       if (!decoded.damage.empty()) {
-        log_.warning(name_ + ": " + called(source) + " is damaged, and shown as far as it can be: " + decoded.damage);
+        log_.warning(name_ + ": " + called(source) + " is damaged and partly shown: " + decoded.damage);
       }
       decoded.image.name = image.name;
       return std::move(decoded.image);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::file) throw;
-      log_.warning(name_ + ": " + called(source) + " is left out: " + error.what());
+      log_.warning(name_ + ": " + called(source) + " is ignored: " + error.what());
     }
     return std::nullopt;
   }
@@ -469,9 +468,9 @@ MovableLight import_light(const tinygltf::Light& light, const std::string& what)
   } else if (light.type == "spot") {
     to.kind = PunctualLight::Kind::spot;
   } else if (light.type != "point") {
-    malformed(what + ": type \"" + one_line(light.type) + "\" is none of KHR_lights_punctual's");
+    malformed(what + ": type \"" + one_line(light.type) + "\" is unknown in KHR_lights_punctual");
   }
-  if (!light.color.empty() && light.color.size() != 3) malformed(what + ": color has not 3 numbers");
+  if (!light.color.empty() && light.color.size() != 3) malformed(what + ": color does not have 3 numbers");
   if (!light.color.empty()) movable.color = color(light.color);
   movable.intensity = positive(light.intensity);
   to.intensity = movable.color * movable.intensity;
@@ -508,7 +507,7 @@ SceneCamera import_camera(const tinygltf::Camera& camera, const std::string& wha
     to.near_plane = from.znear;
     to.far_plane = from.zfar;
   } else {
-    malformed(what + ": type \"" + one_line(camera.type) + "\" is none of glTF's");
+    malformed(what + ": type \"" + one_line(camera.type) + "\" is unknown");
   }
   return to;
 }

@@ -76,7 +76,7 @@ class Primitive {
   /// Returns nullopt if the primitive draws no triangles.
   std::optional<MeshPart> import() {
     if (from_.mode < TINYGLTF_MODE_POINTS || from_.mode > TINYGLTF_MODE_TRIANGLE_FAN) {
-      malformed(what_ + ": mode " + std::to_string(from_.mode) + " is none of glTF's");
+      malformed(what_ + ": mode " + std::to_string(from_.mode) + " is unknown");
     }
     if (from_.mode < TINYGLTF_MODE_TRIANGLES || !has("POSITION")) {
       ++remarks_.not_triangles;
@@ -284,7 +284,7 @@ class Primitive {
     result.reserve(values.size() * 4);
     for (const glm::vec4& value : values) {
       for (int c = 0; c < 4; ++c) {
-        if (!(value[c] >= 0.0F && value[c] <= 65535.0F)) malformed(label(name) + " is not of unsigned integers");
+        if (!(value[c] >= 0.0F && value[c] <= 65535.0F)) malformed(label(name) + " does not contain unsigned integers");
         result.push_back(static_cast<std::uint32_t>(value[c]));
       }
     }
@@ -383,7 +383,7 @@ class Primitive {
         const auto found = target.find(name);
         if (found == target.end()) return;
         const std::string what = what_ + ", target " + std::to_string(t) + ", " + name;
-        if (accessors_.count(found->second, what) != count_) malformed(what + " has not an element a vertex");
+        if (accessors_.count(found->second, what) != count_) malformed(what + " does not have one element per vertex");
         values = accessors_.vectors<3>(found->second, what, &which_);
         if (std::string_view(name) == "POSITION") {
           for (const glm::vec3& value : values) {

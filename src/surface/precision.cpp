@@ -45,8 +45,8 @@ std::string PrecisionRemark::text(const std::string& name) const {
   const std::string size =
       worst_.size > 0.0 ? ", " + digits(100.0 * worst_.part()) + " % of its size" : ", more than its size";
   return cumulet::one_line(name, 4096) + ": the positions of " + what_ + more + " lose precision: they reach " +
-         digits(worst_.farthest) + ", where 32-bit floats are rounded by up to " + digits(worst_.error) + size +
-         ". A node's translation holds such an offset exactly";
+         digits(worst_.farthest) + ", where 32-bit floats have a rounding error of up to " + digits(worst_.error) +
+         size + ". Use a node translation for large offsets";
 }
 
 }  // namespace cumulet::surface::detail

@@ -15,7 +15,7 @@ namespace {
 
 void expect(const std::vector<double>& values, std::size_t count, const std::string& what, const char* name) {
   if (!values.empty() && values.size() != count) {
-    malformed(what + ": " + name + " has not " + std::to_string(count) + " numbers");
+    malformed(what + ": " + name + " does not have " + std::to_string(count) + " numbers");
   }
 }
 
@@ -40,15 +40,15 @@ class Importer {
     for (std::size_t i = 0; i < model_.animations.size(); ++i) animation(i);
     hide();
     if (unmatched_ > 0) {
-      log_.warning(name_ + ": " + std::to_string(unmatched_) + " nodes have not a weight a morph target");
+      log_.warning(name_ + ": " + std::to_string(unmatched_) + " nodes have a wrong number of morph weights");
     }
     if (without_data_ > 0) {
       log_.warning(name_ + ": " + std::to_string(without_data_) +
-                   " skins and animation channels are as at rest: their buffer has no data");
+                   " skins and animation channels are ignored: their buffer has no data");
     }
     if (without_elements_ > 0) {
       log_.warning(name_ + ": " + std::to_string(without_elements_) +
-                   " skins and animation channels are as at rest: an accessor of theirs has a count of 0");
+                   " skins and animation channels are ignored: an accessor has a count of 0");
     }
     if (frozen_ > 0) {
       log_.warning(name_ + ": " + std::to_string(frozen_) +
@@ -56,7 +56,7 @@ class Importer {
     }
     if (not_followed_ > 0) {
       const std::string others = not_followed_ == 1 ? "" : " and " + std::to_string(not_followed_ - 1) + " more";
-      log_.warning(name_ + ": animated pointers that are not followed: " + first_not_followed_ + others);
+      log_.warning(name_ + ": unsupported animated pointers: " + first_not_followed_ + others);
     }
     return std::move(rig_);
   }
@@ -120,7 +120,7 @@ class Importer {
     if (rig_.order.size() == count) return;
     // Each node has at most one parent, so a node that no root reaches is in a cycle.
     const auto lost = std::find(seen.begin(), seen.end(), false) - seen.begin();
-    malformed(numbered("node", static_cast<std::size_t>(lost)) + " descends from itself");
+    malformed(numbered("node", static_cast<std::size_t>(lost)) + " is its own ancestor");
   }
 
   /// Appends the descendants of a root, parents first. Nodes already seen are skipped with their descendants.
@@ -331,10 +331,10 @@ class Importer {
     } else if (sampler.interpolation == "CUBICSPLINE") {
       to.interpolation = Interpolation::cubic_spline;
     } else if (sampler.interpolation != "LINEAR") {
-      malformed(what + ": interpolation \"" + one_line(sampler.interpolation) + "\" is none of glTF's");
+      malformed(what + ": interpolation \"" + one_line(sampler.interpolation) + "\" is unknown");
     }
     if (to.property == Property::visibility && to.interpolation != Interpolation::step) {
-      malformed(what + ": what is true or false changes by STEP alone");
+      malformed(what + ": a boolean can only be animated with STEP interpolation");
     }
     if (file_.without_data(sampler.input) || file_.without_data(sampler.output)) {
       ++without_data_;
@@ -347,7 +347,7 @@ class Importer {
     to.times = accessors_.scalars(sampler.input, what + ", input");
     for (std::size_t k = 0; k < to.times.size(); ++k) {
       if (!std::isfinite(to.times[k]) || to.times[k] < 0.0F || (k > 0 && to.times[k] < to.times[k - 1])) {
-        malformed(what + ": its times do not rise");
+        malformed(what + ": its times are not increasing");
       }
     }
     read_values(sampler.output, what + ", output", to);

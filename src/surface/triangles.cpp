@@ -28,11 +28,12 @@ void require_finite(std::span<const float> values, const std::string& what) {
 
 void check_mesh(const TriangleMesh& mesh) {
   const std::size_t count = mesh.positions.size() / 3;
-  if (mesh.positions.size() % 3 != 0) malformed("positions are not 3 a vertex");
+  if (mesh.positions.size() % 3 != 0) malformed("positions do not have 3 values per vertex");
   if (count > std::numeric_limits<std::uint32_t>::max()) malformed("has more than 2^32 vertices");
-  if (!mesh.normals.empty() && mesh.normals.size() != 3 * count) malformed("normals are not 3 a vertex");
-  if (!mesh.colors.empty() && mesh.colors.size() != 4 * count) malformed("colors are not 4 a vertex");
-  if (!mesh.velocities.empty() && mesh.velocities.size() != 3 * count) malformed("velocities are not 3 a vertex");
+  if (!mesh.normals.empty() && mesh.normals.size() != 3 * count) malformed("normals do not have 3 values per vertex");
+  if (!mesh.colors.empty() && mesh.colors.size() != 4 * count) malformed("colors do not have 4 values per vertex");
+  if (!mesh.velocities.empty() && mesh.velocities.size() != 3 * count)
+    malformed("velocities do not have 3 values per vertex");
   require_finite(mesh.positions, "positions are");
   require_finite(mesh.normals, "normals are");
   if (!std::ranges::all_of(mesh.velocities, [](float v) { return std::abs(v) < 1e18F; })) {
@@ -43,8 +44,8 @@ void check_mesh(const TriangleMesh& mesh) {
   }
   if (mesh.indices.size() > std::numeric_limits<std::uint32_t>::max()) malformed("has more than 2^32 indices");
   if (mesh.indices.empty() ? count % 3 != 0 : mesh.indices.size() % 3 != 0) {
-    malformed(mesh.indices.empty() ? "without indices, its vertices are not 3 a triangle"
-                                   : "indices are not 3 a triangle");
+    malformed(mesh.indices.empty() ? "without indices, the number of vertices is not a multiple of 3"
+                                   : "the number of indices is not a multiple of 3");
   }
   for (const std::uint32_t index : mesh.indices) {
     if (index >= count) {

@@ -76,9 +76,9 @@ bool needs_values(const VolumeAsset& volume, const BuildSettings& settings) {
 }
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
-  log.info((most < max_cells ? "the memory that is allowed, of " + std::to_string(most) + " cells,"
+  log.info((most < max_cells ? "the memory limit of " + std::to_string(most) + " cells"
                              : "max_cells (" + std::to_string(max_cells) + ")") +
-           " ended the refinement before the threshold");
+           " stopped the refinement above the threshold");
 }
 
 Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress,
@@ -97,8 +97,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   const VolumeAssetPtr moving = open_of(volume, settings.shutter_seconds, progress);
   const VolumeAsset& shown = moving ? *moving : *volume;
   if (moving && 0.5 * settings.shutter_seconds * volume->fastest() > volume::farthest_voxels)
-    log.info(volume->name() +
-             ": what moves further than 64 voxels in half of the shutter's time is blurred by that much");
+    log.info(volume->name() + ": motion blur is limited to 64 voxels per half shutter time");
   const double taken = watch.lap();
   const auto [voxels, statistics, unit] = shown.density(settings.density_ramp, progress, built.seconds.statistics);
   watch.lap();
@@ -118,7 +117,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     return built;
   }
   if (settings.on == BuildOn::gpu && moving)
-    log.info(volume->name() + ": it moves while the shutter is open, so its grid is built on the CPU");
+    log.info(volume->name() + ": its grid is built on the CPU because it has motion blur");
   const Carried carried = Carried::of(channels);
   const std::uint64_t max_cells = settings.refine.max_cells;
   grid::RefineSettings refine = settings.refine;
@@ -133,8 +132,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
       return {};
     }
     if (!planned)
-      log.info(volume->name() + ": its grid is built on the CPU: the lattice of " +
-               std::to_string(lattice->device_bytes()) + " bytes leaves too little of the GL memory that is allowed, " +
+      log.info(volume->name() + ": its grid is built on the CPU: a lattice of " +
+               std::to_string(lattice->device_bytes()) + " bytes leaves too little of the GPU memory limit of " +
                std::to_string(resource_limits.gl_bytes()) + " bytes");
   }
   if (planned) {

@@ -45,12 +45,12 @@ void require_format(const core::Frame& f) {
   require(f.encoding != render::ColorEncoding::hdr || is_float,
           "cumulet_frame_desc.format clamps CUMULET_COLOR_HDR: it needs GL_RGBA16F or GL_RGBA32F");
   require(f.encoding != render::ColorEncoding::srgb_framebuffer || f.format == GL_SRGB8_ALPHA8,
-          "cumulet_frame_desc.format is not encoded by OpenGL: CUMULET_COLOR_SRGB_FRAMEBUFFER needs GL_SRGB8_ALPHA8");
+          "cumulet_frame_desc.format has no sRGB encoding: CUMULET_COLOR_SRGB_FRAMEBUFFER needs GL_SRGB8_ALPHA8");
 }
 
 core::Frame read_frame(const cumulet_frame_desc* desc) {
   const cumulet_frame_desc d = read_desc(desc, "cumulet_frame_desc");
-  require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is not up to 1e9");
+  require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is above 1e9 or not finite");
   require(number(d.target) <= CUMULET_TARGET_NONE, "cumulet_frame_desc.target is unknown");
   require(number(d.color) <= CUMULET_COLOR_HDR, "cumulet_frame_desc.color is unknown");
   require(number(d.blend) <= CUMULET_BLEND_REPLACE, "cumulet_frame_desc.blend is unknown");
@@ -155,7 +155,7 @@ cumulet_status cumulet_shader_cache_create(const cumulet_shader_cache_desc* desc
     if (d.shaders != nullptr && *d.shaders != '\0') {
       if (!cumulet::gl::reloads_shaders) {
         throw cumulet::Error(cumulet::ErrorCode::unsupported,
-                             "shaders of a folder are for debug builds of the library");
+                             "loading shaders from a folder requires a debug build of the library");
       }
       shaders = std::make_shared<cumulet::gl::ShaderFolder>(d.shaders);
     }
@@ -265,7 +265,7 @@ cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequenc
 
 cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame, char* cause, size_t size) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(cause != nullptr && size > 0, "there is no room for the cause");
+    require(cause != nullptr && size > 0, "the buffer for the cause is NULL or empty");
     const std::optional<cumulet::Error> failure = v.frame_failure(frame);
     copy_text(failure ? failure->what() : "", cause, size);
   });
@@ -284,7 +284,7 @@ cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumul
                                                    char* cause, size_t size) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
-    require(cause != nullptr && size > 0, "there is no room for the cause");
+    require(cause != nullptr && size > 0, "the buffer for the cause is NULL or empty");
     const std::optional<cumulet::Error> failure = v.frame_failure(*instance->asset, frame);
     copy_text(failure ? failure->what() : "", cause, size);
   });
@@ -339,7 +339,8 @@ cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, con
   return guarded(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::Place> places = v.places();
     const bool ends = open != nullptr || close != nullptr;
-    require(!ends || count == places.size(), "the shutter transforms are not as many as those of the volume");
+    require(!ends || count == places.size(),
+            "the number of shutter transforms differs from the number of volume transforms");
     constexpr std::array<double, 16> as_it_is{};
     const auto at = [&](const double* matrices, size_t i) {
       return matrices != nullptr ? std::span<const double, 16>(matrices + 16 * i, 16)
@@ -542,7 +543,7 @@ cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display
 
 cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(in_range(seconds, -1e9, 1e9), "seconds are not within 1e9");
+    require(in_range(seconds, -1e9, 1e9), "seconds is not from -1e9 to 1e9");
     v.set_previous_camera(camera != nullptr ? camera->asset : nullptr, seconds);
   });
 }
@@ -580,7 +581,7 @@ cumulet_status cumulet_input(cumulet_viewer* viewer, const cumulet_event* event,
     require(number(e.type) <= CUMULET_EVENT_FOCUS_LOST, "cumulet_event.type is unknown");
     require(number(e.button) <= CUMULET_BUTTON_RIGHT, "cumulet_event.button is unknown");
     require(in_range(e.x, -1e9, 1e9) && in_range(e.y, -1e9, 1e9) && in_range(e.wheel, -1e4, 1e4),
-            "cumulet_event's position or wheel is not finite");
+            "cumulet_event's position or wheel is out of range");
     core::InputEvent i;
     i.type = static_cast<core::InputEvent::Type>(e.type);
     i.x = e.x;
@@ -695,7 +696,7 @@ cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoi
 cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linear, uint8_t* rgba, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(linear != nullptr && rgba != nullptr, "linear or rgba is NULL");
-    require(count % 4 == 0, "count is no multiple of 4");
+    require(count % 4 == 0, "count is not a multiple of 4");
     v.encode_display({linear, count}, {rgba, count});
   });
 }

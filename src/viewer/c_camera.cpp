@@ -24,7 +24,7 @@ bool within_range(std::span<const double, 3> v) {
 
 CameraPose pose_of(const cumulet_camera_desc* desc) {
   const cumulet_camera_desc d = read_desc(desc, "cumulet_camera_desc");
-  require(within_range(d.eye) && within_range(d.target), "cumulet_camera_desc.eye or target is not within +-1e30");
+  require(within_range(d.eye) && within_range(d.target), "cumulet_camera_desc.eye or target is not from -1e30 to 1e30");
   require(all_finite(d.up), "cumulet_camera_desc.up is not finite");
   require(d.fovy_degrees == 0.0 || in_range(d.fovy_degrees, 0.01, 175.0),
           "cumulet_camera_desc.fovy_degrees is not from 0.01 to 175");
@@ -47,7 +47,7 @@ CameraPose pose_of(const cumulet_camera_desc* desc) {
   pose.target = to_dvec3(d.target);
   const glm::dvec3 look = pose.target - pose.eye;
   require(look == glm::dvec3(0.0) || glm::length(look) > 1.0 / farthest,
-          "cumulet_camera_desc.eye and target are too near each other");
+          "cumulet_camera_desc.eye and target are too close to each other");
   const double up = std::max({std::abs(d.up[0]), std::abs(d.up[1]), std::abs(d.up[2])});
   if (up > 0.0) pose.up = to_dvec3(d.up) / up;
   if (d.fovy_degrees > 0.0) pose.fovy_degrees = d.fovy_degrees;
@@ -59,7 +59,7 @@ CameraPose pose_of(const cumulet_camera_desc* desc) {
 }
 
 ClipDepth clip_of(const cumulet_clip_space& clip) {
-  require(number(clip) <= CUMULET_CLIP_ZERO_TO_ONE, "the cumulet_clip_space is unknown");
+  require(number(clip) <= CUMULET_CLIP_ZERO_TO_ONE, "clip is unknown");
   return static_cast<ClipDepth>(number(clip));
 }
 
@@ -183,7 +183,7 @@ cumulet_status cumulet_camera_frame(cumulet_camera* camera, const double box_min
     require(in_range(aspect, 1e-6, 1e6), "the aspect ratio is not from 1e-6 to 1e6");
     const std::span<const double, 3> low(box_min, 3);
     const std::span<const double, 3> high(box_max, 3);
-    require(within_range(low) && within_range(high), "the box is not within +-1e30");
+    require(within_range(low) && within_range(high), "the box is not from -1e30 to 1e30");
     require(glm::all(glm::lessThanEqual(to_dvec3(low), to_dvec3(high))), "box_min is greater than box_max");
     c.frame({to_dvec3(low), to_dvec3(high)}, aspect);
   });

@@ -21,7 +21,7 @@ InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
   InstanceSettings settings;
   require((d.volume != nullptr) + (d.sequence != nullptr) + (d.dynamic_volume != nullptr) <= 1,
-          "cumulet_instance_desc has more than one of a volume, a sequence and a dynamic volume");
+          "cumulet_instance_desc has more than one of volume, sequence and dynamic_volume");
   if (d.volume != nullptr) settings.volume = d.volume->asset;
   if (d.sequence != nullptr) settings.sequence = d.sequence->asset;
   if (d.dynamic_volume != nullptr) settings.live = d.dynamic_volume->asset;

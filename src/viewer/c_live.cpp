@@ -45,7 +45,7 @@ struct HandedState {
 MemoryField field_of(const cumulet_field& field, const std::string& what) {
   const cumulet_field f = read_desc(&field, "cumulet_field");
   if (number(f.channel) > CUMULET_CHANNEL_VELOCITY_Z) refuse(what + ": its channel is unknown");
-  if ((f.dense == nullptr) == (f.sparse == nullptr)) refuse(what + ": it has not one of dense and sparse");
+  if ((f.dense == nullptr) == (f.sparse == nullptr)) refuse(what + ": exactly one of dense and sparse must be set");
   const auto channel = static_cast<Channel>(number(f.channel));
   if (f.dense != nullptr) return {channel, to_dense(f.dense, what)};
   return {channel, to_sparse(f.sparse, what)};
@@ -62,13 +62,14 @@ HandedState state_of(const cumulet_volume_fields_desc* desc) {
 }
 
 void require_no_release(const HandedState& state) {
-  require(state.desc.release == nullptr, "cumulet_volume_fields_desc.release is for cumulet_dynamic_volume_set alone");
+  require(state.desc.release == nullptr,
+          "cumulet_volume_fields_desc.release is only allowed in cumulet_dynamic_volume_set");
 }
 
 render::GlVoxels gl_voxels_of(const cumulet_gl_field& field, const std::string& what) {
   const cumulet_gl_field f = read_desc(&field, "cumulet_gl_field");
   if (number(f.channel) > CUMULET_CHANNEL_VELOCITY_Z) refuse(what + ": its channel is unknown");
-  if ((f.texture == 0) == (f.buffer == 0)) refuse(what + ": it has not one of texture and buffer");
+  if ((f.texture == 0) == (f.buffer == 0)) refuse(what + ": exactly one of texture and buffer must be set");
   if (f.component > 3) refuse(what + ": its component is not from 0 to 3");
   if (number(f.format) > CUMULET_VOXEL_FORMAT_R8) refuse(what + ": its format is unknown");
   render::GlVoxels voxels{static_cast<Channel>(number(f.channel)), {}, matrix_or_identity(f.index_to_world)};
@@ -104,7 +105,7 @@ std::shared_ptr<Live> live_of(const cumulet_dynamic_volume_desc* desc) {
   const cumulet_dynamic_volume_desc d = read_desc(desc, "cumulet_dynamic_volume_desc");
   const auto moderate = [](double x) { return in_range(x, -1e15, 1e15); };
   require(std::ranges::all_of(d.bounds_min, moderate) && std::ranges::all_of(d.bounds_max, moderate),
-          "cumulet_dynamic_volume_desc's bounds are not within +-1e15");
+          "cumulet_dynamic_volume_desc's bounds are not from -1e15 to 1e15");
   const cumulet::viewer::Bounds bounds{to_dvec3(d.bounds_min), to_dvec3(d.bounds_max)};
   require(d.gpu_resident == 0 || d.gpu_resident == 1, "cumulet_dynamic_volume_desc.gpu_resident is neither 0 nor 1");
   const bool stays = d.gpu_resident == 1;
@@ -194,7 +195,7 @@ cumulet_status cumulet_dynamic_volume_get_volume(cumulet_dynamic_volume* live, c
       in_gl->ask_for_values();
       throw cumulet::Error(
           cumulet::ErrorCode::unsupported,
-          state.volume->name() + ": its voxels are in GL; they are brought to main memory from now on");
+          state.volume->name() + ": its voxels are on the GPU; they are copied to main memory from now on");
     }
     auto handle = std::make_unique<cumulet_volume>();
     handle->asset = std::move(state.volume);

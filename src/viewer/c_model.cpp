@@ -18,7 +18,7 @@ void require_time(double time) { require(std::isfinite(time), "cumulet_model_des
 glm::dmat4 place_of(std::span<const double, 16> to_world, const std::string& what = "") {
   const glm::dmat4 place = matrix_or_identity(to_world);
   require_place(place, what);
-  if (!cumulet::scene::can_stand(place)) refuse(what + "to_world makes things flat or endless");
+  if (!cumulet::scene::can_stand(place)) refuse(what + "to_world is singular or too large");
   return place;
 }
 
@@ -35,7 +35,7 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   settings.ends = place_ends(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_model_desc.");
   if (settings.ends &&
       !(cumulet::scene::can_stand(settings.ends->open) && cumulet::scene::can_stand(settings.ends->close)))
-    refuse("cumulet_model_desc.open_to_world or close_to_world makes things flat or endless");
+    refuse("cumulet_model_desc.open_to_world or close_to_world is singular or too large");
   settings.choice = {d.time, d.animation, d.double_sided == 1, d.variant};
   settings.hidden = d.hidden == 1;
   settings.shadow_only = d.shadow_only == 1;

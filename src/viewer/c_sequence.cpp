@@ -26,14 +26,15 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   const auto there = [&](std::uint32_t from) { return std::to_string(from) + ": it has " + std::to_string(frames); };
   if (d.first_frame >= frames) refuse("the sequence has no frame " + there(d.first_frame));
   const std::uint32_t rest = frames - d.first_frame;
-  if (d.frame_count > rest) refuse("the sequence has fewer frames from " + there(d.first_frame));
+  if (d.frame_count > rest) refuse("the sequence has too few frames from " + there(d.first_frame));
   const bool steps = d.interpolation != CUMULET_FRAME_INTERPOLATION_NONE;
   require(d.subframes <= max_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
   // The default is lower for sequences so long that it would exceed the maximum.
   if (read_desc(desc, "cumulet_playback_desc").subframes == 0)
     d.subframes = std::min(d.subframes, static_cast<std::uint32_t>(max_steps / frames));
   if (steps && std::uint64_t{frames} * d.subframes > max_steps)
-    refuse("cumulet_playback_desc.subframes makes more than 1000000 of " + std::to_string(frames) + " frames");
+    refuse("cumulet_playback_desc.subframes gives more than 1000000 interpolated frames for " + std::to_string(frames) +
+           " frames");
   return {.frames_per_second = d.frames_per_second,
           .offset_seconds = d.offset_seconds,
           .repeat = static_cast<cumulet::scene::Repeat>(d.repeat),
@@ -99,7 +100,7 @@ cumulet_status cumulet_sequence_set_time(cumulet_sequence* sequence, double seco
 
 cumulet_status cumulet_sequence_set_frame(cumulet_sequence* sequence, double frame) {
   return on(sequence, "sequence", [&](Sequence& s) {
-    require(in_range(frame, 0.0, s.files()->count() - 1.0), "frame is none of the sequence's");
+    require(in_range(frame, 0.0, s.files()->count() - 1.0), "frame is not a frame of the sequence");
     s.set_position(frame);
   });
 }
@@ -115,7 +116,7 @@ cumulet_status cumulet_sequence_get_frame_at(const cumulet_sequence* sequence, d
 
 cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* sequence, uint32_t frame, double* seconds) {
   return on(sequence, "sequence", [&](const Sequence& s) {
-    require(frame < s.files()->count(), "frame is none of the sequence's");
+    require(frame < s.files()->count(), "frame is not a frame of the sequence");
     require(seconds != nullptr, "seconds is NULL");
     *seconds = cumulet::scene::time_of(s.get().playback, frame);
   });

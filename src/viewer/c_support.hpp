@@ -186,10 +186,10 @@ inline void require_place(const glm::dmat4& m, const std::string& what = "") {
   };
   if (!all(m, [](double x) { return std::isfinite(x); })) refuse(what + "to_world is not finite");
   if (m[0].w != 0.0 || m[1].w != 0.0 || m[2].w != 0.0 || m[3].w != 1.0) refuse(what + "to_world is not affine");
-  if (!std::isnormal(glm::determinant(glm::dmat3(m)))) refuse(what + "to_world flattens space");
+  if (!std::isnormal(glm::determinant(glm::dmat3(m)))) refuse(what + "to_world is singular");
   const auto moderate = [](double x) { return std::abs(x) <= most; };
   if (!all(m, moderate) || !all(glm::inverse(m), moderate))
-    refuse(what + "to_world, or its inverse, has numbers above 1e15");
+    refuse(what + "to_world or its inverse has values above 1e15");
 }
 
 /// Returns the transforms at shutter open and close; zeros select `place`, the transform at the frame time. Returns
@@ -206,14 +206,14 @@ inline std::optional<scene::PlaceEnds> place_ends(std::span<const double, 16> op
   const scene::PlaceEnds ends{end(open, "open_"), end(close, "close_")};
   if (ends.open == place && ends.close == place) return std::nullopt;
   if (!scene::stays_solid(ends.open, ends.close))
-    refuse(what + "open_to_world and close_to_world make it flat in between");
+    refuse(what + "open_to_world and close_to_world have a singular interpolation");
   return ends;
 }
 
 /// Returns a host's array of count * each values.
 template <class T>
 std::span<const T> array_of(const T* values, uint64_t count, uint64_t each, const std::string& what) {
-  if (count > std::numeric_limits<size_t>::max() / sizeof(T) / each) refuse(what + " are more than memory holds");
+  if (count > std::numeric_limits<size_t>::max() / sizeof(T) / each) refuse(what + " exceed the address space");
   if (values == nullptr && count != 0) refuse(what + " are NULL");
   return {values, static_cast<size_t>(count * each)};
 }
@@ -224,12 +224,12 @@ template <class Desc, class Visit>
 void for_each_desc(const Desc* first, uint64_t count, const char* name, const std::string& what, Visit&& visit) {
   if (count == 0) return;
   const size_t stride = read_desc(first, name).struct_size;
-  if (stride % alignof(Desc) != 0) refuse(what + ": " + name + ".struct_size is no struct's");
+  if (stride % alignof(Desc) != 0) refuse(what + ": " + name + ".struct_size is not a valid size");
   array_of(reinterpret_cast<const unsigned char*>(first), count, stride, what + "s");
   for (uint64_t i = 0; i < count; ++i) {
     const auto* at = reinterpret_cast<const Desc*>(reinterpret_cast<const char*>(first) + i * stride);
     const std::string one = what + " " + std::to_string(i);
-    if (at->struct_size != stride) refuse(one + ": " + name + ".struct_size is not the first one's");
+    if (at->struct_size != stride) refuse(one + ": " + name + ".struct_size differs from that of the first element");
     visit(*at, one);
   }
 }

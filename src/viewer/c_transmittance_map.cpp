@@ -36,7 +36,7 @@ core::MapRequest request_of(const cumulet_transmittance_map_desc* desc) {
   if (d.size != 0) request.size = d.size;
   if (d.slices != 0) request.slices = d.slices;
   require(std::uint64_t{request.size} * request.size * request.slices <= max_texels,
-          "cumulet_transmittance_map_desc.size and slices are more than 2^27 texels");
+          "cumulet_transmittance_map_desc.size and slices give more than 2^27 texels");
   if (d.budget_ms > 0.0) request.budget_ms = d.budget_ms;
   return request;
 }

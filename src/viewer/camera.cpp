@@ -201,7 +201,7 @@ bool finite(const dmat4& m) {
 
 /// Throws if the matrix is not a rotation and a translation within single precision.
 void check_view(const dmat4& view) {
-  if (!finite(view)) refuse("the view matrix has entries that are not finite, or beyond 1e30");
+  if (!finite(view)) refuse("the view matrix has entries that are not finite or exceed 1e30");
   const dvec4 last = glm::row(view, 3);
   if (std::max(largest(dvec3(last)), std::abs(last.w - 1.0)) > 1e-6)
     refuse("the view matrix's last row is not 0 0 0 1");
@@ -224,11 +224,11 @@ void to_window_depth(ClipDepth clip, double& a, double& b) {
 
 ViewFrame frame_of(const dmat4& view, const dmat4& projection, ClipDepth clip) {
   check_view(view);
-  if (!finite(projection)) refuse("the projection matrix has entries that are not finite, or beyond 1e30");
+  if (!finite(projection)) refuse("the projection matrix has entries that are not finite or exceed 1e30");
   dmat4 p = projection;
   const double dirt = 1e-6 * std::max(std::abs(p[0][0]), std::abs(p[1][1]));
   if (std::max(std::abs(p[0][1]), std::abs(p[1][0])) > dirt)
-    refuse("the projection matrix turns or shears the picture");
+    refuse("the projection matrix rotates or shears the image");
   if (std::max(std::abs(p[0][2]), std::abs(p[1][2])) > dirt) refuse("the projection matrix has an oblique near plane");
   if (std::max(std::abs(p[0][3]), std::abs(p[1][3])) > 1e-6 * std::max(std::abs(p[2][3]), std::abs(p[3][3]))) {
     refuse("the projection matrix is neither perspective nor orthographic");
@@ -389,9 +389,9 @@ void Camera::set_shutter(const std::optional<CameraPose>& open, const std::optio
   const bool orthographic = matrices_ ? matrices_frame_.orthographic : pose_.orthographic_height > 0.0;
   for (const auto& end : {open, close}) {
     if (!end) continue;
-    if (end->eye == end->target) refuse("a camera of the shutter looks nowhere: its eye is its target");
+    if (end->eye == end->target) refuse("a shutter camera has equal eye and target");
     if ((end->orthographic_height > 0.0) != orthographic)
-      refuse("a camera of the shutter is not of the camera's kind, perspective or orthographic");
+      refuse("a shutter camera has another projection (perspective or orthographic) than the camera");
   }
   const bool held = shutter_holds();
   if (held ? shutter_->open == open && shutter_->close == close : !open && !close) return;
@@ -420,7 +420,7 @@ std::optional<scene::ViewEnds> Camera::ends(double aspect, const scene::Viewpoin
 
 void Camera::change(const CameraPose& pose) {
   if (!in_range(pose.eye) || !in_range(pose.target) || pose.eye == pose.target) {
-    refuse("the camera would leave the range of its coordinates");
+    refuse("the camera would exceed the coordinate range");
   }
   pose_ = pose;
   matrices_.reset();

@@ -295,7 +295,7 @@ render::Pass Context::display_pass(const char* name, const render::PictureTextur
 
 void Context::composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                         const render::FrameTarget& target) {
-  render::Pass pass = display_pass("cumulet: composite", picture, display);
+  render::Pass pass = display_pass("cumulet: compositing", picture, display);
   if (target.write_depth) pass.reads.push_back(render::film_layers::depth);
   pass.work = [&](const render::Film&, render::Deadline until) {
     render::FrameTarget within = target;

@@ -350,7 +350,7 @@ Log FrameCache::log_of(const std::string& path) {
 void FrameCache::say_failures(std::span<const Error> failures, bool another_is_shown) const {
   for (const Error& failure : failures) {
     const std::string cause = failure.what();
-    log_.warning(another_is_shown ? cause + ": another frame of the sequence is shown instead" : cause);
+    log_.warning(another_is_shown ? cause + ": another frame is shown instead" : cause);
   }
 }
 
@@ -489,7 +489,8 @@ VolumeAssetPtr FrameCache::read(const Which& which, std::optional<Ends>& ends, s
     return std::make_shared<const VolumeAsset>(std::move(made), &progress);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::cancelled) throw;
-    throw Error(error.code(), which.files->paths[frame] + ": what follows it cannot be made: " + error.what());
+    throw Error(error.code(),
+                which.files->paths[frame] + ": the interpolated frame after it cannot be built: " + error.what());
   }
 }
 

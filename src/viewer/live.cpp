@@ -76,7 +76,7 @@ scene::StateInGl Live::with(const scene::StateInGl& newest, const std::vector<sc
   state.name = name;
   for (const scene::StateInGl::Field& field : changed) {
     const auto there = std::ranges::find(state.fields, field.channel, &scene::StateInGl::Field::channel);
-    if (there == state.fields.end()) refuse(name, std::string("there is no ") + name_of(field.channel) + " to update");
+    if (there == state.fields.end()) refuse(name, std::string("no ") + name_of(field.channel) + " to update");
     there->bricks = std::make_shared<const volume::DeviceBricks>(there->bricks->with(*field.bricks));
   }
   return state;
@@ -161,9 +161,10 @@ std::vector<Live::Handed> Live::handed() const {
 const Live::Handed& Live::updatable(const std::vector<Handed>& handed, volume::Channel channel,
                                     const std::string& name) {
   const auto there = std::ranges::find(handed, channel, &Handed::channel);
-  if (there == handed.end()) refuse(name, std::string("there is no ") + name_of(channel) + " to update");
+  if (there == handed.end()) refuse(name, std::string("no ") + name_of(channel) + " to update");
   if (there->takes == Takes::nothing)
-    refuse(name, std::string(name_of(channel)) + " takes no bricks: it was handed over with tiles, or with a release");
+    refuse(name,
+           std::string(name_of(channel)) + " does not accept bricks: it was set with tiles or with a release function");
   return *there;
 }
 
@@ -171,7 +172,7 @@ const Live::Handed& Live::updatable_from_memory(const std::vector<Handed>& hande
                                                 const std::string& name) {
   const Handed& there = updatable(handed, channel, name);
   if (there.takes == Takes::bricks_in_gl)
-    refuse(name, std::string(name_of(channel)) + " is in GL, and takes what changes from there alone");
+    refuse(name, std::string(name_of(channel)) + " is on the GPU and can only be updated from GL");
   return there;
 }
 
@@ -190,7 +191,7 @@ void Live::require_updatable(const std::vector<volume::Channel>& channels,
 void Live::update(const std::vector<MemoryField>& fields, const std::string& name) {
   for (const MemoryField& field : fields) {
     if (!std::holds_alternative<volume::SparseVoxels>(field.voxels))
-      refuse(name, std::string(name_of(field.channel)) + " is dense: an update has bricks");
+      refuse(name, std::string(name_of(field.channel)) + " is dense, but an update must consist of bricks");
   }
   volume::check_update(fields, name);
   const std::vector<Handed> handed = this->handed();
@@ -215,7 +216,7 @@ void Live::update(volume::Changes changes, const std::string& name) {
 void Live::hand_over(volume::Changes changes, const std::vector<Handed>& handed, const std::string& name) {
   {
     const std::scoped_lock lock(mutex_);
-    if (handed != handed_) refuse(name, "another state came between");
+    if (handed != handed_) refuse(name, "another state was set during the update");
     next_.changes.put(std::move(changes));
     ++newest_;
   }

@@ -118,7 +118,7 @@ void LiveBuilder::warn_of_huge(const VolumeAsset& state) {
     if (std::exchange(huge_is_said_, true)) return;
   }
   log_.warning(state.name() + ": " + std::to_string(voxels) +
-               " voxels beyond 1e30, as fill values are, counted as 0; later states are not remarked on");
+               " voxels above 1e30 (fill values) are read as 0; this is not logged again for later states");
 }
 
 bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
@@ -157,7 +157,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
     failure = caught(what);
   }
   const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
-  if (failure && !cancelled) log_.warning(std::string(failure->what()) + ": the state before it stays");
+  if (failure && !cancelled) log_.warning(std::string(failure->what()) + ": the previous state is kept");
   const std::scoped_lock lock(mutex_);
   if (job_ != job || cancelled) {
     if (job_ == job) job_.reset();

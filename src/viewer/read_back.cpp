@@ -64,7 +64,7 @@ std::uint32_t rays_to_denoise(const render::Picture& picture) {
 std::size_t require_room(const render::Picture& picture, const float* rgba, std::size_t count) {
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 4;
   if (rgba == nullptr || count < floats) {
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
   }
   return floats;
 }
@@ -183,13 +183,13 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   target.wait = render::Wait::always;
   composite(picture.film(), textures_of(picture, nullptr), display, target);
   functions_->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
-  gl::check(*functions_, "reading the picture back");
+  gl::check(*functions_, "reading back the image");
 }
 
 render::Picture& Context::readable_shaded() {
   render::Picture& picture = readable();
   if (picture.view() != render::View::shaded) {
-    throw Error(ErrorCode::invalid_argument, "the picture is a debug view: there are AOVs of shaded ones alone");
+    throw Error(ErrorCode::invalid_argument, "the image is a debug view: only shaded images have AOVs");
   }
   return picture;
 }
@@ -197,7 +197,8 @@ render::Picture& Context::readable_shaded() {
 void Context::require_present(bool also) const {
   if (!also || scene_.data() == nullptr ||
       !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
-    throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
+    throw Error(ErrorCode::invalid_argument,
+                "the image is out of date: call cumulet_render until it shows the current scene");
   }
 }
 
@@ -209,16 +210,15 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   const std::optional<FeatureBuffer> feature = feature_of(aov);
   const std::size_t floats = pixels * (color ? 4 : (feature ? render::channels_of(*feature) : 1));
   if (values == nullptr || count < floats) {
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
   }
   if (aov == Aov::beauty) {
     read_means(picture, false, values);
   } else if (aov == Aov::volume) {
     if (!picture.separate_volume_aov()) {
-      throw Error(
-          ErrorCode::invalid_argument,
-          "the volume alone was not gathered: set separate_volume_aov of cumulet_sampling_desc, and wait for the full "
-          "resolution");
+      throw Error(ErrorCode::invalid_argument,
+                  "the volume AOV was not rendered: set cumulet_sampling_desc.separate_volume_aov and render at full "
+                  "resolution");
     }
     progressive_.tracer().read_volume(picture, values);
   } else if (aov == Aov::error) {
@@ -235,12 +235,12 @@ void Context::read_light_group(const DisplaySettings& settings, std::uint32_t gr
   const render::Picture& picture = readable();
   if (group >= picture.light_groups()) {
     throw Error(ErrorCode::invalid_argument,
-                "the picture has " + std::to_string(picture.light_groups()) +
-                    " groups of lights: set light_groups of cumulet_sampling_desc, and wait for the full resolution");
+                "the image has " + std::to_string(picture.light_groups()) +
+                    " light groups: set cumulet_sampling_desc.light_groups and render at full resolution");
   }
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 3;
   if (rgb == nullptr || count < floats)
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
   progressive_.tracer().read_light_group(picture, group, settings.shown(false).shows_background(), rgb);
 }
 
@@ -249,7 +249,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
   render::Picture& picture = readable_shaded();
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 2 * ranks;
   if (values == nullptr || count < floats)
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
   require_present(true);
   render::MatteIds ids;
   MatteObject object;
@@ -294,7 +294,7 @@ bool Context::can_denoise(const render::Picture& picture) const {
 void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
   if (!is_traced(picture)) {
-    throw Error(ErrorCode::unsupported, "only shaded pictures whose surfaces are traced can be denoised");
+    throw Error(ErrorCode::unsupported, "only shaded images with path-traced surfaces can be denoised");
   }
   require_room(picture, rgba, count);
   find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture));
@@ -306,7 +306,7 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
   std::vector<glm::vec4> pixels(box.area());
   functions_->GetTextureImage(denoised.name(), 0, GL_RGBA, GL_FLOAT,
                               static_cast<GLsizei>(pixels.size() * sizeof(glm::vec4)), pixels.data());
-  gl::check(*functions_, "reading the denoised picture back");
+  gl::check(*functions_, "reading back the denoised image");
   std::fill_n(rgba, std::size_t{4} * size.x * size.y, 0.0F);
   for (std::size_t y = 0; y < box.size.y; ++y) {
     const std::size_t to = 4 * ((box.first.y + y) * size.x + box.first.x);
@@ -333,7 +333,7 @@ gl::Object Context::filtered(const render::Picture& picture, bool with_backgroun
   render::PictureTextures textures = textures_of(picture, nullptr);
   textures.view.reset();  // read-back must not depend on previously displayed images
   const glm::ivec2 size(picture.size());
-  gl::Object means = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the denoised picture");
+  gl::Object means = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the denoised image");
   render::Wavelet wavelet(functions_, programs_);
   wavelet.able(textures, background, true);
   wavelet.begin(textures);

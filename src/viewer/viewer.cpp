@@ -462,7 +462,7 @@ std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
 std::vector<Viewer::Shown>::iterator Viewer::look_up(const Instance& instance) {
   sync();
   const auto shown = find(instance);
-  if (shown == shown_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the instance");
+  if (shown == shown_.end()) throw Error(ErrorCode::invalid_argument, "the instance is not in the viewer");
   return shown;
 }
 
@@ -591,7 +591,7 @@ void Viewer::add_instance(std::shared_ptr<Instance> instance) {
   reported_failures_.retire();
   sync();
   if (find(*instance) != shown_.end())
-    throw Error(ErrorCode::invalid_argument, "the viewer shows the instance already");
+    throw Error(ErrorCode::invalid_argument, "the instance is already in the viewer");
   Shown shown;
   shown.id = ++last_id_;
   shown.listener = instance->listen([this] { notify(); });
@@ -616,7 +616,7 @@ void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
   reported_failures_.retire();
   sync();
   if (find(*model) != shown_models_.end())
-    throw Error(ErrorCode::invalid_argument, "the viewer shows the model already");
+    throw Error(ErrorCode::invalid_argument, "the model is already in the viewer");
   ShownModel shown;
   shown.id = ++last_id_;
   shown.listener = model->listen([this] { notify(); });
@@ -630,7 +630,7 @@ void Viewer::remove_model(const ModelInstance& model) {
   reported_failures_.retire();
   sync();
   const auto place = find(model);
-  if (place == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the model");
+  if (place == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the model is not in the viewer");
   shown_models_.erase(place);
   poses_due_ = true;
   sync();  // drops its failures
@@ -1264,7 +1264,7 @@ void Viewer::remark_on_anisotropy() {
   const std::string& name = *volume_info_->anisotropy_grid;
   if (remarked_anisotropy_ == name) return;
   remarked_anisotropy_ = name;
-  log_.info("grid \"" + name + "\" is not shown: the Mie phase function has an anisotropy of its own");
+  log_.info("grid \"" + name + "\" is ignored: the Mie phase function has its own anisotropy");
 }
 
 void Viewer::set_medium(const Medium& medium) {
@@ -1347,7 +1347,7 @@ void Viewer::show_environment(light::EnvironmentPtr environment) {
   }
   if (environment && environment->replaced > 0) {
     log_.warning(one_line(environment->name) + ": " + std::to_string(environment->replaced) +
-                 " pixels are in part not finite, negative or above 1e30, which counts as 0");
+                 " pixels have non-finite, negative or too large (above 1e30) values, which are read as 0");
   }
   environment_ = std::move(environment);
   surround();
@@ -1602,7 +1602,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
 Bounds Viewer::bounds() {
   sync();
   const auto all = box();
-  if (!all) throw Error(ErrorCode::invalid_argument, "the viewer has nothing to show: no volume, no surfaces");
+  if (!all) throw Error(ErrorCode::invalid_argument, "the scene is empty: no volume and no surfaces");
   return *all;
 }
 

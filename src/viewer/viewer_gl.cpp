@@ -46,12 +46,12 @@ struct Failures {
 }  // namespace
 
 Context& Viewer::gl() const {
-  if (!gl_) throw Error(ErrorCode::detached, "the viewer is attached to no GL context");
+  if (!gl_) throw Error(ErrorCode::detached, "the viewer is not attached to a GL context");
   return *gl_;
 }
 
 void Viewer::attach(GetProc get_proc, void* user) {
-  if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is attached to a GL context already");
+  if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is already attached to a GL context");
   auto functions = gl::load_functions(get_proc, user);
   gl::clear_errors(*functions);
   gl::require_rendering(*functions);
@@ -233,9 +233,8 @@ void Viewer::remark_on_samples(Context& g) {
   const std::uint64_t count = picture != nullptr ? picture->samples_not_finite() : 0;
   if (count == 0 || (remarked_picture_ && (sampling_.preview || remarked_picture_ == picture->begun()))) return;
   remarked_picture_ = picture->begun();
-  log_.warning("the light of " + std::to_string(count) +
-               " samples of the picture so far was not finite: they count as black (nonfinite_samples of the "
-               "statistics counts them)");
+  log_.warning("the radiance of " + std::to_string(count) +
+               " samples was not finite; they are black (see nonfinite_samples in the statistics)");
 }
 
 FrameResult Viewer::render(const Frame& frame) {
@@ -263,9 +262,9 @@ FrameResult Viewer::render(const Frame& frame) {
     // This query counts against the budget: waking the driver's threads may cost the calling thread its core.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
-    if (!lives_in_gl_.empty()) attempt("cumulet: voxels in GL", [&] { update_gpu_resident(g); });
+    if (!lives_in_gl_.empty()) attempt("cumulet: voxels on the GPU", [&] { update_gpu_resident(g); });
     if (g.transfers().busy()) {
-      attempt("cumulet: live voxels", [&] { follow_transfers(g, frame.budget_ms); });
+      attempt("cumulet: dynamic voxels", [&] { follow_transfers(g, frame.budget_ms); });
     } else {
       follow_transfers(g, 0.0);
     }
@@ -277,7 +276,7 @@ FrameResult Viewer::render(const Frame& frame) {
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
-    attempt("cumulet: surfaces alone", [&] { g.draw_surfaces_alone(shot, frame); });
+    attempt("cumulet: surfaces only", [&] { g.draw_surfaces_alone(shot, frame); });
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     remark_on_samples(g);
@@ -424,7 +423,8 @@ std::optional<glm::dmat4> Viewer::place_in_gl(Context& g, const std::shared_ptr<
   const scene::StateInGlPtr rest = live->in_gl().state;
   if (announced ? !announced->gpu_resident : !rest) return std::nullopt;
   if (!announced && !g.has(*rest))
-    throw Error(ErrorCode::invalid_argument, one_line(state.name + ": the rest of it is in another viewer's context"));
+    throw Error(ErrorCode::invalid_argument,
+                one_line(state.name + ": other fields of it belong to another viewer's context"));
   if (live->gpu_resident()) return announced ? announced->index_to_world : rest->index_to_world;
   bring_back(g, live, announced ? announced->channels : channels_of(*rest));
   return std::nullopt;
@@ -649,7 +649,7 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
     filtered = display_.denoise && g.can_denoise(picture);
   });
   if (rgba == nullptr || count < pixels * 4)
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " bytes");
+    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(pixels * 4) + " bytes");
   std::vector<float> linear(pixels * 4);
   if (filtered) {
     read_denoised(nullptr, linear.data(), linear.size());

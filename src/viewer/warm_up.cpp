@@ -93,10 +93,11 @@ void Context::warm_up_drawing(const Shot& shot, const Frame& frame, const render
     shader_warm_up_->draw(picture, display(shot, frame, shown), target);
     return;
   }
-  const gl::Object color = gl::make_texture_2d(functions_, frame.format, 1, 1, "creating a target to rehearse with");
+  const gl::Object color = gl::make_texture_2d(functions_, frame.format, 1, 1, "creating the warm-up target");
   gl::Object depth;
   if (frame.write_depth) {
-    depth = gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, 1, 1, "creating a target's depth to rehearse with");
+    depth =
+        gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, 1, 1, "creating the depth buffer of the warm-up target");
   }
   const gl::TransientFramebuffer framebuffer(functions_, color.name(), depth.name());
   target.framebuffer = framebuffer.name();

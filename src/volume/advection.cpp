@@ -65,7 +65,7 @@ class Advection final : Gathering {
   }
 
  private:
-  [[noreturn]] void too_large() const override { fail("is too large to be moved along its velocity"); }
+  [[noreturn]] void too_large() const override { fail("is too large to be advected"); }
 
   [[nodiscard]] Box support(std::size_t i, const Box& box) const override {
     const Box way{box.min - glm::ivec3(glm::ceil(most_ + alike)), box.max + glm::ivec3(glm::ceil(alike - least_))};

@@ -101,7 +101,7 @@ class Blending final : Gathering {
     }
   }
 
-  [[noreturn]] void too_large() const override { fail("is too large to be blended"); }
+  [[noreturn]] void too_large() const override { fail("is too large to be interpolated"); }
 
   std::size_t fields_;
   std::size_t of_matter_;  // number of fields that are amounts per unit volume, density first

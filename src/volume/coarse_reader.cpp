@@ -203,7 +203,7 @@ SourceGrid CoarseReader::read(std::size_t grid, Portion /*portion*/, const Log& 
   const bool is_first = looked_.empty();
   if (is_first) first_ = grid;
   SourceGrid& whole = (is_first ? first_source_ : later_source_) = std::move(read);
-  if (is_first && whole.leaves->count() < min_bricks_) fail("is small enough to be read at once");
+  if (is_first && whole.leaves->count() < min_bricks_) fail("is small enough to be read completely");
 
   ProgressPart part(progress_, at, at, whole.leaves->count());
   Box box = active_leaf_region(*whole.leaves, part).box;
@@ -228,7 +228,7 @@ SourceGrid CoarseReader::read(std::size_t grid, Portion /*portion*/, const Log& 
 
 std::array<SourceGrid, 3> CoarseReader::read_vector(std::size_t /*grid*/, Portion /*portion*/, const Log& /*log*/,
                                                     const std::string& /*log_prefix*/) {
-  fail("is of vectors");
+  fail("contains vectors");
 }
 
 std::optional<Proxy::Extent> CoarseReader::extent(const VolumeFrame& frame) const {

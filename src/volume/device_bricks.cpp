@@ -27,8 +27,7 @@ bool DeviceBricks::gone() const {
 
 void DeviceBricks::ask_for_values() const {
   if (gone())
-    throw Error(ErrorCode::unsupported,
-                "the volume's voxels went with the context that they were in; hand over the next state");
+    throw Error(ErrorCode::unsupported, "the volume's voxels were lost with their OpenGL context; set a new state");
   if (wanted) wanted->ask();
 }
 

@@ -58,14 +58,14 @@ std::vector<std::size_t> channels(const std::vector<GridInfo>& grids, const std:
 
 /// Returns why a grid cannot hold colors; empty if it can.
 std::string color_refusal(const GridInfo& grid) {
-  if (grid.values != Values::lengths || grid.type == "vec3i") return "is of type " + grid.type + ", not vec3s or vec3d";
-  if (grid.grid_class == "staggered") return "is staggered: velocities, not colours";
+  if (grid.values != Values::lengths || grid.type == "vec3i") return "has type " + grid.type + ", not vec3s or vec3d";
+  if (grid.grid_class == "staggered") return "is staggered: it contains velocities, not colors";
   return {};
 }
 
 /// Returns why a grid cannot hold velocities; empty if it can.
 std::string velocity_refusal(const GridInfo& grid) {
-  return grid.values == Values::lengths ? std::string() : "is of type " + grid.type + ", not of vectors";
+  return grid.values == Values::lengths ? std::string() : "has type " + grid.type + ", not a vector type";
 }
 
 /// Returns the vector grid of this name, or else the three scalar grids. parts: their suffixes.
@@ -76,7 +76,7 @@ std::vector<std::size_t> choose_vectors(const std::vector<GridInfo>& grids, cons
   const bool usable = std::ranges::any_of(whole, [&](std::size_t i) { return refusal(grids[i]).empty(); });
   if (!three.empty() && !usable) return three;
   if (whole.empty()) {
-    fail_without(grids, "has no grid of vectors \"" + name + "\", nor all of \"" + name + parts[0] + "\", \"" + name +
+    fail_without(grids, "has no vector grid \"" + name + "\", and not all of \"" + name + parts[0] + "\", \"" + name +
                             parts[1] + "\" and \"" + name + parts[2] + "\"; it has ");
   }
   return {choose_named(grids, name, refusal)};
@@ -112,7 +112,7 @@ std::vector<std::size_t> choose_color(const std::vector<GridInfo>& grids, const 
 }
 
 Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
-  if (grids.empty()) fail("holds no grids");
+  if (grids.empty()) fail("contains no grids");
   // A grid that is named for one field is not chosen for another.
   std::vector<std::size_t> taken;
   const auto asked = [&](const std::string& name) -> std::optional<std::size_t> {
@@ -134,7 +134,7 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
   find(out.flame, names.flame, flame_names);
   find(out.anisotropy, names.anisotropy, anisotropy_names);
   const bool nothing = !out.density && !out.temperature && !out.flame;
-  if (nothing && !by_name(names.density)) fail_without(grids, "every field is left out; it has ");
+  if (nothing && !by_name(names.density)) fail_without(grids, "all fields are excluded; the file has ");
   if (nothing) {
     if (out.anisotropy) taken.push_back(*out.anisotropy);
     const auto left = any_fog(grids, taken);
@@ -163,13 +163,12 @@ bool apart(const ScalarVolume& a, const ScalarVolume& b) {
 /// same for all frames of a sequence.
 std::string remark_on_temperature(const ScalarVolume& field) {
   if (field.max_value > max_relative_temperature && field.negative_voxels > 0)
-    return "reaches hundreds and has negative values, as degrees Celsius do: they are taken as kelvin, unless "
-           "temperature_offset is 273.15";
+    return "has negative values and values in the hundreds, which may be degrees Celsius; they are read as kelvin. Set "
+           "temperature_offset to 273.15 for Celsius";
   if (field.max_value > max_relative_temperature)
-    return "reaches more than 20, as kelvin do: its values are taken as such, unless temperature_scale is set";
+    return "has values above 20, which are read as kelvin unless temperature_scale is set";
   if (field.max_value > 0.0F && field.max_value <= 1.0F)
-    return "reaches 1 at most, as temperatures from 0 to 1 do: 1 is taken as 1500 kelvin, unless temperature_scale is "
-           "set";
+    return "has values from 0 to 1; 1 is read as 1500 kelvin unless temperature_scale is set";
   return {};
 }
 
@@ -321,7 +320,7 @@ class FrameImport {
     } catch (const Error& error) {
       const bool of_the_grid = error.code() != ErrorCode::cancelled && error.code() != ErrorCode::out_of_memory;
       if (velocity_is_named_ || !of_the_grid) throw;
-      remark(LogLevel::warning, error.what(), "the velocity is left out");
+      remark(LogLevel::warning, error.what(), "the velocity is ignored");
     }
   }
 
@@ -396,7 +395,7 @@ class FrameImport {
     const std::uint64_t beyond = clamp_to(1.0F, *out_.anisotropy);
     if (beyond == 0) return;
     remark(LogLevel::warning, name_of((*out_.anisotropy)[0]),
-           std::to_string(beyond) + " voxels beyond -1 and 1 clamped to these");
+           std::to_string(beyond) + " voxels clamped to the range from -1 to 1");
   }
 
   // Converts to_index from the file's world to the lattice, and clamps speeds to the range of half floats.
@@ -404,9 +403,9 @@ class FrameImport {
     velocity.to_index = Velocity::to_index_of(out_.density.index_to_world) * velocity.to_index;
     const std::uint64_t beyond = clamp_to(velocity.most(), velocity.parts);
     if (beyond == 0) return;
-    remark(LogLevel::warning, name_of(velocity.parts[0]),
-           std::to_string(beyond) + " components beyond " + general_text(fastest_velocity) +
-               " voxels a second clamped to that");
+    remark(
+        LogLevel::warning, name_of(velocity.parts[0]),
+        std::to_string(beyond) + " components above " + general_text(fastest_velocity) + " voxels per second clamped");
   }
 
   void put_on_lattice(ScalarVolume& field, const std::optional<Box>& within, Portion portion) const {
@@ -453,7 +452,8 @@ class FrameImport {
     for (const std::string_view name : color_names) {
       const std::vector<std::size_t> found = channels(grids, std::string(name));
       if (found.empty()) continue;
-      remark(LogLevel::info, file_, "colour is read from " + describe(grids, found) + " only if it is named");
+      remark(LogLevel::info, file_,
+             "color can be read from " + describe(grids, found) + ", but only if the grid is named");
       return;
     }
   }
@@ -467,7 +467,7 @@ class FrameImport {
   void warn_if_elsewhere(std::span<const ScalarVolume> parts) const {
     const auto elsewhere = [&](const ScalarVolume& part) { return part.empty() || apart(part, out_.density); };
     if (out_.density.empty() || !std::ranges::all_of(parts, elsewhere)) return;
-    remark(LogLevel::warning, name_of(parts[0]), "lies nowhere over \"" + out_.density.name + "\"");
+    remark(LogLevel::warning, name_of(parts[0]), "does not overlap \"" + out_.density.name + "\"");
   }
 
   [[nodiscard]] std::string name_of(const ScalarVolume& field) const { return file_ + ": grid \"" + field.name + "\""; }

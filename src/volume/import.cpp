@@ -25,8 +25,8 @@ namespace cumulet::volume {
 using namespace detail;
 
 std::string detail::scalar_fog_refusal(std::string_view type, std::string_view grid_class, bool scalar) {
-  if (type == "points") return "holds points, not a fog volume";
-  if (!scalar) return "is of type " + std::string(type) + ", not a float or half scalar";
+  if (type == "points") return "contains points, not a fog volume";
+  if (!scalar) return "has type " + std::string(type) + ", not a float or half scalar";
   if (grid_class == "fog volume" || grid_class == "unknown") return {};
   return "is a " + std::string(grid_class) + ", not a fog volume";
 }
@@ -165,7 +165,7 @@ std::string detail::remark_on_choice(const std::vector<GridInfo>& grids, std::si
     one_density = one_density && lower_case(grids[i].name) != "density";
   }
   if (others.empty() || one_density) return {};
-  return "shows its grid " + label(grids[chosen]) + "; there is also " + describe(grids, others);
+  return "uses the grid " + label(grids[chosen]) + "; it also has " + describe(grids, others);
 }
 
 std::vector<std::string> detail::remarks_on_case(const std::vector<GridInfo>& grids, const std::string& field,
@@ -179,7 +179,7 @@ std::vector<std::string> detail::remarks_on_case(const std::vector<GridInfo>& gr
     std::vector<std::size_t> others = called_so(grids, grids[grid].name, alike);
     std::erase_if(others, [&](std::size_t i) { return is_among(i, shown); });
     if (others.empty()) continue;
-    remarks.push_back("reads its grid " + label(grids[grid]) + " as " + field + "; there is also " +
+    remarks.push_back("uses the grid " + label(grids[grid]) + " as " + field + "; it also has " +
                       describe(grids, others));
   }
   return remarks;
@@ -231,12 +231,12 @@ std::size_t detail::choose_named(const std::vector<GridInfo>& grids, const std::
   std::vector<std::size_t> usable;
   std::ranges::copy_if(found, std::back_inserter(usable), [&](std::size_t i) { return refusal(grids[i]).empty(); });
   if (usable.empty()) fail("grid \"" + grids[found[0]].unique_name + "\" " + refusal(grids[found[0]]));
-  if (usable.size() > 1) fail("several grids are called so, choose one by name: " + describe(grids, usable));
+  if (usable.size() > 1) fail("several grids have this name, choose one of: " + describe(grids, usable));
   return usable[0];
 }
 
 std::size_t detail::choose_grid(const std::vector<GridInfo>& grids, const std::string& name) {
-  if (grids.empty()) fail("holds no grids");
+  if (grids.empty()) fail("contains no grids");
   if (!name.empty()) return choose_named(grids, name, &GridInfo::refusal);
   if (const auto density = first_fog(grids, density_names)) return *density;
   if (const auto any = any_fog(grids)) return *any;
@@ -492,9 +492,8 @@ std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress*
   for (std::size_t i = 0; i < order.size(); ++i) {
     const glm::ivec3 origin = leaves.origin(order[i]);
     if (((origin.x | origin.y | origin.z) & (brick_size - 1)) != 0)
-      fail("damaged tree: a brick is out of place, at " + to_string(origin));
-    if (i > 0 && leaves.origin(order[i - 1]) == origin)
-      fail("damaged tree: two bricks in one place, at " + to_string(origin));
+      fail("damaged tree: misaligned brick at " + to_string(origin));
+    if (i > 0 && leaves.origin(order[i - 1]) == origin) fail("damaged tree: two bricks at " + to_string(origin));
   }
   return order;
 }
@@ -538,7 +537,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   const glm::i64vec3 extent = glm::i64vec3(bounds.max) - glm::i64vec3(bounds.min) + std::int64_t{1};
   if (glm::any(glm::greaterThan(extent, glm::i64vec3(max_extent)))) {
     fail("its active voxels span " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
-         std::to_string(extent.z) + " voxels; the limit is " + std::to_string(max_extent) + " an axis");
+         std::to_string(extent.z) + " voxels; the limit is " + std::to_string(max_extent) + " per axis");
   }
   if (glm::any(glm::lessThan(bounds.min, glm::ivec3(-max_coordinate))) ||
       glm::any(glm::greaterThan(bounds.max, glm::ivec3(max_coordinate)))) {
@@ -618,8 +617,8 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
       log.warning(log_prefix + std::to_string(voxels) + what + (voxels == 1 ? " voxel" : " voxels") + how);
   };
   warn(out.negative_voxels, " negative", " clamped to 0");
-  warn(out.non_finite_voxels, " non-finite", " counted as 0");
-  warn(out.huge_voxels, "", " beyond 1e30, as fill values are, counted as 0");
+  warn(out.non_finite_voxels, " non-finite", " read as 0");
+  warn(out.huge_voxels, "", " above 1e30 (fill values) read as 0");
   return std::move(out);
 }
 

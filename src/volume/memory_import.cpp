@@ -185,7 +185,7 @@ class Disjointness {
       }
       for (const std::uint32_t b : part.bricks) {
         if (meet(a, brick(b)))
-          fail("its tile at " + to_string(a.min) + " lies over the brick at " + to_string(brick(b).min));
+          fail("its tile at " + to_string(a.min) + " overlaps the brick at " + to_string(brick(b).min));
       }
     }
   }
@@ -251,7 +251,7 @@ void check_counts(const SparseVoxels& voxels, const std::string& name) {
   const std::size_t count = voxels.brick_origins.size() / 3;
   if (voxels.brick_origins.size() != 3 * count || voxels.brick_values.size() != count * brick_voxels ||
       (!voxels.brick_active.empty() && voxels.brick_active.size() != count * brick_size)) {
-    refuse(name, "its numbers of brick origins, values and masks differ");
+    refuse(name, "the numbers of brick origins, values and masks differ");
   }
 }
 
@@ -259,12 +259,12 @@ void check_bricks(const SparseVoxels& voxels) {
   for (std::size_t i = 0; i < voxels.brick_origins.size() / 3; ++i) {
     const glm::ivec3 origin = origin_of(voxels.brick_origins, i);
     if (((origin.x | origin.y | origin.z) & (brick_size - 1)) != 0) {
-      fail("its brick origin " + to_string(origin) + " is no multiple of 8");
+      fail("its brick origin " + to_string(origin) + " is not a multiple of 8");
     }
   }
   for (const SourceTile& tile : voxels.tiles) {
     if (glm::any(glm::greaterThan(tile.box.min, tile.box.max))) {
-      fail("its tile at " + to_string(tile.box.min) + " ends before it begins, at " + to_string(tile.box.max));
+      fail("its tile at " + to_string(tile.box.min) + " has its end before its beginning: " + to_string(tile.box.max));
     }
   }
 }
@@ -368,10 +368,10 @@ void check_fields(std::span<const MemoryField> fields, const std::string& name) 
   const auto there = [&](Channel channel) { return count.at(static_cast<std::size_t>(channel)); };
   const int colors = there(Channel::red) + there(Channel::green) + there(Channel::blue);
   const int velocities = there(Channel::velocity_x) + there(Channel::velocity_y) + there(Channel::velocity_z);
-  if (colors % 3 != 0) refuse(name, "has some of red, green and blue, not all");
-  if (velocities % 3 != 0) refuse(name, "has some of velocity_x, velocity_y and velocity_z, not all");
+  if (colors % 3 != 0) refuse(name, "has only some of red, green and blue");
+  if (velocities % 3 != 0) refuse(name, "has only some of velocity_x, velocity_y and velocity_z");
   if (there(Channel::density) + there(Channel::temperature) + there(Channel::flame) == 0)
-    refuse(name, "has neither density nor temperature nor flame");
+    refuse(name, "has no density, temperature or flame");
   check_voxels(fields, name);
 }
 

@@ -133,9 +133,9 @@ class DirectoryReader {
 
   void take_version(const nanovdb::Version& version) {
     const std::uint32_t major = version.getMajor();
-    if (!is_likely(version)) fail("the file is damaged: impossible version of NanoVDB");
+    if (!is_likely(version)) fail("the file is damaged: invalid NanoVDB version");
     if (major != NANOVDB_MAJOR_VERSION_NUMBER) {
-      fail("was written by NanoVDB " + text_of(version) + ", this library reads NanoVDB " +
+      fail("was written by NanoVDB " + text_of(version) + "; this library reads NanoVDB " +
            std::to_string(NANOVDB_MAJOR_VERSION_NUMBER) + "." +
            (major < NANOVDB_MAJOR_VERSION_NUMBER ? "0 and later" : "x"));
     }
@@ -182,7 +182,7 @@ class DirectoryReader {
       std::string name(std::min<std::uint64_t>(meta.nameSize, size_), '\0');
       read_bytes(position, name.data(), meta.nameSize);
       position += meta.nameSize;
-      if (name.empty() || name.back() != '\0') fail("the file is damaged: a grid name has no end");
+      if (name.empty() || name.back() != '\0') fail("the file is damaged: a grid name is not terminated");
       name.resize(name.find('\0'));
       add({0, meta.fileSize, meta.gridSize, header.codec, meta.gridType}, name, meta.gridClass);
     }

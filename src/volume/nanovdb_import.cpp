@@ -100,7 +100,7 @@ class NanoWalk {
   /// Every node has one parent, so visiting more nodes than fit the buffer means that the tree is invalid.
   void count(int level, std::uint64_t bytes) {
     node_bytes_ += bytes;
-    if (++visited_[level] > declared_[level] || node_bytes_ > size_) damaged("its tree has more nodes than it says");
+    if (++visited_[level] > declared_[level] || node_bytes_ > size_) damaged("its tree has more nodes than declared");
   }
 
   void tile(glm::ivec3 min, int size, float value, bool active) {
@@ -121,7 +121,7 @@ class NanoWalk {
 
     // The checksum covers contiguous bytes; in a damaged file the root may be elsewhere.
     if (root_offset == sizeof(TreeT) && !has_right_checksum(*grid->data(), root_bytes)) {
-      log.warning(log_prefix + "its checksum does not match, it may be damaged");
+      log.warning(log_prefix + "its checksum does not match; the file may be damaged");
     }
 
     const nanovdb::Map& map = grid->data()->mMap;
@@ -137,8 +137,9 @@ class NanoWalk {
       const auto* entry = root->data()->tile(i);
       const nanovdb::Coord key = entry->origin();
       const glm::ivec3 origin(key[0], key[1], key[2]);
-      if (((origin.x | origin.y | origin.z) & (size - 1)) != 0) damaged("a root tile is out of place");
-      if (!regions.insert({{origin.x, origin.y, origin.z}, true}).second) damaged("two root tiles in one place");
+      if (((origin.x | origin.y | origin.z) & (size - 1)) != 0) damaged("misaligned root tile");
+      if (!regions.insert({{origin.x, origin.y, origin.z}, true}).second)
+        damaged("two root tiles at the same position");
       if (entry->isChild()) {
         upper(*at<UpperT>(root, entry->child), origin);
       } else {
@@ -171,7 +172,7 @@ class NanoWalk {
         const auto* leaf = at<LeafT>(data, data->mTable[i].child);
         std::uint64_t bytes = sizeof(LeafT);
         if constexpr (std::is_same_v<BuildT, nanovdb::FpN>) {
-          if (leaf->data()->mFlags >> 5U > 4) damaged("a leaf has an impossible bit width");
+          if (leaf->data()->mFlags >> 5U > 4) damaged("a leaf has an invalid bit width");
           bytes = leaf->data()->memUsage();
           at<LeafT>(data, data->mTable[i].child, bytes);
         }
@@ -263,7 +264,7 @@ class NanoReader final : public Reader {
     auto handle = std::make_shared<const Handle>(load(directory_.places[index], portion));
     if (handle->size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
     const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle->data());
-    if (!is_nano_grid(*grid)) fail("the file is damaged: no grid where one should be");
+    if (!is_nano_grid(*grid)) fail("the file is damaged: missing grid");
     if (grid->mGridType != directory_.places[index].type)
       fail("the file is damaged: grid and directory differ in type");
     return handle;
@@ -367,8 +368,8 @@ class NanoReader final : public Reader {
     });
   }
 
-  static constexpr const char* unreadable = "is of a type that cannot be read";
-  static constexpr const char* sizes_differ = "the file is damaged: its sizes do not agree";
+  static constexpr const char* unreadable = "has an unsupported type";
+  static constexpr const char* sizes_differ = "the file is damaged: inconsistent sizes";
   static constexpr std::uint64_t max_chunk = std::uint64_t{1} << 30U;  ///< NanoVDB's maximum per Blosc frame
   static constexpr std::uint64_t max_piece = std::uint64_t{4} << 20U;  ///< bytes between cancellation checks
 

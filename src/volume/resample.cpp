@@ -59,7 +59,7 @@ class Resampling final : Gathering {
         to_field_(glm::inverse(field.index_to_world) * lattice) {
     for (int axis = 0; axis < 3; ++axis) {
       const double step = glm::length(glm::dvec3(to_field_[axis]));
-      if (!(step <= max_finer)) fail("has voxels too small for the lattice of the file's other fields");
+      if (!(step <= max_finer)) fail("has voxels that are too small compared with the file's other grids");
       const double wanted = step > much_finer ? std::ceil(step - alike) : 1.0;
       samples_[axis] = static_cast<int>(std::min(wanted, max_samples));
       // Distance from a voxel's center to its outermost sample.
@@ -81,7 +81,7 @@ class Resampling final : Gathering {
     if (glm::any(glm::greaterThan(min, max))) return std::move(gather({})[0]);
     if (!glm::all(glm::lessThan(glm::max(glm::abs(min), glm::abs(max)), glm::dvec3(max_coordinate))) ||
         !glm::all(glm::lessThan(max - min, glm::dvec3(max_extent)))) {
-      fail("is too far off or too large for the lattice of the file's other fields");
+      fail("is too far from the file's other grids or too large");
     }
     const Box box{glm::ivec3(min), glm::ivec3(max)};
     // Each brick of the field fills as many bricks as its relative size, and all together at most those in the box.
@@ -96,7 +96,7 @@ class Resampling final : Gathering {
 
  private:
   [[noreturn]] void too_large() const override {
-    fail("has voxels too large for the lattice of the file's other fields");
+    fail("has voxels that are too large compared with the file's other grids");
   }
 
   [[nodiscard]] Box support(std::size_t /*source*/, const Box& box) const override {

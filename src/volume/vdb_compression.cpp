@@ -12,7 +12,7 @@ namespace cumulet::volume::detail {
 
 namespace {
 
-constexpr const char* damaged = "the file is damaged: its compressed values are not as long as it says";
+constexpr const char* damaged = "the file is damaged: wrong size of compressed values";
 
 void unpack_blosc(const std::vector<char>& packed, char* data, std::size_t bytes) {
   std::size_t whole = 0;

@@ -99,7 +99,7 @@ void with_type(const openvdb::GridBase& grid, Call&& f) {
                                 openvdb::Int64Grid, openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>();
 }
 
-constexpr const char* unreadable = "is of a type that cannot be read";
+constexpr const char* unreadable = "has an unsupported type";
 
 template <typename T>
 T read_value(SourceFile& stream) {
@@ -230,7 +230,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
            std::to_string(openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) + " and later");
     }
     if (version > known_file_version) {
-      remarks_.push_back("is of VDB file format " + std::to_string(version) + ", which is newer than the known " +
+      remarks_.push_back("has VDB file format " + std::to_string(version) + ", which is newer than the known " +
                          std::to_string(known_file_version));
     }
     format_ = "OpenVDB " + std::to_string(version);
@@ -356,7 +356,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
       const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
         return d.uniqueName() == descriptors_[index].instanceParentName();
       });
-      if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a grid that is missing");
+      if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a missing grid");
       grid->setTree(read_grid(*parent, portion)->baseTreePtr());
     }
     return grid;

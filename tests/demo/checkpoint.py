@@ -63,10 +63,10 @@ def stopped(render, volume, out):
         assert not part.output.exists()
         if part.checkpoint.exists() and had:
             times += 1
-            assert f"goes on from {part.checkpoint}" in error, error
+            assert f"resuming from {part.checkpoint}" in error, error
     if not part.output.exists():
         status, error = part.run(part.kept)
-        assert status == 0 and "goes on from" in error, error
+        assert status == 0 and "resuming from" in error, error
         times += 1
     assert times > 0, "it was never stopped"
     assert part.output.read_bytes() == whole.output.read_bytes(), "not the same file"
@@ -102,7 +102,7 @@ def refused(render, volume, out):
     kept = picture.checkpoint.read_bytes()
     for more in (["--seed", "4"], ["--size", "32x32"], ["--density-scale", "2"], ["--spp", "4"]):
         status, error = picture.run(picture.kept + more)
-        assert status == 1 and error.count("\n") == 1 and "is the checkpoint of another picture" in error, error
+        assert status == 1 and error.count("\n") == 1 and "is the checkpoint of another image" in error, error
     assert picture.checkpoint.read_bytes() == kept and not picture.output.exists()
     picture.checkpoint.write_bytes(kept[: len(kept) // 2])
     status, error = picture.run(picture.kept)

@@ -738,10 +738,10 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
   frame();
   const auto& controls = panel_.ui().controls();
   const std::set<std::string> without_tip = {
-      "Scene",     "File",          "Volumes",  "Volume 1",      "Display",     "Sun & sky",   "Lights",
-      "Medium",    "Models",        "Surfaces", "Model",         "Environment", "Picture",     "Triangles",
-      "Grid",      "Camera",        "Sampling", "Statistics",    "Live cells",  "Levels",      "Build",
-      "Grid data", "Active voxels", "Trace",    "OpenGL memory", "Renderer",    "Steps a path"};
+      "Scene",     "File",          "Volumes",  "Volume 1",   "Display",     "Sun & sky",     "Lights",
+      "Medium",    "Models",        "Surfaces", "Model",      "Environment", "Image",         "Triangles",
+      "Grid",      "Camera",        "Sampling", "Statistics", "Cell count",  "Levels",        "Build",
+      "Grid data", "Active voxels", "Trace",    "GPU memory", "Renderer",    "Steps per path"};
   EXPECT_GT(controls.size(), 50u);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   for (const auto& [name, control] : controls) {
@@ -764,7 +764,7 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
 TEST_P(PanelTest, LabelsFitBesideTheirControls) {
   frame();
   frame();
-  for (const char* label : {"Camera adaptive", "Sun elevation", "Density scale", "OpenGL memory", "Background"}) {
+  for (const char* label : {"Camera adaptive", "Sun elevation", "Density scale", "GPU memory", "Background"}) {
     EXPECT_LT(ImGui::GetFont()->CalcTextSizeA(ImGui::GetFontSize(), 1e9f, 0.0f, label).x, panel_.ui().px(126.0f))
         << label;
   }
@@ -829,11 +829,11 @@ TEST_P(PanelTest, DrawingChangesNothing) {
 TEST_P(PanelTest, DialogListsOnlyItsFileTypes) {
   model_.preferences.recent = {"/a/cloud.vdb", "/a/sky.HDR", "/a/town.glb"};
   const auto offers = [&](const char* name) { return panel_.ui().controls().contains(std::string("Recent/") + name); };
-  panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, "");
+  panel_.dialog().open("Open environment map", Action::open, {".hdr", ".exr"}, "");
   for (int i = 0; i < 3; ++i) frame();
   EXPECT_TRUE(offers("sky.HDR"));
   EXPECT_FALSE(offers("cloud.vdb") || offers("town.glb"));
-  panel_.dialog().open("Add a volume", Action::add_volume, {".vdb", ".nvdb"}, "");
+  panel_.dialog().open("Add volume", Action::add_volume, {".vdb", ".nvdb"}, "");
   for (int i = 0; i < 3; ++i) frame();
   EXPECT_TRUE(offers("cloud.vdb")) << "what is added is opened, not saved";
   EXPECT_FALSE(offers("sky.HDR"));

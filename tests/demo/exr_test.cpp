@@ -174,7 +174,7 @@ TEST_P(RenderedExr, MetadataDescribesTheRendering) {
   const auto number = [&](const char* name) { return header.typedAttribute<Imf::DoubleAttribute>(name).value(); };
   const auto three = [&](const char* name) { return header.typedAttribute<Imf::V3dAttribute>(name).value(); };
   ASSERT_TRUE(Imf::hasComments(header));
-  EXPECT_EQ(Imf::comments(header), "Cumulet " + text("cumulet:version") + ", 4 samples a pixel");
+  EXPECT_EQ(Imf::comments(header), "Cumulet " + text("cumulet:version") + ", 4 samples per pixel");
   EXPECT_EQ(text("cumulet:grid_type"), "tetrahedral");
   EXPECT_EQ(number("cumulet:samples"), 4.0);
   EXPECT_EQ(number("cumulet:seed"), 3e9);

@@ -376,8 +376,9 @@ TEST(Items, AreTheObjectsWithAPosition) {
   const std::vector<Item> items = items_of(scene);
   std::vector<std::string> names;
   for (const Item& item : items) names.push_back(name_of(scene, item));
-  EXPECT_EQ(names, (std::vector<std::string>{"Volume 1: a.vdb", "Volume 2, place 1: b.vdb", "Volume 2, place 2: b.vdb",
-                                             "Model 1: c.glb", "Light 2: rectangle", "Light 3: point"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"Volume 1: a.vdb", "Volume 2, instance 1: b.vdb", "Volume 2, instance 2: b.vdb",
+                                      "Model 1: c.glb", "Light 2: rectangle", "Light 3: point"}));
   EXPECT_TRUE(items_of(SceneOptions()).empty());
   EXPECT_FALSE(place_of(scene, {Item::Kind::analytic_light, 0, 0})) << "a sun stands nowhere";
   EXPECT_FALSE(place_of(scene, {Item::Kind::volume, 2, 0}));

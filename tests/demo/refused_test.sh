@@ -18,5 +18,5 @@ refused() {
   [ ! -e "$work/picture.png" ] || fail "there is a picture"
 }
 
-refused "there is no animation 99: the file has 1" --gltf-animation 99
-refused 'there is no variant "night": the file has none' --gltf-variant night
+refused "no animation 99; the file has 1" --gltf-animation 99
+refused 'no material variant "night"; the file has none' --gltf-variant night

@@ -43,7 +43,7 @@ def main():
 def ending(lines):
     """Parses the last line: noise and samples per pixel."""
     last = [line for line in lines if line][-1]
-    match = re.match(r"stopped.png: noise ([\d.]+) %.* after ([\d.]+) samples a pixel", last)
+    match = re.match(r"stopped.png: noise ([\d.]+) %.* after ([\d.]+) samples per pixel", last)
     assert match, last
     return float(match.group(1)), float(match.group(2)), last
 
@@ -57,13 +57,13 @@ def stops_by_noise(render, volume, folder):
     assert parts == sorted(parts), lines
     # If the noise limit needs more samples than the maximum, the output says so.
     _, samples, last = ending(shown(picture + ["--spp", "3"], folder))
-    assert samples == 3 and last.endswith("the most that one may have"), last
+    assert samples == 3 and last.endswith(", the maximum"), last
 
 
 def stops_by_time(render, volume, folder):
     lines = shown([render, volume, "--size", "64x48", "-o", "stopped.png", "--time-limit", "0.5"], folder)
     _, samples, last = ending(lines)
-    assert samples >= 1 and last.endswith("at the time limit of 0.5 s"), last
+    assert samples >= 1 and last.endswith(", stopped at the time limit of 0.5 s"), last
     assert (folder / "stopped.png").stat().st_size > 0
 
 

@@ -171,13 +171,13 @@ def negative(sequence, out):
             frames = [LINE.fullmatch(line) for line in done.stdout.splitlines()]
             assert [int(m[1]) for m in frames] == numbers, (words, done)
             assert [m[4] for m in frames] == ["failed" if n < -2 else "done" for n in numbers], (words, done)
-            assert done.returncode == (1 if -4 in numbers else 0) and "passed over" not in done.stderr, (words, done)
+            assert done.returncode == (1 if -4 in numbers else 0) and "ignored because" not in done.stderr, (words, done)
         assert sorted(files(pictures)) == sorted(f"p.{n:04d}.exr" for n in range(-2, 3)), files(pictures)
         assert len(set(files(pictures).values())) == 5, "each its own frame"
     shutil.copy(sequence.folder / "explosion_0014.vdb", there / "n.7.vdb")
     done = made("--overwrite", "--frames", "-1")
     assert done.returncode == 0 and done.stderr.splitlines()[0] == (
-        f"warning: {there}/n.####.vdb: passed over, for their numbers are written otherwise: n.7.vdb"), done
+        f"warning: {there}/n.####.vdb: files ignored because their frame numbers have another padding: n.7.vdb"), done
     far = empty(out / "far")
     for n in (9999, 10000, 10001):
         shutil.copy(sequence.folder / "explosion_0014.vdb", far / f"f.{n}.vdb")
@@ -227,7 +227,7 @@ def interrupted(sequence, out):
     _, error = process.communicate(timeout=120)
     assert process.returncode == 1, error
     last = error.splitlines()[-1]
-    assert last.startswith("cumulet-render: interrupted") and last.endswith(": frames 12-14 not made"), error
+    assert last.startswith("cumulet-render: interrupted") and last.endswith(": frames 12-14 not rendered"), error
     assert files(pictures) == {}, files(pictures)
 
 

@@ -267,7 +267,7 @@ def test_handles(s):
             "key e", "frames 2", *shot("rings"), 'drag "Handle Y" to viewport 0.45 0.7', *tell("turned"),
             'key x', "key r", "frames 2", *shot("blocks"), "press ctrl", 'drag "Handle free" to viewport 0.6 0.4', "release ctrl",
             *tell("scaled"),
-            'click "Scene/Volume 2, place 2"', "key w", *tell("place"), 'drag "Handle free" to viewport 0.8 0.6', *tell("place_moved"),
+            'click "Scene/Volume 2, instance 2"', "key w", *tell("place"), 'drag "Handle free" to viewport 0.8 0.6', *tell("place_moved"),
             'click "Scene/Model 1"', *tell("model"), "press ctrl", 'drag "Handle Y" to viewport 0.45 0.2', "release ctrl", *tell("model_moved"),
             'click "Scene/Light 1"', *tell("lamp"), "key x", "key e", "frames 2", 'drag "Handle Z" to viewport 0.6 0.4', *tell("lamp_turned"),
             "click viewport 0.02 0.05", *tell("nothing"), "key q", *there, *shot("none")],
@@ -298,7 +298,7 @@ def test_handles(s):
     assert size[0] > 1.05 and abs(10 * size[0] - round(10 * size[0])) < 1e-6 and max(size) - min(size) < 1e-6, size
     assert abs(scaled[8] / size[2] - turned[8]) < 1e-6 and steps("scaled") == 2, scaled
     # Moves only the selected one of two instances.
-    assert report("place")["chosen"] == "Volume 2, place 2" and steps("place") == 2
+    assert report("place")["chosen"] == "Volume 2, instance 2" and steps("place") == 2
     assert places("place_moved", 1)[0] == places("place", 1)[0] != places("place_moved", 1)[1], places("place_moved", 1)
     (model_before,), (model_moved,) = (report(name)["models"] for name in ("model", "model_moved"))
     assert report("model_moved")["chosen"] == "Model 1" and steps("model_moved") == 4
@@ -404,7 +404,7 @@ def test_environment(s):
                       *shot("undone"), 'click "Environment view"', 'click "Environment view"', *there, *shot("back"),
                       "key ctrl+z", *there, f"{turn} 0.99 0.5", "frames 20", f"{turn} 0.99 0.5", *there,
                       *shot("around"), 'click "Remove environment"', *there, *shot("removed"), "key ctrl+z", *there,
-                      *shot("again"), 'drag "Env. strength" 0.5 0.5 to "Env. strength" 0.7 0.5', *there,
+                      *shot("again"), 'drag "Strength" 0.5 0.5 to "Strength" 0.7 0.5', *there,
                       *shot("strong")],
            "--volume", s.cumulus, "--spp", "4")
     day, report, area = look(s, "day")
@@ -420,7 +420,7 @@ def test_environment(s):
     assert report["undo_steps"] == 2, "a drag is one step"
     assert_differ(left, turned, area)
     # The environment stays in the image, in the scene and in the undo history.
-    for name, cause in (("bad", "bad.hdr: a Radiance picture that is cut short"),
+    for name, cause in (("bad", "bad.hdr: truncated Radiance file"),
                         ("none", "none.exr: No such file or directory")):
         bad, report, _ = look(s, name)
         assert any(m["error"] and cause in m["text"] for m in report["messages"]), report["messages"]
@@ -533,7 +533,7 @@ def test_warm_up(s):
 
 
 def test_glow(s):
-    s.play("replay", [*SETTLE, *shot("dark"), 'drag "Glow" 0.02 0.5 to "Glow" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
+    s.play("replay", [*SETTLE, *shot("dark"), 'drag "Emission" 0.02 0.5 to "Emission" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
                       *SETTLE, *shot("undone")], "--volume", s.explosion, "--flame-grid", "none", "--spp", "16")
     dark, report, area = look(s, "dark")
     glowing, glowing_report, _ = look(s, "glowing")
@@ -749,7 +749,7 @@ def test_exposure(s):
 def test_scene_file(s):
     # A camera is saved, left and selected again.
     view = ['click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
-            "frames 3", 'click "Look through"', "frames 2", 'click "Look through/near"', "frames 3"]
+            "frames 3", 'click "Saved camera"', "frames 2", 'click "Saved camera/near"', "frames 3"]
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
                     *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
                     "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key f12", "frames 2",
@@ -1075,7 +1075,7 @@ def test_failures(s):
     mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
     (s.out / "replay.replay").write_text('frames 3\nwait loaded\nframes 3\nreport "report.json"\n')
     done = s.start([*SIZE, "--gltf", str(mountains), "--gltf-animation", "99", "--replay", "replay.replay"])
-    assert "mountains.glb: there is no animation 99: the file has " in done.stderr, done
+    assert "mountains.glb: no animation 99; the file has " in done.stderr, done
     report = s.report("report")
     assert [m for m in report["messages"] if m["error"] and "animation 99" in m["text"]], report["messages"]
     assert "surfaces" not in report["scene"] and report["recent"] == [], report
@@ -1100,7 +1100,7 @@ def test_failures(s):
 
 def test_grids(s):
     """The panel lists a file's grids and shows each of them, with a suitable density scale."""
-    s.play("replay", ["wait loaded", *shot("opened"), 'click "Look into the grids"', "frames 2", "idle 3", *shot("picker"),
+    s.play("replay", ["wait loaded", *shot("opened"), 'click "Inspect grids"', "frames 2", "idle 3", *shot("picker"),
                       'click "Grids/temperature"', "frames 3", "wait loaded", *shot("temperature"),
                       'drag "Density scale" 0.5 0.5 to "Density scale" 0.9 0.5', "frames 3", *shot("dense"),
                       'click "Auto density"', "frames 5", *shot("auto"), "key ctrl+z", "frames 5", *shot("undone"),

@@ -4,7 +4,7 @@ import collections
 import json
 
 ROUNDING = 0.01  # microseconds
-PASSES = ("cumulet: upload", "cumulet: trace", "cumulet: surfaces alone", "cumulet: draw")
+PASSES = ("cumulet: upload", "cumulet: trace", "cumulet: surfaces only", "cumulet: draw")
 
 
 def read(path):

@@ -19,7 +19,7 @@ LINE = re.compile(r"task (\S+) \((\d+) of (\d+)\) (done in [\d.]+ s|kept|failed:
 
 
 def lines(text):
-    matches = [LINE.fullmatch(line) for line in text.splitlines() if " is tried again: " not in line]
+    matches = [LINE.fullmatch(line) for line in text.splitlines() if " is retried: " not in line]
     assert all(matches), text
     assert [int(m[2]) for m in matches] == list(range(1, len(matches) + 1)), text
     return {m[1]: m[4].split()[0].rstrip(":") for m in matches}
@@ -53,7 +53,7 @@ def parts(farm, out):
     assert done.returncode == 0 and "12 tasks" in done.stdout, done
     other = [{"7": "9"}.get(word, word) for word in options]
     done = farm.do("run", made, *other)
-    assert done.returncode == 1 and "by other commands" in done.stderr and done.stderr.count("\n") == 1, done
+    assert done.returncode == 1 and "with other commands" in done.stderr and done.stderr.count("\n") == 1, done
     assert files(made) == wanted
     done = farm.do("run", made, *other, "--overwrite", "--keep-parts")
     assert done.returncode == 0 and set(lines(done.stdout).values()) == {"done"} and files(made) != wanted, done
@@ -115,10 +115,10 @@ def failing(farm, out):
     states = lines(done.stdout)
     assert done.returncode == 1 and done.stderr.count("\n") == 1 and "3 of 6 tasks failed" in done.stderr, done
     assert {name for name, state in states.items() if state == "failed"} == {"part0.0", "part1.0", "merge.0"}, done
-    assert done.stdout.count("is tried again: exit status 1, attempt 1 of 2") == 2, done
+    assert done.stdout.count("is retried: exit status 1, attempt 1 of 2") == 2, done
     assert sorted(files(made)) == ["p.0012.exr"]
     log = (made / "p.farm" / "logs" / "part0.0.log").read_text()
-    assert log.count(" begins") == 2 and "explosion_0098.vdb" in log, log
+    assert log.count(" started, attempt ") == 2 and "explosion_0098.vdb" in log, log
     status = farm.do("status", made, arguments=False)
     assert status.returncode == 1 and "merge: 1 of 2 done; not frames 98" in status.stdout, status
     # A wrong command is not tried again, because it would always fail.
@@ -126,7 +126,7 @@ def failing(farm, out):
     farm.look = [*farm.look, "--no-such-flag"]
     done = farm.do("run", wrong, "--frames", "12", "--wait", "0")
     farm.look.pop()
-    assert done.returncode == 1 and "attempt 1 of 3" in done.stdout and "tried again" not in done.stdout, done
+    assert done.returncode == 1 and "attempt 1 of 3" in done.stdout and "retried" not in done.stdout, done
 
 
 def stopped(farm, out):
@@ -144,7 +144,7 @@ def stopped(farm, out):
     (made / "p.0012.exr").write_bytes(b"of a live job")
     for words in (["run"], ["submit"], ["run", "--overwrite"], ["describe", "--overwrite"]):
         second = farm.do(words[0], made, *(["--frames", "12", *words[1:]] if words[1:] else []), arguments=bool(words[1:]))
-        assert second.returncode == 1 and "another process runs this job" in second.stderr, second
+        assert second.returncode == 1 and "another process is running this job" in second.stderr, second
         assert checkpoint.exists() and log.exists() and (made / "p.0012.exr").exists(), words
     (made / "p.0012.exr").unlink()
     process.send_signal(signal.SIGTERM)
@@ -153,7 +153,7 @@ def stopped(farm, out):
     assert not files(made) and checkpoint.exists()
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done
-    assert "goes on from" in log.read_text()
+    assert "resuming from" in log.read_text()
     assert files(made) == wanted and not checkpoint.exists()
 
 
@@ -169,7 +169,7 @@ def apart(farm, out):
         done = subprocess.run([*command, frame, "-o", str(made / name), "--", *farm.arguments()], capture_output=True, text=True,
                               timeout=60)
         assert done.returncode == status and done.stderr.count("\n") == status, done
-        assert status == 0 or f"makes {made / 'p.%04d.exr'}" in done.stderr, done
+        assert status == 0 or f"has the output {made / 'p.%04d.exr'}" in done.stderr, done
     assert "p.%04d.exr" in (folder / "job.json").read_text()
     # Slurm's answer decides. If Slurm cannot be reached, the job may still be running.
     tools = empty(out / "tools")
@@ -182,7 +182,7 @@ def apart(farm, out):
                               text=True, timeout=60, env=environment)
     assert answered("echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1").returncode == 0
     assert answered("exit 0").returncode == 0
-    for script, told in (("echo 7", "still has arrays"),
+    for script, told in (("echo 7", "still contains arrays"),
                          ("echo 'Unable to contact slurm controller' >&2; exit 1", "Unable to contact")):
         done = answered(script, "--overwrite")
         assert done.returncode == 1 and told in done.stderr and done.stderr.count("\n") == 1, done
@@ -207,7 +207,7 @@ def sent_again(farm, out):
     for times, status in ((100, 1), (99, 0)):
         done = subprocess.run(command, capture_output=True, text=True, timeout=300,
                               env={**os.environ, "SLURM_RESTART_COUNT": str(times)})
-        assert done.returncode == status and ("sent again 100 times" in done.stderr) == (status == 1), done
+        assert done.returncode == status and ("requeued 100 times" in done.stderr) == (status == 1), done
 
 
 def slurm_flags(farm, out):
@@ -261,7 +261,7 @@ def refused(farm, out):
     for command in (["true"], ["touch", "x"]):
         (folder / "job.json").write_text(json.dumps({**good, "tasks": [{**task, "commands": [command]}]}))
         done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
-        assert done.returncode == 1 and "x is not there" in done.stdout, done
+        assert done.returncode == 1 and "x was not created" in done.stdout, done
 
 
 def negative(farm, out):

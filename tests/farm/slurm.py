@@ -70,7 +70,7 @@ def killed(farm, slurm, out):
     done = farm.do("submit", made, *options)
     assert done.returncode == 0 and "12 of 12 tasks submitted" in done.stdout, done
     again = farm.do("submit", made, *options)
-    assert again.returncode == 1 and "still has arrays" in again.stderr and again.stderr.count("\n") == 1, again
+    assert again.returncode == 1 and "still contains arrays" in again.stderr and again.stderr.count("\n") == 1, again
 
     os.kill(wait_for_work(slurm, "node1"), signal.SIGKILL)
     wait_for_work(slurm, "node0")
@@ -90,8 +90,8 @@ def killed(farm, slurm, out):
     assert len(rendered) == 8 and all(state == "done" for _, state, _ in rendered), rendered
     assert len({file for _, _, file in rendered}) == 8, rendered
     assert len(re.findall(r"^task \S+ done", text, re.MULTILINE)) == 12, text
-    assert len(re.findall(r"^task \S+ begins", text, re.MULTILINE)) == 14, text
-    assert text.count("killed by SIGKILL") == 1 and text.count("goes on from") == 2, text
+    assert len(re.findall(r"^task \S+ started", text, re.MULTILINE)) == 14, text
+    assert text.count("killed by SIGKILL") == 1 and text.count("resuming from") == 2, text
     # The parts' files and the files of killed processes are deleted.
     assert not unfinished(made) and not files(made / "p.farm" / "parts") and not list(made.rglob("*.ck"))
     assert farm.do("status", made, arguments=False).returncode == 0
@@ -139,7 +139,7 @@ def split(farm, slurm, out):
     farm.look.pop()
     slurm.wait("the queue", lambda: drained(slurm), 300)
     log = next((wrong / "p.farm" / "logs").iterdir()).read_text()
-    assert log.count(" begins") == 1 and "exit status 2" in log, log
+    assert log.count(" started, attempt ") == 1 and "exit status 2" in log, log
 
 
 def main():

@@ -390,17 +390,18 @@ TEST(LightDescriptors, InvalidValuesAreRejectedByName) {
   EXPECT_EQ(bad([](auto& d) { d.kind = static_cast<cumulet_light_kind>(5); }), field + "kind is unknown");
   EXPECT_EQ(bad([](auto& d) { d.power = -1.0F; }), field + "power is not from 0 to 1e30");
   EXPECT_EQ(bad([](auto& d) { d.position[2] = NAN; }), field + "position is not finite");
-  EXPECT_EQ(bad([](auto& d) { d.position[2] = 1e300; }), field + "position is beyond 1e30");
+  EXPECT_EQ(bad([](auto& d) { d.position[2] = 1e300; }), field + "position exceeds 1e30");
   EXPECT_EQ(bad([](auto& d) { d.direction[0] = INFINITY; }), field + "direction is not finite");
   EXPECT_EQ(bad([](auto& d) { d.color[0] = -1.0F; }), field + "color is negative or not finite");
-  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 1e29F; }), field + "power times color is above 1e30");
-  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 20.0F; }), field + "power times color is above 1e30");
+  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 1e29F; }), field + "power times color exceeds 1e30");
+  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 20.0F; }), field + "power times color exceeds 1e30");
   EXPECT_EQ(bad([](auto& d) { d.width = -1.0; }), field + "width is not from 0 to 1e30");
   EXPECT_EQ(bad([](auto& d) { d.angle_degrees = 181.0; }), field + "angle_degrees is not from 0 to 180");
   EXPECT_EQ(bad([](auto& d) { d.kind = CUMULET_LIGHT_DISTANT, d.angle_degrees = 91.0; }),
-            field + "angle_degrees of a distant light is above 90");
+            field + "angle_degrees is above 90, the maximum for a distant light");
   EXPECT_EQ(bad([](auto& d) { d.blend = 1.5; }), field + "blend is not from 0 to 1");
-  EXPECT_EQ(bad([](auto& d) { d.struct_size -= 8; }), "light 1: cumulet_light_desc.struct_size is not the first one's");
+  EXPECT_EQ(bad([](auto& d) { d.struct_size -= 8; }),
+            "light 1: cumulet_light_desc.struct_size differs from that of the first element");
   EXPECT_THROW(c_abi::analytic_lights_of(nullptr, 1), Error);
   EXPECT_THROW(c_abi::analytic_lights_of(&good, 4097), Error);
   EXPECT_TRUE(c_abi::analytic_lights_of(nullptr, 0).empty());

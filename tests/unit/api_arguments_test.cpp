@@ -70,7 +70,7 @@ TEST_F(ApiArguments, ReadingIntoNullIsAnError) {
   expect_refused("bounds", cumulet_get_bounds(v_, box.data(), nullptr), "box_min or box_max is NULL");
   // A buffer that is too small has a different error.
   std::vector<float> few(4);
-  expect_refused("few", cumulet_read_linear(v_, few.data(), few.size()), "the picture needs 1024 floats");
+  expect_refused("few", cumulet_read_linear(v_, few.data(), few.size()), "the image needs 1024 floats");
 }
 
 TEST_F(ApiArguments, NonFinitePositionsAndTimesAreRejected) {
@@ -87,11 +87,11 @@ TEST_F(ApiArguments, NonFinitePositionsAndTimesAreRejected) {
   EXPECT_EQ(cumulet_pick_at(v_, 0.5 * side, 0.5 * side, &pick), CUMULET_OK);
   EXPECT_EQ(pick.hit, 1);
   expect_refused("wait", cumulet_wait(v_, nan), "timeout_ms is not a number");
-  expect_refused("camera", cumulet_set_previous_camera(v_, nullptr, nan), "seconds are not within 1e9");
+  expect_refused("camera", cumulet_set_previous_camera(v_, nullptr, nan), "seconds is not from -1e9 to 1e9");
   expect_refused("camera", cumulet_set_camera(v_, nullptr), "camera is NULL");
   auto event = make_desc<cumulet_event>();
   event.x = nan;
-  expect_refused("event", cumulet_input(v_, &event, nullptr), "cumulet_event's position or wheel is not finite");
+  expect_refused("event", cumulet_input(v_, &event, nullptr), "cumulet_event's position or wheel is out of range");
   expect_refused("event", cumulet_input(v_, nullptr, nullptr), "cumulet_event is NULL");
   std::array<double, 16> matrix{};
   matrix.fill(nan);
@@ -101,7 +101,8 @@ TEST_F(ApiArguments, NonFinitePositionsAndTimesAreRejected) {
                  "transform 0: open_to_world is not finite");
   auto frame = target_.frame();
   frame.budget_ms = nan;
-  expect_refused("budget", cumulet_render(v_, &frame, nullptr), "cumulet_frame_desc.budget_ms is not up to 1e9");
+  expect_refused("budget", cumulet_render(v_, &frame, nullptr),
+                 "cumulet_frame_desc.budget_ms is above 1e9 or not finite");
   frame = target_.frame();
   frame.scale = nan;
   expect_refused("scale", cumulet_render(v_, &frame, nullptr), "cumulet_frame_desc.scale is not from 0.1 to 16");

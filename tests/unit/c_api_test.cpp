@@ -109,15 +109,15 @@ TEST_F(CApi, InvalidRampsGiveAOneLineError) {
     const char* cause;
   };
   for (const Case& c :
-       {Case{{1, 2}, "the ramp of flame has 1 point, not none or 2 to 32"},
-        Case{Points(66, 1.0F), "the ramp of flame has 33 points, not none or 2 to 32"},
-        Case{{0, 0, 0, 1}, "the ramp of flame has a point 0:1 that does not come after 0:0"},
-        Case{{1, 0, 0.7F, 1}, "the ramp of flame has a point 0.7:1 that does not come after 1:0"},
-        Case{{0, -1, 1, 0}, "the ramp of flame has a point 0:-1, but values become 0 to 1e30"},
-        Case{{0, 1, 1, nan}, "the ramp of flame has a point 1:nan, but values become 0 to 1e30"},
-        Case{{0, 1, 1, inf}, "the ramp of flame has a point 1:inf, but values become 0 to 1e30"},
-        Case{{nan, 1, 1, 1}, "the ramp of flame has a point nan:1 whose value is not from -1e30 to 1e30"},
-        Case{{0, 1, inf, 1}, "the ramp of flame has a point inf:1 whose value is not from -1e30 to 1e30"}}) {
+       {Case{{1, 2}, "the ramp of flame has 1 point; it must have 0 or 2 to 32"},
+        Case{Points(66, 1.0F), "the ramp of flame has 33 points; it must have 0 or 2 to 32"},
+        Case{{0, 0, 0, 1}, "the ramp of flame has a point 0:1 whose input is not above that of 0:0"},
+        Case{{1, 0, 0.7F, 1}, "the ramp of flame has a point 0.7:1 whose input is not above that of 1:0"},
+        Case{{0, -1, 1, 0}, "the ramp of flame has a point 0:-1 whose output is not from 0 to 1e30"},
+        Case{{0, 1, 1, nan}, "the ramp of flame has a point 1:nan whose output is not from 0 to 1e30"},
+        Case{{0, 1, 1, inf}, "the ramp of flame has a point 1:inf whose output is not from 0 to 1e30"},
+        Case{{nan, 1, 1, 1}, "the ramp of flame has a point nan:1 whose input is not from -1e30 to 1e30"},
+        Case{{0, 1, inf, 1}, "the ramp of flame has a point inf:1 whose input is not from -1e30 to 1e30"}}) {
     EXPECT_EQ(set(CUMULET_RAMP_FLAME, c.points, c.points.size() / 2), CUMULET_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(error(), c.cause);
   }
@@ -699,10 +699,10 @@ TEST_F(CApiSurfaces, InvalidTrianglesGiveAOneLineError) {
   bad.index_count = 3;
   refused(bad, "index 4 is out of range, of 4 vertices");
   bad.index_count = 2;
-  refused(bad, "3 a triangle");
+  refused(bad, "the number of indices is not a multiple of 3");
   bad = good;
   bad.index_count = 0;
-  refused(bad, "3 a triangle");
+  refused(bad, "the number of vertices is not a multiple of 3");
   bad = good;
   bad.indices = nullptr;
   refused(bad, "indices are NULL");
@@ -711,7 +711,7 @@ TEST_F(CApiSurfaces, InvalidTrianglesGiveAOneLineError) {
   refused(bad, "positions are NULL");
   bad = good;
   bad.vertex_count = UINT64_MAX / 8;
-  refused(bad, "more than memory holds");
+  refused(bad, "exceed the address space");
   float numbers[16] = {};
   numbers[7] = std::nanf("");
   bad = good;

@@ -67,7 +67,7 @@ TEST_F(CVolumeInstance, InvalidInputGivesAOneLineError) {
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = -1.0;
   refused([](auto& d) { d.to_world[0] = NAN; }, "cumulet_instance_desc.to_world is not finite");
-  refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_instance_desc.to_world flattens space");
+  refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_instance_desc.to_world is singular");
   refused([](auto& d) { d.close_to_world[0] = NAN; }, "cumulet_instance_desc.close_to_world is not finite");
   // Rotated by 180 degrees: the interpolated transform is singular.
   refused(
@@ -75,7 +75,7 @@ TEST_F(CVolumeInstance, InvalidInputGivesAOneLineError) {
         d.close_to_world[0] = d.close_to_world[5] = -1.0;
         d.close_to_world[10] = d.close_to_world[15] = 1.0;
       },
-      "cumulet_instance_desc.open_to_world and close_to_world make it flat in between");
+      "cumulet_instance_desc.open_to_world and close_to_world have a singular interpolation");
   refused([](auto& d) { d.hidden = 2; }, "cumulet_instance_desc.hidden is not 0 or 1");
   refused([&](auto& d) { d.medium = &medium; }, "cumulet_medium_desc.density_scale is not from 0 to 1e60");
   const InstanceRef one = make_instance(ball_.get());
@@ -88,10 +88,10 @@ TEST_F(CVolumeInstance, InvalidInputGivesAOneLineError) {
   const ViewerPtr shows = make();
   EXPECT_EQ(cumulet_add_instance(shows.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_remove_instance(shows.get(), one.get()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(shows.get()), "the viewer does not show the instance");
+  EXPECT_STREQ(cumulet_last_error(shows.get()), "the instance is not in the viewer");
   EXPECT_EQ(cumulet_add_instance(shows.get(), one.get()), CUMULET_OK);
   EXPECT_EQ(cumulet_add_instance(shows.get(), one.get()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(shows.get()), "the viewer shows the instance already");
+  EXPECT_STREQ(cumulet_last_error(shows.get()), "the instance is already in the viewer");
 }
 
 TEST_F(CVolumeInstance, ChangesAppearInAllItsViewers) {
@@ -184,7 +184,8 @@ TEST_F(CVolumeInstance, VolumeTransformsMoveUntilSetAgain) {
   EXPECT_NE(picture(shows.get()), sharp);
   EXPECT_EQ(cumulet_set_volume_shutter_transforms(shows.get(), nullptr, there.data(), 2),
             CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(shows.get()), "the shutter transforms are not as many as those of the volume");
+  EXPECT_STREQ(cumulet_last_error(shows.get()),
+               "the number of shutter transforms differs from the number of volume transforms");
   ASSERT_EQ(cumulet_set_volume_transforms(shows.get(), nullptr, 0), CUMULET_OK);
   EXPECT_EQ(difference(picture(shows.get()), sharp), "");
 }

@@ -135,9 +135,9 @@ TEST_F(CModelInstance, InvalidInputGivesAOneLineError) {
     EXPECT_EQ(cumulet_model_set(one.get(), &desc), CUMULET_ERROR_INVALID_ARGUMENT);
   };
   refused([](auto& d) { d.to_world[0] = NAN; }, "cumulet_model_desc.to_world is not finite");
-  refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_model_desc.to_world flattens space");
+  refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_model_desc.to_world is singular");
   refused([](auto& d) { d.to_world[0] = d.to_world[5] = d.to_world[10] = 1e-11, d.to_world[15] = 1.0; },
-          "cumulet_model_desc.to_world makes things flat or endless");
+          "cumulet_model_desc.to_world is singular or too large");
   refused([](auto& d) { d.hidden = 2; }, "cumulet_model_desc.hidden is not 0 or 1");
   refused([](auto& d) { d.shadow_only = -1; }, "cumulet_model_desc.shadow_only is not 0 or 1");
   refused([](auto& d) { d.double_sided = 7; }, "cumulet_model_desc.double_sided is not 0 or 1");
@@ -152,10 +152,10 @@ TEST_F(CModelInstance, InvalidInputGivesAOneLineError) {
   const ViewerPtr shows = make();
   EXPECT_EQ(cumulet_add_model(shows.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_remove_model(shows.get(), one.get()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(shows.get()), "the viewer does not show the model");
+  EXPECT_STREQ(cumulet_last_error(shows.get()), "the model is not in the viewer");
   EXPECT_EQ(cumulet_add_model(shows.get(), one.get()), CUMULET_OK);
   EXPECT_EQ(cumulet_add_model(shows.get(), one.get()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(shows.get()), "the viewer shows the model already");
+  EXPECT_STREQ(cumulet_last_error(shows.get()), "the model is already in the viewer");
 }
 
 TEST_F(CModelInstance, ChangesAppearInAllItsViewers) {

@@ -394,7 +394,7 @@ TEST(CameraMatrices, InvalidViewOrProjectionIsRejected) {
       {with(ortho, 2, 2, 0.0), "singular"},
       {with(ortho, 3, 3, 0.0), "singular"},
       {-ortho, "singular"},
-      {with(projection, 0, 1, 0.1), "turns or shears"},
+      {with(projection, 0, 1, 0.1), "rotates or shears"},
       {with(projection, 0, 2, 0.1), "oblique near plane"},
       {with(projection, 0, 3, 0.1), "neither perspective nor orthographic"},
   };

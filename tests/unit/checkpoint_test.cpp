@@ -63,14 +63,14 @@ TEST_F(CheckpointFile, IsRejectedForAnotherImage) {
     options_ = before;
     return said;
   };
-  const std::string other = "is the checkpoint of another picture: the ";
+  const std::string other = "is the checkpoint of another image: the ";
   cumulet_sampling_desc& sampling = options_.scene.sampling;
   EXPECT_EQ(differs([&] { options_.scene.width = 7; }), other + "size differs");
   EXPECT_EQ(differs([&] { sampling.seed = 7; }), other + "seed differs");
   EXPECT_EQ(differs([&] { sampling.first_sample = 7; }), other + "first sample differs");
   EXPECT_EQ(differs([&] { sampling.samples = 7; }), other + "number of samples differs");
   EXPECT_EQ(differs([&] { sampling.noise_target_percent = 7.0f; }), other + "noise target differs");
-  EXPECT_EQ(differs([&] { options_.aovs = {CUMULET_AOV_VOLUME}; }), other + "choice of the layer volume differs");
+  EXPECT_EQ(differs([&] { options_.aovs = {CUMULET_AOV_VOLUME}; }), other + "volume AOV differs");
   EXPECT_EQ(differs([&] { options_.scene.medium.anisotropy = 0.5f; }), other + "scene differs");
   EXPECT_EQ(differs([&] { options_.scene.volume = "other.vdb"; }), other + "scene differs");
   EXPECT_EQ(differs([&] { options_.output = "elsewhere.exr"; }), "");
@@ -79,7 +79,7 @@ TEST_F(CheckpointFile, IsRejectedForAnotherImage) {
 TEST_F(CheckpointFile, TruncatedOrDamagedFileIsReported) {
   write_checkpoint(path(), checkpoint_);
   const std::string whole = cumulet::image::read_file(path());
-  const std::string damaged = "is no checkpoint of cumulet-render, or damaged: without it the picture begins anew";
+  const std::string damaged = "is not a checkpoint of cumulet-render, or is damaged; delete it to start over";
   for (std::size_t size = 0; size < whole.size(); size += size < 400 ? 1 : 97) {
     std::ofstream(path(), std::ios::binary) << whole.substr(0, size);
     ASSERT_EQ(refusal(), damaged) << size;

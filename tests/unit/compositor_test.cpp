@@ -725,7 +725,7 @@ TEST_P(Compositing, InvalidTargetsAreReported) {
     }
     return "";
   };
-  EXPECT_EQ(cause(4711), "the target, 4711, is no framebuffer of the current context");
+  EXPECT_EQ(cause(4711), "the target, 4711, is not a framebuffer of the current context");
   EXPECT_EQ(cause(incomplete.name()),
             "the target, framebuffer " + std::to_string(incomplete.name()) + ", is not complete");
   EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});

@@ -770,8 +770,8 @@ TEST(CppSurfaces, FromFilesAndMemory) {
   const auto nowhere = Surfaces::from_memory(bytes, nullptr, "json");
   EXPECT_EQ(nowhere.error().status, StatusCode::file);
   EXPECT_STREQ(nowhere.error().message.c_str(),
-               "json: mesh 0, primitive 0, POSITION: buffer 0: \"corners.bin\" is a file of its own, and there is no "
-               "folder to look in");
+               "json: mesh 0, primitive 0, POSITION: buffer 0: \"corners.bin\" is an external file, but the glTF "
+               "data has no folder");
   const auto missing = Surfaces::from_memory(bytes, "/nowhere");
   EXPECT_STREQ(missing.error().message.c_str(),
                "memory: mesh 0, primitive 0, POSITION: buffer 0: corners.bin: no such file");

@@ -407,7 +407,7 @@ TEST_P(Cryptomatte, InvalidInputGivesAOneLineError) {
   make();
   EXPECT_EQ(read(1, values.size()), CUMULET_OK);
   EXPECT_EQ(read(1, values.size() - 1), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(v_), "the picture needs 512 floats");
+  EXPECT_STREQ(cumulet_last_error(v_), "the image needs 512 floats");
   EXPECT_EQ(read(0, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(read(17, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_cryptomatte(v_, nullptr, nullptr, 1, values.data(), values.size()),

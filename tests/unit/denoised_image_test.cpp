@@ -130,12 +130,12 @@ TEST_F(DenoisedImage, InvalidRequestsGiveAOneLineError) {
   EXPECT_EQ(cumulet_read_denoised(viewer_.get(), nullptr, rgba.data(), rgba.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   std::vector<float> short_one(floats - 1);
   EXPECT_EQ(denoise(file_, short_one), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(error(), "the picture needs 6400 floats");
+  EXPECT_EQ(error(), "the image needs 6400 floats");
   std::ofstream(file_, std::ios::binary) << "none";
   const std::string other = (folder_ / "other.tza").string();
   std::filesystem::rename(file_, other);
   EXPECT_EQ(denoise(other, rgba), CUMULET_ERROR_FILE);
-  EXPECT_EQ(error(), other + ": no tensor archive (.tza) of Open Image Denoise");
+  EXPECT_EQ(error(), other + ": is not a tensor archive (.tza) of Open Image Denoise");
 }
 
 // Measured: the error of the noisy image is 14 times that of the filtered one, relative to 1024 samples.

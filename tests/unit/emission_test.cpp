@@ -673,7 +673,7 @@ TEST(AnisotropyField, UnsupportedFieldIsReportedOnce) {
     show();
   }
   ASSERT_EQ(told.size(), 1U);
-  EXPECT_NE(told[0].find("is not shown: the Mie phase function"), std::string::npos);
+  EXPECT_NE(told[0].find("is ignored: the Mie phase function"), std::string::npos);
   viewer.set_medium({});
   viewer.set_medium(mie);
   EXPECT_EQ(told.size(), 2U);

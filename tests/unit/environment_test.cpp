@@ -326,13 +326,13 @@ std::string refusal_of(const light::EnvironmentPixels& pixels) {
 }
 
 TEST(Environment, InvalidSizesGiveOneLineErrors) {
-  EXPECT_EQ(refusal_of({0, 4, {}}), "host: an environment of 0x4 pixels");
-  EXPECT_EQ(refusal_of({32768, 1, {}}), "host: an environment of 32768x1 pixels; at most 16384 a side");
-  EXPECT_EQ(refusal_of({2, 2, {vec3(1.0F)}}), "host: an environment of 2x2 pixels has 1");
+  EXPECT_EQ(refusal_of({0, 4, {}}), "host: the environment has 0x4 pixels");
+  EXPECT_EQ(refusal_of({32768, 1, {}}), "host: the environment has 32768x1 pixels; the limit is 16384 per side");
+  EXPECT_EQ(refusal_of({2, 2, {vec3(1.0F)}}), "host: the environment size is 2x2 pixels, but it has 1 values");
   EXPECT_EQ(test::refusal([] {
               light::make_environment({0, 4, {}}, "two\nlines");
             }),
-            "two lines: an environment of 0x4 pixels");
+            "two lines: the environment has 0x4 pixels");
   EXPECT_EQ(test::refusal([] { light::read_environment("two\nlines.hdr"); }),
             "two lines.hdr: No such file or directory");
 }
@@ -371,16 +371,16 @@ TEST(EnvironmentFile, RadianceHdrIsReadFlatAndRunLengthEncoded) {
   EXPECT_EQ(eight.values.at(0), vec3(1.0F, 0.5F, 0.25F));
   EXPECT_EQ(eight.values.at(7), vec3(1.0F, 0.5F, 0.125F));
   const auto why = [&](const std::string& text) { return test::refusal([&] { read(text); }); };
-  EXPECT_EQ(why(""), path + ": a Radiance picture that is cut short");
+  EXPECT_EQ(why(""), path + ": truncated Radiance file");
   EXPECT_EQ(why("no picture\n"), path + ": neither a Radiance (.hdr) nor an OpenEXR file");
-  EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs.substr(0, 8))), path + ": a Radiance picture that is cut short");
-  EXPECT_EQ(why(radiance_file("-Y 9999 +X 9999", runs)), path + ": a Radiance picture that is cut short");
+  EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs.substr(0, 8))), path + ": truncated Radiance file");
+  EXPECT_EQ(why(radiance_file("-Y 9999 +X 9999", runs)), path + ": truncated Radiance file");
   EXPECT_EQ(why(radiance_file("-Y 16 +X 32000", runs)),
-            path + ": an environment of 32000x16 pixels; at most 16384 a side");
+            path + ": the environment has 32000x16 pixels; the limit is 16384 per side");
   EXPECT_EQ(why(radiance_file("+X 8 -Z 1", runs)),
-            path + ": a resolution of '+X 8 -Z 1', not '-Y HEIGHT +X WIDTH' or the like");
+            path + ": has the resolution '+X 8 -Z 1', which is not of a form such as '-Y HEIGHT +X WIDTH'");
   runs[4] = '\xff';
-  EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs)), path + ": a run beyond its row");
+  EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs)), path + ": a run exceeds its row");
   EXPECT_EQ(test::refusal([&] { light::read_environment((folder / "none.hdr").string()); }),
             (folder / "none.hdr").string() + ": No such file or directory");
   EXPECT_NE(why(std::string("\x76\x2f\x31\x01nonsense", 12)).find(path + ": not a readable OpenEXR file: "),

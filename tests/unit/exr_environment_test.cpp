@@ -218,7 +218,7 @@ TEST_F(ExrEnvironment, DataWindowIsPlacedInTheDisplayWindow) {
   ASSERT_EQ(got.height, unsigned{height});
   expect_near(
       got, [](int x, int y) { return x >= 10 && x <= 29 && y >= 4 && y <= 19 ? smooth(x, y) : vec3(0.0F); }, 1e-6F);
-  expect_remark(got, "what is outside is black");
+  expect_remark(got, "pixels outside are black");
 
   got = written(Imf::Header(display, Imath::Box2i({-7, -3}, {width + 4, height + 8})), rgb(smooth));
   ASSERT_EQ(got.width, unsigned{width});
@@ -236,7 +236,7 @@ TEST_F(ExrEnvironment, DataWindowIsPlacedInTheDisplayWindow) {
   EXPECT_EQ(test::refusal([&] {
               written(Imf::Header(Imath::Box2i({0, 0}, {99999, 9}), Imath::Box2i({0, 0}, {9, 9})), rgb(smooth));
             }),
-            path() + ": an environment of 100000x10 pixels; at most 16384 a side");
+            path() + ": the environment has 100000x10 pixels; the limit is 16384 per side");
 }
 
 vec3 of_direction(const vec3& w) { return vec3(1.5F) + w; }
@@ -274,7 +274,7 @@ TEST_F(ExrEnvironment, CubeMapFollowsTheOpenExrConvention) {
   Imf::Header wrong(width, height);
   Imf::addEnvmap(wrong, Imf::ENVMAP_CUBE);
   EXPECT_EQ(test::refusal([&] { written(wrong, rgb(smooth)); }),
-            path() + ": a cube map of 64x32 pixels, not six square faces");
+            path() + ": the cube map has 64x32 pixels, which are not six square faces");
   Imf::Header plain(width, height);
   Imf::addEnvmap(plain, Imf::ENVMAP_LATLONG);
   expect_near(written(plain, rgb(smooth)), smooth, 1e-6F);
@@ -330,7 +330,7 @@ TEST_F(ExrEnvironment, ChromaticitiesAreConverted) {
   expect_near(written(header, rgb(white)), white, 1e-4F);
   // Colors outside of the Rec. 709 gamut are reported.
   got = written(header, rgb([](int x, int) { return x == 3 ? vec3(0.0F, 1.0F, 0.0F) : vec3(1.0F); }));
-  expect_remark(got, "32 pixels lose saturation");
+  expect_remark(got, "which desaturates 32 pixels outside its gamut");
   for (const vec3& value : got.values) EXPECT_GE(std::min({value.x, value.y, value.z}), 0.0F);
 
   Imf::Header plain(width, height);
@@ -416,13 +416,13 @@ TEST_F(ExrEnvironment, SelectedPartAndLayerAreReported) {
     }
   }
   expect_near(read(), smooth, 1e-6F);
-  expect_remark(read(), "part 2 (picture) of 3 is read");
+  expect_remark(read(), "part 2 (picture) of 3 is used");
 
   std::vector<Channel> layers = rgb(other, Imf::HALF, "albedo.");
   for (const Channel& channel : rgb(smooth, Imf::FLOAT, "View Layer.Combined.")) layers.push_back(channel);
   EnvironmentPixels got = written(Imf::Header(width, height), layers);
   expect_near(got, smooth, 1e-6F);
-  expect_remark(got, "the layer View Layer.Combined is read");
+  expect_remark(got, "layer View Layer.Combined is used");
   for (const Channel& channel : rgb(smooth)) layers.push_back(channel);
   layers.erase(layers.begin() + 3, layers.begin() + 6);
   got = written(Imf::Header(width, height), layers);
@@ -458,7 +458,7 @@ TEST_F(ExrEnvironment, ImageWithoutColorsGivesAOneLineError) {
     file.setFrameBuffer(frame);
     file.writePixels(4);
   }
-  EXPECT_EQ(refusal(), path() + ": a deep OpenEXR picture, of which Cumulet reads none");
+  EXPECT_EQ(refusal(), path() + ": deep OpenEXR images are not supported");
 
   written(Imf::Header(width, height), rgb(smooth));
   const auto size = std::filesystem::file_size(path());

@@ -187,8 +187,7 @@ TEST(ExtremeValues, FillValuesCountAsZeroAndAreCounted) {
     EXPECT_EQ(volume.negative_voxels + volume.non_finite_voxels, 0U);
     EXPECT_FLOAT_EQ(volume.max_value, 0.56F);
     EXPECT_EQ(test::value_at(volume, {1, 0, 0}), 0.0F);
-    EXPECT_EQ(messages.warnings,
-              std::vector<std::string>{"sea: 6 voxels beyond 1e30, as fill values are, counted as 0"});
+    EXPECT_EQ(messages.warnings, std::vector<std::string>{"sea: 6 voxels above 1e30 (fill values) read as 0"});
   }
 }
 
@@ -232,7 +231,7 @@ TEST(ExtremeValues, FillValuesOfEachFieldCountAsZero) {
   for (const ScalarVolume* part : frame.fields()) EXPECT_LE(part->max_value, 0.6F) << part->name;
   ASSERT_EQ(messages.warnings.size(), fields.size());
   for (const std::string& warning : messages.warnings) {
-    EXPECT_HAS(warning, ": 2 voxels beyond 1e30");
+    EXPECT_HAS(warning, ": 2 voxels above 1e30");
   }
 }
 

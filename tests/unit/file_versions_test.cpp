@@ -323,12 +323,12 @@ TEST_F(FileVersions, NanoVdbRefusalsNameVersionAndCause) {
   };
   const std::string file = segment({grid_bytes(handle, known)}, known, Codec::NONE);
   EXPECT_HAS(refusal(write(with_version(file, 8, {33, 1, 0}), "33.nvdb")),
-             "was written by NanoVDB 33.1.0, this library reads NanoVDB 32.x");
+             "was written by NanoVDB 33.1.0; this library reads NanoVDB 32.x");
   EXPECT_HAS(refusal(write(with_version(file, 8, {29, 3, 0}), "29.nvdb")),
-             "was written by NanoVDB 29.3.0, this library reads NanoVDB 32.0 and later");
+             "was written by NanoVDB 29.3.0; this library reads NanoVDB 32.0 and later");
   for (const NanoVersion& version : nano_versions) {
     EXPECT_HAS(refusal(write(with_version(grid_bytes(handle, version), 16, {34, 0, 1}), "raw.nvdb")),
-               "was written by NanoVDB 34.0.1, this library reads NanoVDB 32.x");
+               "was written by NanoVDB 34.0.1; this library reads NanoVDB 32.x");
   }
   std::string other = file;
   other[7] = '7';
@@ -343,8 +343,8 @@ TEST_F(FileVersions, NanoVdbRefusalsNameVersionAndCause) {
   for (const auto& [type, name] : types) {
     std::string grid = grid_bytes(handle, known);
     reinterpret_cast<nanovdb::GridData*>(grid.data())->mGridType = static_cast<nanovdb::GridType>(type);
-    EXPECT_HAS(refusal(write(segment({grid}, known, Codec::BLOSC), "type.nvdb")), "is of type " + name);
-    EXPECT_HAS(refusal(write(grid, "raw_type.nvdb")), "is of type " + name);
+    EXPECT_HAS(refusal(write(segment({grid}, known, Codec::BLOSC), "type.nvdb")), "has type " + name);
+    EXPECT_HAS(refusal(write(grid, "raw_type.nvdb")), "has type " + name);
   }
 }
 
@@ -391,8 +391,8 @@ TEST_F(FileVersions, AnyVdbVersionNumberIsAccepted) {
     const fs::path file = write(bytes, "later.vdb");
     expect_same(import_volume(file, "", messages.log), wanted);
     ASSERT_EQ(messages.warnings.size(), 1U);
-    EXPECT_EQ(messages.warnings[0], file.string() + ": is of VDB file format " + std::to_string(later) +
-                                        ", which is newer than the known 225");
+    EXPECT_EQ(messages.warnings[0],
+              file.string() + ": has VDB file format " + std::to_string(later) + ", which is newer than the known 225");
     messages.warnings.clear();
     (void)import_frame(file, {}, messages.log);
     EXPECT_EQ(messages.warnings.size(), 1U);
@@ -472,7 +472,7 @@ TEST_F(FileVersions, OnlyUnknownGridTypesAreRejected) {
   const fs::path file = write(bytes, "future.vdb");
   EXPECT_EQ(import_volume(file, "density", messages.log).max_value, grid->tree().cbeginLeaf() ? 255.0F / 64.0F : 0.0F);
   const std::string refused = cumulet::test::refusal(file, [&] { (void)import_volume(file, "future", {}); });
-  EXPECT_HAS(refused, "grid \"future\" is of type Tree_quarter_543");
+  EXPECT_HAS(refused, "grid \"future\" has type Tree_quarter_543");
 }
 
 }  // namespace

@@ -98,7 +98,7 @@ TEST_P(FilmLayers, PassWithMissingInputIsRejected) {
     }
     return std::string("not refused");
   };
-  const std::string words = "the pass remember reads the layer radiance, which nothing has written";
+  const std::string words = "the pass remember reads the layer radiance, which no pass has written";
   EXPECT_EQ(why(), words);
   EXPECT_EQ(film_.texture(history), 0U);  // not allocated
   ASSERT_TRUE(run(fill(layers::radiance, 1.0F)));

@@ -57,18 +57,18 @@ TEST(Frames, RangesAreReadInTheirOrder) {
 }
 
 TEST(Frames, InvalidRangesAreRejectedByName) {
-  EXPECT_EQ(refusal([] { return parse_frames("10-1"); }), "'10-1' runs backwards");
-  EXPECT_EQ(refusal([] { return parse_frames("1-3,9-8"); }), "'9-8' runs backwards");
+  EXPECT_EQ(refusal([] { return parse_frames("10-1"); }), "'10-1' is a descending range");
+  EXPECT_EQ(refusal([] { return parse_frames("1-3,9-8"); }), "'9-8' is a descending range");
   EXPECT_EQ(refusal([] { return parse_frames("1-9x0"); }), "'1-9x0' has a step of 0");
   EXPECT_EQ(refusal([] { return parse_frames("1-9x0.000"); }), "'1-9x0.000' has a step of 0");
   EXPECT_EQ(refusal([] { return parse_frames("1-9x0.0625"); }), "'1-9x0.0625' has more than three decimals");
-  EXPECT_EQ(refusal([] { return parse_frames("9999999.5"); }), "'9999999.5' goes beyond frame 9999999");
-  EXPECT_EQ(refusal([] { return parse_frames("5x2"); }), "'5x2' has a step, but is no range");
-  EXPECT_EQ(refusal([] { return parse_frames("1-10000000"); }), "'1-10000000' goes beyond frame 9999999");
+  EXPECT_EQ(refusal([] { return parse_frames("9999999.5"); }), "'9999999.5' has a frame above 9999999");
+  EXPECT_EQ(refusal([] { return parse_frames("5x2"); }), "'5x2' has a step, but is not a range");
+  EXPECT_EQ(refusal([] { return parse_frames("1-10000000"); }), "'1-10000000' has a frame above 9999999");
   EXPECT_EQ(refusal([] { return parse_frames("99999999999999999999"); }),
-            "'99999999999999999999' goes beyond frame 9999999");
-  EXPECT_EQ(refusal([] { return parse_frames("-10000000"); }), "'-10000000' goes beyond frame -9999999");
-  EXPECT_EQ(refusal([] { return parse_frames("1--3"); }), "'1--3' runs backwards");
+            "'99999999999999999999' has a frame above 9999999");
+  EXPECT_EQ(refusal([] { return parse_frames("-10000000"); }), "'-10000000' has a frame below -9999999");
+  EXPECT_EQ(refusal([] { return parse_frames("1--3"); }), "'1--3' is a descending range");
   EXPECT_EQ(refusal([] { return parse_frames("1-3x-1"); }), "'1-3x-1' has a negative step");
   for (const char* text :
        {"",      "a",    "1-",      "-",  "--5", "-5-",   "-1---3", "-5x2",   "-a", "- 5", "1,", ",1",
@@ -135,7 +135,7 @@ TEST(FramePattern, RejectsNamesWithNoneOrSeveralPatterns) {
                            "####/cloud.vdb", "a %d/$F4/cloud.vdb", ""})
     EXPECT_FALSE(FramePattern::parse(name)) << name;
   EXPECT_EQ(refusal([] { return FramePattern::parse("a.##.b.##.vdb"); }),
-            "'a.##.b.##.vdb' has two places for a frame's number");
+            "'a.##.b.##.vdb' has two placeholders for the frame number");
   EXPECT_NE(refusal([] { return FramePattern::parse("a.##.%d.vdb"); }), "");
   EXPECT_EQ(refusal([] { return FramePattern::parse("a.%10d.vdb"); }),
             "'a.%10d.vdb' has a number of more than 9 digits");
@@ -190,8 +190,8 @@ TEST(FramePattern, ReportsSkippedFiles) {
     write(folder / name, "x");
   const auto pattern = FramePattern::parse(folder / "f.####.vdb");
   EXPECT_EQ(pattern->passed_over(), (folder / "f.####.vdb").string() +
-                                        ": passed over, for their numbers are written otherwise: f.-1.vdb, f.04.vdb, "
-                                        "f.3.vdb");
+                                        ": files ignored because their frame numbers have another padding: f.-1.vdb, "
+                                        "f.04.vdb, f.3.vdb");
   for (int i = 10; i < 20; ++i) write(folder / ("f." + std::to_string(i) + ".vdb"), "x");
   EXPECT_TRUE(pattern->passed_over().ends_with("f.11.vdb, f.12.vdb and 8 more")) << pattern->passed_over();
 }
@@ -287,14 +287,14 @@ TEST_F(FrameSelection, SeveralFramesNeedANumberInTheOutput) {
   options.scene.volume = folder / "f.#.vdb";
   options.output = "out/pic.exr";
   EXPECT_EQ(said(),
-            "--output: the name 'out/pic.exr' is that of 2 frames, and needs a place for their numbers, such as "
-            "pic.####.exr");
+            "--output: the name 'out/pic.exr' is used for 2 frames and needs a placeholder for the frame number, "
+            "such as pic.####.exr");
   options.frames = {2};
   ASSERT_EQ(said(), "");
   EXPECT_EQ(plan->frames.at(0).output, "out/pic.exr");
   options.frames = {};
   options.output = "a.##.##.exr";
-  EXPECT_EQ(said(), "--output: 'a.##.##.exr' has two places for a frame's number");
+  EXPECT_EQ(said(), "--output: 'a.##.##.exr' has two placeholders for the frame number");
   options.output = "a.##.exr";
   options.stats = "s.json";
   EXPECT_NE(said().find("--stats: the name 's.json'"), std::string::npos);
@@ -302,12 +302,12 @@ TEST_F(FrameSelection, SeveralFramesNeedANumberInTheOutput) {
 
 TEST_F(FrameSelection, NonSequencesAreRejected) {
   options.scene.volume = folder / "f.####.vdb";
-  EXPECT_EQ(said(), options.scene.volume + ": no file of such a name is there");
+  EXPECT_EQ(said(), options.scene.volume + ": no matching file exists");
   options.scene.volume = folder / "cloud.vdb";
   options.frames = {1};
-  EXPECT_NE(said().find("cloud.vdb' has neither a number nor a place for one"), std::string::npos);
+  EXPECT_NE(said().find("cloud.vdb' has no frame number and no placeholder"), std::string::npos);
   options.scene.volume = "";
-  EXPECT_EQ(said(), "--frames counts volumes, and the scene has none");
+  EXPECT_EQ(said(), "--frames needs a volume, but the scene has none");
   options.frames = {};
   ASSERT_EQ(said(), "");
   EXPECT_FALSE(plan);
@@ -355,7 +355,7 @@ TEST_F(FrameSelection, SubframesNeedBothFiles) {
   EXPECT_EQ(plan->frames[3].volume, folder / "f.0014.vdb");
   EXPECT_EQ(plan->frames[3].next->volume, folder / "f.0016.vdb") << "missing, which its turn tells";
   options.frames = {{10, 333}};
-  EXPECT_EQ(said(), "frame 10.333: the files are 2 frames apart, of which this is no thousandth");
+  EXPECT_EQ(said(), "frame 10.333: the files are 2 frames apart, and this is not a multiple of 1/1000 of that");
 }
 
 TEST_F(FrameSelection, NegativeFramesAreSupported) {

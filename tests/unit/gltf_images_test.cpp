@@ -169,8 +169,7 @@ TEST(GltfJpeg, DamagedImageIsReportedAndPartlyShown) {
       const Read got = read(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)));
       if (got.image && got.warnings.empty()) continue;  // the cut is after the last needed block
       ASSERT_EQ(got.warnings.size(), 1U) << size;
-      EXPECT_TRUE(has(got.warnings[0],
-                      got.image ? "image 0 is damaged, and shown as far as it can be: " : "image 0 is left out: "))
+      EXPECT_TRUE(has(got.warnings[0], got.image ? "image 0 is damaged and partly shown: " : "image 0 is ignored: "))
           << got.warnings[0];
       damaged |= got.image.has_value();
     }
@@ -353,8 +352,7 @@ TEST(GltfCounts, EmptyAccessorDropsItsPrimitive) {
     Lines lines;
     EXPECT_EQ(imported(two(change), lines.log)->triangle_count(), 1U);
     ASSERT_EQ(lines.warnings.size(), 1U);
-    EXPECT_TRUE(has(lines.warnings[0], "1 primitives are not drawn: an accessor of theirs has a count of 0"))
-        << lines.warnings[0];
+    EXPECT_TRUE(has(lines.warnings[0], "1 primitives are ignored: an accessor has a count of 0")) << lines.warnings[0];
   }
   Lines lines;
   const GltfModel moved = two([&](GltfModel& m) {
@@ -365,8 +363,8 @@ TEST(GltfCounts, EmptyAccessorDropsItsPrimitive) {
   });
   EXPECT_EQ(imported(moved, lines.log)->triangle_count(), 1U);
   ASSERT_EQ(lines.warnings.size(), 2U);
-  EXPECT_TRUE(has(lines.warnings[0], "1 skins and animation channels are as at rest: an accessor"));
-  EXPECT_TRUE(has(lines.warnings[1], "1 nodes are not drawn: an accessor of their instances"));
+  EXPECT_TRUE(has(lines.warnings[0], "1 skins and animation channels are ignored: an accessor"));
+  EXPECT_TRUE(has(lines.warnings[1], "1 nodes are ignored: an accessor of their instances"));
 }
 
 TEST(OneLine, EscapesRawBytes) {

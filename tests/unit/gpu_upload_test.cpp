@@ -179,7 +179,7 @@ TEST_F(SurfaceUploads, CopiesPerFrameStayWithinTheTimeBudget) {
       if (loading) sum_ms += ms;
       most = std::max(most, fake_->uploaded() - begun);
     }
-    // For tests/bench/README.md.
+    // For tests/bench/results/single_values.csv.
     std::printf("%s: %.1f MB in %d frames, all but the last %.1f ms, the longest %.1f ms\n",
                 time > 0.0 ? "a pose" : "a model", static_cast<double>(fake_->uploaded() - before) / 1048576.0, frames,
                 sum_ms, longest_ms);

@@ -52,7 +52,7 @@ TEST_F(GridNameCase, ExactCaseOfDensityIsPreferred) {
     EXPECT_EQ(import_frame(file, {}, messages.log).density.name, "density");
     ASSERT_EQ(messages.warnings.size(), 2U);
     for (const std::string& warning : messages.warnings) {
-      EXPECT_HAS(warning, "shows its grid \"density\" (float, fog volume); there is also \"Density\"");
+      EXPECT_HAS(warning, "uses the grid \"density\" (float, fog volume); it also has \"Density\"");
       EXPECT_HAS(warning, "\"DENSITY\"");
     }
   }
@@ -65,9 +65,9 @@ TEST_F(GridNameCase, CaseInsensitiveMatchIsReported) {
   const auto file = write({dot("DENSITY", 1.0F), dot("Density", 2.0F)});
   EXPECT_EQ(import_frame(file, {}, messages.log).density.name, "DENSITY");
   ASSERT_EQ(messages.warnings.size(), 1U);
-  EXPECT_EQ(messages.warnings[0],
-            file.string() +
-                ": shows its grid \"DENSITY\" (float, fog volume); there is also \"Density\" (float, fog volume)");
+  EXPECT_EQ(
+      messages.warnings[0],
+      file.string() + ": uses the grid \"DENSITY\" (float, fog volume); it also has \"Density\" (float, fog volume)");
   // With one candidate there is no warning.
   messages.warnings.clear();
   (void)import_frame(write({dot("Density", 1.0F), dot("Temperature", 2.0F), dot("dust", 1.0F)}), {}, messages.log);
@@ -88,11 +88,11 @@ TEST_F(GridNameCase, OtherFieldsFollowTheSameRule) {
   std::string all;
   for (const std::string& warning : messages.warnings) all += warning + "\n";
   EXPECT_EQ(messages.warnings.size(), 5U) << all;
-  EXPECT_HAS(all, ": reads its grid \"temperature\" (float, fog volume) as temperature; there is also \"Temperature\"");
-  EXPECT_HAS(all, ": reads its grid \"FLAME\" (float, fog volume) as flame; there is also \"Flame\"");
-  EXPECT_HAS(all, ": reads its grid \"phase_g\" (float, fog volume) as anisotropy; there is also \"Phase_G\"");
-  EXPECT_HAS(all, ": reads its grid \"cd\" (vec3s, unknown) as color; there is also \"Cd\"");
-  EXPECT_HAS(all, ": reads its grid \"vel\" (vec3s, unknown) as velocity; there is also \"Vel\"");
+  EXPECT_HAS(all, ": uses the grid \"temperature\" (float, fog volume) as temperature; it also has \"Temperature\"");
+  EXPECT_HAS(all, ": uses the grid \"FLAME\" (float, fog volume) as flame; it also has \"Flame\"");
+  EXPECT_HAS(all, ": uses the grid \"phase_g\" (float, fog volume) as anisotropy; it also has \"Phase_G\"");
+  EXPECT_HAS(all, ": uses the grid \"cd\" (vec3s, unknown) as color; it also has \"Cd\"");
+  EXPECT_HAS(all, ": uses the grid \"vel\" (vec3s, unknown) as velocity; it also has \"Vel\"");
   // list_grids and channels_by_name choose the same grids.
   const auto grids = list_grids(file);
   const std::vector<std::string> channels = channels_by_name(grids);
@@ -119,7 +119,7 @@ TEST_F(GridNameCase, DuplicateGridNamesAreReported) {
   const auto file = write({dot("density", 1.0F), dot("temperature", 2.0F), dot("temperature", 3.0F)});
   EXPECT_EQ(import_frame(file, {}, messages.log).temperature->max_value, 2.0F);
   ASSERT_EQ(messages.warnings.size(), 1U);
-  EXPECT_HAS(messages.warnings[0], "reads its grid \"temperature[0]\" (float, fog volume) as temperature");
+  EXPECT_HAS(messages.warnings[0], "uses the grid \"temperature[0]\" (float, fog volume) as temperature");
 }
 
 TEST_F(GridNameCase, ComponentGridsMustHaveTheSameCase) {

@@ -305,14 +305,14 @@ TEST_P(GridSetUploads, TooLargeGridsAreRejectedByName) {
             "800 texels");
   auto constant = std::make_shared<scene::MarchSource>(*plain_);
   constant->linear = false;
-  EXPECT_EQ(refused({plain_, constant}, 0), "grids of different marches are not shown together");
+  EXPECT_EQ(refused({plain_, constant}, 0), "grids of different types cannot be shown together");
   for (const scene::March march : {scene::March::dense, scene::March::brick}) {
     auto voxels = std::make_shared<scene::MarchSource>();
     voxels->march = march;
     const std::string name = march == scene::March::dense ? "dense" : "brick";
     EXPECT_EQ(refused({voxels, std::make_shared<scene::MarchSource>(*voxels)}, 0),
-              "the " + name + " march shows one grid, not 2: only that of tetrahedra shows several");
-    EXPECT_EQ(refused({plain_, voxels}, 0), "grids of different marches are not shown together");
+              "the " + name + " grid type supports one grid, not 2; only tetrahedral grids support several");
+    EXPECT_EQ(refused({plain_, voxels}, 0), "grids of different types cannot be shown together");
   }
 }
 

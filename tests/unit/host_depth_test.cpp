@@ -531,7 +531,7 @@ TEST_P(HostDepths, InvalidNamesAreReportedAndKeepTheImage) {
     return "";
   };
   const auto text = [](const char* kind, GLuint name, const std::string& rest) {
-    return "the host's depth, " + std::string(kind) + " " + std::to_string(name) + ", " + rest;
+    return "host depth, " + std::string(kind) + " " + std::to_string(name) + ", " + rest;
   };
   const Object color = gl::make_texture_2d(gl_, GL_RGBA8, size.x, size.y, "colour");
   const Object array = gl::make_texture_2d_array(gl_, GL_DEPTH_COMPONENT24, 4, 4, 4, "array");
@@ -542,22 +542,23 @@ TEST_P(HostDepths, InvalidNamesAreReportedAndKeepTheImage) {
   const GLuint name = host.depth.name();
   const GLuint framebuffer = host.framebuffer.name();
   for (const GLuint unknown : {0U, 4711U}) {
-    EXPECT_EQ(cause(DepthSource::texture, unknown, viewport), text("texture", unknown, "is no GL_TEXTURE_2D"));
+    EXPECT_EQ(cause(DepthSource::texture, unknown, viewport), text("texture", unknown, "is not a GL_TEXTURE_2D"));
   }
-  EXPECT_EQ(cause(DepthSource::texture, array.name(), viewport), text("texture", array.name(), "is no GL_TEXTURE_2D"));
+  EXPECT_EQ(cause(DepthSource::texture, array.name(), viewport),
+            text("texture", array.name(), "is not a GL_TEXTURE_2D"));
   EXPECT_EQ(cause(DepthSource::texture_multisample, name, viewport),
-            text("texture", name, "is no GL_TEXTURE_2D_MULTISAMPLE"));
+            text("texture", name, "is not a GL_TEXTURE_2D_MULTISAMPLE"));
   EXPECT_EQ(cause(DepthSource::texture, color.name(), viewport),
-            text("texture", color.name(), "is of no depth format, nor GL_R32F"));
+            text("texture", color.name(), "has neither a depth format nor GL_R32F"));
   EXPECT_EQ(cause(DepthSource::texture_multisample, multisample.name(), viewport),
-            text("texture", multisample.name(), "is of no depth format"));
+            text("texture", multisample.name(), "does not have a depth format"));
   EXPECT_EQ(cause(DepthSource::framebuffer, 4711, viewport),
-            text("framebuffer", 4711, "is none of the current context"));
+            text("framebuffer", 4711, "does not exist in the current context"));
   EXPECT_EQ(cause(DepthSource::framebuffer, empty.name(), viewport),
             text("framebuffer", empty.name(), "is not complete"));
   EXPECT_EQ(cause(DepthSource::framebuffer, no_depth.name(), viewport),
-            text("framebuffer", no_depth.name(), "has no depth"));
-  const std::string small = "is 48x32 and does not hold the viewport, 48x33 at 0,0";
+            text("framebuffer", no_depth.name(), "has no depth buffer"));
+  const std::string small = "is 48x32 and does not contain the viewport, 48x33 at 0,0";
   EXPECT_EQ(cause(DepthSource::texture, name, {0, 0, 48, 33}), text("texture", name, small));
   EXPECT_EQ(cause(DepthSource::framebuffer, framebuffer, {0, 0, 48, 33}), text("framebuffer", framebuffer, small));
   EXPECT_NE(cause(DepthSource::texture, name, {-1, 0, 20, 20}), "");

@@ -578,12 +578,12 @@ void expect_refused(const Instance& instance, ErrorCode code, const char* cause)
 }
 
 TEST(InstanceTree, InvalidTransformsAreRejected) {
-  constexpr const char* nowhere = "its place is not finite, or makes it flat or endless";
+  constexpr const char* nowhere = "its transform is not finite, is singular, or is too large";
   expect_refused(instance_of(glm::scale(dmat4(1.0), dvec3(1.0, 0.0, 1.0))), ErrorCode::invalid_argument, nowhere);
   expect_refused(instance_of(glm::translate(dmat4(1.0), dvec3(std::nan("")))), ErrorCode::invalid_argument, nowhere);
   expect_refused(instance_of(glm::translate(dmat4(1.0), dvec3(1e300))), ErrorCode::invalid_argument, nowhere);
   expect_refused(instance_of(glm::translate(dmat4(1.0), dvec3(0.0, 2e12, 0.0))), ErrorCode::unsupported,
-                 "it reaches 1e12 or more from the scene");
+                 "it extends 1e12 or more from the scene");
 }
 
 // ---- on the GPU ----

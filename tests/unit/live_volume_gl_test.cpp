@@ -238,7 +238,7 @@ class LiveStatesFromGl : public testing::Test {
   // Renders until main memory has the voxels of the newest state.
   void wait_for_voxels(const LiveRef& live) {
     cumulet_volume* volume = nullptr;
-    render_until([&] { return cumulet_live_get_volume(live.get(), &volume, nullptr, 0) == CUMULET_OK; });
+    render_until([&] { return cumulet_dynamic_volume_get_volume(live.get(), &volume, nullptr, 0) == CUMULET_OK; });
     cumulet_volume_release(volume);
   }
   Picture picture() { return test::drawn_once(v_, target_); }
@@ -540,8 +540,10 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
     return field;
   };
 
-  refused(changed(texture, [](auto& f) { f.texture = 0; }), "smoke: field 0: it has not one of texture and buffer");
-  refused(changed(texture, [](auto& f) { f.buffer = 7; }), "smoke: field 0: it has not one of texture and buffer");
+  refused(changed(texture, [](auto& f) { f.texture = 0; }),
+          "smoke: field 0: exactly one of texture and buffer must be set");
+  refused(changed(texture, [](auto& f) { f.buffer = 7; }),
+          "smoke: field 0: exactly one of texture and buffer must be set");
   refused(changed(texture, [](auto& f) { f.component = 4; }), "smoke: field 0: its component is not from 0 to 3");
   refused(changed(texture, [](auto& f) { f.component = 1; }), named("texture ", good) + ", has no component 1");
   refused(changed(texture, [](auto& f) { f.index_to_world[3] = 1.0; }), "smoke: density: its transform is not affine",
@@ -552,9 +554,9 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   refused(changed(buffer, [&](auto& f) { std::memcpy(&f.format, &none_such, sizeof none_such); }),
           "smoke: field 0: its format is unknown");
   refused(changed(texture, [](auto& f) { f.channel = CUMULET_CHANNEL_RED; }),
-          "smoke: has some of red, green and blue, not all");
+          "smoke: has only some of red, green and blue");
   refused(changed(texture, [](auto& f) { f.texture = 4711; }),
-          named("texture ", 4711) + ", is no GL_TEXTURE_3D of this context's group");
+          named("texture ", 4711) + ", is not a GL_TEXTURE_3D of this context's share group");
 
   const auto odd_texture = [&](GLenum target, const std::string& cause, const std::function<void(GLuint)>& fill) {
     GLuint name = 0;
@@ -563,10 +565,10 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
     refused(in_texture(CUMULET_CHANNEL_DENSITY, odd, name), named("texture ", name) + ", " + cause);
     gl_.DeleteTextures(1, &name);
   };
-  odd_texture(GL_TEXTURE_2D, "is no GL_TEXTURE_3D of this context's group",
+  odd_texture(GL_TEXTURE_2D, "is not a GL_TEXTURE_3D of this context's share group",
               [&](GLuint name) { gl_.TextureStorage2D(name, 1, GL_R32F, 8, 8); });
   odd_texture(GL_TEXTURE_3D, "has no level 0", [](GLuint) {});
-  odd_texture(GL_TEXTURE_3D, "is of whole numbers",
+  odd_texture(GL_TEXTURE_3D, "has an integer format",
               [&](GLuint name) { gl_.TextureStorage3D(name, 1, GL_R16UI, 8, 8, 8); });
   odd_texture(GL_TEXTURE_3D, "has a base level that is not 0", [&](GLuint name) {
     gl_.TextureStorage3D(name, 2, GL_R16F, 8, 8, 8);
@@ -574,12 +576,11 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   });
 
   refused(changed(buffer, [](auto& f) { f.buffer = 4711; }),
-          named("buffer ", 4711) + ", is none of this context's group");
+          named("buffer ", 4711) + ", is not a buffer of this context's share group");
   refused(changed(buffer, [](auto& f) { f.size[1] = 0; }), named("buffer ", bytes) + ", has voxels of size 23x0x17");
   refused(changed(buffer, [](auto& f) { f.size[1] = 1 << 30; }),
           named("buffer ", bytes) + ", has voxels of size 23x1073741824x17");
-  const std::string too_small =
-      named("buffer ", bytes) + ", has 12124 bytes, and does not hold the words of its voxels";
+  const std::string too_small = named("buffer ", bytes) + ", has 12124 bytes, which is too small for its voxels";
   refused(changed(buffer, [](auto& f) { f.size[2] = 18; }), too_small);
   refused(changed(buffer, [](auto& f) { f.offset = 4; }), too_small);
   refused(changed(buffer, [](auto& f) { f.offset = ~std::uint64_t{0} - 3; }), too_small);
@@ -590,7 +591,7 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
                     f.size[2] = 8;
                     f.offset = 1;
                   }),
-          named("buffer ", bytes) + ", has an offset or strides that are no multiples of a number's 2 bytes");
+          named("buffer ", bytes) + ", has an offset or strides that are not multiples of the component size, 2 bytes");
   ASSERT_NE(gl_.MapNamedBuffer(bytes, GL_READ_ONLY), nullptr);
   refused(buffer, named("buffer ", bytes) + ", is mapped");
   gl_.UnmapNamedBuffer(bytes);
@@ -601,7 +602,7 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   cumulet_gl_volume_desc desc = state_of(fine);
   int word = 0;
   desc.wait = &word;
-  EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: what is to be waited for is no sync object");
+  EXPECT_EQ(refusal(desc, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: `wait` is not a valid GLsync");
   desc.wait = nullptr;
   const cumulet_voxel_box box{{0, 0, 0}, {7, 7, 7}};
   desc.changed = &box;
@@ -620,9 +621,9 @@ TEST_F(LiveStatesFromGl, InvalidInputGivesAOneLineError) {
   cumulet_gl_volume_desc update = state_of(flame);
   update.changed = &box;
   update.changed_count = 1;
-  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
+  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: no flame to update");
   EXPECT_EQ(arrive(), 1U);
-  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: there is no flame to update");
+  EXPECT_EQ(refusal(update, CUMULET_ERROR_INVALID_ARGUMENT), "smoke: no flame to update");
   // The GPU waits for the fence, not the CPU.
   desc = state_of(fine);
   const GLsync fence = gl_.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -694,7 +695,7 @@ TEST_F(LiveStatesFromGl, SecondFailureInAFrameIsLogged) {
   hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, types[0], bad))});
   cumulet_frame_desc frame = target_.frame();
   frame.framebuffer = 4711;
-  const std::string no_framebuffer = "the target, 4711, is no framebuffer of the current context";
+  const std::string no_framebuffer = "the target, 4711, is not a framebuffer of the current context";
   cumulet_status status = CUMULET_ERROR_GL;
   for (int i = 0; i < 100 && status != CUMULET_ERROR_FILE; ++i) status = cumulet_render(v_, &frame, nullptr);
   EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: its voxel (3, 20, 11) is not finite");
@@ -1034,7 +1035,7 @@ TEST_F(LiveStatesOnGpu, RejectedStateKeepsTheLastValidState) {
   for (const std::size_t type : {0, 1}) {
     hand_over_density(Array(types.at(type).format, values), types.at(type));
     EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
-    EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
+    EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: non-finite value in the 8x8x8 brick at (0, 16, 8)");
     EXPECT_EQ(difference(target_.pixels(), before), "");
     EXPECT_EQ(handed(), 1U);
     // Boxes after a rejected state have no state to update.
@@ -1053,7 +1054,7 @@ TEST_F(LiveStatesOnGpu, RejectedStateKeepsTheLastValidState) {
   std::array<char, 256> error{};
   EXPECT_EQ(cumulet_dynamic_volume_update(live_.get(), &desc, error.data(), error.size()),
             CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "smoke: density is in GL, and takes what changes from there alone");
+  EXPECT_STREQ(error.data(), "smoke: density is on the GPU and can only be updated from GL");
   EXPECT_EQ(difference(picture(), before), "");
 }
 
@@ -1403,7 +1404,7 @@ TEST_F(LiveFireOnGpu, NonFiniteValuesAreRejected) {
   const Fire bad = spoilt(fire(0), 1);
   hand_over(bad.fields);
   EXPECT_EQ(frames_until_failure(), CUMULET_ERROR_FILE);
-  EXPECT_STREQ(cumulet_last_error(v_), "smoke: temperature: a voxel of the 8x8x8 from (0, 16, 8) on is not finite");
+  EXPECT_STREQ(cumulet_last_error(v_), "smoke: temperature: non-finite value in the 8x8x8 brick at (0, 16, 8)");
   EXPECT_EQ(difference(settled(v_), before), "");
 }
 
@@ -1481,7 +1482,7 @@ TEST_F(LiveStatesOnGpu, PartialUpdatesThroughAnotherViewerAreRejected) {
   boxes.changed = &box;
   boxes.changed_count = 1;
   EXPECT_EQ(cumulet_dynamic_volume_set_gl(other.get(), live_.get(), &boxes), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(other.get()), "smoke: the rest of it is in another viewer's context");
+  EXPECT_STREQ(cumulet_last_error(other.get()), "smoke: other fields of it belong to another viewer's context");
   render(other.get());
   EXPECT_EQ(difference(picture(), expected), "");
   hand_over(fields, {box});
@@ -1598,7 +1599,7 @@ TEST_F(LiveStatesOnGpu, IsReleasedWithItsContext) {
     // The state is lost with the context; the rest continues.
     EXPECT_NE(difference(picture(), before), "");
     EXPECT_EQ(get_volume(CUMULET_ERROR_UNSUPPORTED),
-              "the volume's voxels went with the context that they were in; hand over the next state");
+              "the volume's voxels were lost with their OpenGL context; set a new state");
     hand_over_density(second, types[1]);
     EXPECT_EQ(arrive(), 1U);
     EXPECT_EQ(difference(picture(), reference(second.values)), "");

@@ -126,7 +126,7 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
     desc.bounds_max[i] = 1e308;
   }
   EXPECT_EQ(cumulet_dynamic_volume_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_dynamic_volume_desc's bounds are not within +-1e15");
+  EXPECT_STREQ(error.data(), "cumulet_dynamic_volume_desc's bounds are not from -1e15 to 1e15");
   desc = make_desc<cumulet_dynamic_volume_desc>();
   desc.gpu_resident = 2;
   EXPECT_EQ(cumulet_dynamic_volume_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
@@ -136,10 +136,10 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   const auto refused = [&](const State& state, const char* cause) {
     EXPECT_EQ(refusal(live, state.desc(), CUMULET_ERROR_INVALID_ARGUMENT), cause);
   };
-  refused(State(), "smoke: has neither density nor temperature nor flame");
-  refused(State().dense(CUMULET_CHANNEL_RED, small, 0), "smoke: has some of red, green and blue, not all");
+  refused(State(), "smoke: has no density, temperature or flame");
+  refused(State().dense(CUMULET_CHANNEL_RED, small, 0), "smoke: has only some of red, green and blue");
   refused(smoke(small, 0).dense(CUMULET_CHANNEL_VELOCITY_X, small, 0),
-          "smoke: has some of velocity_x, velocity_y and velocity_z, not all");
+          "smoke: has only some of velocity_x, velocity_y and velocity_z");
   refused(smoke(small, 0).dense(CUMULET_CHANNEL_DENSITY, small, 0), "smoke: has density twice");
   refused(State().dense(CUMULET_CHANNEL_DENSITY, {3, 3, 3}, std::vector<float>(26)),
           "smoke: density: has 26 values for a size of (3, 3, 3)");
@@ -149,7 +149,7 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   refused(unknown, "smoke: field 0: its channel is unknown");
   State neither = smoke(small, 0);
   neither.fields()[0].dense = nullptr;
-  refused(neither, "smoke: field 0: it has not one of dense and sparse");
+  refused(neither, "smoke: field 0: exactly one of dense and sparse must be set");
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, small, 0);
   State twice;
   twice.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{8, 8, 8}, {0, 8, 8}, {8, 8, 8}});
@@ -157,7 +157,7 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   State astray;
   astray.sparse(CUMULET_CHANNEL_DENSITY, small, values, {{4, 8, 8}});
   EXPECT_EQ(refusal(live, astray.desc(), CUMULET_ERROR_FILE),
-            "smoke: density: its brick origin (4, 8, 8) is no multiple of 8");
+            "smoke: density: its brick origin (4, 8, 8) is not a multiple of 8");
   EXPECT_EQ(cumulet_dynamic_volume_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
   // No state was submitted.
   EXPECT_EQ(newest(live), nullptr);
@@ -170,9 +170,8 @@ TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   };
   no_update(bricks, "smoke: there is no state to update");
   hand_over(live, smoke(small, 0));
-  no_update(smoke(small, 0), "smoke: density is dense: an update has bricks");
-  no_update(std::move(State().sparse(CUMULET_CHANNEL_FLAME, small, values, {{8, 8, 8}})),
-            "smoke: there is no flame to update");
+  no_update(smoke(small, 0), "smoke: density is dense, but an update must consist of bricks");
+  no_update(std::move(State().sparse(CUMULET_CHANNEL_FLAME, small, values, {{8, 8, 8}})), "smoke: no flame to update");
   hand_over(live, bricks, cumulet_dynamic_volume_update);
 
   const ViewerPtr viewer = make();
@@ -328,7 +327,7 @@ TEST_F(CLiveVolume, RejectedStateKeepsTheLastValidState) {
   const std::string line = cumulet_last_error(viewer.get());
   EXPECT_EQ(line.rfind("smoke: density: its active voxels span ", 0), 0U) << line;
   ASSERT_EQ(warnings_.lines.size(), 1U);
-  EXPECT_EQ(warnings_.lines[0], line + ": the state before it stays");
+  EXPECT_EQ(warnings_.lines[0], line + ": the previous state is kept");
   auto progress = make_desc<cumulet_progress>();
   ASSERT_EQ(cumulet_get_progress(viewer.get(), &progress), CUMULET_OK);
   EXPECT_EQ(progress.volume_message, line);
@@ -380,7 +379,7 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
   // Rejected in the call: the host keeps the memory.
   const State nothing;
   EXPECT_EQ(refusal(live, held(nothing), CUMULET_ERROR_INVALID_ARGUMENT),
-            "smoke: has neither density nor temperature nor flame");
+            "smoke: has no density, temperature or flame");
   EXPECT_EQ(releases.count, 2);
   // Rejected when it is read: the last good state stays, and the memory is released.
   auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
@@ -399,7 +398,7 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
   State bricks;
   bricks.sparse(CUMULET_CHANNEL_DENSITY, odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 3), {{8, 8, 8}});
   EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_dynamic_volume_update),
-            "smoke: density takes no bricks: it was handed over with tiles, or with a release");
+            "smoke: density does not accept bricks: it was set with tiles or with a release function");
   EXPECT_EQ(releases.count, 3);
   cumulet_dynamic_volume_release(cumulet_dynamic_volume_retain(live.get()));
   EXPECT_EQ(releases.count, 3);
@@ -592,14 +591,14 @@ TEST_F(CLiveVolume, InvalidInstancesGiveAOneLineError) {
   std::array<char, 256> error{};
   cumulet_instance* out = nullptr;
   EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a dynamic volume");
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of volume, sequence and dynamic_volume");
   const InstanceRef still = stand(viewer, volume.get(), 0.0);
   auto info = make_desc<cumulet_dynamic_volume_info>();
   EXPECT_EQ(cumulet_get_instance_dynamic_volume_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance shows no dynamic volume");
   ASSERT_EQ(cumulet_remove_instance(viewer.get(), still.get()), CUMULET_OK);
   EXPECT_EQ(cumulet_get_instance_dynamic_volume_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer does not show the instance");
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance is not in the viewer");
 }
 
 // States change quickly while the instance is added and removed. Each state that the instance builds is displayed, and

@@ -237,10 +237,10 @@ TEST_F(Locales, CppLocaleDoesNotAffectFiles) {
   EXPECT_EQ(texts.at("metadata box"), "[1000, 20, -30000]");
   EXPECT_EQ(texts.at("metadata size"), "[0.5, 1e+09, 2]");
   EXPECT_HAS(texts.at("metadata frame"), "[[1.500000, 0.000000, 0.000000, 0.000000],\n [");
-  EXPECT_HAS(texts.at("remarks on a volume"), "reaches more than 20");
-  EXPECT_HAS(texts.at("warnings of a volume"), " beyond 65504 voxels a second");
+  EXPECT_HAS(texts.at("remarks on a volume"), "has values above 20");
+  EXPECT_HAS(texts.at("warnings of a volume"), " above 65504 voxels per second");
   EXPECT_HAS(texts.at("a refused volume"), "span 4000000001 x 1 x 1 voxels");
-  EXPECT_HAS(texts.at("warnings of a model"), "emissiveFactor[1] is 3.5, more than glTF's 1");
+  EXPECT_HAS(texts.at("warnings of a model"), "emissiveFactor[1] is 3.5, more than the glTF limit of 1");
   EXPECT_HAS(texts.at("a scene file"), "0.125");
   EXPECT_HAS(texts.at("comments of a picture"), "1234.5 samples");
 }

@@ -205,21 +205,20 @@ TEST_F(Merge, NonAdditiveLayersAreDroppedAndReported) {
 
 TEST_F(Merge, OverlappingAndMissingSamplesAreNamed) {
   EXPECT_EQ(refusal({part(0, 16), part(8, 16)}),
-            "part1.exr: has samples 8 to 23, some of which part0.exr has as well: samples 0 to 15");
-  EXPECT_EQ(refusal({part(20, 4), part(0, 16)}), "between part3.exr and part2.exr no part has samples 16 to 19");
-  EXPECT_EQ(refusal({part(5, 4), part(0, 4)}), "between part5.exr and part4.exr no part has sample 4");
+            "part1.exr: has samples 8 to 23, overlapping those of part0.exr: samples 0 to 15");
+  EXPECT_EQ(refusal({part(20, 4), part(0, 16)}), "between part3.exr and part2.exr no file has samples 16 to 19");
+  EXPECT_EQ(refusal({part(5, 4), part(0, 4)}), "between part5.exr and part4.exr no file has sample 4");
   const std::string twice = part(0, 4);
-  EXPECT_NE(refusal({twice, twice}).find("as well"), std::string::npos);
+  EXPECT_NE(refusal({twice, twice}).find("overlapping those of"), std::string::npos);
 }
 
 TEST_F(Merge, PartsOfOtherImagesAreRejected) {
   const std::string a = part(0, 4);
-  EXPECT_EQ(refusal({a, part(4, 4, {.width = 7})}), "part1.exr: is of 7x3 pixels, and part0.exr of 5x3");
-  EXPECT_EQ(refusal({a, part(4, 4, {.version = "0.3.0"})}),
-            "part2.exr: is of another version of Cumulet than part0.exr");
-  EXPECT_EQ(refusal({a, part(4, 4, {.seed = 4.0})}), "part3.exr: is of another seed than part0.exr");
-  EXPECT_EQ(refusal({a, part(4, 4, {.grid_type = "dense"})}), "part4.exr: is of another grid type than part0.exr");
-  EXPECT_EQ(refusal({a, part(4, 4, {.scene = "0"})}), "part5.exr: is of another scene than part0.exr");
+  EXPECT_EQ(refusal({a, part(4, 4, {.width = 7})}), "part1.exr: has 7x3 pixels, but part0.exr has 5x3");
+  EXPECT_EQ(refusal({a, part(4, 4, {.version = "0.3.0"})}), "part2.exr: has another version of Cumulet than part0.exr");
+  EXPECT_EQ(refusal({a, part(4, 4, {.seed = 4.0})}), "part3.exr: has another seed than part0.exr");
+  EXPECT_EQ(refusal({a, part(4, 4, {.grid_type = "dense"})}), "part4.exr: has another grid type than part0.exr");
+  EXPECT_EQ(refusal({a, part(4, 4, {.scene = "0"})}), "part5.exr: has another scene than part0.exr");
   EXPECT_EQ(refusal({a, part(4, 4, {.error = false})}), "part6.exr: has other layers than part0.exr");
 }
 
@@ -234,19 +233,20 @@ TEST_F(Merge, CryptomattesComeFromTheFirstPart) {
   EXPECT_EQ(std::get<std::string>(found->value), named.manifest);
   std::filesystem::remove(output());
   EXPECT_EQ(refusal({first, part(4, 4, {.manifest = R"({"smoke":"13851a76"})"})}),
-            "part2.exr: has mattes of other names than part0.exr");
+            "part2.exr: has other Cryptomatte names than part0.exr");
   EXPECT_EQ(refusal({first, part(4, 4)}), "part3.exr: has other layers than part0.exr");
 }
 
 TEST_F(Merge, OtherFilesAreRejected) {
   const std::string a = part(0, 4);
-  EXPECT_NE(refusal({a, part(4, 4, {.whole = false})}).find("part1.exr: is no part of a picture"), std::string::npos);
+  EXPECT_NE(refusal({a, part(4, 4, {.whole = false})}).find("part1.exr: is not a partial render"), std::string::npos);
   image::write_exr(folder_ / "plain.exr", {1, 1, {0.0f, 0.0f, 0.0f, 1.0f}});
-  EXPECT_EQ(refusal({folder_ / "plain.exr"}), "plain.exr: is no picture of cumulet-render: no cumulet:version");
+  EXPECT_EQ(refusal({folder_ / "plain.exr"}),
+            "plain.exr: is not an image of cumulet-render: it has no attribute cumulet:version");
   EXPECT_EQ(refusal({folder_ / "none.exr"}), "none.exr: No such file or directory");
   std::ofstream(folder_ / "torn.exr") << "no picture";
   EXPECT_NE(refusal({folder_ / "torn.exr"}).find("torn.exr: not a readable OpenEXR file"), std::string::npos);
-  EXPECT_EQ(refusal({}), "there is no part to merge");
+  EXPECT_EQ(refusal({}), "there are no files to merge");
 }
 
 }  // namespace

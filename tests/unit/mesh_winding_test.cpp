@@ -135,8 +135,8 @@ TEST(Winding, TheImporterNamesFileAndMesh) {
   EXPECT_TRUE(warnings({box(0)}, json::object(), {{"scale", {-1, 1, 1}}}).empty());
   for (const int inward : {6, 2}) {  // 2: half of the four long sides, as of a bar with two inverted faces
     EXPECT_EQ(warnings({box(0), box(inward)}),
-              std::vector<std::string>{"made.gltf: much of mesh 1 (Box 2) faces into its closed shape, and is not seen "
-                                       "from outside: double_sided of the surface settings shows it"});
+              std::vector<std::string>{"made.gltf: triangles of mesh 1 (Box 2) appear to be wound inside out and are "
+                                       "invisible from outside; use double_sided of the surface settings"});
   }
   const auto many = warnings({box(6), box(6), box(6), box(6), box(6)});
   ASSERT_EQ(many.size(), 1U);

@@ -193,11 +193,11 @@ TEST(Models, InvalidTransformsAreRejected) {
       EXPECT_STREQ(error.what(), cause);
     }
   };
-  const char* const flat = "model 1: its place is not finite, or makes it flat or endless";
+  const char* const flat = "model 1: its transform is not finite, is singular, or is too large";
   refused(glm::scale(dmat4(1.0), dvec3(1.0, 0.0, 1.0)), ErrorCode::invalid_argument, flat);
   refused(glm::scale(dmat4(1.0), dvec3(std::numeric_limits<double>::quiet_NaN())), ErrorCode::invalid_argument, flat);
   refused(glm::translate(dmat4(1.0), dvec3(1e13, 0.0, 0.0)), ErrorCode::unsupported,
-          "model 1: it reaches 1e12 or more from the world's origin");
+          "model 1: it extends 1e12 or more from the world origin");
 }
 
 }  // namespace

@@ -239,7 +239,7 @@ TEST(Options, FlagsOverrideAMediumPreset) {
   EXPECT_EQ(burns(0.0, 2.0, 0.0).flame_strength, 0.8F) << "alone: by its size";
   EXPECT_EQ(burns(0.0, 2.0, 0.0).density_scale, 0.0);
   EXPECT_EQ(usage_error(with({"--preset", "steam"})),
-            "--preset: 'steam' is none of cumulus, smoke, fire, explosion, ground-fog");
+            "--preset: 'steam' is not one of cumulus, smoke, fire, explosion, ground-fog");
 }
 
 TEST(Options, RampIsAListOfPoints) {
@@ -249,9 +249,8 @@ TEST(Options, RampIsAListOfPoints) {
   EXPECT_EQ(scene.ramps[CUMULET_RAMP_DENSITY], (Points{{0.0f, 0.0f}, {0.25f, 0.1f}, {3.0f, 2.5f}}));
   EXPECT_EQ(scene.ramps[CUMULET_RAMP_TEMPERATURE], (Points{{-1.0f, 0.0f}, {1.0f, 2.0f}}));
   EXPECT_TRUE(scene.ramps[CUMULET_RAMP_FLAME].empty());
-  EXPECT_NE(usage_error(with({"--flame-ramp", "0:0,1"})).find("'1' is not a value and what it becomes"),
-            std::string::npos);
-  EXPECT_NE(usage_error(with({"--flame-ramp", "1:0,0:1"})).find("has a point 0:1 that does not come after 1:0"),
+  EXPECT_NE(usage_error(with({"--flame-ramp", "0:0,1"})).find("'1' is not a pair INPUT:OUTPUT"), std::string::npos);
+  EXPECT_NE(usage_error(with({"--flame-ramp", "1:0,0:1"})).find("has a point 0:1 whose input is not above that of 1:0"),
             std::string::npos);
 }
 
@@ -311,21 +310,21 @@ TEST(Options, AnyWhiteSpaceSeparatesWords) {
 
 TEST(Options, InvalidLightGivesAOneLineError) {
   const auto told = [](const char* analytic_light) { return usage_error(with({"--light", analytic_light})); };
-  EXPECT_EQ(told(""), "--light: '' is none of point, spot, disk, rect, distant");
-  EXPECT_EQ(told("bulb power=1"), "--light: 'bulb' is none of point, spot, disk, rect, distant");
-  EXPECT_EQ(told("point power 1"), "--light: 'power' is not a key and its value, such as power=100");
-  EXPECT_EQ(told("point watts=1"), "--light: lights have no 'watts'");
-  EXPECT_EQ(told("point kind=spot"), "--light: lights have no 'kind'");
+  EXPECT_EQ(told(""), "--light: '' is not one of point, spot, disk, rect, distant");
+  EXPECT_EQ(told("bulb power=1"), "--light: 'bulb' is not one of point, spot, disk, rect, distant");
+  EXPECT_EQ(told("point power 1"), "--light: 'power' is not KEY=VALUE, such as power=100");
+  EXPECT_EQ(told("point watts=1"), "--light: lights have no setting 'watts'");
+  EXPECT_EQ(told("point kind=spot"), "--light: lights have no setting 'kind'");
   EXPECT_EQ(told("point power=1 power=2"), "--light: power is given twice");
   EXPECT_EQ(told("point power=-1"), "--light: power: '-1' is not from 0 to 1e30");
   EXPECT_EQ(told("point power="), "--light: power: '' is not a finite number");
-  EXPECT_EQ(told("point position=1,2"), "--light: position: '1,2' is not 3 numbers between commas");
-  EXPECT_EQ(told("point position=1,2,1e31"), "--light: position is beyond 1e30");
-  EXPECT_EQ(told("point color=0,0,0"), "--light: color: '0,0,0' is black");
+  EXPECT_EQ(told("point position=1,2"), "--light: position: '1,2' is not 3 numbers separated by commas");
+  EXPECT_EQ(told("point position=1,2,1e31"), "--light: position exceeds 1e30");
+  EXPECT_EQ(told("point color=0,0,0"), "--light: color: '0,0,0' must not be black");
   EXPECT_EQ(told("point color=1,-1,0"), "--light: color: '1,-1,0' has a negative number");
-  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--light: power times color is above 1e30");
+  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--light: power times color exceeds 1e30");
   EXPECT_EQ(told("disk width=0"), "--light: width: '0' is not above 0");
-  EXPECT_EQ(told("distant angle_degrees=100"), "--light: angle_degrees of a distant light is above 90");
+  EXPECT_EQ(told("distant angle_degrees=100"), "--light: angle_degrees is above 90, the maximum for a distant light");
   EXPECT_EQ(told("spot blend=2"), "--light: blend: '2' is not from 0 to 1");
 }
 
@@ -404,9 +403,8 @@ TEST_F(SceneOption, SelectsACameraOfTheScene) {
   const auto loose = parse_render_options({path, "--scene-camera", "the side", "-o", "a.png"}, out);
   EXPECT_EQ(loose->scene.camera.eye[0], 9.0) << "of a scene without a flag";
   EXPECT_EQ(usage_error({"--scene", path, "-o", "a.png", "--scene-camera", "side"}),
-            R"(--scene-camera: there is no camera "side": the scene has "front", "the side")");
-  EXPECT_EQ(usage_error(with({"--scene-camera", "side"})),
-            R"(--scene-camera: there is no camera "side": the scene has none)");
+            R"(--scene-camera: no camera "side"; the scene has "front", "the side")");
+  EXPECT_EQ(usage_error(with({"--scene-camera", "side"})), R"(--scene-camera: no camera "side"; the scene has none)");
 }
 
 TEST_F(SceneOption, NeedsAVolumeInTheSceneOrAsAFlag) {
@@ -471,7 +469,7 @@ TEST(Options, PartialImageNeedsASampleRangeAndExr) {
     more.insert(more.end(), {"--first-sample", "0"});
     return usage_error(with(more));
   };
-  EXPECT_EQ(refused({"-o", "a.png"}), "--first-sample needs an .exr to write to");
+  EXPECT_EQ(refused({"-o", "a.png"}), "--first-sample needs an .exr output");
   EXPECT_EQ(refused({"-o", "a.exr"}), "");
   for (const Arguments& more :
        {Arguments{"--view", "cells"}, {"--denoise", "fast"}, {"--noise-target", "2"}, {"--time-limit", "2"}})
@@ -494,7 +492,7 @@ TEST(Options, ParsesSequenceFrames) {
             CUMULET_FRAME_INTERPOLATION_BLEND);
   EXPECT_EQ(parse({"--velocity-scale", "24"}).scene.sequence.playback.velocity_scale, 24.0);
   EXPECT_TRUE(parse({}).frames.empty());
-  EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' runs backwards");
+  EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' is a descending range");
 }
 
 TEST(Options, HelpListsFileFormats) {
@@ -522,14 +520,15 @@ TEST(Progress, CountsTowardTheNearestLimit) {
 
 TEST(Progress, LastLineGivesTheReasonForStopping) {
   EXPECT_EQ(ending_line(Ending::noise, 0.01874, 91.0, 2.0, std::nullopt),
-            "noise 1.87 % (target 2 %) after 91 samples a pixel");
+            "noise 1.87 % (target 2 %) after 91 samples per pixel");
   EXPECT_EQ(ending_line(Ending::samples, 0.024, 64.0, 2.0, 30.0),
-            "noise 2.4 % (target 2 %) after 64 samples a pixel, the most that one may have");
+            "noise 2.4 % (target 2 %) after 64 samples per pixel, the maximum");
   EXPECT_EQ(ending_line(Ending::time, 0.1, 10.26, 0.0, 30.0),
-            "noise 10 % after 10.26 samples a pixel, at the time limit of 30 s");
+            "noise 10 % after 10.26 samples per pixel, stopped at the time limit of 30 s");
   EXPECT_EQ(ending_line(Ending::samples, std::nullopt, 1.0, 2.0, std::nullopt),
-            "noise unknown (target 2 %) after 1 sample a pixel, the most that one may have");
-  EXPECT_EQ(ending_line(Ending::noise, 0.0, 16.0, 2.0, std::nullopt), "noise 0 % (target 2 %) after 16 samples a pixel")
+            "noise unknown (target 2 %) after 1 sample per pixel, the maximum");
+  EXPECT_EQ(ending_line(Ending::noise, 0.0, 16.0, 2.0, std::nullopt),
+            "noise 0 % (target 2 %) after 16 samples per pixel")
       << "a black picture has none";
 }
 
@@ -575,8 +574,8 @@ TEST(PictureMemory, InsufficientMemoryIsReportedBeforeRendering) {
   };
   // Memory of a software driver is main memory.
   EXPECT_EQ(told("llvmpipe (LLVM 15.0.6, 256 bits)", 15 * gib),
-            "a picture of 16384x16384 needs 8.0 GiB of OpenGL's memory and 11.0 GiB of main memory: 15.0 GiB of main "
-            "memory are free, and this driver has no other");
+            "an image of 16384x16384 needs 8.0 GiB of GPU memory and 11.0 GiB of main memory: 15.0 GiB of main "
+            "memory are available, and this software driver uses main memory");
   EXPECT_EQ(told("NVIDIA H100", 15 * gib), "");
   EXPECT_NE(told("NVIDIA H100", 10 * gib), "");
   EXPECT_EQ(told("llvmpipe", 64 * gib), "");

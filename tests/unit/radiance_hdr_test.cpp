@@ -65,7 +65,7 @@ TEST(RadianceHdr, ExposuresAndColorCorrectionsAreDividedOut) {
   const EnvironmentPixels got = read(with_header(start + "COLORCORR= 2.0 1 +0.5\nEXPOSURE=2\nCOLORCORR=1 1 4\n"));
   expect_two(got, vec3(0.25F, 0.5F, 0.25F));
   ASSERT_EQ(got.remarks.size(), 2U);
-  EXPECT_EQ(got.remarks[0], "COLORCORR 2.0 1 +0.5 is divided out of its colors");
+  EXPECT_EQ(got.remarks[0], "COLORCORR 2.0 1 +0.5 is removed from the colors");
   const EnvironmentPixels gamma = read(with_header(start + "GAMMA=2.2\n"));
   ASSERT_EQ(gamma.remarks.size(), 1U);
   EXPECT_EQ(gamma.remarks[0], "GAMMA 2.2 is ignored");
@@ -76,8 +76,7 @@ TEST(RadianceHdr, ExposuresAndColorCorrectionsAreDividedOut) {
   EXPECT_EQ(why("EXPOSURE=1,5"), "sky.hdr: cannot read EXPOSURE=1,5");
   EXPECT_EQ(why("COLORCORR=1 1"), "sky.hdr: cannot read COLORCORR=1 1");
   EXPECT_EQ(why("EXPOSURE=1e300\nEXPOSURE=1e300"), "sky.hdr: exposures out of range");
-  EXPECT_EQ(why("FORMAT=32-bit_rle_luv"),
-            "sky.hdr: is of FORMAT=32-bit_rle_luv, not 32-bit_rle_rgbe or 32-bit_rle_xyze");
+  EXPECT_EQ(why("FORMAT=32-bit_rle_luv"), "sky.hdr: has FORMAT=32-bit_rle_luv, not 32-bit_rle_rgbe or 32-bit_rle_xyze");
 }
 
 TEST(RadianceHdr, PrimariesAndXyzAreConverted) {
@@ -128,7 +127,7 @@ TEST(RadianceHdr, AllEightOrientationsGiveTheSameImage) {
     }
   }
   for (const char* bad : {"-Y 2 -Y 3", "Y 2 X 3", "-Y 2", "-Y two +X 3", "-Y 2 +X 3 +Z 4", "-Y -2 +X 3", ""}) {
-    EXPECT_NE(refusal("#?RADIANCE\n\n" + std::string(bad) + "\n" + two_pixels).find("sky.hdr: a resolution of '"),
+    EXPECT_NE(refusal("#?RADIANCE\n\n" + std::string(bad) + "\n" + two_pixels).find("sky.hdr: has the resolution '"),
               std::string::npos)
         << bad;
   }
@@ -160,7 +159,7 @@ TEST(RadianceHdr, FlatImagesMayResembleRunLengthEncodedOnes) {
   }
   // An image that is not uncompressed stays invalid.
   EXPECT_EQ(refusal(header + std::string("\x02\x02\x04\x78", 4) + flat(128, '\x40')),
-            "sky.hdr: a row of another width");
+            "sky.hdr: a row has the wrong width");
 }
 
 TEST(RadianceHdr, ReadsOldRunLengthsAndNarrowImages) {
@@ -173,8 +172,8 @@ TEST(RadianceHdr, ReadsOldRunLengthsAndNarrowImages) {
       read("#?RADIANCE\n\n-Y 1 +X 7\n" + std::string("\x02\x02\x00\x07", 4) + flat(6, '\x40'));
   ASSERT_EQ(narrow.values.size(), 7U);
   EXPECT_EQ(refusal("#?RADIANCE\n\n-Y 1 +X 40000\n" + flat(1, '\x40')),
-            "sky.hdr: an environment of 40000x1 pixels; at most 16384 a side");
-  EXPECT_EQ(refusal("#?RADIANCE\n\n-Y 1 +X 4\n" + flat(3, '\x40')), "sky.hdr: a Radiance picture that is cut short");
+            "sky.hdr: the environment has 40000x1 pixels; the limit is 16384 per side");
+  EXPECT_EQ(refusal("#?RADIANCE\n\n-Y 1 +X 4\n" + flat(3, '\x40')), "sky.hdr: truncated Radiance file");
 }
 
 TEST(RadianceHdr, SharedTestImagesGiveTheSameEnvironment) {

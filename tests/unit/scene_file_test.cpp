@@ -328,17 +328,17 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
         Case{R"("display": {"exposure_stops": 65})", "display.exposure_stops"},
         Case{R"("display": {"tone_map": "aces"})", "display.tone_map"},
         Case{R"("medium": {"density_ramp": 3})", "medium.density_ramp: is not a list of points"},
-        Case{R"("medium": {"flame_ramp": [[0, 1]]})", "medium.flame_ramp: has 1 point, not none or 2"},
+        Case{R"("medium": {"flame_ramp": [[0, 1]]})", "medium.flame_ramp: has 1 point; it must have 0 or 2"},
         Case{R"("medium": {"flame_ramp": [[0, 1], [1]]})", "medium.flame_ramp: has a point that is not two numbers"},
         Case{R"("medium": {"density_ramp": [[0, 1], [1, "1"]]})", "medium.density_ramp: is not a number"},
         Case{R"("medium": {"density_ramp": [[0.1, 1], [0.10000000001, 1]]})",
-             "medium.density_ramp: has a point 0.1:1 that does not come after 0.1:1"},
+             "medium.density_ramp: has a point 0.1:1 whose input is not above that of 0.1:1"},
         Case{R"("medium": {"temperature_ramp": [[1, 1], [0, 0]]})",
-             "medium.temperature_ramp: has a point 0:0 that does not come after 1:1"},
+             "medium.temperature_ramp: has a point 0:0 whose input is not above that of 1:1"},
         Case{R"("medium": {"temperature_ramp": [[0, 1], [1, -1]]})",
-             "medium.temperature_ramp: has a point 1:-1, but values become 0 to 1e30"},
+             "medium.temperature_ramp: has a point 1:-1 whose output is not from 0 to 1e30"},
         Case{R"("medium": {"temperature_ramp": [[0, 1], [1e300, 1]]})",
-             "medium.temperature_ramp: has a point inf:1 whose value is not from -1e30 to 1e30"},
+             "medium.temperature_ramp: has a point inf:1 whose input is not from -1e30 to 1e30"},
         Case{R"("volume": {"file": 3})", "volume.file"},
         Case{R"("volume": {"file": "a\u0000b"})", "volume.file"}}) {
     const std::string error = error_of(with(c.section));
@@ -466,11 +466,11 @@ TEST(SceneFile, VersionThreeErrorsNameTheNewKey) {
   EXPECT_EQ(third(R"("grid": {"marsh": "dense"})"), "dir/s.json: grid.marsh: there is no such setting");
   EXPECT_EQ(third(R"("grid": {"type": "tet"})"), "dir/s.json: grid.type: 'tet' is now 'tetrahedral'");
   EXPECT_EQ(third(R"("grid": {"type": "fast"})"),
-            "dir/s.json: grid.type: 'fast' is none of tetrahedral, dense, bricks");
+            "dir/s.json: grid.type: 'fast' is not one of tetrahedral, dense, bricks");
   EXPECT_EQ(third(R"("lights": [{"kind": "disc"}])"), "dir/s.json: lights[0].kind: 'disc' is now 'disk'");
   // Versions 1 and 2 keep their names.
   EXPECT_EQ(told(R"("grid": {"type": "dense"})"), "dir/s.json: grid.type: there is no such setting");
-  EXPECT_EQ(told(R"("grid": {"march": "bricks"})"), "dir/s.json: grid.march: 'bricks' is none of tet, dense, brick");
+  EXPECT_EQ(told(R"("grid": {"march": "bricks"})"), "dir/s.json: grid.march: 'bricks' is not one of tet, dense, brick");
   EXPECT_EQ(told(R"("sun_sky": {})"), "dir/s.json: sun_sky: there is no such setting");
 }
 
@@ -484,7 +484,7 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"x": 1}}])"),
             start + "volumes[1].medium.x: there is no such setting");
   EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"max_bounces": 3}}])"),
-            start + "volumes[1].medium.max_bounces: is the first volume's, for all of them");
+            start + "volumes[1].medium.max_bounces: can only be set for the first volume and applies to all");
   EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "places": [7]}])"),
             start + "volumes[1].places[0]: is neither 16 numbers nor an object");
   EXPECT_EQ(told(R"("models": [{}, {}, {}])"), start + "models[1].file: is missing");
@@ -494,7 +494,7 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(told(R"("models": [{"file": "a.glb", "translate": [1, 2]}])"),
             start + "models[0].translate: is not three numbers");
   EXPECT_EQ(told(R"("models": [{"file": "a.glb", "visible": false, "camera": 0}])"),
-            start + "models[0].camera: is of a model that stands as its file has it");
+            start + "models[0].camera: is only supported for a model without transform and name");
   EXPECT_EQ(told(R"("models": [{"shadow_only": true}])"), start + "models[0].file: is missing");
   EXPECT_EQ(told(R"("models": [{}, {"file": "a.glb", "scale": [1, 0, 1]}])").rfind(start + "models[1].scale: ", 0), 0U);
   EXPECT_EQ(told(R"("volumes": {})"), start + "volumes: is not a list");
@@ -503,15 +503,15 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(told(R"("volumes": [{"medium": {"albedo": 1}}])"),
             start + "volumes[0].medium.albedo: is not three numbers");
   EXPECT_EQ(told(R"("volumes": [{"medium": {"density_ramp": [[1, 0], [0, 1]]}}])"),
-            start + "volumes[0].medium.density_ramp: has a point 0:1 that does not come after 1:0");
+            start + "volumes[0].medium.density_ramp: has a point 0:1 whose input is not above that of 1:0");
   EXPECT_EQ(told(R"("volumes": [{"medium": {"x": 1}}])"), start + "volumes[0].medium.x: there is no such setting");
   EXPECT_EQ(told(R"("volumes": [{"to_world": [1]}])"), start + "volumes[0].to_world: is not 16 numbers");
   EXPECT_EQ(told(R"("volumes": [{"scale": [1, 0, 1]}])"), start + "volumes[0].scale: 0 is not above 0");
   EXPECT_EQ(told(R"("volumes": [{"to_world": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1], "scale": [1, 1, 1]}])"),
-            start + "volumes[0].to_world: is given beside translate, rotate_degrees or scale");
+            start + "volumes[0].to_world: cannot be combined with translate, rotate_degrees or scale");
   EXPECT_EQ(told(R"("volumes": [{"places": {}}])"), start + "volumes[0].places: is not a list");
   EXPECT_EQ(told(R"("volumes": [{"places": []}])"),
-            start + "volumes[0].places: is empty: without it the volume stands once");
+            start + "volumes[0].places: is empty: remove it for a single instance");
   EXPECT_EQ(told(R"("volumes": [{"places": [{}, [1]]}])"), start + "volumes[0].places[1]: is not 16 numbers");
   EXPECT_EQ(told(R"("volumes": [{"places": [7]}])"),
             start + "volumes[0].places[0]: is neither 16 numbers nor an object");
@@ -528,17 +528,17 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(told(R"("lights": [{}])"), start + "lights[0].kind: is missing");
   EXPECT_EQ(told(R"("lights": [{"kind": "point"}, 1])"), start + "lights[1] is not an object");
   EXPECT_EQ(told(R"("lights": [{"kind": "cube"}])"),
-            start + "lights[0].kind: 'cube' is none of point, spot, disc, rectangle, sun");
+            start + "lights[0].kind: 'cube' is not one of point, spot, disc, rectangle, sun");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "watts": 1}])"), start + "lights[0].watts: there is no such setting");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "power": -1}])"), start + "lights[0].power: -1 is not from 0 to 1e30");
   EXPECT_EQ(told(R"("lights": [{"kind": "sun", "angle_degrees": 91}])"),
-            start + "lights[0].angle_degrees: of a distant light is above 90");
+            start + "lights[0].angle_degrees: is above 90, the maximum for a distant light");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "position": [0, 1e31, 0]}])"),
-            start + "lights[0].position: is beyond 1e30");
+            start + "lights[0].position: exceeds 1e30");
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "color": [1e20, 1, 1], "power": 1e20}])"),
-            start + "lights[0].power: times color is above 1e30");
+            start + "lights[0].power: times color exceeds 1e30");
   EXPECT_EQ(error_of(R"({"cumulet_scene": 4})"),
-            start + "cumulet_scene: version 4 is not known: this program reads 1 to 3");
+            start + "cumulet_scene: version 4 is not supported: this program reads 1 to 3");
   EXPECT_EQ(error_of(with(R"("lights": [])")), start + "lights: there is no such setting");
 }
 
@@ -596,9 +596,9 @@ TEST(SceneFile, MotionRoundTrips) {
     EXPECT_FALSE(same_scene(scene, other));
   }
   EXPECT_EQ(told(R"("camera": {"open": {"eye": [1, 2, 3], "target": [0, 0, 0]}})"),
-            "dir/s.json: camera.open: is of a camera that has no eye and no target");
+            "dir/s.json: camera.open: needs a camera with eye and target");
   EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"orthographic_height": 3}})"),
-            "dir/s.json: camera.close.orthographic_height: is of another projection than the camera's");
+            "dir/s.json: camera.close.orthographic_height: has another projection than the camera");
   EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"lens_radius": 3}})"),
             "dir/s.json: camera.close.lens_radius: there is no such setting");
   EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
@@ -674,20 +674,20 @@ TEST(SceneFile, CamerasRoundTrip) {
 
 TEST(SceneFile, CameraNamesAreUnique) {
   const std::string two = R"("cameras": [{"name": "a"}, {"name": "b"}], )";
-  EXPECT_EQ(told(two + R"("camera": "c")"), R"(dir/s.json: camera: there is no camera "c": the scene has "a", "b")");
-  EXPECT_EQ(told(R"("camera": "c")"), R"(dir/s.json: camera: there is no camera "c": the scene has none)");
+  EXPECT_EQ(told(two + R"("camera": "c")"), R"(dir/s.json: camera: no camera "c"; the scene has "a", "b")");
+  EXPECT_EQ(told(R"("camera": "c")"), R"(dir/s.json: camera: no camera "c"; the scene has none)");
   EXPECT_EQ(told(R"("cameras": [{"name": "a"}, {"name": "b"}, {"name": "a"}])"),
-            R"(dir/s.json: cameras[2].name: "a" is another camera's, too)");
+            R"(dir/s.json: cameras[2].name: "a" is also the name of another camera)");
   EXPECT_EQ(told(R"("cameras": [{}])"), "dir/s.json: cameras[0].name: is missing");
   EXPECT_EQ(told(R"("cameras": [{"name": ""}])"), "dir/s.json: cameras[0].name: is empty");
-  EXPECT_EQ(told(R"("cameras": [{"name": 1}])"), "dir/s.json: cameras[0].name: is not a text");
+  EXPECT_EQ(told(R"("cameras": [{"name": 1}])"), "dir/s.json: cameras[0].name: is not a string");
   EXPECT_EQ(told(R"("cameras": ["a"])"), "dir/s.json: cameras[0] is not an object");
   EXPECT_EQ(told(R"("cameras": {})"), "dir/s.json: cameras: is not a list");
   EXPECT_EQ(told(R"("camera": 1)"), "dir/s.json: camera is not an object");
   EXPECT_EQ(told(R"("cameras": [{"name": "a", "eye": [0, 0, 1]}])"), "dir/s.json: cameras[0].target: is missing");
   EXPECT_EQ(told(R"("cameras": [{"name": "a", "fovy": 1}])"), "dir/s.json: cameras[0].fovy: there is no such setting");
   EXPECT_EQ(told(R"("cameras": [{"name": "a", "open": {"fovy_degrees": 3}}])"),
-            "dir/s.json: cameras[0].open: is of a camera that has no eye and no target");
+            "dir/s.json: cameras[0].open: needs a camera with eye and target");
   EXPECT_EQ(error_of(with(R"("cameras": [{"name": "a"}])")), "dir/s.json: cameras: there is no such setting");
   EXPECT_EQ(error_of(with(R"("camera": "a")")), "dir/s.json: camera is not an object");
 }
@@ -738,9 +738,9 @@ TEST(SceneFile, VariantsAreFoundByNameThenByNumber) {
     }
     return "";
   };
-  EXPECT_EQ(refusal("Beach", names), R"(shoe.glb: there is no variant "Beach": the file has "beach", "1", "street")");
+  EXPECT_EQ(refusal("Beach", names), R"(shoe.glb: no material variant "Beach"; the file has "beach", "1", "street")");
   for (const char* wanted : {"3", "-1", "0x", "4294967296"}) EXPECT_NE(refusal(wanted, names), "") << wanted;
-  EXPECT_EQ(refusal("0", {}), R"(shoe.glb: there is no variant "0": the file has none)");
+  EXPECT_EQ(refusal("0", {}), R"(shoe.glb: no material variant "0"; the file has none)");
 }
 
 TEST(SceneFile, SequenceRoundTrips) {
@@ -781,7 +781,7 @@ TEST(SceneFile, SequenceRoundTrips) {
   EXPECT_EQ(refused(R"({"frames_per_second": 0})").rfind("scene.json: sequence.frames_per_second: ", 0), 0U);
   EXPECT_EQ(refused(R"({"frame": -1e8})").rfind("scene.json: sequence.frame: ", 0), 0U);
   EXPECT_EQ(refused(R"({"first_frame": 9, "last_frame": 8})"),
-            "scene.json: sequence.last_frame: comes before sequence.first_frame");
+            "scene.json: sequence.last_frame: is less than sequence.first_frame");
   EXPECT_EQ(refused(R"({"speed": 2})"), "scene.json: sequence.speed: there is no such setting");
 }
 

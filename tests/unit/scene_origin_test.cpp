@@ -234,7 +234,7 @@ TEST(FarModels, ImpreciseVerticesGiveAWarning) {
   const std::string far = remark(glm::vec3(0.5F), glm::vec3(ecef));
   EXPECT_TRUE(
       far.starts_with("made.gltf: the positions of mesh 0 (house) lose precision: they reach 4.78e+06, where "
-                      "32-bit floats are rounded by up to 0.25, "))
+                      "32-bit floats have a rounding error of up to 0.25, "))
       << far;
   EXPECT_TRUE(test::has(far, " % of its size")) << far;
   EXPECT_TRUE(test::has(remark(glm::vec3(0.5F), glm::vec3(1e8F)), "more than its size")) << "it is one point";

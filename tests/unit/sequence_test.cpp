@@ -693,7 +693,7 @@ TEST_F(PlayedInstances, VolumeAndSequenceTogetherAreRejected) {
   cumulet_instance* out = nullptr;
   std::array<char, 256> error{};
   EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a dynamic volume");
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of volume, sequence and dynamic_volume");
   // From volume to sequence and back, and to neither.
   const ViewerPtr viewer = make();
   see_all(viewer.get());

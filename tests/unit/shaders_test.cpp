@@ -55,7 +55,7 @@ TEST_P(Programs, ExistOnlyForListedVariants) {
     FAIL() << "a variant that nobody validated";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::internal);
-    EXPECT_STREQ(error.what(), "host_depth.comp names no variant with [CM_MULTISAMPLE 1, CM_NEW 1]");
+    EXPECT_STREQ(error.what(), "host_depth.comp has no variant with [CM_MULTISAMPLE 1, CM_NEW 1]");
   }
 }
 

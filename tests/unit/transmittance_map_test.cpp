@@ -396,7 +396,7 @@ TEST_F(TransmittanceMaps, InvalidInputGivesAOneLineError) {
       (of + "position is not finite").c_str());
   refused([](auto& d) { d.size = 15; }, (of + "size is not from 16 to 4096").c_str());
   refused([](auto& d) { d.slices = 1; }, (of + "slices is not from 2 to 256").c_str());
-  refused([](auto& d) { d.size = 4096; }, (of + "size and slices are more than 2^27 texels").c_str());
+  refused([](auto& d) { d.size = 4096; }, (of + "size and slices give more than 2^27 texels").c_str());
   refused([](auto& d) { d.budget_ms = -1.0; }, (of + "budget_ms is not from 0 to 1e9").c_str());
   auto desc = make_desc<cumulet_transmittance_map_desc>();
   EXPECT_EQ(cumulet_update_transmittance_map(viewer_.get(), &desc, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);

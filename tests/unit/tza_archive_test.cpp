@@ -66,26 +66,27 @@ TEST(TzaArchive, RoundTrips) {
 }
 
 TEST(TzaArchive, InvalidFilesGiveAOneLineError) {
-  EXPECT_EQ(refusal(Bytes{}), "x.tza: no tensor archive (.tza) of Open Image Denoise");
-  EXPECT_EQ(refusal(Bytes{'P', 'K', 3, 4}), "x.tza: no tensor archive (.tza) of Open Image Denoise");
-  EXPECT_EQ(refusal(Bytes{0xD7, 0x41, 2, 0}), "x.tza: is cut short in its header");
+  EXPECT_EQ(refusal(Bytes{}), "x.tza: is not a tensor archive (.tza) of Open Image Denoise");
+  EXPECT_EQ(refusal(Bytes{'P', 'K', 3, 4}), "x.tza: is not a tensor archive (.tza) of Open Image Denoise");
+  EXPECT_EQ(refusal(Bytes{0xD7, 0x41, 2, 0}), "x.tza: is truncated: incomplete header");
   EXPECT_EQ(refusal(TzaBytes().number(0x41D7, 2).number(1, 1).number(0, 9).bytes()),
             "x.tza: is a tensor archive of version 1, not 2");
-  EXPECT_EQ(refusal(TzaBytes().header(13).bytes()), "x.tza: is cut short before its table");
-  EXPECT_EQ(refusal(TzaBytes().header(~std::uint64_t{0}).bytes()), "x.tza: is cut short before its table");
-  EXPECT_EQ(refusal(TzaBytes().header(12).bytes()), "x.tza: is cut short in its table");
+  EXPECT_EQ(refusal(TzaBytes().header(13).bytes()), "x.tza: is truncated: no tensor table");
+  EXPECT_EQ(refusal(TzaBytes().header(~std::uint64_t{0}).bytes()), "x.tza: is truncated: no tensor table");
+  EXPECT_EQ(refusal(TzaBytes().header(12).bytes()), "x.tza: is truncated: incomplete tensor table");
   EXPECT_EQ(refusal(one("a", {8}, 'h', 12)), "");
-  EXPECT_EQ(refusal(one("a", {8}, 'h', 12, 2)), "x.tza: is cut short in its table");
-  EXPECT_EQ(refusal(one("a", {8}, 'h', 12, ~0U)), "x.tza: is cut short in its table");
+  EXPECT_EQ(refusal(one("a", {8}, 'h', 12, 2)), "x.tza: is truncated: incomplete tensor table");
+  EXPECT_EQ(refusal(one("a", {8}, 'h', 12, ~0U)), "x.tza: is truncated: incomplete tensor table");
   EXPECT_EQ(refusal(one("a", {}, 'h', 12)), "x.tza: tensor 'a' has 0 dimensions");
   EXPECT_EQ(refusal(one("a", std::vector<std::uint32_t>(5, 1), 'h', 12)), "x.tza: tensor 'a' has 5 dimensions");
-  EXPECT_EQ(refusal(one("a\nb", {8}, 'd', 12)), "x.tza: tensor 'a b' is neither of half ('h') nor of float ('f')");
+  EXPECT_EQ(refusal(one("a\nb", {8}, 'd', 12)),
+            "x.tza: tensor 'a b' has a data type other than half ('h') or float ('f')");
   EXPECT_EQ(refusal(one("a", {8, 0}, 'h', 12)), "x.tza: tensor 'a' is empty");
-  EXPECT_EQ(refusal(one("a", {80}, 'h', 12)), "x.tza: tensor 'a' goes beyond the file's end");
-  EXPECT_EQ(refusal(one("a", {8}, 'h', ~std::uint64_t{0})), "x.tza: tensor 'a' goes beyond the file's end");
+  EXPECT_EQ(refusal(one("a", {80}, 'h', 12)), "x.tza: tensor 'a' exceeds the end of the file");
+  EXPECT_EQ(refusal(one("a", {8}, 'h', ~std::uint64_t{0})), "x.tza: tensor 'a' exceeds the end of the file");
   const std::uint32_t many = ~0U;
-  EXPECT_EQ(refusal(one("a", {many, many, many, many}, 'f', 12)), "x.tza: tensor 'a' goes beyond the file's end");
-  EXPECT_EQ(refusal(one("a", {65536, 65536, 65536, 65536}, 'h', 12)), "x.tza: tensor 'a' goes beyond the file's end");
+  EXPECT_EQ(refusal(one("a", {many, many, many, many}, 'f', 12)), "x.tza: tensor 'a' exceeds the end of the file");
+  EXPECT_EQ(refusal(one("a", {65536, 65536, 65536, 65536}, 'h', 12)), "x.tza: tensor 'a' exceeds the end of the file");
 }
 
 TEST(TzaArchive, SmallFileDoesNotAllocateMuchMemory) {
@@ -93,19 +94,19 @@ TEST(TzaArchive, SmallFileDoesNotAllocateMuchMemory) {
   constexpr std::size_t numbers = 1000;
   file.header(12 + 2 * numbers).values(std::vector<float>(numbers, 1.0F), 'h').number(100, 4);
   for (int i = 0; i < 100; ++i) file.record(std::to_string(i), {numbers}, "x", 'h', 12);
-  EXPECT_EQ(refusal(file.bytes()), "x.tza: tensor '1' lies over others");
+  EXPECT_EQ(refusal(file.bytes()), "x.tza: tensor '1' overlaps another tensor");
 }
 
 TEST(TzaArchive, NonFiniteValuesAndInvalidNamesAreRejected) {
   for (const float value : {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
     for (const char type : {'h', 'f'}) {
       EXPECT_EQ(refusal(tza_file({{"a", {{2}, "x", {1.0F, value}}}}, type)),
-                "x.tza: tensor 'a' has a value that is not finite");
+                "x.tza: tensor 'a' contains a non-finite value");
     }
   }
   TzaBytes file;
   file.header(16).values({1.0F, 1.0F}, 'h').number(2, 4).record("a", {1}, "x", 'h', 12);
-  EXPECT_EQ(refusal(file.record("a", {1}, "x", 'h', 14).bytes()), "x.tza: tensor 'a' is there twice");
+  EXPECT_EQ(refusal(file.record("a", {1}, "x", 'h', 14).bytes()), "x.tza: tensor 'a' occurs twice");
 }
 
 TEST(TzaArchive, ReadsFilesByPath) {
@@ -114,7 +115,7 @@ TEST(TzaArchive, ReadsFilesByPath) {
   const auto message = [](const std::string& path) { return refusal([&] { static_cast<void>(read_tza(path)); }); };
   EXPECT_EQ(message(missing), missing + ": No such file or directory");
   EXPECT_TRUE(message(folder.path().string()).starts_with(folder.path().string() + ": "));
-  EXPECT_EQ(message("/dev/zero"), "/dev/zero: is larger than 64 MiB, which no network of Open Image Denoise is");
+  EXPECT_EQ(message("/dev/zero"), "/dev/zero: is larger than 64 MiB, the maximum for a network");
   const std::string path = (folder / "a.tza").string();
   const Bytes bytes = tza_file({{"a", {{2}, "x", {1.0F, 2.0F}}}});
   std::ofstream(path, std::ios::binary)
@@ -201,15 +202,15 @@ TEST(DenoiserNetwork, MissingOrMisshapenTensorsAreNamed) {
   EXPECT_EQ(changed([](TensorArchive& a) {
               a["enc_conv0.weight"] = {{32, 6, 3, 3}, "oihw", {}};
             }),
-            "x.tza: tensor 'enc_conv0.weight' is 32x6x3x3, not of 3 or 9 inputs");
+            "x.tza: tensor 'enc_conv0.weight' is 32x6x3x3, not with 3 or 9 inputs");
   EXPECT_EQ(changed([](TensorArchive& a) {
               a["dec_conv0.weight"] = {{4, 32, 3, 3}, "oihw", {}}, a["dec_conv0.bias"] = {{4}, "x", {}};
             }),
-            "x.tza: tensor 'dec_conv0.weight' is 4x32x3x3, not of 3 outputs");
+            "x.tza: tensor 'dec_conv0.weight' is 4x32x3x3, not with 3 outputs");
   EXPECT_EQ(changed([](TensorArchive& a) {
               a["enc_conv0.weight"] = {{4000000000U, 9, 3, 3}, "oihw", {}};
             }),
-            "x.tza: tensor 'enc_conv0.weight' is 4000000000x9x3x3, not of at most 512 outputs");
+            "x.tza: tensor 'enc_conv0.weight' is 4000000000x9x3x3, not with at most 512 outputs");
 }
 
 TEST(DenoiserNetwork, ReadsThePublishedNetworks) {

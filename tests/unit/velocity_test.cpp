@@ -133,7 +133,7 @@ TEST(Velocity, TooManyVelocityCellsAreDroppedWithAWarning) {
   });
   EXPECT_FALSE(scene::momentum_of(frame, {}, nullptr, log));
   ASSERT_EQ(heard.size(), 1U);
-  EXPECT_NE(heard[0].find("the velocity is left out: density without detail fills more than 262144 bricks"),
+  EXPECT_NE(heard[0].find("the velocity is ignored: density with constant values covers more than 262144 bricks"),
             std::string::npos);
 }
 

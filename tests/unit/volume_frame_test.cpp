@@ -126,7 +126,7 @@ TEST_F(VolumeFrameImport, MissingRequestedFieldIsNamed) {
     EXPECT_HAS(what, "\"density\" (float, fog volume), \"temperature\" (float, fog volume)");
   }
   EXPECT_HAS(refusal(file, naming({{&GridNames::density, "none"}, {&GridNames::temperature, "none"}})),
-             "every field is left out");
+             "all fields are excluded; the file has \"density\"");
   auto level_set = dot("temperature", 1.0F);
   level_set->setGridClass(openvdb::GRID_LEVEL_SET);
   EXPECT_HAS(refusal(write({level_set}), naming({{&GridNames::temperature, "temperature"}})), "is a level set");
@@ -143,7 +143,7 @@ TEST_F(VolumeFrameImport, ColorFromThreeGrids) {
   Messages messages;
   EXPECT_FALSE(import_frame(file, {}, messages.log).color);
   ASSERT_EQ(messages.hints.size(), 1U);
-  EXPECT_HAS(messages.hints[0], "colour is read from \"color_r\"");
+  EXPECT_HAS(messages.hints[0], "color can be read from \"color_r\"");
   EXPECT_HAS(refusal(file, naming({{&GridNames::color, "x"}})), "\"x_g\"");
 }
 
@@ -181,7 +181,7 @@ TEST_F(VolumeFrameImport, ColorFromAVectorGrid) {
     expect_colors(import_frame(file, naming({{&GridNames::color, "Cd"}}), {}), *grid);
     EXPECT_FALSE(import_frame(file, naming({{&GridNames::color, "none"}}), {}).color);
     EXPECT_HAS(refusal(file, naming({{&GridNames::color, "color"}})), "grid \"color\" is staggered");
-    EXPECT_HAS(refusal(file, naming({{&GridNames::color, "density"}})), "is of type float, not vec3s");
+    EXPECT_HAS(refusal(file, naming({{&GridNames::color, "density"}})), "has type float, not vec3s");
   }
 }
 
@@ -278,8 +278,8 @@ TEST_F(VolumeFrameImport, AnisotropyBeyondOneIsClamped) {
   EXPECT_EQ(anisotropy_at(frame, {17, 1, 1}), -1.0F);
   EXPECT_EQ((*frame.anisotropy)[1].max_value, 1.0F);
   ASSERT_EQ(messages.warnings.size(), 2U);
-  EXPECT_HAS(messages.warnings[0], "3 non-finite voxels counted as 0");
-  EXPECT_HAS(messages.warnings[1], "grid \"anisotropy\": 514 voxels beyond -1 and 1 clamped to these");
+  EXPECT_HAS(messages.warnings[0], "3 non-finite voxels read as 0");
+  EXPECT_HAS(messages.warnings[1], "grid \"anisotropy\": 514 voxels clamped to the range from -1 to 1");
 }
 
 // Grids with another transform are resampled with their signs.
@@ -349,7 +349,7 @@ TEST_F(VolumeFrameImport, UnusedFieldsAreReported) {
   Messages messages;
   (void)import_frame(write({dot("smoke", 1.0F), dot("temperature", 1.0F), dot("shadow", 1.0F)}), {}, messages.log);
   ASSERT_EQ(messages.warnings.size(), 1U);
-  EXPECT_HAS(messages.warnings[0], "shows its grid \"smoke\" (float, fog volume); there is also \"shadow\"");
+  EXPECT_HAS(messages.warnings[0], "uses the grid \"smoke\" (float, fog volume); it also has \"shadow\"");
 }
 
 // --- fields on another lattice ---
@@ -542,10 +542,10 @@ TEST_F(VolumeFrameImport, AdditionalFieldsAreKeptAndReported) {
   EXPECT_EQ(frame.temperature->bounds_min, glm::ivec3(100));
   ASSERT_EQ(messages.warnings.size(), 4U);
   const std::string where = path().string() + ": grid ";
-  EXPECT_EQ(messages.warnings[0], where + "\"temperature\": lies nowhere over \"density\"");
-  EXPECT_EQ(messages.warnings[1], where + "\"Cd\": lies nowhere over \"density\"");
-  EXPECT_EQ(messages.warnings[2], where + "\"anisotropy\": lies nowhere over \"density\"");
-  EXPECT_EQ(messages.warnings[3], where + "\"vel_x\": lies nowhere over \"density\"");
+  EXPECT_EQ(messages.warnings[0], where + "\"temperature\": does not overlap \"density\"");
+  EXPECT_EQ(messages.warnings[1], where + "\"Cd\": does not overlap \"density\"");
+  EXPECT_EQ(messages.warnings[2], where + "\"anisotropy\": does not overlap \"density\"");
+  EXPECT_EQ(messages.warnings[3], where + "\"vel_x\": does not overlap \"density\"");
 }
 
 // --- velocities ---
@@ -598,9 +598,10 @@ TEST_F(VolumeFrameImport, VelocityFromAVectorGrid) {
       EXPECT_FALSE(import_frame(file, naming({{&GridNames::velocity, "none"}}), {}).velocity);
       expect_vectors(import_frame(file, naming({{&GridNames::velocity, name}}), {}), *grid);
       EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, "nope"}})),
-                 "has no grid of vectors \"nope\", nor all of \"nopex\", \"nopey\" and \"nopez\"; it has \"density\"");
+                 "has no vector grid \"nope\", and not all of \"nopex\", \"nopey\" and \"nopez\"; it has "
+                 "\"density\"");
       EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, "density"}})),
-                 "grid \"density\" is of type float, not of vectors");
+                 "grid \"density\" has type float, not a vector type");
       EXPECT_FALSE(import_frame(file, naming({{&GridNames::color, name}}), {}).velocity) << "it is the colour";
     }
   }
@@ -739,9 +740,9 @@ TEST_F(VolumeFrameImport, InvalidAndTooLargeVelocitiesAreReported) {
   EXPECT_EQ(velocity_at(frame, {0, 0, 1}), glm::dvec3(0.0, 0.0, 4.0));
   EXPECT_EQ(velocity_at(frame, {0, 0, 2}), glm::dvec3(0.0, 6.0, -60000.0));
   ASSERT_EQ(messages.warnings.size(), 3U);
-  EXPECT_HAS(messages.warnings[0], "grid \"vel\", x: 2 non-finite voxels counted as 0");
-  EXPECT_HAS(messages.warnings[1], "grid \"vel\", y: 1 non-finite voxel counted as 0");
-  EXPECT_HAS(messages.warnings[2], "grid \"vel\": 2 components beyond 65504 voxels a second clamped to that");
+  EXPECT_HAS(messages.warnings[0], "grid \"vel\", x: 2 non-finite voxels read as 0");
+  EXPECT_HAS(messages.warnings[1], "grid \"vel\", y: 1 non-finite voxel read as 0");
+  EXPECT_HAS(messages.warnings[2], "grid \"vel\": 2 components above 65504 voxels per second clamped");
   // An empty grid also gives a warning.
   grid->tree().clear();
   messages.warnings.clear();
@@ -762,14 +763,14 @@ TEST_F(VolumeFrameImport, FailedVelocityIsDroppedUnlessRequestedByName) {
     ASSERT_EQ(messages.warnings.size(), 1U);
     EXPECT_HAS(messages.warnings[0], file.string() + ": grid \"" + name);
     EXPECT_HAS(messages.warnings[0], cause);
-    EXPECT_HAS(messages.warnings[0], ": the velocity is left out");
+    EXPECT_HAS(messages.warnings[0], ": the velocity is ignored");
     EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, name}})), cause);
     EXPECT_FALSE(import_frame(file, naming({{&GridNames::velocity, "none"}}), {}).velocity);
   };
   const auto fine = vectors("motion");
   fine->setGridClass(openvdb::GRID_STAGGERED);
   fine->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e-3)));
-  expect({density, fine}, "motion", "has voxels too small");
+  expect({density, fine}, "motion", "has voxels that are too small");
   auto wide = vectors("vel");
   wide->tree().setValue(Coord(1 << 22, 0, 0), openvdb::Vec3f(1.0F));
   expect({density, wide}, "vel", "voxels span");
@@ -824,9 +825,10 @@ TEST_F(VolumeFrameImport, VelocityIsKeptOnlyInTheDensitysBounds) {
 TEST_F(VolumeFrameImport, OutOfRangeGridsAreRejected) {
   auto far = dot("flame", 1.0F);
   far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e9)));
-  EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": is too far off or too large");
+  EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}),
+             "grid \"flame\": is too far from the file's other grids or too large");
   far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e-3)));
-  EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": has voxels too small");
+  EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": has voxels that are too small");
   // Near the limits of the coordinates.
   auto wide = fog("flame");
   wide->tree().setValue(Coord(1 << 30), 1.0F);
@@ -841,7 +843,7 @@ TEST_F(VolumeFrameImport, TooFineGridsAreRejectedImmediately) {
   const auto coarse = box("flame", scaled(1.0), 60, [&](const Vec3d&) { return static_cast<float>(random() % 1000); });
   auto density = dot("density", 1.0F);
   density->setTransform(openvdb::math::Transform::createLinearTransform(scaled(0.01)));
-  EXPECT_HAS(refusal(write({density, coarse}), {}), "grid \"flame\": has voxels too large for the lattice");
+  EXPECT_HAS(refusal(write({density, coarse}), {}), "grid \"flame\": has voxels that are too large");
 }
 
 TEST_F(VolumeFrameImport, ResamplingAMuchFinerFieldSkipsEmptySpace) {
@@ -886,8 +888,8 @@ TEST_F(VolumeFrameImport, UnusualTemperaturesAreReported) {
     float low, high;
     std::string hint;
   };
-  for (const Case& c : {Case{0.0F, 2.5F, ""}, Case{0.0F, 0.9F, "as temperatures from 0 to 1 do"},
-                        Case{0.0F, 1800.0F, "as kelvin do"}, Case{-5.0F, 900.0F, "as degrees Celsius do"}}) {
+  for (const Case& c : {Case{0.0F, 2.5F, ""}, Case{0.0F, 0.9F, "has values from 0 to 1; "},
+                        Case{0.0F, 1800.0F, "has values above 20, "}, Case{-5.0F, 900.0F, "may be degrees Celsius"}}) {
     auto heat = dot("temperature", c.high);
     heat->tree().setValue(Coord(5, 5, 5), c.low);
     Messages messages;

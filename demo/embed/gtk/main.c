@@ -296,7 +296,7 @@ static void on_open(GtkButton* button, gpointer user) {
 }
 
 static gboolean on_timer(gpointer user) {
-  static const char* const stages[] = {"Tracing", "Loading", "Voxel statistics", "Refining", "Records", "Uploading"};
+  static const char* const stages[] = {"Tracing", "Loading", "Voxel statistics", "Refining", "Packing", "Uploading"};
   Host* host = user;
   cumulet_progress progress = {.struct_size = sizeof progress};
   ok(host, cumulet_get_progress(host->viewer, &progress));
@@ -391,7 +391,7 @@ int main(int argc, char** argv) {
   Host host = {0};
   const GOptionEntry entries[] = {
       {"volume", 0, 0, G_OPTION_ARG_FILENAME, &host.volume, "Volume to show (.vdb, .nvdb)", "FILE"},
-      {"test", 0, 0, G_OPTION_ARG_FILENAME, &host.test_folder, "Act by itself and write pictures", "OUT_DIR"},
+      {"test", 0, 0, G_OPTION_ARG_FILENAME, &host.test_folder, "Run the self-test and write screenshots", "OUT_DIR"},
       {0}};
   GtkApplication* application = gtk_application_new(NULL, G_APPLICATION_NON_UNIQUE);
   g_application_add_main_option_entries(G_APPLICATION(application), entries);
@@ -458,7 +458,7 @@ static gboolean save(Host* host, const char* name, Drawable drawable, int x, int
   g_free(file);
   g_object_unref(texture);
   g_bytes_unref(bytes);
-  return written || fail(host, "a picture cannot be written");
+  return written || fail(host, "a screenshot cannot be written");
 }
 
 /* Returns the rectangle of the area in its window, in physical pixels. */
@@ -522,7 +522,7 @@ static void move(Host* host, GtkBox* box) {
 
 static gboolean act(Host* host) {
   if (!GDK_IS_X11_DISPLAY(gtk_widget_get_display(GTK_WIDGET(host->window)))) return fail(host, "needs GDK_BACKEND=x11");
-  if (g_mkdir_with_parents(host->test_folder, 0777) != 0) return fail(host, "cannot make the folder for pictures");
+  if (g_mkdir_with_parents(host->test_folder, 0777) != 0) return fail(host, "cannot create the folder for screenshots");
   cumulet_sampling_desc sampling = {.struct_size = sizeof sampling, .samples = 4};
   if (!ok(host, cumulet_set_sampling(host->viewer, &sampling))) return FALSE;
   host->budget_ms = 100.0; /* there is no interaction, so frames may be long */
@@ -542,13 +542,13 @@ static gboolean act(Host* host) {
   move(host, home);
   gtk_window_destroy(GTK_WINDOW(away));
   if (!settle(host) || !shoot(host, "reparented")) return FALSE;
-  if (host->contexts != 3) return fail(host, "re-parenting made no new context");
+  if (host->contexts != 3) return fail(host, "re-parenting did not create a new context");
 
   /* A new exposure does not restart rendering: the next frame is converged. */
   const guint frames = host->frames;
   gtk_range_set_value(host->exposure, 2.0);
   while (host->frames == frames) g_main_context_iteration(NULL, TRUE);
-  if (!(host->result.flags & CUMULET_RENDER_CONVERGED)) return fail(host, "a new exposure restarts the picture");
+  if (!(host->result.flags & CUMULET_RENDER_CONVERGED)) return fail(host, "a new exposure restarted the render");
   if (!shoot(host, "brighter")) return FALSE;
 
   if (!point(host, 0.7, 0.3, "mousedown 1") || !point(host, 0.5, 0.4, "") || !point(host, 0.3, 0.5, "mouseup 1") ||

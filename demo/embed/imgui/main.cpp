@@ -102,7 +102,7 @@ GLuint make_program() {
   glLinkProgram(program);
   GLint linked = 0;
   glGetProgramiv(program, GL_LINK_STATUS, &linked);
-  if (linked == 0) fail("the scene's shaders do not build");
+  if (linked == 0) fail("the scene's shaders failed to compile");
   return program;
 }
 

@@ -421,7 +421,7 @@ class Window final : public QMainWindow {
       cumulet_volume_release(volume);  // the viewers hold references
     }
 
-    constexpr std::array stages = {"Tracing", "Loading", "Voxel statistics", "Refining", "Records", "Uploading"};
+    constexpr std::array stages = {"Tracing", "Loading", "Voxel statistics", "Refining", "Packing", "Uploading"};
     if (work.stage == CUMULET_STAGE_IDLE && work.status == CUMULET_OK)
       right->ok(cumulet_get_progress(right->handle(), &work));
     const bool idle = work.stage == CUMULET_STAGE_IDLE;
@@ -447,7 +447,7 @@ class Window final : public QMainWindow {
 class SelfTest {
  public:
   SelfTest(Window& window, const QString& folder) : window_(window), folder_(folder) {
-    if (!folder_.mkpath(".")) throw std::runtime_error("cannot make the folder " + folder.toStdString());
+    if (!folder_.mkpath(".")) throw std::runtime_error("cannot create the folder " + folder.toStdString());
   }
 
   void run(const QString& volume) {
@@ -473,7 +473,7 @@ class SelfTest {
     window_.right_dock->setFloating(true);
     window_.right_dock->move(440, 20);
     settle();
-    if (window_.right->contexts() != contexts + 1) throw std::runtime_error("floating made no new context");
+    if (window_.right->contexts() != contexts + 1) throw std::runtime_error("floating did not create a new context");
     shoot("floating");
     // Moves the viewer without its dock into the other dock, which is part of the main window.
     window_.left_dock->setWidget(window_.right);
@@ -484,15 +484,15 @@ class SelfTest {
     window_.restoreState(layout);
     even_out();
     settle();
-    if (window_.right->contexts() < contexts + 4) throw std::runtime_error("re-parenting made no new context");
+    if (window_.right->contexts() < contexts + 4) throw std::runtime_error("re-parenting did not create a new context");
     shoot("reparented");
 
     // A new exposure does not restart rendering: the next frame is converged.
     window_.exposure->setValue(2.0);
     const int frames = window_.left->frames();
-    wait([&] { return window_.left->frames() > frames; }, "a new exposure draws no frame");
+    wait([&] { return window_.left->frames() > frames; }, "a new exposure drew no frame");
     if ((window_.left->result().flags & CUMULET_RENDER_CONVERGED) == 0)
-      throw std::runtime_error("a new exposure restarts the picture");
+      throw std::runtime_error("a new exposure restarted the render");
     settle();
     shoot("brighter");
 
@@ -599,7 +599,7 @@ int run(int argc, char** argv) {
   parser.setApplicationDescription("A Qt 6 window with two Cumulet viewers");
   parser.addHelpOption();
   parser.addOption({"volume", "Volume to show (.vdb, .nvdb).", "FILE"});
-  parser.addOption({"test", "Act by itself and write pictures of the window.", "OUT_DIR"});
+  parser.addOption({"test", "Run the self-test and write screenshots of the window.", "OUT_DIR"});
   parser.process(application);
 
   Window window;

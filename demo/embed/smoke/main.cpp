@@ -347,7 +347,7 @@ std::vector<Moved> read_mouse(const std::string& path) {
   std::vector<Moved> moves;
   Moved move;
   while (file >> move.frame >> move.mouse.x >> move.mouse.y >> move.mouse.stirs) moves.push_back(move);
-  if (moves.empty() || !file.eof()) fail(path + ": is no record of a mouse");
+  if (moves.empty() || !file.eof()) fail(path + ": not a mouse record");
   return moves;
 }
 
@@ -395,7 +395,7 @@ void play(const std::string& record, const std::string& folder, const Options& o
   const int frames = moves.back().frame + 1;
   const auto follow = [&] {
     const auto info = must(viewer.get_dynamic_volume_info());
-    if (info.displayed_update < drawn) fail("a state was drawn after a newer one");
+    if (info.displayed_update < drawn) fail("an older state was drawn after a newer one");
     if (info.ready_count > info.displayed_count + 1) fail("a state was built and never drawn");
     drawn = info.displayed_update;
     return info;
@@ -417,7 +417,7 @@ void play(const std::string& record, const std::string& folder, const Options& o
   const auto info = follow();
   std::printf("%d frames, %llu states, %llu drawn\n", frames, static_cast<unsigned long long>(info.submitted_update),
               static_cast<unsigned long long>(info.displayed_count));
-  if (info.displayed_count * 20 < info.submitted_update) fail("states starve");
+  if (info.displayed_count * 20 < info.submitted_update) fail("too few states were drawn");
 
   // Checks that the image shows the latest state: the center of the smoke must agree.
   must(viewer.set_ground({}));
@@ -436,16 +436,16 @@ void play(const std::string& record, const std::string& folder, const Options& o
     y += depth * (double(row) + 0.5) / height;
   }
   const auto expected = host.middle_of_smoke(1.0);
-  std::printf("smoke at %.3f, %.3f; in the picture at %.3f, %.3f\n", expected[0], expected[1], x / mass, y / mass);
+  std::printf("smoke at %.3f, %.3f; in the image at %.3f, %.3f\n", expected[0], expected[1], x / mass, y / mass);
   if (!(std::abs(x / mass - expected[0]) < 0.03 && std::abs(y / mass - expected[1]) < 0.03))
-    fail("the picture is not of the newest state");
+    fail("the image does not show the newest state");
   if (options.fire) {
     const auto by_red = [&](std::size_t a, std::size_t b) { return linear[4 * a] < linear[4 * b]; };
     std::size_t hottest = 0;
     for (std::size_t i = 0; i < std::size_t{width} * height; ++i) hottest = std::max(hottest, i, by_red);
     const float* color = &linear[4 * hottest];
     std::printf("hottest %.3f, %.3f, %.3f\n", double{color[0]}, double{color[1]}, double{color[2]});
-    if (!(color[0] > 1.0F && color[0] > 3.0F * color[2])) fail("nothing glows");
+    if (!(color[0] > 1.0F && color[0] > 3.0F * color[2])) fail("no emission is visible");
   }
   must(viewer.set_ground({.mode = cumulet::GroundMode::below}));
   while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {

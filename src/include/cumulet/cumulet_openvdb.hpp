@@ -35,7 +35,7 @@ struct Flat {
 template <class TreeT>
 void flatten(const TreeT& tree, Flat& flat) {
   using LeafT = typename TreeT::LeafNodeType;
-  static_assert(LeafT::DIM == 8, "Cumulet's bricks are OpenVDB's usual leaves");
+  static_assert(LeafT::DIM == 8, "a brick must have the size of an OpenVDB leaf node");
   flat.background = static_cast<float>(tree.background());
 
   std::vector<const LeafT*> leaves;
@@ -98,7 +98,7 @@ inline std::string flatten_grid(const openvdb::GridBase::ConstPtr& grid, Sparse&
   using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
   if (!flatten_if<openvdb::FloatTree>(tree, flat) && !flatten_if<openvdb::DoubleTree>(tree, flat) &&
       !flatten_if<HalfTree>(tree, flat))
-    return "is of type " + grid->valueType() + ", not a float or half scalar";
+    return "has type " + grid->valueType() + ", not a float or half scalar";
   cumulet_sparse_desc& desc = sparse.desc;
   desc.struct_size = sizeof desc;
   desc.brick_origins = flat.origins.data();
