@@ -164,11 +164,9 @@ cumulet_status cumulet_shader_cache_create(const cumulet_shader_cache_desc* desc
   });
 }
 
-cumulet_shader_cache* cumulet_shader_cache_retain(cumulet_shader_cache* programs) {
-  return cumulet::c_abi::retain(programs);
-}
+cumulet_shader_cache* cumulet_shader_cache_retain(cumulet_shader_cache* cache) { return cumulet::c_abi::retain(cache); }
 
-void cumulet_shader_cache_release(cumulet_shader_cache* programs) { cumulet::c_abi::release(programs); }
+void cumulet_shader_cache_release(cumulet_shader_cache* cache) { cumulet::c_abi::release(cache); }
 
 void cumulet_destroy(cumulet_viewer* viewer) {
   if (viewer == nullptr || cumulet::CallbackScope::inside() || viewer->process != getpid()) return;
