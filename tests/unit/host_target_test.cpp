@@ -86,10 +86,10 @@ CUMULET_ON_BACKENDS(HostTargets);
 TEST_P(HostTargets, UnsupportedColorFormatsAreRejected) {
   for (const GLenum format : {GL_RGBA8UI, GL_RGBA32I, GL_RGBA16UI}) {
     attach(GL_COLOR_ATTACHMENT0, texture(format));
-    refused(frame(), "integers");
+    refused(frame(), "integer color");
     attach(GL_COLOR_ATTACHMENT0, 0);
     gl_.NamedFramebufferRenderbuffer(framebuffer_, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, renderbuffer(format));
-    refused(frame(), "integers");
+    refused(frame(), "integer color");
   }
   for (const GLenum format : {GL_R8, GL_RG16F}) {
     attach(GL_COLOR_ATTACHMENT0, texture(format));
@@ -166,7 +166,7 @@ TEST_P(HostTargets, LayeredTargetsAreRejected) {
   gl_.CreateTextures(GL_TEXTURE_2D_ARRAY, 1, &layers);
   gl_.TextureStorage3D(layers, 1, GL_RGBA8, side, side, 3);
   attach(GL_COLOR_ATTACHMENT0, layers);
-  refused(frame(), "layers");
+  refused(frame(), "layered");
   gl_.NamedFramebufferTextureLayer(framebuffer_, GL_COLOR_ATTACHMENT0, layers, 0, 2);
   EXPECT_EQ(error_of(frame()), "");
 }
