@@ -48,7 +48,7 @@ dmat4 place_of(const cumulet_light_desc& analytic_light) {
   const dvec3 down(0.0, -1.0, 0.0);
   const dvec3 shines = glm::make_vec3(analytic_light.direction);
   const dvec3 direction = glm::length(shines) > 0.0 ? glm::normalize(shines) : down;
-  dvec3 tangent = glm::make_vec3(analytic_light.tangent);
+  dvec3 across = glm::make_vec3(analytic_light.tangent);
   across -= glm::dot(across, direction) * direction;
   constexpr double least = 1e-9;
   // Default of cumulet_light_desc: horizontal, or +X.
