@@ -87,7 +87,7 @@ core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm:
   return shutter;
 }
 
-bool moves(const scene::Volume& volume) { return volume.place.ends || volume.source->changes(); }
+bool moves(const scene::Volume& volume) { return volume.transform.ends || volume.source->changes(); }
 
 bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
 
@@ -162,10 +162,10 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
   for (const scene::Volume& volume : present_) {
     const core::CmGrid& grid = *data_->grid(*volume.source);
     instances.push_back({.source = volume.source,
-                         .place = volume.place.to_world,
+                         .transform = volume.transform.to_world,
                          .grid = grid,
                          .medium = medium_of(*volume.medium, *volume.source, extent),
-                         .ends = volume.place.ends,
+                         .ends = volume.transform.ends,
                          .emissive = *data_->emissive(*volume.source)});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
@@ -351,7 +351,7 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
 }
 
 light::Lit GpuScene::ball_of(const scene::Volume& volume) const {
-  const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+  const glm::dmat4 to_world = volume.transform.to_world * volume.source->cube.to_world;
   const core::CmGrid& grid = *data_->grid(*volume.source);
   return {glm::dvec3(to_world * glm::dvec4(0.5 * glm::dvec3(grid.box_min + grid.box_max), 1.0)),
           0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
@@ -361,7 +361,7 @@ std::vector<glm::dvec3> GpuScene::corners() const {
   std::vector<glm::dvec3> corners;
   corners.reserve(8 * present_.size());
   for (const scene::Volume& volume : present_) {
-    const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+    const glm::dmat4 to_world = volume.transform.to_world * volume.source->cube.to_world;
     const core::CmGrid& grid = *data_->grid(*volume.source);
     for (const glm::dvec3& corner : corners_of(grid.box_min, grid.box_max))
       corners.emplace_back(to_world * glm::dvec4(corner, 1.0));
@@ -384,7 +384,7 @@ double GpuScene::optical_depth() const {
   double depth = 0.0;
   for (const scene::Volume& volume : present_) {
     const double own =
-        volume.medium->density_scale * volume.source->optical_depth * scene::mean_stretch(volume.place.to_world);
+        volume.medium->density_scale * volume.source->optical_depth * scene::mean_stretch(volume.transform.to_world);
     depth += own * std::pow(ball_of(volume).radius / radius, 2.0);
   }
   return depth;
@@ -587,7 +587,7 @@ TraceInputs GpuScene::trace_inputs(const scene::Snapshot& snapshot, bool traced)
 scene::MotionTable GpuScene::motion(const scene::Snapshot& snapshot) const {
   const scene::Volume& first = present_.front();
   const glm::dmat4 ray_to_world = instances_ ? glm::translate(glm::dmat4(1.0), instances_->origin())
-                                             : first.place.to_world * first.source->cube.to_world;
+                                             : first.transform.to_world * first.source->cube.to_world;
   if (!placed_) return scene::make_motion(snapshot, ray_to_world, present_, {}, nullptr, {});
   const ModelData& data = *placed_.of().data;
   return scene::make_motion(
@@ -613,13 +613,14 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
     p.grid = *data_->grid(source);
     // Where several volumes were refused, this one is drawn as if it were the only one.
     p.medium = medium_of(*volume.medium, source, 2.0 * ball_of(volume).radius);
-    const glm::dmat4& place = volume.place.to_world;
-    const glm::dmat4 to_world = place * source.cube.to_world;
+    const glm::dmat4& transform = volume.transform.to_world;
+    const glm::dmat4 to_world = transform * source.cube.to_world;
     p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);
     eye_of = [to_cube = glm::inverse(to_world)](const glm::dvec3& eye) {
       return glm::vec3(to_cube * glm::dvec4(eye, 1.0));
     };
-    const scene::PlacedEmissive emissive = scene::emissive_of(*data_->emissive(source), source.cube.to_world, place);
+    const scene::PlacedEmissive emissive =
+        scene::emissive_of(*data_->emissive(source), source.cube.to_world, transform);
     p.emissive = emissive.looks;
     own.power = emissive.power;
     own.length = emissive.length;

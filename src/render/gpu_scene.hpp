@@ -43,7 +43,7 @@ class GpuScene {
   /// are only path-traced.
   void update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline);
 
-  /// In the order that Picked::place indexes.
+  /// In the order that Picked::volume indexes.
   [[nodiscard]] const std::vector<scene::Volume>& volumes() const { return present_; }
   /// Null: there is no volume, so no picture can be made.
   [[nodiscard]] const MarchData* data() const { return data_.get(); }

@@ -474,7 +474,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   for (const RasterItem& item : items_) {
     const surface::Pose& pose = item.content->pose();
     for (const surface::PunctualLight& analytic_light : pose.lights)
-      analytic_lights.push_back(scene::placed(analytic_light, surface::from_origin(item.to_world, pose)));
+      analytic_lights.push_back(scene::transformed(analytic_light, surface::from_origin(item.to_world, pose)));
   }
   light::AnalyticLights of_host = lighting.analytic_lights;
   for (light::AnalyticLight& analytic_light : of_host) {

@@ -1108,7 +1108,7 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(picked.z), &picked.z);
   gl_->GetTextureImage(pick_place_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
   gl::check(*gl_, "picking");
-  if (met.x == 1U) picked.place = met.y;
+  if (met.x == 1U) picked.volume = met.y;
   if (met.x == 2U) picked.triangle = met.y;
   return picked;
 }

@@ -111,7 +111,7 @@ constexpr std::uint32_t max_feature_rays = 64;
 constexpr std::uint32_t matte_rays = 64;
 constexpr std::uint32_t max_matte_ranks = 16;
 
-/// Cryptomatte IDs (cryptomatte_id) of the visible objects; 0: in no matte. Volumes are in the order of Picked::place,
+/// Cryptomatte IDs (cryptomatte_id) of the visible objects; 0: in no matte. Volumes are in the order of Picked::volume,
 /// and models in their own.
 struct MatteIds {
   std::uint32_t ground = 0;
@@ -297,7 +297,7 @@ class Tracer {
   struct Picked {
     float z = 0.0F;  ///< view depth of the volume at half opacity, or of a triangle; 0: neither was hit
     /// if the volume was hit: index of the volume with the highest extinction there
-    std::optional<std::uint32_t> place;
+    std::optional<std::uint32_t> volume;
     std::optional<std::uint32_t> triangle;  ///< if a triangle was hit: its number among those of all models
   };
   Picked pick(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,

@@ -99,7 +99,7 @@ dvec3 origin_of(std::span<const Instance> instances) {
   dvec3 high(-low);
   for (const Instance& instance : instances) {
     if (!is_solid(instance.grid)) continue;
-    const Block block = block_of(instance.place * instance.source->cube.to_world, dvec3(instance.grid.box_min),
+    const Block block = block_of(instance.transform * instance.source->cube.to_world, dvec3(instance.grid.box_min),
                                  dvec3(instance.grid.box_max));
     const dvec3 reach = reach_of(block);
     low = glm::min(low, block.middle - reach);
@@ -122,21 +122,21 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
   };
   for (const Instance& instance : instances) {
     const grid::Cube& cube = instance.source->cube;
-    const auto stand = [&](const glm::dmat4& place, CmInstance& record) {
-      const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * place * cube.to_world;
+    const auto stand = [&](const glm::dmat4& transform, CmInstance& record) {
+      const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * transform * cube.to_world;
       record.space = space_of(to_scene, instance.grid.box_min, instance.grid.box_max);
       if (!is_sound(record.space))
         refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
       return block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max));
     };
     CmInstance record{};
-    const Block& block = blocks.emplace_back(stand(instance.place, record));
+    const Block& block = blocks.emplace_back(stand(instance.transform, record));
     record.grid = instance.grid;
     record.medium = instance.medium;
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U) |
                    (instance.ends ? core::CM_INSTANCE_MOVES : 0U);
-    emissive.push_back(emissive_of(instance.emissive, cube.to_world, instance.place));
+    emissive.push_back(emissive_of(instance.emissive, cube.to_world, instance.transform));
     dvec3 low = block.middle - reach_of(block);
     dvec3 high = block.middle + reach_of(block);
     if (instance.ends) {

@@ -274,9 +274,9 @@ void pack_ends(ModelSource& source, const surface::PoseEnds& ends, const Progres
 }
 
 // Returns transforms at both ends for placings that change and exist at both ends; else an empty vector.
-std::vector<PlaceEnds> placing_ends(const std::vector<glm::dmat4>& now, const std::vector<glm::dmat4>& open,
-                                    const std::vector<glm::dmat4>& close) {
-  std::vector<PlaceEnds> ends;
+std::vector<ShutterTransforms> placing_ends(const std::vector<glm::dmat4>& now, const std::vector<glm::dmat4>& open,
+                                            const std::vector<glm::dmat4>& close) {
+  std::vector<ShutterTransforms> ends;
   if (open == close || open.size() != now.size() || close.size() != now.size()) return ends;
   for (std::size_t i = 0; i < now.size(); ++i) ends.push_back({open[i], close[i]});
   return ends;

@@ -9,7 +9,7 @@
 
 #include "base/shared_code.hpp"
 #include "light/emitters.hpp"
-#include "scene/place.hpp"
+#include "scene/instance_transform.hpp"
 #include "scene/raster_source.hpp"
 #include "scene/texture_atlas.hpp"
 #include "surface/bvh.hpp"
@@ -45,9 +45,9 @@ struct ModelMesh {
   std::uint32_t triangles = 0;
   std::uint32_t emitters = 0;
   std::uint32_t emitter_count = 0;
-  double flux = 0.0;                    ///< as in light::EmitterTable, in the mesh's own space
-  std::optional<MeshEnds> ends;         ///< empty: it does not deform
-  std::vector<PlaceEnds> placing_ends;  ///< of each placing; empty: none moves
+  double flux = 0.0;                            ///< as in light::EmitterTable, in the mesh's own space
+  std::optional<MeshEnds> ends;                 ///< empty: it does not deform
+  std::vector<ShutterTransforms> placing_ends;  ///< of each placing; empty: none moves
 };
 
 /// Everything that is rendered of one pose of a scene, in main memory: the tables for paths and for the surface pass.

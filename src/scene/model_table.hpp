@@ -52,7 +52,7 @@ struct ModelTable {
 };
 
 /// Transforms a model's light to world space. Its intensity is unchanged. to_world: from the space of its position.
-surface::PunctualLight placed(surface::PunctualLight light, const glm::dmat4& to_world);
+surface::PunctualLight transformed(surface::PunctualLight light, const glm::dmat4& to_world);
 
 /// World bounds of a model's triangles; `any` is false if it has none.
 struct ModelBounds {

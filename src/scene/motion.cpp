@@ -39,8 +39,8 @@ MotionTable make_motion(const Snapshot& snapshot, const dmat4& ray_to_world, std
   made.maps.push_back(map_of(into(now) * ray_to_world));
   made.maps.push_back(map_of(into_then * ray_to_world));
   for (const Volume& volume : volumes) {
-    const dmat4& place = volume.place.to_world;
-    const dmat4 moved = volume.previous ? volume.previous->to_world * glm::inverse(place) : dmat4(1.0);
+    const dmat4& transform = volume.transform.to_world;
+    const dmat4 moved = volume.previous ? volume.previous->to_world * glm::inverse(transform) : dmat4(1.0);
     made.maps.push_back(map_of(into_then * moved * ray_to_world));
   }
   made.frame.first_model = static_cast<std::uint32_t>(made.maps.size());

@@ -171,7 +171,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
 
 namespace {
 
-void place(volume::VolumeFrame& frame, const glm::dmat4& to_world) {
+void transform(volume::VolumeFrame& frame, const glm::dmat4& to_world) {
   for (volume::ScalarVolume* field : frame.fields()) field->index_to_world = to_world * field->index_to_world;
 }
 
@@ -182,13 +182,13 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const { retu
 VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
                                 const std::function<void(volume::Proxy)>& take_proxy) const {
   const auto take = [&](volume::Proxy made) {
-    place(made.frame, to_world);
+    transform(made.frame, to_world);
     if (made.extent) made.extent->index_to_world = to_world * made.extent->index_to_world;
     take_proxy(std::move(made));
   };
   volume::VolumeFrame frame = take_proxy ? volume::import_frame(path, grids, log, progress, {take, min_proxy_bricks})
                                          : volume::import_frame(path, grids, log, progress);
-  place(frame, to_world);
+  transform(frame, to_world);
   frame.temperature_scale = temperature_scale;
   try {
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);

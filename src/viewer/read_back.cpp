@@ -134,12 +134,12 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   pick.distance = z * glm::length(ray);
   if (picked.triangle) meet(pick, *scene_.models(), *picked.triangle, ray);
   pick.position += shot.scene->origin;
-  if (!picked.place) return pick;
+  if (!picked.volume) return pick;
   // Instances of one volume are consecutive.
   const std::vector<scene::Volume>& volumes = scene_.volumes();
-  pick.volume = volumes.at(*picked.place).id;
+  pick.volume = volumes.at(*picked.volume).id;
   const auto first = std::ranges::find_if(volumes, [&](const scene::Volume& v) { return v.id == pick.volume; });
-  pick.place = *picked.place - static_cast<std::uint32_t>(first - volumes.begin());
+  pick.transform_index = *picked.volume - static_cast<std::uint32_t>(first - volumes.begin());
   return pick;
 }
 
@@ -255,7 +255,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
   MatteObject object;
   for (const scene::Volume& volume : scene_.volumes()) {
     // Instances of one volume are consecutive.
-    object.place = !ids.volumes.empty() && object.id == volume.id ? object.place + 1 : 0;
+    object.transform_index = !ids.volumes.empty() && object.id == volume.id ? object.transform_index + 1 : 0;
     object.id = volume.id;
     ids.volumes.push_back((*volume.medium).holdout ? 0 : id_of(object));
   }

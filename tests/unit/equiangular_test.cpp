@@ -187,7 +187,7 @@ TEST_P(Equiangular, AgreesWithDistanceSamplingAmongSurfaces) {
 
 TEST_P(Equiangular, AgreesWithDistanceSamplingInOverlappingVolumes) {
   const glm::dmat4 aside = glm::translate(glm::dmat4(1.0), dvec3(10.0, 4.0, -6.0));
-  still_->viewer().set_places({{glm::dmat4(1.0)}, {aside}});
+  still_->viewer().set_transforms({{glm::dmat4(1.0)}, {aside}});
   set_medium(0.03);
   set_march(March::tet);
   expect_the_same("two places");

@@ -203,7 +203,7 @@ TEST_P(FarFromOrigin, PicksAndAovsAreInWorldSpace) {
     before.eye += dvec3(0.5, 0.2, 0.0);
     still.viewer().set_previous_camera(std::make_shared<viewer::Camera>(before), 0.04);
     model->edit([&](viewer::ModelSettings& s) { s.previous = moved(dvec3(0.0, 0.4, 0.0)) * s.to_world; });
-    still.viewer().set_previous_places({{moved(dvec3(0.3, 0.0, 0.0))}});
+    still.viewer().set_previous_transforms({{moved(dvec3(0.3, 0.0, 0.0))}});
     test::render(still, image);
     std::vector<float> values;
     for (const auto& [aov, channels] :
@@ -273,12 +273,12 @@ TEST_P(FarFromOrigin, MotionBlurMatchesThatAtTheOrigin) {
   const auto blurred = [&](const dvec3& at) {
     const auto still = show(kind, at);
     model_->edit([](viewer::ModelSettings& s) {
-      s.ends = scene::PlaceEnds{s.to_world, moved(dvec3(0.0, 3.0, 0.0)) * s.to_world};
+      s.ends = scene::ShutterTransforms{s.to_world, moved(dvec3(0.0, 3.0, 0.0)) * s.to_world};
     });
     viewer::CameraPose close = still->viewer().camera()->pose();
     close.eye += dvec3(1.0, 0.0, 0.0);
     still->viewer().camera()->set_shutter(std::nullopt, close);
-    still->viewer().set_places({{dmat4(1.0), scene::PlaceEnds{dmat4(1.0), moved(dvec3(-2.0, 0.0, 0.0))}}});
+    still->viewer().set_transforms({{dmat4(1.0), scene::ShutterTransforms{dmat4(1.0), moved(dvec3(-2.0, 0.0, 0.0))}}});
     test::Image open = image;
     open.shutter_seconds = 0.02;
     return test::render(*still, open);

@@ -213,8 +213,8 @@ TEST_P(Holdout, WorksForOneVolumeAmongOthers) {
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
   samples(8);
   const auto put = [&](double z) {
-    const auto place = at(0.0, 0.0, z);
-    ASSERT_EQ(cumulet_instance_set_to_world(made, place.data()), CUMULET_OK);
+    const auto transform = at(0.0, 0.0, z);
+    ASSERT_EQ(cumulet_instance_set_to_world(made, transform.data()), CUMULET_OK);
   };
   // If opaque, it hides the volume behind it completely. Light from that volume reaches nothing visible.
   set_medium(1e4, true);

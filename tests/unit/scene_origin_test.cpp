@@ -137,7 +137,8 @@ TEST(FarModels, KeepTheirShape) {
     EXPECT_LT(glm::distance(pose.low, near_pose.low + at), precision);
     EXPECT_LT(glm::distance(pose.high, near_pose.high + at), precision);
     EXPECT_LT(glm::distance(dvec3(pose.cameras.at(0).to_world[3]), dvec3(1.0, 2.0, 6.0) + at), precision);
-    const auto light = scene::placed(pose.lights.at(0), surface::from_origin(glm::translate(dmat4(1.0), -at), pose));
+    const auto light =
+        scene::transformed(pose.lights.at(0), surface::from_origin(glm::translate(dmat4(1.0), -at), pose));
     EXPECT_LT(glm::distance(dvec3(light.position), dvec3(1.0, 4.0, 3.0)), precision);
     for (std::size_t v = 0; v < pose.vertices.size(); ++v)
       EXPECT_LT(glm::distance(pose.vertices[v].normal, near_pose.vertices[v].normal), 1e-5F);
