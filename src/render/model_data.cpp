@@ -130,12 +130,12 @@ void ModelData::bind(const gl::Functions& gl) const {
   gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->texture.name());
 }
 
-PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, std::vector<scene::Model> models,
-                                ModelDataPtr data, const PlacedModels* last) {
-  PlacedModels placed;
-  placed.table_ =
+ModelInstances ModelInstances::make(const gl::FunctionsPtr& gl, const gl::Limits& limits,
+                                    std::vector<scene::Model> models, ModelDataPtr data, const ModelInstances* last) {
+  ModelInstances instances;
+  instances.table_ =
       scene::make_model_table(models, [&](const scene::ModelSource& source) { return data->words_of(source); });
-  const scene::ModelTable& table = placed.table_;
+  const scene::ModelTable& table = instances.table_;
   std::vector<core::CmModel> records = table.records;
   records.insert(records.end(), table.ends.begin(), table.ends.end());
   const std::size_t record_bytes = records.size() * sizeof(core::CmModel);
@@ -145,31 +145,31 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
                                             " models are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
                                             std::to_string(limits.storage_block_bytes) + ", holds");
   }
-  placed.records_ = gl::make_buffer(gl, record_bytes, records.data(), 0, "creating the table of models");
-  placed.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the tree of models");
-  placed.tables_.low = glm::prevFloat(glm::vec3(table.low));
-  placed.tables_.high = glm::nextFloat(glm::vec3(table.high));
-  placed.tables_.models = static_cast<std::uint32_t>(table.records.size());
-  placed.tables_.ggx_albedo = data->ggx_albedo();
-  placed.tables_.ggx_albedo_averages = data->ggx_albedo_averages();
-  placed.tables_.sheen_albedo = data->sheen_albedo();
-  placed.tables_.extended_bsdf =
+  instances.records_ = gl::make_buffer(gl, record_bytes, records.data(), 0, "creating the table of models");
+  instances.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the tree of models");
+  instances.tables_.low = glm::prevFloat(glm::vec3(table.low));
+  instances.tables_.high = glm::nextFloat(glm::vec3(table.high));
+  instances.tables_.models = static_cast<std::uint32_t>(table.records.size());
+  instances.tables_.ggx_albedo = data->ggx_albedo();
+  instances.tables_.ggx_albedo_averages = data->ggx_albedo_averages();
+  instances.tables_.sheen_albedo = data->sheen_albedo();
+  instances.tables_.extended_bsdf =
       std::ranges::any_of(models, [](const scene::Model& model) { return model.source->extended_bsdf; }) ? 1U : 0U;
-  placed.bytes_ = record_bytes + node_bytes;
+  instances.bytes_ = record_bytes + node_bytes;
   Numbering numbering;
   for (const scene::ModelPart& part : table.parts)
     numbering.emplace_back(models[part.model].source->scene,
                            models[part.model].source->meshes[part.mesh].first_triangle);
   // Paths inside transmissive objects store the object's material as a word offset in the data.
   const bool lasts = last != nullptr && *last->numbering_ == numbering &&
-                     (last->data_ == data || (placed.tables_.extended_bsdf | last->tables_.extended_bsdf) == 0U);
-  placed.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
-  placed.models_ = std::move(models);
-  placed.data_ = std::move(data);
-  return placed;
+                     (last->data_ == data || (instances.tables_.extended_bsdf | last->tables_.extended_bsdf) == 0U);
+  instances.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
+  instances.models_ = std::move(models);
+  instances.data_ = std::move(data);
+  return instances;
 }
 
-void PlacedModels::bind(const gl::Functions& gl) const {
+void ModelInstances::bind(const gl::Functions& gl) const {
   data_->bind(gl);
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MODELS, records_.name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MODEL_NODES, nodes_.name());

@@ -40,7 +40,7 @@ std::uint32_t seed_of(const PictureParameters& parameters) {
 }
 
 std::shared_ptr<const void> scene_met(const TraceInputs& trace_inputs) {
-  const PlacedModels* met = trace_inputs.met();
+  const ModelInstances* met = trace_inputs.met();
   return met != nullptr ? met->numbering() : nullptr;
 }
 

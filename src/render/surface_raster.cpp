@@ -302,10 +302,10 @@ void SurfaceRaster::show(std::vector<RasterItem> items) {
       own.push_back(surface::from_origin(item.to_world, shown.content->pose()));
     }
     add_places(shown, std::move(own));
-    for (const std::vector<glm::dmat4>& placings : shown.content->pose().placings) {
+    for (const std::vector<glm::dmat4>& transforms : shown.content->pose().prototype_transforms) {
       std::vector<glm::dmat4> all;
       for (const glm::dmat4& to_world : whole) {
-        for (const glm::dmat4& placing : placings) all.push_back(to_world * placing);
+        for (const glm::dmat4& transform : transforms) all.push_back(to_world * transform);
       }
       add_places(shown, std::move(all));
     }

@@ -410,7 +410,7 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const TraceInput
   // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const PlacedModels* met = settings.view == View::shaded && !preview ? trace_inputs.met() : nullptr;
+  const ModelInstances* met = settings.view == View::shaded && !preview ? trace_inputs.met() : nullptr;
   return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().extended_bsdf != 0U ? 2 : 1);
 }
 

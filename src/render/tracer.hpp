@@ -45,7 +45,7 @@ struct TraceInputs {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
   glm::uvec2 size{0U};
-  const PlacedModels* scene = nullptr;
+  const ModelInstances* scene = nullptr;
   bool traced = true;               // paths hit the scene's triangles; else only the surface pass draws them
   SurfaceRaster* raster = nullptr;  // the surface pass, with its view and lighting below
   SurfaceView view;
@@ -59,7 +59,7 @@ struct TraceInputs {
   const scene::MotionTable* motion = nullptr;  // transforms for motion vectors; required for FeatureSet::all
 
   /// Returns the scene whose triangles paths hit; null: none.
-  [[nodiscard]] const PlacedModels* met() const { return traced ? scene : nullptr; }
+  [[nodiscard]] const ModelInstances* met() const { return traced ? scene : nullptr; }
   [[nodiscard]] std::uint32_t analytic_lights_met() const {
     return analytic_lights == nullptr ? 0 : analytic_lights->count();
   }

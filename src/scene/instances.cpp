@@ -69,10 +69,10 @@ bool overlaps_another(const InstanceTable& table, const std::vector<Block>& bloc
 }
 
 // Sets the probability with which next-event estimation samples the emissive cells of each instance.
-void set_emissive(InstanceTable& table, const std::vector<PlacedEmissive>& emissive) {
+void set_emissive(InstanceTable& table, const std::vector<InstanceEmissive>& emissive) {
   double square = 0.0;  // sum of the integrals of L^2 of the instances: length^3 = power^2 / square
   std::vector<double> power;
-  for (const PlacedEmissive& of : emissive) {
+  for (const InstanceEmissive& of : emissive) {
     power.push_back(of.power);
     table.emissive_power += of.power;
     if (of.power > 0.0) square += of.power / of.length * (of.power / of.length) / of.length;
@@ -115,7 +115,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
   const bool moves = std::ranges::any_of(instances, [](const Instance& i) { return i.ends.has_value(); });
   if (moves) table.ends.resize(2 * count);
   std::vector<Block> blocks;
-  std::vector<PlacedEmissive> emissive;
+  std::vector<InstanceEmissive> emissive;
   std::vector<TreeBox> boxes;
   const auto refuse = [&](ErrorCode code, const char* cause) {
     throw Error(code, "instance " + std::to_string(table.records.size()) + ": " + cause);

@@ -93,8 +93,8 @@ ModelBounds bounds_of(const ModelSource& source, const dmat4& to_world) {
   for (const ModelMesh& mesh : source.meshes) {
     const auto [low, high] = box_of(mesh.bvh);
     if (!(low.x <= high.x)) continue;
-    for (const dmat4& placing : mesh.placings) {
-      const Block block = block_of(to_world * placing, low, high);
+    for (const dmat4& transform : mesh.transforms) {
+      const Block block = block_of(to_world * transform, low, high);
       const dvec3 reach = reach_of(block);
       add(block.middle - reach, block.middle + reach);
     }
@@ -114,7 +114,7 @@ namespace {
 CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& at) {
   CmModel record{};
   record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
-                 (model.ends || !mesh.placing_ends.empty() ? core::CM_MODEL_MOVES : 0U) |
+                 (model.ends || !mesh.shutter_transforms.empty() ? core::CM_MODEL_MOVES : 0U) |
                  (mesh.ends ? core::CM_MODEL_DEFORMS : 0U);
   record.nodes = at.first + mesh.nodes;
   record.records = at.first + mesh.records;
@@ -128,12 +128,12 @@ CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& a
   return record;
 }
 
-// Returns the shutter transforms of one placing of a mesh within the model.
-ShutterTransforms ends_of(const Model& model, const ModelMesh& mesh, std::size_t placing) {
+// Returns the shutter transforms of one instance of a mesh within the model.
+ShutterTransforms ends_of(const Model& model, const ModelMesh& mesh, std::size_t instance) {
   const ShutterTransforms of_model = model.ends.value_or(ShutterTransforms{model.to_world, model.to_world});
-  const dmat4& still = mesh.placings[placing];
+  const dmat4& still = mesh.transforms[instance];
   const ShutterTransforms within =
-      mesh.placing_ends.empty() ? ShutterTransforms{still, still} : mesh.placing_ends[placing];
+      mesh.shutter_transforms.empty() ? ShutterTransforms{still, still} : mesh.shutter_transforms[instance];
   const ShutterTransforms ends{of_model.open * within.open, of_model.close * within.close};
   // An animation that rotates too fast to interpolate is not an error: the mesh is then static.
   if (can_stand(ends.open) && can_stand(ends.close) && stays_solid(ends.open, ends.close)) return ends;
@@ -160,7 +160,7 @@ std::pair<dvec3, dvec3> own_box(const ModelMesh& mesh) {
 }
 
 bool moves(const Model& model) {
-  const auto of_itself = [](const ModelMesh& mesh) { return mesh.ends || !mesh.placing_ends.empty(); };
+  const auto of_itself = [](const ModelMesh& mesh) { return mesh.ends || !mesh.shutter_transforms.empty(); };
   return model.ends || std::ranges::any_of(model.source->meshes, of_itself);
 }
 
@@ -207,8 +207,8 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
     for (std::size_t i = 0; i < source.meshes.size(); ++i) {
       const ModelMesh& mesh = source.meshes[i];
       const auto [own_low, own_high] = own_box(mesh);
-      for (std::size_t k = 0; k < mesh.placings.size(); ++k) {
-        const dmat4 to_world = model.to_world * mesh.placings[k];
+      for (std::size_t k = 0; k < mesh.transforms.size(); ++k) {
+        const dmat4 to_world = model.to_world * mesh.transforms[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
         CmModel record = record_of(model, mesh, at);
         set_transform(record, to_world);

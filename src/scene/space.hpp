@@ -25,11 +25,11 @@ double max_extinction(double extent);
 bool stays_solid(const glm::dmat4& open, const glm::dmat4& close);
 
 /// The emissive-cell table of one volume instance: its emission, and the sampling parameters for shaders.
-struct PlacedEmissive {
+struct InstanceEmissive {
   double power = 0.0;  ///< see EmissiveSum for both
   double length = 0.0;
   core::CmEmissive looks{};
 };
-PlacedEmissive emissive_of(const EmissiveSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& transform);
+InstanceEmissive emissive_of(const EmissiveSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& transform);
 
 }  // namespace cumulet::scene

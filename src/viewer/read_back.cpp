@@ -81,7 +81,7 @@ void put_before(const render::Display& display, const render::Picture& picture, 
 }
 
 // Fills in the model that the ray hit. pick.position is relative to the snapshot's origin.
-void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle, const dvec3& ray) {
+void meet(Pick& pick, const render::ModelInstances& models, std::uint32_t triangle, const dvec3& ray) {
   const scene::ModelTable& table = models.table();
   const std::size_t record = table.record_of(triangle);
   const scene::Model& model = models.models().at(table.parts.at(record).model);

@@ -1592,10 +1592,10 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   }
   for (const scene::Model& model : models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
-      for (const glm::dmat4& placing : mesh.placings) {
+      for (const glm::dmat4& transform : mesh.transforms) {
         // For many instances the boxes are sufficient.
         vertices += mesh.triangle_count;
-        add_mesh(*model.source, mesh, model.to_world * placing, vertices > max_vertices, add);
+        add_mesh(*model.source, mesh, model.to_world * transform, vertices > max_vertices, add);
       }
     }
   }

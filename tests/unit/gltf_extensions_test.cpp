@@ -750,7 +750,7 @@ std::array<glm::vec3, 3> placed_corners(const Scene& scene, const Pose& pose, st
   std::array<glm::vec3, 3> corners{};
   for (std::size_t i = 0; i < 3; ++i) {
     const glm::dvec4 own(pose.vertices.at(scene.indices.at(i)).position, 1.0);
-    corners[i] = glm::vec3(pose.placings.at(0).at(instance) * own);
+    corners[i] = glm::vec3(pose.prototype_transforms.at(0).at(instance) * own);
   }
   return corners;
 }
@@ -779,7 +779,7 @@ TEST(GltfInstances, TransformsCombineAttributesAndNode) {
   test::near(turned[1], {120, 4, 0}, 1e-3F);  // x, doubled twice, becomes y
   test::near(turned[2], {114, 0, 0}, 1e-3F);  // y becomes -x
   test::near(placed_corners(*scene, pose, 2)[1], {98, 0, 10});
-  EXPECT_LT(glm::determinant(glm::dmat3(pose.placings[0][2])), 0.0);
+  EXPECT_LT(glm::determinant(glm::dmat3(pose.prototype_transforms[0][2])), 0.0);
   EXPECT_EQ(pose.low.x, 98.0);
   test::near(glm::vec3(pose.high), {120, 4, 10}, 1e-3F);
 }
@@ -831,7 +831,7 @@ TEST(GltfInstances, ZeroScaleInstancesAreNotDrawn) {
   const ScenePtr scene = imported(instanced_model([](GltfModel& m) {
     return json{{"SCALE", m.vec3({1, 1, 1, 1, 0, 1, 0, 0, 0})}};
   }));
-  EXPECT_EQ(scene->pose(0.0).placings.at(0).size(), 1U);
+  EXPECT_EQ(scene->pose(0.0).prototype_transforms.at(0).size(), 1U);
 }
 
 }  // namespace

@@ -163,7 +163,7 @@ TEST(TransformedEmission, PowerScalesWithVolume) {
   table.cells.resize(1);
   table.power = 3.0;
   table.length = 2.0;
-  const scene::PlacedEmissive twice = scene::emissive_of(table, dmat4(1.0), glm::scale(dmat4(1.0), dvec3(2.0)));
+  const scene::InstanceEmissive twice = scene::emissive_of(table, dmat4(1.0), glm::scale(dmat4(1.0), dvec3(2.0)));
   EXPECT_DOUBLE_EQ(twice.power, 24.0);
   EXPECT_DOUBLE_EQ(twice.length, 4.0);
   EXPECT_FLOAT_EQ(twice.looks.density, 1.0F / 24.0F);

@@ -338,7 +338,7 @@ TEST_P(MotionBlur, VertexAndTransformMotionCancel) {
   squares->prototypes.push_back({1, 1, 1});
   squares->move = [](surface::Pose& pose, double t) {
     for (std::size_t i = 0; i < 8; ++i) pose.vertices[i].position.x += static_cast<float>((i < 4 ? 20.0 : 50.0) * t);
-    pose.placings = {{moved(-30.0 * t, 0, 0)}};
+    pose.prototype_transforms = {{moved(-30.0 * t, 0, 0)}};
   };
   viewer::ModelSettings settings = posed_at(squares, 0.5);
   settings.ends = scene::ShutterTransforms{dmat4(1.0), moved(-20, 0, 0)};
@@ -400,7 +400,8 @@ TEST_P(MotionBlur, DeformingModelIsTheMeanOfStills) {
       vertex.position.y *= 1.0F - 0.6F * s;
       vertex.normal = glm::normalize(glm::mix(vertex.normal, glm::normalize(narrow), s));
     }
-    pose.placings = {{between(moved(4, 4, 16), moved(10, 8, 18), t), between(moved(16, 6, 8), moved(13, 3, 8), t)}};
+    pose.prototype_transforms = {
+        {between(moved(4, 4, 16), moved(10, 8, 18), t), between(moved(16, 6, 8), moved(13, 3, 8), t)}};
   };
   only_absorb(0.02);
   show(cloud());

@@ -85,10 +85,10 @@ std::vector<dvec3> corners(const ScenePtr& scene, const Pose& pose, const dmat4&
   const scene::ModelSourcePtr source = scene::make_model_source(scene, pose, nullptr);
   std::vector<dvec3> all;
   for (const scene::ModelMesh& mesh : source->meshes) {
-    for (const dmat4& placing : mesh.placings) {
+    for (const dmat4& transform : mesh.transforms) {
       for (std::size_t i = 3 * mesh.first_triangle; i < 3 * (mesh.first_triangle + std::size_t{mesh.triangle_count});
            ++i)
-        all.emplace_back(to_world * placing * glm::dvec4(source->pose.vertices[scene->indices[i]].position, 1.0));
+        all.emplace_back(to_world * transform * glm::dvec4(source->pose.vertices[scene->indices[i]].position, 1.0));
     }
   }
   return all;
