@@ -374,7 +374,7 @@ void Panel::cameras(Model& model) {
   ImGui::EndDisabled();
   bool keep = ui_.text("Camera name", "What the present view is called once it is kept.", "a name", camera_name_);
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
-  const bool can_keep = !camera_name_.empty() && !is_unplaced(model.scene.camera);
+  const bool can_keep = !camera_name_.empty() && !needs_fit(model.scene.camera);
   ImGui::BeginDisabled(!can_keep);
   keep |= ui_.button("Keep camera", "Makes the present view one of the scene's cameras; one of that name becomes it.",
                      {width, 0.0f});

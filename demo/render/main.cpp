@@ -40,9 +40,9 @@
 #include "models.hpp"
 #include "object_name.hpp"
 #include "options.hpp"
-#include "places.hpp"
 #include "progress.hpp"
 #include "settled.hpp"
+#include "transforms.hpp"
 
 namespace {
 
@@ -718,7 +718,7 @@ class Studio {
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_sun_sky(viewer_.get(), &scene.light));
     check(viewer_, cumulet_set_lights(viewer_.get(), scene.analytic_lights.data(), scene.analytic_lights.size()));
-    check(viewer_, set_places(viewer_.get(), scene));
+    check(viewer_, set_transforms(viewer_.get(), scene));
     if (!scene.environment.empty()) {
       check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
       check(viewer_, cumulet_set_environment_settings(viewer_.get(), &scene.environment_settings));
@@ -785,9 +785,9 @@ bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, cam
 
 /// Returns true if none of the settings shared by a sequence's frames has to be derived from a volume.
 bool is_settled(const SceneOptions& scene) {
-  const bool placed = scene.surface_camera >= 0 || !fits(scene.camera);
+  const bool has_camera = scene.surface_camera >= 0 || !fits(scene.camera);
   const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
-  return placed && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
+  return has_camera && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
 }
 
 /// Returns the height of a ground plane below all objects. With models it is slightly lower, because many models
