@@ -237,7 +237,7 @@ CM_BLOCK(CmDispatch) {
   uint picks;    // 1: inspect.comp inspects only the tile's one pixel and writes the result to (0, 0)
   CM_ALIGN(8) uvec2 rows;  // rows of the tile, for kernels that run by rows: first, and one past the last
   uint lanes;    // number of lanes for paths
-  uint places;   // number of their pixel slots: pixels of the tile's listed squares, glsl/path_places.glsl
+  uint slots;   // number of their pixel slots: pixels of the tile's listed squares, glsl/pixel_slots.glsl
   uint rays_before;  // feature rays traced by earlier dispatches: glsl/aovs.comp, cryptomatte.comp
   uint rays_least;   // minimum number of feature rays, even if they all agree
   CM_EQUALITY(CmDispatch)

@@ -39,15 +39,15 @@ uint cm_queue_list(uint queue, uint round_number) {
 
 void cm_enqueue(uint queue, uint round_number, uint lane) {
   uint head = round_number * CM_QUEUES + queue;
-  uint place = atomicAdd(cm_heads[head].count, 1u);
-  if (place % CM_QUEUE_GROUP == 0u) atomicAdd(cm_heads[head].groups, 1u);
-  cm_waiting[cm_queue_list(queue, round_number) + place] = lane;
+  uint index = atomicAdd(cm_heads[head].count, 1u);
+  if (index % CM_QUEUE_GROUP == 0u) atomicAdd(cm_heads[head].groups, 1u);
+  cm_waiting[cm_queue_list(queue, round_number) + index] = lane;
 }
 
 // Index of this invocation in its queue, length of the queue, and the invocation's lane.
-uint cm_queue_place() { return gl_WorkGroupID.x * CM_QUEUE_GROUP + gl_LocalInvocationIndex; }
+uint cm_queue_index() { return gl_WorkGroupID.x * CM_QUEUE_GROUP + gl_LocalInvocationIndex; }
 uint cm_queue_count(uint queue) { return cm_heads[cm_round * CM_QUEUES + queue].count; }
-uint cm_queue_lane(uint queue) { return cm_waiting[cm_queue_list(queue, cm_round) + cm_queue_place()]; }
+uint cm_queue_lane(uint queue) { return cm_waiting[cm_queue_list(queue, cm_round) + cm_queue_index()]; }
 
 // Appends the path to the queue of its next stage: in this round if that kernel is still to run, else in the next.
 void cm_send_on(CmPath p, uint lane) {

@@ -47,7 +47,7 @@
 //   bounces         number of events
 //   steps           number of cells traversed
 //   number          number of the sample in its pixel
-//   place           slot of its pixel (glsl/path_places.glsl)
+//   slot            slot of its pixel (glsl/pixel_slots.glsl)
 //   ahead           CM_RAY_EQUIANGULAR only: distance along w from o to the point where the path continues
 // CM_PATH_SCATTERED, state that passes to the next ray:
 //   w               world direction of the camera or scattered ray; kept while a shadow ray is traced
@@ -85,7 +85,7 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(place)             \
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(slot)             \
   CM_PATH_AHEAD(FLOAT)
 #if CM_EQUIANGULAR
 #define CM_PATH_AHEAD(FLOAT) FLOAT(ahead)

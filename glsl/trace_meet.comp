@@ -23,7 +23,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "groups.glsl"
 
 void main() {
-  if (cm_queue_place() >= cm_queue_count(CM_QUEUE_MEET)) return;
+  if (cm_queue_index() >= cm_queue_count(CM_QUEUE_MEET)) return;
   uint lane = cm_queue_lane(CM_QUEUE_MEET);
   CmPath p = cm_load_path(lane);
   cm_load_within(p, lane);

@@ -842,7 +842,7 @@ void Tracer::dispatch(Picture& picture, const TraceInputs& trace_inputs, const s
   parameters.dispatch.rounds = what.rounds;
   parameters.dispatch.samples = picture.pass_target_;
   parameters.dispatch.lanes = picture.lanes_;
-  parameters.dispatch.places = static_cast<std::uint32_t>(CM_SQUARE_PIXELS * picture.squares_.size());
+  parameters.dispatch.slots = static_cast<std::uint32_t>(CM_SQUARE_PIXELS * picture.squares_.size());
   // Blocks are permuted with a large stride. If a driver gives each core a run of work groups, each core gets a
   // fraction of the expensive ones.
   const std::size_t count = what.blocks.size();
@@ -1088,7 +1088,7 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   make_shared_objects();
   dispatches_in_flight_.order();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
-  if (!pick_place_) pick_place_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the texture of what is picked");
+  if (!pick_object_) pick_object_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the texture of what is picked");
   core::CmParameters p = assemble(parameters, trace_inputs);
   p.dispatch.tile_corner = pixel;
   p.dispatch.tile_size = glm::uvec2(1U);
@@ -1098,7 +1098,7 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   inspect_program(data, trace_inputs, "inspect.comp").object->use(*gl_);
   bind(data, trace_inputs);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, pick_place_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, pick_object_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
   gl_->DispatchCompute(1, 1, 1);
@@ -1106,7 +1106,7 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   Picked picked;
   glm::uvec2 met(0U);
   gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(picked.z), &picked.z);
-  gl_->GetTextureImage(pick_place_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
+  gl_->GetTextureImage(pick_object_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
   gl::check(*gl_, "picking");
   if (met.x == 1U) picked.volume = met.y;
   if (met.x == 2U) picked.triangle = met.y;

@@ -456,10 +456,10 @@ class Tracer {
   PathKernels kernels_;
   std::weak_ptr<const Blocks> paths_of_;  // the tile whose paths the kernels hold
   gl::Object uniforms_;
-  gl::Object pick_;        // depth of a pick...
-  gl::Object pick_place_;  // ...and the object that it hit
-  gl::Object motion_;      // TraceInputs::motion, for the feature pass in progress
-  gl::Object errors_;      // errors of a tile
+  gl::Object pick_;         // depth of a pick...
+  gl::Object pick_object_;  // ...and the object that it hit
+  gl::Object motion_;       // TraceInputs::motion, for the feature pass in progress
+  gl::Object errors_;       // errors of a tile
   InFlightDispatches dispatches_in_flight_;
   InFlightDispatches rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;

@@ -130,7 +130,7 @@ const std::array fields{
     CM_FIELD(dispatch, picks),
     CM_FIELD(dispatch, rows),
     CM_FIELD(dispatch, lanes),
-    CM_FIELD(dispatch, places),
+    CM_FIELD(dispatch, slots),
     CM_FIELD(dispatch, rays_before),
     CM_FIELD(dispatch, rays_least),
     CM_FIELD(shutter, open.eye),
