@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 #include "cell_split.glsl"
 #include "lattice.glsl"
 #include "grid_state.glsl"
-#include "grid_places.glsl"
+#include "lattice_lookup.glsl"
 #include "grid_leaves.glsl"
 
 // First child of the cell at this index in the list of splitting cells.
@@ -99,7 +99,7 @@ void main() {
     if (whole != CM_NONE) whole = cm_behind_whole(whole, i);
     cm_links[children + side] = cm_with_link(own, faces.x, whole);
     vec3 child_v0 = side == 0u ? v0 : cm_cell_vertex(v0, shape, 1u);
-    cm_cells[children + side].where = cm_record_place(child_v0, cm_child_shape(shape, side), cm_cube_is_wide());
+    cm_cells[children + side].where = cm_pack_v0_shape(child_v0, cm_child_shape(shape, side), cm_cube_is_wide());
   }
 }
 

@@ -158,14 +158,14 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
     entry = cm_emissive_word(2u * i);
   }
   uvec4 record = cm_emissive_word(2u * i + 1u);
-  uvec4 place = uvec4(entry.z, entry.w, 0u, 0u);
+  uvec4 v0_shape = uvec4(entry.z, entry.w, 0u, 0u);
   bool wide = cm_is_wide(CM_GRID.root_exponent);
-  uint shape = cm_record_shape(place, wide);
+  uint shape = cm_record_shape(v0_shape, wide);
   uint cell_class = cm_shape_class(shape);
   vec3 point = cm_cell_point(cell_class, vec3(u.x, u.y, cm_random(p.random, p.stream)));
   // Measured from p.o, not from `here`, which is slightly above a surface: rays through the medium start at p.o as
   // well.
-  vec3 to_v0 = cm_record_v0(place, wide) - cm_in_volume_point(p.o);
+  vec3 to_v0 = cm_record_v0(v0_shape, wide) - cm_in_volume_point(p.o);
   vec3 way = cm_out_of_volume(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
   float length_2 = max(dot(way, way), 1e-24f);
   vec3 mean = cm_emission_mean(record);

@@ -315,9 +315,9 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
   stack.push_back({0, 0, static_cast<std::uint32_t>(bricks.size()), std::move(all_tiles)});
 
   std::uint64_t rounds = 0;
-  std::uint64_t placed = 0;
+  std::uint64_t done = 0;
   while (!stack.empty()) {
-    if (++rounds % 256 == 0) part.add(std::exchange(placed, 0));
+    if (++rounds % 256 == 0) part.add(std::exchange(done, 0));
     Work work = std::move(stack.back());
     stack.pop_back();
     const ivec3 corner = nodes_[work.node].corner;
@@ -335,7 +335,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
     by_size_[static_cast<std::size_t>(log2_size)].push_back(work.node);
     if (log2_size == 3 && !no_bricks) {
       node.values = static_cast<std::int32_t>(bricks[work.first]);
-      ++placed;
+      ++done;
       continue;
     }
     if (log2_size == 3) {
