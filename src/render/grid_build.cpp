@@ -147,7 +147,7 @@ void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const v
 }
 
 void LatticeUpload::plan_bytes(const gl::Object& buffer, std::uint64_t bytes, const void* from) {
-  upload_.add_bytes([&buffer] { return Upload::Place{buffer.name(), 0}; }, from, bytes);
+  upload_.add_bytes([&buffer] { return Upload::Location{buffer.name(), 0}; }, from, bytes);
 }
 
 void LatticeUpload::plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes,
@@ -531,7 +531,7 @@ void GridBuild::plan_clear(Upload& upload, const gl::Object& buffer, std::uint64
 void GridBuild::plan_decision() {
   const grid::Lattice& l = data_->lattice();
   decision_.add([this] { level_bytes_ = make_storage(levels_.size(), "creating the levels that a view allows"); });
-  decision_.add_bytes([this] { return Upload::Place{level_bytes_.name(), 0}; }, levels_.data(), levels_.size());
+  decision_.add_bytes([this] { return Upload::Location{level_bytes_.name(), 0}; }, levels_.data(), levels_.size());
   plan_clear(decision_, data_->priorities_, std::uint64_t{l.blocks.size()} * CM_BLOCK_POINTS * 4);
   plan_clear(decision_, data_->bins_, std::uint64_t{CM_PRIORITIES} * 4);
   decision_.add([this] {

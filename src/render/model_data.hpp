@@ -41,7 +41,7 @@ class ModelData {
   };
   struct Atlas {
     gl::Object texture;
-    scene::TextureAtlas places;
+    scene::TextureAtlas layout;
     std::vector<scene::TextureImagesPtr> images;
   };
   [[nodiscard]] std::uint32_t first_word() const {

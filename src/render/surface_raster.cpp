@@ -168,7 +168,7 @@ class RasterContent::Planner {
     gl::Object* const to = &buffer;
     upload_.add(
         [gl = gl_, to, bytes, what] { *to = gl::make_buffer(gl, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what); });
-    upload_.add_bytes([to] { return Upload::Place{to->name(), 0}; }, values.data(), bytes);
+    upload_.add_bytes([to] { return Upload::Location{to->name(), 0}; }, values.data(), bytes);
   }
 
  private:

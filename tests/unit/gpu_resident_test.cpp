@@ -166,12 +166,13 @@ class GpuResidentStates : public test::GlTest {
   volume::ScalarVolume copied(const volume::ScalarVolume& in_gl) {
     const volume::DeviceBricks& bricks = *in_gl.on_device;
     std::vector<float> values;
-    for (const volume::DeviceBricks::Place& place : bricks.places) {
+    for (const volume::DeviceBricks::Location& location : bricks.locations) {
       const std::size_t first = values.size();
       values.resize(first + volume::brick_voxels);
-      const volume::DeviceMemory& memory = *bricks.memories[place.memory];
+      const volume::DeviceMemory& memory = *bricks.memories[location.memory];
       EXPECT_FALSE(memory.halves);
-      gl_->GetNamedBufferSubData(memories_->find(memory)->name(), GLintptr{place.brick} * 2048, 2048, &values[first]);
+      gl_->GetNamedBufferSubData(memories_->find(memory)->name(), GLintptr{location.brick} * 2048, 2048,
+                                 &values[first]);
     }
     volume::ScalarVolume volume = in_gl;
     volume.on_device = nullptr;

@@ -52,7 +52,7 @@ struct CpuSurfaceData {
     shown_atlas = scene::pack_atlas(std::vector<scene::TextureImagesPtr>{shown_source->images});
     const auto textures = static_cast<uint>(shown_words.size());
     for (const surface::Texture& texture : shown_source->scene->textures)
-      shown_words.push_back(scene::texture_word(texture, shown_atlas.places[0][texture.image]));
+      shown_words.push_back(scene::texture_word(texture, shown_atlas.regions[0][texture.image]));
     const scene::ModelTable table = scene::make_model_table(models, [&](const scene::ModelSource&) {
       return scene::ModelWords{0, textures};
     });
@@ -80,13 +80,13 @@ struct CpuSurfaceData {
     return analytic_light;
   }
   vec4 cm_atlas_value(ivec3 at) const {
-    for (std::size_t i = 0; i < shown_atlas.places[0].size(); ++i) {
-      const scene::TextureAtlas::Place& place = shown_atlas.places[0][i];
+    for (std::size_t i = 0; i < shown_atlas.regions[0].size(); ++i) {
+      const scene::TextureAtlas::Region& region = shown_atlas.regions[0][i];
       const uvec2 texel =
-          uvec2(ivec2(at)) - place.corner;  // texels to the left or above wrap to values beyond any size
-      if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
+          uvec2(ivec2(at)) - region.corner;  // texels to the left or above wrap to values beyond any size
+      if (uint(at.z) != region.layer || texel.x >= region.size.x || texel.y >= region.size.y) continue;
       const std::uint8_t* const value =
-          &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
+          &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * region.size.x + texel.x));
       return vec4(value[0], value[1], value[2], value[3]) / 255.0F;
     }
     throw std::out_of_range("no image there");
