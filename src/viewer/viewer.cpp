@@ -1362,7 +1362,7 @@ void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
 
 std::optional<light::Day> Viewer::day() const {
   if (!light_.sky) return std::nullopt;
-  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.place != GroundPlace::none};
+  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.mode != GroundMode::none};
 }
 
 void Viewer::surround() {
@@ -1538,10 +1538,10 @@ bool Viewer::shows_triangles() const {
 
 std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
   // A ground plane at a given height is also shown without other objects: a sequence's frame may be empty.
-  if (ground_.place == GroundPlace::none || (ground_.place == GroundPlace::below && !all)) return std::nullopt;
+  if (ground_.mode == GroundMode::none || (ground_.mode == GroundMode::below && !all)) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
   // With models it is slightly below the bounds, because many models include a floor.
-  if (ground_.place == GroundPlace::below)
+  if (ground_.mode == GroundMode::below)
     ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
   // Then the visible edge of the plane is at most 1e-4 radians below the true horizon.
   const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;

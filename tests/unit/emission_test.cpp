@@ -719,7 +719,7 @@ TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
         .floor = true,
         .among = viewer::SurfaceLight::shadows}}) {
     SCOPED_TRACE(of.name);
-    viewer->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -6.0});
+    viewer->viewer().set_ground({of.ground ? viewer::GroundMode::at_height : viewer::GroundMode::none, -6.0});
     if (of.ground) viewer->set_camera(test::camera_at({23.5, 130.0, 165.0}, {23.5, 23.5, 23.5}, 16.0));
     if (of.floor) viewer->set_camera(test::camera_at({23.5, 23.5, 200.0}, {23.5, 23.5, 0.0}, 10.0));
     analytic_light.power = vec3(of.analytic_light);

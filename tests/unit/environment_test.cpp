@@ -583,7 +583,7 @@ TEST_P(EnvironmentLighting, NextEventEstimationAgreesWithScatteredRaysOnly) {
     grid.build.march = scene::March::dense;
     still->set_grid(grid);
     still->set_medium({of.ground ? 0.05 : 0.15, vec3(0.9F), {of.g}, of.bounces});
-    still->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -2.0});
+    still->viewer().set_ground({of.ground ? viewer::GroundMode::at_height : viewer::GroundMode::none, -2.0});
     // All pixels see one point: the box's center, or the ground in front of it.
     still->set_camera(of.ground ? test::camera_at({9.5, 30.0, 60.0}, {9.5, -2.0, 24.0}, 0.01)
                                 : test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 0.01));

@@ -163,9 +163,9 @@ TEST_P(Equiangular, RespectsTheBounceLimit) {
 TEST_P(Equiangular, AgreesWithDistanceSamplingUnderSunSkyAndGround) {
   still_->set_light({30.0F, 40.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.4F)});
   expect_the_same("sun and sky");
-  still_->viewer().set_ground({viewer::GroundPlace::at_height, -2.0, vec3(0.6F)});
+  still_->viewer().set_ground({viewer::GroundMode::at_height, -2.0, vec3(0.6F)});
   expect_the_same("ground below");
-  still_->viewer().set_ground({viewer::GroundPlace::at_height, 8.0, vec3(0.6F)});
+  still_->viewer().set_ground({viewer::GroundMode::at_height, 8.0, vec3(0.6F)});
   expect_the_same("ground within");
 }
 

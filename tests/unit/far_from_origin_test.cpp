@@ -66,7 +66,7 @@ class FarFromOrigin : public test::ViewerTest {
     analytic_light.position = at + dvec3(6.0, 14.0, 12.0);
     analytic_light.power = vec3(2000.0F);
     viewer.set_lights({analytic_light});
-    viewer.set_ground({.place = viewer::GroundPlace::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
+    viewer.set_ground({.mode = viewer::GroundMode::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
     const dmat4 turned = glm::rotate(moved(at + dvec3(12.0, 1.0, 2.0)), 0.7, dvec3(0.3, 0.9, 0.1));
     if (kind.volume) {
       volume::ScalarVolume volume = test::noise_volume({12, 10, 8}, ivec3(0), 2);
@@ -181,7 +181,7 @@ TEST_P(FarFromOrigin, SceneMayMoveAwayAndReturn) {
     pose.eye += at;
     pose.target += at;
     still->set_camera(pose);
-    still->viewer().set_ground({.place = viewer::GroundPlace::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
+    still->viewer().set_ground({.mode = viewer::GroundMode::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
     light::AnalyticLight analytic_light;
     analytic_light.position = at + dvec3(6.0, 14.0, 12.0);
     analytic_light.power = vec3(2000.0F);
