@@ -310,8 +310,8 @@ void main() {
     scattered_z += scatters.y;
     if (before.x > 0.0) {
       vec2 moments = before.yz / before.x;
-      float place = first_z + moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
-      sun_from[1] = cm_from_cube_point(o + min(place * t_per_z, solid_t) * d);
+      float sample_z = first_z + moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
+      sun_from[1] = cm_from_cube_point(o + min(sample_z * t_per_z, solid_t) * d);
     }
     vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
 #if CM_SURFACES

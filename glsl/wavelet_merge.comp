@@ -118,5 +118,5 @@ void main() {
   imageStore(cm_spread_out, texel, spread);
 #endif
   imageStore(cm_light_out, texel, cm_packed_light(CmLit(front, spread.y, min(spread.z, cm_most))));
-  imageStore(cm_guides_out, texel, cm_packed_place(cm_place_at(texel)));
+  imageStore(cm_guides_out, texel, cm_packed_geometry(cm_geometry_at(texel)));
 }

@@ -124,11 +124,11 @@ void App::frame() {
     host.converged = settled() && (model_.status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
     host.viewport = viewport_;
     host.find = [this](const std::string& label) {
-      auto place = panel_.ui().find(label);
+      auto control = panel_.ui().find(label);
       const auto seen = sight();
-      if (!place && seen) place = Handles::find(label, model_, *seen, ui_scale_);
-      if (!place) panel_.ui().bring_into_view(label);
-      return place;
+      if (!control && seen) control = Handles::find(label, model_, *seen, ui_scale_);
+      if (!control) panel_.ui().bring_into_view(label);
+      return control;
     };
     order_ = player_->next(host, window_->input());
   }

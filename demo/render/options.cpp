@@ -611,9 +611,10 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
     try {
       std::array<std::string, 3> of_kind;
       for (const std::string& file : files) {
-        std::string& place = of_kind[static_cast<std::size_t>(kind_of(file))];
-        if (!place.empty()) throw UsageError(in_quotes(file) + " is given as well as " + in_quotes(place));
-        place = file;
+        std::string& file_of_kind = of_kind[static_cast<std::size_t>(kind_of(file))];
+        if (!file_of_kind.empty())
+          throw UsageError(in_quotes(file) + " is given as well as " + in_quotes(file_of_kind));
+        file_of_kind = file;
       }
       const auto& [volume, surfaces, scene_file] = of_kind;
       lit = !scene_file.empty();

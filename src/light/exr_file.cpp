@@ -287,8 +287,8 @@ class ExrPicture {
 };
 
 /// Returns the display window of an image that has pixels in its data window; the rest is black.
-EnvironmentPixels placed(EnvironmentPixels from, const Window& data, const Window& display, const std::string& path,
-                         Progress* progress) {
+EnvironmentPixels in_display_window(EnvironmentPixels from, const Window& data, const Window& display,
+                                    const std::string& path, Progress* progress) {
   if (data == display) return from;
   const std::int64_t left = std::max(data.left, display.left);
   const std::int64_t right = std::min(data.left + data.width, display.left + display.width);
@@ -355,8 +355,8 @@ EnvironmentPixels read_exr(std::vector<std::uint8_t> bytes, const std::string& p
       part.check();
       file->combine(y);
     }
-    EnvironmentPixels pixels =
-        placed(to_rec709(file->take(), description, progress), description.data, description.display, path, progress);
+    EnvironmentPixels pixels = in_display_window(to_rec709(file->take(), description, progress), description.data,
+                                                 description.display, path, progress);
     if (!description.cube) return pixels;
     EnvironmentPixels flat = resample({pixels.width, std::move(pixels.values)}, progress);
     flat.remarks = std::move(pixels.remarks);

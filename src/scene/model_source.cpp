@@ -126,7 +126,7 @@ std::uint32_t pack_vertices(std::vector<uvec4>& words, const surface::Scene& sce
       const surface::PosedVertex& v = vertices[i];
       const surface::VertexAttributes& a = scene.attributes[i];
       uvec4* to = &words[first + core::CM_VERTEX_WORDS * i];
-      to[core::CM_VERTEX_PLACE] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
+      to[core::CM_VERTEX_POSITION] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
       to[core::CM_VERTEX_UV] = bits(vec4(a.uv[0], a.uv[1]));
       to[core::CM_VERTEX_REST] =
           uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),

@@ -102,9 +102,9 @@ std::vector<std::uint32_t> DracoMesh::indices() const {
 void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
                      float* to, std::size_t step, const std::string& what) const {
   draco::Mesh& mesh = *state_->mesh;
-  const int place = mesh.GetAttributeIdByUniqueId(id);
-  if (place < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
-  draco::PointAttribute* attribute = mesh.attribute(place);
+  const int attribute_id = mesh.GetAttributeIdByUniqueId(id);
+  if (attribute_id < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
+  draco::PointAttribute* attribute = mesh.attribute(attribute_id);
   if (!attribute->is_mapping_identity() && attribute->indices_map_size() < mesh.num_points()) {
     malformed(what + " has fewer elements than vertices");
   }

@@ -439,9 +439,9 @@ cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_d
 
 cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points, uint64_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    PlacedRamp read = read_ramp(ramp, points, count);
+    ParsedRamp read = read_ramp(ramp, points, count);
     core::Ramps ramps = v.ramps();
-    ramps.*read.place = std::move(read.ramp);
+    ramps.*read.target = std::move(read.ramp);
     v.set_ramps(ramps);
   });
 }

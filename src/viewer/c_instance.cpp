@@ -73,7 +73,7 @@ cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ram
                                          uint64_t count) {
   return on(instance, "instance", [&](Instance& i) {
     auto read = read_ramp(ramp, points, count);
-    i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.place, read.ramp); });
+    i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.target, read.ramp); });
   });
 }
 
