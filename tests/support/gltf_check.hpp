@@ -106,8 +106,8 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
       const surface::PosedVertex& v = pose.vertices[scene.indices[i]];
       if (!finite(v.position)) return "a position is not finite";
       for (int c = 0; c < 3 && !surface::is_hidden(pose, d) && d < scene.first_prototype_draw(); ++c) {
-        const double place = pose.origin[c] + double{v.position[c]};
-        if (place < pose.low[c] || place > pose.high[c]) return "a position is out of bounds";
+        const double coordinate = pose.origin[c] + double{v.position[c]};
+        if (coordinate < pose.low[c] || coordinate > pose.high[c]) return "a position is out of bounds";
       }
       if (!unit(v.normal)) return "a normal is not of unit length";
       const glm::vec3 tangent(v.tangent);

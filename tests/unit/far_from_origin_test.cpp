@@ -130,7 +130,7 @@ TEST_P(FarFromOrigin, ImagesMatchThoseAtTheOrigin) {
                          Kind{.name = "both", .volume = true, .model = true},
                          Kind{.name = "instances and all", .volume = true, .own_surfaces = true, .instance = true},
                          Kind{.name = "rasterised", .volume = true, .model = true, .rasterised = true}};
-  const std::array places{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.3), dvec3(1e8)};
+  const std::array positions{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.3), dvec3(1e8)};
   std::size_t turn = 0;
   for (const Kind& kind : kinds) {
     const auto at_origin = show(kind, dvec3(0.0));
@@ -138,7 +138,7 @@ TEST_P(FarFromOrigin, ImagesMatchThoseAtTheOrigin) {
     EXPECT_GT(near.mean().x, 0.05) << kind.name;
     // Each kind is tested at two positions; together the kinds cover all positions.
     for (int i = 0; i < 2; ++i) {
-      const dvec3 at = places[turn++ % places.size()];
+      const dvec3 at = positions[turn++ % positions.size()];
       const auto far = show(kind, at);
       expect_alike(test::render(*far, image), near, kind.name + (" at " + std::to_string(at.x)));
       EXPECT_EQ(far->viewer().stats().samples_not_finite, 0U);

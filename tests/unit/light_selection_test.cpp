@@ -514,9 +514,9 @@ TEST_P(AddedLightTypeShader, CompilesInTheDriver) {
       "CM_MARCH 1", "CM_LINEAR 0", "CM_PAGES 1",
       "CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, 0.5, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)"};
   std::string text = shader->with(defines);
-  const std::size_t place = text.find("// ---- All kinds");
-  ASSERT_NE(place, std::string::npos);
-  text.insert(place, R"(
+  const std::size_t offset = text.find("// ---- All kinds");
+  ASSERT_NE(offset, std::string::npos);
+  text.insert(offset, R"(
 const vec3 cm_disc_to = vec3(0.0, 1.0, 0.0);
 const float cm_disc_cosine = 0.5;
 const vec3 cm_disc_radiance_in = vec3(1.0);

@@ -220,9 +220,9 @@ TEST_P(ShaderParameters, DriverReportsNoOtherFields) {
     const GLuint uniform = gl_->GetProgramResourceIndex(program.name(), GL_UNIFORM, name.c_str());
     ASSERT_NE(uniform, GL_INVALID_INDEX) << name;
     const GLenum offset = GL_OFFSET;
-    GLint place = -1;
-    gl_->GetProgramResourceiv(program.name(), GL_UNIFORM, uniform, 1, &offset, 1, nullptr, &place);
-    EXPECT_EQ(static_cast<std::size_t>(place), field.offset) << name;
+    GLint member_offset = -1;
+    gl_->GetProgramResourceiv(program.name(), GL_UNIFORM, uniform, 1, &offset, 1, nullptr, &member_offset);
+    EXPECT_EQ(static_cast<std::size_t>(member_offset), field.offset) << name;
   }
 }
 
