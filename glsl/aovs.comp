@@ -270,27 +270,27 @@ void main() {
       }
       used += depth;
       // Scattering in this segment: its probability, and its mean position, as if extinction were constant.
-      float chance = 1.0 - exp(-depth);
-      float middle = t + cm_middle_of_part(depth, chance) * min(span, walk.t_end - t);
+      float probability = 1.0 - exp(-depth);
+      float middle = t + cm_middle_of_part(depth, probability) * min(span, walk.t_end - t);
 #if CM_CHANNELS
       // Absorption as if extinction were constant in this segment.
-      float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
+      float dimmed = depth > 1e-3 ? clear * probability / depth : clear;
       emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
 #endif
       float z = middle / t_per_z;
-      scatters += clear * chance * vec2(1.0, z);
+      scatters += clear * probability * vec2(1.0, z);
       if (t < solid_t) {
-        emission += clear * chance * cm_walk_source(walk);
-        medium += clear * chance * cm_walk_scatters(walk);
+        emission += clear * probability * cm_walk_source(walk);
+        medium += clear * probability * cm_walk_scatters(walk);
         if (before.x == 0.0) first_z = z;
         float beyond = z - first_z;
-        before += clear * chance * vec3(1.0, beyond, beyond * beyond);
+        before += clear * probability * vec3(1.0, beyond, beyond * beyond);
       }
 #if CM_VELOCITY
-      velocity += clear * chance * cm_walk_velocity(walk, t_1);
-      volume_motion += clear * chance * cm_walk_backward(walk, t_1, o + middle * d);
+      velocity += clear * probability * cm_walk_velocity(walk, t_1);
+      volume_motion += clear * probability * cm_walk_backward(walk, t_1, o + middle * d);
 #endif
-      clear -= clear * chance;
+      clear -= clear * probability;
       cm_walk_on(walk, t_1);
     }
     transmittance += exp(-used);
@@ -339,13 +339,13 @@ void main() {
     rays += before;
     vec4 normal_before = imageLoad(cm_normal, texel);
     vec2 volume_before = imageLoad(cm_volume_z, texel).xy;
-    float chances = before * (1.0 - through_before.x);
+    float probabilities = before * (1.0 - through_before.x);
     normal += before * normal_before.xyz;
     solid_z = normal_before.w;
     albedo += before * albedo_before.rgb;
     if (albedo_before.a < CM_INFINITE) {
-      scattered_z += chances * albedo_before.a;
-      scattered += chances;
+      scattered_z += probabilities * albedo_before.a;
+      scattered += probabilities;
     }
     transmittance += before * through_before.x;
     squares += before * through_before.w;
@@ -355,8 +355,8 @@ void main() {
     of_sun += before * light_before.a * cm_luminance(light_before.rgb);
 #if CM_VELOCITY
     vec4 motion_before = imageLoad(cm_motion, texel);
-    velocity += chances * imageLoad(cm_velocity, texel).xyz;
-    volume_motion += chances * motion_before.zw;
+    velocity += probabilities * imageLoad(cm_velocity, texel).xyz;
+    volume_motion += probabilities * motion_before.zw;
     motion = motion_before.xy;
 #endif
   } else {

@@ -178,7 +178,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
   // MIS: NEE samples the same cells.
   float scattering_pdf = p.bounces > 0u ? p.pdf : 1.0f;
-  float nee_pdf = p.bounces > 0u ? cm.lights.cell_chance * cm_nee_probability(p, CM_LIGHT_CELL, p.pdf, 0.0f) : 0.0f;
+  float nee_pdf =
+      p.bounces > 0u ? cm.lights.cell_probability * cm_nee_probability(p, CM_LIGHT_CELL, p.pdf, 0.0f) : 0.0f;
 #endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;

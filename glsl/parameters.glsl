@@ -150,13 +150,13 @@ CM_BLOCK(CmLights) {
   CM_ALIGN(16) vec3 sun_direction;  // world, unit, towards the sun
   uint any;                         // 1: there is a light to sample
   CM_ALIGN(16) vec3 sun_irradiance;
-  float sky_chance;
+  float sky_probability;
   CM_ALIGN(16) vec3 sky_radiance;  // for an environment map its mean, which lights the surfaces of previews
-  float triangle_chance;
-  float analytic_light_chance;  // of all analytic lights together; the sun has the rest
-  float emissive_chance;        // probability that a ray from a surface is aimed at the medium's emission
-  float cell_chance;            // of emissive cells
-  float environment_chance;
+  float triangle_probability;
+  float analytic_light_probability;  // of all analytic lights together; the sun has the rest
+  float emissive_probability;        // probability that a ray from a surface is aimed at the medium's emission
+  float cell_probability;            // of emissive cells
+  float environment_probability;
   float environment_strength;        // factor on the environment map's radiance
   CM_ALIGN(8) vec2 environment_turn;  // cosine and sine of its rotation
   CM_ALIGN(16) vec3 sun_radiance;     // of a sun with an extent

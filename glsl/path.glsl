@@ -209,11 +209,12 @@ CM_FN CmNee cm_nee(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   if (nee.to_light) nee.light = cm_light_sample(p, here, u);
 #ifdef CM_MARCH  // without CM_MARCH the vertex is on a triangle
   if (nee.to_light) {
-    float chance = cm_nee_probability(p, nee.light.kind, cm_scattered(p, nee.light.direction), nee.light.pdf);
-    nee.to_light = nee.draw.u_distance < chance;
-    float rest = nee.to_light ? nee.draw.u_distance / chance : (nee.draw.u_distance - chance) / (1.0f - chance);
+    float probability = cm_nee_probability(p, nee.light.kind, cm_scattered(p, nee.light.direction), nee.light.pdf);
+    nee.to_light = nee.draw.u_distance < probability;
+    float rest = nee.to_light ? nee.draw.u_distance / probability
+                              : (nee.draw.u_distance - probability) / (1.0f - probability);
     nee.draw.u_distance = min(rest, 0.99999994f);  // below 1, whatever the rounding of the driver's division
-    nee.light.pdf *= chance;
+    nee.light.pdf *= probability;
     if (!nee.to_light) {
       // The probability may depend on the light's direction, and thus on the random numbers that chose it. The
       // scattered ray needs new ones.
@@ -224,7 +225,7 @@ CM_FN CmNee cm_nee(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   }
 #endif
   // Stretches the sky's range of u.z to [0, 1], so that the number can choose a lobe.
-  if (nee.to_light && nee.light.kind == CM_LIGHT_SKY) nee.draw.u_choice = min(1.0f, u.z / cm.lights.sky_chance);
+  if (nee.to_light && nee.light.kind == CM_LIGHT_SKY) nee.draw.u_choice = min(1.0f, u.z / cm.lights.sky_probability);
   if (nee.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) nee.light.radiance = vec3(0.0f, 0.0f, 0.0f);
 #if CM_EQUIANGULAR && defined(CM_MARCH)
   bool analytic_light = nee.to_light && nee.light.kind == CM_LIGHT_ANALYTIC_LIGHT && nee.light.distance < 3.0e38f;

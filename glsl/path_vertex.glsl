@@ -371,7 +371,7 @@ CM_FN vec3 cm_sample_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw)
   float u_1 = draw.u_direction.y;
   if (!vertex.on_triangle) return cm_scattered_direction(p, u_0, u_1);
   float u_3 = draw.u_choice;
-  float to_emissive = cm.lights.emissive_chance;
+  float to_emissive = cm.lights.emissive_probability;
   bool aimed = u_3 < to_emissive;
   u_3 = aimed ? u_3 / to_emissive : (u_3 - to_emissive) / (1.0f - to_emissive);
   vec3 w = cm_surface_sample(vertex.surface, p.w, u_0, u_1, u_3);
@@ -388,7 +388,7 @@ CM_FN CmScatterSample cm_scatter_sample(CmPath p, CmVertex vertex, vec3 wi) {
   if (vertex.on_triangle) {
     scatter.share = cm_surface_eval(vertex.surface, p.w, wi);
     scatter.lobe_pdf = cm_surface_pdf(vertex.surface, p.w, wi);
-    scatter.pdf = (1.0f - cm.lights.emissive_chance) * scatter.lobe_pdf +
+    scatter.pdf = (1.0f - cm.lights.emissive_probability) * scatter.lobe_pdf +
                    cm_light_pdf(cm_light_hit(CM_LIGHT_EMISSIVE, p.o, wi, scatter.lobe_pdf));
     scatter.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
 #if CM_EXTENDED_BSDF

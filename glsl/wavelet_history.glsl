@@ -43,7 +43,8 @@ uvec4 cm_packed_geometry(CmGeometry geometry) {
 
 CmGeometry cm_unpacked_geometry(uvec4 words) {
   vec2 halves = unpackHalf2x16(words.y);
-  return CmGeometry(unpackSnorm4x8(words.x).xyz, halves.x, halves.y, uintBitsToFloat(words.z), uintBitsToFloat(words.w));
+  return CmGeometry(unpackSnorm4x8(words.x).xyz, halves.x, halves.y, uintBitsToFloat(words.z),
+                    uintBitsToFloat(words.w));
 }
 
 layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;

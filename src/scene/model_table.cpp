@@ -54,17 +54,17 @@ void share_looks(ModelTable& table, const std::vector<double>& power) {
   table.lights.triangle_flux = sum;
   const std::vector<light::Alias> aliases = light::alias_table(power, sum);
   // Computed from the quantized alias words, as shaders use them.
-  std::vector<double> chance(power.size(), 0.0);
+  std::vector<double> probability(power.size(), 0.0);
   for (std::size_t i = 0; i < power.size(); ++i) {
     table.records[i].alias = aliases[i].stays;
     table.records[i].alias_other = aliases[i].other;
     const double stays =
         table.records[i].emitter_count > 0 ? (static_cast<double>(aliases[i].stays) + 1.0) / 4294967296.0 : 0.0;
-    chance[i] += stays;
-    chance[aliases[i].other] += 1.0 - stays;
+    probability[i] += stays;
+    probability[aliases[i].other] += 1.0 - stays;
   }
   for (std::size_t i = 0; i < power.size(); ++i) {
-    table.records[i].emitter_chance = static_cast<float>(chance[i] / static_cast<double>(power.size()));
+    table.records[i].emitter_probability = static_cast<float>(probability[i] / static_cast<double>(power.size()));
     table.lights.triangles = std::max(table.lights.triangles, table.records[i].emitter_count);
   }
 }

@@ -162,10 +162,10 @@ constexpr Edit where_they_collide = {
     "    if (way < left) emitted += emission.mean * (there / max(mix(e_0, e_1, way / max(span, 1e-30f)), 1e-30f));\n"};
 // Disables NEE of emissive cells: if there is no other light, or among other lights.
 constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
-                                 "arrived && cm.lights.any != 0u && cm.lights.cell_chance < 1.0f;"};
-constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance,",
-                           "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
-constexpr Edit flights_have_all = {"free_flight.glsl", "cm.lights.cell_chance * cm_nee_probability(",
+                                 "arrived && cm.lights.any != 0u && cm.lights.cell_probability < 1.0f;"};
+constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_probability,",
+                           "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_probability),"};
+constexpr Edit flights_have_all = {"free_flight.glsl", "cm.lights.cell_probability * cm_nee_probability(",
                                    "0.0f * cm_nee_probability("};
 // Disables Russian roulette of shadow rays.
 constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
@@ -174,7 +174,7 @@ constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return
 // Samples all lights with equal probability.
 constexpr Edit any_analytic_light = {
     "light.glsl", "  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;\n", ""};
-constexpr Edit all_alike = {"light.glsl", "  light.pdf = analytic_light.chance;\n",
+constexpr Edit all_alike = {"light.glsl", "  light.pdf = analytic_light.probability;\n",
                             "  light.pdf = 1.0f / float(max(cm.analytic_lights.count, 1u));\n"};
 
 /// Lights as on a film set: a key light at the side, one with a tenth of its power opposite, and fourteen like the key

@@ -526,15 +526,15 @@ TEST(InstanceTree, EmitterSelectionFollowsPower) {
   }
   const InstanceTable table = scene::make_instances(instances, origin);
   EXPECT_NEAR(table.emissive_power, sum, 1e-9 * sum);
-  std::vector<double> chance(instances.size());
+  std::vector<double> probability(instances.size());
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const double stays = static_cast<double>(table.records[i].alias) / 4294967296.0;
-    chance[i] += stays / static_cast<double>(instances.size());
-    chance.at(table.records[i].alias_other) += (1.0 - stays) / static_cast<double>(instances.size());
+    probability[i] += stays / static_cast<double>(instances.size());
+    probability.at(table.records[i].alias_other) += (1.0 - stays) / static_cast<double>(instances.size());
   }
   core::InstanceRays rays = rays_of(table);
   for (std::size_t i = 0; i < instances.size(); ++i) {
-    EXPECT_NEAR(chance[i], power[i] / sum, 1e-8);
+    EXPECT_NEAR(probability[i], power[i] / sum, 1e-8);
     if (power[i] > 0.0) {
       EXPECT_FLOAT_EQ(table.records[i].emissive.density, static_cast<float>(1.0 / sum));
       EXPECT_GT(table.records[i].emissive.min_stretch, 0.0F);

@@ -75,7 +75,7 @@ struct CpuSurfaceData {
   uvec4 cm_words(uint word) const { return shown_words.at(word); }
   CmAnalyticLight cm_analytic_light(uint i) const {
     CmAnalyticLight analytic_light = light::analytic_light_record(shown_source->pose.lights.at(i), dvec3(0.0));
-    analytic_light.chance = 1.0F / static_cast<float>(shown_source->pose.lights.size());
+    analytic_light.probability = 1.0F / static_cast<float>(shown_source->pose.lights.size());
     analytic_light.stays = light::Alias::certain;
     return analytic_light;
   }
