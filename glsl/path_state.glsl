@@ -85,8 +85,8 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(slot) \
-  CM_PATH_AHEAD(FLOAT)
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                            \
+  VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(slot) CM_PATH_AHEAD(FLOAT)
 #if CM_EQUIANGULAR
 #define CM_PATH_AHEAD(FLOAT) FLOAT(ahead)
 #else
