@@ -135,7 +135,7 @@ CM_BLOCK(CmMedium) {
   float anisotropy;          // these four are CmPhase of glsl/phase.glsl
   float second_anisotropy;
   float second_bend;
-  float second_share;
+  float second_weight;
   uint emits;        // 1: its cells emit light; this and the next two only with CM_CHANNELS
   uint colored;      // 1: cells have a scattering color
   uint anisotropic;  // 1: cells have an anisotropy, which replaces the one above

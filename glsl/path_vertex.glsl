@@ -74,7 +74,7 @@ CM_FN CmPhase cm_lobes(float anisotropy) {
   phase.anisotropy = anisotropy;
   phase.second_anisotropy = CM_MEDIUM.second_anisotropy;
   phase.second_bend = CM_MEDIUM.second_bend;
-  phase.second_share = CM_MEDIUM.second_share;
+  phase.second_weight = CM_MEDIUM.second_weight;
   return phase;
 }
 CM_FN float cm_medium_phase(float g, float cosine) { return cm_phase(cm_lobes(g), cosine); }

@@ -35,7 +35,7 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   m.anisotropy = medium.phase.anisotropy;
   m.second_anisotropy = medium.phase.second_anisotropy;
   m.second_bend = medium.phase.second_bend;
-  m.second_share = medium.phase.second_share;
+  m.second_weight = medium.phase.second_weight;
   m.emits = source.emits() ? 1U : 0U;
   m.colored = source.colored() ? 1U : 0U;
   m.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;

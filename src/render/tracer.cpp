@@ -420,7 +420,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, trace_inputs, settings);
   picture.extended_bsdf_ = picture.traced_ > 0 && trace_inputs.met()->tables().extended_bsdf != 0U;
-  picture.second_lobe_ = parameters.medium.second_share > 0.0F;
+  picture.second_lobe_ = parameters.medium.second_weight > 0.0F;
   const core::CmMedium& medium = parameters.medium;
   picture.channels_ = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
   picture.environment_ = trace_inputs.environment != nullptr;

@@ -561,10 +561,10 @@ TEST_P(EmissionRendering, ConstantAnisotropyFieldMatchesTheMediums) {
   medium.density_scale = 0.3;
   medium.albedo = vec3(0.75F);
   const VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 2.0F)};
-  for (const float second_share : {0.0F, 0.25F}) {
+  for (const float second_weight : {0.0F, 0.25F}) {
     for (const test::MarchKind& kind : test::march_kinds) {
       viewer->set_grid(test::settings_of(kind));
-      medium.phase = {.anisotropy = 0.75F, .second_anisotropy = -0.5F, .second_share = second_share};
+      medium.phase = {.anisotropy = 0.75F, .second_anisotropy = -0.5F, .second_weight = second_weight};
       viewer->set_medium(medium);
       show(*viewer, VolumeFrame{.density = frame.density});
       const glm::dvec4 setting = look(*viewer, 500.0, 256).mean();

@@ -700,7 +700,7 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(medium.anisotropy),
                                    CM_RECORD(medium.second_anisotropy),
                                    CM_RECORD(medium.second_bend),
-                                   CM_RECORD(medium.second_share),
+                                   CM_RECORD(medium.second_weight),
                                    CM_RECORD(medium.emits),
                                    CM_RECORD(medium.colored),
                                    CM_RECORD(medium.anisotropic),

@@ -73,7 +73,7 @@ const std::array fields{
     CM_FIELD(medium, anisotropy),
     CM_FIELD(medium, second_anisotropy),
     CM_FIELD(medium, second_bend),
-    CM_FIELD(medium, second_share),
+    CM_FIELD(medium, second_weight),
     CM_FIELD(medium, emits),
     CM_FIELD(medium, colored),
     CM_FIELD(medium, anisotropic),
