@@ -136,9 +136,9 @@ float cm_depth_to_far(vec3 from, vec3 d) {
   vec3 o = cm_to_cube_point(from);
   if (cm_ground_distance(o, cm_to_cube(d)) < CM_NO_GROUND) return 1e30;
 #if CM_SURFACES
-  CmHit met;
+  CmHit hit;
   cm_hit_camera = false;
-  if (cm_trace_models(from, d, 0.0, 3.0e38, true, met)) return 1e30;
+  if (cm_trace_models(from, d, 0.0, 3.0e38, true, hit)) return 1e30;
 #endif
   float used = 0.0;
   CmWalk walk = cm_walk(o, cm_to_cube(d), 3.0e38, false);

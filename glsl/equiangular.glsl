@@ -112,9 +112,9 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   passed.to_light = !hidden && angle > 0.0f && cm_is_positive(strongest) && strongest < 3.0e38f;
   // In a dense medium, estimated from the optical depth that the ray used, collisions find the light as well. Lights
   // that contribute little are not worth a shadow ray each. Both are skipped by Russian roulette.
-  float met = p.depth_0 - max(p.depth, 0.0f);
+  float depth_used = p.depth_0 - max(p.depth, 0.0f);
   float share = cm_equiangular_weight(cm_equiangular_pdf(passed.o, p.w, passed.direction, passed.distance),
-                                 met / (range.y - range.x));
+                                      depth_used / (range.y - range.x));
   float probability = clamp(2.0f * cm.lights.analytic_light_probability, 0.0f, 1.0f) * min(1.0f, 2.0f * share);
   passed.to_light = passed.to_light && cm_random(p.random, p.stream) < probability;
   passed.light /= max(probability, 1e-30f);

@@ -576,12 +576,13 @@ TraceInputs GpuScene::trace_inputs(const scene::Snapshot& snapshot, bool traced)
                            .analytic_lights = *snapshot.analytic_lights};
   trace_inputs.environment = environment_.get();
   // Selection probabilities are normalized over a whole table, so there is one table per case.
-  trace_inputs.analytic_lights =
-      !model_instances_ || trace_inputs.met() != nullptr ? analytic_lights_.get() : host_analytic_lights_.get();
+  trace_inputs.analytic_lights = !model_instances_ || trace_inputs.traced_models() != nullptr
+                                     ? analytic_lights_.get()
+                                     : host_analytic_lights_.get();
   trace_inputs.instances = instances_.get();
   trace_inputs.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
-  trace_inputs.model_holdout =
-      trace_inputs.met() != nullptr && std::ranges::any_of(model_instances_->models(), &scene::Model::holdout);
+  trace_inputs.model_holdout = trace_inputs.traced_models() != nullptr &&
+                               std::ranges::any_of(model_instances_->models(), &scene::Model::holdout);
   return trace_inputs;
 }
 
@@ -634,8 +635,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
   }
   own.radius = lit()[0].radius;
   own.aimed = integrator.light_among_surfaces != 0U && (p.medium.emits != 0U || p.medium.source != glm::vec3(0.0F));
-  const ModelInstances* met = trace_inputs.met();
-  light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
+  const ModelInstances* models = trace_inputs.traced_models();
+  light::SceneLights near = models != nullptr ? models->lights() : light::SceneLights{};
   light::add_analytic_lights(near, *snapshot.analytic_lights);
   near.analytic_lights_arrive = trace_inputs.analytic_lights != nullptr ? trace_inputs.analytic_lights->arrives() : 0.0;
   const std::optional<double> nearest =

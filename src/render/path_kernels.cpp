@@ -104,7 +104,7 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t lanes,
   programs.begin->use(*gl_);
   run_one(lanes, blocks);
   settle();
-  const std::array<const gl::Program*, CM_QUEUES> order{programs.travel, programs.meet, programs.shade,
+  const std::array<const gl::Program*, CM_QUEUES> order{programs.travel, programs.intersect, programs.shade,
                                                         programs.camera};
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::uint32_t queue = 0; queue < CM_QUEUES; ++queue) {

@@ -61,7 +61,7 @@ std::size_t far_step(std::size_t n) {
 void describe(const TraceInputs& trace_inputs, core::CmParameters& parameters) {
   parameters.host_depth = {trace_inputs.size, trace_inputs.depth != 0 ? trace_inputs.layers : 0};
   if (trace_inputs.scene != nullptr) parameters.surfaces = trace_inputs.scene->tables();
-  parameters.analytic_lights.count = trace_inputs.analytic_lights_met();
+  parameters.analytic_lights.count = trace_inputs.analytic_light_count();
 }
 
 // Pixel transfer format of a layer.
@@ -357,24 +357,24 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   if (picture.environment_) shade.emplace_back(environment_macro);
   if (picture.equiangular_) shade.emplace_back(equiangular_macro);
   if (picture.model_holdout_) shade.emplace_back(holdout_macro);
-  std::vector<std::string> meet{"CM_SURFACES 1"};
+  std::vector<std::string> intersect{"CM_SURFACES 1"};
   if (picture.extended_bsdf_) {
     shade.emplace_back(extended_bsdf_macro);
-    meet.emplace_back(extended_bsdf_macro);
+    intersect.emplace_back(extended_bsdf_macro);
   }
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.motion_) {
-    for (auto* defines : {&shade, &meet, &camera}) defines->emplace_back("CM_MOTION 1");
+    for (auto* defines : {&shade, &intersect, &camera}) defines->emplace_back("CM_MOTION 1");
   }
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
   if (picture.environment_) camera.emplace_back(environment_macro);
-  for (std::vector<std::string>* defines : {&shade, &meet, &camera}) add_groups(picture, *defines);
+  for (std::vector<std::string>* defines : {&shade, &intersect, &camera}) add_groups(picture, *defines);
   std::vector<std::string> begin = camera;
   begin[1] = "CM_DENSE 1";
   StagePrograms programs;
   programs.begin = program(begin, "trace_camera.comp").object;
   programs.travel = trace_program(picture, data).object;
-  programs.meet = program(meet, "trace_meet.comp").object;
+  programs.intersect = program(intersect, "trace_intersect.comp").object;
   programs.shade = program(shade, "trace_shade.comp").object;
   programs.camera = program(camera, "trace_camera.comp").object;
   return programs;
@@ -410,8 +410,8 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const TraceInput
   // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const ModelInstances* met = settings.view == View::shaded && !preview ? trace_inputs.met() : nullptr;
-  return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().extended_bsdf != 0U ? 2 : 1);
+  const ModelInstances* models = settings.view == View::shaded && !preview ? trace_inputs.traced_models() : nullptr;
+  return models == nullptr ? 0 : (models->lights().triangles > 0 || models->tables().extended_bsdf != 0U ? 2 : 1);
 }
 
 void Tracer::classify(Picture& picture, const PictureParameters& parameters, const TraceInputs& trace_inputs,
@@ -419,12 +419,12 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   const bool shaded = settings.view == View::shaded;
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, trace_inputs, settings);
-  picture.extended_bsdf_ = picture.traced_ > 0 && trace_inputs.met()->tables().extended_bsdf != 0U;
+  picture.extended_bsdf_ = picture.traced_ > 0 && trace_inputs.traced_models()->tables().extended_bsdf != 0U;
   picture.second_lobe_ = parameters.medium.second_weight > 0.0F;
   const core::CmMedium& medium = parameters.medium;
   picture.channels_ = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
   picture.environment_ = trace_inputs.environment != nullptr;
-  picture.analytic_lights_ = trace_inputs.analytic_lights_met() > 0;
+  picture.analytic_lights_ = trace_inputs.analytic_light_count() > 0;
   picture.several_ = trace_inputs.instances != nullptr;
   picture.volume_holdout_ = shaded && trace_inputs.volume_holdout;
   picture.model_holdout_ = shaded && picture.traced_ > 0 && trace_inputs.model_holdout;
@@ -1104,12 +1104,12 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   gl_->DispatchCompute(1, 1, 1);
   gl::memory_barrier(*gl_, GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   Picked picked;
-  glm::uvec2 met(0U);
+  glm::uvec2 object(0U);
   gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(picked.z), &picked.z);
-  gl_->GetTextureImage(pick_object_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
+  gl_->GetTextureImage(pick_object_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(object), &object);
   gl::check(*gl_, "picking");
-  if (met.x == 1U) picked.volume = met.y;
-  if (met.x == 2U) picked.triangle = met.y;
+  if (object.x == 1U) picked.volume = object.y;
+  if (object.x == 2U) picked.triangle = object.y;
   return picked;
 }
 

@@ -59,8 +59,8 @@ struct TraceInputs {
   const scene::MotionTable* motion = nullptr;  // transforms for motion vectors; required for FeatureSet::all
 
   /// Returns the scene whose triangles paths hit; null: none.
-  [[nodiscard]] const ModelInstances* met() const { return traced ? scene : nullptr; }
-  [[nodiscard]] std::uint32_t analytic_lights_met() const {
+  [[nodiscard]] const ModelInstances* traced_models() const { return traced ? scene : nullptr; }
+  [[nodiscard]] std::uint32_t analytic_light_count() const {
     return analytic_lights == nullptr ? 0 : analytic_lights->count();
   }
 };

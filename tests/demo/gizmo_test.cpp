@@ -50,7 +50,7 @@ TEST(Gizmo, FindsTheNearestPointOnAnAxis) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   const auto vector = [&] { return dvec3(normal(random), normal(random), normal(random)); };
-  int met = 0;
+  int hits = 0;
   for (int i = 0; i < 200; ++i) {
     const Ray ray{vector(), glm::normalize(vector())};
     const dvec3 point = vector();
@@ -74,9 +74,9 @@ TEST(Gizmo, FindsTheNearestPointOnAnAxis) {
     if (found) {
       EXPECT_NEAR(*found, low, 1e-5 * std::max(1.0, std::abs(low)));
     }
-    met += before ? 1 : 0;
+    hits += before ? 1 : 0;
   }
-  EXPECT_GT(met, 50);
+  EXPECT_GT(hits, 50);
   const Ray ray{{0.0, 0.0, 0.0}, {0.0, 0.0, -1.0}};
   EXPECT_FALSE(nearest_on_axis(ray, {1.0, 0.0, 0.0}, {0.0, 0.0, -1.0})) << "they run alike";
   EXPECT_FALSE(nearest_on_axis(ray, {1.0, 0.0, 5.0}, {1.0, 0.0, 0.0})) << "behind";

@@ -272,9 +272,9 @@ Counts expect_like_brute_force(const std::vector<Instance>& instances, std::size
         ++counts.doubtful;
         continue;
       }
-      const bool meets = asked && solid && span.first < std::min(span.last, double{ray.t_end});
-      EXPECT_EQ(entries[i] >= 0.0F, meets) << r << ' ' << i << ' ' << span.first << ' ' << span.last;
-      if (meets) {
+      const bool hits = asked && solid && span.first < std::min(span.last, double{ray.t_end});
+      EXPECT_EQ(entries[i] >= 0.0F, hits) << r << ' ' << i << ' ' << span.first << ' ' << span.last;
+      if (hits) {
         EXPECT_NEAR(entries[i], span.first, unsure) << r << ' ' << i;
       }
       if (testing::Test::HasFailure()) return counts;

@@ -37,15 +37,15 @@ dmat4 any_transform(std::mt19937& random, bool mirrored) {
   return transform;
 }
 
-struct Met {
+struct Hit {
   double t = 1e30;
   std::size_t model = 0;
   dvec3 normal{0.0};  // towards the ray
 };
 
 // Nearest hit among all triangles in world space, in double precision (Moeller and Trumbore).
-Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const dvec3& d) {
-  Met met;
+Hit brute_force(const std::vector<scene::Model>& models, const dvec3& o, const dvec3& d) {
+  Hit nearest;
   for (std::size_t m = 0; m < models.size(); ++m) {
     const scene::ModelSource& source = *models[m].source;
     for (std::size_t i = 0; i < source.scene->indices.size(); i += 3) {
@@ -63,12 +63,12 @@ Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const d
       const dvec3 q = glm::cross(s, a);
       const double v = glm::dot(d, q) / det;
       const double t = glm::dot(b, q) / det;
-      if (u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= met.t) continue;
+      if (u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= nearest.t) continue;
       const dvec3 n = glm::normalize(glm::cross(a, b));
-      met = {t, m, glm::dot(n, d) > 0.0 ? -n : n};
+      nearest = {t, m, glm::dot(n, d) > 0.0 ? -n : n};
     }
   }
-  return met;
+  return nearest;
 }
 
 TEST(Models, RaysHitLikeInWorldSpace) {
@@ -86,17 +86,17 @@ TEST(Models, RaysHitLikeInWorldSpace) {
   for (int i = 0; i < 4000; ++i) {
     const vec3 o = 8.0F * vec3(even(random), even(random), even(random));
     const vec3 d = vec3(even(random), even(random), even(random));
-    const Met expected = brute_force(models, dvec3(o), dvec3(d));
+    const Hit expected = brute_force(models, dvec3(o), dvec3(d));
     core::CpuTetSurfaces::CmHit hit;
     rays.cm_hit_camera = false;
-    const bool met = rays.cm_trace_models(o, d, 0.0F, 1e30F, false, hit);
+    const bool is_hit = rays.cm_trace_models(o, d, 0.0F, 1e30F, false, hit);
     core::CpuTetSurfaces::CmHit any;
-    EXPECT_EQ(rays.cm_trace_models(o, d, 0.0F, 1e30F, true, any), met);
-    if (met != (expected.t < 1e30) || (met && std::abs(hit.t - expected.t) > 1e-4 * (1.0 + expected.t))) {
+    EXPECT_EQ(rays.cm_trace_models(o, d, 0.0F, 1e30F, true, any), is_hit);
+    if (is_hit != (expected.t < 1e30) || (is_hit && std::abs(hit.t - expected.t) > 1e-4 * (1.0 + expected.t))) {
       ++other;
       continue;
     }
-    if (!met) continue;
+    if (!is_hit) continue;
     ++hits;
     EXPECT_EQ(table.parts[table.record_of(hit.triangle)].model, expected.model);
     const auto point = rays.cm_surface_point(hit.triangle, hit.barycentrics, glm::normalize(d), !hit.front);
