@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
@@ -783,7 +783,7 @@ namespace {
 
 // Runs `work` on a detached thread; its failures become Errors.
 template <class Made, class Work>
-std::future<Made> make_apart(const char* what, Work work) {
+std::future<Made> make_detached(const char* what, Work work) {
   const auto task = std::make_shared<std::packaged_task<Made()>>([what, work = std::move(work)] {
     try {
       return work();
@@ -792,14 +792,14 @@ std::future<Made> make_apart(const char* what, Work work) {
     }
   });
   std::future<Made> made = task->get_future();
-  leave([task] { (*task)(); });
+  run_detached([task] { (*task)(); });
   return made;
 }
 
 }  // namespace
 
 void GridBuild::begin_emissive_table() {
-  emissive_table_ = make_apart<scene::EmissiveTable>(
+  emissive_table_ = make_detached<scene::EmissiveTable>(
       "the table of what glows", [words = std::move(emissive_words_), cube = data_->lattice().cube] {
         return scene::emissive_table(in_order(words), cube);
       });
@@ -975,7 +975,7 @@ double GridBuilds::progress() const {
 
 CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
     : source_(std::move(source)), why_(std::move(why)), progress_(std::make_shared<Progress>()) {
-  made_ = make_apart<BuiltGrid>("building the grid on the CPU", [of = source_, progress = progress_] {
+  made_ = make_detached<BuiltGrid>("building the grid on the CPU", [of = source_, progress = progress_] {
     const scene::GridPlan& plan = *of->plan;
     const grid::DiamondSet diamonds(plan.lattice->own, plan.levels, plan.max_cells, progress.get());
     grid::GridBuilder builder(*of->statistics, diamonds);

@@ -12,7 +12,7 @@
 #include <span>
 #include <tuple>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "scene/threaded_tree.hpp"
@@ -309,7 +309,7 @@ std::pair<dvec3, dvec3> box_of(const surface::Bvh& bvh) {
 
 ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends) {
-  auto source = make_left<ModelSource>();
+  auto source = make_deferred_delete<ModelSource>();
   source->scene = std::move(scene);
   source->pose = std::move(pose);
   find_meshes(*source);
@@ -329,7 +329,7 @@ ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Pr
 
 ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends) {
-  auto source = make_left<ModelSource>();
+  auto source = make_deferred_delete<ModelSource>();
   source->scene = last.scene;
   source->pose = std::move(pose);
   check(progress);

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 
 namespace cumulet::surface::detail {
 
@@ -72,7 +72,7 @@ DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, B
   }
   constexpr std::uint64_t bytes_per_face = 256;  // of the decoder's tables
   budget.take(faces, bytes_per_face, what);
-  state_->mesh = apart(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
+  state_->mesh = run_cancellable(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
     draco::DecoderBuffer buffer;
     buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     draco::Decoder decoder;

@@ -8,7 +8,7 @@
 #include <optional>
 #include <set>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/progress_part.hpp"
 #include "surface/accessors.hpp"
 #include "surface/gltf_file.hpp"
@@ -275,9 +275,9 @@ class Assembler {
         for (const std::uint32_t index : part.indices) indices.push_back(first + index);
       }
       const Progress* const progress = budget_.progress_for(sizeof(std::uint32_t) * indices.size());
-      const Winding winding = apart(progress, [positions = std::move(positions), indices = std::move(indices)] {
-        return winding_of(positions, indices);
-      });
+      const Winding winding = run_cancellable(
+          progress,
+          [positions = std::move(positions), indices = std::move(indices)] { return winding_of(positions, indices); });
       if (!(winding.inward > max_inward * winding.area)) continue;
       if (++count > 3) continue;
       const std::string called = one_line(file_.model.meshes[m].name);
@@ -378,7 +378,7 @@ class Assembler {
   const std::string& name_;
   Budget& budget_;
   Progress* progress_;
-  std::shared_ptr<PosableScene> scene_ = make_left<PosableScene>();
+  std::shared_ptr<PosableScene> scene_ = make_deferred_delete<PosableScene>();
   std::vector<bool> used_;
   std::vector<std::vector<std::size_t>> parts_of_;
   MeshRemarks remarks_;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "grid/tet_grid.hpp"
 #include "scene/space.hpp"
 #include "viewer/cell_budget.hpp"
@@ -150,13 +150,14 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     return built;
   }
   refine.max_cells = built.cell_limit = cells_that_fit(max_cells, carried, volume->bytes(), resource_limits);
-  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
-  auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
+  const auto diamonds = make_deferred_delete<const grid::DiamondSet>(*statistics, channels, refine, &progress);
+  auto builder = make_deferred_delete<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
   progress.begin(Progress::Stage::records);
   const float max_value = voxels->max_value;
-  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, channels, &progress));
+  auto grid = make_deferred_delete<const grid::TetGrid>(
+      builder->records(settings.refine.cells, max_value, channels, &progress));
   builder.reset();
   built.seconds.records = watch.lap();
   built.cells = grid->cells.size();

@@ -15,7 +15,7 @@
 #include <limits>
 #include <numeric>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/progress_part.hpp"
 #include "volume/bricks.hpp"
 #include "volume/import_detail.hpp"
@@ -519,7 +519,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
                               Portion portion) {
   check_transform(source.index_to_world);
 
-  const auto made = make_left<ScalarVolume>();
+  const auto made = make_deferred_delete<ScalarVolume>();
   ScalarVolume& out = *made;
   out.index_to_world = source.index_to_world;
 
