@@ -210,7 +210,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   p.cache = cell.z;
   float e_0 = extinction * r_0;
   float e_1 = extinction * r_1;
-  // Placed after the loop, because software drivers execute both sides of every branch in each step.
+  // This follows the loop, because software drivers execute both sides of every branch in each step.
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);

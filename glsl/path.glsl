@@ -350,7 +350,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   arrived = collided || hit_triangle || grounded;
   if (grounded) p.t = cm_ground_distance(p.o, p.d);
   if (arrived) {
-    // Another kernel found the ground, but here rounding places it just out of reach.
+    // Another kernel found the ground, but here rounding puts it just out of reach.
     bool missed = grounded && p.t >= CM_NO_GROUND;
     finished = cm_arrive(p, collided, grounded) || dark || missed;
     if (hit_triangle) finished = cm_stand(p, vertex) || finished;
@@ -366,7 +366,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   return finished;
 }
 
-// Handles an event: end of the ray, then light sample, then scattering. Each costly step is called in one place only,
+// Handles an event: end of the ray, then light sample, then scattering. Each costly step has a single call,
 // because software drivers execute both sides of every branch. Stage CM_STAGE_VERTEX: the path is on a triangle. Stage
 // CM_STAGE_EVENT: it is in the medium or on the ground.
 CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {

@@ -350,7 +350,7 @@ CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
 #endif
 }
 
-// Places the path on the triangle that it hit, after cm_arrive. Returns true if the path ends there.
+// Moves the path to the triangle that it hit, after cm_arrive. Returns true if the path ends there.
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   p.o = cm_to_cube_point(vertex.surface.position);
   p.start = CM_ON_TRIANGLE;

@@ -20,7 +20,7 @@
 
 namespace cumulet::viewer {
 
-/// Metadata of a volume that is available without its voxels, for example to place a camera.
+/// Metadata of a volume that is available without its voxels, for example to fit a camera.
 struct VolumeInfo {
   bool empty = true;      ///< no field has an active voxel
   bool may_emit = false;  ///< it has a field that can emit light
