@@ -103,7 +103,7 @@ void expect_moved(const std::vector<dvec3>& far, const std::vector<dvec3>& near,
   EXPECT_LT(worst, within) << what;
 }
 
-const std::array positions{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.0), dvec3(1e8)};
+const std::array far_positions{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.0), dvec3(1e8)};
 constexpr double precision = 2e-5;  // of objects of size 1
 
 // A rotated, nested box, with a camera and a light above it.
@@ -128,7 +128,7 @@ TEST(FarModels, KeepTheirShape) {
   const Pose near_pose = near->pose(0.0);
   EXPECT_EQ(near_pose.origin, dvec3(0.0));
   const std::vector<dvec3> shape = corners(near, near_pose);
-  for (const dvec3& at : positions) {
+  for (const dvec3& at : far_positions) {
     const ScenePtr far = test::imported(georeferenced(at));
     EXPECT_EQ(far->precision_remark, "");
     const Pose pose = far->pose(0.0);
@@ -203,7 +203,7 @@ GltfModel skinned(const dvec3& at) {
 
 TEST(FarModels, SkinAndAnimateLikeNearModels) {
   const ScenePtr near = test::imported(skinned(dvec3(0.0)));
-  for (const dvec3& at : positions) {
+  for (const dvec3& at : far_positions) {
     const ScenePtr far = test::imported(skinned(at));
     for (const double time : {0.0, 0.5, 1.0}) {
       expect_moved(corners(far, far->pose(time)), corners(near, near->pose(time)), glm::translate(dmat4(1.0), at),
