@@ -238,7 +238,7 @@ class LiveStatesFromGl : public testing::Test {
   // Renders until main memory has the voxels of the newest state.
   void wait_for_voxels(const LiveRef& live) {
     cumulet_volume* volume = nullptr;
-    render_until([&] { return cumulet_live_get_volume(live.get(), &volume, nullptr, 0) == CUMULET_OK; });
+    render_until([&] { return cumulet_dynamic_volume_get_volume(live.get(), &volume, nullptr, 0) == CUMULET_OK; });
     cumulet_volume_release(volume);
   }
   Picture picture() { return test::drawn_once(v_, target_); }
