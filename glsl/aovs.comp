@@ -136,9 +136,9 @@ float cm_depth_to_far(vec3 from, vec3 d) {
   vec3 o = cm_to_cube_point(from);
   if (cm_ground_distance(o, cm_to_cube(d)) < CM_NO_GROUND) return 1e30;
 #if CM_SURFACES
-  CmHit met;
+  CmHit hit;
   cm_hit_camera = false;
-  if (cm_trace_models(from, d, 0.0, 3.0e38, true, met)) return 1e30;
+  if (cm_trace_models(from, d, 0.0, 3.0e38, true, hit)) return 1e30;
 #endif
   float used = 0.0;
   CmWalk walk = cm_walk(o, cm_to_cube(d), 3.0e38, false);
@@ -270,27 +270,27 @@ void main() {
       }
       used += depth;
       // Scattering in this segment: its probability, and its mean position, as if extinction were constant.
-      float chance = 1.0 - exp(-depth);
-      float middle = t + cm_middle_of_part(depth, chance) * min(span, walk.t_end - t);
+      float probability = 1.0 - exp(-depth);
+      float middle = t + cm_middle_of_part(depth, probability) * min(span, walk.t_end - t);
 #if CM_CHANNELS
       // Absorption as if extinction were constant in this segment.
-      float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
+      float dimmed = depth > 1e-3 ? clear * probability / depth : clear;
       emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
 #endif
       float z = middle / t_per_z;
-      scatters += clear * chance * vec2(1.0, z);
+      scatters += clear * probability * vec2(1.0, z);
       if (t < solid_t) {
-        emission += clear * chance * cm_walk_source(walk);
-        medium += clear * chance * cm_walk_scatters(walk);
+        emission += clear * probability * cm_walk_source(walk);
+        medium += clear * probability * cm_walk_scatters(walk);
         if (before.x == 0.0) first_z = z;
         float beyond = z - first_z;
-        before += clear * chance * vec3(1.0, beyond, beyond * beyond);
+        before += clear * probability * vec3(1.0, beyond, beyond * beyond);
       }
 #if CM_VELOCITY
-      velocity += clear * chance * cm_walk_velocity(walk, t_1);
-      volume_motion += clear * chance * cm_walk_backward(walk, t_1, o + middle * d);
+      velocity += clear * probability * cm_walk_velocity(walk, t_1);
+      volume_motion += clear * probability * cm_walk_backward(walk, t_1, o + middle * d);
 #endif
-      clear -= clear * chance;
+      clear -= clear * probability;
       cm_walk_on(walk, t_1);
     }
     transmittance += exp(-used);
@@ -310,8 +310,8 @@ void main() {
     scattered_z += scatters.y;
     if (before.x > 0.0) {
       vec2 moments = before.yz / before.x;
-      float place = first_z + moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
-      sun_from[1] = cm_from_cube_point(o + min(place * t_per_z, solid_t) * d);
+      float sample_z = first_z + moments.x + sqrt(max(0.0, moments.y - moments.x * moments.x)) * cm_deviation_of_ray(i);
+      sun_from[1] = cm_from_cube_point(o + min(sample_z * t_per_z, solid_t) * d);
     }
     vec3 light[2] = vec3[2](of_sun, medium.rgb * cm.lights.sun_irradiance);
 #if CM_SURFACES
@@ -339,13 +339,13 @@ void main() {
     rays += before;
     vec4 normal_before = imageLoad(cm_normal, texel);
     vec2 volume_before = imageLoad(cm_volume_z, texel).xy;
-    float chances = before * (1.0 - through_before.x);
+    float probabilities = before * (1.0 - through_before.x);
     normal += before * normal_before.xyz;
     solid_z = normal_before.w;
     albedo += before * albedo_before.rgb;
     if (albedo_before.a < CM_INFINITE) {
-      scattered_z += chances * albedo_before.a;
-      scattered += chances;
+      scattered_z += probabilities * albedo_before.a;
+      scattered += probabilities;
     }
     transmittance += before * through_before.x;
     squares += before * through_before.w;
@@ -355,8 +355,8 @@ void main() {
     of_sun += before * light_before.a * cm_luminance(light_before.rgb);
 #if CM_VELOCITY
     vec4 motion_before = imageLoad(cm_motion, texel);
-    velocity += chances * imageLoad(cm_velocity, texel).xyz;
-    volume_motion += chances * motion_before.zw;
+    velocity += probabilities * imageLoad(cm_velocity, texel).xyz;
+    volume_motion += probabilities * motion_before.zw;
     motion = motion_before.xy;
 #endif
   } else {

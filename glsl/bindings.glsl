@@ -65,7 +65,7 @@ const int CM_UNIFORM_MATERIAL = 1;
 const int CM_UNIFORM_BRICK_POINTS = 0;  // grid_lattice.comp
 const int CM_UNIFORM_CELL_PARTS = 0;    // grid_records.comp, grid_channels.comp
 const int CM_UNIFORM_BRICK_TREE = 0;    // summarize_bricks.comp, own_priorities.comp
-const int CM_UNIFORM_POINT_PLACES = 1;  // own_priorities.comp
+const int CM_UNIFORM_POINT_INDICES = 1;  // own_priorities.comp
 
 // Storage buffers.
 const int CM_STORAGE_PATHS = 0;
@@ -81,7 +81,7 @@ const int CM_STORAGE_MATTES = 0;         // cryptomatte.comp
 const int CM_STORAGE_ERRORS = 1;         // noise.comp
 const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
 const int CM_STORAGE_SIGN = 0;           // sign.comp
-const int CM_STORAGE_PACKED_PLACES = 0;  // pack_bricks.comp
+const int CM_STORAGE_PACKED_BRICKS = 0;  // pack_bricks.comp
 const int CM_STORAGE_PACKED_VALUES = 1;
 const int CM_STORAGE_PACKED_CHOICE = 2;
 const int CM_STORAGE_HOST_VOXELS = 3;
@@ -103,7 +103,7 @@ const int CM_STORAGE_DENOISE_CHANNELS = 1;
 const int CM_STORAGE_DENOISE_WEIGHTS = 2;
 const int CM_STORAGE_GRID_STATE = 0;  // grid_*.comp
 const int CM_STORAGE_GRID_PRIORITIES = 1;
-const int CM_STORAGE_GRID_PLACES = 2;
+const int CM_STORAGE_LATTICE_ENTRIES = 2;
 const int CM_STORAGE_GRID_BLOCKS = 3;
 const int CM_STORAGE_GRID_NODES = 4;
 const int CM_STORAGE_GRID_LEVELS = 5;

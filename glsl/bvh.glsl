@@ -168,15 +168,15 @@ CM_FN void cm_bvh_search(vec3 o, vec3 d, float t_first, bool any, CM_INOUT(CmHit
       vec2 barycentrics = vec2(v, w) * inverse_determinant;
       float t = (u * a.z + v * b.z + w * c.z) * inverse_determinant * inverse_z;
       bool front = (determinant < 0.0f) == ((turned.z < 0.0f) == ((texel_1.w & CM_TRIANGLE_CLOCKWISE) == 0u));
-      bool meets = inside && determinant != 0.0f && t > t_first && t < hit.t &&
+      bool hits = inside && determinant != 0.0f && t > t_first && t < hit.t &&
                    (front || !CM_BVH_CULLS || (texel_1.w & CM_TRIANGLE_ONE_SIDED) == 0u);
 #ifdef CM_HIT_ACCEPT
       // A loop of at most one iteration: software drivers execute the body of an `if` for every lane.
-      for (bool ask = meets && (texel_1.w & CM_TRIANGLE_ASK) != 0u; ask; ask = false) {
-        meets = cm_hit_accept(texel_0.w, barycentrics);
+      for (bool ask = hits && (texel_1.w & CM_TRIANGLE_ASK) != 0u; ask; ask = false) {
+        hits = cm_hit_accept(texel_0.w, barycentrics);
       }
 #endif
-      if (meets) {
+      if (hits) {
         hit.t = t;
         hit.triangle = CM_BVH_NUMBER(texel_0.w);
         hit.record = record;

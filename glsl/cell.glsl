@@ -181,7 +181,7 @@ CM_FN vec3 cm_wide_v0(uvec4 data) {
 CM_FN vec3 cm_record_v0(uvec4 data, bool wide) { return wide ? cm_wide_v0(data) : cm_record_v0(data); }
 CM_FN uint cm_record_shape(uvec4 data, bool wide) { return wide ? cm_wide_shape(data) : cm_record_shape(data); }
 // Encodes the x and y of a record's data.
-CM_FN uvec2 cm_record_place(vec3 v0, uint shape, bool wide) {
+CM_FN uvec2 cm_pack_v0_shape(vec3 v0, uint shape, bool wide) {
   if (!wide) return uvec2(uint(v0.x) | (uint(v0.y) << 16), uint(v0.z) | (shape << 16));
   float unit = cm_shape_unit(shape);
   vec3 corner = v0 + cm_from_frame(vec3(unit, unit, unit), shape);

@@ -122,17 +122,17 @@ void main() {
       float span = t_1 - walk.t;
       float depth = cm_depth_of(e_0, e_1, span, way);
       used += depth;
-      float chance = 1.0 - exp(-depth);
+      float probability = 1.0 - exp(-depth);
       // Splits the probability by the volumes' extinctions at the mean position of scattering.
-      float middle = walk.t + cm_middle_of_part(depth, chance) * min(span, way);
+      float middle = walk.t + cm_middle_of_part(depth, probability) * min(span, way);
       float extinction = 0.0;
       for (int k = 0; CM_IS_FRONT(k, walk); ++k) extinction += cm_front_extinction(walk.front[k], middle);
-      float rare = extinction > 0.0 ? clear * chance / extinction : 0.0;
+      float rare = extinction > 0.0 ? clear * probability / extinction : 0.0;
       for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
         cm_add_to_matte(cm_matte_ids[CM_MATTE_OF_VOLUMES + walk.front[k].volume],
                         rare * cm_front_extinction(walk.front[k], middle));
       }
-      clear -= clear * chance;
+      clear -= clear * probability;
       cm_walk_on(walk, t_1);
     }
     cm_add_to_matte(solid, exp(-used));

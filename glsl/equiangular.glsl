@@ -45,7 +45,7 @@ CM_FN float cm_equiangular_pdf(vec3 o, vec3 w, vec3 to_light, float distance) {
 
 // MIS weight of an equi-angular sample at a point of this extinction: the power heuristic.
 CM_FN float cm_equiangular_weight(float pdf, float extinction) {
-  float collided = cm.lights.analytic_light_chance * extinction;
+  float collided = cm.lights.analytic_light_probability * extinction;
   return cm_balance(pdf * pdf, collided * collided);
 }
 
@@ -104,7 +104,7 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   t = clamp(t, range.x, range.y);
   float pdf = across / (angle * (across * across + (t - along) * (t - along)));
   vec3 light = cm_analytic_light_irradiance(analytic_light, from, o + t * p.w, passed.direction, passed.distance);
-  passed.light = p.throughput * light / (analytic_light.chance * pdf);
+  passed.light = p.throughput * light / (analytic_light.probability * pdf);
   passed.o = p.o + t * p.d;
   // A ray of no length, or a light on it, gives NaN or infinity.
   bool hidden = cm_ground_distance(passed.o, cm_to_cube(passed.direction)) < passed.distance;
@@ -112,12 +112,12 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   passed.to_light = !hidden && angle > 0.0f && cm_is_positive(strongest) && strongest < 3.0e38f;
   // In a dense medium, estimated from the optical depth that the ray used, collisions find the light as well. Lights
   // that contribute little are not worth a shadow ray each. Both are skipped by Russian roulette.
-  float met = p.depth_0 - max(p.depth, 0.0f);
+  float depth_used = p.depth_0 - max(p.depth, 0.0f);
   float share = cm_equiangular_weight(cm_equiangular_pdf(passed.o, p.w, passed.direction, passed.distance),
-                                 met / (range.y - range.x));
-  float chance = clamp(2.0f * cm.lights.analytic_light_chance, 0.0f, 1.0f) * min(1.0f, 2.0f * share);
-  passed.to_light = passed.to_light && cm_random(p.random, p.stream) < chance;
-  passed.light /= max(chance, 1e-30f);
+                                      depth_used / (range.y - range.x));
+  float probability = clamp(2.0f * cm.lights.analytic_light_probability, 0.0f, 1.0f) * min(1.0f, 2.0f * share);
+  passed.to_light = passed.to_light && cm_random(p.random, p.stream) < probability;
+  passed.light /= max(probability, 1e-30f);
   return passed;
 }
 

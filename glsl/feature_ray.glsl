@@ -32,9 +32,9 @@ CmFeatureRay cm_feature_ray(uvec2 pixel, int i) {
 }
 
 // Mean position of the first scattering in a segment, from 0 at its start to 1, as if extinction were constant. depth:
-// optical depth of the segment; chance: probability of scattering in it.
-float cm_middle_of_part(float depth, float chance) {
-  return depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
+// optical depth of the segment; probability: that of scattering in it.
+float cm_middle_of_part(float depth, float probability) {
+  return depth > 0.05 ? 1.0 / depth - (1.0 - probability) / probability : 0.5 - depth * (1.0 / 12.0);
 }
 
 #endif

@@ -105,21 +105,21 @@ CM_FN bool cm_seek(CM_INOUT(CmPath) p) {
 CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
   uint what = event;
   if (over) {
-    bool met = p.met != CM_INSTANCE_NONE;
-    what = met ? CM_EVENT_COLLISION : CM_EVENT_ESCAPE;
+    bool collided = p.collision_instance != CM_INSTANCE_NONE;
+    what = collided ? CM_EVENT_COLLISION : CM_EVENT_ESCAPE;
     if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_SCATTERED && p.gathers == 0u) {
       what = CM_EVENT_NONE;
       p.gathers = 1u;
       cm_begin_visits(p);
-    } else if (met) {
+    } else if (collided) {
       p.t = p.t_end;
-      p.cell = p.met_cell;
+      p.cell = p.collision_cell;
       p.cache = CM_NONE;
-      p.instance = p.met;
+      p.instance = p.collision_instance;
     }
   } else if (event == CM_EVENT_COLLISION && p.ray == CM_RAY_SCATTERED) {
-    p.met = p.instance;
-    p.met_cell = p.cell;
+    p.collision_instance = p.instance;
+    p.collision_cell = p.cell;
     p.t_end = p.t;
     p.depth = cm_free_depth(cm_random(p.random, p.stream));
     what = CM_EVENT_NONE;
@@ -178,7 +178,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
   // MIS: NEE samples the same cells.
   float scattering_pdf = p.bounces > 0u ? p.pdf : 1.0f;
-  float nee_pdf = p.bounces > 0u ? cm.lights.cell_chance * cm_nee_probability(p, CM_LIGHT_CELL, p.pdf, 0.0f) : 0.0f;
+  float nee_pdf =
+      p.bounces > 0u ? cm.lights.cell_probability * cm_nee_probability(p, CM_LIGHT_CELL, p.pdf, 0.0f) : 0.0f;
 #endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
@@ -209,7 +210,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   p.cache = cell.z;
   float e_0 = extinction * r_0;
   float e_1 = extinction * r_1;
-  // Placed after the loop, because software drivers execute both sides of every branch in each step.
+  // This follows the loop, because software drivers execute both sides of every branch in each step.
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);
@@ -244,7 +245,7 @@ CM_FN uint cm_stage_after_ray(CmPath p) {
   if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_SCATTERED) {
     return p.found == CM_FOUND_TRIANGLE && p.event == CM_EVENT_ESCAPE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
   }
-  if (cm_asks(p)) return CM_STAGE_MEET;
+  if (cm_asks(p)) return CM_STAGE_INTERSECT;
   return p.ray != CM_RAY_SCATTERED && p.start == CM_ON_TRIANGLE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
 }
 
@@ -258,7 +259,7 @@ CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
     if (p.stage == CM_STAGE_EVENT) cm_handle(p, cm_in_medium());
     if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) {
       if (CM_CHANNELS != 0 && cm.medium.emits != 0u && cm_asks_first(p)) {
-        p.stage = CM_STAGE_MEET;
+        p.stage = CM_STAGE_INTERSECT;
       } else {
         cm_aim(p);
       }

@@ -86,7 +86,7 @@ CM_FN float cm_ggx(CmAlpha alpha, vec3 wo, vec3 wi, vec3 h) {
 
 // Table coordinates of an albedo, by cosine and roughness, from 0 to CM_GGX_ALBEDO_SIZE - 1. Grazing angles, where the
 // albedo changes fast, have the highest resolution.
-CM_FN vec2 cm_ggx_albedo_place(float roughness, float cosine) {
+CM_FN vec2 cm_ggx_albedo_position(float roughness, float cosine) {
   return clamp(vec2(sqrt(max(cosine, 0.0f)), roughness), 0.0f, 1.0f) * float(CM_GGX_ALBEDO_SIZE - 1);
 }
 

@@ -12,11 +12,11 @@ layout(local_size_x = 64) in;
 #include "cell_split.glsl"
 #include "lattice.glsl"
 #include "grid_state.glsl"
-#include "grid_places.glsl"
+#include "lattice_lookup.glsl"
 #include "grid_leaves.glsl"
 
 // First child of the cell at this index in the list of splitting cells.
-uint cm_children(uint place) { return CM_ROOTS + 2u * place; }
+uint cm_children(uint slot) { return CM_ROOTS + 2u * slot; }
 
 #if CM_STAGE == 0
 
@@ -44,7 +44,7 @@ void main() {
   uint lane = gl_LocalInvocationID.x;
   if (lane < 2u) cm_counts[lane] = 0u;
   barrier();
-  uint place = inside ? atomicAdd(cm_counts[splits ? 0u : 1u], 1u) : 0u;
+  uint slot = inside ? atomicAdd(cm_counts[splits ? 0u : 1u], 1u) : 0u;
   barrier();
   if (lane == 0u) {
     cm_begins[0] = atomicAdd(cm_state.split, cm_counts[0]);
@@ -52,9 +52,9 @@ void main() {
   }
   barrier();
   if (!inside) return;
-  place += cm_begins[splits ? 0u : 1u];
-  cm_list[place] = i;
-  cm_cells[i].child = splits ? cm_children(place) : 0u;
+  slot += cm_begins[splits ? 0u : 1u];
+  cm_list[slot] = i;
+  cm_cells[i].child = splits ? cm_children(slot) : 0u;
   if (!splits) cm_below[i].x = 1u;
 }
 
@@ -76,10 +76,10 @@ uvec2 cm_behind_halves(uint other, vec3 v0) {
 }
 
 void main() {
-  uint place = cm_first + gl_GlobalInvocationID.x;
-  if (place >= cm_end) return;
-  uint i = cm_list[place];
-  uint children = cm_children(place);
+  uint slot = cm_first + gl_GlobalInvocationID.x;
+  if (slot >= cm_end) return;
+  uint i = cm_list[slot];
+  uint children = cm_children(slot);
   uvec2 where = cm_cells[i].where;
   uvec4 links = cm_links[i];
   uint shape = cm_shape_of(where);
@@ -99,7 +99,7 @@ void main() {
     if (whole != CM_NONE) whole = cm_behind_whole(whole, i);
     cm_links[children + side] = cm_with_link(own, faces.x, whole);
     vec3 child_v0 = side == 0u ? v0 : cm_cell_vertex(v0, shape, 1u);
-    cm_cells[children + side].where = cm_record_place(child_v0, cm_child_shape(shape, side), cm_cube_is_wide());
+    cm_cells[children + side].where = cm_pack_v0_shape(child_v0, cm_child_shape(shape, side), cm_cube_is_wide());
   }
 }
 
@@ -111,10 +111,10 @@ layout(std430, binding = CM_STORAGE_GRID_BELOW) buffer CmBelow { uvec2 cm_below[
 #if CM_STAGE == 2
 
 void main() {
-  uint place = cm_first + gl_GlobalInvocationID.x;
-  if (place >= cm_end) return;
-  uint children = cm_children(place);
-  cm_below[cm_list[place]].x = cm_below[children].x + cm_below[children + 1u].x;
+  uint slot = cm_first + gl_GlobalInvocationID.x;
+  if (slot >= cm_end) return;
+  uint children = cm_children(slot);
+  cm_below[cm_list[slot]].x = cm_below[children].x + cm_below[children + 1u].x;
 }
 
 #else
@@ -140,10 +140,10 @@ void main() {
   cm_tree[2u * CM_ROOTS + 2u] = 0u;
   cm_tree[2u * CM_ROOTS + 3u] = 0u;
 #else
-  uint place = cm_first + gl_GlobalInvocationID.x;
-  if (place >= cm_end) return;
-  uint i = cm_list[place];
-  uint children = cm_children(place);
+  uint slot = cm_first + gl_GlobalInvocationID.x;
+  if (slot >= cm_end) return;
+  uint i = cm_list[slot];
+  uint children = cm_children(slot);
   uint rank = cm_cells[i].rank;
   uint inner = cm_below[i].y;
   uint leaves = cm_below[children].x;

@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 #include "channels.glsl"
 #include "lattice.glsl"
 #include "grid_state.glsl"
-#include "grid_places.glsl"
+#include "lattice_lookup.glsl"
 #include "grid_leaves.glsl"
 
 #if CM_CHANNEL == CM_CHANNEL_EMISSION

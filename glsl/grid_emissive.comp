@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 
 struct CmGlowingCell {
   uint cell;
-  uint place[2];     // as in a record
+  uint v0_shape[2];  // as in a record
   uint emission[4];  // grid::EmissionRecord
 };
 layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };

@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 #include "cell.glsl"
 #include "lattice.glsl"
 #include "grid_state.glsl"
-#include "grid_places.glsl"
+#include "lattice_lookup.glsl"
 
 layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };
 layout(std430, binding = CM_STORAGE_GRID_PRIORITIES) buffer CmPriorities { uint cm_priorities[]; };

@@ -10,7 +10,7 @@ layout(local_size_x = 64) in;
 #include "cell_fit.glsl"
 #include "lattice.glsl"
 #include "grid_state.glsl"
-#include "grid_places.glsl"
+#include "lattice_lookup.glsl"
 #include "grid_leaves.glsl"
 #include "grid_links.glsl"
 

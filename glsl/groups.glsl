@@ -9,17 +9,17 @@
 // groups.
 layout(rgba32f, binding = CM_IMAGE_GROUPS) uniform image2DArray cm_groups;
 
-uint cm_group_place(uint group) { return cm_group_lane + uint(CM_FIRST_GROUPS + int(group)) * cm_lanes(); }
+uint cm_group_index(uint group) { return cm_group_lane + uint(CM_FIRST_GROUPS + int(group)) * cm_lanes(); }
 
 // Groups without a layer are added to the first.
 void cm_add_to_group(uint group, vec3 radiance) {
   if (radiance == vec3(0.0)) return;
-  uint at = cm_group_place(group < cm.integrator.groups ? group : 0u);
+  uint at = cm_group_index(group < cm.integrator.groups ? group : 0u);
   cm_paths[at] = uvec4(floatBitsToUint(uintBitsToFloat(cm_paths[at].xyz) + radiance), 0u);
 }
 
 void cm_begin_groups() {
-  for (uint i = 0u; i < cm.integrator.groups; ++i) cm_paths[cm_group_place(i)] = uvec4(0u);
+  for (uint i = 0u; i < cm.integrator.groups; ++i) cm_paths[cm_group_index(i)] = uvec4(0u);
 }
 
 void cm_add_to_layer(uvec2 at, uint layer, vec3 radiance) {
@@ -34,7 +34,7 @@ void cm_finish_groups(CmPath p, uvec2 at) {
   uint count = cm.integrator.groups;
   // The surface pass mixes all lights, so its color counts in the first group.
   if (p.bounces == 0u && p.at_layer != 0u) cm_add_to_group(0u, p.light);
-  for (uint i = 0u; i < count; ++i) cm_add_to_layer(at, i, uintBitsToFloat(cm_paths[cm_group_place(i)].xyz));
+  for (uint i = 0u; i < count; ++i) cm_add_to_layer(at, i, uintBitsToFloat(cm_paths[cm_group_index(i)].xyz));
   if (p.bounces > 0u || p.at_layer != 0u) return;
   // Any tint in front of the background is the same for both.
   vec3 sun = cm_sun_radiance(p.w);

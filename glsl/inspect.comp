@@ -220,15 +220,15 @@ void main() {
     if (view == CM_VIEW_WIREFRAME) color = lines + clear * vec3(0.02) + 0.04 * alpha;
   }
   if (view == CM_VIEW_DEPTH) {
-    bool met_volume = half_t > 0.0;
-    uvec4 met = uvec4(met_volume ? 1u : 0u, densest, 0u, 0u);
+    bool hit_volume = half_t > 0.0;
+    uvec4 object = uvec4(hit_volume ? 1u : 0u, densest, 0u, 0u);
 #if CM_SURFACES
-    if (solid && !met_volume) {
+    if (solid && !hit_volume) {
       half_t = triangle.t;
-      met = uvec4(2u, triangle.triangle, 0u, 0u);
+      object = uvec4(2u, triangle.triangle, 0u, 0u);
     }
 #endif
-    if (cm.dispatch.picks != 0u) imageStore(cm_counts, ivec2(local), met);
+    if (cm.dispatch.picks != 0u) imageStore(cm_counts, ivec2(local), object);
     imageStore(cm_volume_z, ivec2(cm.dispatch.picks != 0u ? local : pixel), vec4(half_t / t_per_z));
     return;
   }

@@ -73,9 +73,9 @@ CM_FN bool cm_next_instance(vec3 o, vec3 d, float t_end, uint flags, CM_INOUT(fl
   while (i < nodes) {
     CmInstanceNode node = cm_instance_nodes[i];
     vec2 span = cm_instance_span(o, inverse, node.low, node.high);
-    bool meets = span.x < span.y && span.x <= least && span.y > entry;
+    bool hits = span.x < span.y && span.x <= least && span.y > entry;
     uint at = node.instance;
-    if (meets && at != CM_INSTANCE_NONE) {
+    if (hits && at != CM_INSTANCE_NONE) {
       vec2 own = cm_instance_span(cm_in_instance_point(at, o), cm_instance_inverse(cm_in_instance(at, d)),
                                   cm_instances[at].space.box_min, cm_instances[at].space.box_max);
       float enters = max(own.x, span.x);
@@ -86,7 +86,7 @@ CM_FN bool cm_next_instance(vec3 o, vec3 d, float t_end, uint flags, CM_INOUT(fl
         next = at;
       }
     }
-    i = meets ? i + 1u : node.skip;
+    i = hits ? i + 1u : node.skip;
   }
   if (!(least < t_end)) return false;
   entry = least;

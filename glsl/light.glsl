@@ -158,14 +158,14 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
     entry = cm_emissive_word(2u * i);
   }
   uvec4 record = cm_emissive_word(2u * i + 1u);
-  uvec4 place = uvec4(entry.z, entry.w, 0u, 0u);
+  uvec4 v0_shape = uvec4(entry.z, entry.w, 0u, 0u);
   bool wide = cm_is_wide(CM_GRID.root_exponent);
-  uint shape = cm_record_shape(place, wide);
+  uint shape = cm_record_shape(v0_shape, wide);
   uint cell_class = cm_shape_class(shape);
   vec3 point = cm_cell_point(cell_class, vec3(u.x, u.y, cm_random(p.random, p.stream)));
   // Measured from p.o, not from `here`, which is slightly above a surface: rays through the medium start at p.o as
   // well.
-  vec3 to_v0 = cm_record_v0(place, wide) - cm_in_volume_point(p.o);
+  vec3 to_v0 = cm_record_v0(v0_shape, wide) - cm_in_volume_point(p.o);
   vec3 way = cm_out_of_volume(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
   float length_2 = max(dot(way, way), 1e-24f);
   vec3 mean = cm_emission_mean(record);
@@ -217,7 +217,7 @@ CM_FN CmLightSample cm_analytic_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3
   CmLightSample light;
   light.kind = CM_LIGHT_ANALYTIC_LIGHT;
   light.radiance = cm_analytic_light_irradiance(analytic_light, from, here, light.direction, light.distance);
-  light.pdf = analytic_light.chance;
+  light.pdf = analytic_light.probability;
   return light;
 }
 
@@ -232,7 +232,7 @@ CM_FN uvec4 cm_emitter(uint model, uint i) { return cm_words(cm_models[model].em
 // Solid-angle pdf of a point on an emissive triangle. The model and the triangle are picked by power, the point by
 // area. way: vector from the shading point to that point, along w (unit); n: unit normal of the triangle.
 CM_FN float cm_emitter_pdf(uint model, uvec4 entry, vec3 way, vec3 w, vec3 n) {
-  float by_area = cm_models[model].emitter_chance * abs(uintBitsToFloat(entry.w)) * cm_own_area(model, n);
+  float by_area = cm_models[model].emitter_probability * abs(uintBitsToFloat(entry.w)) * cm_own_area(model, n);
 #if CM_MOTION
   // The table's probabilities assume the triangles' areas at the frame time.
   if (cm_model_deforms(model)) by_area *= cm_area_share(cm_vertex_mix(model, entry.x, vec2(0.0f)));
@@ -320,28 +320,28 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 #endif
 
 #if CM_ENVIRONMENT
-#define CM_FAR_LIGHTS(LIGHT)                                                                       \
-  LIGHT(CM_LIGHT_ENVIRONMENT, cm.lights.environment_chance, cm_environment_sample, cm_environment_pdf, \
+#define CM_FAR_LIGHTS(LIGHT)                                                                                \
+  LIGHT(CM_LIGHT_ENVIRONMENT, cm.lights.environment_probability, cm_environment_sample, cm_environment_pdf, \
         cm_environment_radiance) CM_MORE_LIGHTS(LIGHT)
 #else
 #define CM_FAR_LIGHTS(LIGHT) \
-  LIGHT(CM_LIGHT_SKY, cm.lights.sky_chance, cm_sky_sample, cm_sky_pdf, cm_sky_radiance) CM_MORE_LIGHTS(LIGHT)
+  LIGHT(CM_LIGHT_SKY, cm.lights.sky_probability, cm_sky_sample, cm_sky_pdf, cm_sky_radiance) CM_MORE_LIGHTS(LIGHT)
 #endif
 
 #if CM_CELL_LIGHTS
-#define CM_GLOWING_LIGHTS(LIGHT) LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance, cm_cell_sample, cm_no_pdf, cm_unused)
+#define CM_GLOWING_LIGHTS(LIGHT) LIGHT(CM_LIGHT_CELL, cm.lights.cell_probability, cm_cell_sample, cm_no_pdf, cm_unused)
 #else
 #define CM_GLOWING_LIGHTS(LIGHT)
 #endif
 
 #if CM_SURFACES > 1
-#define CM_NEAR_LIGHTS(LIGHT)                                                                         \
-  LIGHT(CM_LIGHT_TRIANGLE, cm.lights.triangle_chance, cm_triangle_sample, cm_triangle_pdf, cm_unused) \
-  LIGHT(CM_LIGHT_ANALYTIC_LIGHT, cm.lights.analytic_light_chance, cm_analytic_light_sample, cm_no_pdf, cm_unused)                   \
+#define CM_NEAR_LIGHTS(LIGHT)                                                                                          \
+  LIGHT(CM_LIGHT_TRIANGLE, cm.lights.triangle_probability, cm_triangle_sample, cm_triangle_pdf, cm_unused)             \
+  LIGHT(CM_LIGHT_ANALYTIC_LIGHT, cm.lights.analytic_light_probability, cm_analytic_light_sample, cm_no_pdf, cm_unused) \
   CM_GLOWING_LIGHTS(LIGHT)
 #elif CM_ANALYTIC_LIGHTS
-#define CM_NEAR_LIGHTS(LIGHT)                                                       \
-  LIGHT(CM_LIGHT_ANALYTIC_LIGHT, cm.lights.analytic_light_chance, cm_analytic_light_sample, cm_no_pdf, cm_unused) \
+#define CM_NEAR_LIGHTS(LIGHT)                                                                                          \
+  LIGHT(CM_LIGHT_ANALYTIC_LIGHT, cm.lights.analytic_light_probability, cm_analytic_light_sample, cm_no_pdf, cm_unused) \
   CM_GLOWING_LIGHTS(LIGHT)
 #else
 #define CM_NEAR_LIGHTS(LIGHT) CM_GLOWING_LIGHTS(LIGHT)
@@ -351,29 +351,29 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 CM_FN float cm_balance(float mine, float other) { return mine / max(mine + other, 1e-30f); }
 
 // The sun's probability is the rest to 1.
-#define CM_LEAVE(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) -CHANCE
-CM_FN float cm_sun_chance() { return max(0.0f, 1.0f CM_FAR_LIGHTS(CM_LEAVE) CM_NEAR_LIGHTS(CM_LEAVE)); }
+#define CM_LEAVE(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE) -PROBABILITY
+CM_FN float cm_sun_probability() { return max(0.0f, 1.0f CM_FAR_LIGHTS(CM_LEAVE) CM_NEAR_LIGHTS(CM_LEAVE)); }
 
-#define CM_DENSITY(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
-  if (hit.kind == NUMBER) return CHANCE * PDF(hit);
+#define CM_DENSITY(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE) \
+  if (hit.kind == NUMBER) return PROBABILITY * PDF(hit);
 
 // Solid-angle pdf with which NEE samples the light that a ray has reached.
 CM_FN float cm_light_pdf(CmLightHit hit) {
   CM_FAR_LIGHTS(CM_DENSITY)
   CM_NEAR_LIGHTS(CM_DENSITY)
-  if (hit.kind == CM_LIGHT_SUN) return cm_sun_chance() * cm_sun_pdf(hit);
+  if (hit.kind == CM_LIGHT_SUN) return cm_sun_probability() * cm_sun_pdf(hit);
 #if CM_SURFACES
-  if (hit.kind == CM_LIGHT_EMISSIVE) return cm.lights.emissive_chance * cm_emissive_pdf(hit);
+  if (hit.kind == CM_LIGHT_EMISSIVE) return cm.lights.emissive_probability * cm_emissive_pdf(hit);
 #endif
   return 0.0f;
 }
 
-#define CM_NEE(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                 \
-  if (u.z >= before && u.z < before + CHANCE) {                        \
-    light = SAMPLE(p, here, vec3(u.x, u.y, (u.z - before) / CHANCE));  \
-    light.pdf *= CHANCE;                                           \
-  }                                                                    \
-  before += CHANCE;
+#define CM_NEE(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE)                 \
+  if (u.z >= before && u.z < before + PROBABILITY) {                       \
+    light = SAMPLE(p, here, vec3(u.x, u.y, (u.z - before) / PROBABILITY)); \
+    light.pdf *= PROBABILITY;                                              \
+  }                                                                        \
+  before += PROBABILITY;
 
 // Samples a light for NEE. u.z picks the kind.
 CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
@@ -382,7 +382,7 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   CM_FAR_LIGHTS(CM_NEE)
 #if CM_ANALYTIC_LIGHTS
   // A new random number for the near kinds. The individual light is picked by the random state after it.
-  if (u.z >= before && cm.lights.triangle_chance + cm.lights.analytic_light_chance > 0.0f) {
+  if (u.z >= before && cm.lights.triangle_probability + cm.lights.analytic_light_probability > 0.0f) {
     u.z = before + (1.0f - before) * cm_random(p.random, p.stream);
   }
 #endif
@@ -392,7 +392,7 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 }
 
 // Returns true if scattered rays reach the light of this sample by escaping.
-#define CM_IS_FAR(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) || light.kind == NUMBER
+#define CM_IS_FAR(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE) || light.kind == NUMBER
 CM_FN bool cm_is_far(CmLightSample light) {
   return (light.kind == CM_LIGHT_SUN && cm.lights.sun_spread > 0.0f) CM_FAR_LIGHTS(CM_IS_FAR);
 }
@@ -422,7 +422,7 @@ CM_FN float cm_nee_probability(CmPath p, uint kind, float scattering_pdf, float 
   if (!near) share *= clamp(8.0f / float(p.bounces), 0.25f, 1.0f);
 #if CM_ENVIRONMENT
   // Where the environment is much brighter than its mean, such as a sun in it, scattered rays seldom find it.
-  float bright = 12.5663706f * pdf / max(cm.lights.environment_chance, 1e-30f);
+  float bright = 12.5663706f * pdf / max(cm.lights.environment_probability, 1e-30f);
   if (kind == CM_LIGHT_ENVIRONMENT) share *= max(cm_nee_even_probability(p), min(1.0f, 0.125f * bright));
 #endif
   return min(1.0f, share);
@@ -437,13 +437,13 @@ CM_FN float cm_nee_pdf(CmPath p, CmLightHit hit) {
 
 // Weighted radiance of the distant lights that a scattered ray reaches when it escapes with this transmittance.
 #if CM_GROUPS
-#define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                                         \
-  of_kind = RADIANCE(p.w) * cm_balance(transmittance * p.pdf,                                \
+#define CM_ESCAPED(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE)                                \
+  of_kind = RADIANCE(p.w) * cm_balance(transmittance * p.pdf,                                 \
                                        cm_nee_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.pdf))); \
-  brought += of_kind;                                                                            \
+  brought += of_kind;                                                                         \
   cm_add_to_group(cm_group_of(NUMBER), p.throughput * of_kind);
 #else
-#define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)           \
+#define CM_ESCAPED(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE) \
   brought += RADIANCE(p.w) * cm_balance(transmittance * p.pdf, \
                                         cm_nee_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.pdf)));
 #endif
@@ -458,7 +458,7 @@ CM_FN vec3 cm_far_light(CmPath p, float transmittance) {
 }
 
 // Radiance of the background as seen by cameras.
-#define CM_SEEN(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) seen += RADIANCE(w);
+#define CM_SEEN(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE) seen += RADIANCE(w);
 CM_FN vec3 cm_background_radiance(vec3 w) {
   vec3 seen = cm_sun_radiance(w);
   CM_FAR_LIGHTS(CM_SEEN)

@@ -17,10 +17,10 @@ CM_FN bool cm_trace_models(vec3 o, vec3 d, float t_min, float t_max, bool any, C
     vec3 slack;
     vec3 inverse = cm_bvh_inverse(d, slack);
     vec2 slabs = cm_bvh_slabs(cm_model_nodes[i].low, cm_model_nodes[i].high, o, inverse, slack);
-    bool meets = max(slabs.x, t_first) <= min(slabs.y, hit.t);
+    bool hits = max(slabs.x, t_first) <= min(slabs.y, hit.t);
     uint at = cm_model_nodes[i].instance;
-    i = meets ? i + 1u : cm_model_nodes[i].skip;
-    if (meets && at != CM_INSTANCE_NONE && (!cm_hit_camera || (cm_models[at].flags & CM_MODEL_SEEN) != 0u)) {
+    i = hits ? i + 1u : cm_model_nodes[i].skip;
+    if (hits && at != CM_INSTANCE_NONE && (!cm_hit_camera || (cm_models[at].flags & CM_MODEL_SEEN) != 0u)) {
       cm_model = at;
       cm_bvh_search(cm_in_model_point(at, o), cm_in_model(at, d), t_first, any, hit);
       if (any && hit.triangle != CM_BVH_NONE) i = nodes;

@@ -31,7 +31,7 @@ CM_BLOCK(CmModel) {
   uint textures;
   uint emitters;             // its emissive triangles
   uint emitter_count;
-  float emitter_chance;      // probability that NEE of emissive triangles picks one of this model
+  float emitter_probability;  // probability that NEE of emissive triangles picks one of this model
   float own_volume;          // volume in its own space of a unit of world volume
   uint flags;
   uint alias;        // alias table: a uniformly drawn entry stays if a random word is at most

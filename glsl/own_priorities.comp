@@ -31,8 +31,8 @@ shared uint cm_points;  // number of points that may split
 
 const uint cm_points_of_levels[10] = uint[10](CM_POINTS_OF_LEVELS);
 
-layout(std140, binding = CM_UNIFORM_POINT_PLACES) uniform CmPointPlaces {
-  uvec4 cm_point_places[183];  // 9^3 points, four per uvec4: their index in brick_points()
+layout(std140, binding = CM_UNIFORM_POINT_INDICES) uniform CmPointIndices {
+  uvec4 cm_point_indices[183];  // 9^3 points, four per uvec4: their index in brick_points()
 };
 
 float cm_squared(CmCell cell, CmSums sums, float edge_squared) {
@@ -60,8 +60,8 @@ void cm_visit(uint level, uint heap, uint frame, CmSums sums) {
   if (!(squared > cm_measure.z)) return;
   uvec3 p = uvec3(cell.midpoint + 0.5);
   uint at = (p.x * 9u + p.y) * 9u + p.z;
-  uint place = cm_point_places[at >> 2u][at & 3u];
-  if (place < cm_points) atomicMax(cm_found[place], max(floatBitsToUint(squared) >> 16, 1u));
+  uint index = cm_point_indices[at >> 2u][at & 3u];
+  if (index < cm_points) atomicMax(cm_found[index], max(floatBitsToUint(squared) >> 16, 1u));
 }
 
 void main() {

@@ -11,10 +11,10 @@ const int CM_HALVES = 1;
 const int CM_SHORTS = 2;
 const int CM_BYTES = 3;
 
-layout(std430, binding = CM_STORAGE_PACKED_PLACES) buffer CmPlaces {
+layout(std430, binding = CM_STORAGE_PACKED_BRICKS) buffer CmPackedBricks {
   uint cm_filled;
   uint cm_emptied;
-  uint cm_places[];  // filled bricks from the beginning, empty ones from the end
+  uint cm_packed_bricks[];  // filled bricks from the beginning, empty ones from the end
 };
 layout(std430, binding = CM_STORAGE_PACKED_VALUES) writeonly buffer CmValues { uint cm_values[]; };
 #if CM_CHOSEN
@@ -82,10 +82,10 @@ void main() {
   if (t == 0u && inside) {
     if (filled) {
       cm_slot = atomicAdd(cm_filled, 1u);
-      cm_places[cm_slot] = brick;
+      cm_packed_bricks[cm_slot] = brick;
     }
 #if CM_CHOSEN
-    else cm_places[cm_bricks.y - 1u - atomicAdd(cm_emptied, 1u)] = brick;
+    else cm_packed_bricks[cm_bricks.y - 1u - atomicAdd(cm_emptied, 1u)] = brick;
 #endif
   }
   barrier();

@@ -135,7 +135,7 @@ CM_BLOCK(CmMedium) {
   float anisotropy;          // these four are CmPhase of glsl/phase.glsl
   float second_anisotropy;
   float second_bend;
-  float second_share;
+  float second_weight;
   uint emits;        // 1: its cells emit light; this and the next two only with CM_CHANNELS
   uint colored;      // 1: cells have a scattering color
   uint anisotropic;  // 1: cells have an anisotropy, which replaces the one above
@@ -150,13 +150,13 @@ CM_BLOCK(CmLights) {
   CM_ALIGN(16) vec3 sun_direction;  // world, unit, towards the sun
   uint any;                         // 1: there is a light to sample
   CM_ALIGN(16) vec3 sun_irradiance;
-  float sky_chance;
+  float sky_probability;
   CM_ALIGN(16) vec3 sky_radiance;  // for an environment map its mean, which lights the surfaces of previews
-  float triangle_chance;
-  float analytic_light_chance;  // of all analytic lights together; the sun has the rest
-  float emissive_chance;        // probability that a ray from a surface is aimed at the medium's emission
-  float cell_chance;            // of emissive cells
-  float environment_chance;
+  float triangle_probability;
+  float analytic_light_probability;  // of all analytic lights together; the sun has the rest
+  float emissive_probability;        // probability that a ray from a surface is aimed at the medium's emission
+  float cell_probability;            // of emissive cells
+  float environment_probability;
   float environment_strength;        // factor on the environment map's radiance
   CM_ALIGN(8) vec2 environment_turn;  // cosine and sine of its rotation
   CM_ALIGN(16) vec3 sun_radiance;     // of a sun with an extent
@@ -237,7 +237,7 @@ CM_BLOCK(CmDispatch) {
   uint picks;    // 1: inspect.comp inspects only the tile's one pixel and writes the result to (0, 0)
   CM_ALIGN(8) uvec2 rows;  // rows of the tile, for kernels that run by rows: first, and one past the last
   uint lanes;    // number of lanes for paths
-  uint places;   // number of their pixel slots: pixels of the tile's listed squares, glsl/path_places.glsl
+  uint slots;   // number of their pixel slots: pixels of the tile's listed squares, glsl/pixel_slots.glsl
   uint rays_before;  // feature rays traced by earlier dispatches: glsl/aovs.comp, cryptomatte.comp
   uint rays_least;   // minimum number of feature rays, even if they all agree
   CM_EQUALITY(CmDispatch)

@@ -4,7 +4,7 @@
 //   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface in that pixel
 //
 // The stages are functions. This file has cm_camera, cm_handle (which calls cm_end_ray, cm_nee and cm_scatter) and
-// cm_finish. glsl/path_vertex.glsl has cm_meet and the code that differs with triangles. glsl/free_flight.glsl has
+// cm_finish. glsl/path_vertex.glsl has cm_intersect and the code that differs with triangles. glsl/free_flight.glsl has
 // cm_aim and cm_fly, which traverse the grid. Either one megakernel runs all stages (glsl/trace.comp), or a wavefront
 // of kernels runs one stage each over a queue of paths (glsl/path_queue.glsl).
 //
@@ -209,11 +209,12 @@ CM_FN CmNee cm_nee(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   if (nee.to_light) nee.light = cm_light_sample(p, here, u);
 #ifdef CM_MARCH  // without CM_MARCH the vertex is on a triangle
   if (nee.to_light) {
-    float chance = cm_nee_probability(p, nee.light.kind, cm_scattered(p, nee.light.direction), nee.light.pdf);
-    nee.to_light = nee.draw.u_distance < chance;
-    float rest = nee.to_light ? nee.draw.u_distance / chance : (nee.draw.u_distance - chance) / (1.0f - chance);
+    float probability = cm_nee_probability(p, nee.light.kind, cm_scattered(p, nee.light.direction), nee.light.pdf);
+    nee.to_light = nee.draw.u_distance < probability;
+    float rest = nee.to_light ? nee.draw.u_distance / probability
+                              : (nee.draw.u_distance - probability) / (1.0f - probability);
     nee.draw.u_distance = min(rest, 0.99999994f);  // below 1, whatever the rounding of the driver's division
-    nee.light.pdf *= chance;
+    nee.light.pdf *= probability;
     if (!nee.to_light) {
       // The probability may depend on the light's direction, and thus on the random numbers that chose it. The
       // scattered ray needs new ones.
@@ -224,7 +225,7 @@ CM_FN CmNee cm_nee(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   }
 #endif
   // Stretches the sky's range of u.z to [0, 1], so that the number can choose a lobe.
-  if (nee.to_light && nee.light.kind == CM_LIGHT_SKY) nee.draw.u_choice = min(1.0f, u.z / cm.lights.sky_chance);
+  if (nee.to_light && nee.light.kind == CM_LIGHT_SKY) nee.draw.u_choice = min(1.0f, u.z / cm.lights.sky_probability);
   if (nee.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) nee.light.radiance = vec3(0.0f, 0.0f, 0.0f);
 #if CM_EQUIANGULAR && defined(CM_MARCH)
   bool analytic_light = nee.to_light && nee.light.kind == CM_LIGHT_ANALYTIC_LIGHT && nee.light.distance < 3.0e38f;
@@ -254,7 +255,7 @@ CM_FN void cm_begin_visits(CM_INOUT(CmPath) p) {
 
 CM_FN void cm_begin_march(CM_INOUT(CmPath) p) {
   p.t_end = p.reach;
-  p.met = CM_INSTANCE_NONE;
+  p.collision_instance = CM_INSTANCE_NONE;
   p.gathers = 0u;
   if (p.start != CM_IN_MEDIUM) p.start_instance = 0u;  // otherwise stale: kernels store it only for origins in a medium
   cm_begin_visits(p);
@@ -321,10 +322,10 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
 // continues from the ray's end.
 CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived) {
   bool scattered = p.ray == CM_RAY_SCATTERED;
-  bool met = vertex.on_triangle && scattered;
-  bool grounded = scattered && p.event == CM_EVENT_ESCAPE && !met && p.to_ground != 0u;
-  bool escaped = p.event == CM_EVENT_ESCAPE && !met && !grounded;
-  bool collided = scattered && p.event == CM_EVENT_COLLISION && !met;
+  bool hit_triangle = vertex.on_triangle && scattered;
+  bool grounded = scattered && p.event == CM_EVENT_ESCAPE && !hit_triangle && p.to_ground != 0u;
+  bool escaped = p.event == CM_EVENT_ESCAPE && !hit_triangle && !grounded;
+  bool collided = scattered && p.event == CM_EVENT_COLLISION && !hit_triangle;
 #if CM_INSTANCES
   cm_here = collided ? p.instance : p.start_instance;
 #endif
@@ -332,7 +333,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   // Emission in front of the holdout stays. Behind it the sample is empty, without the background.
   bool cut = collided && CM_MEDIUM.holdout != 0u;
 #if CM_SURFACES
-  cut = cut || (met && (cm_models[cm_model_of(p.triangle)].flags & CM_MODEL_HOLDOUT) != 0u);
+  cut = cut || (hit_triangle && (cm_models[cm_model_of(p.triangle)].flags & CM_MODEL_HOLDOUT) != 0u);
 #endif
   if (cut && p.bounces == 0u) {
     p.light = vec3(0.0f, 0.0f, 0.0f);
@@ -342,16 +343,17 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
 #endif
   if (escaped) cm_escape(p);
   bool finished = escaped && scattered;
-  if (met) cm_see(p, vertex);
-  bool dark = (met && cm_among_surfaces_dark(p) && !cm_came_through(p)) || ((collided || grounded) && cm_is_dark(p));
+  if (hit_triangle) cm_see(p, vertex);
+  bool dark = (hit_triangle && cm_among_surfaces_dark(p) && !cm_came_through(p)) ||
+              ((collided || grounded) && cm_is_dark(p));
   cm_emissive(p, scattered, collided && !dark);
-  arrived = collided || met || grounded;
+  arrived = collided || hit_triangle || grounded;
   if (grounded) p.t = cm_ground_distance(p.o, p.d);
   if (arrived) {
-    // Another kernel found the ground, but here rounding places it just out of reach.
+    // Another kernel found the ground, but here rounding puts it just out of reach.
     bool missed = grounded && p.t >= CM_NO_GROUND;
     finished = cm_arrive(p, collided, grounded) || dark || missed;
-    if (met) finished = cm_stand(p, vertex) || finished;
+    if (hit_triangle) finished = cm_stand(p, vertex) || finished;
   }
 #if CM_EQUIANGULAR
   if (p.ray == CM_RAY_EQUIANGULAR) {
@@ -364,7 +366,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   return finished;
 }
 
-// Handles an event: end of the ray, then light sample, then scattering. Each costly step is called in one place only,
+// Handles an event: end of the ray, then light sample, then scattering. Each costly step has a single call,
 // because software drivers execute both sides of every branch. Stage CM_STAGE_VERTEX: the path is on a triangle. Stage
 // CM_STAGE_EVENT: it is in the medium or on the ground.
 CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {

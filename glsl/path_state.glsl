@@ -3,14 +3,14 @@
 #define CM_PATH_STATE_GLSL
 
 // The path's next step.
-#define CM_STAGE_CAMERA 0u  // start a camera ray
-#define CM_STAGE_AIM 1u     // clip the ray to the bounds and find its first cell
-#define CM_STAGE_FLY 2u     // traverse the grid
-#define CM_STAGE_MEET 3u    // test in the BVH whether a triangle is nearer than the event of the traversal
-#define CM_STAGE_EVENT 4u   // handle the event in the medium or on the ground
-#define CM_STAGE_VERTEX 5u  // handle the event on a triangle: a hit, or the end of a shadow ray that started there
-#define CM_STAGE_FINISH 6u  // add the sample to its pixel
-#define CM_STAGE_DONE 7u    // nothing: the pixel has all its samples
+#define CM_STAGE_CAMERA 0u     // start a camera ray
+#define CM_STAGE_AIM 1u        // clip the ray to the bounds and find its first cell
+#define CM_STAGE_FLY 2u        // traverse the grid
+#define CM_STAGE_INTERSECT 3u  // test in the BVH whether a triangle is nearer than the event of the traversal
+#define CM_STAGE_EVENT 4u      // handle the event in the medium or on the ground
+#define CM_STAGE_VERTEX 5u     // handle the event on a triangle: a hit, or the end of a shadow ray that started there
+#define CM_STAGE_FINISH 6u     // add the sample to its pixel
+#define CM_STAGE_DONE 7u       // nothing: the pixel has all its samples
 
 // The event that ended a ray.
 #define CM_EVENT_NONE 0u
@@ -47,7 +47,7 @@
 //   bounces         number of events
 //   steps           number of cells traversed
 //   number          number of the sample in its pixel
-//   place           slot of its pixel (glsl/path_places.glsl)
+//   slot            slot of its pixel (glsl/pixel_slots.glsl)
 //   ahead           CM_RAY_EQUIANGULAR only: distance along w from o to the point where the path continues
 // CM_PATH_SCATTERED, state that passes to the next ray:
 //   w               world direction of the camera or scattered ray; kept while a shadow ray is traced
@@ -74,7 +74,8 @@
 //   instance        volume instance that the ray traverses or entered last; after a collision, the instance it is with
 //   entry           distance where the ray entered that instance; -1 for the instance that contains o
 //   start_instance  instance that contains o if o is in a medium; start_cell is a cell of it
-//   met, met_cell   scattered or camera ray: instance (or CM_NONE) and cell of the nearest collision so far, at t_end
+//   collision_instance, collision_cell   scattered or camera ray: instance (or CM_NONE) and cell of the nearest
+//                   collision so far, at t_end
 //   gathers         1: the ray's end is known, and a second sweep visits the emissive overlapping instances
 // CM_PATH_WITHIN, only with CM_EXTENDED_BSDF, and only in kernels that use triangle materials:
 //   within          first word of the material whose volume contains the ray, plus one; 0: none
@@ -85,8 +86,8 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(place)             \
-  CM_PATH_AHEAD(FLOAT)
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                            \
+  VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(slot) CM_PATH_AHEAD(FLOAT)
 #if CM_EQUIANGULAR
 #define CM_PATH_AHEAD(FLOAT) FLOAT(ahead)
 #else
@@ -110,7 +111,7 @@
 #endif
 
 #define CM_PATH_VISIT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                          \
-  UINT(instance) FLOAT(entry) UINT(start_instance) UINT(met) UVEC2(met_cell) BITS(gathers, 1)
+  UINT(instance) FLOAT(entry) UINT(start_instance) UINT(collision_instance) UVEC2(collision_cell) BITS(gathers, 1)
 
 #define CM_PATH_WITHIN(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
   UINT(within) UINT(outside) BITS(through, 1) BITS(dispersed, 1)

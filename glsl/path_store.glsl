@@ -1,5 +1,5 @@
 // Storage of paths between dispatches: structure of arrays, one plane of lanes per four words of a path. A lane keeps
-// its pixel of the tile until that is finished and then takes another (glsl/path_places.glsl). The includer has
+// its pixel of the tile until that is finished and then takes another (glsl/pixel_slots.glsl). The includer has
 // glsl/path_state.glsl before this.
 #ifndef CM_PATH_STORE_GLSL
 #define CM_PATH_STORE_GLSL
@@ -13,7 +13,7 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_blocks[CM_MAX_BLOCKS];   // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
                                     // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
                                     // dispatch
-  uint cm_next_place;               // first unused pixel slot
+  uint cm_next_slot;               // first unused pixel slot
   uint cm_squares[CM_MAX_SQUARES];  // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
   uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];  // per list and block: number of lanes with a path
   uint cm_active_paths[];  // per list: lanes of all blocks; in each block the active lanes come first
@@ -153,8 +153,8 @@ void cm_store_path(CmPath p, uint lane) {
 // For kernels with a row of work groups per block of the dispatch: number of the block, and of the invocation in it.
 // cm_block_lane may be beyond cm_lanes(). cm_block_begins: a tile begins, so that no lane has a path.
 uint cm_block() { return bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, 0, CM_LIST_BIT); }
-uint cm_place_in_block() { return gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex; }
-uint cm_block_lane() { return cm_block() * CM_BLOCK_LANES + cm_place_in_block(); }
+uint cm_index_in_block() { return gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex; }
+uint cm_block_lane() { return cm_block() * CM_BLOCK_LANES + cm_index_in_block(); }
 bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
 uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
 
@@ -163,9 +163,9 @@ uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
 // and clears the third.
 uint cm_list(uint ahead) { return (bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, CM_LIST_BIT, 2) + ahead) % CM_LISTS; }
 uint cm_ranked_lane() {
-  if (cm_place_in_block() == 0u) cm_active_counts[cm_list(2u) * CM_MAX_BLOCKS + cm_block()] = 0u;
+  if (cm_index_in_block() == 0u) cm_active_counts[cm_list(2u) * CM_MAX_BLOCKS + cm_block()] = 0u;
   if (cm_block_begins()) return cm_block_lane();
-  if (cm_place_in_block() >= cm_active_counts[cm_list(0u) * CM_MAX_BLOCKS + cm_block()]) return cm_lanes();
+  if (cm_index_in_block() >= cm_active_counts[cm_list(0u) * CM_MAX_BLOCKS + cm_block()]) return cm_lanes();
   return cm_active_paths[cm_list(0u) * cm_lanes() + cm_block_lane()];
 }
 // Adds the lane to the list of the next dispatch.

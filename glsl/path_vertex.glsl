@@ -74,7 +74,7 @@ CM_FN CmPhase cm_lobes(float anisotropy) {
   phase.anisotropy = anisotropy;
   phase.second_anisotropy = CM_MEDIUM.second_anisotropy;
   phase.second_bend = CM_MEDIUM.second_bend;
-  phase.second_share = CM_MEDIUM.second_share;
+  phase.second_weight = CM_MEDIUM.second_weight;
   return phase;
 }
 CM_FN float cm_medium_phase(float g, float cosine) { return cm_phase(cm_lobes(g), cosine); }
@@ -200,15 +200,15 @@ CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
 }
 
 // Applies the absorption of material volumes between a ray's origin and its hit, collision or end.
-CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool met, CmHit hit) {
+CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool is_hit, CmHit hit) {
   bool scattered = p.ray == CM_RAY_SCATTERED;
   // Emissive media are traversed after this query. cm_see then dims the light of the triangle that was hit.
   if (scattered && cm.medium.emits != 0u) return;
   uint within = p.within;
   uint outside = p.outside;
   if (!scattered && p.start == CM_ON_TRIANGLE && p.through != 0u) cm_cross(cm_bounds(p.triangle), p.back != 0u, within, outside);
-  if (scattered && met && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // a camera may be inside
-  float way = met ? hit.t : (scattered && p.event == CM_EVENT_COLLISION ? p.t : p.reach);
+  if (scattered && is_hit && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // a camera may be inside
+  float way = is_hit ? hit.t : (scattered && p.event == CM_EVENT_COLLISION ? p.t : p.reach);
   // A ray without end left through a hole in the mesh.
   if (way > 1e30f) return;
   vec3 transmittance = cm_transmittance_within(within, way);
@@ -239,7 +239,7 @@ CM_FN bool cm_asks_first(CmPath p) {
 }
 
 // Intersects the ray with the triangles.
-CM_FN void cm_meet(CM_INOUT(CmPath) p) {
+CM_FN void cm_intersect(CM_INOUT(CmPath) p) {
   bool scattered = p.ray == CM_RAY_SCATTERED;
   bool first = scattered && cm.medium.emits != 0u;
   vec3 d = cm_to_world(p.d);
@@ -257,7 +257,7 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
 #if CM_EXTENDED_BSDF
   cm_hit_direction = normalize(d);
-  bool met = false;
+  bool is_hit = false;
   // Camera and scattered rays are traced again up to their hit: on the way to it the BVH also visited surfaces behind
   // it.
   for (int turn = 0; turn < 2; ++turn) {
@@ -265,28 +265,28 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
     cm_hit_passed = vec3(1.0f);
     bool ends = cm_trace_models(o, d, 0.0f, turn == 0 ? reach : hit.t, !scattered, found);
     if (turn == 0) {
-      met = ends;
+      is_hit = ends;
       hit = found;
     }
-    if (!(met && scattered) || cm_hit_passed == vec3(1.0f)) break;
+    if (!(is_hit && scattered) || cm_hit_passed == vec3(1.0f)) break;
   }
   if (scattered) p.throughput *= cm_hit_passed;
   if (!scattered || p.bounces == 0u) p.light *= cm_hit_passed;
-  cm_absorb(p, met, hit);
+  cm_absorb(p, is_hit, hit);
 #else
-  bool met = cm_trace_models(o, d, 0.0f, reach, !scattered, hit);
+  bool is_hit = cm_trace_models(o, d, 0.0f, reach, !scattered, hit);
 #endif
-  if (met && !scattered) p.event = CM_EVENT_COLLISION;
-  if (met && scattered) {
+  if (is_hit && !scattered) p.event = CM_EVENT_COLLISION;
+  if (is_hit && scattered) {
     p.triangle = hit.triangle;
     p.weights = hit.barycentrics;
     p.back = hit.front ? 0u : 1u;
   }
   if (first) {
-    p.found = met ? CM_FOUND_TRIANGLE : CM_FOUND_NONE;
-    if (met) p.reach = hit.t;
+    p.found = is_hit ? CM_FOUND_TRIANGLE : CM_FOUND_NONE;
+    if (is_hit) p.reach = hit.t;
   }
-  bool vertex = scattered ? met : p.start == CM_ON_TRIANGLE;
+  bool vertex = scattered ? is_hit : p.start == CM_ON_TRIANGLE;
   p.stage = first ? CM_STAGE_AIM : (vertex ? CM_STAGE_VERTEX : CM_STAGE_EVENT);
 }
 
@@ -350,7 +350,7 @@ CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
 #endif
 }
 
-// Places the path on the triangle that it hit, after cm_arrive. Returns true if the path ends there.
+// Moves the path to the triangle that it hit, after cm_arrive. Returns true if the path ends there.
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   p.o = cm_to_cube_point(vertex.surface.position);
   p.start = CM_ON_TRIANGLE;
@@ -371,7 +371,7 @@ CM_FN vec3 cm_sample_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw)
   float u_1 = draw.u_direction.y;
   if (!vertex.on_triangle) return cm_scattered_direction(p, u_0, u_1);
   float u_3 = draw.u_choice;
-  float to_emissive = cm.lights.emissive_chance;
+  float to_emissive = cm.lights.emissive_probability;
   bool aimed = u_3 < to_emissive;
   u_3 = aimed ? u_3 / to_emissive : (u_3 - to_emissive) / (1.0f - to_emissive);
   vec3 w = cm_surface_sample(vertex.surface, p.w, u_0, u_1, u_3);
@@ -388,7 +388,7 @@ CM_FN CmScatterSample cm_scatter_sample(CmPath p, CmVertex vertex, vec3 wi) {
   if (vertex.on_triangle) {
     scatter.share = cm_surface_eval(vertex.surface, p.w, wi);
     scatter.lobe_pdf = cm_surface_pdf(vertex.surface, p.w, wi);
-    scatter.pdf = (1.0f - cm.lights.emissive_chance) * scatter.lobe_pdf +
+    scatter.pdf = (1.0f - cm.lights.emissive_probability) * scatter.lobe_pdf +
                    cm_light_pdf(cm_light_hit(CM_LIGHT_EMISSIVE, p.o, wi, scatter.lobe_pdf));
     scatter.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
 #if CM_EXTENDED_BSDF
@@ -436,7 +436,7 @@ struct CmVertex {
 CM_FN bool cm_came_through(CmPath p) { return false; }
 CM_FN bool cm_asks(CmPath p) { return false; }
 CM_FN bool cm_asks_first(CmPath p) { return false; }
-CM_FN void cm_meet(CM_INOUT(CmPath) p) {}
+CM_FN void cm_intersect(CM_INOUT(CmPath) p) {}
 CM_FN CmVertex cm_in_medium() { return CmVertex(false); }
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {}
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }

@@ -4,13 +4,13 @@
 #define CM_PHASE_GLSL
 #include "frame.glsl"
 
-// A Henyey-Greenstein lobe, mixed by second_share with a second lobe of Draine (2003). The latter is Henyey-Greenstein
+// A Henyey-Greenstein lobe, mixed by second_weight with a second lobe of Draine (2003). The latter is Henyey-Greenstein
 // with g = second_anisotropy times 1 + second_bend cosine^2, normalized.
 struct CmPhase {
   float anisotropy;
   float second_anisotropy;
   float second_bend;
-  float second_share;
+  float second_weight;
 };
 
 CM_FN float cm_henyey_greenstein(float g, float cosine) {
@@ -27,7 +27,7 @@ CM_FN float cm_draine(float g, float bend, float cosine) {
 
 CM_FN float cm_phase(CmPhase phase, float cosine) {
   float first = cm_henyey_greenstein(phase.anisotropy, cosine);
-  return mix(first, cm_draine(phase.second_anisotropy, phase.second_bend, cosine), phase.second_share);
+  return mix(first, cm_draine(phase.second_anisotropy, phase.second_bend, cosine), phase.second_weight);
 }
 
 // Samples a cosine by inversion; its pdf is 2 pi times the phase function.
@@ -61,9 +61,9 @@ CM_FN float cm_draine_cosine(float g, float bend, float u) {
 }
 
 CM_FN float cm_phase_cosine(CmPhase phase, float u) {
-  float first = 1.0f - phase.second_share;
+  float first = 1.0f - phase.second_weight;
   if (u < first) return cm_henyey_greenstein_cosine(phase.anisotropy, u / first);
-  u = (u - first) / phase.second_share;
+  u = (u - first) / phase.second_weight;
   if (phase.second_bend == 0.0f) return cm_henyey_greenstein_cosine(phase.second_anisotropy, u);
   return cm_draine_cosine(phase.second_anisotropy, phase.second_bend, u);
 }

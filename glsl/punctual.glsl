@@ -18,7 +18,7 @@ struct CmAnalyticLight {
   float cone_scale;  // cone attenuation: clamp(scale cosine + offset, 0, 1)^2
   vec3 along;        // perpendicular to `across`; of a rectangle, half its height
   float cone_offset;
-  float chance;  // selection probability for NEE
+  float probability;  // selection probability for NEE
   uint stays;    // alias table: a uniformly drawn entry stays if a random word is at most this, else `other`
   uint other;
   uint group;    // light group

@@ -16,10 +16,10 @@ layout(local_size_x = 64) in;
 #define CM_HALVES (CM_FORMAT == 1)
 #define CM_CELLS (CM_FIELD == 2)
 
-layout(std430, binding = CM_STORAGE_PACKED_PLACES) readonly buffer CmPlaces {
+layout(std430, binding = CM_STORAGE_PACKED_BRICKS) readonly buffer CmPackedBricks {
   uint cm_filled;
   uint cm_emptied;
-  uint cm_places[];
+  uint cm_packed_bricks[];
 };
 layout(std430, binding = CM_STORAGE_PACKED_VALUES) readonly buffer CmPacked { uint cm_packed[]; };
 layout(std430, binding = CM_STORAGE_BRICKS_KEPT) writeonly buffer CmKept { uint cm_kept[]; };
@@ -133,7 +133,7 @@ void cm_put_cells(uint t, uint slot) {
   for (uint i = 0u; i < 8u; ++i)
     block += cm_values[(low.x + (i >> 2u)) * 64u + (low.y + ((i >> 1u) & 1u)) * 8u + low.z + (i & 1u)];
   cm_summaries[slot].blocks[t] = block;
-  uint brick = cm_places[slot];
+  uint brick = cm_packed_bricks[slot];
   uvec3 odd = uvec3(brick % cm_bricks.x, brick / cm_bricks.x % cm_bricks.y, brick / (cm_bricks.x * cm_bricks.y)) & 1u;
   for (uint permutation = 0u; permutation < 6u; ++permutation) {
     // Cubes of such bricks begin at an even brick (grid::fit_cube).

@@ -15,13 +15,13 @@
 layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // of surface/ggx_albedo.hpp
 
 vec2 cm_ggx_albedo(float roughness, float cosine) {
-  vec2 place = cm_ggx_albedo_place(roughness, cosine);
-  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
+  vec2 position = cm_ggx_albedo_position(roughness, cosine);
+  return textureLod(cm_albedo_table, (position + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
 }
 
 vec2 cm_ggx_albedo_average(float roughness) {
-  vec2 place = vec2(float(CM_GGX_ALBEDO_SIZE), cm_ggx_albedo_place(roughness, 0.0).y);
-  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
+  vec2 position = vec2(float(CM_GGX_ALBEDO_SIZE), cm_ggx_albedo_position(roughness, 0.0).y);
+  return textureLod(cm_albedo_table, (position + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
 }
 
 #include "bsdf.glsl"
@@ -101,11 +101,12 @@ vec3 cm_matte_beyond(vec3 normal) {
 }
 
 vec3 cm_prefiltered_beyond(CmSurface s, vec3 wo, float roughness) {
-  vec2 place = cm_prefiltered_position(cm_turned(cm_prefiltered_middle(s.normal, wo, roughness), cm_view.sky_turn.xy));
+  vec2 position =
+      cm_prefiltered_position(cm_turned(cm_prefiltered_middle(s.normal, wo, roughness), cm_view.sky_turn.xy));
   float level = cm_prefiltered_level(roughness);
   float low = floor(level);
-  vec3 smoother = textureLod(cm_prefiltered, vec3(place, low), 0.0).rgb;
-  vec3 rougher = textureLod(cm_prefiltered, vec3(place, low + 1.0), 0.0).rgb;
+  vec3 smoother = textureLod(cm_prefiltered, vec3(position, low), 0.0).rgb;
+  vec3 rougher = textureLod(cm_prefiltered, vec3(position, low + 1.0), 0.0).rgb;
   return cm_view.sky_turn.z * mix(smoother, rougher, level - low);
 }
 

@@ -50,9 +50,9 @@ vec3 cm_hit_passed = vec3(1.0f);     // transmittance over pass probability of t
 #endif
 
 CM_FN vec2 cm_ggx_albedo(float roughness, float cosine) {
-  vec2 place = cm_ggx_albedo_place(roughness, cosine);
-  ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
-  vec2 f = place - vec2(cell);
+  vec2 position = cm_ggx_albedo_position(roughness, cosine);
+  ivec2 cell = min(ivec2(position), CM_GGX_ALBEDO_SIZE - 2);
+  vec2 f = position - vec2(cell);
   uvec4 corners = cm_words(cm.surfaces.ggx_albedo + uint(cell.y * (CM_GGX_ALBEDO_SIZE - 1) + cell.x));
   vec2 low = mix(unpackHalf2x16(corners.x), unpackHalf2x16(corners.y), f.x);
   vec2 high = mix(unpackHalf2x16(corners.z), unpackHalf2x16(corners.w), f.x);
@@ -60,29 +60,29 @@ CM_FN vec2 cm_ggx_albedo(float roughness, float cosine) {
 }
 
 CM_FN vec2 cm_ggx_albedo_average(float roughness) {
-  float place = cm_ggx_albedo_place(roughness, 0.0f).y;
-  int row = min(int(place), CM_GGX_ALBEDO_SIZE - 2);
+  float position = cm_ggx_albedo_position(roughness, 0.0f).y;
+  int row = min(int(position), CM_GGX_ALBEDO_SIZE - 2);
   uvec4 ends = cm_words(cm.surfaces.ggx_albedo_averages + uint(row));
-  return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), place - float(row));
+  return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), position - float(row));
 }
 
 #if CM_EXTENDED_BSDF
 
 CM_FN float cm_sheen_albedo(float roughness, float cosine) {
-  vec2 place = cm_ggx_albedo_place(roughness, cosine);
-  ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
-  vec2 f = place - vec2(cell);
+  vec2 position = cm_ggx_albedo_position(roughness, cosine);
+  ivec2 cell = min(ivec2(position), CM_GGX_ALBEDO_SIZE - 2);
+  vec2 f = position - vec2(cell);
   vec4 corners = cm_floats(cm.surfaces.sheen_albedo + uint(cell.y * (CM_GGX_ALBEDO_SIZE - 1) + cell.x));
   vec2 ends = mix(vec2(corners.x, corners.z), vec2(corners.y, corners.w), f.x);
   return mix(ends.x, ends.y, f.y);
 }
 
 CM_FN float cm_sheen_albedo_average(float roughness) {
-  float place = cm_ggx_albedo_place(roughness, 0.0f).y;
-  int row = min(int(place), CM_GGX_ALBEDO_SIZE - 2);
+  float position = cm_ggx_albedo_position(roughness, 0.0f).y;
+  int row = min(int(position), CM_GGX_ALBEDO_SIZE - 2);
   int first = (CM_GGX_ALBEDO_SIZE - 1) * (CM_GGX_ALBEDO_SIZE - 1);
   vec4 ends = cm_floats(cm.surfaces.sheen_albedo + uint(first + row));
-  return mix(ends.x, ends.y, place - float(row));
+  return mix(ends.x, ends.y, position - float(row));
 }
 
 #endif
@@ -202,9 +202,9 @@ struct CmCorner {
 };
 
 CM_FN CmCorner cm_corner_at(uint first) {
-  uvec4 place = cm_words(first + CM_VERTEX_PLACE);
+  uvec4 position_normal = cm_words(first + CM_VERTEX_POSITION);
   uvec4 rest = cm_words(first + CM_VERTEX_REST);
-  return CmCorner(uintBitsToFloat(uvec3(place)), cm_octahedral(place.w),
+  return CmCorner(uintBitsToFloat(uvec3(position_normal)), cm_octahedral(position_normal.w),
                   vec4(cm_octahedral(rest.x), uintBitsToFloat(rest.y)));
 }
 

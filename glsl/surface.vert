@@ -9,11 +9,11 @@ layout(location = 1) in vec3 cm_normal;
 layout(location = 2) in vec4 cm_tangent;
 layout(location = 3) in vec4 cm_uv;  // both sets of texture coordinates
 layout(location = 4) in vec4 cm_color;
-layout(location = 5) in vec3 cm_place_x;  // columns of the linear part from its own space to the world
-layout(location = 6) in vec3 cm_place_y;
-layout(location = 7) in vec3 cm_place_z;
-layout(location = 8) in vec3 cm_place_high;  // its origin relative to the eye, as a sum of two floats
-layout(location = 9) in vec3 cm_place_low;
+layout(location = 5) in vec3 cm_transform_x;  // columns of the linear part from its own space to the world
+layout(location = 6) in vec3 cm_transform_y;
+layout(location = 7) in vec3 cm_transform_z;
+layout(location = 8) in vec3 cm_origin_high;  // its origin relative to the eye, as a sum of two floats
+layout(location = 9) in vec3 cm_origin_low;
 layout(location = 0) uniform vec2 cm_shift;  // jitter of the layer, in normalized device coordinates
 
 layout(location = 0) out vec3 cm_from_eye;
@@ -25,8 +25,9 @@ layout(location = 5) out float cm_z;
 
 void main() {
   // Near the eye the first sum is exact, however far both are from the origin.
-  precise vec3 turned = cm_place_x * cm_position.x + cm_place_y * cm_position.y + cm_place_z * cm_position.z;
-  precise vec3 q = (turned + cm_place_high) + cm_place_low;
+  precise vec3 turned =
+      cm_transform_x * cm_position.x + cm_transform_y * cm_position.y + cm_transform_z * cm_position.z;
+  precise vec3 q = (turned + cm_origin_high) + cm_origin_low;
   precise vec3 v = cm_view.to_view_x.xyz * q.x + cm_view.to_view_y.xyz * q.y + cm_view.to_view_z.xyz * q.z;
   // One expression for every projection: with "orthographic ? 1 : z", NVIDIA's driver 580 does not divide varyings by w
   // again.
@@ -34,11 +35,11 @@ void main() {
   gl_Position = vec4(v.x + cm_shift.x * w, -v.y + cm_shift.y * w, cm_view.clip.x + cm_view.clip.y * v.z, w);
   cm_from_eye = q;
   // Scaled, because products of short columns would underflow.
-  vec3 longest = max(max(abs(cm_place_x), abs(cm_place_y)), abs(cm_place_z));
+  vec3 longest = max(max(abs(cm_transform_x), abs(cm_transform_y)), abs(cm_transform_z));
   float scale = 1.0 / max(max(longest.x, longest.y), longest.z);
-  vec3 x = scale * cm_place_x;
-  vec3 y = scale * cm_place_y;
-  vec3 z = scale * cm_place_z;
+  vec3 x = scale * cm_transform_x;
+  vec3 y = scale * cm_transform_y;
+  vec3 z = scale * cm_transform_z;
   vec3 across = cross(y, z);
   float side = dot(x, across) < 0.0 ? -1.0 : 1.0;
   vec3 normal = across * cm_normal.x + cross(z, x) * cm_normal.y + cross(x, y) * cm_normal.z;

@@ -5,7 +5,7 @@
 
 // A vertex: position and normal; both sets of texture coordinates; tangent with handedness, and color.
 const uint CM_VERTEX_WORDS = 3u;
-const uint CM_VERTEX_PLACE = 0u;
+const uint CM_VERTEX_POSITION = 0u;
 const uint CM_VERTEX_UV = 1u;
 const uint CM_VERTEX_REST = 2u;
 

@@ -19,7 +19,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path_state.glsl"
 #include "path_store.glsl"
 #include "pixel_store.glsl"
-#include "path_places.glsl"
+#include "pixel_slots.glsl"
 #include "run.glsl"
 #include "groups.glsl"
 
@@ -45,11 +45,11 @@ void main() {
   CmPath p = cm_begin_path();
   uint samples = 0u;
   if (cm_block_begins()) {
-    cm_take_place(p, lane, samples);
+    cm_take_slot(p, lane, samples);
   } else {
     p = cm_load_path(lane);
     cm_load_visit(p, lane);
-    samples = cm_pixel_samples(cm_pixel_of(p.place));
+    samples = cm_pixel_samples(cm_pixel_of(p.slot));
   }
   cm_forget_triangles(p);
   CmRun run = cm_run(p, samples, cm.dispatch.rounds);

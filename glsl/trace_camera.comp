@@ -20,7 +20,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path.glsl"
 #include "path_store.glsl"
 #include "pixel_store.glsl"
-#include "path_places.glsl"
+#include "pixel_slots.glsl"
 #include "path_queue.glsl"
 #include "groups.glsl"
 
@@ -34,16 +34,16 @@ void main() {
   CmPath p = cm_begin_path();
   uint samples = 0u;
   if (cm_block_begins()) {
-    cm_take_place(p, lane, samples);
+    cm_take_slot(p, lane, samples);
     if (p.stage == CM_STAGE_CAMERA) {
-      cm_camera(p, samples, cm_pixel_of(p.place));
+      cm_camera(p, samples, cm_pixel_of(p.slot));
       cm_begin_within(lane);
     }
     cm_store_path(p, lane);
   } else {
     cm_load_sum(p, lane);
     cm_load_ends(p, lane);
-    if (p.stage != CM_STAGE_DONE) samples = cm_pixel_samples(cm_pixel_of(p.place));
+    if (p.stage != CM_STAGE_DONE) samples = cm_pixel_samples(cm_pixel_of(p.slot));
   }
   if (p.stage == CM_STAGE_DONE) return;
   atomicAdd(cm_blocks[cm_block_of(lane)].y, 1u);
@@ -52,10 +52,10 @@ void main() {
 }
 #else
 void main() {
-  if (cm_queue_place() >= cm_queue_count(CM_QUEUE_CAMERA)) return;
+  if (cm_queue_index() >= cm_queue_count(CM_QUEUE_CAMERA)) return;
   uint lane = cm_queue_lane(CM_QUEUE_CAMERA);
   CmPath p = cm_load_path(lane);
-  uvec2 at = cm_pixel_of(p.place);
+  uvec2 at = cm_pixel_of(p.slot);
   CmPixel pixel = cm_load_pixel(at);
 #if CM_GROUPS
   cm_group_lane = lane;
@@ -68,13 +68,13 @@ void main() {
   if (pixel.samples == 1u) atomicAdd(cm_blocks[block].z, 0xffffffffu);
   uint samples = pixel.samples;
   if (p.stage == CM_STAGE_DONE) {
-    cm_take_next_place(p, samples);
+    cm_take_next_slot(p, samples);
     if (p.stage != CM_STAGE_DONE && samples == 0u) atomicAdd(cm_blocks[block].z, 1u);
   }
   if (p.stage == CM_STAGE_DONE) {
     atomicAdd(cm_blocks[block].y, 0xffffffffu);
   } else {
-    cm_camera(p, samples, cm_pixel_of(p.place));
+    cm_camera(p, samples, cm_pixel_of(p.slot));
     cm_begin_within(lane);
     cm_enqueue(CM_QUEUE_TRAVEL, cm_round + 1u, lane);
   }

@@ -38,7 +38,7 @@ void cm_forget_ray(inout CmPath p) {
 // The shading data of a triangle, a light sample and the path together need too many registers for good occupancy. Each
 // is loaded when it is needed, and stored or loaded again rather than kept.
 void main() {
-  if (cm_queue_place() >= cm_queue_count(CM_QUEUE_SHADE)) return;
+  if (cm_queue_index() >= cm_queue_count(CM_QUEUE_SHADE)) return;
   uint lane = cm_queue_lane(CM_QUEUE_SHADE);
   CmPath p = cm_begin_path();
 #if CM_GROUPS

@@ -29,8 +29,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 void main() {
   uint count = cm_queue_count(CM_QUEUE_TRAVEL);
-  if (cm_queue_place() >= count) return;
-  if (cm_queue_place() == 0u) atomicAdd(cm_total.x, count);
+  if (cm_queue_index() >= count) return;
+  if (cm_queue_index() == 0u) atomicAdd(cm_total.x, count);
   uint lane = cm_queue_lane(CM_QUEUE_TRAVEL);
 #if CM_GROUPS
   cm_group_lane = lane;

@@ -189,7 +189,7 @@ vec4 cm_walk_scatters(inout CmWalk walk) {
     cm_stand_at(walk.front[k]);
     float extinction = walk.front[k].e_0 + walk.front[k].e_1;
     vec3 albedo = CM_MEDIUM.holdout != 0u ? vec3(0.0) : CM_MEDIUM.albedo;
-    vec4 here = vec4(albedo, mix(CM_MEDIUM.anisotropy, CM_MEDIUM.second_anisotropy, CM_MEDIUM.second_share));
+    vec4 here = vec4(albedo, mix(CM_MEDIUM.anisotropy, CM_MEDIUM.second_anisotropy, CM_MEDIUM.second_weight));
 #if CM_CHANNELS
     if (CM_MEDIUM.colored != 0u) here.rgb *= cm_march_color(walk.front[k].cell.xy);
     if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy);

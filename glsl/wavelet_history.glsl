@@ -10,7 +10,7 @@ struct CmLit {
   float samples;  // 0: no history
 };
 
-struct CmPlace {
+struct CmGeometry {
   vec3 normal;  // like CmGuides'
   float transmittance;
   float open;        // uncovered fraction
@@ -35,24 +35,25 @@ CmLit cm_unpacked_light(uvec4 words) {
   return CmLit(vec4(most * vec3(low, high.x), rest.x), most * high.y * most * high.y, rest.y);
 }
 
-uvec4 cm_packed_place(CmPlace place) {
-  return uvec4(packSnorm4x8(vec4(place.normal, 0.0)), packHalf2x16(vec2(place.transmittance, place.open)),
-               floatBitsToUint(min(place.solid_z, 2.0 * CM_NOTHING_Z)),
-               floatBitsToUint(min(place.scattered_z, 2.0 * CM_NOTHING_Z)));
+uvec4 cm_packed_geometry(CmGeometry geometry) {
+  return uvec4(packSnorm4x8(vec4(geometry.normal, 0.0)), packHalf2x16(vec2(geometry.transmittance, geometry.open)),
+               floatBitsToUint(min(geometry.solid_z, 2.0 * CM_NOTHING_Z)),
+               floatBitsToUint(min(geometry.scattered_z, 2.0 * CM_NOTHING_Z)));
 }
 
-CmPlace cm_unpacked_place(uvec4 words) {
+CmGeometry cm_unpacked_geometry(uvec4 words) {
   vec2 halves = unpackHalf2x16(words.y);
-  return CmPlace(unpackSnorm4x8(words.x).xyz, halves.x, halves.y, uintBitsToFloat(words.z), uintBitsToFloat(words.w));
+  return CmGeometry(unpackSnorm4x8(words.x).xyz, halves.x, halves.y, uintBitsToFloat(words.z),
+                    uintBitsToFloat(words.w));
 }
 
 layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
 layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
 
 // Geometry of the image being filtered. aovs.comp stores depths beside normals and albedos.
-CmPlace cm_place_at(ivec2 texel) {
+CmGeometry cm_geometry_at(ivec2 texel) {
   CmGuides guides = cm_guides_at(texel);
-  return CmPlace(guides.normal, guides.transmittance, texelFetch(cm_spread, texel, 0).x,
+  return CmGeometry(guides.normal, guides.transmittance, texelFetch(cm_spread, texel, 0).x,
                  texelFetch(cm_normal, texel, 0).w, texelFetch(cm_albedo, texel, 0).w);
 }
 

@@ -19,8 +19,8 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_
 #define CM_ENOUGH 64.0
 // Clamping range of the history, in standard deviations of the neighborhood.
 #define CM_CLAMP 2.0
-// Squared differences up to this multiple of the noise's variance count as chance.
-#define CM_BY_CHANCE 2.0
+// Squared differences up to this multiple of the noise's variance count as noise.
+#define CM_NOISE_BOUND 2.0
 // The history's variance counts as at most this many samples beside the new ones.
 #define CM_FEW 4.0
 
@@ -80,7 +80,7 @@ CmLit cm_trusted_history(CmLit lit, CmAround around, float cover, float samples)
   if (around.samples_now == 0.0 || lit.samples == 0.0) return lit;
   float off = cm_luminance(around.then - around.now);
   float noise = around.variance * (1.0 / around.samples_now + 1.0 / around.samples_then);
-  float bias = max(0.0, off * off - CM_BY_CHANCE * noise);
+  float bias = max(0.0, off * off - CM_NOISE_BOUND * noise);
   // Equivalent number of samples: the history's error is bias^2 + variance / lit.samples.
   lit.samples *= around.variance > 0.0 ? around.variance / (around.variance + lit.samples * bias)
                                        : (bias > 0.0 ? 0.0 : 1.0);
@@ -118,5 +118,5 @@ void main() {
   imageStore(cm_spread_out, texel, spread);
 #endif
   imageStore(cm_light_out, texel, cm_packed_light(CmLit(front, spread.y, min(spread.z, cm_most))));
-  imageStore(cm_guides_out, texel, cm_packed_place(cm_place_at(texel)));
+  imageStore(cm_guides_out, texel, cm_packed_geometry(cm_geometry_at(texel)));
 }

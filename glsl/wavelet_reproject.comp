@@ -40,13 +40,13 @@ struct CmRoom {
   float normal;  // squared length
 };
 
-CmRoom cm_room(ivec2 texel, CmPlace here) {
+CmRoom cm_room(ivec2 texel, CmGeometry here) {
   ivec2 last = textureSize(cm_guides, 0) - 1;
   CmRoom room = CmRoom(0.0, 0.0, 0.05);
   for (int axis = 0; axis < 2; ++axis) {
     ivec2 by = ivec2(1 - axis, axis);
-    CmPlace to = cm_place_at(min(texel + by, last));
-    CmPlace from = cm_place_at(max(texel - by, ivec2(0)));
+    CmGeometry to = cm_geometry_at(min(texel + by, last));
+    CmGeometry from = cm_geometry_at(max(texel - by, ivec2(0)));
     float solid = abs(cm_smaller(here.solid_z - from.solid_z, to.solid_z - here.solid_z));
     float scattered = abs(cm_smaller(here.scattered_z - from.scattered_z, to.scattered_z - here.scattered_z));
     if (solid < 0.1 * CM_NOTHING_Z) room.solid_z += solid;
@@ -60,7 +60,7 @@ CmRoom cm_room(ivec2 texel, CmPlace here) {
 
 // Adds the history at a reprojected position, weighted by its similarity. solid: compare depths of surfaces, else of
 // the medium. share: weight.
-void cm_recall(inout CmLit sum, CmPlace here, float cover, vec4 before, bool solid, CmRoom room, float share) {
+void cm_recall(inout CmLit sum, CmGeometry here, float cover, vec4 before, bool solid, CmRoom room, float share) {
   ivec2 size = textureSize(cm_history_light, 0);
   if (before.w == 0.0 || any(lessThan(before.xy, vec2(-1.0))) || any(greaterThan(before.xy, vec2(size)))) return;
   vec2 low = floor(before.xy);
@@ -74,7 +74,7 @@ void cm_recall(inout CmLit sum, CmPlace here, float cover, vec4 before, bool sol
     if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
     CmLit lit = cm_unpacked_light(texelFetch(cm_history_light, at, 0));
     if (!cm_is_positive(lit.samples)) continue;
-    CmPlace there = cm_unpacked_place(texelFetch(cm_history_guides, at, 0));
+    CmGeometry there = cm_unpacked_geometry(texelFetch(cm_history_guides, at, 0));
     float z = solid ? there.solid_z : there.scattered_z;
     bool none = before.z > CM_NOTHING_Z;
     float off = none != (z > CM_NOTHING_Z) ? 10.0 : (none ? 0.0 : min(10.0, abs(z - before.z) / apart));
@@ -95,7 +95,7 @@ void main() {
   if (texel.x >= size.x || texel.y >= cm_rows.y) return;
   CmLit sum = CmLit(vec4(0.0), 0.0, 0.0);
   if (cm_guides_at(texel).finite) {
-    CmPlace here = cm_place_at(texel);
+    CmGeometry here = cm_geometry_at(texel);
     CmRoom room = cm_room(texel, here);
     vec2 at = vec2(2.0, -2.0) * ((vec2(texel) + 0.5) / vec2(size) - 0.5);
     float cover = cm_cover(here.open);

@@ -124,11 +124,11 @@ void App::frame() {
     host.converged = settled() && (model_.status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
     host.viewport = viewport_;
     host.find = [this](const std::string& label) {
-      auto place = panel_.ui().find(label);
+      auto control = panel_.ui().find(label);
       const auto seen = sight();
-      if (!place && seen) place = Handles::find(label, model_, *seen, ui_scale_);
-      if (!place) panel_.ui().bring_into_view(label);
-      return place;
+      if (!control && seen) control = Handles::find(label, model_, *seen, ui_scale_);
+      if (!control) panel_.ui().bring_into_view(label);
+      return control;
     };
     order_ = player_->next(host, window_->input());
   }
@@ -140,7 +140,7 @@ void App::frame() {
   handle(events);
   if (const auto region = region_drag_.taken(viewport_)) std::ranges::copy(*region, model_.scene.sampling.region);
   drag_handle();
-  if (model_.chosen && !place_of(model_.scene, *model_.chosen)) model_.chosen.reset();
+  if (model_.chosen && !transform_of(model_.scene, *model_.chosen)) model_.chosen.reset();
 
   model_.can_undo = history_->can_undo(model_.scene);
   model_.can_redo = history_->can_redo();
@@ -272,7 +272,7 @@ void App::choose_at(const glm::dvec2& pixel) {
 }
 
 std::optional<Sight> App::sight() const {
-  if (is_unplaced(model_.scene.camera) || !(viewport_.width > 0.0 && viewport_.height > 0.0)) return std::nullopt;
+  if (needs_fit(model_.scene.camera) || !(viewport_.width > 0.0 && viewport_.height > 0.0)) return std::nullopt;
   return Sight(model_.scene.camera, viewport_);
 }
 
@@ -603,7 +603,7 @@ void App::open(const std::string& path) {
     model_.scene_path = path;
     opening_scene_ = path;
     reload_ = true;
-    fit_next_ = is_unplaced(model_.scene.camera);
+    fit_next_ = needs_fit(model_.scene.camera);
   } catch (const std::exception& error) {
     complain(error.what());
     model_.preferences.forget(path);

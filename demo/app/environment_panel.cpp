@@ -68,8 +68,8 @@ bool Ui::environment(const char* label, const char* tip, unsigned texture, float
   // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
   auto* picture = reinterpret_cast<ImTextureID>(std::uintptr_t{texture});
   draw.AddImageRounded(picture, corner, end, {left, 0.0f}, {left + 1.0f, 1.0f}, IM_COL32_WHITE, px(4.0f));
-  const float x =
-      std::clamp(corner.x + width * static_cast<float>(place_of(ahead_degrees)), corner.x + px(6.0f), end.x - px(6.0f));
+  const float x = std::clamp(corner.x + width * static_cast<float>(position_of(ahead_degrees)), corner.x + px(6.0f),
+                             end.x - px(6.0f));
   const float wing = px(6.0f);
   const auto triangle = [&](float size, ImU32 color) {
     draw.AddTriangleFilled({x - size, end.y}, {x + size, end.y}, {x, end.y - 1.5f * size}, color);

@@ -45,9 +45,9 @@ double left_edge(double rotation_degrees) { return rotation_degrees / 360.0; }
 
 double dragged(double rotation_degrees, double width) { return wrap_degrees(rotation_degrees - 360.0 * width); }
 
-double place_of(double azimuth_degrees) {
-  const double place = 0.5 - wrap_degrees(azimuth_degrees) / 360.0;
-  return place >= 1.0 ? 0.0 : place;
+double position_of(double azimuth_degrees) {
+  const double position = 0.5 - wrap_degrees(azimuth_degrees) / 360.0;
+  return position >= 1.0 ? 0.0 : position;
 }
 
 }  // namespace cumulet::demo

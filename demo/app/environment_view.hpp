@@ -33,6 +33,6 @@ using ThumbnailPtr = std::shared_ptr<const Thumbnail>;
 /// result is in (-180, 180].
 [[nodiscard]] double dragged(double rotation_degrees, double width);
 /// Returns the horizontal position of a direction, 0 to 1.
-[[nodiscard]] double place_of(double azimuth_degrees);
+[[nodiscard]] double position_of(double azimuth_degrees);
 
 }  // namespace cumulet::demo

@@ -162,11 +162,11 @@ double round_step(double most) {
   return (most >= 5.0 * ten ? 5.0 : most >= 2.0 * ten ? 2.0 : 1.0) * ten;
 }
 
-Sight::Sight(const cumulet_camera_desc& camera, const Rectangle& place) : place_(place) {
+Sight::Sight(const cumulet_camera_desc& camera, const Rectangle& area) : area_(area) {
   cumulet_camera* made = nullptr;
   if (cumulet_camera_create(&camera, &made) != CUMULET_OK) return;
   const std::unique_ptr<cumulet_camera, void (*)(cumulet_camera*)> held(made, cumulet_camera_release);
-  static_cast<void>(cumulet_camera_get_matrices(made, place.width / place.height, CUMULET_CLIP_NEGATIVE_ONE_TO_ONE,
+  static_cast<void>(cumulet_camera_get_matrices(made, area.width / area.height, CUMULET_CLIP_NEGATIVE_ONE_TO_ONE,
                                                 glm::value_ptr(to_eye_), glm::value_ptr(projection_)));
   to_world_ = glm::inverse(to_eye_);
   perspective_ = projection_[2][3] != 0.0;
@@ -181,8 +181,8 @@ dvec3 Sight::in_eye_space(const dvec3& point) const {
 
 dvec2 Sight::pixel_of(const dvec3& in_eye_space) const {
   const dvec4 clip = projection_ * dvec4(in_eye_space, 1.0);
-  return {place_.x + 0.5 * (1.0 + clip.x / clip.w) * place_.width,
-          place_.y + 0.5 * (1.0 - clip.y / clip.w) * place_.height};
+  return {area_.x + 0.5 * (1.0 + clip.x / clip.w) * area_.width,
+          area_.y + 0.5 * (1.0 - clip.y / clip.w) * area_.height};
 }
 
 std::optional<dvec2> Sight::project(const dvec3& point) const {
@@ -207,7 +207,7 @@ std::optional<std::array<dvec2, 2>> Sight::project(const dvec3& a, const dvec3& 
 }
 
 Ray Sight::ray(const dvec2& pixel) const {
-  const dvec2 clip(2.0 * (pixel.x - place_.x) / place_.width - 1.0, 1.0 - 2.0 * (pixel.y - place_.y) / place_.height);
+  const dvec2 clip(2.0 * (pixel.x - area_.x) / area_.width - 1.0, 1.0 - 2.0 * (pixel.y - area_.y) / area_.height);
   const dvec2 scale(projection_[0][0], projection_[1][1]);
   if (!perspective_) {
     const dvec2 at = (clip - dvec2(projection_[3])) / scale;
@@ -218,7 +218,7 @@ Ray Sight::ray(const dvec2& pixel) const {
 }
 
 double Sight::pixel_at(const dvec3& point) const {
-  const double height = 2.0 / projection_[1][1] / place_.height;
+  const double height = 2.0 / projection_[1][1] / area_.height;
   return perspective_ ? height * std::max(-in_eye_space(point).z, nearest_) : height;
 }
 
@@ -231,10 +231,10 @@ dvec3 Sight::to_eye(const dvec3& point) const {
 
 dvec3 Sight::forward() const { return -glm::normalize(dvec3(to_world_[2])); }
 
-Gizmo gizmo_of(Tool tool, Axes axes, const dmat4& place, const dvec3& pivot, double reach) {
+Gizmo gizmo_of(Tool tool, Axes axes, const dmat4& transform, const dvec3& pivot, double reach) {
   Gizmo gizmo{tool, pivot, dmat3(1.0), reach};
   if (axes == Axes::world && tool != Tool::scale) return gizmo;
-  for (int i = 0; i < 3; ++i) gizmo.axes[i] = glm::normalize(dvec3(place[i]));
+  for (int i = 0; i < 3; ++i) gizmo.axes[i] = glm::normalize(dvec3(transform[i]));
   return gizmo;
 }
 

@@ -36,7 +36,7 @@ struct Ray {
 class Sight {
  public:
   /// The camera must have a position, and the rectangle must not be empty.
-  Sight(const cumulet_camera_desc& camera, const Rectangle& place);
+  Sight(const cumulet_camera_desc& camera, const Rectangle& area);
 
   /// Returns nullopt for points behind the near limit.
   [[nodiscard]] std::optional<glm::dvec2> project(const glm::dvec3& point) const;
@@ -59,7 +59,7 @@ class Sight {
   glm::dmat4 projection_{1.0};
   bool perspective_ = true;
   double nearest_ = 0.0;  // near limit, a depth; for a perspective camera
-  Rectangle place_;
+  Rectangle area_;
 };
 
 enum class Tool { none, move, rotate, scale };
@@ -81,9 +81,9 @@ struct Gizmo {
   double reach = 0.0;    // length of an axis in pixels
 };
 
-/// Returns the handles for an object with the transform `place`, centered at a world-space point. Scaling always uses
+/// Returns the handles for an object with this transform, centered at a world-space point. Scaling always uses
 /// the object's own axes.
-[[nodiscard]] Gizmo gizmo_of(Tool tool, Axes axes, const glm::dmat4& place, const glm::dvec3& pivot, double reach);
+[[nodiscard]] Gizmo gizmo_of(Tool tool, Axes axes, const glm::dmat4& transform, const glm::dvec3& pivot, double reach);
 
 /// Returns the shape of a handle in pixels: a line from the pivot, the outline of a square, an arc, or a circle for the
 /// free handle. Returns an empty shape if the handle is seen so much from its end or edge that dragging would be

@@ -101,11 +101,11 @@ class Pen {
   float scale_;
 };
 
-void draw_box(const Pen& pen, const dmat4& place, const Box& box) {
+void draw_box(const Pen& pen, const dmat4& transform, const Box& box) {
   const auto corner = [&](unsigned i) {
     const dvec3 at((i & 1U) != 0 ? box.most.x : box.least.x, (i & 2U) != 0 ? box.most.y : box.least.y,
                    (i & 4U) != 0 ? box.most.z : box.least.z);
-    return dvec3(place * dvec4(at, 1.0));
+    return dvec3(transform * dvec4(at, 1.0));
   };
   for (unsigned i = 0; i < 8; ++i)
     for (unsigned bit = 1; bit < 8; bit *= 2)
@@ -113,8 +113,8 @@ void draw_box(const Pen& pen, const dmat4& place, const Box& box) {
 }
 
 /// Draws the outline of a light: its size and the direction of its emission.
-void draw_analytic_light(const Pen& pen, const cumulet_light_desc& analytic_light, const dmat4& place) {
-  const auto at = [&](double x, double y, double z) { return dvec3(place * dvec4(x, y, z, 1.0)); };
+void draw_analytic_light(const Pen& pen, const cumulet_light_desc& analytic_light, const dmat4& transform) {
+  const auto at = [&](double x, double y, double z) { return dvec3(transform * dvec4(x, y, z, 1.0)); };
   const double far = handle_reach * static_cast<double>(pen.scale()) * pen.sight().pixel_at(at(0.0, 0.0, 0.0));
   const auto round = [&](double radius, double z) {
     constexpr int parts = 32;
@@ -159,10 +159,10 @@ void draw_handle(const Pen& pen, const Gizmo& gizmo, Handle handle, ImU32 color)
 
 std::optional<Gizmo> gizmo_of(const Model& model, float scale) {
   if (!model.chosen || model.tool == Tool::none) return std::nullopt;
-  const auto place = place_of(model.scene, *model.chosen);
-  if (!place) return std::nullopt;
-  const glm::dvec3 pivot = pivot_of(*place, box_of(model.scene, model.status.boxes, *model.chosen));
-  return gizmo_of(model.tool, model.axes, *place, pivot, handle_reach * static_cast<double>(scale));
+  const auto transform = transform_of(model.scene, *model.chosen);
+  if (!transform) return std::nullopt;
+  const glm::dvec3 pivot = pivot_of(*transform, box_of(model.scene, model.status.boxes, *model.chosen));
+  return gizmo_of(model.tool, model.axes, *transform, pivot, handle_reach * static_cast<double>(scale));
 }
 
 }  // namespace
@@ -173,13 +173,13 @@ bool Handles::press(const Model& model, const Sight& sight, const dvec2& pixel, 
   const auto handle = handle_at(*gizmo, sight, pixel, grasp_tolerance * static_cast<double>(scale));
   if (!handle) return false;
   held_.emplace(Held{Drag(*gizmo, *handle, sight, pixel), *model.chosen, model.scene,
-                     *place_of(model.scene, *model.chosen), pixel});
+                     *transform_of(model.scene, *model.chosen), pixel});
   return true;
 }
 
 void Handles::drag(Model& model, const Sight& sight, const dvec2& pixel, bool snapped) {
   if (!held_) return;
-  if (!place_of(model.scene, held_->item)) {
+  if (!transform_of(model.scene, held_->item)) {
     held_.reset();
     return;
   }
@@ -187,11 +187,11 @@ void Handles::drag(Model& model, const Sight& sight, const dvec2& pixel, bool sn
   if (pixel == held_->pixel && snapped == held_->snapped) return;
   held_->pixel = pixel;
   held_->snapped = snapped;
-  set_place(model.scene, held_->item, held_->drag.to(sight, pixel, snapped) * held_->place);
+  set_transform(model.scene, held_->item, held_->drag.to(sight, pixel, snapped) * held_->transform);
 }
 
 void Handles::cancel(Model& model) {
-  if (held_ && place_of(model.scene, held_->item)) restore_place(model.scene, held_->item, held_->before);
+  if (held_ && transform_of(model.scene, held_->item)) restore_transform(model.scene, held_->item, held_->before);
   held_.reset();
 }
 
@@ -202,7 +202,7 @@ std::optional<Item> Handles::analytic_light_at(const Model& model, const Sight& 
   double least = (mark_radius + 3.0) * static_cast<double>(scale);
   for (const Item& item : items_of(model.scene)) {
     if (item.kind != Item::Kind::analytic_light) continue;
-    const auto at = sight.project(pivot_of(*place_of(model.scene, item), std::nullopt));
+    const auto at = sight.project(pivot_of(*transform_of(model.scene, item), std::nullopt));
     if (!at || !(glm::distance(*at, pixel) <= least)) continue;
     least = glm::distance(*at, pixel);
     found = item;
@@ -236,9 +236,9 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
   const Pen pen(list, sight, scale);
   for (const Item& item : items_of(model.scene)) {
     const bool is_chosen = item == model.chosen;
-    const dmat4 place = *place_of(model.scene, item);
+    const dmat4 transform = *transform_of(model.scene, item);
     if (item.kind == Item::Kind::analytic_light) {
-      const auto at = sight.project(pivot_of(place, std::nullopt));
+      const auto at = sight.project(pivot_of(transform, std::nullopt));
       const double radius = mark_radius * static_cast<double>(scale);
       if (at) {
         const ImU32 color = is_chosen ? chosen_color : analytic_light_color;
@@ -246,9 +246,9 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
         list.AddCircle(vec(*at), static_cast<float>(radius), color, 0, thin * scale);
         list.AddCircleFilled(vec(*at), static_cast<float>(0.3 * radius), color);
       }
-      if (is_chosen) draw_analytic_light(pen, model.scene.analytic_lights[item.index], place);
+      if (is_chosen) draw_analytic_light(pen, model.scene.analytic_lights[item.index], transform);
     } else if (is_chosen) {
-      if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, place, *box);
+      if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, transform, *box);
     }
   }
   const auto gizmo = gizmo_of(model, scale);

@@ -41,8 +41,8 @@ class Handles {
     Drag drag;
     Item item;
     SceneOptions before;
-    glm::dmat4 place;  // transform at the start
-    glm::dvec2 pixel;  // last pointer position
+    glm::dmat4 transform;  // transform at the start
+    glm::dvec2 pixel;      // last pointer position
     bool snapped = false;
   };
 

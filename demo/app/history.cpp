@@ -4,11 +4,11 @@
 
 namespace cumulet::demo {
 
-bool is_unplaced(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
+bool needs_fit(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
 
 void History::offer(const SceneOptions& scene, bool held) {
   SceneOptions& now = states_[now_];
-  if (is_unplaced(now.camera) && !is_unplaced(scene.camera)) now.camera = scene.camera;
+  if (needs_fit(now.camera) && !needs_fit(scene.camera)) now.camera = scene.camera;
   if (held || same_scene(scene, now)) return;
   states_.resize(now_ + 1);
   states_.push_back(scene);

@@ -32,6 +32,6 @@ class History {
 };
 
 /// Returns true if the library still has to fit the camera.
-[[nodiscard]] bool is_unplaced(const cumulet_camera_desc& camera);
+[[nodiscard]] bool needs_fit(const cumulet_camera_desc& camera);
 
 }  // namespace cumulet::demo

@@ -371,7 +371,7 @@ void Panel::cameras(Model& model) {
   ImGui::EndDisabled();
   bool keep = ui_.text("Camera name", "Name for saving the current view.", "name", camera_name_);
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
-  const bool can_keep = !camera_name_.empty() && !is_unplaced(model.scene.camera);
+  const bool can_keep = !camera_name_.empty() && !needs_fit(model.scene.camera);
   ImGui::BeginDisabled(!can_keep);
   keep |=
       ui_.button("Save camera", "Saves the current view as a camera of the scene; replaces a camera of the same name.",

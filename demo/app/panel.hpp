@@ -46,11 +46,12 @@ class Panel {
   /// Draws the list of the scene's objects and the settings of the handles.
   void items(Model& model);
   void volumes(Model& model, std::vector<Command>& commands);
-  /// Draws the transform of a volume. place: the selected one of several transforms. number: suffix of the labels.
-  void stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number);
+  /// Draws the transform of a volume. transform_index: the selected one of several transforms. number: suffix of the
+  /// labels.
+  void stand(SceneVolume& volume, std::optional<std::size_t> transform_index, const std::string& number);
   void models(Model& model, std::vector<Command>& commands);
-  // Draws the rows of the transform `place`. Returns the new transform if the user changed it.
-  std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& place,
+  // Draws the rows of a transform. Returns the new transform if the user changed it.
+  std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& transform,
                                                  const std::string& number);
   void analytic_lights(Model& model);
   void sequence(Model& model, std::vector<Command>& commands);

@@ -31,7 +31,7 @@ void fit(RampView& view, const RampPoints& points, float max_value) {
 
 std::optional<std::size_t> add_point(RampPoints& points, RampPoint point) {
   const auto at = std::ranges::lower_bound(points, value_of(point), {}, value_of);
-  const auto place = static_cast<std::size_t>(at - points.begin());
+  const auto index = static_cast<std::size_t>(at - points.begin());
   if (at != points.end() && value_of(*at) == value_of(point)) {
     *at = point;
   } else if (points.size() < settings::max_ramp_points) {
@@ -39,18 +39,18 @@ std::optional<std::size_t> add_point(RampPoints& points, RampPoint point) {
   } else {
     return std::nullopt;
   }
-  return place;
+  return index;
 }
 
-void move_point(RampPoints& points, std::size_t place, RampPoint to) {
-  const float least = place > 0 ? std::nextafter(value_of(points[place - 1]), farthest) : -farthest;
-  const float most = place + 1 < points.size() ? std::nextafter(value_of(points[place + 1]), -farthest) : farthest;
-  points[place] = {std::clamp(value_of(to), least, most), std::clamp(result_of(to), 0.0f, farthest)};
+void move_point(RampPoints& points, std::size_t index, RampPoint to) {
+  const float least = index > 0 ? std::nextafter(value_of(points[index - 1]), farthest) : -farthest;
+  const float most = index + 1 < points.size() ? std::nextafter(value_of(points[index + 1]), -farthest) : farthest;
+  points[index] = {std::clamp(value_of(to), least, most), std::clamp(result_of(to), 0.0f, farthest)};
 }
 
-bool remove_point(RampPoints& points, std::size_t place) {
+bool remove_point(RampPoints& points, std::size_t index) {
   if (points.size() <= 2) return false;
-  points.erase(points.begin() + static_cast<std::ptrdiff_t>(place));
+  points.erase(points.begin() + static_cast<std::ptrdiff_t>(index));
   return true;
 }
 

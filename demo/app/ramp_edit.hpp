@@ -21,8 +21,8 @@ void fit(RampView& view, const settings::RampPoints& points, float max_value);
 /// of points is reached.
 std::optional<std::size_t> add_point(settings::RampPoints& points, settings::RampPoint point);
 /// Moves a point; its value is limited by the neighboring points.
-void move_point(settings::RampPoints& points, std::size_t place, settings::RampPoint to);
+void move_point(settings::RampPoints& points, std::size_t index, settings::RampPoint to);
 /// Removes a point. Returns false if only two are left, the minimum for a ramp.
-bool remove_point(settings::RampPoints& points, std::size_t place);
+bool remove_point(settings::RampPoints& points, std::size_t index);
 
 }  // namespace cumulet::demo

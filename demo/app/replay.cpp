@@ -63,22 +63,22 @@ class Line {
     return code;
   }
 
-  Place place() {
+  Position position() {
     if (ended()) fail("a position is missing");
-    Place place;
+    Position position;
     if (words_.peek() == '"') {
-      place.of = Place::Of::control;
-      place.control = quoted();
-      place.x = place.y = 0.5;
+      position.of = Position::Of::control;
+      position.control = quoted();
+      position.x = position.y = 0.5;
       const int next = ended() ? 0 : words_.peek();
-      if ((next < '0' || next > '9') && next != '.' && next != '-') return place;
+      if ((next < '0' || next > '9') && next != '.' && next != '-') return position;
     } else if (words_.peek() == 'v') {
       if (word() != "viewport") fail("a position must be \"a control\", viewport X Y, or X Y");
-      place.of = Place::Of::viewport;
+      position.of = Position::Of::viewport;
     }
-    place.x = number();
-    place.y = number();
-    return place;
+    position.x = number();
+    position.y = number();
+    return position;
   }
 
  private:
@@ -120,18 +120,18 @@ class Parser {
       step.seconds = line.number();
       if (!(step.seconds > 0.0 && step.seconds <= 60.0)) line.fail("idle needs a time of up to 60 seconds");
     } else if (command == "move") {
-      move(line.place());
+      move(line.position());
     } else if (command == "down" || command == "up") {
       event(button_event(line.button(), command == "down"));
     } else if (command == "click") {
-      move(line.place());
+      move(line.position());
       const int button = line.button();
       event(button_event(button, true));
       event(button_event(button, false));
     } else if (command == "drag") {
-      const Place from = line.place();
+      const Position from = line.position();
       if (line.word() != "to") line.fail("expected: drag POSITION to POSITION [BUTTON]");
-      const Place to = line.place();
+      const Position to = line.position();
       const int button = line.button();
       move(from);
       event(button_event(button, true));
@@ -186,9 +186,9 @@ class Parser {
     return step;
   }
   void event(Event what) { add(ReplayStep::Type::event).event = std::move(what); }
-  void move(const Place& place) {
+  void move(const Position& position) {
     ReplayStep& step = add(ReplayStep::Type::move);
-    step.from = step.to = place;
+    step.from = step.to = position;
   }
 
   /// Adds the events of "ctrl+shift+z": keys go down in this order and up in reverse order.
@@ -268,22 +268,22 @@ void Player::fail(const std::string& cause) const {
   throw std::runtime_error(path_ + ":" + std::to_string(steps_[at_].line) + ": " + cause);
 }
 
-std::optional<Rectangle> Player::locate(const ReplayHost& host, const Place& place) const {
-  switch (place.of) {
-    case Place::Of::window:
-      return Rectangle{place.x, place.y, 0.0, 0.0};
-    case Place::Of::viewport:
-      return Rectangle{host.viewport.x + place.x * host.viewport.width,
-                       host.viewport.y + place.y * host.viewport.height, 0.0, 0.0};
-    case Place::Of::control:
+std::optional<Rectangle> Player::locate(const ReplayHost& host, const Position& position) const {
+  switch (position.of) {
+    case Position::Of::window:
+      return Rectangle{position.x, position.y, 0.0, 0.0};
+    case Position::Of::viewport:
+      return Rectangle{host.viewport.x + position.x * host.viewport.width,
+                       host.viewport.y + position.y * host.viewport.height, 0.0, 0.0};
+    case Position::Of::control:
       break;
   }
-  const auto control = host.find(place.control);
+  const auto control = host.find(position.control);
   if (!control) {
-    if (frames_ > control_frames) fail("there is no control \"" + place.control + "\"");
+    if (frames_ > control_frames) fail("there is no control \"" + position.control + "\"");
     return std::nullopt;
   }
-  return Rectangle{control->x + place.x * control->width, control->y + place.y * control->height, 0.0, 0.0};
+  return Rectangle{control->x + position.x * control->width, control->y + position.y * control->height, 0.0, 0.0};
 }
 
 bool Player::wait_over(const ReplayHost& host) {

@@ -22,7 +22,7 @@ struct Rectangle {
 };
 
 /// A position in the window, resolved when the command is executed.
-struct Place {
+struct Position {
   enum class Of { window, viewport, control };
   Of of = Of::window;
   std::string control;  // the control's label
@@ -36,8 +36,8 @@ struct ReplayStep {
   Type type = Type::frames;
   int count = 1;         // for frames
   double seconds = 0.0;  // for idle
-  Place from;            // move: start and end; `part` is the fraction in between
-  Place to;
+  Position from;         // move: start and end; `part` is the fraction in between
+  Position to;
   double part = 1.0;
   Event event;
   std::string text;  // text: the text; screenshot, report: the file
@@ -76,7 +76,7 @@ class Player {
  private:
   using Clock = std::chrono::steady_clock;
   [[noreturn]] void fail(const std::string& cause) const;
-  [[nodiscard]] std::optional<Rectangle> locate(const ReplayHost& host, const Place& place) const;
+  [[nodiscard]] std::optional<Rectangle> locate(const ReplayHost& host, const Position& position) const;
   /// Returns true if a waiting step is done. frames_ counts the calls.
   [[nodiscard]] bool wait_over(const ReplayHost& host);
 

@@ -25,7 +25,7 @@ bool has(const SceneOptions& scene, const Item& item) {
   switch (item.kind) {
     case Item::Kind::volume:
       if (item.index > scene.others.size() || volume_at(scene, item.index).volume.empty()) return false;
-      return item.place < std::max<std::size_t>(1, volume_at(scene, item.index).places.size());
+      return item.transform_index < std::max<std::size_t>(1, volume_at(scene, item.index).transforms.size());
     case Item::Kind::model:
       return item.index < scene.models.size();
     case Item::Kind::analytic_light:
@@ -43,8 +43,8 @@ Numbers numbers_of(const dmat4& matrix) {
   return numbers;
 }
 
-dmat4 place_of(const cumulet_light_desc& analytic_light) {
-  dmat4 place(1.0);
+dmat4 transform_of(const cumulet_light_desc& analytic_light) {
+  dmat4 transform(1.0);
   const dvec3 down(0.0, -1.0, 0.0);
   const dvec3 shines = glm::make_vec3(analytic_light.direction);
   const dvec3 direction = glm::length(shines) > 0.0 ? glm::normalize(shines) : down;
@@ -55,26 +55,28 @@ dmat4 place_of(const cumulet_light_desc& analytic_light) {
   if (!(glm::length(tangent) > least)) tangent = glm::cross(-down, direction);
   if (!(glm::length(tangent) > least)) tangent = dvec3(1.0, 0.0, 0.0);
   tangent = glm::normalize(tangent);
-  place[0] = dvec4(tangent, 0.0);
-  place[1] = dvec4(glm::cross(direction, tangent), 0.0);
-  place[2] = dvec4(direction, 0.0);
-  place[3] = dvec4(glm::make_vec3(analytic_light.position), 1.0);
-  return place;
+  transform[0] = dvec4(tangent, 0.0);
+  transform[1] = dvec4(glm::cross(direction, tangent), 0.0);
+  transform[2] = dvec4(direction, 0.0);
+  transform[3] = dvec4(glm::make_vec3(analytic_light.position), 1.0);
+  return transform;
 }
 
-void set_place(cumulet_light_desc& analytic_light, const dmat4& place) {
-  const dmat4 before = place_of(analytic_light);
-  std::copy_n(glm::value_ptr(place[3]), 3, analytic_light.position);
+void set_transform(cumulet_light_desc& analytic_light, const dmat4& transform) {
+  const dmat4 before = transform_of(analytic_light);
+  std::copy_n(glm::value_ptr(transform[3]), 3, analytic_light.position);
   // Unchanged directions keep their exact numbers.
-  if (place[2] != before[2]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[2]))), 3, analytic_light.direction);
-  if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, analytic_light.tangent);
+  if (transform[2] != before[2])
+    std::copy_n(glm::value_ptr(glm::normalize(dvec3(transform[2]))), 3, analytic_light.direction);
+  if (transform[0] != before[0])
+    std::copy_n(glm::value_ptr(glm::normalize(dvec3(transform[0]))), 3, analytic_light.tangent);
   const auto stretched = [](double length, double by) {
     double longer = length;
     if (std::abs(by - 1.0) > 1e-9) longer *= by;
     return longer;
   };
-  const double wider = glm::length(dvec3(place[0]));
-  const double higher = glm::length(dvec3(place[1]));
+  const double wider = glm::length(dvec3(transform[0]));
+  const double higher = glm::length(dvec3(transform[1]));
   const bool is_disc = analytic_light.kind == CUMULET_LIGHT_DISK;
   analytic_light.width = stretched(analytic_light.width, is_disc ? std::sqrt(wider * higher) : wider);
   if (!is_disc) analytic_light.height = stretched(analytic_light.height, higher);
@@ -104,8 +106,9 @@ std::vector<Item> items_of(const SceneOptions& scene) {
     if (has(scene, item)) items.push_back(item);
   };
   for (std::size_t i = 0; i <= scene.others.size(); ++i) {
-    const std::size_t places = volume_at(scene, i).places.size();
-    for (std::size_t place = 0; place < std::max<std::size_t>(1, places); ++place) add({Item::Kind::volume, i, place});
+    const std::size_t transforms = volume_at(scene, i).transforms.size();
+    for (std::size_t transform_index = 0; transform_index < std::max<std::size_t>(1, transforms); ++transform_index)
+      add({Item::Kind::volume, i, transform_index});
   }
   for (std::size_t i = 0; i < scene.models.size(); ++i) add({Item::Kind::model, i, 0});
   for (std::size_t i = 0; i < scene.analytic_lights.size(); ++i) add({Item::Kind::analytic_light, i, 0});
@@ -116,8 +119,8 @@ std::string title_of(const SceneOptions& scene, const Item& item) {
   const std::string number = std::to_string(item.index + 1);
   switch (item.kind) {
     case Item::Kind::volume:
-      if (volume_at(scene, item.index).places.size() < 2) return "Volume " + number;
-      return "Volume " + number + ", instance " + std::to_string(item.place + 1);
+      if (volume_at(scene, item.index).transforms.size() < 2) return "Volume " + number;
+      return "Volume " + number + ", instance " + std::to_string(item.transform_index + 1);
     case Item::Kind::model:
       return "Model " + number;
     case Item::Kind::analytic_light:
@@ -147,42 +150,42 @@ void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index) {
     --chosen->index;
 }
 
-std::optional<dmat4> place_of(const SceneOptions& scene, const Item& item) {
+std::optional<dmat4> transform_of(const SceneOptions& scene, const Item& item) {
   if (!has(scene, item)) return std::nullopt;
   switch (item.kind) {
     case Item::Kind::volume: {
-      const auto& places = volume_at(scene, item.index).places;
-      return places.empty() ? dmat4(1.0) : matrix_of(places[item.place]);
+      const auto& transforms = volume_at(scene, item.index).transforms;
+      return transforms.empty() ? dmat4(1.0) : matrix_of(transforms[item.transform_index]);
     }
     case Item::Kind::model:
       return matrix_of(scene.models[item.index].to_world);
     case Item::Kind::analytic_light:
       break;
   }
-  return place_of(scene.analytic_lights[item.index]);
+  return transform_of(scene.analytic_lights[item.index]);
 }
 
-void set_place(SceneOptions& scene, const Item& item, const dmat4& place) {
+void set_transform(SceneOptions& scene, const Item& item, const dmat4& transform) {
   switch (item.kind) {
     case Item::Kind::volume: {
-      auto& places = volume_at(scene, item.index).places;
-      if (places.empty()) places.emplace_back();
-      places[item.place] = numbers_of(place);
+      auto& transforms = volume_at(scene, item.index).transforms;
+      if (transforms.empty()) transforms.emplace_back();
+      transforms[item.transform_index] = numbers_of(transform);
       break;
     }
     case Item::Kind::model:
-      scene.models[item.index].to_world = numbers_of(place);
+      scene.models[item.index].to_world = numbers_of(transform);
       break;
     case Item::Kind::analytic_light:
-      set_place(scene.analytic_lights[item.index], place);
+      set_transform(scene.analytic_lights[item.index], transform);
       break;
   }
 }
 
-void restore_place(SceneOptions& scene, const Item& item, const SceneOptions& from) {
+void restore_transform(SceneOptions& scene, const Item& item, const SceneOptions& from) {
   switch (item.kind) {
     case Item::Kind::volume:
-      volume_at(scene, item.index).places = volume_at(from, item.index).places;
+      volume_at(scene, item.index).transforms = volume_at(from, item.index).transforms;
       break;
     case Item::Kind::model:
       scene.models[item.index].to_world = from.models[item.index].to_world;
@@ -214,9 +217,9 @@ std::optional<Box> box_of(const SceneOptions& scene, const Boxes& boxes, const I
   return Box{-half, half};
 }
 
-dvec3 pivot_of(const dmat4& place, const std::optional<Box>& box) {
+dvec3 pivot_of(const dmat4& transform, const std::optional<Box>& box) {
   const dvec3 middle = box ? 0.5 * (box->least + box->most) : dvec3(0.0);
-  const dvec4 at = place * dvec4(middle, 1.0);
+  const dvec4 at = transform * dvec4(middle, 1.0);
   return {at.x, at.y, at.z};
 }
 

@@ -16,8 +16,8 @@ namespace cumulet::demo {
 struct Item {
   enum class Kind { volume, model, analytic_light };
   Kind kind = Kind::volume;
-  std::size_t index = 0;  // volumes: 0 is the scene's first volume, 1 the first of others
-  std::size_t place = 0;  // index of a volume's transform
+  std::size_t index = 0;            // volumes: 0 is the scene's first volume, 1 the first of others
+  std::size_t transform_index = 0;  // index of a volume's transform
 
   bool operator==(const Item&) const = default;
 };
@@ -34,12 +34,12 @@ void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index);
 
 /// Returns the transform of an item, relative to the placement by its file; nullopt if the scene does not have it. For
 /// a light, it transforms one at the origin that shines along +Z and has its width along +X; its axes are unit vectors.
-[[nodiscard]] std::optional<glm::dmat4> place_of(const SceneOptions& scene, const Item& item);
+[[nodiscard]] std::optional<glm::dmat4> transform_of(const SceneOptions& scene, const Item& item);
 /// Sets the transform of an item of the scene. For a light, settings that its kind does not have are kept, and the
 /// lengths of the axes scale its size.
-void set_place(SceneOptions& scene, const Item& item, const glm::dmat4& place);
+void set_transform(SceneOptions& scene, const Item& item, const glm::dmat4& transform);
 /// Restores the transform from another scene that has this item.
-void restore_place(SceneOptions& scene, const Item& item, const SceneOptions& from);
+void restore_transform(SceneOptions& scene, const Item& item, const SceneOptions& from);
 
 /// World-space bounding box of a volume or model before its item transform.
 struct Box {
@@ -54,6 +54,6 @@ struct Boxes {
 /// Returns the bounding box of an item. A light has a box of its size, or none.
 [[nodiscard]] std::optional<Box> box_of(const SceneOptions& scene, const Boxes& boxes, const Item& item);
 /// Returns the transformed center of the box; the transform's origin if the box is not known.
-[[nodiscard]] glm::dvec3 pivot_of(const glm::dmat4& place, const std::optional<Box>& box);
+[[nodiscard]] glm::dvec3 pivot_of(const glm::dmat4& transform, const std::optional<Box>& box);
 
 }  // namespace cumulet::demo

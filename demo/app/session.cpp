@@ -27,8 +27,8 @@ constexpr double patience = 1.0;  // seconds to wait for the volume before surfa
 
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
-    return std::tie(volume.name, volume.visible, volume.places, volume.shutter, volume.ramps, volume.auto_density_scale,
-                    volume.sequence);
+    return std::tie(volume.name, volume.visible, volume.transforms, volume.shutter, volume.ramps,
+                    volume.auto_density_scale, volume.sequence);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
 }
@@ -47,9 +47,9 @@ std::optional<Box> box_of(Handle* handle, Get get) {
   return box_of(info);
 }
 
-std::optional<Item> item_of(const std::optional<Instances::Placed>& placed) {
-  if (!placed) return std::nullopt;
-  return Item{Item::Kind::volume, placed->volume + 1, placed->place};  // index 0 is the viewer's own volume
+std::optional<Item> item_of(const std::optional<Instances::Indices>& indices) {
+  if (!indices) return std::nullopt;
+  return Item{Item::Kind::volume, indices->volume + 1, indices->transform};  // index 0 is the viewer's own volume
 }
 
 }  // namespace
@@ -126,7 +126,7 @@ void Session::follow(const DesiredState& desired) {
   if (first) known_ = SceneOptions();
   if (first || load) {
     fit_.reset();
-    if (is_unplaced(scene_.camera)) {
+    if (needs_fit(scene_.camera)) {
       // Fitted again when the density scale is known, because that determines the visible extent.
       if (scene_.surface_camera < 0) fit_ = scene_.camera;
     } else if (desired_.fit) {
@@ -155,7 +155,7 @@ void Session::follow(const DesiredState& desired) {
   if (!same(known_->camera, scene_.camera)) set_camera();
   follow_navigation();
   follow_surfaces();
-  follow_places();
+  follow_transforms();
   follow_volume();
   follow_playback();
   follow_visible();
@@ -268,11 +268,11 @@ void Session::finish_others() {
   follow_others();
 }
 
-void Session::follow_places() {
-  if (known_->places == scene_.places && known_->shutter == scene_.shutter) return;
-  known_->places = scene_.places;
+void Session::follow_transforms() {
+  if (known_->transforms == scene_.transforms && known_->shutter == scene_.shutter) return;
+  known_->transforms = scene_.transforms;
   known_->shutter = scene_.shutter;
-  check(set_places(viewer_.get(), scene_));
+  check(set_transforms(viewer_.get(), scene_));
 }
 
 void Session::follow_ramps() {
@@ -431,7 +431,7 @@ void Session::set_camera() {
   known_->camera = scene_.camera;
   // The library's rounding is not a camera movement.
   static_cast<void>(cumulet_camera_get(camera_.get(), &seen_));
-  if (is_unplaced(scene_.camera) && !is_unplaced(seen_)) scene_.camera = known_->camera = seen_;
+  if (needs_fit(scene_.camera) && !needs_fit(seen_)) scene_.camera = known_->camera = seen_;
 }
 
 bool Session::begin_volume() {
@@ -702,7 +702,7 @@ void Session::see_camera() {
 
 void Session::see_boxes() {
   // The frames of a sequence differ in size. If the volume is not transformed, the current bounding box is known.
-  if (sequence_ && scene_.places.empty() && status_.has_volume) shown_box_ = box_of(status_.stats);
+  if (sequence_ && scene_.transforms.empty() && status_.has_volume) shown_box_ = box_of(status_.stats);
   status_.boxes = {};
   if (shown_box_) status_.boxes.volumes.emplace_back(shown_volume_, *shown_box_);
   for (const VolumeFile& file : scene_.others)

@@ -10,10 +10,10 @@
 #include <models.hpp>
 #include <mutex>
 #include <optional>
-#include <places.hpp>
 #include <shader_cache.hpp>
 #include <string>
 #include <timeline.hpp>
+#include <transforms.hpp>
 #include <vector>
 
 #include "given_settings.hpp"
@@ -189,7 +189,7 @@ class Session {
   }
   void follow_ramps();
   void follow_analytic_lights();
-  void follow_places();
+  void follow_transforms();
   void follow_surfaces();
   void set_surfaces();
   void remove_surfaces();

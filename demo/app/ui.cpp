@@ -73,7 +73,7 @@ void Ui::begin(float scale, double time) {
 std::optional<Rectangle> Ui::find(const std::string& label) const {
   const auto control = last_.find(label);
   if (control == last_.end() || !control->second.in_view) return std::nullopt;
-  return control->second.place;
+  return control->second.rectangle;
 }
 
 void Ui::remember(const char* label, const char* tip) {
@@ -86,7 +86,7 @@ void Ui::remember(const char* label, const char* tip) {
   const ImVec2 centre((least.x + most.x) * 0.5f, (least.y + most.y) * 0.5f);
   // A control is in view if its center can be clicked.
   Control& control = drawn_[label];
-  control.place = {least.x, least.y, most.x - least.x, most.y - least.y};
+  control.rectangle = {least.x, least.y, most.x - least.x, most.y - least.y};
   control.in_view = ImGui::GetCurrentWindow()->ClipRect.Contains(centre);
   control.has_tip = tip != nullptr && tip[0] != '\0';
   if (!control.has_tip || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
@@ -351,7 +351,7 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   const float pad = px(6.0f);  // so that points at the border are not clipped
   const ImVec2 low(corner.x + pad, end.y - pad);
   const ImVec2 high(end.x - pad, corner.y + pad);
-  const auto place_of = [&](const settings::RampPoint& point) {
+  const auto position_of = [&](const settings::RampPoint& point) {
     return ImVec2(low.x + (high.x - low.x) * (point[0] / view.max_value),
                   low.y + (high.y - low.y) * (point[1] / view.max_result));
   };
@@ -364,7 +364,7 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   float nearest = px(9.0f);
   const bool hovered = ImGui::IsItemHovered();
   for (std::size_t i = 0; hovered && i < points.size(); ++i) {
-    const ImVec2 at = place_of(points[i]);
+    const ImVec2 at = position_of(points[i]);
     const float distance = std::hypot(at.x - mouse.x, at.y - mouse.y);
     if (distance > nearest) continue;
     nearest = distance;
@@ -398,22 +398,22 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   draw.PushClipRect(corner, end, true);
   const float step = reach / static_cast<float>(std::max<std::size_t>(heights.size(), 1));
   for (std::size_t i = 0; i < heights.size(); ++i) {
-    const float from = place_of({step * static_cast<float>(i), 0.0f}).x;
-    const float to = place_of({step * static_cast<float>(i + 1), 0.0f}).x;
+    const float from = position_of({step * static_cast<float>(i), 0.0f}).x;
+    const float to = position_of({step * static_cast<float>(i + 1), 0.0f}).x;
     draw.AddRectFilled({from, low.y + (high.y - low.y) * heights[i]}, {to, low.y},
                        color_of(ImGuiCol_PlotHistogram, 0.22f));
   }
   const ImU32 line = color_of(ImGuiCol_PlotLines);
-  ImVec2 before(corner.x, place_of(points.front()).y);
+  ImVec2 before(corner.x, position_of(points.front()).y);
   for (const settings::RampPoint& point : points) {
-    const ImVec2 at = place_of(point);
+    const ImVec2 at = position_of(point);
     draw.AddLine(before, at, line, px(1.5f));
     before = at;
   }
   draw.AddLine(before, {end.x, before.y}, line, px(1.5f));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const bool lit = i == near || i == view.held;
-    draw.AddCircleFilled(place_of(points[i]), px(lit ? 5.5f : 4.0f),
+    draw.AddCircleFilled(position_of(points[i]), px(lit ? 5.5f : 4.0f),
                          color_of(i == view.chosen ? ImGuiCol_CheckMark : ImGuiCol_Text));
   }
   draw.PopClipRect();

@@ -75,7 +75,7 @@ class Ui {
 
   /// A control of the current frame.
   struct Control {
-    Rectangle place;
+    Rectangle rectangle;
     bool in_view = false;
     bool has_tip = false;
   };

@@ -46,21 +46,21 @@ std::optional<Stand> stand_of(const Matrix& m) {
 
 }  // namespace
 
-void Panel::stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number) {
-  auto& places = volume.places;
-  if (places.size() > 1) {
-    ui_.value_row(("Instances" + number).c_str(), std::to_string(places.size()));
-    if (!place || *place >= places.size()) return;
-    if (const auto moved = stand_at(places[*place], number)) places[*place] = *moved;
+void Panel::stand(SceneVolume& volume, std::optional<std::size_t> transform_index, const std::string& number) {
+  auto& transforms = volume.transforms;
+  if (transforms.size() > 1) {
+    ui_.value_row(("Instances" + number).c_str(), std::to_string(transforms.size()));
+    if (!transform_index || *transform_index >= transforms.size()) return;
+    if (const auto moved = stand_at(transforms[*transform_index], number)) transforms[*transform_index] = *moved;
     return;
   }
   std::optional<Matrix> only;
-  if (!places.empty()) only = places.front();
-  if (const auto moved = stand_at(only, number)) places.assign(1, *moved);
+  if (!transforms.empty()) only = transforms.front();
+  if (const auto moved = stand_at(only, number)) transforms.assign(1, *moved);
 }
 
-std::optional<Matrix> Panel::stand_at(const std::optional<Matrix>& place, const std::string& number) {
-  const Matrix now = place.value_or(matrix_of({}));
+std::optional<Matrix> Panel::stand_at(const std::optional<Matrix>& transform, const std::string& number) {
+  const Matrix now = transform.value_or(matrix_of({}));
   const std::optional<Stand> upright = stand_of(now);
   Stand stand = upright.value_or(Stand{{now[12], now[13], now[14]}});
   const double far = std::hypot(stand.position[0], stand.position[1], stand.position[2]);
@@ -97,9 +97,9 @@ void Panel::models(Model& model, std::vector<Command>& commands) {
     ui_.checkbox(("Shadow only" + number).c_str(),
                  "Invisible to the camera, but casts shadows and appears in reflections.", one.shadow_only);
     ui_.checkbox(("Holdout" + number).c_str(), "Leaves a hole with alpha 0 in the image.", one.holdout);
-    std::optional<Matrix> place;
-    if (one.to_world != Matrix{}) place = one.to_world;
-    if (const auto moved = stand_at(place, number)) one.to_world = *moved;
+    std::optional<Matrix> transform;
+    if (one.to_world != Matrix{}) transform = one.to_world;
+    if (const auto moved = stand_at(transform, number)) one.to_world = *moved;
     const float spacing = ImGui::GetStyle().ItemSpacing.x;
     const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
     const std::string plain = " model " + std::to_string(i + 1);
@@ -132,7 +132,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     ui_.checkbox(("Visible" + number).c_str(), "If off, the object is hidden and casts no shadow.", volume.visible);
     const auto& chosen = model.chosen;
     const bool is_chosen = chosen && chosen->kind == Item::Kind::volume && chosen->index + 1 == i;
-    stand(volume, is_chosen ? std::optional(chosen->place) : std::nullopt, number);
+    stand(volume, is_chosen ? std::optional(chosen->transform_index) : std::nullopt, number);
   };
   if (!model.scene.volume.empty()) row(model.scene, 1);
 

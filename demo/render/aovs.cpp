@@ -75,7 +75,8 @@ class Mattes {
   }
 
  private:
-  static const char* tell(void* user, cumulet_object_kind kind, std::uint64_t tag, std::uint32_t /*place*/) noexcept {
+  static const char* tell(void* user, cumulet_object_kind kind, std::uint64_t tag,
+                          std::uint32_t /*transform_index*/) noexcept {
     auto& mattes = *static_cast<Mattes*>(user);
     const std::string name = mattes.name_(kind, tag);
     if (name.empty()) return nullptr;

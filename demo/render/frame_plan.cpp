@@ -146,12 +146,12 @@ bool is_made(const std::string& output) {
   return fs::is_regular_file(output, error) && fs::file_size(output, error) > 0 && !error;
 }
 
-std::string frame_line(const Moment& number, std::size_t place, std::size_t count, FrameState state,
+std::string frame_line(const Moment& number, std::size_t position, std::size_t count, FrameState state,
                        const std::string& what) {
   const char* word = "failed";
   if (state == FrameState::done) word = "done";
   if (state == FrameState::kept) word = "kept";
-  return one_line("frame " + number.text() + " (" + std::to_string(place) + " of " + std::to_string(count) + ") " +
+  return one_line("frame " + number.text() + " (" + std::to_string(position) + " of " + std::to_string(count) + ") " +
                   word + " " + what);
 }
 

@@ -48,7 +48,7 @@ enum class FrameState { done, kept, failed };
 
 /// Returns the status line of a frame, for render farms to parse: "frame 12 (3 of 20) done out.0012.exr in 8.21 s",
 /// "frame 13 (4 of 20) kept out.0013.exr", "frame 14 (5 of 20) failed fire.0014.vdb: it is not there".
-[[nodiscard]] std::string frame_line(const Moment& number, std::size_t place, std::size_t count, FrameState state,
+[[nodiscard]] std::string frame_line(const Moment& number, std::size_t position, std::size_t count, FrameState state,
                                      const std::string& what);
 
 }  // namespace cumulet::demo

@@ -27,7 +27,7 @@ cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) 
   return medium;
 }
 
-bool same_place(const cumulet_instance_desc& a, const cumulet_instance_desc& b) {
+bool same_instance(const cumulet_instance_desc& a, const cumulet_instance_desc& b) {
   const auto same = [](const double(&one)[16], const double(&other)[16]) { return std::ranges::equal(one, other); };
   return same(a.to_world, b.to_world) && same(a.open_to_world, b.open_to_world) &&
          same(a.close_to_world, b.close_to_world) && a.hidden == b.hidden && a.tag == b.tag;
@@ -108,9 +108,9 @@ cumulet_volume* Instances::volume(const VolumeFile& file) const {
   return given == nullptr ? nullptr : given->volume.volume.get();
 }
 
-std::optional<Instances::Placed> Instances::find_tag(std::uint64_t tag) const {
+std::optional<Instances::Indices> Instances::find_tag(std::uint64_t tag) const {
   if (tag == 0 || tag > shown_.size()) return std::nullopt;
-  return shown_[static_cast<std::size_t>(tag) - 1].placed;
+  return shown_[static_cast<std::size_t>(tag) - 1].indices;
 }
 
 void Instances::give(const VolumeFile& file, OpenVolume volume) { given_.push_back({file, std::move(volume)}); }
@@ -142,9 +142,9 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     return std::ranges::none_of(volumes, [&](const VolumeFile& file) { return file == given.file; });
   });
   std::size_t count = 0;
-  const auto place = [&](const SceneVolume& scene, const OpenVolume& open,
-                         const std::shared_ptr<cumulet_sequence>& sequence, cumulet_instance_desc desc,
-                         const Placed& placed) {
+  const auto update = [&](const SceneVolume& scene, const OpenVolume& open,
+                          const std::shared_ptr<cumulet_sequence>& sequence, cumulet_instance_desc desc,
+                          const Indices& indices) {
     desc.tag = count + 1;
     if (count == shown_.size()) {
       cumulet_instance* made = nullptr;
@@ -152,18 +152,18 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
       check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
       std::shared_ptr<cumulet_instance> instance(made, cumulet_instance_release);
       check(cumulet_add_instance(viewer, made), cumulet_last_error(viewer));
-      shown_.push_back({std::move(instance), desc, open.volume, sequence, *desc.medium, {}, placed});
+      shown_.push_back({std::move(instance), desc, open.volume, sequence, *desc.medium, {}, indices});
     }
     Shown& shown = shown_[count++];
     if (shown.volume != open.volume || shown.sequence != sequence || !settings::same(shown.medium, *desc.medium) ||
-        !same_place(shown.desc, desc))
+        !same_instance(shown.desc, desc))
       check(cumulet_instance_set(shown.instance.get(), &desc), "");
     shown.desc = desc;
     shown.desc.medium = nullptr;  // `medium` points to a local variable of the caller; a copy is stored below
     shown.volume = open.volume;
     shown.sequence = sequence;
     shown.medium = *desc.medium;
-    shown.placed = placed;
+    shown.indices = indices;
     for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
       if (shown.ramps[i] == scene.ramps[i]) continue;
       check(cumulet_instance_set_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
@@ -186,11 +186,11 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     desc.medium = &medium;
     desc.hidden = scene.visible ? 0 : 1;
     set_shutter(scene.shutter, desc.to_world, desc.open_to_world, desc.close_to_world);
-    if (scene.places.empty()) place(scene, given->volume, sequence, desc, {i, 0});
-    for (std::size_t at = 0; at < scene.places.size(); ++at) {
-      std::ranges::copy(scene.places[at], desc.to_world);
+    if (scene.transforms.empty()) update(scene, given->volume, sequence, desc, {i, 0});
+    for (std::size_t at = 0; at < scene.transforms.size(); ++at) {
+      std::ranges::copy(scene.transforms[at], desc.to_world);
       set_shutter(scene.shutter, desc.to_world, desc.open_to_world, desc.close_to_world);
-      place(scene, given->volume, sequence, desc, {i, at});
+      update(scene, given->volume, sequence, desc, {i, at});
     }
   }
   std::erase_if(playing_, [&](const Playing& playing) {

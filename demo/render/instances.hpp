@@ -54,12 +54,12 @@ class Instances {
   [[nodiscard]] bool plays() const { return !playing_.empty(); }
 
   /// Index of a volume in SceneOptions::others, and index of one of its transforms.
-  struct Placed {
+  struct Indices {
     std::size_t volume = 0;
-    std::size_t place = 0;
+    std::size_t transform = 0;
   };
   /// Returns the volume and transform of a displayed instance by its tag.
-  [[nodiscard]] std::optional<Placed> find_tag(std::uint64_t tag) const;
+  [[nodiscard]] std::optional<Indices> find_tag(std::uint64_t tag) const;
 
  private:
   struct Given {
@@ -78,7 +78,7 @@ class Instances {
     std::shared_ptr<cumulet_sequence> sequence;  // keeps desc.sequence alive
     cumulet_medium_desc medium{};                // the value of desc.medium
     decltype(SceneVolume::ramps) ramps;
-    Placed placed;
+    Indices indices;
   };
 
   [[nodiscard]] const Given* find(const VolumeFile& file) const;

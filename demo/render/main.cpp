@@ -40,9 +40,9 @@
 #include "models.hpp"
 #include "object_name.hpp"
 #include "options.hpp"
-#include "places.hpp"
 #include "progress.hpp"
 #include "settled.hpp"
+#include "transforms.hpp"
 
 namespace {
 
@@ -717,7 +717,7 @@ class Studio {
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_sun_sky(viewer_.get(), &scene.light));
     check(viewer_, cumulet_set_lights(viewer_.get(), scene.analytic_lights.data(), scene.analytic_lights.size()));
-    check(viewer_, set_places(viewer_.get(), scene));
+    check(viewer_, set_transforms(viewer_.get(), scene));
     if (!scene.environment.empty()) {
       check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
       check(viewer_, cumulet_set_environment_settings(viewer_.get(), &scene.environment_settings));
@@ -785,9 +785,9 @@ bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, cam
 
 /// Returns true if none of the settings shared by a sequence's frames has to be derived from a volume.
 bool is_settled(const SceneOptions& scene) {
-  const bool placed = scene.surface_camera >= 0 || !fits(scene.camera);
+  const bool has_camera = scene.surface_camera >= 0 || !fits(scene.camera);
   const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
-  return placed && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
+  return has_camera && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
 }
 
 /// Returns the height of a ground plane below all objects. With models it is slightly lower, because many models
@@ -865,16 +865,16 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
 class Report {
  public:
   explicit Report(const FramePlan& plan) : plan_(plan) {}
-  void say(std::size_t place, FrameState state, const std::string& what, Progress* progress) {
-    const Moment number = plan_.frames[place].number;
+  void say(std::size_t index, FrameState state, const std::string& what, Progress* progress) {
+    const Moment number = plan_.frames[index].number;
     if (progress != nullptr) progress->clear();
-    std::cout << cumulet::demo::frame_line(number, place + 1, plan_.frames.size(), state, what) << std::endl;
+    std::cout << cumulet::demo::frame_line(number, index + 1, plan_.frames.size(), state, what) << std::endl;
     if (state == FrameState::failed) failed_.push_back(number);
   }
-  /// Returns the text that the frames from `place` on have not been rendered.
-  [[nodiscard]] std::string not_made(std::size_t place) const {
+  /// Returns the text that the frames from `index` on have not been rendered.
+  [[nodiscard]] std::string not_made(std::size_t index) const {
     std::vector<Moment> rest;
-    for (std::size_t i = place; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
+    for (std::size_t i = index; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
     return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not rendered";
   }
   /// Throws if any frame failed.
@@ -891,7 +891,7 @@ class Report {
 
 /// Renders a frame: loads its volume, traces, writes.
 void render_frame_of(Studio& studio, const RenderOptions& picture, const PlannedFrame& frame, Report& report,
-                     std::size_t place) {
+                     std::size_t index) {
   const auto start = Clock::now();
   Traced traced = Traced::stopped;
   try {
@@ -900,23 +900,23 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
     traced = studio.trace(picture, from);
     if (frame.next && picture.scene.is_shown() && traced != Traced::stopped) studio.require_drawn(*frame.next);
   } catch (const std::runtime_error& error) {
-    if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
-    return report.say(place, FrameState::failed, error.what(), &studio.progress());
+    if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));
+    return report.say(index, FrameState::failed, error.what(), &studio.progress());
   }
   // Nothing is written: the next run would keep the incomplete image.
-  if (traced == Traced::stopped) throw std::runtime_error("interrupted: " + report.not_made(place));
+  if (traced == Traced::stopped) throw std::runtime_error("interrupted: " + report.not_made(index));
   try {
     studio.write(picture);
     forget_checkpoint(picture.checkpoint);
     studio.tell_end(picture, traced);
   } catch (const std::runtime_error& error) {
-    report.say(place, FrameState::failed, error.what(), &studio.progress());
-    throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
+    report.say(index, FrameState::failed, error.what(), &studio.progress());
+    throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));
   }
   std::array<char, 32> seconds{};
   std::snprintf(seconds.data(), seconds.size(), " in %.2f s",
                 std::chrono::duration<double>(Clock::now() - start).count());
-  report.say(place, FrameState::done, picture.output + seconds.data(), &studio.progress());
+  report.say(index, FrameState::done, picture.output + seconds.data(), &studio.progress());
 }
 
 /// Renders the frames without output one after the other. A missing or corrupt volume fails only its own frame. A write

@@ -612,11 +612,11 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
     try {
       std::array<std::string, 3> of_kind;
       for (const std::string& file : files) {
-        std::string& place = of_kind[static_cast<std::size_t>(kind_of(file))];
-        if (!place.empty())
-          throw UsageError(in_quotes(place) + " and " + in_quotes(file) +
+        std::string& file_of_kind = of_kind[static_cast<std::size_t>(kind_of(file))];
+        if (!file_of_kind.empty())
+          throw UsageError(in_quotes(file_of_kind) + " and " + in_quotes(file) +
                            " are files of the same kind; only one is allowed");
-        place = file;
+        file_of_kind = file;
       }
       const auto& [volume, surfaces, scene_file] = of_kind;
       lit = !scene_file.empty();

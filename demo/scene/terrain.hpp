@@ -25,7 +25,7 @@ class Terrain {
 
   /// Returns the ground with snow, rock, scree and grass as vertex colors. uv: in tiles of the detail texture.
   [[nodiscard]] Mesh ground() const;
-  /// Returns conifers at suitable places.
+  /// Returns conifers at suitable positions.
   [[nodiscard]] Mesh forest() const;
 
   static constexpr float lake_level = -27.5F;

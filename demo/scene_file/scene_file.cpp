@@ -65,13 +65,13 @@ Matrix rotation(std::size_t axis, double degrees) {
   return m;
 }
 
-constexpr std::size_t max_places = 100'000;
+constexpr std::size_t max_transforms = 100'000;
 constexpr std::size_t max_volumes = 10'000;
 constexpr std::size_t max_models = 10'000;
 constexpr std::size_t max_cameras = 10'000;
 
 /// A transform: scale, then rotations about x, y and z, then translation.
-struct PlaceParts {
+struct TransformParts {
   double translate[3] = {};
   double degrees[3] = {};
   double scale[3] = {1.0, 1.0, 1.0};
@@ -192,8 +192,8 @@ class Reader {
     if (!value) return;
     if (!value->is_array()) wrong(key, "is not a list");
     if (value->empty()) wrong(key, "is empty: remove it for a single instance");
-    if (value->size() > max_places)
-      wrong(key, "has " + std::to_string(value->size()) + " elements; the limit is " + std::to_string(max_places));
+    if (value->size() > max_transforms)
+      wrong(key, "has " + std::to_string(value->size()) + " elements; the limit is " + std::to_string(max_transforms));
     for (std::size_t i = 0; i < value->size(); ++i) {
       const Json& one = (*value)[i];
       const std::string where = key + "[" + std::to_string(i) + "]";
@@ -203,7 +203,7 @@ class Reader {
         continue;
       }
       if (!one.is_object()) wrong(where, "is neither 16 numbers nor an object");
-      PlaceParts parts;
+      TransformParts parts;
       for (const auto& item : one.items()) {
         const std::string part = where + "." + item.key();
         if (item.key() == "translate") {
@@ -261,14 +261,14 @@ class Reader {
   }
 
   /// A value and the object that contains it; both null if the key does not exist.
-  struct Place {
+  struct Location {
     Json* value = nullptr;
     Json* object = nullptr;
   };
 
   /// Finds a value. Records the objects and lists on its path as known sections, which are valid even if they are
   /// empty.
-  Place find(const std::string& wanted) {
+  Location find(const std::string& wanted) {
     const std::string key = key_in(format_, wanted, volume_);
     Json* at = &json_;
     for (std::size_t begin = 0;;) {
@@ -296,11 +296,11 @@ class Reader {
   }
 
   std::optional<Json> take(const std::string& key) {
-    const Place place = find(key);
-    if (place.value == nullptr) return std::nullopt;
-    Json taken = std::move(*place.value);
+    const Location location = find(key);
+    if (location.value == nullptr) return std::nullopt;
+    Json taken = std::move(*location.value);
     const std::string path = key_in(format_, key, volume_);
-    place.object->erase(path.substr(path.rfind('.') + 1));
+    location.object->erase(path.substr(path.rfind('.') + 1));
     return taken;
   }
 
@@ -366,13 +366,13 @@ bool read_pose(Reader& reader, const std::string& of, bool is_end, cumulet_camer
 
 /// Reads a camera. of: "camera." or "cameras[0]." Values missing in the shutter poses are those of the camera itself.
 void read_camera(Reader& reader, SceneFormat format, const std::string& of, SceneCamera& out) {
-  const bool placed = read_pose(reader, of, false, out.camera);
+  const bool has_pose = read_pose(reader, of, false, out.camera);
   reader.number(of + "lens_radius", out.camera.lens_radius, settings::not_negative);
   reader.number(of + "focus_distance", out.camera.focus_distance, settings::not_negative);
   if (format == SceneFormat::first) return;
   const auto end = [&](const std::string& key, std::optional<cumulet_camera_desc>& pose) {
     if (!reader.has(key)) return;
-    if (!placed) reader.wrong(key, "needs a camera with eye and target");
+    if (!has_pose) reader.wrong(key, "needs a camera with eye and target");
     pose = out.camera;
     read_pose(reader, key + ".", true, *pose);
     if ((pose->orthographic_height > 0.0) != (out.camera.orthographic_height > 0.0))
@@ -454,23 +454,23 @@ void read_analytic_lights(Reader& reader, std::vector<cumulet_light_desc>& analy
 }
 
 /// Reads the transform of a volume or model. of: "volume." or "models[0]."
-void read_place(Reader& reader, const std::string& of, Matrix& to_world) {
+void read_transform(Reader& reader, const std::string& of, Matrix& to_world) {
   const bool whole = reader.numbers(of + "to_world", std::span<double>(to_world), "16 numbers");
-  PlaceParts place;
-  bool parts = reader.three(of + "translate", place.translate);
-  parts = reader.three(of + "rotate_degrees", place.degrees) || parts;
-  parts = reader.three(of + "scale", place.scale, settings::above_zero) || parts;
+  TransformParts transform;
+  bool parts = reader.three(of + "translate", transform.translate);
+  parts = reader.three(of + "rotate_degrees", transform.degrees) || parts;
+  parts = reader.three(of + "scale", transform.scale, settings::above_zero) || parts;
   if (whole && parts) reader.wrong(of + "to_world", "cannot be combined with translate, rotate_degrees or scale");
-  if (parts) to_world = place.matrix();
+  if (parts) to_world = transform.matrix();
 }
 
-/// Reads the transforms at shutter open and close. of: as in read_place.
+/// Reads the transforms at shutter open and close. of: as in read_transform.
 void read_shutter(Reader& reader, const std::string& of, SceneShutter& shutter) {
   const auto end = [&](const std::string& key, std::optional<Matrix>& out) {
     if (!reader.has(key)) return;
     Matrix step{};
-    read_place(reader, key + ".", step);
-    if (step == Matrix{}) step = PlaceParts().matrix();
+    read_transform(reader, key + ".", step);
+    if (step == Matrix{}) step = TransformParts().matrix();
     out = step;
   };
   end(of + "open", shutter.open);
@@ -506,8 +506,8 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   volume.auto_density_scale = reader.word("medium.density_scale", "auto");
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, volume.ramps[i]);
   if (format == SceneFormat::first) return;
-  read_place(reader, "volume.", volume.to_world);
-  reader.transforms("volume.transforms", volume.places);
+  read_transform(reader, "volume.", volume.to_world);
+  reader.transforms("volume.transforms", volume.transforms);
   read_shutter(reader, "volume.", volume.shutter);
   reader.text("volume.name", volume.name);
   volume.visible = read_visible(reader, "volume.");
@@ -520,7 +520,7 @@ SceneModel read_model(Reader& reader, const std::string& of) {
   reader.text(of + "file", model.file);
   if (model.file.empty()) reader.wrong(of + "file", "is empty");
   reader.text(of + "name", model.name);
-  read_place(reader, of, model.to_world);
+  read_transform(reader, of, model.to_world);
   read_shutter(reader, of, model.shutter);
   model.visible = read_visible(reader, of);
   std::int32_t flag = 0;
@@ -541,7 +541,7 @@ SceneModel read_model(Reader& reader, const std::string& of) {
 
 /// Returns true if models[0] is a model with its own transform or name. Otherwise it is the scene's surfaces, which
 /// version 1 also supports.
-bool is_placed(Reader& reader, const std::string& of) {
+bool has_transform(Reader& reader, const std::string& of) {
   constexpr std::array keys{"name",    "to_world",    "translate", "rotate_degrees", "scale",
                             "visible", "shadow_only", "open",      "close"};
   return std::ranges::any_of(keys, [&](const char* key) { return reader.has(of + key); });
@@ -551,7 +551,7 @@ void read_models(Reader& reader, SceneOptions& scene) {
   const std::size_t count = reader.list("models", max_models);
   for (std::size_t i = 0; i < count; ++i) {
     const std::string of = "models[" + std::to_string(i) + "].";
-    if (i == 0 && !is_placed(reader, of)) continue;
+    if (i == 0 && !has_transform(reader, of)) continue;
     if (i == 0 && reader.has(of + "camera"))
       reader.wrong(of + "camera", "is only supported for a model without transform and name");
     scene.models.push_back(read_model(reader, of));
@@ -768,7 +768,7 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
   if (volume.up != UpAxis::y) writer.put("volume.up", name_of(format, up_names, volume.up));
   if (has_lists) {
     if (volume.to_world != Matrix{}) writer.put("volume.to_world", volume.to_world);
-    if (!volume.places.empty()) writer.put("volume.transforms", volume.places);
+    if (!volume.transforms.empty()) writer.put("volume.transforms", volume.transforms);
     put_shutter(writer, "volume.", volume.shutter);
     if (!volume.visible) writer.put("volume.visible", false);
   }
@@ -943,10 +943,10 @@ std::string light_groups_refusal(const std::vector<std::string>& names) {
 }
 
 void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], double (&open)[16], double (&close)[16]) {
-  Matrix place{};
-  std::ranges::copy(to_world, place.begin());
+  Matrix transform{};
+  std::ranges::copy(to_world, transform.begin());
   const auto end = [&](const std::optional<Matrix>& step, double(&out)[16]) {
-    const Matrix at = !step ? Matrix{} : place == Matrix{} ? *step : product(*step, place);
+    const Matrix at = !step ? Matrix{} : transform == Matrix{} ? *step : product(*step, transform);
     std::ranges::copy(at, out);
   };
   end(shutter.open, open);

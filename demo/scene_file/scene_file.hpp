@@ -66,8 +66,8 @@ void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], doub
 struct SceneVolume : VolumeFile {
   std::string name;  // "": file name
   bool visible = true;
-  std::vector<std::array<double, 16>> places;  // instance transforms, applied after to_world; empty: one instance
-  SceneShutter shutter;                        // for all instances
+  std::vector<std::array<double, 16>> transforms;  // instance transforms, applied after to_world; empty: one instance
+  SceneShutter shutter;                            // for all instances
   cumulet_medium_desc medium{};
   std::array<settings::RampPoints, settings::ramps.size()> ramps;  // indexed by cumulet_ramp
   SceneSequence sequence;                                          // for a volume that is a sequence

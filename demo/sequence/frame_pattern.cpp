@@ -28,7 +28,7 @@ std::size_t run_of_digits(std::string_view text, std::size_t from) {
   return length;
 }
 
-struct Place {
+struct Placeholder {
   std::size_t at;
   std::size_t length;
   std::size_t digits;
@@ -43,32 +43,33 @@ std::size_t number_at(std::string_view text, std::size_t at, std::size_t length)
 }
 
 /// Matches digits between two strings: "%" ... "d", "$F" ..., "<frame" ... ">".
-std::optional<Place> worded(std::string_view path, std::size_t at, std::string_view before, std::string_view after) {
+std::optional<Placeholder> worded(std::string_view path, std::size_t at, std::string_view before,
+                                  std::string_view after) {
   if (path.substr(at, before.size()) != before) return std::nullopt;
   const std::size_t digits = run_of_digits(path, at + before.size());
   const std::size_t end = at + before.size() + digits;
   if (path.substr(end, after.size()) != after) return std::nullopt;
-  return Place{at, end + after.size() - at, number_at(path, at + before.size(), digits)};
+  return Placeholder{at, end + after.size() - at, number_at(path, at + before.size(), digits)};
 }
 
-std::optional<Place> place_at(std::string_view path, std::size_t at) {
+std::optional<Placeholder> placeholder_at(std::string_view path, std::size_t at) {
   std::size_t hashes = 0;
   while (at + hashes < path.size() && path[at + hashes] == '#') ++hashes;
-  if (hashes > 0) return Place{at, hashes, hashes};
-  if (const auto place = worded(path, at, "%", "d")) return place;
-  if (const auto place = worded(path, at, "$F", "")) return place;
+  if (hashes > 0) return Placeholder{at, hashes, hashes};
+  if (const auto placeholder = worded(path, at, "%", "d")) return placeholder;
+  if (const auto placeholder = worded(path, at, "$F", "")) return placeholder;
   return worded(path, at, "<frame", ">");
 }
 
 }  // namespace
 
 std::optional<FramePattern> FramePattern::parse(const std::string& path) {
-  std::optional<Place> found;
+  std::optional<Placeholder> found;
   for (std::size_t at = name_begin(path); at < path.size();) {
-    const std::optional<Place> place = place_at(path, at);
-    if (place && found) throw UsageError("'" + path + "' has two placeholders for the frame number");
-    if (place) found = place;
-    at += place ? place->length : 1;
+    const std::optional<Placeholder> placeholder = placeholder_at(path, at);
+    if (placeholder && found) throw UsageError("'" + path + "' has two placeholders for the frame number");
+    if (placeholder) found = placeholder;
+    at += placeholder ? placeholder->length : 1;
   }
   if (!found) return std::nullopt;
   if (found->digits > max_digits)

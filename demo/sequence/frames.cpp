@@ -51,9 +51,9 @@ std::int64_t parse_moment(std::string_view text, std::string_view part) {
 /// Splits the text at the first occurrence of a character at or after `from`. If there is none, the second part is
 /// empty.
 std::pair<std::string_view, std::string_view> cut(std::string_view text, char at, std::size_t from = 0) {
-  const auto place = text.find(at, from);
-  if (place == std::string_view::npos) return {text, {}};
-  return {text.substr(0, place), text.substr(place + 1)};
+  const auto found = text.find(at, from);
+  if (found == std::string_view::npos) return {text, {}};
+  return {text.substr(0, found), text.substr(found + 1)};
 }
 
 }  // namespace

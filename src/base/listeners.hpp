@@ -15,10 +15,10 @@ class Listeners {
   /// call is under way. `changed` must not throw, call listen() or destroy a token.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     const std::scoped_lock lock(all_->mutex);
-    const auto place = all_->calls.insert(all_->calls.end(), std::move(changed));
-    return {nullptr, [all = all_, place](void*) {
+    const auto call = all_->calls.insert(all_->calls.end(), std::move(changed));
+    return {nullptr, [all = all_, call](void*) {
               const std::scoped_lock deleting(all->mutex);
-              all->calls.erase(place);
+              all->calls.erase(call);
             }};
   }
 

@@ -27,7 +27,7 @@ std::uint32_t quads_of(std::size_t convolution) {
 }
 
 /// Converts a position in the padded image to the image.
-glm::ivec2 in_picture(glm::uvec2 place) { return glm::ivec2(place) - static_cast<int>(rim); }
+glm::ivec2 in_picture(glm::uvec2 position) { return glm::ivec2(position) - static_cast<int>(rim); }
 
 std::uint32_t groups_of(const Network& network, std::size_t convolution) {
   return divided_up(network.convolutions.at(convolution).outputs, quads_of(convolution) * quad_channels);
@@ -155,10 +155,10 @@ void Denoiser::add_stages() {
     for (std::size_t i = 0; i < Network::convolution_count; ++i) {
       const Convolution& convolution = network_->convolutions.at(i);
       const glm::uvec2 at_level = size >> convolution.level;
-      const std::uint32_t places = divided_up(at_level.x, group_side) * divided_up(at_level.y, group_side);
+      const std::uint32_t work_groups = divided_up(at_level.x, group_side) * divided_up(at_level.y, group_side);
       const double each = double(group_side * group_side * taps) * quads_of(i) * quad_channels *
                           blocks_of(*network_, convolution) * block_channels;
-      stages_.push_back({Kind::convolution, t, i, places * groups_of(*network_, i), each});
+      stages_.push_back({Kind::convolution, t, i, work_groups * groups_of(*network_, i), each});
     }
   }
   for (const Stage& stage : stages_) total_ += stage.groups * stage.multiply_adds_each;
@@ -216,11 +216,11 @@ void Denoiser::set_convolution(GLuint program, const Tile& tile, std::size_t ind
   gl.ProgramUniform1ui(program, 2, tile.size.y >> convolution.level);
   gl.ProgramUniform1ui(program, 3, groups_of(*network_, index));
   gl.ProgramUniform1ui(program, 4, weights_at_.at(index));
-  const auto place = [&](const Source& source) {
+  const auto offset_of = [&](const Source& source) {
     return source.convolution ? memory_.results.at(*source.convolution) : memory_.input;
   };
   const Source& first = convolution.sources.front();
-  gl.ProgramUniform1ui(program, 6, place(first));
+  gl.ProgramUniform1ui(program, 6, offset_of(first));
   gl.ProgramUniform1ui(program, 7, blocks_of(*network_, first));
   if (index + 1 == Network::convolution_count) {
     const glm::ivec2 begin = in_picture(tile.begin);
@@ -234,7 +234,7 @@ void Denoiser::set_convolution(GLuint program, const Tile& tile, std::size_t ind
   }
   const bool two = convolution.sources.size() > 1;
   gl.ProgramUniform1ui(program, 8, first.enlarged ? 1 : 0);
-  gl.ProgramUniform1ui(program, 9, two ? place(convolution.sources.back()) : 0);
+  gl.ProgramUniform1ui(program, 9, two ? offset_of(convolution.sources.back()) : 0);
   gl.ProgramUniform1ui(program, 10, two ? blocks_of(*network_, convolution.sources.back()) : 0);
 }
 

@@ -67,7 +67,7 @@ class DebugGroup {
 class Fence {
  public:
   Fence() = default;
-  /// Placed after all commands issued so far, which are flushed.
+  /// Inserted after all commands issued so far, which are flushed.
   explicit Fence(FunctionsPtr gl);
   Fence(Fence&& other) noexcept : gl_(std::move(other.gl_)), sync_(std::exchange(other.sync_, nullptr)) {}
   Fence& operator=(Fence&& other) noexcept {

@@ -91,7 +91,7 @@ Lattice::Lattice(const Statistics& statistics, const Channels& beside, const Ref
       cells(settings.cells) {
   const std::vector<ChannelFields> fields = fields_of(statistics, beside);
   find_blocks(statistics, fields, progress);
-  fill_places(statistics, progress);
+  fill_entries(statistics, progress);
   fill_coarse(statistics, progress);
   for (const ChannelFields& of : fields) channels.push_back(make_channel(of, progress));
   if (beside.momentum) channels.back().fastest = beside.momentum->fastest();
@@ -147,7 +147,7 @@ std::uint32_t Lattice::block_at(const ivec3& corner, std::uint32_t scale) const 
 }
 
 template <class Visit>
-void Lattice::for_each_place(const Progress* progress, Visit&& visit) const {
+void Lattice::for_each_entry(const Progress* progress, Visit&& visit) const {
   for (std::uint32_t b = 1; b < first[0]; ++b) {
     check(progress);
     const int scale = static_cast<int>(core::cm_block_scale(blocks[b]));
@@ -160,19 +160,19 @@ void Lattice::for_each_place(const Progress* progress, Visit&& visit) const {
   }
 }
 
-std::size_t Lattice::place_about(const ivec3& corner, int log2_size) const {
+std::size_t Lattice::entry_about(const ivec3& corner, int log2_size) const {
   const ivec3 middle = corner + (1 << (log2_size - 1));
   const std::uint32_t scale = core::cm_octave(middle) / 3;
   const ivec3 point = middle >> static_cast<int>(3 * scale);
   return std::size_t{block_at(point >> 3, scale)} * CM_BLOCK_POINTS + core::cm_in_block(point);
 }
 
-void Lattice::fill_places(const Statistics& statistics, const Progress* progress) {
-  resize(places, std::size_t{first[0]} * CM_BLOCK_POINTS, progress);
+void Lattice::fill_entries(const Statistics& statistics, const Progress* progress) {
+  resize(entries, std::size_t{first[0]} * CM_BLOCK_POINTS, progress);
   even_bricks.push_back(0.0F);
   std::unordered_map<float, std::uint32_t> even{{0.0F, 0}};
   struct Brick {
-    std::size_t place;
+    std::size_t entry;
     std::uint32_t number;
   };
   std::vector<Brick> with_values;
@@ -180,20 +180,20 @@ void Lattice::fill_places(const Statistics& statistics, const Progress* progress
     // The entry for a block is at the point of the next coarser scale at its corner.
     const ivec3 corner = core::cm_block_corner(blocks[b]);
     const std::uint32_t above = block_at(corner >> 3, core::cm_block_scale(blocks[b]) + 1);
-    places[std::size_t{above} * CM_BLOCK_POINTS + core::cm_in_block(corner)].block = b;
+    entries[std::size_t{above} * CM_BLOCK_POINTS + core::cm_in_block(corner)].block = b;
   }
-  for_each_place(progress, [&](std::size_t index, const ivec3& corner, int scale) {
+  for_each_entry(progress, [&](std::size_t index, const ivec3& corner, int scale) {
     const Statistics::Node& node = statistics.node_at(corner, 3 * scale);
     if (node.is_uniform()) {
       const auto [found, added] = even.emplace(node.uniform, static_cast<std::uint32_t>(even_bricks.size()));
       if (added) even_bricks.push_back(node.uniform);
-      places[index].brick = found->second;
+      entries[index].brick = found->second;
     } else if (scale == 1) {
       with_values.push_back({index, node.moments / 6});
     }
   });
   for (const Brick& brick : with_values)
-    places[brick.place].brick = static_cast<std::uint32_t>(even_bricks.size()) + brick.number;
+    entries[brick.entry].brick = static_cast<std::uint32_t>(even_bricks.size()) + brick.number;
   bricks = even_bricks.size() + statistics.nodes_of_size(3).size();
   halves = statistics.values_are_halves() &&
            std::ranges::all_of(even_bricks, [](float value) { return volume::exact_half(value).has_value(); });
@@ -217,7 +217,7 @@ void Lattice::fill_coarse(const Statistics& statistics, const Progress* progress
         made.coefficients[cell] = coefficients_of(m, v0, shape, cells, to_relative);
         if (m.max > 0.0F) made.dense[cell / 32] |= 1U << (cell % 32);
       });
-      places[place_about(node.corner, node.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
+      entries[entry_about(node.corner, node.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
     }
   });
 }
@@ -265,31 +265,31 @@ LatticeChannel Lattice::make_channel(const ChannelFields& fields, const Progress
         fields.put_record(v0, shape, cells, records.subspan(words * cell, words));
         if (fields.emits(v0, shape)) records[words * CM_COARSE_CELLS + cell / 32] |= 1U << (cell % 32);
       });
-      made.places[place_about(at.corner, at.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
+      made.entries[entry_about(at.corner, at.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
     }
   });
   return made;
 }
 
 void Lattice::fill_bricks(const ChannelFields& fields, LatticeChannel& made, const Progress* progress) const {
-  resize(made.places, places.size(), progress);
-  std::ranges::transform(places, made.places.begin(),
-                         [](const LatticePlace& place) { return LatticePlace{.block = place.block}; });
+  resize(made.entries, entries.size(), progress);
+  std::ranges::transform(entries, made.entries.begin(),
+                         [](const LatticeEntry& entry) { return LatticeEntry{.block = entry.block}; });
   made.even_bricks.push_back({});
   std::map<ChannelNumbers, std::uint32_t> even{{ChannelNumbers{}, 0}};
   std::vector<std::size_t> with_values;
-  for_each_place(progress, [&](std::size_t index, const ivec3& corner, int scale) {
+  for_each_entry(progress, [&](std::size_t index, const ivec3& corner, int scale) {
     if (const std::optional<ChannelNumbers> numbers = fields.even(corner, 3 * scale)) {
       const auto [found, added] = even.emplace(*numbers, static_cast<std::uint32_t>(made.even_bricks.size()));
       if (added) made.even_bricks.push_back(*numbers);
-      made.places[index].brick = found->second;
+      made.entries[index].brick = found->second;
     } else if (scale == 1) {
       with_values.push_back(index);
       made.bricks.push_back(corner);
     }
   });
   for (std::size_t i = 0; i < with_values.size(); ++i)
-    made.places[with_values[i]].brick = static_cast<std::uint32_t>(made.even_bricks.size() + i);
+    made.entries[with_values[i]].brick = static_cast<std::uint32_t>(made.even_bricks.size() + i);
 }
 
 namespace {

@@ -15,8 +15,8 @@
 namespace cumulet::grid {
 
 /// Entry for a lattice point p of scale m >= 1. It describes the cube of 8^m voxels with its low corner at p and the
-/// octree cube with its center at p. Layout: glsl/lattice.glsl; reader: glsl/grid_places.glsl.
-struct LatticePlace {
+/// octree cube with its center at p. Layout: glsl/lattice.glsl; reader: glsl/lattice_lookup.glsl.
+struct LatticeEntry {
   std::uint32_t block = 0;   ///< index of the block of the next finer scale in this cube; 0: none
   std::uint32_t brick = 0;   ///< index of the brick with the cube's values, if the cube is a brick or has no finer
                              ///< block
@@ -34,8 +34,8 @@ static_assert(sizeof(CoarseCells) == 4 * CM_COARSE_WORDS);
 /// Source data of a channel's cell records, as Lattice has it for density. Reader: glsl/grid_channels.comp.
 struct LatticeChannel {
   Channel channel = Channel::emission;
-  std::size_t numbers = 0;           ///< values per voxel
-  std::vector<LatticePlace> places;  ///< as Lattice::places, with this channel's bricks and coarse cells
+  std::size_t numbers = 0;            ///< values per voxel
+  std::vector<LatticeEntry> entries;  ///< as Lattice::entries, with this channel's bricks and coarse cells
   /// Per octree cube above bricks: the records of its cells, indexed by cm_coarse_cell(). For emission one bit per cell
   /// follows, set if the cell emits. The first cube is an empty placeholder.
   std::vector<std::uint32_t> coarse;
@@ -44,7 +44,7 @@ struct LatticeChannel {
   float fastest = 0.0F;                     ///< for velocity: maximum, in voxels per second
 
   [[nodiscard]] std::uint64_t bytes() const {
-    return places.size() * sizeof(LatticePlace) + coarse.size() * 4 + even_bricks.size() * sizeof(ChannelNumbers) +
+    return entries.size() * sizeof(LatticeEntry) + coarse.size() * 4 + even_bricks.size() * sizeof(ChannelNumbers) +
            bricks.size() * sizeof(glm::ivec3);
   }
 };
@@ -64,7 +64,7 @@ struct Lattice {
   /// Blocks of scale s are [first[s], first[s - 1]); those of scale 0 extend to the end.
   std::array<std::uint32_t, Cube::max_log2_size / 3 + 1> first{};
   /// CM_BLOCK_POINTS entries for the placeholder and for each block of scale 1 or coarser.
-  std::vector<LatticePlace> places;
+  std::vector<LatticeEntry> entries;
   std::vector<CoarseCells> coarse;  ///< the first is an empty placeholder
   /// Values of uniform bricks; the first is 0. Higher brick numbers are bricks of the statistics, in the order of
   /// nodes_of_size(3).
@@ -80,7 +80,7 @@ struct Lattice {
   [[nodiscard]] std::uint64_t bytes() const {
     std::uint64_t beside = 0;
     for (const LatticeChannel& channel : channels) beside += channel.bytes();
-    return beside + own.bytes() + blocks.size() * sizeof(glm::uvec2) + places.size() * sizeof(LatticePlace) +
+    return beside + own.bytes() + blocks.size() * sizeof(glm::uvec2) + entries.size() * sizeof(LatticeEntry) +
            coarse.size() * sizeof(CoarseCells) + even_bricks.size() * 4;
   }
   /// GPU buffer memory in bytes, with brick values and space for priorities.
@@ -88,15 +88,15 @@ struct Lattice {
 
  private:
   void find_blocks(const Statistics& statistics, const std::vector<ChannelFields>& beside, Progress* progress);
-  void fill_places(const Statistics& statistics, const Progress* progress);
+  void fill_entries(const Statistics& statistics, const Progress* progress);
   void fill_coarse(const Statistics& statistics, const Progress* progress);
   [[nodiscard]] LatticeChannel make_channel(const ChannelFields& fields, const Progress* progress) const;
   void fill_bricks(const ChannelFields& fields, LatticeChannel& made, const Progress* progress) const;
-  // Calls visit(index, corner, scale) for each entry of `places` within the cube.
+  // Calls visit(index, corner, scale) for each entry of `entries` within the cube.
   template <class Visit>
-  void for_each_place(const Progress* progress, Visit&& visit) const;
-  // Returns the index in `places` for the point at the center of this octree cube.
-  [[nodiscard]] std::size_t place_about(const glm::ivec3& corner, int log2_size) const;
+  void for_each_entry(const Progress* progress, Visit&& visit) const;
+  // Returns the index in `entries` for the point at the center of this octree cube.
+  [[nodiscard]] std::size_t entry_about(const glm::ivec3& corner, int log2_size) const;
   // Returns the index of the block with this corner and scale; 0: none.
   [[nodiscard]] std::uint32_t block_at(const glm::ivec3& corner, std::uint32_t scale) const;
 };

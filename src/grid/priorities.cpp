@@ -24,18 +24,18 @@ unsigned level_in_brick(const ivec3& point) {
   return octave >= 3 ? brick_levels : core::cm_split_level(point, octave, 4) - 1;
 }
 
-unsigned place_of(const ivec3& point) { return static_cast<unsigned>((point.x * 9 + point.y) * 9 + point.z); }
+unsigned index_of(const ivec3& point) { return static_cast<unsigned>((point.x * 9 + point.y) * 9 + point.z); }
 
 struct Points {
   BrickPoints points;
-  PlacesOfBrickPoints index{};  // indexed by place_of()
+  BrickPointIndices index{};  // indexed by index_of()
   Points() {
     unsigned count = 0;
     for (unsigned level = 0; level < brick_levels; ++level) {
       for (int i = 0; i < 729; ++i) {
         const ivec3 point(i / 81, i / 9 % 9, i % 9);
         if (level_in_brick(point) != level) continue;
-        index[place_of(point)] = static_cast<std::uint16_t>(count);
+        index[index_of(point)] = static_cast<std::uint16_t>(count);
         points[count++] = glm::u8vec3(point);
       }
     }
@@ -91,7 +91,7 @@ void find(const Evaluations& evaluations, const CubeKey& cube, int log2_size, fl
     if (node.log2_size != cube.log2_size || node.is_uniform()) continue;
     evaluation.node(node, splitting_levels(log2_size), sums, floor, [&](const ivec3& vertex, float squared) {
       const ivec3 point = (vertex - cube.corner) >> (cube.log2_size - 3);
-      std::uint16_t& most = found[all.index[place_of(point)]];
+      std::uint16_t& most = found[all.index[index_of(point)]];
       most = std::max(most, quantize(squared));
     });
   }
@@ -107,7 +107,7 @@ constexpr std::uint64_t max_values = std::uint64_t{1} << 32U;
 
 const BrickPoints& brick_points() { return points().points; }
 
-const PlacesOfBrickPoints& places_of_brick_points() { return points().index; }
+const BrickPointIndices& brick_point_indices() { return points().index; }
 
 OwnPriorities::OwnPriorities(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                              Progress* progress)

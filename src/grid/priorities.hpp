@@ -24,8 +24,8 @@ using BrickPoints = std::array<glm::u8vec3, CM_BRICK_POINTS>;
 const BrickPoints& brick_points();
 
 /// Maps each of a brick's 9^3 points, x first, to its index in brick_points().
-using PlacesOfBrickPoints = std::array<std::uint16_t, 9 * 9 * 9>;
-const PlacesOfBrickPoints& places_of_brick_points();
+using BrickPointIndices = std::array<std::uint16_t, 9 * 9 * 9>;
+const BrickPointIndices& brick_point_indices();
 
 /// Parameters of the refinement criterion for a field, as passed to shaders.
 struct OwnMeasure {

@@ -39,7 +39,7 @@ struct RefineCamera {
   double pixels_per_radian = 1000.0;  ///< image height / (2 tan_half_y)
   /// Instance transforms (affine) from the volume's world space to the camera's. The grid is refined for the instance
   /// that needs the finest cells.
-  std::vector<glm::dmat4> places{glm::dmat4(1.0)};
+  std::vector<glm::dmat4> transforms{glm::dmat4(1.0)};
   bool operator==(const RefineCamera&) const = default;
 };
 

@@ -20,7 +20,7 @@ class RgbField {
   RgbField& operator=(const RgbField&) = delete;
 
   [[nodiscard]] const Statistics& component(std::size_t i) const { return *statistics_[i]; }
-  /// Integral of each component along a ray: the mean over the axis-parallel rays that meet any of it.
+  /// Integral of each component along a ray: the mean over the axis-parallel rays that hit any of it.
   [[nodiscard]] glm::dvec3 mean_depth() const;
   [[nodiscard]] float max_value() const;
   /// Inclusive voxel bounds of everything that is not black.

@@ -261,14 +261,14 @@ struct VoxelBox {
   [[nodiscard]] bool holds(const VoxelBox& box) const {
     return glm::all(glm::greaterThanEqual(box.low, low)) && glm::all(glm::lessThanEqual(box.high, high));
   }
-  [[nodiscard]] bool meets(const VoxelBox& box) const {
+  [[nodiscard]] bool overlaps(const VoxelBox& box) const {
     return glm::all(glm::lessThanEqual(low, box.high)) && glm::all(glm::greaterThanEqual(high, box.low));
   }
 };
 
 VoxelBox box_of(const volume::Tile& tile) { return {tile.min, tile.max}; }
 
-// Returns the value of a box without bricks if it is uniform. tiles: all tiles that meet the box.
+// Returns the value of a box without bricks if it is uniform. tiles: all tiles that overlap the box.
 std::optional<float> one_value(const volume::ScalarVolume& volume, const VoxelBox& box,
                                const std::vector<std::uint32_t>& tiles) {
   const VoxelBox bounds{volume.bounds_min, volume.bounds_max};
@@ -302,7 +302,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
   struct Work {
     std::uint32_t node;
     std::uint32_t first, last;         // range of bricks
-    std::vector<std::uint32_t> tiles;  // tiles that meet the node
+    std::vector<std::uint32_t> tiles;  // tiles that overlap the node
   };
   std::vector<std::uint32_t> bricks(volume.brick_origins.size());
   for (std::uint32_t i = 0; i < bricks.size(); ++i) bricks[i] = i;
@@ -315,17 +315,17 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
   stack.push_back({0, 0, static_cast<std::uint32_t>(bricks.size()), std::move(all_tiles)});
 
   std::uint64_t rounds = 0;
-  std::uint64_t placed = 0;
+  std::uint64_t done = 0;
   while (!stack.empty()) {
-    if (++rounds % 256 == 0) part.add(std::exchange(placed, 0));
+    if (++rounds % 256 == 0) part.add(std::exchange(done, 0));
     Work work = std::move(stack.back());
     stack.pop_back();
     const ivec3 corner = nodes_[work.node].corner;
     const int log2_size = nodes_[work.node].log2_size;
     const ivec3 low = corner + cube_.origin;
     const VoxelBox box{low, low + ((1 << log2_size) - 1)};
-    if (!box.meets({volume.bounds_min, volume.bounds_max})) continue;  // uniform zero
-    std::erase_if(work.tiles, [&](std::uint32_t t) { return !box.meets(box_of(volume.tiles[t])); });
+    if (!box.overlaps({volume.bounds_min, volume.bounds_max})) continue;  // uniform zero
+    std::erase_if(work.tiles, [&](std::uint32_t t) { return !box.overlaps(box_of(volume.tiles[t])); });
     const bool no_bricks = work.first == work.last;
     Node& node = nodes_[work.node];
     if (const auto value = no_bricks ? one_value(volume, box, work.tiles) : std::nullopt) {
@@ -335,7 +335,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
     by_size_[static_cast<std::size_t>(log2_size)].push_back(work.node);
     if (log2_size == 3 && !no_bricks) {
       node.values = static_cast<std::int32_t>(bricks[work.first]);
-      ++placed;
+      ++done;
       continue;
     }
     if (log2_size == 3) {
@@ -439,7 +439,7 @@ void Statistics::compute_moments(Progress* progress) {
 
 namespace {
 
-// Set of the voxel columns along an axis that meet any density. Memory is proportional to the number of bricks and
+// Set of the voxel columns along an axis that hit any density. Memory is proportional to the number of bricks and
 // uniform cubes, not to their size.
 class Shadow {
  public:

@@ -115,7 +115,7 @@ class Statistics {
     return moments_[node.moments + permutation];
   }
   /// Optical depth per unit extinction scale, in grid value x world unit: the mean over the rays along the three axes
-  /// that meet any density.
+  /// that hit any density.
   [[nodiscard]] double mean_optical_depth() const { return mean_optical_depth_; }
   /// Nodes of one size that are not uniform.
   [[nodiscard]] const std::vector<std::uint32_t>& nodes_of_size(int log2_size) const {

@@ -253,18 +253,18 @@ void GridBuilder::number_nodes(TetGrid& grid, ProgressPart& part) const {
     grid.roots[root] = {first_leaf_[root], first_leaf_[root] - root};
   }
   grid.roots[24] = {count, count - 24};
-  std::vector<std::uint32_t> place;
-  part.resize(place, nodes_.size());
-  for (unsigned root = 0; root < 24; ++root) place[root] = grid.roots[root].first_internal;
+  std::vector<std::uint32_t> numbers;
+  part.resize(numbers, nodes_.size());
+  for (unsigned root = 0; root < 24; ++root) numbers[root] = grid.roots[root].first_internal;
   for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
                       [&](const auto& range) {
                         for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
                           const std::uint32_t child = nodes_[i].child;
                           if (child == 0) continue;
-                          grid.tree[place[i]] = leaves_below_[child] - 1;
-                          place[child] = place[i] + 1;
-                          place[child + 1] = place[i] + leaves_below_[child];
+                          grid.tree[numbers[i]] = leaves_below_[child] - 1;
+                          numbers[child] = numbers[i] + 1;
+                          numbers[child + 1] = numbers[i] + leaves_below_[child];
                         }
                         part.add(range.size());
                       });
@@ -511,9 +511,9 @@ CellRecord GridBuilder::record(std::uint32_t index, const vec4& fit, bool emits)
     const std::uint32_t other = resolve(index, face);
     record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
   }
-  const glm::uvec2 place = core::cm_record_place(vec3(node.v0), node.shape, statistics_->cube().wide());
-  record.data.x = place.x;
-  record.data.y = place.y | (emits ? CM_RECORD_EMITS : 0U);
+  const glm::uvec2 v0_shape = core::cm_pack_v0_shape(vec3(node.v0), node.shape, statistics_->cube().wide());
+  record.data.x = v0_shape.x;
+  record.data.y = v0_shape.y | (emits ? CM_RECORD_EMITS : 0U);
   const glm::uvec2 packed = pack_fit(fit);
   record.data.z = packed.x;
   record.data.w = packed.x == 0 ? 0 : packed.y;
@@ -527,14 +527,14 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   grid.levels = static_cast<std::uint32_t>(level_first_.size() - 2);
   grid.density_unit = max_value > 0.0F ? max_value : 1.0F;
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
-  ProgressPart places(progress, 0.0, 0.1, nodes_.size());
-  places.resize(grid.cells, count);
-  if (channels.emission) places.resize(grid.emission, count);
-  if (channels.scattering) places.resize(grid.color, count);
-  if (channels.forward) places.resize(grid.anisotropy, count);
-  if (channels.momentum) places.resize(grid.velocity, count);
-  if (channels.ends) places.resize(grid.change, count);
-  number_nodes(grid, places);
+  ProgressPart allocation(progress, 0.0, 0.1, nodes_.size());
+  allocation.resize(grid.cells, count);
+  if (channels.emission) allocation.resize(grid.emission, count);
+  if (channels.scattering) allocation.resize(grid.color, count);
+  if (channels.forward) allocation.resize(grid.anisotropy, count);
+  if (channels.momentum) allocation.resize(grid.velocity, count);
+  if (channels.ends) allocation.resize(grid.change, count);
+  number_nodes(grid, allocation);
 
   struct Box {
     vec3 low{3.0e38F};

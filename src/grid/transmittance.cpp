@@ -15,7 +15,7 @@ namespace {
 using glm::ivec3;
 
 // Index of a non-uniform node. Bricks come first, in the order of nodes_of_size(3).
-std::size_t place(const Statistics::Node& node) { return node.moments / 6; }
+std::size_t index_of(const Statistics::Node& node) { return node.moments / 6; }
 
 // Index of a block by its position along an axis and across it.
 std::size_t block_at(int axis, int along, int u, int v) {
@@ -44,12 +44,12 @@ Transmittance::Transmittance(const Statistics& statistics, double extinction, co
 
 const float* Transmittance::blocks(const ivec3& corner) const {
   const Statistics::Node& node = statistics_->node_at(corner);
-  return node.values < 0 ? nullptr : transmittance_.data() + place(node) * blocks_per_brick;
+  return node.values < 0 ? nullptr : transmittance_.data() + index_of(node) * blocks_per_brick;
 }
 
 float Transmittance::most(const ivec3& corner, int log2_size) const {
   const Statistics::Node& node = statistics_->node_at(corner, log2_size);
-  return node.is_uniform() ? 1.0F : most_[place(node)];
+  return node.is_uniform() ? 1.0F : most_[index_of(node)];
 }
 
 void Transmittance::sum_blocks(const Progress* progress) {
@@ -102,8 +102,8 @@ void Transmittance::sweep_column(int axis, ivec3 at) {
       for (float& row : depth) row += all;
       continue;
     }
-    bricks.push_back({place(node), depth});
-    const float* sums = sums_.data() + place(node) * blocks_per_brick;
+    bricks.push_back({index_of(node), depth});
+    const float* sums = sums_.data() + index_of(node) * blocks_per_brick;
     for (int row = 0; row < 16; ++row) {
       for (int along = 0; along < 4; ++along)
         depth[static_cast<std::size_t>(row)] += to_depth * sums[block_at(axis, along, row / 4, row % 4)];
@@ -137,7 +137,7 @@ void Transmittance::fill_pyramid() {
       const Statistics::Node& node = statistics_->nodes()[n];
       for (std::uint32_t i = 0; i < 8; ++i) {
         const Statistics::Node& child = statistics_->nodes()[node.child + i];
-        if (!child.is_uniform()) most_[place(node)] = std::max(most_[place(node)], most_[place(child)]);
+        if (!child.is_uniform()) most_[index_of(node)] = std::max(most_[index_of(node)], most_[index_of(child)]);
       }
     }
   }

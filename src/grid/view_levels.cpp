@@ -47,8 +47,8 @@ ViewLevels::ViewLevels(const Cube& cube, const RefineSettings& settings) : log2_
   if (!settings.camera) return;
   const RefineCamera& camera = *settings.camera;
   const glm::dmat3 linear(cube.to_world);
-  for (const glm::dmat4& place : camera.places)
-    placed_.push_back({place * cube.to_world, largest_stretch(glm::dmat3(place))});
+  for (const glm::dmat4& transform : camera.transforms)
+    instances_.push_back({transform * cube.to_world, largest_stretch(glm::dmat3(transform))});
   const auto side = [&](const dvec3& axis, double tangent) {
     planes_.push_back(glm::normalize(camera.forward * tangent - axis));
   };
@@ -79,8 +79,8 @@ unsigned ViewLevels::in(const ivec3& corner, int node_size) const {
   const double size = 1 << node_size;
   const dvec3 centre = dvec3(corner) + 0.5 * size;
   double shortest = std::numeric_limits<double>::infinity();
-  for (const Placed& placed : placed_) {
-    shortest = std::min(shortest, shortest_edge(placed, centre, unit_radius_ * size));
+  for (const Instance& instance : instances_) {
+    shortest = std::min(shortest, shortest_edge(instance, centre, unit_radius_ * size));
     if (shortest <= 0.0) break;
   }
   const auto end =
@@ -101,13 +101,13 @@ RefineSettings with_slack(const RefineSettings& settings) {
 }
 
 // Infinity: outside the frustum.
-double ViewLevels::shortest_edge(const Placed& placed, const dvec3& centre, double radius) const {
-  const dvec3 to = dvec3(placed.to_camera * glm::dvec4(centre, 1.0)) - eye_;
-  radius *= placed.stretch;
+double ViewLevels::shortest_edge(const Instance& instance, const dvec3& centre, double radius) const {
+  const dvec3 to = dvec3(instance.to_camera * glm::dvec4(centre, 1.0)) - eye_;
+  radius *= instance.stretch;
   for (const dvec3& plane : planes_) {
     if (glm::dot(plane, to) < -radius) return std::numeric_limits<double>::infinity();
   }
-  return angle_ * std::max(0.0, glm::length(to) - radius) / placed.stretch;
+  return angle_ * std::max(0.0, glm::length(to) - radius) / instance.stretch;
 }
 
 }  // namespace cumulet::grid

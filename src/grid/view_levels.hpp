@@ -31,16 +31,16 @@ class ViewLevels {
   [[nodiscard]] unsigned in(const glm::ivec3& corner, int node_size) const;
 
  private:
-  struct Placed {
+  struct Instance {
     glm::dmat4 to_camera{1.0};  // from cube space to the camera's world space
     double stretch = 1.0;       // maximum scale factor of the instance transform
   };
-  [[nodiscard]] double shortest_edge(const Placed& placed, const glm::dvec3& centre, double radius) const;
+  [[nodiscard]] double shortest_edge(const Instance& instance, const glm::dvec3& centre, double radius) const;
 
   int log2_size_;
   double angle_ = 0.0;  // minimum angle that an edge must cover, in radians
   glm::dvec3 eye_{0.0};
-  std::vector<Placed> placed_;  // empty: no camera
+  std::vector<Instance> instances_;  // empty: no camera
   std::vector<glm::dvec3> planes_;
   double unit_radius_ = 0.0;     // radius of the sphere around a voxel, in the volume's world space
   std::vector<double> longest_;  // per level: longest edge of this level and all finer ones

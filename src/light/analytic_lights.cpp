@@ -125,7 +125,7 @@ double share_looks(std::span<core::CmAnalyticLight> records, std::span<const Lit
   for (double& share : shares) share = shared > 0.0 ? (1.0 - alike) * share / shared + alike * even : even;
   const std::vector<Alias> table = count > 0 ? alias_table(shares, 1.0) : std::vector<Alias>();
   for (std::size_t i = 0; i < count; ++i) {
-    records[i].chance = static_cast<float>(shares[i]);
+    records[i].probability = static_cast<float>(shares[i]);
     records[i].stays = table[i].stays;
     records[i].other = table[i].other;
   }

@@ -57,7 +57,7 @@ struct Lit {
 
 /// Sets the probability with which next-event estimation samples each light: by the luminance of its irradiance at the
 /// ball's center, or at the ball's surface if the light is inside. With several balls, probabilities are averaged. A
-/// fifth of the samples is distributed uniformly, for places where the bright lights are occluded. Returns the maximum
+/// fifth of the samples is distributed uniformly, for points where the bright lights are occluded. Returns the maximum
 /// total irradiance. lit: balls of radius 0 are ignored.
 double share_looks(std::span<core::CmAnalyticLight> records, std::span<const Lit> lit);
 

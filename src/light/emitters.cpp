@@ -170,14 +170,14 @@ EmitterTable emitter_table(std::span<const EmissiveTriangle> triangles, const Sc
     table.entries[i].z = aliases[i].other;
   }
   // Computed from the quantized alias words, as shaders use them.
-  std::vector<double> chance(n, 0.0);
+  std::vector<double> probability(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     const double stays = (static_cast<double>(table.entries[i].y) + 1.0) / 4294967296.0;
-    chance[i] += stays;
-    chance[table.entries[i].z] += 1.0 - stays;
+    probability[i] += stays;
+    probability[table.entries[i].z] += 1.0 - stays;
   }
   for (std::size_t i = 0; i < n; ++i) {
-    const double density = chance[i] / static_cast<double>(n) / areas[i];
+    const double density = probability[i] / static_cast<double>(n) / areas[i];
     glm::uvec4& entry = table.entries[i];
     entry.w = glm::floatBitsToUint(static_cast<float>(entry.w != 0U ? -density : density));
   }

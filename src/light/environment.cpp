@@ -10,7 +10,7 @@
 #include <numbers>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "base/one_line.hpp"
@@ -155,7 +155,7 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
                                      std::to_string(pixels.height) + " pixels, but it has " +
                                      std::to_string(pixels.values.size()) + " values");
   }
-  const auto made = make_left<Environment>();
+  const auto made = make_deferred_delete<Environment>();
   made->name = name;
   made->remarks = pixels.remarks;
   made->width = pixels.width;
@@ -185,9 +185,9 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
   if (all.weight > 0.0) {
     const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(texels);
     made->density = static_cast<float>(1.0 / (all.weight * unit));
-    const std::vector<Alias> aliases = apart(progress, [weights = std::move(weights), sum = all.weight]() mutable {
-      return alias_table(std::move(weights), sum);
-    });
+    const std::vector<Alias> aliases = run_cancellable(
+        progress,
+        [weights = std::move(weights), sum = all.weight]() mutable { return alias_table(std::move(weights), sum); });
     ProgressPart part(progress, 0.9, 0.95, pixels.height);
     for_each_row(pixels.height, [&](std::uint32_t y) {
       for (std::size_t i = std::size_t{y} * pixels.width; i < std::size_t{y + 1} * pixels.width; ++i) {

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <vector>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 #include "base/progress_part.hpp"
@@ -52,7 +52,7 @@ EnvironmentPixels read_environment(const FilePath& path, Progress* progress) {
 }
 
 EnvironmentPtr open_environment(const FilePath& path, Progress* progress) {
-  const auto pixels = make_left<const EnvironmentPixels>(read_environment(path, progress));
+  const auto pixels = make_deferred_delete<const EnvironmentPixels>(read_environment(path, progress));
   return make_environment(*pixels, path.given(), progress);
 }
 

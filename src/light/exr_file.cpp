@@ -19,7 +19,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 #include "base/progress_part.hpp"
@@ -34,7 +34,8 @@ namespace cumulet::light {
 namespace {
 
 // Creates OpenEXR's statics when the library is loaded. At exit they are then destroyed after decoding that continues
-// in the background (base/apart) has ended. If they were created with the first file, they would be destroyed before.
+// in the background (base/detached_work) has ended. If they were created with the first file, they would be destroyed
+// before.
 [[maybe_unused]] const bool open_exr_is_made = []() noexcept {
   Imf::staticInitialize();
   return IlmThread::ThreadPool::globalThreadPool().numThreads() >= 0;
@@ -104,7 +105,7 @@ Primaries primaries_of(const Imf::Header& header) {
   return primaries;
 }
 
-/// An OpenEXR image while it is decoded. Owns all of its data, as apart() requires.
+/// An OpenEXR image while it is decoded. Owns all of its data, as run_cancellable() requires.
 class ExrPicture {
  public:
   ExrPicture(std::vector<std::uint8_t> bytes, const std::string& path)
@@ -288,8 +289,8 @@ class ExrPicture {
 };
 
 /// Returns the display window of an image that has pixels in its data window; the rest is black.
-EnvironmentPixels placed(EnvironmentPixels from, const Window& data, const Window& display, const std::string& path,
-                         Progress* progress) {
+EnvironmentPixels in_display_window(EnvironmentPixels from, const Window& data, const Window& display,
+                                    const std::string& path, Progress* progress) {
   if (data == display) return from;
   const std::int64_t left = std::max(data.left, display.left);
   const std::int64_t right = std::min(data.left + data.width, display.left + display.width);
@@ -340,14 +341,14 @@ EnvironmentPixels to_rec709(EnvironmentPixels pixels, const Description& descrip
 
 EnvironmentPixels read_exr(std::vector<std::uint8_t> bytes, const std::string& path, Progress* progress) {
   try {
-    const auto file = make_left<ExrPicture>(std::move(bytes), path);
+    const auto file = make_deferred_delete<ExrPicture>(std::move(bytes), path);
     file->open(progress);
     const Description& description = file->description();
     // OpenEXR caches the block of rows that it decoded last.
     constexpr std::uint32_t rows = 64;
     ProgressPart part(progress, decoded_from, decoded_to, file->height());
     for (std::uint32_t y = 0; y < file->height();) {
-      const std::uint32_t next = apart(progress, [file, y] { return file->decode(y, rows); });
+      const std::uint32_t next = run_cancellable(progress, [file, y] { return file->decode(y, rows); });
       part.add(next - y);
       y = next;
     }
@@ -356,8 +357,8 @@ EnvironmentPixels read_exr(std::vector<std::uint8_t> bytes, const std::string& p
       part.check();
       file->combine(y);
     }
-    EnvironmentPixels pixels =
-        placed(to_rec709(file->take(), description, progress), description.data, description.display, path, progress);
+    EnvironmentPixels pixels = in_display_window(to_rec709(file->take(), description, progress), description.data,
+                                                 description.display, path, progress);
     if (!description.cube) return pixels;
     EnvironmentPixels flat = resample({pixels.width, std::move(pixels.values)}, progress);
     flat.remarks = std::move(pixels.remarks);

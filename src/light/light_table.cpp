@@ -11,14 +11,14 @@ namespace cumulet::light {
 namespace {
 
 // Half of the sky's fraction of the light: escaping paths sample the sky as well.
-double sky_chance(double sun, double sky, bool near) {
+double sky_probability(double sun, double sky, bool near) {
   if (sun > 0.0) return 0.5 * sky / (sky + sun);
   if (!(sky > 0.0)) return 0.0;
   return near ? 0.25 : 1.0;
 }
 
 // Escaping paths sample it as well, but rarely hit a sun in the image.
-double environment_chance(double sun, double environment, bool near) {
+double environment_probability(double sun, double environment, bool near) {
   if (sun > 0.0 && environment > 0.0) return std::clamp(environment / (environment + sun), 0.2, 0.8);
   if (!(environment > 0.0)) return 0.0;
   return near ? 0.5 : 1.0;
@@ -39,7 +39,7 @@ double sun_share(const SceneLights& scene, double sun) {
 
 // Probability of sampling emissive cells: by their irradiance at the rim of the medium's box, compared with that of all
 // other lights.
-double cell_chance(const MediumLight& medium, const SceneLights& scene, double distant) {
+double cell_probability(const MediumLight& medium, const SceneLights& scene, double distant) {
   if (!(medium.power > 0.0)) return 0.0;
   const double square = std::max(medium.radius * medium.radius, 1e-30);
   // Scattered rays reach a large fire often enough, and inside of it NEE sees as little as they do: on Mantaflow's
@@ -82,14 +82,14 @@ LightTable::LightTable(const DistantLights& distant, const Surroundings& surroun
     : distant_(with_mean(distant, surroundings)), surroundings_(surroundings) {
   const double sun = luminance(glm::dvec3(distant.sun_irradiance));
   const double sky = 4.0 * std::numbers::pi * luminance(glm::dvec3(distant_.sky_radiance));
-  const auto add = [&](Kind kind, double chance) {
-    if (chance > 0.0) entries_.push_back({kind, static_cast<float>(chance)});
+  const auto add = [&](Kind kind, double probability) {
+    if (probability > 0.0) entries_.push_back({kind, static_cast<float>(probability)});
   };
   const bool near = scene.analytic_lights + scene.triangles > 0;
   const bool surrounded = surroundings.environment != nullptr;
-  const double to_cells = cell_chance(medium, scene, sun + sky);
+  const double to_cells = cell_probability(medium, scene, sun + sky);
   const double rest = 1.0 - to_cells;
-  const double to_far = surrounded ? environment_chance(sun, sky, near) : sky_chance(sun, sky, near);
+  const double to_far = surrounded ? environment_probability(sun, sky, near) : sky_probability(sun, sky, near);
   const double to_triangles = (1.0 - to_far) * triangle_share(scene, sun);
   const double to_sun = sun_share(scene, sun) * (1.0 - to_far - to_triangles);
   const double to_analytic_lights = scene.analytic_lights > 0 ? 1.0 - to_far - to_triangles - to_sun : 0.0;
@@ -101,9 +101,9 @@ LightTable::LightTable(const DistantLights& distant, const Surroundings& surroun
   if (medium.aimed) add(Kind::emissive, 0.5);
 }
 
-float LightTable::chance(Kind kind) const {
+float LightTable::probability(Kind kind) const {
   const auto found = std::ranges::find(entries_, kind, &Entry::kind);
-  return found != entries_.end() ? found->chance : 0.0F;
+  return found != entries_.end() ? found->probability : 0.0F;
 }
 
 core::CmLights LightTable::parameters() const {
@@ -113,18 +113,18 @@ core::CmLights LightTable::parameters() const {
   p.sky_radiance = distant_.sky_radiance;
   // Below a thousandth of a degree it is a direction, because of float precision.
   if (const double half = distant_.sun_angle_degrees * std::numbers::pi / 360.0;
-      half > 1e-5 && chance(Kind::sun) > 0.0F) {
+      half > 1e-5 && probability(Kind::sun) > 0.0F) {
     // Irradiance is the integral of radiance times the cosine over the disk.
     p.sun_radiance = distant_.sun_irradiance / static_cast<float>(std::numbers::pi * std::pow(std::sin(half), 2.0));
     p.sun_spread = static_cast<float>(2.0 * std::pow(std::sin(0.5 * half), 2.0));
   }
   p.any = std::ranges::any_of(entries_, [](const Entry& entry) { return entry.kind != Kind::emissive; }) ? 1U : 0U;
-  p.sky_chance = chance(Kind::sky);
-  p.triangle_chance = chance(Kind::triangle);
-  p.analytic_light_chance = chance(Kind::analytic_light);
-  p.emissive_chance = chance(Kind::emissive);
-  p.cell_chance = chance(Kind::cell);
-  p.environment_chance = chance(Kind::environment);
+  p.sky_probability = probability(Kind::sky);
+  p.triangle_probability = probability(Kind::triangle);
+  p.analytic_light_probability = probability(Kind::analytic_light);
+  p.emissive_probability = probability(Kind::emissive);
+  p.cell_probability = probability(Kind::cell);
+  p.environment_probability = probability(Kind::environment);
   p.environment_strength = surroundings_.strength;
   p.environment_turn = turn_of(surroundings_);
   return p;

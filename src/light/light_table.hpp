@@ -41,7 +41,7 @@ class LightTable {
     Kind kind = Kind::sky;
     /// Probability of sampling this kind at a vertex. Probabilities sum to 1 unless there is no light. For
     /// Kind::emissive: the fraction of rays scattered at surfaces that is aimed at the medium.
-    float chance = 0.0F;
+    float probability = 0.0F;
   };
 
   /// An environment in `surroundings` replaces the sky.
@@ -50,7 +50,7 @@ class LightTable {
 
   [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
   /// Returns 0 for a kind that does not occur.
-  [[nodiscard]] float chance(Kind kind) const;
+  [[nodiscard]] float probability(Kind kind) const;
   /// Returns the parameters of the kernels.
   [[nodiscard]] core::CmLights parameters() const;
 

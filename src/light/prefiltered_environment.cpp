@@ -46,9 +46,9 @@ class Lobe {
     }
   }
   [[nodiscard]] float operator()(float cosine) const {
-    const float place = std::sqrt(std::max(0.0F, 0.5F - 0.5F * cosine)) * (entries - 1);
-    const auto low = std::min(static_cast<std::size_t>(place), weights_.size() - 2);
-    return glm::mix(weights_[low], weights_[low + 1], place - static_cast<float>(low));
+    const float position = std::sqrt(std::max(0.0F, 0.5F - 0.5F * cosine)) * (entries - 1);
+    const auto low = std::min(static_cast<std::size_t>(position), weights_.size() - 2);
+    return glm::mix(weights_[low], weights_[low + 1], position - static_cast<float>(low));
   }
 
  private:

@@ -89,7 +89,7 @@ double to_top(double r, double mu) {
   return std::max(0.0, -r * mu + std::sqrt(std::max(0.0, r * r * (mu * mu - 1.0) + top * top)));
 }
 double horizon(double r) { return -std::sqrt(std::max(0.0, 1.0 - (ground / r) * (ground / r))); }
-bool meets_ground(double r, double mu) { return mu < horizon(r); }
+bool hits_ground(double r, double mu) { return mu < horizon(r); }
 double to_ground(double r, double mu) {
   return std::max(0.0, -r * mu - std::sqrt(std::max(0.0, r * r * (mu * mu - 1.0) + ground * ground)));
 }
@@ -203,7 +203,7 @@ class Atmosphere {
     const double across = std::sqrt(std::max(0.0, 1.0 - mu * mu));
     const dvec3 along(across * std::cos(azimuth), mu, across * std::sin(azimuth));
     const dvec3 sun(std::sqrt(std::max(0.0, 1.0 - sun_mu * sun_mu)), sun_mu, 0.0);
-    const double length = meets_ground(r, mu) ? to_ground(r, mu) : to_top(r, mu);
+    const double length = hits_ground(r, mu) ? to_ground(r, mu) : to_top(r, mu);
     Bands through{};
     through.fill(1.0F);
     for (int i = 0; i < steps; ++i) {
@@ -283,7 +283,7 @@ class Atmosphere {
         }
       };
       const Bands through = march(r, mu, azimuth, sun_mu, steps, visit);
-      if (!meets_ground(r, mu)) continue;
+      if (!hits_ground(r, mu)) continue;
       const double length = to_ground(r, mu);
       const double across = std::sqrt(std::max(0.0, 1.0 - mu * mu));
       const double sun_across = std::sqrt(std::max(0.0, 1.0 - sun_mu * sun_mu));

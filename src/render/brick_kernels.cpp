@@ -46,8 +46,8 @@ std::uint32_t bricks_per_step(const gl::Functions& gl) {
 std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks, std::span<const MovedBrick> moved) {
   std::vector<std::vector<MovedBrick>> moves(bricks.memories.size());
   for (const MovedBrick& brick : moved) {
-    const volume::DeviceBricks::Place& place = bricks.places[brick.x];
-    moves[place.memory].emplace_back(place.brick, brick.y);
+    const volume::DeviceBricks::Location& location = bricks.locations[brick.x];
+    moves[location.memory].emplace_back(location.brick, brick.y);
   }
   return moves;
 }
@@ -81,7 +81,7 @@ void BrickSummaries::dispatch(const gl::Functions& gl, const gl::Program& progra
   const bool cells = field == Field::cells;
   gl.ProgramUniform2ui(program.name(), 0, first, end);
   if (cells) gl.ProgramUniform3ui(program.name(), 1, bricks.x, bricks.y, bricks.z);
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_PLACES, places->name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_BRICKS, packed_bricks->name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_VALUES, values->name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_KEPT, kept->name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICK_SUMMARIES, summaries->name());

@@ -61,8 +61,8 @@ struct BrickSummaries {
     cells          ///< a complete summary, with the sums of the cells in the brick; negative values become 0
   };
   Field field = Field::cells;
-  const gl::Object* places = nullptr;
-  glm::uvec3 bricks{0};  ///< size of the lattice that `places` index, in bricks per axis
+  const gl::Object* packed_bricks = nullptr;
+  glm::uvec3 bricks{0};  ///< size of the lattice that `packed_bricks` index, in bricks per axis
   const gl::Object* values = nullptr;
   const gl::Object* kept = nullptr;  ///< may be `values` itself if these are floats
   const gl::Object* summaries = nullptr;

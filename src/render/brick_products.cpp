@@ -118,7 +118,7 @@ void BrickProducts::plan(Part& part) {
     upload_.add_dispatches(programs_, BrickSummaries{}.program(), static_cast<std::uint32_t>(part.count), a_step,
                            [this, &part, c](const gl::Program& program, std::uint32_t first, std::uint32_t end) {
                              const gl::Object* values = memories_->find(*part.kept[c]);
-                             const BrickSummaries work{.places = &part.places,
+                             const BrickSummaries work{.packed_bricks = &part.packed_bricks,
                                                        .bricks = glm::uvec3(bricks_),
                                                        .values = values,
                                                        .kept = values,
@@ -136,12 +136,13 @@ void BrickProducts::plan(Part& part) {
 }
 
 void BrickProducts::make(Part& part) {
-  std::vector<std::uint32_t> places{static_cast<std::uint32_t>(part.count), 0};
+  std::vector<std::uint32_t> packed_bricks{static_cast<std::uint32_t>(part.count), 0};
   for (std::size_t i = 0; i < part.count; ++i) {
     const glm::ivec3 brick = origins_[part.first + i] / volume::brick_size;
-    places.push_back(static_cast<std::uint32_t>((brick.z * bricks_.y + brick.y) * bricks_.x + brick.x));
+    packed_bricks.push_back(static_cast<std::uint32_t>((brick.z * bricks_.y + brick.y) * bricks_.x + brick.x));
   }
-  part.places = gl::make_buffer(gl_, places.size() * 4, places.data(), 0, "creating the brick index");
+  part.packed_bricks =
+      gl::make_buffer(gl_, packed_bricks.size() * 4, packed_bricks.data(), 0, "creating the brick index");
   const std::size_t bytes = part.count * sizeof(volume::BrickSummary);
   for (std::size_t c = 0; c < components(); ++c) {
     part.kept.push_back(memories_->make(part.count, false));
@@ -152,8 +153,8 @@ void BrickProducts::make(Part& part) {
 
 void BrickProducts::multiply(const Part& part, std::size_t to, const gl::Program& program, std::uint32_t first,
                              std::uint32_t end) const {
-  const auto bind = [&](int place, const gl::Object& buffer) {
-    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, static_cast<GLuint>(place), buffer.name());
+  const auto bind = [&](int binding, const gl::Object& buffer) {
+    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, static_cast<GLuint>(binding), buffer.name());
   };
   const GLuint name = program.name();
   gl_->ProgramUniform2ui(name, 0, first, end);
@@ -185,7 +186,7 @@ scene::ProductInGl BrickProducts::take(const scene::ProductInGl* before) {
       if (std::ranges::all_of(part.kept, is_zero)) continue;
       for (volume::DeviceBricks& component : made) {
         component.origins.push_back(origins_[part.first + i]);
-        component.places.push_back({static_cast<std::uint32_t>(component.memories.size()), i});
+        component.locations.push_back({static_cast<std::uint32_t>(component.memories.size()), i});
       }
     }
     for (std::size_t c = 0; c < components(); ++c) made[c].memories.push_back(part.kept[c]);

@@ -38,7 +38,7 @@ class BrickProducts {
   struct Part {
     std::size_t first = 0;
     std::size_t count = 0;
-    gl::Object places;
+    gl::Object packed_bricks;
     std::vector<std::shared_ptr<volume::DeviceMemory>> kept;
     std::vector<gl::Object> summaries;
     std::vector<gl::ReadBack> back;

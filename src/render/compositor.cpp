@@ -316,7 +316,7 @@ void Compositor::aim(const FrameTarget& target, const Display& display) const {
   gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
-void Compositor::place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target) {
+void Compositor::set_viewport(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target) {
   const glm::ivec4 viewport = target.viewport;
   gl.ProgramUniform4i(program.name(), 0, viewport.x, viewport.y, viewport.z, viewport.w);
   gl.ProgramUniform1i(program.name(), 1, as_bool(target.flip_y));
@@ -332,7 +332,7 @@ void Compositor::bind_color(const Shown& shown, const PictureTextures& picture, 
     gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, resolved ? shown.means->background.name() : picture.background);
   }
   const GLuint color = shown.program->name();
-  place(gl, *shown.program, target);
+  set_viewport(gl, *shown.program, target);
   gl.ProgramUniform1f(color, 2, exposure_of(display));
   gl.ProgramUniform1i(color, 3, as_bool(display.transparent));
   const glm::vec3 backdrop = display.backdrop.value_or(glm::vec3(0.0F));
@@ -409,7 +409,7 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
   if (texture == 0) return false;
   composed_rows_ = composed_.composed_rows();
   gl.BindTextureUnit(core::CM_UNIT_SUM, texture);
-  place(gl, copy, target);
+  set_viewport(gl, copy, target);
   aim(target, display);
   copy.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
@@ -448,7 +448,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
   small.blend_over = false;
   draw_color(shown, picture, display, small);
   gl.BindTextureUnit(core::CM_UNIT_SUM, small_.name());
-  place(gl, enlarge, target);
+  set_viewport(gl, enlarge, target);
   aim(target, display);
   enlarge.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);

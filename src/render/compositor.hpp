@@ -125,7 +125,7 @@ class Compositor {
   // Binds the framebuffer, and sets the viewport, scissor, blending and encoding. Until the draw ends, nothing outside
   // the region is written.
   void aim(const FrameTarget& target, const Display& display) const;
-  static void place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
+  static void set_viewport(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
   // Binds the inputs of a color pass and sets its uniforms, except the framebuffer state that aim() sets.
   void bind_color(const Shown& shown, const PictureTextures& picture, const Display& display,
                   const FrameTarget& target) const;

@@ -51,9 +51,9 @@ volume::DeviceBricksPtr DeviceMemories::gather(const gl::FunctionsPtr& gl, const
   const std::shared_ptr<volume::DeviceMemory> memory = make(std::max<std::size_t>(bricks.origins.size(), 1), halves);
   auto made = std::make_shared<volume::DeviceBricks>(bricks);
   std::vector<MovedBrick> moved;
-  for (std::uint32_t i = 0; i < bricks.places.size(); ++i) {
+  for (std::uint32_t i = 0; i < bricks.locations.size(); ++i) {
     moved.emplace_back(i, i);
-    made->places[i] = {0, i};
+    made->locations[i] = {0, i};
     memory->summaries[i] = bricks.summary(i);
   }
   gl::memory_barrier(*gl, GL_SHADER_STORAGE_BARRIER_BIT);

@@ -22,7 +22,7 @@ EnvironmentUpload::EnvironmentUpload(gl::FunctionsPtr gl, gl::WordHeap& heap, li
   });
   upload_.add_bytes(
       [this] {
-        return Upload::Place{data_.words_.buffer(), data_.words_.offset()};
+        return Upload::Location{data_.words_.buffer(), data_.words_.offset()};
       },
       e.words.data(), bytes);
 }

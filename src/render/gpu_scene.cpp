@@ -35,7 +35,7 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   m.anisotropy = medium.phase.anisotropy;
   m.second_anisotropy = medium.phase.second_anisotropy;
   m.second_bend = medium.phase.second_bend;
-  m.second_share = medium.phase.second_share;
+  m.second_weight = medium.phase.second_weight;
   m.emits = source.emits() ? 1U : 0U;
   m.colored = source.colored() ? 1U : 0U;
   m.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;
@@ -87,7 +87,7 @@ core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm:
   return shutter;
 }
 
-bool moves(const scene::Volume& volume) { return volume.place.ends || volume.source->changes(); }
+bool moves(const scene::Volume& volume) { return volume.transform.ends || volume.source->changes(); }
 
 bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
 
@@ -138,7 +138,7 @@ std::vector<scene::Volume> GpuScene::came_with_data(const scene::Snapshot& snaps
   return volumes;
 }
 
-bool GpuScene::models_move() const { return placed_ && !placed_->table().ends.empty(); }
+bool GpuScene::models_move() const { return model_instances_ && !model_instances_->table().ends.empty(); }
 
 void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& wanted) {
   // If anything moves, a single volume also uses an instance table, so that fewer programs are needed. Holdouts exist
@@ -162,10 +162,10 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
   for (const scene::Volume& volume : present_) {
     const core::CmGrid& grid = *data_->grid(*volume.source);
     instances.push_back({.source = volume.source,
-                         .place = volume.place.to_world,
+                         .transform = volume.transform.to_world,
                          .grid = grid,
                          .medium = medium_of(*volume.medium, *volume.source, extent),
-                         .ends = volume.place.ends,
+                         .ends = volume.transform.ends,
                          .emissive = *data_->emissive(*volume.source)});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
@@ -197,7 +197,8 @@ std::vector<scene::Model> GpuScene::present_models(const scene::Snapshot& snapsh
   const auto is_here = [&](const scene::ModelSourcePtr& source) {
     return std::ranges::find(model_.of(), source) != model_.of().end();
   };
-  const std::vector<scene::Model>& before = placed_ && placed_.of().data == *model_ ? placed_.of().models : models_of_;
+  const std::vector<scene::Model>& before =
+      model_instances_ && model_instances_.of().data == *model_ ? model_instances_.of().models : models_of_;
   for (const scene::Model& model : snapshot.models) {
     scene::Model shown = model;
     if (!is_here(model.source)) {
@@ -220,7 +221,7 @@ void GpuScene::update_models(const scene::Snapshot& snapshot, const Wanted& want
   }
   if (sources.empty()) {
     if (!model_.empty()) model_revision_.advance();
-    placed_.clear();
+    model_instances_.clear();
     model_.clear();
     models_of_.clear();
     model_upload_.reset();
@@ -233,7 +234,7 @@ void GpuScene::update_models(const scene::Snapshot& snapshot, const Wanted& want
   } catch (const Error& error) {
     failure = error;
   }
-  place_models(present_models(snapshot), wanted);
+  make_model_instances(present_models(snapshot), wanted);
   if (failure) throw Error(*failure);
 }
 
@@ -286,34 +287,34 @@ void GpuScene::finish_models() {
     if (failed) raster_.fail(upload.of, upload.settings);
   }
   // This is last because it may throw.
-  if (upload.parts != ModelParts::raster) place_models(upload.models, {.settings = upload.settings});
+  if (upload.parts != ModelParts::raster) make_model_instances(upload.models, {.settings = upload.settings});
 }
 
-void GpuScene::place_models(std::vector<scene::Model> models, const Wanted& wanted) {
+void GpuScene::make_model_instances(std::vector<scene::Model> models, const Wanted& wanted) {
   if (!model_) return;
-  PlacedOf of{std::move(models), *model_};
-  if (!placed_.wants(of, wanted.settings)) return;
+  ModelInstancesOf of{std::move(models), *model_};
+  if (!model_instances_.wants(of, wanted.settings)) return;
   try {
-    placed_.put(of, PlacedModels::make(gl_, limits_, of.models, of.data, placed_.get()));
+    model_instances_.put(of, ModelInstances::make(gl_, limits_, of.models, of.data, model_instances_.get()));
   } catch (const Error&) {
-    placed_.fail(of, wanted.settings);
+    model_instances_.fail(of, wanted.settings);
     throw;
   }
   model_revision_.advance();
-  place_raster();
+  update_raster();
 }
 
 void GpuScene::show_raster(const ModelData::Sources& of, RasterContents contents) {
   if (contents.empty() && raster_.empty()) return;
   raster_.clear();
   if (!contents.empty()) raster_.put(of, std::move(contents));
-  place_raster();
+  update_raster();
 }
 
-void GpuScene::place_raster() {
+void GpuScene::update_raster() {
   std::vector<RasterItem> items;
-  if (raster_ && placed_) {
-    for (const scene::Model& model : placed_.of().models) {
+  if (raster_ && model_instances_) {
+    for (const scene::Model& model : model_instances_.of().models) {
       const auto source = std::ranges::find(raster_.of(), model.source);
       if (source == raster_.of().end()) continue;
       items.push_back({(*raster_)[static_cast<std::size_t>(source - raster_.of().begin())], model.to_world,
@@ -351,7 +352,7 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
 }
 
 light::Lit GpuScene::ball_of(const scene::Volume& volume) const {
-  const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+  const glm::dmat4 to_world = volume.transform.to_world * volume.source->cube.to_world;
   const core::CmGrid& grid = *data_->grid(*volume.source);
   return {glm::dvec3(to_world * glm::dvec4(0.5 * glm::dvec3(grid.box_min + grid.box_max), 1.0)),
           0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
@@ -361,7 +362,7 @@ std::vector<glm::dvec3> GpuScene::corners() const {
   std::vector<glm::dvec3> corners;
   corners.reserve(8 * present_.size());
   for (const scene::Volume& volume : present_) {
-    const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+    const glm::dmat4 to_world = volume.transform.to_world * volume.source->cube.to_world;
     const core::CmGrid& grid = *data_->grid(*volume.source);
     for (const glm::dvec3& corner : corners_of(grid.box_min, grid.box_max))
       corners.emplace_back(to_world * glm::dvec4(corner, 1.0));
@@ -384,7 +385,7 @@ double GpuScene::optical_depth() const {
   double depth = 0.0;
   for (const scene::Volume& volume : present_) {
     const double own =
-        volume.medium->density_scale * volume.source->optical_depth * scene::mean_stretch(volume.place.to_world);
+        volume.medium->density_scale * volume.source->optical_depth * scene::mean_stretch(volume.transform.to_world);
     depth += own * std::pow(ball_of(volume).radius / radius, 2.0);
   }
   return depth;
@@ -399,15 +400,15 @@ std::array<light::Lit, 2> GpuScene::lit() const {
   } else if (!present_.empty()) {
     lit[0] = ball_of(present_.front());
   }
-  if (placed_) {
-    const scene::ModelTable& table = placed_->table();
+  if (model_instances_) {
+    const scene::ModelTable& table = model_instances_->table();
     lit[1] = {0.5 * (table.low + table.high), 0.5 * glm::length(table.high - table.low)};
   }
   return lit;
 }
 
 void GpuScene::update_analytic_lights(const scene::Snapshot& snapshot, const Wanted& wanted) {
-  const auto make = [&](Slot<AnalyticLightData, AnalyticLightsOf>& analytic_lights, const PlacedModels* models) {
+  const auto make = [&](Slot<AnalyticLightData, AnalyticLightsOf>& analytic_lights, const ModelInstances* models) {
     const auto of_scene =
         models != nullptr ? std::span(models->table().analytic_lights) : std::span<const surface::PunctualLight>();
     const auto groups =
@@ -421,12 +422,12 @@ void GpuScene::update_analytic_lights(const scene::Snapshot& snapshot, const Wan
       return AnalyticLightData::make(gl_, limits_, *snapshot.analytic_lights, of_scene, groups, of.lit);
     });
   };
-  if (placed_) {
+  if (model_instances_) {
     make(host_analytic_lights_, nullptr);
   } else {
     host_analytic_lights_.clear();
   }
-  make(analytic_lights_, placed_.get());
+  make(analytic_lights_, model_instances_.get());
 }
 
 void GpuScene::drop_data() {
@@ -536,7 +537,7 @@ std::uint64_t GpuScene::other_bytes() const {
   if (raster_) {
     for (const RasterContentPtr& content : *raster_) raster += content->bytes();
   }
-  return (model_ ? (*model_)->bytes() : 0) + (placed_ ? placed_->bytes() : 0) + raster +
+  return (model_ ? (*model_)->bytes() : 0) + (model_instances_ ? model_instances_->bytes() : 0) + raster +
          (environment_ ? environment_->bytes() : 0) + (instances_ ? instances_->bytes() : 0) + surface_pass_.bytes() +
          grids_.bytes() + heap_.free_bytes();
 }
@@ -559,7 +560,7 @@ light::DistantLights GpuScene::lights(const scene::Snapshot& snapshot) const {
 
 TraceInputs GpuScene::trace_inputs(const scene::Snapshot& snapshot, bool traced) {
   TraceInputs trace_inputs;
-  trace_inputs.scene = placed_.get();
+  trace_inputs.scene = model_instances_.get();
   trace_inputs.raster = raster_ ? &surface_pass_ : nullptr;
   trace_inputs.traced = traced || trace_inputs.raster == nullptr;
   if (*snapshot.view) trace_inputs.view = **snapshot.view;
@@ -575,23 +576,24 @@ TraceInputs GpuScene::trace_inputs(const scene::Snapshot& snapshot, bool traced)
                            .analytic_lights = *snapshot.analytic_lights};
   trace_inputs.environment = environment_.get();
   // Selection probabilities are normalized over a whole table, so there is one table per case.
-  trace_inputs.analytic_lights =
-      !placed_ || trace_inputs.met() != nullptr ? analytic_lights_.get() : host_analytic_lights_.get();
+  trace_inputs.analytic_lights = !model_instances_ || trace_inputs.traced_models() != nullptr
+                                     ? analytic_lights_.get()
+                                     : host_analytic_lights_.get();
   trace_inputs.instances = instances_.get();
   trace_inputs.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
-  trace_inputs.model_holdout =
-      trace_inputs.met() != nullptr && std::ranges::any_of(placed_->models(), &scene::Model::holdout);
+  trace_inputs.model_holdout = trace_inputs.traced_models() != nullptr &&
+                               std::ranges::any_of(model_instances_->models(), &scene::Model::holdout);
   return trace_inputs;
 }
 
 scene::MotionTable GpuScene::motion(const scene::Snapshot& snapshot) const {
   const scene::Volume& first = present_.front();
   const glm::dmat4 ray_to_world = instances_ ? glm::translate(glm::dmat4(1.0), instances_->origin())
-                                             : first.place.to_world * first.source->cube.to_world;
-  if (!placed_) return scene::make_motion(snapshot, ray_to_world, present_, {}, nullptr, {});
-  const ModelData& data = *placed_.of().data;
+                                             : first.transform.to_world * first.source->cube.to_world;
+  if (!model_instances_) return scene::make_motion(snapshot, ray_to_world, present_, {}, nullptr, {});
+  const ModelData& data = *model_instances_.of().data;
   return scene::make_motion(
-      snapshot, ray_to_world, present_, placed_->models(), &placed_->table(),
+      snapshot, ray_to_world, present_, model_instances_->models(), &model_instances_->table(),
       [&](const scene::ModelSource& source) { return data.words_of(source).first + source.vertices; });
 }
 
@@ -613,13 +615,14 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
     p.grid = *data_->grid(source);
     // Where several volumes were refused, this one is drawn as if it were the only one.
     p.medium = medium_of(*volume.medium, source, 2.0 * ball_of(volume).radius);
-    const glm::dmat4& place = volume.place.to_world;
-    const glm::dmat4 to_world = place * source.cube.to_world;
+    const glm::dmat4& transform = volume.transform.to_world;
+    const glm::dmat4 to_world = transform * source.cube.to_world;
     p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);
     eye_of = [to_cube = glm::inverse(to_world)](const glm::dvec3& eye) {
       return glm::vec3(to_cube * glm::dvec4(eye, 1.0));
     };
-    const scene::PlacedEmissive emissive = scene::emissive_of(*data_->emissive(source), source.cube.to_world, place);
+    const scene::InstanceEmissive emissive =
+        scene::emissive_of(*data_->emissive(source), source.cube.to_world, transform);
     p.emissive = emissive.looks;
     own.power = emissive.power;
     own.length = emissive.length;
@@ -632,8 +635,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
   }
   own.radius = lit()[0].radius;
   own.aimed = integrator.light_among_surfaces != 0U && (p.medium.emits != 0U || p.medium.source != glm::vec3(0.0F));
-  const PlacedModels* met = trace_inputs.met();
-  light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
+  const ModelInstances* models = trace_inputs.traced_models();
+  light::SceneLights near = models != nullptr ? models->lights() : light::SceneLights{};
   light::add_analytic_lights(near, *snapshot.analytic_lights);
   near.analytic_lights_arrive = trace_inputs.analytic_lights != nullptr ? trace_inputs.analytic_lights->arrives() : 0.0;
   const std::optional<double> nearest =

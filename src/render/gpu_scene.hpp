@@ -43,7 +43,7 @@ class GpuScene {
   /// are only path-traced.
   void update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline);
 
-  /// In the order that Picked::place indexes.
+  /// In the order that Picked::volume indexes.
   [[nodiscard]] const std::vector<scene::Volume>& volumes() const { return present_; }
   /// Null: there is no volume, so no picture can be made.
   [[nodiscard]] const MarchData* data() const { return data_.get(); }
@@ -57,7 +57,7 @@ class GpuScene {
   [[nodiscard]] Revision<EnvironmentData> environment_revision() const { return environment_revision_; }
   [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
   /// Null: there are none.
-  [[nodiscard]] const PlacedModels* models() const { return placed_.get(); }
+  [[nodiscard]] const ModelInstances* models() const { return model_instances_.get(); }
   [[nodiscard]] bool uploading_volumes() const { return upload_.has_value(); }
   [[nodiscard]] bool uploading() const { return upload_ || model_upload_ || environment_upload_; }
   /// Fraction of the current upload or build that is done, 0 to 1; 1 if there is none.
@@ -102,10 +102,10 @@ class GpuScene {
   // The snapshot's models whose sources are uploaded. A model whose newest source is not uploaded keeps its previous
   // one.
   [[nodiscard]] std::vector<scene::Model> present_models(const scene::Snapshot& snapshot) const;
-  void place_models(std::vector<scene::Model> models, const Wanted& wanted);
+  void make_model_instances(std::vector<scene::Model> models, const Wanted& wanted);
   void show_raster(const ModelData::Sources& of, RasterContents contents);
   // Shows the rasterized models with the same transforms as the path-traced ones.
-  void place_raster();
+  void update_raster();
   void drop_data();
   // Builds the grids that are built on the GPU and are not uploaded. Returns whether all are built.
   bool build_grids(const MarchUpload::Sources& of, std::uint64_t max_bytes, Deadline deadline);
@@ -165,15 +165,15 @@ class GpuScene {
   Revision<ModelData> model_revision_;
   Slot<ModelDataPtr, ModelData::Sources> model_;
   std::vector<scene::Model> models_of_;  // models of the last upload
-  struct PlacedOf {
+  struct ModelInstancesOf {
     std::vector<scene::Model> models;
     ModelDataPtr data;
-    bool operator==(const PlacedOf&) const = default;
+    bool operator==(const ModelInstancesOf&) const = default;
   };
-  Slot<PlacedModels, PlacedOf> placed_;              // if there are any
-  Slot<RasterContents, ModelData::Sources> raster_;  // if it is needed
-  SurfaceRaster surface_pass_;                       // draws raster_
-  std::optional<ModelsUnderWay> model_upload_;       // the next model_ and raster_
+  Slot<ModelInstances, ModelInstancesOf> model_instances_;  // if there are any
+  Slot<RasterContents, ModelData::Sources> raster_;         // if it is needed
+  SurfaceRaster surface_pass_;                              // draws raster_
+  std::optional<ModelsUnderWay> model_upload_;              // the next model_ and raster_
   struct EnvironmentUnderWay {
     light::EnvironmentPtr of;
     std::uint64_t settings = 0;

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
@@ -120,7 +120,7 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   plan_buffer(data_->own_, l.own.all_values() * 2, nullptr, "creating the split priorities");
   plan_bytes(data_->own_, l.own.values.size() * 2, l.own.values.data());
   plan(data_->blocks_, l.blocks, "creating the lattice's blocks");
-  plan(data_->places_, l.places, "creating the lattice index");
+  plan(data_->entries_, l.entries, "creating the lattice index");
   plan(data_->coarse_, l.coarse, "creating the coefficients of coarse cells");
   plan_bricks();
   plan_channels();
@@ -147,7 +147,7 @@ void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const v
 }
 
 void LatticeUpload::plan_bytes(const gl::Object& buffer, std::uint64_t bytes, const void* from) {
-  upload_.add_bytes([&buffer] { return Upload::Place{buffer.name(), 0}; }, from, bytes);
+  upload_.add_bytes([&buffer] { return Upload::Location{buffer.name(), 0}; }, from, bytes);
 }
 
 void LatticeUpload::plan_values(const gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes,
@@ -230,9 +230,9 @@ void LatticeUpload::plan_priorities() {
     };
     scratch_.lit = make(rated.lit, "creating the emission of bricks");
     scratch_.tree = make_brick_tree(gl_, rated.edges_squared);
-    std::array<std::uint32_t, (std::tuple_size_v<grid::PlacesOfBrickPoints> + 3) / 4 * 4> places{};
-    std::ranges::copy(grid::places_of_brick_points(), places.begin());
-    scratch_.points = make(places, "creating the index of a brick's sample points");
+    std::array<std::uint32_t, (std::tuple_size_v<grid::BrickPointIndices> + 3) / 4 * 4> indices{};
+    std::ranges::copy(grid::brick_point_indices(), indices.begin());
+    scratch_.points = make(indices, "creating the index of a brick's sample points");
     gl_->ClearNamedBufferSubData(data_->own_.name(), GL_R32UI, static_cast<GLintptr>(l.own.values.size() * 2),
                                  static_cast<GLsizeiptr>(rated.values * 2), GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   });
@@ -300,7 +300,7 @@ void LatticeUpload::plan_priorities(const std::vector<glm::uvec2>& list, bool of
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_TO_RATE, scratch_.to_rate.name());
         gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BRICKS_LIT, scratch_.lit.name());
         gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_TREE, scratch_.tree.name());
-        gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_POINT_PLACES, scratch_.points.name());
+        gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_POINT_INDICES, scratch_.points.name());
         program.use(*gl_);
         dispatch_groups(*gl_, end - first);
       });
@@ -313,7 +313,7 @@ void LatticeUpload::plan_channels() {
   for (std::size_t i = 0; i < channels.size(); ++i) {
     const grid::LatticeChannel& channel = channels[i];
     LatticeData::Channel& data = data_->channels_[i];
-    plan_buffer(data.places, channel.places.size() * sizeof(grid::LatticePlace), channel.places.data(),
+    plan_buffer(data.entries, channel.entries.size() * sizeof(grid::LatticeEntry), channel.entries.data(),
                 "creating a channel's index");
     plan_buffer(data.coarse, channel.coarse.size() * 4, channel.coarse.data(), "creating a channel's coarse cells");
     const auto fill = [&channel, &fields = fields_[i]](std::size_t brick, std::byte* to) {
@@ -531,7 +531,7 @@ void GridBuild::plan_clear(Upload& upload, const gl::Object& buffer, std::uint64
 void GridBuild::plan_decision() {
   const grid::Lattice& l = data_->lattice();
   decision_.add([this] { level_bytes_ = make_storage(levels_.size(), "creating the maximum levels of a view"); });
-  decision_.add_bytes([this] { return Upload::Place{level_bytes_.name(), 0}; }, levels_.data(), levels_.size());
+  decision_.add_bytes([this] { return Upload::Location{level_bytes_.name(), 0}; }, levels_.data(), levels_.size());
   plan_clear(decision_, data_->priorities_, std::uint64_t{l.blocks.size()} * CM_BLOCK_POINTS * 4);
   plan_clear(decision_, data_->bins_, std::uint64_t{CM_PRIORITIES} * 4);
   decision_.add([this] {
@@ -543,7 +543,7 @@ void GridBuild::plan_decision() {
   const auto bind = [this](GLuint /*program*/) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_PRIORITIES, &data_->priorities_},
-                  {core::CM_STORAGE_GRID_PLACES, &data_->places_},
+                  {core::CM_STORAGE_LATTICE_ENTRIES, &data_->entries_},
                   {core::CM_STORAGE_GRID_BLOCKS, &data_->blocks_},
                   {core::CM_STORAGE_GRID_NODES, &data_->nodes_},
                   {core::CM_STORAGE_GRID_LEVELS, &level_bytes_},
@@ -625,7 +625,7 @@ void GridBuild::plan_cells() {
     const std::array<grid::RootCell, CM_ROOTS> roots = grid::root_cells(data_->lattice().cube.log2_size);
     const bool wide = data_->lattice().cube.wide();
     for (std::size_t i = 0; i < roots.size(); ++i) {
-      cells[i] = {0, 0, core::cm_record_place(roots[i].v0, roots[i].shape, wide)};
+      cells[i] = {0, 0, core::cm_pack_v0_shape(roots[i].v0, roots[i].shape, wide)};
       links[i] = {roots[i].links[0], roots[i].links[1], roots[i].links[2], roots[i].links[3]};
     }
     gl_->NamedBufferSubData(tree_cells_.name(), 0, sizeof cells, cells.data());
@@ -671,7 +671,7 @@ void GridBuild::plan_records() {
   const auto bind = [this](GLuint program) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_COARSE, &data_->coarse_},
-                  {core::CM_STORAGE_GRID_PLACES, &data_->places_},
+                  {core::CM_STORAGE_LATTICE_ENTRIES, &data_->entries_},
                   {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
                   {core::CM_STORAGE_GRID_LINKS, &links_},
                   {core::CM_STORAGE_GRID_LIST, &list_},
@@ -730,7 +730,7 @@ void GridBuild::plan_channel(std::size_t index) {
   const auto bind = [this, &channel, &data = data_->channels_[index], &records](GLuint program) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_COARSE, &data.coarse},
-                  {core::CM_STORAGE_GRID_PLACES, &data.places},
+                  {core::CM_STORAGE_LATTICE_ENTRIES, &data.entries},
                   {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
                   {core::CM_STORAGE_GRID_CHANNEL, &records},
                   {core::CM_STORAGE_GRID_LIST, &list_},
@@ -784,7 +784,7 @@ namespace {
 
 // Runs `work` on a detached thread; its failures become Errors.
 template <class Made, class Work>
-std::future<Made> make_apart(const char* what, Work work) {
+std::future<Made> make_detached(const char* what, Work work) {
   const auto task = std::make_shared<std::packaged_task<Made()>>([what, work = std::move(work)] {
     try {
       return work();
@@ -793,14 +793,14 @@ std::future<Made> make_apart(const char* what, Work work) {
     }
   });
   std::future<Made> made = task->get_future();
-  leave([task] { (*task)(); });
+  run_detached([task] { (*task)(); });
   return made;
 }
 
 }  // namespace
 
 void GridBuild::begin_emissive_table() {
-  emissive_table_ = make_apart<scene::EmissiveTable>(
+  emissive_table_ = make_detached<scene::EmissiveTable>(
       "building the emissive-cell distribution", [words = std::move(emissive_words_), cube = data_->lattice().cube] {
         return scene::emissive_table(in_order(words), cube);
       });
@@ -810,7 +810,7 @@ void GridBuild::plan_tree_cells() {
   const auto bind_splits = [this, first_leaf = tree_levels_.back().splits_end](GLuint program) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_PRIORITIES, &data_->priorities_},
-                  {core::CM_STORAGE_GRID_PLACES, &data_->places_},
+                  {core::CM_STORAGE_LATTICE_ENTRIES, &data_->entries_},
                   {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
                   {core::CM_STORAGE_GRID_LIST, &list_},
                   {core::CM_STORAGE_GRID_BELOW, &below_}});
@@ -976,7 +976,7 @@ double GridBuilds::progress() const {
 
 CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
     : source_(std::move(source)), why_(std::move(why)), progress_(std::make_shared<Progress>()) {
-  made_ = make_apart<BuiltGrid>("building the grid on the CPU", [of = source_, progress = progress_] {
+  made_ = make_detached<BuiltGrid>("building the grid on the CPU", [of = source_, progress = progress_] {
     const scene::GridPlan& plan = *of->plan;
     const grid::DiamondSet diamonds(plan.lattice->own, plan.levels, plan.max_cells, progress.get());
     grid::GridBuilder builder(*of->statistics, diamonds);

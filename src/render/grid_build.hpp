@@ -47,9 +47,9 @@ class LatticeData {
   friend class LatticeUpload;
   friend class GridBuild;
   grid::LatticePtr lattice_;
-  gl::Object nodes_, own_, blocks_, places_, coarse_, bricks_;
+  gl::Object nodes_, own_, blocks_, entries_, coarse_, bricks_;
   struct Channel {
-    gl::Object places, coarse, bricks;
+    gl::Object entries, coarse, bricks;
   };
   std::vector<Channel> channels_;  // as in the lattice
   gl::Object points_, parts_;      // uniform buffers
@@ -197,7 +197,7 @@ class GridBuild {
     gl::ProgramKey key;
     std::uint32_t cost = 1;
     bool item_a_group = false;  // one work group of 64 invocations per item, else one invocation
-    bool of_lattice = true;     // the kernel includes glsl/grid_places.glsl
+    bool of_lattice = true;     // the kernel includes glsl/lattice_lookup.glsl
     double weight = 1.0;        // per item, if the items of a kernel differ
   };
   using Bind = std::function<void(GLuint program)>;

@@ -175,7 +175,7 @@ bool HostDepth::answered() {
   bool changed = false;
   while (!asked_.empty() && asked_.front().fence.passed()) {
     std::uint32_t answer = 0;
-    std::memcpy(&answer, answers_.data() + asked_.front().place * sizeof(answer), sizeof(answer));
+    std::memcpy(&answer, answers_.data() + asked_.front().slot * sizeof(answer), sizeof(answer));
     changed = changed || answer != 0;
     asked_.pop_front();
   }
@@ -236,9 +236,9 @@ bool HostDepth::update(const HostDepthInput& input) {
   gl.DispatchCompute((size.x + 7) / 8, (size.y + 7) / 8, layers);
   gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
                              GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
-  const std::size_t place = next_place_++ % max_asked;
-  gl.CopyNamedBufferSubData(changed_.name(), answers_.name(), 0, static_cast<GLintptr>(place * 4), 4);
-  asked_.push_back({place, gl.dispatches_in_call ? gl::Fence() : gl::Fence(gl_)});
+  const std::size_t slot = next_slot_++ % max_asked;
+  gl.CopyNamedBufferSubData(changed_.name(), answers_.name(), 0, static_cast<GLintptr>(slot * 4), 4);
+  asked_.push_back({slot, gl.dispatches_in_call ? gl::Fence() : gl::Fence(gl_)});
   gl.BindSampler(core::CM_UNIT_DEPTH_SOURCE, 0);
   gl::check(gl, "reading the host's depth");
   if (!fits) {

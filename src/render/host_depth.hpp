@@ -71,12 +71,12 @@ class HostDepth {
   static constexpr std::size_t max_asked = 8;
   gl::ReadBack answers_;  // read-back of changed_, one slot per request
   struct Asked {
-    std::size_t place = 0;
+    std::size_t slot = 0;
     gl::Fence fence;
   };
   std::deque<Asked> asked_;
   bool waits_ = false;
-  std::size_t next_place_ = 0;
+  std::size_t next_slot_ = 0;
 };
 
 }  // namespace cumulet::render

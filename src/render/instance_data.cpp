@@ -31,7 +31,7 @@ InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& li
   data.medium_ = instances.front().medium;
   for (const scene::Instance& instance : instances) {
     data.medium_.source = glm::max(data.medium_.source, instance.medium.source);
-    data.medium_.second_share = std::max(data.medium_.second_share, instance.medium.second_share);
+    data.medium_.second_weight = std::max(data.medium_.second_weight, instance.medium.second_weight);
     data.medium_.emits |= instance.medium.emits;
     data.medium_.colored |= instance.medium.colored;
     data.medium_.anisotropic |= instance.medium.anisotropic;

@@ -158,7 +158,7 @@ MarchData::Run MarchData::run(std::size_t cell, std::size_t count) const {
   return {cell / page_cells, cell % page_cells, std::min(count, page_cells - cell % page_cells)};
 }
 
-Upload::Place MarchData::place_of(const Run& run) const {
+Upload::Location MarchData::location_of(const Run& run) const {
   const gl::WordHeap::Span& page = cells_[run.page];
   return {page.buffer(), page.offset() + run.cell * sizeof(grid::CellRecord)};
 }
@@ -230,12 +230,12 @@ const scene::EmissiveTable& MarchUpload::emissive_of(const MarchData::Part& part
   return part.source->plan ? built_->at(part.source).emissive : part.source->emissive;
 }
 
-void MarchUpload::add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes) {
+void MarchUpload::add_copy(const LocationOf& to, const LocationOf& from, std::size_t bytes) {
   upload_.add_pieces(bytes, [this, to, from](std::size_t first, std::size_t count) {
-    const Upload::Place place = to();
-    const Upload::Place old = from();
-    gl_->CopyNamedBufferSubData(old.buffer, place.buffer, static_cast<GLintptr>(old.offset + first),
-                                static_cast<GLintptr>(place.offset + first), static_cast<GLsizeiptr>(count));
+    const Upload::Location location = to();
+    const Upload::Location old = from();
+    gl_->CopyNamedBufferSubData(old.buffer, location.buffer, static_cast<GLintptr>(old.offset + first),
+                                static_cast<GLintptr>(location.offset + first), static_cast<GLsizeiptr>(count));
   });
 }
 
@@ -285,19 +285,19 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
     const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
     for (std::size_t done = 0; done < part.cells.count;) {
       MarchData::Run to = data_.run(part.cell + done, part.cells.count - done);
-      const PlaceOf place = [this, to] { return data_.place_of(to); };
+      const LocationOf location = [this, to] { return data_.location_of(to); };
       if (old != nullptr) {
         const MarchData::Run from = before_->run(old->cell + done, to.count);
         to.count = from.count;
         add_copy(
-            place, [this, from] { return before_->place_of(from); }, to.count * sizeof(grid::CellRecord));
+            location, [this, from] { return before_->location_of(from); }, to.count * sizeof(grid::CellRecord));
       } else if (const grid::TetGrid* grid = grid_of(part)) {
-        upload_.add_bytes(place, &grid->cells[done], to.count * sizeof(grid::CellRecord));
+        upload_.add_bytes(location, &grid->cells[done], to.count * sizeof(grid::CellRecord));
       } else {
         const auto from = [buffer = built_->at(part.source).cells.name(), done] {
-          return Upload::Place{buffer, done * sizeof(grid::CellRecord)};
+          return Upload::Location{buffer, done * sizeof(grid::CellRecord)};
         };
-        add_copy(place, from, to.count * sizeof(grid::CellRecord));
+        add_copy(location, from, to.count * sizeof(grid::CellRecord));
       }
       done += to.count;
     }
@@ -337,28 +337,28 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
   for (const MarchData::Part& part : data_.parts_) {
     const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
     const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
-    const auto place_at = [this, first = part.channels](std::size_t at) {
-      return [this, place = first + at] {
-        return Upload::Place{data_.channels_.buffer(), data_.channels_.offset() + place};
+    const auto location_at = [this, first = part.channels](std::size_t at) {
+      return [this, offset = first + at] {
+        return Upload::Location{data_.channels_.buffer(), data_.channels_.offset() + offset};
       };
     };
     if (old != nullptr) {
       const auto from = [this, first = old->channels] {
-        return Upload::Place{before_->channels_.buffer(), before_->channels_.offset() + first};
+        return Upload::Location{before_->channels_.buffer(), before_->channels_.offset() + first};
       };
-      add_copy(place_at(0), from, channels.all());
+      add_copy(location_at(0), from, channels.all());
       continue;
     }
-    upload_.add_bytes(place_at(channels.emissive_at()), emissive_of(part).cells.data(), channels.emissive);
+    upload_.add_bytes(location_at(channels.emissive_at()), emissive_of(part).cells.data(), channels.emissive);
     const grid::TetGrid* grid = grid_of(part);
     if (grid == nullptr) {
       const BuiltGrid& made = built_->at(part.source);
       const auto add = [&](grid::Channel channel, std::size_t at, std::size_t channel_bytes) {
         const gl::Object& records = made.channels[static_cast<std::size_t>(channel)];
         add_copy(
-            place_at(at),
+            location_at(at),
             [buffer = records.name()] {
-              return Upload::Place{buffer, 0};
+              return Upload::Location{buffer, 0};
             },
             channel_bytes);
       };
@@ -369,11 +369,11 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       add(Channel::anisotropy, channels.anisotropy_at(), channels.anisotropy);
       continue;
     }
-    upload_.add_bytes(place_at(0), grid->emission.data(), channels.emission);
-    upload_.add_bytes(place_at(channels.velocity_at()), grid->velocity.data(), channels.velocity);
-    upload_.add_bytes(place_at(channels.change_at()), grid->change.data(), channels.change);
-    upload_.add_bytes(place_at(channels.color_at()), grid->color.data(), channels.color);
-    upload_.add_bytes(place_at(channels.anisotropy_at()), grid->anisotropy.data(), channels.anisotropy);
+    upload_.add_bytes(location_at(0), grid->emission.data(), channels.emission);
+    upload_.add_bytes(location_at(channels.velocity_at()), grid->velocity.data(), channels.velocity);
+    upload_.add_bytes(location_at(channels.change_at()), grid->change.data(), channels.change);
+    upload_.add_bytes(location_at(channels.color_at()), grid->color.data(), channels.color);
+    upload_.add_bytes(location_at(channels.anisotropy_at()), grid->anisotropy.data(), channels.anisotropy);
   }
 }
 
@@ -393,29 +393,31 @@ void MarchUpload::plan_trees(gl::WordHeap& heap) {
   });
   for (const MarchData::Part& part : data_.parts_) {
     const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
-    const auto place_at = [this, first = part.tree](std::size_t at) {
-      return [this, place = first + at] { return Upload::Place{data_.trees_.buffer(), data_.trees_.offset() + place}; };
+    const auto location_at = [this, first = part.tree](std::size_t at) {
+      return [this, offset = first + at] {
+        return Upload::Location{data_.trees_.buffer(), data_.trees_.offset() + offset};
+      };
     };
     if (old != nullptr) {
       const auto from = [this, first = old->tree] {
-        return Upload::Place{before_->trees_.buffer(), before_->trees_.offset() + first};
+        return Upload::Location{before_->trees_.buffer(), before_->trees_.offset() + first};
       };
-      add_copy(place_at(0), from, bytes_of(part));
+      add_copy(location_at(0), from, bytes_of(part));
       continue;
     }
     const grid::TetGrid* grid = grid_of(part);
     if (grid == nullptr) {
-      const auto from = [buffer = built_->at(part.source).tree.name()] { return Upload::Place{buffer, 0}; };
-      add_copy(place_at(0), from, bytes_of(part));
+      const auto from = [buffer = built_->at(part.source).tree.name()] { return Upload::Location{buffer, 0}; };
+      add_copy(location_at(0), from, bytes_of(part));
       continue;
     }
     Roots roots{};
     std::ranges::copy(grid->roots, roots.begin());
-    upload_.add([this, place = place_at(0), roots] {
-      const Upload::Place to = place();
+    upload_.add([this, location = location_at(0), roots] {
+      const Upload::Location to = location();
       gl_->NamedBufferSubData(to.buffer, static_cast<GLintptr>(to.offset), sizeof roots, roots.data());
     });
-    upload_.add_bytes(place_at(sizeof roots), grid->tree.data(), grid->tree.size() * sizeof(std::uint32_t));
+    upload_.add_bytes(location_at(sizeof roots), grid->tree.data(), grid->tree.size() * sizeof(std::uint32_t));
   }
 }
 
@@ -537,7 +539,7 @@ void MarchUpload::plan_brick() {
   });
   upload_.add_bytes(
       [this] {
-        return Upload::Place{data_.brick_values_.name(), 0};
+        return Upload::Location{data_.brick_values_.name(), 0};
       },
       source_->brick_values.data(), bytes);
   if (const std::size_t changes = source_->brick_changes.size() * 2; changes > 0) {
@@ -549,7 +551,7 @@ void MarchUpload::plan_brick() {
     });
     upload_.add_bytes(
         [this] {
-          return Upload::Place{data_.brick_changes_.name(), 0};
+          return Upload::Location{data_.brick_changes_.name(), 0};
         },
         source_->brick_changes.data(), changes);
   }

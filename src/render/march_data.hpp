@@ -70,7 +70,7 @@ class MarchData {
     std::size_t count = 0;
   };
   [[nodiscard]] Run run(std::size_t cell, std::size_t count) const;
-  [[nodiscard]] Upload::Place place_of(const Run& run) const;
+  [[nodiscard]] Upload::Location location_of(const Run& run) const;
 
   March march_ = March::tet;
   bool linear_ = false;
@@ -123,8 +123,8 @@ class MarchUpload {
   void plan_channels(gl::WordHeap& heap, std::int64_t texels);
   void plan_trees(gl::WordHeap& heap);
   // Adds steps that copy a range from one buffer to another.
-  using PlaceOf = std::function<Upload::Place()>;
-  void add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes);
+  using LocationOf = std::function<Upload::Location()>;
+  void add_copy(const LocationOf& to, const LocationOf& from, std::size_t bytes);
   void plan_dense();
   void plan_brick();
   void plan_channel_voxels();

@@ -44,10 +44,10 @@ std::shared_ptr<ModelData> ModelData::plan(const gl::FunctionsPtr& gl, const gl:
     to->atlas_ = last->atlas_;
   } else {
     to->atlas_ = std::make_shared<Atlas>();
-    to->atlas_->places = scene::pack_atlas(images);
+    to->atlas_->layout = scene::pack_atlas(images);
     to->atlas_->images = std::move(images);
   }
-  const scene::TextureAtlas& atlas = to->atlas_->places;
+  const scene::TextureAtlas& atlas = to->atlas_->layout;
   if (static_cast<int>(atlas.edge) > limits.texture_size_2d) {
     throw Error(ErrorCode::unsupported, "the surfaces' images need textures " + std::to_string(atlas.edge) +
                                             " wide; this driver's GL_MAX_TEXTURE_SIZE is " +
@@ -57,9 +57,9 @@ std::shared_ptr<ModelData> ModelData::plan(const gl::FunctionsPtr& gl, const gl:
   const std::size_t bytes = (words + to->common_.size()) * sizeof(glm::uvec4);
   to->bytes_ = bytes + std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
   upload.add([&heap, to, bytes] { to->words_ = heap.take(bytes, "creating the surfaces' tables"); });
-  const auto place_at = [to](std::uint32_t word) {
+  const auto location_at = [to](std::uint32_t word) {
     return [to, word] {
-      return Upload::Place{to->words_.buffer(), to->words_.offset() + std::size_t{word} * sizeof(glm::uvec4)};
+      return Upload::Location{to->words_.buffer(), to->words_.offset() + std::size_t{word} * sizeof(glm::uvec4)};
     };
   };
   for (const Part& part : to->parts_) {
@@ -67,31 +67,32 @@ std::shared_ptr<ModelData> ModelData::plan(const gl::FunctionsPtr& gl, const gl:
     const auto was = last == nullptr ? std::vector<Part>::const_iterator()
                                      : std::ranges::find(last->parts_, part.source, &Part::source);
     if (last == nullptr || was == last->parts_.end()) {
-      upload.add_bytes(place_at(part.first), part.source->words.data(), size);
+      upload.add_bytes(location_at(part.first), part.source->words.data(), size);
       continue;
     }
     const std::size_t from = std::size_t{was->first} * sizeof(glm::uvec4);
-    upload.add_pieces(size, [gl, last, at = place_at(part.first), from](std::size_t first, std::size_t count) {
-      const Upload::Place place = at();
-      gl->CopyNamedBufferSubData(last->words_.buffer(), place.buffer,
+    upload.add_pieces(size, [gl, last, at = location_at(part.first), from](std::size_t first, std::size_t count) {
+      const Upload::Location location = at();
+      gl->CopyNamedBufferSubData(last->words_.buffer(), location.buffer,
                                  static_cast<GLintptr>(last->words_.offset() + from + first),
-                                 static_cast<GLintptr>(place.offset + first), static_cast<GLsizeiptr>(count));
+                                 static_cast<GLintptr>(location.offset + first), static_cast<GLsizeiptr>(count));
     });
   }
-  upload.add_bytes(place_at(static_cast<std::uint32_t>(words)), to->common_.data(),
+  upload.add_bytes(location_at(static_cast<std::uint32_t>(words)), to->common_.data(),
                    to->common_.size() * sizeof(glm::uvec4));
   if (same_images) return data;
   Atlas* const made = to->atlas_.get();
   upload.add([gl, made] {
-    const int edge = static_cast<int>(made->places.edge);
+    const int edge = static_cast<int>(made->layout.edge);
     made->texture = gl::make_texture_2d_array(
-        gl, GL_RGBA8, edge, edge, static_cast<int>(std::max(1U, made->places.layers)), "creating the surfaces' images");
+        gl, GL_RGBA8, edge, edge, static_cast<int>(std::max(1U, made->layout.layers)), "creating the surfaces' images");
   });
   for (std::size_t i = 0; i < made->images.size(); ++i) {
     for (std::size_t j = 0; j < made->images[i]->sizes.size(); ++j) {
-      const scene::TextureAtlas::Place& place = atlas.places[i][j];
+      const scene::TextureAtlas::Region& region = atlas.regions[i][j];
       upload.add_image([made] { return made->texture.name(); },
-                       {place.corner, place.size, 0, static_cast<int>(place.layer)}, made->images[i]->rgba(j).data());
+                       {region.corner, region.size, 0, static_cast<int>(region.layer)},
+                       made->images[i]->rgba(j).data());
     }
   }
   return data;
@@ -104,7 +105,7 @@ void ModelData::add_common(std::uint32_t first) {
       if (part.source->images == atlas_->images[i]) part.textures = here();
     }
     for (const surface::Texture& texture : atlas_->images[i]->scene->textures)
-      common_.push_back(scene::texture_word(texture, atlas_->places.places[i][texture.image]));
+      common_.push_back(scene::texture_word(texture, atlas_->layout.regions[i][texture.image]));
   }
   const surface::GgxAlbedo& albedo = surface::GgxAlbedo::table();
   const std::vector<glm::uvec4> cells = albedo.cells();
@@ -130,12 +131,12 @@ void ModelData::bind(const gl::Functions& gl) const {
   gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->texture.name());
 }
 
-PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, std::vector<scene::Model> models,
-                                ModelDataPtr data, const PlacedModels* last) {
-  PlacedModels placed;
-  placed.table_ =
+ModelInstances ModelInstances::make(const gl::FunctionsPtr& gl, const gl::Limits& limits,
+                                    std::vector<scene::Model> models, ModelDataPtr data, const ModelInstances* last) {
+  ModelInstances instances;
+  instances.table_ =
       scene::make_model_table(models, [&](const scene::ModelSource& source) { return data->words_of(source); });
-  const scene::ModelTable& table = placed.table_;
+  const scene::ModelTable& table = instances.table_;
   std::vector<core::CmModel> records = table.records;
   records.insert(records.end(), table.ends.begin(), table.ends.end());
   const std::size_t record_bytes = records.size() * sizeof(core::CmModel);
@@ -145,31 +146,31 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
                                             " models are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
                                             std::to_string(limits.storage_block_bytes) + ", holds");
   }
-  placed.records_ = gl::make_buffer(gl, record_bytes, records.data(), 0, "creating the table of models");
-  placed.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the model BVH");
-  placed.tables_.low = glm::prevFloat(glm::vec3(table.low));
-  placed.tables_.high = glm::nextFloat(glm::vec3(table.high));
-  placed.tables_.models = static_cast<std::uint32_t>(table.records.size());
-  placed.tables_.ggx_albedo = data->ggx_albedo();
-  placed.tables_.ggx_albedo_averages = data->ggx_albedo_averages();
-  placed.tables_.sheen_albedo = data->sheen_albedo();
-  placed.tables_.extended_bsdf =
+  instances.records_ = gl::make_buffer(gl, record_bytes, records.data(), 0, "creating the table of models");
+  instances.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the model BVH");
+  instances.tables_.low = glm::prevFloat(glm::vec3(table.low));
+  instances.tables_.high = glm::nextFloat(glm::vec3(table.high));
+  instances.tables_.models = static_cast<std::uint32_t>(table.records.size());
+  instances.tables_.ggx_albedo = data->ggx_albedo();
+  instances.tables_.ggx_albedo_averages = data->ggx_albedo_averages();
+  instances.tables_.sheen_albedo = data->sheen_albedo();
+  instances.tables_.extended_bsdf =
       std::ranges::any_of(models, [](const scene::Model& model) { return model.source->extended_bsdf; }) ? 1U : 0U;
-  placed.bytes_ = record_bytes + node_bytes;
+  instances.bytes_ = record_bytes + node_bytes;
   Numbering numbering;
   for (const scene::ModelPart& part : table.parts)
     numbering.emplace_back(models[part.model].source->scene,
                            models[part.model].source->meshes[part.mesh].first_triangle);
   // Paths inside transmissive objects store the object's material as a word offset in the data.
   const bool lasts = last != nullptr && *last->numbering_ == numbering &&
-                     (last->data_ == data || (placed.tables_.extended_bsdf | last->tables_.extended_bsdf) == 0U);
-  placed.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
-  placed.models_ = std::move(models);
-  placed.data_ = std::move(data);
-  return placed;
+                     (last->data_ == data || (instances.tables_.extended_bsdf | last->tables_.extended_bsdf) == 0U);
+  instances.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
+  instances.models_ = std::move(models);
+  instances.data_ = std::move(data);
+  return instances;
 }
 
-void PlacedModels::bind(const gl::Functions& gl) const {
+void ModelInstances::bind(const gl::Functions& gl) const {
   data_->bind(gl);
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MODELS, records_.name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MODEL_NODES, nodes_.name());

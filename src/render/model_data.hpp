@@ -41,7 +41,7 @@ class ModelData {
   };
   struct Atlas {
     gl::Object texture;
-    scene::TextureAtlas places;
+    scene::TextureAtlas layout;
     std::vector<scene::TextureImagesPtr> images;
   };
   [[nodiscard]] std::uint32_t first_word() const {
@@ -62,12 +62,12 @@ using ModelDataPtr = std::shared_ptr<const ModelData>;
 
 /// Instance table of the models: their transforms, and other data that change when a model moves. All calls need a
 /// current context and an active StateGuard.
-class PlacedModels {
+class ModelInstances {
  public:
   /// models: their sources are in the data. last: the previous table, or null. Throws as scene::make_model_table(), and
   /// Error(unsupported) if the table exceeds a limit of the driver.
-  static PlacedModels make(const gl::FunctionsPtr& gl, const gl::Limits& limits, std::vector<scene::Model> models,
-                           ModelDataPtr data, const PlacedModels* last);
+  static ModelInstances make(const gl::FunctionsPtr& gl, const gl::Limits& limits, std::vector<scene::Model> models,
+                             ModelDataPtr data, const ModelInstances* last);
   void bind(const gl::Functions& gl) const;
   [[nodiscard]] const core::CmSurfaceTables& tables() const { return tables_; }
   [[nodiscard]] const light::SceneLights& lights() const { return table_.lights; }

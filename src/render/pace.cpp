@@ -175,10 +175,10 @@ bool InFlightDispatches::is_over(InFlightDispatch& pending, Clock::time_point no
 }
 
 void InFlightDispatches::begin(Kind kind) {
-  if (!ring_) ring_ = gl::ReadBack(gl_, (most + 1) * place_bytes, "creating the counters' ring");
+  if (!ring_) ring_ = gl::ReadBack(gl_, (most + 1) * slot_bytes, "creating the counters' ring");
   next_ = {};
-  next_.place = next_place_;
-  next_place_ = (next_place_ + 1) % (most + 1);
+  next_.slot = next_slot_;
+  next_slot_ = (next_slot_ + 1) % (most + 1);
   next_.serial = ++serial_;
   next_.in_call = kind == Kind::dispatch && gl_->dispatches_in_call;
   if (!next_.in_call) {
@@ -209,7 +209,7 @@ void InFlightDispatches::end(Dispatched what, GLuint buffer, std::size_t words) 
   }
   if (words > 0) {
     gl::memory_barrier(*gl_, GL_BUFFER_UPDATE_BARRIER_BIT);
-    gl_->CopyNamedBufferSubData(buffer, ring_.name(), 0, static_cast<GLintptr>(next_.place * place_bytes),
+    gl_->CopyNamedBufferSubData(buffer, ring_.name(), 0, static_cast<GLintptr>(next_.slot * slot_bytes),
                                 static_cast<GLsizeiptr>(words * 16));
   }
   if (!next_.in_call) {
@@ -222,7 +222,7 @@ void InFlightDispatches::end(Dispatched what, GLuint buffer, std::size_t words) 
 void InFlightDispatches::give_up() {
   if (queries_[0] != 0) gl_->DeleteQueries(2, queries_.data());
   queries_ = {};
-  next_place_ = next_.place;
+  next_slot_ = next_.slot;
 }
 
 std::optional<InFlightDispatches::Completed> InFlightDispatches::take_completed() {
@@ -249,7 +249,7 @@ std::optional<InFlightDispatches::Completed> InFlightDispatches::take_completed(
   }
   if (!completed.ms && first.began && close) completed.ms = milliseconds(now - *first.began);
   completed.words.resize(first.words);
-  if (first.words > 0) std::memcpy(completed.words.data(), ring_.data() + first.place * place_bytes, first.words * 16);
+  if (first.words > 0) std::memcpy(completed.words.data(), ring_.data() + first.slot * slot_bytes, first.words * 16);
   completed.what = std::move(first.what);
   if (completed.ms && completed.what.max_ms > 0.0) {
     likely_ += 0.1 * (std::clamp(*completed.ms / completed.what.max_ms, 0.05, 1.0) - likely_);

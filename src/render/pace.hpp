@@ -180,7 +180,7 @@ class InFlightDispatches {
   struct InFlightDispatch {
     Dispatched what;
     std::size_t words = 0;
-    std::size_t place = 0;
+    std::size_t slot = 0;
     std::uint32_t serial = 0;
     gl::Fence before;
     gl::Fence after;
@@ -198,10 +198,10 @@ class InFlightDispatches {
   // fence is queried. (Drivers that run dispatches within the call also write marks at once, before queued work; fences
   // are used there.)
   static constexpr std::size_t times_bytes = 16;
-  static constexpr std::size_t place_bytes = max_words * 16 + times_bytes + 16;
+  static constexpr std::size_t slot_bytes = max_words * 16 + times_bytes + 16;
   enum class Mark : std::size_t { begun = 0, over = 1 };
   [[nodiscard]] static std::size_t times_at(const InFlightDispatch& pending) {
-    return pending.place * place_bytes + max_words * 16;
+    return pending.slot * slot_bytes + max_words * 16;
   }
   [[nodiscard]] static std::size_t mark_at(const InFlightDispatch& pending, Mark mark) {
     return times_at(pending) + times_bytes + 4 * static_cast<std::size_t>(mark);
@@ -213,7 +213,7 @@ class InFlightDispatches {
 
   gl::FunctionsPtr gl_;
   gl::ReadBack ring_;
-  std::size_t next_place_ = 0;
+  std::size_t next_slot_ = 0;
   std::uint32_t serial_ = 0;  // of the newest; the value of its marks
   std::deque<InFlightDispatch> in_flight_;
   std::array<GLuint, 2> queries_{};

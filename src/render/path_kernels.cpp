@@ -30,9 +30,9 @@ constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MAX_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // per lane
 
-// Offsets of cm_next_place and the fields after it, behind cm_total and cm_blocks.
-constexpr std::size_t next_place_at = (1 + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
-constexpr std::size_t squares_at = next_place_at + sizeof(std::uint32_t);
+// Offsets of cm_next_slot and the fields after it, behind cm_total and cm_blocks.
+constexpr std::size_t next_slot_at = (1 + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
+constexpr std::size_t squares_at = next_slot_at + sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_at = squares_at + CM_MAX_SQUARES * sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_bytes = std::size_t{CM_LISTS} * CM_MAX_BLOCKS * sizeof(std::uint32_t);
 constexpr std::size_t blocks_bytes(std::size_t lanes) {
@@ -81,7 +81,7 @@ void PathKernels::set_counters(std::span<const glm::uvec4> words) const {
 }
 
 void PathKernels::set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const {
-  gl_->NamedBufferSubData(blocks_.name(), next_place_at, sizeof lanes, &lanes);
+  gl_->NamedBufferSubData(blocks_.name(), next_slot_at, sizeof lanes, &lanes);
   gl_->NamedBufferSubData(blocks_.name(), squares_at, static_cast<GLsizeiptr>(squares.size_bytes()), squares.data());
   gl_->ClearNamedBufferSubData(blocks_.name(), GL_R32UI, rank_counts_at, rank_counts_bytes, GL_RED_INTEGER,
                                GL_UNSIGNED_INT, nullptr);
@@ -104,7 +104,7 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t lanes,
   programs.begin->use(*gl_);
   run_one(lanes, blocks);
   settle();
-  const std::array<const gl::Program*, CM_QUEUES> order{programs.travel, programs.meet, programs.shade,
+  const std::array<const gl::Program*, CM_QUEUES> order{programs.travel, programs.intersect, programs.shade,
                                                         programs.camera};
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::uint32_t queue = 0; queue < CM_QUEUES; ++queue) {

@@ -14,7 +14,7 @@ namespace cumulet::render {
 struct StagePrograms {
   const gl::Program* begin = nullptr;  // trace_camera.comp over all pixels of a dispatch
   const gl::Program* travel = nullptr;
-  const gl::Program* meet = nullptr;
+  const gl::Program* intersect = nullptr;
   const gl::Program* shade = nullptr;
   const gl::Program* camera = nullptr;
 };

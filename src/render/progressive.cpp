@@ -39,9 +39,9 @@ std::uint32_t seed_of(const PictureParameters& parameters) {
   return hash;
 }
 
-std::shared_ptr<const void> scene_met(const TraceInputs& trace_inputs) {
-  const PlacedModels* met = trace_inputs.met();
-  return met != nullptr ? met->numbering() : nullptr;
+std::shared_ptr<const void> traced_scene(const TraceInputs& trace_inputs) {
+  const ModelInstances* models = trace_inputs.traced_models();
+  return models != nullptr ? models->numbering() : nullptr;
 }
 
 }  // namespace
@@ -176,7 +176,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Trac
                   request_.content.data,
                   request_.content.instances,
                   divisor,
-                  scene_met(trace_inputs),
+                  traced_scene(trace_inputs),
                   request_.content.environment,
                   request_.frames,
                   requests_,
@@ -229,7 +229,7 @@ void Progressive::take(const PictureRequest& request, const TraceInputs& trace_i
     if (other_data) finest_ = 1;
     // In-flight paths are invalid for other data or for another scene's triangles. The program in use may read an
     // environment that does not exist any more.
-    const bool other_scene = working_ && (scene_met(trace_inputs) != working_->scene ||
+    const bool other_scene = working_ && (traced_scene(trace_inputs) != working_->scene ||
                                           request.content.environment != working_->environment);
     if (other_data || request.content.preview != last.preview || other_scene) {
       working_.reset();

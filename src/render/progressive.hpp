@@ -145,7 +145,7 @@ class Progressive {
     Revision<MarchData> data;
     Revision<InstanceData> instances;
     std::uint32_t divisor = 1;              // of the resolution
-    std::shared_ptr<const void> scene;      // PlacedModels::numbering() of the triangles that its paths hit
+    std::shared_ptr<const void> scene;      // ModelInstances::numbering() of the triangles that its paths hit
     Revision<EnvironmentData> environment;  // hit by paths that escape
     scene::SequenceFrames frames;
     std::uint64_t request = 0;  // number of its request

@@ -169,7 +169,7 @@ class RasterContent::Planner {
     gl::Object* const to = &buffer;
     upload_.add(
         [gl = gl_, to, bytes, what] { *to = gl::make_buffer(gl, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what); });
-    upload_.add_bytes([to] { return Upload::Place{to->name(), 0}; }, values.data(), bytes);
+    upload_.add_bytes([to] { return Upload::Location{to->name(), 0}; }, values.data(), bytes);
   }
 
  private:
@@ -261,7 +261,7 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
   return content;
 }
 
-const SurfaceRaster::Places& SurfaceRaster::Shown::places_of(std::uint32_t draw) const {
+const SurfaceRaster::TransformRange& SurfaceRaster::Shown::transform_range(std::uint32_t draw) const {
   const std::vector<surface::Prototype>& prototypes = content->scene().scene->prototypes;
   const auto after = std::ranges::upper_bound(prototypes, draw, {}, &surface::Prototype::first_draw);
   return sets[static_cast<std::size_t>(after - prototypes.begin())];
@@ -271,22 +271,22 @@ bool SurfaceRaster::blends() const {
   return std::ranges::any_of(drawn_, [](const Shown& shown) { return shown.content->blends(); });
 }
 
-void SurfaceRaster::add_places(Shown& shown, std::vector<glm::dmat4> places) {
-  const auto volume = [](const glm::dmat4& place) { return glm::determinant(glm::dmat3(place)); };
-  std::erase_if(places, [&](const glm::dmat4& place) { return !(std::abs(volume(place)) > 0.0); });
+void SurfaceRaster::add_transforms(Shown& shown, std::vector<glm::dmat4> transforms) {
+  const auto volume = [](const glm::dmat4& transform) { return glm::determinant(glm::dmat3(transform)); };
+  std::erase_if(transforms, [&](const glm::dmat4& transform) { return !(std::abs(volume(transform)) > 0.0); });
   const auto mirrored =
-      std::stable_partition(places.begin(), places.end(), [&](const glm::dmat4& p) { return volume(p) > 0.0; });
-  const auto count = static_cast<std::uint32_t>(places.end() - mirrored);
+      std::stable_partition(transforms.begin(), transforms.end(), [&](const glm::dmat4& p) { return volume(p) > 0.0; });
+  const auto count = static_cast<std::uint32_t>(transforms.end() - mirrored);
   shown.sets.push_back(
-      {static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(places.size()) - count, count});
-  places_.insert(places_.end(), places.begin(), places.end());
+      {static_cast<std::uint32_t>(transforms_.size()), static_cast<std::uint32_t>(transforms.size()) - count, count});
+  transforms_.insert(transforms_.end(), transforms.begin(), transforms.end());
 }
 
 void SurfaceRaster::show(std::vector<RasterItem> items) {
   items_ = std::move(items);
   shown_ = std::make_shared<char>();
   drawn_.clear();
-  places_.clear();
+  transforms_.clear();
   sorted_.clear();
   sorted_view_.reset();
   for (const RasterItem& item : items_) {
@@ -302,13 +302,13 @@ void SurfaceRaster::show(std::vector<RasterItem> items) {
       whole.push_back(item.to_world);
       own.push_back(surface::from_origin(item.to_world, shown.content->pose()));
     }
-    add_places(shown, std::move(own));
-    for (const std::vector<glm::dmat4>& placings : shown.content->pose().placings) {
+    add_transforms(shown, std::move(own));
+    for (const std::vector<glm::dmat4>& transforms : shown.content->pose().prototype_transforms) {
       std::vector<glm::dmat4> all;
       for (const glm::dmat4& to_world : whole) {
-        for (const glm::dmat4& placing : placings) all.push_back(to_world * placing);
+        for (const glm::dmat4& transform : transforms) all.push_back(to_world * transform);
       }
-      add_places(shown, std::move(all));
+      add_transforms(shown, std::move(all));
     }
   }
 }
@@ -320,17 +320,17 @@ void SurfaceRaster::sort_blended(const SurfaceView& view) {
   struct Triangle {
     double z;
     std::uint32_t shown;
-    std::uint32_t place;
+    std::uint32_t transform;
     std::uint32_t number;  // index among the content's blended triangles
   };
   std::vector<Triangle> order;
   for (std::uint32_t i = 0; i < drawn_.size(); ++i) {
     const RasterContent& content = *drawn_[i].content;
     for (std::uint32_t t = 0; t < content.scene().blended.size(); ++t) {
-      const Places& places = drawn_[i].places_of(content.scene().blended[t].draw);
+      const TransformRange& range = drawn_[i].transform_range(content.scene().blended[t].draw);
       const glm::dvec4 centre((*content.centres_)[t], 1.0);
-      for (std::uint32_t p = places.first; p < places.first + places.upright + places.mirrored; ++p)
-        order.push_back({glm::dot(row, glm::dvec3(places_[p] * centre) - view.eye), i, p, t});
+      for (std::uint32_t p = range.first; p < range.first + range.upright + range.mirrored; ++p)
+        order.push_back({glm::dot(row, glm::dvec3(transforms_[p] * centre) - view.eye), i, p, t});
     }
   }
   std::ranges::stable_sort(order, std::ranges::greater{}, &Triangle::z);
@@ -341,8 +341,9 @@ void SurfaceRaster::sort_blended(const SurfaceView& view) {
     const scene::RasterSource& source = drawn_[triangle.shown].content->scene();
     const Batch& batch = source.blended[triangle.number];
     if (sorted_.empty() || sorted_.back().batch.draw != batch.draw || sorted_.back().shown != triangle.shown ||
-        sorted_.back().place != triangle.place) {
-      sorted_.push_back({triangle.shown, triangle.place, {static_cast<std::uint32_t>(indices.size()), 0, batch.draw}});
+        sorted_.back().transform != triangle.transform) {
+      sorted_.push_back(
+          {triangle.shown, triangle.transform, {static_cast<std::uint32_t>(indices.size()), 0, batch.draw}});
     }
     sorted_.back().batch.count += 3;
     const auto first = source.scene->indices.begin() + batch.first;
@@ -364,7 +365,7 @@ void SurfaceRaster::fill(gl::Object& buffer, std::size_t& size, const void* from
 }
 
 // An instance transform: its columns, and its origin relative to the eye as the sum of two floats, for precision.
-struct SurfaceRaster::PlaceRecord {
+struct SurfaceRaster::TransformRecord {
   glm::vec3 x;
   glm::vec3 y;
   glm::vec3 z;
@@ -372,16 +373,16 @@ struct SurfaceRaster::PlaceRecord {
   glm::vec3 low;
 };
 
-void SurfaceRaster::upload_places(const SurfaceView& view) {
-  std::vector<PlaceRecord> records;
-  records.reserve(places_.size());
-  for (const glm::dmat4& place : places_) {
-    const glm::dvec3 from_eye = glm::dvec3(place[3]) - view.eye;
+void SurfaceRaster::upload_transforms(const SurfaceView& view) {
+  std::vector<TransformRecord> records;
+  records.reserve(transforms_.size());
+  for (const glm::dmat4& transform : transforms_) {
+    const glm::dvec3 from_eye = glm::dvec3(transform[3]) - view.eye;
     const glm::vec3 high(from_eye);
-    records.push_back(
-        {glm::vec3(place[0]), glm::vec3(place[1]), glm::vec3(place[2]), high, glm::vec3(from_eye - glm::dvec3(high))});
+    records.push_back({glm::vec3(transform[0]), glm::vec3(transform[1]), glm::vec3(transform[2]), high,
+                       glm::vec3(from_eye - glm::dvec3(high))});
   }
-  fill(place_buffer_, place_bytes_, records.data(), records.size() * sizeof(PlaceRecord),
+  fill(transform_buffer_, transform_bytes_, records.data(), records.size() * sizeof(TransformRecord),
        "creating the surfaces' transforms");
 }
 
@@ -433,7 +434,7 @@ void SurfaceRaster::make_fixtures() {
 
 std::uint64_t SurfaceRaster::bytes() const {
   std::uint64_t bytes =
-      light_bytes_ + place_bytes_ + sorted_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
+      light_bytes_ + transform_bytes_ + sorted_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
   if (prefiltered_)
     bytes += std::uint64_t{core::CM_PREFILTERED_WIDTH} * core::CM_PREFILTERED_HEIGHT * core::CM_PREFILTERED_LEVELS * 16;
   if (!view_block_) return bytes;
@@ -475,7 +476,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   for (const RasterItem& item : items_) {
     const surface::Pose& pose = item.content->pose();
     for (const surface::PunctualLight& analytic_light : pose.lights)
-      analytic_lights.push_back(scene::placed(analytic_light, surface::from_origin(item.to_world, pose)));
+      analytic_lights.push_back(scene::transformed(analytic_light, surface::from_origin(item.to_world, pose)));
   }
   light::AnalyticLights of_host = lighting.analytic_lights;
   for (light::AnalyticLight& analytic_light : of_host) {
@@ -507,7 +508,7 @@ class SurfaceRaster::Pen {
     take(content, content.fixed_->shared->indices.name());
     for (std::size_t b = 0; b < batches.size();) {
       const Batch& batch = batches[b];
-      const Places& places = shown.places_of(batch.draw);
+      const TransformRange& range = shown.transform_range(batch.draw);
       const std::uint8_t flipped = content.pose().flipped[batch.draw];
       const std::uint32_t material = material_of(content, batch);
       // Copies of a mesh are adjacent, so that one call draws them all.
@@ -515,15 +516,15 @@ class SurfaceRaster::Pen {
       for (++b; b < batches.size(); ++b) {
         const Batch& next = batches[b];
         if (next.first != batch.first + count || count + next.count > std::numeric_limits<GLsizei>::max() ||
-            &shown.places_of(next.draw) != &places || content.pose().flipped[next.draw] != flipped ||
+            &shown.transform_range(next.draw) != &range || content.pose().flipped[next.draw] != flipped ||
             material_of(content, next) != material) {
           break;
         }
         count += next.count;
       }
-      draw(content, {batch.first, static_cast<std::uint32_t>(count), batch.draw}, places.first, places.upright, false);
-      draw(content, {batch.first, static_cast<std::uint32_t>(count), batch.draw}, places.first + places.upright,
-           places.mirrored, true);
+      draw(content, {batch.first, static_cast<std::uint32_t>(count), batch.draw}, range.first, range.upright, false);
+      draw(content, {batch.first, static_cast<std::uint32_t>(count), batch.draw}, range.first + range.upright,
+           range.mirrored, true);
     }
   }
 
@@ -531,8 +532,8 @@ class SurfaceRaster::Pen {
   void blended(const Blended& what) {
     const Shown& shown = raster_.drawn_[what.shown];
     take(*shown.content, raster_.sorted_indices_.name());
-    const Places& places = shown.places_of(what.batch.draw);
-    draw(*shown.content, what.batch, what.place, 1, what.place >= places.first + places.upright);
+    const TransformRange& range = shown.transform_range(what.batch.draw);
+    draw(*shown.content, what.batch, what.transform, 1, what.transform >= range.first + range.upright);
   }
 
  private:
@@ -553,9 +554,9 @@ class SurfaceRaster::Pen {
     indices_ = indices;
   }
 
-  void draw(const RasterContent& content, const Batch& batch, std::uint32_t first_place, std::uint32_t places,
+  void draw(const RasterContent& content, const Batch& batch, std::uint32_t first_transform, std::uint32_t transforms,
             bool in_mirror) {
-    if (places == 0) return;
+    if (transforms == 0) return;
     const RasterContent::Fixed& fixed = *content.fixed_;
     const std::uint32_t index = material_of(content, batch);
     const scene::RasterSource::Material& material = content.scene().materials[index];
@@ -584,7 +585,7 @@ class SurfaceRaster::Pen {
     // NOLINTNEXTLINE(performance-no-int-to-ptr): so GL takes offsets
     const void* start = reinterpret_cast<const void*>(offset);
     gl_.DrawElementsInstancedBaseInstance(GL_TRIANGLES, static_cast<GLsizei>(batch.count), GL_UNSIGNED_INT, start,
-                                          static_cast<GLsizei>(places), first_place);
+                                          static_cast<GLsizei>(transforms), first_transform);
   }
 
   const SurfaceRaster& raster_;
@@ -615,10 +616,10 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   gl::Object vertex_array;
   const bool drawable = !drawn_.empty();
   if (drawable) {
-    upload_places(view);
+    upload_transforms(view);
     vertex_array = gl::make_vertex_array(gl_);
     const GLuint array = vertex_array.name();
-    gl.VertexArrayVertexBuffer(array, 2, place_buffer_.name(), 0, sizeof(PlaceRecord));
+    gl.VertexArrayVertexBuffer(array, 2, transform_buffer_.name(), 0, sizeof(TransformRecord));
     gl.VertexArrayBindingDivisor(array, 2, 1);
     const auto attribute = [&](GLuint location, GLint components, GLuint offset, GLuint binding) {
       gl.EnableVertexArrayAttrib(array, location);
@@ -630,11 +631,11 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     attribute(2, 4, offsetof(surface::PosedVertex, tangent), 0);
     attribute(3, 4, offsetof(surface::VertexAttributes, uv), 1);
     attribute(4, 4, offsetof(surface::VertexAttributes, color), 1);
-    attribute(5, 3, offsetof(PlaceRecord, x), 2);
-    attribute(6, 3, offsetof(PlaceRecord, y), 2);
-    attribute(7, 3, offsetof(PlaceRecord, z), 2);
-    attribute(8, 3, offsetof(PlaceRecord, high), 2);
-    attribute(9, 3, offsetof(PlaceRecord, low), 2);
+    attribute(5, 3, offsetof(TransformRecord, x), 2);
+    attribute(6, 3, offsetof(TransformRecord, y), 2);
+    attribute(7, 3, offsetof(TransformRecord, z), 2);
+    attribute(8, 3, offsetof(TransformRecord, high), 2);
+    attribute(9, 3, offsetof(TransformRecord, low), 2);
     gl.BindVertexArray(array);
     gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
     gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());

@@ -147,8 +147,8 @@ class SurfaceRaster {
 
  private:
   using Batch = scene::RasterSource::Batch;
-  // A range of places_: upright transforms, then mirroring ones.
-  struct Places {
+  // A range of transforms_: upright transforms, then mirroring ones.
+  struct TransformRange {
     std::uint32_t first = 0;
     std::uint32_t upright = 0;
     std::uint32_t mirrored = 0;
@@ -156,13 +156,13 @@ class SurfaceRaster {
   // A drawn content with its instance transforms: one set for the draws that are not instanced, then one per prototype.
   struct Shown {
     RasterContentPtr content;
-    std::vector<Places> sets;
-    [[nodiscard]] const Places& places_of(std::uint32_t draw) const;
+    std::vector<TransformRange> sets;
+    [[nodiscard]] const TransformRange& transform_range(std::uint32_t draw) const;
   };
   // Blended triangles of one draw with one instance transform.
   struct Blended {
     std::uint32_t shown = 0;
-    std::uint32_t place = 0;
+    std::uint32_t transform = 0;
     Batch batch;  // a range of sorted_indices_
   };
 
@@ -171,18 +171,18 @@ class SurfaceRaster {
   void make_fixtures();
   void upload_prefiltered(const light::PrefilteredEnvironmentPtr& prefiltered);
   void upload_view(const SurfaceView& view, const SurfaceLighting& lighting);
-  struct PlaceRecord;
-  void upload_places(const SurfaceView& view);
+  struct TransformRecord;
+  void upload_transforms(const SurfaceView& view);
   // Uploads data to a buffer, which is reallocated if it is too small.
   void fill(gl::Object& buffer, std::size_t& size, const void* from, std::size_t bytes, const char* what) const;
-  void add_places(Shown& shown, std::vector<glm::dmat4> places);
+  void add_transforms(Shown& shown, std::vector<glm::dmat4> transforms);
   // Draws batches of a content, with all of their instance transforms or with one.
   class Pen;
 
   gl::FunctionsPtr gl_;
   std::vector<RasterItem> items_;
   std::vector<Shown> drawn_;
-  std::vector<glm::dmat4> places_;
+  std::vector<glm::dmat4> transforms_;
   std::shared_ptr<const void> shown_;
   std::vector<Blended> sorted_;
   std::optional<SurfaceView> sorted_view_;
@@ -196,8 +196,8 @@ class SurfaceRaster {
   gl::Object view_block_;
   gl::Object light_buffer_;
   std::size_t light_bytes_ = 0;
-  gl::Object place_buffer_;
-  std::size_t place_bytes_ = 0;
+  gl::Object transform_buffer_;
+  std::size_t transform_bytes_ = 0;
   gl::Object sorted_indices_;  // of blended triangles
   std::size_t sorted_bytes_ = 0;
 

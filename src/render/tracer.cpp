@@ -62,7 +62,7 @@ std::size_t far_step(std::size_t n) {
 void describe(const TraceInputs& trace_inputs, core::CmParameters& parameters) {
   parameters.host_depth = {trace_inputs.size, trace_inputs.depth != 0 ? trace_inputs.layers : 0};
   if (trace_inputs.scene != nullptr) parameters.surfaces = trace_inputs.scene->tables();
-  parameters.analytic_lights.count = trace_inputs.analytic_lights_met();
+  parameters.analytic_lights.count = trace_inputs.analytic_light_count();
 }
 
 // Pixel transfer format of a layer.
@@ -358,24 +358,24 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   if (picture.environment_) shade.emplace_back(environment_macro);
   if (picture.equiangular_) shade.emplace_back(equiangular_macro);
   if (picture.model_holdout_) shade.emplace_back(holdout_macro);
-  std::vector<std::string> meet{"CM_SURFACES 1"};
+  std::vector<std::string> intersect{"CM_SURFACES 1"};
   if (picture.extended_bsdf_) {
     shade.emplace_back(extended_bsdf_macro);
-    meet.emplace_back(extended_bsdf_macro);
+    intersect.emplace_back(extended_bsdf_macro);
   }
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.motion_) {
-    for (auto* defines : {&shade, &meet, &camera}) defines->emplace_back("CM_MOTION 1");
+    for (auto* defines : {&shade, &intersect, &camera}) defines->emplace_back("CM_MOTION 1");
   }
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
   if (picture.environment_) camera.emplace_back(environment_macro);
-  for (std::vector<std::string>* defines : {&shade, &meet, &camera}) add_groups(picture, *defines);
+  for (std::vector<std::string>* defines : {&shade, &intersect, &camera}) add_groups(picture, *defines);
   std::vector<std::string> begin = camera;
   begin[1] = "CM_DENSE 1";
   StagePrograms programs;
   programs.begin = program(begin, "trace_camera.comp").object;
   programs.travel = trace_program(picture, data).object;
-  programs.meet = program(meet, "trace_meet.comp").object;
+  programs.intersect = program(intersect, "trace_intersect.comp").object;
   programs.shade = program(shade, "trace_shade.comp").object;
   programs.camera = program(camera, "trace_camera.comp").object;
   return programs;
@@ -411,8 +411,8 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const TraceInput
   // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const PlacedModels* met = settings.view == View::shaded && !preview ? trace_inputs.met() : nullptr;
-  return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().extended_bsdf != 0U ? 2 : 1);
+  const ModelInstances* models = settings.view == View::shaded && !preview ? trace_inputs.traced_models() : nullptr;
+  return models == nullptr ? 0 : (models->lights().triangles > 0 || models->tables().extended_bsdf != 0U ? 2 : 1);
 }
 
 void Tracer::classify(Picture& picture, const PictureParameters& parameters, const TraceInputs& trace_inputs,
@@ -420,12 +420,12 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   const bool shaded = settings.view == View::shaded;
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, trace_inputs, settings);
-  picture.extended_bsdf_ = picture.traced_ > 0 && trace_inputs.met()->tables().extended_bsdf != 0U;
-  picture.second_lobe_ = parameters.medium.second_share > 0.0F;
+  picture.extended_bsdf_ = picture.traced_ > 0 && trace_inputs.traced_models()->tables().extended_bsdf != 0U;
+  picture.second_lobe_ = parameters.medium.second_weight > 0.0F;
   const core::CmMedium& medium = parameters.medium;
   picture.channels_ = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
   picture.environment_ = trace_inputs.environment != nullptr;
-  picture.analytic_lights_ = trace_inputs.analytic_lights_met() > 0;
+  picture.analytic_lights_ = trace_inputs.analytic_light_count() > 0;
   picture.several_ = trace_inputs.instances != nullptr;
   picture.volume_holdout_ = shaded && trace_inputs.volume_holdout;
   picture.model_holdout_ = shaded && picture.traced_ > 0 && trace_inputs.model_holdout;
@@ -843,7 +843,7 @@ void Tracer::dispatch(Picture& picture, const TraceInputs& trace_inputs, const s
   parameters.dispatch.rounds = what.rounds;
   parameters.dispatch.samples = picture.pass_target_;
   parameters.dispatch.lanes = picture.lanes_;
-  parameters.dispatch.places = static_cast<std::uint32_t>(CM_SQUARE_PIXELS * picture.squares_.size());
+  parameters.dispatch.slots = static_cast<std::uint32_t>(CM_SQUARE_PIXELS * picture.squares_.size());
   // Blocks are permuted with a large stride. If a driver gives each core a run of work groups, each core gets a
   // fraction of the expensive ones.
   const std::size_t count = what.blocks.size();
@@ -1089,7 +1089,7 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   make_shared_objects();
   dispatches_in_flight_.order();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the pick texture");
-  if (!pick_place_) pick_place_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the pick result");
+  if (!pick_object_) pick_object_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the pick result");
   core::CmParameters p = assemble(parameters, trace_inputs);
   p.dispatch.tile_corner = pixel;
   p.dispatch.tile_size = glm::uvec2(1U);
@@ -1099,18 +1099,18 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   inspect_program(data, trace_inputs, "inspect.comp").object->use(*gl_);
   bind(data, trace_inputs);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, pick_place_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, pick_object_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
   gl_->DispatchCompute(1, 1, 1);
   gl::memory_barrier(*gl_, GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   Picked picked;
-  glm::uvec2 met(0U);
+  glm::uvec2 object(0U);
   gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(picked.z), &picked.z);
-  gl_->GetTextureImage(pick_place_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
+  gl_->GetTextureImage(pick_object_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(object), &object);
   gl::check(*gl_, "picking");
-  if (met.x == 1U) picked.place = met.y;
-  if (met.x == 2U) picked.triangle = met.y;
+  if (object.x == 1U) picked.volume = object.y;
+  if (object.x == 2U) picked.triangle = object.y;
   return picked;
 }
 

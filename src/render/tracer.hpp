@@ -45,7 +45,7 @@ struct TraceInputs {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
   glm::uvec2 size{0U};
-  const PlacedModels* scene = nullptr;
+  const ModelInstances* scene = nullptr;
   bool traced = true;               // paths hit the scene's triangles; else only the surface pass draws them
   SurfaceRaster* raster = nullptr;  // the surface pass, with its view and lighting below
   SurfaceView view;
@@ -59,8 +59,8 @@ struct TraceInputs {
   const scene::MotionTable* motion = nullptr;  // transforms for motion vectors; required for FeatureSet::all
 
   /// Returns the scene whose triangles paths hit; null: none.
-  [[nodiscard]] const PlacedModels* met() const { return traced ? scene : nullptr; }
-  [[nodiscard]] std::uint32_t analytic_lights_met() const {
+  [[nodiscard]] const ModelInstances* traced_models() const { return traced ? scene : nullptr; }
+  [[nodiscard]] std::uint32_t analytic_light_count() const {
     return analytic_lights == nullptr ? 0 : analytic_lights->count();
   }
 };
@@ -111,7 +111,7 @@ constexpr std::uint32_t max_feature_rays = 64;
 constexpr std::uint32_t matte_rays = 64;
 constexpr std::uint32_t max_matte_ranks = 16;
 
-/// Cryptomatte IDs (cryptomatte_id) of the visible objects; 0: in no matte. Volumes are in the order of Picked::place,
+/// Cryptomatte IDs (cryptomatte_id) of the visible objects; 0: in no matte. Volumes are in the order of Picked::volume,
 /// and models in their own.
 struct MatteIds {
   std::uint32_t ground = 0;
@@ -297,7 +297,7 @@ class Tracer {
   struct Picked {
     float z = 0.0F;  ///< view depth of the volume at half opacity, or of a triangle; 0: neither was hit
     /// if the volume was hit: index of the volume with the highest extinction there
-    std::optional<std::uint32_t> place;
+    std::optional<std::uint32_t> volume;
     std::optional<std::uint32_t> triangle;  ///< if a triangle was hit: its number among those of all models
   };
   Picked pick(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
@@ -456,10 +456,10 @@ class Tracer {
   PathKernels kernels_;
   std::weak_ptr<const Blocks> paths_of_;  // the tile whose paths the kernels hold
   gl::Object uniforms_;
-  gl::Object pick_;        // depth of a pick...
-  gl::Object pick_place_;  // ...and the object that it hit
-  gl::Object motion_;      // TraceInputs::motion, for the feature pass in progress
-  gl::Object errors_;      // errors of a tile
+  gl::Object pick_;         // depth of a pick...
+  gl::Object pick_object_;  // ...and the object that it hit
+  gl::Object motion_;       // TraceInputs::motion, for the feature pass in progress
+  gl::Object errors_;       // errors of a tile
   InFlightDispatches dispatches_in_flight_;
   InFlightDispatches rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;

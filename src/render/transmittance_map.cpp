@@ -168,8 +168,8 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     under_way_.reset();
     if (request.size >> coarser_ > min_size) ++coarser_;
   }
-  const TraceInputs met = scene.trace_inputs(snapshot, false);
-  const gl::Program& program = programs_->ask({"transmittance.comp", data->defines(met.instances != nullptr)});
+  const TraceInputs inputs = scene.trace_inputs(snapshot, false);
+  const gl::Program& program = programs_->ask({"transmittance.comp", data->defines(inputs.instances != nullptr)});
   if (!program.usable()) return;
   if (failed_ == of) return;
   if (!under_way_) {
@@ -186,7 +186,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
   failed_.reset();
   dispatches_in_flight_.order();
   data->bind(*gl_);
-  if (met.instances != nullptr) met.instances->bind(*gl_);
+  if (inputs.instances != nullptr) inputs.instances->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
   gl_->BindImageTexture(core::CM_IMAGE_TRANSMITTANCE_MAP, work.made.texture.name(), 0, GL_TRUE, 0, GL_WRITE_ONLY,
                         GL_R16F);

@@ -12,12 +12,12 @@ void Upload::add_pieces(std::size_t bytes, const std::function<void(std::size_t,
   }
 }
 
-void Upload::add_bytes(std::function<Place()> to, const void* bytes, std::size_t size) {
+void Upload::add_bytes(std::function<Location()> to, const void* bytes, std::size_t size) {
   add_pieces(size, [this, to = std::move(to), from = static_cast<const std::byte*>(bytes)](std::size_t first,
                                                                                            std::size_t count) {
-    const Place place = to();
-    gl_->NamedBufferSubData(place.buffer, static_cast<GLintptr>(place.offset + first), static_cast<GLsizeiptr>(count),
-                            from + first);
+    const Location location = to();
+    gl_->NamedBufferSubData(location.buffer, static_cast<GLintptr>(location.offset + first),
+                            static_cast<GLsizeiptr>(count), from + first);
   });
 }
 

@@ -49,11 +49,11 @@ class Upload {
   void add_pieces(std::size_t bytes, const std::function<void(std::size_t, std::size_t)>& copy, std::size_t unit = 1);
   /// Adds steps that copy to a buffer with GL_DYNAMIC_STORAGE_BIT, from `offset` on. `to` is called by the steps, when
   /// the buffer exists.
-  struct Place {
+  struct Location {
     GLuint buffer = 0;
     std::size_t offset = 0;
   };
-  void add_bytes(std::function<Place()> to, const void* bytes, std::size_t size);
+  void add_bytes(std::function<Location()> to, const void* bytes, std::size_t size);
   /// Adds dispatches of a_step items each. They wait until the program is linked.
   using DispatchItems = std::function<void(const gl::Program& program, std::uint32_t first, std::uint32_t end)>;
   void add_dispatches(const gl::ProgramsPtr& programs, const gl::ProgramKey& key, std::uint32_t items,

@@ -161,10 +161,10 @@ void require_finite(const volume::DeviceBricks& bricks, volume::Channel channel,
 }  // namespace
 
 // Reads the list of bricks that glsl/pack_bricks.comp wrote: the filled ones come first.
-class VoxelTransfers::PackedPlaces {
+class VoxelTransfers::PackedBricks {
  public:
   /// Throws Error if there are more filled bricks than `room`.
-  PackedPlaces(const gl::ReadBack& words, std::uint32_t room, glm::ivec3 size, const std::string& name)
+  PackedBricks(const gl::ReadBack& words, std::uint32_t room, glm::ivec3 size, const std::string& name)
       : words_(words.data()), room_(room), bricks_(bricks_of(size)), filled_(word(0)) {
     if (filled_ > room) throw Error(ErrorCode::gl, one_line(name + ": the driver did not pack the bricks correctly"));
   }
@@ -347,10 +347,11 @@ VoxelTransfers::Room VoxelTransfers::take_room(std::size_t bricks, std::size_t b
     return room;
   }
   Room room;
-  room.places = gl::make_buffer(gl_, places_bytes(bricks), nullptr, 0, "creating the index of the host's bricks");
+  room.packed_bricks =
+      gl::make_buffer(gl_, packed_bricks_bytes(bricks), nullptr, 0, "creating the index of the host's bricks");
   room.values = gl::make_buffer(gl_, bytes, nullptr, 0, "creating a copy of the host's bricks");
-  room.places_back =
-      gl::ReadBack::unfilled(gl_, places_bytes(bricks), "creating the read-back of the host's brick index");
+  room.packed_bricks_back =
+      gl::ReadBack::unfilled(gl_, packed_bricks_bytes(bricks), "creating the read-back of the host's brick index");
   room.bricks = bricks;
   room.bytes = bytes;
   return room;
@@ -388,9 +389,9 @@ void VoxelTransfers::pack(const Transfer& transfer, const Piece& piece, GLuint c
     gl.BindTextureUnit(core::CM_UNIT_HOST_VOXELS, source.texture);
     gl.BindSampler(core::CM_UNIT_HOST_VOXELS, sampler_.name());
   }
-  gl.ClearNamedBufferSubData(piece.room.places.name(), GL_R32UI, 0, 2 * sizeof(std::uint32_t), GL_RED_INTEGER,
+  gl.ClearNamedBufferSubData(piece.room.packed_bricks.name(), GL_R32UI, 0, 2 * sizeof(std::uint32_t), GL_RED_INTEGER,
                              GL_UNSIGNED_INT, nullptr);
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_PLACES, piece.room.places.name());
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_BRICKS, piece.room.packed_bricks.name());
   gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_VALUES, piece.room.values.name());
   if (chosen != 0) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PACKED_CHOICE, chosen);
   program.use(gl);
@@ -448,8 +449,8 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
                              GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
   for (const Piece& piece : transfer.pieces) {
     const Room& room = piece.room;
-    gl.CopyNamedBufferSubData(room.places.name(), room.places_back.name(), 0, 0,
-                              static_cast<GLsizeiptr>(places_bytes(piece.count)));
+    gl.CopyNamedBufferSubData(room.packed_bricks.name(), room.packed_bricks_back.name(), 0, 0,
+                              static_cast<GLsizeiptr>(packed_bricks_bytes(piece.count)));
     const std::size_t bytes = piece.copied * brick_bytes(transfer.sources[piece.field].format);
     if (bytes > 0)
       gl.CopyNamedBufferSubData(room.values.name(), room.values_back.name(), 0, 0, static_cast<GLsizeiptr>(bytes));
@@ -523,9 +524,9 @@ bool VoxelTransfers::take_back(Transfer& transfer, Deadline deadline) {
     const volume::DeviceBricks& bricks = *back.state->fields[back.field].bricks;
     auto& copy = std::get<volume::BrickCopy>(transfer.fields[back.field].voxels);
     while (back.taken < bricks.origins.size()) {
-      const volume::DeviceBricks::Place& place = bricks.places[back.taken];
-      const VoxelFormat format = bricks.memories[place.memory]->halves ? VoxelFormat::halves : VoxelFormat::floats;
-      unpack(format, back.memories[back.field][place.memory].data() + place.brick * brick_bytes(format), values);
+      const volume::DeviceBricks::Location& location = bricks.locations[back.taken];
+      const VoxelFormat format = bricks.memories[location.memory]->halves ? VoxelFormat::halves : VoxelFormat::floats;
+      unpack(format, back.memories[back.field][location.memory].data() + location.brick * brick_bytes(format), values);
       copy.add(bricks.origins[back.taken], values);
       if (++back.taken % at_a_time == 0 && std::chrono::steady_clock::now() > deadline) return false;
     }
@@ -544,15 +545,15 @@ void VoxelTransfers::make_products(const void* whose, std::string name, StayInGl
   transfers_.push_back(std::move(transfer));
 }
 
-VoxelTransfers::PackedPlaces VoxelTransfers::places_of(const Transfer& transfer, const Piece& piece) {
-  return {piece.room.places_back, piece.count, transfer.sources[piece.field].size, transfer.name};
+VoxelTransfers::PackedBricks VoxelTransfers::read_packed_bricks(const Transfer& transfer, const Piece& piece) {
+  return {piece.room.packed_bricks_back, piece.count, transfer.sources[piece.field].size, transfer.name};
 }
 
 void VoxelTransfers::begin_summaries(Transfer& transfer) {
   transfer.brick_tree = make_brick_tree(gl_, grid::brick_edges(index_to_world_of(transfer.fields[0])));
   for (Piece& piece : transfer.pieces) {
     Room& room = piece.room;
-    piece.filled = places_of(transfer, piece).filled();
+    piece.filled = read_packed_bricks(transfer, piece).filled();
     if (piece.filled == 0) continue;
     if (room.summed < piece.filled) {
       const std::size_t with_more = std::min<std::size_t>(piece.filled + piece.filled / 4, piece.count);
@@ -570,7 +571,7 @@ BrickSummaries VoxelTransfers::summaries_of(const Transfer& transfer, const Piec
   const Source& source = transfer.sources[piece.field];
   return {.format = source.format,
           .field = field_of(transfer.fields[piece.field].channel),
-          .places = &piece.room.places,
+          .packed_bricks = &piece.room.packed_bricks,
           .bricks = glm::uvec3(bricks_of(source.size)),
           .values = &piece.room.values,
           .kept = piece.kept ? memories_->find(*piece.kept) : nullptr,
@@ -612,17 +613,17 @@ std::vector<scene::StateInGl::Field> VoxelTransfers::take_fields(Transfer& trans
   std::vector<volume::DeviceBricks> made(transfer.fields.size());
   for (Piece& piece : transfer.pieces) {
     volume::DeviceBricks& field = made[piece.field];
-    const PackedPlaces places = places_of(transfer, piece);
+    const PackedBricks packed = read_packed_bricks(transfer, piece);
     if (piece.kept) {
       std::memcpy(piece.kept->summaries.data(), piece.room.summaries_back.data(),
                   piece.filled * sizeof(volume::BrickSummary));
       field.memories.push_back(piece.kept);
     }
-    for (std::uint32_t i = 0; i < places.filled(); ++i) {
-      field.origins.push_back(places.origin(i));
-      field.places.push_back({static_cast<std::uint32_t>(field.memories.size() - 1), i});
+    for (std::uint32_t i = 0; i < packed.filled(); ++i) {
+      field.origins.push_back(packed.origin(i));
+      field.locations.push_back({static_cast<std::uint32_t>(field.memories.size() - 1), i});
     }
-    for (std::size_t i = places.filled(); i < places.all(); ++i) field.emptied.push_back(places.origin(i));
+    for (std::size_t i = packed.filled(); i < packed.all(); ++i) field.emptied.push_back(packed.origin(i));
   }
   std::vector<scene::StateInGl::Field> fields;
   for (std::size_t i = 0; i < made.size(); ++i) {
@@ -727,7 +728,7 @@ void VoxelTransfers::copy_rest(Transfer& transfer) const {
   bool copies = false;
   for (Piece& piece : transfer.pieces) {
     Room& room = piece.room;
-    const std::size_t filled = places_of(transfer, piece).filled();
+    const std::size_t filled = read_packed_bricks(transfer, piece).filled();
     room.expected = filled;
     if (filled <= piece.copied) continue;
     const std::size_t each = brick_bytes(transfer.sources[piece.field].format);
@@ -759,19 +760,19 @@ bool VoxelTransfers::take(Transfer& transfer, Deadline deadline) {
   for (Piece& piece : transfer.pieces) {
     const Source& source = transfer.sources[piece.field];
     auto& copy = std::get<volume::BrickCopy>(transfer.fields[piece.field].voxels);
-    const PackedPlaces places = places_of(transfer, piece);
-    if (piece.taken == 0) copy.reserve(copy.count() + places.all());
-    for (; piece.taken < places.all(); ++piece.taken) {
+    const PackedBricks packed = read_packed_bricks(transfer, piece);
+    if (piece.taken == 0) copy.reserve(copy.count() + packed.all());
+    for (; piece.taken < packed.all(); ++piece.taken) {
       if (bricks_since++ == at_a_time) {
         bricks_since = 0;
         if (std::chrono::steady_clock::now() > deadline) return false;
       }
-      if (piece.taken >= places.filled()) {
+      if (piece.taken >= packed.filled()) {
         values.fill(0.0F);
       } else {
         unpack(source.format, piece.room.values_back.data() + piece.taken * brick_bytes(source.format), values);
       }
-      if (!copy.add(places.origin(piece.taken), values)) transfer.finite = false;
+      if (!copy.add(packed.origin(piece.taken), values)) transfer.finite = false;
     }
   }
   return true;

@@ -131,9 +131,9 @@ class VoxelTransfers {
     std::size_t bricks = 0;
     std::size_t bytes = 0;  // of values
     std::size_t back_bytes = 0;
-    gl::Object places;
+    gl::Object packed_bricks;
     gl::Object values;
-    gl::ReadBack places_back;
+    gl::ReadBack packed_bricks_back;
     gl::ReadBack values_back;
     std::size_t expected = 0;  // bricks filled last time
     std::size_t summed = 0;    // capacity of the summaries
@@ -141,10 +141,10 @@ class VoxelTransfers {
     gl::ReadBack summaries_back;
 
     [[nodiscard]] std::uint64_t all_bytes() const {
-      return 2 * places_bytes(bricks) + bytes + back_bytes + 2 * summed * sizeof(volume::BrickSummary);
+      return 2 * packed_bricks_bytes(bricks) + bytes + back_bytes + 2 * summed * sizeof(volume::BrickSummary);
     }
   };
-  static std::size_t places_bytes(std::size_t bricks) { return (2 + bricks) * sizeof(std::uint32_t); }
+  static std::size_t packed_bricks_bytes(std::size_t bricks) { return (2 + bricks) * sizeof(std::uint32_t); }
   // Layers of bricks of a field that one dispatch packs.
   struct Piece {
     std::size_t field = 0;
@@ -196,8 +196,8 @@ class VoxelTransfers {
   };
 
   // Origins of the bricks that were packed.
-  class PackedPlaces;
-  static PackedPlaces places_of(const Transfer& transfer, const Piece& piece);
+  class PackedBricks;
+  static PackedBricks read_packed_bricks(const Transfer& transfer, const Piece& piece);
 
   [[nodiscard]] Source open(const GlVoxels& field, const std::string& what) const;
   [[nodiscard]] Source open_texture(const VoxelTexture& texture, const std::string& what) const;

@@ -29,7 +29,7 @@ EmissiveTable emissive_table(std::vector<GlowingCell> cells, const grid::Cube& c
   for (const GlowingCell& cell : cells) {
     if (power.size() % 65536 == 0) check(progress);
     const double bright = brightness_of(cell.emission);
-    const std::uint32_t shape = core::cm_record_shape({cell.place, 0U, 0U}, cube.wide());
+    const std::uint32_t shape = core::cm_record_shape({cell.v0_shape, 0U, 0U}, cube.wide());
     const double unit = core::cm_shape_unit(shape);
     power.push_back(bright * frame_volume(core::cm_shape_class(shape)) * unit * unit * unit * unit_volume);
     square += bright * power.back();

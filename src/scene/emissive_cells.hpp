@@ -14,8 +14,8 @@ namespace cumulet::scene {
 
 /// An emissive cell, as the shaders read it (glsl/light.glsl).
 struct GlowingCell {
-  light::Alias alias;  ///< entry of the alias table; `other` indexes the same table
-  glm::uvec2 place;    ///< x and y of the cell record: its v0 and shape
+  light::Alias alias;   ///< entry of the alias table; `other` indexes the same table
+  glm::uvec2 v0_shape;  ///< x and y of the cell record: its v0 and shape
   grid::EmissionRecord emission;
 };
 static_assert(sizeof(GlowingCell) == 32);

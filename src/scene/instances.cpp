@@ -69,10 +69,10 @@ bool overlaps_another(const InstanceTable& table, const std::vector<Block>& bloc
 }
 
 // Sets the probability with which next-event estimation samples the emissive cells of each instance.
-void set_emissive(InstanceTable& table, const std::vector<PlacedEmissive>& emissive) {
+void set_emissive(InstanceTable& table, const std::vector<InstanceEmissive>& emissive) {
   double square = 0.0;  // sum of the integrals of L^2 of the instances: length^3 = power^2 / square
   std::vector<double> power;
-  for (const PlacedEmissive& of : emissive) {
+  for (const InstanceEmissive& of : emissive) {
     power.push_back(of.power);
     table.emissive_power += of.power;
     if (of.power > 0.0) square += of.power / of.length * (of.power / of.length) / of.length;
@@ -99,7 +99,7 @@ dvec3 origin_of(std::span<const Instance> instances) {
   dvec3 high(-low);
   for (const Instance& instance : instances) {
     if (!is_solid(instance.grid)) continue;
-    const Block block = block_of(instance.place * instance.source->cube.to_world, dvec3(instance.grid.box_min),
+    const Block block = block_of(instance.transform * instance.source->cube.to_world, dvec3(instance.grid.box_min),
                                  dvec3(instance.grid.box_max));
     const dvec3 reach = reach_of(block);
     low = glm::min(low, block.middle - reach);
@@ -115,28 +115,28 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
   const bool moves = std::ranges::any_of(instances, [](const Instance& i) { return i.ends.has_value(); });
   if (moves) table.ends.resize(2 * count);
   std::vector<Block> blocks;
-  std::vector<PlacedEmissive> emissive;
+  std::vector<InstanceEmissive> emissive;
   std::vector<TreeBox> boxes;
   const auto refuse = [&](ErrorCode code, const char* cause) {
     throw Error(code, "instance " + std::to_string(table.records.size()) + ": " + cause);
   };
   for (const Instance& instance : instances) {
     const grid::Cube& cube = instance.source->cube;
-    const auto stand = [&](const glm::dmat4& place, CmInstance& record) {
-      const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * place * cube.to_world;
+    const auto stand = [&](const glm::dmat4& transform, CmInstance& record) {
+      const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * transform * cube.to_world;
       record.space = space_of(to_scene, instance.grid.box_min, instance.grid.box_max);
       if (!is_sound(record.space))
         refuse(ErrorCode::invalid_argument, "its transform is not finite, is singular, or is too large");
       return block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max));
     };
     CmInstance record{};
-    const Block& block = blocks.emplace_back(stand(instance.place, record));
+    const Block& block = blocks.emplace_back(stand(instance.transform, record));
     record.grid = instance.grid;
     record.medium = instance.medium;
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U) |
                    (instance.ends ? core::CM_INSTANCE_MOVES : 0U);
-    emissive.push_back(emissive_of(instance.emissive, cube.to_world, instance.place));
+    emissive.push_back(emissive_of(instance.emissive, cube.to_world, instance.transform));
     dvec3 low = block.middle - reach_of(block);
     dvec3 high = block.middle + reach_of(block);
     if (instance.ends) {

@@ -20,13 +20,13 @@ namespace cumulet::scene {
 
 /// A volume instance: a source, its transform and its medium.
 struct Instance {
-  MarchSourcePtr source;  ///< not null
-  glm::dmat4 place{1.0};  ///< affine transform from the world space of the source
-  core::CmGrid grid{};    ///< where the source's data are, and the bounding box of all of them
+  MarchSourcePtr source;      ///< not null
+  glm::dmat4 transform{1.0};  ///< affine transform from the world space of the source
+  core::CmGrid grid{};        ///< where the source's data are, and the bounding box of all of them
   core::CmMedium medium{};
   bool hidden_from_camera = false;
-  std::optional<PlaceEnds> ends = {};  ///< transforms at shutter open and close; empty: it does not move
-  EmissiveSum emissive{};              ///< emission of the source's cells
+  std::optional<ShutterTransforms> ends = {};  ///< transforms at shutter open and close; empty: it does not move
+  EmissiveSum emissive{};                      ///< emission of the source's cells
 };
 
 /// The arrays are copied to buffers unchanged; `ends` follows `records`.

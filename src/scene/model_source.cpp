@@ -12,7 +12,7 @@
 #include <span>
 #include <tuple>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "scene/threaded_tree.hpp"
@@ -126,7 +126,7 @@ std::uint32_t pack_vertices(std::vector<uvec4>& words, const surface::Scene& sce
       const surface::PosedVertex& v = vertices[i];
       const surface::VertexAttributes& a = scene.attributes[i];
       uvec4* to = &words[first + core::CM_VERTEX_WORDS * i];
-      to[core::CM_VERTEX_PLACE] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
+      to[core::CM_VERTEX_POSITION] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
       to[core::CM_VERTEX_UV] = bits(vec4(a.uv[0], a.uv[1]));
       to[core::CM_VERTEX_REST] =
           uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
@@ -200,14 +200,14 @@ void build(ModelSource& source, ModelMesh& mesh, const std::vector<std::uint32_t
 }
 
 // Adds a mesh of the draws [first, last), which are contiguous in the indices.
-void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vector<glm::dmat4> placings,
+void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vector<glm::dmat4> transforms,
               std::optional<std::size_t> prototype) {
   const surface::Scene& scene = *source.scene;
   const std::size_t end = last < scene.draws.size() ? scene.draws[last].first_index : scene.indices.size();
   ModelMesh mesh;
   mesh.first_triangle = first < scene.draws.size() ? scene.draws[first].first_index / 3 : 0;
   mesh.triangle_count = static_cast<std::uint32_t>(end / 3) - mesh.first_triangle;
-  mesh.placings = std::move(placings);
+  mesh.transforms = std::move(transforms);
   mesh.prototype = prototype;
   if (mesh.triangle_count > 0) source.meshes.push_back(std::move(mesh));
 }
@@ -219,7 +219,8 @@ void find_meshes(ModelSource& source) {
     add_mesh(source, 0, scene.first_prototype_draw(), {surface::from_origin(glm::dmat4(1.0), source.pose)}, {});
   for (std::size_t p = 0; p < scene.prototypes.size(); ++p) {
     const surface::Prototype& prototype = scene.prototypes[p];
-    add_mesh(source, prototype.first_draw, prototype.first_draw + prototype.draw_count, source.pose.placings[p], p);
+    add_mesh(source, prototype.first_draw, prototype.first_draw + prototype.draw_count,
+             source.pose.prototype_transforms[p], p);
   }
 }
 
@@ -273,10 +274,11 @@ void pack_ends(ModelSource& source, const surface::PoseEnds& ends, const Progres
   }
 }
 
-// Returns transforms at both ends for placings that change and exist at both ends; else an empty vector.
-std::vector<PlaceEnds> placing_ends(const std::vector<glm::dmat4>& now, const std::vector<glm::dmat4>& open,
-                                    const std::vector<glm::dmat4>& close) {
-  std::vector<PlaceEnds> ends;
+// Returns the transforms at both ends if they change and exist at both ends; else an empty vector.
+std::vector<ShutterTransforms> shutter_transforms_of(const std::vector<glm::dmat4>& now,
+                                                     const std::vector<glm::dmat4>& open,
+                                                     const std::vector<glm::dmat4>& close) {
+  std::vector<ShutterTransforms> ends;
   if (open == close || open.size() != now.size() || close.size() != now.size()) return ends;
   for (std::size_t i = 0; i < now.size(); ++i) ends.push_back({open[i], close[i]});
   return ends;
@@ -287,8 +289,8 @@ void move(ModelSource& source, const std::optional<surface::PoseEnds>& ends, con
   pack_ends(source, *ends, progress);
   for (ModelMesh& mesh : source.meshes) {
     if (!mesh.prototype) continue;
-    mesh.placing_ends =
-        placing_ends(mesh.placings, ends->open.placings[*mesh.prototype], ends->close.placings[*mesh.prototype]);
+    mesh.shutter_transforms = shutter_transforms_of(mesh.transforms, ends->open.prototype_transforms[*mesh.prototype],
+                                                    ends->close.prototype_transforms[*mesh.prototype]);
   }
 }
 
@@ -307,7 +309,7 @@ std::pair<dvec3, dvec3> box_of(const surface::Bvh& bvh) {
 
 ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends) {
-  auto source = make_left<ModelSource>();
+  auto source = make_deferred_delete<ModelSource>();
   source->scene = std::move(scene);
   source->pose = std::move(pose);
   find_meshes(*source);
@@ -327,7 +329,7 @@ ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Pr
 
 ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends) {
-  auto source = make_left<ModelSource>();
+  auto source = make_deferred_delete<ModelSource>();
   source->scene = last.scene;
   source->pose = std::move(pose);
   check(progress);

@@ -9,7 +9,7 @@
 
 #include "base/shared_code.hpp"
 #include "light/emitters.hpp"
-#include "scene/place.hpp"
+#include "scene/instance_transform.hpp"
 #include "scene/raster_source.hpp"
 #include "scene/texture_atlas.hpp"
 #include "surface/bvh.hpp"
@@ -37,17 +37,17 @@ struct ModelMesh {
   std::uint32_t first_triangle = 0;
   std::uint32_t triangle_count = 0;
   surface::Bvh bvh;
-  double built_cost = 0.0;               ///< cost of the BVH when it was built, before refits
-  std::vector<glm::dmat4> placings{1};   ///< transforms to the model's own world space
-  std::optional<std::size_t> prototype;  ///< index in the scene; empty: positions are relative to the pose's origin
-  std::uint32_t nodes = 0;               ///< offset of each table
+  double built_cost = 0.0;                ///< cost of the BVH when it was built, before refits
+  std::vector<glm::dmat4> transforms{1};  ///< transforms to the model's own world space
+  std::optional<std::size_t> prototype;   ///< index in the scene; empty: positions are relative to the pose's origin
+  std::uint32_t nodes = 0;                ///< offset of each table
   std::uint32_t records = 0;
   std::uint32_t triangles = 0;
   std::uint32_t emitters = 0;
   std::uint32_t emitter_count = 0;
-  double flux = 0.0;                    ///< as in light::EmitterTable, in the mesh's own space
-  std::optional<MeshEnds> ends;         ///< empty: it does not deform
-  std::vector<PlaceEnds> placing_ends;  ///< of each placing; empty: none moves
+  double flux = 0.0;                                  ///< as in light::EmitterTable, in the mesh's own space
+  std::optional<MeshEnds> ends;                       ///< empty: it does not deform
+  std::vector<ShutterTransforms> shutter_transforms;  ///< of each instance; empty: none moves
 };
 
 /// Everything that is rendered of one pose of a scene, in main memory: the tables for paths and for the surface pass.
@@ -73,7 +73,7 @@ using ModelSourcePtr = std::shared_ptr<const ModelSource>;
 std::pair<glm::dvec3, glm::dvec3> box_of(const surface::Bvh& bvh);
 
 /// Builds the BVH and the tables. ends: the poses at shutter open and close; empty: nothing moves. In between, vertices
-/// and placings move linearly. Visibility and everything else come from `pose`. Throws Error(cancelled).
+/// and instances move linearly. Visibility and everything else come from `pose`. Throws Error(cancelled).
 ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress,
                                  const std::optional<surface::PoseEnds>& ends = std::nullopt);
 /// Updates to another pose of the same scene: refits the BVH and packs the tables again; images are shared.

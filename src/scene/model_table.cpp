@@ -28,7 +28,7 @@ bool is_sound(const CmModel& m) {
          sound(m.to_world_z) && sound(m.origin) && m.own_volume > 0.0F && m.own_volume < 1e30F;
 }
 
-void place(CmModel& record, const dmat4& to_world) {
+void set_transform(CmModel& record, const dmat4& to_world) {
   const glm::dmat3 linear(to_world);
   const glm::dmat3 inverse = glm::inverse(linear);
   record.to_world_x = vec3(linear[0]);
@@ -54,24 +54,24 @@ void share_looks(ModelTable& table, const std::vector<double>& power) {
   table.lights.triangle_flux = sum;
   const std::vector<light::Alias> aliases = light::alias_table(power, sum);
   // Computed from the quantized alias words, as shaders use them.
-  std::vector<double> chance(power.size(), 0.0);
+  std::vector<double> probability(power.size(), 0.0);
   for (std::size_t i = 0; i < power.size(); ++i) {
     table.records[i].alias = aliases[i].stays;
     table.records[i].alias_other = aliases[i].other;
     const double stays =
         table.records[i].emitter_count > 0 ? (static_cast<double>(aliases[i].stays) + 1.0) / 4294967296.0 : 0.0;
-    chance[i] += stays;
-    chance[aliases[i].other] += 1.0 - stays;
+    probability[i] += stays;
+    probability[aliases[i].other] += 1.0 - stays;
   }
   for (std::size_t i = 0; i < power.size(); ++i) {
-    table.records[i].emitter_chance = static_cast<float>(chance[i] / static_cast<double>(power.size()));
+    table.records[i].emitter_probability = static_cast<float>(probability[i] / static_cast<double>(power.size()));
     table.lights.triangles = std::max(table.lights.triangles, table.records[i].emitter_count);
   }
 }
 
 }  // namespace
 
-surface::PunctualLight placed(surface::PunctualLight light, const dmat4& to_world) {
+surface::PunctualLight transformed(surface::PunctualLight light, const dmat4& to_world) {
   light.position = vec3(to_world * glm::dvec4(light.position, 1.0));
   const dvec3 direction = glm::dmat3(to_world) * dvec3(light.direction);
   light.direction = vec3(glm::normalize(direction));
@@ -93,8 +93,8 @@ ModelBounds bounds_of(const ModelSource& source, const dmat4& to_world) {
   for (const ModelMesh& mesh : source.meshes) {
     const auto [low, high] = box_of(mesh.bvh);
     if (!(low.x <= high.x)) continue;
-    for (const dmat4& placing : mesh.placings) {
-      const Block block = block_of(to_world * placing, low, high);
+    for (const dmat4& transform : mesh.transforms) {
+      const Block block = block_of(to_world * transform, low, high);
       const dvec3 reach = reach_of(block);
       add(block.middle - reach, block.middle + reach);
     }
@@ -104,7 +104,7 @@ ModelBounds bounds_of(const ModelSource& source, const dmat4& to_world) {
 
 bool can_stand(const dmat4& to_world) {
   CmModel whole{};
-  place(whole, to_world);
+  set_transform(whole, to_world);
   return is_sound(whole);
 }
 
@@ -114,7 +114,7 @@ namespace {
 CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& at) {
   CmModel record{};
   record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
-                 (model.ends || !mesh.placing_ends.empty() ? core::CM_MODEL_MOVES : 0U) |
+                 (model.ends || !mesh.shutter_transforms.empty() ? core::CM_MODEL_MOVES : 0U) |
                  (mesh.ends ? core::CM_MODEL_DEFORMS : 0U);
   record.nodes = at.first + mesh.nodes;
   record.records = at.first + mesh.records;
@@ -128,12 +128,13 @@ CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& a
   return record;
 }
 
-// Returns the shutter transforms of one placing of a mesh within the model.
-PlaceEnds ends_of(const Model& model, const ModelMesh& mesh, std::size_t placing) {
-  const PlaceEnds of_model = model.ends.value_or(PlaceEnds{model.to_world, model.to_world});
-  const dmat4& still = mesh.placings[placing];
-  const PlaceEnds within = mesh.placing_ends.empty() ? PlaceEnds{still, still} : mesh.placing_ends[placing];
-  const PlaceEnds ends{of_model.open * within.open, of_model.close * within.close};
+// Returns the shutter transforms of one instance of a mesh within the model.
+ShutterTransforms ends_of(const Model& model, const ModelMesh& mesh, std::size_t instance) {
+  const ShutterTransforms of_model = model.ends.value_or(ShutterTransforms{model.to_world, model.to_world});
+  const dmat4& still = mesh.transforms[instance];
+  const ShutterTransforms within =
+      mesh.shutter_transforms.empty() ? ShutterTransforms{still, still} : mesh.shutter_transforms[instance];
+  const ShutterTransforms ends{of_model.open * within.open, of_model.close * within.close};
   // An animation that rotates too fast to interpolate is not an error: the mesh is then static.
   if (can_stand(ends.open) && can_stand(ends.close) && stays_solid(ends.open, ends.close)) return ends;
   return {model.to_world * still, model.to_world * still};
@@ -142,7 +143,7 @@ PlaceEnds ends_of(const Model& model, const ModelMesh& mesh, std::size_t placing
 // Returns the record of a mesh at one shutter end: its transform, and its tables if it deforms.
 CmModel record_of_end(const dmat4& to_world, const ModelMesh& mesh, MeshEnds::End MeshEnds::*end, std::uint32_t first) {
   CmModel record{};
-  place(record, to_world);
+  set_transform(record, to_world);
   if (!mesh.ends) return record;
   const MeshEnds::End& at = (*mesh.ends).*end;
   record.nodes = first + at.nodes;
@@ -159,7 +160,7 @@ std::pair<dvec3, dvec3> own_box(const ModelMesh& mesh) {
 }
 
 bool moves(const Model& model) {
-  const auto of_itself = [](const ModelMesh& mesh) { return mesh.ends || !mesh.placing_ends.empty(); };
+  const auto of_itself = [](const ModelMesh& mesh) { return mesh.ends || !mesh.shutter_transforms.empty(); };
   return model.ends || std::ranges::any_of(model.source->meshes, of_itself);
 }
 
@@ -170,10 +171,10 @@ struct Way {
   double size = 0.0;
 };
 
-Way way_of(std::initializer_list<dmat4> places, const dvec3& low, const dvec3& high) {
+Way way_of(std::initializer_list<dmat4> transforms, const dvec3& low, const dvec3& high) {
   Way way;
-  for (const dmat4& place : places) {
-    const Block block = block_of(place, low, high);
+  for (const dmat4& transform : transforms) {
+    const Block block = block_of(transform, low, high);
     way.low = glm::min(way.low, block.middle - reach_of(block));
     way.high = glm::max(way.high, block.middle + reach_of(block));
   }
@@ -206,18 +207,18 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
     for (std::size_t i = 0; i < source.meshes.size(); ++i) {
       const ModelMesh& mesh = source.meshes[i];
       const auto [own_low, own_high] = own_box(mesh);
-      for (std::size_t k = 0; k < mesh.placings.size(); ++k) {
-        const dmat4 to_world = model.to_world * mesh.placings[k];
+      for (std::size_t k = 0; k < mesh.transforms.size(); ++k) {
+        const dmat4 to_world = model.to_world * mesh.transforms[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
         CmModel record = record_of(model, mesh, at);
-        place(record, to_world);
+        set_transform(record, to_world);
         // A mesh that a file scales to zero is left out.
         if (!is_sound(record)) continue;
         record.first = static_cast<std::uint32_t>(triangles);
         triangles += mesh.triangle_count;
         if (triangles >= std::numeric_limits<std::uint32_t>::max())
           refuse(ErrorCode::unsupported, "the total exceeds 2^32 triangles, counted per instance");
-        const PlaceEnds ends = ends_of(model, mesh, k);
+        const ShutterTransforms ends = ends_of(model, mesh, k);
         if (any_moves) {
           opens.push_back(record_of_end(ends.open, mesh, &MeshEnds::open, at.first));
           closes.push_back(record_of_end(ends.close, mesh, &MeshEnds::close, at.first));
@@ -241,7 +242,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
       }
     }
     for (const surface::PunctualLight& light : source.pose.lights) {
-      table.analytic_lights.push_back(placed(light, surface::from_origin(model.to_world, source.pose)));
+      table.analytic_lights.push_back(transformed(light, surface::from_origin(model.to_world, source.pose)));
       table.analytic_light_groups.push_back(model.group);
     }
   }

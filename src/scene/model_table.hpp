@@ -26,16 +26,16 @@ struct ModelWords {
   std::uint32_t textures = 0;
 };
 
-/// The model, mesh and placing of a record.
+/// The model, mesh and instance of a record.
 struct ModelPart {
   std::uint32_t model = 0;
   std::uint32_t mesh = 0;
-  std::uint32_t placing = 0;  // index within the mesh
+  std::uint32_t instance = 0;  // index within the mesh
 };
 
 /// Records and nodes are copied to buffers unchanged. A scene without triangles has one record, which no ray hits.
 struct ModelTable {
-  std::vector<core::CmModel> records;  ///< one for each placing of each mesh
+  std::vector<core::CmModel> records;  ///< one for each instance of each mesh
   /// Follow the records in the buffer: the transforms at shutter open, then at shutter close, and for deforming meshes
   /// the tables at that end. Empty if nothing moves.
   std::vector<core::CmModel> ends;
@@ -52,7 +52,7 @@ struct ModelTable {
 };
 
 /// Transforms a model's light to world space. Its intensity is unchanged. to_world: from the space of its position.
-surface::PunctualLight placed(surface::PunctualLight light, const glm::dmat4& to_world);
+surface::PunctualLight transformed(surface::PunctualLight light, const glm::dmat4& to_world);
 
 /// World bounds of a model's triangles; `any` is false if it has none.
 struct ModelBounds {
@@ -67,7 +67,7 @@ bool can_stand(const glm::dmat4& to_world);
 
 /// Builds the table. words: returns the offsets of a source. Throws Error(invalid_argument) for a transform that is not
 /// finite, is singular or scales too far. Throws Error(unsupported) for a model that reaches 1e12 or more from the
-/// world origin. Also throws it for more than 2^32 triangles, counted once per placing. Messages count models from 0.
+/// world origin. Also throws it for more than 2^32 triangles, counted once per instance. Messages count models from 0.
 /// O(n log n).
 ModelTable make_model_table(std::span<const Model> models, const std::function<ModelWords(const ModelSource&)>& words);
 

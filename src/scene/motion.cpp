@@ -39,8 +39,8 @@ MotionTable make_motion(const Snapshot& snapshot, const dmat4& ray_to_world, std
   made.maps.push_back(map_of(into(now) * ray_to_world));
   made.maps.push_back(map_of(into_then * ray_to_world));
   for (const Volume& volume : volumes) {
-    const dmat4& place = volume.place.to_world;
-    const dmat4 moved = volume.previous ? volume.previous->to_world * glm::inverse(place) : dmat4(1.0);
+    const dmat4& transform = volume.transform.to_world;
+    const dmat4 moved = volume.previous ? volume.previous->to_world * glm::inverse(transform) : dmat4(1.0);
     made.maps.push_back(map_of(into_then * moved * ray_to_world));
   }
   made.frame.first_model = static_cast<std::uint32_t>(made.maps.size());
@@ -49,11 +49,12 @@ MotionTable make_motion(const Snapshot& snapshot, const dmat4& ray_to_world, std
     const Model& model = models[part.model];
     // If the previous scene had other meshes, the current pose is used.
     const ModelSourcePtr& then_posed = model.previous_source;
-    const bool alike = then_posed && then_posed->meshes.size() == model.source->meshes.size() &&
-                       then_posed->meshes[part.mesh].placings.size() == model.source->meshes[part.mesh].placings.size();
+    const bool alike =
+        then_posed && then_posed->meshes.size() == model.source->meshes.size() &&
+        then_posed->meshes[part.mesh].transforms.size() == model.source->meshes[part.mesh].transforms.size();
     const ModelSource& source = alike ? *then_posed : *model.source;
-    const dmat4 placing = source.meshes.at(part.mesh).placings.at(part.placing);
-    made.maps.push_back(map_of(into_then * model.previous.value_or(model.to_world) * placing, vertices_of(source)));
+    const dmat4 transform = source.meshes.at(part.mesh).transforms.at(part.instance);
+    made.maps.push_back(map_of(into_then * model.previous.value_or(model.to_world) * transform, vertices_of(source)));
   }
   return made;
 }

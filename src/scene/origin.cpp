@@ -23,8 +23,9 @@ double scale_of(const Extent& thing, const dvec3& eye) {
   return std::max(glm::distance(thing.low, thing.high), glm::distance(eye, glm::clamp(eye, thing.low, thing.high)));
 }
 
-void move(std::optional<PlaceEnds>& ends, const dvec3& origin) {
-  if (ends) ends = PlaceEnds{cumulet::counted_from(ends->open, origin), cumulet::counted_from(ends->close, origin)};
+void move(std::optional<ShutterTransforms>& ends, const dvec3& origin) {
+  if (ends)
+    ends = ShutterTransforms{cumulet::counted_from(ends->open, origin), cumulet::counted_from(ends->close, origin)};
 }
 
 }  // namespace
@@ -53,14 +54,14 @@ dvec3 origin_of_scene(std::span<const Extent> things, const std::optional<dvec3>
   return far_origin(there, there, scale_of(*worst, *eye));
 }
 
-Place counted_from(Place place, const dvec3& origin) {
-  place.to_world = cumulet::counted_from(place.to_world, origin);
-  move(place.ends, origin);
-  return place;
+InstanceTransform counted_from(InstanceTransform transform, const dvec3& origin) {
+  transform.to_world = cumulet::counted_from(transform.to_world, origin);
+  move(transform.ends, origin);
+  return transform;
 }
 
 Volume counted_from(Volume volume, const dvec3& origin) {
-  volume.place = counted_from(volume.place, origin);
+  volume.transform = counted_from(volume.transform, origin);
   if (volume.previous) volume.previous = counted_from(*volume.previous, origin);
   return volume;
 }

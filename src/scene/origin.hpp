@@ -23,7 +23,7 @@ struct Extent {
 glm::dvec3 origin_of_scene(std::span<const Extent> things, const std::optional<glm::dvec3>& eye);
 
 /// Converts objects from world space to coordinates relative to the origin.
-Place counted_from(Place place, const glm::dvec3& origin);
+InstanceTransform counted_from(InstanceTransform transform, const glm::dvec3& origin);
 Volume counted_from(Volume volume, const glm::dvec3& origin);
 Model counted_from(Model model, const glm::dvec3& origin);
 light::AnalyticLights counted_from(light::AnalyticLights analytic_lights, const glm::dvec3& origin);

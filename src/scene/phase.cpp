@@ -18,7 +18,7 @@ double mean_cosine(const Phase& phase) {
   const double g = phase.second_anisotropy;
   const double bend = phase.second_bend;
   const double second = g * (1.0 + bend * (3.0 + 2.0 * g * g) / 5.0) / (1.0 + bend * (1.0 + 2.0 * g * g) / 3.0);
-  return (1.0 - phase.second_share) * double{phase.anisotropy} + phase.second_share * second;
+  return (1.0 - phase.second_weight) * double{phase.anisotropy} + phase.second_weight * second;
 }
 
 }  // namespace cumulet::scene

@@ -3,12 +3,12 @@
 namespace cumulet::scene {
 
 /// A phase function, as CmPhase of glsl/phase.glsl: a Henyey-Greenstein lobe, and a second lobe of Draine's form with
-/// weight second_share.
+/// weight second_weight.
 struct Phase {
   float anisotropy = 0.0F;
   float second_anisotropy = 0.0F;
   float second_bend = 0.0F;
-  float second_share = 0.0F;
+  float second_weight = 0.0F;
   bool operator==(const Phase&) const = default;
   /// Whether the anisotropy of the first lobe may vary in space; not for a fitted phase function.
   [[nodiscard]] bool may_vary() const { return second_bend == 0.0F; }

@@ -152,13 +152,13 @@ struct Between {
 };
 
 std::vector<Between> between(std::uint32_t larger, std::uint32_t smaller) {
-  std::vector<Between> places(smaller);
+  std::vector<Between> weights(smaller);
   for (std::uint32_t i = 0; i < smaller; ++i) {
     const double at = (i + 0.5) * larger / smaller - 0.5;
     const auto first = static_cast<std::uint32_t>(at);
-    places[i] = {first, std::min(first + 1, larger - 1), static_cast<float>(at - first)};
+    weights[i] = {first, std::min(first + 1, larger - 1), static_cast<float>(at - first)};
   }
-  return places;
+  return weights;
 }
 
 }  // namespace

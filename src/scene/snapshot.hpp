@@ -10,11 +10,11 @@
 #include "light/analytic_lights.hpp"
 #include "light/distant_lights.hpp"
 #include "light/environment.hpp"
+#include "scene/instance_transform.hpp"
 #include "scene/march_source.hpp"
 #include "scene/model_source.hpp"
 #include "scene/part.hpp"
 #include "scene/phase.hpp"
-#include "scene/place.hpp"
 
 namespace cumulet::scene {
 
@@ -80,23 +80,23 @@ struct Volume {
   std::uint64_t id = 0;   ///< shared by instances of one volume, which change together
   MarchSourcePtr source;  ///< not null; all in a scene have the same grid type
   Part<Medium> medium;
-  Place place;
-  std::optional<SequenceFrame> frame = {};  ///< if it is of a sequence or a dynamic volume
-  std::optional<Place> previous = {};       ///< transform in the previous frame; empty: unchanged
+  InstanceTransform transform;
+  std::optional<SequenceFrame> frame = {};         ///< if it is of a sequence or a dynamic volume
+  std::optional<InstanceTransform> previous = {};  ///< transform in the previous frame; empty: unchanged
   bool operator==(const Volume&) const = default;
 };
 
 /// A posed surface model and its transform.
 struct Model {
-  std::uint64_t id = 0;                     ///< identifies the model; unchanged if its source changes
-  ModelSourcePtr source;                    ///< not null
-  glm::dmat4 to_world{1.0};                 ///< affine, from the world space that it was posed in
-  bool shadow_only = false;                 ///< camera rays do not hit it; other rays do
-  std::uint32_t group = 0;                  ///< light group
-  std::optional<glm::dmat4> previous = {};  ///< transform in the previous frame; empty: unchanged
-  ModelSourcePtr previous_source = {};      ///< pose in the previous frame; null: unchanged
-  bool holdout = false;                     ///< holdout: occludes and renders as transparent
-  std::optional<PlaceEnds> ends = {};       ///< empty: it does not move
+  std::uint64_t id = 0;                        ///< identifies the model; unchanged if its source changes
+  ModelSourcePtr source;                       ///< not null
+  glm::dmat4 to_world{1.0};                    ///< affine, from the world space that it was posed in
+  bool shadow_only = false;                    ///< camera rays do not hit it; other rays do
+  std::uint32_t group = 0;                     ///< light group
+  std::optional<glm::dmat4> previous = {};     ///< transform in the previous frame; empty: unchanged
+  ModelSourcePtr previous_source = {};         ///< pose in the previous frame; null: unchanged
+  bool holdout = false;                        ///< holdout: occludes and renders as transparent
+  std::optional<ShutterTransforms> ends = {};  ///< empty: it does not move
   bool operator==(const Model&) const = default;
 };
 

@@ -40,7 +40,9 @@ core::CmSpace space_of(const glm::dmat4& cube_to_world, const vec3& low, const v
   return space;
 }
 
-double mean_stretch(const glm::dmat4& place) { return std::cbrt(std::abs(glm::determinant(glm::dmat3(place)))); }
+double mean_stretch(const glm::dmat4& transform) {
+  return std::cbrt(std::abs(glm::determinant(glm::dmat3(transform))));
+}
 
 double max_extinction(double extent) {
   constexpr double max_depth = 0x1p23;
@@ -74,13 +76,13 @@ bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
   return std::ranges::all_of(at, [&](double t) { return side * volume(t) > bound; });
 }
 
-PlacedEmissive emissive_of(const EmissiveSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
+InstanceEmissive emissive_of(const EmissiveSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& transform) {
   if (!(sum.power > 0.0)) return {};
-  PlacedEmissive emissive{.power = sum.power * std::abs(glm::determinant(glm::dmat3(place))),
-                          .length = sum.length * mean_stretch(place)};
+  InstanceEmissive emissive{.power = sum.power * std::abs(glm::determinant(glm::dmat3(transform))),
+                            .length = sum.length * mean_stretch(transform)};
   emissive.looks.density = static_cast<float>(1.0 / emissive.power);
   emissive.looks.extent = static_cast<float>(emissive.length);
-  emissive.looks.min_stretch = static_cast<float>(min_stretch(glm::dmat3(place * cube_to_world)));
+  emissive.looks.min_stretch = static_cast<float>(min_stretch(glm::dmat3(transform * cube_to_world)));
   return emissive;
 }
 

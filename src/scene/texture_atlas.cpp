@@ -55,16 +55,16 @@ TextureImages texture_images(surface::ScenePtr scene, std::uint32_t largest, con
 
 TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes) {
   TextureAtlas atlas;
-  std::vector<TextureAtlas::Place*> order;
+  std::vector<TextureAtlas::Region*> order;
   std::uint32_t widest = 1;
   std::uint64_t texels = 0;
-  atlas.places.resize(scenes.size());
+  atlas.regions.resize(scenes.size());
   for (std::size_t i = 0; i < scenes.size(); ++i) {
-    atlas.places[i].resize(scenes[i]->sizes.size());
-    for (std::size_t j = 0; j < atlas.places[i].size(); ++j) {
+    atlas.regions[i].resize(scenes[i]->sizes.size());
+    for (std::size_t j = 0; j < atlas.regions[i].size(); ++j) {
       const uvec2 size = scenes[i]->sizes[j];
-      atlas.places[i][j].size = size;
-      order.push_back(&atlas.places[i][j]);
+      atlas.regions[i][j].size = size;
+      order.push_back(&atlas.regions[i][j]);
       widest = std::max({widest, size.x, size.y});
       texels += std::uint64_t{size.x} * size.y;
     }
@@ -75,27 +75,27 @@ TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes) {
   std::ranges::stable_sort(order, [](const auto* a, const auto* b) { return a->size.y > b->size.y; });
   uvec2 at(0U);
   std::uint32_t cache = 0;
-  for (TextureAtlas::Place* const place : order) {
-    if (at.x + place->size.x > atlas.edge) {
+  for (TextureAtlas::Region* const region : order) {
+    if (at.x + region->size.x > atlas.edge) {
       at = {0U, at.y + cache};
       cache = 0;
     }
-    if (at.y + place->size.y > atlas.edge) {
+    if (at.y + region->size.y > atlas.edge) {
       at = uvec2(0U);
       cache = 0;
       ++atlas.layers;
     }
-    place->corner = at;
-    place->layer = atlas.layers;
-    at.x += place->size.x;
-    cache = std::max(cache, place->size.y);
+    region->corner = at;
+    region->layer = atlas.layers;
+    at.x += region->size.x;
+    cache = std::max(cache, region->size.y);
   }
   ++atlas.layers;
   return atlas;
 }
 
-glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Place& place) {
-  return {place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
+glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Region& region) {
+  return {region.corner.x | region.corner.y << 16U, region.size.x | region.size.y << 16U, region.layer,
           wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << core::CM_WRAP_T_SHIFT |
               (texture.sampler.magnify == surface::Filter::nearest ? core::CM_TEXTURE_NEAREST : 0U)};
 }

@@ -30,14 +30,14 @@ TextureImages texture_images(surface::ScenePtr scene, std::uint32_t largest, con
 
 /// Images packed into layers of one size, each stored once: glsl/surface.glsl does the wrapping and filtering.
 struct TextureAtlas {
-  struct Place {
+  struct Region {
     glm::uvec2 corner{0U};
     glm::uvec2 size{0U};
     std::uint32_t layer = 0;
   };
   std::uint32_t edge = 1;  // width and height of a layer
   std::uint32_t layers = 0;
-  std::vector<std::vector<Place>> places;  // for each image of each scene
+  std::vector<std::vector<Region>> regions;  // for each image of each scene
 };
 
 /// Packs images in rows of decreasing height (shelf packing). The layer edge is at least that of the largest image. O(n
@@ -46,6 +46,6 @@ TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes);
 
 /// Returns a word of glsl/surface.glsl's texture table: the image's position in the atlas, and its wrapping and
 /// filtering.
-glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Place& place);
+glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Region& region);
 
 }  // namespace cumulet::scene

@@ -119,14 +119,15 @@ class Bvh::Builder {
         Record& record = out.records_[i];
         record.triangle = ids_[i];
         record.flags = flags_.empty() ? 0 : flags_[ids_[i]];
-        place(record, vertices_, indices_);
+        set_triangle(record, vertices_, indices_);
       }
     });
   }
 
   // Sets the corners of a record's triangle. If a coordinate is not sound, all corners become 0, `spare` becomes 1 and
   // the box is empty.
-  static void place(Record& record, std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices) {
+  static void set_triangle(Record& record, std::span<const PosedVertex> vertices,
+                           std::span<const std::uint32_t> indices) {
     const std::size_t first = std::size_t{record.triangle} * 3;
     record.v0 = vertices[indices[first]].position;
     record.v1 = vertices[indices[first + 1]].position;
@@ -513,8 +514,8 @@ class Bvh::Builder {
     std::vector<Node> above;
     std::uint32_t next = 0;
     // Nodes above the parts with their positions, known once all nodes before them are counted.
-    std::vector<std::pair<std::uint32_t, Node>> placed;
-    const std::function<std::uint32_t(const Piece&)> place_piece = [&](const Piece& p) {
+    std::vector<std::pair<std::uint32_t, Node>> nodes_above;
+    const std::function<std::uint32_t(const Piece&)> put_piece = [&](const Piece& p) {
       if (!p.nodes.empty()) {
         const std::uint32_t at = next;
         parts.emplace_back(&p, at);
@@ -525,16 +526,16 @@ class Bvh::Builder {
       const std::uint32_t at = next++;
       Node node{};
       for (unsigned half = 0; half < 2; ++half) {
-        node.child[half] = child_of(p.halves[half]->box, place_piece(*p.halves[half]));
+        node.child[half] = child_of(p.halves[half]->box, put_piece(*p.halves[half]));
       }
-      placed.emplace_back(at, node);
+      nodes_above.emplace_back(at, node);
       return at;
     };
-    place_piece(root);
+    put_piece(root);
     out.nodes_.resize(next);
     out.parts_.clear();
     for (const auto& [p, at] : parts) out.parts_.push_back({at, at + static_cast<std::uint32_t>(p->nodes.size())});
-    for (const auto& [at, node] : placed) out.nodes_[at] = node;
+    for (const auto& [at, node] : nodes_above) out.nodes_[at] = node;
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
       const std::uint32_t at = parts[i].second;
       std::size_t to = at;
@@ -612,7 +613,7 @@ void Bvh::refit(std::span<const PosedVertex> vertices, std::span<const std::uint
   Builder::check_indices(vertices, indices);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, records_.size(), grain), [&](const auto& range) {
     check(progress);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) Builder::place(records_[i], vertices, indices);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) Builder::set_triangle(records_[i], vertices, indices);
   });
   // Bottom-up: children come after their parents.
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t p) {

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 
 namespace cumulet::surface::detail {
 
@@ -72,7 +72,7 @@ DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, B
   }
   constexpr std::uint64_t bytes_per_face = 256;  // of the decoder's tables
   budget.take(faces, bytes_per_face, what);
-  state_->mesh = apart(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
+  state_->mesh = run_cancellable(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
     draco::DecoderBuffer buffer;
     buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     draco::Decoder decoder;
@@ -102,9 +102,9 @@ std::vector<std::uint32_t> DracoMesh::indices() const {
 void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
                      float* to, std::size_t step, const std::string& what) const {
   draco::Mesh& mesh = *state_->mesh;
-  const int place = mesh.GetAttributeIdByUniqueId(id);
-  if (place < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
-  draco::PointAttribute* attribute = mesh.attribute(place);
+  const int attribute_id = mesh.GetAttributeIdByUniqueId(id);
+  if (attribute_id < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
+  draco::PointAttribute* attribute = mesh.attribute(attribute_id);
   if (!attribute->is_mapping_identity() && attribute->indices_map_size() < mesh.num_points()) {
     malformed(what + " has fewer elements than vertices");
   }

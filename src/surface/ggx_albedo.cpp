@@ -74,18 +74,18 @@ GgxAlbedo::GgxAlbedo() : texels_(static_cast<std::size_t>(width() * height())) {
 }
 
 glm::vec2 GgxAlbedo::towards(float roughness, float cosine) const {
-  const glm::vec2 place = core::cm_ggx_albedo_place(roughness, cosine);
-  const glm::ivec2 cell = glm::min(glm::ivec2(place), size - 2);
-  const glm::vec2 f = place - glm::vec2(cell);
+  const glm::vec2 position = core::cm_ggx_albedo_position(roughness, cosine);
+  const glm::ivec2 cell = glm::min(glm::ivec2(position), size - 2);
+  const glm::vec2 f = position - glm::vec2(cell);
   const glm::vec2 low = glm::mix(texels_[index(cell.x, cell.y)], texels_[index(cell.x + 1, cell.y)], f.x);
   const glm::vec2 high = glm::mix(texels_[index(cell.x, cell.y + 1)], texels_[index(cell.x + 1, cell.y + 1)], f.x);
   return glm::mix(low, high, f.y);
 }
 
 glm::vec2 GgxAlbedo::average(float roughness) const {
-  const float place = core::cm_ggx_albedo_place(roughness, 0.0F).y;
-  const int row = std::min(static_cast<int>(place), size - 2);
-  return glm::mix(texels_[index(size, row)], texels_[index(size, row + 1)], place - static_cast<float>(row));
+  const float position = core::cm_ggx_albedo_position(roughness, 0.0F).y;
+  const int row = std::min(static_cast<int>(position), size - 2);
+  return glm::mix(texels_[index(size, row)], texels_[index(size, row + 1)], position - static_cast<float>(row));
 }
 
 std::vector<glm::uvec4> GgxAlbedo::cells() const {

@@ -18,7 +18,7 @@ class GgxAlbedo {
   /// Returns the cosine-weighted mean over all directions, of the interpolated table.
   [[nodiscard]] glm::vec2 average(float roughness) const;
 
-  /// Rows by roughness, each with `width` entries: by cosine (cm_ggx_albedo_place), then the average.
+  /// Rows by roughness, each with `width` entries: by cosine (cm_ggx_albedo_position), then the average.
   [[nodiscard]] const std::vector<glm::vec2>& texels() const { return texels_; }
   static int width();
   static int height();

@@ -445,7 +445,7 @@ std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::
     malformed(what + ": " + std::to_string(from.size()) + " bytes cannot hold " + std::to_string(count) + " elements");
   }
   budget.take(count, stride, what);
-  return apart(budget.progress_for(count * stride), [=] {
+  return run_cancellable(budget.progress_for(count * stride), [=] {
     std::vector<std::uint8_t> bytes(count * stride);
     int status = 0;
     if (count != 0) {
@@ -470,7 +470,7 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
   file.folder = folder;
   const Container container = unpack(file.storage->emplace_back(std::move(bytes)));
   const std::size_t length = container.json.size();
-  auto checked = apart(budget.progress_for(length), [text = container.json, owner = file.storage] {
+  auto checked = run_cancellable(budget.progress_for(length), [text = container.json, owner = file.storage] {
     json parsed = parse_json(text);
     std::string out_of_range = check_schema(parsed);
     return std::pair(std::move(parsed), std::move(out_of_range));
@@ -484,7 +484,7 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
     log.warning(name + ": " + std::to_string(aside.channels) + " animation channels without a target node are ignored");
   }
 
-  file.model = apart(budget.progress_for(length), [root = std::move(root)] { return parse_model(root); });
+  file.model = run_cancellable(budget.progress_for(length), [root = std::move(root)] { return parse_model(root); });
   for (const auto& [mesh, primitive, accessor] : aside.indices) {
     if (mesh >= file.model.meshes.size() || primitive >= file.model.meshes[mesh].primitives.size()) {
       malformed(numbered("mesh", mesh) + " is malformed");

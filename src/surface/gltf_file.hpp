@@ -15,7 +15,7 @@
 #include <variant>
 #include <vector>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "base/one_line.hpp"
@@ -56,8 +56,8 @@ class Budget {
   void check(std::size_t turn) const {
     if (turn % 16384 == 0) cumulet::check(progress_);
   }
-  /// Returns the progress to pass to apart() for work on this many bytes; null for few bytes, which are not worth a
-  /// thread.
+  /// Returns the progress to pass to run_cancellable() for work on this many bytes; null for few bytes, which are not
+  /// worth a thread.
   [[nodiscard]] const Progress* progress_for(std::uint64_t bytes) const {
     constexpr std::uint64_t few = 65536;
     return bytes < few ? nullptr : progress_;
@@ -104,7 +104,7 @@ struct GltfFile {
   std::optional<std::filesystem::path> folder;  ///< folder of referenced files; none: they are refused
 
   using Storage = std::deque<std::vector<std::uint8_t>>;
-  std::shared_ptr<Storage> storage = make_left<Storage>();  ///< memory that `views` points into
+  std::shared_ptr<Storage> storage = make_deferred_delete<Storage>();  ///< memory that `views` points into
 
   /// Returns the bytes of a buffer view. Throws Error(file) if it does not exist, or if its buffer has no data.
   [[nodiscard]] Bytes view(std::int64_t index) const;

@@ -263,15 +263,15 @@ class Schema {
       value.erase("extras");
       const bool any = kinds_.contains(type + ".*");
       for (const auto& [key, member] : value.items()) {
-        std::string place = type;
-        if (!place.empty()) place += '.';
-        place += any ? "*" : key;
-        visit(member, place, type.empty() ? one_line(key) : where + "." + one_line(key));
+        std::string pattern = type;
+        if (!pattern.empty()) pattern += '.';
+        pattern += any ? "*" : key;
+        visit(member, pattern, type.empty() ? one_line(key) : where + "." + one_line(key));
       }
     } else if (value.is_array()) {
-      const std::string place = type + "[]";
+      const std::string pattern = type + "[]";
       std::size_t i = 0;
-      for (json& element : value) visit(element, place, where + "[" + std::to_string(i++) + "]");
+      for (json& element : value) visit(element, pattern, where + "[" + std::to_string(i++) + "]");
     }
   }
 

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "surface/jpeg.h"
 #include "surface/materials.hpp"
 
@@ -153,7 +153,7 @@ DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
     malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
   const std::uint64_t pixels = header.width * header.height;
   budget.take(pixels, 4, "an image of " + size);
-  return apart(budget.progress_for(4 * pixels), [bytes, owner, header] {
+  return run_cancellable(budget.progress_for(4 * pixels), [bytes, owner, header] {
     if (is_jpeg(bytes)) return decode_jpeg(bytes, header);
     return DecodedImage{is_webp(bytes) ? decode_webp(bytes, header) : decode_png(bytes), {}};
   });

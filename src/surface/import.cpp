@@ -8,7 +8,7 @@
 #include <optional>
 #include <set>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/progress_part.hpp"
 #include "surface/accessors.hpp"
 #include "surface/gltf_file.hpp"
@@ -46,7 +46,7 @@ class Assembler {
     variants();
     meshes();
     look_at_winding();
-    place();
+    add_draws();
     lights_and_cameras();
     count();
     remark();
@@ -94,12 +94,13 @@ class Assembler {
         ++without_instances_;
         continue;
       }
-      if (!attributes.Keys().empty()) placings_[node] = placings(accessors, node, attributes);
+      if (!attributes.Keys().empty()) instance_transforms_[node] = instance_transforms(accessors, node, attributes);
     }
   }
 
   /// Returns one matrix per instance.
-  std::vector<glm::dmat4> placings(const Accessors& accessors, std::uint32_t node, const tinygltf::Value& attributes) {
+  std::vector<glm::dmat4> instance_transforms(const Accessors& accessors, std::uint32_t node,
+                                              const tinygltf::Value& attributes) {
     const std::string what = numbered("node", node) + ", instances' ";
     std::optional<std::size_t> count;
     for (const std::string& name : attributes.Keys()) {
@@ -167,7 +168,7 @@ class Assembler {
   }
 
   /// Adds a draw for every part under every node.
-  void place() {
+  void add_draws() {
     std::uint64_t vertices = 0;
     std::uint64_t indices = 0;
     std::uint64_t draws = 0;
@@ -186,23 +187,23 @@ class Assembler {
     scene_->attributes.reserve(vertices);
     scene_->indices.reserve(indices);
     // Prototypes come last, each of one node.
-    for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
-      if (!placings_.contains(node)) place_part(node, part, place);
+    for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t part_index) {
+      if (!instance_transforms_.contains(node)) add_part(node, part, part_index);
     });
-    for (auto& [node, in_node] : placings_) {
+    for (auto& [node, in_node] : instance_transforms_) {
       const auto first = static_cast<std::uint32_t>(scene_->draws.size());
-      for (const std::size_t place : parts_of_[static_cast<std::size_t>(file_.model.nodes[node].mesh)]) {
-        place_part(node, scene_->parts[place], place);
+      for (const std::size_t part_index : parts_of_[static_cast<std::size_t>(file_.model.nodes[node].mesh)]) {
+        add_part(node, scene_->parts[part_index], part_index);
         scene_->instances.back().in_prototype = true;
       }
       const auto parts = static_cast<std::uint32_t>(scene_->draws.size()) - first;
       if (parts == 0) continue;
       scene_->prototypes.push_back({first, parts, static_cast<std::uint32_t>(in_node.size())});
-      scene_->placings.push_back({node, std::move(in_node)});
+      scene_->prototype_instances.push_back({node, std::move(in_node)});
     }
   }
 
-  void place_part(std::uint32_t node, const MeshPart& part, std::size_t place) {
+  void add_part(std::uint32_t node, const MeshPart& part, std::size_t part_index) {
     check(progress_);
     int skin = file_.model.nodes[node].skin;
     if (skin >= 0 && part.influences == 0) {
@@ -216,7 +217,7 @@ class Assembler {
                   " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
       }
     }
-    scene_->add_instance(place, node, skin, progress_);
+    scene_->add_instance(part_index, node, skin, progress_);
     budget_.take(part.variants.size(), sizeof(std::uint32_t), "all variants");
     for (std::size_t v = 0; v < part.variants.size(); ++v) {
       scene_->variants[v].materials.push_back(part.variants[v]);
@@ -228,8 +229,8 @@ class Assembler {
     for (const std::uint32_t node : scene_->rig.displayed) {
       const int mesh = file_.model.nodes[node].mesh;
       if (mesh < 0 || scene_->rig.hidden[node]) continue;
-      for (const std::size_t place : parts_of_[static_cast<std::size_t>(mesh)]) {
-        visit(node, scene_->parts[place], place);
+      for (const std::size_t part_index : parts_of_[static_cast<std::size_t>(mesh)]) {
+        visit(node, scene_->parts[part_index], part_index);
       }
     }
   }
@@ -265,8 +266,8 @@ class Assembler {
     for (std::size_t m = 0; m < parts_of_.size(); ++m) {
       std::vector<glm::vec3> positions;
       std::vector<std::uint32_t> indices;
-      for (const std::size_t place : parts_of_[m]) {
-        const MeshPart& part = scene_->parts[place];
+      for (const std::size_t part_index : parts_of_[m]) {
+        const MeshPart& part = scene_->parts[part_index];
         if (scene_->materials[part.material].double_sided) continue;
         budget_.take(part.indices.size(), 120, "the tables of a mesh");
         const auto first = static_cast<std::uint32_t>(positions.size());
@@ -274,9 +275,9 @@ class Assembler {
         for (const std::uint32_t index : part.indices) indices.push_back(first + index);
       }
       const Progress* const progress = budget_.progress_for(sizeof(std::uint32_t) * indices.size());
-      const Winding winding = apart(progress, [positions = std::move(positions), indices = std::move(indices)] {
-        return winding_of(positions, indices);
-      });
+      const Winding winding = run_cancellable(
+          progress,
+          [positions = std::move(positions), indices = std::move(indices)] { return winding_of(positions, indices); });
       if (!(winding.inward > max_inward * winding.area)) continue;
       if (++count > 3) continue;
       const std::string called = one_line(file_.model.meshes[m].name);
@@ -295,7 +296,7 @@ class Assembler {
     double largest = 0.0;
     for (const MeshPart& part : scene_->parts)
       largest = std::max(largest, glm::distance(glm::dvec3(part.low), glm::dvec3(part.high)));
-    for (const Placings& of : scene_->placings) {
+    for (const PrototypeInstances& of : scene_->prototype_instances) {
       double farthest = 0.0;
       for (const glm::dmat4& in_node : of.in_node) farthest = std::max(farthest, farthest_coordinate(in_node[3]));
       remark.add(numbered("node", of.node) + "'s instances", farthest, largest);
@@ -311,8 +312,8 @@ class Assembler {
     for (std::size_t m = 0; m < parts_of_.size(); ++m) {
       const std::string called = one_line(file_.model.meshes[m].name);
       const std::string what = numbered("mesh", m) + (called.empty() ? "" : " (" + called + ")");
-      for (const std::size_t place : parts_of_[m])
-        remark.add(what, scene_->parts[place].low, scene_->parts[place].high);
+      for (const std::size_t part_index : parts_of_[m])
+        remark.add(what, scene_->parts[part_index].low, scene_->parts[part_index].high);
     }
     scene_->precision_remark = remark.text(name_);
   }
@@ -379,12 +380,12 @@ class Assembler {
   const std::string& name_;
   Budget& budget_;
   Progress* progress_;
-  std::shared_ptr<PosableScene> scene_ = make_left<PosableScene>();
+  std::shared_ptr<PosableScene> scene_ = make_deferred_delete<PosableScene>();
   std::vector<bool> used_;
   std::vector<std::vector<std::size_t>> parts_of_;
   MeshRemarks remarks_;
   std::size_t absent_joints_ = 0;
-  std::map<std::uint32_t, std::vector<glm::dmat4>> placings_;  ///< by node, from EXT_mesh_gpu_instancing
+  std::map<std::uint32_t, std::vector<glm::dmat4>> instance_transforms_;  ///< by node, from EXT_mesh_gpu_instancing
   std::size_t skinned_instances_ = 0;
   std::size_t without_instances_ = 0;
   std::set<std::string> own_attributes_;  ///< instance attributes other than transforms

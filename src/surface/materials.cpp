@@ -209,8 +209,8 @@ class Materials {
     to.metallic = even.metallic;
     to.roughness = even.roughness;
     // Both textures are combined into one, with the transform of the diffuse one.
-    auto at = placed(TextureSlot::base_color, diffuse, what, movable);
-    const auto other = placed(TextureSlot::metallic_roughness, specular, what, movable);
+    auto at = texture_use(TextureSlot::base_color, diffuse, what, movable);
+    const auto other = texture_use(TextureSlot::metallic_roughness, specular, what, movable);
     if (!at) at = other;
     if (!at) return;
     if (other && (other->uv_set != at->uv_set || other->transform != at->transform)) {
@@ -278,15 +278,15 @@ class Materials {
   }
 
   void texture(TextureSlot slot, const Use& from, const std::string& what, MovableMaterial& movable) {
-    auto to = placed(slot, from, what, movable);
+    auto to = texture_use(slot, from, what, movable);
     if (!to) return;
     to->texture = texture_of(static_cast<std::size_t>(from.index));
     use_of(movable.now, slot) = *to;
   }
 
   /// Returns a texture use with its transform, without the texture. Nullopt if there is none or it cannot be read.
-  std::optional<TextureUse> placed(TextureSlot slot, const Use& from, const std::string& what,
-                                   MovableMaterial& movable) {
+  std::optional<TextureUse> texture_use(TextureSlot slot, const Use& from, const std::string& what,
+                                        MovableMaterial& movable) {
     if (from.index < 0) return std::nullopt;
     if (static_cast<std::size_t>(from.index) >= file_.model.textures.size()) {
       malformed(what + ": there is no texture " + std::to_string(from.index));
@@ -315,7 +315,7 @@ class Materials {
     const auto known = textures_.find(index);
     if (known != textures_.end()) return known->second;
     const tinygltf::Texture& from = file_.model.textures[index];
-    std::int32_t place = -1;
+    std::int32_t scene_index = -1;
     const Sampler made = sampler(from.sampler, index);
     std::int64_t image = -1;
     // The core image is the fallback for the extension's.
@@ -325,11 +325,11 @@ class Materials {
     if (image < 0) image = image_of(from.source, index);
     if (image < 0 && from.source < 0) remark_on(from, index);
     if (image >= 0) {
-      place = static_cast<std::int32_t>(scene_.textures.size());
+      scene_index = static_cast<std::int32_t>(scene_.textures.size());
       scene_.textures.push_back({static_cast<std::uint32_t>(image), made});
     }
-    textures_[index] = place;
-    return place;
+    textures_[index] = scene_index;
+    return scene_index;
   }
 
   /// Logs textures with only an image of an unsupported extension, such as KHR_texture_basisu. A texture without any
@@ -348,13 +348,13 @@ class Materials {
     if (number < 0) return -1;
     const auto known = images_.find(number);
     if (known != images_.end()) return known->second;
-    std::int64_t place = -1;
+    std::int64_t scene_index = -1;
     if (auto image = read_image(number, index)) {
-      place = static_cast<std::int64_t>(scene_.images.size());
+      scene_index = static_cast<std::int64_t>(scene_.images.size());
       scene_.images.push_back(std::move(*image));
     }
-    images_[number] = place;
-    return place;
+    images_[number] = scene_index;
+    return scene_index;
   }
 
   /// Decodes the glTF image of a texture. An image that cannot be read is logged as a warning.

@@ -49,14 +49,14 @@ std::vector<std::uint32_t> compact(std::vector<std::uint32_t>& indices, std::siz
     return used;
   }
   constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> place(count, unused);
-  for (const std::uint32_t index : indices) place[index] = 0;
+  std::vector<std::uint32_t> new_index(count, unused);
+  for (const std::uint32_t index : indices) new_index[index] = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (place[i] == unused) continue;
-    place[i] = static_cast<std::uint32_t>(used.size());
+    if (new_index[i] == unused) continue;
+    new_index[i] = static_cast<std::uint32_t>(used.size());
     used.push_back(i);
   }
-  for (std::uint32_t& index : indices) index = place[index];
+  for (std::uint32_t& index : indices) index = new_index[index];
   return used;
 }
 

@@ -21,14 +21,14 @@ struct Instance {
 };
 
 /// Instance transforms of a prototype, in the space of its node.
-struct Placings {
+struct PrototypeInstances {
   std::uint32_t node = 0;
   std::vector<glm::dmat4> in_node;
   glm::dvec3 origin{0.0};  ///< in that space: vertices are relative to it
 };
 
 /// A light under a node.
-struct PlacedLight {
+struct LightInstance {
   std::uint32_t node = 0;
   std::uint32_t light = 0;  ///< its index in the file
   MovableLight at_rest;
@@ -39,9 +39,9 @@ class PosableScene final : public Scene {
   Rig rig;
   std::vector<MeshPart> parts;
   std::vector<Instance> instances;
-  std::vector<Placings> placings;        ///< one per prototype
-  std::vector<MovableMaterial> movable;  ///< animatable materials; empty: no animation changes any
-  std::vector<PlacedLight> lights;
+  std::vector<PrototypeInstances> prototype_instances;  ///< one per prototype
+  std::vector<MovableMaterial> movable;                 ///< animatable materials; empty: no animation changes any
+  std::vector<LightInstance> lights;
   std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;  ///< with their nodes
 
   /// Adds a draw of a part under a node; skin: index, negative: none. Throws Error(file) for too many vertices, and
@@ -69,15 +69,16 @@ class PosableScene final : public Scene {
   /// Computes the bounds of all visible triangles.
   void bound(Pose& pose) const;
   /// Applies animated materials and lights.
-  void move(const Track& track, double time, Pose& pose, std::vector<PlacedLight>& lights_now) const;
+  void move(const Track& track, double time, Pose& pose, std::vector<LightInstance>& lights_now) const;
   /// Returns the world transforms of each prototype's instances. Transforms that flatten space are left out.
-  [[nodiscard]] std::vector<std::vector<glm::dmat4>> place_prototypes(const Stance& now) const;
+  [[nodiscard]] std::vector<std::vector<glm::dmat4>> find_prototype_transforms(const Stance& now) const;
   /// Poses an instance; returns true if the instance mirrors.
-  bool place(const Instance& instance, const Stance& now, double drift, Pose& pose, const Progress* progress) const;
+  bool pose_instance(const Instance& instance, const Stance& now, double drift, Pose& pose,
+                     const Progress* progress) const;
   /// Matrix: a float matrix for an origin of 0, else a double matrix. side: -1 for mirrored instances.
   template <class Matrix>
-  void place_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
-                      const Progress* progress) const;
+  void pose_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
+                     const Progress* progress) const;
 };
 
 }  // namespace cumulet::surface::detail

@@ -103,12 +103,12 @@ bool alike(const Pose& a, const Pose& b) {
   for (std::size_t i = 0; i < a.vertices.size(); ++i) {
     if (!(glm::distance(a.vertices[i].position, b.vertices[i].position) <= most)) return false;
   }
-  for (std::size_t p = 0; p < a.placings.size(); ++p) {
-    if (a.placings[p].size() != b.placings[p].size()) return false;
-    for (std::size_t i = 0; i < a.placings[p].size(); ++i) {
+  for (std::size_t p = 0; p < a.prototype_transforms.size(); ++p) {
+    if (a.prototype_transforms[p].size() != b.prototype_transforms[p].size()) return false;
+    for (std::size_t i = 0; i < a.prototype_transforms[p].size(); ++i) {
       for (int c = 0; c < 4; ++c) {
-        const double bound = c == 3 ? double{most} : 1e-4 * glm::length(a.placings[p][i][c]);
-        if (!(glm::distance(a.placings[p][i][c], b.placings[p][i][c]) <= bound)) return false;
+        const double bound = c == 3 ? double{most} : 1e-4 * glm::length(a.prototype_transforms[p][i][c]);
+        if (!(glm::distance(a.prototype_transforms[p][i][c], b.prototype_transforms[p][i][c]) <= bound)) return false;
       }
     }
   }
@@ -165,13 +165,13 @@ void PosableScene::finish() {
 }
 
 void PosableScene::find_origins_of_prototypes() {
-  for (std::size_t p = 0; p < placings.size(); ++p) {
+  for (std::size_t p = 0; p < prototype_instances.size(); ++p) {
     Box box;
     const std::size_t first = prototypes[p].first_draw;
     const std::size_t last = first + prototypes[p].draw_count;
     for (std::size_t i = first; i < last; ++i) box.add(parts[instances[i].part], glm::dmat4(1.0));
-    placings[p].origin = box.origin();
-    for (std::size_t i = first; i < last; ++i) instances[i].origin = placings[p].origin;
+    prototype_instances[p].origin = box.origin();
+    for (std::size_t i = first; i < last; ++i) instances[i].origin = prototype_instances[p].origin;
   }
 }
 
@@ -190,16 +190,16 @@ glm::dvec3 PosableScene::origin_of(const Stance& now) const {
   }
   if (!box.is_empty()) return box.origin();
   // Then only lights and bounds are relative to the origin.
-  for (const PlacedLight& light : lights) box.add(glm::dvec3(now.to_world[light.node][3]));
-  for (const Placings& of : placings) {
+  for (const LightInstance& light : lights) box.add(glm::dvec3(now.to_world[light.node][3]));
+  for (const PrototypeInstances& of : prototype_instances) {
     for (const glm::dmat4& in_node : of.in_node) box.add(glm::dvec3((now.to_world[of.node] * in_node)[3]));
   }
   return box.origin(1.0);
 }
 
 template <class Matrix>
-void PosableScene::place_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
-                                  const Progress* progress) const {
+void PosableScene::pose_vertices(const Instance& instance, const Stance& now, double drift, float side, Pose& pose,
+                                 const Progress* progress) const {
   using Number = typename Matrix::value_type;
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];
@@ -238,8 +238,8 @@ void PosableScene::place_vertices(const Instance& instance, const Stance& now, d
   });
 }
 
-bool PosableScene::place(const Instance& instance, const Stance& now, double drift, Pose& pose,
-                         const Progress* progress) const {
+bool PosableScene::pose_instance(const Instance& instance, const Stance& now, double drift, Pose& pose,
+                                 const Progress* progress) const {
   const MeshPart& part = parts[instance.part];
   bool flipped = false;
   if (instance.skin >= 0) {
@@ -255,9 +255,9 @@ bool PosableScene::place(const Instance& instance, const Stance& now, double dri
   const float side = flipped ? -1.0F : 1.0F;
   const glm::dvec3& origin = instance.in_prototype ? instance.origin : pose.origin;
   if (origin == glm::dvec3(0.0)) {
-    place_vertices<glm::mat4>(instance, now, drift, side, pose, progress);
+    pose_vertices<glm::mat4>(instance, now, drift, side, pose, progress);
   } else {
-    place_vertices<glm::dmat4>(instance, now, drift, side, pose, progress);
+    pose_vertices<glm::dmat4>(instance, now, drift, side, pose, progress);
   }
 
   PosedVertex* const vertices = &pose.vertices[instance.first_vertex];
@@ -284,7 +284,7 @@ bool PosableScene::place(const Instance& instance, const Stance& now, double dri
   return flipped;
 }
 
-void PosableScene::move(const Track& track, double time, Pose& pose, std::vector<PlacedLight>& lights_now) const {
+void PosableScene::move(const Track& track, double time, Pose& pose, std::vector<LightInstance>& lights_now) const {
   std::vector<MovableMaterial> moved = movable;
   std::vector<float> values;
   for (const Channel& channel : track.channels) {
@@ -295,22 +295,22 @@ void PosableScene::move(const Track& track, double time, Pose& pose, std::vector
       channel.of_material.set(moved[channel.target], values);
       continue;
     }
-    for (PlacedLight& light : lights_now) {
+    for (LightInstance& light : lights_now) {
       if (light.light == channel.target) channel.of_light.set(light.at_rest, values);
     }
   }
   for (const MovableMaterial& material : moved) pose.materials.push_back(material.now);
 }
 
-std::vector<std::vector<glm::dmat4>> PosableScene::place_prototypes(const Stance& now) const {
+std::vector<std::vector<glm::dmat4>> PosableScene::find_prototype_transforms(const Stance& now) const {
   std::vector<std::vector<glm::dmat4>> all;
-  for (const Placings& of : placings) {
-    std::vector<glm::dmat4>& placed = all.emplace_back();
+  for (const PrototypeInstances& of : prototype_instances) {
+    std::vector<glm::dmat4>& transforms = all.emplace_back();
     if (!now.visible[of.node]) continue;
     for (const glm::dmat4& in_node : of.in_node) {
       const glm::dmat4 to_world = glm::translate(now.to_world[of.node] * in_node, of.origin);
       const double volume = glm::determinant(glm::dmat3(to_world));
-      if (finite(to_world) && std::isnormal(volume)) placed.push_back(to_world);
+      if (finite(to_world) && std::isnormal(volume)) transforms.push_back(to_world);
     }
   }
   return all;
@@ -335,9 +335,9 @@ void PosableScene::bound(Pose& pose) const {
     }
     // For many instances the corners of a box are used, for few each vertex.
     const auto prototype = std::ranges::upper_bound(prototypes, i, {}, &Prototype::first_draw) - prototypes.begin() - 1;
-    const std::vector<glm::dmat4>& placed = pose.placings[static_cast<std::size_t>(prototype)];
+    const std::vector<glm::dmat4>& transforms = pose.prototype_transforms[static_cast<std::size_t>(prototype)];
     std::vector<glm::vec3> points;
-    if (placed.size() * count <= max_bounded) {
+    if (transforms.size() * count <= max_bounded) {
       for (const PosedVertex& vertex : vertices) points.push_back(vertex.position);
     } else {
       glm::vec3 own_low(std::numeric_limits<float>::max());
@@ -348,7 +348,7 @@ void PosableScene::bound(Pose& pose) const {
       }
       for (const glm::dvec3& corner : corners_of(own_low, own_high)) points.emplace_back(corner);
     }
-    for (const glm::dmat4& to_world : placed) {
+    for (const glm::dmat4& to_world : transforms) {
       const glm::dmat4 from_origin = counted_from(to_world, pose.origin);
       for (const glm::vec3& p : points) add(glm::vec3(from_origin * glm::dvec4(p, 1.0)));
     }
@@ -378,15 +378,15 @@ Pose PosableScene::pose(double time, std::size_t animation, double drift, const 
   resize(result.vertices, attributes.size(), progress);
   for (const Instance& instance : instances) {
     check(progress);
-    result.flipped.push_back(place(instance, now, drift, result, progress) ? 1 : 0);
+    result.flipped.push_back(pose_instance(instance, now, drift, result, progress) ? 1 : 0);
     result.hidden.push_back(now.visible[instance.node] ? 0 : 1);
   }
   check(progress);
-  result.placings = place_prototypes(now);
+  result.prototype_transforms = find_prototype_transforms(now);
   bound(result);
-  std::vector<PlacedLight> lights_now = lights;
+  std::vector<LightInstance> lights_now = lights;
   if (track != nullptr) move(*track, at, result, lights_now);
-  for (const PlacedLight& light : lights_now) {
+  for (const LightInstance& light : lights_now) {
     if (!now.visible[light.node]) continue;
     const glm::dmat4& to_world = now.to_world[light.node];
     result.lights.push_back(light.at_rest.now);

@@ -149,7 +149,7 @@ struct Draw {
 struct Prototype {
   std::uint32_t first_draw = 0;
   std::uint32_t draw_count = 0;
-  std::uint32_t placings = 0;  ///< number of instances
+  std::uint32_t instance_count = 0;  ///< number of instances
 };
 
 /// Vertex attributes that do not move; all poses share them.
@@ -174,8 +174,8 @@ struct Pose {
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
   std::vector<std::uint8_t> flipped;  ///< per Draw: 1 if the node mirrors, so that the winding is clockwise
   std::vector<std::uint8_t> hidden;   ///< per Draw: 1 if it is not visible at this time; empty: all are visible
-  std::vector<std::vector<glm::dmat4>> placings;  ///< per Prototype: transforms to world space
-  std::vector<Material> materials;                ///< at this time; empty: those of the scene
+  std::vector<std::vector<glm::dmat4>> prototype_transforms;  ///< per Prototype: transforms to world space
+  std::vector<Material> materials;                            ///< at this time; empty: those of the scene
   std::vector<std::uint32_t> chosen;  ///< per Draw: its material in the chosen variant; empty: the Draw's own
   bool double_sided = false;          ///< treat all materials as double sided
   std::vector<PunctualLight> lights;
@@ -262,7 +262,7 @@ inline std::uint64_t Scene::shown_triangles() const {
   for (const Prototype& prototype : prototypes) {
     std::uint64_t own = 0;
     for (std::uint32_t i = 0; i < prototype.draw_count; ++i) own += draws[prototype.first_draw + i].index_count / 3;
-    all = all - own + own * prototype.placings;
+    all = all - own + own * prototype.instance_count;
   }
   return all;
 }

@@ -64,18 +64,18 @@ float SheenAlbedo::at(int column, int row) const {
 }
 
 float SheenAlbedo::towards(float roughness, float cosine) const {
-  const glm::vec2 place = core::cm_ggx_albedo_place(roughness, cosine);
-  const glm::ivec2 cell = glm::min(glm::ivec2(place), size - 2);
-  const glm::vec2 f = place - glm::vec2(cell);
+  const glm::vec2 position = core::cm_ggx_albedo_position(roughness, cosine);
+  const glm::ivec2 cell = glm::min(glm::ivec2(position), size - 2);
+  const glm::vec2 f = position - glm::vec2(cell);
   const float low = glm::mix(at(cell.x, cell.y), at(cell.x + 1, cell.y), f.x);
   const float high = glm::mix(at(cell.x, cell.y + 1), at(cell.x + 1, cell.y + 1), f.x);
   return glm::mix(low, high, f.y);
 }
 
 float SheenAlbedo::average(float roughness) const {
-  const float place = core::cm_ggx_albedo_place(roughness, 0.0F).y;
-  const auto row = static_cast<std::size_t>(std::min(static_cast<int>(place), size - 2));
-  return glm::mix(averages_[row], averages_[row + 1], place - static_cast<float>(row));
+  const float position = core::cm_ggx_albedo_position(roughness, 0.0F).y;
+  const auto row = static_cast<std::size_t>(std::min(static_cast<int>(position), size - 2));
+  return glm::mix(averages_[row], averages_[row + 1], position - static_cast<float>(row));
 }
 
 std::vector<glm::uvec4> SheenAlbedo::words() const {

@@ -43,12 +43,12 @@ class Texels {
   [[nodiscard]] glm::vec4 at(std::uint32_t x, std::uint32_t y) const {
     if (image_ == nullptr) return glm::vec4(1.0F);
     if (image_->width == width_ && image_->height == height_) return texel(x, y);
-    const auto place = [](std::uint32_t i, std::uint32_t count, std::uint32_t of) {
+    const auto position = [](std::uint32_t i, std::uint32_t count, std::uint32_t of) {
       return std::clamp((static_cast<float>(i) + 0.5F) * static_cast<float>(of) / static_cast<float>(count) - 0.5F,
                         0.0F, static_cast<float>(of - 1));
     };
-    const float u = place(x, width_, image_->width);
-    const float v = place(y, height_, image_->height);
+    const float u = position(x, width_, image_->width);
+    const float v = position(y, height_, image_->height);
     const auto left = static_cast<std::uint32_t>(u);
     const auto top = static_cast<std::uint32_t>(v);
     const std::uint32_t right = std::min(left + 1, image_->width - 1);

@@ -44,7 +44,7 @@ class Sums {
   explicit Sums(std::size_t corners) : slots_(std::bit_ceil(2 * corners + 1), none) {}
 
   glm::vec3& operator[](const Corner& corner) {
-    std::uint32_t& slot = slots_[place(corner)];
+    std::uint32_t& slot = slots_[slot_of(corner)];
     if (slot == none) {
       slot = static_cast<std::uint32_t>(entries_.size());
       entries_.push_back({corner, glm::vec3(0.0F)});
@@ -53,7 +53,7 @@ class Sums {
   }
   /// Returns null if there is none.
   [[nodiscard]] const glm::vec3* find(const Corner& corner) const {
-    const std::uint32_t slot = slots_[place(corner)];
+    const std::uint32_t slot = slots_[slot_of(corner)];
     return slot == none ? nullptr : &entries_[slot].sum;
   }
 
@@ -64,7 +64,7 @@ class Sums {
   };
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-  [[nodiscard]] std::size_t place(const Corner& corner) const {
+  [[nodiscard]] std::size_t slot_of(const Corner& corner) const {
     const std::size_t mask = slots_.size() - 1;
     std::size_t at = hash_of(corner) & mask;
     while (slots_[at] != none && !(entries_[slots_[at]].corner == corner)) at = (at + 1) & mask;

@@ -26,12 +26,12 @@ std::vector<std::uint32_t> weld(std::span<const glm::vec3> positions) {
   std::iota(order.begin(), order.end(), 0U);
   const auto key = [&](std::uint32_t i) { return std::array{positions[i].x, positions[i].y, positions[i].z}; };
   std::ranges::sort(order, {}, key);
-  std::vector<std::uint32_t> place(positions.size());
+  std::vector<std::uint32_t> welded(positions.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
-    place[order[i]] = same ? place[order[i - 1]] : order[i];
+    welded[order[i]] = same ? welded[order[i - 1]] : order[i];
   }
-  return place;
+  return welded;
 }
 
 /// Union-find over connected triangles. Each triangle is wound like the root of its component or opposite to it.
@@ -41,11 +41,11 @@ class Pieces {
     std::iota(parent_.begin(), parent_.end(), 0U);
   }
 
-  struct Place {
+  struct Component {
     std::uint32_t piece = 0;
     bool against = false;
   };
-  Place find(std::uint32_t triangle) {
+  Component find(std::uint32_t triangle) {
     std::uint32_t root = triangle;
     bool against = false;
     for (; parent_[root] != root; root = parent_[root]) against ^= against_[root] != 0;
@@ -62,8 +62,8 @@ class Pieces {
     return {root, against};
   }
   void join(std::uint32_t a, std::uint32_t b, bool against) {
-    const Place x = find(a);
-    const Place y = find(b);
+    const Component x = find(a);
+    const Component y = find(b);
     if (x.piece == y.piece) {
       if ((x.against != y.against) != against) open(a);  // a Moebius strip has no inside
       return;
@@ -133,11 +133,11 @@ Pieces pieces_of(const std::vector<std::array<std::uint32_t, 3>>& triangles) {
 }  // namespace
 
 Winding winding_of(std::span<const glm::vec3> positions, std::span<const std::uint32_t> indices) {
-  const std::vector<std::uint32_t> place = weld(positions);
+  const std::vector<std::uint32_t> welded = weld(positions);
   std::vector<std::array<std::uint32_t, 3>> triangles;
   triangles.reserve(indices.size() / 3);
   for (std::size_t i = 0; i + 3 <= indices.size(); i += 3) {
-    const std::array<std::uint32_t, 3> t{place[indices[i]], place[indices[i + 1]], place[indices[i + 2]]};
+    const std::array<std::uint32_t, 3> t{welded[indices[i]], welded[indices[i + 1]], welded[indices[i + 2]]};
     if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) triangles.push_back(t);
   }
   Pieces pieces = pieces_of(triangles);

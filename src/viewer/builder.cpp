@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "grid/tet_grid.hpp"
 #include "scene/space.hpp"
 #include "viewer/cell_budget.hpp"
@@ -149,13 +149,14 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     return built;
   }
   refine.max_cells = built.cell_limit = cells_that_fit(max_cells, carried, volume->bytes(), resource_limits);
-  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
-  auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
+  const auto diamonds = make_deferred_delete<const grid::DiamondSet>(*statistics, channels, refine, &progress);
+  auto builder = make_deferred_delete<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
   progress.begin(Progress::Stage::records);
   const float max_value = voxels->max_value;
-  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, channels, &progress));
+  auto grid = make_deferred_delete<const grid::TetGrid>(
+      builder->records(settings.refine.cells, max_value, channels, &progress));
   builder.reset();
   built.seconds.records = watch.lap();
   built.cells = grid->cells.size();
@@ -170,7 +171,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
 
 namespace {
 
-void place(volume::VolumeFrame& frame, const glm::dmat4& to_world) {
+void transform(volume::VolumeFrame& frame, const glm::dmat4& to_world) {
   for (volume::ScalarVolume* field : frame.fields()) field->index_to_world = to_world * field->index_to_world;
 }
 
@@ -181,13 +182,13 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const { retu
 VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
                                 const std::function<void(volume::Proxy)>& take_proxy) const {
   const auto take = [&](volume::Proxy made) {
-    place(made.frame, to_world);
+    transform(made.frame, to_world);
     if (made.extent) made.extent->index_to_world = to_world * made.extent->index_to_world;
     take_proxy(std::move(made));
   };
   volume::VolumeFrame frame = take_proxy ? volume::import_frame(path, grids, log, progress, {take, min_proxy_bricks})
                                          : volume::import_frame(path, grids, log, progress);
-  place(frame, to_world);
+  transform(frame, to_world);
   frame.temperature_scale = temperature_scale;
   try {
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);

@@ -22,14 +22,14 @@ constexpr double unknown_noise = std::numeric_limits<double>::infinity();
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
 
-std::vector<cumulet::scene::Place> places_of(const double* to_world, uint32_t count) {
+std::vector<cumulet::scene::InstanceTransform> transforms_of(const double* to_world, uint32_t count) {
   const std::span<const double> values = array_of(to_world, count, 16, "transforms");
-  std::vector<cumulet::scene::Place> places(count);
+  std::vector<cumulet::scene::InstanceTransform> transforms(count);
   for (size_t i = 0; i < count; ++i) {
-    places[i].to_world = matrix_or_identity(values.subspan(16 * i).first<16>());
-    require_place(places[i].to_world, "transform " + std::to_string(i) + ": ");
+    transforms[i].to_world = matrix_or_identity(values.subspan(16 * i).first<16>());
+    require_transform(transforms[i].to_world, "transform " + std::to_string(i) + ": ");
   }
-  return places;
+  return transforms;
 }
 
 // Default format of the viewer's own target texture.
@@ -322,33 +322,33 @@ cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_d
 
 cumulet_status cumulet_set_volume_transforms(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    std::vector<cumulet::scene::Place> places = places_of(to_world, count);
-    if (places.empty()) places.emplace_back();
-    v.set_places(places);
+    std::vector<cumulet::scene::InstanceTransform> transforms = transforms_of(to_world, count);
+    if (transforms.empty()) transforms.emplace_back();
+    v.set_transforms(transforms);
   });
 }
 
 cumulet_status cumulet_set_previous_volume_transforms(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_previous_places(places_of(to_world, count)); });
+  return guarded(viewer, [&](core::Viewer& v) { v.set_previous_transforms(transforms_of(to_world, count)); });
 }
 
 cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, const double* open, const double* close,
                                                      uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    std::vector<cumulet::scene::Place> places = v.places();
+    std::vector<cumulet::scene::InstanceTransform> transforms = v.transforms();
     const bool ends = open != nullptr || close != nullptr;
-    require(!ends || count == places.size(),
+    require(!ends || count == transforms.size(),
             "the number of shutter transforms differs from the number of volume transforms");
     constexpr std::array<double, 16> as_it_is{};
     const auto at = [&](const double* matrices, size_t i) {
       return matrices != nullptr ? std::span<const double, 16>(matrices + 16 * i, 16)
                                  : std::span<const double, 16>(as_it_is);
     };
-    for (size_t i = 0; i < places.size(); ++i) {
-      places[i].ends =
-          place_ends(at(open, i), at(close, i), places[i].to_world, "transform " + std::to_string(i) + ": ");
+    for (size_t i = 0; i < transforms.size(); ++i) {
+      transforms[i].ends = shutter_transforms_of(at(open, i), at(close, i), transforms[i].to_world,
+                                                 "transform " + std::to_string(i) + ": ");
     }
-    v.set_places(places);
+    v.set_transforms(transforms);
   });
 }
 
@@ -438,9 +438,9 @@ cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_d
 
 cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points, uint64_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    PlacedRamp read = read_ramp(ramp, points, count);
+    ParsedRamp read = read_ramp(ramp, points, count);
     core::Ramps ramps = v.ramps();
-    ramps.*read.place = std::move(read.ramp);
+    ramps.*read.target = std::move(read.ramp);
     v.set_ramps(ramps);
   });
 }
@@ -643,8 +643,8 @@ cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumul
     out.hit = p.hit ? 1 : 0;
     for (int axis = 0; axis < 3; ++axis) out.position[axis] = p.position[axis];
     out.distance = p.distance;
-    out.hit_volume = p.place ? 1 : 0;
-    out.transform_index = p.place.value_or(0);
+    out.hit_volume = p.transform_index ? 1 : 0;
+    out.transform_index = p.transform_index.value_or(0);
     out.tag = p.tag;
     if (p.surface) {
       out.hit_surface = 1;
@@ -722,7 +722,7 @@ cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_n
     require(values != nullptr, "values is NULL");
     const auto id_of = [&](const core::MatteObject& object) {
       const cumulet::CallbackScope inside;
-      const char* text = name(user, static_cast<cumulet_object_kind>(object.kind), object.tag, object.place);
+      const char* text = name(user, static_cast<cumulet_object_kind>(object.kind), object.tag, object.transform_index);
       return text == nullptr || *text == '\0' ? 0U : cumulet::cryptomatte_id(text);
     };
     v.read_mattes(id_of, ranks, values, count);

@@ -26,8 +26,8 @@ InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   if (d.sequence != nullptr) settings.sequence = d.sequence->asset;
   if (d.dynamic_volume != nullptr) settings.live = d.dynamic_volume->asset;
   settings.to_world = matrix_or_identity(d.to_world);
-  require_place(settings.to_world, "cumulet_instance_desc.");
-  settings.ends = place_ends(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_instance_desc.");
+  require_transform(settings.to_world, "cumulet_instance_desc.");
+  settings.ends = shutter_transforms_of(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_instance_desc.");
   cumulet_medium_desc medium{};
   medium.struct_size = sizeof medium;
   settings.medium = Medium::of(read_settings(d.medium == nullptr ? &medium : d.medium));
@@ -60,10 +60,10 @@ cumulet_status cumulet_instance_set(cumulet_instance* instance, const cumulet_in
 cumulet_status cumulet_instance_set_to_world(cumulet_instance* instance, const double to_world[16]) {
   return on(instance, "instance", [&](Instance& i) {
     require(to_world != nullptr, "to_world is NULL");
-    const glm::dmat4 place = matrix_or_identity(std::span<const double, 16>(to_world, 16));
-    require_place(place);
+    const glm::dmat4 transform = matrix_or_identity(std::span<const double, 16>(to_world, 16));
+    require_transform(transform);
     i.edit([&](InstanceSettings& settings) {
-      settings.to_world = place;
+      settings.to_world = transform;
       settings.ends.reset();
     });
   });
@@ -73,17 +73,18 @@ cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ram
                                          uint64_t count) {
   return on(instance, "instance", [&](Instance& i) {
     auto read = read_ramp(ramp, points, count);
-    i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.place, read.ramp); });
+    i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.target, read.ramp); });
   });
 }
 
 cumulet_status cumulet_instance_set_previous(cumulet_instance* instance, const double* to_world) {
   return on(instance, "instance", [&](Instance& i) {
-    std::optional<cumulet::scene::Place> place;
+    std::optional<cumulet::scene::InstanceTransform> transform;
     if (to_world != nullptr) {
-      place.emplace(cumulet::scene::Place{matrix_or_identity(std::span<const double, 16>(to_world, 16))});
-      require_place(place->to_world);
+      transform.emplace(
+          cumulet::scene::InstanceTransform{matrix_or_identity(std::span<const double, 16>(to_world, 16))});
+      require_transform(transform->to_world);
     }
-    i.edit([&](InstanceSettings& settings) { settings.previous = place; });
+    i.edit([&](InstanceSettings& settings) { settings.previous = transform; });
   });
 }

@@ -15,11 +15,11 @@ using cumulet::viewer::ModelSettings;
 void require_time(double time) { require(std::isfinite(time), "cumulet_model_desc.time is not finite"); }
 
 // what: prefix of the message.
-glm::dmat4 place_of(std::span<const double, 16> to_world, const std::string& what = "") {
-  const glm::dmat4 place = matrix_or_identity(to_world);
-  require_place(place, what);
-  if (!cumulet::scene::can_stand(place)) refuse(what + "to_world is singular or too large");
-  return place;
+glm::dmat4 transform_of(std::span<const double, 16> to_world, const std::string& what = "") {
+  const glm::dmat4 transform = matrix_or_identity(to_world);
+  require_transform(transform, what);
+  if (!cumulet::scene::can_stand(transform)) refuse(what + "to_world is singular or too large");
+  return transform;
 }
 
 ModelSettings settings_of(const cumulet_model_desc* desc) {
@@ -31,8 +31,8 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   require_time(d.time);
   ModelSettings settings;
   if (d.surfaces != nullptr) settings.surfaces = d.surfaces->asset;
-  settings.to_world = place_of(d.to_world, "cumulet_model_desc.");
-  settings.ends = place_ends(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_model_desc.");
+  settings.to_world = transform_of(d.to_world, "cumulet_model_desc.");
+  settings.ends = shutter_transforms_of(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_model_desc.");
   if (settings.ends &&
       !(cumulet::scene::can_stand(settings.ends->open) && cumulet::scene::can_stand(settings.ends->close)))
     refuse("cumulet_model_desc.open_to_world or close_to_world is singular or too large");
@@ -69,9 +69,9 @@ cumulet_status cumulet_model_set(cumulet_model* model, const cumulet_model_desc*
 cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_world[16]) {
   return on(model, "model", [&](ModelInstance& m) {
     require(to_world != nullptr, "to_world is NULL");
-    const glm::dmat4 place = place_of(std::span<const double, 16>(to_world, 16));
+    const glm::dmat4 transform = transform_of(std::span<const double, 16>(to_world, 16));
     m.edit([&](ModelSettings& settings) {
-      settings.to_world = place;
+      settings.to_world = transform;
       settings.ends.reset();
     });
   });
@@ -86,15 +86,15 @@ cumulet_status cumulet_model_set_time(cumulet_model* model, double time) {
 
 cumulet_status cumulet_model_set_previous(cumulet_model* model, const double* to_world, const double* time) {
   return on(model, "model", [&](ModelInstance& m) {
-    std::optional<glm::dmat4> place;
+    std::optional<glm::dmat4> transform;
     std::optional<double> moment;
-    if (to_world != nullptr) place = place_of(std::span<const double, 16>(to_world, 16));
+    if (to_world != nullptr) transform = transform_of(std::span<const double, 16>(to_world, 16));
     if (time != nullptr) {
       require(std::isfinite(*time), "time is not finite");
       moment = *time;
     }
     m.edit([&](ModelSettings& settings) {
-      settings.previous = place;
+      settings.previous = transform;
       settings.previous_time = moment;
     });
   });

@@ -14,16 +14,16 @@
 
 namespace cumulet::c_abi {
 
-struct PlacedRamp {
-  volume::Ramp viewer::Ramps::*place;
+struct ParsedRamp {
+  volume::Ramp viewer::Ramps::*target;
   volume::Ramp ramp;
 };
 
 /// Throws Error(invalid_argument) for an invalid ramp.
-inline PlacedRamp read_ramp(cumulet_ramp of, const float* points, std::uint64_t count) {
-  constexpr std::array places = {&viewer::Ramps::density, &viewer::Ramps::temperature, &viewer::Ramps::flame};
-  static_assert(places.size() == settings::ramps.size());
-  require(number(of) < places.size(), "ramp is unknown");
+inline ParsedRamp read_ramp(cumulet_ramp of, const float* points, std::uint64_t count) {
+  constexpr std::array targets = {&viewer::Ramps::density, &viewer::Ramps::temperature, &viewer::Ramps::flame};
+  static_assert(targets.size() == settings::ramps.size());
+  require(number(of) < targets.size(), "ramp is unknown");
   const auto accept = [&](const std::string& why) {
     if (!why.empty()) refuse(std::string("the ramp of ") + settings::ramps.at(number(of)).name + " " + why);
   };
@@ -36,7 +36,7 @@ inline PlacedRamp read_ramp(cumulet_ramp of, const float* points, std::uint64_t 
     curve.emplace_back(given[i], given[i + 1]);
   }
   accept(settings::ramp_refusal(checked));
-  return {places.at(number(of)), volume::Ramp(std::move(curve))};
+  return {targets.at(number(of)), volume::Ramp(std::move(curve))};
 }
 
 }  // namespace cumulet::c_abi

@@ -176,7 +176,7 @@ inline glm::dmat4 matrix_or_identity(std::span<const double, 16> m) {
 }
 
 /// Throws if the transform is not affine, finite and invertible in float precision. what: prefix of the message.
-inline void require_place(const glm::dmat4& m, const std::string& what = "") {
+inline void require_transform(const glm::dmat4& m, const std::string& what = "") {
   constexpr double most = 1e15;
   const auto all = [](const glm::dmat4& matrix, auto holds) {
     for (int i = 0; i < 16; ++i) {
@@ -192,19 +192,21 @@ inline void require_place(const glm::dmat4& m, const std::string& what = "") {
     refuse(what + "to_world or its inverse has values above 1e15");
 }
 
-/// Returns the transforms at shutter open and close; zeros select `place`, the transform at the frame time. Returns
-/// nullopt if both equal `place`. Throws as require_place(), and if an interpolated transform would be singular. what:
-/// prefix of the message.
-inline std::optional<scene::PlaceEnds> place_ends(std::span<const double, 16> open, std::span<const double, 16> close,
-                                                  const glm::dmat4& place, const std::string& what = "") {
+/// Returns the transforms at shutter open and close; zeros select `transform`, the transform at the frame time. Returns
+/// nullopt if both equal `transform`. Throws as require_transform(), and if an interpolated transform would be
+/// singular. what: prefix of the message.
+inline std::optional<scene::ShutterTransforms> shutter_transforms_of(std::span<const double, 16> open,
+                                                                     std::span<const double, 16> close,
+                                                                     const glm::dmat4& transform,
+                                                                     const std::string& what = "") {
   const auto end = [&](std::span<const double, 16> m, const char* which) {
-    if (std::ranges::all_of(m, [](double value) { return value == 0.0; })) return place;
+    if (std::ranges::all_of(m, [](double value) { return value == 0.0; })) return transform;
     const glm::dmat4 matrix = matrix_or_identity(m);
-    require_place(matrix, what + which);
+    require_transform(matrix, what + which);
     return matrix;
   };
-  const scene::PlaceEnds ends{end(open, "open_"), end(close, "close_")};
-  if (ends.open == place && ends.close == place) return std::nullopt;
+  const scene::ShutterTransforms ends{end(open, "open_"), end(close, "close_")};
+  if (ends.open == transform && ends.close == transform) return std::nullopt;
   if (!scene::stays_solid(ends.open, ends.close))
     refuse(what + "open_to_world and close_to_world have a singular interpolation");
   return ends;

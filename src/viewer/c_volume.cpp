@@ -55,7 +55,7 @@ viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
   const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
   require(d.path != nullptr && *d.path != '\0', "path is NULL or empty");
   const glm::dmat4 m = matrix_or_identity(d.to_world);
-  require_place(m);
+  require_transform(m);
   require(d.suggested_density_scale == 0 || d.suggested_density_scale == 1,
           "suggested_density_scale is neither 0 nor 1");
   const auto name = [](const char* given) { return std::string(given == nullptr ? "" : given); };

@@ -129,7 +129,8 @@ CameraPose fitted(const CameraPose& from, const dvec3& back, const Subject& subj
 }
 
 /// Replaces a pose with eye == target by one that fits the subject, or by a default pose without a subject.
-CameraPose placed(const CameraPose& from, const std::optional<Subject>& subject, double aspect, double margin) {
+CameraPose fitted_if_unset(const CameraPose& from, const std::optional<Subject>& subject, double aspect,
+                           double margin) {
   if (from.eye != from.target) return from;
   if (subject) return fitted(from, glm::normalize(dvec3(0.0, 0.2, 1.0)), *subject, aspect, margin);
   CameraPose pose = from;
@@ -356,7 +357,7 @@ void Camera::matrices(double aspect, ClipDepth clip, dmat4& view, dmat4& project
     }
     return;
   }
-  const CameraPose pose = placed(pose_, std::nullopt, aspect, 0.0);
+  const CameraPose pose = fitted_if_unset(pose_, std::nullopt, aspect, 0.0);
   const ViewFrame frame = frame_of(pose, aspect);
   const Axes axes = axes_of(pose);
   const dmat3 rotation = glm::transpose(dmat3(axes.right, axes.up, -axes.forward));
@@ -503,7 +504,7 @@ void Camera::fly(double right, double up, double forward) {
 }
 
 void Camera::frame(const Subject& subject, double aspect, double margin) {
-  change(waits_for_bounds() ? placed(pose_, subject, aspect, margin)
+  change(waits_for_bounds() ? fitted_if_unset(pose_, subject, aspect, margin)
                             : fitted(pose_, -axes_of(pose_).forward, subject, aspect, margin));
 }
 
@@ -589,8 +590,8 @@ ViewFrame Camera::view(double aspect, const std::optional<Subject>& subject) {
     return frame;
   }
   if (!(aspect > 0.0 && std::isfinite(aspect)))
-    return frame_of(placed(pose_, std::nullopt, 1.0, 0.0), 1.0);  // there is no image
-  const CameraPose pose = placed(pose_, subject, aspect, fit_margin);
+    return frame_of(fitted_if_unset(pose_, std::nullopt, 1.0, 0.0), 1.0);  // there is no image
+  const CameraPose pose = fitted_if_unset(pose_, subject, aspect, fit_margin);
   if (subject && pose != pose_) {
     // Initial placement is not a motion, so the shutter poses stay valid.
     const bool held = shutter_holds();

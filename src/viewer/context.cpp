@@ -127,9 +127,9 @@ bool Context::has_pending_frame(const scene::SequenceFrame& frame) const {
   return scene::holds(uploaded_frames(), frame) ? progressive_.has_pending_picture() : scene_.uploading_volumes();
 }
 
-render::PictureRequest Context::request(const Shot& shot, const Frame& frame, const render::TraceInputs& met) const {
+render::PictureRequest Context::request(const Shot& shot, const Frame& frame, const render::TraceInputs& inputs) const {
   render::PictureRequest request;
-  request.parameters = parameters(shot, met);
+  request.parameters = parameters(shot, inputs);
   request.content.viewpoint = shot.scene->view;
   request.content.previous = shot.scene->previous;
   request.content.view_ends = shot.scene->view_ends;
@@ -153,7 +153,7 @@ render::PictureRequest Context::request(const Shot& shot, const Frame& frame, co
   request.content.size = shot.size;
   request.content.region = shot.sampling.region;
   request.content.view = shot.sampling.view;
-  request.content.surfaces_traced = met.traced;
+  request.content.surfaces_traced = inputs.traced;
   request.content.preview = shot.sampling.preview;
   request.content.separate_volume_aov = shot.sampling.separate_volume_aov;
   request.content.light_groups = shot.sampling.light_groups;
@@ -171,8 +171,8 @@ void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadl
   if (!shot.view()) return;
   take_host_depth(shot, frame);
   if (scene_.data() == nullptr) return;
-  const render::TraceInputs met = trace_inputs(shot);
-  progressive_.advance(request(shot, frame, met), *scene_.data(), met, deadline, frame.budget_ms);
+  const render::TraceInputs inputs = trace_inputs(shot);
+  progressive_.advance(request(shot, frame, inputs), *scene_.data(), inputs, deadline, frame.budget_ms);
 }
 
 std::uint64_t Context::TargetKind::bytes() const {

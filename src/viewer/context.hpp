@@ -178,7 +178,7 @@ class Context {
   [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::TraceInputs& trace_inputs) const;
   void take_host_depth(const Shot& shot, const Frame& frame);
   [[nodiscard]] render::PictureRequest request(const Shot& shot, const Frame& frame,
-                                               const render::TraceInputs& met) const;
+                                               const render::TraceInputs& inputs) const;
   [[nodiscard]] static render::Display display(const Shot& shot, const Frame& frame, const render::Picture& shown);
   [[nodiscard]] render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown) const;
   // Warms up programs. Returns true once all are warm.

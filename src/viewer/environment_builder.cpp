@@ -1,6 +1,6 @@
 #include "viewer/environment_builder.hpp"
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "light/environment_file.hpp"
 
 namespace cumulet::viewer {
@@ -19,7 +19,7 @@ void EnvironmentBuilder::load(const FilePath& path) {
 
 void EnvironmentBuilder::make_sky(const light::Day& day) {
   skies_.post({"computing the sky", Progress::Stage::idle, [this, day](Progress& progress) {
-                 last_sky_ = apart(
+                 last_sky_ = run_cancellable(
                      &progress, [day, last = last_sky_] { return light::make_daylight(day, last ? &*last : nullptr); });
                  const std::scoped_lock lock(mutex_);
                  sky_ = last_sky_;

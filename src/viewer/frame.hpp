@@ -55,10 +55,10 @@ struct Pick {
   bool hit = false;
   glm::dvec3 position{0.0};
   double distance = 0.0;
-  std::optional<std::uint32_t> place;  // if a volume was hit: index of its instance transform
-  std::uint64_t volume = 0;            // its scene::Volume::id
-  std::uint64_t model = 0;             // if a surface was hit: its scene::Model::id
-  std::uint64_t tag = 0;               // tag of the instance or model
+  std::optional<std::uint32_t> transform_index;  // if a volume was hit: index of its instance transform
+  std::uint64_t volume = 0;                      // its scene::Volume::id
+  std::uint64_t model = 0;                       // if a surface was hit: its scene::Model::id
+  std::uint64_t tag = 0;                         // tag of the instance or model
   struct Surface {
     glm::dvec3 normal{0.0};  // unit, towards the ray's origin
     std::uint32_t material = 0;
@@ -96,7 +96,7 @@ struct MatteObject {
   enum class Kind { volume = 0, surfaces = 1, ground = 2 };
   Kind kind = Kind::volume;
   std::uint64_t id = 0;  // of the viewer's instances and models; its own objects have 0
-  std::uint32_t place = 0;
+  std::uint32_t transform_index = 0;
   std::uint64_t tag = 0;  // set by the host
 };
 /// Returns the object's matte ID; 0: it is in no matte.

@@ -23,12 +23,12 @@ struct InstanceSettings {
   std::shared_ptr<Sequence> sequence = {};  ///< replaces the volume; null: none
   std::shared_ptr<Live> live = {};          ///< replaces the volume; null: none
   glm::dmat4 to_world{1.0};
-  std::optional<scene::PlaceEnds> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
+  std::optional<scene::ShutterTransforms> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
   Medium medium = {};
   Ramps ramps = {};
   bool hidden = false;
-  std::uint64_t tag = 0;                      ///< for the host's own use
-  std::optional<scene::Place> previous = {};  ///< transform one frame ago; nullopt: unchanged
+  std::uint64_t tag = 0;                                  ///< for the host's own use
+  std::optional<scene::InstanceTransform> previous = {};  ///< transform one frame ago; nullopt: unchanged
 };
 
 /// Settings of a model instance.
@@ -36,7 +36,7 @@ struct ModelSettings {
   SurfaceAssetPtr surfaces;  ///< null: none
   SurfaceChoice choice;
   glm::dmat4 to_world{1.0};
-  std::optional<scene::PlaceEnds> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
+  std::optional<scene::ShutterTransforms> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
   bool hidden = false;
   bool shadow_only = false;
   bool holdout = false;

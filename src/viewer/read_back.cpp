@@ -81,7 +81,7 @@ void put_before(const render::Display& display, const render::Picture& picture, 
 }
 
 // Fills in the model that the ray hit. pick.position is relative to the snapshot's origin.
-void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle, const dvec3& ray) {
+void set_hit(Pick& pick, const render::ModelInstances& models, std::uint32_t triangle, const dvec3& ray) {
   const scene::ModelTable& table = models.table();
   const std::size_t record = table.record_of(triangle);
   const scene::Model& model = models.models().at(table.parts.at(record).model);
@@ -119,8 +119,9 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   const auto& view = shot.view();
   if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
   const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
-  const render::TraceInputs met = trace_inputs(shot);
-  const render::Tracer::Picked picked = progressive_.tracer().pick(*scene_.data(), parameters(shot, met), met, pixel);
+  const render::TraceInputs inputs = trace_inputs(shot);
+  const render::Tracer::Picked picked =
+      progressive_.tracer().pick(*scene_.data(), parameters(shot, inputs), inputs, pixel);
   const double z = picked.z;
   if (!(z > 0.0)) return {};
   const double right = 2.0 * (pixel.x + 0.5) / shot.size.x - 1.0;
@@ -132,14 +133,14 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   pick.hit = true;
   pick.position = origin + z * ray;
   pick.distance = z * glm::length(ray);
-  if (picked.triangle) meet(pick, *scene_.models(), *picked.triangle, ray);
+  if (picked.triangle) set_hit(pick, *scene_.models(), *picked.triangle, ray);
   pick.position += shot.scene->origin;
-  if (!picked.place) return pick;
+  if (!picked.volume) return pick;
   // Instances of one volume are consecutive.
   const std::vector<scene::Volume>& volumes = scene_.volumes();
-  pick.volume = volumes.at(*picked.place).id;
+  pick.volume = volumes.at(*picked.volume).id;
   const auto first = std::ranges::find_if(volumes, [&](const scene::Volume& v) { return v.id == pick.volume; });
-  pick.place = *picked.place - static_cast<std::uint32_t>(first - volumes.begin());
+  pick.transform_index = *picked.volume - static_cast<std::uint32_t>(first - volumes.begin());
   return pick;
 }
 
@@ -255,19 +256,19 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
   MatteObject object;
   for (const scene::Volume& volume : scene_.volumes()) {
     // Instances of one volume are consecutive.
-    object.place = !ids.volumes.empty() && object.id == volume.id ? object.place + 1 : 0;
+    object.transform_index = !ids.volumes.empty() && object.id == volume.id ? object.transform_index + 1 : 0;
     object.id = volume.id;
     ids.volumes.push_back((*volume.medium).holdout ? 0 : id_of(object));
   }
-  const render::TraceInputs met = trace_inputs(shot);
+  const render::TraceInputs inputs = trace_inputs(shot);
   object = {.kind = MatteObject::Kind::surfaces};
-  for (std::size_t i = 0; met.scene != nullptr && i < met.scene->models().size(); ++i) {
-    const scene::Model& model = met.scene->models()[i];
+  for (std::size_t i = 0; inputs.scene != nullptr && i < inputs.scene->models().size(); ++i) {
+    const scene::Model& model = inputs.scene->models()[i];
     object.id = model.id;
     ids.models.push_back(model.holdout || model.shadow_only ? 0 : id_of(object));
   }
   if (*shot.scene->ground) ids.ground = id_of({.kind = MatteObject::Kind::ground});
-  progressive_.tracer().read_mattes(picture, *scene_.data(), met, ids, ranks, values);
+  progressive_.tracer().read_mattes(picture, *scene_.data(), inputs, ids, ranks, values);
 }
 
 void Context::find_features(const Shot& shot, render::Picture& picture, render::FeatureSet features,
@@ -275,14 +276,15 @@ void Context::find_features(const Shot& shot, render::Picture& picture, render::
   // Motion vectors refer to the current scene.
   const bool of_now = features != render::FeatureSet::all || progressive_.newest_is_seen_as(*shot.scene);
   require_present(of_now);
-  render::TraceInputs met = trace_inputs(shot);
+  render::TraceInputs inputs = trace_inputs(shot);
   scene::MotionTable motion;
   if (features == render::FeatureSet::all) {
     motion = scene_.motion(*shot.scene);
-    met.motion = &motion;
+    inputs.motion = &motion;
   }
   compositor_.begin_denoising_anew();
-  while (!progressive_.tracer().find_features(picture, *scene_.data(), met, deadline_after(1000.0), rays, features)) {
+  while (
+      !progressive_.tracer().find_features(picture, *scene_.data(), inputs, deadline_after(1000.0), rays, features)) {
   }
 }
 

@@ -158,10 +158,10 @@ void RequestCache<Request, Made>::build_missing(Progress& progress) {
     {
       const std::scoped_lock lock(mutex_);
       under_way_.reset();
-      const auto place = find(*next);
-      if (place != cache_.end()) {
-        place->built = std::move(built);
-        place->failure = std::move(failure);
+      const auto found = find(*next);
+      if (found != cache_.end()) {
+        found->built = std::move(built);
+        found->failure = std::move(failure);
         ++revision_;
       }
     }

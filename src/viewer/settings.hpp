@@ -117,15 +117,15 @@ struct EnvironmentSettings {
   static EnvironmentSettings of(const cumulet_environment_settings_desc& d) { return {d.rotation_degrees, d.strength}; }
 };
 
-enum class GroundPlace { none = 0, below = 1, at_height = 2 };
+enum class GroundMode { none = 0, below = 1, at_height = 2 };
 
 struct GroundSettings {
-  GroundPlace place = GroundPlace::none;
+  GroundMode mode = GroundMode::none;
   double height = 0.0;
   glm::vec3 albedo{0.3F};
 
   static GroundSettings of(const cumulet_ground_desc& d) {
-    return {static_cast<GroundPlace>(d.mode), d.height, glm::make_vec3(d.albedo)};
+    return {static_cast<GroundMode>(d.mode), d.height, glm::make_vec3(d.albedo)};
   }
 };
 

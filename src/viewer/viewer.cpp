@@ -56,7 +56,7 @@ scene::Medium shown_medium(const Medium& medium) {
 bool same_but_view(BuildSettings a, const BuildSettings& b) {
   a.refine.density_scale = b.refine.density_scale;
   a.refine.anisotropy = b.refine.anisotropy;
-  if (a.refine.camera && b.refine.camera) a.refine.camera->places = b.refine.camera->places;
+  if (a.refine.camera && b.refine.camera) a.refine.camera->transforms = b.refine.camera->transforms;
   return a == b;
 }
 
@@ -65,8 +65,8 @@ void join(BuildSettings& a, const BuildSettings& b) {
   a.refine.density_scale = std::max(a.refine.density_scale, b.refine.density_scale);
   a.refine.anisotropy = std::min(a.refine.anisotropy, b.refine.anisotropy);
   if (a.refine.camera && b.refine.camera)
-    a.refine.camera->places.insert(a.refine.camera->places.end(), b.refine.camera->places.begin(),
-                                   b.refine.camera->places.end());
+    a.refine.camera->transforms.insert(a.refine.camera->transforms.end(), b.refine.camera->transforms.begin(),
+                                       b.refine.camera->transforms.end());
 }
 
 bool is_of_cells(const Built& built) { return built.source && built.source->march == scene::March::tet; }
@@ -491,8 +491,9 @@ std::optional<BuildSettings> Viewer::settings_at_once() const {
 BuildSettings Viewer::settings_for_view() const {
   BuildSettings settings = grid_.build;
   settings.refine.camera = refine_camera();
-  settings.refine.camera->places.clear();
-  for (const scene::Place& place : places_) settings.refine.camera->places.push_back(place.to_world);
+  settings.refine.camera->transforms.clear();
+  for (const scene::InstanceTransform& transform : transforms_)
+    settings.refine.camera->transforms.push_back(transform.to_world);
   return settings;
 }
 
@@ -575,10 +576,10 @@ VolumeInfoPtr Viewer::volume_info() {
   return volume_info_;
 }
 
-void Viewer::set_places(const std::vector<scene::Place>& places) {
+void Viewer::set_transforms(const std::vector<scene::InstanceTransform>& transforms) {
   sync();
-  places_ = places;
-  places_changed_ = true;
+  transforms_ = transforms;
+  transforms_changed_ = true;
   show_medium();
   if (other_opacity()) {
     take_medium();
@@ -629,9 +630,9 @@ void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
 void Viewer::remove_model(const ModelInstance& model) {
   reported_failures_.retire();
   sync();
-  const auto place = find(model);
-  if (place == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the model is not in the viewer");
-  shown_models_.erase(place);
+  const auto found = find(model);
+  if (found == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the model is not in the viewer");
+  shown_models_.erase(found);
   poses_due_ = true;
   sync();  // drops its failures
   touch();
@@ -700,7 +701,7 @@ void Viewer::follow_poses() {
   if (std::exchange(poses_due_, false)) poses_.request(std::move(requests));
 }
 
-std::optional<scene::PlaceEnds> Viewer::while_open(const std::optional<scene::PlaceEnds>& ends) const {
+std::optional<scene::ShutterTransforms> Viewer::while_open(const std::optional<scene::ShutterTransforms>& ends) const {
   return sampling_.shutter_seconds > 0.0 ? ends : std::nullopt;
 }
 
@@ -789,7 +790,7 @@ Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const s
 }
 
 template <class Player>
-void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*place) {
+void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*member) {
   struct Wanted {
     std::optional<BuildSettings> settings;
     std::vector<Shown*> by;
@@ -797,7 +798,7 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
   };
   std::vector<Wanted> all;
   for (Shown& shown : shown_) {
-    if (!Player::source_of(shown.settings)) (shown.*place).reset();
+    if (!Player::source_of(shown.settings)) (shown.*member).reset();
     // A hidden instance keeps its player for when it is shown again.
     if (!Player::source_of(shown.settings) || !shown.is_seen()) continue;
     std::optional<BuildSettings> settings;
@@ -819,15 +820,15 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
     const auto suits_it = [&](const std::shared_ptr<Player>& p) {
       return p && p->source() == wanted.source() && std::ranges::find(next, p) == next.end();
     };
-    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->*place); });
+    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->*member); });
     const auto any = std::ranges::find_if(players, suits_it);
-    std::shared_ptr<Player> p = had != wanted.by.end() ? (*had)->*place : any != players.end() ? *any : nullptr;
+    std::shared_ptr<Player> p = had != wanted.by.end() ? (*had)->*member : any != players.end() ? *any : nullptr;
     if (p) {
       p->configure(wanted.settings);
     } else {
       p = player_of(wanted.source(), wanted.settings);
     }
-    for (Shown* shown : wanted.by) shown->*place = p;
+    for (Shown* shown : wanted.by) shown->*member = p;
     next.push_back(std::move(p));
   }
   const std::scoped_lock lock(played_mutex_);
@@ -896,7 +897,7 @@ BuildSettings Viewer::settings_of(const Shown& shown) const {
   settings.anisotropic = medium.phase.may_vary();
   if (grid_.camera_adaptive) {
     settings.refine.camera = refine_camera();
-    settings.refine.camera->places = {shown.settings.to_world};
+    settings.refine.camera->transforms = {shown.settings.to_world};
   }
   return settings;
 }
@@ -1361,7 +1362,7 @@ void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
 
 std::optional<light::Day> Viewer::day() const {
   if (!light_.sky) return std::nullopt;
-  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.place != GroundPlace::none};
+  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.mode != GroundMode::none};
 }
 
 void Viewer::surround() {
@@ -1432,8 +1433,8 @@ void Viewer::set_previous_camera(std::shared_ptr<Camera> camera, double seconds)
   touch();
 }
 
-void Viewer::set_previous_places(std::vector<scene::Place> places) {
-  previous_places_ = std::move(places);
+void Viewer::set_previous_transforms(std::vector<scene::InstanceTransform> transforms) {
+  previous_transforms_ = std::move(transforms);
   touch();
 }
 
@@ -1456,20 +1457,22 @@ void Viewer::frame_all() {
 
 double Viewer::stretch() const {
   double most = 0.0;
-  for (const scene::Place& place : places_) most = std::max(most, scene::mean_stretch(place.to_world));
+  for (const scene::InstanceTransform& transform : transforms_)
+    most = std::max(most, scene::mean_stretch(transform.to_world));
   return most;
 }
 
 Bounds Viewer::bounds_of(const VolumeInfo& volume) const {
-  Bounds all = volume.bounds(places_.front().to_world);
-  for (std::size_t i = 1; i < places_.size(); ++i) all = both(all, volume.bounds(places_[i].to_world));
+  Bounds all = volume.bounds(transforms_.front().to_world);
+  for (std::size_t i = 1; i < transforms_.size(); ++i) all = both(all, volume.bounds(transforms_[i].to_world));
   return all;
 }
 
 std::vector<Bounds> Viewer::boxes() const {
   std::vector<Bounds> boxes;
   if (const VolumeInfoPtr& volume_info = shown_info(); volume_info && !volume_info->empty) {
-    for (const scene::Place& place : places_) boxes.push_back(volume_info->bounds(place.to_world));
+    for (const scene::InstanceTransform& transform : transforms_)
+      boxes.push_back(volume_info->bounds(transform.to_world));
   }
   for (const Shown& shown : shown_) {
     if (shown.is_there() && !shown.volume_info()->empty)
@@ -1522,7 +1525,7 @@ void Viewer::count_from(const dvec3& origin) {
       volume = scene::counted_from(std::move(volume), origin);
     } else if (origin != dvec3(0.0)) {
       // The empty volume for surfaces is moved to the origin.
-      volume.place = {glm::translate(glm::dmat4(1.0), -dvec3(empty_volume_->volume().index_to_world[3]))};
+      volume.transform = {glm::translate(glm::dmat4(1.0), -dvec3(empty_volume_->volume().index_to_world[3]))};
     }
   }
 }
@@ -1535,10 +1538,10 @@ bool Viewer::shows_triangles() const {
 
 std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
   // A ground plane at a given height is also shown without other objects: a sequence's frame may be empty.
-  if (ground_.place == GroundPlace::none || (ground_.place == GroundPlace::below && !all)) return std::nullopt;
+  if (ground_.mode == GroundMode::none || (ground_.mode == GroundMode::below && !all)) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
   // With models it is slightly below the bounds, because many models include a floor.
-  if (ground_.place == GroundPlace::below)
+  if (ground_.mode == GroundMode::below)
     ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
   // Then the visible edge of the plane is at most 1e-4 radians below the true horizon.
   const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
@@ -1564,7 +1567,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
   };
   const VolumeInfoPtr& own = shown_info();
-  const std::size_t count = (own ? places_.size() : 0) + shown_.size();
+  const std::size_t count = (own ? transforms_.size() : 0) + shown_.size();
   const auto add_volume = [&](const VolumeInfo& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
     const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
@@ -1581,18 +1584,18 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     if (volume.may_emit) add_box();
   };
   std::size_t vertices = 0;
-  for (const scene::Place& place : places_) {
-    if (own) add_volume(*own, place.to_world, seen_medium());
+  for (const scene::InstanceTransform& transform : transforms_) {
+    if (own) add_volume(*own, transform.to_world, seen_medium());
   }
   for (const Shown& shown : shown_) {
     if (shown.is_there()) add_volume(*shown.volume_info(), shown.settings.to_world, shown.settings.medium);
   }
   for (const scene::Model& model : models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
-      for (const glm::dmat4& placing : mesh.placings) {
+      for (const glm::dmat4& transform : mesh.transforms) {
         // For many instances the boxes are sufficient.
         vertices += mesh.triangle_count;
-        add_mesh(*model.source, mesh, model.to_world * placing, vertices > max_vertices, add);
+        add_mesh(*model.source, mesh, model.to_world * transform, vertices > max_vertices, add);
       }
     }
   }
@@ -1653,10 +1656,10 @@ void Viewer::show_volumes() {
   const scene::MarchSourcePtr& source = proxy_ ? proxy_->source : built_.source;
   if (source && (shown_info() || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
-    for (const scene::Place& place : places_)
-      volumes.push_back({0, source, shown_medium_, {place.to_world, while_open(place.ends)}, frame});
-    for (std::size_t i = 0; i < std::min(volumes.size(), previous_places_.size()); ++i)
-      volumes[i].previous = previous_places_[i];
+    for (const scene::InstanceTransform& transform : transforms_)
+      volumes.push_back({0, source, shown_medium_, {transform.to_world, while_open(transform.ends)}, frame});
+    for (std::size_t i = 0; i < std::min(volumes.size(), previous_transforms_.size()); ++i)
+      volumes[i].previous = previous_transforms_[i];
   }
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && shown.built)

@@ -115,8 +115,8 @@ class Viewer {
   LiveStatus live(const Instance& instance);
   /// Sets the instance transforms of the viewer's own volume, sequence or dynamic volume: affine, from its own world
   /// space; at least one. A grid that does not suit the new scale is rebuilt.
-  void set_places(const std::vector<scene::Place>& places);
-  [[nodiscard]] const std::vector<scene::Place>& places() const { return places_; }
+  void set_transforms(const std::vector<scene::InstanceTransform>& transforms);
+  [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return transforms_; }
   /// World bounds of all instances of a volume.
   [[nodiscard]] Bounds bounds_of(const VolumeInfo& volume) const;
   /// Shows an instance with its current settings, beside the viewer's own volume. Throws Error(invalid_argument) if it
@@ -183,7 +183,7 @@ class Viewer {
   /// Sets the camera of the previous frame, `seconds` ago; null: the camera has not moved.
   void set_previous_camera(std::shared_ptr<Camera> camera, double seconds);
   /// Sets the previous transforms of the volume's first instances.
-  void set_previous_places(std::vector<scene::Place> places);
+  void set_previous_transforms(std::vector<scene::InstanceTransform> transforms);
   void set_navigation(const NavigationSettings& settings);
   bool input(const InputEvent& event);
   void frame_all();
@@ -305,8 +305,8 @@ class Viewer {
   [[nodiscard]] bool voxels_in_gl_wait(Context& g) const;
   static void bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels);
   // Returns the transform for a state that stays GPU-resident; nullopt if the state must go to main memory.
-  static std::optional<glm::dmat4> place_in_gl(Context& g, const std::shared_ptr<Live>& live,
-                                               const render::GlState& state);
+  static std::optional<glm::dmat4> transform_in_gl(Context& g, const std::shared_ptr<Live>& live,
+                                                   const render::GlState& state);
   static void make_products(Context& g, const std::shared_ptr<Live>& live);
   // Sorts and merges the scattered bricks of its newest state.
   static void gather(Context& g, Live& live);
@@ -415,7 +415,7 @@ class Viewer {
   WatchingPtr player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings);
   // Assigns one player to all instances that can share it. Existing players are reused.
   template <class Player>
-  void share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*place);
+  void share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*member);
   // A displayed instance, with its settings when it was last checked.
   struct Shown {
     std::shared_ptr<Instance> instance;
@@ -477,7 +477,8 @@ class Viewer {
   // Request for its pose one frame ago; nullopt: same as now.
   [[nodiscard]] static std::optional<PoseCache::Request> previous_pose(const ShownModel& shown);
   // Returns `ends` if the shutter has a duration.
-  [[nodiscard]] std::optional<scene::PlaceEnds> while_open(const std::optional<scene::PlaceEnds>& ends) const;
+  [[nodiscard]] std::optional<scene::ShutterTransforms> while_open(
+      const std::optional<scene::ShutterTransforms>& ends) const;
   // Sets the shutter duration if the surfaces may move. surfaces: null: they are still to be read.
   [[nodiscard]] SurfaceChoice while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const;
   // Requests the pose of the viewer's own surfaces.
@@ -573,18 +574,18 @@ class Viewer {
   light::AnalyticLights analytic_lights_;           // set by the host
   bool analytic_lights_due_ = false;                // the scene's lights are outdated
   std::vector<std::weak_ptr<const surface::Scene>> remarked_scenes_;
-  std::optional<std::uint64_t> remarked_picture_;  // the last image with a warning about its samples
-  std::vector<scene::Place> places_{1};            // instance transforms of the volume; at least one
-  scene::Part<scene::Medium> shown_medium_;        // of the viewer's own volume
-  std::vector<Shown> shown_;                       // in the order in which they were added
-  std::vector<ShownModel> shown_models_;           // in the order in which they were added
-  std::uint64_t posed_ = 0;                        // revision of poses_ when it was last checked
+  std::optional<std::uint64_t> remarked_picture_;        // the last image with a warning about its samples
+  std::vector<scene::InstanceTransform> transforms_{1};  // instance transforms of the volume; at least one
+  scene::Part<scene::Medium> shown_medium_;              // of the viewer's own volume
+  std::vector<Shown> shown_;                             // in the order in which they were added
+  std::vector<ShownModel> shown_models_;                 // in the order in which they were added
+  std::uint64_t posed_ = 0;                              // revision of poses_ when it was last checked
   std::uint64_t last_id_ = 0;
   std::uint64_t cache_revision_ = 0;  // revision of cache_ when it was last checked
   bool poses_due_ = false;            // the requests for poses_ are outdated
   bool requests_due_ = false;         // the requests for cache_ are outdated
   bool waits_for_own_ = false;        // an instance waits for the volume's own grid, which is being built
-  bool places_changed_ = false;       // since the last traced frame
+  bool transforms_changed_ = false;   // since the last traced frame
   std::uint64_t settings_revision_ = 1;
   glm::uvec2 frame_size_{0U};  // image size of the last frame
   // In the volume's own world space, for volume_. It becomes the medium's once a grid has been built for it.
@@ -592,7 +593,7 @@ class Viewer {
   std::shared_ptr<Camera> previous_camera_;
   std::shared_ptr<void> previous_listener_;
   double previous_seconds_ = 0.0;
-  std::vector<scene::Place> previous_places_;
+  std::vector<scene::InstanceTransform> previous_transforms_;
   std::optional<ViewFrame> previous_view_;  // view of previous_camera_
   std::optional<ViewFrame> view_;           // of the last frame
   std::optional<ViewFrame> traced_view_;    // of the last traced frame
@@ -600,10 +601,10 @@ class Viewer {
   struct BuildView {
     ViewFrame view;
     glm::uvec2 size{0U};
-    std::vector<scene::Place> places;
+    std::vector<scene::InstanceTransform> transforms;
     bool operator==(const BuildView&) const = default;
   };
-  [[nodiscard]] BuildView build_view() const { return {*view_, frame_size_, places_}; }
+  [[nodiscard]] BuildView build_view() const { return {*view_, frame_size_, transforms_}; }
   std::optional<BuildView> built_for_;  // camera-adaptive: view of the last request
   bool built_in_motion_ = false;        // that request kept cells of the previous grid
   bool own_left_out_ = false;           // that request left out the viewer's own volume, because a load may replace it

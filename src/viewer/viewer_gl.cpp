@@ -142,12 +142,12 @@ void Viewer::prepare(const Frame& frame) {
   if (frame.budget_ms < 0.0) return;
 
   last_view_ = std::exchange(traced_view_, view_);
-  const bool places_rest = !std::exchange(places_changed_, false);
+  const bool transforms_rest = !std::exchange(transforms_changed_, false);
   // A build of the previous volume would replace the queued load.
   const bool another_comes = builder_.loads();
   const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
   if ((shown_info() || others || watches) && built_for_another() && !waits) {
-    const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
+    const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
     // GPU builds follow a moving camera, one grid after another, each of which is displayed.
     const bool follows =
         volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
@@ -413,8 +413,8 @@ render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, c
 
 }  // namespace
 
-std::optional<glm::dmat4> Viewer::place_in_gl(Context& g, const std::shared_ptr<Live>& live,
-                                              const render::GlState& state) {
+std::optional<glm::dmat4> Viewer::transform_in_gl(Context& g, const std::shared_ptr<Live>& live,
+                                                  const render::GlState& state) {
   const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
   if (!lattice) return std::nullopt;
   if (!state.changed) return live->gpu_resident() ? lattice : std::nullopt;
@@ -438,15 +438,15 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
       const auto announced = g.transfers().announced(live.get());
       live->require_updatable(channels, announced ? std::optional(announced->channels) : std::nullopt, state.name);
     }
-    render::GlState placed = state;
+    render::GlState transformed = state;
     render::VoxelTransfers::Arrival arrival = arrive(live, state.name, state.changed.has_value());
-    if (const std::optional<glm::dmat4> place = place_in_gl(g, live, state)) {
-      for (render::GlVoxels& field : placed.fields) field.index_to_world = *place;
+    if (const std::optional<glm::dmat4> transform = transform_in_gl(g, live, state)) {
+      for (render::GlVoxels& field : transformed.fields) field.index_to_world = *transform;
       arrival = state.changed ? stay_in_gl(live, state.name, [this, live] { gather(gl(), *live); })
-                              : stay_in_gl(live, state.name, *place);
+                              : stay_in_gl(live, state.name, *transform);
       track_gpu_resident(live);
     }
-    g.transfers().begin(placed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
+    g.transfers().begin(transformed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
   });
   notify();
 }

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "grid/cube.hpp"
 #include "viewer/patient_lock.hpp"
 #include "volume/advection.hpp"
@@ -48,13 +48,13 @@ std::optional<grid::MomentumField::Values> mean_momentum(std::optional<grid::Mom
 }  // namespace
 
 VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
-    : frame_(make_left<const volume::VolumeFrame>(std::move(frame))) {
+    : frame_(make_deferred_delete<const volume::VolumeFrame>(std::move(frame))) {
   begin(progress);
 }
 
 VolumeAsset::VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, const Progress* progress)
-    : frame_(make_left<const volume::VolumeFrame>(std::move(open))),
-      close_(make_left<const volume::VolumeFrame>(std::move(close))) {
+    : frame_(make_deferred_delete<const volume::VolumeFrame>(std::move(open))),
+      close_(make_deferred_delete<const volume::VolumeFrame>(std::move(close))) {
   begin(progress);
 }
 
@@ -62,7 +62,7 @@ VolumeAsset::VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress, st
     : in_gl_(std::move(in_gl)) {
   volume::VolumeFrame frame = in_gl_->frame();
   frame.temperature_scale = temperature_scale;
-  frame_ = make_left<const volume::VolumeFrame>(std::move(frame));
+  frame_ = make_deferred_delete<const volume::VolumeFrame>(std::move(frame));
   begin(progress);
 }
 
@@ -154,14 +154,14 @@ const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progres
     close = volume::in_units_of(unit, std::move(close), &progress);
     // Nullopt for fire without density.
     auto mean = scene::mean_of(&open, &close, "density", &progress);
-    voxels = make_left<const volume::ScalarVolume>(mean ? std::move(*mean) : open);
-    if (mean) ends = make_left<const grid::DensityEnds>(std::move(open), std::move(close), cube_, &progress);
+    voxels = make_deferred_delete<const volume::ScalarVolume>(mean ? std::move(*mean) : open);
+    if (mean) ends = make_deferred_delete<const grid::DensityEnds>(std::move(open), std::move(close), cube_, &progress);
   } else {
     volume::ScalarVolume density = curved(frame_->density);
     unit = volume::value_unit(density.max_value);
-    voxels = make_left<const volume::ScalarVolume>(volume::in_units_of(unit, std::move(density), &progress));
+    voxels = make_deferred_delete<const volume::ScalarVolume>(volume::in_units_of(unit, std::move(density), &progress));
   }
-  auto statistics = make_left<const grid::Statistics>(*voxels, cube_, &progress);
+  auto statistics = make_deferred_delete<const grid::Statistics>(*voxels, cube_, &progress);
   put(ramped_, Ramped{ramp, {std::move(voxels), std::move(statistics), unit}, std::move(ends)});
   return *ramped_;
 }
@@ -175,7 +175,7 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
   const auto since = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   if (ramp.empty() && !close_ && !is_extreme()) {
     if (!statistics_) {
-      put(statistics_, make_left<const grid::Statistics>(frame_->density, cube_, &progress));
+      put(statistics_, make_deferred_delete<const grid::Statistics>(frame_->density, cube_, &progress));
       seconds = since();
     }
     return {{frame_, &frame_->density}, statistics_};
@@ -218,9 +218,9 @@ grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Chan
   const auto lock = patient_lock(computing_, progress);
   if (!latticed_ || latticed_->ramp != ramp || latticed_->channels != channels || latticed_->refine != of) {
     drop(latticed_);
-    put(latticed_,
-        Latticed{ramp, channels, of,
-                 make_left<const grid::Lattice>(*field.statistics, channels, of, field.voxels->max_value, &progress)});
+    put(latticed_, Latticed{ramp, channels, of,
+                            make_deferred_delete<const grid::Lattice>(*field.statistics, channels, of,
+                                                                      field.voxels->max_value, &progress)});
   }
   return latticed_->lattice;
 }
@@ -248,14 +248,14 @@ VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::
   if (unit == 1.0) return {frame, ramp};
   volume::VolumeFrame copy = *frame;
   copy.density = volume::in_units_of(unit, volume::apply(ramp, frame->density, &progress), &progress);
-  return {make_left<const volume::VolumeFrame>(std::move(copy)), {}};
+  return {make_deferred_delete<const volume::VolumeFrame>(std::move(copy)), {}};
 }
 
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
                                      bool anisotropic, Progress& progress, const Log& log) const {
   const scene::Emission given = emission_by(emission);
   const auto field = [&]<class Field>(std::type_identity<Field>, auto values) {
-    return values ? make_left<const Field>(*std::move(values), cube_, &progress) : nullptr;
+    return values ? make_deferred_delete<const Field>(*std::move(values), cube_, &progress) : nullptr;
   };
   constexpr std::type_identity<grid::RgbField> colors;
   constexpr std::type_identity<grid::ScalarField> numbers;

@@ -20,7 +20,7 @@
 
 namespace cumulet::viewer {
 
-/// Metadata of a volume that is available without its voxels, for example to place a camera.
+/// Metadata of a volume that is available without its voxels, for example to fit a camera.
 struct VolumeInfo {
   bool empty = true;      ///< no field has an active voxel
   bool may_emit = false;  ///< it has a field that can emit light
@@ -30,10 +30,10 @@ struct VolumeInfo {
   std::optional<std::string> anisotropy_grid;  ///< its name
   volume::CoarseVolume coarse;
 
-  /// Returns the world bounds of the active voxels of density and flame, or of temperature if there are none. place:
-  /// instance transform.
-  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const {
-    return world_bounds(low, high, place * index_to_world);
+  /// Returns the world bounds of the active voxels of density and flame, or of temperature if there are none.
+  /// transform: instance transform.
+  [[nodiscard]] Bounds bounds(const glm::dmat4& transform = glm::dmat4(1.0)) const {
+    return world_bounds(low, high, transform * index_to_world);
   }
 };
 using VolumeInfoPtr = std::shared_ptr<const VolumeInfo>;
@@ -73,7 +73,9 @@ class VolumeAsset {
   /// Throws Error(cancelled) and Error(file).
   [[nodiscard]] std::shared_ptr<const VolumeAsset> while_open(double seconds, Progress& progress) const;
   [[nodiscard]] bool empty() const { return volume_info_->empty; }
-  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const { return volume_info_->bounds(place); }
+  [[nodiscard]] Bounds bounds(const glm::dmat4& transform = glm::dmat4(1.0)) const {
+    return volume_info_->bounds(transform);
+  }
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return volume_info_->coarse; }
   /// Main memory in bytes, including data derived so far.
   [[nodiscard]] std::uint64_t bytes() const;

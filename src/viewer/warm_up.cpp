@@ -77,8 +77,8 @@ bool Context::warm_up_frame(const Shot& shot, const Frame& frame, render::Deadli
       if (drawing) warm_up_drawing(shot, frame, shown);
     };
     if (scene_.data() != nullptr) {
-      const render::TraceInputs met = trace_inputs(shot);
-      if (!shader_warm_up_->advance(request(shot, frame, met), *scene_.data(), met, deadline, draw)) return false;
+      const render::TraceInputs inputs = trace_inputs(shot);
+      if (!shader_warm_up_->advance(request(shot, frame, inputs), *scene_.data(), inputs, deadline, draw)) return false;
     }
     if (host_depth_.waits_for_program()) return false;
   }

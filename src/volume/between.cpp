@@ -133,8 +133,8 @@ VolumeFrame moved(const VolumeFrame& frame, const glm::dmat4& lattice, Progress*
   const glm::dmat4 to_lattice = glm::inverse(lattice) * frame.density.index_to_world;
   const std::vector<ScalarVolume*> fields = out.fields();
   for (std::size_t i = 0; i < fields.size(); ++i) {
-    const auto share = [&](std::size_t place) {
-      return static_cast<double>(place) / static_cast<double>(fields.size());
+    const auto share = [&](std::size_t index) {
+      return static_cast<double>(index) / static_cast<double>(fields.size());
     };
     if (!fields[i]->empty()) {
       const ScalarVolume before = std::move(*fields[i]);
@@ -157,7 +157,7 @@ VolumeFrame blend(const VolumeFrame& before, const VolumeFrame& after, double pa
   return naming("\"" + before.density.name + "\"", [&] {
     const glm::dmat4& lattice = before.density.index_to_world;
     const Box box = box_of(after);
-    if (!box.empty() && !same_places(lattice, after.density.index_to_world, box)) {
+    if (!box.empty() && !same_positions(lattice, after.density.index_to_world, box)) {
       constexpr double moving = 0.6;
       return blend(before, moved(after, lattice, progress, portion.part(0.0, moving)), part, progress,
                    portion.part(moving, 1.0));

@@ -60,13 +60,13 @@ class CoarseLeaves final : public HeldLeaves {
     check(progress);
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const glm::ivec3 brick = parts_[i].origin >> coarse_brick_log2;
-      if (i == 0 || bricks_.back().place != brick) bricks_.push_back({brick, i});
+      if (i == 0 || bricks_.back().position != brick) bricks_.push_back({brick, i});
     }
     take_means(at, progress);
   }
 
   [[nodiscard]] std::size_t count() const override { return bricks_.size(); }
-  [[nodiscard]] glm::ivec3 origin(std::size_t brick) const override { return bricks_[brick].place * brick_size; }
+  [[nodiscard]] glm::ivec3 origin(std::size_t brick) const override { return bricks_[brick].position * brick_size; }
   [[nodiscard]] ActiveMask active(std::size_t brick) const override {
     ActiveMask mask{};
     for_parts(brick, [&](std::size_t part, const glm::ivec3& corner) {
@@ -100,7 +100,7 @@ class CoarseLeaves final : public HeldLeaves {
     std::size_t part;   ///< index of a leaf or, after the leaves, of a tile
   };
   struct Brick {
-    glm::ivec3 place;                ///< position in bricks
+    glm::ivec3 position;             ///< in bricks
     std::size_t first;               ///< index of its first part
     std::optional<float> mean = {};  ///< of active voxels; empty: no leaf of it was read
   };
@@ -109,11 +109,11 @@ class CoarseLeaves final : public HeldLeaves {
   class Around {
    public:
     Around(const CoarseLeaves& of, std::size_t brick) {
-      const glm::ivec3 place = of.bricks_[brick].place;
+      const glm::ivec3 position = of.bricks_[brick].position;
       for (int i = 0; i < 27; ++i) {
-        const glm::ivec3 other = place + glm::ivec3(i / 9, i / 3 % 3, i % 3) - 1;
-        const auto found = std::ranges::lower_bound(of.bricks_, other, lexicographic, &Brick::place);
-        const bool is_there = found != of.bricks_.end() && found->place == other;
+        const glm::ivec3 other = position + glm::ivec3(i / 9, i / 3 % 3, i % 3) - 1;
+        const auto found = std::ranges::lower_bound(of.bricks_, other, lexicographic, &Brick::position);
+        const bool is_there = found != of.bricks_.end() && found->position == other;
         if (is_there) means_[static_cast<std::size_t>(i)] = found->mean;
       }
     }
@@ -128,8 +128,8 @@ class CoarseLeaves final : public HeldLeaves {
         const glm::ivec3 corner(i >> 2, (i >> 1) & 1, i & 1);
         const glm::vec3 weight = glm::mix(1.0F - part, part, glm::vec3(corner));
         const glm::ivec3 brick = low + corner;
-        const int place = (brick.x * 3 + brick.y) * 3 + brick.z;
-        const std::optional<float> mean = means_[static_cast<std::size_t>(place)];
+        const int index = (brick.x * 3 + brick.y) * 3 + brick.z;
+        const std::optional<float> mean = means_[static_cast<std::size_t>(index)];
         if (!mean) continue;
         sum += weight.x * weight.y * weight.z * *mean;
         weights += weight.x * weight.y * weight.z;
@@ -145,7 +145,7 @@ class CoarseLeaves final : public HeldLeaves {
   void for_parts(std::size_t brick, const Use& use) const {
     const std::size_t end = brick + 1 < bricks_.size() ? bricks_[brick + 1].first : parts_.size();
     for (std::size_t i = bricks_[brick].first; i < end; ++i)
-      use(parts_[i].part, (parts_[i].origin - (bricks_[brick].place << coarse_brick_log2)) >> step_log2);
+      use(parts_[i].part, (parts_[i].origin - (bricks_[brick].position << coarse_brick_log2)) >> step_log2);
   }
 
   [[nodiscard]] std::array<int, 8> active_of(std::size_t part) const {

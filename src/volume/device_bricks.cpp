@@ -40,7 +40,7 @@ bool DeviceBricks::scattered() const {
 }
 
 std::uint64_t DeviceBricks::bytes() const {
-  std::uint64_t bytes = origins.size() * (sizeof(glm::ivec3) + sizeof(Place));
+  std::uint64_t bytes = origins.size() * (sizeof(glm::ivec3) + sizeof(Location));
   for (const DeviceMemoryPtr& memory : memories) bytes += memory->bricks() * sizeof(BrickSummary);
   return bytes;
 }
@@ -60,10 +60,10 @@ void DeviceBricks::drop_empty() {
       continue;
     }
     origins[kept] = origins[i];
-    places[kept++] = places[i];
+    locations[kept++] = locations[i];
   }
   origins.resize(kept);
-  places.resize(kept);
+  locations.resize(kept);
 }
 
 void DeviceBricks::tidy() {
@@ -76,15 +76,15 @@ void DeviceBricks::tidy() {
   constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> kept(memories.size(), none);
   for (const std::size_t i : order) {
-    Place place = places[i];
-    std::uint32_t& memory = kept[place.memory];
+    Location location = locations[i];
+    std::uint32_t& memory = kept[location.memory];
     if (memory == none) {
       memory = static_cast<std::uint32_t>(made.memories.size());
-      made.memories.push_back(memories[place.memory]);
+      made.memories.push_back(memories[location.memory]);
     }
-    place.memory = memory;
+    location.memory = memory;
     made.origins.push_back(origins[i]);
-    made.places.push_back(place);
+    made.locations.push_back(location);
   }
   *this = std::move(made);
 }
@@ -100,12 +100,12 @@ DeviceBricks DeviceBricks::with(const DeviceBricks& other) const {
   for (std::size_t i = 0; i < origins.size(); ++i) {
     if (std::ranges::binary_search(replaced, origins[i], lexicographic)) continue;
     made.origins.push_back(origins[i]);
-    made.places.push_back(places[i]);
+    made.locations.push_back(locations[i]);
   }
   const auto first = static_cast<std::uint32_t>(made.memories.size());
   made.memories.insert(made.memories.end(), other.memories.begin(), other.memories.end());
   made.origins.insert(made.origins.end(), other.origins.begin(), other.origins.end());
-  for (const Place& place : other.places) made.places.push_back({first + place.memory, place.brick});
+  for (const Location& location : other.locations) made.locations.push_back({first + location.memory, location.brick});
   made.tidy();
   return made;
 }

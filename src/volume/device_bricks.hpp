@@ -69,19 +69,19 @@ using ValuesWantedPtr = std::shared_ptr<ValuesWanted>;
 /// A field of GPU-resident bricks at distinct origins, in the order of ScalarVolume::brick_origins. Immutable when
 /// shared.
 struct DeviceBricks {
-  struct Place {
+  struct Location {
     std::uint32_t memory = 0;  ///< index into `memories`
     std::uint32_t brick = 0;   ///< index in that memory
   };
   std::vector<DeviceMemoryPtr> memories;
   std::vector<glm::ivec3> origins;
-  std::vector<Place> places;
+  std::vector<Location> locations;
   std::vector<glm::ivec3> emptied;  ///< in an update of another field: origins of bricks that became empty
   std::uint64_t huge_voxels = 0;    ///< in bricks that were dropped
   ValuesWantedPtr wanted;  ///< requests for values in main memory; the owner then provides another state of the volume
 
   [[nodiscard]] const BrickSummary& summary(std::size_t brick) const {
-    return memories[places[brick].memory]->summaries[places[brick].brick];
+    return memories[locations[brick].memory]->summaries[locations[brick].brick];
   }
   /// Returns the index of the brick at this origin, or nullopt if there is none.
   [[nodiscard]] std::optional<std::uint32_t> find(const glm::ivec3& origin) const;

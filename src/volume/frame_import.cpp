@@ -223,7 +223,7 @@ class FrameImport {
       out_.density.index_to_world = (by_flame ? *out_.flame : *out_.temperature).index_to_world;
       out_.density.bounds_max = out_.density.bounds_min;
     }
-    place(portion);
+    put_all_on_lattice(portion);
     return std::move(out_);
   }
 
@@ -348,7 +348,7 @@ class FrameImport {
     return velocity;
   }
 
-  void place(Portion portion) {
+  void put_all_on_lattice(Portion portion) {
     Shares shares(portion, out_.beside_density().size());
     std::optional<Velocity> velocity = std::exchange(out_.velocity, std::nullopt);
     const auto put = [&](ScalarVolume& field, const std::optional<Box>& within) {
@@ -411,12 +411,12 @@ class FrameImport {
   void put_on_lattice(ScalarVolume& field, const std::optional<Box>& within, Portion portion) const {
     const glm::dmat4& lattice = out_.density.index_to_world;
     const Box bounds{field.bounds_min, field.bounds_max};
-    const bool placed = field.empty() || same_places(field.index_to_world, lattice, bounds);
+    const bool aligned = field.empty() || same_positions(field.index_to_world, lattice, bounds);
     const bool clipped = within && !within->contains(bounds) && field.background == 0.0F;
-    if (!placed || (clipped && !field.empty())) {
+    if (!aligned || (clipped && !field.empty())) {
       constexpr double sampling = 0.7;
-      SourceGrid source = placed ? bricks_within(field, *within)
-                                 : resample(field, lattice, within, progress_, portion.part(0.0, sampling));
+      SourceGrid source = aligned ? bricks_within(field, *within)
+                                  : resample(field, lattice, within, progress_, portion.part(0.0, sampling));
       // Warnings about its values were already logged.
       ScalarVolume volume = assemble(std::move(source), {}, {}, progress_, portion.part(sampling, 1.0));
       volume.name = field.name;

@@ -19,11 +19,11 @@ std::uint64_t pieces(int depth) { return std::uint64_t{1} << (3 * std::max(told_
 
 Window::Window(const ScalarVolume& field, const Box& box, const Items& items)
     : field_(&field), low_(box.min >> 3), size_((box.max >> 3) - low_ + 1) {
-  cells_.assign(place(size_ - 1) + 1, {std::nullopt, field.background});
+  cells_.assign(index_of(size_ - 1) + 1, {std::nullopt, field.background});
   for (const std::uint32_t item : items) {
     if (item < field.brick_origins.size()) {
       const glm::ivec3 cell = (field.brick_origins[item] >> 3) - low_;
-      cells_[place(cell)].first = std::size_t{item} * brick_voxels;
+      cells_[index_of(cell)].first = std::size_t{item} * brick_voxels;
       continue;
     }
     // Within bounds, a cell is covered by at most one tile.
@@ -32,13 +32,13 @@ Window::Window(const ScalarVolume& field, const Box& box, const Items& items)
     const glm::ivec3 max = glm::min((tile.max >> 3) - low_, size_ - 1);
     for (glm::ivec3 c = min; c.x <= max.x; ++c.x) {
       for (c.y = min.y; c.y <= max.y; ++c.y) {
-        for (c.z = min.z; c.z <= max.z; ++c.z) cells_[place(c)].constant = tile.value;
+        for (c.z = min.z; c.z <= max.z; ++c.z) cells_[index_of(c)].constant = tile.value;
       }
     }
   }
 }
 
-std::size_t Window::place(glm::ivec3 cell) const {
+std::size_t Window::index_of(glm::ivec3 cell) const {
   return (static_cast<std::size_t>(cell.x) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(cell.y)) *
              static_cast<std::size_t>(size_.z) +
          static_cast<std::size_t>(cell.z);
@@ -46,7 +46,7 @@ std::size_t Window::place(glm::ivec3 cell) const {
 
 double Window::voxel(glm::ivec3 p) const {
   if (glm::any(glm::lessThan(p, field_->bounds_min)) || glm::any(glm::greaterThan(p, field_->bounds_max))) return 0.0;
-  const Cell& cell = cells_[place((p >> 3) - low_)];
+  const Cell& cell = cells_[index_of((p >> 3) - low_)];
   if (!cell.first) return cell.constant;
   const int within = ((p.x & 7) * brick_size + (p.y & 7)) * brick_size + (p.z & 7);
   return field_->brick_values[*cell.first + static_cast<std::size_t>(within)];
@@ -55,12 +55,12 @@ double Window::voxel(glm::ivec3 p) const {
 std::optional<double> Window::constant(const Box& box) const {
   const glm::ivec3 min = (box.min >> 3) - low_;
   const glm::ivec3 max = (box.max >> 3) - low_;
-  const float value = cells_[place(min)].constant;
+  const float value = cells_[index_of(min)].constant;
   if (value != 0.0F && !Box{field_->bounds_min, field_->bounds_max}.contains(box)) return std::nullopt;
   for (glm::ivec3 c = min; c.x <= max.x; ++c.x) {
     for (c.y = min.y; c.y <= max.y; ++c.y) {
       for (c.z = min.z; c.z <= max.z; ++c.z) {
-        const Cell& cell = cells_[place(c)];
+        const Cell& cell = cells_[index_of(c)];
         if (cell.first || cell.constant != value) return std::nullopt;
       }
     }
@@ -79,9 +79,9 @@ double Window::at(const glm::dvec3& p) const {
 /// The bricks of a field; voxels that are not 0 are active.
 class Gathering::Leaves final : public HeldLeaves {
  public:
-  explicit Leaves(std::vector<std::deque<Placed>> bricks) : bricks_(std::move(bricks)) {
-    for (const std::deque<Placed>& some : bricks_) {
-      for (const Placed& brick : some) order_.push_back(&brick);
+  explicit Leaves(std::vector<std::deque<LatticeBrick>> bricks) : bricks_(std::move(bricks)) {
+    for (const std::deque<LatticeBrick>& some : bricks_) {
+      for (const LatticeBrick& brick : some) order_.push_back(&brick);
     }
   }
   [[nodiscard]] std::size_t count() const override { return order_.size(); }
@@ -90,8 +90,8 @@ class Gathering::Leaves final : public HeldLeaves {
   void values(std::size_t leaf, float* out) const override { std::ranges::copy(order_[leaf]->values, out); }
 
  private:
-  std::vector<std::deque<Placed>> bricks_;
-  std::vector<const Placed*> order_;
+  std::vector<std::deque<LatticeBrick>> bricks_;
+  std::vector<const LatticeBrick*> order_;
 };
 
 Gathering::Gathering(std::vector<const ScalarVolume*> sources, std::size_t made, Progress* progress, Portion portion)
@@ -117,7 +117,7 @@ std::vector<SourceGrid> Gathering::gather(const Box& box) {
   std::vector<SourceGrid> fields(made_);
   for (std::size_t i = 0; i < made_; ++i) {
     for (const auto& tiles : tiles_) fields[i].tiles.insert(fields[i].tiles.end(), tiles[i].begin(), tiles[i].end());
-    std::vector<std::deque<Placed>> bricks;
+    std::vector<std::deque<LatticeBrick>> bricks;
     for (Bricks& some : bricks_) bricks.push_back(std::move(some[i]));
     fields[i].leaves = std::make_unique<Leaves>(std::move(bricks));
   }
@@ -194,7 +194,7 @@ void Gathering::make_brick(const glm::ivec3& origin, std::span<const Box> needed
 void assemble_in_place_of(std::span<const ScalarVolume* const> before, std::vector<SourceGrid> gathered,
                           std::span<ScalarVolume* const> out, Progress* progress, Portion portion) {
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const auto share = [&](std::size_t place) { return static_cast<double>(place) / static_cast<double>(out.size()); };
+    const auto share = [&](std::size_t index) { return static_cast<double>(index) / static_cast<double>(out.size()); };
     gathered[i].index_to_world = before[i]->index_to_world;
     *out[i] = assemble(std::move(gathered[i]), {}, {}, progress, portion.part(share(i), share(i + 1)));
     // Warnings about its values were already logged.

@@ -37,7 +37,7 @@ class Window {
     std::optional<std::size_t> first;  // index of its brick's first value
     float constant;
   };
-  [[nodiscard]] std::size_t place(glm::ivec3 cell) const;
+  [[nodiscard]] std::size_t index_of(glm::ivec3 cell) const;
 
   const ScalarVolume* field_;
   glm::ivec3 low_, size_;
@@ -97,11 +97,11 @@ class Gathering {
   static constexpr std::uint64_t max_bricks = std::uint64_t{1} << 21U;
 
  private:
-  struct Placed {
+  struct LatticeBrick {
     glm::ivec3 origin;
     Brick values;
   };
-  using Bricks = std::vector<std::deque<Placed>>;  // one deque per field
+  using Bricks = std::vector<std::deque<LatticeBrick>>;  // one deque per field
   class Leaves;
 
   [[nodiscard]] Box box_of(std::size_t i, std::uint32_t item) const;

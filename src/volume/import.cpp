@@ -15,7 +15,7 @@
 #include <limits>
 #include <numeric>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "base/progress_part.hpp"
 #include "volume/bricks.hpp"
 #include "volume/import_detail.hpp"
@@ -419,7 +419,7 @@ struct BrickTotals {
 
 /// A grid's leaves that overlap its bounds, sorted by origin, with the results of a sweep.
 struct Bricks {
-  std::vector<std::size_t> place;  ///< for each leaf its index; the end for leaves outside of the bounds
+  std::vector<std::size_t> index_of;  ///< for each leaf its index; the end for leaves outside of the bounds
   std::vector<glm::ivec3> origins;
   std::vector<char> constant;  ///< 1: all values are equal
   std::vector<float> first;    ///< first value
@@ -434,13 +434,13 @@ bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vect
   resize(values, bricks.origins.size() * brick_voxels, progress);
   tbb::enumerable_thread_specific<BrickTotals> totals;
   const auto take = [&](std::size_t leaf, std::span<float, brick_voxels> found) {
-    const std::size_t place = bricks.place[leaf];
-    if (place == bricks.origins.size()) return true;
-    const CleanBrick brick = clean(found, bricks.origins[place], bounds);
+    const std::size_t index = bricks.index_of[leaf];
+    if (index == bricks.origins.size()) return true;
+    const CleanBrick brick = clean(found, bricks.origins[index], bounds);
     totals.local().add({brick.negative, brick.non_finite, brick.huge, brick.max});
-    bricks.constant[place] = brick.constant ? 1 : 0;
-    bricks.first[place] = brick.first;
-    return brick.constant || keep(found, values.data() + place * brick_voxels);
+    bricks.constant[index] = brick.constant ? 1 : 0;
+    bricks.first[index] = brick.first;
+    return brick.constant || keep(found, values.data() + index * brick_voxels);
   };
   if (!leaves.sweep(take, progress, portion)) return false;
   bricks.totals = {};
@@ -454,10 +454,10 @@ bool begins_with_halves(const LeafSource& leaves, const Box& bounds, const Brick
   std::atomic<int> looked_at = 0;
   std::atomic<bool> halves = true;
   const auto look = [&](std::size_t leaf, std::span<float, brick_voxels> found) {
-    const std::size_t place = bricks.place[leaf];
-    if (place == bricks.origins.size()) return true;
+    const std::size_t index = bricks.index_of[leaf];
+    if (index == bricks.origins.size()) return true;
     std::array<std::uint16_t, brick_voxels> room;
-    if (!clean(found, bricks.origins[place], bounds).constant && !keep(found, room.data())) halves = false;
+    if (!clean(found, bricks.origins[index], bounds).constant && !keep(found, room.data())) halves = false;
     return halves && ++looked_at < enough;
   };
   leaves.sweep(look, nullptr, {at, at});
@@ -518,7 +518,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
                               Portion portion) {
   check_transform(source.index_to_world);
 
-  const auto made = make_left<ScalarVolume>();
+  const auto made = make_deferred_delete<ScalarVolume>();
   ScalarVolume& out = *made;
   out.index_to_world = source.index_to_world;
 
@@ -553,8 +553,8 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   {
     std::vector<std::size_t> order = sorted_leaves(leaves, progress);
     std::erase_if(order, [&](std::size_t leaf) { return clipped(leaves.origin(leaf)).empty(); });
-    bricks.place.assign(leaves.count(), order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) bricks.place[order[i]] = i;
+    bricks.index_of.assign(leaves.count(), order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) bricks.index_of[order[i]] = i;
     bricks.origins.reserve(order.size());
     for (const std::size_t leaf : order) bricks.origins.push_back(leaves.origin(leaf));
     bricks.constant.resize(order.size());

@@ -119,7 +119,7 @@ class SparseLeaves final : public HeldLeaves {
   std::span<const std::uint64_t> active_;
 };
 
-bool meet(const Tile& a, const Tile& b) {
+bool do_overlap(const Tile& a, const Tile& b) {
   return glm::all(glm::lessThanEqual(a.min, b.max)) && glm::all(glm::lessThanEqual(b.min, a.max));
 }
 
@@ -181,10 +181,10 @@ class Disjointness {
     for (std::size_t i = 0; i < part.tiles.size(); ++i) {
       const Tile& a = tile(part.tiles[i]);
       for (std::size_t j = 0; j < i; ++j) {
-        if (meet(a, tile(part.tiles[j]))) overlap(a, tile(part.tiles[j]));
+        if (do_overlap(a, tile(part.tiles[j]))) overlap(a, tile(part.tiles[j]));
       }
       for (const std::uint32_t b : part.bricks) {
-        if (meet(a, brick(b)))
+        if (do_overlap(a, brick(b)))
           fail("its tile at " + to_string(a.min) + " overlaps the brick at " + to_string(brick(b).min));
       }
     }

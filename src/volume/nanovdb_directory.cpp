@@ -147,16 +147,16 @@ class DirectoryReader {
     out_.format = "NanoVDB " + std::to_string(major) + "." + std::to_string(version.getMinor());
   }
 
-  void add(const NanoPlace& place, const std::string& name, nanovdb::GridClass grid_class) {
+  void add(const NanoLocation& location, const std::string& name, nanovdb::GridClass grid_class) {
     GridInfo entry;
     entry.name = name;
-    entry.type = type_name(place.type);
+    entry.type = type_name(location.type);
     entry.grid_class = class_name(grid_class);
-    entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_nano_scalar(place.type));
-    entry.values = is_nano_scalar(place.type)   ? Values::scalars
-                   : is_nano_vector(place.type) ? Values::lengths
-                                                : Values::none;
-    out_.places.push_back(place);
+    entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_nano_scalar(location.type));
+    entry.values = is_nano_scalar(location.type)   ? Values::scalars
+                   : is_nano_vector(location.type) ? Values::lengths
+                                                   : Values::none;
+    out_.locations.push_back(location);
     out_.grids.push_back(std::move(entry));
   }
 
@@ -175,7 +175,7 @@ class DirectoryReader {
     take_version(header.version);
     if (header.codec >= Codec::END) fail("the file is damaged: unknown compression");
     position += sizeof header;
-    const std::size_t first = out_.places.size();
+    const std::size_t first = out_.locations.size();
     for (int i = 0; i < header.gridCount; ++i) {
       const auto meta = read_value<nanovdb::io::MetaData>(position);
       position += sizeof meta;
@@ -186,9 +186,9 @@ class DirectoryReader {
       name.resize(name.find('\0'));
       add({0, meta.fileSize, meta.gridSize, header.codec, meta.gridType}, name, meta.gridClass);
     }
-    for (std::size_t i = first; i < out_.places.size(); ++i) {
-      out_.places[i].position = position;
-      position = behind(position, out_.places[i].file_bytes);
+    for (std::size_t i = first; i < out_.locations.size(); ++i) {
+      out_.locations[i].position = position;
+      position = behind(position, out_.locations[i].file_bytes);
     }
     return position;
   }

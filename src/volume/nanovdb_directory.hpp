@@ -15,7 +15,7 @@
 namespace cumulet::volume::detail {
 
 /// Location of the bytes of one grid.
-struct NanoPlace {
+struct NanoLocation {
   std::uint64_t position;
   std::uint64_t file_bytes;
   std::uint64_t memory_bytes;
@@ -23,11 +23,11 @@ struct NanoPlace {
   nanovdb::GridType type;
 };
 
-/// All sizes are within the file. places[i] belongs to grids[i].
+/// All sizes are within the file. locations[i] belongs to grids[i].
 struct NanoDirectory {
   std::string format;                ///< "NanoVDB 32.9"
   std::vector<std::string> remarks;  ///< one warning each
-  std::vector<NanoPlace> places;
+  std::vector<NanoLocation> locations;
   std::vector<GridInfo> grids;
 };
 

@@ -212,7 +212,7 @@ class NanoReader final : public Reader {
 
   SourceGrid read(std::size_t index, Portion portion, const Log& log, const std::string& log_prefix) override {
     std::shared_ptr<const Handle> handle = load_checked(index, portion);
-    switch (directory_.places[index].type) {
+    switch (directory_.locations[index].type) {
       case nanovdb::GridType::Float:
         return NanoWalk<float>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Double:
@@ -246,9 +246,9 @@ class NanoReader final : public Reader {
       }
       return out;
     };
-    if (directory_.places[index].type == nanovdb::GridType::Vec3f)
+    if (directory_.locations[index].type == nanovdb::GridType::Vec3f)
       return components.template operator()<nanovdb::Vec3f>();
-    if (directory_.places[index].type == nanovdb::GridType::Vec3d)
+    if (directory_.locations[index].type == nanovdb::GridType::Vec3d)
       return components.template operator()<nanovdb::Vec3d>();
     fail(unreadable);
   }
@@ -261,26 +261,26 @@ class NanoReader final : public Reader {
   }
 
   std::shared_ptr<const Handle> load_checked(std::size_t index, Portion portion) {
-    auto handle = std::make_shared<const Handle>(load(directory_.places[index], portion));
+    auto handle = std::make_shared<const Handle>(load(directory_.locations[index], portion));
     if (handle->size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
     const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle->data());
     if (!is_nano_grid(*grid)) fail("the file is damaged: missing grid");
-    if (grid->mGridType != directory_.places[index].type)
+    if (grid->mGridType != directory_.locations[index].type)
       fail("the file is damaged: grid and directory differ in type");
     return handle;
   }
 
   /// Reads and decodes a grid, validating all sizes. NanoVDB's own reader does not, and cannot be cancelled.
-  Handle load(const NanoPlace& place, Portion portion) {
+  Handle load(const NanoLocation& location, Portion portion) {
     // No codec exceeds zlib's ratio of 1032 to 1: a larger size is rejected before memory is allocated.
     constexpr std::uint64_t max_expansion = 1040;
-    if (place.memory_bytes == 0 || place.memory_bytes / max_expansion > place.file_bytes) fail(sizes_differ);
-    if (place.codec == Codec::NONE && place.memory_bytes != place.file_bytes) fail(sizes_differ);
-    ProgressPart& part = stream_.begin(portion.from, portion.to,
-                                       place.file_bytes + (place.codec == Codec::NONE ? 0 : place.memory_bytes));
-    auto buffer = nanovdb::HostBuffer::create(place.memory_bytes);
-    std::uint64_t position = place.position;
-    std::uint64_t rest = place.file_bytes;
+    if (location.memory_bytes == 0 || location.memory_bytes / max_expansion > location.file_bytes) fail(sizes_differ);
+    if (location.codec == Codec::NONE && location.memory_bytes != location.file_bytes) fail(sizes_differ);
+    ProgressPart& part = stream_.begin(
+        portion.from, portion.to, location.file_bytes + (location.codec == Codec::NONE ? 0 : location.memory_bytes));
+    auto buffer = nanovdb::HostBuffer::create(location.memory_bytes);
+    std::uint64_t position = location.position;
+    std::uint64_t rest = location.file_bytes;
     const auto next_frame = [&] {
       std::uint64_t bytes = 0;
       if (rest < sizeof bytes) fail(sizes_differ);
@@ -292,22 +292,22 @@ class NanoReader final : public Reader {
       rest -= bytes;
       return bytes;
     };
-    switch (place.codec) {
+    switch (location.codec) {
       case Codec::ZIP: {
         const std::uint64_t frame = next_frame();
-        inflate_frame(frame, buffer.data(), place.memory_bytes, part);
+        inflate_frame(frame, buffer.data(), location.memory_bytes, part);
         break;
       }
       case Codec::BLOSC:
-        for (std::uint64_t done = 0; done < place.memory_bytes;) {
-          const std::uint64_t chunk = std::min<std::uint64_t>(place.memory_bytes - done, max_chunk);
+        for (std::uint64_t done = 0; done < location.memory_bytes;) {
+          const std::uint64_t chunk = std::min<std::uint64_t>(location.memory_bytes - done, max_chunk);
           const std::uint64_t frame = next_frame();
           unpack_frame(frame, buffer.data() + done, chunk, part);
           done += chunk;
         }
         break;
       default:
-        read_bytes(position, buffer.data(), place.memory_bytes);
+        read_bytes(position, buffer.data(), location.memory_bytes);
         rest = 0;
     }
     if (rest != 0) fail(sizes_differ);

@@ -122,8 +122,8 @@ class Resampling final : Gathering {
     for (glm::ivec3 s(0); s.x < samples_.x; ++s.x) {
       for (s.y = 0; s.y < samples_.y; ++s.y) {
         for (s.z = 0; s.z < samples_.z; ++s.z) {
-          const glm::dvec3 place = voxel - 0.5 + step * (glm::dvec3(s) + 0.5);
-          sum += window.at(glm::dvec3(to_field_ * glm::dvec4(place, 1.0)));
+          const glm::dvec3 position = voxel - 0.5 + step * (glm::dvec3(s) + 0.5);
+          sum += window.at(glm::dvec3(to_field_ * glm::dvec4(position, 1.0)));
         }
       }
     }
@@ -138,7 +138,7 @@ class Resampling final : Gathering {
 
 }  // namespace
 
-bool same_places(const glm::dmat4& a, const glm::dmat4& b, const Box& voxels) {
+bool same_positions(const glm::dmat4& a, const glm::dmat4& b, const Box& voxels) {
   const glm::dmat4 to_a = glm::inverse(a) * b;
   // The deviation of an affine map is largest at a corner.
   for (int corner = 0; corner < 8; ++corner) {

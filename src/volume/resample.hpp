@@ -9,7 +9,7 @@
 namespace cumulet::volume::detail {
 
 /// Whether the voxel positions of two lattices, within a box of the second, agree to a thousandth of a voxel.
-bool same_places(const glm::dmat4& a, const glm::dmat4& b, const Box& voxels);
+bool same_positions(const glm::dmat4& a, const glm::dmat4& b, const Box& voxels);
 
 /// Resamples a field as described at import_frame(). Regions where the input of a brick is constant become tiles, all
 /// others bricks. O(voxels that become bricks, times samples per axis cubed). Runs in parallel; the result does not

@@ -99,10 +99,10 @@ std::size_t BrickCopy::Hash::operator()(const glm::ivec3& origin) const {
 }
 
 void BrickCopy::index() {
-  if (!places_.empty()) return;
-  places_.reserve(count());
+  if (!indices_.empty()) return;
+  indices_.reserve(count());
   for (std::size_t brick = 0; brick < count(); ++brick)
-    places_.emplace(glm::ivec3(origins_[3 * brick], origins_[3 * brick + 1], origins_[3 * brick + 2]), brick);
+    indices_.emplace(glm::ivec3(origins_[3 * brick], origins_[3 * brick + 1], origins_[3 * brick + 2]), brick);
 }
 
 void BrickCopy::set(std::size_t brick, const BrickCopy& of, std::size_t from) {
@@ -114,18 +114,18 @@ void BrickCopy::put(const BrickCopy& other) {
   index();
   for (std::size_t from = 0; from < other.count(); ++from) {
     const glm::ivec3 origin(other.origins_[3 * from], other.origins_[3 * from + 1], other.origins_[3 * from + 2]);
-    auto place = places_.find(origin);
-    if (place == places_.end()) {
+    auto found = indices_.find(origin);
+    if (found == indices_.end()) {
       // Everything that may throw comes before the first change.
       make_room(origins_, 3);
       make_room(values_, brick_voxels);
       make_room(active_, brick_size);
-      place = places_.emplace(origin, count()).first;
+      found = indices_.emplace(origin, count()).first;
       for (int axis = 0; axis < 3; ++axis) origins_.push_back(origin[axis]);
       values_.resize(values_.size() + brick_voxels);
       active_.resize(active_.size() + brick_size);
     }
-    set(place->second, other, from);
+    set(found->second, other, from);
   }
 }
 

@@ -69,7 +69,7 @@ class BrickCopy {
   std::vector<SourceTile> tiles_;
   float background_ = 0.0F;
   glm::dmat4 index_to_world_{1.0};
-  std::unordered_map<glm::ivec3, std::size_t, Hash> places_;  // index of bricks by origin; empty until put() is called
+  std::unordered_map<glm::ivec3, std::size_t, Hash> indices_;  // index of bricks by origin; empty until put() is called
 };
 
 /// A field with its own memory.

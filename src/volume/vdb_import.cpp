@@ -11,7 +11,7 @@
 #include <mutex>
 #include <string_view>
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 #include "volume/import_detail.hpp"
 #include "volume/source_file.hpp"
 #include "volume/vdb_leaves.hpp"
@@ -343,7 +343,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   static bool own_tree(openvdb::GridBase& grid) {
     bool own = false;
     with_type(grid, [&]<typename GridT>() {
-      grid.setTree(make_left<OwningTree<typename GridT::TreeType>>());
+      grid.setTree(make_deferred_delete<OwningTree<typename GridT::TreeType>>());
       own = true;
     });
     return own;

@@ -54,9 +54,9 @@ class MemoryStream final : public std::istream {
       return seekpos(base + offset, which);
     }
     pos_type seekpos(pos_type position, std::ios_base::openmode /*which*/) override {
-      const off_type place = position;
-      if (place < 0 || place > egptr() - eback()) return {off_type{-1}};
-      setg(eback(), eback() + place, egptr());
+      const off_type target = position;
+      if (target < 0 || target > egptr() - eback()) return {off_type{-1}};
+      setg(eback(), eback() + target, egptr());
       return position;
     }
   };

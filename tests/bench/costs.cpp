@@ -131,24 +131,24 @@ viewer::VolumeAssetPtr read(const Input& input, const std::string& color) {
 }
 
 /// Position of the lights: above and to the side, directed at the center.
-struct Place {
+struct Position {
   dvec3 at;
   dvec3 direction;
   double distance;
 };
-Place beside(const viewer::Bounds& bounds) {
+Position beside(const viewer::Bounds& bounds) {
   const double size = glm::length(bounds.max - bounds.min);
   const dvec3 direction = glm::normalize(dvec3(-1.0, -1.5, -0.7));
   return {0.5 * (bounds.min + bounds.max) - direction * size, direction, size};
 }
 
-scene::ModelSourcePtr emitter_at(const Place& place, double side, float radiance) {
+scene::ModelSourcePtr emitter_at(const Position& position, double side, float radiance) {
   const auto scene = std::make_shared<test::StillScene>();
   surface::Material material = test::diffuse(vec3(0.0F));
   material.emission = vec3(radiance);
-  const dvec3 across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), place.direction)) * (0.5 * side);
-  const dvec3 along = glm::normalize(glm::cross(place.direction, across)) * (0.5 * side);
-  const auto corner = [&](double u, double v) { return vec3(place.at + u * across + v * along); };
+  const dvec3 across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), position.direction)) * (0.5 * side);
+  const dvec3 along = glm::normalize(glm::cross(position.direction, across)) * (0.5 * side);
+  const auto corner = [&](double u, double v) { return vec3(position.at + u * across + v * along); };
   scene->add_quad({corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)}, scene->add(material));
   return test::source_of(scene);
 }
@@ -162,10 +162,10 @@ constexpr Edit where_they_collide = {
     "    if (way < left) emitted += emission.mean * (there / max(mix(e_0, e_1, way / max(span, 1e-30f)), 1e-30f));\n"};
 // Disables NEE of emissive cells: if there is no other light, or among other lights.
 constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
-                                 "arrived && cm.lights.any != 0u && cm.lights.cell_chance < 1.0f;"};
-constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance,",
-                           "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
-constexpr Edit flights_have_all = {"free_flight.glsl", "cm.lights.cell_chance * cm_nee_probability(",
+                                 "arrived && cm.lights.any != 0u && cm.lights.cell_probability < 1.0f;"};
+constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_probability,",
+                           "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_probability),"};
+constexpr Edit flights_have_all = {"free_flight.glsl", "cm.lights.cell_probability * cm_nee_probability(",
                                    "0.0f * cm_nee_probability("};
 // Disables Russian roulette of shadow rays.
 constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
@@ -174,12 +174,12 @@ constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return
 // Samples all lights with equal probability.
 constexpr Edit any_analytic_light = {
     "light.glsl", "  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;\n", ""};
-constexpr Edit all_alike = {"light.glsl", "  light.pdf = analytic_light.chance;\n",
+constexpr Edit all_alike = {"light.glsl", "  light.pdf = analytic_light.probability;\n",
                             "  light.pdf = 1.0f / float(max(cm.analytic_lights.count, 1u));\n"};
 
 /// Lights as on a film set: a key light at the side, one with a tenth of its power opposite, and fourteen like the key
 /// light far away.
-light::AnalyticLights sixteen_analytic_lights(const viewer::Bounds& bounds, const Place& place, float power) {
+light::AnalyticLights sixteen_analytic_lights(const viewer::Bounds& bounds, const Position& position, float power) {
   light::AnalyticLights analytic_lights;
   const auto add = [&](const dvec3& at, float share) {
     light::AnalyticLight analytic_light;
@@ -188,11 +188,11 @@ light::AnalyticLights sixteen_analytic_lights(const viewer::Bounds& bounds, cons
     analytic_lights.push_back(analytic_light);
   };
   const dvec3 middle = 0.5 * (bounds.min + bounds.max);
-  add(place.at, 1.0F);
-  add(2.0 * middle - place.at, 0.1F);
+  add(position.at, 1.0F);
+  add(2.0 * middle - position.at, 0.1F);
   for (int i = 0; i < 14; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / 14.0;
-    add(middle + 10.0 * place.distance * dvec3(std::cos(angle), 0.3, std::sin(angle)), 1.0F);
+    add(middle + 10.0 * position.distance * dvec3(std::cos(angle), 0.3, std::sin(angle)), 1.0F);
   }
   return analytic_lights;
 }
@@ -250,13 +250,13 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     print_costs("Channels", rows.get(), options);
   }
   {
-    const Place place = beside(plain->bounds());
-    const double side = 0.5 * place.distance;
-    const auto power = static_cast<float>(10.0 * place.distance * place.distance);
+    const Position position = beside(plain->bounds());
+    const double side = 0.5 * position.distance;
+    const auto power = static_cast<float>(10.0 * position.distance * position.distance);
     light::AnalyticLight analytic_light;
-    analytic_light.position = place.at;
-    analytic_light.direction = place.direction;
-    analytic_light.across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), place.direction));
+    analytic_light.position = position.at;
+    analytic_light.direction = position.direction;
+    analytic_light.across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), position.direction));
     analytic_light.power = vec3(power);
     analytic_light.width = analytic_light.height = side;
     analytic_light.angle = std::numbers::pi / 4.0;
@@ -278,14 +278,14 @@ void measure_costs(headless::Context& context, const Input& input, const Options
           .viewer()
           .set_environment(light::make_environment(light::read_environment(name), name));
     }
-    lit("point beside it", light::AnalyticLight::Kind::point, place.at);
-    lit("spot", light::AnalyticLight::Kind::spot, place.at);
-    lit("disc", light::AnalyticLight::Kind::disc, place.at);
-    lit("rectangle", light::AnalyticLight::Kind::rectangle, place.at);
-    lit("point in it", light::AnalyticLight::Kind::point, place.at + place.direction * place.distance);
+    lit("point beside it", light::AnalyticLight::Kind::point, position.at);
+    lit("spot", light::AnalyticLight::Kind::spot, position.at);
+    lit("disc", light::AnalyticLight::Kind::disc, position.at);
+    lit("rectangle", light::AnalyticLight::Kind::rectangle, position.at);
+    lit("point in it", light::AnalyticLight::Kind::point, position.at + position.direction * position.distance);
     rows.add("two triangles like the rectangle", plain, Burns::no, dark)
         .viewer()
-        .show_surfaces(emitter_at(place, side, power / static_cast<float>(4.0 * side * side)));
+        .show_surfaces(emitter_at(position, side, power / static_cast<float>(4.0 * side * side)));
     if (plain->may_emit()) rows.add("its own fire", plain, Burns::both, dark);
     print_costs("Light", rows.get(), options);
 
@@ -296,7 +296,7 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     print_costs("Looks for sun and sky", looks.get(), options);
 
     const EditedShaders alike(std::array{any_analytic_light, all_alike});
-    const light::AnalyticLights sixteen = sixteen_analytic_lights(plain->bounds(), place, power);
+    const light::AnalyticLights sixteen = sixteen_analytic_lights(plain->bounds(), position, power);
     Rows many(context, density_scale);
     many.add("by what arrives", plain, Burns::no, dark).viewer().set_lights(sixteen);
     many.add("each alike", plain, Burns::no, dark, alike.programs()).viewer().set_lights(sixteen);

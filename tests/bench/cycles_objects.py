@@ -98,8 +98,8 @@ def medium(name, grid, settings):
 
 
 @bpy.app.handlers.persistent
-def place_all(*_):
-    bpy.app.handlers.load_post.remove(place_all)
+def add_instances(*_):
+    bpy.app.handlers.load_post.remove(add_instances)
     with open(FILE) as file:
         scene = json.load(file)
     folder = os.path.dirname(os.path.abspath(FILE))
@@ -118,12 +118,12 @@ def place_all(*_):
         volume.grids.load()
         to_object = next(grid for grid in volume.grids if grid.name == one["grid"]).matrix_object
         shift = to_object @ Matrix.Translation((-0.5, -0.5, -0.5)) @ to_object.inverted()
-        for place in one["places"]:
+        for transform in one["places"]:
             instance = bpy.data.objects.new(volume.name, volume)
             bpy.context.collection.objects.link(instance)
             # An object's own transform cannot contain shear, but its parent inverse matrix can.
             instance.parent = origin
-            instance.matrix_parent_inverse = matrix(place) @ shift
+            instance.matrix_parent_inverse = matrix(transform) @ shift
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
     bpy.context.scene.render.fps = 1  # frame rate of imported keyframes
     for number, one in enumerate(scene.get("models", [])):
@@ -141,4 +141,4 @@ def place_all(*_):
             bpy.data.objects.remove(other)
 
 
-bpy.app.handlers.load_post.append(place_all)
+bpy.app.handlers.load_post.append(add_instances)

@@ -24,7 +24,7 @@ from cycles_gltf import PEER_PATH, SKY, SUN, Unusable, compare, numpy, read_pfm,
 CAMERA = {"eye": [8, 40, 128], "target": [5, 27, 0], "fovy_degrees": 40}
 
 
-def place(translate, degrees=0.0, scale=(1, 1, 1)):
+def transform(translate, degrees=0.0, scale=(1, 1, 1)):
     """Returns a matrix, column by column: scale, then rotation about the vertical axis, then translation."""
     s, c = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
     x, y, z = scale
@@ -55,14 +55,14 @@ def flow(file):
 def volumes(cloud, other):
     """Returns a cloud, a stretched, sheared and colored second instance of it across the first, and a volume of another
     file."""
-    sheared = place([34, 2, 12], 40, (0.9, 0.7, 0.6))
+    sheared = transform([34, 2, 12], 40, (0.9, 0.7, 0.6))
     sheared[4] = 0.25
     return [
-        {"file": cloud, "grid": "density", "places": [place([-14, 0, 0])],
+        {"file": cloud, "grid": "density", "places": [transform([-14, 0, 0])],
          "medium": {"density_scale": 0.1, "albedo": [1, 1, 1], "anisotropy": 0.3}},
         {"file": cloud, "grid": "density", "places": [sheared],
          "medium": {"density_scale": 0.2, "albedo": [0.95, 0.7, 0.4], "anisotropy": 0.3}},
-        {"file": other, "grid": "density", "places": [place([10, 14, 26], -30, (3.5, 3.5, 3.5))],
+        {"file": other, "grid": "density", "places": [transform([10, 14, 26], -30, (3.5, 3.5, 3.5))],
          "medium": {"density_scale": 0.15, "albedo": [0.5, 0.6, 0.8], "anisotropy": 0.3}}]
 
 
@@ -84,7 +84,7 @@ def standing(bounds, middle, size, degrees):
     """Returns the transform that scales a model to this size and moves its center to this point."""
     low, high = bounds
     scale = size / max(b - a for a, b in zip(low, high))
-    at = place([0, 0, 0], degrees, (scale,) * 3)
+    at = transform([0, 0, 0], degrees, (scale,) * 3)
     centre = [(a + b) / 2 for a, b in zip(low, high)]
     moved = [middle[row] - sum(at[4 * i + row] * centre[i] for i in range(3)) for row in range(3)]
     return at[:12] + moved + [1]

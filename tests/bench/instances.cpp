@@ -26,7 +26,7 @@ namespace {
 using cumulet::bench::must;
 using cumulet::headless::Context;
 using cumulet::test::make_desc;
-using Place = std::array<double, 16>;
+using Transform = std::array<double, 16>;
 
 constexpr std::uint32_t width = 240;
 constexpr std::uint32_t height = 135;
@@ -42,11 +42,11 @@ void check(cumulet_status status, const char* cause) {
 }
 
 /// Transforms for a cloud of width `size`: a square from the origin away from the camera, towards -Z.
-std::vector<Place> layer(int count, double size) {
+std::vector<Transform> layer(int count, double size) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   const int side = static_cast<int>(std::ceil(std::sqrt(count)));
-  std::vector<Place> places;
+  std::vector<Transform> transforms;
   for (int i = 0; i < count; ++i) {
     // The nearest first, from the center to the sides.
     const int row = i / side;
@@ -59,11 +59,11 @@ std::vector<Place> layer(int count, double size) {
     const double flat = scale * (0.8 + 0.2 * part(random));
     constexpr double spacing = 1.3;
     constexpr double jitter = 0.45;
-    places.push_back({c, 0.0, -s, 0.0, 0.0, flat, 0.0, 0.0, s, 0.0, c, 0.0,
-                      size * (spacing * beside + jitter * part(random)), size * 0.15 * part(random),
-                      size * (-spacing * row + jitter * part(random)), 1.0});
+    transforms.push_back({c, 0.0, -s, 0.0, 0.0, flat, 0.0, 0.0, s, 0.0, c, 0.0,
+                          size * (spacing * beside + jitter * part(random)), size * 0.15 * part(random),
+                          size * (-spacing * row + jitter * part(random)), 1.0});
   }
-  return places;
+  return transforms;
 }
 
 class Bench {
@@ -99,8 +99,8 @@ class Bench {
     begin();
     double begun = processor_seconds();
     std::vector<cumulet::test::InstanceRef> instances;
-    const std::vector<Place> places = layer(count, size_);
-    for (const Place& place : places) instances.push_back(add(place));
+    const std::vector<Transform> transforms = layer(count, size_);
+    for (const Transform& transform : transforms) instances.push_back(add(transform));
     cost.add = milliseconds_since(begun);
     begun = processor_seconds();
     must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
@@ -115,9 +115,9 @@ class Bench {
     must(viewer_.get(), cumulet_get_stats(viewer_.get(), &cost.stats));
     cost.steps = static_cast<double>(cost.stats.steps) / static_cast<double>(cost.stats.samples);
     if (!picture.empty()) write(picture);
-    cost.move = move(instances.front().get(), places.front());
+    cost.move = move(instances.front().get(), transforms.front());
     // Looks at a single instance, away from the layer.
-    const Place alone{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 8.0 * size_, 1};
+    const Transform alone{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 8.0 * size_, 1};
     check(cumulet_instance_set_to_world(instances.front().get(), alone.data()), "");
     look({0.0, 0.3 * size_, 6.2 * size_}, {0.0, 0.3 * size_, 8.0 * size_});
     cost.rate_of_one = rate();
@@ -148,11 +148,11 @@ class Bench {
     must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
   }
 
-  cumulet::test::InstanceRef add(const Place& place) {
+  cumulet::test::InstanceRef add(const Transform& transform) {
     auto desc = make_desc<cumulet_instance_desc>();
     desc.volume = volume_.get();
     desc.medium = &medium_;
-    std::ranges::copy(place, desc.to_world);
+    std::ranges::copy(transform, desc.to_world);
     cumulet_instance* made = nullptr;
     std::array<char, 256> error{};
     check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
@@ -197,14 +197,14 @@ class Bench {
   }
 
   /// Additional time of a call after one instance has moved. The call traces almost nothing.
-  double move(cumulet_instance* instance, Place place) {
+  double move(cumulet_instance* instance, Transform transform) {
     constexpr double min_budget = 0.01;
     constexpr int times = 7;
     std::vector<double> moved;
     std::vector<double> still;
     for (int i = 0; i < 2 * times; ++i) {
-      place[13] += 1e-3 * size_;
-      if (i % 2 == 0) check(cumulet_instance_set_to_world(instance, place.data()), "");
+      transform[13] += 1e-3 * size_;
+      if (i % 2 == 0) check(cumulet_instance_set_to_world(instance, transform.data()), "");
       const double begun = processor_seconds();
       render(min_budget);
       (i % 2 == 0 ? moved : still).push_back(milliseconds_since(begun));

@@ -148,14 +148,14 @@ struct Policy {
   int events = 8;
 };
 
-void simulate(const std::vector<const Paths*>& pixels, const Policy& policy, double vectors_a_place) {
+void simulate(const std::vector<const Paths*>& pixels, const Policy& policy, double vectors_per_slot) {
   Sums sums;
   const auto later = [](const Vector* a, const Vector* b) { return a->time > b->time; };
   std::priority_queue<Vector*, std::vector<Vector*>, decltype(later)> running(later);
   const double vectors = static_cast<double>(pixels.size()) / static_cast<double>(policy.lanes);
-  std::vector<Vector> places(static_cast<std::size_t>(std::max(1.0, vectors / vectors_a_place)), Vector(policy.lanes));
+  std::vector<Vector> slots(static_cast<std::size_t>(std::max(1.0, vectors / vectors_per_slot)), Vector(policy.lanes));
   std::size_t next = 0;
-  for (Vector& place : places) running.push(&place);
+  for (Vector& slot : slots) running.push(&slot);
   double end = 0.0;
   while (!running.empty()) {
     Vector& vector = *running.top();
@@ -168,8 +168,8 @@ void simulate(const std::vector<const Paths*>& pixels, const Policy& policy, dou
     vector.round(policy.chunk, policy.events, sums);
     running.push(&vector);
   }
-  const double whole = end * static_cast<double>(places.size());
-  std::printf("| %zu | %.1f | %s | %d | %d | %.1f | %.1f | %.1f | %.0f | %.2f |\n", policy.lanes, vectors_a_place,
+  const double whole = end * static_cast<double>(slots.size());
+  std::printf("| %zu | %.1f | %s | %d | %d | %.1f | %.1f | %.1f | %.0f | %.2f |\n", policy.lanes, vectors_per_slot,
               policy.takes_next ? "next pixel" : "-", policy.chunk, policy.events, sums.steps / sums.vectors_steps,
               sums.events / sums.vectors_events, sums.instructions / sums.steps, 100.0 * sums.instructions / whole,
               whole / sums.steps);
@@ -196,8 +196,8 @@ void measure(core::Recording& recording, const std::filesystem::path& file, cons
       "|\n|--:|--:|---|--:|--:|--:|--:|--:|--:|--:|\n",
       file.filename().c_str(), steps / static_cast<double>(pixels.size()) / options.samples);
   for (const std::size_t lanes : {std::size_t{32}, std::size_t{8}}) {
-    for (const double vectors_a_place : {2.6, 10.0}) {
-      for (const bool takes_next : {false, true}) simulate(pixels, {lanes, takes_next}, vectors_a_place);
+    for (const double vectors_per_slot : {2.6, 10.0}) {
+      for (const bool takes_next : {false, true}) simulate(pixels, {lanes, takes_next}, vectors_per_slot);
     }
   }
   for (const int chunk : {4, 32}) simulate(pixels, {32, false, chunk}, 10.0);

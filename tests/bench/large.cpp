@@ -68,8 +68,8 @@ std::unique_ptr<Leaf> larger_leaf(openvdb::FloatGrid::ConstAccessor& from, const
   auto leaf = std::make_unique<Leaf>(origin, 0.0F, false);
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
     const openvdb::Coord at = leaf->offsetToGlobalCoord(i);
-    const openvdb::Vec3d place = (at.asVec3d() + 0.5) / times - 0.5;
-    const float value = openvdb::tools::BoxSampler::sample(from, place);
+    const openvdb::Vec3d position = (at.asVec3d() + 0.5) / times - 0.5;
+    const float value = openvdb::tools::BoxSampler::sample(from, position);
     if (value <= smallest) continue;
     const float detailed = value * (0.7F + 0.6F * noise({at.x(), at.y(), at.z()}));
     if (detailed > smallest) leaf->setValueOn(i, detailed);

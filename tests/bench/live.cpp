@@ -113,13 +113,13 @@ class Textures {
     dense.values = read_;
     dense.value_count = static_cast<std::uint64_t>(side_) * static_cast<std::uint64_t>(side_ * side_);
     for (int& s : dense.size) s = side_;
-    std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), dense.index_to_world);
+    std::ranges::copy(cumulet::test::simulated_transform({side_, side_, side_}), dense.index_to_world);
   }
   [[nodiscard]] cumulet_gl_field field(cumulet_channel channel) const {
     auto field = make_desc<cumulet_gl_field>();
     field.channel = channel;
     field.texture = names_[0];
-    std::ranges::copy(cumulet::test::simulated_place({side_, side_, side_}), field.index_to_world);
+    std::ranges::copy(cumulet::test::simulated_transform({side_, side_, side_}), field.index_to_world);
     return field;
   }
   // A tenth of the volume, around the middle of its height.

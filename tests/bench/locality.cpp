@@ -116,7 +116,7 @@ Order by_key(const std::vector<std::uint64_t>& keys) {
   std::iota(cells.begin(), cells.end(), 0U);
   std::ranges::stable_sort(cells, {}, [&](std::uint32_t cell) { return keys[cell]; });
   Order order(keys.size());
-  for (std::uint32_t place = 0; place < cells.size(); ++place) order[cells[place]] = place;
+  for (std::uint32_t position = 0; position < cells.size(); ++position) order[cells[position]] = position;
   return order;
 }
 

@@ -60,7 +60,7 @@ class Truth {
     for (std::size_t b = 0; b < volume.brick_origins.size(); ++b) {
       const float* values = volume.brick_values.brick(b, room);
       for (int i = 0; i < volume::brick_voxels; ++i)
-        values_[place(volume.brick_origins[b] + ivec3(i / 64, (i / 8) % 8, i % 8))] = extinction * double{values[i]};
+        values_[index_of(volume.brick_origins[b] + ivec3(i / 64, (i / 8) % 8, i % 8))] = extinction * double{values[i]};
     }
   }
 
@@ -78,7 +78,7 @@ class Truth {
       const ivec3 voxel = glm::clamp(ivec3(glm::floor(p + 0.5)), ivec3(0), size - 1);
       const dvec3 exit = (dvec3(voxel) + 0.5 * glm::sign(d) - o) / d;
       const double next = std::min({exit.x, exit.y, exit.z, end});
-      use(t, next, values_[place(voxel)]);
+      use(t, next, values_[index_of(voxel)]);
       t = std::max(next, t + 1e-9);
     }
   }
@@ -89,7 +89,7 @@ class Truth {
   }
 
  private:
-  static std::size_t place(const ivec3& p) { return static_cast<std::size_t>((p.x * size.y + p.y) * size.z + p.z); }
+  static std::size_t index_of(const ivec3& p) { return static_cast<std::size_t>((p.x * size.y + p.y) * size.z + p.z); }
   std::vector<double> values_;
 };
 

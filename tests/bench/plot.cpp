@@ -66,7 +66,7 @@ struct LogAxis {
   double high = 10.0;
   double from = 0.0;
   double to = 1.0;
-  [[nodiscard]] double place(double value) const {
+  [[nodiscard]] double position_of(double value) const {
     return from + (to - from) * std::log(value / low) / std::log(high / low);
   }
   /// 1, 2, 5 times powers of ten, or only the powers if there would be too many.
@@ -118,12 +118,12 @@ std::string line_plot(const std::string& title, const std::string& x_label, cons
   if (y.high <= y.low) y = {1.0, 10.0, y.from, y.to};
   std::string svg = head(height, title);
   for (const double tick : x.ticks()) {
-    const double at = x.place(tick);
+    const double at = x.position_of(tick);
     svg += format("<line class=\"rule\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>\n", at, y.from, at, y.to);
     svg += text_at(at, y.from + 18.0, "middle", short_number(tick));
   }
   for (const double tick : y.ticks()) {
-    const double at = y.place(tick);
+    const double at = y.position_of(tick);
     svg += format("<line class=\"rule\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>\n", x.from, at, x.to, at);
     svg += text_at(x.from - 8.0, at + 4.0, "end", short_number(tick));
   }
@@ -146,8 +146,9 @@ std::string line_plot(const std::string& title, const std::string& x_label, cons
     std::string dots;
     for (const auto& [a, b] : s.points) {
       if (!(a > 0.0) || !(b > 0.0)) continue;
-      path += format("%c%.1f %.1f", path.empty() ? 'M' : 'L', x.place(a), y.place(b));
-      dots += format("<circle class=\"fill%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"3\"/>", s.color, x.place(a), y.place(b));
+      path += format("%c%.1f %.1f", path.empty() ? 'M' : 'L', x.position_of(a), y.position_of(b));
+      dots += format("<circle class=\"fill%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"3\"/>", s.color, x.position_of(a),
+                     y.position_of(b));
     }
     if (!path.empty()) {
       svg += format("<path class=\"line%d\" fill=\"none\" stroke-width=\"2\"%s d=\"", s.color, dash) + path + "\"/>\n";

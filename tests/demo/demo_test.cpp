@@ -128,13 +128,13 @@ TEST(UndoHistory, LaterChangeIsASeparateStep) {
 
 TEST(UndoHistory, FirstCameraIsNoStep) {
   History history(scene_with(1));
-  SceneOptions placed = scene_with(1);
-  placed.camera.eye[2] = 5.0;
-  history.offer(placed, false);
+  SceneOptions posed = scene_with(1);
+  posed.camera.eye[2] = 5.0;
+  history.offer(posed, false);
   EXPECT_EQ(history.depth(), 0u);
-  placed.camera.eye[2] = 6.0;
-  history.offer(placed, false);
-  EXPECT_EQ(history.undo(placed)->camera.eye[2], 5.0);
+  posed.camera.eye[2] = 6.0;
+  history.offer(posed, false);
+  EXPECT_EQ(history.undo(posed)->camera.eye[2], 5.0);
 }
 
 TEST(UndoHistory, IsBounded) {
@@ -467,8 +467,8 @@ TEST(SunDial, PointsAndAnglesRoundTrip) {
 
 TEST(EnvironmentView, RotationFollowsThePointer) {
   // The image coordinate below a position in the view.
-  const auto under = [](double rotation, double place) {
-    const double u = left_edge(rotation) + place;
+  const auto under = [](double rotation, double offset) {
+    const double u = left_edge(rotation) + offset;
     return u - std::floor(u);
   };
   for (int rotation = -180; rotation <= 180; rotation += 30) {
@@ -481,12 +481,12 @@ TEST(EnvironmentView, RotationFollowsThePointer) {
     }
   }
   // As in cumulet.h: +Z in the center, +X left of it. A rotation moves the image's center from +Z towards +X.
-  EXPECT_NEAR(place_of(0.0), 0.5, 1e-12);
-  EXPECT_NEAR(place_of(90.0), 0.25, 1e-12);
-  EXPECT_NEAR(place_of(-90.0), 0.75, 1e-12);
-  EXPECT_NEAR(place_of(180.0), 0.0, 1e-12);
-  EXPECT_NEAR(place_of(-180.0), 0.0, 1e-12);
-  EXPECT_NEAR(under(90.0, place_of(90.0)), 0.5, 1e-12);
+  EXPECT_NEAR(position_of(0.0), 0.5, 1e-12);
+  EXPECT_NEAR(position_of(90.0), 0.25, 1e-12);
+  EXPECT_NEAR(position_of(-90.0), 0.75, 1e-12);
+  EXPECT_NEAR(position_of(180.0), 0.0, 1e-12);
+  EXPECT_NEAR(position_of(-180.0), 0.0, 1e-12);
+  EXPECT_NEAR(under(90.0, position_of(90.0)), 0.5, 1e-12);
   EXPECT_NEAR(dragged(0.0, -0.25), 90.0, 1e-12);
 }
 
@@ -733,7 +733,7 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
   double time_ = 1.0;
 };
 
-TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
+TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnArea) {
   frame();
   frame();
   const auto& controls = panel_.ui().controls();
@@ -746,12 +746,12 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   for (const auto& [name, control] : controls) {
     EXPECT_EQ(control.has_tip, !without_tip.contains(name)) << name;
-    const Rectangle& a = control.place;
+    const Rectangle& a = control.rectangle;
     EXPECT_GE(a.x, 0.0) << name;
     EXPECT_LE(a.x + a.width, static_cast<double>(screen.x) + 0.5) << name;
     EXPECT_GT(a.width, 2.0) << name;
     for (const auto& [other, control_b] : controls) {
-      const Rectangle& b = control_b.place;
+      const Rectangle& b = control_b.rectangle;
       const bool apart = a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
       // The toolbar is fixed; scrolled controls pass below it.
       if (name < other && control.in_view && control_b.in_view) {
@@ -773,11 +773,12 @@ TEST_P(PanelTest, LabelsFitBesideTheirControls) {
 TEST_P(PanelTest, ThumbnailRotatesTheEnvironment) {
   panel_.ui().bring_into_view("Environment view");
   for (int i = 0; i < 5; ++i) frame();
-  const auto place = panel_.ui().find("Environment view");
-  ASSERT_TRUE(place);
-  EXPECT_NEAR(place->height, 0.5 * place->width, 1.0);
+  const auto rectangle = panel_.ui().find("Environment view");
+  ASSERT_TRUE(rectangle);
+  EXPECT_NEAR(rectangle->height, 0.5 * rectangle->width, 1.0);
   const auto at = [&](double x) {
-    return ImVec2(static_cast<float>(place->x + x * place->width), static_cast<float>(place->y + 0.5 * place->height));
+    return ImVec2(static_cast<float>(rectangle->x + x * rectangle->width),
+                  static_cast<float>(rectangle->y + 0.5 * rectangle->height));
   };
   float& rotation = model_.scene.environment_settings.rotation_degrees;
   ImGuiIO& io = ImGui::GetIO();
@@ -854,8 +855,9 @@ TEST_P(PanelTest, SceneWithOnlyAModelIsListedAndSaved) {
 TEST_P(PanelTest, ButtonsIssueTheirCommands) {
   frame();
   frame();
-  const Rectangle place = *panel_.ui().find("Open");
-  const ImVec2 middle(static_cast<float>(place.x + place.width / 2), static_cast<float>(place.y + place.height / 2));
+  const Rectangle rectangle = *panel_.ui().find("Open");
+  const ImVec2 middle(static_cast<float>(rectangle.x + rectangle.width / 2),
+                      static_cast<float>(rectangle.y + rectangle.height / 2));
   ImGuiIO& io = ImGui::GetIO();
   frame(middle);
   io.MouseDown[0] = true;

@@ -40,7 +40,7 @@ using cumulet::headless::Context;
 constexpr std::uint32_t width = 96;
 constexpr std::uint32_t height = 64;
 // Position of the only voxel.
-constexpr std::array<double, 3> place{3.0, -1.0, 2.0};
+constexpr std::array<double, 3> position{3.0, -1.0, 2.0};
 
 struct Destroy {
   void operator()(cumulet_viewer* viewer) const { cumulet_destroy(viewer); }
@@ -63,7 +63,7 @@ class RenderedExr : public testing::TestWithParam<Backend> {
     dense.values = &value;
     dense.value_count = 1;
     dense.size[0] = dense.size[1] = dense.size[2] = 1;
-    const std::array<double, 16> to_world{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, place[0], place[1], place[2], 1};
+    const std::array<double, 16> to_world{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, position[0], position[1], position[2], 1};
     std::copy(to_world.begin(), to_world.end(), dense.index_to_world);
     cumulet_volume* volume = nullptr;
     EXPECT_EQ(cumulet_volume_from_dense(&dense, &volume, error.data(), error.size()), CUMULET_OK) << error.data();
@@ -402,7 +402,7 @@ TEST_P(RenderedExr, MatricesProjectTheVolumeIntoTheImage) {
     const std::string path = write("a.exr");
     Imf::InputFile file(path.c_str());
     ASSERT_TRUE(Imf::hasWorldToCamera(file.header()) && Imf::hasWorldToNDC(file.header()));
-    const Imath::V3d at(place[0], place[1], place[2]);
+    const Imath::V3d at(position[0], position[1], position[2]);
     const Imath::M44d to_camera(Imf::worldToCamera(file.header()));
     const Imath::M44d to_ndc(Imf::worldToNDC(file.header()));
     const Imath::V3d ndc = at * to_ndc;

@@ -50,7 +50,7 @@ TEST(Gizmo, FindsTheNearestPointOnAnAxis) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   const auto vector = [&] { return dvec3(normal(random), normal(random), normal(random)); };
-  int met = 0;
+  int hits = 0;
   for (int i = 0; i < 200; ++i) {
     const Ray ray{vector(), glm::normalize(vector())};
     const dvec3 point = vector();
@@ -74,9 +74,9 @@ TEST(Gizmo, FindsTheNearestPointOnAnAxis) {
     if (found) {
       EXPECT_NEAR(*found, low, 1e-5 * std::max(1.0, std::abs(low)));
     }
-    met += before ? 1 : 0;
+    hits += before ? 1 : 0;
   }
-  EXPECT_GT(met, 50);
+  EXPECT_GT(hits, 50);
   const Ray ray{{0.0, 0.0, 0.0}, {0.0, 0.0, -1.0}};
   EXPECT_FALSE(nearest_on_axis(ray, {1.0, 0.0, 0.0}, {0.0, 0.0, -1.0})) << "they run alike";
   EXPECT_FALSE(nearest_on_axis(ray, {1.0, 0.0, 5.0}, {1.0, 0.0, 0.0})) << "behind";
@@ -166,10 +166,10 @@ TEST(Drag, MovesAsFarAsThePointer) {
 
 TEST(Drag, MovesAlongTheObjectsOwnAxes) {
   const Sight sight(camera({4.0, 5.0, 9.0}), window);
-  const dmat4 place = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0))) *
-                      glm::scale(dmat4(1.0), dvec3(2.0, 3.0, 0.5));
-  const Gizmo gizmo = gizmo_of(Tool::move, Axes::local, place, dvec3(0.0), reach);
-  const dvec3 axis = glm::normalize(dvec3(place[1]));
+  const dmat4 transform = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0))) *
+                          glm::scale(dmat4(1.0), dvec3(2.0, 3.0, 0.5));
+  const Gizmo gizmo = gizmo_of(Tool::move, Axes::local, transform, dvec3(0.0), reach);
+  const dvec3 axis = glm::normalize(dvec3(transform[1]));
   Drag drag(gizmo, Handle::y, sight, at(sight, dvec3(0.0)));
   expect_near(dvec3(drag.to(sight, at(sight, 1.5 * axis), false)[3]), 1.5 * axis, 1e-9);
   EXPECT_EQ(drag.told(), "Y 1.5");
@@ -237,33 +237,33 @@ TEST(Drag, RotatesARingSeenEdgeOn) {
 
 TEST(Drag, ScalesAlongTheObjectsOwnAxes) {
   const dvec3 pivot(0.3, -0.2, 0.5);
-  const dmat4 place = glm::translate(dmat4(1.0), pivot) *
-                      glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0))) *
-                      glm::scale(dmat4(1.0), dvec3(2.0, 3.0, 0.5));
+  const dmat4 transform = glm::translate(dmat4(1.0), pivot) *
+                          glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0))) *
+                          glm::scale(dmat4(1.0), dvec3(2.0, 3.0, 0.5));
   for (const Sight& sight : sights()) {
     for (const Axes axes : {Axes::world, Axes::local}) {
-      const Gizmo gizmo = gizmo_of(Tool::scale, axes, place, pivot, reach);
+      const Gizmo gizmo = gizmo_of(Tool::scale, axes, transform, pivot, reach);
       for (int i = 0; i < 3; ++i) {
-        const dvec3 axis = glm::normalize(dvec3(place[i]));
+        const dvec3 axis = glm::normalize(dvec3(transform[i]));
         if (std::abs(glm::dot(axis, sight.to_eye(pivot))) > 0.95) continue;
         Drag drag(gizmo, static_cast<Handle>(i), sight, at(sight, pivot + axis));
-        const dmat4 changed = drag.to(sight, at(sight, pivot + 1.75 * axis), false) * place;
+        const dmat4 changed = drag.to(sight, at(sight, pivot + 1.75 * axis), false) * transform;
         dvec3 scale(1.0);
         scale[i] = 1.75;
-        const dmat4 want = place * glm::scale(dmat4(1.0), scale);
+        const dmat4 want = transform * glm::scale(dmat4(1.0), scale);
         for (int column = 0; column < 4; ++column) expect_near(dvec3(changed[column]), dvec3(want[column]), 1e-9);
         EXPECT_EQ(drag.told(), "1.75 x");
         // Dragging through the center and beyond only makes it small; it is not mirrored.
-        const dmat4 small = drag.to(sight, at(sight, pivot - 0.5 * axis), false) * place;
-        EXPECT_NEAR(glm::length(dvec3(small[i])), 0.01 * glm::length(dvec3(place[i])), 1e-9);
+        const dmat4 small = drag.to(sight, at(sight, pivot - 0.5 * axis), false) * transform;
+        EXPECT_NEAR(glm::length(dvec3(small[i])), 0.01 * glm::length(dvec3(transform[i])), 1e-9);
         EXPECT_GT(glm::determinant(small), 0.0);
         static_cast<void>(drag.to(sight, at(sight, pivot + 1.76 * axis), true));
         EXPECT_EQ(drag.told(), "1.8 x");
       }
     }
-    Drag alike(gizmo_of(Tool::scale, Axes::world, place, pivot, reach), Handle::free, sight, {300.0, 200.0});
-    const dmat4 twice = alike.to(sight, dvec2(300.0 + 2.0 * std::log(2.0) * reach, 200.0), false) * place;
-    for (int i = 0; i < 3; ++i) expect_near(dvec3(twice[i]), 2.0 * dvec3(place[i]), 1e-9);
+    Drag alike(gizmo_of(Tool::scale, Axes::world, transform, pivot, reach), Handle::free, sight, {300.0, 200.0});
+    const dmat4 twice = alike.to(sight, dvec2(300.0 + 2.0 * std::log(2.0) * reach, 200.0), false) * transform;
+    for (int i = 0; i < 3; ++i) expect_near(dvec3(twice[i]), 2.0 * dvec3(transform[i]), 1e-9);
     expect_near(dvec3(twice[3]), pivot, 1e-9);
   }
 }
@@ -272,7 +272,7 @@ TEST(Drag, ScalesAlongTheObjectsOwnAxes) {
 TEST(Drag, TransformStaysValidForAnyDrag) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> anywhere(-3000.0, 4000.0);
-  const dmat4 place = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0)));
+  const dmat4 transform = glm::rotate(dmat4(1.0), 0.6, glm::normalize(dvec3(1.0, 2.0, -1.0)));
   std::vector<Sight> all_of = sights();
   // Its axis passes close to the eye.
   all_of.emplace_back(camera({0.2, 0.1, 3.0}), window);
@@ -280,7 +280,7 @@ TEST(Drag, TransformStaysValidForAnyDrag) {
     for (const Tool tool : {Tool::move, Tool::rotate, Tool::scale}) {
       for (const Handle handle : all) {
         for (const dvec3& pivot : {dvec3(0.0), dvec3(0.5, -0.3, 0.1)}) {
-          const Gizmo gizmo = gizmo_of(tool, Axes::local, place, pivot, reach);
+          const Gizmo gizmo = gizmo_of(tool, Axes::local, transform, pivot, reach);
           Drag drag(gizmo, handle, sight, at(sight, pivot) + dvec2(13.0, 7.0));
           for (int i = 0; i < 100; ++i) {
             const dmat4 now = drag.to(sight, {anywhere(random), anywhere(random)}, i % 3 == 0);
@@ -359,8 +359,8 @@ SceneOptions scene_of_all() {
   scene.volume = "a.vdb";
   scene.others.resize(1);
   scene.others[0].volume = "b.vdb";
-  scene.others[0].places.resize(2);
-  for (auto& place : scene.others[0].places) place[0] = place[5] = place[10] = place[15] = 1.0;
+  scene.others[0].transforms.resize(2);
+  for (auto& transform : scene.others[0].transforms) transform[0] = transform[5] = transform[10] = transform[15] = 1.0;
   scene.models.push_back({"c.glb"});
   for (const cumulet_light_kind kind : {CUMULET_LIGHT_DISTANT, CUMULET_LIGHT_RECT, CUMULET_LIGHT_POINT}) {
     scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_light_desc);
@@ -380,9 +380,9 @@ TEST(Items, AreTheObjectsWithAPosition) {
             (std::vector<std::string>{"Volume 1: a.vdb", "Volume 2, instance 1: b.vdb", "Volume 2, instance 2: b.vdb",
                                       "Model 1: c.glb", "Light 2: rectangle", "Light 3: point"}));
   EXPECT_TRUE(items_of(SceneOptions()).empty());
-  EXPECT_FALSE(place_of(scene, {Item::Kind::analytic_light, 0, 0})) << "a sun stands nowhere";
-  EXPECT_FALSE(place_of(scene, {Item::Kind::volume, 2, 0}));
-  EXPECT_FALSE(place_of(scene, {Item::Kind::volume, 1, 2}));
+  EXPECT_FALSE(transform_of(scene, {Item::Kind::analytic_light, 0, 0})) << "a sun stands nowhere";
+  EXPECT_FALSE(transform_of(scene, {Item::Kind::volume, 2, 0}));
+  EXPECT_FALSE(transform_of(scene, {Item::Kind::volume, 1, 2}));
 }
 
 TEST(Items, TransformsRoundTrip) {
@@ -391,17 +391,17 @@ TEST(Items, TransformsRoundTrip) {
                        glm::rotate(dmat4(1.0), 0.7, glm::normalize(dvec3(1.0, 1.0, 0.0)));
   for (const Item& item : items_of(before)) {
     SceneOptions scene = before;
-    const dmat4 place = change * place_of(scene, item).value();
-    set_place(scene, item, place);
-    const dmat4 now = place_of(scene, item).value();
+    const dmat4 transform = change * transform_of(scene, item).value();
+    set_transform(scene, item, transform);
+    const dmat4 now = transform_of(scene, item).value();
     // A point light has no orientation.
     for (int column = item == Item{Item::Kind::analytic_light, 2, 0} ? 3 : 0; column < 4; ++column)
-      expect_near(dvec3(now[column]), dvec3(place[column]), 1e-12);
+      expect_near(dvec3(now[column]), dvec3(transform[column]), 1e-12);
     for (const Item& other : items_of(before)) {
       if (other == item) continue;
-      EXPECT_EQ(place_of(scene, other), place_of(before, other));
+      EXPECT_EQ(transform_of(scene, other), transform_of(before, other));
     }
-    restore_place(scene, item, before);
+    restore_transform(scene, item, before);
     EXPECT_TRUE(same_scene(scene, before)) << "to the letter";
   }
 }
@@ -409,15 +409,15 @@ TEST(Items, TransformsRoundTrip) {
 TEST(Items, ScaledLightKeepsItsOtherSettings) {
   const Item item{Item::Kind::analytic_light, 1, 0};
   SceneOptions scene = scene_of_all();
-  const dmat4 place = place_of(scene, item).value();
-  expect_near(dvec3(place[2]), {0.0, -1.0, 0.0}, 1e-15);
-  set_place(scene, item, glm::translate(dmat4(1.0), dvec3(0.0, 5.0, 0.0)) * place);
+  const dmat4 transform = transform_of(scene, item).value();
+  expect_near(dvec3(transform[2]), {0.0, -1.0, 0.0}, 1e-15);
+  set_transform(scene, item, glm::translate(dmat4(1.0), dvec3(0.0, 5.0, 0.0)) * transform);
   EXPECT_EQ(scene.analytic_lights[1].position[1], 5.0);
   EXPECT_EQ(scene.analytic_lights[1].direction[1], 0.0) << "down, as it was";
-  set_place(scene, item, place_of(scene, item).value() * glm::scale(dmat4(1.0), dvec3(3.0, 0.5, 7.0)));
+  set_transform(scene, item, transform_of(scene, item).value() * glm::scale(dmat4(1.0), dvec3(3.0, 0.5, 7.0)));
   EXPECT_DOUBLE_EQ(scene.analytic_lights[1].width, 6.0);
   EXPECT_DOUBLE_EQ(scene.analytic_lights[1].height, 2.0);
-  expect_near(dvec3(place_of(scene, item).value()[2]), {0.0, -1.0, 0.0}, 1e-12);
+  expect_near(dvec3(transform_of(scene, item).value()[2]), {0.0, -1.0, 0.0}, 1e-12);
 }
 
 TEST(Items, SelectionFollowsRemovals) {

@@ -31,10 +31,10 @@ def main():
     folder = pathlib.Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     lines = shown([render, volume, "--size", "64x48", "--spp", "4", "--gltf", model, "-o", "picture.png"], folder)
-    places = {name: [i for i, line in enumerate(lines) if line.startswith(name)] for name in ("compiling shaders", "rendering")}
-    parts = [int(re.search(r"(\d+) %", lines[i]).group(1)) for i in places["compiling shaders"]]
+    lines_with = {name: [i for i, line in enumerate(lines) if line.startswith(name)] for name in ("compiling shaders", "rendering")}
+    parts = [int(re.search(r"(\d+) %", lines[i]).group(1)) for i in lines_with["compiling shaders"]]
     assert parts == sorted(parts) and parts[-1] == 100, lines
-    assert max(places["compiling shaders"]) < min(places["rendering"]), lines
+    assert max(lines_with["compiling shaders"]) < min(lines_with["rendering"]), lines
     assert (folder / "picture.png").stat().st_size > 0
     stops_by_noise(render, volume, folder)
     stops_by_time(render, volume, folder)

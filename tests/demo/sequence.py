@@ -30,8 +30,8 @@ class Sequence:
         done = subprocess.run(self.command(output, *more), capture_output=True, text=True, timeout=600)
         matches = [LINE.fullmatch(line) for line in done.stdout.splitlines()]
         assert all(matches), done.stdout
-        places = [(int(m[2]), int(m[3])) for m in matches]
-        assert places == [(i + 1, places[0][1]) for i in range(len(places))], done.stdout
+        positions = [(int(m[2]), int(m[3])) for m in matches]
+        assert positions == [(i + 1, positions[0][1]) for i in range(len(positions))], done.stdout
         return done.returncode, [(int(m[1]), m[4], m[5]) for m in matches], done.stderr
 
 

@@ -274,32 +274,32 @@ def test_handles(s):
            "--scene", "all.json", "--spp", "2", "--max-bounces", "2", size=["--size", "1000x560"])
     report = lambda name: s.report(name)
     steps = lambda name: s.report(name)["undo_steps"]
-    places = lambda name, i: s.report(name)["volumes"][i].get("transforms", [])
+    transforms = lambda name, i: s.report(name)["volumes"][i].get("transforms", [])
     assert report("first")["chosen"] is None and steps("first") == 0
     assert report("clicked")["chosen"] == "Volume 1" and steps("clicked") == 0, "choosing is no change"
     area = look(s, "first")[2]
     # Compares the maximum block difference, because an outline is thin.
     outlined = lambda name: difference(look(s, "first")[0], look(s, name)[0], area)[1] > 2 * ALIKE[1]
     assert outlined("clicked")
-    (moved,) = places("moved", 0)
+    (moved,) = transforms("moved", 0)
     assert moved[12] > 5 and abs(moved[13]) < 1e-9 and abs(moved[14]) < 1e-9, moved
     assert steps("moved") == 1, "a drag is one step"
-    assert places("undone", 0) == [] and steps("undone") == 0 and report("undone")["chosen"] == "Volume 1"
+    assert transforms("undone", 0) == [] and steps("undone") == 0 and report("undone")["chosen"] == "Volume 1"
     assert_alike(look(s, "clicked")[0], look(s, "undone")[0], area)
-    assert places("redone", 0) == places("moved", 0) and steps("redone") == 1
-    assert places("held", 0) != [] and places("let_go", 0) == [] and steps("let_go") == 0, "Escape takes it back"
+    assert transforms("redone", 0) == transforms("moved", 0) and steps("redone") == 1
+    assert transforms("held", 0) != [] and transforms("let_go", 0) == [] and steps("let_go") == 0, "Escape takes it back"
     # A rotation about the vertical axis; the object's center does not move.
-    (turned,) = places("turned", 0)
+    (turned,) = transforms("turned", 0)
     assert abs(turned[5] - 1) < 1e-9 and abs(turned[0] - turned[10]) < 1e-9 and 0.1 < abs(turned[8]) < 1, turned
     assert steps("turned") == 1
     # Scales in steps of 0.1, along the object's own axes.
-    (scaled,) = places("scaled", 0)
+    (scaled,) = transforms("scaled", 0)
     size = [sum(scaled[4 * i + k] ** 2 for k in range(3)) ** 0.5 for i in range(3)]
     assert size[0] > 1.05 and abs(10 * size[0] - round(10 * size[0])) < 1e-6 and max(size) - min(size) < 1e-6, size
     assert abs(scaled[8] / size[2] - turned[8]) < 1e-6 and steps("scaled") == 2, scaled
     # Moves only the selected one of two instances.
     assert report("place")["chosen"] == "Volume 2, instance 2" and steps("place") == 2
-    assert places("place_moved", 1)[0] == places("place", 1)[0] != places("place_moved", 1)[1], places("place_moved", 1)
+    assert transforms("place_moved", 1)[0] == transforms("place", 1)[0] != transforms("place_moved", 1)[1], transforms("place_moved", 1)
     (model_before,), (model_moved,) = (report(name)["models"] for name in ("model", "model_moved"))
     assert report("model_moved")["chosen"] == "Model 1" and steps("model_moved") == 4
     way = [a - b for a, b in zip(model_moved["to_world"], model_before["to_world"])]

@@ -261,7 +261,7 @@ class Program {
   }
 
   /// Writes a matrix, usually a valid transform; sometimes leaves it unchanged.
-  void put_place(double* to_world) {
+  void put_transform(double* to_world) {
     const int kind = data_.ConsumeIntegralInRange(0, 7);
     if (kind == 0) return;
     std::fill_n(to_world, 16, 0.0);
@@ -274,12 +274,12 @@ class Program {
     to_world[15] = 1.0;
   }
 
-  void set_places() {
+  void set_transforms() {
     constexpr std::uint32_t most = 3;
-    std::array<double, std::size_t{16} * most> places{};
+    std::array<double, std::size_t{16} * most> transforms{};
     const auto all = [&] {
-      for (std::size_t i = 0; i < most; ++i) put_place(&places[16 * i]);
-      return places;
+      for (std::size_t i = 0; i < most; ++i) put_transform(&transforms[16 * i]);
+      return transforms;
     };
     const auto count = data_.ConsumeIntegralInRange(0U, most);
     told(cumulet_set_volume_transforms(viewer_.get(), all().data(), count));
@@ -294,9 +294,9 @@ class Program {
     auto medium = described<cumulet_medium_desc>();
     std::array<cumulet_instance_desc, 2> desc{};
     desc[0] = described<cumulet_instance_desc>();
-    put_place(desc[0].to_world);
-    put_place(desc[0].open_to_world);
-    put_place(desc[0].close_to_world);
+    put_transform(desc[0].to_world);
+    put_transform(desc[0].open_to_world);
+    put_transform(desc[0].close_to_world);
     desc[0].volume = volume_.get();
     desc[0].sequence = volume_ ? nullptr : sequence_.get();
     desc[0].dynamic_volume = volume_ || sequence_ ? nullptr : live_.get();
@@ -326,9 +326,9 @@ class Program {
   void change_models() {
     std::array<cumulet_model_desc, 2> desc{};
     desc[0] = described<cumulet_model_desc>();
-    put_place(desc[0].to_world);
-    put_place(desc[0].open_to_world);
-    put_place(desc[0].close_to_world);
+    put_transform(desc[0].to_world);
+    put_transform(desc[0].open_to_world);
+    put_transform(desc[0].close_to_world);
     desc[0].surfaces = surfaces_.get();
     switch (data_.ConsumeIntegralInRange(0, 6)) {
       case 0:
@@ -828,7 +828,7 @@ class Program {
       case 35:
         return focus();
       case 36:
-        return set_places();
+        return set_transforms();
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));

@@ -88,10 +88,11 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
   for (const surface::Material& m : pose.materials) {
     if (const std::string what = broken(scene, m); !what.empty()) return what;
   }
-  if (pose.placings.size() != scene.prototypes.size()) return "there are not as many placings as prototypes";
-  for (const std::vector<glm::dmat4>& placings : pose.placings) {
-    for (const glm::dmat4& placing : placings) {
-      if (!(std::abs(glm::determinant(glm::dmat3(placing))) > 0.0)) return "a placing is flat";
+  if (pose.prototype_transforms.size() != scene.prototypes.size())
+    return "there are not as many placings as prototypes";
+  for (const std::vector<glm::dmat4>& transforms : pose.prototype_transforms) {
+    for (const glm::dmat4& transform : transforms) {
+      if (!(std::abs(glm::determinant(glm::dmat3(transform))) > 0.0)) return "a placing is flat";
     }
   }
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
@@ -105,8 +106,8 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
       const surface::PosedVertex& v = pose.vertices[scene.indices[i]];
       if (!finite(v.position)) return "a position is not finite";
       for (int c = 0; c < 3 && !surface::is_hidden(pose, d) && d < scene.first_prototype_draw(); ++c) {
-        const double place = pose.origin[c] + double{v.position[c]};
-        if (place < pose.low[c] || place > pose.high[c]) return "a position is out of bounds";
+        const double coordinate = pose.origin[c] + double{v.position[c]};
+        if (coordinate < pose.low[c] || coordinate > pose.high[c]) return "a position is out of bounds";
       }
       if (!unit(v.normal)) return "a normal is not of unit length";
       const glm::vec3 tangent(v.tangent);

@@ -148,7 +148,7 @@ TEST(AdaptiveSampleCounts, RareBrightSamplesAreNotMissed) {
   constexpr unsigned squares = 32;
   constexpr double target = 0.5;
   std::mt19937_64 random(3);
-  const auto chance_of = [](unsigned square) { return square < squares / 2 ? 0.002 : 0.9; };
+  const auto probability_of = [](unsigned square) { return square < squares / 2 ? 0.002 : 0.9; };
   double sum = 0.0;
   constexpr int pictures = 60;
   for (int picture = 0; picture < pictures; ++picture) {
@@ -164,7 +164,7 @@ TEST(AdaptiveSampleCounts, RareBrightSamplesAreNotMissed) {
       for (std::size_t i = 0; i < total.size(); ++i) {
         const auto x = static_cast<unsigned>(i % (8 * squares));
         const auto y = static_cast<unsigned>(i / (8 * squares));
-        const double p = chance_of(x / 8);
+        const double p = probability_of(x / 8);
         if (allotment.is_live({x, y})) {
           std::binomial_distribution<int> hits(static_cast<int>(samples - count[i]), p);
           const double found = hits(random);

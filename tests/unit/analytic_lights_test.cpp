@@ -101,7 +101,7 @@ class AnalyticLights : public test::ViewerTest {
 CUMULET_ON_BACKENDS(AnalyticLights);
 
 constexpr double above = 20.0;  // of the floor
-const dvec3 place(32.0, floor_y + above, 32.0);
+const dvec3 position(32.0, floor_y + above, 32.0);
 
 // Irradiance below a corner of a horizontal rectangle of radiance 1, with sides a and b, at height h.
 double quarter(double a, double b, double h) {
@@ -117,9 +117,9 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
     EXPECT_NEAR(irradiance(), expected, 0.01 * expected + 1e-9) << what;
   };
   const double point = 1000.0 / (4.0 * pi) / (above * above);
-  expect(analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F), point, "point");
+  expect(analytic_light(CUMULET_LIGHT_POINT, position, 1000.0F), point, "point");
 
-  auto spot = analytic_light(CUMULET_LIGHT_SPOT, place, 1000.0F);
+  auto spot = analytic_light(CUMULET_LIGHT_SPOT, position, 1000.0F);
   expect(spot, point, "spot");
   spot.direction[0] = std::tan(20.0 * pi / 180.0);
   spot.direction[1] = -1.0;
@@ -132,17 +132,17 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
   const double edge = std::cos(30.0 * pi / 180.0);
   const double share = (std::cos(25.0 * pi / 180.0) - edge) / (1.0 - edge);
   expect(spot, point * share * share, "blended");
-  auto narrow = analytic_light(CUMULET_LIGHT_SPOT, place, 1000.0F);
+  auto narrow = analytic_light(CUMULET_LIGHT_SPOT, position, 1000.0F);
   narrow.angle_degrees = 4.0;
   expect(narrow, point, "narrow");
 
-  auto disc = analytic_light(CUMULET_LIGHT_DISK, place, 1000.0F);
+  auto disc = analytic_light(CUMULET_LIGHT_DISK, position, 1000.0F);
   disc.width = 30.0;
   expect(disc, 0.25 * 1000.0 / (above * above + 225.0), "disc");
   disc.direction[1] = 1.0;
   expect(disc, 0.0, "a disc's back");
 
-  auto rectangle = analytic_light(CUMULET_LIGHT_RECT, place, 1000.0F);
+  auto rectangle = analytic_light(CUMULET_LIGHT_RECT, position, 1000.0F);
   rectangle.width = 30.0;
   rectangle.height = 8.0;
   const double radiance = 1000.0 / (4.0 * 240.0);
@@ -174,15 +174,15 @@ TEST_P(AnalyticLights, FloorIrradianceMatchesFormFactors) {
 // Lights are sampled by their contribution, and weak ones are still unbiased.
 TEST_P(AnalyticLights, DimLightsNextToBrightOnesCount) {
   set_floor();
-  std::vector<cumulet_light_desc> analytic_lights{analytic_light(CUMULET_LIGHT_POINT, place, 1.0F)};
-  auto away = analytic_light(CUMULET_LIGHT_SPOT, place, 1e6F);  // faces up
+  std::vector<cumulet_light_desc> analytic_lights{analytic_light(CUMULET_LIGHT_POINT, position, 1.0F)};
+  auto away = analytic_light(CUMULET_LIGHT_SPOT, position, 1e6F);  // faces up
   away.direction[1] = 1.0;
   analytic_lights.push_back(away);
   set_lights(analytic_lights);
   const double dim = 1.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(irradiance(1024), dim, 0.03 * dim);
   for (const float power : {10.0F, 3.0F, 100.0F})
-    analytic_lights.push_back(analytic_light(CUMULET_LIGHT_POINT, place, power));
+    analytic_lights.push_back(analytic_light(CUMULET_LIGHT_POINT, position, power));
   analytic_lights.erase(analytic_lights.begin() + 1);
   set_lights(analytic_lights);
   EXPECT_NEAR(irradiance(256), 114.0 * dim, 0.01 * 114.0 * dim);
@@ -191,13 +191,13 @@ TEST_P(AnalyticLights, DimLightsNextToBrightOnesCount) {
 TEST_P(AnalyticLights, CombineWithModelLightsAndHaveColors) {
   surface::PunctualLight of_scene;
   of_scene.intensity = vec3(100.0F);
-  of_scene.position = vec3(place);
+  of_scene.position = vec3(position);
   set_floor({of_scene});
-  auto d = analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F);
+  auto d = analytic_light(CUMULET_LIGHT_POINT, position, 1000.0F);
   d.color[0] = 0.5F;
   d.color[1] = 0.25F;
-  set_lights(
-      {d, analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 0.1F), analytic_light(CUMULET_LIGHT_POINT, place, 0.0F)});
+  set_lights({d, analytic_light(CUMULET_LIGHT_DISTANT, dvec3(0.0), 0.1F),
+              analytic_light(CUMULET_LIGHT_POINT, position, 0.0F)});
   const test::Picture picture = test::render(*still_, {16, 16, 1024, 1, render::View::shaded});
   const double each = 1000.0 / (4.0 * pi) / (above * above);
   EXPECT_NEAR(picture.mean().x * pi, 100.0 / (above * above) + 0.5 * each + 0.1, 0.005);
@@ -212,9 +212,9 @@ TEST_P(AnalyticLights, LightRasterizedSurfaces) {
   viewer::SurfaceSettings none;
   none.light = viewer::SurfaceLight::none;
   still_->viewer().set_surface_settings(none);
-  set_lights({analytic_light(CUMULET_LIGHT_POINT, place, 1000.0F)});
+  set_lights({analytic_light(CUMULET_LIGHT_POINT, position, 1000.0F)});
   EXPECT_NEAR(irradiance(4) * (4.0 * pi) * above * above / 1000.0, 1.0, 0.01);
-  auto disc = analytic_light(CUMULET_LIGHT_DISK, place, 1000.0F);
+  auto disc = analytic_light(CUMULET_LIGHT_DISK, position, 1000.0F);
   disc.width = 0.1;
   set_lights({disc});
   EXPECT_NEAR(irradiance(4) * 4.0 * above * above / 1000.0, 1.0, 0.01);

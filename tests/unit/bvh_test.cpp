@@ -132,10 +132,10 @@ void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed,
     doubtful += unsure ? 1 : 0;
     if (unsure) continue;
     Hit hit{};
-    const bool met = rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit);
-    ASSERT_EQ(met, nearest < ray.t_max) << glm::length(ray.o);
-    ASSERT_EQ(rays.cm_bvh_occluded(ray.o, ray.d, 0.0F, ray.t_max), met);
-    if (!met) continue;
+    const bool is_hit = rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit);
+    ASSERT_EQ(is_hit, nearest < ray.t_max) << glm::length(ray.o);
+    ASSERT_EQ(rays.cm_bvh_occluded(ray.o, ray.d, 0.0F, ray.t_max), is_hit);
+    if (!is_hit) continue;
     ++hits;
     const double reach = glm::length(o) + nearest * glm::length(d);
     ASSERT_NEAR(hit.t, nearest, 2e-5 * reach / glm::length(d));
@@ -214,8 +214,8 @@ std::size_t slips(const Mesh& mesh, std::size_t count, unsigned seed) {
   std::size_t slipped = 0;
   for (const Ray& ray : rays_out_of(mesh, count, seed)) {
     Hit hit{};
-    const bool met = rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit);
-    slipped += met && !hit.front && rays.cm_bvh_occluded(ray.o, ray.d, 0.0F, ray.t_max) ? 0 : 1;
+    const bool is_hit = rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit);
+    slipped += is_hit && !hit.front && rays.cm_bvh_occluded(ray.o, ray.d, 0.0F, ray.t_max) ? 0 : 1;
   }
   return slipped;
 }
@@ -259,10 +259,10 @@ TEST(Bvh, RefitMatchesARebuild) {
     for (const Ray& ray : rays_at(posed, 20000, 12)) {
       Hit a{};
       Hit b{};
-      const bool met = refitted.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, a);
-      ASSERT_EQ(met, rebuilt.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, b));
-      hits += met ? 1 : 0;
-      ASSERT_TRUE(!met || same_hit(a, b));
+      const bool is_hit = refitted.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, a);
+      ASSERT_EQ(is_hit, rebuilt.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, b));
+      hits += is_hit ? 1 : 0;
+      ASSERT_TRUE(!is_hit || same_hit(a, b));
     }
     EXPECT_GT(hits, 5000U);
     // The refitted tree costs more than a rebuilt one, and little more if little moved.
@@ -561,11 +561,11 @@ TEST_P(BvhGl, ShadersMatchTheCpu) {
     }
     const std::vector<test::GlHit> hits = gl.trace(bvh, all);
     std::size_t different = 0;
-    std::size_t met = 0;
+    std::size_t hit_count = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
       Hit hit{};
       const bool expected = rays.cm_bvh_closest(all[i].o, all[i].d, 0.0F, all[i].t_max, hit);
-      met += expected ? 1 : 0;
+      hit_count += expected ? 1 : 0;
       ASSERT_EQ(hits[i].triangle != CM_BVH_NONE, hits[i].occluded != 0) << i;
       // GPU division may round differently. Hits at an edge, a needle or the ray's end may differ.
       if (hits[i].triangle != hit.triangle) {
@@ -579,7 +579,7 @@ TEST_P(BvhGl, ShadersMatchTheCpu) {
       ASSERT_NEAR(hits[i].barycentrics.y, hit.barycentrics.y, 1e-2F) << i;
     }
     EXPECT_LE(different, all.size() / 500) << mesh.indices.size();
-    EXPECT_GE(met, mesh.indices.size() < 4 ? 0U : all.size() / 20);
+    EXPECT_GE(hit_count, mesh.indices.size() < 4 ? 0U : all.size() / 20);
   }
 }
 

@@ -28,10 +28,10 @@ using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
 using Picture = std::vector<std::uint8_t>;
 
-InstanceRef make_instance(cumulet_volume* volume, const std::array<double, 16>& place = {}) {
+InstanceRef make_instance(cumulet_volume* volume, const std::array<double, 16>& transform = {}) {
   auto desc = make_desc<cumulet_instance_desc>();
   desc.volume = volume;
-  std::ranges::copy(place, desc.to_world);
+  std::ranges::copy(transform, desc.to_world);
   return cumulet::test::make_instance(desc);
 }
 
@@ -222,8 +222,8 @@ TEST_F(CVolumeInstance, MayBeChangedFromAnyThread) {
   for (int i = 0; i < 4; ++i) {
     threads.emplace_back([&, i, instance = instances[static_cast<std::size_t>(i)].get()] {
       for (int k = 0; !ends; ++k) {
-        const auto place = at(0.1 * (k % 50) - 2.0, i, 0.0);
-        EXPECT_EQ(cumulet_instance_set_to_world(instance, place.data()), CUMULET_OK);
+        const auto transform = at(0.1 * (k % 50) - 2.0, i, 0.0);
+        EXPECT_EQ(cumulet_instance_set_to_world(instance, transform.data()), CUMULET_OK);
         auto desc = make_desc<cumulet_instance_desc>();
         desc.volume = k % 3 == 0 ? ball_.get() : small_.get();
         desc.hidden = k % 5 == 0 ? 1 : 0;

@@ -75,23 +75,23 @@ struct Box {
   }
 };
 
-SurfacesRef surfaces_of(const std::vector<Matrix>& places, const Box& box = Box(), float emission = 0.0F) {
+SurfacesRef surfaces_of(const std::vector<Matrix>& transforms, const Box& box = Box(), float emission = 0.0F) {
   std::vector<cumulet_mesh_desc> meshes;
-  for (const Matrix& place : places) {
+  for (const Matrix& transform : transforms) {
     meshes.push_back(box.mesh());
-    std::ranges::copy(place, meshes.back().to_world);
+    std::ranges::copy(transform, meshes.back().to_world);
     for (float& e : meshes.back().emission) e = emission;
   }
   return make_surfaces(meshes);
 }
 
-ModelRef make_model(cumulet_surfaces* surfaces, const Matrix& place = {}, bool shadow_only = false,
+ModelRef make_model(cumulet_surfaces* surfaces, const Matrix& transform = {}, bool shadow_only = false,
                     std::uint64_t tag = 0) {
   auto desc = make_desc<cumulet_model_desc>();
   desc.surfaces = surfaces;
   desc.shadow_only = shadow_only ? 1 : 0;
   desc.tag = tag;
-  std::ranges::copy(place, desc.to_world);
+  std::ranges::copy(transform, desc.to_world);
   return cumulet::test::made_by<ModelRef>(cumulet_model_create, desc);
 }
 

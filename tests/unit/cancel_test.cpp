@@ -57,11 +57,11 @@ std::vector<double> fractions_of(const Work& work) {
   return seen;
 }
 
-/// Expects that the fraction never decreases, stays within [0, 1], reaches 1, and takes at least `places` values.
-void expect_steady_progress(const Work& work, std::size_t places = 5) {
+/// Expects that the fraction never decreases, stays within [0, 1], reaches 1, and takes at least `min_values` values.
+void expect_steady_progress(const Work& work, std::size_t min_values = 5) {
   std::vector<double> all;
   // On a busy machine the watching thread may miss most values.
-  for (int attempt = 0; attempt < 20 && all.size() < places; ++attempt) {
+  for (int attempt = 0; attempt < 20 && all.size() < min_values; ++attempt) {
     const std::vector<double> seen = fractions_of(work);
     EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
     EXPECT_GE(seen.front(), 0.0);
@@ -70,7 +70,7 @@ void expect_steady_progress(const Work& work, std::size_t places = 5) {
     std::sort(all.begin(), all.end());
     all.erase(std::unique(all.begin(), all.end()), all.end());
   }
-  EXPECT_GE(all.size(), places);
+  EXPECT_GE(all.size(), min_values);
 }
 
 double processor_milliseconds() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -156,8 +156,8 @@ void expect_stops(const Work& work) {
   expect_soon(delays, 100.0);
 }
 
-void expect_both(const Work& work, std::size_t places = 5) {
-  expect_steady_progress(work, places);
+void expect_both(const Work& work, std::size_t min_values = 5) {
+  expect_steady_progress(work, min_values);
   expect_cancels(work);
 }
 

@@ -46,7 +46,7 @@ class Rays {
     return d;
   }
   /// Whether a ray reaches a cell that has density (at any time of the shutter interval) or emits light.
-  [[nodiscard]] bool meets(std::uint32_t cell, const vec3& o, const vec3& d) const {
+  [[nodiscard]] bool hits(std::uint32_t cell, const vec3& o, const vec3& d) const {
     while (cell != CM_NONE) {
       const glm::uvec4& data = grid_.cells[cell].data;
       if (!core::cm_record_is_empty(data)) return true;
@@ -82,7 +82,7 @@ Found look(const grid::TetGrid& grid) {
       ++found.cones;
       if (!core::cm_record_is_clear(data, 1U << cone)) continue;
       ++found.clear;
-      if (rays.meets(cell, rays.within(cell), rays.within_cone(cone))) ++found.wrong;
+      if (rays.hits(cell, rays.within(cell), rays.within_cone(cone))) ++found.wrong;
     }
   }
   return found;

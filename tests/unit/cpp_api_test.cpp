@@ -300,15 +300,15 @@ TEST(CppVolume, IsSharedByCopies) {
 TEST(CppInstance, IsSharedByCopies) {
   const std::vector<float> values = ball();
   const Volume volume = Volume::from_dense({.values = values, .size = {16, 16, 16}}).value();
-  std::array<double, 16> place{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1};
-  auto made = Instance::create({.volume = volume, .to_world = place, .tag = 5});
+  std::array<double, 16> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1};
+  auto made = Instance::create({.volume = volume, .to_world = transform, .tag = 5});
   ASSERT_TRUE(made.has_value());
   const Instance instance = made.value();
-  place[0] = 0.0;
-  EXPECT_FALSE(instance.set_to_world(place).has_value());
-  EXPECT_FALSE(Instance::create({.volume = volume, .to_world = place}).has_value());
-  place[0] = 2.0;
-  EXPECT_TRUE(instance.set_to_world(place).has_value());
+  transform[0] = 0.0;
+  EXPECT_FALSE(instance.set_to_world(transform).has_value());
+  EXPECT_FALSE(Instance::create({.volume = volume, .to_world = transform}).has_value());
+  transform[0] = 2.0;
+  EXPECT_TRUE(instance.set_to_world(transform).has_value());
   constexpr std::array<std::array<float, 2>, 2> same{{{0.0F, 0.0F}, {1.0F, 1.0F}}};
   EXPECT_TRUE(instance.set_ramp(Ramp::density, same).has_value());
   EXPECT_TRUE(instance.set({.volume = volume, .medium = {.density_scale = 2.0}, .hidden = true}).has_value());
@@ -477,8 +477,8 @@ TEST_F(CppViewer, ShowsAVolume) {
   EXPECT_GT(linear[(8 * 24 + 12) * 4 + 3], 0.9F);  // the ball's alpha, in the middle
   std::vector<float> mattes(24 * 16 * 2);
   int asked = 0;
-  const auto name = [&](ObjectKind kind, std::uint64_t tag, std::uint32_t place) -> const char* {
-    asked += kind == ObjectKind::volume && tag == 0 && place == 0 ? 1 : 100;
+  const auto name = [&](ObjectKind kind, std::uint64_t tag, std::uint32_t transform_index) -> const char* {
+    asked += kind == ObjectKind::volume && tag == 0 && transform_index == 0 ? 1 : 100;
     return "ball";
   };
   viewer.read_cryptomatte(name, 1, mattes).value();
@@ -812,8 +812,8 @@ TEST(CppModel, IsSharedByCopies) {
   const std::array<float, 9> positions = {0, 0, 0, 2, 0, 0, 0, 1, 0};
   const std::array<MeshDesc, 1> meshes = {MeshDesc{.positions = positions}};
   const Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes}).value();
-  std::array<double, 16> place{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1};
-  Model model = Model::create({.surfaces = surfaces, .to_world = place, .tag = 5}).value();
+  std::array<double, 16> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1};
+  Model model = Model::create({.surfaces = surfaces, .to_world = transform, .tag = 5}).value();
   const Model copy = model;
   EXPECT_EQ(copy.handle(), model.handle());
   Model moved = std::move(model);
@@ -823,14 +823,14 @@ TEST(CppModel, IsSharedByCopies) {
   EXPECT_FALSE(moved);  // NOLINT(bugprone-use-after-move)
   EXPECT_TRUE(model.set_time(0.5));
   EXPECT_FALSE(model.set_time(std::numeric_limits<double>::quiet_NaN()));
-  place[0] = 0.0;
-  EXPECT_FALSE(model.set_to_world(place)) << "flat";
-  const auto flat = Model::create({.surfaces = surfaces, .to_world = place});
+  transform[0] = 0.0;
+  EXPECT_FALSE(model.set_to_world(transform)) << "flat";
+  const auto flat = Model::create({.surfaces = surfaces, .to_world = transform});
   ASSERT_FALSE(flat);
   EXPECT_EQ(flat.error().status, StatusCode::invalid_argument);
   EXPECT_FALSE(flat.error().message.empty());
-  place[0] = 2.0;
-  EXPECT_TRUE(copy.set_to_world(place));
+  transform[0] = 2.0;
+  EXPECT_TRUE(copy.set_to_world(transform));
   EXPECT_TRUE(model.set({.surfaces = surfaces, .hidden = true}));
   EXPECT_EQ(Model().set({}).error().status, StatusCode::invalid_argument);
   EXPECT_EQ(Model().set_time(0.0).error().status, StatusCode::invalid_argument);
@@ -841,8 +841,8 @@ TEST_F(CppViewer, ShowsModels) {
   const std::array<std::uint32_t, 6> indices = {0, 1, 2, 0, 2, 3};
   const std::array<MeshDesc, 1> meshes = {MeshDesc{.positions = positions, .indices = indices, .emission = {1, 0, 0}}};
   const Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes}).value();
-  std::array<double, 16> place{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  Model model = Model::create({.surfaces = surfaces, .to_world = place, .tag = 7}).value();
+  std::array<double, 16> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  Model model = Model::create({.surfaces = surfaces, .to_world = transform, .tag = 7}).value();
   Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
   viewer.set_sampling({.samples = 4, .preview = Preview::off}).value();
   viewer.get_camera()->set({.eye = {0, 0, 5}, .target = {0, 0, 0}}).value();
@@ -859,11 +859,11 @@ TEST_F(CppViewer, ShowsModels) {
   EXPECT_EQ(pick.tag, 7U);
   EXPECT_NEAR(pick.distance, 5.0, 1e-2);
   EXPECT_EQ(viewer.get_bounds()->max, (Vector{1, 1, 0}));
-  place[14] = 2.0;
-  model.set_to_world(place).value();
+  transform[14] = 2.0;
+  model.set_to_world(transform).value();
   EXPECT_NEAR(picked().distance, 3.0, 1e-2);
   EXPECT_EQ(viewer.get_bounds()->max, (Vector{1, 1, 2}));
-  model.set({.surfaces = surfaces, .to_world = place, .shadow_only = true}).value();
+  model.set({.surfaces = surfaces, .to_world = transform, .shadow_only = true}).value();
   EXPECT_FALSE(picked().hit) << "cameras do not see it";
   // The viewer keeps its own reference.
   model = Model();

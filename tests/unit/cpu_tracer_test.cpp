@@ -160,7 +160,7 @@ TEST(LightPassingRay, RayThatOnlyTouchesTheBoxHasAFiniteWeight) {
   twin.cm.space.to_cube_y = {0.0F, 1.0F, 0.0F};
   twin.cm.space.to_cube_z = {0.0F, 0.0F, 1.0F};
   twin.cm.space.box_max = vec3(8.0F);
-  twin.cm.lights.analytic_light_chance = 0.5F;
+  twin.cm.lights.analytic_light_probability = 0.5F;
   const vec3 along_an_edge = glm::normalize(vec3(1.0F, -1.0F, 0.0F));
   const float density = twin.cm_equiangular_pdf({8.0F, 8.0F, 4.0F}, along_an_edge, {0.0F, 0.0F, 1.0F}, 2.0F);
   EXPECT_EQ(twin.cm_equiangular_weight(density, 3.0F), 1.0F);

@@ -56,7 +56,7 @@ TEST(CryptomatteId, IsAFiniteFloat) {
 struct Told {
   cumulet_object_kind kind;
   std::uint64_t tag;
-  std::uint32_t place;
+  std::uint32_t transform_index;
   bool operator==(const Told&) const = default;
 };
 
@@ -135,9 +135,9 @@ class Cryptomatte : public CViewerTest {
   /// Pairs of an id and a coverage; names_ gives the names.
   std::vector<std::pair<std::uint32_t, float>> read(std::uint32_t ranks) {
     asked_.clear();
-    const auto name = [](void* user, cumulet_object_kind kind, std::uint64_t tag, std::uint32_t place) {
+    const auto name = [](void* user, cumulet_object_kind kind, std::uint64_t tag, std::uint32_t transform_index) {
       auto& test = *static_cast<Cryptomatte*>(user);
-      test.asked_.push_back({kind, tag, place});
+      test.asked_.push_back({kind, tag, transform_index});
       double noise = 0.0;
       EXPECT_NE(cumulet_measure_noise(test.v_, &noise), CUMULET_OK) << "from within";
       const auto found = test.names_.find({kind, tag});
@@ -323,12 +323,12 @@ TEST_P(Cryptomatte, ObjectsWithOneNameShareAMatte) {
 TEST_P(Cryptomatte, InstancesOfTheVolumeAreSeparate) {
   const VolumeRef block = make_block();
   ASSERT_EQ(cumulet_set_volume(v_, block.get()), CUMULET_OK);
-  std::vector<double> places;
+  std::vector<double> transforms;
   for (const double x : {-4.0, 4.0}) {
-    const auto place = at(x, 0.0, 0.0);
-    places.insert(places.end(), place.begin(), place.end());
+    const auto transform = at(x, 0.0, 0.0);
+    transforms.insert(transforms.end(), transform.begin(), transform.end());
   }
-  ASSERT_EQ(cumulet_set_volume_transforms(v_, places.data(), 2), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, transforms.data(), 2), CUMULET_OK);
   names_[{CUMULET_OBJECT_VOLUME, 0}] = "block";
   make();
   const std::vector<float> covered = coverage("block");

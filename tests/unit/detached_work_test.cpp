@@ -1,6 +1,6 @@
-// apart() and leave(): calls on detached threads, which cannot be interrupted.
+// run_cancellable() and run_detached(): calls on detached threads, which cannot be interrupted.
 
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 
 #include <gtest/gtest.h>
 
@@ -20,11 +20,11 @@ using namespace cumulet;
 TEST(DetachedWork, ReturnsTheResult) {
   Progress progress;
   const auto here = std::this_thread::get_id();
-  EXPECT_NE(apart(&progress, [] { return std::this_thread::get_id(); }), here);
-  EXPECT_EQ(apart(nullptr, [] { return std::this_thread::get_id(); }), here);
-  EXPECT_EQ(*apart(&progress, [n = std::make_unique<int>(7)] { return std::make_unique<int>(*n + 1); }), 8);
+  EXPECT_NE(run_cancellable(&progress, [] { return std::this_thread::get_id(); }), here);
+  EXPECT_EQ(run_cancellable(nullptr, [] { return std::this_thread::get_id(); }), here);
+  EXPECT_EQ(*run_cancellable(&progress, [n = std::make_unique<int>(7)] { return std::make_unique<int>(*n + 1); }), 8);
   try {
-    apart(&progress, []() -> int { throw Error(ErrorCode::file, "no such thing"); });
+    run_cancellable(&progress, []() -> int { throw Error(ErrorCode::file, "no such thing"); });
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::file);
@@ -43,11 +43,11 @@ TEST(DetachedWork, CancelledCallerDoesNotWait) {
   });
   bool cancelled = false;
   try {
-    // The call ends only after apart() has returned. If apart() waited for it, the test would hang.
-    apart(&progress, [&begun, &seen, owned = std::shared_ptr<int>(new int(0), [&freed](const int* last) {
-                                       delete last;
-                                       freed = true;
-                                     })] {
+    // The call ends only after run_cancellable() has returned. If it waited for it, the test would hang.
+    run_cancellable(&progress, [&begun, &seen, owned = std::shared_ptr<int>(new int(0), [&freed](const int* last) {
+                                                 delete last;
+                                                 freed = true;
+                                               })] {
       begun.count_down();
       seen.wait();
       return *owned;
@@ -65,11 +65,11 @@ TEST(DetachedWork, CancelledCallerDoesNotWait) {
 TEST(DetachedWork, DoesNotStartIfCancelled) {
   Progress progress;
   progress.cancel();
-  EXPECT_THROW(apart(&progress,
-                     [] {
-                       ADD_FAILURE();
-                       return 0;
-                     }),
+  EXPECT_THROW(run_cancellable(&progress,
+                               [] {
+                                 ADD_FAILURE();
+                                 return 0;
+                               }),
                Error);
 }
 
@@ -80,7 +80,7 @@ TEST(DetachedWork, DataIsFreedOnAnotherThread) {
     std::atomic<std::thread::id>& by;
   };
   std::atomic<std::thread::id> by;
-  make_left<Tree>(by).reset();
+  make_deferred_delete<Tree>(by).reset();
   while (by.load() == std::thread::id()) std::this_thread::yield();
   EXPECT_NE(by.load(), std::this_thread::get_id());
 }
@@ -93,7 +93,7 @@ TEST(DetachedWork, ExcessWorkRunsOnTheCallersThread) {
   for (; at_once == 0 && left < 1000; ++left) {
     const auto here = std::this_thread::get_id();
     auto told = std::make_shared<std::atomic<bool>>(false);
-    leave([&open, &done, told, here] {
+    run_detached([&open, &done, told, here] {
       if (std::this_thread::get_id() == here) {
         *told = true;
       } else {
@@ -114,9 +114,9 @@ TEST(DetachedWorkDeathTest, ExitWaitsForNestedDetachedWork) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   const auto left_and_exit = [] {
     for (int i = 0; i < 12; ++i) {
-      leave([i] {
+      run_detached([i] {
         std::this_thread::sleep_for(std::chrono::microseconds(100 * i));
-        for (int k = 0; k < 20; ++k) leave([] { std::this_thread::sleep_for(std::chrono::microseconds(50)); });
+        for (int k = 0; k < 20; ++k) run_detached([] { std::this_thread::sleep_for(std::chrono::microseconds(50)); });
       });
     }
     std::exit(0);

@@ -561,10 +561,10 @@ TEST_P(EmissionRendering, ConstantAnisotropyFieldMatchesTheMediums) {
   medium.density_scale = 0.3;
   medium.albedo = vec3(0.75F);
   const VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 2.0F)};
-  for (const float second_share : {0.0F, 0.25F}) {
+  for (const float second_weight : {0.0F, 0.25F}) {
     for (const test::MarchKind& kind : test::march_kinds) {
       viewer->set_grid(test::settings_of(kind));
-      medium.phase = {.anisotropy = 0.75F, .second_anisotropy = -0.5F, .second_share = second_share};
+      medium.phase = {.anisotropy = 0.75F, .second_anisotropy = -0.5F, .second_weight = second_weight};
       viewer->set_medium(medium);
       show(*viewer, VolumeFrame{.density = frame.density});
       const glm::dvec4 setting = look(*viewer, 500.0, 256).mean();
@@ -719,7 +719,7 @@ TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
         .floor = true,
         .among = viewer::SurfaceLight::shadows}}) {
     SCOPED_TRACE(of.name);
-    viewer->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -6.0});
+    viewer->viewer().set_ground({of.ground ? viewer::GroundMode::at_height : viewer::GroundMode::none, -6.0});
     if (of.ground) viewer->set_camera(test::camera_at({23.5, 130.0, 165.0}, {23.5, 23.5, 23.5}, 16.0));
     if (of.floor) viewer->set_camera(test::camera_at({23.5, 23.5, 200.0}, {23.5, 23.5, 0.0}, 10.0));
     analytic_light.power = vec3(of.analytic_light);

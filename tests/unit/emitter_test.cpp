@@ -142,15 +142,15 @@ surface::Image stripes() {
 // ---- the table ----
 
 /// The probability of each triangle, as the shader samples them.
-std::map<std::uint32_t, double> chances(const EmitterTable& table) {
-  std::map<std::uint32_t, double> chance;
+std::map<std::uint32_t, double> probabilities(const EmitterTable& table) {
+  std::map<std::uint32_t, double> probability;
   const double n = static_cast<double>(table.entries.size());
   for (const glm::uvec4& entry : table.entries) {
     const double stays = (static_cast<double>(entry.y) + 1.0) / 4294967296.0;
-    chance[entry.x] += stays / n;
-    if (stays < 1.0) chance[table.entries.at(entry.z).x] += (1.0 - stays) / n;
+    probability[entry.x] += stays / n;
+    if (stays < 1.0) probability[table.entries.at(entry.z).x] += (1.0 - stays) / n;
   }
-  return chance;
+  return probability;
 }
 
 double area_of(const StillScene& scene, std::uint32_t triangle) {
@@ -175,8 +175,8 @@ TEST(Emitters, SelectionFollowsPower) {
   const EmitterTable table = light::emitter_table(emissive, *scene, scene->rest);
   double sum = 0.0;
   double flux = 0.0;
-  const std::map<std::uint32_t, double> chance = chances(table);
-  ASSERT_EQ(chance.size(), table.entries.size());
+  const std::map<std::uint32_t, double> probability = probabilities(table);
+  ASSERT_EQ(probability.size(), table.entries.size());
   for (std::size_t i = 0; i < table.entries.size(); ++i) {
     const glm::uvec4& entry = table.entries[i];
     EXPECT_LT(i > 0 ? table.entries[i - 1].x : 0U, entry.x);
@@ -186,9 +186,9 @@ TEST(Emitters, SelectionFollowsPower) {
     EXPECT_EQ(density < 0.0F, quad == 5);
     const double area = area_of(*scene, entry.x);
     const double power = area * (quad % 4 == 1 ? 1.0 : 2.0 * 7.0 * 0.7152);
-    EXPECT_NEAR(chance.at(entry.x) * table.flux / pi / power, 1.0, 2e-3);
-    EXPECT_NEAR(std::abs(density) * area / chance.at(entry.x), 1.0, 1e-5);
-    sum += chance.at(entry.x);
+    EXPECT_NEAR(probability.at(entry.x) * table.flux / pi / power, 1.0, 2e-3);
+    EXPECT_NEAR(std::abs(density) * area / probability.at(entry.x), 1.0, 1e-5);
+    sum += probability.at(entry.x);
     flux += pi * power;
   }
   EXPECT_NEAR(sum, 1.0, 1e-9);
@@ -399,9 +399,9 @@ struct Kind {
   SurfaceLight light;
 };
 
-std::shared_ptr<StillScene> gallery(const Kind& kind, bool by_chance) {
+std::shared_ptr<StillScene> gallery(const Kind& kind, bool without_nee) {
   auto scene = std::make_shared<StillScene>();
-  Material shine = by_chance ? unlit(vec3(4.0F, 2.0F, 1.0F)) : emitter(vec3(4.0F, 2.0F, 1.0F));
+  Material shine = without_nee ? unlit(vec3(4.0F, 2.0F, 1.0F)) : emitter(vec3(4.0F, 2.0F, 1.0F));
   shine.base_color.a = kind.alpha == surface::AlphaMode::opaque ? 1.0F : 0.6F;
   shine.alpha_mode = kind.alpha;
   shine.double_sided = true;
@@ -411,8 +411,8 @@ std::shared_ptr<StillScene> gallery(const Kind& kind, bool by_chance) {
     scene->images[1].rgba = {255, 255, 255, 255, 255, 255, 255, 0};
     scene->textures.resize(2);
     scene->textures[1].image = 1;
-    shine.base_color_texture.texture = by_chance ? 0 : 1;
-    shine.emission_texture.texture = by_chance ? -1 : 0;
+    shine.base_color_texture.texture = without_nee ? 0 : 1;
+    shine.emission_texture.texture = without_nee ? -1 : 0;
     // The image is transparent where it is dark.
   }
   Material metal;
@@ -449,8 +449,8 @@ TEST_P(EmitterRendering, MatchesScatteredRaysOnly) {
                            Kind{"shadows", AlphaMode::opaque, false, true, SurfaceLight::shadows}}) {
     std::array<Picture, 2> pictures;
     std::array<double, 2> noise{};
-    for (const bool by_chance : {false, true}) {
-      const auto viewer = dark(gallery(kind, by_chance));
+    for (const bool without_nee : {false, true}) {
+      const auto viewer = dark(gallery(kind, without_nee));
       viewer->viewer().set_surface_settings(surface_light(kind.light));
       viewer->set_camera(camera_at({32.0, 10.0, 110.0}, {32.0, 0.0, 32.0}, 30.0));
       viewer->set_medium(medium(0.04, 0.9F, 0.5F));
@@ -461,8 +461,9 @@ TEST_P(EmitterRendering, MatchesScatteredRaysOnly) {
         light.sky_radiance = vec3(0.2F);
         viewer->set_light(light);
       }
-      pictures[by_chance ? 1 : 0] = test::render(*viewer, {24, 16, by_chance ? 512U : 256U, 3, render::View::shaded});
-      noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise().value();
+      pictures[without_nee ? 1 : 0] =
+          test::render(*viewer, {24, 16, without_nee ? 512U : 256U, 3, render::View::shaded});
+      noise[without_nee ? 1 : 0] = viewer->viewer().measure_noise().value();
     }
     const double mean = pictures[1].mean().x;
     Picture difference = pictures[0];
@@ -505,10 +506,10 @@ TEST_P(EmitterRendering, ManyEmittersMatchOne) {
 TEST_P(EmitterRendering, NextEventEstimationReducesNoise) {
   for (const double sigma : {1e-6, 0.02}) {
     std::array<double, 2> noise{};
-    for (const bool by_chance : {false, true}) {
+    for (const bool without_nee : {false, true}) {
       auto scene = std::make_shared<StillScene>();
       scene->add(test::diffuse(vec3(0.5F)));
-      Material analytic_light = by_chance ? unlit(vec3(40.0F)) : emitter(vec3(40.0F));
+      Material analytic_light = without_nee ? unlit(vec3(40.0F)) : emitter(vec3(40.0F));
       analytic_light.double_sided = true;
       scene->add(analytic_light);
       scene->add_quad(square(floor_y, 30.0F, false), 0);
@@ -522,7 +523,7 @@ TEST_P(EmitterRendering, NextEventEstimationReducesNoise) {
       // The emitter is outside of the image, because its edges are equally noisy in both cases.
       viewer->set_camera(camera_at({32.0, 20.0, 140.0}, {32.0, 8.0, 32.0}, 18.0));
       test::render(*viewer, {32, 32, 64, 3, render::View::shaded});
-      noise[by_chance ? 1 : 0] = viewer->viewer().measure_noise().value();
+      noise[without_nee ? 1 : 0] = viewer->viewer().measure_noise().value();
     }
     RecordProperty(sigma < 1e-3 ? "vacuum" : "fog", std::to_string(noise[1] / noise[0]));
     EXPECT_LT(noise[0], noise[1] / 3.0) << sigma;  // a ninth of the samples

@@ -583,7 +583,7 @@ TEST_P(EnvironmentLighting, NextEventEstimationAgreesWithScatteredRaysOnly) {
     grid.build.march = scene::March::dense;
     still->set_grid(grid);
     still->set_medium({of.ground ? 0.05 : 0.15, vec3(0.9F), {of.g}, of.bounces});
-    still->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -2.0});
+    still->viewer().set_ground({of.ground ? viewer::GroundMode::at_height : viewer::GroundMode::none, -2.0});
     // All pixels see one point: the box's center, or the ground in front of it.
     still->set_camera(of.ground ? test::camera_at({9.5, 30.0, 60.0}, {9.5, -2.0, 24.0}, 0.01)
                                 : test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 0.01));
@@ -610,16 +610,16 @@ TEST_P(EnvironmentLighting, NextEventEstimationAgreesWithScatteredRaysOnly) {
     };
     const Seen kernels = of_pixels([&](std::uint32_t i) { return picture.pixels[i]; });
     std::array<Seen, 3> seen;
-    constexpr std::array chances = {1.0F, 0.0F, 0.5F};
+    constexpr std::array probabilities = {1.0F, 0.0F, 0.5F};
     // The middle probability is tested in one case only, because paths on the CPU are slow.
     for (std::size_t k = 0; k < (of.ground ? 3 : 2); ++k) {
-      cpu.cm.lights.environment_chance = chances.at(k);
+      cpu.cm.lights.environment_probability = probabilities.at(k);
       seen.at(k) = of_pixels([&](std::uint32_t i) {
         const auto pixel = cpu.traced({i % 16, i / 16});
         return vec3(pixel.sum) / float(samples) + pixel.background;
       });
       expect_same(seen.at(k), kernels, 1e-3);
-      EXPECT_LT(seen.at(k).error.x, 0.07 * kernels.mean.x) << chances.at(k);
+      EXPECT_LT(seen.at(k).error.x, 0.07 * kernels.mean.x) << probabilities.at(k);
     }
     expect_same(seen[1], seen[0], 1e-3);
     EXPECT_GT(seen[1].error.x, 1.3 * seen[0].error.x) << "looks are of use";

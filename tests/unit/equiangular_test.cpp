@@ -163,9 +163,9 @@ TEST_P(Equiangular, RespectsTheBounceLimit) {
 TEST_P(Equiangular, AgreesWithDistanceSamplingUnderSunSkyAndGround) {
   still_->set_light({30.0F, 40.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.4F)});
   expect_the_same("sun and sky");
-  still_->viewer().set_ground({viewer::GroundPlace::at_height, -2.0, vec3(0.6F)});
+  still_->viewer().set_ground({viewer::GroundMode::at_height, -2.0, vec3(0.6F)});
   expect_the_same("ground below");
-  still_->viewer().set_ground({viewer::GroundPlace::at_height, 8.0, vec3(0.6F)});
+  still_->viewer().set_ground({viewer::GroundMode::at_height, 8.0, vec3(0.6F)});
   expect_the_same("ground within");
 }
 
@@ -187,7 +187,7 @@ TEST_P(Equiangular, AgreesWithDistanceSamplingAmongSurfaces) {
 
 TEST_P(Equiangular, AgreesWithDistanceSamplingInOverlappingVolumes) {
   const glm::dmat4 aside = glm::translate(glm::dmat4(1.0), dvec3(10.0, 4.0, -6.0));
-  still_->viewer().set_places({{glm::dmat4(1.0)}, {aside}});
+  still_->viewer().set_transforms({{glm::dmat4(1.0)}, {aside}});
   set_medium(0.03);
   set_march(March::tet);
   expect_the_same("two places");

@@ -66,7 +66,7 @@ class FarFromOrigin : public test::ViewerTest {
     analytic_light.position = at + dvec3(6.0, 14.0, 12.0);
     analytic_light.power = vec3(2000.0F);
     viewer.set_lights({analytic_light});
-    viewer.set_ground({.place = viewer::GroundPlace::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
+    viewer.set_ground({.mode = viewer::GroundMode::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
     const dmat4 turned = glm::rotate(moved(at + dvec3(12.0, 1.0, 2.0)), 0.7, dvec3(0.3, 0.9, 0.1));
     if (kind.volume) {
       volume::ScalarVolume volume = test::noise_volume({12, 10, 8}, ivec3(0), 2);
@@ -130,7 +130,7 @@ TEST_P(FarFromOrigin, ImagesMatchThoseAtTheOrigin) {
                          Kind{.name = "both", .volume = true, .model = true},
                          Kind{.name = "instances and all", .volume = true, .own_surfaces = true, .instance = true},
                          Kind{.name = "rasterised", .volume = true, .model = true, .rasterised = true}};
-  const std::array places{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.3), dvec3(1e8)};
+  const std::array positions{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.3), dvec3(1e8)};
   std::size_t turn = 0;
   for (const Kind& kind : kinds) {
     const auto at_origin = show(kind, dvec3(0.0));
@@ -138,7 +138,7 @@ TEST_P(FarFromOrigin, ImagesMatchThoseAtTheOrigin) {
     EXPECT_GT(near.mean().x, 0.05) << kind.name;
     // Each kind is tested at two positions; together the kinds cover all positions.
     for (int i = 0; i < 2; ++i) {
-      const dvec3 at = places[turn++ % places.size()];
+      const dvec3 at = positions[turn++ % positions.size()];
       const auto far = show(kind, at);
       expect_alike(test::render(*far, image), near, kind.name + (" at " + std::to_string(at.x)));
       EXPECT_EQ(far->viewer().stats().samples_not_finite, 0U);
@@ -181,7 +181,7 @@ TEST_P(FarFromOrigin, SceneMayMoveAwayAndReturn) {
     pose.eye += at;
     pose.target += at;
     still->set_camera(pose);
-    still->viewer().set_ground({.place = viewer::GroundPlace::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
+    still->viewer().set_ground({.mode = viewer::GroundMode::at_height, .height = at.y - 2.0, .albedo = vec3(0.4F)});
     light::AnalyticLight analytic_light;
     analytic_light.position = at + dvec3(6.0, 14.0, 12.0);
     analytic_light.power = vec3(2000.0F);
@@ -203,7 +203,7 @@ TEST_P(FarFromOrigin, PicksAndAovsAreInWorldSpace) {
     before.eye += dvec3(0.5, 0.2, 0.0);
     still.viewer().set_previous_camera(std::make_shared<viewer::Camera>(before), 0.04);
     model->edit([&](viewer::ModelSettings& s) { s.previous = moved(dvec3(0.0, 0.4, 0.0)) * s.to_world; });
-    still.viewer().set_previous_places({{moved(dvec3(0.3, 0.0, 0.0))}});
+    still.viewer().set_previous_transforms({{moved(dvec3(0.3, 0.0, 0.0))}});
     test::render(still, image);
     std::vector<float> values;
     for (const auto& [aov, channels] :
@@ -273,12 +273,12 @@ TEST_P(FarFromOrigin, MotionBlurMatchesThatAtTheOrigin) {
   const auto blurred = [&](const dvec3& at) {
     const auto still = show(kind, at);
     model_->edit([](viewer::ModelSettings& s) {
-      s.ends = scene::PlaceEnds{s.to_world, moved(dvec3(0.0, 3.0, 0.0)) * s.to_world};
+      s.ends = scene::ShutterTransforms{s.to_world, moved(dvec3(0.0, 3.0, 0.0)) * s.to_world};
     });
     viewer::CameraPose close = still->viewer().camera()->pose();
     close.eye += dvec3(1.0, 0.0, 0.0);
     still->viewer().camera()->set_shutter(std::nullopt, close);
-    still->viewer().set_places({{dmat4(1.0), scene::PlaceEnds{dmat4(1.0), moved(dvec3(-2.0, 0.0, 0.0))}}});
+    still->viewer().set_transforms({{dmat4(1.0), scene::ShutterTransforms{dmat4(1.0), moved(dvec3(-2.0, 0.0, 0.0))}}});
     test::Image open = image;
     open.shutter_seconds = 0.02;
     return test::render(*still, open);

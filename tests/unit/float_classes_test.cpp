@@ -49,11 +49,11 @@ std::uint32_t expected(const Sort& sort) {
 
 // Tests each component of a vector.
 template <typename Test>
-bool in_any_place(Test test, float x) {
-  const glm::vec3 places[] = {{x, 1.0F, 1.0F}, {1.0F, x, 1.0F}, {1.0F, 1.0F, x}};
-  EXPECT_EQ(test(places[0]), test(places[1]));
-  EXPECT_EQ(test(places[0]), test(places[2]));
-  return test(places[0]);
+bool in_any_component(Test test, float x) {
+  const glm::vec3 vectors[] = {{x, 1.0F, 1.0F}, {1.0F, x, 1.0F}, {1.0F, 1.0F, x}};
+  EXPECT_EQ(test(vectors[0]), test(vectors[1]));
+  EXPECT_EQ(test(vectors[0]), test(vectors[2]));
+  return test(vectors[0]);
 }
 
 TEST(FloatClasses, CppClassifiesEveryKindOfFloat) {
@@ -64,8 +64,8 @@ TEST(FloatClasses, CppClassifiesEveryKindOfFloat) {
     EXPECT_EQ(core::cm_is_finite(x), sort.finite) << at;
     EXPECT_EQ(core::cm_is_within(x, 2.0F), sort.small) << at;
     EXPECT_EQ(core::cm_is_positive(x), sort.positive) << at;
-    EXPECT_EQ(in_any_place([](const glm::vec3& v) { return core::cm_is_finite(v); }, x), sort.finite) << at;
-    EXPECT_EQ(in_any_place([](const glm::vec3& v) { return core::cm_is_within(v, 2.0F); }, x), sort.small) << at;
+    EXPECT_EQ(in_any_component([](const glm::vec3& v) { return core::cm_is_finite(v); }, x), sort.finite) << at;
+    EXPECT_EQ(in_any_component([](const glm::vec3& v) { return core::cm_is_within(v, 2.0F); }, x), sort.small) << at;
   }
 }
 
@@ -76,7 +76,7 @@ TEST_P(FloatClassesShader, ShaderClassifiesEveryKindOfFloat) {
   const std::string text = "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("numbers.glsl") + R"(
 layout(std430, binding = 0) buffer Floats { float floats[]; };
 layout(std430, binding = 1) buffer Words { uint words[]; };
-uint bit(bool value, int place) { return value ? 1u << place : 0u; }
+uint bit(bool value, int index) { return value ? 1u << index : 0u; }
 void main() {
   uint i = gl_GlobalInvocationID.x;
   float x = floats[i];

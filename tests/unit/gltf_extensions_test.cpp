@@ -749,11 +749,11 @@ GltfModel instanced_model(const std::function<json(GltfModel&)>& attributes, con
 }
 
 /// World positions of the triangle's vertices in this instance.
-std::array<glm::vec3, 3> placed_corners(const Scene& scene, const Pose& pose, std::size_t instance) {
+std::array<glm::vec3, 3> transformed_corners(const Scene& scene, const Pose& pose, std::size_t instance) {
   std::array<glm::vec3, 3> corners{};
   for (std::size_t i = 0; i < 3; ++i) {
     const glm::dvec4 own(pose.vertices.at(scene.indices.at(i)).position, 1.0);
-    corners[i] = glm::vec3(pose.placings.at(0).at(instance) * own);
+    corners[i] = glm::vec3(pose.prototype_transforms.at(0).at(instance) * own);
   }
   return corners;
 }
@@ -776,13 +776,13 @@ TEST(GltfInstances, TransformsCombineAttributesAndNode) {
   ASSERT_EQ(scene->triangle_count(), 1U);  // stored once
   ASSERT_EQ(scene->prototypes.size(), 1U);
   const Pose pose = scene->pose(0.0);
-  test::near(placed_corners(*scene, pose, 0)[1], {102, 0, 0});
-  const auto turned = placed_corners(*scene, pose, 1);
+  test::near(transformed_corners(*scene, pose, 0)[1], {102, 0, 0});
+  const auto turned = transformed_corners(*scene, pose, 1);
   test::near(turned[0], {120, 0, 0}, 1e-3F);
   test::near(turned[1], {120, 4, 0}, 1e-3F);  // x, doubled twice, becomes y
   test::near(turned[2], {114, 0, 0}, 1e-3F);  // y becomes -x
-  test::near(placed_corners(*scene, pose, 2)[1], {98, 0, 10});
-  EXPECT_LT(glm::determinant(glm::dmat3(pose.placings[0][2])), 0.0);
+  test::near(transformed_corners(*scene, pose, 2)[1], {98, 0, 10});
+  EXPECT_LT(glm::determinant(glm::dmat3(pose.prototype_transforms[0][2])), 0.0);
   EXPECT_EQ(pose.low.x, 98.0);
   test::near(glm::vec3(pose.high), {120, 4, 10}, 1e-3F);
 }
@@ -791,7 +791,7 @@ TEST(GltfInstances, FollowTheirNode) {
   GltfModel model = instanced_model([](GltfModel& m) { return json{{"TRANSLATION", m.vec3({0, 0, 0, 3, 0, 0})}}; });
   animate(model, {{"/nodes/0/translation", 3, {0, 0, 0, 0, 8, 0}}});
   const ScenePtr scene = imported(model);
-  test::near(placed_corners(*scene, scene->pose(1.0), 1)[0], {3, 8, 0});
+  test::near(transformed_corners(*scene, scene->pose(1.0), 1)[0], {3, 8, 0});
 }
 
 TEST(GltfInstances, UnsupportedAttributesAreReported) {
@@ -834,7 +834,7 @@ TEST(GltfInstances, ZeroScaleInstancesAreNotDrawn) {
   const ScenePtr scene = imported(instanced_model([](GltfModel& m) {
     return json{{"SCALE", m.vec3({1, 1, 1, 1, 0, 1, 0, 0, 0})}};
   }));
-  EXPECT_EQ(scene->pose(0.0).placings.at(0).size(), 1U);
+  EXPECT_EQ(scene->pose(0.0).prototype_transforms.at(0).size(), 1U);
 }
 
 }  // namespace

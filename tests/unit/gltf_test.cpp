@@ -341,8 +341,8 @@ TEST(Gltf, ListsStripsAndFansWithAndWithoutIndices) {
     std::vector<int> vertices;  // vertex indices in the order of drawing
     for (const std::uint32_t index : scene->indices) {
       for (std::size_t v = 0; v < 5; ++v) {
-        const glm::vec3 place(five[3 * v], five[3 * v + 1], five[3 * v + 2]);
-        if (pose.vertices[index].position == place) vertices.push_back(static_cast<int>(v));
+        const glm::vec3 position(five[3 * v], five[3 * v + 1], five[3 * v + 2]);
+        if (pose.vertices[index].position == position) vertices.push_back(static_cast<int>(v));
       }
     }
     return vertices;
@@ -413,9 +413,9 @@ TEST(Gltf, InterleavedAttributes) {
   GltfModel model;
   // Position, then color, padded to 20 bytes.
   Bytes bytes;
-  const float places[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const float coordinates[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   for (std::size_t v = 0; v < 3; ++v) {
-    const Bytes position = test::bytes_of(std::vector<float>(places + 3 * v, places + 3 * v + 3));
+    const Bytes position = test::bytes_of(std::vector<float>(coordinates + 3 * v, coordinates + 3 * v + 3));
     bytes.insert(bytes.end(), position.begin(), position.end());
     const auto shade = static_cast<std::uint8_t>(51 * (v + 1));
     bytes.insert(bytes.end(), {shade, 0, 255, 0, 0, 0, 0, 0});
@@ -846,9 +846,9 @@ TEST(Gltf, MeshoptExponentialAndQuaternionFilters) {
                 {"filter", filter}}}}}};
     return view;
   };
-  const std::vector<float> places = {0, 0, 0, 4, 2, -8};
+  const std::vector<float> coordinates = {0, 0, 0, 4, 2, -8};
   Bytes exponential(24);
-  meshopt_encodeFilterExp(exponential.data(), 2, 12, 15, places.data());
+  meshopt_encodeFilterExp(exponential.data(), 2, 12, 15, coordinates.data());
   const std::vector<float> turns = {0, 0, 0, 1, 0, 0, 0.70710678F, 0.70710678F};
   Bytes quaternions(16);
   meshopt_encodeFilterQuat(quaternions.data(), 2, 8, 14, turns.data());
@@ -1228,17 +1228,17 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
         auto digit = std::find_if(bytes.begin() + at, bytes.end(), [](std::uint8_t c) { return c >= '0' && c <= '9'; });
         auto end = std::find_if(digit, bytes.end(), [](std::uint8_t c) { return c < '0' || c > '9'; });
         const std::string word = words[below(std::size(words))];
-        const auto place = digit - bytes.begin();
+        const auto offset = digit - bytes.begin();
         const auto length = end - digit;
         if (word.size() <= static_cast<std::size_t>(length)) {
           for (std::ptrdiff_t k = 0; k < length; ++k) {
-            bytes[static_cast<std::size_t>(place + k)] =
+            bytes[static_cast<std::size_t>(offset + k)] =
                 static_cast<std::size_t>(k) < word.size() ? static_cast<std::uint8_t>(word[static_cast<std::size_t>(k)])
                                                           : ' ';
           }
         } else if (bytes[0] == '{') {  // text files may grow, because they store no length
           bytes.erase(digit, end);
-          bytes.insert(bytes.begin() + place, word.begin(), word.end());
+          bytes.insert(bytes.begin() + offset, word.begin(), word.end());
         }
         break;
       }

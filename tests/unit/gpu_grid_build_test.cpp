@@ -140,17 +140,17 @@ void expect_same(const grid::TetGrid& expected, const render::BuiltGrid& built, 
   EXPECT_EQ(std::memcmp(read.tree.data(), expected.roots.data(), sizeof expected.roots), 0);
   EXPECT_TRUE(std::equal(expected.tree.begin(), expected.tree.end(), read.tree.begin() + 52, read.tree.end()));
   std::size_t links = 0;
-  std::size_t places = 0;
+  std::size_t v0_shapes = 0;
   for (std::size_t i = 0; i < expected.cells.size(); ++i) {
     const grid::CellRecord& a = expected.cells[i];
     const grid::CellRecord& b = read.cells[i];
     if (a.links != b.links) ++links;
-    if (a.data.x != b.data.x || a.data.y != b.data.y) ++places;
+    if (a.data.x != b.data.x || a.data.y != b.data.y) ++v0_shapes;
     ASSERT_NO_FATAL_FAILURE(expect_within_a_rounding(a.data, b.data, rounding)) << i;
   }
   expect_clear_cones(built, read, expected.cube);
   EXPECT_EQ(links, 0U);
-  EXPECT_EQ(places, 0U);
+  EXPECT_EQ(v0_shapes, 0U);
 }
 
 TEST_P(GpuGridBuilds, MatchTheCpuForEveryVolumeAndTwoHundredCameras) {
@@ -407,7 +407,7 @@ TEST_P(GpuGridBuilds, ChannelsMatchTheVoxels) {
     EXPECT_NEAR(built.emissive.power, wanted.power, 1e-5 * wanted.power);
     EXPECT_NEAR(built.emissive.length, wanted.length, 1e-5 * wanted.length);
     for (std::size_t c = 0; c < wanted.cells.size(); ++c)
-      ASSERT_EQ(built.emissive.cells[c].place, wanted.cells[c].place) << c;
+      ASSERT_EQ(built.emissive.cells[c].v0_shape, wanted.cells[c].v0_shape) << c;
   }
   EXPECT_GT(glowing, 1000U);
   EXPECT_LT(static_cast<double>(others), 0.02 * static_cast<double>(glowing));

@@ -166,12 +166,13 @@ class GpuResidentStates : public test::GlTest {
   volume::ScalarVolume copied(const volume::ScalarVolume& in_gl) {
     const volume::DeviceBricks& bricks = *in_gl.on_device;
     std::vector<float> values;
-    for (const volume::DeviceBricks::Place& place : bricks.places) {
+    for (const volume::DeviceBricks::Location& location : bricks.locations) {
       const std::size_t first = values.size();
       values.resize(first + volume::brick_voxels);
-      const volume::DeviceMemory& memory = *bricks.memories[place.memory];
+      const volume::DeviceMemory& memory = *bricks.memories[location.memory];
       EXPECT_FALSE(memory.halves);
-      gl_->GetNamedBufferSubData(memories_->find(memory)->name(), GLintptr{place.brick} * 2048, 2048, &values[first]);
+      gl_->GetNamedBufferSubData(memories_->find(memory)->name(), GLintptr{location.brick} * 2048, 2048,
+                                 &values[first]);
     }
     volume::ScalarVolume volume = in_gl;
     volume.on_device = nullptr;
@@ -192,7 +193,7 @@ std::vector<float> as_halves(std::vector<float> values) {
 }
 
 // Anisotropic and rotated.
-glm::dmat4 place() {
+glm::dmat4 transform() {
   glm::dmat4 m(1.0);
   m[0] = {0.5, 0.1, 0.0, 0.0};
   m[1] = {-0.1, 0.4, 0.05, 0.0};
@@ -209,8 +210,8 @@ TEST_P(GpuResidentStates, StatisticsMatchTheVoxels) {
   for (const bool halves : {false, true}) {
     auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
     if (halves) values = as_halves(values);
-    const GridReference known = field_of(bring(values, odd, place(), halves), place());
-    const GridReference reference = in_memory(values, odd, place(), known);
+    const GridReference known = field_of(bring(values, odd, transform(), halves), transform());
+    const GridReference reference = in_memory(values, odd, transform(), known);
     EXPECT_EQ(known.volume->brick_origins, reference.volume->brick_origins);
     EXPECT_EQ(known.volume->active_voxels, reference.volume->active_voxels);
     EXPECT_EQ(known.volume->bounds_min, reference.volume->bounds_min);
@@ -271,8 +272,8 @@ TEST_P(GpuResidentStates, GridsMatchTheVoxels) {
   for (const bool halves : {false, true}) {
     auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
     if (halves) values = as_halves(values);
-    const GridReference known = field_of(bring(values, odd, place(), halves), place());
-    const GridReference reference = in_memory(values, odd, place(), known);
+    const GridReference known = field_of(bring(values, odd, transform(), halves), transform());
+    const GridReference reference = in_memory(values, odd, transform(), known);
     for (const auto criterion :
          {grid::Criterion::transmittance, grid::Criterion::deviation, grid::Criterion::range_mean}) {
       for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
@@ -319,7 +320,7 @@ volume::VolumeFrame frame_of(const std::vector<std::pair<volume::Channel, std::v
                              const Sides& size) {
   std::vector<volume::MemoryField> views;
   for (const auto& [channel, values] : fields)
-    views.push_back({channel, volume::DenseVoxels{values, {size[0], size[1], size[2]}, place()}});
+    views.push_back({channel, volume::DenseVoxels{values, {size[0], size[1], size[2]}, transform()}});
   return volume::import_fields(views, "smoke", {});
 }
 
@@ -362,7 +363,7 @@ TEST_P(GpuResidentStates, EmissionChannelsMatchTheVoxels) {
   const scene::StateInGl state = bring({{volume::Channel::density, density},
                                         {volume::Channel::temperature, temperature},
                                         {volume::Channel::flame, flame, true}},
-                                       odd, place(), wanted);
+                                       odd, transform(), wanted);
   ASSERT_EQ(state.products.size(), wanted.size());
   const volume::VolumeFrame in_memory = frame_of({{volume::Channel::density, density},
                                                   {volume::Channel::temperature, temperature},
@@ -474,7 +475,7 @@ TEST_P(GpuResidentStates, ScatteringChannelsMatchTheVoxels) {
     // With flames in addition.
     handed.push_back({volume::Channel::flame, simulated(CUMULET_CHANNEL_FLAME, odd, 3)});
     const scene::Emission burning = emissions()[2];
-    const scene::StateInGl state = bring(handed, odd, place(), {burning});
+    const scene::StateInGl state = bring(handed, odd, transform(), {burning});
     EXPECT_EQ(state.products.size(), colored ? 4U : 3U);
     const volume::VolumeFrame in_memory = frame_of(fields, odd);
     const volume::VolumeFrame in_gl = state.frame();
@@ -549,14 +550,14 @@ TEST_P(GpuResidentStates, ZeroColorIsBlackAndEmptyStatesHaveNoChannels) {
   for (const Channel channel : {Channel::red, Channel::green, Channel::blue, Channel::velocity_x, Channel::velocity_y,
                                 Channel::velocity_z, Channel::anisotropy})
     fields.push_back({channel, nothing});
-  const scene::StateInGl black = bring(fields, odd, place(), {});
+  const scene::StateInGl black = bring(fields, odd, transform(), {});
   ASSERT_TRUE(black.scattering() && black.forward());
   EXPECT_TRUE((*black.scattering())[1].empty());
   EXPECT_TRUE(black.forward()->empty());
   EXPECT_FALSE(black.momentum()) << "nothing moves";
   EXPECT_TRUE(black.has_wanted({}));
   fields[0].values = nothing;
-  const scene::StateInGl none = bring(fields, odd, place(), {});
+  const scene::StateInGl none = bring(fields, odd, transform(), {});
   EXPECT_TRUE(none.products.empty());
   EXPECT_TRUE(none.has_wanted({}));
 }
@@ -572,7 +573,7 @@ TEST_P(GpuResidentStates, PartialUpdatesEqualAFullState) {
     return fields;
   };
   std::vector<Values> fields = fields_at(1);
-  std::optional<scene::StateInGl> state = bring(fields, odd, place(), {wanted[0], wanted[1]});
+  std::optional<scene::StateInGl> state = bring(fields, odd, transform(), {wanted[0], wanted[1]});
   for (int step = 2; step < 5; ++step) {
     const std::vector<Values> next = fields_at(step);
     const render::VoxelBox box{{8 * step, 0, 0}, {8 * step + 15, odd[1], odd[2]}};
@@ -587,8 +588,8 @@ TEST_P(GpuResidentStates, PartialUpdatesEqualAFullState) {
       }
     }
     // Other emission settings are requested from the second state on.
-    state = bring(fields, odd, place(), {wanted[0], wanted[2]}, std::vector{box}, &*state);
-    const scene::StateInGl whole = bring(fields, odd, place(), {wanted[0], wanted[2]});
+    state = bring(fields, odd, transform(), {wanted[0], wanted[2]}, std::vector{box}, &*state);
+    const scene::StateInGl whole = bring(fields, odd, transform(), {wanted[0], wanted[2]});
     ASSERT_EQ(state->products.size(), 5U);
     ASSERT_EQ(whole.products.size(), 5U);
     for (const scene::ProductInGl& expected : whole.products) {
@@ -597,8 +598,8 @@ TEST_P(GpuResidentStates, PartialUpdatesEqualAFullState) {
       ASSERT_NE(found, nullptr);
       ASSERT_EQ(found->components.size(), expected.components.size());
       for (std::size_t c = 0; c < expected.components.size(); ++c) {
-        const volume::ScalarVolume a = copied(volume::volume_on_device(found->components[c], "", place()));
-        const volume::ScalarVolume b = copied(volume::volume_on_device(expected.components[c], "", place()));
+        const volume::ScalarVolume a = copied(volume::volume_on_device(found->components[c], "", transform()));
+        const volume::ScalarVolume b = copied(volume::volume_on_device(expected.components[c], "", transform()));
         EXPECT_EQ(a.brick_origins, b.brick_origins);
         ASSERT_EQ(a.brick_values.size(), b.brick_values.size());
         for (std::size_t i = 0; i < b.brick_values.size(); ++i) ASSERT_EQ(a.brick_values[i], b.brick_values[i]);
@@ -611,17 +612,17 @@ TEST_P(GpuResidentStates, PartialUpdatesEqualAFullState) {
 TEST_P(GpuResidentStates, AnUploadTakesManyFrames) {
   const auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
   const auto others = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
-  std::optional<volume::DeviceBricks> before = bring(others, odd, place());
-  const GridReference known = field_of(bring(values, odd, place()), place());
+  std::optional<volume::DeviceBricks> before = bring(others, odd, transform());
+  const GridReference known = field_of(bring(values, odd, transform()), transform());
   grid::RefineSettings settings;
   settings.threshold = 0.05;
   int steps = 0;
   const Cells found = build(known, settings, [&] {
     ++steps;
-    before = bring(others, odd, place());
+    before = bring(others, odd, transform());
   });
   EXPECT_GT(steps, 10);
-  expect_same_cells(found, in_memory(values, odd, place(), known).grid(settings));
+  expect_same_cells(found, in_memory(values, odd, transform(), known).grid(settings));
   const std::uint64_t bytes = memories_->bytes();
   before.reset();
   transfers_->follow(Deadline::max());
@@ -632,7 +633,7 @@ TEST_P(GpuResidentStates, AnUploadTakesManyFrames) {
 TEST_P(GpuResidentStates, ScatteredBricksAreCompacted) {
   const auto old = simulated(CUMULET_CHANNEL_DENSITY, odd, 1);
   auto values = as_halves(old);
-  volume::DeviceBricks all = bring(values, odd, place(), true);
+  volume::DeviceBricks all = bring(values, odd, transform(), true);
   all.tidy();
   for (int step = 2; step < 6; ++step) {
     const auto next = simulated(CUMULET_CHANNEL_DENSITY, odd, step);
@@ -643,7 +644,7 @@ TEST_P(GpuResidentStates, ScatteredBricksAreCompacted) {
           values[test::State::at({x, y, z}, odd)] = next[test::State::at({x, y, z}, odd)];
       }
     }
-    all = all.with(bring(values, odd, place(), false, std::vector{box}));
+    all = all.with(bring(values, odd, transform(), false, std::vector{box}));
   }
   EXPECT_EQ(all.memories.size(), 5U);
   EXPECT_FALSE(all.are_halves());
@@ -656,10 +657,10 @@ TEST_P(GpuResidentStates, ScatteredBricksAreCompacted) {
   EXPECT_EQ(gathered->origins, all.origins);
   grid::RefineSettings settings;
   settings.threshold = 0.05;
-  const GridReference known = field_of(*gathered, place());
-  const grid::TetGrid expected = in_memory(values, odd, place(), known).grid(settings);
+  const GridReference known = field_of(*gathered, transform());
+  const grid::TetGrid expected = in_memory(values, odd, transform(), known).grid(settings);
   expect_same_cells(build(known, settings), expected);
-  expect_same_cells(build(field_of(all, place()), settings), expected);
+  expect_same_cells(build(field_of(all, transform()), settings), expected);
   render::DeviceMemories small(gl_, programs_, 1000);
   EXPECT_EQ(small.gather(gl_, all), nullptr) << "larger than a storage block";
 }

@@ -74,7 +74,7 @@ TEST_P(Uploads, ImagesAndBuffersAreCompletelyUploaded) {
   Upload upload(gl_, "uploading");
   upload.add_image([&] { return flat.name(); }, {glm::uvec2(0U), {width, height}, 0, std::nullopt}, rgba.data());
   upload.add_image([&] { return layers.name(); }, {{9U, 5U}, {width, height}, 0, 1}, rgba.data());
-  upload.add_bytes([&] { return Upload::Place{buffer.name(), 16}; }, rgba.data(), rgba.size());
+  upload.add_bytes([&] { return Upload::Location{buffer.name(), 16}; }, rgba.data(), rgba.size());
   int advances = 1;
   while (!upload.advance(Deadline::min())) ++advances;
   EXPECT_EQ(advances, 9);

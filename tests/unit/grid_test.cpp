@@ -291,9 +291,9 @@ TEST(WideRecords, RoundTripEveryCell) {
       std::uint32_t shape = 0;
       core::cm_root_cell(random() % 24, static_cast<std::uint32_t>(log2_size - 1), v0, shape);
       while (true) {
-        const glm::uvec2 place = core::cm_record_place(v0, shape, wide);
-        const glm::uvec4 data(place.x, place.y | (random() % 2 == 0 ? CM_RECORD_EMITS : 0U), random(), random());
-        ASSERT_EQ(place.y & CM_RECORD_EMITS, 0U);
+        const glm::uvec2 v0_shape = core::cm_pack_v0_shape(v0, shape, wide);
+        const glm::uvec4 data(v0_shape.x, v0_shape.y | (random() % 2 == 0 ? CM_RECORD_EMITS : 0U), random(), random());
+        ASSERT_EQ(v0_shape.y & CM_RECORD_EMITS, 0U);
         ASSERT_EQ(core::cm_record_v0(data, wide), v0) << log2_size << ' ' << shape;
         ASSERT_EQ(core::cm_record_shape(data, wide), shape) << log2_size;
         shapes.insert(shape);

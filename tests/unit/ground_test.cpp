@@ -19,7 +19,7 @@ using glm::dvec3;
 using glm::ivec3;
 using glm::vec3;
 using test::StillScene;
-using viewer::GroundPlace;
+using viewer::GroundMode;
 
 constexpr double pi = std::numbers::pi;
 
@@ -53,7 +53,7 @@ TEST_P(Ground, UnderASlabIsLitAndVisibleThroughIt) {
     grid.build.refine.threshold = -1.0;
     still->set_grid(grid);
     for (const double height : {-10.0, 3.5}) {
-      still->viewer().set_ground({GroundPlace::at_height, height, albedo});
+      still->viewer().set_ground({GroundMode::at_height, height, albedo});
       for (const double sigma : {1e-6, 0.1}) {
         still->set_medium({sigma, vec3(0.0F), {}, 0});
         for (const float elevation : {90.0F, 70.0F}) {
@@ -81,7 +81,7 @@ TEST_P(Ground, ExistsAtAGivenHeightWithoutAVolume) {
     viewer::GridSettings grid;
     grid.build.march = march;
     still->set_grid(grid);
-    still->viewer().set_ground({GroundPlace::at_height, -2.0, vec3(0.8F)});
+    still->viewer().set_ground({GroundMode::at_height, -2.0, vec3(0.8F)});
     const test::Picture picture = test::render(*still, {16, 16, 16, 1, render::View::shaded});
     EXPECT_NEAR(picture.mean().x, 0.8 * 3.0 * 0.5 / pi, 1e-4);
     EXPECT_NEAR(picture.mean().w, 1.0, 1e-6);
@@ -93,7 +93,7 @@ TEST_P(Ground, WhiteFurnaceIsOne) {
   const auto still = make();
   still->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
   still->set_light(sun_at(0.0F, 0.0F, 1.0F));
-  still->viewer().set_ground({GroundPlace::below, 0.0, vec3(1.0F)});
+  still->viewer().set_ground({GroundMode::below, 0.0, vec3(1.0F)});
   still->set_medium({0.5, vec3(1.0F), {0.4F}, 0});
   still->set_camera(test::camera_at({12.0, 30.0, 60.0}, {12.0, 8.0, 11.0}, 32.0));
   const test::Picture picture = test::render(*still, {24, 24, 128, 7, render::View::shaded});
@@ -139,7 +139,7 @@ TEST_P(Ground, MatchesTwoTriangles) {
       still->viewer().set_lights({point, disc});
       still->set_camera(test::camera_at({12.0, 40.0, 70.0}, {14.0, 0.0, 10.0}, 40.0));
       if (model || floor) still->viewer().show_surfaces(test::source_of(scene(floor)));
-      if (!floor) still->viewer().set_ground({GroundPlace::at_height, height, albedo});
+      if (!floor) still->viewer().set_ground({GroundMode::at_height, height, albedo});
       return test::render(*still, {32, 32, 256, 5, render::View::shaded});
     };
     const test::Picture ground = picture(false);
@@ -166,7 +166,7 @@ TEST_P(Ground, IsHitOnlyFromAbove) {
   still->set_volume(test::slab());
   still->set_light(sun_at(90.0F, 3.0F, 0.0F));
   still->set_medium({1e-6, vec3(0.0F), {}, 0});
-  still->viewer().set_ground({GroundPlace::at_height, -50.0, vec3(0.5F)});
+  still->viewer().set_ground({GroundMode::at_height, -50.0, vec3(0.5F)});
   still->set_camera(test::camera_at({32.0, -90.0, 300.0}, {32.0, 0.0, 32.0}, 1.0));
   EXPECT_NEAR(test::render(*still, {8, 8, 4, 1, render::View::shaded}).mean().w, 0.0, 1e-3);
   still->set_camera(test::camera_at({32.0, -10.0, 300.0}, {32.0, -40.0, 32.0}, 1.0));

@@ -168,9 +168,9 @@ TEST_P(Holdout, CastsShadows) {
     // None of the 16 feature rays hits the panes here. Except for slivers at silhouettes, no sample does either.
     bool near = false;
     for (std::size_t j = 0; j < count; ++j) {
-      const bool met = normal[3 * j] != 0.0F || normal[3 * j + 1] != 0.0F || normal[3 * j + 2] != 0.0F;
+      const bool is_hit = normal[3 * j] != 0.0F || normal[3 * j + 1] != 0.0F || normal[3 * j + 2] != 0.0F;
       const auto apart = [](std::size_t a, std::size_t b) { return a > b ? a - b : b - a; };
-      near = near || (met && apart(i % side, j % side) <= 1 && apart(i / side, j / side) <= 1);
+      near = near || (is_hit && apart(i % side, j % side) <= 1 && apart(i / side, j / side) <= 1);
     }
     if (near) continue;
     ++aside;
@@ -213,8 +213,8 @@ TEST_P(Holdout, WorksForOneVolumeAmongOthers) {
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);
   samples(8);
   const auto put = [&](double z) {
-    const auto place = at(0.0, 0.0, z);
-    ASSERT_EQ(cumulet_instance_set_to_world(made, place.data()), CUMULET_OK);
+    const auto transform = at(0.0, 0.0, z);
+    ASSERT_EQ(cumulet_instance_set_to_world(made, transform.data()), CUMULET_OK);
   };
   // If opaque, it hides the volume behind it completely. Light from that volume reaches nothing visible.
   set_medium(1e4, true);

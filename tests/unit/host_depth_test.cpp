@@ -223,11 +223,11 @@ class DepthScene {
   void expect_scene(const Camera& camera, glm::ivec4 viewport, bool flip, unsigned layers, double step) {
     ASSERT_EQ(depth_->size(), glm::uvec2(viewport.z, viewport.w));
     ASSERT_EQ(depth_->layers(), layers);
-    std::vector<glm::vec2> places(layers, glm::vec2(0.5F));
+    std::vector<glm::vec2> positions(layers, glm::vec2(0.5F));
     if (layers > 1) {
       const Host multisampled = make_host(GL_DEPTH_COMPONENT32F, static_cast<int>(layers), false);
       functions_->BindFramebuffer(GL_DRAW_FRAMEBUFFER, multisampled.framebuffer.name());
-      for (unsigned s = 0; s < layers; ++s) functions_->GetMultisamplefv(GL_SAMPLE_POSITION, s, &places[s].x);
+      for (unsigned s = 0; s < layers; ++s) functions_->GetMultisamplefv(GL_SAMPLE_POSITION, s, &positions[s].x);
     }
     const std::vector<float> z = read();
     int surfaces = 0;
@@ -236,8 +236,8 @@ class DepthScene {
       for (int row = 0; row < viewport.w; ++row) {
         for (int column = 0; column < viewport.z; ++column) {
           const int up = flip ? row : viewport.w - 1 - row;
-          const double x = 2.0 * (column + double(places[layer].x)) / viewport.z - 1.0;
-          const double y = 2.0 * (up + double(places[layer].y)) / viewport.w - 1.0;
+          const double x = 2.0 * (column + double(positions[layer].x)) / viewport.z - 1.0;
+          const double y = 2.0 * (up + double(positions[layer].y)) / viewport.w - 1.0;
           const double dx = 2.0 / viewport.z;
           const double dy = 2.0 / viewport.w;
           const auto near_edge = [&](double cx, double cy) { return std::abs(cx) < dx || std::abs(cy) < dy; };

@@ -78,25 +78,25 @@ class Random {
   std::mt19937 engine_;
 };
 
-Instance instance_of(const dmat4& place, const vec3& low = vec3(0.0F), const vec3& high = vec3(16.0F)) {
+Instance instance_of(const dmat4& transform, const vec3& low = vec3(0.0F), const vec3& high = vec3(16.0F)) {
   auto source = std::make_shared<scene::MarchSource>();
   source->cube.to_world = glm::scale(glm::translate(dmat4(1.0), origin), dvec3(0.5));
   Instance instance;
   instance.source = std::move(source);
   // The transform applies about the scene's origin, not the world's.
-  instance.place = glm::translate(dmat4(1.0), origin) * place * glm::translate(dmat4(1.0), -origin);
+  instance.transform = glm::translate(dmat4(1.0), origin) * transform * glm::translate(dmat4(1.0), -origin);
   instance.grid.box_min = low;
   instance.grid.box_max = high;
   return instance;
 }
 
-dmat4 any_place(Random& random, double wide) {
-  dmat4 place = glm::translate(dmat4(1.0), random.in_box(-wide, wide));
-  place = glm::rotate(place, random(0.0, 6.0), random.unit());
-  place = glm::scale(place, random.in_box(1.0, 5.0));
-  place[1] += random(-0.5, 0.5) * place[0];  // sheared
-  if (random.below(4) == 0) place[2] = -place[2];
-  return place;
+dmat4 any_transform(Random& random, double wide) {
+  dmat4 transform = glm::translate(dmat4(1.0), random.in_box(-wide, wide));
+  transform = glm::rotate(transform, random(0.0, 6.0), random.unit());
+  transform = glm::scale(transform, random.in_box(1.0, 5.0));
+  transform[1] += random(-0.5, 0.5) * transform[0];  // sheared
+  if (random.below(4) == 0) transform[2] = -transform[2];
+  return transform;
 }
 
 // Random instances: rotated, sheared, mirrored, with boxes anywhere in their cubes.
@@ -105,7 +105,7 @@ std::vector<Instance> any_instances(std::size_t count, unsigned seed, double wid
   std::vector<Instance> instances;
   for (std::size_t i = 0; i < count; ++i) {
     const dvec3 low = random.in_box(0.0, 6.0);
-    instances.push_back(instance_of(any_place(random, wide), vec3(low), vec3(low + random.in_box(4.0, 10.0))));
+    instances.push_back(instance_of(any_transform(random, wide), vec3(low), vec3(low + random.in_box(4.0, 10.0))));
     instances.back().hidden_from_camera = random.below(3) == 0;
     instances.back().medium.emits = random.below(2) == 0 ? 1U : 0U;
   }
@@ -122,7 +122,7 @@ std::vector<Instance> tiles() {
 
 std::vector<Instance> coincident() {
   Random random(5);
-  std::vector<Instance> instances(50, instance_of(any_place(random, 5.0)));
+  std::vector<Instance> instances(50, instance_of(any_transform(random, 5.0)));
   for (const Instance& other : any_instances(10, 6, 10.0)) instances.push_back(other);
   return instances;
 }
@@ -219,7 +219,7 @@ struct Span {
 };
 Span exact_span(const Instance& instance, const Ray& ray) {
   const dmat4 from_scene =
-      glm::inverse(glm::translate(dmat4(1.0), -origin) * instance.place * instance.source->cube.to_world);
+      glm::inverse(glm::translate(dmat4(1.0), -origin) * instance.transform * instance.source->cube.to_world);
   const dvec3 o(from_scene * dvec4(dvec3(ray.o), 1.0));
   const dvec3 d(from_scene * dvec4(dvec3(ray.d), 0.0));
   Span span;
@@ -272,9 +272,9 @@ Counts expect_like_brute_force(const std::vector<Instance>& instances, std::size
         ++counts.doubtful;
         continue;
       }
-      const bool meets = asked && solid && span.first < std::min(span.last, double{ray.t_end});
-      EXPECT_EQ(entries[i] >= 0.0F, meets) << r << ' ' << i << ' ' << span.first << ' ' << span.last;
-      if (meets) {
+      const bool hits = asked && solid && span.first < std::min(span.last, double{ray.t_end});
+      EXPECT_EQ(entries[i] >= 0.0F, hits) << r << ' ' << i << ' ' << span.first << ' ' << span.last;
+      if (hits) {
         EXPECT_NEAR(entries[i], span.first, unsure) << r << ' ' << i;
       }
       if (testing::Test::HasFailure()) return counts;
@@ -324,11 +324,11 @@ TEST(InstanceTree, SceneOriginIsNearTheInstances) {
       dvec3 low(1e300);
       dvec3 high(-1e300);
       for (Instance& instance : there) {
-        instance.place = glm::scale(glm::translate(dmat4(1.0), scale * at), dvec3(scale)) * instance.place;
+        instance.transform = glm::scale(glm::translate(dmat4(1.0), scale * at), dvec3(scale)) * instance.transform;
         for (int corner = 0; corner < 8; ++corner) {
           const dvec3 unit(corner & 1, corner / 2 & 1, corner / 4);
           const dvec3 in_grid = glm::mix(dvec3(instance.grid.box_min), dvec3(instance.grid.box_max), unit);
-          const dvec3 point(instance.place * instance.source->cube.to_world * glm::dvec4(in_grid, 1.0));
+          const dvec3 point(instance.transform * instance.source->cube.to_world * glm::dvec4(in_grid, 1.0));
           low = glm::min(low, point);
           high = glm::max(high, point);
         }
@@ -338,8 +338,8 @@ TEST(InstanceTree, SceneOriginIsNearTheInstances) {
       for (int step = 0; step < 100; ++step) {
         const dvec3 before = scene::origin_of(there);
         for (Instance& instance : there)
-          instance.place =
-              glm::translate(dmat4(1.0), dvec3(0.01 * glm::distance(low, high), 0.0, 0.0)) * instance.place;
+          instance.transform =
+              glm::translate(dmat4(1.0), dvec3(0.01 * glm::distance(low, high), 0.0, 0.0)) * instance.transform;
         jumps += scene::origin_of(there) == before ? 0 : 1;
       }
       EXPECT_LE(jumps, 1) << "by its own size";
@@ -362,7 +362,7 @@ TEST(InstanceTree, MatchesAFlatList) {
 TEST(InstanceTree, MatchesAFlatListFarFromTheOrigin) {
   std::vector<Instance> instances = any_instances(100, 12);
   for (Instance& instance : instances)
-    instance.place = glm::translate(dmat4(1.0), dvec3(3e8, -1e8, 7e7)) * instance.place;
+    instance.transform = glm::translate(dmat4(1.0), dvec3(3e8, -1e8, 7e7)) * instance.transform;
   const InstanceTable table = scene::make_instances(instances, origin);
   const InstanceTable list = flattened(table);
   core::InstanceRays by_tree = rays_of(table);
@@ -420,7 +420,7 @@ double common_margin(const Instance& a, const Instance& b) {
   };
   std::vector<Face> faces;
   for (const Instance* instance : {&a, &b}) {
-    const dmat4 to_scene = glm::translate(dmat4(1.0), -origin) * instance->place * instance->source->cube.to_world;
+    const dmat4 to_scene = glm::translate(dmat4(1.0), -origin) * instance->transform * instance->source->cube.to_world;
     const dmat4 normals = glm::transpose(glm::inverse(to_scene));
     for (int axis = 0; axis < 3; ++axis) {
       const dvec3 n = glm::normalize(dvec3(normals[axis]));
@@ -479,7 +479,7 @@ TEST(InstanceTree, TouchingInstancesDoNotOverlapAndCoincidentOnesDo) {
   const InstanceTable ones = scene::make_instances(coincident(), origin);
   for (std::size_t i = 0; i < 50; ++i) EXPECT_NE(ones.records[i].flags & CM_INSTANCE_OVERLAPS, 0U);
   std::vector<Instance> slightly = tiles();
-  slightly[21].place = glm::translate(dmat4(1.0), dvec3(1e-3, 0.0, 0.0)) * slightly[21].place;
+  slightly[21].transform = glm::translate(dmat4(1.0), dvec3(1e-3, 0.0, 0.0)) * slightly[21].transform;
   const InstanceTable moved = scene::make_instances(slightly, origin);
   std::set<std::size_t> overlapping;
   for (std::size_t i = 0; i < 64; ++i) {
@@ -503,7 +503,7 @@ TEST(InstanceTree, RecordsRoundTrip) {
     EXPECT_EQ((record.flags & CM_INSTANCE_EMITS) != 0, instances[i].medium.emits != 0);
     core::InstanceRays rays = rays_of(table);
     const dvec3 v(3.0, 5.0, 7.0);
-    const dvec3 p(instances[i].place * instances[i].source->cube.to_world * dvec4(v, 1.0));
+    const dvec3 p(instances[i].transform * instances[i].source->cube.to_world * dvec4(v, 1.0));
     EXPECT_LT(glm::distance(dvec3(rays.cm_in_instance_point(static_cast<std::uint32_t>(i), vec3(p - origin))), v),
               1e-3);
   }
@@ -521,20 +521,20 @@ TEST(InstanceTree, EmitterSelectionFollowsPower) {
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const double of_source = i % 3 == 0 ? 0.0 : std::exp2(static_cast<double>(i % 7));
     make_emissive(instances[i], of_source, 2.0);
-    power[i] = of_source * std::abs(glm::determinant(glm::dmat3(instances[i].place)));
+    power[i] = of_source * std::abs(glm::determinant(glm::dmat3(instances[i].transform)));
     sum += power[i];
   }
   const InstanceTable table = scene::make_instances(instances, origin);
   EXPECT_NEAR(table.emissive_power, sum, 1e-9 * sum);
-  std::vector<double> chance(instances.size());
+  std::vector<double> probability(instances.size());
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const double stays = static_cast<double>(table.records[i].alias) / 4294967296.0;
-    chance[i] += stays / static_cast<double>(instances.size());
-    chance.at(table.records[i].alias_other) += (1.0 - stays) / static_cast<double>(instances.size());
+    probability[i] += stays / static_cast<double>(instances.size());
+    probability.at(table.records[i].alias_other) += (1.0 - stays) / static_cast<double>(instances.size());
   }
   core::InstanceRays rays = rays_of(table);
   for (std::size_t i = 0; i < instances.size(); ++i) {
-    EXPECT_NEAR(chance[i], power[i] / sum, 1e-8);
+    EXPECT_NEAR(probability[i], power[i] / sum, 1e-8);
     if (power[i] > 0.0) {
       EXPECT_FLOAT_EQ(table.records[i].emissive.density, static_cast<float>(1.0 / sum));
       EXPECT_GT(table.records[i].emissive.min_stretch, 0.0F);
@@ -632,10 +632,10 @@ void main() {
       return gl::make_buffer(gl_, values.size() * sizeof(values[0]), values.data(), 0, "instances");
     };
     const std::array buffers{buffer(rays), buffer(found), buffer(table.records), buffer(table.nodes)};
-    const std::array<GLuint, 4> places{0, 1, GLuint{core::CM_STORAGE_INSTANCES},
-                                       GLuint{core::CM_STORAGE_INSTANCE_NODES}};
+    const std::array<GLuint, 4> bindings{0, 1, GLuint{core::CM_STORAGE_INSTANCES},
+                                         GLuint{core::CM_STORAGE_INSTANCE_NODES}};
     gl_->UseProgram(program.name());
-    for (std::size_t i = 0; i < 4; ++i) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, places[i], buffers[i].name());
+    for (std::size_t i = 0; i < 4; ++i) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, bindings[i], buffers[i].name());
     gl_->DispatchCompute(static_cast<GLuint>((rays.size() + 63) / 64), 1, 1);
     gl_->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     gl_->GetNamedBufferSubData(buffers[1].name(), 0, static_cast<GLsizeiptr>(found.size() * sizeof(Visit)),
@@ -700,7 +700,7 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(medium.anisotropy),
                                    CM_RECORD(medium.second_anisotropy),
                                    CM_RECORD(medium.second_bend),
-                                   CM_RECORD(medium.second_share),
+                                   CM_RECORD(medium.second_weight),
                                    CM_RECORD(medium.emits),
                                    CM_RECORD(medium.colored),
                                    CM_RECORD(medium.anisotropic),

@@ -160,12 +160,12 @@ TEST(Lattice, EachRecordBelongsToOneCoarseCell) {
       const auto scale = static_cast<std::uint32_t>((size - 1) / 3);
       std::uint32_t block = CM_TOP_BLOCK;
       for (std::uint32_t s = lattice.top_scale(); s > scale; --s)
-        block = lattice.places[block * CM_BLOCK_POINTS + core::cm_in_block(centre >> static_cast<int>(3 * s))].block;
-      const auto place =
-          lattice.places[block * CM_BLOCK_POINTS + core::cm_in_block(centre >> static_cast<int>(3 * scale))];
-      ASSERT_NE(place.coarse, 0U);
+        block = lattice.entries[block * CM_BLOCK_POINTS + core::cm_in_block(centre >> static_cast<int>(3 * s))].block;
+      const auto entry =
+          lattice.entries[block * CM_BLOCK_POINTS + core::cm_in_block(centre >> static_cast<int>(3 * scale))];
+      ASSERT_NE(entry.coarse, 0U);
       const std::uint32_t index = core::cm_coarse_cell(v0, shape, vec3(corner));
-      const glm::uvec2 coefficients = lattice.coarse[place.coarse].coefficients[index];
+      const glm::uvec2 coefficients = lattice.coarse[entry.coarse].coefficients[index];
       EXPECT_EQ(coefficients.x, cell.data.z);
       if (cell.data.z != 0) {
         EXPECT_EQ(coefficients.y, cell.data.w);
@@ -182,25 +182,25 @@ TEST(Lattice, EachRecordBelongsToOneCoarseCell) {
     EXPECT_GT(found, 20U) << small.name;
   }
   // All entries of a cube, each once.
-  std::set<std::uint32_t> places;
+  std::set<std::uint32_t> indices;
   for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
     const ivec3 corner(16, 48, 32);
     const std::uint32_t shape = grid::kuhn_frame(corner, 16, permutation) | (1U << 9U) | (4U << 11U);
     vec3 v0(corner);
     for (int axis = 0; axis < 3; ++axis) v0[axis] += static_cast<float>(corner[axis] & 16);
-    places.insert(core::cm_coarse_cell(v0, shape, vec3(corner)));
+    indices.insert(core::cm_coarse_cell(v0, shape, vec3(corner)));
     for (unsigned a = 0; a < 2; ++a) {
       const vec3 half_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
       const std::uint32_t half = core::cm_child_shape(shape, a);
-      places.insert(core::cm_coarse_cell(half_v0, half, vec3(corner)));
+      indices.insert(core::cm_coarse_cell(half_v0, half, vec3(corner)));
       for (unsigned b = 0; b < 2; ++b) {
-        places.insert(core::cm_coarse_cell(b == 0 ? half_v0 : core::cm_cell_vertex(half_v0, half, 1),
-                                           core::cm_child_shape(half, b), vec3(corner)));
+        indices.insert(core::cm_coarse_cell(b == 0 ? half_v0 : core::cm_cell_vertex(half_v0, half, 1),
+                                            core::cm_child_shape(half, b), vec3(corner)));
       }
     }
   }
-  EXPECT_EQ(places.size(), std::size_t{CM_COARSE_CELLS});
-  EXPECT_EQ(*places.rbegin(), CM_COARSE_CELLS - 1);
+  EXPECT_EQ(indices.size(), std::size_t{CM_COARSE_CELLS});
+  EXPECT_EQ(*indices.rbegin(), CM_COARSE_CELLS - 1);
 }
 
 TEST(Lattice, BrickEdgeLengthsCoverAllTheirCells) {

@@ -254,8 +254,8 @@ TEST_P(LightGroups, EmissionOfInstancesFollowsTheirMediumsGroup) {
   medium.emission[1] = 0.5F;
   desc.volume = ball_.get();
   desc.medium = &medium;
-  const auto place = at(6.0, 3.0, 0.0);
-  std::copy(place.begin(), place.end(), desc.to_world);
+  const auto transform = at(6.0, 3.0, 0.0);
+  std::copy(transform.begin(), transform.end(), desc.to_world);
   const InstanceRef instance = cumulet::test::make_instance(desc);
   cumulet_instance* const made = instance.get();
   ASSERT_EQ(cumulet_add_instance(v_, made), CUMULET_OK);

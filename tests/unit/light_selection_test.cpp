@@ -35,11 +35,11 @@ struct CpuDisc {
   vec3 cm_disc_to{0.0F, 1.0F, 0.0F};
   float cm_disc_cosine = 0.5F;
   vec3 cm_disc_radiance_in{1.0F};
-  float cm_disc_chance = 1.0F;
+  float cm_disc_probability = 1.0F;
   float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
   float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
 #define CM_MARCH 1
-#define CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, cm_disc_chance, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)
+#define CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, cm_disc_probability, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)
 #include "support/traced.inc"
 
 #include "support/disc_light.glsl"
@@ -59,7 +59,7 @@ struct CpuManyAnalyticLights {
     CmAnalyticLight analytic_light{};
     analytic_light.kind = CM_ANALYTIC_LIGHT_DISTANT;
     analytic_light.intensity = vec3(even ? 1.0F : 0.0F, static_cast<float>(i) / (2.0F * pairs), 0.0F);
-    analytic_light.chance = (even ? 0.3F : 0.7F) / pairs;
+    analytic_light.probability = (even ? 0.3F : 0.7F) / pairs;
     analytic_light.stays = even ? static_cast<uint>(0.6 * light::Alias::certain) : light::Alias::certain;
     analytic_light.other = i + 1;
     return analytic_light;
@@ -111,16 +111,16 @@ TEST(LightSelection, ProbabilitiesSumToOneOrZeroWithoutLight) {
             const LightTable table(distant, {}, scene_of(analytic_lights, triangles), fire);
             double sum = 0.0;
             for (const LightTable::Entry& entry : table.entries()) {
-              if (entry.kind != Kind::emissive) sum += entry.chance;
+              if (entry.kind != Kind::emissive) sum += entry.probability;
             }
             const bool any = sun + sky > 0.0F || analytic_lights + triangles > 0 || power > 0.0;
             EXPECT_NEAR(sum, any ? 1.0 : 0.0, 1e-6);
             EXPECT_EQ(table.parameters().any, any ? 1U : 0U);
-            EXPECT_EQ(table.chance(Kind::sun) > 0.0F, sun > 0.0F);
-            EXPECT_EQ(table.chance(Kind::sky) > 0.0F, sky > 0.0F);
-            EXPECT_EQ(table.chance(Kind::analytic_light) > 0.0F, analytic_lights > 0);
-            EXPECT_EQ(table.chance(Kind::triangle) > 0.0F, triangles > 0);
-            EXPECT_EQ(table.chance(Kind::cell) > 0.0F, power > 0.0);
+            EXPECT_EQ(table.probability(Kind::sun) > 0.0F, sun > 0.0F);
+            EXPECT_EQ(table.probability(Kind::sky) > 0.0F, sky > 0.0F);
+            EXPECT_EQ(table.probability(Kind::analytic_light) > 0.0F, analytic_lights > 0);
+            EXPECT_EQ(table.probability(Kind::triangle) > 0.0F, triangles > 0);
+            EXPECT_EQ(table.probability(Kind::cell) > 0.0F, power > 0.0);
           }
         }
       }
@@ -135,9 +135,9 @@ TEST(LightSelection, SunAndLightsAreSelectedByIncidentFlux) {
   const auto sun = [&](double arrives) {
     analytic_lights.analytic_lights_arrive = arrives;
     const LightTable table(distant, {}, analytic_lights, {});
-    EXPECT_NEAR(table.chance(Kind::analytic_light), 1.0F - table.chance(Kind::sun), 1e-6);
-    EXPECT_EQ(table.chance(Kind::emissive), 0.0F);
-    return table.chance(Kind::sun);
+    EXPECT_NEAR(table.probability(Kind::analytic_light), 1.0F - table.probability(Kind::sun), 1e-6);
+    EXPECT_EQ(table.probability(Kind::emissive), 0.0F);
+    return table.probability(Kind::sun);
   };
   EXPECT_NEAR(sun(3.0), 0.4, 1e-6);
   EXPECT_NEAR(sun(0.0), 0.8, 1e-6);
@@ -152,7 +152,7 @@ core::CmAnalyticLight point_analytic_light(const glm::dvec3& at, float power) {
 }
 
 // Compares each light's stored probability, and the probability that its alias table entries give.
-void expect_chances(const std::vector<core::CmAnalyticLight>& records, const std::vector<double>& expected) {
+void expect_probabilities(const std::vector<core::CmAnalyticLight>& records, const std::vector<double>& expected) {
   std::vector<double> drawn(records.size(), 0.0);
   for (std::size_t i = 0; i < records.size(); ++i) {
     const double part = 1.0 / static_cast<double>(records.size());
@@ -161,7 +161,7 @@ void expect_chances(const std::vector<core::CmAnalyticLight>& records, const std
     drawn.at(records[i].other) += part * (1.0 - stays);
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
-    EXPECT_NEAR(records[i].chance, expected[i], 1e-6) << i;
+    EXPECT_NEAR(records[i].probability, expected[i], 1e-6) << i;
     EXPECT_NEAR(drawn[i], expected[i], 1e-6) << i;
   }
 }
@@ -175,17 +175,17 @@ TEST(AnalyticLightSelection, LightsAreSelectedByIncidentFlux) {
       point_analytic_light({0, 0, 5}, 0.5F), point_analytic_light({0, 0.1, 0}, 0.01F)};
   const double arrives = light::share_looks(records, ball);
   EXPECT_NEAR(arrives, 0.05 / (4.0 * std::numbers::pi), 1e-6);
-  expect_chances(records, {0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.4, 0.05 + 0.8 * 0.2});
+  expect_probabilities(records, {0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.4, 0.05 + 0.8 * 0.2});
 
   // With two lit balls, the mean of both: near the second ball only the first light counts.
   records.resize(2);
   light::share_looks(records, std::vector<light::Lit>{ball[0], {glm::dvec3(10, 0, 0), 1e-3}});
-  expect_chances(records, {0.1 + 0.8 * 0.75, 0.1 + 0.8 * 0.25});
+  expect_probabilities(records, {0.1 + 0.8 * 0.75, 0.1 + 0.8 * 0.25});
 
   // A light whose range ends before the ball keeps a small probability, because points outside of the ball may need it.
   records[0].range = 3.0F;
   light::share_looks(records, ball);
-  expect_chances(records, {0.1, 0.9});
+  expect_probabilities(records, {0.1, 0.9});
 }
 
 TEST(AnalyticLightSelection, SamplesMatchProbabilitiesForAnyCount) {
@@ -208,11 +208,11 @@ TEST(AnalyticLightSelection, IsUniformWithoutPowerOrReceivers) {
   std::vector<core::CmAnalyticLight> records{point_analytic_light({10, 0, 0}, 1.0F),
                                              point_analytic_light({0, 2, 0}, 4.0F)};
   EXPECT_EQ(light::share_looks(records, std::vector<light::Lit>{{glm::dvec3(0.0), 0.0}}), 0.0);
-  expect_chances(records, {0.5, 0.5});
+  expect_probabilities(records, {0.5, 0.5});
   std::vector<core::CmAnalyticLight> dark{point_analytic_light({10, 0, 0}, 0.0F),
                                           point_analytic_light({0, 2, 0}, 0.0F)};
   EXPECT_EQ(light::share_looks(dark, std::vector<light::Lit>{{glm::dvec3(0.0), 1.0}}), 0.0);
-  expect_chances(dark, {0.5, 0.5});
+  expect_probabilities(dark, {0.5, 0.5});
   EXPECT_EQ(light::share_looks({}, {}), 0.0);
 }
 
@@ -222,17 +222,17 @@ TEST(LightSelection, SmallFiresShareSamplesWithDistantLights) {
   sun.analytic_lights = 1;  // no flux: there is no surface
   const light::MediumLight fire{.aimed = false, .power = 1.0, .length = 0.01, .radius = 1.0};
   const LightTable table({}, {}, sun, fire);
-  EXPECT_EQ(table.chance(Kind::analytic_light), 0.5F);
-  EXPECT_EQ(table.chance(Kind::cell), 0.5F);
+  EXPECT_EQ(table.probability(Kind::analytic_light), 0.5F);
+  EXPECT_EQ(table.probability(Kind::cell), 0.5F);
 }
 
 TEST(LightSelection, OnlySmallFiresAreSampled) {
-  const auto chance = [](double length) {
+  const auto probability = [](double length) {
     const light::MediumLight fire{.aimed = false, .power = 1.0, .length = length, .radius = 1.0};
-    return LightTable({}, {}, {}, fire).chance(Kind::cell);
+    return LightTable({}, {}, {}, fire).probability(Kind::cell);
   };
-  EXPECT_EQ(chance(0.01), 1.0F);
-  EXPECT_EQ(chance(0.5), 0.0F);
+  EXPECT_EQ(probability(0.01), 1.0F);
+  EXPECT_EQ(probability(0.5), 0.0F);
 }
 
 class AddedLightType : public test::ViewerTest {};
@@ -296,8 +296,8 @@ TEST_P(AddedLightType, DiskIsSampledByNextEventEstimationAndHitByRays) {
     cpu.origin = ivec3(grid::fit_cube(box.volume).origin);
     cpu.cm_disc_cosine = static_cast<float>(std::cos(0.6));
     const double expected = single_scattering(dvec3(box.voxels), BoxOfVoxels::sigma, g, std::cos(0.6));
-    for (const float chance : {1.0F, 0.3F, 0.0F}) {
-      cpu.cm_disc_chance = chance;
+    for (const float probability : {1.0F, 0.3F, 0.0F}) {
+      cpu.cm_disc_probability = probability;
       std::array<double, 64> means{};
       double mean = 0.0;
       for (std::uint32_t i = 0; i < 64; ++i) {
@@ -307,8 +307,8 @@ TEST_P(AddedLightType, DiskIsSampledByNextEventEstimationAndHitByRays) {
       double square = 0.0;
       for (const double m : means) square += (m - mean) * (m - mean);
       const double error = std::sqrt(square) / 64.0;
-      EXPECT_NEAR(mean, expected, 4.0 * error) << "g " << g << " chance " << chance;
-      EXPECT_LT(error, (chance > 0.0F ? 0.02 : 0.1) * expected);
+      EXPECT_NEAR(mean, expected, 4.0 * error) << "g " << g << " chance " << probability;
+      EXPECT_LT(error, (probability > 0.0F ? 0.02 : 0.1) * expected);
     }
   }
 }
@@ -342,11 +342,11 @@ TEST_P(Sun, SunWithAngleMatchesQuadratureForEverySamplingMethod) {
     cpu.volume = &box.volume;
     cpu.origin = ivec3(grid::fit_cube(box.volume).origin);
     cpu.cm_disc_radiance_in = vec3(0.0F);
-    for (const float chance : {0.0F, 0.5F, 1.0F}) {
-      cpu.cm_disc_chance = chance;
+    for (const float probability : {0.0F, 0.5F, 1.0F}) {
+      cpu.cm_disc_probability = probability;
       double mean = 0.0;
       for (std::uint32_t i = 0; i < 64; ++i) mean += cpu.traced({i % 8, i / 8}).sum.x / 256.0 / 64.0;
-      EXPECT_NEAR(mean, expected, (chance < 1.0F ? 0.03 : 0.1) * expected) << g << " " << chance;
+      EXPECT_NEAR(mean, expected, (probability < 1.0F ? 0.03 : 0.1) * expected) << g << " " << probability;
     }
   }
 }
@@ -514,9 +514,9 @@ TEST_P(AddedLightTypeShader, CompilesInTheDriver) {
       "CM_MARCH 1", "CM_LINEAR 0", "CM_PAGES 1",
       "CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, 0.5, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)"};
   std::string text = shader->with(defines);
-  const std::size_t place = text.find("// ---- All kinds");
-  ASSERT_NE(place, std::string::npos);
-  text.insert(place, R"(
+  const std::size_t offset = text.find("// ---- All kinds");
+  ASSERT_NE(offset, std::string::npos);
+  text.insert(offset, R"(
 const vec3 cm_disc_to = vec3(0.0, 1.0, 0.0);
 const float cm_disc_cosine = 0.5;
 const vec3 cm_disc_radiance_in = vec3(1.0);

@@ -146,8 +146,8 @@ class Objects {
 cumulet_gl_field field_at(cumulet_channel channel, const Sides& size) {
   auto field = make_desc<cumulet_gl_field>();
   field.channel = channel;
-  const auto place = test::simulated_place(size);
-  std::copy(place.begin(), place.end(), field.index_to_world);
+  const auto transform = test::simulated_transform(size);
+  std::copy(transform.begin(), transform.end(), field.index_to_world);
   return field;
 }
 cumulet_gl_field in_texture(cumulet_channel channel, const Sides& size, GLuint name, std::uint32_t component = 0) {

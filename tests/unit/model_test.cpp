@@ -26,26 +26,26 @@ std::shared_ptr<test::StillScene> lumps(std::mt19937& random) {
 }
 
 // A random transform: rotated, sheared and stretched by up to 10 to 1; mirrored on request.
-dmat4 any_place(std::mt19937& random, bool mirrored) {
+dmat4 any_transform(std::mt19937& random, bool mirrored) {
   std::uniform_real_distribution<double> even(-1.0, 1.0);
-  dmat4 place(1.0);
+  dmat4 transform(1.0);
   do {
-    for (int c = 0; c < 3; ++c) place[c] = glm::dvec4(even(random), even(random), even(random), 0.0);
-  } while (std::abs(glm::determinant(place)) < 0.1);
-  if ((glm::determinant(place) < 0.0) != mirrored) place[0] = -place[0];
-  place[3] = glm::dvec4(4.0 * even(random), 4.0 * even(random), 4.0 * even(random), 1.0);
-  return place;
+    for (int c = 0; c < 3; ++c) transform[c] = glm::dvec4(even(random), even(random), even(random), 0.0);
+  } while (std::abs(glm::determinant(transform)) < 0.1);
+  if ((glm::determinant(transform) < 0.0) != mirrored) transform[0] = -transform[0];
+  transform[3] = glm::dvec4(4.0 * even(random), 4.0 * even(random), 4.0 * even(random), 1.0);
+  return transform;
 }
 
-struct Met {
+struct Hit {
   double t = 1e30;
   std::size_t model = 0;
   dvec3 normal{0.0};  // towards the ray
 };
 
 // Nearest hit among all triangles in world space, in double precision (Moeller and Trumbore).
-Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const dvec3& d) {
-  Met met;
+Hit brute_force(const std::vector<scene::Model>& models, const dvec3& o, const dvec3& d) {
+  Hit nearest;
   for (std::size_t m = 0; m < models.size(); ++m) {
     const scene::ModelSource& source = *models[m].source;
     for (std::size_t i = 0; i < source.scene->indices.size(); i += 3) {
@@ -63,19 +63,19 @@ Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const d
       const dvec3 q = glm::cross(s, a);
       const double v = glm::dot(d, q) / det;
       const double t = glm::dot(b, q) / det;
-      if (u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= met.t) continue;
+      if (u < 0.0 || v < 0.0 || u + v > 1.0 || t <= 0.0 || t >= nearest.t) continue;
       const dvec3 n = glm::normalize(glm::cross(a, b));
-      met = {t, m, glm::dot(n, d) > 0.0 ? -n : n};
+      nearest = {t, m, glm::dot(n, d) > 0.0 ? -n : n};
     }
   }
-  return met;
+  return nearest;
 }
 
 TEST(Models, RaysHitLikeInWorldSpace) {
   std::mt19937 random(7);
   const auto source = test::source_of(lumps(random));
   std::vector<scene::Model> models;
-  for (int i = 0; i < 40; ++i) models.push_back({std::uint64_t(i), source, any_place(random, i % 2 == 1)});
+  for (int i = 0; i < 40; ++i) models.push_back({std::uint64_t(i), source, any_transform(random, i % 2 == 1)});
   core::CpuTetSurfaces rays;
   rays.cm.surfaces = rays.show(models);
   const scene::ModelTable table =
@@ -86,17 +86,17 @@ TEST(Models, RaysHitLikeInWorldSpace) {
   for (int i = 0; i < 4000; ++i) {
     const vec3 o = 8.0F * vec3(even(random), even(random), even(random));
     const vec3 d = vec3(even(random), even(random), even(random));
-    const Met expected = brute_force(models, dvec3(o), dvec3(d));
+    const Hit expected = brute_force(models, dvec3(o), dvec3(d));
     core::CpuTetSurfaces::CmHit hit;
     rays.cm_hit_camera = false;
-    const bool met = rays.cm_trace_models(o, d, 0.0F, 1e30F, false, hit);
+    const bool is_hit = rays.cm_trace_models(o, d, 0.0F, 1e30F, false, hit);
     core::CpuTetSurfaces::CmHit any;
-    EXPECT_EQ(rays.cm_trace_models(o, d, 0.0F, 1e30F, true, any), met);
-    if (met != (expected.t < 1e30) || (met && std::abs(hit.t - expected.t) > 1e-4 * (1.0 + expected.t))) {
+    EXPECT_EQ(rays.cm_trace_models(o, d, 0.0F, 1e30F, true, any), is_hit);
+    if (is_hit != (expected.t < 1e30) || (is_hit && std::abs(hit.t - expected.t) > 1e-4 * (1.0 + expected.t))) {
       ++other;
       continue;
     }
-    if (!met) continue;
+    if (!is_hit) continue;
     ++hits;
     EXPECT_EQ(table.parts[table.record_of(hit.triangle)].model, expected.model);
     const auto point = rays.cm_surface_point(hit.triangle, hit.barycentrics, glm::normalize(d), !hit.front);
@@ -114,12 +114,12 @@ TEST(Models, NormalsArePerpendicularUnderShear) {
   scene->add_sphere(vec3(0.0F), 1.0F, 0, 40);
   const auto source = test::source_of(scene);
   for (int i = 0; i < 20; ++i) {
-    const dmat4 place = any_place(random, i % 2 == 1);
+    const dmat4 transform = any_transform(random, i % 2 == 1);
     core::CpuTetSurfaces rays;
-    rays.cm.surfaces = rays.show(std::vector<scene::Model>{{0, source, place}});
+    rays.cm.surfaces = rays.show(std::vector<scene::Model>{{0, source, transform}});
     std::uniform_real_distribution<float> even(-1.0F, 1.0F);
     for (int k = 0; k < 50; ++k) {
-      const vec3 towards(place * glm::dvec4(0.5F * even(random), 0.5F * even(random), 0.5F * even(random), 1.0));
+      const vec3 towards(transform * glm::dvec4(0.5F * even(random), 0.5F * even(random), 0.5F * even(random), 1.0));
       const vec3 o = towards + 20.0F * glm::normalize(vec3(even(random), even(random), even(random)));
       const vec3 d = glm::normalize(towards - o);
       core::CpuTetSurfaces::CmHit hit;
@@ -127,8 +127,8 @@ TEST(Models, NormalsArePerpendicularUnderShear) {
       EXPECT_TRUE(hit.front);
       const auto point = rays.cm_surface_point(hit.triangle, hit.barycentrics, d, false);
       // The normal of an ellipsoid is the gradient of |A^-1 (p - c)|^2.
-      const dvec3 own = glm::inverse(glm::dmat3(place)) * (dvec3(point.position) - dvec3(place[3]));
-      const dvec3 expected = glm::normalize(glm::transpose(glm::inverse(glm::dmat3(place))) * own);
+      const dvec3 own = glm::inverse(glm::dmat3(transform)) * (dvec3(point.position) - dvec3(transform[3]));
+      const dvec3 expected = glm::normalize(glm::transpose(glm::inverse(glm::dmat3(transform))) * own);
       EXPECT_GT(glm::dot(dvec3(point.material.smooth_normal), expected), 0.97) << i;
       EXPECT_LT(glm::dot(dvec3(point.geometric), dvec3(d)), 0.0);
     }
@@ -144,7 +144,7 @@ TEST(Models, EmissiveTrianglesAreSelectedByArea) {
   const auto source = test::source_of(scene);
   std::mt19937 random(5);
   std::vector<scene::Model> models;
-  for (int i = 0; i < 5; ++i) models.push_back({std::uint64_t(i), source, any_place(random, i % 2 == 1)});
+  for (int i = 0; i < 5; ++i) models.push_back({std::uint64_t(i), source, any_transform(random, i % 2 == 1)});
   core::CpuTetEmitters rays;
   rays.cm.surfaces = rays.show(models);
   double sum = 0.0;
@@ -183,8 +183,8 @@ TEST(Models, ShadowOnlyModelsAreHitByAllButCameraRays) {
 TEST(Models, InvalidTransformsAreRejected) {
   std::mt19937 random(3);
   const auto source = test::source_of(lumps(random));
-  const auto refused = [&](const dmat4& place, ErrorCode code, const char* cause) {
-    const std::vector<scene::Model> models{{0, source}, {1, source, place}};
+  const auto refused = [&](const dmat4& transform, ErrorCode code, const char* cause) {
+    const std::vector<scene::Model> models{{0, source}, {1, source, transform}};
     try {
       scene::make_model_table(models, [](const scene::ModelSource&) { return scene::ModelWords{}; });
       ADD_FAILURE() << cause;

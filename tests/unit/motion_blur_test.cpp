@@ -87,9 +87,9 @@ class MotionBlur : public test::CloudTest {
     });
   }
   void expect_as_stills(const dmat4& open, const dmat4& close) {
-    viewer().set_places({{dmat4(1.0), scene::PlaceEnds{open, close}}});
+    viewer().set_transforms({{dmat4(1.0), scene::ShutterTransforms{open, close}}});
     const Blocks swept = blurred();
-    test::expect_alike(swept, still_mean([&](double t) { viewer().set_places({{between(open, close, t)}}); }));
+    test::expect_alike(swept, still_mean([&](double t) { viewer().set_transforms({{between(open, close, t)}}); }));
   }
 };
 // Only numbers are compared, so one driver is enough.
@@ -103,7 +103,7 @@ TEST_P(MotionBlur, PassingBoxIsWeightedByItsTime) {
   for (const test::MarchKind& kind : test::march_kinds) {
     still_->set_grid(test::settings_of(kind));
     // The box x in [-0.5, 7.5] moves by 20 to each side: it covers x = 3.5 for 8 of 40.
-    viewer().set_places({{dmat4(1.0), scene::PlaceEnds{moved(-20, 0, 0), moved(20, 0, 0)}}});
+    viewer().set_transforms({{dmat4(1.0), scene::ShutterTransforms{moved(-20, 0, 0), moved(20, 0, 0)}}});
     const double covered = 8.0 / 40.0;
     const double expected = 1.0 - covered * (1.0 - clear);
     EXPECT_NEAR(along_z(3.5, 31.5), expected, 4.5 * sigma(expected));
@@ -119,7 +119,7 @@ TEST_P(MotionBlur, GrowingBoxIsTheMeanOfItsTransmittances) {
   only_absorb(0.05);
   show(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
   const dmat4 thrice = glm::scale(dmat4(1.0), dvec3(1.0, 1.0, 3.0));
-  viewer().set_places({{dmat4(1.0), scene::PlaceEnds{dmat4(1.0), thrice}}});
+  viewer().set_transforms({{dmat4(1.0), scene::ShutterTransforms{dmat4(1.0), thrice}}});
   const double thin = 0.05 * 16.0;
   const double expected = (std::exp(-thin) - std::exp(-3.0 * thin)) / (2.0 * thin);
   EXPECT_NEAR(along_z(7.5, 7.5), expected, 4.5 * sigma(expected));
@@ -133,7 +133,7 @@ TEST_P(MotionBlur, WithoutMotionTheImageIsUnchanged) {
   open.shutter_seconds = 0.5;
   const test::Picture before = test::render(*still_, image);
   EXPECT_EQ(test::render(*still_, open).pixels, before.pixels) << "nothing moves";
-  viewer().set_places({{dmat4(1.0), scene::PlaceEnds{moved(-1, 0, 0), moved(1, 0, 0)}}});
+  viewer().set_transforms({{dmat4(1.0), scene::ShutterTransforms{moved(-1, 0, 0), moved(1, 0, 0)}}});
   EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "it is closed";
   const test::Picture swept = test::render(*still_, open);
   EXPECT_NE(swept.pixels, before.pixels);
@@ -169,12 +169,13 @@ TEST_P(MotionBlur, VoxelGridsMatchTetrahedralGrids) {
 TEST_P(MotionBlur, MovingInstanceAmongStaticOnes) {
   show(cloud());
   const std::vector<dmat4> stand{moved(14, 3, 0), moved(-10, -6, 8)};
-  const auto places = [&](const scene::Place& place) {
-    return std::vector<scene::Place>{{stand[0]}, place, {stand[1]}};
+  const auto transforms = [&](const scene::InstanceTransform& transform) {
+    return std::vector<scene::InstanceTransform>{{stand[0]}, transform, {stand[1]}};
   };
-  viewer().set_places(places({dmat4(1.0), scene::PlaceEnds{moved(-12, 0, 0), moved(12, 0, 0)}}));
+  viewer().set_transforms(transforms({dmat4(1.0), scene::ShutterTransforms{moved(-12, 0, 0), moved(12, 0, 0)}}));
   const Blocks swept = blurred();
-  test::expect_alike(swept, still_mean([&](double t) { viewer().set_places(places({moved(24 * t - 12, 0, 0)})); }));
+  test::expect_alike(swept,
+                     still_mean([&](double t) { viewer().set_transforms(transforms({moved(24 * t - 12, 0, 0)})); }));
 }
 
 // The camera rotates about one axis at constant speed, and its position moves linearly.
@@ -252,20 +253,20 @@ TEST_P(MotionBlur, MovingModelIsTheMeanOfStills) {
   still_->set_medium(medium_);
   // So small that NEE samples its cells.
   show(cloud(), test::make_volume({2, 2, 2}, {11, 3, 10}, [](const ivec3&) { return 1.5F; }));
-  const scene::PlaceEnds growth{moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.5)), dmat4(1.0)};
-  viewer().set_places({{dmat4(1.0), growth}});
+  const scene::ShutterTransforms growth{moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.5)), dmat4(1.0)};
+  viewer().set_transforms({{dmat4(1.0), growth}});
   const dmat4 about = moved(12, 20, 14);
   const dmat4 open = moved(-4, 0, 0);
   const dmat4 close =
       moved(4, 2, 0) * about * glm::rotate(dmat4(1.0), glm::radians(80.0), dvec3(0, 0, 1)) * glm::inverse(about);
   viewer::ModelSettings settings;
   settings.surfaces = std::make_shared<const viewer::SurfaceAsset>(scene, std::string("glow"));
-  settings.ends = scene::PlaceEnds{open, close};
+  settings.ends = scene::ShutterTransforms{open, close};
   const auto model = std::make_shared<viewer::ModelInstance>(settings);
   viewer().add_model(model);
   const Blocks swept = blurred();
   test::expect_alike(swept, still_mean([&](double t) {
-                       viewer().set_places({{between(growth.open, growth.close, t)}});
+                       viewer().set_transforms({{between(growth.open, growth.close, t)}});
                        model->edit([&](viewer::ModelSettings& of) {
                          of.ends.reset();
                          of.to_world = between(open, close, t);
@@ -337,10 +338,10 @@ TEST_P(MotionBlur, VertexAndTransformMotionCancel) {
   squares->prototypes.push_back({1, 1, 1});
   squares->move = [](surface::Pose& pose, double t) {
     for (std::size_t i = 0; i < 8; ++i) pose.vertices[i].position.x += static_cast<float>((i < 4 ? 20.0 : 50.0) * t);
-    pose.placings = {{moved(-30.0 * t, 0, 0)}};
+    pose.prototype_transforms = {{moved(-30.0 * t, 0, 0)}};
   };
   viewer::ModelSettings settings = posed_at(squares, 0.5);
-  settings.ends = scene::PlaceEnds{dmat4(1.0), moved(-20, 0, 0)};
+  settings.ends = scene::ShutterTransforms{dmat4(1.0), moved(-20, 0, 0)};
   viewer().add_model(std::make_shared<viewer::ModelInstance>(settings));
   for (const double y : {4.0, 24.0}) {
     EXPECT_NEAR(along_z(4.0, y), 0.0, 1e-6) << y;
@@ -399,13 +400,14 @@ TEST_P(MotionBlur, DeformingModelIsTheMeanOfStills) {
       vertex.position.y *= 1.0F - 0.6F * s;
       vertex.normal = glm::normalize(glm::mix(vertex.normal, glm::normalize(narrow), s));
     }
-    pose.placings = {{between(moved(4, 4, 16), moved(10, 8, 18), t), between(moved(16, 6, 8), moved(13, 3, 8), t)}};
+    pose.prototype_transforms = {
+        {between(moved(4, 4, 16), moved(10, 8, 18), t), between(moved(16, 6, 8), moved(13, 3, 8), t)}};
   };
   only_absorb(0.02);
   show(cloud());
   still_->set_light({40.0F, 50.0F, vec3(1.0F), vec3(0.3F)});
   const auto model = std::make_shared<viewer::ModelInstance>(posed_at(scene, 0.5));
-  const scene::PlaceEnds ends{moved(-1, 0, 0), moved(3, 1, 0)};
+  const scene::ShutterTransforms ends{moved(-1, 0, 0), moved(3, 1, 0)};
   model->edit([&](viewer::ModelSettings& of) { of.ends = ends; });
   viewer().add_model(model);
   const Blocks swept = blurred();

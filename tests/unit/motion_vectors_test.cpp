@@ -185,14 +185,14 @@ class MotionVectors : public CViewerTest {
     EXPECT_GT(most, 0.2) << what << ": there is motion to be seen";
   }
   // The previous position of a point in a plane that moved by this transform.
-  static Before on_plane(const dmat4& moved, const dmat4& place = dmat4(1.0)) {
+  static Before on_plane(const dmat4& moved, const dmat4& transform = dmat4(1.0)) {
     return [=](const Eye::Ray& ray, glm::dvec4& now) -> std::optional<glm::dvec4> {
-      const dmat4 back = glm::inverse(place);
+      const dmat4 back = glm::inverse(transform);
       const dvec3 o(back * glm::dvec4(ray.o, 1.0));
       const dvec3 d(back * glm::dvec4(ray.d, 0.0));
       const dvec3 own = o - o.z / d.z * d;
       if (std::max(std::abs(own.x), std::abs(own.y)) > 18.0) return std::nullopt;
-      now = place * glm::dvec4(own, 1.0);
+      now = transform * glm::dvec4(own, 1.0);
       return moved * now;
     };
   }
@@ -278,28 +278,28 @@ TEST_P(MotionVectors, OfTheMediumFollowItsVelocity) {
   then(elsewhere, seconds);
   expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * v)), "and the camera");
   // With a rotated instance transform, the motion is rotated too.
-  const dmat4 place = glm::rotate(dmat4(1.0), 0.5, dvec3(0.0, 1.0, 0.0));
-  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(place), 1), CUMULET_OK);
-  const dvec3 there = glm::dmat3(place) * v;
-  expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * there), place), "turned", 2e-2);
+  const dmat4 transform = glm::rotate(dmat4(1.0), 0.5, dvec3(0.0, 1.0, 0.0));
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(transform), 1), CUMULET_OK);
+  const dvec3 there = glm::dmat3(transform) * v;
+  expect(CUMULET_AOV_VOLUME_MOTION, on_plane(glm::translate(dmat4(1.0), -seconds * there), transform), "turned", 2e-2);
 }
 
 TEST_P(MotionVectors, OfInstancesFollowTheirPreviousTransforms) {
   const VolumeRef plate = make_plate(dvec3(0.0));
   ASSERT_EQ(cumulet_set_volume(v_, plate.get()), CUMULET_OK);
-  const dmat4 place = glm::rotate(dmat4(1.0), 0.3, dvec3(1.0, 0.0, 0.0));
-  const dmat4 was = turned * place;
-  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(place), 1), CUMULET_OK);
+  const dmat4 transform = glm::rotate(dmat4(1.0), 0.3, dvec3(1.0, 0.0, 0.0));
+  const dmat4 was = turned * transform;
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(transform), 1), CUMULET_OK);
   ASSERT_EQ(cumulet_set_previous_volume_transforms(v_, glm::value_ptr(was), 1), CUMULET_OK);
   then(std::nullopt);
-  expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, place), "a place", 2e-2);
+  expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, transform), "a place", 2e-2);
   // Several transforms move separately. One far away stays fixed.
-  std::array<dmat4, 2> places{place, glm::translate(dmat4(1.0), dvec3(0.0, 0.0, -500.0))};
-  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(places[0]), 2), CUMULET_OK);
+  std::array<dmat4, 2> transforms{transform, glm::translate(dmat4(1.0), dvec3(0.0, 0.0, -500.0))};
+  ASSERT_EQ(cumulet_set_volume_transforms(v_, glm::value_ptr(transforms[0]), 2), CUMULET_OK);
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 1e5;
   ASSERT_EQ(cumulet_set_medium(v_, &medium), CUMULET_OK);
-  expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, place), "the first of two", 2e-2);
+  expect(CUMULET_AOV_VOLUME_MOTION, on_plane(turned, transform), "the first of two", 2e-2);
   ASSERT_EQ(cumulet_set_previous_volume_transforms(v_, nullptr, 0), CUMULET_OK);
   expect_none(CUMULET_AOV_VOLUME_MOTION);
 }
@@ -327,16 +327,16 @@ TEST_P(MotionVectors, OfAModelFollowItsTransform) {
   const SurfacesRef wall = make_wall();
   auto desc = make_desc<cumulet_model_desc>();
   desc.surfaces = wall.get();
-  const dmat4 place = glm::rotate(dmat4(1.0), 0.3, dvec3(0.0, 1.0, 0.0));
-  std::copy_n(glm::value_ptr(place), 16, desc.to_world);
+  const dmat4 transform = glm::rotate(dmat4(1.0), 0.3, dvec3(0.0, 1.0, 0.0));
+  std::copy_n(glm::value_ptr(transform), 16, desc.to_world);
   cumulet_model* made = nullptr;
   ASSERT_EQ(cumulet_model_create(&desc, &made, nullptr, 0), CUMULET_OK);
   const ModelRef model(made);
   ASSERT_EQ(cumulet_add_model(v_, made), CUMULET_OK);
-  const dmat4 was = turned * place;
+  const dmat4 was = turned * transform;
   ASSERT_EQ(cumulet_model_set_previous(made, glm::value_ptr(was), nullptr), CUMULET_OK);
   then(elsewhere);
-  expect(CUMULET_AOV_MOTION, on_plane(turned, place), "a model");
+  expect(CUMULET_AOV_MOTION, on_plane(turned, transform), "a model");
 }
 
 // A wall whose animation moves it by 2 per second along x and stretches it along y.

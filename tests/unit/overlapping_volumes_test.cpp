@@ -47,10 +47,10 @@ volume::ScalarVolume merged(const volume::ScalarVolume& one, const Offsets& offs
   });
 }
 
-std::vector<scene::Place> places_of(const Offsets& offsets) {
-  std::vector<scene::Place> places;
-  for (const ivec3& offset : offsets) places.push_back({glm::translate(dmat4(1.0), dvec3(offset))});
-  return places;
+std::vector<scene::InstanceTransform> transforms_of(const Offsets& offsets) {
+  std::vector<scene::InstanceTransform> transforms;
+  for (const ivec3& offset : offsets) transforms.push_back({glm::translate(dmat4(1.0), dvec3(offset))});
+  return transforms;
 }
 
 class OverlappingVolumes : public test::CloudTest {
@@ -63,9 +63,9 @@ class OverlappingVolumes : public test::CloudTest {
     look_from({60.0, 50.0, 70.0}, {14.0, 10.0, 14.0});
   }
   void look_from(const dvec3& eye, const dvec3& at) { still_->set_camera(test::camera_at(eye, at, 32.0)); }
-  void show(volume::ScalarVolume density, std::optional<volume::ScalarVolume> flame, const Offsets& places) {
+  void show(volume::ScalarVolume density, std::optional<volume::ScalarVolume> flame, const Offsets& offsets) {
     CloudTest::show(std::move(density), std::move(flame));
-    viewer().set_places(places_of(places));
+    viewer().set_transforms(transforms_of(offsets));
   }
   test::Blocks blocks(std::uint32_t samples = 64, unsigned pictures = 6) {
     return test::blocks_of(pictures, [&](unsigned k) {
@@ -154,14 +154,14 @@ TEST_P(OverlappingVolumes, RenderAmongSurfaces) {
 
 // Two instances at half the density equal one, with a rotated, stretched and sheared transform.
 TEST_P(OverlappingVolumes, TwoAtHalfDensityMatchOne) {
-  const dmat4 place(dvec4(0.7, 0.2, -0.4, 0), dvec4(0.3, 1.4, 0.1, 0), dvec4(0.2, -0.5, 1.1, 0),
-                    dvec4(3.0, -2.0, 11.0, 1));
+  const dmat4 transform(dvec4(0.7, 0.2, -0.4, 0), dvec4(0.3, 1.4, 0.1, 0), dvec4(0.2, -0.5, 1.1, 0),
+                        dvec4(3.0, -2.0, 11.0, 1));
   show(cloud(), std::nullopt, {ivec3(0)});
-  viewer().set_places({{place}});
+  viewer().set_transforms({{transform}});
   const test::Blocks once = blocks();
   medium_.density_scale *= 0.5;
   still_->set_medium(medium_);
-  viewer().set_places({{place}, {place}});
+  viewer().set_transforms({{transform}, {transform}});
   test::expect_alike(once, blocks());
 }
 
@@ -227,8 +227,8 @@ TEST_P(OverlappingVolumes, AovsAndDebugViewsMatchOneMergedVolume) {
     EXPECT_GT(opaque, pixels / 20);
     EXPECT_TRUE(one.pick.hit);
     EXPECT_TRUE(several.pick.hit);
-    EXPECT_EQ(one.pick.place, 0U);
-    EXPECT_TRUE(several.pick.place);
+    EXPECT_EQ(one.pick.transform_index, 0U);
+    EXPECT_TRUE(several.pick.transform_index);
     EXPECT_LT(glm::distance(several.pick.position, one.pick.position), 0.1);
   }
 }
@@ -243,13 +243,13 @@ TEST_P(OverlappingVolumes, PicksReturnTheVolume) {
     test::render(*still_, {edge, edge, 1, 1, render::View::shaded});
     return viewer().pick(0.5 * edge, 0.5 * edge);
   };
-  for (std::uint32_t i = 0; i < middles.size(); ++i) EXPECT_EQ(pick_at(middles[i]).place, i);
+  for (std::uint32_t i = 0; i < middles.size(); ++i) EXPECT_EQ(pick_at(middles[i]).transform_index, i);
   auto scene = std::make_shared<test::StillScene>();
   scene->add_sphere({41.5F, 60.0F, 10.5F}, 4.0F, scene->add(test::diffuse(vec3(0.5F))), 8);
   viewer().show_surfaces(test::source_of(scene));
   const viewer::Pick surface = pick_at(middles[1]);
   EXPECT_TRUE(surface.hit);
-  EXPECT_FALSE(surface.place);
+  EXPECT_FALSE(surface.transform_index);
 }
 
 // Overlap deeper than the list of active volumes that kernels keep. Later volumes are processed afterwards, and paths
@@ -284,14 +284,14 @@ TEST_P(OverlappingVolumes, RejectedVolumeKeepsTheOthers) {
   };
   show(cloud(), std::nullopt, apart);
   const std::vector<float> before = picture();
-  std::vector<scene::Place> far = places_of(apart);
+  std::vector<scene::InstanceTransform> far = transforms_of(apart);
   far.push_back({glm::translate(dmat4(1.0), dvec3(1e13, 0.0, 0.0))});
-  viewer().set_places(far);
+  viewer().set_transforms(far);
   EXPECT_EQ(picture_after_refusal(), before) << "as it was";
   // Another volume has no instance table at that time, so it is displayed once, with the first transform.
   still_->set_volume(merged(cloud(), overlapping));
   const std::vector<float> once = picture_after_refusal();
-  viewer().set_places({{}});
+  viewer().set_transforms({{}});
   EXPECT_EQ(picture(), once);
   show(cloud(), std::nullopt, apart);
   EXPECT_EQ(picture(), before);
@@ -301,14 +301,14 @@ TEST_P(OverlappingVolumes, CanBeAddedAndRemoved) {
   show(cloud(), std::nullopt, {ivec3(0)});
   const test::Image image{edge, edge, 4, 3, render::View::shaded};
   const test::Picture one = test::render(*still_, image);
-  viewer().set_places(places_of(overlapping));
+  viewer().set_transforms(transforms_of(overlapping));
   const test::Picture several = test::render(*still_, image);
   EXPECT_NE(several.pixels, one.pixels);
-  viewer().set_places(places_of(apart));
+  viewer().set_transforms(transforms_of(apart));
   EXPECT_NE(test::render(*still_, image).pixels, several.pixels);
-  viewer().set_places(places_of(overlapping));
+  viewer().set_transforms(transforms_of(overlapping));
   EXPECT_EQ(test::render(*still_, image).pixels, several.pixels);
-  viewer().set_places({{}});
+  viewer().set_transforms({{}});
   EXPECT_EQ(test::render(*still_, image).pixels, one.pixels);
 }
 
@@ -422,16 +422,16 @@ TEST_P(VolumeInstances, HaveSeparateRamps) {
 
 TEST_P(VolumeInstances, OfOneVolumeShareItsGrid) {
   still_->set_volume(asset_of(cloud()));
-  const test::Blocks in_places = [&] {
-    viewer().set_places(places_of(overlapping));
+  const test::Blocks at_offsets = [&] {
+    viewer().set_transforms(transforms_of(overlapping));
     return blocks();
   }();
-  viewer().set_places(places_of({ivec3(0)}));
+  viewer().set_transforms(transforms_of({ivec3(0)}));
   static_cast<void>(transmittance(1));
   const viewer::Stats alone = viewer().stats();
   std::vector<std::shared_ptr<viewer::Instance>> held;
   for (std::size_t i = 1; i < overlapping.size(); ++i) held.push_back(add(viewer().volume(), dvec3(overlapping[i])));
-  test::expect_alike(blocks(), in_places);
+  test::expect_alike(blocks(), at_offsets);
   EXPECT_EQ(viewer().stats().cells, alone.cells);
   EXPECT_EQ(viewer().stats().cell_bytes, alone.cell_bytes);
   // When the viewer's volume changes, the instances keep their grid.
@@ -452,10 +452,10 @@ TEST_P(VolumeInstances, PicksReturnTheirTag) {
     return viewer().pick(0.5 * edge, 0.5 * edge);
   };
   const viewer::Pick own = pick_at({41.5, 9.5, 10.5});
-  EXPECT_EQ(own.place, 1U);
+  EXPECT_EQ(own.transform_index, 1U);
   EXPECT_EQ(own.tag, 0U);
   const viewer::Pick other = pick_at({8.5, 12.5, 37.5});
-  EXPECT_EQ(other.place, 0U);
+  EXPECT_EQ(other.transform_index, 0U);
   EXPECT_EQ(other.tag, 77U);
 }
 

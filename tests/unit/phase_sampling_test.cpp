@@ -56,7 +56,7 @@ TEST(Phase, SamplesMatchThePdf) {
 }
 
 CmPhase phase_of(const cumulet::scene::Phase& p) {
-  return {p.anisotropy, p.second_anisotropy, p.second_bend, p.second_share};
+  return {p.anisotropy, p.second_anisotropy, p.second_bend, p.second_weight};
 }
 
 // Mixtures: quadrature of the phase function in double precision, compared with samples of evenly spread u. The droplet
@@ -97,7 +97,7 @@ TEST(Phase, DropletsScatterForward) {
   EXPECT_NEAR(made.anisotropy, 0.99461, 1e-4);
   EXPECT_NEAR(made.second_anisotropy, 0.59378, 1e-4);
   EXPECT_NEAR(made.second_bend, 27.113, 1e-2);
-  EXPECT_NEAR(made.second_share, 0.49818, 1e-4);
+  EXPECT_NEAR(made.second_weight, 0.49818, 1e-4);
   const CmPhase phase = phase_of(made);
   double mean = 0.0;
   const int n = 200000;
@@ -105,7 +105,7 @@ TEST(Phase, DropletsScatterForward) {
   const double g = made.second_anisotropy;
   const double a = made.second_bend;
   const double draine = g * (1.0 + a * (3.0 + 2.0 * g * g) / 5.0) / (1.0 + a * (1.0 + 2.0 * g * g) / 3.0);
-  EXPECT_NEAR(mean, (1.0 - made.second_share) * made.anisotropy + made.second_share * draine, 1e-3);
+  EXPECT_NEAR(mean, (1.0 - made.second_weight) * made.anisotropy + made.second_weight * draine, 1e-3);
 }
 
 TEST(Phase, SampledDirectionsAreUnitWithTheirCosine) {

@@ -82,8 +82,8 @@ SceneOptions full_scene() {
     scene.analytic_lights.push_back(analytic_light);
   }
   for (std::size_t i = 0; i < 16; ++i) scene.to_world[i] = 0.1 * static_cast<double>(i);
-  scene.places.assign(2, scene.to_world);
-  scene.places[1][12] = -7.5;
+  scene.transforms.assign(2, scene.to_world);
+  scene.transforms[1][12] = -7.5;
   scene.grid.type = CUMULET_GRID_BRICKS;
   scene.grid.cells = CUMULET_CELLS_CONSTANT;
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
@@ -120,7 +120,7 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.light, scene.light));
   EXPECT_TRUE(std::ranges::equal(read.analytic_lights, scene.analytic_lights, same<cumulet_light_desc>));
   EXPECT_EQ(read.to_world, scene.to_world);
-  EXPECT_EQ(read.places, scene.places);
+  EXPECT_EQ(read.transforms, scene.transforms);
   EXPECT_TRUE(same(read.grid, scene.grid));
   EXPECT_TRUE(same(read.sampling, scene.sampling));
   EXPECT_TRUE(same(read.display, scene.display));
@@ -136,7 +136,7 @@ TEST(SceneFile, SupportsAnyNumberOfVolumes) {
   smoke.up = UpAxis::z;
   smoke.name = "smoke";
   smoke.medium.anisotropy = 0.3f;
-  smoke.places.assign(3, scene.to_world);
+  smoke.transforms.assign(3, scene.to_world);
   smoke.ramps[CUMULET_RAMP_DENSITY] = {{0.0f, 0.0f}, {1.0f, 2.0f}};
   SceneVolume& fire = scene.others.emplace_back();
   fire.volume = "/elsewhere/fire.vdb";
@@ -159,7 +159,7 @@ TEST(SceneFile, SupportsAnyNumberOfVolumes) {
     EXPECT_EQ(static_cast<const VolumeFile&>(a), static_cast<const VolumeFile&>(b)) << i;
     EXPECT_EQ(a.name, b.name);
     EXPECT_EQ(a.visible, b.visible);
-    EXPECT_EQ(a.places, b.places);
+    EXPECT_EQ(a.transforms, b.transforms);
     EXPECT_EQ(a.ramps, b.ramps);
     EXPECT_EQ(a.auto_density_scale, b.auto_density_scale);
     EXPECT_EQ(a.medium.density_scale, b.medium.density_scale);
@@ -208,8 +208,8 @@ TEST(SceneFile, EveryDifferenceIsDetected) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.analytic_lights[1].power = 1.0f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.analytic_lights.pop_back(); }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.to_world[3] = 5.0; }));
-  EXPECT_TRUE(differs([](SceneOptions& s) { s.places[1][3] = 5.0; }));
-  EXPECT_TRUE(differs([](SceneOptions& s) { s.places.pop_back(); }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.transforms[1][3] = 5.0; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.transforms.pop_back(); }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.ramps[CUMULET_RAMP_DENSITY][1][0] = 0.2f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.ramps[CUMULET_RAMP_FLAME].clear(); }));
   EXPECT_TRUE(
@@ -359,7 +359,7 @@ TEST(SceneFile, VersionTwoMatchesVersionOne) {
   EXPECT_FALSE(same_scene(parse_scene(first, "s.json"), scene));
   scene.analytic_lights.clear();
   scene.to_world = {};
-  scene.places.clear();
+  scene.transforms.clear();
   EXPECT_EQ(first.rfind("{\n  \"cumulet_scene\": 1,\n  \"volume\"", 0), 0u) << first;
   EXPECT_TRUE(same_scene(parse_scene(first, "s.json"), scene));
   const std::string second = scene_text(scene, "s.json", SceneFormat::second);
@@ -403,10 +403,10 @@ TEST(SceneFile, VersionThreeMatchesVersionTwo) {
                                          "dir/s.json");
   EXPECT_TRUE(same_scene(second, third));
   EXPECT_EQ(scene_hash(second), scene_hash(third));
-  EXPECT_EQ(third.places, second.places);
-  ASSERT_EQ(third.places.size(), 2U);
-  EXPECT_EQ(third.places[0][13], 2.0);
-  EXPECT_EQ(third.others[0].places, second.others[0].places);
+  EXPECT_EQ(third.transforms, second.transforms);
+  ASSERT_EQ(third.transforms.size(), 2U);
+  EXPECT_EQ(third.transforms[0][13], 2.0);
+  EXPECT_EQ(third.others[0].transforms, second.others[0].transforms);
   EXPECT_EQ(third.medium.second_weight, 0.25F);
   EXPECT_EQ(third.others[0].medium.second_weight, 0.75F);
   EXPECT_EQ(third.sequence, second.sequence);
@@ -550,13 +550,13 @@ TEST(SceneFile, TransformIsAMatrixOrTranslationRotationScale) {
   // z to x.
   const std::array<double, 16> expected = {0, 2, 0, 0, 0, 0, 3, 0, 4, 0, 0, 0, 5, 6, 7, 1};
   for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(parts.to_world[i], expected[i], 1e-12) << i;
-  const SceneOptions places = parse_scene(
+  const SceneOptions scene = parse_scene(
       R"({"cumulet_scene": 2, "volumes": [{"places": [
           {"translate": [5, 6, 7], "rotate_degrees": [90, 0, 90], "scale": [2, 3, 4]}, {},
           [0, 2, 0, 0, 0, 0, 3, 0, 4, 0, 0, 0, 5, 6, 7, 1]]}]})",
       "s.json");
-  EXPECT_EQ(places.places, (std::vector<std::array<double, 16>>{
-                               parts.to_world, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, expected}));
+  EXPECT_EQ(scene.transforms, (std::vector<std::array<double, 16>>{
+                                  parts.to_world, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, expected}));
   SceneOptions z_up = parts;
   z_up.up = UpAxis::z;
   const cumulet_volume_file_desc file = volume_file(z_up);
@@ -604,10 +604,10 @@ TEST(SceneFile, MotionRoundTrips) {
   EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
             "dir/s.json: volumes[0].open.turn: there is no such setting");
   // Shutter transforms are relative to the instance transform.
-  double place[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1};
+  double to_world[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1};
   double open[16];
   double close[16];
-  set_shutter(scene.shutter, place, open, close);
+  set_shutter(scene.shutter, to_world, open, close);
   EXPECT_EQ(open[0], 2.0);
   EXPECT_EQ(open[12], 4.0);
   EXPECT_EQ(close[15], 0.0) << "where it stands";

@@ -85,10 +85,10 @@ std::vector<dvec3> corners(const ScenePtr& scene, const Pose& pose, const dmat4&
   const scene::ModelSourcePtr source = scene::make_model_source(scene, pose, nullptr);
   std::vector<dvec3> all;
   for (const scene::ModelMesh& mesh : source->meshes) {
-    for (const dmat4& placing : mesh.placings) {
+    for (const dmat4& transform : mesh.transforms) {
       for (std::size_t i = 3 * mesh.first_triangle; i < 3 * (mesh.first_triangle + std::size_t{mesh.triangle_count});
            ++i)
-        all.emplace_back(to_world * placing * glm::dvec4(source->pose.vertices[scene->indices[i]].position, 1.0));
+        all.emplace_back(to_world * transform * glm::dvec4(source->pose.vertices[scene->indices[i]].position, 1.0));
     }
   }
   return all;
@@ -103,7 +103,7 @@ void expect_moved(const std::vector<dvec3>& far, const std::vector<dvec3>& near,
   EXPECT_LT(worst, within) << what;
 }
 
-const std::array places{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.0), dvec3(1e8)};
+const std::array far_positions{dvec3(1e5, 0.0, -1e5), dvec3(1e6, 3.0, 2e6), ecef, dvec3(-1e7, 1e7, 0.0), dvec3(1e8)};
 constexpr double precision = 2e-5;  // of objects of size 1
 
 // A rotated, nested box, with a camera and a light above it.
@@ -128,7 +128,7 @@ TEST(FarModels, KeepTheirShape) {
   const Pose near_pose = near->pose(0.0);
   EXPECT_EQ(near_pose.origin, dvec3(0.0));
   const std::vector<dvec3> shape = corners(near, near_pose);
-  for (const dvec3& at : places) {
+  for (const dvec3& at : far_positions) {
     const ScenePtr far = test::imported(georeferenced(at));
     EXPECT_EQ(far->precision_remark, "");
     const Pose pose = far->pose(0.0);
@@ -137,7 +137,8 @@ TEST(FarModels, KeepTheirShape) {
     EXPECT_LT(glm::distance(pose.low, near_pose.low + at), precision);
     EXPECT_LT(glm::distance(pose.high, near_pose.high + at), precision);
     EXPECT_LT(glm::distance(dvec3(pose.cameras.at(0).to_world[3]), dvec3(1.0, 2.0, 6.0) + at), precision);
-    const auto light = scene::placed(pose.lights.at(0), surface::from_origin(glm::translate(dmat4(1.0), -at), pose));
+    const auto light =
+        scene::transformed(pose.lights.at(0), surface::from_origin(glm::translate(dmat4(1.0), -at), pose));
     EXPECT_LT(glm::distance(dvec3(light.position), dvec3(1.0, 4.0, 3.0)), precision);
     for (std::size_t v = 0; v < pose.vertices.size(); ++v)
       EXPECT_LT(glm::distance(pose.vertices[v].normal, near_pose.vertices[v].normal), 1e-5F);
@@ -202,7 +203,7 @@ GltfModel skinned(const dvec3& at) {
 
 TEST(FarModels, SkinAndAnimateLikeNearModels) {
   const ScenePtr near = test::imported(skinned(dvec3(0.0)));
-  for (const dvec3& at : places) {
+  for (const dvec3& at : far_positions) {
     const ScenePtr far = test::imported(skinned(at));
     for (const double time : {0.0, 0.5, 1.0}) {
       expect_moved(corners(far, far->pose(time)), corners(near, near->pose(time)), glm::translate(dmat4(1.0), at),

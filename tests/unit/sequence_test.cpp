@@ -568,7 +568,7 @@ InstanceRef make_instance(cumulet_sequence* sequence, double x = 0.0, double den
 class PlayedInstances : public CSequence {
  protected:
   // The image of instances of this file's volume.
-  Picture still(int frame, const std::vector<double>& places) {
+  Picture still(int frame, const std::vector<double>& positions) {
     auto file = make_desc<cumulet_volume_file_desc>();
     file.path = clip_.path(frame).c_str();
     cumulet_volume* volume = nullptr;
@@ -576,7 +576,7 @@ class PlayedInstances : public CSequence {
     const VolumeRef owner(volume);
     const ViewerPtr viewer = make();
     std::vector<InstanceRef> instances;
-    for (const double x : places) {
+    for (const double x : positions) {
       auto desc = make_desc<cumulet_instance_desc>();
       desc.volume = volume;
       for (int i = 0; i < 16; i += 5) desc.to_world[i] = 1.0;

@@ -73,7 +73,7 @@ const std::array fields{
     CM_FIELD(medium, anisotropy),
     CM_FIELD(medium, second_anisotropy),
     CM_FIELD(medium, second_bend),
-    CM_FIELD(medium, second_share),
+    CM_FIELD(medium, second_weight),
     CM_FIELD(medium, emits),
     CM_FIELD(medium, colored),
     CM_FIELD(medium, anisotropic),
@@ -82,14 +82,14 @@ const std::array fields{
     CM_FIELD(medium, changes),
     CM_FIELD(lights, sun_direction),
     CM_FIELD(lights, any),
-    CM_FIELD(lights, sky_chance),
+    CM_FIELD(lights, sky_probability),
     CM_FIELD(lights, sun_irradiance),
     CM_FIELD(lights, sky_radiance),
-    CM_FIELD(lights, triangle_chance),
-    CM_FIELD(lights, analytic_light_chance),
-    CM_FIELD(lights, emissive_chance),
-    CM_FIELD(lights, cell_chance),
-    CM_FIELD(lights, environment_chance),
+    CM_FIELD(lights, triangle_probability),
+    CM_FIELD(lights, analytic_light_probability),
+    CM_FIELD(lights, emissive_probability),
+    CM_FIELD(lights, cell_probability),
+    CM_FIELD(lights, environment_probability),
     CM_FIELD(lights, environment_strength),
     CM_FIELD(lights, environment_turn),
     CM_FIELD(lights, sun_radiance),
@@ -130,7 +130,7 @@ const std::array fields{
     CM_FIELD(dispatch, picks),
     CM_FIELD(dispatch, rows),
     CM_FIELD(dispatch, lanes),
-    CM_FIELD(dispatch, places),
+    CM_FIELD(dispatch, slots),
     CM_FIELD(dispatch, rays_before),
     CM_FIELD(dispatch, rays_least),
     CM_FIELD(shutter, open.eye),
@@ -220,9 +220,9 @@ TEST_P(ShaderParameters, DriverReportsNoOtherFields) {
     const GLuint uniform = gl_->GetProgramResourceIndex(program.name(), GL_UNIFORM, name.c_str());
     ASSERT_NE(uniform, GL_INVALID_INDEX) << name;
     const GLenum offset = GL_OFFSET;
-    GLint place = -1;
-    gl_->GetProgramResourceiv(program.name(), GL_UNIFORM, uniform, 1, &offset, 1, nullptr, &place);
-    EXPECT_EQ(static_cast<std::size_t>(place), field.offset) << name;
+    GLint member_offset = -1;
+    gl_->GetProgramResourceiv(program.name(), GL_UNIFORM, uniform, 1, &offset, 1, nullptr, &member_offset);
+    EXPECT_EQ(static_cast<std::size_t>(member_offset), field.offset) << name;
   }
 }
 

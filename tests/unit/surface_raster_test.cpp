@@ -205,13 +205,13 @@ TEST(SurfaceJitter, EveryRowAndColumnHasOneLayer) {
     std::set<int> columns;
     std::set<int> rows;
     for (unsigned layer = 0; layer < layers; ++layer) {
-      const glm::vec2 place = surface_jitter(layer, layers);
-      const glm::vec2 cell = place * static_cast<float>(layers) - 0.5F;
+      const glm::vec2 position = surface_jitter(layer, layers);
+      const glm::vec2 cell = position * static_cast<float>(layers) - 0.5F;
       columns.insert(static_cast<int>(std::lround(cell.x)));
       rows.insert(static_cast<int>(std::lround(cell.y)));
       EXPECT_NEAR(cell.x, std::round(cell.x), 1e-5F);
       EXPECT_NEAR(cell.y, std::round(cell.y), 1e-5F);
-      EXPECT_TRUE(place.x > 0.0F && place.x < 1.0F && place.y > 0.0F && place.y < 1.0F);
+      EXPECT_TRUE(position.x > 0.0F && position.x < 1.0F && position.y > 0.0F && position.y < 1.0F);
     }
     EXPECT_EQ(columns.size(), layers);
     EXPECT_EQ(rows.size(), layers);
@@ -259,9 +259,9 @@ TEST_P(SurfaceRasters, DepthIsTheAnalyticOne) {
     for (unsigned layer = 0; layer < 2; ++layer) {
       for (unsigned y = 0; y < size.y; ++y) {
         for (unsigned x = 0; x < size.x; ++x) {
-          const glm::dvec2 place = glm::dvec2(x, y) + glm::dvec2(surface_jitter(layer, 2));
-          const double px = 2.0 * place.x / size.x - 1.0;
-          const double py = 1.0 - 2.0 * place.y / size.y;
+          const glm::dvec2 position = glm::dvec2(x, y) + glm::dvec2(surface_jitter(layer, 2));
+          const double px = 2.0 * position.x / size.x - 1.0;
+          const double py = 1.0 - 2.0 * position.y / size.y;
           const glm::dvec3 shift = view.right * px + view.up * py;
           const glm::dvec3 o = view.orthographic ? view.eye + shift : view.eye;
           const glm::dvec3 d = view.orthographic ? view.forward : view.forward + shift;
@@ -544,9 +544,9 @@ TEST_P(SurfaceRasters, LayersUseTheirSubpixelPositions) {
       unsigned columns = 0;
       unsigned rows = 0;
       for (unsigned layer = 0; layer < layers; ++layer) {
-        const glm::vec2 place = surface_jitter(layer, layers);
-        EXPECT_EQ(std::isfinite(picture.z(5, 1, layer)), place.x < edge - 5.0F) << layers << ' ' << layer;
-        EXPECT_EQ(std::isfinite(picture.z(1, 5, layer)), place.y < edge - 5.0F) << layers << ' ' << layer;
+        const glm::vec2 position = surface_jitter(layer, layers);
+        EXPECT_EQ(std::isfinite(picture.z(5, 1, layer)), position.x < edge - 5.0F) << layers << ' ' << layer;
+        EXPECT_EQ(std::isfinite(picture.z(1, 5, layer)), position.y < edge - 5.0F) << layers << ' ' << layer;
         EXPECT_TRUE(std::isfinite(picture.z(4, 4, layer)));
         EXPECT_FALSE(std::isfinite(picture.z(6, 1, layer)));
         EXPECT_FALSE(std::isfinite(picture.z(1, 6, layer)));

@@ -264,7 +264,7 @@ TEST_P(Trace, SingleScatteringMatchesQuadrature) {
     viewer->set_camera(test::camera_at({199.5, 7.5, 900.0}, {199.5, 7.5, 0.0}, 0.01));
     const double g = medium.second_anisotropy;
     const double second = lobe(g) / (1.0 + medium.second_bend * (1.0 + 2.0 * g * g) / 3.0);
-    const double phase = (1.0 - medium.second_share) * lobe(medium.anisotropy) + medium.second_share * second;
+    const double phase = (1.0 - medium.second_weight) * lobe(medium.anisotropy) + medium.second_weight * second;
     const double expected = phase * 5.0 * std::exp(-sigma * 8.0) * (1.0 - std::exp(-sigma * 16.0));
     for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2]}) {
       viewer->set_grid(test::settings_of(kind, 0.02));

@@ -159,12 +159,13 @@ class TransmittanceMaps : public testing::Test {
     GLint linked = 0;
     gl.GetProgramiv(program, GL_LINK_STATUS, &linked);
     EXPECT_EQ(linked, 1);
-    std::vector<glm::vec4> places;
-    for (const dvec3& point : points) places.emplace_back(glm::vec3(point), 1.0F);
+    std::vector<glm::vec4> positions;
+    for (const dvec3& point : points) positions.emplace_back(glm::vec3(point), 1.0F);
     std::array<GLuint, 2> buffers{};
     gl.CreateBuffers(2, buffers.data());
-    gl.NamedBufferStorage(buffers[0], static_cast<GLsizeiptr>(places.size() * sizeof(glm::vec4)), places.data(), 0);
-    gl.NamedBufferStorage(buffers[1], static_cast<GLsizeiptr>(places.size() * sizeof(float)), nullptr, 0);
+    gl.NamedBufferStorage(buffers[0], static_cast<GLsizeiptr>(positions.size() * sizeof(glm::vec4)), positions.data(),
+                          0);
+    gl.NamedBufferStorage(buffers[1], static_cast<GLsizeiptr>(positions.size() * sizeof(float)), nullptr, 0);
     std::array<float, 16> to_map{};
     std::copy_n(map.to_map, 16, to_map.begin());
     gl.ProgramUniformMatrix4fv(program, 0, 1, GL_FALSE, to_map.data());
@@ -197,11 +198,11 @@ class TransmittanceMaps : public testing::Test {
             points.emplace_back(back * dvec4(within, 1.0));
             continue;
           }
-          const glm::dvec2 place = 2.0 * glm::dvec2(x, y) / double(last) - 1.0;
-          dvec3 d(place, 1.0 - std::abs(place.x) - std::abs(place.y));
+          const glm::dvec2 position = 2.0 * glm::dvec2(x, y) / double(last) - 1.0;
+          dvec3 d(position, 1.0 - std::abs(position.x) - std::abs(position.y));
           if (d.z < 0.0) {
-            d.x = (1.0 - std::abs(place.y)) * (place.x < 0.0 ? -1.0 : 1.0);
-            d.y = (1.0 - std::abs(place.x)) * (place.y < 0.0 ? -1.0 : 1.0);
+            d.x = (1.0 - std::abs(position.y)) * (position.x < 0.0 ? -1.0 : 1.0);
+            d.y = (1.0 - std::abs(position.x)) * (position.y < 0.0 ? -1.0 : 1.0);
           }
           const double r = map.near_distance + (map.far_distance - map.near_distance) * z / (map.slices - 1.0);
           points.push_back(from() + r * glm::normalize(d));
@@ -291,27 +292,27 @@ TEST_F(TransmittanceMaps, CoverPointsOutsideAndInside) {
 
 TEST_F(TransmittanceMaps, IncludeAllInstances) {
   show();
-  dmat4 place = glm::translate(dmat4(1.0), dvec3(9.0, -3.0, 4.0));
-  place = glm::rotate(place, 0.7, dvec3(1.0, 2.0, 0.5));
-  place = glm::scale(place, dvec3(1.3, 0.6, 1.0));
-  place[0].y += 0.3;
+  dmat4 transform = glm::translate(dmat4(1.0), dvec3(9.0, -3.0, 4.0));
+  transform = glm::rotate(transform, 0.7, dvec3(1.0, 2.0, 0.5));
+  transform = glm::scale(transform, dvec3(1.3, 0.6, 1.0));
+  transform[0].y += 0.3;
   auto medium = make_desc<cumulet_medium_desc>();
   medium.density_scale = 0.2;
   auto desc = make_desc<cumulet_instance_desc>();
   desc.volume = blob_.get();
   desc.medium = &medium;
-  for (int i = 0; i < 16; ++i) desc.to_world[i] = place[i / 4][i % 4];
+  for (int i = 0; i < 16; ++i) desc.to_world[i] = transform[i / 4][i % 4];
   const InstanceRef one = cumulet::test::make_instance(desc);
   ASSERT_EQ(cumulet_add_instance(viewer_.get(), one.get()), CUMULET_OK);
   converge(viewer_.get(), target_.frame());
-  standing_.push_back({place, 0.2});
+  standing_.push_back({transform, 0.2});
   expect_truth(sun());
   // After a move and another update.
-  place[3] += dvec4(-5.0, 2.0, 0.0, 0.0);
-  for (int i = 0; i < 16; ++i) desc.to_world[i] = place[i / 4][i % 4];
+  transform[3] += dvec4(-5.0, 2.0, 0.0, 0.0);
+  for (int i = 0; i < 16; ++i) desc.to_world[i] = transform[i / 4][i % 4];
   ASSERT_EQ(cumulet_instance_set_to_world(one.get(), desc.to_world), CUMULET_OK);
   converge(viewer_.get(), target_.frame());
-  standing_.back().to_world = place;
+  standing_.back().to_world = transform;
   expect_truth(sun());
 }
 

@@ -293,12 +293,12 @@ TEST_P(VelocityAov, VelocityFollowsTheFilesTransform) {
     // Two instance transforms. The second is rotated by a quarter turn about y, and only it is in view: (x, y, z) to
     // (z, y, -x).
     const dmat4 turned = glm::rotate(glm::translate(dmat4(1.0), dvec3(200.0, 0.0, 0.0)), 0.5 * M_PI, dvec3(0, 1, 0));
-    viewer->viewer().set_places({{dmat4(1.0)}, {turned}});
+    viewer->viewer().set_transforms({{dmat4(1.0)}, {turned}});
     expect_all(look(*viewer, middle + dvec3(0.0, 0.0, 500.0), middle), dvec3(3.0, 9.0, -6.0), name_of(kind));
     const dvec3 there(turned * glm::dvec4(middle, 1.0));
     expect_all(look(*viewer, there + dvec3(0.0, 0.0, 500.0), there), dvec3(-6.0, 9.0, -3.0),
                name_of(kind) + ", turned");
-    viewer->viewer().set_places({{dmat4(1.0)}});
+    viewer->viewer().set_transforms({{dmat4(1.0)}});
   }
 }
 
@@ -313,7 +313,7 @@ TEST_P(VelocityAov, OverlappingInstancesGiveTheMeanVelocity) {
                        glm::translate(dmat4(1.0), dvec3(-31.5, -31.5, 0.0));
   for (const test::MarchKind& kind : test::march_kinds) {
     viewer->set_grid(test::settings_of(kind, 0.1));
-    viewer->viewer().set_places({{dmat4(1.0)}, {turned}});
+    viewer->viewer().set_transforms({{dmat4(1.0)}, {turned}});
     expect_all(look(*viewer), dvec3(0.0, 0.0, 3.0), name_of(kind));
   }
 }

@@ -206,7 +206,7 @@ TEST_P(ViewerFrames, EnvironmentsAndSkiesLoadAsynchronously) {
     viewer().set_light(daylight(10.0F + static_cast<float>(i)));
     if (i % 3 == 0) viewer().load_environment(files.at(static_cast<std::size_t>(i) % 2));
     if (i % 8 == 5) viewer().set_environment(nullptr);
-    viewer().set_ground({i % 4 == 0 ? viewer::GroundPlace::none : viewer::GroundPlace::below});
+    viewer().set_ground({i % 4 == 0 ? viewer::GroundMode::none : viewer::GroundMode::below});
     EXPECT_FALSE(viewer().render(frame(24, 24, 1.0)).failed);
   }
   viewer().load_environment(files[1]);
@@ -225,7 +225,7 @@ TEST_P(ViewerFrames, EnvironmentsAndSkiesLoadAsynchronously) {
   viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   show_noise();
   viewer().set_sampling({4, 3, render::View::shaded, false});
-  viewer().set_ground({viewer::GroundPlace::below});
+  viewer().set_ground({viewer::GroundMode::below});
   viewer().set_light(daylight(33.0F));
   viewer().wait(-1.0);
   converge(frame(24, 24));

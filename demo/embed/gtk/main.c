@@ -462,7 +462,7 @@ static gboolean save(Host* host, const char* name, Drawable drawable, int x, int
 }
 
 /* Returns the rectangle of the area in its window, in physical pixels. */
-static GdkRectangle place(Host* host) {
+static GdkRectangle image_area(Host* host) {
   GtkWidget* widget = GTK_WIDGET(host->area);
   GtkNative* native = gtk_widget_get_native(widget);
   const int scale = gtk_widget_get_scale_factor(widget);
@@ -486,7 +486,7 @@ static gboolean shoot(Host* host, const char* name) {
   const gint64 end = g_get_monotonic_time() + G_TIME_SPAN_SECOND / 5;
   while (g_get_monotonic_time() < end) g_main_context_iteration(NULL, TRUE);
   Display* display = gdk_x11_display_get_xdisplay(gtk_widget_get_display(GTK_WIDGET(host->window)));
-  const GdkRectangle area = place(host);
+  const GdkRectangle area = image_area(host);
   char screen[64];
   g_snprintf(screen, sizeof screen, "%s_screen", name);
   return save(host, screen, DefaultRootWindow(display), 0, 0, DisplayWidth(display, DefaultScreen(display)),
@@ -496,7 +496,7 @@ static gboolean shoot(Host* host, const char* name) {
 
 /* Sends real X events. x and y are fractions of the area. */
 static gboolean point(Host* host, double x, double y, const char* action) {
-  const GdkRectangle area = place(host);
+  const GdkRectangle area = image_area(host);
   char command[256];
   g_snprintf(command, sizeof command, "xdotool mousemove --window %lu %d %d %s", xid(host),
              area.x + (int)(x * area.width), area.y + (int)(y * area.height), action);

@@ -293,13 +293,13 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();
     const ImVec2 room = ImGui::GetIO().DisplaySize;
-    const ImGuiCond place = room.x != last_room.x || room.y != last_room.y ? ImGuiCond_Always : ImGuiCond_Once;
+    const ImGuiCond condition = room.x != last_room.x || room.y != last_room.y ? ImGuiCond_Always : ImGuiCond_Once;
     last_room = room;
     cumulet::FrameResult image, scene;
 
     // First panel: the viewer renders into its own texture.
-    ImGui::SetNextWindowPos(ImVec2(room.x * 0.01F, room.y * 0.02F), place);
-    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), place);
+    ImGui::SetNextWindowPos(ImVec2(room.x * 0.01F, room.y * 0.02F), condition);
+    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
     if (ImGui::Begin("Viewer")) {
       const cumulet::Progress progress = must(image_viewer.get_progress());
       if (!progress.message.empty()) ImGui::TextWrapped("%s", progress.message.c_str());
@@ -320,8 +320,8 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     }
 
     // Second panel: the host draws its scene, then the viewer draws the volume over it, clipped by the scene's depth.
-    ImGui::SetNextWindowPos(ImVec2(room.x * 0.51F, room.y * 0.02F), place);
-    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), place);
+    ImGui::SetNextWindowPos(ImVec2(room.x * 0.51F, room.y * 0.02F), condition);
+    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
     if (ImGui::Begin("Scene") && volume_shared) {
       const Panel panel(scene_viewer);
       target.resize(panel.width, panel.height);

@@ -67,7 +67,7 @@ ivec3 cell = ivec3(gl_GlobalInvocationID);
 int n = textureSize(velocity, 0).x;
 vec3 from() { return (vec3(cell) + 0.5 - dt * texelFetch(velocity, cell, 0).xyz) / n; }
 vec4 at(sampler3D field, ivec3 p) { return texelFetch(field, clamp(p, ivec3(0), ivec3(n - 1)), 0); }
-// Of the place where smoke comes in.
+// Density of the smoke that enters near (0.5, 0.1, 0.5).
 float source() {
   vec3 away = (vec3(cell) + 0.5) / n - vec3(0.5, 0.1, 0.5);
   return max(0.0, 1.0 - dot(away, away) / 0.008);

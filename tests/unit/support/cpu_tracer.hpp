@@ -52,7 +52,7 @@ struct CpuSurfaceData {
     shown_atlas = scene::pack_atlas(std::vector<scene::TextureImagesPtr>{shown_source->images});
     const auto textures = static_cast<uint>(shown_words.size());
     for (const surface::Texture& texture : shown_source->scene->textures)
-      shown_words.push_back(scene::texture_word(texture, shown_atlas.places[0][texture.image]));
+      shown_words.push_back(scene::texture_word(texture, shown_atlas.regions[0][texture.image]));
     const scene::ModelTable table = scene::make_model_table(models, [&](const scene::ModelSource&) {
       return scene::ModelWords{0, textures};
     });
@@ -75,18 +75,18 @@ struct CpuSurfaceData {
   uvec4 cm_words(uint word) const { return shown_words.at(word); }
   CmAnalyticLight cm_analytic_light(uint i) const {
     CmAnalyticLight analytic_light = light::analytic_light_record(shown_source->pose.lights.at(i), dvec3(0.0));
-    analytic_light.chance = 1.0F / static_cast<float>(shown_source->pose.lights.size());
+    analytic_light.probability = 1.0F / static_cast<float>(shown_source->pose.lights.size());
     analytic_light.stays = light::Alias::certain;
     return analytic_light;
   }
   vec4 cm_atlas_value(ivec3 at) const {
-    for (std::size_t i = 0; i < shown_atlas.places[0].size(); ++i) {
-      const scene::TextureAtlas::Place& place = shown_atlas.places[0][i];
+    for (std::size_t i = 0; i < shown_atlas.regions[0].size(); ++i) {
+      const scene::TextureAtlas::Region& region = shown_atlas.regions[0][i];
       const uvec2 texel =
-          uvec2(ivec2(at)) - place.corner;  // texels to the left or above wrap to values beyond any size
-      if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
+          uvec2(ivec2(at)) - region.corner;  // texels to the left or above wrap to values beyond any size
+      if (uint(at.z) != region.layer || texel.x >= region.size.x || texel.y >= region.size.y) continue;
       const std::uint8_t* const value =
-          &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
+          &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * region.size.x + texel.x));
       return vec4(value[0], value[1], value[2], value[3]) / 255.0F;
     }
     throw std::out_of_range("no image there");

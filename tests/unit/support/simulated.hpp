@@ -46,7 +46,7 @@ inline std::vector<float> simulated(cumulet_channel channel, const Sides& size, 
 }
 
 /// index_to_world of a volume centered on the origin, 16 units high.
-inline std::array<double, 16> simulated_place(const Sides& size) {
+inline std::array<double, 16> simulated_transform(const Sides& size) {
   const double voxel = 16.0 / size[1];
   std::array<double, 16> m{};
   for (std::size_t a = 0; a < 3; ++a) {
@@ -65,8 +65,8 @@ class State {
     desc.values = values_.emplace_back(std::move(values)).data();
     desc.value_count = values_.back().size();
     std::copy(size.begin(), size.end(), desc.size);
-    const auto place = simulated_place(size);
-    std::copy(place.begin(), place.end(), desc.index_to_world);
+    const auto transform = simulated_transform(size);
+    std::copy(transform.begin(), transform.end(), desc.index_to_world);
     auto field = make_desc<cumulet_field>();
     field.channel = channel;
     field.dense = &denses_.emplace_back(desc);
@@ -101,8 +101,8 @@ class State {
     desc.brick_values = v.data();
     desc.brick_active = active.data();
     desc.brick_count = origins.size();
-    const auto place = simulated_place(size);
-    std::copy(place.begin(), place.end(), desc.index_to_world);
+    const auto transform = simulated_transform(size);
+    std::copy(transform.begin(), transform.end(), desc.index_to_world);
     auto field = make_desc<cumulet_field>();
     field.channel = channel;
     field.sparse = &sparses_.emplace_back(desc);

@@ -91,9 +91,9 @@ class Cameras {
     camera.tan_half_y = 0.05 + uniform(engine_);
     camera.pixels_per_radian = std::exp2(1.0 + 8.0 * uniform(engine_));
     if (uniform(engine_) < 0.25) {
-      glm::dmat4 place(0.5 + uniform(engine_));
-      place[3] = glm::dvec4(radius * direction(), 1.0);
-      camera.places.push_back(place);
+      glm::dmat4 transform(0.5 + uniform(engine_));
+      transform[3] = glm::dvec4(radius * direction(), 1.0);
+      camera.transforms.push_back(transform);
     }
     return camera;
   }

@@ -7,7 +7,7 @@
 namespace cumulet::demo {
 
 /// Sets the instance transforms and the shutter transforms of the viewer's first volume.
-[[nodiscard]] cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene);
+[[nodiscard]] cumulet_status set_transforms(cumulet_viewer* viewer, const SceneOptions& scene);
 /// Sets the scene's camera and its shutter poses.
 [[nodiscard]] cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene);
 

@@ -1,4 +1,4 @@
-#include "places.hpp"
+#include "transforms.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,20 +7,20 @@
 
 namespace cumulet::demo {
 
-cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
-  const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
+cumulet_status set_transforms(cumulet_viewer* viewer, const SceneOptions& scene) {
+  const double* first = scene.transforms.empty() ? nullptr : scene.transforms.front().data();
   const cumulet_status status =
-      cumulet_set_volume_transforms(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
+      cumulet_set_volume_transforms(viewer, first, static_cast<std::uint32_t>(scene.transforms.size()));
   if (status != CUMULET_OK || !scene.shutter.moves()) return status;
-  const std::size_t count = std::max<std::size_t>(scene.places.size(), 1);
+  const std::size_t count = std::max<std::size_t>(scene.transforms.size(), 1);
   std::vector<double> open;
   std::vector<double> close;
   for (std::size_t i = 0; i < count; ++i) {
-    double place[16] = {};
+    double transform[16] = {};
     double at_open[16];
     double at_close[16];
-    if (!scene.places.empty()) std::ranges::copy(scene.places[i], place);
-    set_shutter(scene.shutter, place, at_open, at_close);
+    if (!scene.transforms.empty()) std::ranges::copy(scene.transforms[i], transform);
+    set_shutter(scene.shutter, transform, at_open, at_close);
     open.insert(open.end(), at_open, at_open + 16);
     close.insert(close.end(), at_close, at_close + 16);
   }

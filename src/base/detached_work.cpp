@@ -1,4 +1,4 @@
-#include "base/apart.hpp"
+#include "base/detached_work.hpp"
 
 #include <exception>
 #include <list>
@@ -11,7 +11,7 @@ namespace cumulet {
 
 namespace {
 
-/// The background threads of leave(). They are joined, not detached: code must not be unloaded while they run.
+/// The background threads of run_detached(). They are joined, not detached: code must not be unloaded while they run.
 class Threads {
  public:
   /// Returns false if no thread is available, for example because the process is ending.
@@ -41,7 +41,7 @@ Threads& threads() {
 
 }  // namespace
 
-void leave(const std::function<void()>& work) {
+void run_detached(const std::function<void()>& work) {
   if (!threads().run(work)) work();
 }
 

@@ -16,13 +16,13 @@ namespace cumulet {
 /// Runs `work` on a background thread, or inline if too many such threads are active, none can be created, or the
 /// process is exiting. `work` must own everything it touches, call no callback of the host and not throw. Unloading the
 /// library and process exit wait for it, however long it takes.
-void leave(const std::function<void()>& work);
+void run_detached(const std::function<void()>& work);
 
 /// Runs `call`, which cannot be interrupted (a library's decoder, a sort), and returns its result. On cancellation it
 /// throws Error(cancelled) within a few milliseconds, and `call` continues in the background. `call` must therefore own
 /// everything it touches and call no callback of the host. Without a Progress it is called directly.
 template <class Call>
-std::invoke_result_t<Call&> apart(const Progress* progress, Call call) {
+std::invoke_result_t<Call&> run_cancellable(const Progress* progress, Call call) {
   if (progress == nullptr) return call();
   progress->check();
   // An exception is moved to the caller like a result, so that only the caller owns it.
@@ -35,7 +35,7 @@ std::invoke_result_t<Call&> apart(const Progress* progress, Call call) {
     }
   });
   std::future<Outcome> result = task->get_future();
-  leave([task] { (*task)(); });
+  run_detached([task] { (*task)(); });
   while (result.wait_for(std::chrono::milliseconds(5)) != std::future_status::ready) progress->check();
   Outcome outcome = result.get();
   if (outcome.index() == 1) std::rethrow_exception(std::get<1>(std::move(outcome)));
@@ -45,9 +45,9 @@ std::invoke_result_t<Call&> apart(const Progress* progress, Call call) {
 /// Creates a shared object that takes long to free (a tree of many nodes, gigabytes). It is deleted on a background
 /// thread, so the last owner does not wait.
 template <class T, class... Arguments>
-std::shared_ptr<T> make_left(Arguments&&... arguments) {
+std::shared_ptr<T> make_deferred_delete(Arguments&&... arguments) {
   auto whole = std::make_unique<T>(std::forward<Arguments>(arguments)...);
-  return {whole.release(), [](T* last) { leave([last] { delete last; }); }};
+  return {whole.release(), [](T* last) { run_detached([last] { delete last; }); }};
 }
 
 }  // namespace cumulet

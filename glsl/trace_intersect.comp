@@ -23,11 +23,11 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "groups.glsl"
 
 void main() {
-  if (cm_queue_place() >= cm_queue_count(CM_QUEUE_MEET)) return;
-  uint lane = cm_queue_lane(CM_QUEUE_MEET);
+  if (cm_queue_index() >= cm_queue_count(CM_QUEUE_INTERSECT)) return;
+  uint lane = cm_queue_lane(CM_QUEUE_INTERSECT);
   CmPath p = cm_load_path(lane);
   cm_load_within(p, lane);
-  cm_meet(p);
+  cm_intersect(p);
 #if CM_EXTENDED_BSDF
   cm_store_scattered(p, lane);  // throughput and light, dimmed by absorption
 #endif
