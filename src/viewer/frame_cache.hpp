@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "viewer/job_log.hpp"
 #include "viewer/sequence.hpp"
 
 namespace cumulet::viewer {
@@ -116,6 +117,11 @@ class FrameCache {
   /// Waits until the first requested step is ready or cannot be made, or until the given time. Returns true unless the
   /// time ran out.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  /// Sets the receiver of requests, or null. player: identifies this object there. For tests.
+  void set_job_log(JobLog* log, JobLog::Player player) {
+    job_log_ = log;
+    player_ = player;
+  }
 
  private:
   struct Entry {
@@ -186,6 +192,8 @@ class FrameCache {
   std::function<void()> notify_;
   Trace trace_;
   ResourceLimitsPtr resource_limits_;
+  JobLog* job_log_ = nullptr;
+  JobLog::Player player_ = 0;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Request> request_;

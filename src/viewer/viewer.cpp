@@ -775,14 +775,17 @@ void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
 
 Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
                                     const std::optional<BuildSettings>& settings) {
-  return std::make_shared<Played>(
+  auto played = std::make_shared<Played>(
       follow(sequence, settings), log_, [this] { notify(); }, trace_, resource_limits_);
+  played->cache.set_job_log(job_log_, played->followed.id);
+  return played;
 }
 
 Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
   auto watching = std::make_shared<Watching>(
       log_, [this] { notify(); }, trace_, resource_limits_);
   watching->watched = watch(live, watching->builder);
+  watching->builder.set_job_log(job_log_, watching->watched.id);
   watching->settings = settings;
   watching->builder.follow(live, settings);
   return watching;
@@ -1045,6 +1048,19 @@ void Viewer::fit_cells() {
   if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
   cuts_own_ = !has_cells_allowed(built_, *resource_limits_);
   if (cuts_own_) request_build();
+}
+
+void Viewer::set_job_log(JobLog* log) {
+  job_log_ = log;
+  builder_.set_job_log(log);
+  surface_builder_.set_job_log(log);
+  environment_builder_.set_job_log(log);
+  cache_.set_job_log(log);
+  poses_.set_job_log(log);
+  frames_.set_job_log(log, 0);
+  lives_.set_job_log(log, 0);
+  for (const PlayedPtr& played : played_) played->cache.set_job_log(log, played->followed.id);
+  for (const WatchingPtr& watching : watching_) watching->builder.set_job_log(log, watching->watched.id);
 }
 
 void Viewer::cancel() {

@@ -26,6 +26,7 @@
 #include "viewer/frame_cache.hpp"
 #include "viewer/grid_cache.hpp"
 #include "viewer/instance.hpp"
+#include "viewer/job_log.hpp"
 #include "viewer/live_builder.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/pose_cache.hpp"
@@ -224,6 +225,8 @@ class Viewer {
   void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl().progressive().tracer().set_log(log); }
   /// Limits the texels per page of cell records; 0: the driver's limit; for tests.
   void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
+  /// Sets the receiver of all requests to workers, or null; for tests.
+  void set_job_log(JobLog* log);
 
  private:
   [[nodiscard]] Context& gl() const;
@@ -539,6 +542,7 @@ class Viewer {
   std::atomic<double> upload_progress_ = 1.0;
   std::shared_ptr<Sharing> sharing_;
   std::int64_t page_texels_ = 0;
+  JobLog* job_log_ = nullptr;
 
   GridSettings grid_;
   Medium medium_;
