@@ -313,7 +313,9 @@ Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder) 
 }
 
 bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
-  return !gl_ || !sampling_.preview || !taken || (is_rendered && !gl_->has_pending_frame(*taken));
+  if (!sampling_.preview || !taken) return true;
+  if (gl_) return is_rendered && !gl_->has_pending_frame(*taken);
+  return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
 }
 
 std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
