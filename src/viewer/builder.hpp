@@ -15,6 +15,7 @@
 #include "grid/refine.hpp"
 #include "scene/channels.hpp"
 #include "scene/march_source.hpp"
+#include "viewer/job_log.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
 #include "volume/proxy.hpp"
@@ -165,6 +166,8 @@ class Builder {
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
+  /// Sets the receiver of requests, or null; for tests.
+  void set_job_log(JobLog* log) { job_log_ = log; }
 
  private:
   // Settings for the build that follows a load. They may change while `open`, until the file is read.
@@ -187,6 +190,7 @@ class Builder {
   Log log_;
   std::function<void()> notify_;
   ResourceLimitsPtr resource_limits_;
+  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;            // held by its job
   std::weak_ptr<Progress> proxy_load_;  // of the proxy that is being built

@@ -11,6 +11,7 @@
 #include "base/file_path.hpp"
 #include "light/environment.hpp"
 #include "light/sky.hpp"
+#include "viewer/job_log.hpp"
 #include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
@@ -33,7 +34,7 @@ class EnvironmentBuilder {
   /// Drops the failure of the last sky.
   void forget_sky_failure() { skies_.forget_failure(); }
   /// Cancels loads; an untaken result remains.
-  void cancel() { files_.cancel(); }
+  void cancel();
 
   /// Returns the newest environment that was read, once.
   std::optional<light::EnvironmentPtr> take_environment();
@@ -48,8 +49,11 @@ class EnvironmentBuilder {
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const {
     return files_.wait(until) && skies_.wait(until);
   }
+  /// Sets the receiver of requests, or null; for tests.
+  void set_job_log(JobLog* log) { job_log_ = log; }
 
  private:
+  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::optional<light::EnvironmentPtr> environment_;
   std::optional<light::Daylight> sky_;

@@ -39,6 +39,7 @@ FrameCache::FrameCache(Log log, std::function<void()> notify, Trace trace, Resou
       worker_([this] { tell(); }, trace) {}
 
 void FrameCache::request(Request request) {
+  if (job_log_ != nullptr) job_log_->request(player_, request);
   std::vector<Entry> old;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
@@ -71,6 +72,7 @@ void FrameCache::request(Request request) {
 }
 
 void FrameCache::clear() {
+  if (job_log_ != nullptr) job_log_->call("frames", player_, "clear");
   std::vector<Entry> old;
   {
     const std::scoped_lock lock(mutex_);
@@ -83,6 +85,7 @@ void FrameCache::clear() {
 }
 
 void FrameCache::rebuild() {
+  if (job_log_ != nullptr) job_log_->call("frames", player_, "rebuild");
   std::vector<Entry> old;
   const std::scoped_lock lock(mutex_);
   if (!request_) return;
@@ -100,6 +103,7 @@ void FrameCache::rebuild() {
 }
 
 void FrameCache::cancel() {
+  if (job_log_ != nullptr) job_log_->call("frames", player_, "cancel");
   {
     const std::scoped_lock lock(mutex_);
     cancelled_ = true;

@@ -14,9 +14,44 @@
 #include <utility>
 #include <vector>
 
+#include "viewer/job_log.hpp"
 #include "viewer/sequence.hpp"
 
 namespace cumulet::viewer {
+
+/// Steps of a sequence's frames, including interpolated ones.
+struct FrameSteps {
+  scene::Between between = scene::Between::none;
+  std::uint32_t a_frame = 1;  ///< steps per frame; 1: no interpolation
+  double seconds = 0.0;       ///< for velocities: from a frame to the next
+  bool operator==(const FrameSteps&) const = default;
+
+  /// Steps of a playback.
+  static FrameSteps of(const scene::Playback& playback) {
+    const bool moves = playback.between == scene::Between::advect;
+    const double seconds = moves ? playback.velocity_scale / playback.frames_per_second : 0.0;
+    return {playback.between, playback.steps, seconds};
+  }
+  /// Number of steps of this many frames; `frames` is at least 1.
+  [[nodiscard]] std::size_t count(std::uint32_t frames) const { return own(frames - 1) + 1; }
+  /// Step of the frame itself.
+  [[nodiscard]] std::size_t own(std::uint32_t frame) const { return std::size_t{frame} * a_frame; }
+  [[nodiscard]] std::uint32_t frame(std::uint32_t step) const { return step / a_frame; }
+  [[nodiscard]] bool is_between(std::uint32_t step) const { return step % a_frame != 0; }
+  /// Position between its frame and the next, 0 to less than 1.
+  [[nodiscard]] double part(std::uint32_t step) const { return static_cast<double>(step % a_frame) / a_frame; }
+  [[nodiscard]] double position(std::uint32_t step) const { return frame(step) + part(step); }
+};
+
+/// The steps that a FrameCache is to make.
+struct FrameRequest {
+  FrameFilesPtr files;
+  std::vector<std::uint32_t> order;       ///< required steps without duplicates, the soonest first; at least one
+  std::optional<BuildSettings> settings;  ///< nullopt: analyze the sequence, build nothing yet
+  std::uint64_t memory_bytes = 0;         ///< main memory limit; the first step is kept at any limit
+  FrameSteps steps = {};
+  bool takes_suggested = true;  ///< apply the density scale suggested for the sequence, if its file asks for it
+};
 
 /// Asynchronous cache of a sequence's grids. Frames are read and built ahead on a worker thread, as many as fit a
 /// memory limit, the soonest needed first. All calls are thread-safe; none waits for a frame except wait().
@@ -29,36 +64,8 @@ namespace cumulet::viewer {
 /// logged once and replaced by the nearest earlier readable frame, or else by the nearest later one.
 class FrameCache {
  public:
-  struct Steps {
-    scene::Between between = scene::Between::none;
-    std::uint32_t a_frame = 1;  ///< steps per frame; 1: no interpolation
-    double seconds = 0.0;       ///< for velocities: from a frame to the next
-    bool operator==(const Steps&) const = default;
-
-    /// Steps of a playback.
-    static Steps of(const scene::Playback& playback) {
-      const bool moves = playback.between == scene::Between::advect;
-      const double seconds = moves ? playback.velocity_scale / playback.frames_per_second : 0.0;
-      return {playback.between, playback.steps, seconds};
-    }
-    /// Number of steps of this many frames; `frames` is at least 1.
-    [[nodiscard]] std::size_t count(std::uint32_t frames) const { return own(frames - 1) + 1; }
-    /// Step of the frame itself.
-    [[nodiscard]] std::size_t own(std::uint32_t frame) const { return std::size_t{frame} * a_frame; }
-    [[nodiscard]] std::uint32_t frame(std::uint32_t step) const { return step / a_frame; }
-    [[nodiscard]] bool is_between(std::uint32_t step) const { return step % a_frame != 0; }
-    /// Position between its frame and the next, 0 to less than 1.
-    [[nodiscard]] double part(std::uint32_t step) const { return static_cast<double>(step % a_frame) / a_frame; }
-    [[nodiscard]] double position(std::uint32_t step) const { return frame(step) + part(step); }
-  };
-  struct Request {
-    FrameFilesPtr files;
-    std::vector<std::uint32_t> order;       ///< required steps without duplicates, the soonest first; at least one
-    std::optional<BuildSettings> settings;  ///< nullopt: analyze the sequence, build nothing yet
-    std::uint64_t memory_bytes = 0;         ///< main memory limit; the first step is kept at any limit
-    Steps steps = {};
-    bool takes_suggested = true;  ///< apply the density scale suggested for the sequence, if its file asks for it
-  };
+  using Steps = FrameSteps;
+  using Request = FrameRequest;
 
   /// Results of analyzing the whole sequence.
   struct AnalyzedFrame {
@@ -110,6 +117,11 @@ class FrameCache {
   /// Waits until the first requested step is ready or cannot be made, or until the given time. Returns true unless the
   /// time ran out.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  /// Sets the receiver of requests, or null. player: identifies this object there. For tests.
+  void set_job_log(JobLog* log, JobLog::Player player) {
+    job_log_ = log;
+    player_ = player;
+  }
 
  private:
   struct Entry {
@@ -180,6 +192,8 @@ class FrameCache {
   std::function<void()> notify_;
   Trace trace_;
   ResourceLimitsPtr resource_limits_;
+  JobLog* job_log_ = nullptr;
+  JobLog::Player player_ = 0;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Request> request_;

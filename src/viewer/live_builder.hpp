@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "viewer/builder.hpp"
+#include "viewer/job_log.hpp"
 #include "viewer/live.hpp"
 
 namespace cumulet::viewer {
@@ -44,6 +45,11 @@ class LiveBuilder {
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Waits until no job is running, or until the given time. Returns true unless the time ran out.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
+  /// Sets the receiver of requests, or null. player: identifies this object there. For tests.
+  void set_job_log(JobLog* log, JobLog::Player player) {
+    job_log_ = log;
+    player_ = player;
+  }
 
  private:
   // State and settings of the last build, successful or not.
@@ -66,6 +72,8 @@ class LiveBuilder {
 
   Log log_;
   ResourceLimitsPtr resource_limits_;
+  JobLog* job_log_ = nullptr;
+  JobLog::Player player_ = 0;
   mutable std::mutex mutex_;
   std::shared_ptr<Live> live_;
   std::optional<BuildSettings> settings_;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "viewer/job_log.hpp"
 #include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
@@ -43,12 +44,17 @@ class RequestCache {
   /// Changes after each value that was made.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// Ends running and queued work with ErrorCode::cancelled.
-  void cancel() { worker_.cancel(); }
+  void cancel() {
+    if (job_log_ != nullptr) job_log_->call(what_, 0, "cancel");
+    worker_.cancel();
+  }
 
   [[nodiscard]] bool busy() const { return worker_.busy(); }
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
+  /// Sets the receiver of requests, or null; for tests.
+  void set_job_log(JobLog* log) { job_log_ = log; }
 
  private:
   struct Entry {
@@ -65,6 +71,7 @@ class RequestCache {
   Progress::Stage stage_;
   Make make_;
   std::function<void()> notify_;
+  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::vector<Entry> cache_;
   std::optional<Request> under_way_;
@@ -82,6 +89,7 @@ typename std::vector<typename RequestCache<Request, Made>::Entry>::iterator Requ
 
 template <class Request, class Made>
 void RequestCache<Request, Made>::request(std::vector<Request> requests) {
+  if (job_log_ != nullptr) job_log_->request(requests);
   bool missing = false;
   bool failed = false;
   std::vector<Entry> before;  // destroyed after the lock is released, because its contents may be large
@@ -122,6 +130,7 @@ bool RequestCache<Request, Made>::is_under_way(const Request& request) const {
 
 template <class Request, class Made>
 void RequestCache<Request, Made>::forget_failures() {
+  if (job_log_ != nullptr) job_log_->call(what_, 0, "forget failures");
   const std::scoped_lock lock(mutex_);
   for (Entry& entry : cache_) entry.failure.reset();
 }

@@ -11,6 +11,7 @@
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
+#include "viewer/job_log.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/worker.hpp"
 
@@ -49,6 +50,8 @@ class SurfaceBuilder {
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
+  /// Sets the receiver of requests, or null; for tests.
+  void set_job_log(JobLog* log) { job_log_ = log; }
 
  private:
   // The choice for the pose that follows a load. It may change while `open`, until the pose begins.
@@ -59,6 +62,7 @@ class SurfaceBuilder {
   void read(const FilePath& path, Load& load, Progress& progress);
 
   Log log_;
+  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
   std::optional<PosedModel> result_;

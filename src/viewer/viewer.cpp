@@ -313,7 +313,9 @@ Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder) 
 }
 
 bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
-  return !gl_ || !sampling_.preview || !taken || (is_rendered && !gl_->has_pending_frame(*taken));
+  if (!sampling_.preview || !taken) return true;
+  if (gl_) return is_rendered && !gl_->has_pending_frame(*taken);
+  return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
 }
 
 std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
@@ -776,14 +778,17 @@ void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
 
 Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
                                     const std::optional<BuildSettings>& settings) {
-  return std::make_shared<Played>(
+  auto played = std::make_shared<Played>(
       follow(sequence, settings), log_, [this] { notify(); }, trace_, resource_limits_);
+  played->cache.set_job_log(job_log_, played->followed.id);
+  return played;
 }
 
 Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
   auto watching = std::make_shared<Watching>(
       log_, [this] { notify(); }, trace_, resource_limits_);
   watching->watched = watch(live, watching->builder);
+  watching->builder.set_job_log(job_log_, watching->watched.id);
   watching->settings = settings;
   watching->builder.follow(live, settings);
   return watching;
@@ -1046,6 +1051,19 @@ void Viewer::fit_cells() {
   if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
   cuts_own_ = !has_cells_allowed(built_, *resource_limits_);
   if (cuts_own_) request_build();
+}
+
+void Viewer::set_job_log(JobLog* log) {
+  job_log_ = log;
+  builder_.set_job_log(log);
+  surface_builder_.set_job_log(log);
+  environment_builder_.set_job_log(log);
+  cache_.set_job_log(log);
+  poses_.set_job_log(log);
+  frames_.set_job_log(log, 0);
+  lives_.set_job_log(log, 0);
+  for (const PlayedPtr& played : played_) played->cache.set_job_log(log, played->followed.id);
+  for (const WatchingPtr& watching : watching_) watching->builder.set_job_log(log, watching->watched.id);
 }
 
 void Viewer::cancel() {

@@ -26,6 +26,7 @@
 #include "viewer/frame_cache.hpp"
 #include "viewer/grid_cache.hpp"
 #include "viewer/instance.hpp"
+#include "viewer/job_log.hpp"
 #include "viewer/live_builder.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/pose_cache.hpp"
@@ -224,6 +225,22 @@ class Viewer {
   void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl().progressive().tracer().set_log(log); }
   /// Limits the texels per page of cell records; 0: the driver's limit; for tests.
   void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
+  /// Sets the receiver of all requests to workers, or null; for tests.
+  void set_job_log(JobLog* log);
+  /// Answers of a GL context, for a viewer without one.
+  struct SimulatedGl {
+    bool displays_frames = true;             ///< each frame of a sequence is displayed once it was rendered
+    std::uint64_t bytes_beside_volumes = 0;  ///< GPU memory used by everything except volumes
+  };
+  /// Sets the answers that dry_run() and later calls use; nullopt: none. For tests.
+  void simulate_gl(const std::optional<SimulatedGl>& simulated) { simulated_gl_ = simulated; }
+  struct DryRun {
+    Shot shot;
+    FrameResult result;  ///< of these only: loading, more, failed, and converged (nothing prevents it)
+  };
+  /// Makes the decisions of render() without its GL work: takes the results of workers, requests grids and updates the
+  /// scene. For tests, on a viewer that is not attached.
+  DryRun dry_run(const Frame& frame);
 
  private:
   [[nodiscard]] Context& gl() const;
@@ -348,6 +365,10 @@ class Viewer {
   [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
   // Sends the newest request to the cache and checks for results.
   void tell_request(Followed& f, FrameCache& cache) const;
+  // Takes the GPU memory used by everything except volumes in this frame.
+  void take_gl_bytes(std::uint64_t beside_volumes);
+  // Fills in the flags about pending work and failures.
+  void report_pending(FrameResult& result);
   // Marks all frames and states taken last as rendered.
   void note_rendered();
   // True if a frame or a state is ready, but waits until the previous one has been displayed.
@@ -540,6 +561,8 @@ class Viewer {
   std::atomic<double> upload_progress_ = 1.0;
   std::shared_ptr<Sharing> sharing_;
   std::int64_t page_texels_ = 0;
+  JobLog* job_log_ = nullptr;
+  std::optional<SimulatedGl> simulated_gl_;
 
   GridSettings grid_;
   Medium medium_;

@@ -237,6 +237,39 @@ void Viewer::remark_on_samples(Context& g) {
                " samples was not finite; they are black (see nonfinite_samples in the statistics)");
 }
 
+void Viewer::take_gl_bytes(std::uint64_t beside_volumes) {
+  // Requests made before the first frame did not include the memory of images.
+  if (!gl_beside_volumes_ && max_gl_bytes_ != ResourceLimits::no_limit)
+    requests_due_ = requests_due_ || !shown_.empty();
+  gl_beside_volumes_ = beside_volumes;
+  share_gl();
+}
+
+void Viewer::report_pending(FrameResult& result) {
+  if (busy() || proxy_) {
+    result.loading = true;
+    result.converged = false;
+  }
+  if (something_waits()) {
+    result.more = true;
+    result.converged = false;
+  }
+  result.failed = reported_failures_.report(failures(), ReportedFailures::Cancelled::left_out).has_value();
+  result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
+}
+
+Viewer::DryRun Viewer::dry_run(const Frame& frame) {
+  DryRun run;
+  update_pending_ = false;
+  prepare(frame);
+  note_rendered();
+  run.shot = shot();
+  if (simulated_gl_) take_gl_bytes(simulated_gl_->bytes_beside_volumes);
+  run.result.converged = true;
+  report_pending(run.result);
+  return run;
+}
+
 FrameResult Viewer::render(const Frame& frame) {
   const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
@@ -280,24 +313,15 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     remark_on_samples(g);
-    // Requests made before the first frame did not include the memory of images.
-    if (!gl_beside_volumes_ && max_gl_bytes_ != ResourceLimits::no_limit)
-      requests_due_ = requests_due_ || !shown_.empty();
-    gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
-    share_gl();
+    take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    if (busy() || proxy_) {
-      result.loading = true;
-      result.converged = false;
-    }
     if (watched_) note_drawn(g, *watched_);
     for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
-    if (something_waits() || g.transfers().busy() || voxels_in_gl_wait(g)) {
+    report_pending(result);
+    if (g.transfers().busy() || voxels_in_gl_wait(g)) {
       result.more = true;
       result.converged = false;
     }
-    result.failed = reported_failures_.report(this->failures(), ReportedFailures::Cancelled::left_out).has_value();
-    result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
     if (failures.first && !g.is_news(shot, *failures.first)) failures = {};
   });
   failures.tell(log_);
