@@ -147,7 +147,7 @@ void grid_for_views(StageRecorder& r) {
   r.frame({32, 32});
   r.wait();
   r.frame({32, 32});
-  r.call("other transform", [&] { r.viewer().set_places({{moved(5.0)}}); });
+  r.call("other transform", [&] { r.viewer().set_transforms({{moved(5.0)}}); });
   r.frame({32, 32});
   r.frame({32, 32});
   r.wait();

@@ -120,8 +120,8 @@ void instance_settings(StageRecorder& r) {
   edit(r, "group", a, [](auto& settings) { settings.medium.group = 3; });
   edit(r, "holdout", a, [](auto& settings) { settings.medium.holdout = true; });
   edit(r, "tag", a, [](auto& settings) { settings.tag = 7; });
-  edit(r, "previous transform", a, [](auto& settings) { settings.previous = scene::Place{moved(-1.0)}; });
-  edit(r, "motion", a, [](auto& settings) { settings.ends = scene::PlaceEnds{moved(-1.0), moved(1.0)}; });
+  edit(r, "previous transform", a, [](auto& settings) { settings.previous = scene::InstanceTransform{moved(-1.0)}; });
+  edit(r, "motion", a, [](auto& settings) { settings.ends = scene::ShutterTransforms{moved(-1.0), moved(1.0)}; });
   r.call("open the shutter", [&] {
     viewer::Sampling sampling;
     sampling.shutter_seconds = 0.5;

@@ -638,7 +638,7 @@ void dynamic_volume_with_other_settings(StageRecorder& r) {
   r.call("rebuild", [&] { r.viewer().rebuild(); });
   r.wait();
   r.frame();
-  r.call("two transforms", [&] { r.viewer().set_places({{moved(0.0)}, {moved(40.0)}}); });
+  r.call("two transforms", [&] { r.viewer().set_transforms({{moved(0.0)}, {moved(40.0)}}); });
   r.frame();
 }
 

@@ -302,7 +302,7 @@ void model_settings(StageRecorder& r) {
   edit(r, "holdout", a, [](auto& settings) { settings.holdout = true; });
   edit(r, "hidden", a, [](auto& settings) { settings.hidden = true; });
   edit(r, "visible", a, [](auto& settings) { settings.hidden = false; });
-  edit(r, "motion", a, [](auto& settings) { settings.ends = scene::PlaceEnds{moved(0.0), moved(2.0)}; });
+  edit(r, "motion", a, [](auto& settings) { settings.ends = scene::ShutterTransforms{moved(0.0), moved(2.0)}; });
   set_shutter(r, 0.5);
   r.wait();
   r.frame();
@@ -394,7 +394,7 @@ void physical_sky(StageRecorder& r) {
   light.sky->turbidity = 5.0;
   set("hazy");
   show();
-  r.call("ground", [&] { r.viewer().set_ground({viewer::GroundPlace::at_height, -1.0}); });
+  r.call("ground", [&] { r.viewer().set_ground({viewer::GroundMode::at_height, -1.0}); });
   show();
   r.call("environment", [&] {
     r.viewer().set_environment(light::make_environment({4, 2, std::vector<glm::vec3>(8, glm::vec3(0.5F))}, "by hand"));
@@ -478,7 +478,7 @@ void analytic_lights(StageRecorder& r) {
   r.call("a volume", [&] { r.viewer().set_volume(cloud(16, 1)); });
   r.wait();
   r.frame();
-  r.call("far away", [&] { r.viewer().set_places({{moved(1e7)}}); });
+  r.call("far away", [&] { r.viewer().set_transforms({{moved(1e7)}}); });
   r.frame();
   lights.clear();
   set("no lights");
@@ -490,16 +490,16 @@ void ground(StageRecorder& r) {
     r.call(name, [&] { r.viewer().set_ground(settings); });
     r.frame();
   };
-  set("below nothing", {viewer::GroundPlace::below});
-  set("at a height", {viewer::GroundPlace::at_height, 2.0});
+  set("below nothing", {viewer::GroundMode::below});
+  set("at a height", {viewer::GroundMode::at_height, 2.0});
   r.call("set a volume", [&] { r.viewer().set_volume(cloud(16, 1)); });
   r.wait();
   r.frame();
-  set("below the volume", {viewer::GroundPlace::below});
+  set("below the volume", {viewer::GroundMode::below});
   set_surfaces(r, moving_surfaces());
   r.wait();
   r.frame();
-  set("brighter", {viewer::GroundPlace::below, 0.0, glm::vec3(0.75F)});
+  set("brighter", {viewer::GroundMode::below, 0.0, glm::vec3(0.75F)});
   set("none", {});
 }
 

@@ -149,7 +149,7 @@ void load_takes_the_suggested_density_scale(StageRecorder& r) {
   r.call("set the density scale", [&] { r.viewer().set_medium(medium_of(3.0)); });
   r.wait();
   r.frame();
-  r.call("double the size", [&] { r.viewer().set_places({{scaled(2.0)}}); });
+  r.call("double the size", [&] { r.viewer().set_transforms({{scaled(2.0)}}); });
   r.wait();
   r.frame();
   r.load("b.vdb", suggested);
@@ -340,13 +340,13 @@ void transforms_of_the_volume(StageRecorder& r) {
   r.call("set the volume", [&] { r.viewer().set_volume(cloud(16, 1)); });
   r.wait();
   r.frame();
-  r.call("set two transforms", [&] { r.viewer().set_places({{moved(0.0)}, {moved(40.0)}}); });
+  r.call("set two transforms", [&] { r.viewer().set_transforms({{moved(0.0)}, {moved(40.0)}}); });
   r.frame();
-  r.call("set the previous transform", [&] { r.viewer().set_previous_places({{moved(-1.0)}}); });
+  r.call("set the previous transform", [&] { r.viewer().set_previous_transforms({{moved(-1.0)}}); });
   r.frame();
   r.call("move both", [&] {
-    const scene::PlaceEnds ends{moved(0.0, 2.0), moved(0.0, 4.0)};
-    r.viewer().set_places({{moved(0.0, 3.0), ends}, {moved(40.0, 3.0)}});
+    const scene::ShutterTransforms ends{moved(0.0, 2.0), moved(0.0, 4.0)};
+    r.viewer().set_transforms({{moved(0.0, 3.0), ends}, {moved(40.0, 3.0)}});
   });
   r.frame();
   r.call("open the shutter", [&] {
@@ -423,7 +423,7 @@ void opacity_of_the_transmittance_criterion(StageRecorder& r) {
   use("denser");
   medium.phase.anisotropy = 0.9F;
   use("forward scattering");
-  r.call("larger", [&] { r.viewer().set_places({{scaled(4.0)}}); });
+  r.call("larger", [&] { r.viewer().set_transforms({{scaled(4.0)}}); });
   r.wait();
   r.frame();
   r.call("set the grid", [&] { r.viewer().set_grid({}); });

@@ -54,7 +54,7 @@ std::string text_of(const volume::Ramp& ramp) {
 std::string text_of(const scene::Phase& phase) {
   if (phase == scene::Phase{}) return "isotropic";
   return "phase " + text_of(phase.anisotropy) + " " + text_of(phase.second_anisotropy) + " " +
-         text_of(phase.second_bend) + " " + text_of(phase.second_share);
+         text_of(phase.second_bend) + " " + text_of(phase.second_weight);
 }
 
 std::string text_of(const scene::Medium& medium) {
@@ -72,12 +72,12 @@ std::string text_of(const scene::Emission& e) {
                  e.flame_ramp.empty() ? "" : "flame ramp " + text_of(e.flame_ramp)});
 }
 
-std::string text_of(const scene::PlaceEnds& ends) {
+std::string text_of(const scene::ShutterTransforms& ends) {
   return "from " + text_of(ends.open) + " to " + text_of(ends.close);
 }
 
-std::string text_of(const scene::Place& place) {
-  return joined({text_of(place.to_world), place.ends ? text_of(*place.ends) : ""});
+std::string text_of(const scene::InstanceTransform& transform) {
+  return joined({text_of(transform.to_world), transform.ends ? text_of(*transform.ends) : ""});
 }
 
 std::string text_of(const scene::Viewpoint& view) {
@@ -121,7 +121,7 @@ std::string text_of(const grid::RefineCamera& camera) {
   std::string text = joined({"for a view: eye", text_of(camera.eye), "forward", text_of(camera.forward), "up",
                              text_of(camera.up), "tangents", text_of(camera.tan_half_x), text_of(camera.tan_half_y),
                              "pixels", text_of(camera.pixels_per_radian), "transforms"});
-  for (const glm::dmat4& place : camera.places) text += " " + text_of(place);
+  for (const glm::dmat4& transform : camera.transforms) text += " " + text_of(transform);
   return text;
 }
 
@@ -165,7 +165,7 @@ std::string contents_of(const scene::MarchSource& source) {
 std::string contents_of(const scene::ModelSource& source) {
   std::size_t moving = 0;
   for (const scene::ModelMesh& mesh : source.meshes)
-    moving += mesh.ends.has_value() || !mesh.placing_ends.empty() ? 1U : 0U;
+    moving += mesh.ends.has_value() || !mesh.shutter_transforms.empty() ? 1U : 0U;
   return joined({std::to_string(source.scene->triangle_count()), "triangles at", text_of(source.pose.time), "s, bounds",
                  text_of(source.pose.low), text_of(source.pose.high),
                  moving == 0 ? "" : std::to_string(moving) + " meshes move", std::to_string(source.pose.lights.size()),
@@ -210,8 +210,8 @@ std::string text_of(const viewer::DisplaySettings& d) {
 }  // namespace
 
 Identities::Found Identities::find(const std::weak_ptr<const void>& object) {
-  const auto [place, is_new] = numbers_.try_emplace(object, numbers_.size() + 1);
-  return {place->second, is_new};
+  const auto [entry, is_new] = numbers_.try_emplace(object, numbers_.size() + 1);
+  return {entry->second, is_new};
 }
 
 std::string text_of(double value) { return rounded(value, "%.9g"); }
@@ -343,7 +343,7 @@ std::string StageText::volume(const scene::Volume& volume, const scene::Snapshot
     for (const scene::Volume& other : before->volumes)
       has_same_medium = has_same_medium || (other.id == volume.id && other.medium == volume.medium);
   }
-  return joined({"volume", object(volume.id) + ":", source(volume.source), text_of(volume.place),
+  return joined({"volume", object(volume.id) + ":", source(volume.source), text_of(volume.transform),
                  volume.frame ? frame(*volume.frame) : "",
                  volume.previous ? "previously " + text_of(*volume.previous) : "",
                  has_same_medium ? "same medium" : text_of(*volume.medium)});
