@@ -772,7 +772,7 @@ def test_scene_file(s):
                     *shot("opened"), "key ctrl+shift+s", "frames 2", "key ctrl+a", 'text "again.json"', "key enter", "frames 3",
                     "key ctrl+z", "wait loaded", *shot("back")], "--volume", s.explosion)
     assert_alike(saved, look(s, "opened")[0], area)
-    assert s.report("opened")["scene"]["medium"] == medium
+    assert s.report("opened")["volumes"][0]["medium"] == medium
     again = json.loads((s.out / "again.json").read_text())
     assert [again["camera"], again["cameras"]] == ["near", scene["cameras"]], again
     assert s.report("back")["scene"]["volume"]["file"].endswith("explosion_0012.vdb"), "opening a scene can be undone"
