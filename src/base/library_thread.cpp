@@ -1,5 +1,6 @@
 #include "base/library_thread.hpp"
 
+#include <tbb/task_group.h>
 #include <unistd.h>
 
 #include <array>
@@ -149,6 +150,20 @@ Registry& registry() {
 
 void end_threads() { registry().end(); }
 
+// TBB loads libraries (its allocator, for one) when it first runs a task. A thread of the library that did so during
+// dlclose() would wait for the loader's lock, which dlclose() holds while it waits for that thread. TBB therefore loads
+// them before the first thread starts. The thread that runs this task keeps no data of TBB, unlike the host's.
+void load_libraries_of_tbb() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    std::thread([] {
+      tbb::task_group tasks;
+      tasks.run([] {});
+      tasks.wait();
+    }).join();
+  });
+}
+
 void end_call() {
   --of_thread().calls;
   --registry().calls();
@@ -167,6 +182,7 @@ void keep_statics(StaticsOf of) noexcept {
 
 LibraryThread::LibraryThread(std::function<void()> work, std::function<void()> request_stop)
     : entry_(std::make_shared<Entry>(std::move(request_stop))) {
+  load_libraries_of_tbb();
   keep_statics(StaticsOf::thread);
   registry().start(entry_, std::move(work));
 }

@@ -253,7 +253,19 @@ struct Owner {
   bool is_child = false;
 };
 
+// TBB loads its allocator when it first runs a task. A thread that did so during dlclose() would wait for the loader's
+// lock until the library gives up waiting for that thread. It is therefore loaded before the first thread starts.
+bool tbb_has_its_allocator() {
+  const char* const name = "libtbbmalloc.so.2";
+  if (void* const loaded = dlopen(name, RTLD_NOW | RTLD_NOLOAD)) return dlclose(loaded) == 0;
+  return dlopen(name, RTLD_NOW) == nullptr;  // without the file, TBB uses malloc
+}
+
 int unload(Host& host) {
+  if (!tbb_has_its_allocator()) {
+    std::fputs("a thread of the library would load TBB's allocator\n", stderr);
+    return failed;
+  }
   dlclose(host.of.handle);
   if (dlopen(CUMULET_EXIT_LIBRARY, RTLD_NOW | RTLD_NOLOAD) != nullptr) {
     std::fputs("the library was not unloaded\n", stderr);
