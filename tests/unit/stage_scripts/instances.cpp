@@ -372,6 +372,7 @@ void limit_of_threads(StageRecorder& r) {
     limits.threads = threads;
     r.call(std::to_string(threads) + " threads", [&] { r.viewer().set_limits(limits); });
     r.call("set the volume", [&] { r.viewer().set_volume(cloud(16, 1)); });
+    r.wait();  // which of two grids is built first is not defined
     add(r, "a", instance_of(cloud(16, 2, "a"), moved(30.0)));
     r.wait();
     r.frame();

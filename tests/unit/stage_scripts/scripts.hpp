@@ -33,9 +33,9 @@ std::vector<StageScript> error_scripts();
 
 // ---- messages at which jobs can be held ----
 
-inline constexpr const char* negative_voxel = "negative voxel";       ///< loads of write_slow_ball()
-inline constexpr const char* limited_cells = "ended the refinement";  ///< builds with limited_grid()
-inline constexpr const char* unknown_extension = "drawn without";     ///< loads of write_model(), if it is slow
+inline constexpr const char* negative_voxel = "negative voxel";         ///< loads of write_slow_ball()
+inline constexpr const char* limited_cells = "stopped the refinement";  ///< builds with limited_grid()
+inline constexpr const char* unknown_extension = "rendered without";    ///< loads of write_model(), if it is slow
 
 // ---- volumes in memory ----
 
