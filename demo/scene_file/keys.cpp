@@ -74,7 +74,7 @@ std::string old_name(SceneFormat format, const std::string& key) {
 }  // namespace
 
 std::string key_in(SceneFormat format, const std::string& key, std::size_t volume) {
-  const std::string name = old_name(format, key);
+  std::string name = old_name(format, key);
   const std::string section = name.substr(0, name.find('.'));
   if (section == "sequence" && volume > 0) return "volumes[" + std::to_string(volume) + "]." + name;
   const auto* const found = std::ranges::find(moved, section, &Moved::first);
