@@ -153,7 +153,7 @@ void wait(const Viewer& viewer, Progress& progress) {
   }
 }
 
-void tell(Progress& progress, const std::string& line) {
+void print_line(Progress& progress, const std::string& line) {
   progress.clear();
   std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
@@ -172,22 +172,22 @@ std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const Sc
 }
 
 /// Logs the suggested density scale, which does not depend on the camera. The volume was loaded with it.
-void tell_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
+void print_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
   double scale = 0.0;
   if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) return;  // nothing visible
   std::array<char, 32> digits{};
   std::snprintf(digits.data(), digits.size(), "%g", scale);
-  tell(progress, std::string("density scale ") + digits.data() + " for a mean optical depth of 8" +
-                     (ramped ? " before the ramp" : "") + " (--density-scale)");
+  print_line(progress, std::string("density scale ") + digits.data() + " for a mean optical depth of 8" +
+                           (ramped ? " before the ramp" : "") + " (--density-scale)");
 }
 
-void tell_fire(const cumulet_medium_desc& medium, Progress& progress) {
+void print_fire(const cumulet_medium_desc& medium, Progress& progress) {
   std::array<char, 160> line{};
   std::snprintf(
       line.data(), line.size(),
       "the volume burns: using --preset %s --flame-strength %g --blackbody %g (set any medium option to disable this)",
       medium.density_scale > 0.0 ? "explosion" : "fire", double{medium.flame_strength}, double{medium.blackbody});
-  tell(progress, line.data());
+  print_line(progress, line.data());
 }
 
 cumulet_stats stats_of(const Viewer& viewer) {
@@ -292,7 +292,7 @@ std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, c
   try {
     return cumulet::demo::denoised(viewer.get(), network, std::size_t{4} * options.scene.width * options.scene.height);
   } catch (const std::exception& error) {
-    tell(progress, std::string("not denoised: ") + error.what());
+    print_line(progress, std::string("not denoised: ") + error.what());
     return {};
   }
 }
@@ -309,7 +309,7 @@ void warn_of_raised_alpha(const Viewer& viewer, const RenderOptions& options, co
   }
   const std::size_t pixels = cumulet::image::pixels_brighter_than_alpha(linear, scene.display.exposure_stops);
   const std::string note = cumulet::image::raised_alpha_note(options.output, pixels);
-  if (!note.empty()) tell(progress, "warning: " + note);
+  if (!note.empty()) print_line(progress, "warning: " + note);
 }
 
 void write_picture(const Viewer& viewer, const RenderOptions& options, const cumulet::demo::Instances& others,
@@ -426,7 +426,7 @@ void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& p
   try {
     keep(viewer, options);
   } catch (const std::exception& error) {
-    tell(progress, std::string("warning: the checkpoint was not written: ") + error.what());
+    print_line(progress, std::string("warning: the checkpoint was not written: ") + error.what());
   }
 }
 
@@ -442,11 +442,11 @@ void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint
   if (cumulet_restore_accumulation(viewer.get(), from.accumulation.data(), from.accumulation.size()) != CUMULET_OK)
     throw std::runtime_error(options.checkpoint + ": " + cumulet_last_error(viewer.get()));
   const std::string driver = driver_of(viewer);
-  tell(progress,
-       options.output + ": resuming from " + options.checkpoint +
-           (driver == from.driver ? ""
-                                  : ", made with another driver (" + from.driver +
-                                        "); the result will not be bit-identical to an uninterrupted render"));
+  print_line(progress,
+             options.output + ": resuming from " + options.checkpoint +
+                 (driver == from.driver ? ""
+                                        : ", made with another driver (" + from.driver +
+                                              "); the result will not be bit-identical to an uninterrupted render"));
 }
 
 /// Renders until the image has all samples, the time limit is reached, or a signal interrupts it.
@@ -479,16 +479,16 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, const std::opti
   return Traced::stopped;
 }
 
-void tell_ending(const RenderOptions& options, Traced traced, double measured, double samples, Progress& progress) {
+void print_ending(const RenderOptions& options, Traced traced, double measured, double samples, Progress& progress) {
   using cumulet::demo::Ending;
   // The margin covers the library's single-precision sums.
   const double target = 0.01 * 1.0001 * options.scene.sampling.noise_target_percent;
   const auto noise = std::isfinite(measured) ? std::optional(measured) : std::nullopt;
   Ending ending = target > 0.0 && noise && *noise <= target ? Ending::noise : Ending::samples;
   if (traced == Traced::late) ending = Ending::time;
-  tell(progress, options.output + ": " +
-                     cumulet::demo::ending_line(ending, noise, samples, options.scene.sampling.noise_target_percent,
-                                                options.time_limit));
+  print_line(progress, options.output + ": " +
+                           cumulet::demo::ending_line(ending, noise, samples,
+                                                      options.scene.sampling.noise_target_percent, options.time_limit));
 }
 
 /// Returns the denoiser network; "": none is requested, or none exists, which is logged.
@@ -497,7 +497,7 @@ std::string network_of(const RenderOptions& options, Progress& progress) {
   try {
     return cumulet::demo::find_network(options.denoiser);
   } catch (const std::exception& error) {
-    tell(progress, std::string("using --denoise fast: ") + error.what());
+    print_line(progress, std::string("using --denoise fast: ") + error.what());
     return "";
   }
 }
@@ -544,12 +544,12 @@ class Studio {
 
   /// Logs the hints about a loaded volume. Call once.
   void remark(const SceneOptions& scene) {
-    if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress_, *hint);
+    if (const auto hint = cumulet::demo::up_hint(scene)) print_line(progress_, *hint);
     for (const cumulet::demo::SceneVolume& other : scene.others)
-      if (const auto hint = cumulet::demo::up_hint(other)) tell(progress_, *hint);
+      if (const auto hint = cumulet::demo::up_hint(other)) print_line(progress_, *hint);
     if (scene.is_shown() && scene.auto_density_scale)
-      tell_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
-    if (fire_) tell_fire(*fire_, progress_);
+      print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
+    if (fire_) print_fire(*fire_, progress_);
   }
 
   /// Applies the settings that need the loaded surfaces: material variant and camera.
@@ -598,7 +598,7 @@ class Studio {
   void keep_samples(const RenderOptions& options) { try_to_keep(viewer_, options, progress_); }
 
   /// Logs the result of the written image. Throws if rendering was interrupted.
-  void tell_end(const RenderOptions& options, Traced traced) {
+  void print_result(const RenderOptions& options, Traced traced) {
     const cumulet_stats stats = stats_of(viewer_);
     const cumulet_sampling_desc& sampling = options.scene.sampling;
     const cumulet::image::Windows windows =
@@ -611,7 +611,7 @@ class Studio {
       throw std::runtime_error(options.output + ": interrupted: contains the first " + text.data());
     }
     if (options.time_limit || sampling.noise_target_percent > 0.0f)
-      tell_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress_);
+      print_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress_);
   }
 
   void write_trace(const RenderOptions& options) const {
@@ -648,7 +648,7 @@ class Studio {
   /// not apply, because this program fails instead.
   void load_both(const SceneOptions& scene, const cumulet_volume_file_desc& file, const PlannedFrame::Next& next) {
     const auto print = [this](const std::string& failure) {
-      for (const std::string& line : messages_.release(failure)) tell(progress_, line);
+      for (const std::string& line : messages_.release(failure)) print_line(progress_, line);
     };
     messages_.hold();
     try {
@@ -778,7 +778,7 @@ void render(const RenderOptions& options) {
     forget_checkpoint(options.checkpoint);
   }
   studio.write_trace(options);
-  studio.tell_end(options, traced);
+  studio.print_result(options, traced);
 }
 
 bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
@@ -908,7 +908,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
   try {
     studio.write(picture);
     forget_checkpoint(picture.checkpoint);
-    studio.tell_end(picture, traced);
+    studio.print_result(picture, traced);
   } catch (const std::runtime_error& error) {
     report.say(index, FrameState::failed, error.what(), &studio.progress());
     throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));

@@ -83,8 +83,8 @@ CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, cons
   return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group)->take_last();
 }
 
-/// Returns the value with this name; null if there is none. Reports a name of an earlier version. of: what precedes the
-/// name on the command line.
+/// Returns the value with this name; null if there is none. Reports a name of an earlier version. of: the text before
+/// the name on the command line.
 template <class Names>
 auto* find_choice(const CLI::App& app, const std::string& of, const Names& names, std::string_view text) {
   for (const auto& name : names) {

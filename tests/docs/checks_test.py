@@ -5,10 +5,12 @@ import pathlib
 import stat
 import subprocess
 import sys
-import tempfile
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "support"))
+import checkout  # noqa: E402
+
 GOOD = {
     "README.md": "# Title\n\nSee [the guide](docs/guide.md#first-step-2-of-2), [below](#title) and `docs/guide.md`.\n",
     "docs/guide.md": "# Guide\n\n## First step, `2` of 2\n\nSet `size` of `cumulet_thing_desc`. `CUMULET_ONE` is a number.\n\n"
@@ -35,22 +37,13 @@ if os.environ.get("WRITES", "1") == "1":
 """
 
 
-class Checks(unittest.TestCase):
+class Checks(checkout.Checkout):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
-        self.root = self.folder / "checkout"
+        super().setUp()
         self.render = self.folder / "cumulet-render"
         self.render.write_text(RENDER)
         self.render.chmod(self.render.stat().st_mode | stat.S_IXUSR)
         self.write(GOOD)
-
-    def write(self, files):
-        for name, text in files.items():
-            file = self.root / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text)
 
     def replace(self, name, old, new):
         text = (self.root / name).read_text()

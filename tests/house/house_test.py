@@ -3,12 +3,12 @@
 import pathlib
 import subprocess
 import sys
-import tempfile
 import textwrap
 import unittest
 
 HOUSE = pathlib.Path(__file__).resolve().with_name("house.py")
-sys.path.insert(0, str(HOUSE.parent))
+sys.path[:0] = [str(HOUSE.parent), str(HOUSE.parent.parent / "support")]
+import checkout  # noqa: E402
 import cpp  # noqa: E402
 
 TABLE = """# Architecture
@@ -248,20 +248,12 @@ class Functions(unittest.TestCase):
         self.assertEqual([one.full_name for one in source.functions], ["a::b::h", "a::b::S::g"])
 
 
-class Checkout(unittest.TestCase):
+class Checkout(checkout.Checkout):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.root = pathlib.Path(temporary.name) / "checkout"
-        self.bounds = pathlib.Path(temporary.name) / "bounds.txt"
+        super().setUp()
+        self.bounds = self.folder / "bounds.txt"
         self.bounds.write_text("# exceptions\n")
         self.write(GOOD)
-
-    def write(self, files):
-        for name, text in files.items():
-            file = self.root / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text)
 
     def bound(self, *lines):
         self.bounds.write_text("\n".join(("# exceptions", *lines)) + "\n")

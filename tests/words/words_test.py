@@ -5,10 +5,12 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
 WORDS = pathlib.Path(__file__).resolve().with_name("words.py")
+sys.path.insert(0, str(WORDS.parent.parent / "support"))
+import checkout  # noqa: E402
+
 AREAS = ("header", "src", "glsl", "demo", "docs", "build", "tests", "identifiers")
 GOOD = {
     "src/a.cpp": '/// Returns the next sample.\n/// index: of the sample, from 0.\nint next(int index) { return index; }\n'
@@ -20,20 +22,12 @@ GOOD = {
 }
 
 
-class Checkout(unittest.TestCase):
+class Checkout(checkout.Checkout):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.root = pathlib.Path(temporary.name) / "checkout"
-        self.bounds = pathlib.Path(temporary.name) / "bounds.txt"
+        super().setUp()
+        self.bounds = self.folder / "bounds.txt"
         self.write(GOOD)
         self.bound(dict.fromkeys(AREAS, 0))
-
-    def write(self, files):
-        for name, text in files.items():
-            file = self.root / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text)
 
     def bound(self, bounds):
         self.bounds.write_text("# percent\n" + "".join(f"{name} {bound}\n" for name, bound in bounds.items()))
