@@ -284,6 +284,8 @@ void Progressive::advance(const PictureRequest& request, const MarchData& data, 
     } else {
       schedule_.drop();
     }
+    // The coarser pictures tried after it for the same request do not report it again.
+    if (error.code() == ErrorCode::out_of_memory && std::exchange(out_of_memory_for_, requests_) == requests_) return;
     throw;
   }
   if (const auto failure = std::exchange(no_guides_, std::nullopt)) throw Error(*failure);

@@ -191,8 +191,9 @@ class Progressive {
   std::optional<Work> working_;
   std::optional<Work> shown_;
   Picture* before_ = nullptr;
-  std::uint32_t first_divisor_ = 1;  // of the request
-  std::uint32_t finest_ = 1;         // finer ones do not fit the driver's memory
+  std::uint32_t first_divisor_ = 1;                 // of the request
+  std::uint32_t finest_ = 1;                        // finer ones do not fit the driver's memory
+  std::optional<std::uint64_t> out_of_memory_for_;  // request whose lack of memory has been thrown
   double trace_seconds_ = 0.0;
   double answer_seconds_ = 0.0;  // time that the picture being rendered took until it was complete
   double answer_rate_ = 100.0;   // pixels per millisecond, until complete
