@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstring>
 #include <numeric>
 #include <span>
@@ -11,20 +10,16 @@
 
 #include "base/detached_work.hpp"
 #include "base/error.hpp"
-#include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
-#include "render/pace.hpp"
 
 namespace cumulet::render {
 
 namespace {
 
-constexpr std::uint32_t group = 64;  // invocations per work group, of all kernels here
 constexpr std::size_t roots_words = 2 * CM_ROOTS + 4;
-constexpr double parts_weight = 0.05;     // cost of a part of a cell, relative to the rest of its record
-constexpr double max_in_flight_ms = 8.0;  // independent of the deadline, because the host draws, too
+constexpr double parts_weight = 0.05;  // cost of a part of a cell, relative to the rest of its record
 
 // Layout as in glsl/grid_leaves.glsl.
 struct TreeCell {
@@ -62,10 +57,6 @@ std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
   return cells;
 }
 
-// Estimated time of a cheap item before any measurement. Drivers that run dispatches within the call run them on the
-// CPU.
-double cost_ms(const gl::Functions& gl) { return std::exp2(gl.dispatches_in_call ? -18.0 : -22.0); }
-
 gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {"CM_STAGE " + std::to_string(stage)}}; }
 gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {"CM_STAGE " + std::to_string(stage)}}; }
 
@@ -82,13 +73,12 @@ GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Li
                      std::vector<std::uint8_t> levels, std::uint64_t max_cells, std::uint64_t max_bytes,
                      GridPacePtr pace)
     : gl_(std::move(gl)),
-      programs_(std::move(programs)),
       limits_(limits),
       data_(std::move(data)),
       levels_(std::move(levels)),
       max_cells_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(max_cells, CM_ROOTS, std::uint64_t{1} << 30U))),
       max_bytes_(max_bytes),
-      pace_(std::move(pace)),
+      passes_(gl_, std::move(programs), std::move(pace), data_->lattice().cube.log2_size),
       decision_(gl_, "selecting the cells to split") {
   levels_.resize(std::max<std::size_t>((levels_.size() + 3) / 4 * 4, 4));
   plan_decision();
@@ -101,7 +91,7 @@ double GridBuild::progress() const {
 }
 
 bool GridBuild::advance(Deadline deadline) {
-  deadline_ = deadline;
+  passes_.begin_call(deadline);
   if (!cells_) {
     if (!decision_.advance(deadline)) return false;
     plan_cells();
@@ -133,73 +123,13 @@ void GridBuild::require_room(std::uint64_t bytes) const {
                                             " are left within the limit");
 }
 
-double GridBuild::aim_ms() const {
-  constexpr double least = 0.5;
-  constexpr double most = 2.0;
-  const auto now = std::chrono::steady_clock::now();
-  return now < deadline_ ? std::clamp(part_of_rest * milliseconds(deadline_ - now), least, most) : least;
-}
-
-bool GridBuild::has_room_in_flight() {
-  if (in_flight_ms_ < max_in_flight_ms) return true;
-  if (!fence_.passed()) return false;
-  pace_->learn(in_flight_, milliseconds(std::chrono::steady_clock::now() - sent_), GridPace::Measured::at_most);
-  in_flight_.clear();
-  in_flight_ms_ = 0.0;
-  return true;
-}
-
-std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t first, std::uint32_t end,
-                                                 const Bind& bind) {
-  if (!has_room_in_flight()) return std::nullopt;
-  const gl::Program& program = programs_->ask(pass.key);
-  if (!program.usable()) return std::nullopt;
-  constexpr std::uint32_t max_groups = 65535;  // supported by every driver
-  const double ms = pass.weight * pace_->ms(pass.key, pass.cost * cost_ms(*gl_));
-  const double fit = std::clamp(aim_ms() / ms, double{group}, double{max_groups} * (pass.item_a_group ? 1.0 : group));
-  const std::uint32_t items = std::min(static_cast<std::uint32_t>(fit), end - first);
-  const gl::DebugGroup debug(*gl_, "cumulet: grid");
-  gl_->ProgramUniform1ui(program.name(), 0, first);
-  gl_->ProgramUniform1ui(program.name(), 1, first + items);
-  if (pass.of_lattice) gl_->ProgramUniform1ui(program.name(), 2, static_cast<GLuint>(data_->lattice().cube.log2_size));
-  bind(program.name());
-  program.use(*gl_);
-  const auto begun = std::chrono::steady_clock::now();
-  gl_->DispatchCompute(pass.item_a_group ? items : (items + group - 1) / group, 1, 1);
-  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), static_cast<double>(items), pass.weight};
-  if (gl_->dispatches_in_call) {
-    pace_->learn({sent}, milliseconds(std::chrono::steady_clock::now() - begun), GridPace::Measured::exactly);
-    return first + items;
-  }
-  if (in_flight_.empty()) sent_ = begun;
-  in_flight_.push_back(sent);
-  in_flight_ms_ += ms * items;
-  if (in_flight_ms_ >= max_in_flight_ms) fence_ = gl::Fence(gl_);
-  return first + items;
-}
-
-void GridBuild::plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind) {
-  if (first == end) return;  // an empty pass would still cost a step
-  upload.add_until([this, pass, next = first, end, bind]() mutable {
-    while (next < end) {
-      const std::optional<std::uint32_t> left = dispatch(pass, next, end, bind);
-      if (!left) return false;
-      next = *left;
-      if (std::chrono::steady_clock::now() >= deadline_) break;
-    }
-    return next >= end;
-  });
-}
-
 void GridBuild::plan_read_back(Upload& upload) {
   upload.add([this] {
     if (!read_back_) read_back_ = gl::ReadBack(gl_, sizeof(core::CmGridState), "creating the read-back of a grid");
     gl_->CopyNamedBufferSubData(data_->state_.name(), read_back_.name(), 0, 0, sizeof(core::CmGridState));
     gl::memory_barrier(*gl_, GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
     fence_ = gl::Fence(gl_);
-    in_flight_.clear();
-    in_flight_ms_ = 0.0;
+    passes_.clear_in_flight();
   });
   upload.add_until([this] {
     if (!fence_.passed()) return false;
@@ -239,7 +169,7 @@ void GridBuild::plan_decision() {
                   {core::CM_STORAGE_GRID_BINS, &data_->bins_}});
     gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_BRICK_POINTS, data_->points_.name());
   };
-  plan_pass(decision_, {lattice_key(0), 512, true}, 0, static_cast<std::uint32_t>(l.own.nodes.size()), bind);
+  passes_.plan(decision_, {lattice_key(0), 512, true}, 0, static_cast<std::uint32_t>(l.own.nodes.size()), bind);
   // From the finest level up, as in DiamondSet::close().
   for (std::uint32_t octave = 0; octave + 1 < static_cast<std::uint32_t>(l.cube.log2_size); ++octave) {
     const std::uint32_t scale = octave / 3;
@@ -254,17 +184,17 @@ void GridBuild::plan_decision() {
         gl_->ProgramUniform1ui(program, 4, odd);
         gl_->ProgramUniform1ui(program, 5, first_block);
       };
-      plan_pass(decision_, {lattice_key(1), 2}, 0, blocks * cubes * (odd == 3 ? 1 : 3), bind_octave);
+      passes_.plan(decision_, {lattice_key(1), 2}, 0, blocks * cubes * (odd == 3 ? 1 : 3), bind_octave);
     }
   }
   const auto blocks = static_cast<std::uint32_t>(l.blocks.size());
-  plan_pass(decision_, {lattice_key(2), 256, true}, 1, blocks, bind);
+  passes_.plan(decision_, {lattice_key(2), 256, true}, 1, blocks, bind);
   const auto bind_budget = [this, bind](GLuint program) {
     bind(program);
     gl_->ProgramUniform1ui(program, 3, max_cells_);
   };
-  plan_pass(decision_, {lattice_key(3), 1U << 16U, true}, 0, 1, bind_budget);
-  plan_pass(decision_, {lattice_key(4), 256, true}, 1, blocks, bind);
+  passes_.plan(decision_, {lattice_key(3), 1U << 16U, true}, 0, 1, bind_budget);
+  passes_.plan(decision_, {lattice_key(4), 256, true}, 1, blocks, bind);
   plan_read_back(decision_);
 }
 
@@ -349,7 +279,7 @@ void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bi
       const std::uint32_t fine_level = core::cm_fine_level(shape);
       pass.weight += parts_weight * (grid::parts_of_levels[fine_level + 1] - grid::parts_of_levels[fine_level]);
     }
-    plan_pass(*cells_, pass, begin, begin + level.leaves(), bind);
+    passes_.plan(*cells_, pass, begin, begin + level.leaves(), bind);
     begin += level.leaves();
     shape = core::cm_child_shape(shape, 0);
   }
@@ -384,10 +314,10 @@ void GridBuild::plan_clear_cones() {
                   {core::CM_STORAGE_GRID_CLEAR, &clear_}});
   };
   const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {"CM_STAGE " + std::to_string(stage)}}; };
-  plan_pass(*cells_, {key(0), 8}, 0, built_.count, bind);
-  plan_pass(*cells_, {key(1), 4096, true}, 0, CM_CLEAR_CONES, bind);
-  plan_pass(*cells_, {key(2), 8}, 0, CM_CLEAR_CUBES, bind);
-  plan_pass(*cells_, {key(3), 8}, 0, built_.count, bind);
+  passes_.plan(*cells_, {key(0), 8}, 0, built_.count, bind);
+  passes_.plan(*cells_, {key(1), 4096, true}, 0, CM_CLEAR_CONES, bind);
+  passes_.plan(*cells_, {key(2), 8}, 0, CM_CLEAR_CUBES, bind);
+  passes_.plan(*cells_, {key(3), 8}, 0, built_.count, bind);
 }
 
 void GridBuild::plan_channels() {
@@ -405,7 +335,7 @@ void GridBuild::plan_channels() {
                   {core::CM_STORAGE_GRID_CHANNEL, &emission},
                   {core::CM_STORAGE_GRID_GLOWING, &glowing_}});
   };
-  plan_pass(*cells_, {{"grid_emissive.comp", {}}, 2, false, false}, 0, built_.count, bind);
+  passes_.plan(*cells_, {{"grid_emissive.comp", {}}, 2, false, false}, 0, built_.count, bind);
 }
 
 void GridBuild::plan_channel(std::size_t index) {
@@ -493,14 +423,14 @@ void GridBuild::plan_tree_cells() {
                   {core::CM_STORAGE_GRID_TREE, &built_.tree}});
   };
   for (const Level& level : tree_levels_) {
-    plan_pass(*cells_, {cells_key(0), 8}, level.cells_begin, level.cells_end, bind_splits);
-    plan_pass(*cells_, {cells_key(1), 16}, level.splits_begin, level.splits_end, bind);
+    passes_.plan(*cells_, {cells_key(0), 8}, level.cells_begin, level.cells_end, bind_splits);
+    passes_.plan(*cells_, {cells_key(1), 16}, level.splits_begin, level.splits_end, bind);
   }
   for (std::size_t i = tree_levels_.size(); i-- > 0;)
-    plan_pass(*cells_, {cells_key(2), 2}, tree_levels_[i].splits_begin, tree_levels_[i].splits_end, bind);
-  plan_pass(*cells_, {cells_key(3), 1, true}, 0, 1, bind);
+    passes_.plan(*cells_, {cells_key(2), 2}, tree_levels_[i].splits_begin, tree_levels_[i].splits_end, bind);
+  passes_.plan(*cells_, {cells_key(3), 1, true}, 0, 1, bind);
   for (const Level& level : tree_levels_)
-    plan_pass(*cells_, {cells_key(4), 4}, level.splits_begin, level.splits_end, bind);
+    passes_.plan(*cells_, {cells_key(4), 4}, level.splits_begin, level.splits_end, bind);
 }
 
 }  // namespace cumulet::render

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
-#include <functional>
 #include <future>
 #include <glm/glm.hpp>
 #include <initializer_list>
@@ -16,6 +14,7 @@
 #include "gl/programs.hpp"
 #include "render/built_grid.hpp"
 #include "render/grid_pace.hpp"
+#include "render/grid_passes.hpp"
 #include "render/lattice_upload.hpp"
 #include "render/upload.hpp"
 #include "scene/emissive_cells.hpp"
@@ -32,8 +31,8 @@ std::uint64_t building_bytes_at_least();
 /// by level as in grid::GridBuilder.
 /// The number of cells per level is read back once, before the first is made, without waiting. All later buffers have
 /// exactly the needed size. Emissive cells are also read back without waiting, and a worker thread makes their table.
-/// Passes are split into dispatches of about a millisecond, by the measured times of their kernels; a frame may stop
-/// between dispatches. Fences bound the work in flight. All calls need a current context and an active StateGuard.
+/// GridPasses splits its passes into dispatches, and a frame may stop between them. All calls need a current context
+/// and an active StateGuard.
 class GridBuild {
  public:
   /// levels: grid::OwnPriorities::levels() of the view. max_cells: capped at 2^30. max_bytes: limit of GL memory.
@@ -55,15 +54,8 @@ class GridBuild {
   BuiltGrid take() { return std::move(built_); }
 
  private:
-  // A pass of one kernel. cost: estimated time per item, relative to a cheap one.
-  struct Pass {
-    gl::ProgramKey key;
-    std::uint32_t cost = 1;
-    bool item_a_group = false;  // one work group of 64 invocations per item, else one invocation
-    bool of_lattice = true;     // the kernel includes glsl/lattice_lookup.glsl
-    double weight = 1.0;        // per item, if the items of a kernel differ
-  };
-  using Bind = std::function<void(GLuint program)>;
+  using Pass = GridPasses::Pass;
+  using Bind = GridPasses::Bind;
   // A level of the tree: its range of cells, and the range in the list of those that split. In the list all splits come
   // before all leaves. The last level has no splits.
   struct Level {
@@ -88,37 +80,24 @@ class GridBuild {
   void plan_emissive();
   void begin_emissive_table();
   void plan_read_back(Upload& upload);
-  // Plans a pass over items [first, end), in dispatches of bounded time. bind: binds buffers, and sets uniforms beyond
-  // the first three.
-  void plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind);
-  // Sends one dispatch with the first of the items. Returns the end of its items; nullopt if it has to wait.
-  std::optional<std::uint32_t> dispatch(const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind);
-  [[nodiscard]] double aim_ms() const;
-  // Returns whether little enough work is in flight.
-  bool has_room_in_flight();
   void require_room(std::uint64_t bytes) const;
   void bind_storage(std::initializer_list<std::pair<GLint, const gl::Object*>> buffers) const;
   [[nodiscard]] gl::Object make_storage(std::uint64_t bytes, const char* what);
 
   gl::FunctionsPtr gl_;
-  gl::ProgramsPtr programs_;
   gl::Limits limits_;
   LatticeDataPtr data_;
   std::vector<std::uint8_t> levels_;
   std::uint32_t max_cells_;
   std::uint64_t max_bytes_;
-  GridPacePtr pace_;
-  Deadline deadline_{};  // of the current call
+  GridPasses passes_;
   std::uint64_t bytes_ = 0;
   gl::Object level_bytes_;
   gl::Object tree_cells_, links_, below_, list_, clear_, glowing_;
   BuiltGrid built_;
   gl::ReadBack read_back_;
   gl::Fence fence_;
-  std::vector<GridPace::Sent> in_flight_;       // since the previous ones were seen to be finished
-  double in_flight_ms_ = 0.0;                   // estimated time of these
-  std::chrono::steady_clock::time_point sent_;  // when the first of them was sent
-  core::CmGridState state_{};                   // as read back
+  core::CmGridState state_{};  // as read back
   Upload decision_;
   gl::ReadBack emissive_read_back_;
   std::vector<std::uint32_t> emissive_words_;
