@@ -49,7 +49,7 @@ void TransferBack::read(const scene::StateInGlPtr& state) {
     fields_.push_back({field.channel, std::move(copy)});
   }
   fence_ = context_.fence();
-  gl::check(*context_.gl, "copying the host's voxels");
+  gl::check(*context_.gl, transfer_step);
   state_ = state;
 }
 

@@ -117,7 +117,7 @@ bool TransferInGl::summarize(Deadline deadline) {
   }
   brick_tree_ = {};
   fence_ = context_.fence();
-  gl::check(gl, "copying the host's voxels");
+  gl::check(gl, transfer_step);
   return true;
 }
 
@@ -164,7 +164,7 @@ VoxelTransferPtr TransferInGl::join() {
   }
   if (!stay_.instead) return nullptr;
   // The state that it updates is in main memory.
-  auto update = std::make_shared<scene::StateInGl>();
+  const auto update = std::make_shared<scene::StateInGl>();
   update->name = info_.name;
   update->fields = std::move(fields_);
   update->index_to_world = packed_.index_to_world();

@@ -37,7 +37,7 @@ void TransferToMemory::copy_rest() {
     copies = true;
   }
   if (copies) fence_ = context_.fence();
-  gl::check(*context_.gl, "copying the host's voxels");
+  gl::check(*context_.gl, transfer_step);
 }
 
 bool TransferToMemory::take(Deadline deadline) {

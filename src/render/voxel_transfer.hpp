@@ -44,6 +44,9 @@ struct StayInGl {
 /// Returns the GPU-resident state at the time of the call; null: there is none.
 using FindState = std::function<scene::StateInGlPtr()>;
 
+/// Prefix of GL error messages.
+constexpr const char* transfer_step = "copying the host's voxels";
+
 /// The objects that the transfers of a context share.
 struct TransferContext {
   gl::FunctionsPtr gl;

@@ -33,7 +33,7 @@ void VoxelTransfers::begin(const GlState& state, const void* whose, Arrival arri
   if (stay != nullptr) TransferInGl::ask_for_programs(context_, packed);
   packer_.pack(packed, state.wait);
   gl::Fence fence = context_.fence();
-  gl::check(gl, "copying the host's voxels");
+  gl::check(gl, transfer_step);
   if (info.whole) {
     // Superseded transfers are dropped except for the first, so that states arrive however fast they come.
     const auto of_one = [&](const VoxelTransferPtr& other) {
