@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "base/error.hpp"
 #include "base/progress.hpp"
 
 namespace cumulet {
@@ -17,6 +18,21 @@ namespace cumulet {
 /// process is exiting. `work` must own everything it touches, call no callback of the host and not throw. Unloading the
 /// library and process exit wait for it, however long it takes.
 void run_detached(const std::function<void()>& work);
+
+/// Runs `work` by run_detached(). The future has its result, or the Error of its failure. what: names the work in it.
+template <class Made, class Work>
+std::future<Made> make_detached(const char* what, Work work) {
+  const auto task = std::make_shared<std::packaged_task<Made()>>([what, work = std::move(work)] {
+    try {
+      return work();
+    } catch (...) {
+      throw caught(what);
+    }
+  });
+  std::future<Made> made = task->get_future();
+  run_detached([task] { (*task)(); });
+  return made;
+}
 
 /// Runs `call`, which cannot be interrupted (a library's decoder, a sort), and returns its result. On cancellation it
 /// throws Error(cancelled) within a few milliseconds, and `call` continues in the background. `call` must therefore own

@@ -10,6 +10,7 @@
 #include "base/slot.hpp"
 #include "render/analytic_light_data.hpp"
 #include "render/environment_data.hpp"
+#include "render/grid_builds.hpp"
 #include "render/instance_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_upload.hpp"

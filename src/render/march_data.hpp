@@ -12,7 +12,7 @@
 
 #include "gl/objects.hpp"
 #include "gl/word_heap.hpp"
-#include "render/grid_build.hpp"
+#include "render/built_grid.hpp"
 #include "render/parameters.hpp"
 #include "render/upload.hpp"
 #include "scene/march_source.hpp"

@@ -23,6 +23,7 @@
 #include "gl/state_guard.hpp"
 #include "grid/clear_cones.hpp"
 #include "grid/tet_grid.hpp"
+#include "render/grid_builds.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
 #include "support/grid_reference.hpp"
