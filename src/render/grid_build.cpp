@@ -17,7 +17,7 @@
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/evaluation.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 #include "render/brick_kernels.hpp"
 #include "render/pace.hpp"
 #include "volume/brick_values.hpp"
