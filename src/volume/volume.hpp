@@ -61,9 +61,6 @@ struct ScalarVolume {
   }
 };
 
-/// Makes a volume of GPU-resident bricks. bricks: tidy.
-ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const glm::dmat4& index_to_world);
-
 /// An entry of a file's metadata, as text.
 struct Metadata {
   std::string name;

@@ -18,6 +18,7 @@
 #include "support/grid_reference.hpp"
 #include "support/simulated.hpp"
 #include "support/view_cameras.hpp"
+#include "volume/bricks.hpp"
 #include "volume/frame.hpp"
 #include "volume/optical_depth.hpp"
 
