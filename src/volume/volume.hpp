@@ -25,6 +25,12 @@ struct Tile {
   float value;
 };
 
+/// A tile as stored in a tree: not clipped to the active voxels; it may have the background value, or be inactive.
+struct SourceTile {
+  Tile box;
+  bool active;
+};
+
 /// A scalar field on a sparse voxel lattice, independent of file formats.
 ///
 /// Voxel (i,j,k) is the unit cube centered on (i,j,k) in index space, with a constant value. The field is zero outside
