@@ -29,6 +29,7 @@
 #include "grid/grid_builder.hpp"
 #include "render/grid_build.hpp"
 #include "viewer/volume_asset.hpp"
+#include "volume/frame_import.hpp"
 
 namespace {
 

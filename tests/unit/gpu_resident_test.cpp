@@ -19,7 +19,7 @@
 #include "support/simulated.hpp"
 #include "support/view_cameras.hpp"
 #include "volume/bricks.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/optical_depth.hpp"
 
 namespace {
