@@ -252,6 +252,40 @@ bool Ui::text(const char* label, const char* tip, const char* hint, std::string&
   return entered;
 }
 
+void Ui::draw_dial(ImVec2 centre, float radius, bool lit, float azimuth, float elevation, float camera_azimuth) const {
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
+  constexpr int segments = 48;
+  draw.AddCircleFilled(centre, radius, color_of(lit ? ImGuiCol_FrameBgHovered : ImGuiCol_FrameBg), segments);
+  for (const float ring : {1.0f / 3.0f, 2.0f / 3.0f})
+    draw.AddCircle(centre, radius * ring, color_of(ImGuiCol_Text, 0.12f), segments, px(1.0f));
+  draw.AddLine({centre.x - radius, centre.y}, {centre.x + radius, centre.y}, color_of(ImGuiCol_Text, 0.12f), px(1.0f));
+  draw.AddLine({centre.x, centre.y - radius}, {centre.x, centre.y + radius}, color_of(ImGuiCol_Text, 0.12f), px(1.0f));
+  draw.AddCircle(centre, radius, color_of(ImGuiCol_Text, 0.35f), segments, px(1.5f));
+  struct Letter {
+    const char* text;
+    float x, y;
+  };
+  for (const Letter& letter : {Letter{"+X", 1, 0}, Letter{"-X", -1, 0}, Letter{"+Z", 0, 1}, Letter{"-Z", 0, -1}}) {
+    const ImVec2 size = ImGui::CalcTextSize(letter.text);
+    const float at = radius + px(10.0f);
+    draw.AddText({centre.x + letter.x * at - size.x * 0.5f, centre.y + letter.y * at - size.y * 0.5f},
+                 color_of(ImGuiCol_TextDisabled), letter.text);
+  }
+  const DialPoint camera = dial_point({static_cast<double>(camera_azimuth), 0.0});
+  const ImVec2 eye(centre.x + static_cast<float>(camera.x) * radius, centre.y + static_cast<float>(camera.y) * radius);
+  const ImVec2 inward((centre.x - eye.x) / radius, (centre.y - eye.y) / radius);
+  const float wing = px(5.0f);
+  draw.AddTriangleFilled({eye.x + inward.x * wing * 1.8f, eye.y + inward.y * wing * 1.8f},
+                         {eye.x - inward.y * wing, eye.y + inward.x * wing},
+                         {eye.x + inward.y * wing, eye.y - inward.x * wing}, color_of(ImGuiCol_TextDisabled));
+  const DialPoint at = dial_point({static_cast<double>(azimuth), static_cast<double>(elevation)});
+  const ImVec2 disc(centre.x + static_cast<float>(at.x) * radius, centre.y + static_cast<float>(at.y) * radius);
+  const ImU32 gold = elevation < 0.0f ? IM_COL32(150, 120, 80, 255) : IM_COL32(255, 205, 110, 255);
+  draw.AddLine(centre, disc, color_of(ImGuiCol_Text, 0.25f), px(1.0f));
+  draw.AddCircleFilled(disc, px(11.0f), (gold & 0x00FFFFFFu) | 0x38000000u, segments);
+  draw.AddCircleFilled(disc, px(6.5f), gold, segments);
+}
+
 bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& elevation, float camera_azimuth) {
   ImGuiContext& g = *ImGui::GetCurrentContext();
   ImGuiWindow* window = ImGui::GetCurrentWindow();
@@ -303,42 +337,27 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
     elevation = static_cast<float>(sun.elevation);
   }
 
-  ImDrawList& draw = *window->DrawList;
-  constexpr int segments = 48;
-  const bool lit = hovered || g.ActiveId == id;
-  draw.AddCircleFilled(centre, radius, color_of(lit ? ImGuiCol_FrameBgHovered : ImGuiCol_FrameBg), segments);
-  for (const float ring : {1.0f / 3.0f, 2.0f / 3.0f})
-    draw.AddCircle(centre, radius * ring, color_of(ImGuiCol_Text, 0.12f), segments, px(1.0f));
-  draw.AddLine({centre.x - radius, centre.y}, {centre.x + radius, centre.y}, color_of(ImGuiCol_Text, 0.12f), px(1.0f));
-  draw.AddLine({centre.x, centre.y - radius}, {centre.x, centre.y + radius}, color_of(ImGuiCol_Text, 0.12f), px(1.0f));
-  draw.AddCircle(centre, radius, color_of(ImGuiCol_Text, 0.35f), segments, px(1.5f));
-  struct Letter {
-    const char* text;
-    float x, y;
-  };
-  for (const Letter& letter : {Letter{"+X", 1, 0}, Letter{"-X", -1, 0}, Letter{"+Z", 0, 1}, Letter{"-Z", 0, -1}}) {
-    const ImVec2 size = ImGui::CalcTextSize(letter.text);
-    const float at = radius + px(10.0f);
-    draw.AddText({centre.x + letter.x * at - size.x * 0.5f, centre.y + letter.y * at - size.y * 0.5f},
-                 color_of(ImGuiCol_TextDisabled), letter.text);
-  }
-  const DialPoint camera = dial_point({static_cast<double>(camera_azimuth), 0.0});
-  const ImVec2 eye(centre.x + static_cast<float>(camera.x) * radius, centre.y + static_cast<float>(camera.y) * radius);
-  const ImVec2 inward((centre.x - eye.x) / radius, (centre.y - eye.y) / radius);
-  const float wing = px(5.0f);
-  draw.AddTriangleFilled({eye.x + inward.x * wing * 1.8f, eye.y + inward.y * wing * 1.8f},
-                         {eye.x - inward.y * wing, eye.y + inward.x * wing},
-                         {eye.x + inward.y * wing, eye.y - inward.x * wing}, color_of(ImGuiCol_TextDisabled));
-  const DialPoint at = dial_point({static_cast<double>(azimuth), static_cast<double>(elevation)});
-  const ImVec2 disc(centre.x + static_cast<float>(at.x) * radius, centre.y + static_cast<float>(at.y) * radius);
-  const ImU32 gold = elevation < 0.0f ? IM_COL32(150, 120, 80, 255) : IM_COL32(255, 205, 110, 255);
-  draw.AddLine(centre, disc, color_of(ImGuiCol_Text, 0.25f), px(1.0f));
-  draw.AddCircleFilled(disc, px(11.0f), (gold & 0x00FFFFFFu) | 0x38000000u, segments);
-  draw.AddCircleFilled(disc, px(6.5f), gold, segments);
+  draw_dial(centre, radius, hovered || g.ActiveId == id, azimuth, elevation, camera_azimuth);
   ImGui::RenderNavHighlight(box, id);
   remember(label, tip);
   return changed;
 }
+
+/// The rectangle of a curve, and the plot within it.
+struct Ui::CurveArea {
+  ImVec2 corner, end;  // of the rectangle
+  ImVec2 low, high;    // of the plot: the points (0, 0) and (max_value, max_result)
+  float max_value, max_result;
+
+  [[nodiscard]] ImVec2 position_of(const settings::RampPoint& point) const {
+    return {low.x + (high.x - low.x) * (point[0] / max_value), low.y + (high.y - low.y) * (point[1] / max_result)};
+  }
+  /// Returns the point at a position, clamped to the plot.
+  [[nodiscard]] settings::RampPoint point_at(ImVec2 position) const {
+    return {std::clamp((position.x - low.x) / (high.x - low.x), 0.0f, 1.0f) * max_value,
+            std::clamp((position.y - low.y) / (high.y - low.y), 0.0f, 1.0f) * max_result};
+  }
+};
 
 bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
                const std::vector<float>& heights, float reach) {
@@ -349,22 +368,14 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   remember(label, tip);
   const ImVec2 end(corner.x + size.x, corner.y + size.y);
   const float pad = px(6.0f);  // so that points at the border are not clipped
-  const ImVec2 low(corner.x + pad, end.y - pad);
-  const ImVec2 high(end.x - pad, corner.y + pad);
-  const auto position_of = [&](const settings::RampPoint& point) {
-    return ImVec2(low.x + (high.x - low.x) * (point[0] / view.max_value),
-                  low.y + (high.y - low.y) * (point[1] / view.max_result));
-  };
+  const CurveArea area{
+      corner, end, {corner.x + pad, end.y - pad}, {end.x - pad, corner.y + pad}, view.max_value, view.max_result};
   const ImVec2 mouse = ImGui::GetIO().MousePos;
-  const auto under_mouse = [&]() -> settings::RampPoint {
-    return {std::clamp((mouse.x - low.x) / (high.x - low.x), 0.0f, 1.0f) * view.max_value,
-            std::clamp((mouse.y - low.y) / (high.y - low.y), 0.0f, 1.0f) * view.max_result};
-  };
   std::optional<std::size_t> near;
   float nearest = px(9.0f);
   const bool hovered = ImGui::IsItemHovered();
   for (std::size_t i = 0; hovered && i < points.size(); ++i) {
-    const ImVec2 at = position_of(points[i]);
+    const ImVec2 at = area.position_of(points[i]);
     const float distance = std::hypot(at.x - mouse.x, at.y - mouse.y);
     if (distance > nearest) continue;
     nearest = distance;
@@ -374,14 +385,14 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
   bool changed = false;
   if (hovered && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
     changed = !near;
-    view.held = near ? near : add_point(points, under_mouse());
+    view.held = near ? near : add_point(points, area.point_at(mouse));
     if (view.held) view.chosen = *view.held;
   } else if (!ImGui::IsItemActive()) {
     view.held.reset();
   }
   const ImVec2 moved = ImGui::GetIO().MouseDelta;
   if (view.held && !ImGui::IsMouseClicked(ImGuiMouseButton_Left) && (moved.x != 0.0f || moved.y != 0.0f)) {
-    move_point(points, *view.held, under_mouse());
+    move_point(points, *view.held, area.point_at(mouse));
     changed = true;
   }
   const bool removes =
@@ -392,38 +403,43 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
     changed = true;
   }
 
-  if (!ImGui::IsItemVisible()) return changed;
+  if (ImGui::IsItemVisible()) draw_curve(area, points, view, near, heights, reach);
+  return changed;
+}
+
+void Ui::draw_curve(const CurveArea& area, const settings::RampPoints& points, const RampView& view,
+                    std::optional<std::size_t> near, const std::vector<float>& heights, float reach) const {
   ImDrawList& draw = *ImGui::GetWindowDrawList();
-  draw.AddRectFilled(corner, end, color_of(ImGuiCol_FrameBg), px(4.0f));
-  draw.PushClipRect(corner, end, true);
+  draw.AddRectFilled(area.corner, area.end, color_of(ImGuiCol_FrameBg), px(4.0f));
+  draw.PushClipRect(area.corner, area.end, true);
   const float step = reach / static_cast<float>(std::max<std::size_t>(heights.size(), 1));
   for (std::size_t i = 0; i < heights.size(); ++i) {
-    const float from = position_of({step * static_cast<float>(i), 0.0f}).x;
-    const float to = position_of({step * static_cast<float>(i + 1), 0.0f}).x;
-    draw.AddRectFilled({from, low.y + (high.y - low.y) * heights[i]}, {to, low.y},
+    const float from = area.position_of({step * static_cast<float>(i), 0.0f}).x;
+    const float to = area.position_of({step * static_cast<float>(i + 1), 0.0f}).x;
+    draw.AddRectFilled({from, area.low.y + (area.high.y - area.low.y) * heights[i]}, {to, area.low.y},
                        color_of(ImGuiCol_PlotHistogram, 0.22f));
   }
   const ImU32 line = color_of(ImGuiCol_PlotLines);
-  ImVec2 before(corner.x, position_of(points.front()).y);
+  ImVec2 before(area.corner.x, area.position_of(points.front()).y);
   for (const settings::RampPoint& point : points) {
-    const ImVec2 at = position_of(point);
+    const ImVec2 at = area.position_of(point);
     draw.AddLine(before, at, line, px(1.5f));
     before = at;
   }
-  draw.AddLine(before, {end.x, before.y}, line, px(1.5f));
+  draw.AddLine(before, {area.end.x, before.y}, line, px(1.5f));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const bool lit = i == near || i == view.held;
-    draw.AddCircleFilled(position_of(points[i]), px(lit ? 5.5f : 4.0f),
+    draw.AddCircleFilled(area.position_of(points[i]), px(lit ? 5.5f : 4.0f),
                          color_of(i == view.chosen ? ImGuiCol_CheckMark : ImGuiCol_Text));
   }
   draw.PopClipRect();
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.max_result));
-  draw.AddText({corner.x + px(5.0f), corner.y + px(2.0f)}, color_of(ImGuiCol_TextDisabled), text.data());
-  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.max_value));
+  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(area.max_result));
+  draw.AddText({area.corner.x + px(5.0f), area.corner.y + px(2.0f)}, color_of(ImGuiCol_TextDisabled), text.data());
+  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(area.max_value));
   const ImVec2 wide = ImGui::CalcTextSize(text.data());
-  draw.AddText({end.x - px(5.0f) - wide.x, end.y - px(2.0f) - wide.y}, color_of(ImGuiCol_TextDisabled), text.data());
-  return changed;
+  draw.AddText({area.end.x - px(5.0f) - wide.x, area.end.y - px(2.0f) - wide.y}, color_of(ImGuiCol_TextDisabled),
+               text.data());
 }
 
 void Ui::plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest) {

@@ -88,6 +88,11 @@ class Ui {
 
  private:
   void begin_row(const char* label) const;
+  void draw_dial(ImVec2 centre, float radius, bool lit, float azimuth, float elevation, float camera_azimuth) const;
+  struct CurveArea;
+  // near: index of the point under the mouse.
+  void draw_curve(const CurveArea& area, const settings::RampPoints& points, const RampView& view,
+                  std::optional<std::size_t> near, const std::vector<float>& heights, float reach) const;
   template <class Number>
   bool slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
              const char* format, ImGuiSliderFlags flags);

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstddef>
-#include <settings.hpp>
 #include <string>
 #include <string_view>
 
-#include "scene_file.hpp"
-
 namespace cumulet::demo {
+
+/// Versions of the file format. Version 1 has one volume without transform and no lights; saving in it drops the rest.
+/// Version 3 is version 2 with other names.
+enum class SceneFormat { first = 1, second = 2, third = 3 };
 
 // Keys of scene files. The code names a key as version 3 does, but with the sections `volume`, `medium` and `surfaces`
 // of version 1: "volume.transforms" is "volumes[0].transforms" in a file. The tables of settings have such keys.

@@ -3,10 +3,12 @@
 #include <cumulet/cumulet.h>
 
 #include <array>
-#include <scene_file.hpp>
 #include <string>
 
 namespace cumulet::demo {
+
+/// Up axis of a volume file. Blender and Mantaflow use Z; images use Y.
+enum class UpAxis { y, z };
 
 /// Spelling of a value on the command line and in scene files, for values that are not in a settings table.
 template <class Value>

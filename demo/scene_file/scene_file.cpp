@@ -25,9 +25,7 @@
 #include <utility>
 #include <vector>
 
-#include "keys.hpp"
 #include "matrix.hpp"
-#include "names.hpp"
 
 namespace cumulet::demo {
 namespace {

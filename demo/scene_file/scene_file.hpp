@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-namespace cumulet::demo {
+#include "keys.hpp"
+#include "names.hpp"
 
-/// Up axis of a volume file. Blender and Mantaflow use Z; images use Y.
-enum class UpAxis { y, z };
+namespace cumulet::demo {
 
 /// A volume file, its grids and its transform. Changing any of these requires loading it again.
 struct VolumeFile {
@@ -200,10 +200,6 @@ void end_shutter(SceneOptions& scene);
 [[nodiscard]] SceneOptions parse_scene(const std::string& text, const std::string& path);
 /// Reads a scene file. Throws as parse_scene.
 [[nodiscard]] SceneOptions load_scene(const std::string& path);
-
-/// Versions of the file format. Version 1 has one volume without transform and no lights; saving in it drops the rest.
-/// Version 3 is version 2 with other names (keys.cpp).
-enum class SceneFormat { first = 1, second = 2, third = 3 };
 
 /// Returns the text for parse_scene. All settings are written except those left to the library's default. Files in the
 /// scene file's folder or below it get relative names.

@@ -15,7 +15,6 @@
 #include <thread>
 #include <utility>
 
-#include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "base/never_destroyed.hpp"
 

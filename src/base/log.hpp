@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "base/callback_scope.hpp"
+#include "base/library_thread.hpp"
 
 namespace cumulet {
 

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "base/error.hpp"
-#include "gl/compatibility_state.hpp"
+#include "gl/compatibility_functions.hpp"
 
 namespace cumulet::gl {
 
@@ -108,16 +108,6 @@ void clear_errors(const Functions& gl) {
   // A lost context may report errors forever.
   for (int i = 0; i < 64 && gl.GetError() != GL_NO_ERROR; ++i) {
   }
-}
-
-bool has_extension(const Functions& gl, const char* name) {
-  GLint count = 0;
-  gl.GetIntegerv(GL_NUM_EXTENSIONS, &count);
-  for (GLint i = 0; i < count; ++i) {
-    const GLubyte* text = gl.GetStringi(GL_EXTENSIONS, static_cast<GLuint>(i));
-    if (text != nullptr && std::strcmp(reinterpret_cast<const char*>(text), name) == 0) return true;
-  }
-  return false;
 }
 
 std::string string_of(const Functions& gl, GLenum name) {

@@ -122,9 +122,6 @@ void check_reset(const Functions& gl);
 /// Drops errors that are pending, for example from calls of the host.
 void clear_errors(const Functions& gl);
 
-/// Whether the current context supports the extension.
-bool has_extension(const Functions& gl, const char* name);
-
 /// Returns a string of the context (GL_VENDOR, GL_VERSION, ...), or "" if the driver returns none.
 std::string string_of(const Functions& gl, GLenum name);
 

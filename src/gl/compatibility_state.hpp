@@ -4,36 +4,12 @@
 
 #include <array>
 #include <cstddef>
-#include <memory>
 
 #include "gl/bindings.hpp"
 
 namespace cumulet::gl {
 
 struct Functions;
-
-/// The functions that only a compatibility context has, as far as the library needs them. They are loaded through the
-/// host's callback.
-struct CompatibilityFunctions {
-  using GetProc = void* (*)(void* user, const char* name);
-
-  void(GLAD_API_PTR* PixelTransferf)(GLenum name, GLfloat value) = nullptr;
-  void(GLAD_API_PTR* TexEnvf)(GLenum target, GLenum name, GLfloat value) = nullptr;
-  void(GLAD_API_PTR* GetTexEnvfv)(GLenum target, GLenum name, GLfloat* values) = nullptr;
-  // Null where the context lacks GL_ARB_imaging.
-  void(GLAD_API_PTR* MatrixMode)(GLenum mode) = nullptr;
-  void(GLAD_API_PTR* LoadMatrixf)(const GLfloat* matrix) = nullptr;
-  /// The window system's query for the current context. Null if the host's callback does not provide one.
-  void* (*current_context)() = nullptr;
-};
-
-/// Returns null in a core or forward-compatible context. Throws Error(unsupported) with the name of a missing function.
-std::shared_ptr<const CompatibilityFunctions> load_compatibility(const Functions& gl,
-                                                                 CompatibilityFunctions::GetProc get_proc, void* user);
-
-/// Returns the window system's query for the current context. Null if the host's callback provides none that returns a
-/// context.
-void* (*find_current_context(CompatibilityFunctions::GetProc get_proc, void* user))();
 
 /// Whether the calling thread is between glBegin and glEnd, where GL answers no query. `certain` is false if the window
 /// system cannot be queried; there may then be no current context.
@@ -42,8 +18,6 @@ struct BetweenBeginAndEnd {
   bool certain = false;
 };
 BetweenBeginAndEnd between_begin_and_end(const Functions& gl);
-inline constexpr const char* between_begin_and_end_message =
-    "the function was called between glBegin and glEnd, which OpenGL does not allow: call it after glEnd";
 
 /// Throws Error(gl) if a display list is open, or if glRenderMode is GL_SELECT or GL_FEEDBACK. Does nothing in a core
 /// context.

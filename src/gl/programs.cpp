@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
+#include "gl/extensions.hpp"
 #include "gl/shader_sources.hpp"
 
 namespace cumulet::gl {

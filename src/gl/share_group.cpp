@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "base/error.hpp"
+#include "gl/compatibility_functions.hpp"
 #include "gl/compatibility_state.hpp"
 
 namespace cumulet::gl {

@@ -8,15 +8,14 @@
 
 #include "base/progress.hpp"
 #include "grid/cell.hpp"
-#include "grid/refine.hpp"
+#include "grid/own_measure.hpp"
+#include "grid/refine_settings.hpp"
+#include "grid/rgb_field.hpp"
 #include "grid/statistics.hpp"
 #include "grid/view_levels.hpp"
 
 namespace cumulet::grid {
 
-/// Number of levels of splitting cells inside a brick, starting with its Kuhn tetrahedra. For larger cubes the first
-/// three levels are the cube's own.
-inline constexpr unsigned brick_levels = CM_BRICK_LEVELS;
 /// Number of points of a brick's 9^3 at which the cells of its first levels split, by number of levels.
 inline constexpr std::array<unsigned, brick_levels + 1> points_of_levels{CM_POINTS_OF_LEVELS};
 /// Split points of a brick, level by level. For a larger cube they are scaled with its size.
@@ -26,16 +25,6 @@ const BrickPoints& brick_points();
 /// Maps each of a brick's 9^3 points, x first, to its index in brick_points().
 using BrickPointIndices = std::array<std::uint16_t, 9 * 9 * 9>;
 const BrickPointIndices& brick_point_indices();
-
-/// Parameters of the refinement criterion for a field, as passed to shaders.
-struct OwnMeasure {
-  float scale = 0.0F;
-  float own_hiding = 0.0F;
-  float floor = 0.0F;  ///< criteria not above it count as 0
-  bool linear = false;
-  bool two_way = true;  ///< two-way transmittance (density) instead of one-way (emission)
-  Criterion criterion = Criterion::transmittance;
-};
 
 /// GPU-resident bricks. glsl/own_priorities.comp computes their priorities on the GPU.
 struct BricksToRate {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "grid/cube.hpp"
-#include "grid/refine.hpp"
+#include "grid/refine_settings.hpp"
 
 namespace cumulet::grid {
 
@@ -16,6 +16,10 @@ constexpr unsigned splitting_levels(int log2_size) { return static_cast<unsigned
 unsigned level_of(std::uint32_t shape, int log2_size);
 /// Level of the six Kuhn tetrahedra of an octree cube of 2^node_size voxels; negative for the whole cube.
 constexpr int kuhn_level(int log2_size, int node_size) { return 3 * (log2_size - 1 - node_size) + 1; }
+
+/// Number of levels of splitting cells inside a brick, starting with its Kuhn tetrahedra. For larger cubes the first
+/// three levels are the cube's own.
+inline constexpr unsigned brick_levels = CM_BRICK_LEVELS;
 
 /// For each octree cube, the number of bisection levels, from the roots on, that may split in a camera's view. A level
 /// may split if its longest edge, in the volume's world space, covers the settings' pixel_size at the point of the cube

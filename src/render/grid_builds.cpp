@@ -7,7 +7,7 @@
 #include "base/detached_work.hpp"
 #include "base/error.hpp"
 #include "grid/evaluation.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 
 namespace cumulet::render {
 

@@ -598,6 +598,54 @@ class SurfaceRaster::Pen {
   const scene::RasterSource::Material* material_ = nullptr;
 };
 
+namespace {
+
+// Sets the viewport, and the state of depth tests, culling and blending.
+void set_state(const gl::Functions& gl, glm::uvec2 size) {
+  gl.ViewportIndexedf(0, 0.0F, 0.0F, static_cast<GLfloat>(size.x), static_cast<GLfloat>(size.y));
+  gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  gl.Enable(GL_DEPTH_TEST);
+  gl.DepthFunc(GL_GREATER);
+  gl.CullFace(GL_BACK);
+  // For blended surfaces: colors are blended over each other, and z is the nearest.
+  gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
+  gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  gl.BlendEquationSeparatei(1, GL_MIN, GL_MIN);
+}
+
+}  // namespace
+
+gl::Object SurfaceRaster::bind_inputs(const SurfaceView& view, const SurfaceLighting& lighting) {
+  const auto& gl = *gl_;
+  upload_transforms(view);
+  gl::Object vertex_array = gl::make_vertex_array(gl_);
+  const GLuint array = vertex_array.name();
+  gl.VertexArrayVertexBuffer(array, 2, transform_buffer_.name(), 0, sizeof(TransformRecord));
+  gl.VertexArrayBindingDivisor(array, 2, 1);
+  const auto attribute = [&](GLuint location, GLint components, GLuint offset, GLuint binding) {
+    gl.EnableVertexArrayAttrib(array, location);
+    gl.VertexArrayAttribFormat(array, location, components, GL_FLOAT, GL_FALSE, offset);
+    gl.VertexArrayAttribBinding(array, location, binding);
+  };
+  attribute(0, 3, offsetof(surface::PosedVertex, position), 0);
+  attribute(1, 3, offsetof(surface::PosedVertex, normal), 0);
+  attribute(2, 4, offsetof(surface::PosedVertex, tangent), 0);
+  attribute(3, 4, offsetof(surface::VertexAttributes, uv), 1);
+  attribute(4, 4, offsetof(surface::VertexAttributes, color), 1);
+  attribute(5, 3, offsetof(TransformRecord, x), 2);
+  attribute(6, 3, offsetof(TransformRecord, y), 2);
+  attribute(7, 3, offsetof(TransformRecord, z), 2);
+  attribute(8, 3, offsetof(TransformRecord, high), 2);
+  attribute(9, 3, offsetof(TransformRecord, low), 2);
+  gl.BindVertexArray(array);
+  gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
+  gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());
+  upload_prefiltered(lighting.prefiltered);
+  gl.BindTextureUnit(core::CM_UNIT_PREFILTERED, prefiltered_.name());
+  gl.BindSampler(core::CM_UNIT_PREFILTERED, prefiltered_sampler_.name());
+  return vertex_array;
+}
+
 void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
                          SurfaceLayers& into) {
   const auto& gl = *gl_;
@@ -615,44 +663,9 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   gl.NamedFramebufferDrawBuffers(target, 2, buffers.data());
   gl::Object vertex_array;
   const bool drawable = !drawn_.empty();
-  if (drawable) {
-    upload_transforms(view);
-    vertex_array = gl::make_vertex_array(gl_);
-    const GLuint array = vertex_array.name();
-    gl.VertexArrayVertexBuffer(array, 2, transform_buffer_.name(), 0, sizeof(TransformRecord));
-    gl.VertexArrayBindingDivisor(array, 2, 1);
-    const auto attribute = [&](GLuint location, GLint components, GLuint offset, GLuint binding) {
-      gl.EnableVertexArrayAttrib(array, location);
-      gl.VertexArrayAttribFormat(array, location, components, GL_FLOAT, GL_FALSE, offset);
-      gl.VertexArrayAttribBinding(array, location, binding);
-    };
-    attribute(0, 3, offsetof(surface::PosedVertex, position), 0);
-    attribute(1, 3, offsetof(surface::PosedVertex, normal), 0);
-    attribute(2, 4, offsetof(surface::PosedVertex, tangent), 0);
-    attribute(3, 4, offsetof(surface::VertexAttributes, uv), 1);
-    attribute(4, 4, offsetof(surface::VertexAttributes, color), 1);
-    attribute(5, 3, offsetof(TransformRecord, x), 2);
-    attribute(6, 3, offsetof(TransformRecord, y), 2);
-    attribute(7, 3, offsetof(TransformRecord, z), 2);
-    attribute(8, 3, offsetof(TransformRecord, high), 2);
-    attribute(9, 3, offsetof(TransformRecord, low), 2);
-    gl.BindVertexArray(array);
-    gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
-    gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());
-    upload_prefiltered(lighting.prefiltered);
-    gl.BindTextureUnit(core::CM_UNIT_PREFILTERED, prefiltered_.name());
-    gl.BindSampler(core::CM_UNIT_PREFILTERED, prefiltered_sampler_.name());
-  }
+  if (drawable) vertex_array = bind_inputs(view, lighting);
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target);
-  gl.ViewportIndexedf(0, 0.0F, 0.0F, static_cast<GLfloat>(size.x), static_cast<GLfloat>(size.y));
-  gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-  gl.Enable(GL_DEPTH_TEST);
-  gl.DepthFunc(GL_GREATER);
-  gl.CullFace(GL_BACK);
-  // For blended surfaces: colors are blended over each other, and z is the nearest.
-  gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
-  gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  gl.BlendEquationSeparatei(1, GL_MIN, GL_MIN);
+  set_state(gl, size);
   for (GLuint i = 0; i < buffers.size(); ++i) gl.ColorMaski(i, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   const auto clear_to = [&](unsigned layer) {
     gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT0, into.color.name(), 0, static_cast<GLint>(layer));

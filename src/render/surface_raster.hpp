@@ -176,6 +176,8 @@ class SurfaceRaster {
   // Uploads data to a buffer, which is reallocated if it is too small.
   void fill(gl::Object& buffer, std::size_t& size, const void* from, std::size_t bytes, const char* what) const;
   void add_transforms(Shown& shown, std::vector<glm::dmat4> transforms);
+  // Uploads and binds the inputs of the draws, except the contents' own. Returns the vertex array.
+  [[nodiscard]] gl::Object bind_inputs(const SurfaceView& view, const SurfaceLighting& lighting);
   // Draws batches of a content, with all of their instance transforms or with one.
   class Pen;
 

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "base/error.hpp"
-#include "render/compositor.hpp"
 
 namespace cumulet::render {
 

@@ -4,10 +4,9 @@
 
 #include "gl/api.hpp"
 #include "render/display.hpp"
+#include "render/frame_target.hpp"
 
 namespace cumulet::render {
-
-struct FrameTarget;
 
 /// Format of a target's draw buffer 0. bits 0: the driver does not report it, as for some default framebuffers.
 struct TargetFormat {

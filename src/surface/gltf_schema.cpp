@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "base/number_text.hpp"
-#include "surface/gltf_file.hpp"
+#include "surface/budget.hpp"
 
 namespace cumulet::surface::detail {
 

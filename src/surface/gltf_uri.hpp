@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "surface/gltf_file.hpp"
+#include "surface/budget.hpp"
 
 namespace cumulet::surface::detail {
 

@@ -5,8 +5,6 @@
 #include <numbers>
 #include <utility>
 
-#include "surface/materials.hpp"
-
 namespace cumulet::surface::detail {
 
 namespace {
@@ -119,6 +117,12 @@ MaterialMember transform_member(std::size_t slot, std::size_t width, const Chang
 }
 
 }  // namespace
+
+float narrow(double value) {
+  // Products of a few such values are still finite floats.
+  constexpr double most = 1e18;
+  return static_cast<float>(std::clamp(value, -most, most));
+}
 
 glm::mat3x2 TextureTransform::matrix() const {
   const double cosine = std::cos(rotation);

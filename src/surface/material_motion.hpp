@@ -14,6 +14,9 @@
 
 namespace cumulet::surface::detail {
 
+/// Converts to float; clamps values that are too large.
+float narrow(double value);
+
 /// KHR_texture_transform.
 struct TextureTransform {
   glm::dvec2 offset{0.0};

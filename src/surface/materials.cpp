@@ -449,12 +449,6 @@ class Materials {
 
 }  // namespace
 
-float narrow(double value) {
-  // Products of a few such values are still finite floats.
-  constexpr double most = 1e18;
-  return static_cast<float>(std::clamp(value, -most, most));
-}
-
 std::vector<MovableMaterial> import_materials(const GltfFile& file, const Log& log, const std::string& name,
                                               Budget& budget, Progress* progress, Scene& scene) {
   return Materials(file, log, name, budget, progress, scene).import();

@@ -23,9 +23,6 @@ struct DecodedImage {
 /// Error(file).
 DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget);
 
-/// Converts to float; clamps values that are too large.
-float narrow(double value);
-
 /// Imports a light without position and direction, which its node defines.
 MovableLight import_light(const tinygltf::Light& light, const std::string& what);
 /// Imports a camera without its transform, which its node defines.

@@ -7,7 +7,6 @@
 
 #include "base/progress_part.hpp"
 #include "surface/accessors.hpp"
-#include "surface/materials.hpp"
 
 namespace cumulet::surface::detail {
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/detached_work.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 #include "scene/space.hpp"
 #include "viewer/cell_budget.hpp"
 #include "viewer/stopwatch.hpp"

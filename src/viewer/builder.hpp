@@ -18,7 +18,7 @@
 #include "viewer/job_log.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
-#include "volume/proxy.hpp"
+#include "volume/frame_import.hpp"
 
 namespace cumulet::viewer {
 

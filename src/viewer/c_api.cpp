@@ -3,7 +3,7 @@
 #include <array>
 #include <limits>
 
-#include "base/callback_scope.hpp"
+#include "base/library_thread.hpp"
 #include "base/murmur_hash.hpp"
 #include "render/tracer.hpp"
 #include "settings/ramp.hpp"

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "base/callback_scope.hpp"
+#include "base/library_thread.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/c_viewer.hpp"

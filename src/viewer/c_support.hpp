@@ -14,7 +14,6 @@
 #include <string_view>
 #include <utility>
 
-#include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "base/library_thread.hpp"
 #include "base/log.hpp"

@@ -5,6 +5,7 @@
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 #include "viewer/patient_lock.hpp"
+#include "volume/frame_import.hpp"
 
 namespace cumulet::viewer {
 

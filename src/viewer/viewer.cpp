@@ -9,9 +9,9 @@
 #include <numeric>
 #include <utility>
 
-#include "base/callback_scope.hpp"
 #include "base/corners.hpp"
 #include "base/error.hpp"
+#include "base/library_thread.hpp"
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
 #include "scene/model_table.hpp"

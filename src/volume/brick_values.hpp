@@ -4,7 +4,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <optional>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -13,6 +15,11 @@ namespace cumulet::volume {
 
 inline constexpr int brick_size = 8;
 inline constexpr int brick_voxels = brick_size * brick_size * brick_size;
+
+/// The order of ScalarVolume::brick_origins: by x, then y, then z.
+inline bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
+  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
 
 /// Returns the half float (IEEE 754 binary16) that is exactly equal to the value, or nullopt if there is none. value:
 /// finite and not negative.

@@ -1,17 +1,15 @@
 #pragma once
 
-// Access to a ScalarVolume's values by brick.
+// Access to a ScalarVolume by brick.
 
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <string>
 
 #include "volume/volume.hpp"
 
 namespace cumulet::volume {
-
-/// The order of brick_origins: by x, then y, then z.
-bool lexicographic(const glm::ivec3& a, const glm::ivec3& b);
 
 /// Returns the 512 values of the brick at this origin, possibly in `room`; null if there is no such brick. O(log
 /// bricks).
@@ -26,5 +24,8 @@ std::int64_t voxels_between(const glm::ivec3& low, const glm::ivec3& high);
 std::int64_t voxels_of(const Tile& tile);
 /// Returns the number of voxels within bounds that no brick and no tile covers. O(bricks + tiles).
 std::int64_t background_voxels(const ScalarVolume& volume);
+
+/// Makes a volume of GPU-resident bricks. bricks: tidy.
+ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const glm::dmat4& index_to_world);
 
 }  // namespace cumulet::volume

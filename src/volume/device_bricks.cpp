@@ -6,8 +6,6 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "volume/bricks.hpp"
-#include "volume/volume.hpp"
 
 namespace cumulet::volume {
 
@@ -108,33 +106,6 @@ DeviceBricks DeviceBricks::with(const DeviceBricks& other) const {
   for (const Location& location : other.locations) made.locations.push_back({first + location.memory, location.brick});
   made.tidy();
   return made;
-}
-
-ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const glm::dmat4& index_to_world) {
-  ScalarVolume volume;
-  volume.name = std::move(name);
-  volume.index_to_world = index_to_world;
-  volume.bounds_max = glm::ivec3(0);
-  if (!bricks->origins.empty()) {
-    volume.bounds_min = glm::ivec3(std::numeric_limits<int>::max());
-    volume.bounds_max = glm::ivec3(std::numeric_limits<int>::min());
-  }
-  for (std::size_t i = 0; i < bricks->origins.size(); ++i) {
-    const BrickSummary& s = bricks->summary(i);
-    const auto corner = [&](unsigned from) {
-      return bricks->origins[i] +
-             glm::ivec3((s.box >> from) & 7U, (s.box >> (from + 3)) & 7U, (s.box >> (from + 6)) & 7U);
-    };
-    volume.bounds_min = glm::min(volume.bounds_min, corner(0));
-    volume.bounds_max = glm::max(volume.bounds_max, corner(9));
-    volume.active_voxels += s.voxels & CM_BRICK_VOXELS;
-    volume.huge_voxels += huge_voxels_of(s);
-    for (std::size_t cell = 0; cell < 6; ++cell) volume.max_value = std::max(volume.max_value, s.cells[7 * cell + 6]);
-  }
-  volume.huge_voxels += bricks->huge_voxels;
-  volume.brick_origins = bricks->origins;
-  volume.on_device = std::move(bricks);
-  return volume;
 }
 
 }  // namespace cumulet::volume

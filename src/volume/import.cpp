@@ -498,6 +498,101 @@ std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress*
   return order;
 }
 
+/// Throws if the active voxels are too many along an axis or have indices that are too large.
+void check_bounds(const Box& bounds) {
+  const glm::i64vec3 extent = glm::i64vec3(bounds.max) - glm::i64vec3(bounds.min) + std::int64_t{1};
+  if (glm::any(glm::greaterThan(extent, glm::i64vec3(max_extent)))) {
+    fail("its active voxels span " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
+         std::to_string(extent.z) + " voxels; the limit is " + std::to_string(max_extent) + " per axis");
+  }
+  if (glm::any(glm::lessThan(bounds.min, glm::ivec3(-max_coordinate))) ||
+      glm::any(glm::greaterThan(bounds.max, glm::ivec3(max_coordinate)))) {
+    fail("its voxel indices exceed " + std::to_string(max_coordinate));
+  }
+}
+
+/// Returns the part of a brick within the bounds.
+Box clipped_brick(const glm::ivec3& origin, const Box& bounds) {
+  return bounds.clipped({origin, origin + (brick_size - 1)});
+}
+
+/// Returns the leaves that overlap the bounds, without the results of a sweep.
+Bricks bricks_within(const LeafSource& leaves, const Box& bounds, const Progress* progress) {
+  Bricks bricks;
+  std::vector<std::size_t> order = sorted_leaves(leaves, progress);
+  std::erase_if(order, [&](std::size_t leaf) { return clipped_brick(leaves.origin(leaf), bounds).empty(); });
+  bricks.index_of.assign(leaves.count(), order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) bricks.index_of[order[i]] = i;
+  bricks.origins.reserve(order.size());
+  for (const std::size_t leaf : order) bricks.origins.push_back(leaves.origin(leaf));
+  bricks.constant.resize(order.size());
+  bricks.first.resize(order.size());
+  return bricks;
+}
+
+/// Reads the values of all bricks into the volume, and the results of the sweep into `bricks`.
+void read_values(const LeafSource& leaves, const Box& bounds, Bricks& bricks, ScalarVolume& out, Progress* progress,
+                 Portion portion) {
+  // Tries halves first, unless a quick check, before memory is allocated, shows that they are not exact.
+  const auto sweep = [&](auto values, Portion part) {
+    if (!fill(leaves, bounds, bricks, values, progress, part)) return false;
+    close_gaps(bricks, values, out.brick_origins, progress);
+    out.brick_values = std::move(values);
+    return true;
+  };
+  if (!begins_with_halves(leaves, bounds, bricks, portion.at(0.3)) ||
+      !sweep(std::vector<std::uint16_t>(), portion.part(0.3, 1.0))) {
+    const double reached = progress != nullptr ? progress->fraction() : portion.at(0.3);
+    sweep(std::vector<float>(), {reached, portion.to});
+  }
+  out.negative_voxels = bricks.totals.negative;
+  out.non_finite_voxels = bricks.totals.non_finite;
+  out.huge_voxels = bricks.totals.huge;
+  out.max_value = bricks.totals.max;
+}
+
+/// Adds the source's tiles and its background to a volume whose bricks have been read.
+void add_tiles(const SourceGrid& source, const Box& bounds, const Bricks& bricks, ScalarVolume& out) {
+  const auto count_uncounted = [&out](float value, std::uint64_t voxels) {
+    if (!std::isfinite(value)) {
+      out.non_finite_voxels += voxels;
+    } else if (is_huge(value)) {
+      out.huge_voxels += voxels;
+    } else if (value < 0.0F) {
+      out.negative_voxels += voxels;
+    }
+  };
+  std::uint64_t covered = 0;
+  for (const glm::ivec3& origin : bricks.origins) covered += clipped_brick(origin, bounds).voxels();
+  for (const SourceTile& tile : source.tiles) {
+    const Box box = bounds.clipped({tile.box.min, tile.box.max});
+    if (box.empty()) continue;
+    if (tile.active) out.active_voxels += box.voxels();
+    covered += box.voxels();
+    count_uncounted(tile.box.value, box.voxels());
+    const float value = counted(tile.box.value);
+    out.max_value = std::max(out.max_value, value);
+    if (value != out.background) out.tiles.push_back({box.min, box.max, value});
+  }
+  // Voxels without a brick or tile have the background value.
+  const std::uint64_t uncovered = bounds.voxels() - std::min(covered, bounds.voxels());
+  if (uncovered > 0) {
+    out.max_value = std::max(out.max_value, out.background);
+    count_uncounted(source.background, uncovered);
+  }
+}
+
+/// Adds the constant bricks as tiles, which take a seventieth of the memory, and sorts all tiles.
+void add_constant_bricks(const Box& bounds, const Bricks& bricks, ScalarVolume& out) {
+  for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
+    if (bricks.constant[i] == 0 || bricks.first[i] == out.background) continue;
+    const Box box = clipped_brick(bricks.origins[i], bounds);
+    out.tiles.push_back({box.min, box.max, bricks.first[i]});
+  }
+  tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
+                     [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
+}
+
 }  // namespace
 
 void detail::check_transform(const glm::dmat4& m) {
@@ -534,84 +629,15 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     return std::move(out);
   }
   out.background = counted(source.background);
-  const glm::i64vec3 extent = glm::i64vec3(bounds.max) - glm::i64vec3(bounds.min) + std::int64_t{1};
-  if (glm::any(glm::greaterThan(extent, glm::i64vec3(max_extent)))) {
-    fail("its active voxels span " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
-         std::to_string(extent.z) + " voxels; the limit is " + std::to_string(max_extent) + " per axis");
-  }
-  if (glm::any(glm::lessThan(bounds.min, glm::ivec3(-max_coordinate))) ||
-      glm::any(glm::greaterThan(bounds.max, glm::ivec3(max_coordinate)))) {
-    fail("its voxel indices exceed " + std::to_string(max_coordinate));
-  }
+  check_bounds(bounds);
   out.bounds_min = bounds.min;
   out.bounds_max = bounds.max;
   out.active_voxels = region.voxels;
 
-  const LeafSource& leaves = *source.leaves;
-  const auto clipped = [&](const glm::ivec3& origin) { return bounds.clipped({origin, origin + (brick_size - 1)}); };
-  Bricks bricks;
-  {
-    std::vector<std::size_t> order = sorted_leaves(leaves, progress);
-    std::erase_if(order, [&](std::size_t leaf) { return clipped(leaves.origin(leaf)).empty(); });
-    bricks.index_of.assign(leaves.count(), order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) bricks.index_of[order[i]] = i;
-    bricks.origins.reserve(order.size());
-    for (const std::size_t leaf : order) bricks.origins.push_back(leaves.origin(leaf));
-    bricks.constant.resize(order.size());
-    bricks.first.resize(order.size());
-  }
-  // Tries halves first, unless a quick check, before memory is allocated, shows that they are not exact.
-  const auto sweep = [&](auto values, Portion part) {
-    if (!fill(leaves, bounds, bricks, values, progress, part)) return false;
-    close_gaps(bricks, values, out.brick_origins, progress);
-    out.brick_values = std::move(values);
-    return true;
-  };
-  if (!begins_with_halves(leaves, bounds, bricks, portion.at(0.3)) ||
-      !sweep(std::vector<std::uint16_t>(), portion.part(0.3, 1.0))) {
-    const double reached = progress != nullptr ? progress->fraction() : portion.at(0.3);
-    sweep(std::vector<float>(), {reached, portion.to});
-  }
-  out.negative_voxels = bricks.totals.negative;
-  out.non_finite_voxels = bricks.totals.non_finite;
-  out.huge_voxels = bricks.totals.huge;
-  const auto count_uncounted = [&out](float value, std::uint64_t voxels) {
-    if (!std::isfinite(value)) {
-      out.non_finite_voxels += voxels;
-    } else if (is_huge(value)) {
-      out.huge_voxels += voxels;
-    } else if (value < 0.0F) {
-      out.negative_voxels += voxels;
-    }
-  };
-  std::uint64_t covered = 0;
-  for (const glm::ivec3& origin : bricks.origins) covered += clipped(origin).voxels();
-  out.max_value = bricks.totals.max;
-  for (const SourceTile& tile : source.tiles) {
-    const Box box = bounds.clipped({tile.box.min, tile.box.max});
-    if (box.empty()) continue;
-    if (tile.active) out.active_voxels += box.voxels();
-    covered += box.voxels();
-    count_uncounted(tile.box.value, box.voxels());
-    const float value = counted(tile.box.value);
-    out.max_value = std::max(out.max_value, value);
-    if (value != out.background) out.tiles.push_back({box.min, box.max, value});
-  }
-  // Voxels without a brick or tile have the background value.
-  const std::uint64_t uncovered = bounds.voxels() - std::min(covered, bounds.voxels());
-  if (uncovered > 0) {
-    out.max_value = std::max(out.max_value, out.background);
-    count_uncounted(source.background, uncovered);
-  }
-
-  // A constant brick becomes a tile, which takes a seventieth of the memory.
-  for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
-    if (bricks.constant[i] == 0 || bricks.first[i] == out.background) continue;
-    const Box box = clipped(bricks.origins[i]);
-    out.tiles.push_back({box.min, box.max, bricks.first[i]});
-  }
-  tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
-                     [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
+  Bricks bricks = bricks_within(*source.leaves, bounds, progress);
+  read_values(*source.leaves, bounds, bricks, out, progress, portion);
+  add_tiles(source, bounds, bricks, out);
+  add_constant_bricks(bounds, bricks, out);
   const auto warn = [&](std::uint64_t voxels, const char* what, const char* how) {
     if (voxels > 0)
       log.warning(log_prefix + std::to_string(voxels) + what + (voxels == 1 ? " voxel" : " voxels") + how);

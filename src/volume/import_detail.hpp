@@ -24,7 +24,10 @@
 #include "base/one_line.hpp"
 #include "base/progress_part.hpp"
 #include "volume/bricks.hpp"
-#include "volume/memory.hpp"
+
+namespace cumulet::volume {
+struct MemoryField;
+}
 
 namespace cumulet::volume::detail {
 

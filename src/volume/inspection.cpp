@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "volume/bricks.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/import_detail.hpp"
 
 namespace cumulet::volume {

@@ -10,12 +10,6 @@
 
 namespace cumulet::volume {
 
-/// A tile as stored in a tree: not clipped to the active voxels; it may have the background value, or be inactive.
-struct SourceTile {
-  Tile box;
-  bool active;
-};
-
 /// Voxels in a box that begins at (0,0,0); voxels that are not zero are active.
 struct DenseVoxels {
   std::span<const float> values;  ///< x fastest, then y, then z

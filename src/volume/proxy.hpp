@@ -2,8 +2,6 @@
 
 // Low-resolution proxies of large files, shown while the files load.
 
-#include <cstdint>
-#include <functional>
 #include <glm/glm.hpp>
 #include <optional>
 
@@ -25,20 +23,5 @@ struct Proxy {
   };
   std::optional<Extent> extent;  ///< empty if the fields have different lattices
 };
-
-/// A file with this many bricks takes about a second of one core to load.
-inline constexpr std::uint64_t worth_a_proxy = 50'000;
-
-struct ProxyRequest {
-  /// Called on the import's thread, at most once, before the full-resolution import. Its exceptions propagate.
-  std::function<void(Proxy)> take;
-  std::uint64_t min_bricks = worth_a_proxy;  ///< minimum bricks of the first field; smaller files get no proxy
-};
-
-/// Like the other import_frame, but makes a proxy first for a .vdb file of many bricks, which takes about a twentieth
-/// of the time. There is no proxy for files from before OpenVDB 3, or if making it fails: errors of a file are reported
-/// by the full-resolution import.
-VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
-                         const ProxyRequest& proxy);
 
 }  // namespace cumulet::volume

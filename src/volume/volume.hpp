@@ -25,6 +25,12 @@ struct Tile {
   float value;
 };
 
+/// A tile as stored in a tree: not clipped to the active voxels; it may have the background value, or be inactive.
+struct SourceTile {
+  Tile box;
+  bool active;
+};
+
 /// A scalar field on a sparse voxel lattice, independent of file formats.
 ///
 /// Voxel (i,j,k) is the unit cube centered on (i,j,k) in index space, with a constant value. The field is zero outside
@@ -60,9 +66,6 @@ struct ScalarVolume {
            (on_device ? on_device->bytes() : 0);
   }
 };
-
-/// Makes a volume of GPU-resident bricks. bricks: tidy.
-ScalarVolume volume_on_device(DeviceBricksPtr bricks, std::string name, const glm::dmat4& index_to_world);
 
 /// An entry of a file's metadata, as text.
 struct Metadata {

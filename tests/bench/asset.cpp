@@ -9,6 +9,7 @@
 #include <glm/gtc/noise.hpp>
 
 #include "grid/statistics.hpp"
+#include "volume/frame_import.hpp"
 
 namespace cumulet::bench {
 

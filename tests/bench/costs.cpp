@@ -17,6 +17,7 @@
 #include "subject.hpp"
 #include "support/surfaces.hpp"
 #include "turns.hpp"
+#include "volume/frame_import.hpp"
 
 namespace cumulet::bench {
 

@@ -26,9 +26,10 @@
 
 #include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 #include "render/grid_build.hpp"
 #include "viewer/volume_asset.hpp"
+#include "volume/frame_import.hpp"
 
 namespace {
 

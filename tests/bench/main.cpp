@@ -10,6 +10,7 @@
 #include "costs.hpp"
 #include "defaults.hpp"
 #include "denoise.hpp"
+#include "judged.hpp"
 #include "measure.hpp"
 #include "peers.hpp"
 #include "report.hpp"
@@ -95,7 +96,7 @@ void run(const bench::Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bench::ParseResult parsed = bench::parse(argc, argv);
+  const bench::ParseResult parsed = bench::parse(argc, argv, bench::judged_names());
   if (parsed.status >= 0) return parsed.status;
   try {
     run(parsed.options);

@@ -4,8 +4,6 @@
 #include <cstdio>
 #include <map>
 
-#include "judged.hpp"
-
 namespace cumulet::bench {
 
 namespace {
@@ -45,7 +43,7 @@ Input parse_input(const std::string& text) {
 
 }  // namespace
 
-ParseResult parse(int argc, char** argv) {
+ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes) {
   ParseResult result;
   Options& o = result.options;
   CLI::App app(
@@ -99,7 +97,7 @@ ParseResult parse(int argc, char** argv) {
   app.add_flag("--techniques", o.techniques,
                "Only whether pictures of --reference-samples have the same means with each technique off, on them");
   app.add_option("--scene", o.scenes, "With these: cloud, full, fire, explosion, model, terrain, fog, lamp")
-      ->check(CLI::IsMember(judged_names()));
+      ->check(CLI::IsMember(scenes));
   app.add_option("--oidn-weights", o.oidn_weights, "Folder of Open Image Denoise's networks (as of cumulet-render)");
   app.add_option("--reference-samples", o.reference_samples, "Of the pictures to come near (default: 8192)")
       ->check(CLI::Range(2U, 1U << 20U));

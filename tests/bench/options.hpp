@@ -73,6 +73,7 @@ struct ParseResult {
   Options options;
   int status = -1;  ///< not negative: exit with it
 };
-ParseResult parse(int argc, char** argv);
+/// scenes: the names that --scene accepts.
+ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes);
 
 }  // namespace cumulet::bench

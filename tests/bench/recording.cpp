@@ -6,6 +6,7 @@
 #include <string>
 
 #include "asset.hpp"
+#include "grid/grid_builder.hpp"
 #include "subject.hpp"
 #include "support/still.hpp"
 

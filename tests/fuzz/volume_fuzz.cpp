@@ -12,7 +12,7 @@
 #include <string>
 
 #include "base/error.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/inspection.hpp"
 #include "volume/volume.hpp"
 

@@ -15,6 +15,7 @@
 #include "support/vdb_files.hpp"
 #include "support/volumes.hpp"
 #include "volume/bricks.hpp"
+#include "volume/frame_import.hpp"
 
 namespace {
 

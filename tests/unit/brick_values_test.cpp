@@ -14,7 +14,7 @@
 #include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
 #include "support/volumes.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/memory.hpp"
 
 namespace {

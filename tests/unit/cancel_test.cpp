@@ -20,7 +20,7 @@
 #include <thread>
 
 #include "base/progress.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 #include "light/environment_file.hpp"
 #include "render/model_data.hpp"
 #include "support/c_host.hpp"

@@ -22,7 +22,7 @@
 #include "support/vdb_files.hpp"
 #include "viewer/instance.hpp"
 #include "volume/bricks.hpp"
-#include "volume/proxy.hpp"
+#include "volume/frame_import.hpp"
 
 namespace {
 

@@ -15,6 +15,7 @@
 
 #include "base/error.hpp"
 #include "gl/api.hpp"
+#include "gl/compatibility_functions.hpp"
 
 namespace {
 

@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "grid/cell.hpp"
+#include "grid/grid_builder.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/marches.hpp"

@@ -19,7 +19,7 @@
 
 #include "support/folder.hpp"
 #include "support/vdb_files.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/inspection.hpp"
 #include "volume/volume.hpp"
 

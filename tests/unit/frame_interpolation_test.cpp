@@ -16,6 +16,7 @@
 #include "support/volumes.hpp"
 #include "volume/advection.hpp"
 #include "volume/bricks.hpp"
+#include "volume/frame_import.hpp"
 
 namespace {
 

@@ -22,7 +22,7 @@
 #include "base/luminance.hpp"
 #include "gl/state_guard.hpp"
 #include "grid/clear_cones.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 #include "render/grid_builds.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"

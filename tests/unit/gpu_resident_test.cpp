@@ -18,7 +18,8 @@
 #include "support/grid_reference.hpp"
 #include "support/simulated.hpp"
 #include "support/view_cameras.hpp"
-#include "volume/frame.hpp"
+#include "volume/bricks.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/optical_depth.hpp"
 
 namespace {

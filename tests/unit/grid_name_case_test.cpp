@@ -4,7 +4,7 @@
 
 #include "support/folder.hpp"
 #include "support/vdb_files.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/volume.hpp"
 
 namespace {

@@ -9,9 +9,9 @@
 
 #include "base/error.hpp"
 #include "grid/cell.hpp"
+#include "grid/grid_builder.hpp"
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
-#include "grid/tet_grid.hpp"
 #include "grid/transmittance.hpp"
 #include "support/volumes.hpp"
 #include "support/wide_volumes.hpp"

@@ -13,7 +13,7 @@
 #include <set>
 
 #include "grid/evaluation.hpp"
-#include "grid/tet_grid.hpp"
+#include "grid/grid_builder.hpp"
 #include "support/view_cameras.hpp"
 #include "support/volumes.hpp"
 

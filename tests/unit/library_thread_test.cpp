@@ -14,7 +14,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "viewer/worker.hpp"
 

@@ -24,7 +24,7 @@
 #include "support/folder.hpp"
 #include "support/gltf_import.hpp"
 #include "support/vdb_files.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 #include "volume/import_detail.hpp"
 #include "volume/inspection.hpp"
 #include "volume/memory.hpp"

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "grid/cell.hpp"
+#include "grid/grid_builder.hpp"
 #include "grid/refine.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"

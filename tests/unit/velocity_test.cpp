@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "grid/cell.hpp"
+#include "grid/grid_builder.hpp"
 #include "scene/channels.hpp"
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"

@@ -271,6 +271,46 @@ cumulet::Viewer make_viewer(cumulet::Background background, bool test) {
   return viewer;
 }
 
+/// Begins a panel that fills half of a window of size `room`. left: as a fraction of its width.
+bool begin_panel(const char* title, const ImVec2& room, float left, ImGuiCond condition) {
+  ImGui::SetNextWindowPos(ImVec2(room.x * left, room.y * 0.02F), condition);
+  ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
+  return ImGui::Begin(title);
+}
+
+/// First panel: the viewer renders into its own texture.
+cumulet::FrameResult show_image(cumulet::Viewer& viewer) {
+  const cumulet::Progress progress = must(viewer.get_progress());
+  if (!progress.message.empty()) ImGui::TextWrapped("%s", progress.message.c_str());
+  if (progress.stage != cumulet::Stage::idle) ImGui::ProgressBar(static_cast<float>(progress.fraction));
+  const Panel panel(viewer);
+  cumulet::FrameResult image = must(viewer.render({.target = cumulet::FrameTarget::texture,
+                                                   .width = static_cast<std::uint32_t>(panel.width),
+                                                   .height = static_cast<std::uint32_t>(panel.height),
+                                                   .flip_y = true}));
+  panel.show(image.texture, true);
+  return image;
+}
+
+/// Second panel: the host draws its scene, then the viewer draws the volume over it, clipped by the scene's depth.
+cumulet::FrameResult show_scene(cumulet::Viewer& viewer, const cumulet::Camera& camera, SceneTarget& target,
+                                GLuint program, GLuint vertex_array, cumulet::TransmittanceMap& shadow) {
+  const Panel panel(viewer);
+  target.resize(panel.width, panel.height);
+  const auto [view, projection] =
+      must(camera.get_matrices(double(panel.width) / panel.height, cumulet::ClipSpace::negative_one_to_one));
+  draw_scene(target, program, vertex_array, multiply(projection, view), must(viewer.get_bounds()), shadow);
+  cumulet::FrameResult scene = must(viewer.render({.framebuffer = target.framebuffer,
+                                                   .width = static_cast<std::uint32_t>(panel.width),
+                                                   .height = static_cast<std::uint32_t>(panel.height),
+                                                   .depth_source = cumulet::DepthSource::texture,
+                                                   .depth_name = target.depth}));
+  panel.show(target.color, false);
+  // The map contains the data uploaded by render(), and is used for the scene of the next frame.
+  shadow = must(viewer.update_transmittance_map({}));
+  return scene;
+}
+
 /// Runs the frame loop until the window is closed.
 void run(GLFWwindow* window, const std::string& volume_path, const std::string& folder, bool test) {
   cumulet::Viewer image_viewer = make_viewer(cumulet::Background::sky, test);
@@ -297,20 +337,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     last_room = room;
     cumulet::FrameResult image, scene;
 
-    // First panel: the viewer renders into its own texture.
-    ImGui::SetNextWindowPos(ImVec2(room.x * 0.01F, room.y * 0.02F), condition);
-    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
-    if (ImGui::Begin("Viewer")) {
-      const cumulet::Progress progress = must(image_viewer.get_progress());
-      if (!progress.message.empty()) ImGui::TextWrapped("%s", progress.message.c_str());
-      if (progress.stage != cumulet::Stage::idle) ImGui::ProgressBar(static_cast<float>(progress.fraction));
-      const Panel panel(image_viewer);
-      image = must(image_viewer.render({.target = cumulet::FrameTarget::texture,
-                                        .width = static_cast<std::uint32_t>(panel.width),
-                                        .height = static_cast<std::uint32_t>(panel.height),
-                                        .flip_y = true}));
-      panel.show(image.texture, true);
-    }
+    if (begin_panel("Viewer", room, 0.01F, condition)) image = show_image(image_viewer);
     ImGui::End();
 
     if (!volume_shared) {  // when it is loaded
@@ -319,24 +346,8 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
       volume_shared = static_cast<bool>(volume);
     }
 
-    // Second panel: the host draws its scene, then the viewer draws the volume over it, clipped by the scene's depth.
-    ImGui::SetNextWindowPos(ImVec2(room.x * 0.51F, room.y * 0.02F), condition);
-    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
-    if (ImGui::Begin("Scene") && volume_shared) {
-      const Panel panel(scene_viewer);
-      target.resize(panel.width, panel.height);
-      const auto [view, projection] =
-          must(camera.get_matrices(double(panel.width) / panel.height, cumulet::ClipSpace::negative_one_to_one));
-      draw_scene(target, program, vertex_array, multiply(projection, view), must(scene_viewer.get_bounds()), shadow);
-      scene = must(scene_viewer.render({.framebuffer = target.framebuffer,
-                                        .width = static_cast<std::uint32_t>(panel.width),
-                                        .height = static_cast<std::uint32_t>(panel.height),
-                                        .depth_source = cumulet::DepthSource::texture,
-                                        .depth_name = target.depth}));
-      panel.show(target.color, false);
-      // The map contains the data uploaded by render(), and is used for the scene of the next frame.
-      shadow = must(scene_viewer.update_transmittance_map({}));
-    }
+    if (begin_panel("Scene", room, 0.51F, condition) && volume_shared)
+      scene = show_scene(scene_viewer, camera, target, program, vertex_array, shadow);
     ImGui::End();
 
     ImGui::Render();

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "grid/grid_builder.hpp"
 #include "grid/lattice.hpp"
-#include "grid/tet_grid.hpp"
 
 namespace cumulet::test {
 

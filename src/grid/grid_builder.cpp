@@ -1,0 +1,507 @@
+#include "grid/grid_builder.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/combinable.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/luminance.hpp"
+#include "grid/cell.hpp"
+#include "grid/clear_cones.hpp"
+
+namespace cumulet::grid {
+
+namespace {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+using glm::vec4;
+
+}  // namespace
+
+GridBuilder::Vertex::Vertex(const vec3& at) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto whole = static_cast<std::uint32_t>(at[static_cast<int>(axis)]);
+    low[axis] = static_cast<std::uint16_t>(whole);
+    high = static_cast<std::uint16_t>(high | ((whole >> 16U) << (5 * axis)));
+  }
+}
+
+GridBuilder::Vertex::operator vec3() const {
+  const auto whole = [&](std::size_t axis) {
+    return static_cast<float>(low[axis] | (((std::uint32_t{high} >> (5 * axis)) & 31U) << 16U));
+  };
+  return {whole(0), whole(1), whole(2)};
+}
+
+GridBuilder::GridBuilder(const Statistics& statistics, const DiamondSet& diamonds)
+    : statistics_(&statistics), diamonds_(&diamonds) {}
+
+void GridBuilder::make_roots() {
+  const std::array<RootCell, 24> roots = root_cells(statistics_->cube().log2_size);
+  for (unsigned root = 0; root < 24; ++root) {
+    nodes_[root] = {.links = roots[root].links,
+                    .child = 0,
+                    .v0 = Vertex(roots[root].v0),
+                    .shape = static_cast<std::uint16_t>(roots[root].shape),
+                    .heap = 0,
+                    .permutation = 0};
+  }
+}
+
+void GridBuilder::bisect(Progress* progress) {
+  const std::uint64_t count = 24 + 2 * (diamonds_->cell_count() - 24);
+  if (count >= (std::uint64_t{1} << 31U)) {
+    throw Error(ErrorCode::unsupported, "a grid of " + std::to_string(diamonds_->cell_count()) +
+                                            " cells: the limit is 2^30; lower max_cells or raise the threshold");
+  }
+  ProgressPart part(progress, DiamondSet::progress_part, 0.95, count);
+  part.resize(nodes_, count, {});
+  make_roots();
+  level_first_ = {0, 24};
+  while (level_first_.back() != level_first_[level_first_.size() - 2]) {
+    split_level(level_first_[level_first_.size() - 2], level_first_.back(), part);
+  }
+  level_first_.pop_back();
+  if (level_first_.back() != count)
+    throw Error(ErrorCode::internal, "bisection missed diamonds: the refinement set is not conforming");
+  order(progress);
+}
+
+std::uint32_t GridBuilder::mark_splits(std::uint32_t first, std::uint32_t last) {
+  DiamondCursor cursor(*diamonds_);
+  std::uint32_t splits = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    Node& node = nodes_[i];
+    const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+    node.child = 0;
+    if (cell_class == 1 && core::cm_shape_exponent(node.shape) == 0) continue;  // a sixth of a voxel
+    const vec3 middle =
+        vec3(node.v0) +
+        core::cm_from_frame(core::cm_frame_midpoint(cell_class) * core::cm_shape_unit(node.shape), node.shape);
+    if (cursor.is_split(ivec3(middle))) {
+      node.child = 1;
+      ++splits;
+    }
+  }
+  return splits;
+}
+
+// Returns the cell on the other side of a face that `cell` shares with `other`, if the face stays whole when `other`
+// splits. Face 3 of `other` then belongs to its child 1, and its other whole face to child 0.
+std::uint32_t GridBuilder::behind_whole(std::uint32_t other, std::uint32_t cell) const {
+  if (other == CM_NONE || nodes_[other].child == 0) return other;
+  return nodes_[other].child + (nodes_[other].links[3] == cell ? 1 : 0);
+}
+
+void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
+  const Node node = nodes_[parent];
+  const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+  Node& child = nodes_[node.child + side];
+  const std::uint32_t shape = core::cm_child_shape(node.shape, side);
+  child.child = 0;
+  child.shape = static_cast<std::uint16_t>(shape);
+  child.v0 = side == 0 ? node.v0 : Vertex(core::cm_cell_vertex(vec3(node.v0), node.shape, 1));
+  child.heap = node.heap == 0 ? 0 : (2U * node.heap + side) & 0xfffU;
+  child.permutation = node.permutation;
+  if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 3) {
+    child.heap = 1;
+    child.permutation = permutation_of(shape) & 15U;
+  }
+  child.links[3] = node.child + 1 - side;
+  for (unsigned k = 0; k < 2; ++k) {
+    const glm::uvec2 faces = core::cm_half_face(cell_class, side, k);
+    const std::uint32_t other = node.links[faces.y];
+    if (other == CM_NONE) {
+      child.links[faces.x] = CM_NONE;
+      continue;
+    }
+    // The neighbor belongs to the same diamond and splits too: link to its child at the same end of the edge.
+    const Node& neighbour = nodes_[other];
+    child.links[faces.x] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
+  }
+  const glm::uvec2 faces = core::cm_whole_face(cell_class, side);
+  child.links[faces.x] = behind_whole(node.links[faces.y], parent);
+}
+
+void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part) {
+  constexpr std::uint32_t chunk = 4096;
+  const std::uint32_t chunks = (last - first + chunk - 1) / chunk;
+  const auto begin_of = [&](std::uint32_t c) { return first + c * chunk; };
+  const auto end_of = [&](std::uint32_t c) { return std::min(last, begin_of(c + 1)); };
+  std::vector<std::uint32_t> splits(chunks);
+  // Mark splits first. Then children get consecutive indices in the order of their parents.
+  tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    part.check();
+    splits[c] = mark_splits(begin_of(c), end_of(c));
+  });
+  std::uint32_t next = last;
+  for (std::uint32_t& n : splits) {
+    const std::uint32_t here = n;
+    n = next;
+    next += 2 * here;
+  }
+  if (next > nodes_.size())
+    throw Error(ErrorCode::internal, "bisection exceeded its count: the refinement set is not conforming");
+  tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    std::uint32_t child = splits[c];
+    for (std::uint32_t i = begin_of(c); i < end_of(c); ++i) {
+      if (nodes_[i].child == 0) continue;
+      nodes_[i].child = child;
+      child += 2;
+    }
+  });
+  tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    for (std::uint32_t i = begin_of(c); i < end_of(c); ++i) {
+      if (nodes_[i].child == 0) continue;
+      make_child(i, 0);
+      make_child(i, 1);
+    }
+    part.add(end_of(c) - begin_of(c));
+  });
+  level_first_.push_back(next);
+}
+
+// A link may refer to a cell that has split since. This happens at most once, because the next split cuts a face that
+// neither cell's split cuts.
+std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
+  return behind_whole(nodes_[from].links[face], from);
+}
+
+void GridBuilder::order(Progress* progress) {
+  const auto count = static_cast<std::uint32_t>(nodes_.size());
+  ProgressPart part(progress, 0.95, 1.0, 2 * std::uint64_t{count});
+  part.resize(leaves_below_, count, 1U);
+  part.resize(first_leaf_, count);
+  for (std::size_t level = level_first_.size() - 1; level-- > 0;) {
+    tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
+                      [&](const auto& range) {
+                        for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
+                          const std::uint32_t child = nodes_[i].child;
+                          if (child != 0) leaves_below_[i] = leaves_below_[child] + leaves_below_[child + 1];
+                        }
+                        part.add(range.size());
+                      });
+  }
+  for (unsigned root = 1; root < 24; ++root) first_leaf_[root] = first_leaf_[root - 1] + leaves_below_[root - 1];
+  part.resize(leaf_nodes_, diamonds_->cell_count());
+  for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
+    tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
+                      [&](const auto& range) {
+                        for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
+                          const std::uint32_t child = nodes_[i].child;
+                          if (child == 0) {
+                            leaf_nodes_[first_leaf_[i]] = i;
+                          } else {
+                            first_leaf_[child] = first_leaf_[i];
+                            first_leaf_[child + 1] = first_leaf_[i] + leaves_below_[child];
+                          }
+                        }
+                        part.add(range.size());
+                      });
+  }
+}
+
+void GridBuilder::number_nodes(TetGrid& grid, ProgressPart& part) const {
+  const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
+  part.resize(grid.tree, count - 24);
+  // The depth-first number of an internal node is (leaves before it) - (roots before it) + (its internal ancestors). It
+  // is computed level by level: child 0 follows its parent, child 1 follows the whole subtree of child 0.
+  for (unsigned root = 0; root < 24; ++root) {
+    grid.roots[root] = {first_leaf_[root], first_leaf_[root] - root};
+  }
+  grid.roots[24] = {count, count - 24};
+  std::vector<std::uint32_t> numbers;
+  part.resize(numbers, nodes_.size());
+  for (unsigned root = 0; root < 24; ++root) numbers[root] = grid.roots[root].first_internal;
+  for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
+    tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
+                      [&](const auto& range) {
+                        for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
+                          const std::uint32_t child = nodes_[i].child;
+                          if (child == 0) continue;
+                          grid.tree[numbers[i]] = leaves_below_[child] - 1;
+                          numbers[child] = numbers[i] + 1;
+                          numbers[child + 1] = numbers[i] + leaves_below_[child];
+                        }
+                        part.add(range.size());
+                      });
+  }
+}
+
+// Computes moments of consecutive leaves. Leaves in one brick's tree share its sums.
+class GridBuilder::LeafMoments {
+ public:
+  explicit LeafMoments(const Statistics& statistics) : statistics_(&statistics) {}
+  Moments operator()(const Node& node, const vec3& centroid) {
+    const vec3 v0 = vec3(node.v0);
+    if (node.heap == 0) return statistics_->moments(v0, node.shape);
+    const Statistics::Node& holder = statistics_->node_at(ivec3(centroid));
+    if (holder.is_uniform()) return uniform_moments(v0, node.shape, holder.uniform);
+    if (&holder != brick_ || node.permutation != permutation_) {
+      brick_ = &holder;
+      permutation_ = node.permutation;
+      tree_ = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
+      const float* values = statistics_->values(holder, room_);
+      sums_->compute(values, BrickSums::reference_of(values), *tree_);
+    }
+    return sums_->moments(node.heap, holder.corner, *tree_);
+  }
+
+ private:
+  const Statistics* statistics_;
+  std::unique_ptr<BrickSums> sums_ = std::make_unique<BrickSums>();
+  volume::BrickValues::Brick room_{};
+  const Statistics::Node* brick_ = nullptr;  // brick of sums_
+  unsigned permutation_ = 0;
+  const BrickTree* tree_ = nullptr;
+};
+
+// Computes the density of leaves: mean and gradient, in units of density_unit. With shutter ends it returns the mean of
+// both and half of their difference.
+class GridBuilder::LeafDensity {
+ public:
+  LeafDensity(const Statistics& density, const Channels& channels, CellKind cells, float unit)
+      : linear_(cells == CellKind::linear), to_relative_(1.0 / unit) {
+    if (channels.ends) {
+      fields_.emplace_back(channels.ends->open.statistics());
+      fields_.emplace_back(channels.ends->close.statistics());
+    } else {
+      fields_.emplace_back(density);
+    }
+  }
+  struct Of {
+    vec4 fit{0.0F};
+    vec4 change{0.0F};
+    double mass = 0.0;
+    bool any = false;
+  };
+  Of operator()(const Node& node, const vec3& centroid) {
+    Of of = one(fields_[0], node, centroid);
+    if (fields_.size() < 2) return of;
+    const Of close = one(fields_[1], node, centroid);
+    of.change = 0.5F * (close.fit - of.fit);
+    of.fit = 0.5F * (of.fit + close.fit);
+    of.mass = 0.5 * (of.mass + close.mass);
+    of.any = of.any || close.any;
+    return of;
+  }
+
+ private:
+  Of one(LeafMoments& moments, const Node& node, const vec3& centroid) const {
+    const Moments m = moments(node, centroid);
+    const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
+    vec3 gradient(0.0F);
+    if (linear_ && m.min < m.max) {
+      gradient = fit_linear(core::cm_shape_class(node.shape), frame_covariance(m, node.shape, centroid),
+                            static_cast<float>(mean))
+                     .gradient *
+                 static_cast<float>(to_relative_);
+    }
+    return {vec4(static_cast<float>(mean * to_relative_), gradient), vec4(0.0F), m.mass, m.max > 0.0F};
+  }
+
+  std::vector<LeafMoments> fields_;  // density, or both shutter ends
+  bool linear_;
+  double to_relative_;
+};
+
+// Computes the emission of leaves. Each of the three components is fitted.
+class GridBuilder::LeafEmission {
+ public:
+  LeafEmission(const RgbField& emission, CellKind cells)
+      : component_{LeafMoments(emission.component(0)), LeafMoments(emission.component(1)),
+                   LeafMoments(emission.component(2))},
+        cells_(cells) {}
+  // Writes the record; returns true if the leaf emits light.
+  bool put(const Node& node, const vec3& centroid, EmissionRecord& record) {
+    const std::array<Moments, 3> moments{component_[0](node, centroid), component_[1](node, centroid),
+                                         component_[2](node, centroid)};
+    record = emission_record(moments, node.shape, centroid, cells_);
+    return emits(moments);
+  }
+
+ private:
+  std::array<LeafMoments, 3> component_;
+  CellKind cells_;
+};
+
+// Computes the scattering of leaves: density x color.
+class GridBuilder::LeafScattering {
+ public:
+  explicit LeafScattering(const RgbField& scattering)
+      : component_{LeafMoments(scattering.component(0)), LeafMoments(scattering.component(1)),
+                   LeafMoments(scattering.component(2))} {}
+  dvec3 operator()(const Node& node, const vec3& centroid) {
+    return {component_[0](node, centroid).mass, component_[1](node, centroid).mass, component_[2](node, centroid).mass};
+  }
+
+ private:
+  std::array<LeafMoments, 3> component_;
+};
+
+// Computes the mean velocity of leaves. BrickSums lose precision where density is thin relative to its brick, and a
+// velocity is a quotient. So within bricks voxels are summed in double precision.
+class GridBuilder::LeafVelocity {
+ public:
+  LeafVelocity(const Statistics& density, const MomentumField& momentum)
+      : fields_{&density, &momentum.component(0), &momentum.component(1), &momentum.component(2)},
+        fastest_(momentum.fastest()) {}
+  glm::uvec2 operator()(const Node& node, const vec3& centroid) {
+    std::array<double, 4> sums{};
+    if (node.heap == 0) {
+      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = fields_[i]->moments(vec3(node.v0), node.shape).mass;
+    } else {
+      look_up(ivec3(centroid) & ~(volume::brick_size - 1));
+      const BrickTree& tree = brick_tree(kuhn_frame(corner_, volume::brick_size, node.permutation));
+      const std::uint32_t leaves = 512U / std::bit_floor(std::uint32_t{node.heap});
+      const auto voxels = std::span(tree.voxel).subspan(node.heap * leaves - 512U, leaves);
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        const Found& found = found_[i];
+        sums[i] = found.values == nullptr ? double{found.uniform} * leaves : 0.0;
+        for (std::size_t v = 0; found.values != nullptr && v < voxels.size(); ++v) sums[i] += found.values[voxels[v]];
+      }
+    }
+    return pack_velocity({sums[1], sums[2], sums[3]}, sums[0], fastest_);
+  }
+
+ private:
+  // Values of a field's brick, or its uniform value.
+  struct Found {
+    const float* values = nullptr;
+    float uniform = 0.0F;
+  };
+  void look_up(const ivec3& corner) {
+    if (corner == corner_) return;
+    corner_ = corner;
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
+      const Statistics::Node& holder = fields_[i]->node_at(corner);
+      found_[i] = {holder.is_uniform() ? nullptr : fields_[i]->values(holder, rooms_[i]), holder.uniform};
+    }
+  }
+
+  std::array<const Statistics*, 4> fields_;  // density, then momentum along each axis
+  float fastest_;
+  ivec3 corner_{-1};  // corner of the brick in found_
+  std::array<Found, 4> found_;
+  std::array<volume::BrickValues::Brick, 4> rooms_;
+};
+
+// Computes all channels of leaves other than density.
+class GridBuilder::LeafChannels {
+ public:
+  LeafChannels(const Statistics& density, const Channels& channels, CellKind cells) {
+    if (channels.emission) emitted_.emplace(*channels.emission, cells);
+    if (channels.scattering) colored_.emplace(*channels.scattering);
+    if (channels.forward) forward_.emplace(channels.forward->statistics());
+    if (channels.momentum) velocity_.emplace(density, *channels.momentum);
+  }
+  // Writes to the grid's arrays. mass: of the leaf's density. Returns true if the leaf emits light.
+  bool put(const Node& node, const vec3& centroid, double mass, TetGrid& grid, std::uint32_t rank) {
+    bool emits = false;
+    if (emitted_) emits = emitted_->put(node, centroid, grid.emission[rank]);
+    double scattered = mass;
+    if (colored_) {
+      const dvec3 scattering = (*colored_)(node, centroid);
+      grid.color[rank] = pack_color(scattering, mass);
+      scattered = luminance(scattering);
+    }
+    if (forward_) grid.anisotropy[rank] = pack_anisotropy((*forward_)(node, centroid).mass, scattered);
+    if (velocity_) grid.velocity[rank] = (*velocity_)(node, centroid);
+    return emits;
+  }
+
+ private:
+  std::optional<LeafEmission> emitted_;
+  std::optional<LeafScattering> colored_;
+  std::optional<LeafMoments> forward_;
+  std::optional<LeafVelocity> velocity_;
+};
+
+CellRecord GridBuilder::record(std::uint32_t index, const vec4& fit, bool emits) const {
+  const Node& node = nodes_[index];
+  CellRecord record{};
+  for (unsigned face = 0; face < 4; ++face) {
+    const std::uint32_t other = resolve(index, face);
+    record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
+  }
+  const glm::uvec2 v0_shape = core::cm_pack_v0_shape(vec3(node.v0), node.shape, statistics_->cube().wide());
+  record.data.x = v0_shape.x;
+  record.data.y = v0_shape.y | (emits ? CM_RECORD_EMITS : 0U);
+  const glm::uvec2 packed = pack_fit(fit);
+  record.data.z = packed.x;
+  record.data.w = packed.x == 0 ? 0 : packed.y;
+  return record;
+}
+
+TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& channels, Progress* progress) {
+  TetGrid grid;
+  grid.cube = statistics_->cube();
+  grid.limited = diamonds_->limited();
+  grid.levels = static_cast<std::uint32_t>(level_first_.size() - 2);
+  grid.density_unit = max_value > 0.0F ? max_value : 1.0F;
+  const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
+  ProgressPart allocation(progress, 0.0, 0.1, nodes_.size());
+  allocation.resize(grid.cells, count);
+  if (channels.emission) allocation.resize(grid.emission, count);
+  if (channels.scattering) allocation.resize(grid.color, count);
+  if (channels.forward) allocation.resize(grid.anisotropy, count);
+  if (channels.momentum) allocation.resize(grid.velocity, count);
+  if (channels.ends) allocation.resize(grid.change, count);
+  number_nodes(grid, allocation);
+
+  struct Box {
+    vec3 low{3.0e38F};
+    vec3 high{-3.0e38F};
+  };
+  tbb::combinable<Box> boxes;
+  ProgressPart part(progress, 0.1, 0.9, count);
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
+    LeafDensity density(*statistics_, channels, cells, grid.density_unit);
+    const auto beside = std::make_unique<LeafChannels>(*statistics_, channels, cells);
+    Box& box = boxes.local();
+    for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
+      const Node& node = nodes_[leaf_nodes_[rank]];
+      const vec3 v0 = vec3(node.v0);
+      const std::uint32_t shape = node.shape;
+      const std::uint32_t cell_class = core::cm_shape_class(shape);
+      const float unit = core::cm_shape_unit(shape);
+      const vec3 centroid = v0 + core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape);
+      const LeafDensity::Of of = density(node, centroid);
+      const bool emits = beside->put(node, centroid, of.mass, grid, rank);
+      if (of.any || emits) {
+        for (std::uint32_t i = 0; i < 4; ++i) {
+          const vec3 vertex = core::cm_cell_vertex(v0, shape, i);
+          box.low = glm::min(box.low, vertex);
+          box.high = glm::max(box.high, vertex);
+        }
+      }
+      grid.cells[rank] = record(leaf_nodes_[rank], of.fit, emits);
+      if (channels.ends) grid.change[rank] = pack_fit(of.change);
+    }
+    part.add(range.size());
+  });
+  Box all;
+  boxes.combine_each([&](const Box& box) {
+    all.low = glm::min(all.low, box.low);
+    all.high = glm::max(all.high, box.high);
+  });
+  if (all.low.x <= all.high.x) {
+    grid.content_min = all.low;
+    grid.content_max = all.high;
+  }
+  find_clear_cones(grid, progress);
+  return grid;
+}
+
+}  // namespace cumulet::grid
