@@ -199,7 +199,7 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
 }
 
 void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings, std::optional<BuildSettings> proxy) {
-  if (job_log_ != nullptr) job_log_->load_volume(file, settings, proxy);
+  if (job_log() != nullptr) job_log()->load_volume(file, settings, proxy);
   const auto load = std::make_shared<Load>(Load{std::move(settings), std::move(proxy)});
   const std::scoped_lock lock(mutex_);
   load_ = load;
@@ -283,7 +283,7 @@ void Builder::drop_proxy() {
 }
 
 void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before) {
-  if (job_log_ != nullptr) job_log_->build_volume(volume, settings, before);
+  if (job_log() != nullptr) job_log()->build_volume(volume, settings, before);
   const std::scoped_lock lock(mutex_);
   load_.reset();  // replaces a queued load
   worker_.post({"building the grid", Progress::Stage::refining,
@@ -293,12 +293,12 @@ void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene:
 }
 
 void Builder::cancel() {
-  if (job_log_ != nullptr) job_log_->call("volume", 0, "cancel");
+  log_call("volume", "cancel");
   stop([this] { worker_.cancel(); });
 }
 
 void Builder::cancel_loads() {
-  if (job_log_ != nullptr) job_log_->call("volume", 0, "cancel loads");
+  log_call("volume", "cancel loads");
   stop([this] { worker_.cancel_loads(); });
 }
 
@@ -314,7 +314,7 @@ void Builder::stop(const std::function<void()>& jobs) {
 }
 
 void Builder::forget() {
-  if (job_log_ != nullptr) job_log_->call("volume", 0, "forget");
+  log_call("volume", "forget");
   const std::scoped_lock lock(mutex_);
   load_.reset();
   worker_.drop();
@@ -334,7 +334,7 @@ bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
   const auto load = load_.lock();
   if (!load || !load->open) return false;
   load->settings = settings;
-  if (job_log_ != nullptr) job_log_->configure_volume(settings);
+  if (job_log() != nullptr) job_log()->configure_volume(settings);
   return true;
 }
 

@@ -15,7 +15,7 @@
 #include "grid/refine.hpp"
 #include "scene/channels.hpp"
 #include "scene/march_source.hpp"
-#include "viewer/job_log.hpp"
+#include "viewer/job_source.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
 #include "volume/frame_import.hpp"
@@ -122,15 +122,14 @@ void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 /// Loads volumes and builds their grids on a worker thread, one job at a time. Requests are coalesced: the latest wins.
 /// A running build is finished first. In a stream of loads at least every second one is finished, so intermediate
 /// results are displayed. Held at a time: one running job, one queued job and one result. All calls are thread-safe.
-class Builder {
+class Builder : public JobSource {
  public:
-  /// notify: called on the worker thread after a job ended.
-  Builder(Log log, std::function<void()> notify, Trace trace = {},
-          const ResourceLimitsPtr& resource_limits = std::make_shared<const ResourceLimits>())
-      : log_(std::move(log)),
-        notify_(notify),
-        resource_limits_(resource_limits),
-        worker_(std::move(notify), trace, resource_limits) {}
+  explicit Builder(const JobContext& context)
+      : JobSource(context),
+        log_(context.log),
+        notify_(context.notify),
+        resource_limits_(context.resource_limits),
+        worker_(context.notify, context.trace, context.resource_limits) {}
 
   /// Reads a file, then builds its grid unless `settings` is empty. Replaces the running job, as Worker::replace(),
   /// because files may take minutes. proxy: settings for the low-resolution proxy while `settings` is empty; null:
@@ -142,7 +141,7 @@ class Builder {
   /// Changes the settings of a running load. Returns false if there is none; the caller must then take the loaded
   /// volume and call build().
   bool configure_load(const std::optional<BuildSettings>& settings);
-  void cancel();
+  void cancel() override;
   /// True while a file is being read or queued.
   [[nodiscard]] bool loads() const;
   /// Cancels only loads, because another volume has been set.
@@ -160,14 +159,11 @@ class Builder {
   std::optional<Proxy> take_proxy();
 
   /// True if a job is running or a result has not been taken.
-  [[nodiscard]] bool busy() const;
+  [[nodiscard]] bool busy() const override;
   /// True if a result has not been taken.
   [[nodiscard]] bool has_result() const;
-  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Waits until idle, or until the given time. Returns true if idle.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
-  /// Sets the receiver of requests, or null; for tests.
-  void set_job_log(JobLog* log) { job_log_ = log; }
+  [[nodiscard]] Worker::Status status() const override { return worker_.status(); }
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override { return worker_.wait(until); }
 
  private:
   // Settings for the build that follows a load. They may change while `open`, until the file is read.
@@ -190,7 +186,6 @@ class Builder {
   Log log_;
   std::function<void()> notify_;
   ResourceLimitsPtr resource_limits_;
-  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;            // held by its job
   std::weak_ptr<Progress> proxy_load_;  // of the proxy that is being built

@@ -6,7 +6,7 @@
 namespace cumulet::viewer {
 
 void EnvironmentBuilder::load(const FilePath& path) {
-  if (job_log_ != nullptr) job_log_->load_environment(path);
+  if (job_log() != nullptr) job_log()->load_environment(path);
   const std::scoped_lock lock(mutex_);
   files_.replace({path.given(), Progress::Stage::loading,
                   [this, path](Progress& progress) {
@@ -19,7 +19,7 @@ void EnvironmentBuilder::load(const FilePath& path) {
 }
 
 void EnvironmentBuilder::make_sky(const light::Day& day) {
-  if (job_log_ != nullptr) job_log_->make_sky(day);
+  if (job_log() != nullptr) job_log()->make_sky(day);
   skies_.post({"computing the sky", Progress::Stage::idle, [this, day](Progress& progress) {
                  last_sky_ = run_cancellable(
                      &progress, [day, last = last_sky_] { return light::make_daylight(day, last ? &*last : nullptr); });
@@ -29,12 +29,12 @@ void EnvironmentBuilder::make_sky(const light::Day& day) {
 }
 
 void EnvironmentBuilder::cancel() {
-  if (job_log_ != nullptr) job_log_->call("environment", 0, "cancel");
+  log_call("environment", "cancel");
   files_.cancel();
 }
 
 void EnvironmentBuilder::drop_loads() {
-  if (job_log_ != nullptr) job_log_->call("environment", 0, "drop loads");
+  log_call("environment", "drop loads");
   files_.forget_failure();  // of a load that the new environment replaces
   files_.cancel();
   const std::scoped_lock lock(mutex_);

@@ -11,19 +11,19 @@
 #include "base/file_path.hpp"
 #include "light/environment.hpp"
 #include "light/sky.hpp"
-#include "viewer/job_log.hpp"
+#include "viewer/job_source.hpp"
 #include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
 
 /// Reads environment maps and computes physical skies, on one worker thread each. Requests are coalesced as in Builder:
 /// the latest wins, and running jobs are not starved. All calls are thread-safe.
-class EnvironmentBuilder {
+class EnvironmentBuilder : public JobSource {
  public:
-  /// notify: called on a worker thread after a job ended.
-  explicit EnvironmentBuilder(const std::function<void()>& notify, Trace trace = {},
-                              const ResourceLimitsPtr& resource_limits = nullptr)
-      : files_(notify, trace, resource_limits), skies_(notify, trace, resource_limits) {}
+  explicit EnvironmentBuilder(const JobContext& context)
+      : JobSource(context),
+        files_(context.notify, context.trace, context.resource_limits),
+        skies_(context.notify, context.trace, context.resource_limits) {}
 
   /// Reads a file. Replaces the running load, as Worker::replace().
   void load(const FilePath& path);
@@ -34,26 +34,21 @@ class EnvironmentBuilder {
   /// Drops the failure of the last sky.
   void forget_sky_failure() { skies_.forget_failure(); }
   /// Cancels loads; an untaken result remains.
-  void cancel();
+  void cancel() override;
 
   /// Returns the newest environment that was read, once.
   std::optional<light::EnvironmentPtr> take_environment();
   /// Returns the newest sky, once.
   std::optional<light::Daylight> take_sky();
 
-  /// True if a job is running or a result has not been taken.
-  [[nodiscard]] bool busy() const;
+  [[nodiscard]] bool busy() const override;
   /// Status of loads. The failure is that of loads, else that of skies.
-  [[nodiscard]] Worker::Status status() const;
-  /// Waits until idle, or until the given time. Returns true if idle.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const {
+  [[nodiscard]] Worker::Status status() const override;
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override {
     return files_.wait(until) && skies_.wait(until);
   }
-  /// Sets the receiver of requests, or null; for tests.
-  void set_job_log(JobLog* log) { job_log_ = log; }
 
  private:
-  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::optional<light::EnvironmentPtr> environment_;
   std::optional<light::Daylight> sky_;

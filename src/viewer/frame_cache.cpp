@@ -31,15 +31,16 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 
 }  // namespace
 
-FrameCache::FrameCache(Log log, std::function<void()> notify, Trace trace, ResourceLimitsPtr resource_limits)
-    : log_(std::move(log)),
-      notify_(std::move(notify)),
-      trace_(trace),
-      resource_limits_(std::move(resource_limits)),
-      worker_([this] { tell(); }, trace) {}
+FrameCache::FrameCache(const JobContext& context)
+    : JobSource(context),
+      log_(context.log),
+      notify_(context.notify),
+      trace_(context.trace),
+      resource_limits_(context.resource_limits),
+      worker_([this] { tell(); }, context.trace) {}
 
 void FrameCache::request(Request request) {
-  if (job_log_ != nullptr) job_log_->request(player_, request);
+  if (job_log() != nullptr) job_log()->request(player(), request);
   std::vector<Entry> old;  // destroyed after the lock is released, because its contents may be large
   {
     const std::scoped_lock lock(mutex_);
@@ -63,6 +64,7 @@ void FrameCache::request(Request request) {
     if (suggested && analyzed_ && analyzed_->density_scale && request.settings)
       request.settings->refine.density_scale = *analyzed_->density_scale;
     request_ = std::move(request);
+    final_taken_ = false;
     if (other_steps) find_substitutes();
     cancelled_ = false;
     std::ranges::move(take_excess(), std::back_inserter(old));
@@ -72,12 +74,13 @@ void FrameCache::request(Request request) {
 }
 
 void FrameCache::clear() {
-  if (job_log_ != nullptr) job_log_->call("frames", player_, "clear");
+  log_call("frames", "clear");
   std::vector<Entry> old;
   {
     const std::scoped_lock lock(mutex_);
     worker_.cancel();
     request_.reset();
+    final_taken_ = false;
     analyzed_.reset();
     old = std::exchange(cache_, {});
   }
@@ -85,7 +88,7 @@ void FrameCache::clear() {
 }
 
 void FrameCache::rebuild() {
-  if (job_log_ != nullptr) job_log_->call("frames", player_, "rebuild");
+  log_call("frames", "rebuild");
   std::vector<Entry> old;
   const std::scoped_lock lock(mutex_);
   if (!request_) return;
@@ -103,7 +106,7 @@ void FrameCache::rebuild() {
 }
 
 void FrameCache::cancel() {
-  if (job_log_ != nullptr) job_log_->call("frames", player_, "cancel");
+  log_call("frames", "cancel");
   {
     const std::scoped_lock lock(mutex_);
     cancelled_ = true;
@@ -140,6 +143,12 @@ std::optional<FrameCache::Ready> FrameCache::nearest() const {
   return ready;
 }
 
+std::optional<FrameCache::Ready> FrameCache::take() {
+  auto ready = nearest();
+  if (ready) final_taken_ = ready->wanted;
+  return ready;
+}
+
 FrameCache::Status FrameCache::frames() const {
   const std::scoped_lock lock(mutex_);
   Status status;
@@ -159,7 +168,7 @@ std::optional<Error> FrameCache::failure_of(std::uint32_t frame) const {
 
 bool FrameCache::busy() const {
   const std::scoped_lock lock(mutex_);
-  return waits();
+  return !final_taken_ && waits();
 }
 
 Worker::Status FrameCache::status() const {

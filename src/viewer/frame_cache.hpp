@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "viewer/job_log.hpp"
+#include "viewer/job_source.hpp"
 #include "viewer/sequence.hpp"
 
 namespace cumulet::viewer {
@@ -62,7 +62,7 @@ struct FrameRequest {
 /// The sequence is analyzed first, with the largest readable file that is not empty. The result has the bounds for
 /// cameras and ground, and one density scale for all frames, so that nothing jumps. A frame that cannot be read is
 /// logged once and replaced by the nearest earlier readable frame, or else by the nearest later one.
-class FrameCache {
+class FrameCache : public JobSource {
  public:
   using Steps = FrameSteps;
   using Request = FrameRequest;
@@ -86,9 +86,7 @@ class FrameCache {
     std::uint64_t bytes = 0;    ///< main memory of everything cached, including interpolated steps
   };
 
-  /// notify: called on a worker thread after each frame, and when a job ended.
-  FrameCache(Log log, std::function<void()> notify, Trace trace = {},
-             ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>());
+  explicit FrameCache(const JobContext& context);
 
   /// Replaces the request. Running frames are finished, so that with fast-changing requests every frame that was begun
   /// can be displayed. Other files: everything cached is dropped.
@@ -96,32 +94,30 @@ class FrameCache {
   /// Removes the request and everything cached.
   void clear();
   /// Rebuilds all frames, also failed ones. The old ones are available until then.
-  void rebuild();
+  void rebuild() override;
   /// Ends running and queued work until the next request.
-  void cancel();
+  void cancel() override;
 
   /// Returns the result of the analysis, once.
   std::optional<AnalyzedFrame> take_analyzed();
   /// Returns the cached data of the first requested step, or of the nearest step that has any.
   [[nodiscard]] std::optional<Ready> nearest() const;
+  /// Returns nearest() to show it. After a final result nothing else is awaited until the next request.
+  std::optional<Ready> take();
+  [[nodiscard]] bool is_final_taken() const { return final_taken_; }
   /// Changes after each frame that was built or failed.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   [[nodiscard]] Status frames() const;
   /// Returns why a frame cannot be shown. Nullopt if it can, or if this is not known yet.
   [[nodiscard]] std::optional<Error> failure_of(std::uint32_t frame) const;
 
-  /// True while the first requested step is being made.
-  [[nodiscard]] bool busy() const;
+  /// True while the first requested step is being made, unless a final result was taken.
+  [[nodiscard]] bool busy() const override;
   /// Status of the first requested step. failure: no frame can be shown, or no more frames are made.
-  [[nodiscard]] Worker::Status status() const;
+  [[nodiscard]] Worker::Status status() const override;
   /// Waits until the first requested step is ready or cannot be made, or until the given time. Returns true unless the
   /// time ran out.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
-  /// Sets the receiver of requests, or null. player: identifies this object there. For tests.
-  void set_job_log(JobLog* log, JobLog::Player player) {
-    job_log_ = log;
-    player_ = player;
-  }
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override;
 
  private:
   struct Entry {
@@ -192,8 +188,6 @@ class FrameCache {
   std::function<void()> notify_;
   Trace trace_;
   ResourceLimitsPtr resource_limits_;
-  JobLog* job_log_ = nullptr;
-  JobLog::Player player_ = 0;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Request> request_;
@@ -209,7 +203,8 @@ class FrameCache {
   std::set<std::string> said_;  // logged messages, without file names
   bool cancelled_ = false;      // until the next request
   std::atomic<std::uint64_t> revision_ = 0;
-  Worker worker_;  // last: its thread uses all of the above
+  std::atomic<bool> final_taken_ = false;  // since the last request
+  Worker worker_;                          // last: its thread uses all of the above
 };
 
 }  // namespace cumulet::viewer

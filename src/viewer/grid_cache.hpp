@@ -15,16 +15,15 @@ struct GridRequest {
 /// Asynchronous cache of the grids of several volumes.
 class GridCache : public RequestCache<GridRequest, Built> {
  public:
-  GridCache(const Log& log, std::function<void()> notify, Trace trace = {},
-            ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
+  explicit GridCache(const JobContext& context)
       : RequestCache(
             "building the grids of several volumes", Progress::Stage::refining,
-            [log](const Request& request, Progress& progress) {
+            [log = context.log](const Request& request, Progress& progress) {
               ResourceLimits part;
               part.set_gl(request.gl_bytes);
               return build_grid(log, request.volume, request.settings, progress, part);
             },
-            std::move(notify), trace, std::move(resource_limits)) {}
+            context) {}
 };
 
 }  // namespace cumulet::viewer

@@ -14,7 +14,7 @@ constexpr const char* what = "building a dynamic volume";
 }  // namespace
 
 void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings) {
-  if (job_log_ != nullptr) job_log_->follow_states(player_, live, settings);
+  if (job_log() != nullptr) job_log()->follow_states(player(), live, settings);
   std::optional<Ready> old;  // destroyed after the lock is released, because its contents may be large
   const std::scoped_lock lock(mutex_);
   worker_.drop();
@@ -29,7 +29,7 @@ void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings
 }
 
 void LiveBuilder::configure(std::optional<BuildSettings> settings) {
-  if (job_log_ != nullptr) job_log_->configure_states(player_, settings);
+  if (job_log() != nullptr) job_log()->configure_states(player(), settings);
   const std::scoped_lock lock(mutex_);
   settings_ = std::move(settings);
   begin();
@@ -45,14 +45,14 @@ void LiveBuilder::look() noexcept {
 }
 
 void LiveBuilder::rebuild() {
-  if (job_log_ != nullptr) job_log_->call("states", player_, "rebuild");
+  log_call("states", "rebuild");
   const std::scoped_lock lock(mutex_);
   begun_.reset();
   begin();
 }
 
 void LiveBuilder::cancel() {
-  if (job_log_ != nullptr) job_log_->call("states", player_, "cancel");
+  log_call("states", "cancel");
   const std::scoped_lock lock(mutex_);
   worker_.cancel();
   job_.reset();

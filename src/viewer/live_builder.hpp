@@ -8,19 +8,20 @@
 #include <optional>
 
 #include "viewer/builder.hpp"
-#include "viewer/job_log.hpp"
+#include "viewer/job_source.hpp"
 #include "viewer/live.hpp"
 
 namespace cumulet::viewer {
 
 /// Builds grids of a dynamic volume's states on a worker thread. It builds the newest state as soon as the previous
 /// grid was taken, so that every grid that is built can be displayed. All calls are thread-safe.
-class LiveBuilder {
+class LiveBuilder : public JobSource {
  public:
-  /// notify: called on the worker thread after each state, and when a job ended.
-  LiveBuilder(Log log, std::function<void()> notify, Trace trace = {},
-              ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
-      : log_(std::move(log)), resource_limits_(std::move(resource_limits)), worker_(std::move(notify), trace) {}
+  explicit LiveBuilder(const JobContext& context)
+      : JobSource(context),
+        log_(context.log),
+        resource_limits_(context.resource_limits),
+        worker_(context.notify, context.trace) {}
 
   /// Follows this volume instead of the previous one; null: none.
   void follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings);
@@ -29,9 +30,9 @@ class LiveBuilder {
   /// Starts a build if there is a newer state.
   void look() noexcept;
   /// Rebuilds the newest state.
-  void rebuild();
+  void rebuild() override;
   /// Ends running work until the next state or other settings.
-  void cancel();
+  void cancel() override;
 
   struct Ready {
     Built built;
@@ -41,15 +42,9 @@ class LiveBuilder {
   std::optional<Ready> take();
 
   /// True if the newest state is due, is being built or has not been taken.
-  [[nodiscard]] bool busy() const;
-  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Waits until no job is running, or until the given time. Returns true unless the time ran out.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
-  /// Sets the receiver of requests, or null. player: identifies this object there. For tests.
-  void set_job_log(JobLog* log, JobLog::Player player) {
-    job_log_ = log;
-    player_ = player;
-  }
+  [[nodiscard]] bool busy() const override;
+  [[nodiscard]] Worker::Status status() const override { return worker_.status(); }
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override { return worker_.wait(until); }
 
  private:
   // State and settings of the last build, successful or not.
@@ -72,8 +67,6 @@ class LiveBuilder {
 
   Log log_;
   ResourceLimitsPtr resource_limits_;
-  JobLog* job_log_ = nullptr;
-  JobLog::Player player_ = 0;
   mutable std::mutex mutex_;
   std::shared_ptr<Live> live_;
   std::optional<BuildSettings> settings_;

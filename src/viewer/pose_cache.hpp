@@ -14,14 +14,13 @@ struct PoseRequest {
 /// Asynchronous cache of the poses of several models.
 class PoseCache : public RequestCache<PoseRequest, scene::ModelSourcePtr> {
  public:
-  explicit PoseCache(std::function<void()> notify, Trace trace = {},
-                     ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
+  explicit PoseCache(const JobContext& context)
       : RequestCache(
             "posing several models", Progress::Stage::loading,
             [](const Request& request, Progress& progress) {
               return request.surfaces->posed(request.choice, progress);
             },
-            std::move(notify), trace, std::move(resource_limits)) {}
+            context) {}
 };
 
 }  // namespace cumulet::viewer

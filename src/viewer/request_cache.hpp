@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "viewer/job_log.hpp"
+#include "viewer/job_source.hpp"
 #include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
@@ -17,21 +17,20 @@ namespace cumulet::viewer {
 /// Asynchronous cache: makes one value per request on a worker thread, one after another, and keeps it while it is
 /// requested. All calls are thread-safe.
 template <class RequestOf, class Made>
-class RequestCache {
+class RequestCache : public JobSource {
  public:
   using Request = RequestOf;
   using Make = std::function<Made(const Request&, Progress&)>;
 
-  /// what, stage: description of the work in failures and in Worker::status(). notify: called on the worker thread
-  /// after each value, and when a job ended.
-  RequestCache(const char* what, Progress::Stage stage, Make make, std::function<void()> notify, Trace trace = {},
-               ResourceLimitsPtr resource_limits = std::make_shared<const ResourceLimits>())
-      : what_(what),
+  /// what, stage: description of the work in failures and in Worker::status().
+  RequestCache(const char* what, Progress::Stage stage, Make make, const JobContext& context)
+      : JobSource(context),
+        what_(what),
         stage_(stage),
         make_(std::move(make)),
-        notify_(notify),
-        resource_limits_(std::move(resource_limits)),
-        worker_(std::move(notify), trace) {}
+        notify_(context.notify),
+        resource_limits_(context.resource_limits),
+        worker_(context.notify, context.trace) {}
 
   /// Replaces all requests. Running work is finished and its value kept until the next call, so that with fast-changing
   /// requests every value that was begun can be displayed. Failed requests are not retried.
@@ -40,21 +39,21 @@ class RequestCache {
   [[nodiscard]] std::optional<Made> built(const Request& request) const;
   [[nodiscard]] bool is_under_way(const Request& request) const;
   /// Failed requests are retried with the next call of request().
-  void forget_failures();
+  void rebuild() override;
   /// Changes after each value that was made.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// Ends running and queued work with ErrorCode::cancelled.
-  void cancel() {
-    if (job_log_ != nullptr) job_log_->call(what_, 0, "cancel");
+  void cancel() override {
+    log_call(what_, "cancel");
     worker_.cancel();
   }
 
-  [[nodiscard]] bool busy() const { return worker_.busy(); }
-  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Waits until idle, or until the given time. Returns true if idle.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
-  /// Sets the receiver of requests, or null; for tests.
-  void set_job_log(JobLog* log) { job_log_ = log; }
+  /// Returns true if values were made or failed since the last call.
+  bool take_changes();
+  // Check in this order: a job counts its values before it ends.
+  [[nodiscard]] bool busy() const override { return worker_.busy() || revision_ != taken_revision_; }
+  [[nodiscard]] Worker::Status status() const override { return worker_.status(); }
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override { return worker_.wait(until); }
 
  private:
   struct Entry {
@@ -71,11 +70,11 @@ class RequestCache {
   Progress::Stage stage_;
   Make make_;
   std::function<void()> notify_;
-  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::vector<Entry> cache_;
   std::optional<Request> under_way_;
   std::atomic<std::uint64_t> revision_ = 0;
+  std::atomic<std::uint64_t> taken_revision_ = 0;
   ResourceLimitsPtr
       resource_limits_;  // applied to each value separately: with a thread limit, other jobs run between two values
   Worker worker_;        // last: its thread uses all of the above
@@ -89,7 +88,7 @@ typename std::vector<typename RequestCache<Request, Made>::Entry>::iterator Requ
 
 template <class Request, class Made>
 void RequestCache<Request, Made>::request(std::vector<Request> requests) {
-  if (job_log_ != nullptr) job_log_->request(requests);
+  if (job_log() != nullptr) job_log()->request(requests);
   bool missing = false;
   bool failed = false;
   std::vector<Entry> before;  // destroyed after the lock is released, because its contents may be large
@@ -129,10 +128,16 @@ bool RequestCache<Request, Made>::is_under_way(const Request& request) const {
 }
 
 template <class Request, class Made>
-void RequestCache<Request, Made>::forget_failures() {
-  if (job_log_ != nullptr) job_log_->call(what_, 0, "forget failures");
+void RequestCache<Request, Made>::rebuild() {
+  log_call(what_, "forget failures");
   const std::scoped_lock lock(mutex_);
   for (Entry& entry : cache_) entry.failure.reset();
+}
+
+template <class Request, class Made>
+bool RequestCache<Request, Made>::take_changes() {
+  const std::uint64_t revision = revision_;
+  return taken_revision_.exchange(revision) != revision;
 }
 
 template <class Request, class Made>

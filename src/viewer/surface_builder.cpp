@@ -3,7 +3,7 @@
 namespace cumulet::viewer {
 
 void SurfaceBuilder::load(const FilePath& path, SurfaceChoice choice) {
-  if (job_log_ != nullptr) job_log_->load_surfaces(path, choice);
+  if (job_log() != nullptr) job_log()->load_surfaces(path, choice);
   const auto load = std::make_shared<Load>(Load{choice});
   const std::scoped_lock lock(mutex_);
   load_ = load;
@@ -31,7 +31,7 @@ void SurfaceBuilder::read(const FilePath& path, Load& load, Progress& progress) 
 }
 
 void SurfaceBuilder::cancel() {
-  if (job_log_ != nullptr) job_log_->call("surfaces", 0, "cancel");
+  log_call("surfaces", "cancel");
   {
     const std::scoped_lock lock(mutex_);
     load_.reset();  // a load that is being stopped accepts no other settings
@@ -40,7 +40,7 @@ void SurfaceBuilder::cancel() {
 }
 
 void SurfaceBuilder::cancel_loads() {
-  if (job_log_ != nullptr) job_log_->call("surfaces", 0, "cancel loads");
+  log_call("surfaces", "cancel loads");
   {
     const std::scoped_lock lock(mutex_);
     load_.reset();
@@ -53,12 +53,12 @@ bool SurfaceBuilder::configure_load(SurfaceChoice choice) {
   const auto load = load_.lock();
   if (!load || !load->open) return false;
   load->choice = choice;
-  if (job_log_ != nullptr) job_log_->configure_surfaces(choice);
+  if (job_log() != nullptr) job_log()->configure_surfaces(choice);
   return true;
 }
 
 void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceChoice choice) {
-  if (job_log_ != nullptr) job_log_->pose_surfaces(asset, choice);
+  if (job_log() != nullptr) job_log()->pose_surfaces(asset, choice);
   worker_.post(
       {"posing the surfaces", Progress::Stage::loading, [this, asset = std::move(asset), choice](Progress& progress) {
          PosedModel made{nullptr, asset->posed(choice, progress)};

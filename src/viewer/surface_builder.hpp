@@ -11,7 +11,7 @@
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
-#include "viewer/job_log.hpp"
+#include "viewer/job_source.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/worker.hpp"
 
@@ -25,11 +25,10 @@ struct PosedModel {
 
 /// Reads glTF scenes and poses them on a worker thread. Requests are coalesced as in Builder: the latest wins, and
 /// running jobs are not starved. All calls are thread-safe.
-class SurfaceBuilder {
+class SurfaceBuilder : public JobSource {
  public:
-  /// notify: called on the worker thread after a job ended.
-  SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {}, ResourceLimitsPtr resource_limits = nullptr)
-      : log_(std::move(log)), worker_(std::move(notify), trace, std::move(resource_limits)) {}
+  explicit SurfaceBuilder(const JobContext& context)
+      : JobSource(context), log_(context.log), worker_(context.notify, context.trace, context.resource_limits) {}
 
   /// Reads a file, then poses it. Replaces the running job, as Worker::replace().
   void load(const FilePath& path, SurfaceChoice choice);
@@ -38,20 +37,16 @@ class SurfaceBuilder {
   bool configure_load(SurfaceChoice choice);
   /// Poses a scene after the running pose, so that slow poses are displayed before the next.
   void pose(SurfaceAssetPtr asset, SurfaceChoice choice);
-  void cancel();
+  void cancel() override;
   /// Cancels only loads, because other surfaces have been set.
   void cancel_loads();
   /// Drops the failure of the last job.
   void forget_failure() { worker_.forget_failure(); }
   /// Returns the newest result, once.
   std::optional<PosedModel> take();
-  /// True if a job is running or a result has not been taken.
-  [[nodiscard]] bool busy() const;
-  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
-  /// Waits until idle, or until the given time. Returns true if idle.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
-  /// Sets the receiver of requests, or null; for tests.
-  void set_job_log(JobLog* log) { job_log_ = log; }
+  [[nodiscard]] bool busy() const override;
+  [[nodiscard]] Worker::Status status() const override { return worker_.status(); }
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override { return worker_.wait(until); }
 
  private:
   // The choice for the pose that follows a load. It may change while `open`, until the pose begins.
@@ -62,7 +57,6 @@ class SurfaceBuilder {
   void read(const FilePath& path, Load& load, Progress& progress);
 
   Log log_;
-  JobLog* job_log_ = nullptr;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
   std::optional<PosedModel> result_;

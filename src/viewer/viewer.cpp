@@ -130,18 +130,7 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
       update_(std::move(update)),
       restore_state_(restore_state),
       sharing_(sharing ? std::move(sharing) : std::make_shared<Sharing>()),
-      builder_(
-          log_, [this] { notify(); }, trace, resource_limits_),
-      surface_builder_(
-          log_, [this] { notify(); }, trace, resource_limits_),
-      environment_builder_([this] { notify(); }, trace, resource_limits_),
-      cache_(
-          log_, [this] { notify(); }, trace, resource_limits_),
-      poses_([this] { notify(); }, trace, resource_limits_),
-      frames_(
-          log_, [this] { notify(); }, trace, resource_limits_),
-      lives_(
-          log_, [this] { notify(); }, trace, resource_limits_) {
+      jobs_({.log = log_, .notify = [this] { notify(); }, .trace = trace, .resource_limits = resource_limits_}) {
   volume::initialize_readers();
   set_medium({});
   set_light({});
@@ -173,7 +162,7 @@ void Viewer::touch() {
 // ---- volumes and grid builds ----
 
 void Viewer::sync() {
-  if (auto loaded = builder_.take_loaded()) {
+  if (auto loaded = jobs_.builder.take_loaded()) {
     take_volume(std::move(loaded->volume));
     suggested_density_scale_ = loaded->density_scale;
     if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
@@ -182,7 +171,7 @@ void Viewer::sync() {
       take_medium();
     }
   }
-  if (auto built = builder_.take_built()) {
+  if (auto built = jobs_.builder.take_built()) {
     // A rebuild keeps the timings of the load.
     if (built->volume == built_.volume) {
       if (built->seconds.load == 0.0) built->seconds.load = built_.seconds.load;
@@ -203,12 +192,12 @@ void Viewer::sync() {
   follow_watching();
   follow_instances();
   follow_models();
-  if (auto surfaces = surface_builder_.take()) {
+  if (auto surfaces = jobs_.surfaces.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
     model_source_ = std::move(surfaces->source);
   }
-  if (auto read = environment_builder_.take_environment()) show_environment(std::move(*read));
-  if (auto sky = environment_builder_.take_sky()) {
+  if (auto read = jobs_.environments.take_environment()) show_environment(std::move(*read));
+  if (auto sky = jobs_.environments.take_sky()) {
     if (asked_day_ == sky->day) asked_day_.reset();
     // A sky requested earlier is displayed until the newest is ready.
     if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
@@ -219,14 +208,14 @@ void Viewer::sync() {
 void Viewer::follow_proxy() {
   // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
   // read-back must only contain the requested volume.
-  if (auto made = builder_.take_proxy(); made && sampling_.preview && !followed_ && !watched_) {
+  if (auto made = jobs_.builder.take_proxy(); made && sampling_.preview && !followed_ && !watched_) {
     proxy_ = std::move(made);
     show_medium();
   }
   // Check in this order: a job stores its result before it ends.
-  if (!proxy_ || !proxy_->load.expired() || builder_.has_result()) return;
+  if (!proxy_ || !proxy_->load.expired() || jobs_.builder.has_result()) return;
   // Either the volume was loaded and the next frame requests its grid, or the load failed.
-  const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !builder_.status().failure;
+  const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !jobs_.builder.status().failure;
   if (!waits) drop_proxy();
 }
 
@@ -253,7 +242,7 @@ void Viewer::take_volume(VolumeAssetPtr volume) {
 bool Viewer::begin_anew(bool shows, bool showed) {
   if (!shows && !showed) return false;
   reported_failures_.retire();
-  builder_.forget();
+  jobs_.builder.forget();
   drop_proxy();
   sync();
   leave_sequence();
@@ -287,21 +276,21 @@ Viewer::Followed Viewer::follow(std::shared_ptr<Sequence> sequence, std::optiona
 
 void Viewer::leave_sequence() {
   followed_.reset();
-  frames_.clear();
+  jobs_.frames.clear();
   watched_.reset();
-  lives_.follow(nullptr, std::nullopt);
+  jobs_.states.follow(nullptr, std::nullopt);
 }
 
 void Viewer::set_live(std::shared_ptr<Live> live) {
   if (!begin_anew(live != nullptr, watched_.has_value())) return;
-  watched_ = watch(std::move(live), lives_);
-  lives_.follow(watched_->live, settings_at_once());
+  watched_ = watch(std::move(live), jobs_.states, ++last_followed_);
+  jobs_.states.follow(watched_->live, settings_at_once());
   touch();
 }
 
-Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder) {
+Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder, std::uint64_t id) {
   Watched watched;
-  watched.id = ++last_followed_;
+  watched.id = id;
   if (const auto& bounds = live->bounds()) watched.volume_info = info_of(*bounds);
   watched.listener = live->listen([this, &builder] {
     builder.look();
@@ -334,7 +323,7 @@ std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& bu
 void Viewer::follow_live(bool unseen) {
   if (!watched_) return;
   Watched& w = *watched_;
-  auto ready = take_state(w, lives_, unseen);
+  auto ready = take_state(w, jobs_.states, unseen);
   if (!ready) return;
   const bool other_volume = !w.volume_info || w.told.ready_count == 1;
   volume_ = ready->built.volume;
@@ -368,7 +357,7 @@ Viewer::LiveStatus Viewer::live(const Instance& instance) {
 void Viewer::follow_sequence() {
   if (!followed_) return;
   Followed& f = *followed_;
-  if (auto analyzed = frames_.take_analyzed()) {
+  if (auto analyzed = jobs_.frames.take_analyzed()) {
     volume_ = nullptr;
     volume_info_ = std::move(analyzed->volume_info);
     requests_due_ = true;
@@ -381,7 +370,7 @@ void Viewer::follow_sequence() {
       f.request_due = true;
     }
   }
-  tell_request(f, frames_);
+  tell_request(f, jobs_.frames);
   if (f.take_due) take_frame();
 }
 
@@ -396,10 +385,9 @@ void Viewer::tell_request(Followed& f, FrameCache& cache) const {
     if (settings) settings->shutter_seconds *= f.state.playback.velocity_scale;
     cache.request({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
                    std::min(f.state.memory_bytes, resource_limits_->memory_bytes()),
-                   FrameCache::Steps::of(f.state.playback), &cache == &frames_});
+                   FrameCache::Steps::of(f.state.playback), &cache == &jobs_.frames});
     f.request_due = false;
     f.take_due = true;
-    f.is_wanted = false;
   }
   if (const std::uint64_t cache_revision = cache.revision(); cache_revision != f.cache_revision) {
     f.cache_revision = cache_revision;
@@ -407,13 +395,11 @@ void Viewer::tell_request(Followed& f, FrameCache& cache) const {
   }
 }
 
-std::optional<FrameCache::Ready> Viewer::take(Followed& f, const FrameCache& cache) const {
+std::optional<FrameCache::Ready> Viewer::take(Followed& f, FrameCache& cache) const {
   // Each frame that was taken is displayed, even if frames arrive faster.
   if (!is_seen(f.frame, f.is_rendered)) return std::nullopt;
   f.take_due = false;
-  auto ready = cache.nearest();
-  if (ready) f.is_wanted = ready->wanted;
-  return ready;
+  return cache.take();
 }
 
 bool Viewer::note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before) {
@@ -426,7 +412,7 @@ bool Viewer::note_taken(Followed& f, const FrameCache::Ready& ready, const scene
 
 void Viewer::take_frame() {
   Followed& f = *followed_;
-  auto ready = take(f, frames_);
+  auto ready = take(f, jobs_.frames);
   if (!ready) return;
   volume_ = ready->built.volume;
   if (!note_taken(f, *ready, built_.source)) return;
@@ -454,11 +440,11 @@ Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameCache& ca
   return status;
 }
 
-Viewer::SequenceStatus Viewer::sequence() { return status_of(followed(), frames_); }
+Viewer::SequenceStatus Viewer::sequence() { return status_of(followed(), jobs_.frames); }
 
 std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
   require_frame(*followed().sequence, frame);
-  return frames_.failure_of(frame);
+  return jobs_.frames.failure_of(frame);
 }
 
 std::vector<Viewer::Shown>::iterator Viewer::look_up(const Instance& instance) {
@@ -500,24 +486,24 @@ BuildSettings Viewer::settings_for_view() const {
 }
 
 bool Viewer::built_for_another() const {
-  const bool own_is_due = own_left_out_ && !builder_.loads();
+  const bool own_is_due = own_left_out_ && !jobs_.builder.loads();
   return grid_.camera_adaptive && view_ && (built_in_motion_ || own_is_due || built_for_ != build_view());
 }
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   reported_failures_.retire();
-  const bool loads = builder_.configure_load(settings_at_once());
+  const bool loads = jobs_.builder.configure_load(settings_at_once());
   if (loads && !followed_ && !watched_) return;
   sync();
   const auto settings = settings_at_once();
   if (watched_) {
-    if (!loads) builder_.forget_failure();
+    if (!loads) jobs_.builder.forget_failure();
     built_for_.reset();
-    lives_.configure(settings);
+    jobs_.states.configure(settings);
     return;
   }
   if (followed_) {
-    if (!loads) builder_.forget_failure();  // of a load that would have replaced the sequence
+    if (!loads) jobs_.builder.forget_failure();  // of a load that would have replaced the sequence
     // The `concerned` test is skipped, because other frames may have fields that the displayed one lacks.
     built_for_.reset();
     followed_->settings = settings;
@@ -527,7 +513,7 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   if (loads) return;
   if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
   built_for_.reset();
-  if (volume_ && settings) builder_.build(volume_, *settings);
+  if (volume_ && settings) jobs_.builder.build(volume_, *settings);
 }
 
 void Viewer::load_volume(const VolumeFile& file) {
@@ -536,7 +522,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
   drop_proxy();
-  builder_.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
+  jobs_.builder.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
   // A sequence or a dynamic volume is shown until the new volume is ready.
   if (followed_ || watched_) {
     suggested_density_scale_ = suggested;
@@ -547,13 +533,13 @@ void Viewer::load_volume(const VolumeFile& file) {
 
 void Viewer::set_volume(VolumeAssetPtr volume) {
   reported_failures_.retire();
-  builder_.forget_failure();
+  jobs_.builder.forget_failure();
   if (volume) {
-    builder_.cancel_loads();  // builds continue: a host may set volumes faster than they build
+    jobs_.builder.cancel_loads();  // builds continue: a host may set volumes faster than they build
   } else {
-    builder_.cancel();
+    jobs_.builder.cancel();
   }
-  builder_.take_loaded();  // drops a loaded volume that has not been shown
+  jobs_.builder.take_loaded();  // drops a loaded volume that has not been shown
   drop_proxy();
   sync();
   leave_sequence();
@@ -563,7 +549,7 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
     built_ = {};
   } else if (!grid_.camera_adaptive) {
     take_medium();
-    builder_.build(volume_, grid_.build);
+    jobs_.builder.build(volume_, grid_.build);
   }
   touch();
 }
@@ -671,9 +657,7 @@ std::optional<PoseCache::Request> Viewer::previous_pose(const ShownModel& shown)
 }
 
 void Viewer::follow_poses() {
-  const std::uint64_t posed = poses_.revision();
-  if (posed == posed_ && !poses_due_) return;
-  posed_ = posed;
+  if (!jobs_.poses.take_changes() && !poses_due_) return;
   std::vector<PoseCache::Request> requests;
   for (ShownModel& shown : shown_models_) {
     if (!shown.is_wanted()) {
@@ -682,7 +666,7 @@ void Viewer::follow_poses() {
     }
     PoseCache::Request request{shown.settings.surfaces, while_open(shown.settings.choice, shown.settings.surfaces)};
     if (shown.request != request) {
-      if (shown.request && poses_.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
+      if (shown.request && jobs_.poses.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
       shown.request = request;
     }
     if (std::ranges::find(requests, request) == requests.end()) requests.push_back(request);
@@ -692,15 +676,16 @@ void Viewer::follow_poses() {
   // Take results before sending the requests, which may drop poses made for earlier ones.
   for (ShownModel& shown : shown_models_) {
     if (!shown.request) continue;
-    auto source = poses_.built(*shown.request);
+    auto source = jobs_.poses.built(*shown.request);
     if (source) shown.begun.reset();  // older poses are not shown again
     // If requests change faster than poses are made, show one that was begun.
-    if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
+    if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces)
+      source = jobs_.poses.built(*shown.begun);
     if (source) shown.source = std::move(*source);
     const std::optional<PoseCache::Request> then = previous_pose(shown);
-    shown.previous_source = then ? poses_.built(*then).value_or(nullptr) : nullptr;
+    shown.previous_source = then ? jobs_.poses.built(*then).value_or(nullptr) : nullptr;
   }
-  if (std::exchange(poses_due_, false)) poses_.request(std::move(requests));
+  if (std::exchange(poses_due_, false)) jobs_.poses.request(std::move(requests));
 }
 
 std::optional<scene::ShutterTransforms> Viewer::while_open(const std::optional<scene::ShutterTransforms>& ends) const {
@@ -714,7 +699,7 @@ SurfaceChoice Viewer::while_open(SurfaceChoice choice, const SurfaceAssetPtr& su
 
 void Viewer::pose_surfaces() {
   reported_failures_.retire();
-  if (surface_asset_) surface_builder_.pose(surface_asset_, while_open(surface_settings_.choice, surface_asset_));
+  if (surface_asset_) jobs_.surfaces.pose(surface_asset_, while_open(surface_settings_.choice, surface_asset_));
 }
 
 std::vector<scene::Model> Viewer::models() const {
@@ -753,11 +738,9 @@ void Viewer::follow_instances() {
   }
   if (requests_due_) request_for_sequences();
   follow_played();
-  const std::uint64_t built = cache_.revision();
-  if (built != cache_revision_) take_grids();
-  cache_revision_ = built;
+  if (jobs_.grids.take_changes()) take_grids();
   // The viewer's own grid, which was to be reused, may have failed.
-  if (waits_for_own_ && !builder_.busy()) requests_due_ = true;
+  if (waits_for_own_ && !jobs_.builder.busy()) requests_due_ = true;
   if (!requests_due_ || (grid_.camera_adaptive && !view_)) return;
   requests_due_ = false;
   request_for_grids();
@@ -778,17 +761,15 @@ void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
 
 Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
                                     const std::optional<BuildSettings>& settings) {
-  auto played = std::make_shared<Played>(
-      follow(sequence, settings), log_, [this] { notify(); }, trace_, resource_limits_);
-  played->cache.set_job_log(job_log_, played->followed.id);
-  return played;
+  Followed followed = follow(sequence, settings);
+  const JobContext context = jobs_.context(followed.id);
+  return std::make_shared<Played>(std::move(followed), context);
 }
 
 Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
-  auto watching = std::make_shared<Watching>(
-      log_, [this] { notify(); }, trace_, resource_limits_);
-  watching->watched = watch(live, watching->builder);
-  watching->builder.set_job_log(job_log_, watching->watched.id);
+  const std::uint64_t id = ++last_followed_;
+  auto watching = std::make_shared<Watching>(jobs_.context(id));
+  watching->watched = watch(live, watching->builder, id);
   watching->settings = settings;
   watching->builder.follow(live, settings);
   return watching;
@@ -836,13 +817,16 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
     for (Shown* shown : wanted.by) shown->*member = p;
     next.push_back(std::move(p));
   }
-  const std::scoped_lock lock(played_mutex_);
-  players.swap(next);  // unused players are destroyed after the lock is released
+  players = std::move(next);
 }
 
 void Viewer::request_for_sequences() {
   share(played_, &Shown::played);
   share(watching_, &Shown::watching);
+  std::vector<std::shared_ptr<JobSource>> players;
+  for (const PlayedPtr& played : played_) players.emplace_back(played, &played->cache);
+  for (const WatchingPtr& watching : watching_) players.emplace_back(watching, &watching->builder);
+  jobs_.set_players(std::move(players));
 }
 
 void Viewer::follow_watching(bool unseen) {
@@ -879,7 +863,7 @@ std::optional<Built> Viewer::grid_of(const GridCache::Request& request) const {
   for (const Shown& shown : shown_) {
     if (shown.built && is(*shown.built) && fits(*shown.built)) return shown.built;
   }
-  return cache_.built(request);
+  return jobs_.grids.built(request);
 }
 
 void Viewer::take_grids() {
@@ -887,7 +871,7 @@ void Viewer::take_grids() {
     if (!shown.request) continue;
     auto built = grid_of(*shown.request);
     // If requests change faster than grids are built, show one that was begun.
-    if (!built && shown.begun) built = cache_.built(*shown.begun);
+    if (!built && shown.begun) built = jobs_.grids.built(*shown.begun);
     if (built) shown.built = std::move(built);
   }
 }
@@ -966,7 +950,7 @@ void Viewer::request_for_grids() {
   for (GridCache::Request& request : requests) {
     reuse_grid(request);
     if (grid_of(request)) continue;
-    const bool comes = builder_.busy() && !grid_.camera_adaptive && request.volume == volume_;
+    const bool comes = jobs_.builder.busy() && !grid_.camera_adaptive && request.volume == volume_;
     if (comes && suits(grid_.build, request.settings)) {
       waits_for_own_ = true;
     } else {
@@ -976,10 +960,10 @@ void Viewer::request_for_grids() {
   for (std::size_t i = 0; i < shown_.size(); ++i) {
     Shown& shown = shown_[i];
     if (!request_of[i] || shown.request == requests[*request_of[i]]) continue;
-    if (shown.request && cache_.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
+    if (shown.request && jobs_.grids.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
     shown.request = requests[*request_of[i]];
   }
-  cache_.request(std::move(to_build));
+  jobs_.grids.request(std::move(to_build));
   fit_cells();  // its share of GPU memory may have changed
 }
 
@@ -989,14 +973,9 @@ void Viewer::rebuild() {
     shown.request.reset();
     if (shown.built) shown.built->volume = nullptr;  // stays displayed until replaced, but cannot be reused
   }
-  cache_.forget_failures();
+  jobs_.rebuild();
   requests_due_ = true;
-  poses_.forget_failures();
   poses_due_ = true;
-  frames_.rebuild();
-  for (const PlayedPtr& played : played_) played->cache.rebuild();
-  for (const WatchingPtr& watching : watching_) watching->builder.rebuild();
-  lives_.rebuild();
   take_medium();
   request_build();
   touch();
@@ -1023,7 +1002,7 @@ bool Viewer::fits(const Built& built) const {
 }
 
 bool Viewer::makes_room(const Shown& shown) const {
-  return shown.is_seen() && shown.request && shown.built && cache_.busy() && !fits(*shown.built) &&
+  return shown.is_seen() && shown.request && shown.built && jobs_.grids.busy() && !fits(*shown.built) &&
          !grid_of(*shown.request);
 }
 
@@ -1046,63 +1025,35 @@ void Viewer::set_limits(const Limits& limits) {
 
 void Viewer::fit_cells() {
   // The running job may have been started under other limits, or for another volume.
-  if (!cells_due_ || builder_.busy()) return;
+  if (!cells_due_ || jobs_.builder.busy()) return;
   cells_due_ = false;
   if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
   cuts_own_ = !has_cells_allowed(built_, *resource_limits_);
   if (cuts_own_) request_build();
 }
 
-void Viewer::set_job_log(JobLog* log) {
-  job_log_ = log;
-  builder_.set_job_log(log);
-  surface_builder_.set_job_log(log);
-  environment_builder_.set_job_log(log);
-  cache_.set_job_log(log);
-  poses_.set_job_log(log);
-  frames_.set_job_log(log, 0);
-  lives_.set_job_log(log, 0);
-  for (const PlayedPtr& played : played_) played->cache.set_job_log(log, played->followed.id);
-  for (const WatchingPtr& watching : watching_) watching->builder.set_job_log(log, watching->watched.id);
-}
-
-void Viewer::cancel() {
-  builder_.cancel();
-  surface_builder_.cancel();
-  environment_builder_.cancel();
-  cache_.cancel();
-  poses_.cancel();
-  frames_.cancel();
-  lives_.cancel();
-  const std::scoped_lock lock(played_mutex_);
-  for (const PlayedPtr& played : played_) played->cache.cancel();
-  for (const WatchingPtr& watching : watching_) watching->builder.cancel();
-}
-
-bool Viewer::busy() const {
-  const bool poses = poses_.busy() || poses_.revision() != posed_;
-  return builds() || surface_builder_.busy() || poses || environment_builder_.busy();
-}
+bool Viewer::busy() const { return jobs_.busy() || frames_are_due(); }
 
 bool Viewer::builds() const {
-  const auto waits = [](const PlayedPtr& played) { return played->followed.waits(played->cache); };
-  const bool state_comes = (watched_ && lives_.busy()) ||
-                           std::ranges::any_of(watching_, [](const WatchingPtr& w) { return w->builder.busy(); });
-  const bool frame_comes = (followed_ && followed_->waits(frames_)) || std::ranges::any_of(played_, waits);
-  return frame_comes || state_comes || builder_.busy() || cache_.busy() || cache_.revision() != cache_revision_;
+  return jobs_.busy(ContentKind::volume) || jobs_.busy(ContentKind::instances) || frames_are_due();
+}
+
+bool Viewer::frames_are_due() const {
+  const auto are_due = [](const PlayedPtr& played) { return played->followed.is_due(played->cache); };
+  return (followed_ && followed_->is_due(jobs_.frames)) || std::ranges::any_of(played_, are_due);
 }
 
 void Viewer::load_surfaces(const FilePath& path) {
   reported_failures_.retire();
   sync();
-  surface_builder_.load(path, while_open(surface_settings_.choice, nullptr));
+  jobs_.surfaces.load(path, while_open(surface_settings_.choice, nullptr));
   touch();
 }
 
 void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
   reported_failures_.retire();
-  surface_builder_.forget_failure();
-  surface_builder_.cancel();
+  jobs_.surfaces.forget_failure();
+  jobs_.surfaces.cancel();
   sync();
   surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
   model_source_ = std::move(surfaces);
@@ -1111,11 +1062,11 @@ void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
 
 void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
   reported_failures_.retire();
-  surface_builder_.forget_failure();
+  jobs_.surfaces.forget_failure();
   if (surfaces) {
-    surface_builder_.cancel_loads();  // poses continue: a host may set surfaces faster than they are posed
+    jobs_.surfaces.cancel_loads();  // poses continue: a host may set surfaces faster than they are posed
   } else {
-    surface_builder_.cancel();
+    jobs_.surfaces.cancel();
   }
   sync();
   surface_asset_ = std::move(surfaces);
@@ -1131,7 +1082,7 @@ SurfaceAssetPtr Viewer::surfaces_asset() {
 
 void Viewer::set_surface_settings(const SurfaceSettings& settings) {
   const bool poses = settings.choice != surface_settings_.choice &&
-                     !surface_builder_.configure_load(while_open(settings.choice, nullptr));
+                     !jobs_.surfaces.configure_load(while_open(settings.choice, nullptr));
   if (poses) sync();
   surface_settings_ = settings;
   if (poses) pose_surfaces();
@@ -1168,77 +1119,35 @@ void Viewer::use_surface_camera(std::size_t index) {
 void Viewer::wait(double timeout_ms) {
   std::optional<Clock::time_point> until;
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
-  const auto idle = [&] {
-    return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
-           cache_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until) &&
-           std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->cache.wait(until); }) &&
-           std::ranges::all_of(watching_, [&](const WatchingPtr& w) { return w->builder.wait(until); });
-  };
   // One result may cause further work.
   do {
     // Stopped workers never become idle.
     if (process_is_ending()) throw Error(ErrorCode::cancelled, "the process is exiting");
     sync();
-    if (!idle()) throw Error(ErrorCode::timeout, "not ready in time");
+    if (!jobs_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
     // The newest state is waited for, so it need not wait until the previous one has been displayed.
     follow_live(true);
     follow_watching(true);
     sync();
   } while (busy());
-  if (const auto failure = reported_failures_.report(failures(), ReportedFailures::Cancelled::reported))
+  if (const auto failure = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::reported))
     throw Error(*failure);
 }
 
-ContentFailures Viewer::failures() const {
-  const auto first = [](std::optional<Error>& of, std::optional<Error> failure) {
-    if (!of) of = std::move(failure);
-  };
-  ContentFailures failures;
-  std::optional<Error>& volume = failures[ContentKind::volume];
-  first(volume, builder_.status().failure);
-  first(volume, frames_.status().failure);
-  first(volume, lives_.status().failure);
-  std::optional<Error>& instances = failures[ContentKind::instances];
-  first(instances, cache_.status().failure);
-  {
-    const std::scoped_lock lock(played_mutex_);
-    for (const PlayedPtr& played : played_) first(instances, played->cache.status().failure);
-    for (const WatchingPtr& watching : watching_) first(instances, watching->builder.status().failure);
-  }
-  failures[ContentKind::surfaces] = surface_builder_.status().failure;
-  failures[ContentKind::models] = poses_.status().failure;
-  failures[ContentKind::environment] = environment_builder_.status().failure;
-  return failures;
-}
-
 Viewer::Status Viewer::status() const {
-  const ContentFailures failures = this->failures();
+  const JobList::Status jobs = jobs_.status();
   const auto either = [&](ContentKind kind, ContentKind other) {
-    return failures[kind] ? failures[kind] : failures[other];
+    return jobs.failures[kind] ? jobs.failures[kind] : jobs.failures[other];
   };
   Status status;
   status.volume_failure = either(ContentKind::volume, ContentKind::instances);
   status.surfaces_failure = either(ContentKind::surfaces, ContentKind::models);
-  status.environment_failure = failures[ContentKind::environment];
-  status.failure = reported_failures_.report(failures, ReportedFailures::Cancelled::reported);
-  std::vector<Worker::Status> all{builder_.status(),
-                                  frames_.status(),
-                                  lives_.status(),
-                                  cache_.status(),
-                                  surface_builder_.status(),
-                                  poses_.status(),
-                                  environment_builder_.status()};
-  {
-    const std::scoped_lock lock(played_mutex_);
-    for (const PlayedPtr& p : played_) all.push_back(p->cache.status());
-    for (const WatchingPtr& w : watching_) all.push_back(w->builder.status());
-  }
-  const auto under_way =
-      std::ranges::find_if(all, [](const Worker::Status& one) { return one.stage != Progress::Stage::idle; });
+  status.environment_failure = jobs.failures[ContentKind::environment];
+  status.failure = reported_failures_.report(jobs.failures, ReportedFailures::Cancelled::reported);
   const double upload = upload_progress_.load(std::memory_order_relaxed);
-  if (under_way != all.end()) {
-    status.stage = under_way->stage;
-    status.fraction = under_way->fraction;
+  if (jobs.stage != Progress::Stage::idle) {
+    status.stage = jobs.stage;
+    status.fraction = jobs.fraction;
   } else if (upload < 1.0) {
     status.stage = Progress::Stage::uploading;
     status.fraction = upload;
@@ -1341,13 +1250,13 @@ void Viewer::set_lights(light::AnalyticLights analytic_lights) {
 void Viewer::load_environment(const FilePath& path) {
   reported_failures_.retire();
   sync();
-  environment_builder_.load(path);
+  jobs_.environments.load(path);
   touch();
 }
 
 void Viewer::set_environment(light::EnvironmentPtr environment) {
   reported_failures_.retire();
-  environment_builder_.drop_loads();
+  jobs_.environments.drop_loads();
   sync();
   show_environment(std::move(environment));
   touch();
@@ -1388,12 +1297,12 @@ void Viewer::surround() {
                                    environment_settings_.strength};
   const std::optional<light::Day> wanted = day();
   if (!wanted) {
-    environment_builder_.forget_sky_failure();
+    jobs_.environments.forget_sky_failure();
     daylight_.reset();
     scene_.lights.set({to_sun(light_.sun_azimuth_degrees, light_.sun_elevation_degrees), light_.sun_irradiance,
                        light_.sky_radiance, light_.sun_angle_degrees});
   } else if (!(daylight_ && daylight_->day == *wanted) && asked_day_ != wanted) {
-    environment_builder_.make_sky(*wanted);
+    jobs_.environments.make_sky(*wanted);
     asked_day_ = wanted;
   }
   // Until the new sky is ready, sun and sky stay unchanged except for the azimuth.
@@ -1419,7 +1328,7 @@ void Viewer::set_sampling(const Sampling& sampling) {
   if (!sampling_.preview) drop_proxy();
   if (other_shutter) {
     poses_due_ = true;
-    const bool loads = surface_builder_.configure_load(while_open(surface_settings_.choice, nullptr));
+    const bool loads = jobs_.surfaces.configure_load(while_open(surface_settings_.choice, nullptr));
     if (!loads && surface_asset_ && surface_asset_->scene().may_move(surface_settings_.choice.animation))
       pose_surfaces();
   }
@@ -1717,7 +1626,7 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
 
 void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const {
   if (max_gl_bytes_ == ResourceLimits::no_limit) return;
-  const bool own = cuts_own_ && builder_.busy() && !builder_.loads() && !proxy_ && !followed_ && !watched_;
+  const bool own = cuts_own_ && jobs_.builder.busy() && !jobs_.builder.loads() && !proxy_ && !followed_ && !watched_;
   if (!own && std::ranges::none_of(shown_, [this](const Shown& shown) { return makes_room(shown); })) return;
   const auto was = [&](const scene::Volume& volume) {
     return std::ranges::find(scene_.volumes, volume.id, &scene::Volume::id);

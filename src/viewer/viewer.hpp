@@ -8,7 +8,6 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,21 +18,13 @@
 #include "base/trace.hpp"
 #include "denoise/network.hpp"
 #include "scene/snapshot.hpp"
-#include "viewer/builder.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
-#include "viewer/environment_builder.hpp"
-#include "viewer/frame_cache.hpp"
-#include "viewer/grid_cache.hpp"
 #include "viewer/instance.hpp"
-#include "viewer/job_log.hpp"
-#include "viewer/live_builder.hpp"
+#include "viewer/jobs.hpp"
 #include "viewer/navigation.hpp"
-#include "viewer/pose_cache.hpp"
-#include "viewer/reported_failures.hpp"
 #include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
-#include "viewer/surface_builder.hpp"
 
 namespace cumulet::viewer {
 
@@ -139,7 +130,7 @@ class Viewer {
   /// Applies to work started after this call. Grids whose number of cells no longer suits the memory limits are
   /// rebuilt.
   void set_limits(const Limits& limits);
-  void cancel();
+  void cancel() { jobs_.cancel(); }
   /// timeout_ms: negative: no limit. Throws Status::failure, or Error(timeout).
   void wait(double timeout_ms);
   struct Status {
@@ -226,7 +217,7 @@ class Viewer {
   /// Limits the texels per page of cell records; 0: the driver's limit; for tests.
   void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
   /// Sets the receiver of all requests to workers, or null; for tests.
-  void set_job_log(JobLog* log);
+  void set_job_log(JobLog* log) { jobs_.set_job_log(log); }
   /// Answers of a GL context, for a viewer without one.
   struct SimulatedGl {
     bool displays_frames = true;             ///< each frame of a sequence is displayed once it was rendered
@@ -246,8 +237,6 @@ class Viewer {
   [[nodiscard]] Context& gl() const;
   // Must be called after each change of a setting.
   void touch();
-  // Returns the failure of the last work of each kind of content. Thread-safe.
-  [[nodiscard]] ContentFailures failures() const;
   // Updates the scene's lights and environment from the settings.
   void surround();
   // Returns the inputs of the physical sky; nullopt without one.
@@ -257,6 +246,8 @@ class Viewer {
   [[nodiscard]] bool busy() const;
   // busy() for the workers that build grids.
   [[nodiscard]] bool builds() const;
+  // True if a sequence has a request that was not sent, or results that were not checked.
+  [[nodiscard]] bool frames_are_due() const;
   // Runs the body of a [GL] call with state guard and error handling.
   template <class Body>
   void with_gl(Body&& body);
@@ -354,12 +345,11 @@ class Viewer {
     bool take_due = false;
     std::uint64_t id = 0;                       // identifies this object
     std::optional<scene::SequenceFrame> frame;  // frame taken last
-    bool is_wanted = false;                     // it is final: nothing better is expected
     bool is_rendered = false;                   // a frame has rendered it
 
-    // True if there is work pending for it.
-    [[nodiscard]] bool waits(const FrameCache& cache) const {
-      return !is_wanted && (request_due || cache.busy() || cache.revision() != cache_revision);
+    // True if there is work pending for it, beside that of the cache.
+    [[nodiscard]] bool is_due(const FrameCache& cache) const {
+      return !cache.is_final_taken() && (request_due || cache.revision() != cache_revision);
     }
   };
   [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
@@ -374,15 +364,13 @@ class Viewer {
   // True if a frame or a state is ready, but waits until the previous one has been displayed.
   [[nodiscard]] bool something_waits() const;
   // Returns the data to show now, if it may have changed.
-  [[nodiscard]] std::optional<FrameCache::Ready> take(Followed& f, const FrameCache& cache) const;
+  [[nodiscard]] std::optional<FrameCache::Ready> take(Followed& f, FrameCache& cache) const;
   // Records that this data was taken. Returns false if it was taken before.
   bool note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before);
   [[nodiscard]] SequenceStatus status_of(const Followed& f, const FrameCache& cache) const;
   // A sequence of instances. Instances whose grids are the same share one.
   struct Played {
-    Played(Followed requested, const Log& log, std::function<void()> notify, Trace trace,
-           ResourceLimitsPtr resource_limits)
-        : followed(std::move(requested)), cache(log, std::move(notify), trace, std::move(resource_limits)) {}
+    Played(Followed requested, const JobContext& context) : followed(std::move(requested)), cache(context) {}
     Followed followed;
     VolumeInfoPtr volume_info;   // set after its analysis
     std::optional<Built> built;  // for the frame taken last
@@ -409,14 +397,13 @@ class Viewer {
     [[nodiscard]] LiveStatus status() const;
   };
   // Starts following a dynamic volume. The builder is notified of its states while the result exists.
-  [[nodiscard]] Watched watch(std::shared_ptr<Live> live, LiveBuilder& builder);
+  [[nodiscard]] Watched watch(std::shared_ptr<Live> live, LiveBuilder& builder, std::uint64_t id);
   [[nodiscard]] std::optional<LiveBuilder::Ready> take_state(Watched& w, LiveBuilder& builder, bool unseen);
   // Records which state this frame's image shows.
   static void note_drawn(const Context& g, Watched& w);
   // A dynamic volume of instances. Instances whose grids are the same share one.
   struct Watching {
-    Watching(const Log& log, std::function<void()> notify, Trace trace, ResourceLimitsPtr resource_limits)
-        : builder(log, std::move(notify), trace, std::move(resource_limits)) {}
+    explicit Watching(const JobContext& context) : builder(context) {}
     LiveBuilder builder;
     Watched watched;  // its listener notifies `builder`
     std::optional<BuildSettings> settings;
@@ -561,7 +548,6 @@ class Viewer {
   std::atomic<double> upload_progress_ = 1.0;
   std::shared_ptr<Sharing> sharing_;
   std::int64_t page_texels_ = 0;
-  JobLog* job_log_ = nullptr;
   std::optional<SimulatedGl> simulated_gl_;
 
   GridSettings grid_;
@@ -602,13 +588,11 @@ class Viewer {
   scene::Part<scene::Medium> shown_medium_;              // of the viewer's own volume
   std::vector<Shown> shown_;                             // in the order in which they were added
   std::vector<ShownModel> shown_models_;                 // in the order in which they were added
-  std::uint64_t posed_ = 0;                              // revision of poses_ when it was last checked
   std::uint64_t last_id_ = 0;
-  std::uint64_t cache_revision_ = 0;  // revision of cache_ when it was last checked
-  bool poses_due_ = false;            // the requests for poses_ are outdated
-  bool requests_due_ = false;         // the requests for cache_ are outdated
-  bool waits_for_own_ = false;        // an instance waits for the volume's own grid, which is being built
-  bool transforms_changed_ = false;   // since the last traced frame
+  bool poses_due_ = false;           // the requests for poses are outdated
+  bool requests_due_ = false;        // the requests for grids are outdated
+  bool waits_for_own_ = false;       // an instance waits for the volume's own grid, which is being built
+  bool transforms_changed_ = false;  // since the last traced frame
   std::uint64_t settings_revision_ = 1;
   glm::uvec2 frame_size_{0U};  // image size of the last frame
   // In the volume's own world space, for volume_. It becomes the medium's once a grid has been built for it.
@@ -663,16 +647,9 @@ class Viewer {
   std::size_t grids_ = 1;                           // number of grids that share the GPU memory for volumes equally
   std::uint64_t part_of_gl_ = ResourceLimits::no_limit;  // share of each grid when cells were last requested
   std::unique_ptr<Context> gl_;
-  Builder builder_;  // last: their threads use the above
-  SurfaceBuilder surface_builder_;
-  EnvironmentBuilder environment_builder_;
-  GridCache cache_;
-  PoseCache poses_;
-  FrameCache frames_;
-  LiveBuilder lives_;
-  mutable std::mutex played_mutex_;  // the lists change only on the host's thread; other threads read them
-  std::vector<PlayedPtr> played_;
+  std::vector<PlayedPtr> played_;  // both: players of jobs_
   std::vector<WatchingPtr> watching_;
+  Jobs jobs_;  // last: its threads use the above
 };
 
 }  // namespace cumulet::viewer

@@ -125,7 +125,7 @@ void Viewer::prepare(const Frame& frame) {
   if (!scene) built_ = {};
   // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
   // last job's status is kept.
-  if (!volume_info_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
+  if (!volume_info_ && shows_models() && !shows_instances() && !built_.source && !jobs_.builder.busy()) {
     Progress progress;
     built_ = build_grid(log_, empty_volume(), grid_.build, progress);
   }
@@ -144,25 +144,25 @@ void Viewer::prepare(const Frame& frame) {
   last_view_ = std::exchange(traced_view_, view_);
   const bool transforms_rest = !std::exchange(transforms_changed_, false);
   // A build of the previous volume would replace the queued load.
-  const bool another_comes = builder_.loads();
+  const bool another_comes = jobs_.builder.loads();
   const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
   if ((shown_info() || others || watches) && built_for_another() && !waits) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
     // GPU builds follow a moving camera, one grid after another, each of which is displayed.
     const bool follows =
         volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
-        !builder_.busy() && gl_ && !gl_->scene().uploading_volumes() &&
+        !jobs_.builder.busy() && gl_ && !gl_->scene().uploading_volumes() &&
         gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
     if (rests || follows) {
       take_medium();
       if (watched_) {
-        lives_.configure(settings_for_view());
+        jobs_.states.configure(settings_for_view());
       } else if (followed_) {
         followed_->settings = settings_for_view();
         followed_->request_due = true;
         follow_sequence();
       } else if (volume_ && !another_comes) {
-        builder_.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
+        jobs_.builder.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
       }
       requests_due_ = true;
       follow_instances();
@@ -254,8 +254,8 @@ void Viewer::report_pending(FrameResult& result) {
     result.more = true;
     result.converged = false;
   }
-  result.failed = reported_failures_.report(failures(), ReportedFailures::Cancelled::left_out).has_value();
-  result.more = result.more || navigation_.moving() || (built_for_another() && !builder_.loads());
+  result.failed = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::left_out).has_value();
+  result.more = result.more || navigation_.moving() || (built_for_another() && !jobs_.builder.loads());
 }
 
 Viewer::DryRun Viewer::dry_run(const Frame& frame) {
@@ -741,7 +741,7 @@ Stats Viewer::stats() {
     }
   }
   s.build_seconds = built_.seconds;
-  s.memory_bytes = followed_ ? frames_.frames().bytes : built_.bytes();
+  s.memory_bytes = followed_ ? jobs_.frames.frames().bytes : built_.bytes();
   for (const PlayedPtr& played : played_) s.memory_bytes += played->cache.frames().bytes;
   s.steps = totals_.steps;
   s.noise = totals_.noise;

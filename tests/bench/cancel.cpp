@@ -36,10 +36,10 @@ class Load {
  public:
   explicit Load(const std::string& file) {
     if (file.ends_with(".vdb") || file.ends_with(".nvdb")) {
-      volume_.emplace(Log(), [] {});
+      volume_.emplace(viewer::JobContext{{}, [] {}});
       volume_->load({file, {}, glm::dmat4(1.0)}, viewer::BuildSettings{});
     } else {
-      surfaces_.emplace(Log(), [] {});
+      surfaces_.emplace(viewer::JobContext{{}, [] {}});
       surfaces_->load(file, {});
     }
   }

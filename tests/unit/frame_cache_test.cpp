@@ -28,6 +28,7 @@ using cumulet::viewer::BuildSettings;
 using cumulet::viewer::FrameCache;
 using cumulet::viewer::FrameFiles;
 using cumulet::viewer::FrameFilesPtr;
+using cumulet::viewer::JobContext;
 using Frames = std::vector<std::uint32_t>;
 using State = FrameCache::State;
 
@@ -71,11 +72,11 @@ class FrameCacheTest : public testing::Test {
   std::mutex mutex_;
   std::vector<std::string> warnings_;
   std::atomic<int> told_ = 0;
-  FrameCache cache_{cumulet::Log([this](cumulet::LogLevel level, const char* text) {
-                      const std::scoped_lock lock(mutex_);
-                      if (level == cumulet::LogLevel::warning) warnings_.emplace_back(text);
-                    }),
-                    [this] { ++told_; }};
+  FrameCache cache_{JobContext{cumulet::Log([this](cumulet::LogLevel level, const char* text) {
+                                 const std::scoped_lock lock(mutex_);
+                                 if (level == cumulet::LogLevel::warning) warnings_.emplace_back(text);
+                               }),
+                               [this] { ++told_; }}};
 };
 
 // Compares cells, point location and channels bit by bit.
@@ -285,7 +286,7 @@ TEST_F(FrameCacheTest, RepairedFileIsReadAgain) {
     cumulet::test::write_frame(other.path(0), {cumulet::test::clip_ball(0)});
     cache->rebuild();
   };
-  cache = std::make_unique<FrameCache>(cumulet::Log(mend), [] {});
+  cache = std::make_unique<FrameCache>(JobContext{cumulet::Log(mend), [] {}});
   const auto files = std::make_shared<const FrameFiles>(FrameFiles{other.paths(), {}});
   cache->request({files, {0}, BuildSettings{}, plenty});
   ASSERT_TRUE(comes([&] { return !cache->busy() && mended > 0; }));
@@ -297,10 +298,10 @@ TEST_F(FrameCacheTest, RepairedFileIsReadAgain) {
 TEST_F(FrameCacheTest, ReportsWhyItStopped) {
   clip_.corrupt(3);
   std::atomic<bool> throws = true;
-  FrameCache cache(cumulet::Log([&](cumulet::LogLevel, const char*) {
-                     if (throws) throw std::runtime_error("no room");
-                   }),
-                   [] {});
+  FrameCache cache(JobContext{cumulet::Log([&](cumulet::LogLevel, const char*) {
+                                if (throws) throw std::runtime_error("no room");
+                              }),
+                              [] {}});
   cache.request({files(), from(3), BuildSettings{}, plenty});
   ASSERT_TRUE(comes([&] { return cache.status().failure.has_value(); }));
   EXPECT_STREQ(cache.status().failure->what(), "internal error: no room");
@@ -310,6 +311,25 @@ TEST_F(FrameCacheTest, ReportsWhyItStopped) {
   ASSERT_TRUE(cache.wait(std::nullopt));
   EXPECT_FALSE(cache.status().failure);
   EXPECT_TRUE(cache.nearest());
+}
+
+// A rebuild continues in the background; its results are not awaited if nothing was requested since.
+TEST_F(FrameCacheTest, AfterAFinalResultNothingIsAwaited) {
+  const FrameFilesPtr all = files();
+  cache_.request({all, from(2), BuildSettings{}, plenty});
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_FALSE(cache_.is_final_taken());
+  ASSERT_TRUE(cache_.take());
+  EXPECT_TRUE(cache_.is_final_taken());
+  cache_.rebuild();
+  EXPECT_FALSE(cache_.busy());
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  cache_.request({all, from(3), BuildSettings{}, plenty});
+  EXPECT_FALSE(cache_.is_final_taken());
+  ASSERT_TRUE(cache_.wait(std::nullopt));
+  EXPECT_TRUE(cache_.take()->wanted);
+  cache_.clear();
+  EXPECT_FALSE(cache_.is_final_taken());
 }
 
 TEST_F(FrameCacheTest, StopsUntilTheNextRequest) {

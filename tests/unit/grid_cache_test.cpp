@@ -20,7 +20,7 @@ class GridCacheTest : public testing::Test {
         cumulet::test::noise_volume(glm::ivec3(side), glm::ivec3(0), static_cast<int>(seed)));
   }
   std::atomic<int> told_ = 0;
-  viewer::GridCache cache_{{}, [this] { ++told_; }};
+  viewer::GridCache cache_{viewer::JobContext{{}, [this] { ++told_; }}};
 };
 
 TEST_F(GridCacheTest, KeepsRequestedGrids) {
@@ -39,6 +39,7 @@ TEST_F(GridCacheTest, KeepsRequestedGrids) {
   cache_.request({b});
   EXPECT_FALSE(cache_.built(a));
   EXPECT_TRUE(cache_.built(b));
+  EXPECT_TRUE(cache_.take_changes());
   EXPECT_FALSE(cache_.busy());
   EXPECT_GE(told_, 2);
 }
