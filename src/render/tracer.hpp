@@ -13,23 +13,20 @@
 
 #include "gl/programs.hpp"
 #include "render/allotment.hpp"
-#include "render/analytic_light_data.hpp"
-#include "render/environment_data.hpp"
+#include "render/feature_buffers.hpp"
 #include "render/film.hpp"
-#include "render/instance_data.hpp"
 #include "render/march_data.hpp"
-#include "render/model_data.hpp"
+#include "render/mattes.hpp"
 #include "render/pace.hpp"
 #include "render/parameters.hpp"
 #include "render/pass_timer.hpp"
 #include "render/path_kernels.hpp"
+#include "render/picture_settings.hpp"
 #include "render/region.hpp"
 #include "render/surface_raster.hpp"
-#include "scene/motion.hpp"
+#include "render/trace_inputs.hpp"
 
 namespace cumulet::render {
-
-enum class View { shaded = 0, cells = 1, steps = 2, density = 3, wireframe = 4 };
 
 struct Totals {
   std::uint64_t samples = 0;
@@ -37,86 +34,6 @@ struct Totals {
   /// Root mean square over pixels of the standard error of luminance, divided by the mean luminance. Only pixels with
   /// two samples count; nullopt if there are none, or if the value is not finite.
   std::optional<double> noise;
-};
-
-/// Trace inputs other than the volume data: host depth as of HostDepth, triangles, environment, lights, and the
-/// instance table if there are several volumes.
-struct TraceInputs {
-  GLuint depth = 0;  // 0: none
-  unsigned layers = 0;
-  glm::uvec2 size{0U};
-  const ModelInstances* scene = nullptr;
-  bool traced = true;               // paths hit the scene's triangles; else only the surface pass draws them
-  SurfaceRaster* raster = nullptr;  // the surface pass, with its view and lighting below
-  SurfaceView view;
-  SurfaceLighting lighting;
-  const EnvironmentData* environment = nullptr;  // hit by paths that escape
-  const AnalyticLightData* analytic_lights =
-      nullptr;                                 // sampled by NEE: those of the scene if paths hit it, and the host's
-  const InstanceData* instances = nullptr;     // set if there are several volumes; else the volume is the only one
-  bool volume_holdout = false;                 // one of the volumes is a holdout
-  bool model_holdout = false;                  // one of the models that paths hit is a holdout
-  const scene::MotionTable* motion = nullptr;  // transforms for motion vectors; required for FeatureSet::all
-
-  /// Returns the scene whose triangles paths hit; null: none.
-  [[nodiscard]] const ModelInstances* traced_models() const { return traced ? scene : nullptr; }
-  [[nodiscard]] std::uint32_t analytic_light_count() const {
-    return analytic_lights == nullptr ? 0 : analytic_lights->count();
-  }
-};
-
-/// How camera rays use the surface pass (rasterized surfaces).
-enum class Layered {
-  no,       // not at all: they hit triangles, if there are any
-  within,   // they end at it and take its color
-  beneath,  // they end at it; the compositor draws it beneath the picture
-};
-
-struct PictureSettings {
-  View view = View::shaded;
-  /// The first pass leaves the last few pixels of a tile, those with the longest paths, to the second.
-  bool previews_first = false;
-  Layered layered = Layered::no;
-  glm::uvec2 layer_size{0U};
-  unsigned layers = 1;
-  /// Samples that hit the volume before any surface are also summed separately.
-  bool separate_volume_aov = false;
-  /// The picture is done once its noise (Totals::noise) reaches this; nullopt: once it has its samples.
-  std::optional<double> noise_target;
-  /// Pixels are sampled only as much as the noise target needs (Allotment); else all equally.
-  bool adaptive = false;
-  /// Number of light groups with separate sums; 0: none.
-  std::uint32_t light_groups = 0;
-  /// Render region, and a margin of pixels around it. Tiles and noise cover only these pixels.
-  Region region;
-  unsigned margin = 0;
-};
-
-/// Noise-free feature buffers (AOVs); documented in glsl/aovs.comp.
-enum class FeatureBuffer { transmittance, surface_z, volume_z, normal, albedo, velocity, motion, volume_motion };
-constexpr std::size_t channels_of(FeatureBuffer feature) {
-  if (feature == FeatureBuffer::motion || feature == FeatureBuffer::volume_motion) return 2;
-  return feature == FeatureBuffer::normal || feature == FeatureBuffer::albedo || feature == FeatureBuffer::velocity ? 3
-                                                                                                                    : 1;
-}
-/// Feature buffers that are rendered together: denoiser guides, or velocity and motion vectors as well.
-enum class FeatureSet { guides, all };
-
-/// Feature rays per pixel when feature buffers are read back; the denoiser starts with fewer. In pixels whose rays
-/// differ, as with triangles or shadows finer than a pixel, more rays improve denoising, up to max_feature_rays.
-constexpr std::uint32_t feature_rays = 16;
-constexpr std::uint32_t max_feature_rays = 64;
-
-/// Rays per pixel for Cryptomatte, and its maximum number of ranks.
-constexpr std::uint32_t matte_rays = 64;
-constexpr std::uint32_t max_matte_ranks = 16;
-
-/// Cryptomatte IDs (cryptomatte_id) of the visible objects; 0: in no matte. Volumes are in the order of Picked::volume,
-/// and models in their own.
-struct MatteIds {
-  std::uint32_t ground = 0;
-  std::vector<std::uint32_t> volumes;
-  std::vector<std::uint32_t> models;
 };
 
 /// Sample counts of the pixels: minimum, maximum and total.
