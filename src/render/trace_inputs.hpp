@@ -7,6 +7,7 @@
 #include "render/environment_data.hpp"
 #include "render/instance_data.hpp"
 #include "render/model_data.hpp"
+#include "render/parameters.hpp"
 #include "render/surface_raster.hpp"
 #include "scene/motion.hpp"
 
@@ -37,5 +38,13 @@ struct TraceInputs {
     return analytic_lights == nullptr ? 0 : analytic_lights->count();
   }
 };
+
+/// Returns the parameters of kernels. The caller adds layers, light groups and dispatch.
+[[nodiscard]] core::CmParameters kernel_parameters(const PictureParameters& picture, const TraceInputs& trace_inputs);
+/// Sets the parameters that may have changed since the picture was started: poses of surfaces, lights, and the host's
+/// depth.
+[[nodiscard]] core::CmParameters with_current_inputs(core::CmParameters parameters, const TraceInputs& trace_inputs);
+/// Binds the buffers and textures of the inputs.
+void bind_inputs(const gl::Functions& gl, const TraceInputs& trace_inputs);
 
 }  // namespace cumulet::render
