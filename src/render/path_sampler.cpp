@@ -79,7 +79,7 @@ bool PathSampler::accumulate(Picture& picture, const MarchData& data, const Trac
                              Deadline deadline, bool until_complete) {
   const PathFeatures& features = picture.features();
   Accumulation& accumulation = picture.accumulation();
-  InFlightDispatches& in_flight = dispatches_.in_flight();
+  const InFlightDispatches& in_flight = dispatches_.in_flight();
   Kernels kernels{programs_.get(trace_key(features, data)), std::nullopt};
   dispatches_.order();
   dispatches_.use(*kernels.program.object, data, trace_inputs);
