@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "path_blocks.glsl"
-#include "render/pace.hpp"
+#include "render/dispatch_results.hpp"
 
 namespace cumulet::render {
 

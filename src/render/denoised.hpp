@@ -2,7 +2,7 @@
 
 #include "denoise/network.hpp"
 #include "gl/programs.hpp"
-#include "render/tracer.hpp"
+#include "render/picture.hpp"
 
 namespace cumulet::render {
 
@@ -18,7 +18,7 @@ struct Denoising {
 };
 
 /// Returns a GL_RGBA32F texture of the picture's box, row 0 at the top: denoised radiance and unchanged alpha. The
-/// picture must have its feature buffers (Tracer::find_features). Waits for the driver's compiler, never for the
+/// picture must have its feature buffers (FeaturePass::find). Waits for the driver's compiler, never for the
 /// device. Needs a current context and an active StateGuard. Throws Error(out_of_memory, gl).
 gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const Picture& picture,
                     const Denoising& denoising);

@@ -7,6 +7,13 @@
 
 namespace cumulet::render {
 
+PixelTransfer transfer_of(const FilmLayer& layer) {
+  if (layer.format == GL_RGBA32F) return {GL_RGBA, GL_FLOAT};
+  if (layer.format == GL_RG32UI) return {GL_RG_INTEGER, GL_UNSIGNED_INT};
+  if (layer.format == GL_RG32F) return {GL_RG, GL_FLOAT};
+  return {GL_RED, GL_FLOAT};
+}
+
 void Film::begin(glm::uvec2 size) {
   if (size != size_) held_.clear();
   size_ = size;

@@ -20,6 +20,13 @@ struct FilmLayer {
   bool operator==(const FilmLayer& other) const { return std::string_view(name) == other.name; }
 };
 
+/// Pixel transfer format of a layer's texels.
+struct PixelTransfer {
+  GLenum format;
+  GLenum type;
+};
+[[nodiscard]] PixelTransfer transfer_of(const FilmLayer& layer);
+
 /// The layers that pictures have. glsl/aovs.comp documents the feature buffers that it writes.
 namespace film_layers {
 /// Sums over the samples: radiance in front of the background, and alpha.

@@ -14,7 +14,8 @@
 #include "render/instance_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_upload.hpp"
-#include "render/tracer.hpp"
+#include "render/parameters.hpp"
+#include "render/trace_inputs.hpp"
 #include "scene/snapshot.hpp"
 
 namespace cumulet::render {

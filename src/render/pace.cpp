@@ -141,18 +141,6 @@ void Reserve::learn(double budget_ms, double taken_ms) {
   part_ = std::clamp(part_ + step * ((late ? 1.0 : 0.0) - may_be_late), 0.0, max_part);
 }
 
-ErrorSums& ErrorSums::operator+=(const ErrorSums& other) {
-  squared += other.squared;
-  brightness += other.brightness;
-  pixels += other.pixels;
-  return *this;
-}
-
-std::optional<double> ErrorSums::noise() const {
-  if (pixels <= 0.0 || !std::isfinite(squared) || !std::isfinite(brightness)) return std::nullopt;
-  return brightness > 0.0 ? std::sqrt(squared * pixels) / brightness : 0.0;
-}
-
 void InFlightDispatches::leave(Mark mark) {
   gl_->ClearNamedBufferSubData(ring_.name(), GL_R32UI, static_cast<GLintptr>(mark_at(next_, mark)), 4, GL_RED_INTEGER,
                                GL_UNSIGNED_INT, &next_.serial);

@@ -207,8 +207,8 @@ bool Progressive::needs_guides(const Work& work) const {
 void Progressive::find_guides(const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline) {
   if (!needs_guides(*working_)) return;
   try {
-    if (!tracer_.able_to_find(*working_->picture, data, trace_inputs)) return;
-    tracer_.find_features(*working_->picture, data, trace_inputs, deadline, guide_rays(*working_));
+    if (!tracer_.feature_pass().able(*working_->picture, data, trace_inputs)) return;
+    tracer_.feature_pass().find(*working_->picture, data, trace_inputs, deadline, guide_rays(*working_));
   } catch (const Error& error) {
     // Pictures are also shown without guides if the driver does not build their program.
     if (error.code() != ErrorCode::out_of_memory && error.code() != ErrorCode::gl) throw;
@@ -307,7 +307,7 @@ void Progressive::work(const MarchData& data, const TraceInputs& trace_inputs, D
     }
     if (shown() != &picture) before_ = shown_ ? shown_->picture : nullptr;
     shown_ = working_;
-    if (needs_depth()) tracer_.trace_depth(picture, data, trace_inputs, deadline);
+    if (needs_depth()) tracer_.inspector().trace_depth(picture, data, trace_inputs, deadline);
   }
   follow();
 }

@@ -102,7 +102,7 @@ class Progressive {
   /// Returns the picture being rendered if only its samples decide its content: a shaded one at full resolution,
   /// without previews. Throws Error(invalid_argument) if there is none.
   [[nodiscard]] Picture& accumulating();
-  /// Restores the state that Tracer::save() wrote into accumulating(). Throws Error(invalid_argument) if there is no
+  /// Restores a checkpoint (render/checkpoint.hpp) into accumulating(). Throws Error(invalid_argument) if there is no
   /// such picture or the data do not match it.
   void restore(std::span<const std::byte> saved);
   /// True if newest() was started with these data and instance transforms.

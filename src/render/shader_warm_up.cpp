@@ -27,7 +27,8 @@ bool ShaderWarmUp::advance(PictureRequest request, const MarchData& data, const 
     progressive_.advance(request, data, trace_inputs, now(), coarse_ms);
     if (progressive_.shown() != nullptr) draw(*progressive_.shown());
     if (!progressive_.more() && !lags_) {
-      if (!std::exchange(picked_, true)) tracer().pick(data, request.parameters, trace_inputs, glm::uvec2(0U));
+      if (!std::exchange(picked_, true))
+        tracer().inspector().pick(data, request.parameters, trace_inputs, glm::uvec2(0U));
       return true;
     }
   } while (now() < deadline);

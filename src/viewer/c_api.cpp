@@ -5,7 +5,7 @@
 
 #include "base/library_thread.hpp"
 #include "base/murmur_hash.hpp"
-#include "render/tracer.hpp"
+#include "render/mattes.hpp"
 #include "settings/ramp.hpp"
 #include "viewer/c_lights.hpp"
 #include "viewer/c_ramp.hpp"

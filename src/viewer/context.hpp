@@ -17,6 +17,7 @@
 #include "gl/programs.hpp"
 #include "gl/share_group.hpp"
 #include "render/compositor.hpp"
+#include "render/film_reader.hpp"
 #include "render/gpu_scene.hpp"
 #include "render/host_depth.hpp"
 #include "render/pass_timer.hpp"
@@ -141,7 +142,7 @@ class Context {
   /// Continues the image from a saved accumulation. Throws Error(invalid_argument) for data of another image, and then
   /// leaves the image unchanged.
   void restore_accumulation(std::span<const std::byte> bytes);
-  [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
+  [[nodiscard]] render::Totals totals() { return render::FilmReader(functions_).totals(readable()); }
 
   /// Totals since the context was attached.
   [[nodiscard]] render::PassSeconds pass_seconds() const;

@@ -10,6 +10,7 @@
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "gl/transient_framebuffer.hpp"
+#include "render/checkpoint.hpp"
 #include "render/denoised.hpp"
 #include "render/wavelet.hpp"
 #include "viewer/context.hpp"
@@ -120,8 +121,8 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
   const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
   const render::TraceInputs inputs = trace_inputs(shot);
-  const render::Tracer::Picked picked =
-      progressive_.tracer().pick(*scene_.data(), parameters(shot, inputs), inputs, pixel);
+  const render::Picked picked =
+      progressive_.tracer().inspector().pick(*scene_.data(), parameters(shot, inputs), inputs, pixel);
   const double z = picked.z;
   if (!(z > 0.0)) return {};
   const double right = 2.0 * (pixel.x + 0.5) / shot.size.x - 1.0;
@@ -153,7 +154,7 @@ render::Picture& Context::readable() {
 
 void Context::read_means(render::Picture& picture, bool with_background, float* rgba) {
   if (picture.layered() != render::Layered::beneath) {
-    progressive_.tracer().read(picture, with_background, rgba);
+    render::FilmReader(functions_).read(picture, with_background, rgba);
     return;
   }
   std::vector<float> opaque;
@@ -221,14 +222,14 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
                   "the volume AOV was not rendered: set cumulet_sampling_desc.separate_volume_aov and render at full "
                   "resolution");
     }
-    progressive_.tracer().read_volume(picture, values);
+    render::FilmReader(functions_).read_volume(picture, values);
   } else if (aov == Aov::error) {
-    progressive_.tracer().read_error(picture, values);
+    render::FilmReader(functions_).read_error(picture, values);
   } else {
     const bool moves = feature == FeatureBuffer::velocity || feature == FeatureBuffer::motion ||
                        feature == FeatureBuffer::volume_motion;
     find_features(shot, picture, moves ? render::FeatureSet::all : render::FeatureSet::guides);
-    progressive_.tracer().read_feature(picture, feature.value(), values);
+    render::FilmReader(functions_).read_feature(picture, feature.value(), values);
   }
 }
 
@@ -242,7 +243,7 @@ void Context::read_light_group(const DisplaySettings& settings, std::uint32_t gr
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 3;
   if (rgb == nullptr || count < floats)
     throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
-  progressive_.tracer().read_light_group(picture, group, settings.shown(false).shows_background(), rgb);
+  render::FilmReader(functions_).read_light_group(picture, group, settings.shown(false).shows_background(), rgb);
 }
 
 void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_t ranks, float* values,
@@ -268,7 +269,7 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
     ids.models.push_back(model.holdout || model.shadow_only ? 0 : id_of(object));
   }
   if (*shot.scene->ground) ids.ground = id_of({.kind = MatteObject::Kind::ground});
-  progressive_.tracer().read_mattes(picture, *scene_.data(), inputs, ids, ranks, values);
+  progressive_.tracer().feature_pass().read_mattes(picture, *scene_.data(), inputs, ids, ranks, values);
 }
 
 void Context::find_features(const Shot& shot, render::Picture& picture, render::FeatureSet features,
@@ -283,8 +284,8 @@ void Context::find_features(const Shot& shot, render::Picture& picture, render::
     inputs.motion = &motion;
   }
   compositor_.begin_denoising_anew();
-  while (
-      !progressive_.tracer().find_features(picture, *scene_.data(), inputs, deadline_after(1000.0), rays, features)) {
+  while (!progressive_.tracer().feature_pass().find(picture, *scene_.data(), inputs, deadline_after(1000.0), rays,
+                                                    features)) {
   }
 }
 
@@ -358,14 +359,14 @@ render::Picture& Context::accumulating() {
   return progressive_.accumulating();
 }
 
-std::size_t Context::accumulation_bytes() { return render::Tracer::saved_bytes(accumulating()); }
+std::size_t Context::accumulation_bytes() { return render::checkpoint_bytes(accumulating()); }
 
 void Context::read_accumulation(std::span<std::byte> bytes) {
   const render::Picture& picture = accumulating();
-  const std::size_t size = render::Tracer::saved_bytes(picture);
+  const std::size_t size = render::checkpoint_bytes(picture);
   if (bytes.size() < size)
     throw Error(ErrorCode::invalid_argument, "the accumulation needs " + std::to_string(size) + " bytes");
-  progressive_.tracer().save(picture, bytes);
+  render::save_checkpoint(*functions_, picture, bytes);
 }
 
 void Context::restore_accumulation(std::span<const std::byte> bytes) {

@@ -12,7 +12,7 @@
 
 #include "light/sky.hpp"
 #include "render/display.hpp"
-#include "render/tracer.hpp"
+#include "render/picture_settings.hpp"
 #include "scene/phase.hpp"
 #include "settings/settings.hpp"
 #include "viewer/builder.hpp"
