@@ -58,9 +58,8 @@ bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { r
 
 bool same_request(const DesiredState& a, const DesiredState& b) {
   const auto rest = [](const DesiredState& desired) {
-    return std::tie(desired.camera_edit, desired.volume_edit, desired.surfaces_edit, desired.environment_edit,
-                    desired.fit, desired.suggest, desired.unsaid, desired.adaptive_resolution, desired.held,
-                    desired.paused, desired.budget_ms, desired.width, desired.height, desired.scale);
+    return std::tie(desired.edits, desired.fit, desired.suggest, desired.unsaid, desired.adaptive_resolution,
+                    desired.held, desired.paused, desired.budget_ms, desired.width, desired.height, desired.scale);
   };
   return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
@@ -114,12 +113,12 @@ void Session::follow(const DesiredState& desired) {
   const bool first = !known_;
   DesiredState next = desired;
   // Values that the user has not changed since are those of the viewer.
-  if (!first && desired.camera_edit == desired_.camera_edit) next.scene.camera = scene_.camera;
+  if (!first && desired.edits.camera == desired_.edits.camera) next.scene.camera = scene_.camera;
   if (!first && desired.number == desired_.number) next.scene.medium = scene_.medium;
-  const bool load = !first && desired.volume_edit != desired_.volume_edit;
+  const bool load = !first && desired.edits.volume != desired_.edits.volume;
   if (!first && !load) set_volume(next.scene, volume_of(scene_));
-  if (!first && desired.surfaces_edit == desired_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
-  if (!first && desired.environment_edit == desired_.environment_edit) next.scene.environment = scene_.environment;
+  if (!first && desired.edits.surfaces == desired_.edits.surfaces) next.scene.surfaces = scene_.surfaces;
+  if (!first && desired.edits.environment == desired_.edits.environment) next.scene.environment = scene_.environment;
   desired_ = std::move(next);
   scene_.sampling.preview = desired_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
   // Refused settings count as passed, so that the error is reported once.
@@ -736,10 +735,7 @@ Answer Session::answer() {
   answer.volume = volume_of(scene_);
   answer.surfaces = scene_.surfaces;
   answer.environment = scene_.environment;
-  answer.camera_edit = desired_.camera_edit;
-  answer.volume_edit = desired_.volume_edit;
-  answer.surfaces_edit = desired_.surfaces_edit;
-  answer.environment_edit = desired_.environment_edit;
+  answer.edits = desired_.edits;
   answer.camera_moved = std::exchange(camera_moved_, false);
   answer.density_scale = std::exchange(density_scale_, std::nullopt);
   answer.look = std::exchange(look_, std::nullopt);

@@ -41,16 +41,27 @@ struct Picked {
   std::optional<Item> item;  // nullopt: no item that can be selected
 };
 
+/// Counters of the user's changes of values that the viewer itself changes too.
+struct Edits {
+  std::uint64_t camera = 0;
+  std::uint64_t volume = 0;  // volume, grid or up axis; also incremented to reload the same file
+  std::uint64_t surfaces = 0;
+  std::uint64_t environment = 0;
+
+  bool operator==(const Edits&) const = default;
+  /// Returns true if both have the same files.
+  [[nodiscard]] bool same_files(const Edits& other) const {
+    return volume == other.volume && surfaces == other.surfaces && environment == other.environment;
+  }
+};
+
 /// The complete state that the window requests, as a value that is sent to the viewer's thread.
 struct DesiredState {
   std::uint64_t number = 0;  // increases with each request
   SceneOptions scene;
-  // The viewer itself changes the values counted here. They are taken from the scene only if the counter has changed,
-  // which means that the user has changed them.
-  std::uint64_t camera_edit = 0;
-  std::uint64_t volume_edit = 0;  // volume, grid or up axis; also incremented to reload the same file
-  std::uint64_t surfaces_edit = 0;
-  std::uint64_t environment_edit = 0;
+  // The viewer takes the values counted here from the scene only if the counter has changed, which means that the user
+  // has changed them.
+  Edits edits;
   bool fit = false;      // fit the camera when the volume is loaded, because no scene file sets it
   bool suggest = false;  // also compute a suggested density scale, because no scene file sets it
   bool unsaid = false;   // the medium is not set; a burning volume gets the fire medium
@@ -74,10 +85,7 @@ struct Answer {
   VolumeFile volume;  // displayed or loading
   std::string surfaces;
   std::string environment;
-  std::uint64_t camera_edit = 0;  // counters of the request that these values belong to
-  std::uint64_t volume_edit = 0;
-  std::uint64_t surfaces_edit = 0;
-  std::uint64_t environment_edit = 0;
+  Edits edits;  // of the request that these values belong to
   // Events since the last answer that was taken:
   bool drawn = false;                       // there is a new image
   bool camera_moved = false;                // by input, turntable or camera fit
