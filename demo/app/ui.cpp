@@ -303,9 +303,16 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
     elevation = static_cast<float>(sun.elevation);
   }
 
-  ImDrawList& draw = *window->DrawList;
-  constexpr int segments = 48;
   const bool lit = hovered || g.ActiveId == id;
+  draw_dial(centre, radius, lit, {static_cast<double>(azimuth), static_cast<double>(elevation)}, camera_azimuth);
+  ImGui::RenderNavHighlight(box, id);
+  remember(label, tip);
+  return changed;
+}
+
+void Ui::draw_dial(const ImVec2& centre, float radius, bool lit, const SunAngles& sun, float camera_azimuth) const {
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
+  constexpr int segments = 48;
   draw.AddCircleFilled(centre, radius, color_of(lit ? ImGuiCol_FrameBgHovered : ImGuiCol_FrameBg), segments);
   for (const float ring : {1.0f / 3.0f, 2.0f / 3.0f})
     draw.AddCircle(centre, radius * ring, color_of(ImGuiCol_Text, 0.12f), segments, px(1.0f));
@@ -329,15 +336,12 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
   draw.AddTriangleFilled({eye.x + inward.x * wing * 1.8f, eye.y + inward.y * wing * 1.8f},
                          {eye.x - inward.y * wing, eye.y + inward.x * wing},
                          {eye.x + inward.y * wing, eye.y - inward.x * wing}, color_of(ImGuiCol_TextDisabled));
-  const DialPoint at = dial_point({static_cast<double>(azimuth), static_cast<double>(elevation)});
+  const DialPoint at = dial_point(sun);
   const ImVec2 disc(centre.x + static_cast<float>(at.x) * radius, centre.y + static_cast<float>(at.y) * radius);
-  const ImU32 gold = elevation < 0.0f ? IM_COL32(150, 120, 80, 255) : IM_COL32(255, 205, 110, 255);
+  const ImU32 gold = sun.elevation < 0.0 ? IM_COL32(150, 120, 80, 255) : IM_COL32(255, 205, 110, 255);
   draw.AddLine(centre, disc, color_of(ImGuiCol_Text, 0.25f), px(1.0f));
   draw.AddCircleFilled(disc, px(11.0f), (gold & 0x00FFFFFFu) | 0x38000000u, segments);
   draw.AddCircleFilled(disc, px(6.5f), gold, segments);
-  ImGui::RenderNavHighlight(box, id);
-  remember(label, tip);
-  return changed;
 }
 
 bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
@@ -417,13 +421,18 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
                          color_of(i == view.chosen ? ImGuiCol_CheckMark : ImGuiCol_Text));
   }
   draw.PopClipRect();
+  draw_limits(corner, end, view);
+  return changed;
+}
+
+void Ui::draw_limits(const ImVec2& corner, const ImVec2& end, const RampView& view) const {
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.max_result));
   draw.AddText({corner.x + px(5.0f), corner.y + px(2.0f)}, color_of(ImGuiCol_TextDisabled), text.data());
   std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.max_value));
   const ImVec2 wide = ImGui::CalcTextSize(text.data());
   draw.AddText({end.x - px(5.0f) - wide.x, end.y - px(2.0f) - wide.y}, color_of(ImGuiCol_TextDisabled), text.data());
-  return changed;
 }
 
 void Ui::plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest) {

@@ -13,6 +13,7 @@
 
 #include "ramp_edit.hpp"
 #include "replay.hpp"
+#include "sun_dial.hpp"
 
 namespace cumulet::demo {
 
@@ -88,6 +89,10 @@ class Ui {
 
  private:
   void begin_row(const char* label) const;
+  /// Draws the sun dial. lit: it is hovered or edited.
+  void draw_dial(const ImVec2& centre, float radius, bool lit, const SunAngles& sun, float camera_azimuth) const;
+  /// Draws the largest value and result of a curve at two corners.
+  void draw_limits(const ImVec2& corner, const ImVec2& end, const RampView& view) const;
   template <class Number>
   bool slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
              const char* format, ImGuiSliderFlags flags);
