@@ -105,7 +105,7 @@ void ImageInput::drag_handle() {
   if (const auto seen = sight()) handles_.drag(model_, *seen, pointer(), (input_.modifiers() & modifier_ctrl) != 0);
 }
 
-void ImageInput::draw_handles() {
+void ImageInput::draw_handles() const {
   const auto seen = sight();
   if (!seen || model_.navigation.fly != 0) return;
   const bool free = buttons_ == 0 && !ImGui::GetIO().WantCaptureMouse;

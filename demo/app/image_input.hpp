@@ -42,7 +42,7 @@ class ImageInput {
   /// Makes the next drag over the image set the render region.
   void arm_region() { region_drag_.arm(); }
   /// Draws the handles behind the panels.
-  void draw_handles();
+  void draw_handles() const;
   /// Draws the render region during its drag.
   void draw_region() const;
 
