@@ -271,6 +271,26 @@ cumulet::Viewer make_viewer(cumulet::Background background, bool test) {
   return viewer;
 }
 
+/// First panel: the viewer renders into its own texture.
+cumulet::FrameResult show_image(cumulet::Viewer& viewer, const ImVec2& room, ImGuiCond condition) {
+  cumulet::FrameResult image;
+  ImGui::SetNextWindowPos(ImVec2(room.x * 0.01F, room.y * 0.02F), condition);
+  ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
+  if (ImGui::Begin("Viewer")) {
+    const cumulet::Progress progress = must(viewer.get_progress());
+    if (!progress.message.empty()) ImGui::TextWrapped("%s", progress.message.c_str());
+    if (progress.stage != cumulet::Stage::idle) ImGui::ProgressBar(static_cast<float>(progress.fraction));
+    const Panel panel(viewer);
+    image = must(viewer.render({.target = cumulet::FrameTarget::texture,
+                                .width = static_cast<std::uint32_t>(panel.width),
+                                .height = static_cast<std::uint32_t>(panel.height),
+                                .flip_y = true}));
+    panel.show(image.texture, true);
+  }
+  ImGui::End();
+  return image;
+}
+
 /// Runs the frame loop until the window is closed.
 void run(GLFWwindow* window, const std::string& volume_path, const std::string& folder, bool test) {
   cumulet::Viewer image_viewer = make_viewer(cumulet::Background::sky, test);
@@ -295,23 +315,8 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     const ImVec2 room = ImGui::GetIO().DisplaySize;
     const ImGuiCond condition = room.x != last_room.x || room.y != last_room.y ? ImGuiCond_Always : ImGuiCond_Once;
     last_room = room;
-    cumulet::FrameResult image, scene;
-
-    // First panel: the viewer renders into its own texture.
-    ImGui::SetNextWindowPos(ImVec2(room.x * 0.01F, room.y * 0.02F), condition);
-    ImGui::SetNextWindowSize(ImVec2(room.x * 0.48F, room.y * 0.96F), condition);
-    if (ImGui::Begin("Viewer")) {
-      const cumulet::Progress progress = must(image_viewer.get_progress());
-      if (!progress.message.empty()) ImGui::TextWrapped("%s", progress.message.c_str());
-      if (progress.stage != cumulet::Stage::idle) ImGui::ProgressBar(static_cast<float>(progress.fraction));
-      const Panel panel(image_viewer);
-      image = must(image_viewer.render({.target = cumulet::FrameTarget::texture,
-                                        .width = static_cast<std::uint32_t>(panel.width),
-                                        .height = static_cast<std::uint32_t>(panel.height),
-                                        .flip_y = true}));
-      panel.show(image.texture, true);
-    }
-    ImGui::End();
+    const cumulet::FrameResult image = show_image(image_viewer, room, condition);
+    cumulet::FrameResult scene;
 
     if (!volume_shared) {  // when it is loaded
       const cumulet::Volume volume = must(image_viewer.get_volume());
