@@ -18,6 +18,7 @@
 
 #include "given_settings.hpp"
 #include "model.hpp"
+#include "viewer_file.hpp"
 
 namespace cumulet::demo {
 
@@ -41,16 +42,27 @@ struct Picked {
   std::optional<Item> item;  // nullopt: no item that can be selected
 };
 
+/// Counters of the user's changes of values that the viewer itself changes too.
+struct Edits {
+  std::uint64_t camera = 0;
+  std::uint64_t volume = 0;  // volume, grid or up axis; also incremented to reload the same file
+  std::uint64_t surfaces = 0;
+  std::uint64_t environment = 0;
+
+  bool operator==(const Edits&) const = default;
+  /// Returns true if both have the same files.
+  [[nodiscard]] bool same_files(const Edits& other) const {
+    return volume == other.volume && surfaces == other.surfaces && environment == other.environment;
+  }
+};
+
 /// The complete state that the window requests, as a value that is sent to the viewer's thread.
 struct DesiredState {
   std::uint64_t number = 0;  // increases with each request
   SceneOptions scene;
-  // The viewer itself changes the values counted here. They are taken from the scene only if the counter has changed,
-  // which means that the user has changed them.
-  std::uint64_t camera_edit = 0;
-  std::uint64_t volume_edit = 0;  // volume, grid or up axis; also incremented to reload the same file
-  std::uint64_t surfaces_edit = 0;
-  std::uint64_t environment_edit = 0;
+  // The viewer takes the values counted here from the scene only if the counter has changed, which means that the user
+  // has changed them.
+  Edits edits;
   bool fit = false;      // fit the camera when the volume is loaded, because no scene file sets it
   bool suggest = false;  // also compute a suggested density scale, because no scene file sets it
   bool unsaid = false;   // the medium is not set; a burning volume gets the fire medium
@@ -64,8 +76,27 @@ struct DesiredState {
   double scale = 1.0;
 };
 
+/// Events of the viewer since the last answer that was taken.
+struct AnswerEvents {
+  struct Notice {
+    bool error = false;
+    std::string text;
+  };
+  struct File {
+    enum class Fate { opened, failed, saved };
+    std::string path;
+    Fate fate = Fate::opened;
+  };
+  bool camera_moved = false;                // by input, turntable or camera fit
+  std::optional<double> density_scale;      // suggested density scale
+  std::optional<cumulet_medium_desc> look;  // default medium of a volume that was requested with `unsaid`
+  std::optional<Picked> picked;             // result of the last pick
+  std::vector<Notice> notices;
+  std::vector<File> files;
+};
+
 /// The viewer's state, as the answer to a request.
-struct Answer {
+struct Answer : AnswerEvents {
   std::uint64_t desired = 0;  // number of the latest request that was processed
   Status status;
   std::vector<GridInfo> grids;
@@ -74,27 +105,8 @@ struct Answer {
   VolumeFile volume;  // displayed or loading
   std::string surfaces;
   std::string environment;
-  std::uint64_t camera_edit = 0;  // counters of the request that these values belong to
-  std::uint64_t volume_edit = 0;
-  std::uint64_t surfaces_edit = 0;
-  std::uint64_t environment_edit = 0;
-  // Events since the last answer that was taken:
-  bool drawn = false;                       // there is a new image
-  bool camera_moved = false;                // by input, turntable or camera fit
-  std::optional<double> density_scale;      // suggested density scale
-  std::optional<cumulet_medium_desc> look;  // default medium of a volume that was requested with `unsaid`
-  std::optional<Picked> picked;             // result of the last pick
-  struct Notice {
-    bool error = false;
-    std::string text;
-  };
-  std::vector<Notice> notices;
-  struct File {
-    enum class Fate { opened, failed, saved };
-    std::string path;
-    Fate fate = Fate::opened;
-  };
-  std::vector<File> files;
+  Edits edits;         // of the request that these values belong to
+  bool drawn = false;  // there is a new image since the last answer that was taken
 };
 
 [[nodiscard]] bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b);
@@ -159,7 +171,7 @@ class Session {
   static void on_log(void* user, cumulet_log_level level, const char* message);
   static void on_update(void* user);
 
-  void tell(bool error, const std::string& text) { notices_.push_back({error, text}); }
+  void tell(bool error, const std::string& text) { events_.notices.push_back({error, text}); }
   /// Reports the error of a failed call. Returns true on success.
   bool check(cumulet_status status);
   void follow_volume();
@@ -184,7 +196,7 @@ class Session {
   void begin_thumbnail();
   void drop_thumbnail();
   [[nodiscard]] bool waits() const {
-    return waiting_ || waiting_for_surfaces_ || waiting_for_environment_ || opening_.made.valid() ||
+    return volume_.loading || surfaces_.loading || environment_.loading || opening_.made.valid() ||
            opening_model_.made.valid();
   }
   void follow_ramps();
@@ -231,41 +243,41 @@ class Session {
   std::unique_ptr<cumulet_camera, ReleaseCamera> camera_;
   DesiredState desired_;
   SceneOptions& scene_ = desired_.scene;  // includes the viewer's changes
-  std::optional<SceneOptions> known_;     // state that was passed to the viewer
+  std::optional<SceneOptions> known_;     // settings that were passed to the viewer
   GivenSettings given_;
+  ViewerFile<VolumeFile> volume_;
+  ViewerFile<std::string> surfaces_;
+  ViewerFile<std::string> environment_;
   std::vector<Request> saves_;  // waiting for a complete image
   cumulet_camera_desc seen_{};  // last camera of the viewer
-  std::uint32_t drawn_width_ = 0;
-  std::uint32_t drawn_height_ = 0;
-  cumulet_display_desc drawn_display_{};
-  VolumeFile shown_volume_;
-  std::optional<Box> shown_box_;  // bounding box of shown_volume_, if known
-  std::string shown_surfaces_;
-  std::string shown_environment_;
-  bool warm_ = false;                 // the first scene's programs are compiled
-  std::optional<double> cold_since_;  // time in seconds of the first compile request
-  bool waiting_for_surfaces_ = false;
-  bool waiting_for_environment_ = false;
-  bool waiting_ = false;
-  cumulet_status told_surfaces_ = CUMULET_OK;  // reported result of the last job of each kind
-  cumulet_status told_volume_ = CUMULET_OK;
-  cumulet_status told_environment_ = CUMULET_OK;
-  std::optional<cumulet_camera_desc> fit_;  // camera to fit when the volume is loaded
-  bool suggest_ = false;
-  std::optional<double> density_scale_;
-  std::optional<cumulet_medium_desc> look_;
-  std::optional<Picked> picked_;
-  bool camera_moved_ = false;
-  double last_noise_ = 0.0;
-  std::uint64_t noise_samples_ = 0;
+  struct Drawn {
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    cumulet_display_desc display{};
+  } drawn_;
+  std::optional<Box> shown_box_;  // bounding box of the displayed volume, if known
+  struct WarmUp {
+    bool done = false;            // the first scene's programs are compiled
+    std::optional<double> since;  // time in seconds of the first compile request
+  } warm_up_;
+  struct FirstView {
+    std::optional<cumulet_camera_desc> fit;  // camera to fit when the volume is loaded
+    bool suggest = false;                    // suggest the density scale then
+  } first_view_;
+  struct Noise {
+    double measured_at = 0.0;
+    std::uint64_t samples = 0;
+  } noise_;
+  AnswerEvents events_;
   Status status_;
-  VolumePtr backdrop_;                          // empty volume, used while only an environment is shown
-  VolumePtr hidden_;                            // the viewer's volume while it is hidden
-  std::shared_ptr<cumulet_sequence> sequence_;  // shown instead of a volume
-  std::optional<FrameRow> row_;                 // files of the sequence
+  VolumePtr backdrop_;  // empty volume, used while only an environment is shown
+  VolumePtr hidden_;    // the viewer's volume while it is hidden
+  struct Playing {
+    std::shared_ptr<cumulet_sequence> sequence;  // shown instead of a volume
+    std::optional<FrameRow> row;                 // files of the sequence
+  } playing_;
   struct Before {
-    std::shared_ptr<cumulet_sequence> sequence;
-    std::optional<FrameRow> row;
+    Playing playing;
     VolumePtr volume;  // if there was no sequence
   };
   std::optional<Before> before_;  // state to restore if loading the sequence fails
@@ -280,8 +292,6 @@ class Session {
     std::future<SurfacesPtr> made;  // valid while surfaces are being opened
   } opening_model_;
   std::vector<GridInfo> grids_;
-  std::vector<Answer::Notice> notices_;
-  std::vector<Answer::File> files_;
   std::future<void> drawing_;  // valid until the thumbnail is taken
 };
 

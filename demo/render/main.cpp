@@ -1,7 +1,6 @@
 // cumulet-render: renders an image of a volume, or images of a sequence of volumes.
 
 #include <cumulet/cumulet.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
@@ -15,12 +14,9 @@
 #include <image.hpp>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <program.hpp>
-#include <shader_cache.hpp>
 #include <stdexcept>
-#include <straight_alpha.hpp>
 #include <string>
 #include <system_error>
 #include <timeline.hpp>
@@ -36,30 +32,36 @@
 #include "instances.hpp"
 #include "memory.hpp"
 #include "messages.hpp"
-#include "metadata.hpp"
 #include "models.hpp"
-#include "object_name.hpp"
 #include "options.hpp"
+#include "picture.hpp"
 #include "progress.hpp"
+#include "render_viewer.hpp"
 #include "settled.hpp"
+#include "stats.hpp"
 #include "transforms.hpp"
 
 namespace {
 
+using cumulet::demo::check;
 using cumulet::demo::Checkpoint;
+using cumulet::demo::driver_of;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
 using cumulet::demo::Moment;
 using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
 using cumulet::demo::PlannedFrame;
+using cumulet::demo::print_line;
 using cumulet::demo::Progress;
 using cumulet::demo::RenderOptions;
 using cumulet::demo::SceneOptions;
+using cumulet::demo::stats_of;
 using cumulet::demo::Timeline;
+using cumulet::demo::Viewer;
+using cumulet::demo::volume_of;
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
-using Json = nlohmann::ordered_json;
 
 // A signal handler can only access globals.
 volatile std::sig_atomic_t interrupted = 0;
@@ -81,38 +83,6 @@ void catch_signals() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-struct DestroyViewer {
-  void operator()(cumulet_viewer* viewer) const { cumulet_destroy(viewer); }
-};
-using Viewer = std::unique_ptr<cumulet_viewer, DestroyViewer>;
-
-Viewer create_viewer(Context& context, cumulet::demo::Messages& messages, Timeline* timeline,
-                     const std::string& shader_cache) {
-  cumulet_create_desc desc{};
-  desc.struct_size = sizeof desc;
-  desc.get_proc = Context::get_proc;
-  desc.get_proc_user = &context;
-  desc.log = cumulet::demo::Messages::print;
-  desc.log_user = &messages;
-  if (timeline != nullptr) {
-    desc.trace = Timeline::add;
-    desc.trace_user = timeline;
-  }
-  const auto programs = cumulet::demo::make_programs(shader_cache, {});
-  desc.shader_cache = programs.get();
-  cumulet_viewer* viewer = nullptr;
-  std::array<char, 1024> error{};
-  if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(std::string(context.name()) + ": " + error.data());
-  return Viewer(viewer);
-}
-
-void check(const Viewer& viewer, cumulet_status status) {
-  if (status == CUMULET_OK) return;
-  const std::string cause = cumulet_last_error(viewer.get());
-  throw std::runtime_error(cause.empty() ? "status " + std::to_string(status) : cause);
-}
-
 Backend backend_of(cumulet::demo::BackendChoice choice) {
   switch (choice) {
     case cumulet::demo::BackendChoice::egl:
@@ -127,14 +97,6 @@ Backend backend_of(cumulet::demo::BackendChoice choice) {
 
 void check_not_interrupted() {
   if (interrupted) throw std::runtime_error("interrupted before the first sample: no file is written");
-}
-
-void show_camera(const Viewer& viewer, const SceneOptions& scene) {
-  cumulet_camera* camera = nullptr;
-  check(viewer, cumulet_get_camera(viewer.get(), &camera));
-  const cumulet_status status = set_camera(camera, scene);
-  cumulet_camera_release(camera);
-  if (status != CUMULET_OK) throw std::runtime_error("the camera is invalid");
 }
 
 /// Waits until the library's worker thread is done. Throws its error.
@@ -153,32 +115,10 @@ void wait(const Viewer& viewer, Progress& progress) {
   }
 }
 
-void print_line(Progress& progress, const std::string& line) {
-  progress.clear();
-  std::fprintf(stderr, "%s\n", one_line(line).c_str());
-}
-
-/// Returns the viewer's volume, with a reference.
-std::shared_ptr<cumulet_volume> volume_of(const Viewer& viewer) {
-  cumulet_volume* volume = nullptr;
-  check(viewer, cumulet_get_volume(viewer.get(), &volume));
-  return {volume, cumulet_volume_release};
-}
-
 /// Returns the default medium of a burning volume if the scene sets no medium; nullopt if the volume does not burn.
 std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
   if (!scene.is_shown() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
   return cumulet::demo::medium_of_fire(volume_of(viewer).get(), scene.medium);
-}
-
-/// Logs the suggested density scale, which does not depend on the camera. The volume was loaded with it.
-void print_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
-  double scale = 0.0;
-  if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) return;  // nothing visible
-  std::array<char, 32> digits{};
-  std::snprintf(digits.data(), digits.size(), "%g", scale);
-  print_line(progress, std::string("density scale ") + digits.data() + " for a mean optical depth of 8" +
-                           (ramped ? " before the ramp" : "") + " (--density-scale)");
 }
 
 void print_fire(const cumulet_medium_desc& medium, Progress& progress) {
@@ -188,13 +128,6 @@ void print_fire(const cumulet_medium_desc& medium, Progress& progress) {
       "the volume burns: using --preset %s --flame-strength %g --blackbody %g (set any medium option to disable this)",
       medium.density_scale > 0.0 ? "explosion" : "fire", double{medium.flame_strength}, double{medium.blackbody});
   print_line(progress, line.data());
-}
-
-cumulet_stats stats_of(const Viewer& viewer) {
-  cumulet_stats stats{};
-  stats.struct_size = sizeof stats;
-  check(viewer, cumulet_get_stats(viewer.get(), &stats));
-  return stats;
 }
 
 constexpr double draw_only_ms = -1.0;  // budget of a frame that traces no samples
@@ -283,127 +216,9 @@ void check_memory(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::check_memory(options, stats_of(viewer).gl_renderer, cumulet::demo::available_memory());
 }
 
-/// Returns an empty vector if denoising is off or fails. A failure is logged only: a noisy image is better than none
-/// after hours of rendering.
-std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, const std::string& network,
-                           Progress& progress) {
-  if (options.denoise == cumulet::demo::Denoise::off) return {};
-  progress.stage("denoising");
-  try {
-    return cumulet::demo::denoised(viewer.get(), network, std::size_t{4} * options.scene.width * options.scene.height);
-  } catch (const std::exception& error) {
-    print_line(progress, std::string("not denoised: ") + error.what());
-    return {};
-  }
-}
-
-/// Warns if the image has pixels that straight alpha in a PNG cannot represent.
-void warn_of_raised_alpha(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised,
-                          std::size_t floats, Progress& progress) {
-  const SceneOptions& scene = options.scene;
-  if (scene.display.background != CUMULET_BACKGROUND_TRANSPARENT || scene.sampling.view != CUMULET_VIEW_SHADED) return;
-  std::vector<float> linear(denoised);
-  if (linear.empty()) {
-    linear.resize(floats);
-    check(viewer, cumulet_read_linear(viewer.get(), linear.data(), linear.size()));
-  }
-  const std::size_t pixels = cumulet::image::pixels_brighter_than_alpha(linear, scene.display.exposure_stops);
-  const std::string note = cumulet::image::raised_alpha_note(options.output, pixels);
-  if (!note.empty()) print_line(progress, "warning: " + note);
-}
-
-void write_picture(const Viewer& viewer, const RenderOptions& options, const cumulet::demo::Instances& others,
-                   const std::vector<float>& denoised, Progress& progress) {
-  cumulet::image::Image image{options.scene.width, options.scene.height, {}};
-  const std::size_t count = std::size_t{4} * image.width * image.height;
-  const cumulet::image::Windows windows =
-      cumulet::demo::windows_of(options.scene.sampling.region, image.width, image.height);
-  if (options.format == OutputFormat::png) {
-    std::vector<std::uint8_t> bytes(count);
-    check(viewer, denoised.empty() ? cumulet_read_display(viewer.get(), bytes.data(), bytes.size())
-                                   : cumulet_encode_display(viewer.get(), denoised.data(), bytes.data(), bytes.size()));
-    warn_of_raised_alpha(viewer, options, denoised, count, progress);
-    cumulet::demo::clear_around(windows, bytes);
-    cumulet::image::write_png(options.output, image.width, image.height, bytes);
-    return;
-  }
-  if (options.format == OutputFormat::pfm && !denoised.empty()) {
-    image.rgba = denoised;
-    cumulet::image::write_pfm(options.output, image);
-    return;
-  }
-  image.rgba.resize(count);
-  check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
-  if (options.format == OutputFormat::exr) {
-    cumulet::demo::ObjectName name;
-    if (options.cryptomatte) {
-      name = [&](cumulet_object_kind kind, std::uint64_t tag) {
-        return cumulet::demo::object_name(options.scene, others, kind, tag);
-      };
-    }
-    cumulet::demo::write_exr(viewer.get(), options.output, windows,
-                             {image.rgba, denoised, options.scene.light_groups, std::move(name)}, options.aovs,
-                             cumulet::demo::metadata_of(viewer.get(), options.scene, image.width, image.height));
-  } else {
-    cumulet::image::write_pfm(options.output, image);
-  }
-}
-
-/// Scripts rely on these names and units: keys may be added, never renamed. Values that do not apply are omitted.
-void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend) {
-  const bool tet = options.scene.grid.type == CUMULET_GRID_TETRAHEDRAL;
-  Json json;
-  if (tet) {
-    json["cells"] = stats.cells;
-    json["levels"] = stats.levels;
-  }
-  json["cell_bytes"] = stats.cell_bytes;
-  json["active_voxels"] = stats.active_voxels;
-  Json& build = json["build_seconds"];
-  build["total"] = stats.build_seconds_total;
-  const auto add_stage = [&build](const char* name, double seconds) {
-    if (seconds > 0.0) build[name] = seconds;
-  };
-  add_stage("load", stats.build_seconds_load);
-  add_stage("statistics", stats.build_seconds_statistics);
-  add_stage("refine", stats.build_seconds_refine);
-  add_stage("packing", stats.build_seconds_packing);
-  add_stage("upload", stats.build_seconds_upload);
-  json["trace_seconds"] = stats.trace_seconds;
-  Json& passes = json["pass_seconds"];
-  passes["upload"] = stats.pass_seconds_upload;
-  passes["host_depth"] = stats.pass_seconds_host_depth;
-  passes["surfaces"] = stats.pass_seconds_surfaces;
-  passes["trace"] = stats.pass_seconds_trace;
-  passes["inspect"] = stats.pass_seconds_inspect;
-  passes["display"] = stats.pass_seconds_display;
-  json["samples"] = stats.samples;
-  json["nonfinite_samples"] = stats.nonfinite_samples;
-  if (options.scene.sampling.view == CUMULET_VIEW_SHADED)
-    json["noise"] = std::isfinite(stats.noise) ? Json(stats.noise) : Json();  // null: unknown
-  if (stats.trace_seconds > 0.0) json["samples_per_second"] = static_cast<double>(stats.samples) / stats.trace_seconds;
-  if (stats.samples > 0)
-    json["mean_steps_per_path"] = static_cast<double>(stats.steps) / static_cast<double>(stats.samples);
-  rusage usage{};
-  if (getrusage(RUSAGE_SELF, &usage) == 0)
-    json["peak_rss_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
-  json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
-  json["backend"] = backend;
-  json["grid_type"] = cumulet::demo::grid_type_name(options.scene.grid.type);
-  if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
-  // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
-  cumulet::image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-}
-
 enum class Traced { converged, late, stopped };
 
 using Clock = std::chrono::steady_clock;
-
-/// Returns vendor, renderer and version: other drivers may not give bit-identical images.
-std::string driver_of(const Viewer& viewer) {
-  const cumulet_stats stats = stats_of(viewer);
-  return std::string(stats.gl_vendor) + ", " + stats.gl_renderer + ", " + stats.gl_version;
-}
 
 /// Writes the accumulated samples to the checkpoint file.
 void keep(const Viewer& viewer, const RenderOptions& options) {
@@ -509,8 +324,8 @@ class Studio {
       : network_(network_of(options, progress_)),
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
-        viewer_(
-            create_viewer(context_, messages_, options.trace.empty() ? nullptr : &timeline_, options.shader_cache)) {
+        viewer_(cumulet::demo::create_viewer(context_, messages_, options.trace.empty() ? nullptr : &timeline_,
+                                             options.shader_cache)) {
     check_memory(viewer_, options);
     set_scene(options);
   }
@@ -548,7 +363,7 @@ class Studio {
     for (const cumulet::demo::SceneVolume& other : scene.others)
       if (const auto hint = cumulet::demo::up_hint(other)) print_line(progress_, *hint);
     if (scene.is_shown() && scene.auto_density_scale)
-      print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
+      cumulet::demo::print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
     if (fire_) print_fire(*fire_, progress_);
   }
 
@@ -583,15 +398,15 @@ class Studio {
   }
 
   void write(const RenderOptions& options) {
-    const std::vector<float> denoised = denoise(viewer_, options, network_, progress_);
+    const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, network_, progress_);
     progress_.stage("writing " + options.output);
     // The image is written last: if it exists, the other files do too.
     if (!options.stats.empty()) {
       double noise = 0.0;  // stats.noise is the last measured value, so measure now
       check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
-      write_stats(options, stats_of(viewer_), context_.name());
+      cumulet::demo::write_stats(options, stats_of(viewer_), context_.name());
     }
-    write_picture(viewer_, options, others_, denoised, progress_);
+    cumulet::demo::write_picture(viewer_, options, others_, denoised, progress_);
   }
 
   /// Writes a checkpoint, so that another run can continue after the time limit.
@@ -729,7 +544,7 @@ class Studio {
     cumulet_display_desc display = scene.display;
     display.denoise = CUMULET_DENOISE_OFF;  // the image is read without denoising, and denoised separately
     check(viewer_, cumulet_set_display(viewer_.get(), &display));
-    show_camera(viewer_, scene);
+    cumulet::demo::show_camera(viewer_, scene);
     if (!scene.models.empty()) check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
     if (!scene.surfaces.empty()) {
       check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));

@@ -4,12 +4,9 @@
 #include <algorithm>
 #include <analytic_light_limits.hpp>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <names.hpp>
@@ -20,251 +17,15 @@
 #include <type_traits>
 #include <utility>
 
+#include "add_options.hpp"
 #include "old_flags.hpp"
 #include "option_table.hpp"
+#include "option_values.hpp"
 
 namespace cumulet::demo {
 namespace {
 
 constexpr std::size_t help_columns = 100;
-
-std::string in_quotes(std::string_view text) { return "'" + std::string(text) + "'"; }
-
-std::vector<std::string_view> split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const auto end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
-/// Splits a value such as "0,0,1 0,0,0 40" at white space.
-std::vector<std::string_view> words(std::string_view text) {
-  constexpr std::string_view white = " \t\n\v\f\r";
-  std::vector<std::string_view> parts;
-  std::size_t at = text.find_first_not_of(white);
-  while (at != std::string_view::npos) {
-    const std::size_t end = std::min(text.find_first_of(white, at), text.size());
-    parts.push_back(text.substr(at, end - at));
-    at = text.find_first_not_of(white, end);
-  }
-  return parts;
-}
-
-/// Parses three numbers in a range.
-std::array<double, 3> parse_three(std::string_view text, const settings::Range& range) {
-  const std::vector<double> values = parse_numbers(text, 3);
-  for (const double value : values) {
-    if (range.holds(value)) continue;
-    const bool negative = range.least == 0.0 && value < 0.0;
-    throw UsageError(in_quotes(text) + (negative ? " has a negative number" : " has a number that is too large"));
-  }
-  return {values[0], values[1], values[2]};
-}
-
-void parse_light(std::string_view text, float (&rgb)[3]) {
-  const std::array<double, 3> values = parse_three(text, settings::light_range);
-  for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(values[i]);
-}
-
-/// Adds a flag with a value. If it is repeated, the last one wins. A bad value is an error that names the flag.
-CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, const std::string& type,
-                 std::function<void(const std::string&)> parse, const std::string& help) {
-  const auto checked = [flag, parse = std::move(parse)](const std::string& text) {
-    try {
-      parse(text);
-    } catch (const UsageError& error) {
-      // The long spelling is easier to recognize in a script's log.
-      throw CLI::ValidationError(flag.substr(flag.rfind("--")), error.what());
-    }
-  };
-  return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group)->take_last();
-}
-
-/// Returns the value with this name; null if there is none. Reports a name of an earlier version. of: the text before
-/// the name on the command line.
-template <class Names>
-auto* find_choice(const CLI::App& app, const std::string& of, const Names& names, std::string_view text) {
-  for (const auto& name : names) {
-    if (text == name.name) return &name;
-    if constexpr (requires { name.old; }) {
-      if (text.empty() || text != name.old) continue;
-      report_renamed(app, of + ' ' + name.old, of + ' ' + name.name);
-      return &name;
-    }
-  }
-  return static_cast<decltype(&*std::begin(names))>(nullptr);
-}
-
-template <class Names, class Target>
-CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& flag, const Names& names, Target& target,
-                        const std::string& help) {
-  return add(
-      app, group, flag, list_names(names, "|"),
-      [&app, flag, names, &target](const std::string& text) {
-        const auto* const found = find_choice(app, flag, names, text);
-        if (found == nullptr) throw UsageError(in_quotes(text) + " is not one of " + list_names(names, ", "));
-        target = static_cast<Target>(found->value);
-      },
-      help);
-}
-
-/// Returns true if the flag's text is a keyword that has been handled, so that it is not parsed as a value.
-using TakeWord = std::function<bool(std::string_view flag, const std::string& text)>;
-
-/// Parses a number in the range that users may set and that the field can represent.
-template <class Desc, class Value>
-Value parse_real(const settings::Setting<Desc, Value>& setting, const std::string& text) {
-  const double number = parse_number(text);
-  const auto value = static_cast<Value>(number);
-  const settings::Range range = setting.given_range();
-  if (!range.holds(number) || !range.holds(value)) throw UsageError(in_quotes(text) + " " + range.refusal());
-  const bool negative = setting.spelling == settings::Spelling::zero_is_negative && value == Value{};
-  return negative ? Value{-1} : value;
-}
-
-/// Parses a whole number in the range that users may set and that the field can represent.
-template <class Desc, class Value>
-Value parse_count(const settings::Setting<Desc, Value>& setting, const std::string& text) {
-  const settings::Range range = setting.given_range();
-  constexpr auto most = static_cast<double>(std::numeric_limits<Value>::max());
-  return static_cast<Value>(parse_integer(
-      text, static_cast<std::uint64_t>(std::max(range.least, 0.0)),
-      range.most < most ? static_cast<std::uint64_t>(range.most) : std::uint64_t{std::numeric_limits<Value>::max()}));
-}
-
-/// Parses three numbers in the range that users may set and that the field can represent.
-template <class Desc, class Value>
-void parse_triple(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
-  const std::array<double, 3> given = parse_three(text, setting.given_range());
-  if (setting.zero != 0.0 && settings::all_zero(given)) throw UsageError(in_quotes(text) + " must not be black");
-  const bool complement = setting.spelling == settings::Spelling::complement;
-  for (std::size_t i = 0; i < 3; ++i)
-    value[i] = static_cast<std::remove_extent_t<Value>>(complement ? 1.0 - given[i] : given[i]);
-}
-
-/// Parses x, y, width and height.
-template <class Desc, class Value>
-void parse_rectangle(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
-  const std::vector<double> given = parse_numbers(text, 4);
-  for (const double number : given)
-    if (!setting.given_range().holds(number))
-      throw UsageError(in_quotes(text) + " has a number that " + setting.given_range().refusal());
-  std::ranges::transform(given, value, [](double number) { return static_cast<std::remove_extent_t<Value>>(number); });
-}
-
-template <class Desc, class Value>
-void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc, Value>& setting, Value& value,
-                 const TakeWord& take_word) {
-  const auto add_parsed = [&](auto parse) {
-    const auto parse_or_take = [flag = setting.flag, parse, take_word](const std::string& text) {
-      if (!take_word || !take_word(flag, text)) parse(text);
-    };
-    add(app, group, setting.flag, setting.type, parse_or_take, setting.help);
-  };
-  if constexpr (settings::Enumerated<Value>) {
-    add_choice(app, group, setting.flag, setting.choices, value, setting.help);
-  } else if constexpr (settings::Switch<Value>) {
-    if (*setting.type != '\0') {
-      add_choice(app, group, setting.flag, std::array{Name{"on", 1}, Name{"off", 0}}, value, setting.help);
-    } else {
-      app.add_flag_function(
-             setting.flag, [&value](std::int64_t count) { value = count > 0 ? 1 : 0; }, setting.help)
-          ->group(group);
-    }
-  } else if constexpr (settings::Count<Value>) {
-    add_parsed([&value, setting](const std::string& text) { value = parse_count(setting, text); });
-  } else if constexpr (settings::Real<Value>) {
-    add_parsed([&value, setting](const std::string& text) { value = parse_real(setting, text); });
-  } else if constexpr (settings::Rectangle<Value>) {
-    add_parsed([&value, setting](const std::string& text) { parse_rectangle(setting, text, value); });
-  } else {
-    add_parsed([&value, setting](const std::string& text) { parse_triple(setting, text, value); });
-  }
-}
-
-/// Adds the flags of a descriptor's settings.
-template <class Desc>
-void add_settings(CLI::App& app, const char* group, Desc& desc, const TakeWord& take_word = {}) {
-  settings::for_each<Desc>([&](const auto& setting) {
-    if (*setting.flag != '\0') add_setting(app, group, setting, desc.*setting.field, take_word);
-  });
-}
-
-void parse_size(std::string_view text, SceneOptions& scene) {
-  const std::vector<std::string_view> sides = split(text, 'x');
-  if (sides.size() != 2) throw UsageError(in_quotes(text) + " is not WIDTHxHEIGHT, such as 1280x720");
-  scene.width = static_cast<std::uint32_t>(parse_integer(sides[0], 1, 16384));
-  scene.height = static_cast<std::uint32_t>(parse_integer(sides[1], 1, 16384));
-}
-
-/// Sets eye, target and field of view; keeps the lens.
-void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
-  const std::vector<std::string_view> parts = words(text);
-  if (parts.size() != 3) throw UsageError(in_quotes(text) + " is not \"ex,ey,ez tx,ty,tz fovy\"");
-  const std::vector<double> eye = parse_numbers(parts[0], 3);
-  const std::vector<double> target = parse_numbers(parts[1], 3);
-  if (eye == target) throw UsageError("the eye and the target are the same point");
-  const double fovy = parse_number(parts[2]);
-  if (!(fovy > 0.0 && fovy < 180.0))
-    throw UsageError(in_quotes(parts[2]) + " is not an angle between 0 and 180 degrees");
-  const cumulet_camera_desc before = camera;
-  camera = {};
-  camera.struct_size = sizeof camera;
-  camera.lens_radius = before.lens_radius;
-  camera.focus_distance = before.focus_distance;
-  std::copy(eye.begin(), eye.end(), camera.eye);
-  std::copy(target.begin(), target.end(), camera.target);
-  camera.fovy_degrees = fovy;
-}
-
-void parse_sun(std::string_view text, cumulet_sun_sky_desc& light) {
-  const std::vector<std::string_view> parts = words(text);
-  if (parts.empty() || parts.size() > 2) throw UsageError(in_quotes(text) + " is not \"azimuth,elevation r,g,b\"");
-  const std::vector<double> angles = parse_numbers(parts[0], 2);
-  if (std::abs(angles[0]) > 360.0) throw UsageError("the azimuth is not from -360 to 360 degrees");
-  if (std::abs(angles[1]) > 90.0) throw UsageError("the elevation is not from -90 to 90 degrees");
-  if (parts.size() == 2) parse_light(parts[1], light.sun_irradiance);
-  light.sun_azimuth_degrees = static_cast<float>(angles[0]);
-  light.sun_elevation_degrees = static_cast<float>(angles[1]);
-}
-
-void parse_sky_model(std::string_view text, cumulet_sun_sky_desc& light) {
-  const std::vector<double> numbers = parse_numbers(text, 2);
-  const auto take = [&](float cumulet_sun_sky_desc::*field, double number) {
-    settings::with(field, [&](const auto& setting) {
-      if (!setting.given_range().holds(number))
-        throw UsageError(std::string(setting.row.label) + " " + setting.given_range().refusal());
-    });
-    light.*field = static_cast<float>(number);
-  };
-  take(&cumulet_sun_sky_desc::turbidity, numbers[0]);
-  take(&cumulet_sun_sky_desc::ground_albedo, numbers[1]);
-  light.sky = CUMULET_SKY_PHYSICAL;
-}
-
-settings::RampPoints parse_ramp(std::string_view text) {
-  settings::RampPoints points;
-  if (text == "none") return points;
-  for (const std::string_view point : split(text, ',')) {
-    const std::vector<std::string_view> pair = split(point, ':');
-    if (pair.size() != 2) throw UsageError(in_quotes(point) + " is not a pair INPUT:OUTPUT, such as 0.5:1");
-    points.push_back({static_cast<float>(parse_number(pair[0])), static_cast<float>(parse_number(pair[1]))});
-  }
-  const std::string why = settings::ramp_refusal(points);
-  if (!why.empty()) throw UsageError(in_quotes(text) + " " + why);
-  return points;
-}
-
-std::vector<std::string> parse_light_groups(std::string_view text) {
-  std::vector<std::string> names;
-  if (text == "none") return names;
-  for (const std::string_view name : split(text, ',')) names.emplace_back(name);
-  if (const std::string why = light_groups_refusal(names); !why.empty()) throw UsageError(in_quotes(text) + " " + why);
-  return names;
-}
 
 /// Sets one field of a light by its scene file key. Returns false if there is no such key.
 bool take_analytic_light_key(cumulet_light_desc& analytic_light, std::string_view key, const std::string& text) {
@@ -422,36 +183,100 @@ class HelpFormatter final : public CLI::Formatter {
   }
 };
 
+void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
+  add_path(app, group, "--volume", "FILE", scene.volume,
+           "OpenVDB or NanoVDB file (.vdb, .nvdb), or a sequence such as name.####.vdb");
+  add_text(app, group, "--grid-name", "NAME", scene.grid_name,
+           "Density grid (default: density, else the most likely grid)");
+  add_text(app, group, "--temperature-grid", "NAME", scene.temperature_grid,
+           "Temperature grid; none: not used (default: found by name)");
+  add_text(app, group, "--flame-grid", "NAME", scene.flame_grid, "Flame grid; none: not used (default: found by name)");
+  add_text(app, group, "--color-grid", "NAME", scene.color_grid, "Color grid; none: not used (default: found by name)");
+  add_text(app, group, "--anisotropy-grid", "NAME", scene.anisotropy_grid,
+           "Anisotropy grid, replaces --anisotropy; none: not used (default: found by name)");
+  add_text(app, group, "--velocity-grid", "NAME", scene.velocity_grid,
+           "Velocity grid, for --aovs velocity and --shutter; none: not used (default: found by name)");
+  add_choice(app, group, "--up", up_names, scene.up,
+             "Up axis of the volume (default: y; use z for Blender and Mantaflow)");
+}
+
+void add_surface_options(CLI::App& app, const char* group, SceneOptions& scene) {
+  add_path(app, group, "--gltf", "FILE", scene.surfaces, "Surfaces: a glTF 2.0 file (.gltf, .glb)");
+  add_text(app, group, "--gltf-variant", "NAME|N", scene.surface_variant,
+           "Material variant, by name or index from 0 (default: none); --info lists them");
+  add(
+      app, group, "--gltf-camera", "N",
+      [&](const std::string& text) {
+        scene.surface_camera = static_cast<std::int32_t>(parse_integer(text, 0, 1000000));
+      },
+      "Use this camera of the glTF file, by index from 0");
+  add_settings(app, group, scene.surface);
+}
+
+void add_medium_options(CLI::App& app, const char* group, SceneOptions& scene) {
+  const auto take_auto = [&scene](std::string_view flag, const std::string& text) {
+    if (flag != "--density-scale") return false;
+    scene.auto_density_scale = text == "auto";
+    if (scene.auto_density_scale) scene.medium.density_scale = 0.0;
+    return scene.auto_density_scale;
+  };
+  add(
+      app, group, "--preset", list_names(preset_choices, "|"),
+      [&](const std::string& text) {
+        const auto* found = std::find_if(preset_choices.begin(), preset_choices.end(),
+                                         [&](const settings::Choice& choice) { return text == choice.name; });
+        if (found == preset_choices.end())
+          throw UsageError(in_quotes(text) + " is not one of " + list_names(preset_choices, ", "));
+        apply(static_cast<Preset>(found->value), scene.medium);
+      },
+      "Medium preset; does not set the density scale; other flags override its settings");
+  add_settings(app, group, scene.medium, take_auto);
+  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
+    add(
+        app, group, settings::ramps[i].flag, "X:Y,X:Y,...|none",
+        [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
+  }
+}
+
+void add_light_options(CLI::App& app, SceneOptions& scene) {
+  const char* group = "Light (default: a clear day; if sun, sky, environment or lights are given, the others are off)";
+  add(
+      app, group, "--sun", "\"azimuth,elevation r,g,b\"",
+      [&](const std::string& text) { parse_sun(text, scene.light); },
+      "Sun: azimuth from +Z towards +X and elevation in degrees; irradiance, which can be omitted with --sky-model");
+  add_settings(app, group, scene.light);
+  add_path(
+      app, group, "--env", "FILE", [&](const std::string& text) { scene.set_environment(text); },
+      "Environment map (HDRI) instead of the sky: an equirectangular .hdr or .exr image, or an .exr cube map; +Y is "
+      "up, the center is +Z");
+  add_settings(app, group, scene.environment_settings);
+  add(
+      app, group, "--sky-model", "\"turbidity,ground_albedo\"",
+      [&](const std::string& text) { parse_sky_model(text, scene.light); },
+      "Physical sun and sky: turbidity from 1 (no aerosols) to 10, 3 is clear; and ground albedo from 0 to 1");
+  add_analytic_lights(app, group, scene.analytic_lights);
+  add_settings(app, group, scene.ground);
+}
+
+void add_picture_options(CLI::App& app, SceneOptions& scene) {
+  const char* group = "Picture";
+  add(
+      app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
+      "Image size in pixels (default: 1280x720)");
+  add_settings(app, group, scene.sampling);
+  add(
+      app, group, "--light-groups", "NAME,...|none",
+      [&](const std::string& text) { scene.light_groups = parse_light_groups(text); },
+      "Names of up to 8 light groups, starting with group 0. Each is written as a layer Combined_NAME of an .exr; "
+      "their sum is the image. Lights of unnamed groups are added to group 0 (default: none)");
+  const auto choose_color = [&scene](std::string_view flag, const std::string&) {
+    if (flag == "--background-color") scene.display.background = CUMULET_BACKGROUND_COLOR;
+    return false;
+  };
+  add_settings(app, group, scene.display, choose_color);
+}
+
 }  // namespace
-
-double parse_number(std::string_view text) {
-  double value = 0.0;
-  const std::string_view digits = text.substr(text.size() > 1 && text[0] == '+' && text[1] != '-' ? 1 : 0);
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc{} || end != digits.data() + digits.size() || !std::isfinite(value))
-    throw UsageError(in_quotes(text) + " is not a finite number");
-  return value;
-}
-
-std::vector<double> parse_numbers(std::string_view text, std::size_t count) {
-  const std::vector<std::string_view> parts = split(text, ',');
-  if (parts.size() != count)
-    throw UsageError(in_quotes(text) + " is not " + std::to_string(count) + " numbers separated by commas");
-  std::vector<double> values;
-  values.reserve(parts.size());
-  for (const std::string_view part : parts) values.push_back(parse_number(part));
-  return values;
-}
-
-std::uint64_t parse_integer(std::string_view text, std::uint64_t least, std::uint64_t most) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool number = end == text.data() + text.size() && !text.empty();
-  if (!number || error == std::errc::invalid_argument) throw UsageError(in_quotes(text) + " is not a whole number");
-  if (error != std::errc{} || value < least || value > most)
-    throw UsageError(in_quotes(text) + " is not from " + std::to_string(least) + " to " + std::to_string(most));
-  return value;
-}
 
 void add_scene_options(CLI::App& app, SceneOptions& scene) {
   const char* group = "Scene";
@@ -469,50 +294,8 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         }
       },
       "Use this camera of the scene");
-  add(
-      app, group, "--volume", "FILE",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        scene.volume = text;
-      },
-      "OpenVDB or NanoVDB file (.vdb, .nvdb), or a sequence such as name.####.vdb");
-  add(
-      app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
-      "Density grid (default: density, else the most likely grid)");
-  add(
-      app, group, "--temperature-grid", "NAME", [&](const std::string& text) { scene.temperature_grid = text; },
-      "Temperature grid; none: not used (default: found by name)");
-  add(
-      app, group, "--flame-grid", "NAME", [&](const std::string& text) { scene.flame_grid = text; },
-      "Flame grid; none: not used (default: found by name)");
-  add(
-      app, group, "--color-grid", "NAME", [&](const std::string& text) { scene.color_grid = text; },
-      "Color grid; none: not used (default: found by name)");
-  add(
-      app, group, "--anisotropy-grid", "NAME", [&](const std::string& text) { scene.anisotropy_grid = text; },
-      "Anisotropy grid, replaces --anisotropy; none: not used (default: found by name)");
-  add(
-      app, group, "--velocity-grid", "NAME", [&](const std::string& text) { scene.velocity_grid = text; },
-      "Velocity grid, for --aovs velocity and --shutter; none: not used (default: found by name)");
-  add_choice(app, group, "--up", up_names, scene.up,
-             "Up axis of the volume (default: y; use z for Blender and Mantaflow)");
-  add(
-      app, group, "--gltf", "FILE",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        scene.surfaces = text;
-      },
-      "Surfaces: a glTF 2.0 file (.gltf, .glb)");
-  add(
-      app, group, "--gltf-variant", "NAME|N", [&](const std::string& text) { scene.surface_variant = text; },
-      "Material variant, by name or index from 0 (default: none); --info lists them");
-  add(
-      app, group, "--gltf-camera", "N",
-      [&](const std::string& text) {
-        scene.surface_camera = static_cast<std::int32_t>(parse_integer(text, 0, 1000000));
-      },
-      "Use this camera of the glTF file, by index from 0");
-  add_settings(app, group, scene.surface);
+  add_volume_options(app, group, scene);
+  add_surface_options(app, group, scene);
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) {
@@ -521,68 +304,10 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       },
       "Eye, target and vertical field of view in degrees (default: fit the scene)");
   add_settings(app, group, scene.camera);
-
-  const auto take_auto = [&scene](std::string_view flag, const std::string& text) {
-    if (flag != "--density-scale") return false;
-    scene.auto_density_scale = text == "auto";
-    if (scene.auto_density_scale) scene.medium.density_scale = 0.0;
-    return scene.auto_density_scale;
-  };
-  add(
-      app, "Medium", "--preset", list_names(preset_choices, "|"),
-      [&](const std::string& text) {
-        const auto* found = std::find_if(preset_choices.begin(), preset_choices.end(),
-                                         [&](const settings::Choice& choice) { return text == choice.name; });
-        if (found == preset_choices.end())
-          throw UsageError(in_quotes(text) + " is not one of " + list_names(preset_choices, ", "));
-        apply(static_cast<Preset>(found->value), scene.medium);
-      },
-      "Medium preset; does not set the density scale; other flags override its settings");
-  add_settings(app, "Medium", scene.medium, take_auto);
-  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
-    add(
-        app, "Medium", settings::ramps[i].flag, "X:Y,X:Y,...|none",
-        [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
-  }
-
-  group = "Light (default: a clear day; if sun, sky, environment or lights are given, the others are off)";
-  add(
-      app, group, "--sun", "\"azimuth,elevation r,g,b\"",
-      [&](const std::string& text) { parse_sun(text, scene.light); },
-      "Sun: azimuth from +Z towards +X and elevation in degrees; irradiance, which can be omitted with --sky-model");
-  add_settings(app, group, scene.light);
-  add(
-      app, group, "--env", "FILE",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        scene.set_environment(text);
-      },
-      "Environment map (HDRI) instead of the sky: an equirectangular .hdr or .exr image, or an .exr cube map; +Y is "
-      "up, the center is +Z");
-  add_settings(app, group, scene.environment_settings);
-  add(
-      app, group, "--sky-model", "\"turbidity,ground_albedo\"",
-      [&](const std::string& text) { parse_sky_model(text, scene.light); },
-      "Physical sun and sky: turbidity from 1 (no aerosols) to 10, 3 is clear; and ground albedo from 0 to 1");
-  add_analytic_lights(app, group, scene.analytic_lights);
-  add_settings(app, group, scene.ground);
+  add_medium_options(app, "Medium", scene);
+  add_light_options(app, scene);
   add_settings(app, "Grid", scene.grid);
-
-  group = "Picture";
-  add(
-      app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
-      "Image size in pixels (default: 1280x720)");
-  add_settings(app, group, scene.sampling);
-  add(
-      app, group, "--light-groups", "NAME,...|none",
-      [&](const std::string& text) { scene.light_groups = parse_light_groups(text); },
-      "Names of up to 8 light groups, starting with group 0. Each is written as a layer Combined_NAME of an .exr; "
-      "their sum is the image. Lights of unnamed groups are added to group 0 (default: none)");
-  const auto choose_color = [&scene](std::string_view flag, const std::string&) {
-    if (flag == "--background-color") scene.display.background = CUMULET_BACKGROUND_COLOR;
-    return false;
-  };
-  add_settings(app, group, scene.display, choose_color);
+  add_picture_options(app, scene);
 }
 
 namespace {
@@ -760,6 +485,110 @@ bool same_file(const std::string& a, const std::string& b) {
   return of_a || of_b ? a == b : path_a == path_b;
 }
 
+namespace {
+
+/// Parses the names of AOVs, separated by commas. They replace those given before.
+void parse_aovs(std::string_view text, RenderOptions& options) {
+  options.aovs.clear();
+  options.cryptomatte = false;
+  for (const std::string_view part : split(text, ',')) {
+    const bool mattes = part == "all" || part == cryptomatte_name;
+    options.cryptomatte = options.cryptomatte || mattes;
+    for (const auto& [name, aov] : aov_names) {
+      const bool meant = part == "all" || part == name;
+      if (meant && std::ranges::find(options.aovs, aov) == options.aovs.end()) options.aovs.push_back(aov);
+    }
+    const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.name; });
+    if (!known && !mattes)
+      throw UsageError(in_quotes(part) + " is not one of all, " + list_names(aov_names, ", ") + ", " +
+                       cryptomatte_name);
+  }
+}
+
+void add_sequence_options(CLI::App& app, const char* group, RenderOptions& options) {
+  add(
+      app, group, "--frames", "A-BxS,...", [&](const std::string& text) { options.frames = parse_frames(text); },
+      "Frames of the sequence, such as 5, 1-100, 1-100x2, -2-2, 1-3,7 or 1-10x0.5 (fractional frames are interpolated; "
+      "default: the frame of the scene, else all existing files). The volume's name is a pattern with ####, %04d, $F4 "
+      "or <frame04>, or a file of the sequence");
+  add_settings(app, group, options.scene.sequence.playback);
+  app.add_flag("--overwrite", options.overwrite, "Re-render frames whose output exists (default: skip them)")
+      ->group(group);
+  add_path(
+      app, group, "--sequence-cache", "FILE", options.sequence_cache,
+      "Cache values shared by all frames (density scale, camera, ground height) in this file, so that later runs need "
+      "not read the reference frame; it is read again if its size or modification time has changed");
+}
+
+void add_report_options(CLI::App& app, const char* group, RenderOptions& options) {
+  app.add_flag("--info", options.info, "Describe the contents of the files; render nothing")->group(group);
+  app.add_flag("--json", options.json, "Write --info as JSON")->group(group);
+  add(
+      app, group, "--aovs", "NAME,...|all", [&](const std::string& text) { parse_aovs(text, options); },
+      "Additional layers (AOVs) of an .exr: volume, transmittance, depth, volume_depth, normal, albedo, error, "
+      "velocity, backward and volume_backward (motion vectors), cryptomatte");
+  add_path(app, group, "--stats", "FILE.json", options.stats, "Write statistics and timings in SI units");
+  add_path(app, group, "--trace", "FILE.json", options.trace,
+           "Write a trace of frames, passes and worker jobs for chrome://tracing and Perfetto");
+}
+
+void add_sample_options(CLI::App& app, const char* group, RenderOptions& options) {
+  add(
+      app, group, "--time-limit", "SECONDS",
+      [&](const std::string& text) {
+        const double seconds = parse_number(text);
+        if (!(seconds > 0.0)) throw UsageError(text + " is not above 0");
+        options.time_limit = seconds;
+      },
+      "Stop after this time (loading does not count), but not before each pixel has a sample");
+  add(
+      app, group, "--gpu-memory", "MIB",
+      [&](const std::string& text) {
+        constexpr unsigned mebibyte = 20;
+        options.gpu_memory = parse_integer(text, 1, std::uint64_t{1} << 40U) << mebibyte;
+      },
+      "GPU memory limit in MiB; grids are coarsened to fit (default: no limit)");
+  add(
+      app, group, "--first-sample", "N",
+      [&](const std::string& text) {
+        options.scene.sampling.first_sample =
+            static_cast<std::uint32_t>(parse_integer(text, 0, std::numeric_limits<std::uint32_t>::max()));
+      },
+      "Render only the samples N to N + SPP - 1 of each pixel, counted from 0; cumulet-merge joins the .exr files");
+  add_path(
+      app, group, "--checkpoint", "FILE", options.checkpoint,
+      "Save the accumulated samples to FILE periodically and on interruption; the same command resumes from it and "
+      "deletes it when the image is written. For a sequence: name.####");
+  add(
+      app, group, "--checkpoint-every", "SECONDS",
+      [&](const std::string& text) {
+        options.checkpoint_every = parse_number(text);
+        if (!(options.checkpoint_every > 0.0)) throw UsageError(text + " is not above 0");
+      },
+      "Seconds between checkpoints (default: 300)");
+}
+
+void add_device_options(CLI::App& app, const char* group, RenderOptions& options) {
+  // The scene's own setting is for interactive windows.
+  app.remove_option(app.get_option("--denoise"));
+  add_choice(app, group, "--denoise",
+             std::array{Name{"off", Denoise::off}, Name{"fast", Denoise::fast}, Name{"high", Denoise::high}},
+             options.denoise,
+             "Denoise: fast (filter) or high (Open Image Denoise network; fast if there is no network). An .exr gets "
+             "an additional layer `denoised` (default: off)");
+  add_path(app, group, "--oidn-weights", "DIR", options.denoiser,
+           "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
+           "$XDG_DATA_HOME)");
+  add_path(app, group, "--shader-cache", "DIR", options.shader_cache, "Cache compiled shaders in this folder");
+  add_choice(app, group, "--backend",
+             std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
+                        Name{"osmesa", BackendChoice::osmesa}},
+             options.backend,
+             "How to create the OpenGL context without a display (default: auto, which tries EGL, then OSMesa)");
+}
+
+}  // namespace
+
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
   RenderOptions options;
   CLI::App app("Path-traces a volume to an image file, without a display.", "cumulet-render");
@@ -783,122 +612,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       },
       "Output file. .png is exposed and tone-mapped; .exr and .pfm contain linear radiance. For a sequence: "
       "name.####.exr");
-  add(
-      app, group, "--frames", "A-BxS,...", [&](const std::string& text) { options.frames = parse_frames(text); },
-      "Frames of the sequence, such as 5, 1-100, 1-100x2, -2-2, 1-3,7 or 1-10x0.5 (fractional frames are interpolated; "
-      "default: the frame of the scene, else all existing files). The volume's name is a pattern with ####, %04d, $F4 "
-      "or <frame04>, or a file of the sequence");
-  add_settings(app, group, options.scene.sequence.playback);
-  app.add_flag("--overwrite", options.overwrite, "Re-render frames whose output exists (default: skip them)")
-      ->group(group);
-  add(
-      app, group, "--sequence-cache", "FILE",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        options.sequence_cache = text;
-      },
-      "Cache values shared by all frames (density scale, camera, ground height) in this file, so that later runs need "
-      "not read the reference frame; it is read again if its size or modification time has changed");
-  app.add_flag("--info", options.info, "Describe the contents of the files; render nothing")->group(group);
-  app.add_flag("--json", options.json, "Write --info as JSON")->group(group);
-  add(
-      app, group, "--aovs", "NAME,...|all",
-      [&](const std::string& text) {
-        options.aovs.clear();
-        options.cryptomatte = false;
-        for (const std::string_view part : split(text, ',')) {
-          const bool mattes = part == "all" || part == cryptomatte_name;
-          options.cryptomatte = options.cryptomatte || mattes;
-          for (const auto& [name, aov] : aov_names) {
-            const bool meant = part == "all" || part == name;
-            if (meant && std::ranges::find(options.aovs, aov) == options.aovs.end()) options.aovs.push_back(aov);
-          }
-          const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.name; });
-          if (!known && !mattes)
-            throw UsageError(in_quotes(part) + " is not one of all, " + list_names(aov_names, ", ") + ", " +
-                             cryptomatte_name);
-        }
-      },
-      "Additional layers (AOVs) of an .exr: volume, transmittance, depth, volume_depth, normal, albedo, error, "
-      "velocity, backward and volume_backward (motion vectors), cryptomatte");
-  add(
-      app, group, "--stats", "FILE.json",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        options.stats = text;
-      },
-      "Write statistics and timings in SI units");
-  add(
-      app, group, "--trace", "FILE.json",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        options.trace = text;
-      },
-      "Write a trace of frames, passes and worker jobs for chrome://tracing and Perfetto");
-  add(
-      app, group, "--time-limit", "SECONDS",
-      [&](const std::string& text) {
-        const double seconds = parse_number(text);
-        if (!(seconds > 0.0)) throw UsageError(text + " is not above 0");
-        options.time_limit = seconds;
-      },
-      "Stop after this time (loading does not count), but not before each pixel has a sample");
-  add(
-      app, group, "--gpu-memory", "MIB",
-      [&](const std::string& text) {
-        constexpr unsigned mebibyte = 20;
-        options.gpu_memory = parse_integer(text, 1, std::uint64_t{1} << 40U) << mebibyte;
-      },
-      "GPU memory limit in MiB; grids are coarsened to fit (default: no limit)");
-  add(
-      app, group, "--first-sample", "N",
-      [&](const std::string& text) {
-        options.scene.sampling.first_sample =
-            static_cast<std::uint32_t>(parse_integer(text, 0, std::numeric_limits<std::uint32_t>::max()));
-      },
-      "Render only the samples N to N + SPP - 1 of each pixel, counted from 0; cumulet-merge joins the .exr files");
-  add(
-      app, group, "--checkpoint", "FILE",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the file's name is empty");
-        options.checkpoint = text;
-      },
-      "Save the accumulated samples to FILE periodically and on interruption; the same command resumes from it and "
-      "deletes it when the image is written. For a sequence: name.####");
-  add(
-      app, group, "--checkpoint-every", "SECONDS",
-      [&](const std::string& text) {
-        options.checkpoint_every = parse_number(text);
-        if (!(options.checkpoint_every > 0.0)) throw UsageError(text + " is not above 0");
-      },
-      "Seconds between checkpoints (default: 300)");
-  // The scene's own setting is for interactive windows.
-  app.remove_option(app.get_option("--denoise"));
-  add_choice(app, group, "--denoise",
-             std::array{Name{"off", Denoise::off}, Name{"fast", Denoise::fast}, Name{"high", Denoise::high}},
-             options.denoise,
-             "Denoise: fast (filter) or high (Open Image Denoise network; fast if there is no network). An .exr gets "
-             "an additional layer `denoised` (default: off)");
-  add(
-      app, group, "--oidn-weights", "DIR",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the folder's name is empty");
-        options.denoiser = text;
-      },
-      "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
-      "$XDG_DATA_HOME)");
-  add(
-      app, group, "--shader-cache", "DIR",
-      [&](const std::string& text) {
-        if (text.empty()) throw UsageError("the folder's name is empty");
-        options.shader_cache = text;
-      },
-      "Cache compiled shaders in this folder");
-  add_choice(app, group, "--backend",
-             std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
-                        Name{"osmesa", BackendChoice::osmesa}},
-             options.backend,
-             "How to create the OpenGL context without a display (default: auto, which tries EGL, then OSMesa)");
+  add_sequence_options(app, group, options);
+  add_report_options(app, group, options);
+  add_sample_options(app, group, options);
+  add_device_options(app, group, options);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});

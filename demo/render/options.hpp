@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "option_values.hpp"
+
 namespace CLI {
 class App;
 }
@@ -70,15 +72,5 @@ struct RenderOptions {
 /// Parses the arguments of cumulet-render, without the program's name. Returns nullopt for --help and --version, whose
 /// text is written to `out`. Throws UsageError.
 [[nodiscard]] std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out);
-
-// Parsers of single values, for programs with more flags. Each throws UsageError. Numbers are parsed independently of
-// the locale.
-
-/// Parses a finite number; nothing else may follow.
-[[nodiscard]] double parse_number(std::string_view text);
-/// Parses exactly `count` numbers, separated by commas.
-[[nodiscard]] std::vector<double> parse_numbers(std::string_view text, std::size_t count);
-/// Parses an integer from `least` to `most`.
-[[nodiscard]] std::uint64_t parse_integer(std::string_view text, std::uint64_t least, std::uint64_t most);
 
 }  // namespace cumulet::demo

@@ -1,0 +1,283 @@
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app.hpp"
+#include "renderer.hpp"
+
+// The commands of the user interface.
+namespace cumulet::demo {
+namespace {
+
+constexpr float exposure_step = 1.0f / 3.0f;  // stops
+constexpr float max_exposure = 10.0f;         // stops
+constexpr double turn_speed = 20.0;           // degrees per second
+
+}  // namespace
+
+/// The functions of the commands, in the order of Action.
+struct App::Commands {
+  struct Row {
+    Action action;
+    void (*run)(App& app, const Command& command);
+  };
+
+  static constexpr auto table = std::to_array<Row>({
+      {Action::open_dialog,
+       [](App& app, const Command&) {
+         app.open_dialog("Open", Action::open, {".vdb", ".nvdb", ".gltf", ".glb", ".hdr", ".exr", ".json"});
+       }},
+      {Action::open, [](App& app, const Command& command) { app.open(command.text); }},
+      {Action::add_volume_dialog,
+       [](App& app, const Command&) { app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb"}); }},
+      {Action::add_volume,
+       [](App& app, const Command& command) {
+         app.model_.scene.others.emplace_back().volume = command.text;
+         spell_out_defaults(app.model_.scene);
+       }},
+      {Action::add_model_dialog,
+       [](App& app, const Command&) { app.open_dialog("Add model", Action::add_model, {".gltf", ".glb"}); }},
+      {Action::add_model,
+       [](App& app, const Command& command) { app.model_.scene.models.push_back({command.text}); }},
+      {Action::environment_dialog,
+       [](App& app, const Command&) { app.open_dialog("Open environment map", Action::open, {".hdr", ".exr"}); }},
+      {Action::clear_environment,
+       [](App& app, const Command&) {
+         app.model_.scene.environment.clear();
+         give_daylight(app.model_.scene);
+       }},
+      {Action::save_scene,
+       [](App& app, const Command&) {
+         if (app.model_.scene_path.empty())
+           app.execute({Action::save_scene_dialog});
+         else
+           app.save_scene(app.model_.scene_path);
+       }},
+      {Action::save_scene_dialog,
+       [](App& app, const Command&) { app.save_dialog("Save scene", Action::save_scene_as, ".json"); }},
+      {Action::save_scene_as, [](App& app, const Command& command) { app.save_scene(command.text); }},
+      {Action::png_dialog,
+       [](App& app, const Command&) {
+         if (app.model_.status.has_content) app.save_dialog("Save image", Action::save_png, ".png");
+       }},
+      {Action::save_png,
+       [](App& app, const Command& command) { app.request({Request::Type::save_png, command.text}); }},
+      {Action::exr_dialog,
+       [](App& app, const Command&) {
+         if (app.model_.status.has_content) app.save_dialog("Save linear radiance", Action::save_exr, ".exr");
+       }},
+      {Action::save_exr,
+       [](App& app, const Command& command) { app.request({Request::Type::save_exr, command.text}); }},
+      {Action::undo, [](App& app, const Command&) { app.step_history(true); }},
+      {Action::redo, [](App& app, const Command&) { app.step_history(false); }},
+      {Action::frame_all, [](App& app, const Command&) { app.request({Request::Type::frame_all}); }},
+      {Action::cancel, [](App& app, const Command&) { app.cancel(); }},
+      {Action::cancel_load, [](App& app, const Command&) { app.renderer_->cancel(); }},
+      {Action::dismiss,
+       [](App& app, const Command& command) {
+         std::erase_if(app.model_.messages, [&](const Message& message) { return message.text == command.text; });
+       }},
+      {Action::toggle_panel, [](App& app, const Command&) { app.model_.panel = !app.model_.panel; }},
+      {Action::focus_panel,
+       [](App& app, const Command&) {
+         app.model_.panel = true;
+         app.panel_.focus();
+       }},
+      {Action::toggle_help, [](App& app, const Command&) { app.model_.help = !app.model_.help; }},
+      {Action::toggle_fly,
+       [](App& app, const Command&) {
+         auto& fly = app.model_.navigation.fly;
+         fly = fly != 0 ? 0 : 1;
+         // Moves the keyboard focus from the panel to the image.
+         ImGui::SetWindowFocus(nullptr);
+       }},
+      {Action::toggle_turntable,
+       [](App& app, const Command&) {
+         double& speed = app.model_.navigation.turntable_degrees_per_second;
+         speed = speed != 0.0 ? 0.0 : turn_speed;
+       }},
+      {Action::tool,
+       [](App& app, const Command& command) {
+         app.image_->release_handle();
+         app.model_.tool = static_cast<Tool>(command.value);
+       }},
+      {Action::toggle_axes,
+       [](App& app, const Command&) {
+         app.image_->release_handle();
+         app.model_.axes = app.model_.axes == Axes::world ? Axes::local : Axes::world;
+       }},
+      {Action::brighter,
+       [](App& app, const Command&) {
+         float& stops = app.model_.scene.display.exposure_stops;
+         stops = std::min(stops + exposure_step, max_exposure);
+       }},
+      {Action::darker,
+       [](App& app, const Command&) {
+         float& stops = app.model_.scene.display.exposure_stops;
+         stops = std::max(stops - exposure_step, -max_exposure);
+       }},
+      {Action::next_grid_type,
+       [](App& app, const Command&) {
+         cumulet_grid_type& type = app.model_.scene.grid.type;
+         type = static_cast<cumulet_grid_type>((static_cast<int>(type) + 1) % 3);
+       }},
+      {Action::view,
+       [](App& app, const Command& command) {
+         app.model_.scene.sampling.view = static_cast<cumulet_view_mode>(command.value);
+       }},
+      {Action::grids_dialog,
+       [](App& app, const Command&) {
+         const auto& play = app.model_.status.play;
+         app.panel_.picker().open(play ? play->row.file(play->info.requested_frame) : app.model_.scene.volume,
+                                  Window::wake);
+       }},
+      {Action::choose_grid,
+       [](App& app, const Command& command) {
+         app.loading_.suggest = app.model_.scene.grid_name != command.text;
+         app.model_.scene.grid_name = command.text;
+       }},
+      {Action::choose_up,
+       [](App& app, const Command& command) {
+         // The volume moves with the up axis, so the camera must be fitted again.
+         const auto up = static_cast<UpAxis>(command.value);
+         app.loading_.fit = app.model_.scene.up != up;
+         app.model_.scene.up = up;
+       }},
+      {Action::auto_density, [](App& app, const Command&) { app.request({Request::Type::suggest_density}); }},
+      {Action::play_row, [](App& app, const Command&) { app.clock_.play_row(); }},
+      {Action::play, [](App& app, const Command&) { app.clock_.play_or_pause(); }},
+      {Action::step, [](App& app, const Command& command) { app.clock_.step(command.value); }},
+      {Action::go_to,
+       [](App& app, const Command& command) {
+         app.model_.playing = false;
+         app.clock_.go_to(static_cast<std::uint32_t>(command.value));
+       }},
+      {Action::begin_here,
+       [](App& app, const Command&) {
+         if (app.model_.status.play) app.model_.scene.sequence.first = app.model_.status.play->frame();
+       }},
+      {Action::end_here,
+       [](App& app, const Command&) {
+         if (app.model_.status.play) app.model_.scene.sequence.last = app.model_.status.play->frame();
+       }},
+      {Action::draw_region, [](App& app, const Command&) { app.image_->arm_region(); }},
+      {Action::clear_region,
+       [](App& app, const Command&) { std::ranges::fill(app.model_.scene.sampling.region, 0.0f); }},
+      {Action::quit, [](App& app, const Command&) { app.quit_ = true; }},
+  });
+
+  /// Returns true if each action has a function, at its index.
+  static constexpr bool is_complete() {
+    for (std::size_t i = 0; i < table.size(); ++i)
+      if (table[i].action != static_cast<Action>(i)) return false;
+    return table.size() == static_cast<std::size_t>(Action::quit) + 1;
+  }
+};
+
+void App::execute(const std::vector<Command>& commands) {
+  for (const Command& command : commands) execute(command);
+}
+
+void App::execute(const Command& command) {
+  static_assert(Commands::is_complete());
+  Commands::table[static_cast<std::size_t>(command.action)].run(*this, command);
+}
+
+void App::open_dialog(const char* title, Action action, std::vector<std::string> endings) {
+  panel_.dialog().open(title, action, std::move(endings), model_.preferences.folder);
+}
+
+void App::save_dialog(const char* title, Action action, const char* ending) {
+  panel_.dialog().open(title, action, {ending}, suggest_path(model_, ending));
+}
+
+void App::cancel() {
+  if (image_->cancel()) return;
+  if (model_.help)
+    model_.help = false;
+  else if (!model_.messages.empty())
+    model_.messages.pop_back();
+  else if (!model_.status.saving.empty())
+    exchange_.requests.push_back({Request::Type::forget_saves});
+  else if (model_.status.busy || exchange_.waiting())
+    renderer_->cancel();
+  else if (model_.chosen)
+    model_.chosen.reset();
+  else
+    ImGui::SetWindowFocus(nullptr);
+}
+
+void App::open(const std::string& path) {
+  if (path.empty()) return;
+  if (is_model(path)) {
+    open_surfaces(model_, path);
+    return;
+  }
+  if (is_environment(path)) {
+    model_.scene.environment = loading_.environment = path;
+    return;
+  }
+  if (!has_ending(path, ".json")) {
+    set_volume(model_.scene, {.volume = path});
+    model_.scene.sequence.first.reset();
+    model_.scene.sequence.last.reset();
+    model_.scene.sequence.frame.reset();
+    model_.scene.visible = true;
+    loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
+    return;
+  }
+  try {
+    SceneOptions scene = load_scene(path);
+    loading_.suggest = scene.auto_density_scale && scene.medium.density_scale == 0.0;
+    spell_out_defaults(scene);
+    scene.width = model_.scene.width;
+    scene.height = model_.scene.height;
+    model_.scene = std::move(scene);
+    model_.unchosen_ground = false;
+    model_.scene_path = path;
+    loading_.scene = path;
+    loading_.reload = true;
+    loading_.fit = needs_fit(model_.scene.camera);
+  } catch (const std::exception& error) {
+    complain(error.what());
+    model_.preferences.forget(path);
+  }
+}
+
+void App::save_scene(const std::string& path) {
+  SceneOptions scene = model_.scene;
+  // Saves the viewport size, so that cumulet-render gives the same framing.
+  scene.width = static_cast<std::uint32_t>(std::clamp(image_->viewport().width, 1.0, 16384.0));
+  scene.height = static_cast<std::uint32_t>(std::clamp(image_->viewport().height, 1.0, 16384.0));
+  if (model_.status.play) {
+    scene.sequence.frame = model_.status.play->frame();
+    if (!scene.surfaces.empty()) scene.surface.time = std::max(model_.clock, 0.0);
+  }
+  try {
+    demo::save_scene(scene, path);
+    model_.scene_path = path;
+    model_.preferences.remember(path);
+    tell(model_, false, "Saved " + path, now_);
+  } catch (const std::exception& error) {
+    tell(model_, true, error.what(), now_);
+  }
+}
+
+void App::step_history(bool back) {
+  image_->release_handle();
+  const auto scene = back ? history_->undo(model_.scene) : history_->redo(model_.scene);
+  if (!scene) return;
+  const cumulet_camera_desc camera = model_.scene.camera;
+  model_.scene = *scene;
+  loading_.fit = loading_.suggest = false;
+  if (model_.navigation.turntable_degrees_per_second != 0.0) model_.scene.camera = camera;
+}
+
+}  // namespace cumulet::demo

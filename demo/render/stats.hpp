@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cumulet/cumulet.h>
+
+#include "options.hpp"
+
+namespace cumulet::demo {
+
+/// Writes the file of --stats. Scripts rely on its names and units: keys may be added, never renamed. Values that do
+/// not apply are omitted. Throws std::runtime_error.
+void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend);
+
+}  // namespace cumulet::demo
