@@ -1,12 +1,9 @@
 #include <GLFW/glfw3.h>
 #include <gtest/gtest.h>
-#include <imgui.h>
 
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <limits>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -20,7 +17,6 @@
 #include "history.hpp"
 #include "input.hpp"
 #include "model.hpp"
-#include "panel.hpp"
 #include "preferences.hpp"
 #include "ramp_edit.hpp"
 #include "replay.hpp"
@@ -683,196 +679,6 @@ TEST(DemoModel, TypingDoesNotTriggerShortcuts) {
   EXPECT_TRUE(command_of(GLFW_KEY_F1, 0, true).has_value());
   EXPECT_FALSE(command_of(GLFW_KEY_F, modifier_ctrl, false).has_value());
 }
-
-/// The panel without a window: ImGui computes the layout, and nothing is drawn.
-class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
- public:
-  PanelTest(const PanelTest&) = delete;
-  PanelTest& operator=(const PanelTest&) = delete;
-
- protected:
-  PanelTest() {
-    ImGui::CreateContext();
-    ImGuiIO& io = ImGui::GetIO();
-    io.IniFilename = nullptr;
-    io.DisplaySize = GetParam().second;
-    apply_theme(GetParam().first);
-    load_fonts(GetParam().first);
-    unsigned char* pixels = nullptr;
-    int width = 0;
-    int height = 0;
-    io.Fonts->GetTexDataAsAlpha8(&pixels, &width, &height);
-    model_.status.has_volume = model_.status.has_content = true;
-    model_.status.stats.gl_renderer[0] = 'x';
-    model_.status.stats.samples = model_.status.stats.steps = 1;
-    model_.grids = {{"density", "float", ""}, {"velocity", "vec3s", "not a scalar"}};
-    model_.preferences.recent = {"/a/cloud.vdb"};
-    model_.scene.environment = "/a/sky.hdr";
-    model_.thumbnail_texture = 1;
-    for (const cumulet_light_kind kind : {CUMULET_LIGHT_SPOT, CUMULET_LIGHT_RECT}) {
-      model_.scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_light_desc);
-      model_.scene.analytic_lights.back().kind = kind;
-    }
-    spell_out_defaults(model_.scene);
-  }
-  ~PanelTest() override { ImGui::DestroyContext(); }
-
-  void frame(const ImVec2& mouse = {-1.0f, -1.0f}) {
-    ImGuiIO& io = ImGui::GetIO();
-    io.DeltaTime = 1.0f / 60.0f;
-    io.MousePos = mouse;
-    time_ += 1.0 / 60.0;
-    ImGui::NewFrame();
-    panel_.draw(model_, GetParam().first, time_, commands_);
-    ImGui::Render();
-  }
-
-  Model model_;
-  Panel panel_;
-  std::vector<Command> commands_;
-  double time_ = 1.0;
-};
-
-TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnArea) {
-  frame();
-  frame();
-  const auto& controls = panel_.ui().controls();
-  const std::set<std::string> without_tip = {
-      "Scene",     "File",          "Volumes",  "Volume 1",   "Display",     "Sun & sky",     "Lights",
-      "Medium",    "Models",        "Surfaces", "Model",      "Environment", "Image",         "Triangles",
-      "Grid",      "Camera",        "Sampling", "Statistics", "Cell count",  "Levels",        "Build",
-      "Grid data", "Active voxels", "Trace",    "GPU memory", "Renderer",    "Steps per path"};
-  EXPECT_GT(controls.size(), 50u);
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  for (const auto& [name, control] : controls) {
-    EXPECT_EQ(control.has_tip, !without_tip.contains(name)) << name;
-    const Rectangle& a = control.rectangle;
-    EXPECT_GE(a.x, 0.0) << name;
-    EXPECT_LE(a.x + a.width, static_cast<double>(screen.x) + 0.5) << name;
-    EXPECT_GT(a.width, 2.0) << name;
-    for (const auto& [other, control_b] : controls) {
-      const Rectangle& b = control_b.rectangle;
-      const bool apart = a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
-      // The toolbar is fixed; scrolled controls pass below it.
-      if (name < other && control.in_view && control_b.in_view) {
-        EXPECT_TRUE(apart) << name << " and " << other;
-      }
-    }
-  }
-}
-
-TEST_P(PanelTest, LabelsFitBesideTheirControls) {
-  frame();
-  frame();
-  for (const char* label : {"Camera adaptive", "Sun elevation", "Density scale", "GPU memory", "Background"}) {
-    EXPECT_LT(ImGui::GetFont()->CalcTextSizeA(ImGui::GetFontSize(), 1e9f, 0.0f, label).x, panel_.ui().px(126.0f))
-        << label;
-  }
-}
-
-TEST_P(PanelTest, ThumbnailRotatesTheEnvironment) {
-  panel_.ui().bring_into_view("Environment view");
-  for (int i = 0; i < 5; ++i) frame();
-  const auto rectangle = panel_.ui().find("Environment view");
-  ASSERT_TRUE(rectangle);
-  EXPECT_NEAR(rectangle->height, 0.5 * rectangle->width, 1.0);
-  const auto at = [&](double x) {
-    return ImVec2(static_cast<float>(rectangle->x + x * rectangle->width),
-                  static_cast<float>(rectangle->y + 0.5 * rectangle->height));
-  };
-  float& rotation = model_.scene.environment_settings.rotation_degrees;
-  ImGuiIO& io = ImGui::GetIO();
-  frame(at(0.5));
-  EXPECT_EQ(rotation, 0.0f) << "nothing is turned by looking";
-  io.MouseDown[0] = true;
-  frame(at(0.5));
-  EXPECT_EQ(rotation, 0.0f);
-  frame(at(0.6));
-  EXPECT_NEAR(rotation, -36.0f, 1.0f);
-  frame(at(-0.15));  // dragged beyond the edge
-  EXPECT_NEAR(rotation, 360.0f * 0.65f - 360.0f, 1.0f);
-  io.MouseDown[0] = false;
-  frame(at(0.2));
-  const float kept = rotation;
-  for (int i = 0; i < 40; ++i) frame(at(0.3));
-  EXPECT_EQ(rotation, kept);
-  for (int i = 0; i < 2; ++i) {
-    io.MouseDown[0] = true;
-    frame(at(0.3));
-    io.MouseDown[0] = false;
-    frame(at(0.3));
-  }
-  EXPECT_EQ(rotation, 0.0f) << "a double click turns it back";
-}
-
-TEST_P(PanelTest, PathsAreElidedAtTheStart) {
-  const std::string path = "/a/folder/of a very long name/\xc3\xa9t\xc3\xa9/another/cloud_0042.vdb";
-  ImGui::NewFrame();
-  const float whole = ImGui::CalcTextSize(path.c_str()).x;
-  EXPECT_EQ(end_of(path, whole + 1.0f), path);
-  for (float width = 0.9f * whole; width > 0.5f * whole; width -= 0.01f * whole) {
-    const std::string shown = end_of(path, width);
-    EXPECT_TRUE(shown.starts_with("...") && path.ends_with(shown.substr(3))) << shown;
-    EXPECT_TRUE(shown.ends_with("cloud_0042.vdb"));
-    EXPECT_LE(ImGui::CalcTextSize(shown.c_str()).x, width);
-    EXPECT_NE(static_cast<unsigned char>(shown[3]) & 0xC0U, 0x80U) << "within a character";
-  }
-  ImGui::EndFrame();
-}
-
-TEST_P(PanelTest, DrawingChangesNothing) {
-  const SceneOptions before = model_.scene;
-  for (int i = 0; i < 5; ++i) frame();
-  EXPECT_TRUE(same_scene(before, model_.scene));
-  EXPECT_TRUE(commands_.empty());
-}
-
-TEST_P(PanelTest, DialogListsOnlyItsFileTypes) {
-  model_.preferences.recent = {"/a/cloud.vdb", "/a/sky.HDR", "/a/town.glb"};
-  const auto offers = [&](const char* name) { return panel_.ui().controls().contains(std::string("Recent/") + name); };
-  panel_.dialog().open("Open environment map", Action::open, {".hdr", ".exr"}, "");
-  for (int i = 0; i < 3; ++i) frame();
-  EXPECT_TRUE(offers("sky.HDR"));
-  EXPECT_FALSE(offers("cloud.vdb") || offers("town.glb"));
-  panel_.dialog().open("Add volume", Action::add_volume, {".vdb", ".nvdb"}, "");
-  for (int i = 0; i < 3; ++i) frame();
-  EXPECT_TRUE(offers("cloud.vdb")) << "what is added is opened, not saved";
-  EXPECT_FALSE(offers("sky.HDR"));
-}
-
-TEST_P(PanelTest, SceneWithOnlyAModelIsListedAndSaved) {
-  model_ = Model();
-  model_.scene.surfaces = "/a/town.glb";
-  model_.status.has_content = true;
-  for (int i = 0; i < 2; ++i) frame();
-  EXPECT_TRUE(panel_.ui().controls().contains("Scene/Surfaces"));
-  EXPECT_NE(panel_.state(), "");
-  model_.status.saving = "/b/picture.png";
-  frame();
-  EXPECT_NE(panel_.state().find("saving picture.png"), std::string::npos) << panel_.state();
-}
-
-TEST_P(PanelTest, ButtonsIssueTheirCommands) {
-  frame();
-  frame();
-  const Rectangle rectangle = *panel_.ui().find("Open");
-  const ImVec2 middle(static_cast<float>(rectangle.x + rectangle.width / 2),
-                      static_cast<float>(rectangle.y + rectangle.height / 2));
-  ImGuiIO& io = ImGui::GetIO();
-  frame(middle);
-  io.MouseDown[0] = true;
-  frame(middle);
-  io.MouseDown[0] = false;
-  frame(middle);
-  ASSERT_EQ(commands_.size(), 1u);
-  EXPECT_EQ(commands_[0].action, Action::open_dialog);
-}
-
-INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
-                         ::testing::Values(std::make_pair(1.0f, ImVec2(1440, 900)),
-                                           std::make_pair(2.0f, ImVec2(1680, 1040)),
-                                           std::make_pair(1.0f, ImVec2(640, 400)),
-                                           std::make_pair(1.25f, ImVec2(1024, 3000))));
 
 TEST(WorkStatus, ShowsShaderCompilationWhenIdle) {
   Status status;

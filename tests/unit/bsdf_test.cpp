@@ -9,17 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/shared_code.hpp"
 #include "support/appendix_b.hpp"
-#include "surface/ggx_albedo.hpp"
-
-namespace cumulet::core {
-inline vec2 cm_ggx_albedo(float roughness, float cosine) {
-  return surface::GgxAlbedo::table().towards(roughness, cosine);
-}
-inline vec2 cm_ggx_albedo_average(float roughness) { return surface::GgxAlbedo::table().average(roughness); }
-#include "bsdf.glsl"
-}  // namespace cumulet::core
+#include "support/bsdf.hpp"
 
 namespace {
 

@@ -10,23 +10,8 @@
 #include <random>
 #include <vector>
 
-#include "base/shared_code.hpp"
-#include "surface/ggx_albedo.hpp"
-#include "surface/sheen_albedo.hpp"
-
 #define CM_EXTENDED_BSDF 1
-namespace cumulet::core {
-inline vec2 cm_ggx_albedo(float roughness, float cosine) {
-  return surface::GgxAlbedo::table().towards(roughness, cosine);
-}
-inline vec2 cm_ggx_albedo_average(float roughness) { return surface::GgxAlbedo::table().average(roughness); }
-inline float cm_sheen_albedo(float roughness, float cosine) {
-  return surface::SheenAlbedo::table().towards(roughness, cosine);
-}
-inline float cm_sheen_albedo_average(float roughness) { return surface::SheenAlbedo::table().average(roughness); }
-#include "bsdf.glsl"
-#include "dispersion.glsl"
-}  // namespace cumulet::core
+#include "support/bsdf.hpp"
 
 namespace {
 

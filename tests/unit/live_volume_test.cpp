@@ -24,24 +24,22 @@ using cumulet::test::alone;
 using cumulet::test::at;
 using cumulet::test::CameraRef;
 using cumulet::test::difference;
-using cumulet::test::expect_same_voxels;
+using cumulet::test::expect_same_fields;
 using cumulet::test::InstanceRef;
 using cumulet::test::LiveRef;
 using cumulet::test::make_ball;
 using cumulet::test::make_desc;
 using cumulet::test::make_live;
 using cumulet::test::newest;
+using cumulet::test::odd;
 using cumulet::test::picture_of;
 using cumulet::test::Sides;
 using cumulet::test::simulated;
+using cumulet::test::small;
 using cumulet::test::State;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
-using cumulet::volume::ScalarVolume;
 using Picture = std::vector<std::uint8_t>;
-
-constexpr Sides small = {24, 24, 24};
-constexpr Sides odd = {23, 31, 17};
 
 using HandOver = cumulet_status (*)(cumulet_dynamic_volume*, const cumulet_volume_fields_desc*, char*, std::size_t);
 
@@ -69,19 +67,6 @@ State fire(const Sides& size, int step) {
 }
 
 State smoke(const Sides& size, int step) { return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, step)); }
-
-void expect_same(const VolumeRef& a, const VolumeRef& b) {
-  const auto& left = a->asset->frame();
-  const auto& right = b->asset->frame();
-  expect_same_voxels(left.density, right.density);
-  const auto others = left.beside_density();
-  ASSERT_EQ(others.size(), right.beside_density().size());
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    SCOPED_TRACE(others[i]->name);
-    expect_same_voxels(*others[i], *right.beside_density()[i]);
-    EXPECT_EQ(others[i]->index_to_world, right.beside_density()[i]->index_to_world);
-  }
-}
 
 class CLiveVolume : public cumulet::test::CPlaybackTest {
  protected:
@@ -211,7 +196,7 @@ TEST_F(CLiveVolume, StateDoesNotDependOnEarlierStates) {
     const Picture found = picture(viewer.get());
     EXPECT_NE(found, std::exchange(before, found));
     EXPECT_EQ(difference(found, picture_alone(state)), "");
-    expect_same(newest(live), alone(state));
+    expect_same_fields(newest(live), alone(state));
     EXPECT_EQ(info_of(viewer).submitted_update, number);
     EXPECT_EQ(info_of(viewer).displayed_update, number);
   };
@@ -284,7 +269,7 @@ TEST_F(CLiveVolume, PartialUpdatesEqualAFullState) {
         hand_over(live, changes, cumulet_dynamic_volume_update);
         before = now;
       }
-      expect_same(newest(live), alone(whole(before, heat_before)));
+      expect_same_fields(newest(live), alone(whole(before, heat_before)));
       // The image is equal too.
       const ViewerPtr viewer = make();
       ASSERT_EQ(cumulet_set_dynamic_volume(viewer.get(), live.get()), CUMULET_OK);
@@ -374,7 +359,7 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
   const cumulet_volume_fields_desc two = held(second);
   ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &two, error.data(), error.size()), CUMULET_OK) << error.data();
   EXPECT_EQ(releases.count, 1);  // the first state was not read yet
-  expect_same(newest(live), alone(second));
+  expect_same_fields(newest(live), alone(second));
   EXPECT_EQ(releases.count, 2);
   // Rejected in the call: the host keeps the memory.
   const State nothing;
@@ -392,7 +377,7 @@ TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
   EXPECT_EQ(cumulet_dynamic_volume_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_ERROR_FILE);
   EXPECT_STREQ(error.data(), "smoke: density: its voxel (22, 30, 16) is not finite");
   EXPECT_EQ(releases.count, 3);
-  expect_same(newest(live), alone(second));
+  expect_same_fields(newest(live), alone(second));
   // The library keeps no voxels of it.
   ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &two, error.data(), error.size()), CUMULET_OK);
   State bricks;
@@ -695,7 +680,7 @@ TEST_F(CLiveVolume, VolumeAndLiveVolumeReplaceEachOther) {
   EXPECT_EQ(difference(picture(viewer.get()), of_smoke), "");
   cumulet_volume* shown = nullptr;
   ASSERT_EQ(cumulet_get_volume(viewer.get(), &shown), CUMULET_OK);
-  expect_same(VolumeRef(shown), newest(live));
+  expect_same_fields(VolumeRef(shown), newest(live));
   ASSERT_EQ(cumulet_set_volume(viewer.get(), ball.get()), CUMULET_OK);
   hand_over(live, smoke(small, 2));
   EXPECT_EQ(difference(picture(viewer.get()), of_ball), "");

@@ -5,50 +5,24 @@
 #include <clocale>
 #include <cstdint>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <presets.hpp>
 #include <settings.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <timeline.hpp>
 #include <vector>
 
-#include "held_lines.hpp"
 #include "memory.hpp"
-#include "progress.hpp"
 #include "support/folder.hpp"
+#include "support/render_options.hpp"
 
 namespace {
 
 using namespace cumulet::demo;
-using Arguments = std::vector<std::string>;
-
-/// Adds the required arguments.
-Arguments with(const Arguments& more) {
-  Arguments all = {"--volume", "cloud.vdb", "-o", "out.png"};
-  all.insert(all.end(), more.begin(), more.end());
-  return all;
-}
-
-RenderOptions parse(const Arguments& more) {
-  std::ostringstream out;
-  auto options = parse_render_options(with(more), out);
-  if (!options) throw std::logic_error("help instead of options");
-  EXPECT_EQ(out.str(), "");
-  return *options;
-}
-
-std::string usage_error(const Arguments& all) {
-  std::ostringstream out;
-  try {
-    static_cast<void>(parse_render_options(all, out));
-    return "";
-  } catch (const UsageError& error) {
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    return error.what();
-  }
-}
+using cumulet::test::Arguments;
+using cumulet::test::parse;
+using cumulet::test::usage_error;
+using cumulet::test::with;
 
 void expect_rgb(const float (&rgb)[3], float r, float g, float b) {
   EXPECT_FLOAT_EQ(rgb[0], r);
@@ -254,80 +228,6 @@ TEST(Options, RampIsAListOfPoints) {
             std::string::npos);
 }
 
-// Compares each key with the same words in a scene file.
-TEST(Options, LightFlagsMatchSceneFileLights) {
-  const SceneOptions scene = parse({"--light",
-                                    "rect  position=-1,.5,2e1 direction=0,-.5,1 tangent=1,0,0 color=1,0.5,.25 "
-                                    "power=+300 width=2 height=.5 angle_degrees=90 blend=0.25",
-                                    "--light", "point", "--light", "distant power=3 angle_degrees=0.53"})
-                                 .scene;
-  const SceneOptions file = parse_scene(R"({"cumulet_scene": 3, "lights": [
-      {"kind": "rect", "position": [-1, 0.5, 20], "direction": [0, -0.5, 1], "tangent": [1, 0, 0],
-       "color": [1, 0.5, 0.25], "power": 300, "width": 2, "height": 0.5, "angle_degrees": 90, "blend": 0.25},
-      {"kind": "point"}, {"kind": "distant", "power": 3, "angle_degrees": 0.53}]})",
-                                        "a.json");
-  const auto same_analytic_lights = [&](const SceneOptions& other) {
-    ASSERT_EQ(scene.analytic_lights.size(), other.analytic_lights.size());
-    for (std::size_t i = 0; i < scene.analytic_lights.size(); ++i)
-      EXPECT_TRUE(cumulet::settings::same(scene.analytic_lights[i], other.analytic_lights[i])) << i;
-  };
-  same_analytic_lights(file);
-  EXPECT_EQ(scene.analytic_lights[0].struct_size, sizeof(cumulet_light_desc));
-  same_analytic_lights(parse_scene(scene_text(scene, "a.json"), "a.json"));
-  EXPECT_EQ(scene.light.sun_irradiance[0], 0.0f) << "no light but theirs";
-  EXPECT_EQ(scene.light.sky, CUMULET_SKY_CONSTANT);
-  EXPECT_EQ(scene.ground.mode, CUMULET_GROUND_NONE);
-  EXPECT_EQ(parse({"--light", "point", "--sky-model", "3,0.3"}).scene.light.sky, CUMULET_SKY_PHYSICAL);
-  EXPECT_EQ(parse({"--light", "point", "--light", "none"}).scene.light.sky, CUMULET_SKY_PHYSICAL) << "a day without";
-}
-
-TEST(Options, LightFlagsAddToTheScenesLights) {
-  const cumulet::test::Folder folder;
-  const std::string scene = (folder.path() / "scene.json").string();
-  std::ofstream(scene) << R"({"cumulet_scene": 2, "lights": [{"kind": "spot", "power": 7}]})";
-  const auto analytic_lights = [&](const Arguments& more) {
-    Arguments all = {"--scene", scene};
-    all.insert(all.end(), more.begin(), more.end());
-    return parse(all).scene.analytic_lights;
-  };
-  ASSERT_EQ(analytic_lights({}).size(), 1u);
-  const auto two = analytic_lights({"--light", "disk power=3"});
-  ASSERT_EQ(two.size(), 2u);
-  EXPECT_EQ(two[0].power, 7.0f);
-  EXPECT_EQ(two[1].kind, CUMULET_LIGHT_DISK);
-  const auto other = analytic_lights({"--light", "none", "--light", "disk power=3"});
-  ASSERT_EQ(other.size(), 1u);
-  EXPECT_EQ(other[0].power, 3.0f);
-}
-
-TEST(Options, AnyWhiteSpaceSeparatesWords) {
-  const auto analytic_lights = parse({"--light", "\tdisk\n  power=3\r\n\twidth=2\n"}).scene.analytic_lights;
-  ASSERT_EQ(analytic_lights.size(), 1u);
-  EXPECT_EQ(analytic_lights[0].kind, CUMULET_LIGHT_DISK);
-  EXPECT_EQ(analytic_lights[0].power, 3.0f);
-  EXPECT_EQ(analytic_lights[0].width, 2.0);
-}
-
-TEST(Options, InvalidLightGivesAOneLineError) {
-  const auto told = [](const char* analytic_light) { return usage_error(with({"--light", analytic_light})); };
-  EXPECT_EQ(told(""), "--light: '' is not one of point, spot, disk, rect, distant");
-  EXPECT_EQ(told("bulb power=1"), "--light: 'bulb' is not one of point, spot, disk, rect, distant");
-  EXPECT_EQ(told("point power 1"), "--light: 'power' is not KEY=VALUE, such as power=100");
-  EXPECT_EQ(told("point watts=1"), "--light: lights have no setting 'watts'");
-  EXPECT_EQ(told("point kind=spot"), "--light: lights have no setting 'kind'");
-  EXPECT_EQ(told("point power=1 power=2"), "--light: power is given twice");
-  EXPECT_EQ(told("point power=-1"), "--light: power: '-1' is not from 0 to 1e30");
-  EXPECT_EQ(told("point power="), "--light: power: '' is not a finite number");
-  EXPECT_EQ(told("point position=1,2"), "--light: position: '1,2' is not 3 numbers separated by commas");
-  EXPECT_EQ(told("point position=1,2,1e31"), "--light: position exceeds 1e30");
-  EXPECT_EQ(told("point color=0,0,0"), "--light: color: '0,0,0' must not be black");
-  EXPECT_EQ(told("point color=1,-1,0"), "--light: color: '1,-1,0' has a negative number");
-  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--light: power times color exceeds 1e30");
-  EXPECT_EQ(told("disk width=0"), "--light: width: '0' is not above 0");
-  EXPECT_EQ(told("distant angle_degrees=100"), "--light: angle_degrees is above 90, the maximum for a distant light");
-  EXPECT_EQ(told("spot blend=2"), "--light: blend: '2' is not from 0 to 1");
-}
-
 TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "wireframe"}).scene.sampling.view, CUMULET_VIEW_WIREFRAME);
   EXPECT_EQ(parse({"--view", "cells"}).scene.sampling.view, CUMULET_VIEW_CELLS);
@@ -499,53 +399,6 @@ TEST(Options, HelpListsFileFormats) {
   std::ostringstream out;
   EXPECT_FALSE(parse_render_options({"--help"}, out).has_value());
   EXPECT_NE(out.str().find("OpenVDB or NanoVDB file (.vdb, .nvdb)"), std::string::npos) << out.str();
-}
-
-TEST(Progress, RatesAreHiddenUntilMeasurable) {
-  // Time before the first line was not measured.
-  EXPECT_EQ(rendering_line(0.5, 0.0, 1e9, 0.0), "rendering [############............] 50 %");
-  EXPECT_EQ(rendering_line(0.5, 0.01, 1e7, 1e-9), "rendering [############............] 50 %");
-  EXPECT_EQ(rendering_line(0.0, 0.0, 0.0, 10.0), "rendering [........................] 0 %");
-  EXPECT_EQ(rendering_line(0.5, 0.25, 1e6, 10.0),
-            "rendering [############............] 50 %  100 ksamples/s  ETA 0:20");
-  EXPECT_NE(rendering_line(1.0, 1.0, 5e13, 10.0).find("5 Tsamples/s"), std::string::npos);
-}
-
-TEST(Progress, CountsTowardTheNearestLimit) {
-  EXPECT_EQ(part_done(0.3, 9.0, std::nullopt), 0.3);
-  EXPECT_EQ(part_done(0.3, 6.0, 10.0), 0.6) << "the time";
-  EXPECT_EQ(part_done(0.8, 6.0, 10.0), 0.8) << "the noise, or the samples";
-  EXPECT_EQ(part_done(0.8, 11.0, 10.0), 1.0);
-}
-
-TEST(Progress, LastLineGivesTheReasonForStopping) {
-  EXPECT_EQ(ending_line(Ending::noise, 0.01874, 91.0, 2.0, std::nullopt),
-            "noise 1.87 % (target 2 %) after 91 samples per pixel");
-  EXPECT_EQ(ending_line(Ending::samples, 0.024, 64.0, 2.0, 30.0),
-            "noise 2.4 % (target 2 %) after 64 samples per pixel, the maximum");
-  EXPECT_EQ(ending_line(Ending::time, 0.1, 10.26, 0.0, 30.0),
-            "noise 10 % after 10.26 samples per pixel, stopped at the time limit of 30 s");
-  EXPECT_EQ(ending_line(Ending::samples, std::nullopt, 1.0, 2.0, std::nullopt),
-            "noise unknown (target 2 %) after 1 sample per pixel, the maximum");
-  EXPECT_EQ(ending_line(Ending::noise, 0.0, 16.0, 2.0, std::nullopt),
-            "noise 0 % (target 2 %) after 16 samples per pixel")
-      << "a black picture has none";
-}
-
-TEST(HeldLines, FailureIsPrintedOnceAndInOrder) {
-  HeldLines lines;
-  EXPECT_EQ(lines.take(CUMULET_LOG_WARNING, "one"), "warning: one");
-  lines.hold();
-  EXPECT_FALSE(lines.take(CUMULET_LOG_WARNING, "a.3.vdb: it is not there: another frame is shown instead"));
-  EXPECT_FALSE(lines.take(CUMULET_LOG_ERROR, "two\nlines"));
-  EXPECT_FALSE(lines.take(CUMULET_LOG_WARNING, "three"));
-  EXPECT_EQ(lines.release("a.3.vdb: it is not there"),
-            (std::vector<std::string>{"error: two lines", "warning: three"}));
-  EXPECT_EQ(lines.take(CUMULET_LOG_WARNING, "four"), "warning: four");
-  lines.hold();
-  EXPECT_FALSE(lines.take(CUMULET_LOG_WARNING, "five"));
-  EXPECT_EQ(lines.release(), std::vector<std::string>{"warning: five"});
-  EXPECT_TRUE(lines.release().empty());
 }
 
 TEST(Options, NoiseAndTimeLimitsRaiseTheDefaultSampleLimit) {
@@ -855,20 +708,6 @@ TEST(Options, NumbersAreTheSameInEveryLocale) {
   EXPECT_EQ(parse_number("+2"), 2.0);
   for (const char* text : {"", "+", "+-2", " 1", "1 ", "0x10", "nan", "1e400", "--1", "1.5.2"})
     EXPECT_THROW(static_cast<void>(parse_number(text)), UsageError) << text;
-}
-
-TEST(Timeline, IsJsonThatChromeReads) {
-  cumulet::demo::Timeline timeline;
-  EXPECT_EQ(nlohmann::json::parse(timeline.json())["traceEvents"].size(), 0U);
-  cumulet::demo::Timeline::add(&timeline, "a \"name\"\xff", 2.0, 2.5);
-  cumulet::demo::Timeline::add(&timeline, "frame", 1.0, 3.0);
-  const auto events = nlohmann::json::parse(timeline.json())["traceEvents"];
-  ASSERT_EQ(events.size(), 2U);
-  EXPECT_EQ(events[0]["ph"], "X");
-  EXPECT_EQ(events[0]["ts"], 2e6);
-  EXPECT_EQ(events[0]["dur"], 5e5);
-  EXPECT_EQ(events[1]["name"], "frame");
-  EXPECT_EQ(events[0]["tid"], events[1]["tid"]);
 }
 
 }  // namespace

@@ -1,0 +1,306 @@
+"""Tests of session.py: volumes, sequences, surfaces and grids."""
+
+import json
+import pathlib
+import shutil
+import struct
+import subprocess
+
+from demo_session import ALIKE, assert_alike, assert_differ, assert_drawn, look, SETTLE, shot
+from png import difference
+
+
+def test_volumes(s):
+    """Volumes other than the first are hidden, removed, copied and added, and undo reverts each change."""
+    far = {"places": [{"translate": [60, 0, 0]}]}
+    medium = {"medium": {"density_scale": 1, "albedo": [0.8, 0.8, 0.8]}}  # dark, so that paths are short
+    camera = {"eye": [20, 30, 170], "target": [20, 20, 0]}
+    volumes = [{"file": s.cumulus, **medium}, {"file": s.cumulus, **medium, **far}]
+    (s.out / "two.json").write_text(json.dumps({"cumulet_scene": 2, "volumes": volumes, "camera": camera}))
+    there = ["wait loaded", "wait converged"]
+    s.play("volumes",
+           [*there, *shot("both"),
+            'click "Visible 2"', *there, *shot("first"),
+            "key ctrl+z", *there, *shot("again"),
+            'click "Visible 1"', *there, *shot("second"),
+            "key ctrl+z", 'click "Remove volume 2"', *there, *shot("removed"),
+            "key ctrl+z", 'click "Copy volume 2"', *there,
+            'drag "Scale 3" to "Scale 3" 0.55 0.5', *there, 'click "Add volume"', "frames 2", "key escape", *there,
+            *shot("copied")],
+           "--scene", "two.json")
+    both, _, area = look(s, "both")
+    first, second, copied = (look(s, name)[0] for name in ("first", "second", "copied"))
+    assert_drawn(both, area)
+    assert_alike(both, look(s, "again")[0], area)
+    assert_alike(first, look(s, "removed")[0], area)
+    for other in (first, second, copied):
+        assert_differ(both, other, area)
+    assert_differ(first, second, area)
+
+
+def test_handles(s):
+    """Objects are selected by a click or in the list. Handles move, rotate and scale them, and each drag is one undo
+    step."""
+    model = "triangle.gltf"
+    corners = struct.pack("<9f", 0, 0, 0, 30, 0, 0, 0, 30, 0)
+    (s.out / "corners.bin").write_bytes(corners)
+    (s.out / model).write_text(json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "buffers": [{"byteLength": 36, "uri": "corners.bin"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [30, 30, 0]}]}))
+    medium = {"medium": {"density_scale": 4, "albedo": [0.8, 0.8, 0.8]}}
+    volumes = [{"file": s.cumulus, **medium}, {"file": s.cumulus, **medium, "places": [{"translate": [-50, 0, 0]}, {"translate": [55, 0, 0]}]}]
+    lamp = {"kind": "rectangle", "position": [0, 60, 20], "power": 3000, "width": 20, "height": 10}
+    (s.out / "all.json").write_text(json.dumps({
+        "cumulet_scene": 2, "volumes": volumes, "environment": {"sky": {"radiance": [0.5, 0.6, 0.8]}}, "lights": [lamp], "models": [{"file": model, "translate": [-12, -8, 30]}],
+        "camera": {"eye": [20, 50, 190], "target": [0, 20, 0]}}))
+    there = ["frames 2", "wait loaded", "wait converged"]
+    tell = lambda name: ["frames 3", "wait loaded", *shot(name)]
+    s.play("handles",
+           [*there, *shot("first"), "click viewport 0.5 0.45", "move viewport 0.05 0.8", *there, *shot("clicked"),
+            'drag "Handle X" to viewport 0.75 0.5', *there, *shot("moved"),
+            "key ctrl+z", "move viewport 0.05 0.8", *there, *shot("undone"), "key ctrl+shift+z", *tell("redone"), "key ctrl+z", *there,
+            # Escape during a drag reverts it.
+            'move "Handle Y"', "down", "move viewport 0.5 0.1", "frames 2", *shot("held"), "key escape", "frames 2", "up",
+            *tell("let_go"),
+            "key e", "frames 2", *shot("rings"), 'drag "Handle Y" to viewport 0.45 0.7', *tell("turned"),
+            'key x', "key r", "frames 2", *shot("blocks"), "press ctrl", 'drag "Handle free" to viewport 0.6 0.4', "release ctrl",
+            *tell("scaled"),
+            'click "Scene/Volume 2, instance 2"', "key w", *tell("place"), 'drag "Handle free" to viewport 0.8 0.6', *tell("place_moved"),
+            'click "Scene/Model 1"', *tell("model"), "press ctrl", 'drag "Handle Y" to viewport 0.45 0.2', "release ctrl", *tell("model_moved"),
+            'click "Scene/Light 1"', *tell("lamp"), "key x", "key e", "frames 2", 'drag "Handle Z" to viewport 0.6 0.4', *tell("lamp_turned"),
+            "click viewport 0.02 0.05", *tell("nothing"), "key q", *there, *shot("none")],
+           "--scene", "all.json", "--spp", "2", "--max-bounces", "2", size=["--size", "1000x560"])
+    report = lambda name: s.report(name)
+    steps = lambda name: s.report(name)["undo_steps"]
+    transforms = lambda name, i: s.report(name)["volumes"][i].get("transforms", [])
+    assert report("first")["chosen"] is None and steps("first") == 0
+    assert report("clicked")["chosen"] == "Volume 1" and steps("clicked") == 0, "choosing is no change"
+    area = look(s, "first")[2]
+    # Compares the maximum block difference, because an outline is thin.
+    outlined = lambda name: difference(look(s, "first")[0], look(s, name)[0], area)[1] > 2 * ALIKE[1]
+    assert outlined("clicked")
+    (moved,) = transforms("moved", 0)
+    assert moved[12] > 5 and abs(moved[13]) < 1e-9 and abs(moved[14]) < 1e-9, moved
+    assert steps("moved") == 1, "a drag is one step"
+    assert transforms("undone", 0) == [] and steps("undone") == 0 and report("undone")["chosen"] == "Volume 1"
+    assert_alike(look(s, "clicked")[0], look(s, "undone")[0], area)
+    assert transforms("redone", 0) == transforms("moved", 0) and steps("redone") == 1
+    assert transforms("held", 0) != [] and transforms("let_go", 0) == [] and steps("let_go") == 0, "Escape takes it back"
+    # A rotation about the vertical axis; the object's center does not move.
+    (turned,) = transforms("turned", 0)
+    assert abs(turned[5] - 1) < 1e-9 and abs(turned[0] - turned[10]) < 1e-9 and 0.1 < abs(turned[8]) < 1, turned
+    assert steps("turned") == 1
+    # Scales in steps of 0.1, along the object's own axes.
+    (scaled,) = transforms("scaled", 0)
+    size = [sum(scaled[4 * i + k] ** 2 for k in range(3)) ** 0.5 for i in range(3)]
+    assert size[0] > 1.05 and abs(10 * size[0] - round(10 * size[0])) < 1e-6 and max(size) - min(size) < 1e-6, size
+    assert abs(scaled[8] / size[2] - turned[8]) < 1e-6 and steps("scaled") == 2, scaled
+    # Moves only the selected one of two instances.
+    assert report("place")["chosen"] == "Volume 2, instance 2" and steps("place") == 2
+    assert transforms("place_moved", 1)[0] == transforms("place", 1)[0] != transforms("place_moved", 1)[1], transforms("place_moved", 1)
+    (model_before,), (model_moved,) = (report(name)["models"] for name in ("model", "model_moved"))
+    assert report("model_moved")["chosen"] == "Model 1" and steps("model_moved") == 4
+    way = [a - b for a, b in zip(model_moved["to_world"], model_before["to_world"])]
+    assert way[13] > 5 and abs(2 * way[13] - round(2 * way[13])) < 1e-6 and sum(map(abs, way)) == abs(way[13]), "by steps"
+    (lamp_before,), (lamp_turned,) = (report(name)["lights"] for name in ("lamp", "lamp_turned"))
+    assert report("lamp")["chosen"] == "Light 1" and steps("lamp_turned") == 5
+    assert lamp_turned["position"] == lamp_before["position"] and lamp_turned["width"] == lamp_before["width"]
+    assert abs(lamp_turned["direction"][0]) > 0.1 and abs(lamp_turned["direction"][2]) < 1e-9, lamp_turned
+    assert report("nothing")["chosen"] is None and steps("nothing") == 5
+    assert report("none")["tool"] == 0
+
+
+def test_timeline(s):
+    """A numbered file is a single frame until the user makes it a sequence. The sequence is stepped, played, scrubbed,
+    trimmed and saved."""
+    frames = [f"fire_{number:02}.vdb" for number in range(3, 9)]
+    for number, name in enumerate(frames):
+        # Frame 3 is the explosion, 4 is missing, 5 the cloud, 6 corrupt, 7 the explosion, 8 the cloud.
+        if name == "fire_06.vdb":
+            (s.out / name).write_bytes(b"no volume")
+        elif name != "fire_04.vdb":
+            shutil.copy(s.cumulus if number in (2, 5) else s.explosion, s.out / name)
+    there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
+    quick = ["--spp", "2", "--albedo", "0.5,0.5,0.5", "--max-bounces", "2"]
+    size = ["--size", "640x260"]
+    s.play("timeline",
+           [*there, *shot("alone"), 'click "Play the sequence"', *there, *shot("opened"),
+            "key .", *there, *shot("next"), "key ,", "key ,", *there, *shot("missing"),
+            "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Repeat"', "frames 2",
+            'click "Repeat/Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
+            'click "Playhead" 0.99 0.5', "key escape", "key escape", *there, *shot("scrubbed"), "key ctrl+s", "frames 2", "key ctrl+a",
+            'text "played.json"', "key enter", "frames 3",
+            'click "Playhead" 0.01 0.5', *there, "key space", "frames 12", "key space", *there, 'report "again.json"'],
+           "fire_05.vdb", *quick, size=size)
+    alone, opened, following, missing = (s.report(name) for name in ("alone", "opened", "next", "missing"))
+    assert "sequence" not in alone and alone["neighbours"] == 6, alone
+    assert opened["sequence"]["frame"] == opened["sequence"]["drawn"] == 5, opened["sequence"]
+    assert opened["sequence"]["first"] == 3 and opened["sequence"]["count"] == 6, opened["sequence"]
+    assert opened["viewport"][3] < alone["viewport"][3], "the timeline is below the picture"
+    assert following["sequence"]["frame"] == 6 and following["sequence"]["drawn"] == 5, "the one before stands in"
+    assert "fire_06.vdb" in following["sequence"]["failure"], following["sequence"]
+    assert missing["sequence"]["frame"] == 4 and missing["sequence"]["drawn"] == 3, missing["sequence"]
+    assert missing["sequence"]["ready"] == 4 and missing["sequence"]["failed"] == 2, missing["sequence"]
+    told = [m["text"] for m in opened["messages"] + following["messages"] + missing["messages"]]
+    for name in ("fire_04.vdb", "fire_06.vdb"):
+        assert any(name in text for text in told), told
+    assert s.report("undone")["sequence"]["last_played"] is None, "the range is undone"
+    assert s.report("undone")["sequence"]["frame"] == 4, "and the playhead is not"
+    playing = s.report("playing")["sequence"]
+    assert playing["playing"] and playing["first_played"] == 4 and playing["frame"] >= 4, playing
+    assert playing["clock"] - missing["sequence"]["clock"] > 0.9, "it is by the clock of frames"
+    scrubbed = s.report("scrubbed")["sequence"]
+    assert scrubbed["frame"] == scrubbed["drawn"] == 8 and not scrubbed["playing"], scrubbed
+    assert_differ(look(s, "missing")[0], look(s, "scrubbed")[0], look(s, "scrubbed")[2])
+    assert s.report("again")["sequence"]["frame"] >= 4, "from outside it plays the range"
+    # Both programs show the saved scene.
+    scene = json.loads((s.out / "played.json").read_text())
+    assert scene["volumes"][0]["file"] == "fire_##.vdb" and scene["sequence"]["frame"] == 8, scene
+    assert scene["sequence"]["first_frame"] == 4 and scene["sequence"]["repeat"] == "loop", scene["sequence"]
+    s.play("loaded", [*there, "key escape", "key escape", "frames 2", *shot("loaded")], "--scene", "played.json", "--spp", "2", size=size)
+    loaded = s.report("loaded")["sequence"]
+    assert loaded["frame"] == 8 and loaded["first_played"] == 4 and loaded["repeat"] == 1, loaded
+    assert_alike(look(s, "loaded")[0], look(s, "scrubbed")[0], look(s, "loaded")[2])
+    run = subprocess.run([s.renderer, "--scene", "played.json", "--spp", "4", "--size", "64x48", "-o", "eight.png"],
+                         cwd=s.out, env=s.environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0 and "frame 8 (1 of 1) done eight.png" in run.stdout, (run.stdout, run.stderr)
+    run = subprocess.run([s.renderer, "--scene", "played.json", "--frames", "5,7", "--spp", "4", "--size", "64x48", "-o",
+                          "other.#.png"], cwd=s.out, env=s.environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0 and (s.out / "other.5.png").exists() and (s.out / "other.7.png").exists(), run.stderr
+    # A file that cannot be read does not replace the playing sequence. If playback has stopped at the end, it restarts
+    # at the beginning.
+    (s.out / "cut.vdb").write_bytes(b"no volume")
+    for number in (1, 2):
+        (s.out / f"cut_{number}.vdb").write_bytes(b"no volume")
+    mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
+    s.play("kept", [*there, 'drop "cut.vdb"', *there, 'report "cut.json"', 'drop "cut_#.vdb"', *there, 'report "all.json"',
+                    *(["key .", "frames 3"] * 5), *there,
+                    "key ctrl+s", "frames 2", "key ctrl+a", 'text "beside.json"', "key enter", "frames 3",
+                    "key space", "frames 3", 'report "begun.json"'],
+           "fire_##.vdb", "--gltf", str(mountains), "--spp", "1", size=size)
+    for name, cause in (("cut", "cut.vdb"), ("all", "cut_1.vdb")):
+        report = s.report(name)
+        assert report["sequence"]["count"] == 6 and report["sequence"]["drawn"] == 3, report["sequence"]
+        assert any(m["error"] and cause in m["text"] for m in report["messages"]), report["messages"]
+    begun = s.report("begun")["sequence"]
+    assert begun["playing"] and begun["frame"] < 8, begun
+    beside = json.loads((s.out / "beside.json").read_text())
+    assert beside["sequence"]["frame"] == 8 and abs(beside["models"][0]["time"] - 5 / 24) < 1e-6, beside
+
+
+def test_surfaces(s):
+    mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
+    s.play("replay", [*SETTLE, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
+                      *shot("soft"), 'click "Surface lighting"', "frames 2", 'click "Surface lighting/Rasterized"', *SETTLE, *shot("none"),
+                      'click "Remove surfaces"', *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
+           "--volume", s.cumulus, "--gltf", mountains, "--spp", "2")
+    first, report, area = look(s, "first")
+    assert report["scene"]["surfaces"]["indirect_roughness"] == 0
+    soft, soft_report, _ = look(s, "soft")
+    assert 0.4 < soft_report["scene"]["surfaces"]["indirect_roughness"] < 0.8, soft_report["scene"]["surfaces"]
+    assert difference(first, soft, area) != (0, 0), "the same samples find rougher surfaces"
+    none, none_report, _ = look(s, "none")
+    assert none_report["scene"]["surfaces"]["light"] == "none"
+    assert difference(soft, none, area) != (0, 0)
+    removed, removed_report, _ = look(s, "removed")
+    assert "surfaces" not in removed_report["scene"]
+    assert_differ(none, removed, area)
+    assert_alike(none, look(s, "back")[0], area)
+
+
+def test_negative_frames(s):
+    """A sequence with negative frame numbers plays from its first frame."""
+    for number in (-2, -1, 0, 1):
+        shutil.copy(s.explosion if number < 0 else s.cumulus, s.out / f"fire.{'%04d' % number}.vdb")
+    there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
+    s.play("replay", [*there, *shot("first"), "key .", *there, "key i", "key .", *there, *shot("third"), "key ctrl+s", "frames 2",
+                      "key ctrl+a", 'text "played.json"', "key enter", "frames 3"],
+           "fire.####.vdb", "--spp", "1", "--max-bounces", "2", size=["--size", "640x260"])
+    first, third = s.report("first")["sequence"], s.report("third")["sequence"]
+    assert first["first"] == -2 and first["count"] == 4 and first["frame"] == first["drawn"] == -2, first
+    assert third["frame"] == third["drawn"] == 0 and third["first_played"] == -1 and third["failed"] == 0, third
+    scene = json.loads((s.out / "played.json").read_text())
+    assert scene["sequence"]["first_frame"] == -1 and scene["sequence"]["frame"] == 0, scene["sequence"]
+
+
+def test_bad_files(s):
+    volume = pathlib.Path(s.cumulus).read_bytes()
+    (s.out / "cut.vdb").write_bytes(volume[: len(volume) // 2])
+    (s.out / "empty.vdb").write_bytes(b"")
+    (s.out / "text.nvdb").write_text("this is no volume")
+    (s.out / "bad.json").write_text('{"cumulet_scene": 1, "medium": {"albedo": 1}}')
+    names = ["cut.vdb", "empty.vdb", "text.nvdb", "bad.json", "missing.vdb"]
+    replay = ["wait loaded", "wait converged", *shot("before")]
+    for name in names:
+        replay += [f'drop "{s.out}/{name}"', "frames 2", "wait loaded", *shot(name), "key escape", "frames 2"]
+    s.play("replay", [*replay, "wait converged", *shot("after")], "--volume", s.cumulus)
+    for name in names:
+        (message,) = [m for m in s.report(name)["messages"] if m["error"]]
+        assert name in message["text"] and "\n" not in message["text"], message
+    before, report, area = look(s, "before")
+    after, after_report, _ = look(s, "after")
+    assert after_report["messages"] == [], "a message can be dismissed"
+    assert after_report["scene"] == report["scene"]
+    assert_alike(before, after, area)
+
+
+def test_grids(s):
+    """The panel lists a file's grids and shows each of them, with a suitable density scale."""
+    s.play("replay", ["wait loaded", *shot("opened"), 'click "Inspect grids"', "frames 2", "idle 3", *shot("picker"),
+                      'click "Grids/temperature"', "frames 3", "wait loaded", *shot("temperature"),
+                      'drag "Density scale" 0.5 0.5 to "Density scale" 0.9 0.5', "frames 3", *shot("dense"),
+                      'click "Auto density"', "frames 5", *shot("auto"), "key ctrl+z", "frames 5", *shot("undone"),
+                      "key ctrl+z", "frames 3", "key ctrl+z", "frames 3", "wait loaded", *shot("back")],
+           "--density-scale", "auto", "--volume", s.explosion)
+    scale = lambda name: s.report(name)["scene"]["medium"]["density_scale"]
+    grid = lambda name: s.report(name)["scene"]["volume"].get("grid", "")
+    assert [s.report(name)["grid"] for name in ("opened", "temperature", "back")] == ["density", "temperature", "density"]
+    assert scale("opened") not in (0, 1), "a scale that suits it"
+    assert s.report("picker")["dialog"] and not s.report("temperature")["dialog"]
+    assert grid("temperature") == "temperature", s.report("temperature")["scene"]["volume"]
+    assert scale("temperature") != scale("opened")
+    assert scale("dense") > 2 * scale("temperature")
+    assert scale("auto") == scale("temperature") and scale("undone") == scale("dense")
+    assert scale("back") == scale("opened") and grid("back") == "", "undo takes grid and scale back together"
+
+
+def test_unnamed_grids(s):
+    """A file with several grids and none called density opens a dialog. One grid is shown until the user selects
+    another."""
+    bytes_of = pathlib.Path(s.explosion).read_bytes()
+    unknown = bytes_of.replace(b"density", b"mystery").replace(b"temperature", b"warmthiness").replace(b"flame", b"other")
+    (s.out / "unknown.vdb").write_bytes(unknown)
+    (s.out / "fire.vdb").write_bytes(bytes_of.replace(b"density", b"mystery"))
+    # The grid shown at first, and the grid selected instead.
+    for file, first, second in (("unknown", "mystery", "warmthiness"), ("fire", "flame", "mystery")):
+        s.play(file, ["frames 3", f'drop "{s.out}/{file}.vdb"', "frames 3", "wait loaded", "frames 2", "idle 3",
+                      *shot("asked"), f'click "Grids/{second}"', "frames 3", "wait loaded", *shot("chosen"), "key ctrl+z",
+                      "frames 3", "wait loaded", *shot("back")])
+        asked, chosen, back = (s.report(name) for name in ("asked", "chosen", "back"))
+        assert asked["dialog"] and asked["has_volume"] and asked["grid"] == first, (asked["dialog"], asked["grid"])
+        assert not chosen["dialog"] and chosen["grid"] == second, (chosen["dialog"], chosen["grid"])
+        assert chosen["scene"]["volume"]["grid"] == second
+        assert back["grid"] == first and "grid" not in back["scene"]["volume"], back["scene"]["volume"]
+    # A file with a density grid opens no dialog.
+    s.play("named", ["frames 3", f'drop "{s.explosion}"', "frames 3", "wait loaded", "frames 2", "idle 1", *shot("named")])
+    assert not s.report("named")["dialog"] and s.report("named")["grid"] == "density"
+
+
+def test_up_axis(s):
+    """The up axis is selected, displayed, saved and undone; cumulet-render shows the same image."""
+    s.play("replay", ["wait loaded", "wait converged", *shot("y"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
+                      "wait loaded", "wait converged", *shot("z"), "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"',
+                      "key enter", "frames 3", "key escape", "frames 2", "key ctrl+z", "frames 3", "wait loaded",
+                      "wait converged", *shot("back")],
+           "--volume", s.explosion)
+    up = lambda name: s.report(name)["scene"]["volume"].get("up", "y")
+    assert [up(name) for name in ("y", "z", "back")] == ["y", "z", "y"]
+    assert json.loads((s.out / "scene.json").read_text())["volumes"][0]["up"] == "z"
+    standing, report, area = look(s, "y")
+    lying = look(s, "z")[0]
+    assert_differ(standing, lying, area)
+    assert_alike(standing, look(s, "back")[0], area)
+    subprocess.run([s.renderer, "--scene", "scene.json", "-o", "rendered.png"], cwd=s.out, check=True)
+    assert_alike(lying, s.picture("rendered"), area)

@@ -1,0 +1,253 @@
+"""Tests of session.py: light, environments, emission and the display of colors."""
+
+import subprocess
+
+from demo_session import assert_alike, assert_differ, assert_drawn, look, SETTLE, shot
+from png import difference
+
+
+def write_environment(path, bright):
+    """Writes a Radiance image with 64 columns: blue, and orange where bright(column)."""
+    rows = b"".join(b"\xc0\x60\x20\x83" if bright(x) else b"\x20\x40\x80\x80" for _ in range(32) for x in range(64))
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n" + rows)
+
+
+def test_environment(s):
+    """An environment is dropped, rotated by dragging its thumbnail and rotated back. A corrupt file does not replace
+    it, and undo works."""
+    write_environment(s.out / "left.hdr", lambda x: x < 16)
+    write_environment(s.out / "middle.hdr", lambda x: 24 <= x < 40)
+    (s.out / "bad.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n")
+    turn = 'drag "Environment view" 0.25 0.5 to "Environment view"'
+    there = ["frames 3", "wait loaded", "frames 2"]
+    s.play("replay", [*SETTLE, *shot("day"), 'drop "left.hdr"', *there, *SETTLE, *shot("left"), f"{turn} 0.5 0.5",
+                      *SETTLE, *shot("turned"), 'drop "bad.hdr"', *SETTLE, *shot("bad"), 'drop "none.exr"', *there,
+                      *shot("none"), 'drop "middle.hdr"', *there, *SETTLE, *shot("middle"), "key ctrl+z", *there,
+                      *shot("undone"), 'click "Environment view"', 'click "Environment view"', *there, *shot("back"),
+                      "key ctrl+z", *there, f"{turn} 0.99 0.5", "frames 20", f"{turn} 0.99 0.5", *there,
+                      *shot("around"), 'click "Remove environment"', *there, *shot("removed"), "key ctrl+z", *there,
+                      *shot("again"), 'drag "Strength" 0.5 0.5 to "Strength" 0.7 0.5', *there,
+                      *shot("strong")],
+           "--volume", s.cumulus, "--spp", "4")
+    day, report, area = look(s, "day")
+    environment = lambda name: s.report(name)["scene"]["environment"]
+    assert report["scene"]["light"]["sky"]["model"] == "physical" and report["undo_steps"] == 0
+    left, report, _ = look(s, "left")
+    assert environment("left")["file"].endswith("left.hdr") and report["undo_steps"] == 1, report["undo_steps"]
+    assert max(report["scene"]["light"]["sun"]["irradiance"]) == 0.0, "no sun of the default daylight beside it"
+    assert report["recent"][0].endswith("left.hdr")
+    assert_differ(day, left, area)
+    turned, report, _ = look(s, "turned")
+    assert abs(environment("turned")["rotation_degrees"] + 90.0) < 4.0, environment("turned")
+    assert report["undo_steps"] == 2, "a drag is one step"
+    assert_differ(left, turned, area)
+    # The environment stays in the image, in the scene and in the undo history.
+    for name, cause in (("bad", "bad.hdr: truncated Radiance file"),
+                        ("none", "none.exr: No such file or directory")):
+        bad, report, _ = look(s, name)
+        assert any(m["error"] and cause in m["text"] for m in report["messages"]), report["messages"]
+        assert environment(name) == environment("turned") and report["undo_steps"] == 2
+    assert len(s.report("none")["messages"]) == 2, "each told once"
+    assert_alike(s.picture("turned"), s.picture("bad"), (area[0], area[1], area[2], area[3] - 90))
+    assert environment("middle")["file"].endswith("middle.hdr")
+    assert_differ(turned, s.picture("middle"), (area[0], area[1], area[2], area[3] - 90))
+    assert environment("undone") == environment("turned")
+    assert environment("back")["rotation_degrees"] == 0.0 and s.report("back")["undo_steps"] == 3
+    # Two drags of almost a full turn each: the angle has no limit.
+    assert abs(abs(environment("around")["rotation_degrees"]) - 98.0) < 30.0, environment("around")
+    removed = s.report("removed")["scene"]
+    assert "environment" not in removed or not removed["environment"].get("file"), removed
+    assert removed["light"]["sky"]["model"] == "physical", "it is day again"
+    again = environment("again")
+    assert again["file"].endswith("left.hdr") and again["rotation_degrees"] == environment("around")["rotation_degrees"]
+    assert environment("strong")["strength"] > 2.0
+    # The panel shows its thumbnail, which is three quarters blue.
+    def blue(name):
+        picture = s.picture(name)
+        n, left = picture.channels, s.report(name)["viewport"][2]
+        pixels = ((row[x * n], row[x * n + 2]) for row in picture.rows for x in range(int(left), picture.width))
+        return sum(b > r + 40 for r, b in pixels)
+
+    assert blue("turned") > 15000 > 3 * blue("day"), (blue("turned"), blue("day"))
+
+
+def test_lamps(s):
+    """A light is added, made a spot light, dimmed and removed. Each is a step that can be undone and redone."""
+    there = ["frames 3", "wait loaded", "frames 2"]
+    # Hides handles and icons, because the images are compared.
+    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', *SETTLE, *shot("point"), 'click "Light 1"', "frames 2",
+                      'click "Light 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
+                      *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
+                      'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), 'click "Remove light 1"',
+                      *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"'],
+           "--volume", s.cumulus, "--sky", "0.05,0.05,0.05", "--spp", "4")
+    day, report, area = look(s, "day")
+    lights = lambda name: s.report(name)["lights"]
+    steps = lambda name: s.report(name)["undo_steps"]
+    assert lights("day") == [] and steps("day") == 0
+    (point,) = lights("point")
+    assert point["kind"] == "point" and point["power"] > 0.0 and steps("point") == 1, point
+    camera = report["scene"]["camera"]
+    assert point["position"][1] > camera["target"][1] and point["position"][0] == camera["target"][0], (point, camera)
+    shone = look(s, "point")[0]
+    assert_differ(day, shone, area)
+    (spot,) = lights("spot")
+    assert spot == dict(point, kind="spot", angle_degrees=45.0) and steps("spot") == 2, spot
+    (dim,) = lights("dim")
+    assert 0.0 < dim["power"] < 0.1 * spot["power"] and dim == dict(spot, power=dim["power"]), dim
+    assert steps("dim") == 3, "a drag is one step"
+    assert_differ(shone, look(s, "dim")[0], area)
+    assert lights("bright") == [spot] and steps("bright") == 2
+    assert lights("undone") == [] and steps("undone") == 0
+    assert lights("redone") == [point] and steps("redone") == 1
+    assert_alike(shone, look(s, "redone")[0], area)
+    assert lights("removed") == [] and steps("removed") == 2
+    assert_alike(day, look(s, "removed")[0], area)
+    assert lights("again") == [point]
+
+
+def test_sky_and_ground(s):
+    """The physical sky's haze, the uniform sky, the ground's color and height, and no ground: set in the panel, undone
+    and redone."""
+    drag = lambda row, x: f'drag "{row}" 0.5 0.5 to "{row}" {x} 0.5'
+    choose = lambda row, entry: [f'click "{row}"', "frames 2", f'click "{row}/{entry}"']
+    there = ["frames 3", "wait loaded", "frames 2"]
+    tell = lambda name: [*there, f'report "{name}.json"']
+    s.play("replay", [*SETTLE, *shot("day"), drag("Turbidity", 0.95), *SETTLE, *shot("haze"), *choose("Sky", "Constant"), *SETTLE,
+                      *shot("constant"), "key ctrl+z", *tell("hazy"), "key ctrl+z", *SETTLE, *shot("undone"),
+                      "key ctrl+shift+z", "key ctrl+shift+z", *tell("redone"), *choose("Sky", "Physical"), *tell("physical"),
+                      *choose("Ground", "At a height"), *SETTLE, *shot("at_0"), drag("Ground height", 0.4), *tell("lower"),
+                      "key ctrl+z", *SETTLE, *shot("raised"), *choose("Ground", "None"), *SETTLE, *shot("none"), "key ctrl+z",
+                      *tell("there"), "key ctrl+shift+z", *tell("gone")],
+           "--volume", s.cumulus, "--spp", "4")
+    day, report, area = look(s, "day")
+    sky = lambda name: s.report(name)["scene"]["light"]["sky"]
+    sun = lambda name: s.report(name)["scene"]["light"]["sun"]
+    ground = lambda name: s.report(name)["scene"]["ground"]
+    steps = lambda name: s.report(name)["undo_steps"]
+    assert sky("day")["model"] == "physical" and sky("day")["turbidity"] == 2.5 and ground("day")["place"] == "below"
+    assert 8.0 < sky("haze")["turbidity"] <= 10.0 and steps("haze") == 1, sky("haze")
+    assert_differ(day, look(s, "haze")[0], area)
+    assert sky("constant") == dict(sky("haze"), model="constant") and sun("constant") == sun("day"), "nothing else"
+    assert steps("constant") == 2
+    assert_differ(look(s, "haze")[0], look(s, "constant")[0], area)
+    assert sky("hazy") == sky("haze") and sky("undone") == sky("day") and steps("undone") == 0
+    assert_alike(day, look(s, "undone")[0], area)
+    assert sky("redone") == sky("constant") and steps("redone") == 2
+    assert sky("physical") == sky("haze")
+    assert ground("at_0") == dict(ground("day"), place="at-height") and ground("at_0")["height"] == 0.0, ground("at_0")
+    assert ground("lower")["height"] < -10.0 and steps("lower") == steps("at_0") + 1, ground("lower")
+    assert ground("raised") == ground("at_0")
+    assert_alike(look(s, "at_0")[0], look(s, "raised")[0], area)
+    assert ground("none")["place"] == "none"
+    assert_differ(look(s, "at_0")[0], look(s, "none")[0], area)
+    assert ground("there") == ground("at_0") and ground("gone") == ground("none")
+
+
+def test_glow(s):
+    s.play("replay", [*SETTLE, *shot("dark"), 'drag "Emission" 0.02 0.5 to "Emission" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
+                      *SETTLE, *shot("undone")], "--volume", s.explosion, "--flame-grid", "none", "--spp", "16")
+    dark, report, area = look(s, "dark")
+    glowing, glowing_report, _ = look(s, "glowing")
+    assert report["scene"]["medium"]["emission"] == [0, 0, 0]
+    red, green, blue = glowing_report["scene"]["medium"]["emission"]
+    assert red > green > blue > 0, "a glow begins in the colour of fire"
+    assert glowing.mean(area) > dark.mean(area) + 5
+    assert_alike(dark, look(s, "undone")[0], area)
+
+
+def test_preset(s):
+    s.play("replay", [*SETTLE, *shot("first"), 'click "Preset"', "frames 2", 'click "Preset/Explosion"', *SETTLE, *shot("explosion"),
+                      "key ctrl+z", *SETTLE, *shot("undone")], "--volume", s.explosion, "--density-scale", "9", "--spp", "4")
+    first, report, area = look(s, "first")
+    exploded, exploded_report, _ = look(s, "explosion")
+    medium, before = exploded_report["scene"]["medium"], report["scene"]["medium"]
+    assert medium["blackbody"] == 12 and medium["density_scale"] == before["density_scale"] == 9, medium
+    assert_differ(first, exploded, area)
+    assert look(s, "undone")[1]["scene"]["medium"] == before
+
+
+def test_fire(s):
+    """A burning volume looks like fire by default, whether opened in the window or by the command line, as in
+    cumulet-render."""
+    plain, dropped = ["--density-scale", "auto"], f'drop "{s.explosion}"'
+    s.play("replay", [*SETTLE, *shot("cloud"), dropped, *SETTLE, *shot("dropped"), "key ctrl+z", *SETTLE, *shot("undone"),
+                      "key ctrl+shift+z", *SETTLE, *shot("redone"), f'drop "{s.cumulus}"', *SETTLE, *shot("cloud_again")],
+           *plain, "--volume", s.cumulus)
+    s.play("named", ["wait loaded", *SETTLE, *shot("named")], *plain, "--volume", s.explosion)
+    s.play("said", [*SETTLE, dropped, *SETTLE, *shot("said")], *plain, "--anisotropy", "0.5", "--volume", s.cumulus)
+    cloud, report, area = look(s, "cloud")
+    medium = lambda name: s.report(name)["scene"]["medium"]
+    assert medium("cloud")["blackbody"] == 0, medium("cloud")
+    burning, burning_report, _ = look(s, "dropped")
+    assert medium("dropped")["blackbody"] > 0 and medium("dropped")["albedo"][0] < 0.5, medium("dropped")
+    assert burning_report["undo_steps"] == report["undo_steps"] + 1, "the look comes with the file, in one step"
+    warmest = max(b[0] - b[2] for b in burning.blocks(area))
+    assert warmest > 60, f"fire, no white smoke: {warmest}"
+    undone, undone_report, _ = look(s, "undone")
+    assert medium("undone") == medium("cloud") and undone_report["undo_steps"] == report["undo_steps"]
+    assert_alike(cloud, undone, area)
+    assert medium("redone") == medium("dropped")
+    assert_alike(burning, look(s, "redone")[0], area)
+    assert medium("cloud_again") == medium("cloud"), "a look that nobody chose goes with its file"
+    assert s.report("named")["undo_steps"] == 0 and medium("named") == medium("dropped"), medium("named")
+    assert medium("said")["blackbody"] == 0 and medium("said")["anisotropy"] == 0.5, medium("said")
+    done = subprocess.run([s.renderer, s.explosion, "--size", "32x32", "--spp", "1", "-o", "rendered.png"], cwd=s.out,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 0, done.stderr
+    assert f'--flame-strength {medium("named")["flame_strength"]:g}' in done.stderr, (done.stderr, medium("named"))
+
+
+def test_ramps(s):
+    """A ramp with the grid's own values changes nothing. Points are dragged, added by clicks and removed by right
+    clicks."""
+    curve = '"Temperature ramp curve"'
+    s.play("replay", [*SETTLE, *shot("plain"), 'click "Temperature ramp"', *SETTLE, *shot("same"),
+                      'move "Temperature point"', f"drag {curve} 0.02 0.95 to {curve} 0.6 0.97", *SETTLE, *shot("dragged"),
+                      f"click {curve} 0.8 0.97", *SETTLE, *shot("added"), "key ctrl+z", *SETTLE, *shot("undone"), "key ctrl+shift+z", *SETTLE, 'report "redone.json"',
+                      f"click {curve} 0.8 0.97 right", *SETTLE, 'report "removed.json"', 'click "Temperature ramp"', *SETTLE,
+                      *shot("off")],
+           "--volume", s.explosion, "--preset", "explosion", "--density-scale", "9", "--spp", "4", size=["--size", "640x460"])
+    plain, report, area = look(s, "plain")
+    ramp = lambda name: s.report(name)["scene"]["medium"].get("temperature_ramp")
+    assert ramp("plain") is None
+    first, last = ramp("same")
+    assert first == [0, 0] and last[0] == last[1] > 0.5, "as far as the grid's values go"
+    assert_alike(plain, look(s, "same")[0], area)
+    (value, result), end = ramp("dragged")
+    assert end == last and 0.5 * last[0] < value < 0.7 * last[0] and result < 0.1 * last[0], ramp("dragged")
+    dragged, added = look(s, "dragged")[0], look(s, "added")[0]
+    assert len(ramp("added")) == 3 and ramp("added")[0] == ramp("dragged")[0], ramp("added")
+    x, y, width, height = area
+    fire = (x + width // 4, y + height // 3, width // 2, height // 3)
+    assert added.mean(fire) < plain.mean(fire) - 2, "what is below the new point is cold"
+    assert ramp("undone") == ramp("dragged") and ramp("redone") == ramp("added")
+    assert_alike(dragged, look(s, "undone")[0], area)
+    assert ramp("removed") == ramp("dragged")
+    assert ramp("off") is None
+    assert_alike(plain, look(s, "off")[0], area)
+
+
+def test_exposure(s):
+    s.play("replay", ["wait loaded", "wait converged", *shot("first"), 'drag "Exposure" to "Exposure" 0.6 0.5', "frames 3",
+                      *shot("bright"), "key ctrl+z", "frames 3", *shot("undone")], "--volume", s.cumulus)
+    first, report, area = look(s, "first")
+    bright, bright_report, _ = look(s, "bright")
+    assert bright_report["samples"] == report["samples"] and bright_report["converged"], "exposure restarts nothing"
+    assert bright.mean(area) > first.mean(area) + 10
+    undone = look(s, "undone")[0]
+    assert difference(first, undone, area) == (0, 0), "the same samples make the same picture"
+
+
+def test_looks(s):
+    """Takes screenshots for inspection, at 1x and 2x. Checks only that the panels are drawn."""
+    for name, scale, size in (("1x", "1", "1440x900"), ("2x", "2", "1680x1040"), ("small", "1", "640x400")):
+        parts = [*shot(f"{name}_top"), 'move "Pixel size"', "frames 60", *shot(f"{name}_grid"), 'move "Renderer"',
+                 "frames 3", *shot(f"{name}_statistics"), 'drop "/nowhere/cloud.vdb"', "frames 3", "key f1", "frames 3",
+                 *shot(f"{name}_help"), "key f1", "key ctrl+o", "frames 3", *shot(f"{name}_open")]
+        s.play(name, ["frames 3", *shot(f"{name}_empty"), f'drop "{s.cumulus}"', "wait loaded", "frames 30", *parts],
+               "--ui-scale", scale, size=["--size", size])
+        for part in ("top", "grid", "statistics", "help", "open"):
+            picture, report, _ = look(s, f"{name}_{part}")
+            x, _, width, height = report["viewport"]
+            assert_drawn(picture, (x + width, 0, picture.width - x - width, height))
