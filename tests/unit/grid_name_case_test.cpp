@@ -10,6 +10,7 @@
 namespace {
 
 using cumulet::test::Messages;
+using cumulet::test::two_voxels;
 using cumulet::volume::channels_by_name;
 using cumulet::volume::GridNames;
 using cumulet::volume::import_frame;
@@ -17,13 +18,6 @@ using cumulet::volume::import_volume;
 using cumulet::volume::list_grids;
 using cumulet::volume::VolumeFrame;
 using openvdb::Coord;
-
-openvdb::FloatGrid::Ptr dot(const std::string& name, float value) {
-  auto grid = cumulet::test::fog(name);
-  grid->tree().setValue(Coord(1, 2, 3), value);
-  grid->tree().setValue(Coord(1, 2, 4), 0.5F * value);
-  return grid;
-}
 
 openvdb::Vec3SGrid::Ptr arrow(const std::string& name, float value) {
   auto grid = openvdb::Vec3SGrid::create();
@@ -44,8 +38,8 @@ class GridNameCase : public ::testing::Test {
 
 TEST_F(GridNameCase, ExactCaseOfDensityIsPreferred) {
   for (const openvdb::GridPtrVec& grids :
-       {openvdb::GridPtrVec{dot("Density", 1.0F), dot("DENSITY", 2.0F), dot("density", 3.0F)},
-        openvdb::GridPtrVec{dot("density", 3.0F), dot("Density", 1.0F), dot("DENSITY", 2.0F)}}) {
+       {openvdb::GridPtrVec{two_voxels("Density", 1.0F), two_voxels("DENSITY", 2.0F), two_voxels("density", 3.0F)},
+        openvdb::GridPtrVec{two_voxels("density", 3.0F), two_voxels("Density", 1.0F), two_voxels("DENSITY", 2.0F)}}) {
     Messages messages;
     const auto file = write(grids);
     EXPECT_EQ(import_volume(file, "", messages.log).max_value, 3.0F);
@@ -57,12 +51,12 @@ TEST_F(GridNameCase, ExactCaseOfDensityIsPreferred) {
     }
   }
   // Any spelling of "density" comes before an exact "soot".
-  EXPECT_EQ(import_volume(write({dot("soot", 1.0F), dot("Density", 2.0F)}), "", {}).name, "Density");
+  EXPECT_EQ(import_volume(write({two_voxels("soot", 1.0F), two_voxels("Density", 2.0F)}), "", {}).name, "Density");
 }
 
 TEST_F(GridNameCase, CaseInsensitiveMatchIsReported) {
   Messages messages;
-  const auto file = write({dot("DENSITY", 1.0F), dot("Density", 2.0F)});
+  const auto file = write({two_voxels("DENSITY", 1.0F), two_voxels("Density", 2.0F)});
   EXPECT_EQ(import_frame(file, {}, messages.log).density.name, "DENSITY");
   ASSERT_EQ(messages.warnings.size(), 1U);
   EXPECT_EQ(
@@ -70,14 +64,16 @@ TEST_F(GridNameCase, CaseInsensitiveMatchIsReported) {
       file.string() + ": uses the grid \"DENSITY\" (float, fog volume); it also has \"Density\" (float, fog volume)");
   // With one candidate there is no warning.
   messages.warnings.clear();
-  (void)import_frame(write({dot("Density", 1.0F), dot("Temperature", 2.0F), dot("dust", 1.0F)}), {}, messages.log);
+  (void)import_frame(write({two_voxels("Density", 1.0F), two_voxels("Temperature", 2.0F), two_voxels("dust", 1.0F)}),
+                     {}, messages.log);
   EXPECT_TRUE(messages.warnings.empty()) << messages.warnings[0];
 }
 
 TEST_F(GridNameCase, OtherFieldsFollowTheSameRule) {
   Messages messages;
-  const auto file = write({dot("density", 1.0F), dot("Temperature", 2.0F), dot("temperature", 3.0F), dot("FLAME", 4.0F),
-                           dot("Flame", 5.0F), dot("Phase_G", 0.5F), dot("phase_g", 0.25F), arrow("Cd", 0.5F),
+  const auto file = write({two_voxels("density", 1.0F), two_voxels("Temperature", 2.0F),
+                           two_voxels("temperature", 3.0F), two_voxels("FLAME", 4.0F), two_voxels("Flame", 5.0F),
+                           two_voxels("Phase_G", 0.5F), two_voxels("phase_g", 0.25F), arrow("Cd", 0.5F),
                            arrow("cd", 0.25F), arrow("Vel", 1.0F), arrow("vel", 2.0F)});
   const VolumeFrame frame = import_frame(file, {}, messages.log);
   EXPECT_EQ(frame.temperature->name, "temperature");
@@ -116,7 +112,8 @@ TEST_F(GridNameCase, OtherFieldsFollowTheSameRule) {
 
 TEST_F(GridNameCase, DuplicateGridNamesAreReported) {
   Messages messages;
-  const auto file = write({dot("density", 1.0F), dot("temperature", 2.0F), dot("temperature", 3.0F)});
+  const auto file =
+      write({two_voxels("density", 1.0F), two_voxels("temperature", 2.0F), two_voxels("temperature", 3.0F)});
   EXPECT_EQ(import_frame(file, {}, messages.log).temperature->max_value, 2.0F);
   ASSERT_EQ(messages.warnings.size(), 1U);
   EXPECT_HAS(messages.warnings[0], "uses the grid \"temperature[0]\" (float, fog volume) as temperature");
@@ -125,9 +122,10 @@ TEST_F(GridNameCase, DuplicateGridNamesAreReported) {
 TEST_F(GridNameCase, ComponentGridsMustHaveTheSameCase) {
   Messages messages;
   const auto file =
-      write({dot("density", 1.0F), dot("Vel_X", 1.0F), dot("Vel_Y", 1.0F), dot("Vel_Z", 1.0F), dot("vel_x", 2.0F),
-             dot("vel_y", 2.0F), dot("vel_z", 2.0F), dot("Color_r", 1.0F), dot("Color_g", 1.0F), dot("Color_b", 1.0F),
-             dot("color_r", 0.5F), dot("color_g", 0.5F), dot("color_b", 0.5F)});
+      write({two_voxels("density", 1.0F), two_voxels("Vel_X", 1.0F), two_voxels("Vel_Y", 1.0F),
+             two_voxels("Vel_Z", 1.0F), two_voxels("vel_x", 2.0F), two_voxels("vel_y", 2.0F), two_voxels("vel_z", 2.0F),
+             two_voxels("Color_r", 1.0F), two_voxels("Color_g", 1.0F), two_voxels("Color_b", 1.0F),
+             two_voxels("color_r", 0.5F), two_voxels("color_g", 0.5F), two_voxels("color_b", 0.5F)});
   GridNames names;
   for (const std::string color : {"color", "Color"}) {
     names.color = color;

@@ -91,15 +91,8 @@ std::string error_of(Call&& call) {
 /// All texts that are read and written, by kind.
 using Texts = std::map<std::string, std::string>;
 
-openvdb::FloatGrid::Ptr dot(const std::string& name, float value) {
-  auto grid = test::fog(name);
-  grid->tree().setValue(openvdb::Coord(1, 2, 3), value);
-  grid->tree().setValue(openvdb::Coord(1, 2, 4), 0.5F * value);
-  return grid;
-}
-
 void add_volumes(Texts& texts, const fs::path& folder) {
-  const auto density = dot("density", 1234.5F);
+  const auto density = test::two_voxels("density", 1234.5F);
   density->insertMeta("voxels", openvdb::Int64Metadata(363344));
   density->insertMeta("count", openvdb::Int32Metadata(-1234567));
   density->insertMeta("scale", openvdb::FloatMetadata(1234.5F));
@@ -112,7 +105,7 @@ void add_volumes(Texts& texts, const fs::path& folder) {
   velocity->setName("vel");
   velocity->tree().setValue(openvdb::Coord(1, 2, 3), openvdb::Vec3s(1e6F, 0, 0));
   const fs::path file = folder / "fields.vdb";
-  openvdb::io::File(file.string()).write({density, dot("temperature", 1234.5F), velocity});
+  openvdb::io::File(file.string()).write({density, test::two_voxels("temperature", 1234.5F), velocity});
 
   test::Messages messages;
   const volume::VolumeFrame frame = volume::import_frame(file, {}, messages.log);

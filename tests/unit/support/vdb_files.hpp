@@ -48,4 +48,12 @@ inline openvdb::FloatGrid::Ptr fog(const std::string& name, float background = 0
   return grid;
 }
 
+/// A fog grid of two voxels with different values, so that it is not constant. `value` is the first.
+inline openvdb::FloatGrid::Ptr two_voxels(const std::string& name, float value) {
+  auto grid = fog(name);
+  grid->tree().setValue(openvdb::Coord(1, 2, 3), value);
+  grid->tree().setValue(openvdb::Coord(1, 2, 4), 0.5F * value);
+  return grid;
+}
+
 }  // namespace cumulet::test
