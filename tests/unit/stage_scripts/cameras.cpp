@@ -64,7 +64,8 @@ void camera_operations(StageRecorder& r) {
   set_volume(r, cloud(16, 1));
   r.wait();
   r.frame();
-  viewer::Camera& camera = *r.viewer().camera();
+  const std::shared_ptr<viewer::Camera> first = r.viewer().camera();  // the viewer releases it below
+  viewer::Camera& camera = *first;
   const auto show = [&](const char* name, const std::function<void()>& operation) {
     r.call(name, operation);
     r.frame();
