@@ -237,7 +237,6 @@ void grid_for_views_while_reading(StageRecorder& r) {
   r.look({12.0, 12.0, 90.0}, {12.0, 12.0, 12.0});
   r.release();
   r.wait();
-  r.frame();
   build(r);
   r.frame();
 }
