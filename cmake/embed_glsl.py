@@ -2,11 +2,16 @@
 
 A shader that is compiled with macros lists them in comments; gl::Programs builds only these variants:
 
-    // variants: CM_MARCH=0 CM_PAGES=1..8 or CM_MARCH=1,2
+    // variants: CM_STAGE=0 CM_USED=1..8 or CM_STAGE=1,2
     // variants: - or CM_LAYERS=1
 
 A line holds alternatives, and every variant has exactly one of them; "-" means none of the macros. 1,2 are values; 1..8
 is a range of values. The variants are the product of the lines; cmake/validate_glsl.py validates them.
+
+Shaders share alternatives by a list with a name. "..." marks the position of the macros that a use adds:
+
+    // variants of VOLUMES: CM_MARCH=0 ... CM_WIDE=1 or CM_MARCH=1 ...
+    // variants: VOLUMES or VOLUMES CM_MOTION=1
 """
 import argparse
 import itertools
@@ -48,14 +53,27 @@ def parse_macro(text, where):
     return name, [str(i) for i in range(int(low), int(high) + 1)], True
 
 
+def with_lists(line, lists):
+    """Returns the alternatives of a line, each a list of words; names of lists are replaced by their alternatives."""
+    found = []
+    for words in (part.split() for part in line.split(" or ")):
+        if words[0] not in lists:
+            found.append(words)
+            continue
+        for listed in (part.split() for part in lists[words[0]].split(" or ")):
+            at = listed.index("...") if "..." in listed else len(listed)
+            found.append(listed[:at] + words[1:] + listed[at + 1:])
+    return found
+
+
 def variants_of(name, source):
     """Returns the variants. Each is a list of macros (name, values, whether they are a range)."""
     if re.search(r"^// variant:", source, re.M):
         sys.exit(f"{name}: '// variant:' lines are not read any more: see cmake/embed_glsl.py for '// variants:'")
+    lists = dict(re.findall(r"^// variants of ([A-Z_]+):(.*)$", source, re.M))
     lines = []
     for line in re.findall(r"^// variants:(.*)$", source, re.M):
-        alternatives = [part.split() for part in line.split(" or ")]
-        lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in alternatives])
+        lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in with_lists(line, lists)])
     return [sum(choice, []) for choice in itertools.product(*lines)]
 
 
