@@ -1,4 +1,5 @@
-"""Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders.
+"""Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders, and a header that names the macros
+of their variants.
 
 A shader that is compiled with macros lists them in comments; gl::Programs builds only these variants:
 
@@ -93,18 +94,29 @@ def variant_tables(symbol, variants):
     return "\n".join(rows)
 
 
+def macros_header(names):
+    """Returns a C++ header with a constant for each macro: gl::macros::halves is CM_HALVES."""
+    lines = ["// Made by cmake/embed_glsl.py.", "#pragma once", "", '#include "gl/macro_name.hpp"', "",
+             "namespace cumulet::gl::macros {"]
+    lines += [f'inline constexpr MacroName {name.removeprefix("CM_").lower()}("{name}");' for name in sorted(names)]
+    return "\n".join(lines + ["}  // namespace cumulet::gl::macros", ""])
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--macros", type=pathlib.Path, required=True)
     options = parser.parse_args()
 
     parts = ['#include "gl/shader_sources.hpp"\n\nnamespace cumulet::gl {\n']
     entries = []
+    macros = set()
     for path, source in shaders_of(options.folder):
         if number := re.search(r"binding\s*=\s*\d.*", source):
             sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/bindings.glsl")
         variants = variants_of(path.name, source)
+        macros.update(name for variant in variants for name, _, _ in variant)
         symbol = path.name.replace(".", "_")
         # Compilers limit the length of one string literal; adjacent literals are concatenated.
         chunks = [source[i:i + 8000] for i in range(0, len(source), 8000)]
@@ -117,6 +129,10 @@ def main():
     parts.append("std::span<const Shader> shaders() { return all_shaders; }\n")
     parts.append("}  // namespace cumulet::gl\n")
     options.out.write_text("\n".join(parts))
+    header = macros_header(macros)
+    # An unchanged header is not written, so that files that include it are not compiled again.
+    if not options.macros.exists() or options.macros.read_text() != header:
+        options.macros.write_text(header)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -57,8 +58,8 @@ std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
   return cells;
 }
 
-gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {"CM_STAGE " + std::to_string(stage)}}; }
-gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {"CM_STAGE " + std::to_string(stage)}}; }
+gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {gl::macros::stage(stage)}}; }
+gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {gl::macros::stage(stage)}}; }
 
 }  // namespace
 
@@ -299,10 +300,10 @@ void GridBuild::plan_records() {
     gl_->ProgramUniform1f(program, 3, 1.0F / data_->lattice().density_unit);
     gl_->ProgramUniform1i(program, 4, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
   };
-  const auto key = [this](const char* size) {
-    return gl::ProgramKey{"grid_records.comp", {size, data_->lattice().halves ? "CM_HALVES 1" : "CM_HALVES 0"}};
+  const auto key = [this](bool fine) {
+    return gl::ProgramKey{"grid_records.comp", {gl::macros::fine(fine), gl::macros::halves(data_->lattice().halves)}};
   };
-  plan_leaves({key("CM_FINE 0"), 32}, {key("CM_FINE 1"), 32}, bind);
+  plan_leaves({key(false), 32}, {key(true), 32}, bind);
 }
 
 void GridBuild::plan_clear_cones() {
@@ -313,7 +314,7 @@ void GridBuild::plan_clear_cones() {
                   {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
                   {core::CM_STORAGE_GRID_CLEAR, &clear_}});
   };
-  const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {"CM_STAGE " + std::to_string(stage)}}; };
+  const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {gl::macros::stage(stage)}}; };
   passes_.plan(*cells_, {key(0), 8}, 0, built_.count, bind);
   passes_.plan(*cells_, {key(1), 4096, true}, 0, CM_CLEAR_CONES, bind);
   passes_.plan(*cells_, {key(2), 8}, 0, CM_CLEAR_CUBES, bind);
@@ -359,7 +360,7 @@ void GridBuild::plan_channel(std::size_t index) {
       gl_->ProgramUniform1i(program, 3, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
     if (channel.channel == grid::Channel::velocity) gl_->ProgramUniform1f(program, 3, channel.fastest);
   };
-  const Pass pass{{"grid_channels.comp", {"CM_CHANNEL " + std::to_string(static_cast<int>(channel.channel))}}, 32};
+  const Pass pass{{"grid_channels.comp", {gl::macros::channel(channel.channel)}}, 32};
   plan_leaves(pass, pass, bind);
 }
 
