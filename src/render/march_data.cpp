@@ -21,8 +21,6 @@ namespace {
 using glm::ivec3;
 using glm::vec3;
 
-constexpr std::size_t max_pages = 6;
-
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   const int widest = std::max({size.x, size.y, size.z});
   if (widest > limits.texture_size_3d) {
@@ -257,8 +255,9 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
   if (page_cells < cells)
     page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
   data_.page_shift_ = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
-  if (cells > page_cells * static_cast<std::int64_t>(max_pages)) {
-    throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
+  if (cells > page_cells * static_cast<std::int64_t>(MarchData::max_pages)) {
+    throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " +
+                                            std::to_string(MarchData::max_pages) +
                                             " texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
                                             std::to_string(texels) + " texels");
   }
@@ -564,19 +563,9 @@ void MarchUpload::plan_brick() {
   });
 }
 
-std::vector<std::string> MarchData::defines(bool several, bool motion) const {
-  // The page count is one, two or the maximum, to limit the number of programs.
-  std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
-  const auto is_wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
-  const bool wide = march_ == March::tet && std::ranges::any_of(parts_, is_wide);
-  if (pages > 2 || wide || (several && march_ == March::tet)) pages = max_pages;
-  std::vector<std::string> defines{"CM_MARCH " + std::to_string(static_cast<int>(march_)),
-                                   std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
-                                   "CM_PAGES " + std::to_string(pages)};
-  if (several) defines.emplace_back("CM_INSTANCES 1");
-  if (motion) defines.emplace_back("CM_MOTION 1");
-  if (wide) defines.emplace_back("CM_WIDE 1");
-  return defines;
+bool MarchData::is_wide() const {
+  const auto wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
+  return march_ == March::tet && std::ranges::any_of(parts_, wide);
 }
 
 void MarchData::bind(const gl::Functions& gl) const {

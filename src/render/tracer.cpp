@@ -25,7 +25,7 @@ Tracer::Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
 void Tracer::find_programs(const PathFeatures& features, bool measures, const MarchData& data,
                            const TraceInputs& trace_inputs) {
   if (features.view == View::shaded) {
-    sampler_.find_programs(features, data, measures);
+    sampler_.find_programs(features, measures);
   } else {
     programs_.get(inspect_key(data, trace_inputs));
   }
@@ -33,7 +33,7 @@ void Tracer::find_programs(const PathFeatures& features, bool measures, const Ma
 
 bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                   const PictureSettings& settings) {
-  const PathFeatures features = path_features(parameters, trace_inputs, settings);
+  const PathFeatures features = path_features(data, parameters, trace_inputs, settings);
   const bool measures = noise_target_of(settings).has_value();
   return programs_.asked([&] { find_programs(features, measures, data, trace_inputs); });
 }
@@ -43,7 +43,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   const glm::uvec2 size = parameters.view.size;
   const bool shaded = settings.view == View::shaded;
   dispatches_.allocate();
-  picture.begin(size, settings.region, path_features(parameters, trace_inputs, settings));
+  picture.begin(size, settings.region, path_features(data, parameters, trace_inputs, settings));
   const PathFeatures& features = picture.features();
   if (features.layered != Layered::no) {
     draw_layers(picture, trace_inputs, settings);
