@@ -51,10 +51,11 @@ PathTriangles triangles_of(const PictureParameters& parameters, const TraceInput
   // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const ModelInstances* models = settings.view == View::shaded && !preview ? trace_inputs.traced_models() : nullptr;
+  const ModelInstances* models =
+      settings.options.view == View::shaded && !preview ? trace_inputs.traced_models() : nullptr;
   if (models == nullptr) return PathTriangles::none;
   const bool emitting = models->lights().triangles > 0 || models->tables().extended_bsdf != 0U;
-  return emitting || settings.light_groups > 0 ? PathTriangles::emitting : PathTriangles::hit;
+  return emitting || settings.options.light_groups > 0 ? PathTriangles::emitting : PathTriangles::hit;
 }
 
 }  // namespace
@@ -77,14 +78,15 @@ std::vector<std::string> grid_macros(const GridFeatures& grid, bool motion) {
 
 PathFeatures path_features(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                            const PictureSettings& settings) {
-  const bool shaded = settings.view == View::shaded;
+  const PictureOptions& options = settings.options;
+  const bool shaded = options.view == View::shaded;
   const core::CmMedium& medium = parameters.medium;
   PathFeatures features;
   features.grid = grid_of(data, trace_inputs);
-  features.view = settings.view;
+  features.view = options.view;
   features.layered = shaded && trace_inputs.raster != nullptr ? settings.layered : Layered::no;
   features.triangles = triangles_of(parameters, trace_inputs, settings);
-  features.light_groups = shaded ? settings.light_groups : 0;
+  features.light_groups = shaded ? options.light_groups : 0;
   features.second_lobe = medium.second_weight > 0.0F;
   features.channels = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
   features.environment = trace_inputs.environment != nullptr;
@@ -93,7 +95,7 @@ PathFeatures path_features(const MarchData& data, const PictureParameters& param
   features.volume_holdout = shaded && trace_inputs.volume_holdout;
   features.model_holdout = shaded && features.has_stages() && trace_inputs.model_holdout;
   features.motion = shaded && parameters.shutter.lasts != 0U;
-  features.separate_volume_aov = shaded && settings.separate_volume_aov;
+  features.separate_volume_aov = shaded && options.separate_volume_aov;
   // Equiangular sampling is off in these cases. The separate volume AOV depends on the first hit of a path, but such
   // light may lie before a surface. The color of a surface layer is stored in the same field as the light of such an
   // NEE sample. A holdout has no light.
