@@ -223,7 +223,7 @@ void GridBuild::plan_cells() {
   // The memory is checked before anything is allocated.
   std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
   for (const grid::LatticeChannel& channel : data_->lattice().channels) {
-    needs += channel_bytes(channel.channel, built_.count);
+    needs += grid::channel_bytes(channel.channel, built_.count);
     if (channel.channel == grid::Channel::emission) needs += std::uint64_t{built_.count} * glowing_words * 4;
   }
   require_room(needs + built_.bytes());
@@ -323,7 +323,7 @@ void GridBuild::plan_clear_cones() {
 
 void GridBuild::plan_channels() {
   for (std::size_t i = 0; i < data_->lattice().channels.size(); ++i) plan_channel(i);
-  const gl::Object& emission = built_.channels[static_cast<std::size_t>(grid::Channel::emission)];
+  const gl::Object& emission = built_.channels[grid::index_of(grid::Channel::emission)];
   if (std::ranges::none_of(data_->lattice().channels,
                            [](const auto& channel) { return channel.channel == grid::Channel::emission; }))
     return;
@@ -341,11 +341,11 @@ void GridBuild::plan_channels() {
 
 void GridBuild::plan_channel(std::size_t index) {
   const grid::LatticeChannel& channel = data_->lattice().channels[index];
-  gl::Object& records = built_.channels[static_cast<std::size_t>(channel.channel)];
-  const std::uint64_t bytes = (channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
+  gl::Object& records = built_.channels[grid::index_of(channel.channel)];
+  const std::uint64_t bytes = (grid::channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
   cells_->add([this, &records, bytes] { records = make_storage(bytes, "creating a channel's cell data"); });
-  // Two cells share a word.
-  if (channel.channel == grid::Channel::anisotropy) plan_clear(*cells_, records, bytes);
+  // Two cells may share a word.
+  if (grid::row_of(channel.channel).record_bytes < 4) plan_clear(*cells_, records, bytes);
   const auto bind = [this, &channel, &data = data_->channels_[index], &records](GLuint program) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_COARSE, &data.coarse},
