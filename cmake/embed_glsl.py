@@ -1,12 +1,18 @@
-"""Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders.
+"""Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders, and a header that names the macros
+of their variants.
 
 A shader that is compiled with macros lists them in comments; gl::Programs builds only these variants:
 
-    // variants: CM_MARCH=0 CM_PAGES=1..8 or CM_MARCH=1,2
+    // variants: CM_STAGE=0 CM_USED=1..8 or CM_STAGE=1,2
     // variants: - or CM_LAYERS=1
 
 A line holds alternatives, and every variant has exactly one of them; "-" means none of the macros. 1,2 are values; 1..8
 is a range of values. The variants are the product of the lines; cmake/validate_glsl.py validates them.
+
+Shaders share alternatives by a list with a name. "..." marks the position of the macros that a use adds:
+
+    // variants of VOLUMES: CM_MARCH=0 ... CM_WIDE=1 or CM_MARCH=1 ...
+    // variants: VOLUMES or VOLUMES CM_MOTION=1
 """
 import argparse
 import itertools
@@ -48,14 +54,27 @@ def parse_macro(text, where):
     return name, [str(i) for i in range(int(low), int(high) + 1)], True
 
 
+def with_lists(line, lists):
+    """Returns the alternatives of a line, each a list of words; names of lists are replaced by their alternatives."""
+    found = []
+    for words in (part.split() for part in line.split(" or ")):
+        if words[0] not in lists:
+            found.append(words)
+            continue
+        for listed in (part.split() for part in lists[words[0]].split(" or ")):
+            at = listed.index("...") if "..." in listed else len(listed)
+            found.append(listed[:at] + words[1:] + listed[at + 1:])
+    return found
+
+
 def variants_of(name, source):
     """Returns the variants. Each is a list of macros (name, values, whether they are a range)."""
     if re.search(r"^// variant:", source, re.M):
         sys.exit(f"{name}: '// variant:' lines are not read any more: see cmake/embed_glsl.py for '// variants:'")
+    lists = dict(re.findall(r"^// variants of ([A-Z_]+):(.*)$", source, re.M))
     lines = []
     for line in re.findall(r"^// variants:(.*)$", source, re.M):
-        alternatives = [part.split() for part in line.split(" or ")]
-        lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in alternatives])
+        lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in with_lists(line, lists)])
     return [sum(choice, []) for choice in itertools.product(*lines)]
 
 
@@ -75,18 +94,29 @@ def variant_tables(symbol, variants):
     return "\n".join(rows)
 
 
+def macros_header(names):
+    """Returns a C++ header with a constant for each macro: gl::macros::halves is CM_HALVES."""
+    lines = ["// Made by cmake/embed_glsl.py.", "#pragma once", "", '#include "gl/macro_name.hpp"', "",
+             "namespace cumulet::gl::macros {"]
+    lines += [f'inline constexpr MacroName {name.removeprefix("CM_").lower()}("{name}");' for name in sorted(names)]
+    return "\n".join(lines + ["}  // namespace cumulet::gl::macros", ""])
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--macros", type=pathlib.Path, required=True)
     options = parser.parse_args()
 
     parts = ['#include "gl/shader_sources.hpp"\n\nnamespace cumulet::gl {\n']
     entries = []
+    macros = set()
     for path, source in shaders_of(options.folder):
         if number := re.search(r"binding\s*=\s*\d.*", source):
             sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/bindings.glsl")
         variants = variants_of(path.name, source)
+        macros.update(name for variant in variants for name, _, _ in variant)
         symbol = path.name.replace(".", "_")
         # Compilers limit the length of one string literal; adjacent literals are concatenated.
         chunks = [source[i:i + 8000] for i in range(0, len(source), 8000)]
@@ -99,6 +129,10 @@ def main():
     parts.append("std::span<const Shader> shaders() { return all_shaders; }\n")
     parts.append("}  // namespace cumulet::gl\n")
     options.out.write_text("\n".join(parts))
+    header = macros_header(macros)
+    # An unchanged header is not written, so that files that include it are not compiled again.
+    if not options.macros.exists() or options.macros.read_text() != header:
+        options.macros.write_text(header)
 
 
 if __name__ == "__main__":

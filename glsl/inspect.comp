@@ -1,6 +1,6 @@
 #version 450
 // Views of the grid, and the depth at half opacity, by one deterministic ray through each pixel's center.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
+// variants: VOLUME or VOLUMES
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

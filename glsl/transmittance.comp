@@ -4,7 +4,7 @@
 // uniform depths, in closed form per cell and without noise. Parallel rays are those of an orthographic view from the
 // light. Rays of a point light use octahedral mapping (octahedron.glsl). Texels lie on its folds, so that filtering
 // across a fold mixes equal rays.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_WIDE=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
+// variants: VOLUME or VOLUMES
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

@@ -1,9 +1,8 @@
 #include "saved_picture.hpp"
 
 #include <algorithm>
-#include <array>
+#include <aov_table.hpp>
 #include <image.hpp>
-#include <span>
 #include <stdexcept>
 #include <straight_alpha.hpp>
 #include <vector>
@@ -68,12 +67,12 @@ void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_f
   require_picture(shown);
   const std::vector<float> rgba = read_linear(viewer, shown);
   // All AOVs except the separate volume, which would slow down every frame.
-  constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
-                            CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
-                            CUMULET_AOV_VELOCITY,      CUMULET_AOV_MOTION,        CUMULET_AOV_VOLUME_MOTION};
-  const bool shaded = scene.sampling.view == CUMULET_VIEW_SHADED;
-  write_exr(viewer, path, windows_of(scene.sampling.region, shown.width, shown.height), {rgba},
-            std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer, scene, shown.width, shown.height));
+  std::vector<cumulet_aov> aovs;
+  for (const settings::Aov& aov : settings::named_aovs) {
+    if (aov.value != CUMULET_AOV_VOLUME && scene.sampling.view == CUMULET_VIEW_SHADED) aovs.push_back(aov.value);
+  }
+  write_exr(viewer, path, windows_of(scene.sampling.region, shown.width, shown.height), {rgba}, aovs,
+            metadata_of(viewer, scene, shown.width, shown.height));
 }
 
 }  // namespace cumulet::demo

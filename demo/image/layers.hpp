@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <aov_table.hpp>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -17,20 +19,24 @@ struct LayerName {
   std::string_view channels;  // one letter each
 };
 
-/// The layers of a rendered image. docs/aovs.md describes their content and the reasons for their names.
+/// Returns the layer of an AOV.
+constexpr LayerName layer_of(const settings::Aov& aov) { return {aov.name, aov.channels}; }
+constexpr LayerName layer_of(cumulet_aov aov) {
+  return layer_of(*std::ranges::find(settings::aovs, aov, &settings::Aov::value));
+}
+
+/// Layers of a rendered image that code names. docs/aovs.md describes all layers.
 namespace layers {
-inline constexpr LayerName beauty{"", "RGBA"};
+inline constexpr LayerName beauty = layer_of(CUMULET_AOV_BEAUTY);
 inline constexpr LayerName denoised{"denoised", "RGBA"};
-inline constexpr LayerName volume{"volume", "RGBA"};
-inline constexpr LayerName transmittance{"transmittance", "Y"};
-inline constexpr LayerName depth{"depth", "Z"};
-inline constexpr LayerName volume_depth{"volume_depth", "Z"};
-inline constexpr LayerName normal{"normal", "XYZ"};
-inline constexpr LayerName albedo{"albedo", "RGB"};
-inline constexpr LayerName error{"error", "Y"};
-inline constexpr LayerName velocity{"velocity", "XYZ"};
-inline constexpr LayerName backward{"backward", "uv"};
-inline constexpr LayerName volume_backward{"volume_backward", "uv"};
+inline constexpr LayerName volume = layer_of(CUMULET_AOV_VOLUME);
+inline constexpr LayerName transmittance = layer_of(CUMULET_AOV_TRANSMITTANCE);
+inline constexpr LayerName depth = layer_of(CUMULET_AOV_SURFACE_DEPTH);
+inline constexpr LayerName volume_depth = layer_of(CUMULET_AOV_VOLUME_DEPTH);
+inline constexpr LayerName normal = layer_of(CUMULET_AOV_NORMAL);
+inline constexpr LayerName albedo = layer_of(CUMULET_AOV_ALBEDO);
+inline constexpr LayerName error = layer_of(CUMULET_AOV_ERROR);
+inline constexpr LayerName velocity = layer_of(CUMULET_AOV_VELOCITY);
 /// Prefix of the Cryptomatte layers; a layer number follows. Each layer contains two ranks.
 inline constexpr std::string_view cryptomatte_prefix = "CryptoObject";
 inline constexpr std::string_view cryptomatte_channels = "RGBA";

@@ -1,6 +1,7 @@
 #include "merge.hpp"
 
 #include <algorithm>
+#include <aov_table.hpp>
 #include <array>
 #include <attributes.hpp>
 #include <cmath>
@@ -228,16 +229,19 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   merged.without_error = with_error && !sky;
 
   std::vector<std::pair<image::LayerName, std::vector<float>>> made;
-  for (const image::LayerName& layer : {layers::beauty, layers::volume})
-    if (has(first, layer)) made.emplace_back(layer, mean(parts, layer));
+  for (const settings::Aov& aov : settings::aovs) {
+    const image::LayerName layer = image::layer_of(aov);
+    if (aov.kind == settings::AovKind::mean && has(first, layer)) made.emplace_back(layer, mean(parts, layer));
+  }
   for_each_layer(first, layers::light_group_prefix, layers::light_group_channels,
                  [&](const image::LayerName& layer) { made.emplace_back(layer, mean(parts, layer)); });
   const auto take_first = [&](const image::LayerName& layer) {
     made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
   };
-  for (const image::LayerName& layer : {layers::transmittance, layers::depth, layers::volume_depth, layers::normal,
-                                        layers::albedo, layers::velocity, layers::backward, layers::volume_backward})
-    if (has(first, layer)) take_first(layer);
+  for (const settings::Aov& aov : settings::aovs) {
+    const bool is_feature = aov.kind == settings::AovKind::feature || aov.kind == settings::AovKind::depth;
+    if (is_feature && has(first, image::layer_of(aov))) take_first(image::layer_of(aov));
+  }
   // Cryptomatte does not depend on the samples either, and IDs cannot be averaged.
   for_each_layer(first, layers::cryptomatte_prefix, layers::cryptomatte_channels, take_first);
 

@@ -11,34 +11,6 @@
 
 namespace cumulet::demo {
 
-image::LayerName layer_of(cumulet_aov aov) {
-  switch (aov) {
-    case CUMULET_AOV_VOLUME:
-      return image::layers::volume;
-    case CUMULET_AOV_TRANSMITTANCE:
-      return image::layers::transmittance;
-    case CUMULET_AOV_SURFACE_DEPTH:
-      return image::layers::depth;
-    case CUMULET_AOV_VOLUME_DEPTH:
-      return image::layers::volume_depth;
-    case CUMULET_AOV_NORMAL:
-      return image::layers::normal;
-    case CUMULET_AOV_ALBEDO:
-      return image::layers::albedo;
-    case CUMULET_AOV_ERROR:
-      return image::layers::error;
-    case CUMULET_AOV_VELOCITY:
-      return image::layers::velocity;
-    case CUMULET_AOV_MOTION:
-      return image::layers::backward;
-    case CUMULET_AOV_VOLUME_MOTION:
-      return image::layers::volume_backward;
-    case CUMULET_AOV_BEAUTY:
-      break;
-  }
-  return image::layers::beauty;
-}
-
 namespace {
 
 constexpr std::uint32_t matte_ranks = 6;  // the usual number of ranks in other renderers
@@ -145,10 +117,11 @@ void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Win
     add({name, image::layers::light_group_channels}, pixels);
   }
   for (const cumulet_aov aov : aovs) {
-    const image::LayerName name = layer_of(aov);
+    const settings::Aov& row = settings::aovs.at(aov);
+    const image::LayerName name = image::layer_of(row);
     pixels.resize(std::size_t{windows.whole_width} * windows.whole_height * name.channels.size());
     check(cumulet_read_aov(viewer, aov, pixels.data(), pixels.size()));
-    if (aov == CUMULET_AOV_SURFACE_DEPTH || aov == CUMULET_AOV_VOLUME_DEPTH) {
+    if (row.kind == settings::AovKind::depth) {
       for (float& z : pixels) z = std::isfinite(z) ? z : image::no_depth;
     }
     add(name, pixels);

@@ -10,9 +10,6 @@
 
 namespace cumulet::demo {
 
-/// Returns the layer name and channels of an AOV in an OpenEXR file.
-[[nodiscard]] image::LayerName layer_of(cumulet_aov aov);
-
 /// Returns the Cryptomatte name of an object, as cumulet_object_name_fn. "": the object is in no matte.
 using ObjectName = std::function<std::string(cumulet_object_kind kind, std::uint64_t tag)>;
 

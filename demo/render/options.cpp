@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <analytic_light_limits.hpp>
+#include <aov_table.hpp>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -494,13 +495,14 @@ void parse_aovs(std::string_view text, RenderOptions& options) {
   for (const std::string_view part : split(text, ',')) {
     const bool mattes = part == "all" || part == cryptomatte_name;
     options.cryptomatte = options.cryptomatte || mattes;
-    for (const auto& [name, aov] : aov_names) {
-      const bool meant = part == "all" || part == name;
-      if (meant && std::ranges::find(options.aovs, aov) == options.aovs.end()) options.aovs.push_back(aov);
+    for (const settings::Aov& aov : settings::named_aovs) {
+      const bool meant = part == "all" || part == aov.name;
+      if (meant && std::ranges::find(options.aovs, aov.value) == options.aovs.end()) options.aovs.push_back(aov.value);
     }
-    const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.name; });
+    const bool known =
+        std::ranges::find(settings::named_aovs, part, &settings::Aov::name) != settings::named_aovs.end();
     if (!known && !mattes)
-      throw UsageError(in_quotes(part) + " is not one of all, " + list_names(aov_names, ", ") + ", " +
+      throw UsageError(in_quotes(part) + " is not one of all, " + list_names(settings::named_aovs, ", ") + ", " +
                        cryptomatte_name);
   }
 }

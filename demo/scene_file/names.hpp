@@ -20,12 +20,6 @@ template <class Value>
 Name(const char*, Value) -> Name<Value>;
 
 inline constexpr std::array up_names = {Name{"y", UpAxis::y}, Name{"z", UpAxis::z}};
-inline constexpr std::array aov_names = {
-    Name{"volume", CUMULET_AOV_VOLUME},       Name{"transmittance", CUMULET_AOV_TRANSMITTANCE},
-    Name{"depth", CUMULET_AOV_SURFACE_DEPTH}, Name{"volume_depth", CUMULET_AOV_VOLUME_DEPTH},
-    Name{"normal", CUMULET_AOV_NORMAL},       Name{"albedo", CUMULET_AOV_ALBEDO},
-    Name{"error", CUMULET_AOV_ERROR},         Name{"velocity", CUMULET_AOV_VELOCITY},
-    Name{"backward", CUMULET_AOV_MOTION},     Name{"volume_backward", CUMULET_AOV_VOLUME_MOTION}};
 /// Name of the Cryptomatte layers, which are not an AOV of the library.
 inline constexpr const char* cryptomatte_name = "cryptomatte";
 /// Joins the names for an error message or a help text.

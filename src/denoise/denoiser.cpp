@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gl/bindings.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::denoise {
 
@@ -167,17 +168,17 @@ void Denoiser::add_stages() {
 gl::ProgramKey Denoiser::key_of(const Stage& stage) const {
   switch (stage.kind) {
     case Stage::Kind::bins:
-      return {"denoise_exposure.comp", {"CM_STAGE 0"}};
+      return {"denoise_exposure.comp", {gl::macros::stage(0)}};
     case Stage::Kind::exposure:
-      return {"denoise_exposure.comp", {"CM_STAGE 1"}};
+      return {"denoise_exposure.comp", {gl::macros::stage(1)}};
     case Stage::Kind::input:
-      return {"denoise_input.comp", {network_->inputs > 3 ? "CM_GUIDES 1" : "CM_GUIDES 0"}};
+      return {"denoise_input.comp", {gl::macros::guides(network_->inputs > 3)}};
     case Stage::Kind::convolution:
       break;
   }
-  if (stage.convolution + 1 == Network::convolution_count) return {"denoise_convolution.comp", {"CM_RESULT 2"}};
+  if (stage.convolution + 1 == Network::convolution_count) return {"denoise_convolution.comp", {gl::macros::result(2)}};
   const bool pooled = network_->convolutions.at(stage.convolution).pooled;
-  return {"denoise_convolution.comp", {pooled ? "CM_RESULT 1" : "CM_RESULT 0"}};
+  return {"denoise_convolution.comp", {gl::macros::result(pooled)}};
 }
 
 void Denoiser::build() const {

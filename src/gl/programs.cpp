@@ -12,6 +12,7 @@
 #include "gl/bindings.hpp"
 #include "gl/extensions.hpp"
 #include "gl/shader_sources.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::gl {
 
@@ -240,8 +241,8 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
 std::vector<ProgramKey> all_programs() {
   // These are more than half of all variants.
   const auto rare = [](const ShaderMacro& macro) {
-    return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT" || macro.name == "CM_MOTION" ||
-           macro.name == "CM_WIDE";
+    const auto is = [&](MacroName name) { return macro.name == name.text(); };
+    return is(macros::groups) || is(macros::holdout) || is(macros::motion) || is(macros::wide);
   };
   std::vector<ProgramKey> all;
   for (const Shader& shader : shaders()) {

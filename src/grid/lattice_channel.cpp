@@ -42,32 +42,6 @@ ChannelFields::ChannelFields(Channel channel, const Statistics& density, const C
   }
 }
 
-std::size_t ChannelFields::count() const {
-  switch (channel_) {
-    case Channel::emission:
-      return 3;
-    case Channel::anisotropy:
-      return 2;
-    case Channel::color:
-    case Channel::velocity:
-      break;
-  }
-  return 4;
-}
-
-std::size_t ChannelFields::record_words() const {
-  switch (channel_) {
-    case Channel::emission:
-      return sizeof(EmissionRecord) / 4;
-    case Channel::velocity:
-      return sizeof(glm::uvec2) / 4;
-    case Channel::color:
-    case Channel::anisotropy:
-      break;
-  }
-  return 1;
-}
-
 ChannelNumbers ChannelFields::numbers(const std::array<float, max_fields>& values) const {
   switch (channel_) {
     case Channel::emission:
@@ -154,10 +128,9 @@ void ChannelFields::put_record(const vec3& v0, std::uint32_t shape, CellKind cel
 
 std::vector<ChannelFields> fields_of(const Statistics& density, const Channels& channels) {
   std::vector<ChannelFields> all;
-  if (channels.emission) all.emplace_back(Channel::emission, density, channels);
-  if (channels.scattering) all.emplace_back(Channel::color, density, channels);
-  if (channels.forward) all.emplace_back(Channel::anisotropy, density, channels);
-  if (channels.momentum) all.emplace_back(Channel::velocity, density, channels);
+  for (const ChannelRow& row : channel_table) {
+    if (row.is_in(channels)) all.emplace_back(row.channel, density, channels);
+  }
   return all;
 }
 

@@ -9,19 +9,12 @@
 #include <vector>
 
 #include "grid/cell.hpp"
+#include "grid/channel_table.hpp"
 #include "grid/rgb_field.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
 
 namespace cumulet::grid {
-
-/// Quantities that cells store beside density, each in a record of its own.
-enum class Channel {
-  emission = CM_CHANNEL_EMISSION,
-  color = CM_CHANNEL_COLOR,
-  anisotropy = CM_CHANNEL_ANISOTROPY,
-  velocity = CM_CHANNEL_VELOCITY
-};
 
 /// Voxel values whose sums give a channel's records. Emission has red, green and blue. The other channels have a vector
 /// times a weight, followed by the weight; the record stores the weighted mean of the vector. The weight of color and
@@ -38,9 +31,9 @@ class ChannelFields {
 
   [[nodiscard]] Channel channel() const { return channel_; }
   /// Number of values per voxel.
-  [[nodiscard]] std::size_t count() const;
+  [[nodiscard]] std::size_t count() const { return row_of(channel_).numbers; }
   /// Number of words in a cell's record.
-  [[nodiscard]] std::size_t record_words() const;
+  [[nodiscard]] std::size_t record_words() const { return (row_of(channel_).record_bytes + 3) / 4; }
   /// Statistics of the channel's fields.
   [[nodiscard]] std::span<const Statistics* const> statistics() const { return {fields_.data(), used_}; }
   /// Returns the values of all voxels of an octree cube if they are uniform, else nullopt.

@@ -175,7 +175,7 @@ void Accumulation::end_tile() {
   const bool all_begun = has_lanes_for_all();
   if (all_begun && empty <= rest) stage_ = Stage::complete;
   holes_ = all_begun ? empty > 0 : settings_.previews_first && pass_ < 2;
-  // With PictureSettings::previews_first, the first pass leaves its last few pixels to the second.
+  // With PictureOptions::preview, the first pass leaves its last few pixels to the second.
   const bool first_pass = pass_target_ == 1 && settings_.target_samples > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
   if (measures()) {

@@ -29,7 +29,7 @@ struct AccumulationSettings {
   PixelBox box;
   std::uint32_t target_samples = 1;
   std::uint32_t max_lanes = 1;
-  bool previews_first = false;           // PictureSettings::previews_first
+  bool previews_first = false;           // PictureOptions::preview
   std::optional<double> noise_target{};  // PictureSettings::noise_target
   bool adaptive = false;                 // pixels are sampled only as much as the noise target needs
 };

@@ -6,6 +6,7 @@
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/statistics.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -53,9 +54,7 @@ std::vector<std::vector<MovedBrick>> moves_of(const volume::DeviceBricks& bricks
 }
 
 gl::ProgramKey BrickCopies::program() const {
-  return {"copy_bricks.comp",
-          {std::string("CM_FROM_HALVES ") + (from_halves ? "1" : "0"),
-           std::string("CM_TO_HALVES ") + (to_halves ? "1" : "0")}};
+  return {"copy_bricks.comp", {gl::macros::from_halves(from_halves), gl::macros::to_halves(to_halves)}};
 }
 
 void BrickCopies::dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first,
@@ -71,9 +70,7 @@ void BrickCopies::dispatch(const gl::Functions& gl, const gl::Program& program, 
 }
 
 gl::ProgramKey BrickSummaries::program() const {
-  return {
-      "summarize_bricks.comp",
-      {"CM_FORMAT " + std::to_string(static_cast<int>(format)), "CM_FIELD " + std::to_string(static_cast<int>(field))}};
+  return {"summarize_bricks.comp", {gl::macros::format(format), gl::macros::field(field)}};
 }
 
 void BrickSummaries::dispatch(const gl::Functions& gl, const gl::Program& program, std::uint32_t first,

@@ -10,6 +10,7 @@
 #include "gl/bindings.hpp"
 #include "render/brick_kernels.hpp"
 #include "render/voxel_formats.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -136,9 +137,8 @@ void BrickPacker::pack(const PackedFields& packed, const PackedPiece& piece) {
   const auto& gl = *gl_;
   const HostVoxels& source = packed.sources[piece.field];
   const GLuint chosen = packed.chosen[piece.field].name();
-  const gl::Program& program = programs_->get(
-      {"pack_bricks.comp",
-       {source.buffer != 0 ? "CM_BUFFER 1" : "CM_BUFFER 0", chosen != 0 ? "CM_CHOSEN 1" : "CM_CHOSEN 0"}});
+  const gl::Program& program =
+      programs_->get({"pack_bricks.comp", {gl::macros::buffer(source.buffer != 0), gl::macros::chosen(chosen != 0)}});
   const GLuint name = program.name();
   gl.ProgramUniform3i(name, 0, source.size.x, source.size.y, source.size.z);
   gl.ProgramUniform2ui(name, 1, piece.first, piece.count);

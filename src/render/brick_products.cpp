@@ -9,6 +9,7 @@
 
 #include "gl/bindings.hpp"
 #include "grid/evaluation.hpp"
+#include "shader_macros.hpp"
 #include "volume/bricks.hpp"
 
 namespace cumulet::render {
@@ -22,7 +23,7 @@ gl::ProgramKey program_of(const scene::Product& product) {
     int operator()(const scene::Forward& forward) const { return forward.colored ? 3 : 2; }
     int operator()(const scene::Momentum& /*unused*/) const { return 4; }
   };
-  return {"brick_products.comp", {"CM_PRODUCT " + std::to_string(std::visit(Number(), product))}};
+  return {"brick_products.comp", {gl::macros::product(std::visit(Number(), product))}};
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "gl/objects.hpp"
-#include "grid/lattice_channel.hpp"
+#include "grid/channel_table.hpp"
 #include "grid/tet_grid.hpp"
 #include "scene/emissive_cells.hpp"
 #include "scene/march_source.hpp"
@@ -22,7 +22,7 @@ struct BuiltGrid {
   gl::Object cells;  ///< grid::CellRecord each
   gl::Object tree;   ///< 26 grid::RootEntry, of which the last is padding, then TetGrid::tree
   /// Records as in TetGrid, indexed by grid::Channel; null: there is no such channel.
-  std::array<gl::Object, 4> channels;
+  std::array<gl::Object, grid::channel_table.size()> channels;
   scene::EmissiveTable emissive;  ///< in main memory
   /// Set instead of the buffers if the GPU could not build it; why_not then gives the reason.
   std::shared_ptr<const grid::TetGrid> grid;
@@ -38,8 +38,5 @@ struct BuiltGrid {
 };
 /// Grids that were built for the GPU, by source.
 using BuiltGrids = std::map<scene::MarchSourcePtr, BuiltGrid>;
-
-/// Returns the size of the records of a channel.
-std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells);
 
 }  // namespace cumulet::render

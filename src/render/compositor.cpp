@@ -7,6 +7,7 @@
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "gl/transient_framebuffer.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -207,9 +208,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   }
   if (no_memory_for_ == picture.size) return nullptr;
   const gl::Program& program = Compositor::program(
-      {"resolve.comp",
-       {picture.holes ? "CM_HOLES 1" : "CM_HOLES 0", "CM_BACKGROUND " + std::to_string(static_cast<int>(background))}},
-      wait, alike);
+      {"resolve.comp", {gl::macros::holes(picture.holes), gl::macros::background(background)}}, wait, alike);
   if (!program.usable()) {
     lags_ = true;
     return alike ? newest_ : nullptr;
@@ -243,11 +242,11 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
 }
 
 const gl::Program* Compositor::color_program(const Kind& kind, const Display& display, Wait wait) {
-  std::vector<std::string> defines{"CM_DEPTH 0", kind.bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
-                                   kind.resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
-                                   "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
-                                   kind.encoding == ColorEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
-  if (kind.layered) defines.emplace_back("CM_LAYERS 1");
+  std::vector<std::string> defines{gl::macros::depth(0), gl::macros::bilinear(kind.bilinear),
+                                   gl::macros::resolved(kind.resolved),
+                                   gl::macros::tone_map(std::to_string(curve_of(display)) + "u"),
+                                   gl::macros::encode(kind.encoding == ColorEncoding::srgb ? "true" : "false")};
+  if (kind.layered) defines.push_back(gl::macros::layers(1));
   const bool serves = color_ != nullptr && color_kind_ == kind;  // color_ can be used meanwhile
   const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
   if (wanted.usable()) {
@@ -261,7 +260,7 @@ const gl::Program* Compositor::color_program(const Kind& kind, const Display& di
 
 void Compositor::draw_depth(const PictureTextures& picture, const FrameTarget& target) {
   const auto& gl = *gl_;
-  const gl::Program& program = Compositor::program(key_of({"CM_DEPTH 1"}), target.wait, false);
+  const gl::Program& program = Compositor::program(key_of({gl::macros::depth(1)}), target.wait, false);
   if (!program.usable()) {
     lags_ = true;
     return;

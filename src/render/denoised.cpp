@@ -2,6 +2,7 @@
 
 #include "denoise/denoiser.hpp"
 #include "gl/bindings.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -12,8 +13,7 @@ constexpr double step_multiply_adds = 2e9;
 
 gl::ProgramKey guides_key(const Denoising& denoising) {
   return {"denoise_guides.comp",
-          {denoising.with_background ? "CM_BACKGROUND 1" : "CM_BACKGROUND 0",
-           denoising.known_light ? "CM_KNOWN 1" : "CM_KNOWN 0"}};
+          {gl::macros::background(denoising.with_background), gl::macros::known(denoising.known_light)}};
 }
 
 }  // namespace

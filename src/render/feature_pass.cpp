@@ -26,6 +26,11 @@ gl::ProgramKey buffers_key(const Picture& picture, const MarchData& data, const 
 
 }  // namespace
 
+const FeatureBuffer* feature_buffer_of(const FilmLayer& layer) {
+  const auto* found = std::ranges::find(feature_buffers, layer, &FeatureBuffer::layer);
+  return found == feature_buffers.end() ? nullptr : found;
+}
+
 bool FeaturePass::able(const Picture& picture, const MarchData& data, const TraceInputs& trace_inputs) {
   return programs_.asked([&] { programs_.get(buffers_key(picture, data, trace_inputs, FeatureSet::guides)); });
 }
@@ -46,16 +51,17 @@ bool FeaturePass::trace_rays(const PixelBox& box, core::CmParameters parameters,
 
 bool FeaturePass::find(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                        std::uint32_t rays, FeatureSet features) {
-  using namespace film_layers;
   FeatureProgress& progress = picture.feature_progress();
   // A failed read may have requested more buffers.
-  if (trace_inputs.motion == nullptr && !picture.film().has(motion)) progress.set = FeatureSet::guides;
+  if (trace_inputs.motion == nullptr && !picture.film().has(film_layers::motion)) progress.set = FeatureSet::guides;
   if (progress.set < features) progress = {.set = features};
   if (progress.rays >= rays && picture.has_features()) return true;
   // Motion vectors need TraceInputs::motion. Without it only guides are refined.
   const FeatureSet found = trace_inputs.motion != nullptr ? progress.set : FeatureSet::guides;
-  std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
-  if (found == FeatureSet::all) written.insert(written.end(), {velocity, motion});
+  std::vector<FilmLayer> written;
+  for (const FeatureBuffer& buffer : feature_buffers) {
+    if (buffer.set <= found) written.push_back(buffer.layer);
+  }
   const auto work = [&](const Film&, Deadline until) {
     return find_buffers(picture, data, trace_inputs, until, rays, found, written);
   };
@@ -65,20 +71,14 @@ bool FeaturePass::find(Picture& picture, const MarchData& data, const TraceInput
 bool FeaturePass::find_buffers(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs,
                                Deadline deadline, std::uint32_t rays, FeatureSet found,
                                std::span<const FilmLayer> written) {
-  using namespace film_layers;
   const Film& film = picture.film();
   dispatches_.order();
   const TraceProgram& program = programs_.get(buffers_key(picture, data, trace_inputs, found));
   dispatches_.use(*program.object, data, trace_inputs);
-  film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_READ_WRITE);
-  film.bind(*gl_, core::CM_IMAGE_ALBEDO, albedo, GL_READ_WRITE);
-  film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_READ_WRITE);
-  film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
-  film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_READ_WRITE);
-  film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_READ_WRITE);
+  for (const FeatureBuffer& buffer : feature_buffers) {
+    if (buffer.set <= found) film.bind(*gl_, buffer.image, buffer.layer, buffer.access);
+  }
   if (found == FeatureSet::all) {
-    film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_READ_WRITE);
-    film.bind(*gl_, core::CM_IMAGE_MOTION, motion, GL_READ_WRITE);
     upload_motion(*trace_inputs.motion);
     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MOTION, motion_.name());
   }

@@ -27,7 +27,7 @@ struct PixelTransfer {
 };
 [[nodiscard]] PixelTransfer transfer_of(const FilmLayer& layer);
 
-/// The layers that pictures have. glsl/aovs.comp documents the feature buffers that it writes.
+/// The layers that pictures have, beside those of feature buffers (render/feature_buffers.hpp).
 namespace film_layers {
 /// Sums over the samples: radiance in front of the background, and alpha.
 inline constexpr FilmLayer radiance{"radiance", GL_RGBA32F, 16};
@@ -41,18 +41,6 @@ inline constexpr FilmLayer counts{"counts", GL_RG32UI, 8};
 inline constexpr FilmLayer volume{"volume", GL_RGBA32F, 16};
 /// View depth z at half opacity, to be written to the target's depth; 0 if the volume does not reach that opacity.
 inline constexpr FilmLayer depth{"depth", GL_R32F, 4};
-inline constexpr FilmLayer normal{"normal", GL_RGBA32F, 16};
-inline constexpr FilmLayer albedo{"albedo", GL_RGBA32F, 16};
-/// Transmittance of the volume, the fraction of the pixel that surfaces cover, the number of feature rays, and their
-/// spread.
-inline constexpr FilmLayer transmittance{"transmittance", GL_RGBA32F, 16};
-inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
-/// View depth of the volume at half opacity, and the fraction of the pixel that the ground covers.
-inline constexpr FilmLayer volume_z{"volume z", GL_RG32F, 8};
-inline constexpr FilmLayer emission{"emission", GL_RGBA32F, 16};
-inline constexpr FilmLayer velocity{"velocity", GL_RGBA32F, 16};
-/// Motion vectors of surfaces (or of the background where there is none), and of the volume.
-inline constexpr FilmLayer motion{"motion", GL_RGBA32F, 16};
 /// Sums of radiance per light group, then of the sky and of the sun as cameras see them directly.
 constexpr FilmLayer light_groups(unsigned count) { return {"light groups", GL_RGBA32F, 16 * (count + 2), count + 2}; }
 }  // namespace film_layers

@@ -1,7 +1,6 @@
 #include "render/film_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -72,23 +71,17 @@ void FilmReader::read_volume(const Picture& picture, float* rgba) const {
   read_means(picture, film_layers::volume, rgba);
 }
 
-void FilmReader::read_feature(const Picture& picture, FeatureBuffer feature, float* values) const {
-  const std::array layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
-                          film_layers::normal,        film_layers::albedo,    film_layers::velocity,
-                          film_layers::motion,        film_layers::motion};
-  const FilmLayer& layer = layers.at(static_cast<std::size_t>(feature));
-  if (layer == film_layers::motion) {
-    for (const glm::vec4& both : texels<glm::vec4>(picture, layer, GL_RGBA, GL_FLOAT)) {
-      *values++ = feature == FeatureBuffer::motion ? both.x : both.z;
-      *values++ = feature == FeatureBuffer::motion ? both.y : both.w;
-    }
+void FilmReader::read_feature(const Picture& picture, const AovValues& values_of, float* values) const {
+  if (values_of.first == 0 && (values_of.count == 1 || values_of.count == 3)) {
+    const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * values_of.count;
+    gl_->GetTextureImage(picture.film().texture(values_of.layer), 0, values_of.count == 1 ? GL_RED : GL_RGB, GL_FLOAT,
+                         static_cast<GLsizei>(floats * sizeof(float)), values);
+    gl::check(*gl_, "reading the feature buffers");
     return;
   }
-  const std::size_t channels = channels_of(feature);
-  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * channels;
-  gl_->GetTextureImage(picture.film().texture(layer), 0, channels == 1 ? GL_RED : GL_RGB, GL_FLOAT,
-                       static_cast<GLsizei>(floats * sizeof(float)), values);
-  gl::check(*gl_, "reading the feature buffers");
+  for (const glm::vec4& texel : texels<glm::vec4>(picture, values_of.layer, GL_RGBA, GL_FLOAT)) {
+    for (std::size_t i = 0; i < values_of.count; ++i) *values++ = texel[static_cast<int>(values_of.first + i)];
+  }
 }
 
 template <class Visit>

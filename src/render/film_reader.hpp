@@ -36,8 +36,8 @@ class FilmReader {
   /// Reads the standard error of each pixel's luminance, background included; infinity for pixels with fewer than two
   /// samples.
   void read_error(const Picture& picture, float* errors) const;
-  /// Reads a feature buffer, channels_of(feature) floats per pixel, after FeaturePass::find() has rendered it.
-  void read_feature(const Picture& picture, FeatureBuffer feature, float* values) const;
+  /// Reads an AOV from a feature buffer, values_of.count floats per pixel, after FeaturePass::find() has rendered it.
+  void read_feature(const Picture& picture, const AovValues& values_of, float* values) const;
   [[nodiscard]] Totals totals(const Picture& picture) const;
 
  private:

@@ -13,6 +13,7 @@
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -57,8 +58,8 @@ std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
   return cells;
 }
 
-gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {"CM_STAGE " + std::to_string(stage)}}; }
-gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {"CM_STAGE " + std::to_string(stage)}}; }
+gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {gl::macros::stage(stage)}}; }
+gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {gl::macros::stage(stage)}}; }
 
 }  // namespace
 
@@ -222,7 +223,7 @@ void GridBuild::plan_cells() {
   // The memory is checked before anything is allocated.
   std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
   for (const grid::LatticeChannel& channel : data_->lattice().channels) {
-    needs += channel_bytes(channel.channel, built_.count);
+    needs += grid::channel_bytes(channel.channel, built_.count);
     if (channel.channel == grid::Channel::emission) needs += std::uint64_t{built_.count} * glowing_words * 4;
   }
   require_room(needs + built_.bytes());
@@ -299,10 +300,10 @@ void GridBuild::plan_records() {
     gl_->ProgramUniform1f(program, 3, 1.0F / data_->lattice().density_unit);
     gl_->ProgramUniform1i(program, 4, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
   };
-  const auto key = [this](const char* size) {
-    return gl::ProgramKey{"grid_records.comp", {size, data_->lattice().halves ? "CM_HALVES 1" : "CM_HALVES 0"}};
+  const auto key = [this](bool fine) {
+    return gl::ProgramKey{"grid_records.comp", {gl::macros::fine(fine), gl::macros::halves(data_->lattice().halves)}};
   };
-  plan_leaves({key("CM_FINE 0"), 32}, {key("CM_FINE 1"), 32}, bind);
+  plan_leaves({key(false), 32}, {key(true), 32}, bind);
 }
 
 void GridBuild::plan_clear_cones() {
@@ -313,7 +314,7 @@ void GridBuild::plan_clear_cones() {
                   {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
                   {core::CM_STORAGE_GRID_CLEAR, &clear_}});
   };
-  const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {"CM_STAGE " + std::to_string(stage)}}; };
+  const auto key = [](int stage) { return gl::ProgramKey{"grid_clear.comp", {gl::macros::stage(stage)}}; };
   passes_.plan(*cells_, {key(0), 8}, 0, built_.count, bind);
   passes_.plan(*cells_, {key(1), 4096, true}, 0, CM_CLEAR_CONES, bind);
   passes_.plan(*cells_, {key(2), 8}, 0, CM_CLEAR_CUBES, bind);
@@ -322,7 +323,7 @@ void GridBuild::plan_clear_cones() {
 
 void GridBuild::plan_channels() {
   for (std::size_t i = 0; i < data_->lattice().channels.size(); ++i) plan_channel(i);
-  const gl::Object& emission = built_.channels[static_cast<std::size_t>(grid::Channel::emission)];
+  const gl::Object& emission = built_.channels[grid::index_of(grid::Channel::emission)];
   if (std::ranges::none_of(data_->lattice().channels,
                            [](const auto& channel) { return channel.channel == grid::Channel::emission; }))
     return;
@@ -340,11 +341,11 @@ void GridBuild::plan_channels() {
 
 void GridBuild::plan_channel(std::size_t index) {
   const grid::LatticeChannel& channel = data_->lattice().channels[index];
-  gl::Object& records = built_.channels[static_cast<std::size_t>(channel.channel)];
-  const std::uint64_t bytes = (channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
+  gl::Object& records = built_.channels[grid::index_of(channel.channel)];
+  const std::uint64_t bytes = (grid::channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
   cells_->add([this, &records, bytes] { records = make_storage(bytes, "creating a channel's cell data"); });
-  // Two cells share a word.
-  if (channel.channel == grid::Channel::anisotropy) plan_clear(*cells_, records, bytes);
+  // Two cells may share a word.
+  if (grid::row_of(channel.channel).record_bytes < 4) plan_clear(*cells_, records, bytes);
   const auto bind = [this, &channel, &data = data_->channels_[index], &records](GLuint program) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_COARSE, &data.coarse},
@@ -359,7 +360,7 @@ void GridBuild::plan_channel(std::size_t index) {
       gl_->ProgramUniform1i(program, 3, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
     if (channel.channel == grid::Channel::velocity) gl_->ProgramUniform1f(program, 3, channel.fastest);
   };
-  const Pass pass{{"grid_channels.comp", {"CM_CHANNEL " + std::to_string(static_cast<int>(channel.channel))}}, 32};
+  const Pass pass{{"grid_channels.comp", {gl::macros::channel(channel.channel)}}, 32};
   plan_leaves(pass, pass, bind);
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -207,8 +208,7 @@ bool HostDepth::update(const HostDepthInput& input) {
   const Source source = input.source == DepthSource::framebuffer ? open_framebuffer(input) : open_texture(input);
   const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, max_layers));
   const bool multisample = source.samples > 0;
-  const gl::Program& program =
-      programs_->ask({"host_depth.comp", {multisample ? "CM_MULTISAMPLE 1" : "CM_MULTISAMPLE 0"}});
+  const gl::Program& program = programs_->ask({"host_depth.comp", {gl::macros::multisample(multisample)}});
   waits_ = !program.usable();
   if (waits_) return earlier;
   if (!sampler_) sampler_ = gl::make_sampler(gl_);

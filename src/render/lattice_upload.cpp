@@ -10,6 +10,7 @@
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/evaluation.hpp"
+#include "shader_macros.hpp"
 #include "volume/brick_values.hpp"
 #include "volume/bricks.hpp"
 
@@ -144,8 +145,7 @@ void LatticeUpload::plan_device_bricks(const grid::LatticeChannel& channel, cons
   for (const glm::ivec3& corner : channel.bricks) origins.push_back(corner + data_->lattice_->cube.origin);
   const auto to_first = static_cast<std::uint32_t>(channel.even_bricks.size());
   const gl::ProgramKey key{"channel_numbers.comp",
-                           {"CM_CHANNEL " + std::to_string(static_cast<int>(fields.channel())),
-                            "CM_FIELDS " + std::to_string(bricks.size())}};
+                           {gl::macros::channel(fields.channel()), gl::macros::fields(bricks.size())}};
   moves_.plan_together(upload_, bricks, origins, [&](std::size_t first, std::uint32_t count) {
     upload_.add_dispatches(programs_, key, count, bricks_per_step(*gl_),
                            [this, &to, to_first = to_first + static_cast<std::uint32_t>(first)](
@@ -225,8 +225,7 @@ void LatticeUpload::plan_priorities(const std::vector<glm::uvec2>& list, bool of
   });
   const gl::Object& values = of_density ? data_->bricks_ : scratch_.values;
   const gl::ProgramKey key{"own_priorities.comp",
-                           {of_density && l.halves ? "CM_HALVES 1" : "CM_HALVES 0",
-                            "CM_CRITERION " + std::to_string(static_cast<int>(measure.criterion))}};
+                           {gl::macros::halves(of_density && l.halves), gl::macros::criterion(measure.criterion)}};
   upload_.add_dispatches(
       programs_, key, count, bricks_per_step(*gl_),
       [this, &l, &measure, &values](const gl::Program& program, std::uint32_t first, std::uint32_t end) {

@@ -3,11 +3,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <glm/gtc/packing.hpp>
 #include <span>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/luminance.hpp"
@@ -20,8 +22,6 @@ namespace {
 
 using glm::ivec3;
 using glm::vec3;
-
-constexpr std::size_t max_pages = 6;
 
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   const int widest = std::max({size.x, size.y, size.z});
@@ -101,33 +101,43 @@ core::CmGrid parameters_of(const scene::MarchSource& source) {
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
-// Byte sizes and offsets of the channels of a grid's cells.
-struct ChannelBytes {
+// Byte sizes and offsets of the channels of a grid's cells, in descending size of their records, so that each is
+// aligned. Behind those of 16 bytes is the table of emissive cells, behind those of 8 bytes the change.
+class ChannelBytes {
+ public:
+  struct Range {
+    std::size_t at = 0;
+    std::size_t size = 0;
+  };
   // cells, glowing: numbers of cells and of emissive cells, for grids with a plan.
-  ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing)
-      : emissive(glowing * sizeof(scene::GlowingCell)) {
-    using grid::Channel;
-    if (const grid::TetGrid* made = source.grid.get()) {
-      emission = channel_bytes(Channel::emission, made->emission.size());
-      velocity = channel_bytes(Channel::velocity, made->velocity.size());
-      change = made->change.size() * sizeof(glm::uvec2);  // grids built on the GPU have none
-      color = channel_bytes(Channel::color, made->color.size());
-      anisotropy = channel_bytes(Channel::anisotropy, made->anisotropy.size());
-      return;
+  ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing) {
+    const grid::TetGrid* made = source.grid.get();
+    const auto size_of = [&](const grid::ChannelRow& row) -> std::size_t {
+      if (made != nullptr) return row.records(*made).size();
+      return row.is_in(source.channels) ? grid::channel_bytes(row.channel, cells) : 0;
+    };
+    for (const std::size_t record_bytes : {16, 8, 4, 2}) {
+      for (const grid::ChannelRow& row : grid::channel_table) {
+        if (row.record_bytes == record_bytes) channels_[grid::index_of(row.channel)] = append(size_of(row));
+      }
+      if (record_bytes == 16) emissive_ = append(glowing * sizeof(scene::GlowingCell));
+      // Grids built on the GPU have none.
+      if (record_bytes == 8) change_ = append(made != nullptr ? made->change.size() * sizeof(glm::uvec2) : 0);
     }
-    if (source.emits()) emission = channel_bytes(Channel::emission, cells);
-    if (source.moves()) velocity = channel_bytes(Channel::velocity, cells);
-    if (source.colored()) color = channel_bytes(Channel::color, cells);
-    if (source.anisotropic()) anisotropy = channel_bytes(Channel::anisotropy, cells);
   }
-  std::size_t emission = 0, emissive = 0, velocity = 0, change = 0, color = 0, anisotropy = 0;
-  [[nodiscard]] std::size_t emissive_at() const { return emission; }
-  [[nodiscard]] std::size_t velocity_at() const { return emissive_at() + emissive; }
-  [[nodiscard]] std::size_t change_at() const { return velocity_at() + velocity; }
-  [[nodiscard]] std::size_t color_at() const { return change_at() + change; }
-  [[nodiscard]] std::size_t anisotropy_at() const { return color_at() + color; }
+  [[nodiscard]] const Range& of(grid::Channel channel) const { return channels_[grid::index_of(channel)]; }
+  [[nodiscard]] const Range& emissive() const { return emissive_; }
+  [[nodiscard]] const Range& change() const { return change_; }
   // Rounded up to whole texels.
-  [[nodiscard]] std::size_t all() const { return (anisotropy_at() + anisotropy + 15) / 16 * 16; }
+  [[nodiscard]] std::size_t all() const { return (end_ + 15) / 16 * 16; }
+
+ private:
+  Range append(std::size_t size) { return {std::exchange(end_, end_ + size), size}; }
+
+  std::array<Range, grid::channel_table.size()> channels_;
+  Range emissive_;
+  Range change_;
+  std::size_t end_ = 0;
 };
 
 }  // namespace
@@ -257,8 +267,9 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
   if (page_cells < cells)
     page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
   data_.page_shift_ = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
-  if (cells > page_cells * static_cast<std::int64_t>(max_pages)) {
-    throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
+  if (cells > page_cells * static_cast<std::int64_t>(MarchData::max_pages)) {
+    throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " +
+                                            std::to_string(MarchData::max_pages) +
                                             " texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
                                             std::to_string(texels) + " texels");
   }
@@ -325,12 +336,13 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     for (MarchData::Part& part : data_.parts_) {
       const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
       const std::size_t first = data_.channels_.offset() + part.channels;
-      part.grid.first_emission = static_cast<std::uint32_t>(first / 16);
-      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive_at()) / 16);
-      part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.velocity_at()) / 4);
-      part.grid.first_change = static_cast<std::uint32_t>((first + channels.change_at()) / 4);
-      part.grid.first_color = static_cast<std::uint32_t>((first + channels.color_at()) / 4);
-      part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.anisotropy_at()) / 4);
+      using grid::Channel;
+      part.grid.first_emission = static_cast<std::uint32_t>((first + channels.of(Channel::emission).at) / 16);
+      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive().at) / 16);
+      part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.of(Channel::velocity).at) / 4);
+      part.grid.first_change = static_cast<std::uint32_t>((first + channels.change().at) / 4);
+      part.grid.first_color = static_cast<std::uint32_t>((first + channels.of(Channel::color).at) / 4);
+      part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.of(Channel::anisotropy).at) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.glowing);
     }
   });
@@ -349,31 +361,27 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       add_copy(location_at(0), from, channels.all());
       continue;
     }
-    upload_.add_bytes(location_at(channels.emissive_at()), emissive_of(part).cells.data(), channels.emissive);
+    upload_.add_bytes(location_at(channels.emissive().at), emissive_of(part).cells.data(), channels.emissive().size);
     const grid::TetGrid* grid = grid_of(part);
     if (grid == nullptr) {
       const BuiltGrid& made = built_->at(part.source);
-      const auto add = [&](grid::Channel channel, std::size_t at, std::size_t channel_bytes) {
-        const gl::Object& records = made.channels[static_cast<std::size_t>(channel)];
+      for (const grid::ChannelRow& row : grid::channel_table) {
+        const gl::Object& records = made.channels[grid::index_of(row.channel)];
+        const ChannelBytes::Range& range = channels.of(row.channel);
         add_copy(
-            location_at(at),
+            location_at(range.at),
             [buffer = records.name()] {
               return Upload::Location{buffer, 0};
             },
-            channel_bytes);
-      };
-      using grid::Channel;
-      add(Channel::emission, 0, channels.emission);
-      add(Channel::velocity, channels.velocity_at(), channels.velocity);
-      add(Channel::color, channels.color_at(), channels.color);
-      add(Channel::anisotropy, channels.anisotropy_at(), channels.anisotropy);
+            range.size);
+      }
       continue;
     }
-    upload_.add_bytes(location_at(0), grid->emission.data(), channels.emission);
-    upload_.add_bytes(location_at(channels.velocity_at()), grid->velocity.data(), channels.velocity);
-    upload_.add_bytes(location_at(channels.change_at()), grid->change.data(), channels.change);
-    upload_.add_bytes(location_at(channels.color_at()), grid->color.data(), channels.color);
-    upload_.add_bytes(location_at(channels.anisotropy_at()), grid->anisotropy.data(), channels.anisotropy);
+    for (const grid::ChannelRow& row : grid::channel_table) {
+      const ChannelBytes::Range& range = channels.of(row.channel);
+      upload_.add_bytes(location_at(range.at), row.records(*grid).data(), range.size);
+    }
+    upload_.add_bytes(location_at(channels.change().at), grid->change.data(), channels.change().size);
   }
 }
 
@@ -564,19 +572,9 @@ void MarchUpload::plan_brick() {
   });
 }
 
-std::vector<std::string> MarchData::defines(bool several, bool motion) const {
-  // The page count is one, two or the maximum, to limit the number of programs.
-  std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
-  const auto is_wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
-  const bool wide = march_ == March::tet && std::ranges::any_of(parts_, is_wide);
-  if (pages > 2 || wide || (several && march_ == March::tet)) pages = max_pages;
-  std::vector<std::string> defines{"CM_MARCH " + std::to_string(static_cast<int>(march_)),
-                                   std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
-                                   "CM_PAGES " + std::to_string(pages)};
-  if (several) defines.emplace_back("CM_INSTANCES 1");
-  if (motion) defines.emplace_back("CM_MOTION 1");
-  if (wide) defines.emplace_back("CM_WIDE 1");
-  return defines;
+bool MarchData::is_wide() const {
+  const auto wide = [](const Part& part) { return core::cm_is_wide(part.grid.root_exponent); };
+  return march_ == March::tet && std::ranges::any_of(parts_, wide);
 }
 
 void MarchData::bind(const gl::Functions& gl) const {

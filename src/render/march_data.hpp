@@ -25,11 +25,16 @@ using scene::March;
 /// Independent of instance transforms.
 class MarchData {
  public:
+  static constexpr std::size_t max_pages = 6;
+
   [[nodiscard]] March march() const { return march_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// Returns the macros that select this grid type in a shader. several: for an instance table (InstanceData). motion:
-  /// something moves while the shutter is open.
-  [[nodiscard]] std::vector<std::string> defines(bool several, bool motion = false) const;
+  /// Whether the density of tetrahedral cells is linear; else it is constant.
+  [[nodiscard]] bool is_linear() const { return linear_; }
+  /// Number of pages of cell records; at most max_pages.
+  [[nodiscard]] std::size_t pages() const { return cells_.size(); }
+  /// Whether a grid has cells of the wide format (cm_is_wide).
+  [[nodiscard]] bool is_wide() const;
   void bind(const gl::Functions& gl) const;
   /// Number of grids.
   [[nodiscard]] std::size_t size() const { return parts_.size(); }

@@ -1,51 +1,48 @@
 #include "render/path_features.hpp"
 
-#include <span>
-#include <string>
+#include <algorithm>
 #include <utility>
-#include <vector>
 
 #include "render/march_data.hpp"
 #include "render/parameters.hpp"
 #include "render/trace_inputs.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
 namespace {
 
+namespace macros = gl::macros;
 using Macros = std::vector<std::string>;
 
-constexpr const char* surfaces_macro = "CM_SURFACES 1";
-constexpr const char* channels_macro = "CM_CHANNELS 1";
-constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
-constexpr const char* equiangular_macro = "CM_EQUIANGULAR 1";
-constexpr const char* extended_bsdf_macro = "CM_EXTENDED_BSDF 1";
-constexpr const char* groups_macro = "CM_GROUPS 1";
-constexpr const char* holdout_macro = "CM_HOLDOUT 1";
-
-const char* surfaces_macro_of(PathTriangles triangles) {
-  return triangles == PathTriangles::emitting ? "CM_SURFACES 2" : surfaces_macro;
+std::string surfaces_macro_of(PathTriangles triangles) {
+  return macros::surfaces(triangles == PathTriangles::emitting ? 2 : 1);
 }
 
-void add_groups(const PathFeatures& features, Macros& macros) {
-  if (features.light_groups > 0) macros.emplace_back(groups_macro);
+void add_groups(const PathFeatures& features, Macros& more) {
+  if (features.light_groups > 0) more.push_back(macros::groups(1));
 }
 
 // Adds the macros that the holdouts, motion and light groups of a picture need.
-void add_march(const PathFeatures& features, Macros& macros) {
+void add_march(const PathFeatures& features, Macros& more) {
   // To limit the number of variants, those for motion include holdouts.
-  if (features.volume_holdout || features.motion) macros.emplace_back(holdout_macro);
-  add_groups(features, macros);
+  if (features.volume_holdout || features.motion) more.push_back(macros::holdout(1));
+  add_groups(features, more);
 }
 
-void add_medium(const PathFeatures& features, Macros& macros) {
-  if (features.second_lobe) macros.emplace_back("CM_SECOND_LOBE 1");
-  if (features.channels) macros.emplace_back(channels_macro);
+void add_medium(const PathFeatures& features, Macros& more) {
+  if (features.second_lobe) more.push_back(macros::second_lobe(1));
+  if (features.channels) more.push_back(macros::channels(1));
 }
 
-gl::ProgramKey key(const char* name, Macros macros, std::span<const std::string> more) {
-  macros.insert(macros.end(), more.begin(), more.end());
-  return {name, std::move(macros)};
+gl::ProgramKey key(const char* name, const GridFeatures& grid, const Macros& more, bool motion = false) {
+  Macros all = grid_macros(grid, motion);
+  all.insert(all.end(), more.begin(), more.end());
+  return {name, std::move(all)};
+}
+
+GridFeatures grid_of(const MarchData& data, const TraceInputs& trace_inputs) {
+  return grid_features(data, trace_inputs.instances != nullptr);
 }
 
 PathTriangles triangles_of(const PictureParameters& parameters, const TraceInputs& trace_inputs,
@@ -54,33 +51,51 @@ PathTriangles triangles_of(const PictureParameters& parameters, const TraceInput
   // light, the scene lights it.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const ModelInstances* models = settings.view == View::shaded && !preview ? trace_inputs.traced_models() : nullptr;
+  const ModelInstances* models =
+      settings.options.view == View::shaded && !preview ? trace_inputs.traced_models() : nullptr;
   if (models == nullptr) return PathTriangles::none;
   const bool emitting = models->lights().triangles > 0 || models->tables().extended_bsdf != 0U;
-  return emitting || settings.light_groups > 0 ? PathTriangles::emitting : PathTriangles::hit;
+  return emitting || settings.options.light_groups > 0 ? PathTriangles::emitting : PathTriangles::hit;
 }
 
 }  // namespace
 
-PathFeatures path_features(const PictureParameters& parameters, const TraceInputs& trace_inputs,
+GridFeatures grid_features(const MarchData& data, bool several) {
+  const bool wide = data.is_wide();
+  // The page count is one, two or the maximum, to limit the number of programs.
+  std::size_t pages = std::max<std::size_t>(data.pages(), 1);
+  if (pages > 2 || wide || (several && data.march() == March::tet)) pages = MarchData::max_pages;
+  return {data.march(), data.is_linear(), pages, wide, several};
+}
+
+std::vector<std::string> grid_macros(const GridFeatures& grid, bool motion) {
+  Macros all{macros::march(grid.march), macros::linear(grid.linear), macros::pages(grid.pages)};
+  if (grid.several) all.push_back(macros::instances(1));
+  if (motion) all.push_back(macros::motion(1));
+  if (grid.wide) all.push_back(macros::wide(1));
+  return all;
+}
+
+PathFeatures path_features(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                            const PictureSettings& settings) {
-  const bool shaded = settings.view == View::shaded;
+  const PictureOptions& options = settings.options;
+  const bool shaded = options.view == View::shaded;
   const core::CmMedium& medium = parameters.medium;
   PathFeatures features;
-  features.view = settings.view;
+  features.grid = grid_of(data, trace_inputs);
+  features.view = options.view;
   features.layered = shaded && trace_inputs.raster != nullptr ? settings.layered : Layered::no;
   features.triangles = triangles_of(parameters, trace_inputs, settings);
-  features.light_groups = shaded ? settings.light_groups : 0;
+  features.light_groups = shaded ? options.light_groups : 0;
   features.second_lobe = medium.second_weight > 0.0F;
   features.channels = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
   features.environment = trace_inputs.environment != nullptr;
   features.analytic_lights = trace_inputs.analytic_light_count() > 0;
-  features.several = trace_inputs.instances != nullptr;
   features.extended_bsdf = features.has_stages() && trace_inputs.traced_models()->tables().extended_bsdf != 0U;
   features.volume_holdout = shaded && trace_inputs.volume_holdout;
   features.model_holdout = shaded && features.has_stages() && trace_inputs.model_holdout;
   features.motion = shaded && parameters.shutter.lasts != 0U;
-  features.separate_volume_aov = shaded && settings.separate_volume_aov;
+  features.separate_volume_aov = shaded && options.separate_volume_aov;
   // Equiangular sampling is off in these cases. The separate volume AOV depends on the first hit of a path, but such
   // light may lie before a surface. The color of a surface layer is stored in the same field as the light of such an
   // NEE sample. A holdout has no light.
@@ -90,53 +105,53 @@ PathFeatures path_features(const PictureParameters& parameters, const TraceInput
   return features;
 }
 
-gl::ProgramKey trace_key(const PathFeatures& features, const MarchData& data) {
+gl::ProgramKey trace_key(const PathFeatures& features) {
   Macros more;
   if (features.has_stages()) {
-    more.emplace_back(surfaces_macro_of(features.triangles));
+    more.push_back(surfaces_macro_of(features.triangles));
     add_medium(features, more);
-    if (features.environment) more.emplace_back(environment_macro);
-    if (features.equiangular) more.emplace_back(equiangular_macro);
+    if (features.environment) more.push_back(macros::environment(1));
+    if (features.equiangular) more.push_back(macros::equiangular(1));
     add_march(features, more);
-    return key("trace_travel.comp", data.defines(features.several, features.motion), more);
+    return key("trace_travel.comp", features.grid, more, features.motion);
   }
   // To limit the number of variants, those for light groups include layers and lights even if there are none.
   const bool groups = features.light_groups > 0;
-  if (features.layered != Layered::no || (groups && !features.equiangular)) more.emplace_back("CM_LAYERS 1");
-  if (features.separate_volume_aov) more.emplace_back("CM_AOVS 1");
+  if (features.layered != Layered::no || (groups && !features.equiangular)) more.push_back(macros::layers(1));
+  if (features.separate_volume_aov) more.push_back(macros::aovs(1));
   add_medium(features, more);
-  if (features.environment) more.emplace_back(environment_macro);
-  if (features.analytic_lights || groups) more.emplace_back("CM_ANALYTIC_LIGHTS 1");
-  if (features.equiangular) more.emplace_back(equiangular_macro);
+  if (features.environment) more.push_back(macros::environment(1));
+  if (features.analytic_lights || groups) more.push_back(macros::analytic_lights(1));
+  if (features.equiangular) more.push_back(macros::equiangular(1));
   add_march(features, more);
-  return key("trace.comp", data.defines(features.several, features.motion), more);
+  return key("trace.comp", features.grid, more, features.motion);
 }
 
-StageKeys stage_keys(const PathFeatures& features, const MarchData& data) {
+StageKeys stage_keys(const PathFeatures& features) {
   Macros shade{surfaces_macro_of(features.triangles)};
   if (features.channels) {
-    shade.emplace_back(channels_macro);
-    if (features.several) shade.emplace_back("CM_INSTANCES 1");
+    shade.push_back(macros::channels(1));
+    if (features.grid.several) shade.push_back(macros::instances(1));
   }
-  if (features.environment) shade.emplace_back(environment_macro);
-  if (features.equiangular) shade.emplace_back(equiangular_macro);
-  if (features.model_holdout) shade.emplace_back(holdout_macro);
-  Macros intersect{surfaces_macro};
+  if (features.environment) shade.push_back(macros::environment(1));
+  if (features.equiangular) shade.push_back(macros::equiangular(1));
+  if (features.model_holdout) shade.push_back(macros::holdout(1));
+  Macros intersect{macros::surfaces(1)};
   if (features.extended_bsdf) {
-    shade.emplace_back(extended_bsdf_macro);
-    intersect.emplace_back(extended_bsdf_macro);
+    shade.push_back(macros::extended_bsdf(1));
+    intersect.push_back(macros::extended_bsdf(1));
   }
-  Macros camera{surfaces_macro, "CM_DENSE 0"};
+  Macros camera{macros::surfaces(1), macros::dense(0)};
   if (features.motion) {
-    for (Macros* macros : {&shade, &intersect, &camera}) macros->emplace_back("CM_MOTION 1");
+    for (Macros* stage : {&shade, &intersect, &camera}) stage->push_back(macros::motion(1));
   }
-  if (features.separate_volume_aov) camera.emplace_back("CM_AOVS 1");
-  if (features.environment) camera.emplace_back(environment_macro);
-  for (Macros* macros : {&shade, &intersect, &camera}) add_groups(features, *macros);
+  if (features.separate_volume_aov) camera.push_back(macros::aovs(1));
+  if (features.environment) camera.push_back(macros::environment(1));
+  for (Macros* stage : {&shade, &intersect, &camera}) add_groups(features, *stage);
   Macros begin = camera;
-  begin[1] = "CM_DENSE 1";
+  begin[1] = macros::dense(1);
   return {{"trace_camera.comp", begin},
-          trace_key(features, data),
+          trace_key(features),
           {"trace_intersect.comp", intersect},
           {"trace_shade.comp", shade},
           {"trace_camera.comp", camera}};
@@ -146,23 +161,27 @@ gl::ProgramKey noise_key() { return {"noise.comp", {}}; }
 
 gl::ProgramKey inspect_key(const MarchData& data, const TraceInputs& trace_inputs) {
   Macros more;
-  if (trace_inputs.scene != nullptr) more.emplace_back(surfaces_macro);
-  return key("inspect.comp", data.defines(trace_inputs.instances != nullptr), more);
+  if (trace_inputs.scene != nullptr) more.push_back(macros::surfaces(1));
+  return key("inspect.comp", grid_of(data, trace_inputs), more);
 }
 
 gl::ProgramKey feature_buffers_key(const MarchData& data, const TraceInputs& trace_inputs, FeatureSet set, bool emits) {
   Macros more;
-  if (trace_inputs.scene != nullptr) more.emplace_back(surfaces_macro);
-  if (set == FeatureSet::all || emits) more.emplace_back(channels_macro);
-  if (set == FeatureSet::all) more.emplace_back("CM_VELOCITY 1");
-  return key("aovs.comp", data.defines(trace_inputs.instances != nullptr), more);
+  if (trace_inputs.scene != nullptr) more.push_back(macros::surfaces(1));
+  if (set == FeatureSet::all || emits) more.push_back(macros::channels(1));
+  if (set == FeatureSet::all) more.push_back(macros::velocity(1));
+  return key("aovs.comp", grid_of(data, trace_inputs), more);
 }
 
 gl::ProgramKey mattes_key(const MarchData& data, const TraceInputs& trace_inputs, bool motion) {
   Macros more;
-  if (trace_inputs.scene != nullptr) more.emplace_back(surfaces_macro);
-  const bool several = trace_inputs.instances != nullptr;
-  return key("cryptomatte.comp", data.defines(several, several && motion), more);
+  if (trace_inputs.scene != nullptr) more.push_back(macros::surfaces(1));
+  const GridFeatures grid = grid_of(data, trace_inputs);
+  return key("cryptomatte.comp", grid, more, grid.several && motion);
+}
+
+gl::ProgramKey transmittance_key(const MarchData& data, const TraceInputs& trace_inputs) {
+  return key("transmittance.comp", grid_of(data, trace_inputs), {});
 }
 
 }  // namespace cumulet::render

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "gl/programs.hpp"
 #include "render/feature_buffers.hpp"
 #include "render/picture_settings.hpp"
+#include "scene/march_source.hpp"
 
 namespace cumulet::render {
 
@@ -19,8 +23,23 @@ enum class PathTriangles {
   emitting  // NEE samples emissive triangles as well
 };
 
+/// The properties of volume data that decide which programs traverse it.
+struct GridFeatures {
+  scene::March march = scene::March::tet;
+  bool linear = false;    // cells are linear; else constant
+  std::size_t pages = 1;  // of cell records, as the programs have them: one, two or MarchData::max_pages
+  bool wide = false;      // cells have the wide format
+  bool several = false;   // several volumes
+};
+
+/// several: the volumes have an instance table (InstanceData).
+GridFeatures grid_features(const MarchData& data, bool several);
+/// Returns the macros that select this grid type in a shader. motion: something moves while the shutter is open.
+std::vector<std::string> grid_macros(const GridFeatures& grid, bool motion = false);
+
 /// The properties of a picture that decide which programs trace it.
 struct PathFeatures {
+  GridFeatures grid;
   View view = View::shaded;
   Layered layered = Layered::no;
   PathTriangles triangles = PathTriangles::none;
@@ -30,7 +49,6 @@ struct PathFeatures {
   bool environment = false;      // paths that escape hit an environment
   bool analytic_lights = false;  // there are lights to sample
   bool equiangular = false;      // NEE samples lights from points on the ray, too
-  bool several = false;          // several volumes
   bool extended_bsdf = false;    // materials need CM_EXTENDED_BSDF (extended material model)
   bool volume_holdout = false;
   bool model_holdout = false;
@@ -42,7 +60,7 @@ struct PathFeatures {
 };
 
 /// Returns the features of a picture with these settings.
-PathFeatures path_features(const PictureParameters& parameters, const TraceInputs& trace_inputs,
+PathFeatures path_features(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                            const PictureSettings& settings);
 
 /// Programs of the wavefront stages, as StagePrograms.
@@ -55,8 +73,8 @@ struct StageKeys {
 };
 
 /// Returns the megakernel, or the wavefront stage whose cost estimate covers all stages.
-gl::ProgramKey trace_key(const PathFeatures& features, const MarchData& data);
-StageKeys stage_keys(const PathFeatures& features, const MarchData& data);
+gl::ProgramKey trace_key(const PathFeatures& features);
+StageKeys stage_keys(const PathFeatures& features);
 /// Returns the kernel that measures the error of a tile whose samples are done.
 gl::ProgramKey noise_key();
 /// Returns inspect.comp: depth, picks and debug views.
@@ -65,5 +83,7 @@ gl::ProgramKey inspect_key(const MarchData& data, const TraceInputs& trace_input
 gl::ProgramKey feature_buffers_key(const MarchData& data, const TraceInputs& trace_inputs, FeatureSet set, bool emits);
 /// Returns cryptomatte.comp. motion: something moves while the shutter is open.
 gl::ProgramKey mattes_key(const MarchData& data, const TraceInputs& trace_inputs, bool motion);
+/// Returns transmittance.comp.
+gl::ProgramKey transmittance_key(const MarchData& data, const TraceInputs& trace_inputs);
 
 }  // namespace cumulet::render

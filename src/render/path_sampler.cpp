@@ -42,12 +42,13 @@ std::uint32_t PathSampler::max_lanes(const PathFeatures& features) const {
 }
 
 void PathSampler::reserve(const PathFeatures& features, std::uint32_t lanes) {
-  if (!kernels_.reserve(lanes, features.has_stages(), features.several, features.extended_bsdf, features.light_groups))
+  if (!kernels_.reserve(lanes, features.has_stages(), features.grid.several, features.extended_bsdf,
+                        features.light_groups))
     paths_of_.reset();
 }
 
-StagePrograms PathSampler::stage_programs(const PathFeatures& features, const MarchData& data) {
-  StageKeys keys = stage_keys(features, data);
+StagePrograms PathSampler::stage_programs(const PathFeatures& features) {
+  StageKeys keys = stage_keys(features);
   StagePrograms programs;
   programs.begin = programs_.get(std::move(keys.begin)).object;
   programs.travel = programs_.get(std::move(keys.travel)).object;
@@ -57,11 +58,11 @@ StagePrograms PathSampler::stage_programs(const PathFeatures& features, const Ma
   return programs;
 }
 
-void PathSampler::find_programs(const PathFeatures& features, const MarchData& data, bool measures) {
+void PathSampler::find_programs(const PathFeatures& features, bool measures) {
   if (features.has_stages()) {
-    stage_programs(features, data);
+    stage_programs(features);
   } else {
-    programs_.get(trace_key(features, data));
+    programs_.get(trace_key(features));
   }
   if (measures) programs_.get(noise_key());
 }
@@ -80,7 +81,7 @@ bool PathSampler::accumulate(Picture& picture, const MarchData& data, const Trac
   const PathFeatures& features = picture.features();
   Accumulation& accumulation = picture.accumulation();
   const InFlightDispatches& in_flight = dispatches_.in_flight();
-  Kernels kernels{programs_.get(trace_key(features, data)), std::nullopt};
+  Kernels kernels{programs_.get(trace_key(features)), std::nullopt};
   dispatches_.order();
   dispatches_.use(*kernels.program.object, data, trace_inputs);
   if (features.layered != Layered::no) {
@@ -89,7 +90,7 @@ bool PathSampler::accumulate(Picture& picture, const MarchData& data, const Trac
   }
   kernels_.bind();
   bind_samples(*gl_, picture);
-  if (features.has_stages()) kernels.stages = stage_programs(features, data);
+  if (features.has_stages()) kernels.stages = stage_programs(features);
   until_complete = until_complete && !accumulation.complete();
   // Blocks whose paths were overwritten by another picture's start again.
   const auto begun = [](const Block& block) { return !block.begins; };

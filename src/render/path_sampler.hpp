@@ -24,7 +24,7 @@ class PathSampler {
   /// Allocates buffers for this many paths. Throws on a GL error.
   void reserve(const PathFeatures& features, std::uint32_t lanes);
   /// Looks up all programs that a picture is sampled with. measures: it has a noise target.
-  void find_programs(const PathFeatures& features, const MarchData& data, bool measures);
+  void find_programs(const PathFeatures& features, bool measures);
   /// Samples until about the deadline, and may return with dispatches in flight. Parameters are those of
   /// Tracer::trace(). Returns whether the picture is done.
   bool trace(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
@@ -37,7 +37,7 @@ class PathSampler {
     const TraceProgram& program;
     std::optional<StagePrograms> stages;
   };
-  StagePrograms stage_programs(const PathFeatures& features, const MarchData& data);
+  StagePrograms stage_programs(const PathFeatures& features);
   bool accumulate(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                   bool until_complete);
   // Sends one dispatch: samples, or a measurement of the error. Returns false if nothing can be sent. aim_ms: the

@@ -17,23 +17,31 @@ enum class Layered {
   beneath,  // they end at it; the compositor draws it beneath the picture
 };
 
-struct PictureSettings {
+/// Settings of the host for samples. They are passed on as a whole, from the C API to PathFeatures.
+struct PictureOptions {
   View view = View::shaded;
-  /// The first pass leaves the last few pixels of a tile, those with the longest paths, to the second.
-  bool previews_first = false;
+  /// Coarse pictures come first. The first pass of a picture leaves the last few pixels of a tile, those with the
+  /// longest paths, to the second.
+  bool preview = true;
+  /// Samples that hit the volume before any surface are also summed separately, at full resolution.
+  bool separate_volume_aov = false;
+  /// Number of light groups with separate sums, at full resolution; 0: none.
+  std::uint32_t light_groups = 0;
+  /// If there is a noise target, pixels are sampled only as much as it needs (Allotment); else all equally.
+  bool adaptive = false;
+  /// Render region. Tiles and noise cover only its pixels.
+  Region region{};
+  bool operator==(const PictureOptions&) const = default;
+};
+
+struct PictureSettings {
+  PictureOptions options;
   Layered layered = Layered::no;
   glm::uvec2 layer_size{0U};
   unsigned layers = 1;
-  /// Samples that hit the volume before any surface are also summed separately.
-  bool separate_volume_aov = false;
   /// The picture is done once its noise (Totals::noise) reaches this; nullopt: once it has its samples.
   std::optional<double> noise_target;
-  /// Pixels are sampled only as much as the noise target needs (Allotment); else all equally.
-  bool adaptive = false;
-  /// Number of light groups with separate sums; 0: none.
-  std::uint32_t light_groups = 0;
-  /// Render region, and a margin of pixels around it. Tiles and noise cover only these pixels.
-  Region region;
+  /// Margin of pixels around the render region, which are sampled as well.
   unsigned margin = 0;
 };
 

@@ -54,17 +54,14 @@ bool PictureRequest::Content::shows_same(const Content& other) const {
   seen.host_depth = host_depth;
   seen.programs = programs;
   seen.size = size;
-  seen.region = region;
-  seen.preview = preview;
-  seen.separate_volume_aov = separate_volume_aov;
-  seen.light_groups = light_groups;
+  seen.options = options;
+  seen.options.view = other.options.view;
   seen.stops_by_noise = stops_by_noise;
-  seen.adaptive = adaptive;
   return seen == *this;
 }
 
 std::uint32_t Progressive::enough(std::uint32_t divisor) const {
-  const std::uint32_t wanted = request_.content.view == View::shaded ? request_.samples : 1;
+  const std::uint32_t wanted = request_.content.options.view == View::shaded ? request_.samples : 1;
   if (divisor <= finest_) return wanted;
   // A quarter of the work of one sample per pixel at full resolution.
   const std::uint32_t affordable = divisor / finest_ * (divisor / finest_) / 4;
@@ -76,11 +73,11 @@ glm::uvec2 Progressive::size_of(std::uint32_t divisor) const {
 }
 
 double Progressive::pixels_of(std::uint32_t divisor) const {
-  return static_cast<double>(request_.content.region.pixels(size_of(divisor), margin_of(divisor)).area());
+  return static_cast<double>(request_.content.options.region.pixels(size_of(divisor), margin_of(divisor)).area());
 }
 
 unsigned Progressive::margin_of(std::uint32_t divisor) const {
-  return divisor > 1 && !request_.content.region.is_whole() ? 1 : 0;
+  return divisor > 1 && !request_.content.options.region.is_whole() ? 1 : 0;
 }
 
 bool Progressive::is_enough() const {
@@ -90,7 +87,7 @@ bool Progressive::is_enough() const {
 }
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
-  if (!request_.content.preview) return 1;
+  if (!request_.content.options.preview) return 1;
   const double pixels = pixels_of(1);
   std::uint32_t divisor = finest_;
   while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > answer_frames * answer_rate_ * budget_ms)
@@ -132,14 +129,14 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const TraceInputs& 
     const double layer_bytes = (trace_inputs.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
     settings.layers = static_cast<unsigned>(std::clamp(max_layer_bytes / layer_bytes, 1.0, 8.0));
   }
-  settings.view = request_.content.view;
-  settings.previews_first = request_.content.preview;
-  settings.region = request_.content.region;
+  settings.options = request_.content.options;
   settings.margin = margin_of(divisor);
-  settings.separate_volume_aov = request_.content.separate_volume_aov && divisor == finest_;
-  if (divisor == finest_) settings.light_groups = request_.content.light_groups;
-  if (divisor == finest_) settings.noise_target = request_.noise_target;
-  settings.adaptive = request_.content.adaptive;
+  if (divisor == finest_) {
+    settings.noise_target = request_.noise_target;
+  } else {
+    settings.options.separate_volume_aov = false;
+    settings.options.light_groups = 0;
+  }
   return settings;
 }
 
@@ -157,14 +154,14 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Trac
   PictureParameters parameters = request_.parameters;
   parameters.view.size = size_of(divisor);
   // Without previews the read-back result must depend only on the settings.
-  if (request_.guides && request_.content.preview) parameters.integrator.seed = seed_of(parameters);
+  if (request_.guides && request_.content.options.preview) parameters.integrator.seed = seed_of(parameters);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
   try {
     tracer_.begin(picture, data, parameters, enough(divisor), trace_inputs, settings);
   } catch (const Error& error) {
     const bool memory =
-        error.code() == ErrorCode::out_of_memory && request_.content.preview && divisor < coarsest_divisor;
+        error.code() == ErrorCode::out_of_memory && request_.content.options.preview && divisor < coarsest_divisor;
     if (memory) {
       finest_ = divisor * 2;
     } else {
@@ -199,7 +196,7 @@ std::uint32_t Progressive::guide_rays(const Work& work) const {
 }
 
 bool Progressive::needs_guides(const Work& work) const {
-  return request_.guides && request_.content.view == View::shaded && work.data == request_.content.data &&
+  return request_.guides && request_.content.options.view == View::shaded && work.data == request_.content.data &&
          work.instances == request_.content.instances && no_guides_for_ != work.picture->size() &&
          (!work.picture->has_features() || work.picture->rays_of_features() < guide_rays(work));
 }
@@ -231,16 +228,16 @@ void Progressive::take(const PictureRequest& request, const TraceInputs& trace_i
     // environment that does not exist any more.
     const bool other_scene = working_ && (traced_scene(trace_inputs) != working_->scene ||
                                           request.content.environment != working_->environment);
-    if (other_data || request.content.preview != last.preview || other_scene) {
+    if (other_data || request.content.options.preview != last.options.preview || other_scene) {
       working_.reset();
     }
-    schedule_.change(working_ && request.content.preview);
+    schedule_.change(working_ && request.content.options.preview);
   } else if (working_ && working_->divisor == finest_) {
     const std::optional<double> stops_at = working_->picture->noise_target();
     const bool fewer = request.samples < working_->picture->target_samples() ||
                        (stops_at && request.noise_target && *request.noise_target > *stops_at) ||
                        (working_->picture->is_adaptive() && request.noise_target != stops_at);
-    if (!request.content.preview && fewer) {
+    if (!request.content.options.preview && fewer) {
       schedule_.drop();
     } else {
       working_->picture->extend(request.samples, request.noise_target);
@@ -301,7 +298,7 @@ void Progressive::work(const MarchData& data, const TraceInputs& trace_inputs, D
   trace_seconds_ += seconds;
   if (!was_complete) answer_seconds_ += seconds;
   if (picture.complete()) {
-    if (!was_complete && request_.content.view == View::shaded) {
+    if (!was_complete && request_.content.options.view == View::shaded) {
       const auto pixels = static_cast<double>(picture.box().area());
       answer_rate_ += 0.3 * (pixels / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
     }
@@ -364,7 +361,8 @@ void Progressive::settle() {
 }
 
 Picture& Progressive::accumulating() {
-  if (!working_ || request_.content.preview || working_->divisor != 1 || working_->picture->view() != View::shaded) {
+  if (!working_ || request_.content.options.preview || working_->divisor != 1 ||
+      working_->picture->view() != View::shaded) {
     throw Error(ErrorCode::invalid_argument,
                 "no shaded render without previews is in progress: set CUMULET_PREVIEW_OFF and call cumulet_render");
   }

@@ -37,15 +37,9 @@ struct PictureRequest {
     Revision<gl::Programs> programs;
     core::CmIntegrator integrator{};
     glm::uvec2 size{0U};  // at full resolution
-    Region region;        // render region
-    View view = View::shaded;
+    PictureOptions options;
     bool surfaces_traced = true;  // paths hit triangles
-    bool preview = true;          // coarse pictures first; else only at full resolution
-    bool separate_volume_aov =
-        false;                       // at full resolution, samples that hit the volume first are also summed separately
-    std::uint32_t light_groups = 0;  // at full resolution, number of light groups with separate sums
-    bool stops_by_noise = false;     // there is a noise target
-    bool adaptive = false;           // adaptive sampling
+    bool stops_by_noise = false;  // there is a noise target
     bool operator==(const Content&) const = default;
     /// True if only the view, the host's depth or the settings of rendering differ.
     [[nodiscard]] bool shows_same(const Content& other) const;
@@ -116,7 +110,7 @@ class Progressive {
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
   /// True if coarse pictures may come first, so that the result may depend on earlier pictures.
-  [[nodiscard]] bool previews() const { return request_.content.preview; }
+  [[nodiscard]] bool previews() const { return request_.content.options.preview; }
   [[nodiscard]] bool converged() const;
   /// True if no picture of the request has been shown yet, but one will be.
   [[nodiscard]] bool has_pending_picture() const;
@@ -152,7 +146,7 @@ class Progressive {
     std::uint64_t scenes = 0;   // number of its scene
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
-    return request_.content.preview || !working_ ? shown_ : working_;
+    return request_.content.options.preview || !working_ ? shown_ : working_;
   }
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
   [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const TraceInputs& trace_inputs, double budget_ms,

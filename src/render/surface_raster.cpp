@@ -13,6 +13,7 @@
 #include "gl/bindings.hpp"
 #include "light/analytic_lights.hpp"
 #include "scene/model_table.hpp"
+#include "shader_macros.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -213,8 +214,7 @@ class RasterContent::Planner {
   // clearcoat.
   static gl::ProgramKey key_of(const scene::RasterSource::Material& material) {
     return {"surface.frag",
-            {"CM_ALPHA " + std::to_string(static_cast<int>(material.pass)),
-             "CM_USED " + std::to_string(material.used()), material.coated ? "CM_COATED 1" : "CM_COATED 0"},
+            {gl::macros::alpha(material.pass), gl::macros::used(material.used()), gl::macros::coated(material.coated)},
             "surface.vert"};
   }
 

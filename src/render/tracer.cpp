@@ -8,7 +8,7 @@ namespace {
 
 // Returns the noise target of a picture with these settings. Debug views have none.
 std::optional<double> noise_target_of(const PictureSettings& settings) {
-  return settings.view == View::shaded ? settings.noise_target : std::nullopt;
+  return settings.options.view == View::shaded ? settings.noise_target : std::nullopt;
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ Tracer::Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
 void Tracer::find_programs(const PathFeatures& features, bool measures, const MarchData& data,
                            const TraceInputs& trace_inputs) {
   if (features.view == View::shaded) {
-    sampler_.find_programs(features, data, measures);
+    sampler_.find_programs(features, measures);
   } else {
     programs_.get(inspect_key(data, trace_inputs));
   }
@@ -33,7 +33,7 @@ void Tracer::find_programs(const PathFeatures& features, bool measures, const Ma
 
 bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const TraceInputs& trace_inputs,
                   const PictureSettings& settings) {
-  const PathFeatures features = path_features(parameters, trace_inputs, settings);
+  const PathFeatures features = path_features(data, parameters, trace_inputs, settings);
   const bool measures = noise_target_of(settings).has_value();
   return programs_.asked([&] { find_programs(features, measures, data, trace_inputs); });
 }
@@ -41,9 +41,10 @@ bool Tracer::able(const MarchData& data, const PictureParameters& parameters, co
 void Tracer::begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
                    const TraceInputs& trace_inputs, const PictureSettings& settings) {
   const glm::uvec2 size = parameters.view.size;
-  const bool shaded = settings.view == View::shaded;
+  const PictureOptions& options = settings.options;
+  const bool shaded = options.view == View::shaded;
   dispatches_.allocate();
-  picture.begin(size, settings.region, path_features(parameters, trace_inputs, settings));
+  picture.begin(size, options.region, path_features(data, parameters, trace_inputs, settings));
   const PathFeatures& features = picture.features();
   if (features.layered != Layered::no) {
     draw_layers(picture, trace_inputs, settings);
@@ -54,12 +55,12 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   if (features.light_groups == 0) picture.film().drop(film_layers::light_groups(0));
   for (const FilmLayer& layer : picture.accumulated_layers()) picture.film().make(gl_, layer);
   const std::optional<double> noise_target = noise_target_of(settings);
-  Accumulation accumulation({.box = settings.region.pixels(size, settings.margin),
+  Accumulation accumulation({.box = options.region.pixels(size, settings.margin),
                              .target_samples = samples,
                              .max_lanes = sampler_.max_lanes(features),
-                             .previews_first = settings.previews_first,
+                             .previews_first = options.preview,
                              .noise_target = noise_target,
-                             .adaptive = noise_target && settings.adaptive});
+                             .adaptive = noise_target && options.adaptive});
   if (shaded) sampler_.reserve(features, accumulation.lanes());
   find_programs(features, noise_target.has_value(), data, trace_inputs);
   core::CmParameters kernel = kernel_parameters(parameters, trace_inputs);
@@ -69,7 +70,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
     kernel.layers = {layers.layers, layers.blended ? 1U : 0U, layers.size,
                      features.layered == Layered::within ? 1U : 0U};
   }
-  if (!shaded) kernel.dispatch.view = static_cast<std::uint32_t>(settings.view);
+  if (!shaded) kernel.dispatch.view = static_cast<std::uint32_t>(options.view);
   picture.start(kernel, std::move(accumulation), dispatches_.next_revision());
   clear_samples(gl_, picture, shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0);
 }

@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
+#include "render/path_features.hpp"
 
 namespace cumulet::render {
 
@@ -169,7 +170,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
     if (request.size >> coarser_ > min_size) ++coarser_;
   }
   const TraceInputs inputs = scene.trace_inputs(snapshot, false);
-  const gl::Program& program = programs_->ask({"transmittance.comp", data->defines(inputs.instances != nullptr)});
+  const gl::Program& program = programs_->ask(transmittance_key(*data, inputs));
   if (!program.usable()) return;
   if (failed_ == of) return;
   if (!under_way_) {

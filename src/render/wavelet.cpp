@@ -5,6 +5,7 @@
 
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
+#include "shader_macros.hpp"
 
 namespace cumulet::render {
 
@@ -53,7 +54,7 @@ Motion motion(const PictureView& from, const PictureView& to) {
 double slots_of(glm::uvec2 size, std::uint32_t rows) { return double(rows) * size.x / lanes_per_slot; }
 
 gl::ProgramKey output_key(MeansBackground background) {
-  return {"wavelet_output.comp", {"CM_BACKGROUND " + std::to_string(static_cast<int>(background))}};
+  return {"wavelet_output.comp", {gl::macros::background(background)}};
 }
 
 }  // namespace
@@ -68,11 +69,11 @@ std::uint32_t Wavelet::levels() const {
 gl::ProgramKey Wavelet::key(Stage stage, const PictureTextures& picture) const {
   switch (stage) {
     case Stage::input:
-      return {"wavelet_input.comp", {(of_ ? holes_ : picture.holes) ? "CM_HOLES 1" : "CM_HOLES 0"}};
+      return {"wavelet_input.comp", {gl::macros::holes(of_ ? holes_ : picture.holes)}};
     case Stage::reproject:
       return {"wavelet_reproject.comp", {}};
     case Stage::merge:
-      return {"wavelet_merge.comp", {recalls_ ? "CM_HISTORY 1" : "CM_HISTORY 0"}};
+      return {"wavelet_merge.comp", {gl::macros::history(recalls_)}};
     case Stage::variance:
       return {"wavelet_variance.comp", {}};
     case Stage::level:
@@ -91,7 +92,7 @@ bool Wavelet::able(const PictureTextures& picture, MeansBackground background, b
   for (const Stage stage : {Stage::input, Stage::variance, Stage::level, Stage::blend}) ask(key(stage, picture));
   if (picture.view) {
     ask(key(Stage::reproject, picture));
-    for (const char* history : {"CM_HISTORY 0", "CM_HISTORY 1"}) ask({"wavelet_merge.comp", {history}});
+    for (const bool recalls : {false, true}) ask({"wavelet_merge.comp", {gl::macros::history(recalls)}});
   }
   ask(output_key(background));
   return usable;

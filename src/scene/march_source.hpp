@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "grid/channel_table.hpp"
 #include "grid/lattice.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
@@ -51,10 +52,14 @@ struct MarchSource {
   [[nodiscard]] bool goes_with(const MarchSource& other) const {
     return march == other.march && linear == other.linear;
   }
-  [[nodiscard]] bool emits() const { return channels.emission || (grid && !grid->emission.empty()); }
-  [[nodiscard]] bool colored() const { return channels.scattering || (grid && !grid->color.empty()); }
-  [[nodiscard]] bool anisotropic() const { return channels.forward || (grid && !grid->anisotropy.empty()); }
-  [[nodiscard]] bool moves() const { return channels.momentum || (grid && !grid->velocity.empty()); }
+  [[nodiscard]] bool has(grid::Channel channel) const {
+    const grid::ChannelRow& row = grid::row_of(channel);
+    return row.is_in(channels) || (grid && !row.records(*grid).empty());
+  }
+  [[nodiscard]] bool emits() const { return has(grid::Channel::emission); }
+  [[nodiscard]] bool colored() const { return has(grid::Channel::color); }
+  [[nodiscard]] bool anisotropic() const { return has(grid::Channel::anisotropy); }
+  [[nodiscard]] bool moves() const { return has(grid::Channel::velocity); }
   /// Whether the density changes while the shutter is open.
   [[nodiscard]] bool changes() const { return channels.ends || (grid && !grid->change.empty()); }
   /// Main memory in use, including voxels that may be shared with other owners.

@@ -6,6 +6,7 @@
 #include "base/library_thread.hpp"
 #include "base/murmur_hash.hpp"
 #include "render/mattes.hpp"
+#include "settings/aov_table.hpp"
 #include "settings/ramp.hpp"
 #include "viewer/c_lights.hpp"
 #include "viewer/c_ramp.hpp"
@@ -701,7 +702,7 @@ cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linea
 
 cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(number(aov) <= CUMULET_AOV_VOLUME_MOTION, "the AOV is unknown");
+    require(number(aov) < cumulet::settings::aovs.size(), "the AOV is unknown");
     require(values != nullptr, "values is NULL");
     v.read_aov(static_cast<core::Aov>(aov), values, count);
   });

@@ -9,15 +9,15 @@ namespace cumulet::viewer {
 
 namespace {
 
+bool emits(const Carried& carried) { return carried.channels[grid::index_of(grid::Channel::emission)]; }
+
 // Includes the cell's tree node and its entry in the emission table.
 std::uint64_t bytes_per_cell(const Carried& carried) {
   std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
-  using grid::Channel;
-  using render::channel_bytes;
-  if (carried.emission) bytes += channel_bytes(Channel::emission, 1) + sizeof(scene::GlowingCell);
-  if (carried.color) bytes += channel_bytes(Channel::color, 1);
-  if (carried.anisotropy) bytes += channel_bytes(Channel::anisotropy, 1);
-  if (carried.velocity) bytes += channel_bytes(Channel::velocity, 1);
+  for (const grid::ChannelRow& row : grid::channel_table) {
+    if (carried.channels[grid::index_of(row.channel)]) bytes += row.record_bytes;
+  }
+  if (emits(carried)) bytes += sizeof(scene::GlowingCell);
   if (carried.change) bytes += sizeof(glm::uvec2);
   return bytes;
 }
@@ -39,12 +39,17 @@ std::uint64_t fit_in_gl(const Carried& carried, const ResourceLimits& resource_l
 }  // namespace
 
 Carried Carried::of(const grid::Channels& channels) {
-  return {channels.emission != nullptr, channels.scattering != nullptr, channels.forward != nullptr,
-          channels.momentum != nullptr, channels.ends != nullptr};
+  Carried carried{.change = channels.ends != nullptr};
+  for (const grid::ChannelRow& row : grid::channel_table)
+    carried.channels[grid::index_of(row.channel)] = row.is_in(channels);
+  return carried;
 }
 
 Carried Carried::of(const scene::MarchSource& source) {
-  return {source.emits(), source.colored(), source.anisotropic(), source.moves(), source.changes()};
+  Carried carried{.change = source.changes()};
+  for (const grid::ChannelRow& row : grid::channel_table)
+    carried.channels[grid::index_of(row.channel)] = source.has(row.channel);
+  return carried;
 }
 
 std::uint64_t cells_that_fit(std::uint64_t max_cells, const Carried& carried, std::uint64_t held,
@@ -59,7 +64,7 @@ std::optional<std::uint64_t> planned_cells_that_fit(std::uint64_t max_cells, con
   // heap pages.
   const std::uint64_t room = left_of(resource_limits.gl_bytes(), lattice.device_bytes() + tables);
   const std::uint64_t kept = 4 * bytes_per_cell(carried);
-  const std::uint64_t in_gl = std::min(room / (kept + render::building_bytes_per_cell(carried.emission)),
+  const std::uint64_t in_gl = std::min(room / (kept + render::building_bytes_per_cell(emits(carried))),
                                        left_of(room, render::building_bytes_at_least()) / kept);
   // With a small lattice the result is at least two fifths of the CPU limit.
   if (in_gl < std::min(max_cells, fit_in_gl(carried, resource_limits) / 4)) return std::nullopt;

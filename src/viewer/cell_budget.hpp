@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
+#include "grid/channel_table.hpp"
 #include "grid/lattice.hpp"
 #include "scene/channels.hpp"
 #include "scene/march_source.hpp"
@@ -16,10 +18,7 @@ inline constexpr std::uint64_t fewest_cells = 24;
 
 /// Channels that cells store beside density.
 struct Carried {
-  bool emission = false;
-  bool color = false;
-  bool anisotropy = false;
-  bool velocity = false;
+  std::array<bool, grid::channel_table.size()> channels{};
   bool change = false;
 
   static Carried of(const grid::Channels& channels);

@@ -60,7 +60,7 @@ void Context::upload(const Shot& shot, const UploadLimits& limits, render::Deadl
   // In-flight dispatches of another context of the share group may read memory that is about to be written.
   progressive_.tracer().order();
   if (scene_.data() != nullptr && shot.scene->volumes.empty()) progressive_.reset();
-  const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
+  const bool raster = shot.sampling.options.preview || shot.surfaces.light == SurfaceLight::none;
   const std::uint64_t others = bytes() - scene_.data_bytes() - scene_.other_bytes();
   const std::uint64_t room = limits.max_bytes - std::min(limits.max_bytes, others);
   const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, limits.page_texels, room}, deadline); };
@@ -151,16 +151,12 @@ render::PictureRequest Context::request(const Shot& shot, const Frame& frame, co
   request.content.programs = programs_->revision();
   request.content.integrator = request.parameters.integrator;
   request.content.size = shot.size;
-  request.content.region = shot.sampling.region;
-  request.content.view = shot.sampling.view;
   request.content.surfaces_traced = inputs.traced;
-  request.content.preview = shot.sampling.preview;
-  request.content.separate_volume_aov = shot.sampling.separate_volume_aov;
-  request.content.light_groups = shot.sampling.light_groups;
+  request.content.options = shot.sampling.options;
   request.samples = std::max(1U, shot.sampling.samples);
   request.noise_target = shot.sampling.noise_target;
   request.content.stops_by_noise = shot.sampling.noise_target.has_value();
-  request.content.adaptive = request.content.stops_by_noise && shot.sampling.adaptive;
+  if (!request.content.stops_by_noise) request.content.options.adaptive = false;
   request.depth = frame.write_depth;
   request.guides = shot.display.denoise;
   request.held = shot.held;
@@ -316,7 +312,7 @@ render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const 
   render::FrameTarget target;
   target.framebuffer = frame.framebuffer;
   target.viewport = frame.viewport;
-  target.region = &shown == progressive_.shown() ? shown.region() : shot.sampling.region;
+  target.region = &shown == progressive_.shown() ? shown.region() : shot.sampling.options.region;
   target.flip_y = frame.flip_y;
   target.blend_over = frame.blend_over;
   if (frame.target == Target::framebuffer) {

@@ -8,6 +8,7 @@
 
 #include "gl/api.hpp"
 #include "render/display.hpp"
+#include "render/feature_buffers.hpp"
 #include "render/host_depth.hpp"
 
 namespace cumulet::viewer {
@@ -102,19 +103,6 @@ struct MatteObject {
 /// Returns the object's matte ID; 0: it is in no matte.
 using MatteIdOf = std::function<std::uint32_t(const MatteObject&)>;
 
-/// cumulet_aov.
-enum class Aov {
-  beauty = 0,
-  volume = 1,
-  transmittance = 2,
-  surface_depth = 3,
-  volume_depth = 4,
-  normal = 5,
-  albedo = 6,
-  error = 7,
-  velocity = 8,
-  motion = 9,
-  volume_motion = 10
-};
+using render::Aov;
 
 }  // namespace cumulet::viewer

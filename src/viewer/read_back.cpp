@@ -13,6 +13,7 @@
 #include "render/checkpoint.hpp"
 #include "render/denoised.hpp"
 #include "render/wavelet.hpp"
+#include "settings/aov_table.hpp"
 #include "viewer/context.hpp"
 
 namespace cumulet::viewer {
@@ -28,32 +29,10 @@ bool is_traced(const render::Picture& picture) {
   return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath;
 }
 
-std::optional<render::FeatureBuffer> feature_of(Aov aov) {
-  using render::FeatureBuffer;
-  switch (aov) {
-    case Aov::transmittance:
-      return FeatureBuffer::transmittance;
-    case Aov::surface_depth:
-      return FeatureBuffer::surface_z;
-    case Aov::volume_depth:
-      return FeatureBuffer::volume_z;
-    case Aov::normal:
-      return FeatureBuffer::normal;
-    case Aov::albedo:
-      return FeatureBuffer::albedo;
-    case Aov::velocity:
-      return FeatureBuffer::velocity;
-    case Aov::motion:
-      return FeatureBuffer::motion;
-    case Aov::volume_motion:
-      return FeatureBuffer::volume_motion;
-    case Aov::beauty:
-    case Aov::volume:
-    case Aov::error:
-      break;
-  }
-  return std::nullopt;
-}
+// The table of the programs and that of the layers agree.
+static_assert(std::ranges::equal(
+    settings::aovs, render::aov_values, {}, [](const settings::Aov& aov) { return aov.channels.size(); },
+    &render::AovValues::count));
 
 // With few samples per pixel, more feature rays would take longer than more samples, for less benefit.
 std::uint32_t rays_to_denoise(const render::Picture& picture) {
@@ -205,16 +184,17 @@ void Context::require_present(bool also) const {
 }
 
 void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t count) {
-  using render::FeatureBuffer;
   render::Picture& picture = readable_shaded();
-  const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
-  const bool color = aov == Aov::beauty || aov == Aov::volume;
-  const std::optional<FeatureBuffer> feature = feature_of(aov);
-  const std::size_t floats = pixels * (color ? 4 : (feature ? render::channels_of(*feature) : 1));
+  const render::AovValues& values_of = render::aov_values.at(static_cast<std::size_t>(aov));
+  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * values_of.count;
   if (values == nullptr || count < floats) {
     throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
   }
-  if (aov == Aov::beauty) {
+  const render::FilmReader reader(functions_);
+  if (const render::FeatureBuffer* buffer = render::feature_buffer_of(values_of.layer)) {
+    find_features(shot, picture, buffer->set);
+    reader.read_feature(picture, values_of, values);
+  } else if (aov == Aov::beauty) {
     read_means(picture, false, values);
   } else if (aov == Aov::volume) {
     if (!picture.separate_volume_aov()) {
@@ -222,14 +202,9 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
                   "the volume AOV was not rendered: set cumulet_sampling_desc.separate_volume_aov and render at full "
                   "resolution");
     }
-    render::FilmReader(functions_).read_volume(picture, values);
-  } else if (aov == Aov::error) {
-    render::FilmReader(functions_).read_error(picture, values);
+    reader.read_volume(picture, values);
   } else {
-    const bool moves = feature == FeatureBuffer::velocity || feature == FeatureBuffer::motion ||
-                       feature == FeatureBuffer::volume_motion;
-    find_features(shot, picture, moves ? render::FeatureSet::all : render::FeatureSet::guides);
-    render::FilmReader(functions_).read_feature(picture, feature.value(), values);
+    reader.read_error(picture, values);
   }
 }
 

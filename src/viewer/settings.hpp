@@ -150,25 +150,23 @@ struct SurfaceSettings {
 struct Sampling {
   std::uint32_t samples = 256;
   std::uint32_t seed = 0;
-  render::View view = render::View::shaded;
-  bool preview = true;
-  bool separate_volume_aov = false;
+  render::PictureOptions options{};
   std::optional<double> noise_target = std::nullopt;  ///< relative
   std::uint32_t first_sample = 0;
-  render::Region region = {};
-  std::uint32_t light_groups = 0;
   double shutter_seconds = 0.0;
-  bool adaptive = false;
 
   static Sampling of(const cumulet_sampling_desc& d) {
-    Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
-                      d.separate_volume_aov == 1};
+    Sampling sampling{d.samples,
+                      d.seed,
+                      {.view = static_cast<render::View>(d.view),
+                       .preview = d.preview == CUMULET_PREVIEW_AUTO,
+                       .separate_volume_aov = d.separate_volume_aov == 1,
+                       .light_groups = d.light_groups,
+                       .adaptive = d.adaptive == 1,
+                       .region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}}}};
     if (d.noise_target_percent > 0.0F) sampling.noise_target = 0.01 * double(d.noise_target_percent);
     sampling.first_sample = d.first_sample;
-    sampling.region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}};
-    sampling.light_groups = d.light_groups;
     sampling.shutter_seconds = d.shutter_seconds;
-    sampling.adaptive = d.adaptive == 1;
     return sampling;
   }
 };

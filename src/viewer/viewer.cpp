@@ -208,7 +208,7 @@ void Viewer::sync() {
 void Viewer::follow_proxy() {
   // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
   // read-back must only contain the requested volume.
-  if (auto made = jobs_.builder.take_proxy(); made && sampling_.preview && !followed_ && !watched_) {
+  if (auto made = jobs_.builder.take_proxy(); made && sampling_.options.preview && !followed_ && !watched_) {
     proxy_ = std::move(made);
     show_medium();
   }
@@ -302,7 +302,7 @@ Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder, 
 }
 
 bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
-  if (!sampling_.preview || !taken) return true;
+  if (!sampling_.options.preview || !taken) return true;
   if (gl_) return is_rendered && !gl_->has_pending_frame(*taken);
   return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
 }
@@ -522,7 +522,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
   drop_proxy();
-  jobs_.builder.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
+  jobs_.builder.load(file, settings_at_once(), sampling_.options.preview ? std::optional(grid_.build) : std::nullopt);
   // A sequence or a dynamic volume is shown until the new volume is ready.
   if (followed_ || watched_) {
     suggested_density_scale_ = suggested;
@@ -1325,7 +1325,7 @@ void Viewer::set_sampling(const Sampling& sampling) {
   sync();
   const bool other_shutter = sampling_.shutter_seconds != sampling.shutter_seconds;
   sampling_ = sampling;
-  if (!sampling_.preview) drop_proxy();
+  if (!sampling_.options.preview) drop_proxy();
   if (other_shutter) {
     poses_due_ = true;
     const bool loads = jobs_.surfaces.configure_load(while_open(surface_settings_.choice, nullptr));

@@ -147,7 +147,7 @@ void Viewer::prepare(const Frame& frame) {
   const bool another_comes = jobs_.builder.loads();
   const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
   if ((shown_info() || others || watches) && built_for_another() && !waits) {
-    const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
+    const bool rests = !sampling_.options.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
     // GPU builds follow a moving camera, one grid after another, each of which is displayed.
     const bool follows =
         volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
@@ -231,7 +231,7 @@ bool Viewer::something_waits() const {
 void Viewer::remark_on_samples(Context& g) {
   const render::Picture* picture = g.progressive().newest();
   const std::uint64_t count = picture != nullptr ? picture->samples_not_finite() : 0;
-  if (count == 0 || (remarked_picture_ && (sampling_.preview || remarked_picture_ == picture->begun()))) return;
+  if (count == 0 || (remarked_picture_ && (sampling_.options.preview || remarked_picture_ == picture->begun()))) return;
   remarked_picture_ = picture->begun();
   log_.warning("the radiance of " + std::to_string(count) +
                " samples was not finite; they are black (see nonfinite_samples in the statistics)");

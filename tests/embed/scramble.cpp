@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "settings/aov_table.hpp"
 #include "support/c_host.hpp"
 #include "support/gl_state.hpp"
 #include "support/gltf_seeds.hpp"
@@ -235,9 +236,9 @@ TEST_P(StateScramble, EveryCallWithSurfacesRestoresTheState) {
       render(name + " view " + std::to_string(view), target.frame());
     }
     converge(v, target.frame());
-    for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VOLUME_MOTION; ++aov) {
-      expect_kept(host, ++seed, name + " aov " + std::to_string(aov),
-                  [&] { return cumulet_read_aov(v, static_cast<cumulet_aov>(aov), rgba.data(), rgba.size()); });
+    for (const cumulet::settings::Aov& aov : cumulet::settings::aovs) {
+      expect_kept(host, ++seed, name + " aov " + std::to_string(aov.value),
+                  [&] { return cumulet_read_aov(v, aov.value, rgba.data(), rgba.size()); });
     }
     expect_kept(host, ++seed, "pick_at", [&] { return cumulet_pick_at(v, side / 2.0, side / 2.0, &pick); });
     expect_kept(host, ++seed, "read_linear", [&] { return cumulet_read_linear(v, rgba.data(), rgba.size()); });

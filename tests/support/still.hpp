@@ -47,7 +47,7 @@ class Still {
   void set_camera(const viewer::CameraPose& pose) { viewer_->camera()->set(pose); }
   void set_image(const Image& image) {
     image_ = image;
-    viewer::Sampling sampling{image.samples, image.seed, image.view, false};
+    viewer::Sampling sampling{image.samples, image.seed, {image.view, false}};
     sampling.shutter_seconds = image.shutter_seconds;
     viewer_->set_sampling(sampling);
   }

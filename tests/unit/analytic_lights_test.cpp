@@ -252,7 +252,7 @@ TEST_P(AnalyticLights, ModelLightsLightTheVolumeInPreviews) {
   faint.sky_radiance = vec3(1e-6F);
   still_->set_light(faint);
   still_->build();
-  still_->viewer().set_sampling({256, 1, render::View::shaded, true});
+  still_->viewer().set_sampling({256, 1, {render::View::shaded, true}});
   viewer::Frame frame;
   frame.target = viewer::Target::none;
   frame.size = {160, 160};

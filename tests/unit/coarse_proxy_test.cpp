@@ -276,7 +276,7 @@ class CoarseProxyDisplay : public test::BackendTest {
     grid->tree().setValueOn(openvdb::Coord(20, 20, 20), -1.0F);
     write(path_.path() / "large.vdb", {grid});
   }
-  void set_sampling(bool preview) { viewer_->set_sampling({16, 0, render::View::shaded, preview}); }
+  void set_sampling(bool preview) { viewer_->set_sampling({16, 0, {render::View::shaded, preview}}); }
   void load(std::uint64_t min_bricks = 1) {
     viewer_->load_volume({.path = (path_ / "large.vdb").string(), .grids = {}, .min_proxy_bricks = min_bricks});
   }

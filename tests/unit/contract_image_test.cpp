@@ -4,12 +4,14 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "cumulet/cumulet.hpp"
+#include "settings/aov_table.hpp"
 #include "support/c_host.hpp"
 #include "support/contract.hpp"
 
@@ -130,10 +132,13 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   sampling.separate_volume_aov = 1;
   ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
   picture_of(v_, volume_.get(), target_);
-  for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VOLUME_MOTION; ++aov) {
-    EXPECT_EQ(cumulet_read_aov(v_, static_cast<cumulet_aov>(aov), values.data(), values.size()), CUMULET_OK) << aov;
+  for (const cumulet::settings::Aov& aov : cumulet::settings::aovs) {
+    const std::size_t floats = aov.channels.size() * side * side;
+    EXPECT_EQ(cumulet_read_aov(v_, aov.value, values.data(), floats), CUMULET_OK) << aov.name;
+    EXPECT_EQ(cumulet_read_aov(v_, aov.value, values.data(), floats - 1), CUMULET_ERROR_INVALID_ARGUMENT) << aov.name;
   }
-  EXPECT_EQ(cumulet_read_aov(v_, std::bit_cast<cumulet_aov>(11), values.data(), values.size()),
+  const auto unknown = static_cast<std::uint32_t>(cumulet::settings::aovs.size());
+  EXPECT_EQ(cumulet_read_aov(v_, std::bit_cast<cumulet_aov>(unknown), values.data(), values.size()),
             CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, nullptr, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, values.data(), 3), CUMULET_ERROR_INVALID_ARGUMENT);

@@ -308,7 +308,7 @@ TEST_P(FarFromOrigin, LightThatIsNotFiniteIsBlackAndCounted) {
   viewer::CameraPose above = test::camera_at({0.0, 40.0, 0.0}, dvec3(0.0), 40.0);
   above.up = {0.0, 0.0, -1.0};
   viewer.camera()->set(above);
-  viewer.set_sampling({4, 1, render::View::shaded, false});
+  viewer.set_sampling({4, 1, {render::View::shaded, false}});
   viewer::Frame frame;
   frame.target = viewer::Target::none;
   frame.size = {edge, edge};

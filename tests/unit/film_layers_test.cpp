@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
+#include "render/feature_buffers.hpp"
 #include "support/gl_state.hpp"
 
 namespace {

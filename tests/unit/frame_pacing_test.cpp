@@ -276,7 +276,7 @@ TEST_P(FrameBudget, DispatchDurationIsBoundedForCloudsNextToSky) {
   std::vector<render::DispatchRecord> log;
   viewer().wait(-1.0);
   // Sky tiles and passes come first. Their lanes end at once, so thousands of rounds take no time.
-  viewer().set_sampling({8, 1, render::View::shaded, false});
+  viewer().set_sampling({8, 1, {render::View::shaded, false}});
   viewer().set_dispatch_log(&log);
   viewer::FrameResult result;
   for (int i = 0; i < 4000 && !result.converged; ++i) result = viewer().render(frame(600, 96, 40.0));
@@ -296,9 +296,9 @@ TEST_P(FrameBudget, SmallBudgetsConvergeToTheSameImage) {
   viewer().wait(-1.0);
   std::vector<std::vector<float>> pictures;
   for (const double budget_ms : {1e6, 3.0}) {
-    viewer().set_sampling({2, 3, render::View::shaded, false});
+    viewer().set_sampling({2, 3, {render::View::shaded, false}});
     viewer().render(frame(16, 16, 1.0));  // another image between
-    viewer().set_sampling({1, 3, render::View::shaded, false});
+    viewer().set_sampling({1, 3, {render::View::shaded, false}});
     viewer::FrameResult result;
     double last = 0.0;
     for (int i = 0; i < 20000 && !result.converged; ++i) {
@@ -316,7 +316,7 @@ TEST_P(FrameBudget, SmallBudgetsConvergeToTheSameImage) {
 
 TEST_P(FrameBudget, CoarseImagesAreUsefulAndProgressCountsRequestedSamples) {
   viewer().wait(-1.0);
-  viewer().set_sampling({4, 3, render::View::shaded, true});
+  viewer().set_sampling({4, 3, {render::View::shaded, true}});
   const viewer::Frame f = frame(512, 256, 2.0);
   viewer::FrameResult result;
   // A drag, then rest.

@@ -13,6 +13,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
+#include "render/path_features.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_compute.hpp"
 #include "support/gl_state.hpp"
@@ -120,7 +121,8 @@ class GridSetUploads : public test::GlTest {
   // Reads the data with a compute shader that uses the library's accessors.
   Words read(const MarchData& data, const core::CmGrid& grid, std::size_t kind, std::size_t count) {
     std::string text = "#version 450\nlayout(local_size_x = 64) in;\n#define CM_CHANNELS 1\n#define CM_VELOCITY 1\n";
-    for (const std::string& define : data.defines(false)) text += "#define " + define + "\n";
+    for (const std::string& define : render::grid_macros(render::grid_features(data, false)))
+      text += "#define " + define + "\n";
     for (const char* file : {"shared.glsl", "bindings.glsl", "parameters.glsl", "cell.glsl", "buffers.glsl"})
       text += test::glsl_file(file);
     const std::array<const char*, kinds.size()> values{
@@ -190,7 +192,7 @@ constexpr std::int64_t one_page = 0;
 constexpr std::int64_t three_pages = 2048;  // of 1024 cells
 constexpr std::int64_t six_pages = 1024;
 
-std::string pages_of(const MarchData& data) { return data.defines(false).at(2); }
+std::string pages_of(const MarchData& data) { return render::grid_macros(render::grid_features(data, false)).at(2); }
 
 TEST_P(GridSetUploads, ShadersReadEachGrid) {
   for (const auto& [texels, pages] :

@@ -112,7 +112,7 @@ class NoiseTarget : public Noise {
   static viewer::Sampling sampling(std::optional<double> noise_target, std::uint32_t samples = most) {
     viewer::Sampling sampling;
     sampling.samples = samples;
-    sampling.preview = false;
+    sampling.options.preview = false;
     sampling.noise_target = noise_target;
     return sampling;
   }
@@ -207,7 +207,7 @@ TEST_P(NoiseTarget, LowerTargetContinuesAndHigherTargetRestarts) {
   EXPECT_EQ(end(sampling(0.03)), fine);
   // With previews on, existing samples are kept, and they reach the target.
   viewer::Sampling kept = sampling(0.03);
-  kept.preview = true;
+  kept.options.preview = true;
   end(kept);
   kept.noise_target = 0.08;
   EXPECT_EQ(end(kept).samples, fine.samples);
@@ -219,7 +219,7 @@ class AdaptiveSampling : public NoiseTarget {
 
   static viewer::Sampling adaptive(double noise_target, std::uint32_t samples = most) {
     viewer::Sampling request = sampling(noise_target, samples);
-    request.adaptive = true;
+    request.options.adaptive = true;
     return request;
   }
   Ended end_small(const viewer::Sampling& request, double budget_ms = 1e9) { return end(request, budget_ms, size); }
@@ -303,7 +303,7 @@ TEST_P(AdaptiveSampling, WorksWithSeveralTilesAndRegions) {
   EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
   EXPECT_LT(ended.samples, 0.8 * end(sampling(target), 50.0, wide).samples);
   viewer::Sampling part = adaptive(target);
-  part.region = {{0.4F, 0.1F}, {0.5F, 0.8F}};
+  part.options.region = {{0.4F, 0.1F}, {0.5F, 0.8F}};
   end(part, 50.0, wide);
   EXPECT_LE(viewer().measure_noise().value(), target * 1.0001);
 }

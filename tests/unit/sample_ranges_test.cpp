@@ -25,7 +25,7 @@ class SampleRanges : public test::StillCloudTest {
     viewer::Sampling sampling;
     sampling.samples = samples;
     sampling.first_sample = first;
-    sampling.preview = false;
+    sampling.options.preview = false;
     viewer().set_sampling(sampling);
     viewer().wait(-1.0);
     while (!viewer().render(frame(side, side, 1e9)).converged) {
@@ -75,8 +75,8 @@ class ResumedRendering : public SampleRanges {
     viewer::Sampling sampling;
     sampling.samples = samples;
     sampling.seed = 3;
-    sampling.preview = false;
-    sampling.separate_volume_aov = true;
+    sampling.options.preview = false;
+    sampling.options.separate_volume_aov = true;
     sampling.noise_target = noise_target;
     return sampling;
   }
@@ -197,7 +197,7 @@ TEST_P(ResumedRendering, StateOfAnotherImageIsRejected) {
   const Ended whole = end({side, side});
   EXPECT_EQ(whole.samples, 8.0);
   viewer::Sampling previews = sampling(8);
-  previews.preview = true;
+  previews.options.preview = true;
   viewer().set_sampling(previews);
   end({side, side});
   EXPECT_THROW(static_cast<void>(viewer().accumulation_bytes()), Error);

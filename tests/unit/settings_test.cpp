@@ -14,9 +14,11 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "options.hpp"
+#include "settings/aov_table.hpp"
 #include "viewer/c_fields.hpp"
 
 namespace {
@@ -212,6 +214,28 @@ TEST(Settings, DocumentationListsExactlyTheKeys) {
   });
   for (const settings::RampInfo& ramp : settings::ramps) keys.insert(ramp.key);
   EXPECT_EQ(told, keys);
+}
+
+TEST(Aovs, HeaderAndDocumentationListExactlyTheTable) {
+  std::size_t constants = 0;
+  std::ifstream header(CUMULET_DOCS "/../src/include/cumulet/cumulet.h");
+  ASSERT_TRUE(header.is_open());
+  for (std::string line; std::getline(header, line);) {
+    const std::string_view text = std::string_view(line).substr(std::min(line.find_first_not_of(' '), line.size()));
+    constants += text.starts_with("CUMULET_AOV_") ? 1 : 0;
+  }
+  EXPECT_EQ(constants, settings::aovs.size());
+  std::ifstream page(CUMULET_DOCS "/aovs.md");
+  ASSERT_TRUE(page.is_open());
+  std::set<std::string> told;
+  for (std::string line; std::getline(page, line) && !line.starts_with("## ");) {
+    if (line.starts_with("| `")) told.insert(line.substr(3, line.find('`', 3) - 3));
+  }
+  for (const std::string_view name : {"denoised", "Combined_NAME", "CryptoObject00"})
+    EXPECT_EQ(told.erase(std::string(name)), 1U) << name;
+  std::set<std::string> names;
+  for (const settings::Aov& aov : settings::named_aovs) names.emplace(aov.name);
+  EXPECT_EQ(told, names);
 }
 
 TEST(Settings, EachSettingHasAFlag) {

@@ -85,7 +85,7 @@ class SurfacesInVolumes : public test::ViewerTest {
   /// As render(), with the volume accumulated separately for its AOV.
   void trace_for_aovs(std::uint32_t samples) const {
     viewer_->set_image({side, side, samples, 1, render::View::shaded});
-    viewer_->viewer().set_sampling({samples, 1, render::View::shaded, false, true});
+    viewer_->viewer().set_sampling({samples, 1, {render::View::shaded, false, true}});
     viewer_->build();
     while (!viewer_->render(1e9)) {
     }

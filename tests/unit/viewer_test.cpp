@@ -64,10 +64,10 @@ TEST_P(ViewerFrames, PreviewsConvergeToTheImageWithoutPreviews) {
   show_noise();
   // One tile, and several.
   for (const glm::uvec2 size : {glm::uvec2(60, 44), glm::uvec2(600, 20)}) {
-    viewer().set_sampling({5, 3, render::View::shaded, false});
+    viewer().set_sampling({5, 3, {render::View::shaded, false}});
     converge(frame(size.x, size.y));
     const auto off = read(size);
-    viewer().set_sampling({5, 3, render::View::shaded, true});
+    viewer().set_sampling({5, 3, {render::View::shaded, true}});
     bool preview = false;
     viewer::FrameResult result;
     while (!result.converged) {
@@ -84,7 +84,7 @@ TEST_P(ViewerFrames, PreviewsConvergeToTheImageWithoutPreviews) {
 // A preview does not wait for second samples of pixels that finish early.
 TEST_P(ViewerFrames, PreviewIsShownWithItsFirstSamples) {
   show_noise();
-  viewer().set_sampling({1000, 3, render::View::shaded, true});
+  viewer().set_sampling({1000, 3, {render::View::shaded, true}});
   viewer::FrameResult result;
   for (int i = 0; i < 20000 && !result.preview; ++i) result = viewer().render(frame(320, 320, 0.01));
   ASSERT_TRUE(result.preview);
@@ -112,14 +112,14 @@ TEST_P(ViewerFrames, ImagesAppearDuringContinuousCameraMotion) {
 TEST_P(ViewerFrames, RaisingTheSampleLimitContinues) {
   show_noise();
   for (const glm::uvec2 size : {glm::uvec2(40, 30), glm::uvec2(600, 10)}) {
-    viewer().set_sampling({9, 3, render::View::shaded, false});
+    viewer().set_sampling({9, 3, {render::View::shaded, false}});
     converge(frame(size.x, size.y));
     const auto nine = read(size);
-    viewer().set_sampling({2, 3, render::View::shaded, false});
+    viewer().set_sampling({2, 3, {render::View::shaded, false}});
     converge(frame(size.x, size.y));
     EXPECT_NE(nine, read(size));
     const std::uint64_t before = viewer().stats().samples;
-    viewer().set_sampling({9, 3, render::View::shaded, false});
+    viewer().set_sampling({9, 3, {render::View::shaded, false}});
     viewer().render(frame(size.x, size.y, 0.001));
     EXPECT_GE(viewer().stats().samples, before);
     converge(frame(size.x, size.y));
@@ -129,7 +129,7 @@ TEST_P(ViewerFrames, RaisingTheSampleLimitContinues) {
 
 TEST_P(ViewerFrames, ChangesRestartOnlyWhatDependsOnThem) {
   show_noise();
-  viewer().set_sampling({3, 0, render::View::shaded, true});
+  viewer().set_sampling({3, 0, {render::View::shaded, true}});
   const viewer::Frame f = frame(48, 48);
   converge(f);
   const std::uint64_t cells = viewer().stats().cells;
@@ -201,7 +201,7 @@ TEST_P(ViewerFrames, EnvironmentsAndSkiesLoadAsynchronously) {
     return light;
   };
   show_noise();
-  viewer().set_sampling({4, 3, render::View::shaded, false});
+  viewer().set_sampling({4, 3, {render::View::shaded, false}});
   for (int i = 0; i < 24; ++i) {
     viewer().set_light(daylight(10.0F + static_cast<float>(i)));
     if (i % 3 == 0) viewer().load_environment(files.at(static_cast<std::size_t>(i) % 2));
@@ -224,7 +224,7 @@ TEST_P(ViewerFrames, EnvironmentsAndSkiesLoadAsynchronously) {
   still_ = make();
   viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   show_noise();
-  viewer().set_sampling({4, 3, render::View::shaded, false});
+  viewer().set_sampling({4, 3, {render::View::shaded, false}});
   viewer().set_ground({viewer::GroundMode::below});
   viewer().set_light(daylight(33.0F));
   viewer().wait(-1.0);
@@ -261,7 +261,7 @@ TEST_P(ViewerFrames, CameraFitIgnoresHaze) {
   viewer::DisplaySettings display;
   display.transparent = true;
   viewer().set_display(display);
-  viewer().set_sampling({16, 1, render::View::shaded, false});
+  viewer().set_sampling({16, 1, {render::View::shaded, false}});
   still_->build();
   const auto expect_fitted = [&](glm::uvec2 size) {
     converge(frame(size.x, size.y));
@@ -322,7 +322,7 @@ class ViewerSlab : public ViewerFrames {
     if (IsSkipped()) return;
     still_->set_volume(test::make_volume({64, 64, 16}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
     viewer().set_medium({0.1, vec3(0.0F), {0.0F}, 0});
-    viewer().set_sampling({64, 1, render::View::shaded, false});
+    viewer().set_sampling({64, 1, {render::View::shaded, false}});
     viewer::CameraPose pose;
     pose.eye = {31.5, 31.5, 215.5};
     pose.target = {31.5, 31.5, 15.5};
@@ -464,7 +464,7 @@ TEST_P(ViewerSlab, NoiseEstimateMatchesTheVarianceBetweenSeeds) {
   std::vector<std::vector<float>> pictures;
   double told = 0.0;
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
-    viewer().set_sampling({32, seed, render::View::shaded, false});
+    viewer().set_sampling({32, seed, {render::View::shaded, false}});
     converge(frame(24, 24));
     pictures.push_back(read({24, 24}));
     told += viewer().measure_noise().value() / 12.0;

@@ -32,7 +32,7 @@ void set_volume(StageRecorder& r, const viewer::VolumeAssetPtr& volume) {
 void set_preview(StageRecorder& r, bool preview) {
   r.call(preview ? "previews" : "no previews", [&] {
     viewer::Sampling sampling;
-    sampling.preview = preview;
+    sampling.options.preview = preview;
     r.viewer().set_sampling(sampling);
   });
 }
@@ -280,14 +280,14 @@ void sampling_and_display(StageRecorder& r) {
   sampling.samples = 16;
   sampling.seed = 3;
   sampling.first_sample = 4;
-  sampling.region = {{0.25F, 0.25F}, {0.5F, 0.5F}};
+  sampling.options.region = {{0.25F, 0.25F}, {0.5F, 0.5F}};
   r.call("region", [&] { r.viewer().set_sampling(sampling); });
   r.frame();
   sampling.noise_target = 0.01;
-  sampling.adaptive = true;
-  sampling.light_groups = 3;
-  sampling.separate_volume_aov = true;
-  sampling.view = render::View::cells;
+  sampling.options.adaptive = true;
+  sampling.options.light_groups = 3;
+  sampling.options.separate_volume_aov = true;
+  sampling.options.view = render::View::cells;
   r.call("noise target", [&] { r.viewer().set_sampling(sampling); });
   r.frame();
   viewer::DisplaySettings display;
@@ -456,7 +456,7 @@ void context_made_again(StageRecorder& r) {
         viewer::InstanceSettings{.volume = cloud(16, 2, "a"), .to_world = moved(30.0)}));
   });
   r.call("set the surfaces", [&] { r.viewer().set_surfaces(surfaces_of(std::make_shared<const MovingScene>())); });
-  r.call("four samples", [&] { r.viewer().set_sampling({4, 0, render::View::shaded, false}); });
+  r.call("four samples", [&] { r.viewer().set_sampling({4, 0, {render::View::shaded, false}}); });
   r.wait();
   r.frame({16, 16});
   try {

@@ -375,7 +375,7 @@ void sequence_waits_for_the_display(StageRecorder& r) {
   simulate_display(r, false);
   r.call("no previews", [&] {
     viewer::Sampling sampling;
-    sampling.preview = false;
+    sampling.options.preview = false;
     r.viewer().set_sampling(sampling);
   });
   r.call("position 3", [&] { sequence->set_position(3.0); });

@@ -235,7 +235,7 @@ void no_proxy_without_previews(StageRecorder& r) {
   const auto set_preview = [&](bool preview) {
     r.call(preview ? "previews" : "no previews", [&] {
       viewer::Sampling sampling;
-      sampling.preview = preview;
+      sampling.options.preview = preview;
       r.viewer().set_sampling(sampling);
     });
   };

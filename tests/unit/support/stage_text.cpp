@@ -180,20 +180,20 @@ std::string text_of(const viewer::Sampling& s) {
                  "first",
                  std::to_string(s.first_sample),
                  "view",
-                 std::to_string(static_cast<int>(s.view)),
-                 if_set(s.preview, "preview"),
-                 if_set(s.separate_volume_aov, "separate"),
-                 if_set(s.adaptive, "adaptive"),
+                 std::to_string(static_cast<int>(s.options.view)),
+                 if_set(s.options.preview, "preview"),
+                 if_set(s.options.separate_volume_aov, "separate"),
+                 if_set(s.options.adaptive, "adaptive"),
                  s.noise_target ? "noise " + text_of(*s.noise_target) : "",
                  "groups",
-                 std::to_string(s.light_groups),
+                 std::to_string(s.options.light_groups),
                  "shutter",
                  text_of(s.shutter_seconds),
                  "region",
-                 text_of(s.region.corner.x),
-                 text_of(s.region.corner.y),
-                 text_of(s.region.extent.x),
-                 text_of(s.region.extent.y)});
+                 text_of(s.options.region.corner.x),
+                 text_of(s.options.region.corner.y),
+                 text_of(s.options.region.extent.x),
+                 text_of(s.options.region.extent.y)});
 }
 
 std::string text_of(const viewer::SurfaceSettings& s) {
