@@ -181,7 +181,7 @@ void App::handle(const std::vector<Event>& events) {
         handle_key(event);
         break;
       case Event::Type::drop:
-        open(event.path);
+        open_dropped(event.files);
         break;
       case Event::Type::resize:
         window_->resize(static_cast<int>(event.x), static_cast<int>(event.y));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app.hpp"
+#include "dropped_files.hpp"
 #include "renderer.hpp"
 
 // The commands of the user interface.
@@ -249,6 +250,13 @@ void App::open(const std::string& path) {
     complain(error.what());
     model_.preferences.forget(path);
   }
+}
+
+void App::open_dropped(const std::vector<std::string>& files) {
+  const DroppedFiles dropped = demo::open_dropped(files);
+  execute(dropped.commands);
+  for (const std::string& file : dropped.left_out)
+    tell(model_, true, file + ": not opened, because another dropped file of its kind was", now_);
 }
 
 void App::save_scene(const std::string& path) {
