@@ -150,6 +150,7 @@ struct App::Commands {
          const auto up = static_cast<UpAxis>(command.value);
          app.loading_.fit = app.model_.scene.up != up;
          app.model_.scene.up = up;
+         if (app.model_.status.play) app.model_.scene.sequence.frame = app.model_.status.play->frame();
        }},
       {Action::auto_density, [](App& app, const Command&) { app.request({Request::Type::suggest_density}); }},
       {Action::play_row, [](App& app, const Command&) { app.clock_.play_row(); }},
