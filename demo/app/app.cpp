@@ -168,7 +168,8 @@ void App::frame() {
   measurements_.take_status(model_.status, exchange_.drawn, now_);
   ++frames_.count;
 
-  const std::string name = std::filesystem::path(main_file(model_.scene)).filename().string();
+  const std::string& file = model_.scene_path.empty() ? main_file(model_.scene) : model_.scene_path;
+  const std::string name = std::filesystem::path(file).filename().string();
   title_ = name.empty() ? "Cumulet" : name + " - Cumulet";
   window_->set_title(title_);
 }
@@ -181,7 +182,7 @@ void App::handle(const std::vector<Event>& events) {
         handle_key(event);
         break;
       case Event::Type::drop:
-        open(event.path);
+        open_dropped(event.files);
         break;
       case Event::Type::resize:
         window_->resize(static_cast<int>(event.x), static_cast<int>(event.y));

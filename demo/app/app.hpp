@@ -56,6 +56,7 @@ class App {
   /// Opens the file dialog for a new file with this extension.
   void save_dialog(const char* title, Action action, const char* ending);
   void open(const std::string& path);
+  void open_dropped(const std::vector<std::string>& files);
   void save_scene(const std::string& path);
   void step_history(bool back);
   void cancel();

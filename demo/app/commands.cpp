@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app.hpp"
+#include "dropped_files.hpp"
 #include "renderer.hpp"
 
 // The commands of the user interface.
@@ -149,6 +150,7 @@ struct App::Commands {
          const auto up = static_cast<UpAxis>(command.value);
          app.loading_.fit = app.model_.scene.up != up;
          app.model_.scene.up = up;
+         if (app.model_.status.play) app.model_.scene.sequence.frame = app.model_.status.play->frame();
        }},
       {Action::auto_density, [](App& app, const Command&) { app.request({Request::Type::suggest_density}); }},
       {Action::play_row, [](App& app, const Command&) { app.clock_.play_row(); }},
@@ -249,6 +251,13 @@ void App::open(const std::string& path) {
     complain(error.what());
     model_.preferences.forget(path);
   }
+}
+
+void App::open_dropped(const std::vector<std::string>& files) {
+  const DroppedFiles dropped = demo::open_dropped(files);
+  execute(dropped.commands);
+  for (const std::string& file : dropped.left_out)
+    tell(model_, true, file + ": not opened, because another dropped file of its kind was", now_);
 }
 
 void App::save_scene(const std::string& path) {

@@ -87,11 +87,11 @@ void FileDialog::close() {
 void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
   ImGui::BeginChild("files", {0.0f, ui.px(240.0f)}, true, ImGuiWindowFlags_NavFlattened);
   std::string entered;
-  for (const Entry& entry : entries_) {
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Entry& entry = entries_[i];
     const std::string shown = entry.folder ? entry.name + "/" : entry.name;
     const fs::path path = (fs::path(folder_) / entry.name).lexically_normal();
-    if (ImGui::Selectable(shown.c_str(), !entry.folder && path.string() == path_,
-                          ImGuiSelectableFlags_DontClosePopups)) {
+    if (Ui::entry(shown, i, !entry.folder && path.string() == path_, ImGuiSelectableFlags_DontClosePopups)) {
       if (entry.folder)
         entered = path.string();
       else
@@ -113,16 +113,18 @@ void FileDialog::recent(Ui& ui, const Preferences& preferences, std::vector<Comm
   std::ranges::copy_if(preferences.recent, std::back_inserter(files), [this](const auto& file) { return takes(file); });
   if (saving() || files.empty()) return;
   Ui::heading("Recent");
-  for (const std::string& file : files) {
+  ImGui::PushID("recent");
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const std::string& file = files[i];
     const std::string name = fs::path(file).filename().string();
     const std::string shown = end_of(file, ImGui::GetContentRegionAvail().x);
-    if (ImGui::Selectable(std::string(shown).append("##recent").append(file).c_str(), false,
-                          ImGuiSelectableFlags_DontClosePopups)) {
+    if (Ui::entry(shown, i, false, ImGuiSelectableFlags_DontClosePopups)) {
       path_ = file;
       choose(commands);
     }
     ui.remember(("Recent/" + name).c_str(), file.c_str());
   }
+  ImGui::PopID();
   ImGui::Spacing();
 }
 

@@ -18,9 +18,9 @@ struct Event {
   double y = 0.0;  // move: position; resize: height; wheel: steps
   int code = 0;    // button: 0 left, 1 right, 2 middle (GLFW's numbers); key: GLFW key; character: Unicode
   bool down = false;
-  std::string path = {};   // drop: the file
-  double time = 0.0;       // glfwGetTime() when the event was received; 0 in a replay
-  unsigned modifiers = 0;  // Modifier bits after the event; set by Input::take
+  std::vector<std::string> files = {};  // drop: their paths
+  double time = 0.0;                    // glfwGetTime() when the event was received; 0 in a replay
+  unsigned modifiers = 0;               // Modifier bits after the event; set by Input::take
 };
 
 enum Modifier : unsigned { modifier_shift = 1, modifier_ctrl = 2, modifier_alt = 4 };  // same values as in cumulet.h

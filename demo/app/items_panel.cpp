@@ -48,11 +48,11 @@ void Panel::items(Model& model) {
   ImGui::BeginChild("items", {0.0f, rows * height}, false, ImGuiWindowFlags_NavFlattened);
   ImGui::PushStyleColor(ImGuiCol_Header, IM_COL32(95, 143, 191, 120));
   ImGui::Indent(ui_.px(6.0f));
-  for (const Item& item : items) {
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const Item& item = items[i];
     const std::string label = "Scene/" + title_of(model.scene, item);
     const bool chosen = model.chosen == item;
-    ImGui::PushID(label.c_str());
-    if (ImGui::Selectable(name_of(model.scene, item).c_str(), chosen)) {
+    if (Ui::entry(name_of(model.scene, item), i, chosen)) {
       if (chosen)
         model.chosen.reset();
       else
@@ -60,7 +60,6 @@ void Panel::items(Model& model) {
     }
     ui_.remember(label.c_str(),
                  "Selects the object and shows its outline and handles. Objects can also be clicked in the image.");
-    ImGui::PopID();
   }
   ImGui::PopStyleColor();
   ImGui::EndChild();

@@ -17,8 +17,7 @@ using Desc = cumulet_light_desc;
 
 constexpr double sun_at_noon = 4.0;  // W/m²
 
-/// Returns a point light above the camera's target, with the irradiance of the noon sun there. In very large scenes its
-/// power is limited.
+/// Returns a point light above the camera's target, with the irradiance of the noon sun there.
 Desc new_analytic_light(const cumulet_camera_desc& camera) {
   const double distance =
       std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
@@ -28,7 +27,7 @@ Desc new_analytic_light(const cumulet_camera_desc& camera) {
   std::copy(camera.target, camera.target + 3, analytic_light.position);
   analytic_light.position[1] += above;
   analytic_light.direction[1] = -1.0;
-  analytic_light.power = static_cast<float>(std::min(1e6, sun_at_noon * 4.0 * std::numbers::pi * above * above));
+  analytic_light.power = static_cast<float>(sun_at_noon * 4.0 * std::numbers::pi * above * above);
   settings::spell_out_zeros(analytic_light);
   return analytic_light;
 }

@@ -156,7 +156,8 @@ class Parser {
     } else if (command == "drop") {
       Event drop;
       drop.type = Event::Type::drop;
-      drop.path = line.quoted();
+      do drop.files.push_back(line.quoted());
+      while (!line.ended());
       event(drop);
     } else if (command == "resize") {
       Event resize;
@@ -390,7 +391,9 @@ void Recorder::frame(const std::vector<Event>& events, bool loading) {
         file_ << "text " << std::quoted(utf8(event.code)) << '\n';
         break;
       case Event::Type::drop:
-        file_ << "drop " << std::quoted(event.path) << '\n';
+        file_ << "drop";
+        for (const std::string& file : event.files) file_ << ' ' << std::quoted(file);
+        file_ << '\n';
         break;
       case Event::Type::resize:
         file_ << "resize " << event.x << ' ' << event.y << '\n';

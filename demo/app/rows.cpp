@@ -13,12 +13,13 @@ ImGuiSliderFlags flags_of(const settings::Row& row) {
   return row.logarithmic ? ImGuiSliderFlags_Logarithmic : ImGuiSliderFlags_None;
 }
 
-/// Draws a slider with the range converted to the value's type.
+/// Draws a slider with the range converted to the value's type. Typed values may have any value that users may set.
 template <class Number>
-bool slide(Ui& ui, const settings::Row& row, Number& value, const char* format) {
+bool slide(Ui& ui, const settings::SettingInfo& info, Number& value, const char* format) {
+  const settings::Row& row = info.row;
   const bool zero = value == Number{} && *row.zero != '\0';
   return ui.slider(row.label, row.tip, value, static_cast<Number>(row.least), static_cast<Number>(row.most),
-                   zero ? row.zero : format, flags_of(row));
+                   zero ? row.zero : format, flags_of(row), info.given.value_or(info.range));
 }
 
 }  // namespace
@@ -34,19 +35,19 @@ bool Rows::draw(const settings::SettingInfo& info, std::int32_t& value) {
 bool Rows::draw(const settings::SettingInfo& info, std::uint32_t& value) {
   if (!shown(info.row)) return false;
   if (info.row.most == 0.0) return ui_.integer(info.row.label, info.row.tip, value);
-  return slide(ui_, info.row, value, "%u");
+  return slide(ui_, info, value, "%u");
 }
 
 bool Rows::draw(const settings::SettingInfo& info, std::uint64_t& value) {
-  return shown(info.row) && slide(ui_, info.row, value, "%llu");
+  return shown(info.row) && slide(ui_, info, value, "%llu");
 }
 
 bool Rows::draw(const settings::SettingInfo& info, float& value) {
-  return shown(info.row) && slide(ui_, info.row, value, info.row.format);
+  return shown(info.row) && slide(ui_, info, value, info.row.format);
 }
 
 bool Rows::draw(const settings::SettingInfo& info, double& value) {
-  return shown(info.row) && slide(ui_, info.row, value, info.row.format);
+  return shown(info.row) && slide(ui_, info, value, info.row.format);
 }
 
 bool Rows::draw(const settings::SettingInfo& info, float (&value)[3]) {

@@ -137,7 +137,7 @@ bool Ui::checkbox(const char* label, const char* tip, bool& value) {
 
 template <class Number>
 bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
-               const char* format, ImGuiSliderFlags flags) {
+               const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
   begin_row(label);
   Number edited = value;
   const bool changed =
@@ -146,33 +146,35 @@ bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& v
   if (!changed) return false;
   if constexpr (std::is_floating_point_v<Number>)
     if (!std::isfinite(edited)) return false;
-  value = std::clamp(edited, least, most);
+  const bool holds = edited >= least && edited <= most;
+  if (typed && !holds && !typed->holds(static_cast<double>(edited))) return false;
+  value = typed ? edited : std::clamp(edited, least, most);
   return true;
 }
 
 bool Ui::slider(const char* label, const char* tip, float& value, float least, float most, const char* format,
-                ImGuiSliderFlags flags) {
-  return slide(label, tip, ImGuiDataType_Float, value, least, most, format, flags);
+                ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+  return slide(label, tip, ImGuiDataType_Float, value, least, most, format, flags, typed);
 }
 
 bool Ui::slider(const char* label, const char* tip, double& value, double least, double most, const char* format,
-                ImGuiSliderFlags flags) {
-  return slide(label, tip, ImGuiDataType_Double, value, least, most, format, flags);
+                ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+  return slide(label, tip, ImGuiDataType_Double, value, least, most, format, flags, typed);
 }
 
 bool Ui::slider(const char* label, const char* tip, std::int32_t& value, std::int32_t least, std::int32_t most,
-                const char* format, ImGuiSliderFlags flags) {
-  return slide(label, tip, ImGuiDataType_S32, value, least, most, format, flags);
+                const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+  return slide(label, tip, ImGuiDataType_S32, value, least, most, format, flags, typed);
 }
 
 bool Ui::slider(const char* label, const char* tip, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
-                const char* format, ImGuiSliderFlags flags) {
-  return slide(label, tip, ImGuiDataType_U32, value, least, most, format, flags);
+                const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+  return slide(label, tip, ImGuiDataType_U32, value, least, most, format, flags, typed);
 }
 
 bool Ui::slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
-                const char* format, ImGuiSliderFlags flags) {
-  return slide(label, tip, ImGuiDataType_U64, value, least, most, format, flags);
+                const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+  return slide(label, tip, ImGuiDataType_U64, value, least, most, format, flags, typed);
 }
 
 bool Ui::integer(const char* label, const char* tip, std::uint32_t& value) {
@@ -195,20 +197,34 @@ bool Ui::numbers(const char* label, const char* tip, std::span<double> values, f
   return true;
 }
 
+bool Ui::entry(const std::string& text, std::size_t index, bool chosen, ImGuiSelectableFlags flags) {
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const bool clicked = ImGui::Selectable(("##" + std::to_string(index)).c_str(), chosen, flags);
+  ImGui::GetWindowDrawList()->AddText(corner, ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
+  return clicked;
+}
+
 bool Ui::choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value) {
   begin_row(label);
   const auto now = std::find_if(choices.begin(), choices.end(), [&](const Choice& c) { return c.value == value; });
-  bool changed = false;
-  const bool open = ImGui::BeginCombo((std::string("##") + label).c_str(),
-                                      now != choices.end() ? now->text
-                                      : choices.empty()    ? ""
-                                                           : "Choose",
-                                      ImGuiComboFlags_HeightLarge);
+  const char* const shown = now != choices.end() ? now->text : choices.empty() ? "" : "Choose";
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
+  const ImU32 color = ImGui::GetColorU32(ImGuiCol_Text);
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float height = ImGui::GetFrameHeight();
+  const ImVec2 end(corner.x + ImGui::CalcItemWidth() - height, corner.y + height);  // without the arrow
+  const bool open = ImGui::BeginCombo((std::string("##") + label).c_str(), "", ImGuiComboFlags_HeightLarge);
   remember(label, tip);
+  // ImGui's preview would end before "##".
+  const ImVec2 padding = ImGui::GetStyle().FramePadding;
+  const ImVec4 clip(corner.x, corner.y, end.x, end.y);
+  draw.AddText(nullptr, 0.0f, {corner.x + padding.x, corner.y + padding.y}, color, shown, nullptr, 0.0f, &clip);
   if (!open) return false;
-  for (const Choice& choice : choices) {
+  bool changed = false;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const Choice& choice = choices[i];
     const bool chosen = choice.value == value;
-    if (ImGui::Selectable(choice.text, chosen) && !chosen) {
+    if (entry(choice.text, i, chosen) && !chosen) {
       value = choice.value;
       changed = true;
     }

@@ -37,19 +37,26 @@ class Ui {
   static void heading(const char* text);
   bool button(const char* label, const char* tip, ImVec2 size = {});
   bool checkbox(const char* label, const char* tip, bool& value);
+  /// Draws a slider. typed: range of values that are typed after Ctrl+click; nullopt: the slider's range.
   bool slider(const char* label, const char* tip, float& value, float least, float most, const char* format,
-              ImGuiSliderFlags flags = 0);
+              ImGuiSliderFlags flags = 0, const std::optional<settings::Range>& typed = std::nullopt);
   bool slider(const char* label, const char* tip, double& value, double least, double most, const char* format,
-              ImGuiSliderFlags flags = 0);
+              ImGuiSliderFlags flags = 0, const std::optional<settings::Range>& typed = std::nullopt);
   bool slider(const char* label, const char* tip, std::int32_t& value, std::int32_t least, std::int32_t most,
-              const char* format, ImGuiSliderFlags flags = 0);
+              const char* format, ImGuiSliderFlags flags = 0,
+              const std::optional<settings::Range>& typed = std::nullopt);
   bool slider(const char* label, const char* tip, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
-              const char* format, ImGuiSliderFlags flags = 0);
+              const char* format, ImGuiSliderFlags flags = 0,
+              const std::optional<settings::Range>& typed = std::nullopt);
   bool slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
-              const char* format, ImGuiSliderFlags flags = 0);
+              const char* format, ImGuiSliderFlags flags = 0,
+              const std::optional<settings::Range>& typed = std::nullopt);
   bool integer(const char* label, const char* tip, std::uint32_t& value);
   /// Draws numbers that can be dragged or typed. speed: change per pixel.
   bool numbers(const char* label, const char* tip, std::span<double> values, float speed);
+  /// Draws an entry of a list. Returns true if it was clicked. Unlike ImGui's, it shows all of a text with "##", such
+  /// as the pattern of a sequence. index: unique in the list.
+  static bool entry(const std::string& text, std::size_t index, bool chosen, ImGuiSelectableFlags flags = 0);
   /// Returns true if the user chose another entry.
   bool choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value);
   /// Edits a linear color. It is displayed in sRGB.
@@ -95,7 +102,7 @@ class Ui {
                   std::optional<std::size_t> near, const std::vector<float>& heights, float reach) const;
   template <class Number>
   bool slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
-             const char* format, ImGuiSliderFlags flags);
+             const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed);
 
   float scale_ = 1.0f;
   double time_ = 0.0;

@@ -148,6 +148,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
       if (!setting.is(&Desc::density_scale) && !setting.is(&Desc::coalbedo)) return;
       const std::string label = setting.row.label + number;
       setting.row.label = label.c_str();
+      if (setting.is(&Desc::density_scale) && other.auto_density_scale) setting.row.zero = "auto";
       if (rows_.draw(setting, other.medium.*setting.field) && setting.is(&Desc::density_scale))
         other.auto_density_scale = false;
     });

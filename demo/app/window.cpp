@@ -133,10 +133,8 @@ void Window::listen() {
     input_of(w).push(event);
   });
   glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
-    // Only the first file is opened.
-    if (count < 1) return;
     Event event = make(Event::Type::drop);
-    event.path = paths[0];
+    event.files.assign(paths, paths + count);
     input_of(w).push(event);
   });
   glfwSetWindowRefreshCallback(

@@ -293,7 +293,7 @@ struct Table<cumulet_light_desc> {
         .key = "power",
         .row = {.label = "Power",
                 .tip = "Watts, as in Blender. For a distant light: irradiance in W/m².",
-                .most = 1e6, .format = "%.4g", .logarithmic = true}}),
+                .most = 1e9, .format = "%.4g", .logarithmic = true}}),
       Setting(&Desc::width, {.name = "width", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
         .key = "width",
         .row = {.label = "Width",

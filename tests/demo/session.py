@@ -164,6 +164,28 @@ def test_alone(s):
     assert_drawn(look(s, "model")[0], look(s, "model")[2])
 
 
+def test_dropped_together(s):
+    """Files that are dropped together are all shown, and frames as their sequence. The names of patterns are shown
+    whole."""
+    mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
+    for number in (1, 2, 3):
+        shutil.copy(s.explosion, s.out / f"blast_{number}.vdb")
+    there = ["frames 3", "wait loaded", "frames 2"]
+    s.play("several", ["frames 3", f'drop "{mountains}" "{s.cumulus}" "{s.explosion}"', *there, *shot("several"),
+                       f'drop "{s.out}/blast_3.vdb" "{s.out}/blast_1.vdb"', *there, "key escape", "key .", *there, *shot("frames"),
+                       'click "Up axis"', "frames 2", 'click "Up axis/Z"', *there, "key ctrl+s", "frames 2", "key ctrl+a",
+                       'text "saved.json"', "key enter", *there, *shot("saved")],
+           "--spp", "1")
+    several, frames = s.report("several"), s.report("frames")
+    assert [pathlib.Path(volume["file"]).name for volume in several["volumes"]] == ["cumulus.vdb", "explosion_0012.vdb"], several
+    assert "mountains.glb" in json.dumps(several["scene"]) and not [m for m in several["messages"] if m["error"]], several
+    assert frames["sequence"]["count"] == 3 and "blast_#.vdb" in json.dumps(frames["volumes"][0]), frames
+    assert pathlib.Path(frames["volumes"][1]["file"]).name == "explosion_0012.vdb", frames["volumes"]
+    saved = s.report("saved")
+    assert saved["sequence"]["frame"] == frames["sequence"]["frame"] == 2, "another up axis keeps the frame"
+    assert frames["title"] == "blast_#.vdb - Cumulet" and saved["title"] == "saved.json - Cumulet", saved["title"]
+
+
 def test_save_whole(s):
     """Saving during a preview saves the first full-resolution image after it. The status line says so meanwhile."""
     # The view changes right before the dialog opens, and no samples are traced while the dialog is open.

@@ -79,7 +79,10 @@ def test_lamps(s):
                       'click "Light 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
                       *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
                       'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), 'click "Remove light 1"',
-                      *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"'],
+                      *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"',
+                      # Typed values may be beyond the slider.
+                      "press ctrl", 'click "Power 1"', "release ctrl", "frames 2", "key ctrl+a", 'text "5e9"', "key enter",
+                      *there, 'report "typed.json"'],
            "--volume", s.cumulus, "--sky", "0.05,0.05,0.05", "--spp", "4")
     day, report, area = look(s, "day")
     lights = lambda name: s.report(name)["lights"]
@@ -104,6 +107,8 @@ def test_lamps(s):
     assert lights("removed") == [] and steps("removed") == 2
     assert_alike(day, look(s, "removed")[0], area)
     assert lights("again") == [point]
+    (typed,) = lights("typed")
+    assert typed["power"] == 5e9, typed
 
 
 def test_sky_and_ground(s):
