@@ -41,6 +41,17 @@ Input parse_input(const std::string& text) {
   return input;
 }
 
+ShaderVariant parse_variant(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    throw CLI::ValidationError("--variant", "\"" + text + "\" is not NAME=DIR[:constant]");
+  std::string folder = text.substr(equals + 1);
+  const std::string_view constant = ":constant";
+  const bool constant_cells = folder.ends_with(constant);
+  if (constant_cells) folder.resize(folder.size() - constant.size());
+  return {text.substr(0, equals), folder, constant_cells};
+}
+
 }  // namespace
 
 ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes) {
@@ -50,6 +61,7 @@ ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes)
       "Measures the marches against each other: one run, ratios, medians of interleaved repeats.\n"
       "Writes report.md, results.csv and plots (SVG).");
   std::vector<std::string> inputs;
+  std::vector<std::string> variants;
   std::string shared_data = "../shared/data";
   std::string samples = "build/sample-full";
   o.usual_dir = "build/sample";
@@ -79,6 +91,9 @@ ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes)
       "--block-bytes", o.block_bytes,
       "With --peers: what storage blocks are taken to hold, not what the driver says (llvmpipe's 128 MiB are "
       "not where they end)");
+  app.add_option("--variant", variants,
+                 "With --peers: NAME=DIR[:constant], shaders of a folder (a copy of glsl/ with changes) on the same "
+                 "cells, or on constant ones; can be repeated");
   app.add_flag("--by-clock", o.by_clock, "With --peers: the clock's time, as of a GPU, instead of the processors'");
   auto* few = app.add_option("--samples", o.fewest_samples, "A pixel, at least, in a timed run (default: 8; quick: 4)");
   few->check(CLI::Range(1U, 1024U));
@@ -142,6 +157,7 @@ ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes)
   try {
     app.parse(argc, argv);
     for (const std::string& text : inputs) o.inputs.push_back(parse_input(text));
+    for (const std::string& text : variants) o.variants.push_back(parse_variant(text));
   } catch (const CLI::Error& error) {
     result.status = app.exit(error) == 0 ? 0 : 2;
     return result;
