@@ -59,11 +59,11 @@ within() { # SECONDS COMMAND...: runs it for at most this time and the time that
 }
 
 # Sizes.
-size=1024x1024 few=32 many=1024 repeats=3 small_voxels=22e6 large_voxels=1.8e8
+size=1024x1024 few=32 many=1024 paper_spp=64 repeats=3 small_voxels=22e6 large_voxels=1.8e8
 peers=(--size 512 --samples 32 --repeats 3 --error-samples 64 --threshold 0.6 0.3 0.15 --target 0.01)
 pace_frames=200 grid_flags=() filter='*-*osmesa*' pictures=6
 if [ -n "$rehearse" ]; then
-  size=32x32 few=2 many=4 repeats=1 small_voxels=10000 large_voxels=20000
+  size=32x32 few=2 many=4 paper_spp=8 repeats=1 small_voxels=10000 large_voxels=20000
   peers=(--size 16 --samples 2 --repeats 2 --error-samples 2 --threshold 0.6 --target 0.5)
   pace_frames=8 grid_flags=(--once) pictures=1
   filter='*WhiteFurnace*:*RefinementStops*:*FireWithoutDensity*:*StateReader*:*Contract02*-*osmesa*'
@@ -152,10 +152,10 @@ compare_pictures() {
     failed picture same_seed "two renders with one seed differ"
   fi
   # By the same rules both kernels have the same mean.
-  local same=(--volume "$work/scene/cumulus.vdb" --size 96x72 --spp 64 --density-scale 1 --cells constant "${paper[@]}")
+  local same=(--volume "$work/scene/cumulus.vdb" --size 96x72 --spp "$paper_spp" --density-scale 1 --cells constant "${paper[@]}")
   render paper_rules --shaders "$here/shaders/paper_rules" "${same[@]}"
   render paper_kernel --shaders "$here/shaders/paper_kernel" "${same[@]}"
-  if result=$("$programs/bench/cumulet-compare" "$work/paper_kernel.exr" "$work/paper_rules.exr" --tolerance 0.2 --bias 0.02); then
+  if result=$("$programs/bench/cumulet-compare" "$work/paper_kernel.exr" "$work/paper_rules.exr" --tolerance 0.3 --bias 0.03); then
     row picture "paper's kernel" "" 1 "" "ok: $result; against our kernel by the same rules"
   else
     failed picture "paper's kernel" "$result; against our kernel by the same rules"

@@ -349,8 +349,9 @@ typedef struct cumulet_shader_cache_desc {
   const char* folder;
   /**
    * For developers of the library: UTF-8 path of a folder with shaders (a copy of glsl/) that replace the library's
-   * own. The log has one line per shader that is read. They are read again when they change. If one does not build,
-   * the log has one warning and the previous one stays in use. NULL or "": the library's own shaders.
+   * own. The log has one line per shader that is read, and says whether it differs from the library's own. They are
+   * read again when they change. If one does not build, the log has one warning and the previous one stays in use.
+   * NULL or "": the library's own shaders.
    */
   const char* shaders;
 } cumulet_shader_cache_desc;
