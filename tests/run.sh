@@ -134,7 +134,7 @@ format_check() {
 
 # shellcheck disable=SC2317 # called by check
 script_check() {
-  shellcheck -x .ci/run demo/run.sh scripts/*.sh tests/run.sh tests/docs/*.sh tests/embed/*.sh tests/fuzz/*.sh tests/package/*.sh
+  shellcheck -x .ci/run demo/run.sh scripts/*.sh tests/run.sh tests/docs/*.sh tests/embed/*.sh tests/fuzz/*.sh tests/gpu/*.sh tests/package/*.sh
 }
 
 # shellcheck disable=SC2317 # called by xargs

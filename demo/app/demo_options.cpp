@@ -54,7 +54,7 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
   };
   add_folder("--shader-cache", options.shader_cache, "Cache compiled shaders in this folder");
   add_folder("--shaders", options.shaders,
-             "Load shaders from this folder (a copy of glsl/) and reload them when they change; debug builds only");
+             "Load shaders from this folder (a copy of glsl/) and reload them when they change");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});

@@ -325,7 +325,7 @@ class Studio {
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
         viewer_(cumulet::demo::create_viewer(context_, messages_, options.trace.empty() ? nullptr : &timeline_,
-                                             options.shader_cache)) {
+                                             options.shader_cache, options.shaders)) {
     check_memory(viewer_, options);
     set_scene(options);
   }

@@ -582,6 +582,8 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
            "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
            "$XDG_DATA_HOME)");
   add_path(app, group, "--shader-cache", "DIR", options.shader_cache, "Cache compiled shaders in this folder");
+  add_path(app, group, "--shaders", "DIR", options.shaders,
+           "Load shaders from this folder (a copy of glsl/), to compare variants without a build (default: built in)");
   add_choice(app, group, "--backend",
              std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
                         Name{"osmesa", BackendChoice::osmesa}},

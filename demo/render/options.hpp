@@ -47,6 +47,7 @@ struct RenderOptions {
   std::string stats;           // empty: none
   std::string trace;           // empty: none
   std::string shader_cache;    // a folder; empty: none
+  std::string shaders;         // a folder; empty: the library's
   std::vector<Moment> frames;  // of the sequence; empty: the frame of the scene, else all
   bool overwrite = false;      // re-render frames whose output exists
   std::string

@@ -11,7 +11,7 @@
 namespace cumulet::demo {
 
 Viewer create_viewer(headless::Context& context, Messages& messages, Timeline* timeline,
-                     const std::string& shader_cache) {
+                     const std::string& shader_cache, const std::string& shaders) {
   cumulet_create_desc desc{};
   desc.struct_size = sizeof desc;
   desc.get_proc = headless::Context::get_proc;
@@ -22,7 +22,7 @@ Viewer create_viewer(headless::Context& context, Messages& messages, Timeline* t
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
   }
-  const auto programs = make_programs(shader_cache, {});
+  const auto programs = make_programs(shader_cache, shaders);
   desc.shader_cache = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};

@@ -18,10 +18,10 @@ struct DestroyViewer {
 };
 using Viewer = std::unique_ptr<cumulet_viewer, DestroyViewer>;
 
-/// Creates a viewer in a context without a display. timeline: receives trace events, or null. Throws
-/// std::runtime_error.
+/// Creates a viewer in a context without a display. timeline: receives trace events, or null. shader_cache, shaders:
+/// folders as for make_programs. Throws std::runtime_error.
 [[nodiscard]] Viewer create_viewer(headless::Context& context, Messages& messages, Timeline* timeline,
-                                   const std::string& shader_cache);
+                                   const std::string& shader_cache, const std::string& shaders);
 /// Throws the error of a failed call.
 void check(const Viewer& viewer, cumulet_status status);
 /// Sets the camera of the scene.

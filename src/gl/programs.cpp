@@ -142,6 +142,9 @@ Programs::Counts Programs::counts() const {
 void Programs::begin(const ProgramKey& key, Program& program) {
   program.state_ = Program::State::absent;
   const std::vector<Stage> stages = stages_of(shaders_.get(), key);
+  if (shaders_) {
+    for (const Stage& stage : stages) log_shader(stage.name);
+  }
   program.shaders_.clear();
   program.object_ = Object(gl_, Object::Kind::program, gl_->CreateProgram());
   check(*gl_, "creating a shader program");
@@ -161,6 +164,13 @@ void Programs::begin(const ProgramKey& key, Program& program) {
   if (files_) gl_->ProgramParameteri(name, GL_PROGRAM_BINARY_RETRIEVABLE_HINT, GL_TRUE);
   gl_->LinkProgram(name);
   program.state_ = Program::State::compiling;
+}
+
+void Programs::log_shader(const std::string& name) {
+  if (log_ == nullptr || !logged_shaders_.insert(name).second) return;
+  const bool same = shaders_->source(name) == find_shader(name)->source;
+  log_->info("shader " + name + ": read from " + shaders_->given() +
+             (same ? ", identical to the library's" : ", differs from the library's"));
 }
 
 bool Programs::load(const ProgramKey& key, Program& program) {

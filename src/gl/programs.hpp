@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -107,8 +108,8 @@ class Programs {
   void try_again();
   /// Returns the state without a driver call.
   [[nodiscard]] Program::State state(const ProgramKey& key) const;
-  /// Rebuilds programs whose sources have changed. If a build fails, one line is logged and the program stays
-  /// unchanged.
+  /// Rebuilds programs whose sources in the folder have changed. If a build fails, one line is logged and the program
+  /// stays unchanged.
   void refresh();
   /// Revision number; changes when refresh() replaced a program, or when a failed program may be built again.
   [[nodiscard]] const Revision<Programs>& revision() const { return revision_; }
@@ -130,6 +131,8 @@ class Programs {
 
  private:
   void begin(const ProgramKey& key, Program& program);
+  // Logs that a shader is read from the folder, once per shader.
+  void log_shader(const std::string& name);
   // Loads the binary of an earlier run. Returns false if there is none or the driver rejects it.
   bool load(const ProgramKey& key, Program& program);
   [[nodiscard]] bool complete(const Program& program) const;
@@ -144,6 +147,7 @@ class Programs {
   bool parallel_ = false;
   std::shared_ptr<ProgramFiles> files_;
   std::shared_ptr<ShaderFolder> shaders_;
+  std::set<std::string> logged_shaders_;
   Revision<Programs> revision_;
   std::string driver_;  // identifies the driver in the keys of binaries
   std::map<ProgramKey, std::unique_ptr<Program>> programs_;

@@ -9,19 +9,13 @@
 
 namespace cumulet::gl {
 
-/// True if this build can load shaders from a folder, as debug builds do.
-#ifdef NDEBUG
-inline constexpr bool reloads_shaders = false;
-#else
-inline constexpr bool reloads_shaders = true;
-#endif
-
 /// A folder like glsl/ whose files are reloaded when they change, for shader development.
 class ShaderFolder {
  public:
   explicit ShaderFolder(FilePath folder) : folder_(std::move(folder)) {}
   /// Returns a shader with its includes resolved, like cmake/embed_glsl.py. Throws Error(file).
   [[nodiscard]] std::string source(const std::string& name) const;
+  [[nodiscard]] const std::string& given() const { return folder_.given(); }
   /// Whether a file was written since the previous check; false at the first call. Checks the folder a few times per
   /// second at most.
   bool changed();

@@ -153,13 +153,7 @@ cumulet_status cumulet_shader_cache_create(const cumulet_shader_cache_desc* desc
     const cumulet_shader_cache_desc d = read_desc(desc, "cumulet_shader_cache_desc");
     const bool kept = d.folder != nullptr && *d.folder != '\0';
     std::shared_ptr<cumulet::gl::ShaderFolder> shaders;
-    if (d.shaders != nullptr && *d.shaders != '\0') {
-      if (!cumulet::gl::reloads_shaders) {
-        throw cumulet::Error(cumulet::ErrorCode::unsupported,
-                             "loading shaders from a folder requires a debug build of the library");
-      }
-      shaders = std::make_shared<cumulet::gl::ShaderFolder>(d.shaders);
-    }
+    if (d.shaders != nullptr && *d.shaders != '\0') shaders = std::make_shared<cumulet::gl::ShaderFolder>(d.shaders);
     return std::make_shared<cumulet::viewer::Sharing>(
         kept ? std::make_shared<cumulet::gl::ProgramFiles>(d.folder) : nullptr, std::move(shaders));
   });

@@ -95,7 +95,7 @@ void Viewer::with_gl(Body&& body) {
     const gl::Programs::Turn turn(g.programs(), log_);
     const gl::StateGuard guard(*functions, restore_state_);
     g.find_out_dispatches();
-    if constexpr (gl::reloads_shaders) g.programs()->refresh();
+    g.programs()->refresh();
     body(g);
   } catch (const Error& error) {
     // In a lost context every call may fail, so check for loss after any error.

@@ -1,5 +1,6 @@
 #include "edited_shaders.hpp"
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -17,8 +18,13 @@ std::string text_of(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::filesystem::path source_folder(const char* built, const char* variable) {
+  const char* given = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): nothing sets the environment
+  return given == nullptr ? built : given;
+}
+
 EditedShaders::EditedShaders(std::span<const Edit> edits, std::span<const std::filesystem::path> files) {
-  std::filesystem::copy(CUMULET_GLSL_DIR, folder_.path());
+  std::filesystem::copy(source_folder(CUMULET_GLSL_DIR, "CUMULET_BENCH_GLSL"), folder_.path());
   for (const std::filesystem::path& file : files) std::filesystem::copy(file, folder_ / file.filename().string());
   for (const Edit& edit : edits) {
     const std::filesystem::path path = folder_ / edit.file;

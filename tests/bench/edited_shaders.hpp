@@ -16,6 +16,10 @@ struct Edit {
   const char* instead;
 };
 
+/// Returns a source folder of the build, or the value of the environment variable if that is set. Benchmarks run on
+/// machines without the sources (tests/gpu).
+std::filesystem::path source_folder(const char* built, const char* variable);
+
 /// Shader programs of glsl/ with a few replaced texts, for measuring variants without a switch in the library. The
 /// object must live until all programs are compiled.
 class EditedShaders {

@@ -41,6 +41,33 @@ Input parse_input(const std::string& text) {
   return input;
 }
 
+ShaderVariant parse_variant(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    throw CLI::ValidationError("--variant", "\"" + text + "\" is not NAME=DIR[:constant]");
+  std::string folder = text.substr(equals + 1);
+  const std::string_view constant = ":constant";
+  const bool constant_cells = folder.ends_with(constant);
+  if (constant_cells) folder.resize(folder.size() - constant.size());
+  return {text.substr(0, equals), folder, constant_cells};
+}
+
+void add_peer_options(CLI::App& app, Options& options) {
+  const auto take = [&options](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) options.variants.push_back(parse_variant(text));
+  };
+  app.add_option_function<std::vector<std::string>>(
+      "--variant", take,
+      "With --peers: NAME=DIR[:constant], shaders of a folder (a copy of glsl/ with changes) on the same cells, or on "
+      "constant ones; can be repeated");
+  app.add_option(
+      "--block-bytes", options.block_bytes,
+      "With --peers: what storage blocks are taken to hold, not what the driver says (llvmpipe's 128 MiB are "
+      "not where they end)");
+  app.add_flag("--by-clock", options.by_clock,
+               "With --peers: the clock's time, as of a GPU, instead of the processors'");
+}
+
 }  // namespace
 
 ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes) {
@@ -72,14 +99,10 @@ ParseResult parse(int argc, char** argv, const std::vector<std::string>& scenes)
   app.add_option("--environment", o.environment, "With --costs: a .hdr or .exr");
   app.add_flag("--equal-error", o.equal_error,
                "Only what each march takes to --target of a fire's picture, its grid's error and its noise together");
+  add_peer_options(app, o);
   app.add_flag("--peers", o.peers,
                "Only what marches take to equal variance, those through NanoVDB grids among them, on the coarsest of "
                "--threshold's grids within --target of the voxels' picture");
-  app.add_option(
-      "--block-bytes", o.block_bytes,
-      "With --peers: what storage blocks are taken to hold, not what the driver says (llvmpipe's 128 MiB are "
-      "not where they end)");
-  app.add_flag("--by-clock", o.by_clock, "With --peers: the clock's time, as of a GPU, instead of the processors'");
   auto* few = app.add_option("--samples", o.fewest_samples, "A pixel, at least, in a timed run (default: 8; quick: 4)");
   few->check(CLI::Range(1U, 1024U));
   app.add_option("--threshold", o.thresholds,

@@ -17,8 +17,16 @@ struct Input {
   bool optional = false;  ///< a default that may be missing
 };
 
+/// A folder of shaders that is measured on our cells.
+struct ShaderVariant {
+  std::string name;
+  std::filesystem::path folder;
+  bool constant_cells = false;
+};
+
 struct Options {
   std::vector<Input> inputs;
+  std::vector<ShaderVariant> variants;  ///< compared with NanoVDB grids and ours
   std::filesystem::path out = "bench-out";
   std::filesystem::path readme;
   headless::Backend backend = headless::Backend::automatic;

@@ -3,7 +3,9 @@
 // polls the clock until its budget is over, on two cores like the tracer of a software driver. Also the loop of
 // README's host until it converges. Run by hand:
 //
-//     cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK]
+//     cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK] [BUDGET]
+//
+// BUDGET: only this budget in milliseconds, without the control and the loop.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -146,21 +148,24 @@ class Bench {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "usage: cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK]\n");
+    std::fprintf(stderr, "usage: cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK] [BUDGET]\n");
     return 2;
   }
   try {
     Bench bench(argv[1], argc > 2 ? std::max(std::atoi(argv[2]), 8) : 100, argc > 3 ? std::atof(argv[3]) : 120.0);
+    std::vector<double> budgets{5.0, 10.0, 16.0};
+    if (argc > 4) budgets = {std::atof(argv[4])};
     std::printf("| %-22s | ms   | p50    | p95    | max     | samples   |\n|---|--:|--:|--:|--:|--:|\n", "scenario");
     for (const Scenario& scenario : {Scenario{"rest, preview off", CUMULET_PREVIEW_OFF, false, false},
                                      Scenario{"rest, preview", CUMULET_PREVIEW_AUTO, false, false},
                                      Scenario{"drag, preview", CUMULET_PREVIEW_AUTO, true, false},
                                      Scenario{"rest off, busy host", CUMULET_PREVIEW_OFF, false, true},
                                      Scenario{"drag, busy host", CUMULET_PREVIEW_AUTO, true, true}}) {
-      for (const double budget_ms : {5.0, 10.0, 16.0}) bench.pace(scenario, budget_ms);
+      for (const double budget_ms : budgets) bench.pace(scenario, budget_ms);
     }
+    if (argc > 4) return 0;
     for (const bool busy : {false, true}) {
-      for (const double budget_ms : {5.0, 10.0, 16.0})
+      for (const double budget_ms : budgets)
         bench.pace_of_control(busy ? "control, busy host" : "control", busy, budget_ms);
     }
     bench.readme_loop();

@@ -34,10 +34,10 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
       Edit{"path.glsl", "  p.depth = p.depth_0;\n  float ground = ",
            "  p.depth = p.depth_0;\n  if (to_light) p.depth_0 = 1.0f;\n  float ground = "},
   };
-  const std::array<std::filesystem::path, 3> files{
-      std::filesystem::path(CUMULET_BENCH_DIR) / "march_hdda.glsl",
-      std::filesystem::path(CUMULET_BENCH_DIR) / "flight_hdda.glsl",
-      std::filesystem::path(CUMULET_NANOVDB_INCLUDE) / "nanovdb/PNanoVDB.h"};
+  const std::filesystem::path ours = source_folder(CUMULET_BENCH_DIR, "CUMULET_BENCH_PEERS");
+  const std::filesystem::path theirs = source_folder(CUMULET_NANOVDB_INCLUDE, "CUMULET_BENCH_PEERS");
+  const std::array<std::filesystem::path, 3> files{ours / "march_hdda.glsl", ours / "flight_hdda.glsl",
+                                                   theirs / "nanovdb/PNanoVDB.h"};
   return std::make_unique<EditedShaders>(edits, files);
 }
 

@@ -25,8 +25,9 @@ constexpr double megabyte = 1e6;
 /// A grid type in the table.
 struct Entry {
   std::string name;
-  std::unique_ptr<EditedShaders> shaders;  ///< only for NanoVDB and edited shaders
-  std::unique_ptr<BoundGrid> grid;         ///< the NanoVDB grid
+  std::unique_ptr<EditedShaders> shaders;    ///< only for NanoVDB and edited shaders
+  std::shared_ptr<viewer::Sharing> variant;  ///< only for shaders of a folder
+  std::unique_ptr<BoundGrid> grid;           ///< the NanoVDB grid
   std::unique_ptr<Subject> subject;
   double bytes = 0.0;
   double threshold = 0.0;           ///< of its refinement
@@ -65,6 +66,18 @@ Entry to_the_box(headless::Context& context, const Asset& asset, const Entry& te
   entry.shaders = std::make_unique<EditedShaders>(edits);
   entry.subject = std::make_unique<Subject>(context, asset.volume, Kind::tet_linear, options, density_scale,
                                             entry.shaders->programs());
+  entry.subject->refine(grid::Criterion::transmittance, tets.threshold, options.max_cells);
+  return entry;
+}
+
+/// Measures shaders of a folder on a grid of the same threshold.
+Entry variant_of(headless::Context& context, const Asset& asset, const Entry& tets, const ShaderVariant& variant,
+                 const Options& options, double density_scale) {
+  Entry entry;
+  entry.name = variant.name;
+  entry.variant = std::make_shared<viewer::Sharing>(nullptr, std::make_shared<gl::ShaderFolder>(variant.folder));
+  const Kind kind = variant.constant_cells ? Kind::tet_constant : Kind::tet_linear;
+  entry.subject = std::make_unique<Subject>(context, asset.volume, kind, options, density_scale, entry.variant);
   entry.subject->refine(grid::Criterion::transmittance, tets.threshold, options.max_cells);
   return entry;
 }
@@ -130,6 +143,8 @@ void measure_peers(headless::Context& context, const Asset& asset, const Options
     fit(entries[2], reference, options);
   }
   entries.push_back(to_the_box(context, asset, entries[2], options, density_scale));
+  for (const ShaderVariant& variant : options.variants)
+    entries.push_back(variant_of(context, asset, entries[2], variant, options, density_scale));
   for (Entry& entry : entries) {
     entry.subject->shaded(1, 1);
     entry.bytes = static_cast<double>(entry.subject->stats().cell_bytes);

@@ -43,9 +43,8 @@ Bounds Bounds::read(const std::string& path) {
 
 void Bounds::write(const std::string& path) const {
   std::ofstream file(path);
-  file << "# What a kernel may cost at most (of waves: at least) on a family of AMD's GPUs: README.md. Written by\n"
-          "#   cumulet-gpu-cost --bounds tests/gpu_cost/bounds.txt --update --update-readme "
-          "tests/bench/results/gpu_cost.md\n";
+  file << "# What a kernel may cost at most (of waves: at least) on a family of GPUs. README.md has the command that "
+          "writes this file.\n";
   if (!driver.empty()) file << "driver " << driver << '\n';
   file << "# family  registers  spilled  spilled scalars  scratch  shared  waves  code  kernel\n";
   for (const auto& [key, cost] : bounds_) {

@@ -8,11 +8,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <initializer_list>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "bounds.hpp"
+#include "nvcc.hpp"
 
 namespace {
 
@@ -114,6 +117,37 @@ TEST(CostBounds, RoundTrip) {
   std::ofstream(path) << "navi21 1 2 three\n";
   EXPECT_THROW(Bounds::read(path), std::runtime_error);
   std::remove(path.c_str());
+}
+
+TEST(NvidiaCost, ReportIsRead) {
+  std::map<std::string, Cost> costs;
+  cumulet::gpu_cost::read_report(
+      "ptxas info    : Compiling entry function 'a' for 'sm_90'\n"
+      "    16 bytes stack frame, 8 bytes spill stores, 12 bytes spill loads\n"
+      "ptxas info    : Used 93 registers, used 0 barriers\n",
+      costs);
+  EXPECT_EQ(costs.at("a").registers, 93U);
+  EXPECT_EQ(costs.at("a").spilled, 2U);
+  EXPECT_EQ(costs.at("a").scratch_bytes, 512U);
+}
+
+TEST(NvidiaCost, LongestLoopIsFound) {
+  // Branches are 0x947 with the distance in words of four bytes from bit 34 on.
+  const auto code = [](std::initializer_list<int> distances) {
+    std::vector<unsigned char> bytes;
+    for (const int distance : distances) {
+      const auto words = static_cast<std::uint64_t>(static_cast<std::int64_t>(distance) * 4);
+      const std::uint64_t low = distance == 0 ? 0x224U : 0x947U | words << 34U;
+      const std::uint64_t high = distance == 0 ? 0U : words >> 30U & 0x3ffffU;
+      for (const std::uint64_t half : {low, high})
+        for (unsigned i = 0; i < 8; ++i) bytes.push_back(static_cast<unsigned char>(half >> 8U * i));
+    }
+    return bytes;
+  };
+  EXPECT_EQ(cumulet::gpu_cost::longest_loop(code({0, 0, -2, 0, -4, 0, -1})), 4U);
+  EXPECT_EQ(cumulet::gpu_cost::longest_loop(code({0, 2, 0, 0, -1})), 0U);
+  EXPECT_EQ(cumulet::gpu_cost::longest_loop({}), 0U);
+  EXPECT_THROW(cumulet::gpu_cost::functions_of({1, 2, 3}), std::runtime_error);
 }
 
 // Result of the program for the smallest kernel, run as by the tests gpu_cost.*.

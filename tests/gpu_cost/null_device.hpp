@@ -5,23 +5,20 @@
 #include <memory>
 #include <string>
 
-#include "cost.hpp"
-#include "kernels.hpp"
+#include "compiler.hpp"
 
 namespace cumulet::gpu_cost {
 
 /// Mesa's RADV without a GPU: it can only compile for an AMD GPU. At most one at a time.
-class NullDevice {
+class NullDevice final : public Compiler {
  public:
   /// family: a value of RADV_FORCE_FAMILY. Returns null if this driver is not installed.
   static std::unique_ptr<NullDevice> open(const std::string& family);
-  ~NullDevice();
+  ~NullDevice() override;
   NullDevice(const NullDevice&) = delete;
   NullDevice& operator=(const NullDevice&) = delete;
-  /// Throws std::runtime_error if the kernel cannot be compiled.
-  Cost cost(const Kernel& kernel);
-  /// "Mesa 22.3.6". Other versions generate other code.
-  [[nodiscard]] const std::string& version() const { return version_; }
+  Cost cost(const Kernel& kernel) override;
+  [[nodiscard]] const std::string& version() const override { return version_; }
 
  private:
   NullDevice() = default;

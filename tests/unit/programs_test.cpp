@@ -227,10 +227,15 @@ TEST_F(ProgramsTest, ShadersOfAFolderAreReloaded) {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the interval at which it checks the folder
   };
   std::vector<std::string> told;
-  const cumulet::Log log([&](cumulet::LogLevel /*level*/, const char* message) { told.emplace_back(message); });
+  std::vector<std::string> read;
+  const cumulet::Log log([&](cumulet::LogLevel level, const char* message) {
+    (level == cumulet::LogLevel::info ? read : told).emplace_back(message);
+  });
   const auto programs = std::make_shared<Programs>(*gl_, nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
   const Programs::Turn turn(programs, log);
   const Program& program = programs->get(resolve);
+  const std::string from = "shader resolve.comp: read from " + folder_.path().string();
+  EXPECT_EQ(read, std::vector{from + ", identical to the library's"});
   programs->refresh();
   const GLuint first = program.name();
   const auto revision = programs->revision();

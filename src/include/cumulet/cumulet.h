@@ -349,9 +349,9 @@ typedef struct cumulet_shader_cache_desc {
   const char* folder;
   /**
    * For developers of the library: UTF-8 path of a folder with shaders (a copy of glsl/) that replace the library's
-   * own. They are read again when they change. If one does not build, the log has one warning and the previous one
-   * stays in use. Debug builds of the library only; others return CUMULET_ERROR_UNSUPPORTED. NULL or "": the library's
-   * own shaders.
+   * own. The log has one line per shader that is read, and says whether it differs from the library's own. They are
+   * read again when they change. If one does not build, the log has one warning and the previous one stays in use.
+   * NULL or "": the library's own shaders.
    */
   const char* shaders;
 } cumulet_shader_cache_desc;
@@ -372,7 +372,7 @@ typedef struct cumulet_shader_cache_desc {
  * @param out        Receives the handle, which the caller releases; NULL on failure.
  * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
  * @param error_size Bytes at error.
- * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or CUMULET_ERROR_UNSUPPORTED for shaders in a release build.
+ * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
 CUMULET_API cumulet_status cumulet_shader_cache_create(const cumulet_shader_cache_desc* desc,
                                                        cumulet_shader_cache** out, char* error, size_t error_size);

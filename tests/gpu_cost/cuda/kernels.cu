@@ -1,0 +1,129 @@
+// Kernels over the shaders' shared files, for the costs on NVIDIA's GPUs (tests/gpu_cost/README.md). They are only
+// compiled. Each is as the stage of trace.comp for one volume of cells without channels, but paths and pixels are
+// structs in global memory.
+#include "glsl.cuh"
+
+namespace cumulet::core {
+
+#define CM_MARCH 0
+#define CM_PAGES 1
+#include "bindings.glsl"
+#include "parameters.glsl"
+__constant__ CmParameters cm;
+#include "current_volume.glsl"
+
+#include "cell.glsl"
+#include "phase.glsl"
+#include "random.glsl"
+
+__constant__ cudaTextureObject_t cm_cells;
+__constant__ cudaTextureObject_t cm_tree_words;
+__constant__ cudaTextureObject_t cm_surface;
+
+CM_FN uvec4 cm_fetch(cudaTextureObject_t words, int texel) {
+  const uint4 quad = tex1Dfetch<uint4>(words, texel);
+  return uvec4(quad.x, quad.y, quad.z, quad.w);
+}
+CM_FN uvec4 cm_record(uint cell, uint part) { return cm_fetch(cm_cells, int((CM_GRID.first_cell + cell) * 2u + part)); }
+CM_FN uint cm_tree_word(uint word) { return cm_link(cm_fetch(cm_tree_words, int(word >> 2)), word & 3u); }
+CM_FN uint cm_tree(uint node) { return cm_tree_word(CM_GRID.tree + node); }
+CM_FN uint cm_root_leaf(uint root) { return cm_tree_word(CM_GRID.tree - 52u + 2u * root); }
+CM_FN uint cm_root_node(uint root) { return cm_tree_word(CM_GRID.tree - 51u + 2u * root); }
+CM_FN float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
+  if (cm.host_depth.layers == 0u) return 3.0e38f;
+  const vec2 at = (vec2(pixel) + within) * vec2(cm.host_depth.size) / vec2(cm.view.size);
+  return tex2DLayered<float>(cm_surface, at.x, at.y, int(layer % cm.host_depth.layers));
+}
+
+#include "march.glsl"
+#include "path_state.glsl"
+
+__device__ CmPath* cm_lane_paths;
+__device__ CmPixel* cm_pixels;
+__device__ uint cm_next_slot;
+
+CM_FN uvec2 cm_pixel_of(uint slot) { return uvec2(slot % cm.view.size.x, slot / cm.view.size.x); }
+CM_FN CmPixel cm_load_pixel(uvec2 at) { return cm_pixels[at.y * cm.view.size.x + at.x]; }
+CM_FN void cm_store_pixel(CmPixel pixel, uvec2 at) { cm_pixels[at.y * cm.view.size.x + at.x] = pixel; }
+CM_FN void cm_take_next_slot(CmPath& p, uint& samples) {
+  p.slot = atomicAdd(&cm_next_slot, 1u);
+  p.stage = p.slot < cm.dispatch.slots ? CM_STAGE_CAMERA : CM_STAGE_DONE;
+  samples = 0u;
+}
+#include "run.glsl"
+
+// As in trace.comp: constants for the fields that only triangles use.
+CM_FN void cm_forget_triangles(CmPath& p) {
+  p.reach = 0.0f;
+  p.triangle = 0u;
+  p.weights = vec2(0.0f);
+  p.behind = 0u;
+  p.back = 0u;
+  p.lifted = 0u;
+  p.found = CM_FOUND_NOT_ASKED;
+}
+CM_FN CmPath cm_load_path() {
+  CmPath p = cm_lane_paths[blockIdx.x * 64u + threadIdx.x];
+  cm_forget_triangles(p);
+  return p;
+}
+CM_FN void cm_store_path(CmPath& p) {
+  cm_forget_triangles(p);
+  cm_lane_paths[blockIdx.x * 64u + threadIdx.x] = p;
+}
+
+// Everything.
+extern "C" __global__ void __launch_bounds__(64) cm_cost_trace() {
+  CmPath p = cm_load_path();
+  uint samples = cm_load_pixel(cm_pixel_of(p.slot)).samples;
+  cm_run(p, samples, cm.dispatch.rounds);
+  cm_store_path(p);
+}
+
+// Only the traversal: its loop is the step.
+extern "C" __global__ void __launch_bounds__(64) cm_cost_step(float4* rays, uint count) {
+  const uint lane = blockIdx.x * 64u + threadIdx.x;
+  const float4 a = rays[2u * lane];
+  const float4 b = rays[2u * lane + 1u];
+  const float extinction = CM_MEDIUM.extinction;
+  float t = a.w;
+  float depth = b.w;
+  float used = 0.0f;
+  uvec3 cell(__float_as_uint(b.x), 0u, CM_NONE);
+  const CmMarchRay ray = cm_march_ray(vec3(a.x, a.y, a.z), vec3(b.x, b.y, b.z));
+#pragma unroll 1
+  for (uint i = 0u; i < count && used <= depth && cell.x != CM_NONE; ++i) {
+    float t_1;
+    float r_0;
+    float r_1;
+    uvec3 next;
+    cm_march_step(cell, ray, t, t_1, r_0, r_1, next);
+    used = extinction * (0.5f * (r_0 + r_1) * (t_1 - t));
+    if (used <= depth) {
+      depth -= used;
+      t = t_1;
+      cell = next;
+    }
+  }
+  rays[2u * lane] = make_float4(t, depth, used, __uint_as_float(cell.x));
+}
+
+// An event, a camera ray with its entry cell, and only loading and storing a path.
+extern "C" __global__ void __launch_bounds__(64) cm_cost_event() {
+  CmPath p = cm_load_path();
+  cm_handle(p, cm_in_medium());
+  cm_store_path(p);
+}
+extern "C" __global__ void __launch_bounds__(64) cm_cost_camera() {
+  CmPath p = cm_load_path();
+  cm_camera(p, p.number, cm_pixel_of(p.slot));
+  cm_aim(p);
+  cm_store_path(p);
+}
+extern "C" __global__ void __launch_bounds__(64) cm_cost_store() {
+  CmPath p = cm_load_path();
+  p.bounces += 1u;
+  cm_store_path(p);
+}
+
+}  // namespace cumulet::core
