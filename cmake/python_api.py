@@ -109,9 +109,11 @@ class Generator:
         fields = [f'    ("{m.name}", {self.ctype(m.type, m.length, True)}),' for m in struct.members]
         enums = ", ".join(f'"{m.name}": {camel(m.type)}' for m in struct.members if m.type in self.enums)
         counts = ", ".join(f'"{m.name}": {COUNTS[m.name]!r}' for m in struct.members if self.is_array(struct, m))
+        flags = ", ".join(f'"{m.name}": bool' for m in struct.members
+                          if m.type == "int32_t" and not m.length and m.name not in NUMBERS)
         doc = "\n\n".join([struct.doc, *(f"{m.name}: {m.doc}" for m in struct.members if m.doc)])
         return [f"class {struct.name}(Struct):", quoted(doc, "    "), f"    _enums_ = {{{enums}}}",
-                f"    _counts_ = {{{counts}}}", "    _fields_ = [",
+                f"    _counts_ = {{{counts}}}", f"    _flags_ = {{{flags}}}", "    _fields_ = [",
                 *(f"    {field}" for field in fields), "    ]"]
 
     def callback(self, function):

@@ -15,6 +15,7 @@ class Struct(ctypes.Structure):
 
     _enums_ = {}  # the enum of a field
     _counts_ = {}  # the field with the length of an array, and elements per count
+    _flags_ = {}  # fields of int32_t that are 0 or 1
 
     def __init__(self, **values):
         super().__init__(**values)

@@ -437,7 +437,7 @@ def unpack(result: Any, struct: Any) -> Any:
             value = value.decode("utf-8", "replace")
         elif isinstance(value, ctypes.Array):
             value = tuple(value)
-        elif result.__annotations__[name] == "bool":
+        elif name in struct._flags_:
             value = bool(value)
         values.append("" if value is None else value)
     return result._make(values)

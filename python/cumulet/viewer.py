@@ -260,7 +260,7 @@ class Viewer(_methods.ViewerMethods):
                     time.sleep(0.005)  # a worker is busy
         stats = self.get_stats()
         made_by = stats.gl_renderer if self.context is None else f"{self.context.name()}: {stats.gl_renderer}"
-        return Picture(self.read_linear(), self.read_display(), made_by)
+        return Picture(self.read_linear(), self.read_display(), made_by, self.measure_noise())
 
 
 # The scene that `render` adds: a clear day, as that of cumulet-render.

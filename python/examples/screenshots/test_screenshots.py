@@ -1,0 +1,16 @@
+"""Screenshot tests of a plug-in that makes volumes."""
+
+import os
+
+import numpy
+
+
+def ball(voxels=24):
+    """The plug-in's result."""
+    x, y, z = numpy.meshgrid(*[numpy.linspace(-1, 1, voxels, dtype=numpy.float32)] * 3, indexing="ij")
+    radius = float(os.environ.get("BALL_RADIUS", "0.8"))
+    return (x * x + y * y + z * z < radius * radius).astype(numpy.float32)
+
+
+def test_ball(screenshot):
+    screenshot("ball", ball(), size=(48, 36), samples=16, medium={"density_scale": 0.5})
