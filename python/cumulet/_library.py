@@ -23,6 +23,16 @@ class Struct(ctypes.Structure):
             self.struct_size = ctypes.sizeof(self)
 
 
+def load_shared_with_drivers():
+    """Loads the system's copies of libraries that a GL driver also loads, so that the wheel's are used only without."""
+    folder = os.path.join(OWN_FOLDER, "fallback")
+    for file in os.listdir(folder) if os.path.isdir(folder) else ():
+        try:
+            ctypes.CDLL(file)
+        except OSError:
+            pass  # the loader finds the wheel's copy
+
+
 def load(name):
     """Returns the library lib<name>.so.0."""
     if name in _loaded:
@@ -31,6 +41,7 @@ def load(name):
     folders = [folder for folder in (os.environ.get(VARIABLE), OWN_FOLDER) if folder]
     found = [os.path.join(folder, file) for folder in folders if os.path.exists(os.path.join(folder, file))]
     path = found[0] if found else file
+    load_shared_with_drivers()
     try:
         _loaded[name] = ctypes.CDLL(path)
     except OSError as cause:

@@ -13,4 +13,5 @@ def ball(voxels=24):
 
 
 def test_ball(screenshot):
-    screenshot("ball", ball(), size=(48, 36), samples=16, medium={"density_scale": 0.5})
+    camera = {"eye": (30, 25, 70), "target": (11.5, 11.5, 11.5)}
+    screenshot("ball", ball(), size=(48, 36), samples=16, camera=camera, medium={"density_scale": 0.5})
