@@ -17,7 +17,7 @@ void parse_light(std::string_view text, float (&rgb)[3]) {
 
 }  // namespace
 
-std::string in_quotes(std::string_view text) { return "'" + std::string(text) + "'"; }
+std::string in_quotes(std::string_view text) { return std::string("'").append(text).append("'"); }
 
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;

@@ -630,7 +630,11 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
     if (const auto end = cause.find("] "); end != std::string::npos) cause.erase(0, end + 2);
     for (char& c : cause)
       if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-    if (cause.size() > 200) cause = cause.substr(0, 200) + "...";
+    if (cause.size() > 200) {
+      std::size_t end = 200;
+      while (end > 0 && (static_cast<unsigned char>(cause[end]) & 0xC0U) == 0x80) --end;  // within a UTF-8 character
+      cause = cause.substr(0, end) + "...";
+    }
     fail(path, "not JSON: " + cause);
   }
   if (!repeats.first().empty()) fail(path, repeats.first() + ": is given twice");

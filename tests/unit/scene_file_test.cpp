@@ -214,6 +214,15 @@ TEST(SceneFile, DuplicateKeysAreRejected) {
   EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "volume": {"file": "a.vdb"}, "surfaces": {"file": "a.glb"}})"), "");
 }
 
+TEST(SceneFile, LongJsonErrorsAreCutBetweenCharacters) {
+  std::string letters;
+  for (int i = 0; i < 300; ++i) letters += "\u00e9";  // two bytes in UTF-8
+  for (const char* const first : {"", "a"}) {
+    const std::string line = error_of(std::string("{\"") + first + letters);
+    EXPECT_TRUE(line.ends_with("\u00e9...")) << line;
+  }
+}
+
 TEST(SceneFile, MissingKeysHaveDefaults) {
   const SceneOptions read = parse_scene(R"({"cumulet_scene": 1})", "s.json");
   SceneOptions day;

@@ -3,7 +3,7 @@
 #define NANOVDB_USE_ZIP
 #define NANOVDB_USE_BLOSC
 
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>

@@ -11,7 +11,7 @@
 
 #include "support/folder.hpp"
 #include "support/vdb_files.hpp"
-#include "volume/frame.hpp"
+#include "volume/frame_import.hpp"
 
 namespace cumulet::test {
 
