@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import os
@@ -286,8 +287,9 @@ def _show(viewer: Viewer, source: Any, medium: Mapping[str, Any]) -> None:
     else:
         volume = source if isinstance(source, objects.Volume) else objects.Volume.from_numpy(source)
         viewer.set_volume(volume)
-        if scale:
-            viewer.set_medium(**medium, density_scale=volume.suggest_density_scale())
+        with contextlib.suppress(Error):  # a volume without density has no scale
+            if scale:
+                viewer.set_medium(**medium, density_scale=volume.suggest_density_scale())
 
 
 def render(source: Any, size: Tuple[int, int] = (1280, 720), samples: int = 64, *, camera: Any = None,

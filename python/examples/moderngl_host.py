@@ -21,8 +21,8 @@ def main():
         flags = cumulet.RenderFlags(0)
         while not flags & cumulet.RenderFlags.CONVERGED:
             flags = viewer.render(framebuffer=target.glo, width=width, height=height, flip_y=True, budget_ms=200).flags
-        picture = cumulet.Picture(viewer.read_linear(), memoryview(target.read(4)).cast("B", shape=(height, width, 4)),
-                                  viewer.get_stats().gl_renderer)
+        shown = memoryview(target.read(components=4)).cast("B", shape=(height, width, 4))
+        picture = cumulet.Picture(viewer.read_linear(), shown, viewer.get_stats().gl_renderer)
     picture.save(out)
     print(picture)
 

@@ -1,17 +1,18 @@
-"""Shows a volume in a window of PyQt6: qt_host.py VOLUME
+"""Shows a volume in a window of PyQt6: qt_host.py VOLUME [OUT.png SAMPLES]
 
-The left mouse button orbits, the wheel moves closer.
+The left mouse button orbits, the wheel moves closer. With OUT.png the finished picture is saved and the window closes.
 """
 
 import sys
 
 import cumulet
-from PyQt6.QtCore import Qt, pyqtSignal
+from PyQt6.QtCore import Qt, QTimer, pyqtSignal
 from PyQt6.QtGui import QOpenGLContext, QSurfaceFormat
 from PyQt6.QtOpenGLWidgets import QOpenGLWidget
 from PyQt6.QtWidgets import QApplication
 
-BUTTONS = {Qt.MouseButton.LeftButton: "left", Qt.MouseButton.MiddleButton: "middle", Qt.MouseButton.RightButton: "right"}
+BUTTONS = {Qt.MouseButton.LeftButton: "left", Qt.MouseButton.MiddleButton: "middle",
+           Qt.MouseButton.RightButton: "right"}
 
 
 class VolumeView(QOpenGLWidget):
@@ -19,12 +20,14 @@ class VolumeView(QOpenGLWidget):
 
     changed = pyqtSignal()  # from any thread to the thread of the window
 
-    def __init__(self, path):
+    def __init__(self, path, out=None, samples=256):
         super().__init__()
+        self.out = out
         self.changed.connect(self.update)
         self.viewer = cumulet.Viewer(update=self.changed.emit, gl_state="host_resets")
         self.viewer.set_sun_sky(sun_azimuth_degrees=60, sun_elevation_degrees=40, sky="physical")
         self.viewer.set_display(denoise="fast")
+        self.viewer.set_sampling(samples=samples)
         self.viewer.load_volume_file(path, suggested_density_scale=True)
 
     def initializeGL(self):
@@ -43,6 +46,13 @@ class VolumeView(QOpenGLWidget):
                                     height=round(self.height() * ratio), scale=ratio)
         if result.flags & cumulet.RenderFlags.INCOMPLETE:
             self.update()
+        elif self.out and result.flags & cumulet.RenderFlags.CONVERGED:
+            QTimer.singleShot(0, self.save)
+
+    def save(self):
+        self.grabFramebuffer().save(self.out)
+        self.out = None
+        QApplication.quit()
 
     def send(self, event, kind, **fields):
         position = event.position() * self.devicePixelRatio()
@@ -69,8 +79,8 @@ def main():
     surface.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
     QSurfaceFormat.setDefaultFormat(surface)
     application = QApplication(sys.argv)
-    view = VolumeView(sys.argv[1])
-    view.resize(640, 360)
+    view = VolumeView(sys.argv[1], *sys.argv[2:3], *map(int, sys.argv[3:4]))
+    view.resize(*((64, 48) if view.out else (640, 360)))
     view.show()
     sys.exit(application.exec())
 

@@ -6,6 +6,7 @@ The environment has CUMULET_SOURCE, the root of the checkout.
 import importlib.util
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -66,13 +67,27 @@ class Examples(unittest.TestCase):
         self.assertIn("ball: the difference is", changed.stdout)
         self.check_png(self.folder / "ball.failed.png")
 
+    def volume(self):
+        """A volume file, which is a NanoVDB or OpenVDB file of the build's sample scene."""
+        path = os.environ.get("CUMULET_VOLUME")
+        if path is None or not os.path.exists(path):
+            self.skipTest("there is no sample volume")
+        return path
+
     @needs("moderngl")
     def test_moderngl_host(self):
-        volume = os.environ.get("CUMULET_VOLUME")
-        if volume is None:
-            self.skipTest("CUMULET_VOLUME names no volume")
-        self.run_example("moderngl_host.py", volume, self.folder / "moderngl.png", 48, 32, 2)
+        self.run_example("moderngl_host.py", self.volume(), self.folder / "moderngl.png", 48, 32, 2)
         self.check_png(self.folder / "moderngl.png")
+
+    @needs("PyQt6")
+    def test_qt_host(self):
+        if shutil.which("xvfb-run") is None:
+            self.skipTest("not installed: xvfb")
+        command = ("xvfb-run", "-a", sys.executable, "-B", EXAMPLES / "qt_host.py", self.volume())
+        result = subprocess.run([*map(str, command), str(self.folder / "qt.png"), "2"], capture_output=True, text=True,
+                                timeout=SECONDS)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.check_png(self.folder / "qt.png")
 
     def test_examples_compile(self):
         for path in EXAMPLES.rglob("*.py"):
