@@ -1,6 +1,7 @@
 """Writes the parts of the Python package that follow from a C header.
 
---api      a module with the enums, structs, callbacks and functions of the header, by ctypes, under their C names
+--enums    a module with the enums
+--api      a module with the structs, callbacks, functions and constants of the header, by ctypes, under their C names
 --stubs    the same as type hints (.pyi)
 --methods  a module with classes of methods: one per handle, with keyword arguments for the fields of descriptors
 
@@ -93,17 +94,33 @@ class Generator:
             return "ctypes.c_char_p" if stars == 1 else "ctypes.POINTER(ctypes.c_char_p)"
         return "ctypes.POINTER(" * stars + element + ")" * stars
 
-    def enum(self, enum):
+    @staticmethod
+    def enum_names(enum):
+        """The name of the Python class, None for plain numbers, and the prefix of its constants in C."""
         names = [name for name, _, _ in enum.constants]
         prefix = c_header.common_prefix(names) if len(names) > 1 else ""
-        kind, name = ("IntEnum", camel(enum.name)) if enum.name else ("IntFlag", BITS.get(prefix))
-        if not name:
-            return [f"{constant} = {value}" for constant, value, _ in enum.constants]
-        lines = [f"class {name}(enum.{kind}):", quoted(enum.doc or name, "    "), ""]
+        return (camel(enum.name) if enum.name else BITS.get(prefix)), prefix
+
+    def enum(self, enum):
+        name, prefix = self.enum_names(enum)
+        lines = [f"class {name}(enum.{'IntEnum' if enum.name else 'IntFlag'}):", quoted(enum.doc or name, "    "), ""]
         for constant, value, doc in enum.constants:
             lines += [f"    #: {line}" for line in doc.split("\n") if line]
             lines.append(f"    {constant[len(prefix):]} = {value}")
-        return [*lines, "", "", *(f"{c} = {name}.{c[len(prefix):]}" for c in names)]
+        return lines
+
+    def constants(self, enum):
+        """The constants under their C names."""
+        name, prefix = self.enum_names(enum)
+        return [f"{c} = {name}.{c[len(prefix):]}" if name else f"{c} = {value}" for c, value, _ in enum.constants]
+
+    def enum_module(self):
+        enums = [one for one in self.header.of(c_header.Enum) if self.enum_names(one)[0]]
+        parts = ['"""The enums of the C API. Made by cmake/python_api.py."""', "", "import enum", "",
+                 f"__all__ = {[self.enum_names(one)[0] for one in enums]!r}"]
+        for one in enums:
+            parts += ["", "", *self.enum(one)]
+        return parts
 
     def struct(self, struct):
         fields = [f'    ("{m.name}", {self.ctype(m.type, m.length, True)}),' for m in struct.members]
@@ -131,14 +148,14 @@ class Generator:
 
     def api(self, library, imports):
         parts = [f'"""The C API of lib{library}, by ctypes: names and arguments are those of its header. Made by '
-                 'cmake/python_api.py."""', "", "import ctypes", "import enum", "",
+                 'cmake/python_api.py."""', "", "import ctypes", "",
                  "from ._library import Struct, function", *imports]
         if self.header.version:
             parts += ["", f"VERSION = ({', '.join(self.header.version)})"]
         for one in self.header.declarations:
             parts += ["", ""]
             if isinstance(one, c_header.Enum):
-                parts += self.enum(one)
+                parts += self.constants(one)
             elif isinstance(one, c_header.Struct):
                 parts += self.struct(one)
             elif isinstance(one, c_header.Handle):
@@ -150,13 +167,13 @@ class Generator:
         return parts
 
     def stubs(self, imports):
-        parts = ["# Made by cmake/python_api.py.", "import ctypes", "import enum", "from typing import Any, Tuple", "",
+        parts = ["# Made by cmake/python_api.py.", "import ctypes", "from typing import Any, Tuple", "",
                  "from ._library import Struct", *imports]
         if self.header.version:
             parts.append("VERSION: Tuple[int, int]")
         for one in self.header.declarations:
             if isinstance(one, c_header.Enum):
-                parts += [line for line in self.enum(one) if not line.strip().startswith("#:")]
+                parts += self.constants(one)
             elif isinstance(one, c_header.Struct):
                 parts += [f"class {one.name}(Struct):", *(f"    {m.name}: Any" for m in one.members)]
             elif isinstance(one, c_header.Handle):
@@ -423,14 +440,16 @@ def main():
     parser.add_argument("header")
     parser.add_argument("--types", nargs="*", default=[], metavar="HEADER", help="headers that it includes")
     parser.add_argument("--library", required=True, help="the library's name without lib and .so")
+    parser.add_argument("--enums", required=True)
     parser.add_argument("--api", required=True)
     parser.add_argument("--stubs", required=True)
     parser.add_argument("--methods", required=True)
     arguments = parser.parse_args()
     generator = Generator(arguments.header, arguments.types)
-    imports = ["from .api import *"] if arguments.types else []
-    module = re.search(r"(\w+)\.py$", arguments.api)[1]
-    for path, parts in ((arguments.api, generator.api(arguments.library, imports)),
+    module, enums = (re.search(r"(\w+)\.py$", path)[1] for path in (arguments.api, arguments.enums))
+    imports = [f"from .{enums} import *", *(["from .api import *"] if arguments.types else [])]
+    for path, parts in ((arguments.enums, generator.enum_module()),
+                        (arguments.api, generator.api(arguments.library, imports)),
                         (arguments.stubs, generator.stubs(imports)),
                         (arguments.methods, generator.methods(module))):
         with open(path, "w", encoding="utf-8") as file:

@@ -17,7 +17,7 @@ import ctypes  # noqa: E402
 
 from . import _support, api  # noqa: E402
 from ._support import Error  # noqa: E402
-from .api import *  # noqa: E402,F401,F403
+from .enums import *  # noqa: E402,F401,F403
 from .objects import (Camera, DynamicVolume, Environment, Inspection, Instance, Model, Sequence,  # noqa: E402,F401
                       ShaderCache, Surfaces, Volume, list_grids)
 from .picture import Picture  # noqa: E402,F401
@@ -26,6 +26,14 @@ from .viewer import Viewer, get_proc, render  # noqa: E402,F401
 _support.check_version()
 Error.__module__ = __name__
 __version__ = _support.version_text()
+
+
+def __getattr__(name):
+    """Loads libcumulet_headless only for those who use it."""
+    if name == "Headless":
+        from .headless import Headless
+        return Headless
+    raise AttributeError(f"module 'cumulet' has no attribute '{name}'")
 
 
 def region_pixels(region, width, height):

@@ -83,6 +83,16 @@ class Coverage(unittest.TestCase):
             found = subprocess.run([f"{folder}/layout"], check=True, capture_output=True, text=True).stdout.split("\n")
         self.assertEqual([line for line in found if line], wanted)
 
+    def test_code_of_the_pages_has_existing_names(self):
+        blocks = [block for page in ("docs/python.md", "README.md")
+                  for block in re.findall(r"^```python\n(.*?)^```", (SOURCE / page).read_text(encoding="utf-8"), re.M | re.S)]
+        self.assertGreater(len(blocks), 4)
+        for block in blocks:
+            compile(block, "page", "exec")
+            for name, member in re.findall(r"\bcumulet\.(\w+)(?:\.(\w+))?", block.replace("libcumulet.", "")):
+                self.assertTrue(hasattr(cumulet, name), name)
+                self.assertTrue(not member or hasattr(getattr(cumulet, name), member), f"{name}.{member}")
+
     def test_version_is_that_of_the_library(self):
         self.assertEqual(cumulet.__version__, ".".join(map(str, api.VERSION)) + f".{api.cumulet_version() % 100}")
 
