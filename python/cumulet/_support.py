@@ -100,6 +100,7 @@ def callback(kind: Any, function: Callable[..., Any] | None) -> Any:
 _kinds: Dict[str, type] = {}
 _open: "weakref.WeakSet[Handle]" = weakref.WeakSet()
 _postponed: collections.deque = collections.deque()  # destructions that a callback must not do
+_gate = threading.RLock()  # of the counts of running calls; never held during a call
 
 
 def destroy_postponed() -> None:
@@ -112,6 +113,7 @@ class Handle:
 
     _end: Any = None  # the function of the C API that ends the handle
     _closed_at_exit = 1  # the position in the order of handles that are open at exit
+    _calls = 0  # running calls, on any threads
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
@@ -136,7 +138,10 @@ class Handle:
 
     def close(self) -> None:
         """Ends the handle. Objects of the library that use it keep it alive. Does nothing if it has ended."""
-        out = self.__dict__.pop("_out", None)
+        with _gate:
+            out = self.__dict__.pop("_out", None)
+            if out and self._calls:
+                self._ending, out = out, None  # for the last of the running calls
         if out:
             self._release(out)
 
@@ -144,7 +149,17 @@ class Handle:
         type(self)._end(out)
 
     def _call(self, function: Any, *arguments: Any) -> Any:
-        return call(function, self._pointer, *arguments)
+        with _gate:
+            pointer = self._pointer
+            self._calls += 1
+        try:
+            return call(function, pointer, *arguments)
+        finally:
+            with _gate:
+                self._calls -= 1
+                out = None if self._calls else self.__dict__.pop("_ending", None)
+            if out:
+                self._release(out)
 
     _call_any_time = _call
     _call_gl = _call

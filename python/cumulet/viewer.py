@@ -80,8 +80,9 @@ class Viewer(_methods.ViewerMethods):
                  trace: Callable[[str, float, float], Any] | None = None, gl_state: api.GlStatePolicy | str | None = None,
                  shader_cache: objects.ShaderCache | None = None) -> None:
         _support.destroy_postponed()
-        self._lock, self._gate = threading.RLock(), threading.Condition()
-        self._calls = 0  # running calls that may come from any thread
+        self._lock = threading.RLock()  # held during calls, except those at any time, which are counted
+        self._idle = threading.Condition()
+        self._running = 0
         self._size = (0, 0)  # height and width of the displayed image
         self.context = context
         desc = _support.fill(api.cumulet_create_desc, {
@@ -137,19 +138,19 @@ class Viewer(_methods.ViewerMethods):
         return result
 
     def _call_any_time(self, function: Any, *arguments: Any) -> Any:
-        with self._gate:
+        with self._idle:
             pointer = self._pointer
-            self._calls += 1
+            self._running += 1
         try:
             return function(pointer, *arguments)
         finally:
-            with self._gate:
-                self._calls -= 1
-                self._gate.notify_all()
+            with self._idle:
+                self._running -= 1
+                self._idle.notify_all()
 
     def _release(self, out: Any) -> None:
-        with self._gate:
-            self._gate.wait_for(lambda: self._calls == 0)
+        with self._idle:
+            self._idle.wait_for(lambda: self._running == 0)
         destroy = functools.partial(_destroy, out, self._lock, self.context, self._callbacks)
         if _support.in_callback():  # where cumulet_destroy does nothing
             _support._postponed.append(destroy)

@@ -201,6 +201,23 @@ class Handles(unittest.TestCase):
         cumulet.Viewer().close()
         self.assertEqual(len(cumulet._support._postponed), 0)
 
+    def test_an_object_may_be_closed_while_another_thread_uses_it(self):
+        for _ in range(20):
+            volume = cumulet.DynamicVolume()
+            started = threading.Event()
+
+            def work():
+                with self.assertRaisesRegex(cumulet.Error, "it is closed"):
+                    while True:
+                        volume.set(box(8, 8, 8))
+                        started.set()
+
+            thread = threading.Thread(target=work)
+            thread.start()
+            started.wait()
+            volume.close()
+            thread.join()
+
     def test_threads_may_share_a_viewer(self):
         viewer = cumulet.Viewer()
         volume = cumulet.Volume.from_numpy(box(8, 8, 8))
