@@ -28,7 +28,7 @@ COUNTS = {"values": ("value_count", 1), "brick_origins": ("brick_count", 3), "br
           "changed": ("changed_count", 1), "paths": ("count", 1)}
 # Functions that read the image back: floats per pixel, as an expression.
 READS = {"cumulet_read_linear": "4", "cumulet_read_denoised": "4", "cumulet_read_light_group": "3",
-         "cumulet_read_aov": "_support.AOV_FLOATS.get(aov, 1)"}
+         "cumulet_read_aov": "_support.floats_of(aov)"}
 # Functions that create a handle, and the method that calls them.
 CREATE = {"cumulet_camera_create": "__init__", "cumulet_dynamic_volume_create": "__init__",
           "cumulet_shader_cache_create": "__init__", "cumulet_model_create": "__init__",
@@ -168,7 +168,7 @@ class Generator:
 
     def stubs(self, imports):
         parts = ["# Made by cmake/python_api.py.", "import ctypes", "from typing import Any, Tuple", "",
-                 "from ._library import Struct", *imports]
+                 "from ._library import Struct as Struct", *imports]
         if self.header.version:
             parts.append("VERSION: Tuple[int, int]")
         for one in self.header.declarations:
@@ -389,10 +389,7 @@ class Generator:
             lines.append(f"{INDENT}self._adopt(out)" if name == "__init__" else f"{INDENT}return {plan['results'][0]}")
             return lines
         if function.name in READS:
-            values = [f"api.{function.name}", READS[function.name], *values]
-            lines += [f"{INDENT}aov = {values.pop()}", f"{INDENT}return self._read({', '.join(values)}, aov)"] \
-                if function.name == "cumulet_read_aov" else [f"{INDENT}return self._read({', '.join(values)})"]
-            return lines
+            return [*lines, f"{INDENT}return self._read({', '.join([f'api.{function.name}', READS[function.name], *values])})"]
         call = "_call_any_time" if ANY_TIME in function.doc else "_call_gl" if function.doc.startswith("[GL]") else "_call"
         if function.result == "const char*":
             lines.append(f'{INDENT}return self.{call}({arguments}).decode("utf-8")')
@@ -404,7 +401,8 @@ class Generator:
 
     def methods(self, api):
         classes = {handle: [] for handle in self.handles if handle in {h.name for h in self.header.of(c_header.Handle)}}
-        filled = {}
+        filled = {base(p.type): None for f in self.functions for p in f.parameters
+                  if base(p.type) in self.structs and p.type.count("*") == 1 and not p.type.startswith("const")}
         for function in self.functions:
             owner = base(function.parameters[0].type) if function.parameters else None
             name = CREATE.get(function.name)
@@ -419,7 +417,6 @@ class Generator:
             name = name or RENAMED.get(function.name)
             name = name or function.name.removeprefix(owner + "_").removeprefix("cumulet_")
             classes[owner] += [*self.method(own, name, plan), ""]
-            filled.update({base(p.type): None for p in plan["pairs"] if base(p.type) in self.structs})
         parts = ['"""Methods that follow from the C API. Made by cmake/python_api.py."""', "",
                  "from __future__ import annotations", "", "import ctypes",
                  "from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, NamedTuple, Sequence, Tuple", "",
@@ -431,6 +428,8 @@ class Generator:
             doc = quoted(self.handles[owner].doc, "    ")
             end = next((f.name for f in self.functions if re.fullmatch(owner + "_(?:release|destroy)", f.name)), None)
             lines = [f"    _end = api.{end}", "", *lines] if end else lines
+            if any("self._read(" in line for line in lines):
+                lines = ["    _read: Callable[..., memoryview]", "", *lines]
             parts += ["", "", f"class {camel(owner)}Methods(_support.Handle):", doc, "", *lines]
         return parts
 

@@ -2,20 +2,21 @@
 
 import ctypes
 import os
+from typing import Any, Dict, Tuple
 
 # Folders that are searched before the loader's own. The folder "lib" of this package exists in a wheel and in a build.
 VARIABLE = "CUMULET_LIBRARY_DIR"
 OWN_FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "lib")
 
-_loaded = {}
+_loaded: Dict[str, Any] = {}
 
 
 class Struct(ctypes.Structure):
     """A struct of the C API. Its struct_size is set, and the rest is zero, which means the defaults."""
 
-    _enums_ = {}  # the enum of a field
-    _counts_ = {}  # the field with the length of an array, and elements per count
-    _flags_ = {}  # fields of int32_t that are 0 or 1
+    _enums_: Dict[str, Any] = {}  # the enum of a field
+    _counts_: Dict[str, Tuple[str, int]] = {}  # the field with the length of an array, and elements per count
+    _flags_: Dict[str, type] = {}  # fields of int32_t that are 0 or 1
 
     def __init__(self, **values):
         super().__init__(**values)

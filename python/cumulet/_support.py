@@ -12,13 +12,16 @@ import operator
 import os
 import threading
 import weakref
-from typing import Any, Callable, Dict, Iterable, Mapping, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, Mapping, Sequence, Tuple, TypeVar, Union
 
 from . import api
 
 PathLike = Union[str, "os.PathLike[str]"]
 #: 16 numbers, column by column as in OpenGL, or 4 rows of 4 numbers as in a book.
 Matrix = Union[Sequence[float], Sequence[Sequence[float]]]
+
+T = TypeVar("T")
+FUNCTION: Any = api.cumulet_release_fn.__mro__[1]  # the base of all types of callbacks in ctypes
 
 MAX_LINE = 1024
 AOV_FLOATS = {api.Aov.BEAUTY: 4, api.Aov.VOLUME: 4, api.Aov.NORMAL: 3, api.Aov.ALBEDO: 3, api.Aov.VELOCITY: 3,
@@ -78,10 +81,8 @@ def decoded(value: Any) -> Any:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 
 
-def callback(kind: Any, function: Callable[..., Any] | None) -> Any:
+def callback(kind: Any, function: Callable[..., Any]) -> Any:
     """Returns a C callback that calls a Python function, without the argument `user`. ctypes takes the GIL for it."""
-    if function is None:
-        return kind()
     if not callable(function):
         raise TypeError(f"a function is needed, not {type(function).__name__}")
 
@@ -97,7 +98,7 @@ def callback(kind: Any, function: Callable[..., Any] | None) -> Any:
 
 # --- handles ---------------------------------------------------------------------------------------------------------
 
-_kinds: Dict[str, type] = {}
+_kinds: Dict[str, Any] = {}
 _open: "weakref.WeakSet[Handle]" = weakref.WeakSet()
 _postponed: collections.deque = collections.deque()  # destructions that a callback must not do
 _gate = threading.RLock()  # of the counts of running calls; never held during a call
@@ -161,10 +162,10 @@ class Handle:
             if out:
                 self._release(out)
 
-    _call_any_time = _call
-    _call_gl = _call
+    _call_any_time: Any = _call
+    _call_gl: Any = _call
 
-    def __enter__(self) -> Any:
+    def __enter__(self: T) -> T:
         return self
 
     def __exit__(self, *_: Any) -> None:
@@ -221,6 +222,11 @@ def enum_of(kind: Any, value: Any, name: str) -> int:
     return operator.index(value)
 
 
+def floats_of(aov: Any) -> int:
+    """Floats per pixel of an AOV."""
+    return AOV_FLOATS.get(known(api.Aov, enum_of(api.Aov, aov, "aov")), 1)
+
+
 def numbers(kind: Any, count: int, value: Any, name: str) -> Any:
     """A C array of so many numbers. 16 may also be 4 rows of 4."""
     try:
@@ -263,7 +269,7 @@ def converter(struct: Any, name: str, kind: Any) -> Callable[[Any], Any]:
         return lambda value: value
     if issubclass(kind, ctypes.Array):
         return lambda value: numbers(kind._type_, kind._length_, value, name)
-    if issubclass(kind, ctypes._CFuncPtr):
+    if issubclass(kind, FUNCTION):
         return lambda value: value if isinstance(value, kind) else callback(kind, value)
     if not issubclass(kind, ctypes._Pointer):
         return lambda value: integer(kind, value, name)
@@ -418,7 +424,7 @@ class Array:
         ctypes.pythonapi.PyBuffer_Release(ctypes.byref(buffer))
 
     def pointer(self) -> Any:
-        kind = next(one for one, name in SCALARS.items() if name == self.kind)
+        kind: Any = next(one for one, name in SCALARS.items() if name == self.kind)
         return ctypes.cast(self.address, ctypes.POINTER(kind))
 
 

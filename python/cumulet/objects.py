@@ -156,6 +156,6 @@ class Model(_methods.ModelMethods):
 def list_grids(path: PathLike) -> List[Tuple[str, str, str]]:
     """Returns (name, type, reason) of each grid of a volume file. The reason is "" if the grid can be shown."""
     grids: List[Tuple[str, str, str]] = []
-    receive = _support.callback(api.cumulet_grid_fn, lambda *texts: grids.append(texts))
+    receive = _support.callback(api.cumulet_grid_fn, lambda name, kind, reason: grids.append((name, kind, reason)))
     _support.call(api.cumulet_list_grids, _support.text(path), receive, None)
     return grids

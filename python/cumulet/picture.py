@@ -24,8 +24,12 @@ def progress_bar(wanted: bool) -> Iterator[Callable[[float], None]]:
     if not wanted:
         yield lambda part: None
         return
-    with tqdm(total=100, unit="%", disable=False if "ipykernel" in sys.modules else None) as bar:
-        yield lambda part: bar.update(max(0, round(100 * part) - bar.n)) and None
+    hidden: Any = False if "ipykernel" in sys.modules else None  # None: only in a terminal
+    with tqdm(total=100, unit="%", disable=hidden) as bar:
+        def show(part: float) -> None:
+            bar.update(max(0, round(100 * part) - bar.n))
+
+        yield show
 
 
 class Picture:
@@ -40,7 +44,7 @@ class Picture:
         self.driver = driver
         #: The relative standard error of the luminance; 0.02 is 2 %. Infinite if it is unknown.
         self.noise = noise
-        self.height, self.width = display.shape[:2]
+        self.height, self.width = tuple(display.shape or ())[:2]
 
     def numpy(self) -> Any:
         """Linear radiance and alpha as a NumPy array of float32 (height, width, 4), which is not copied."""

@@ -8,7 +8,7 @@ import functools
 import os
 import threading
 import time
-from typing import Any, Callable, Iterable, List, Mapping, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Tuple
 
 from . import _methods, _support, api, objects
 from ._support import Array, Error
@@ -37,11 +37,9 @@ def get_proc(name: str) -> int:
     return next((address for address in (loader(name.encode()) for loader in _loaders()) if address), 0)
 
 
-def _address(function: Callable[[str], Any] | None) -> Callable[[str], int] | None:
+def _address(function: Any) -> Any:
     """get_proc for C. Toolkits return integers or objects that convert to one."""
-    if function is None or not callable(function):
-        return function
-    return lambda name: int(function(name) or 0)
+    return (lambda name: int(function(name) or 0)) if callable(function) else function
 
 
 def _destroy(pointer: Any, lock: Any, context: Any, callbacks: Any) -> None:
@@ -93,7 +91,8 @@ class Viewer(_methods.ViewerMethods):
                 raise TypeError("a viewer has a get_proc or a context, not both")
             from . import headless_api
             context.make_current()
-            desc.get_proc = ctypes.cast(headless_api.cumulet_headless_get_proc, api.cumulet_get_proc_fn)
+            function: Any = headless_api.cumulet_headless_get_proc
+            desc.get_proc = ctypes.cast(function, api.cumulet_get_proc_fn)
             desc.get_proc_user = ctypes.cast(context._pointer, ctypes.c_void_p)
         self._callbacks: List[Any] = [desc]
         out = ctypes.POINTER(api.cumulet_viewer)()
@@ -163,17 +162,17 @@ class Viewer(_methods.ViewerMethods):
         self._call_gl(api.cumulet_attach, receive, None)
         self._callbacks.append(receive)
 
-    def get_sequence_info(self, instance: objects.Instance | None = None) -> Tuple[Any, List[api.FrameState]]:
+    def get_sequence_info(self, instance: objects.Instance | None = None
+                          ) -> Tuple[_methods.SequenceInfo, List[api.FrameState]]:
         """Returns the state of the sequence, of the viewer or of an instance, and of each of its frames.
 
         C: cumulet_get_sequence_info, cumulet_get_instance_sequence_info.
         """
         function: Any = api.cumulet_get_sequence_info
+        owner: List[Any] = []
         if instance is not None:
-            pointer = _support.pointer_of(instance, "Instance", "instance")
-            function, owner = api.cumulet_get_instance_sequence_info, (pointer,)
-        else:
-            owner = ()
+            function = api.cumulet_get_instance_sequence_info
+            owner = [_support.pointer_of(instance, "Instance", "instance")]
         info = api.cumulet_sequence_info()
         self._call(function, *owner, ctypes.byref(info), None, 0)
         states = (ctypes.c_uint8 * max(info.frames, 1))()
@@ -335,7 +334,8 @@ def render(source: Any, size: Tuple[int, int] = (1280, 720), samples: int = 64, 
         viewer.set_lights(lights)
         viewer.set_grid(**(grid or {}))
         viewer.set_display(**(display or {}))
-        viewer.set_sampling(**{"samples": samples, "preview": api.Preview.OFF, **(sampling or {})})
+        quality: Dict[str, Any] = {"samples": samples, "preview": api.Preview.OFF, **(sampling or {})}
+        viewer.set_sampling(**quality)
         if camera is not None:
             viewer.set_camera(camera if isinstance(camera, objects.Camera) else objects.Camera(**camera))
         return viewer.render_picture(size, progress=progress)

@@ -102,6 +102,24 @@ class Arrays(unittest.TestCase):
         self.assertEqual(cumulet.region_pixels((0.5, 0, 0.5, 0), 10, 10), (5, 0, 5, 10))
         self.assertEqual(cumulet.cryptomatte_id("hello"), 0x248BFA47)
 
+    def test_a_sequence_reports_its_frames(self):
+        sequence = cumulet.Sequence(["missing.1.vdb", "missing.2.vdb"], file={"suggested_density_scale": True})
+        sequence.set_playback(frames_per_second=2, repeat="loop")
+        self.assertEqual(sequence.get_frame_at(0.5), 1)
+        with cumulet.Viewer() as viewer:
+            viewer.set_sequence(sequence)
+            with self.assertRaises(cumulet.Error):
+                viewer.wait(-1)
+            info, states = viewer.get_sequence_info()
+            self.assertEqual((info.frames, len(states)), (2, 2))
+            self.assertIn(cumulet.FrameState.FAILED, states)
+            failed = states.index(cumulet.FrameState.FAILED)
+            self.assertEqual(viewer.get_sequence_frame(failed), f"missing.{failed + 1}.vdb: no such file")
+            instance = cumulet.Instance(sequence=sequence)
+            viewer.add_instance(instance)
+            self.assertEqual(viewer.get_sequence_info(instance)[0].frames, 2)
+            self.assertIsInstance(viewer.get_sequence_frame(0, instance), str)
+
     def test_arrays_that_are_read_in_place_live_until_the_library_releases_them(self):
         class Owned(bytearray):
             pass
