@@ -1,9 +1,10 @@
 # `cmake --install` installs the library, its headers, a CMake package, a pkg-config file, the programs with their
 # manual pages, completions and desktop files, the documents and the licenses, and the reference if it was built.
 # `cpack -G TGZ` adds every shared library that the programs need and packs one portable .tar.gz (bundle.cmake).
-# `cpack -G DEB` makes three Debian packages that depend on Debian's own libraries (debian.cmake). A host's package
+# `cpack -G DEB` makes four Debian packages that depend on Debian's own libraries (debian.cmake). A host's package
 # depends on libcumulet0, which has none of the programs' dependencies (windowing). libcumulet-dev has the files for
-# compiling, and cumulet has the programs.
+# compiling, cumulet has the programs, and python3-cumulet has the Python package.
+# The target cumulet_wheel makes a wheel of the Python package, with all shared libraries that it needs.
 include(CMakePackageConfigHelpers)
 
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc/cumulet)
@@ -30,15 +31,48 @@ foreach(program cumulet-render cumulet-merge cumulet-scene cumulet-demo)
   endif()
 endforeach()
 cumulet_rpath(cumulet $ORIGIN)
+set(libraries cumulet)
+if(TARGET cumulet_headless_c)
+  cumulet_rpath(cumulet_headless_c $ORIGIN)
+  list(APPEND libraries cumulet_headless_c)
+endif()
 
 # --- install ---------------------------------------------------------------------------------------------------
-install(TARGETS cumulet EXPORT Cumulet
+install(TARGETS ${libraries} EXPORT Cumulet
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
         RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT library)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet ${PROJECT_BINARY_DIR}/src/include/cumulet
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
         COMPONENT development)
+if(TARGET cumulet_headless_c)
+  install(FILES ${PROJECT_SOURCE_DIR}/demo/headless/cumulet_headless.h
+          DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/cumulet COMPONENT development)
+endif()
+
+# The Python package. Outside of Debian's library folder it finds the libraries through a link.
+set(python_dir lib/python3/dist-packages/cumulet)
+get_property(python_modules GLOBAL PROPERTY CUMULET_PYTHON_MODULES)
+if(TARGET cumulet_python)
+  install(FILES ${python_modules} DESTINATION ${python_dir} COMPONENT python)
+  file(RELATIVE_PATH python_to_lib ${CMAKE_INSTALL_PREFIX}/${python_dir} ${CMAKE_INSTALL_FULL_LIBDIR})
+  install(CODE "file(CREATE_LINK ${python_to_lib} \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${python_dir}/lib\" SYMBOLIC)"
+          COMPONENT python)
+
+  set(wheel_stage ${CMAKE_BINARY_DIR}/wheel)
+  add_custom_target(cumulet_wheel
+    COMMAND ${CMAKE_COMMAND} -E rm -rf ${wheel_stage}
+    COMMAND ${CMAKE_COMMAND} --install ${CMAKE_BINARY_DIR} --component library --prefix ${wheel_stage} --strip
+    COMMAND ${CMAKE_COMMAND} -DCPACK_GENERATOR=TGZ -DCPACK_TEMPORARY_INSTALL_DIRECTORY=${wheel_stage}
+            -DCPACK_CUMULET_LIBDIR=${CMAKE_INSTALL_LIBDIR} -DCPACK_CUMULET_BINDIR=${CMAKE_INSTALL_BINDIR}
+            -DCPACK_CUMULET_DOCDIR=doc -P ${CMAKE_CURRENT_LIST_DIR}/bundle.cmake
+    COMMAND ${CUMULET_GLAD_PYTHON} -B ${CMAKE_CURRENT_LIST_DIR}/wheel.py --version ${PROJECT_VERSION}
+            --license ${PROJECT_SOURCE_DIR}/LICENSE --package ${CMAKE_BINARY_DIR}/python/cumulet
+            --libraries ${wheel_stage}/${CMAKE_INSTALL_LIBDIR} --licenses ${wheel_stage}/doc/licences
+            --out ${CMAKE_BINARY_DIR}
+    VERBATIM)
+  add_dependencies(cumulet_wheel cumulet cumulet_headless_c cumulet_python)
+endif()
 
 # The manual page and the completions of each program, generated from its own table of options.
 set(manual_files)
@@ -126,7 +160,7 @@ if(PROJECT_IS_TOP_LEVEL)
   set(CPACK_CUMULET_DATADIR ${CMAKE_INSTALL_DATADIR})
   set(CPACK_CUMULET_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 
-  set(CPACK_COMPONENTS_ALL library development programs)
+  set(CPACK_COMPONENTS_ALL library development programs python)
   set(CPACK_DEB_COMPONENT_INSTALL ON)
   set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
   set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
@@ -166,6 +200,17 @@ cumulet-demo shows OpenVDB and NanoVDB volumes and glTF models in a window,
 path-traced as they are turned and changed. cumulet-render makes pictures of
 them without a display, cumulet-merge one of parts, cumulet-farm makes them
 on many machines. cumulet-scene writes a sample scene.")
+
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-cumulet)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
+  # EGL is loaded by name.
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "${same_version}, python3:any (>= 3.8), libegl1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS libgl1-mesa-dri)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "libosmesa6, python3-numpy, python3-tqdm")
+  set(CPACK_DEBIAN_PYTHON_DESCRIPTION "path-traced volumes - Python package
+import cumulet renders OpenVDB and NanoVDB volumes, NumPy arrays and glTF
+models in Python, in the OpenGL context of a host or without a window.")
   set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # otherwise it precedes these descriptions
   include(CPack)
 endif()

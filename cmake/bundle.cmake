@@ -1,4 +1,5 @@
-# cpack runs this on the staged tree before it makes the archive. Adds every shared library that the programs and
+# cpack runs this on the staged tree before it makes the archive; the target cumulet_wheel runs it on a tree of libraries.
+# Adds every shared library that the programs and
 # libcumulet need, except those of the C library and of OpenGL, and the licenses of the added libraries.
 cmake_minimum_required(VERSION 3.25)
 if(NOT CPACK_GENERATOR STREQUAL "TGZ")
@@ -24,7 +25,7 @@ set(host_dirs /usr/lib/x86_64-linux-gnu /usr/lib64 /usr/lib)
 
 file(GLOB programs ${stage}/${CPACK_CUMULET_BINDIR}/*)
 list(FILTER programs EXCLUDE REGEX "/cumulet-farm$")  # a script
-file(GLOB libraries ${lib_dir}/libcumulet.so.*.*)
+file(GLOB libraries ${lib_dir}/libcumulet*.so.*.*)
 file(GET_RUNTIME_DEPENDENCIES
      EXECUTABLES ${programs} LIBRARIES ${libraries}
      RESOLVED_DEPENDENCIES_VAR resolved UNRESOLVED_DEPENDENCIES_VAR unresolved CONFLICTING_DEPENDENCIES_PREFIX conflicting
@@ -34,7 +35,7 @@ if(unresolved)
 endif()
 # If a library is both in the staged tree and on the system, the staged one is ours and is already in place.
 foreach(name ${conflicting_FILENAMES})
-  if(NOT name MATCHES "^libcumulet\\.so")
+  if(NOT name MATCHES "^libcumulet")
     list(GET conflicting_${name} 0 first)
     list(APPEND resolved ${first})
   endif()
@@ -45,7 +46,7 @@ set(packages)
 set(count 0)
 foreach(library ${resolved})
   get_filename_component(name ${library} NAME)
-  if(name MATCHES "^libcumulet\\.so")
+  if(name MATCHES "^libcumulet")
     continue()
   endif()
   set(destination ${lib_dir})

@@ -6,17 +6,19 @@ if(NOT CPACK_GENERATOR STREQUAL "DEB")
   return()
 endif()
 
-foreach(component library development programs)
+foreach(component library development programs python)
   string(TOUPPER ${component} upper)
   set(package ${CPACK_DEBIAN_${upper}_PACKAGE_NAME})
   set(usr ${CPACK_TEMPORARY_INSTALL_DIRECTORY}/${component}/usr)
 
-  file(GLOB binaries ${usr}/${CPACK_CUMULET_BINDIR}/* ${usr}/${CPACK_CUMULET_LIBDIR}/libcumulet.so.*)
+  file(GLOB binaries ${usr}/${CPACK_CUMULET_BINDIR}/* ${usr}/${CPACK_CUMULET_LIBDIR}/libcumulet*.so.*)
   foreach(file ${binaries})
     if(NOT IS_SYMLINK ${file} AND NOT file MATCHES "/cumulet-farm$")  # a script
       file(RPATH_REMOVE FILE ${file})
     endif()
   endforeach()
+
+  file(REMOVE ${usr}/lib/python3/dist-packages/cumulet/lib)  # the loader finds the libraries
 
   set(data ${usr}/${CPACK_CUMULET_DATADIR})
   file(MAKE_DIRECTORY ${data}/doc/${package})

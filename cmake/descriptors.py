@@ -35,9 +35,7 @@ def camel(name):
 
 def enum_class(name, body):
     constants = re.findall(r"(CUMULET_\w+)\s*=", body)
-    prefix = constants[0]
-    while not all(c.startswith(prefix) for c in constants) or not prefix.endswith("_"):
-        prefix = prefix[:-1]
+    prefix = c_header.common_prefix(constants)
     values = []
     for constant in constants:
         value = constant.removeprefix(prefix).lower()

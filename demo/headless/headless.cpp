@@ -25,6 +25,7 @@ class Context::Driver {
   Driver& operator=(const Driver&) = delete;
   virtual ~Driver() = default;
   virtual void make_current() = 0;
+  virtual void release_current() noexcept = 0;
   virtual void* get_proc(const char* name) = 0;
   [[nodiscard]] virtual const char* name() const noexcept = 0;
 };
@@ -88,6 +89,8 @@ struct Egl {
   PFNEGLDESTROYCONTEXTPROC DestroyContext = nullptr;
   PFNEGLDESTROYSURFACEPROC DestroySurface = nullptr;
   PFNEGLGETCURRENTCONTEXTPROC GetCurrentContext = nullptr;
+  PFNEGLGETCURRENTDISPLAYPROC GetCurrentDisplay = nullptr;
+  PFNEGLGETCURRENTSURFACEPROC GetCurrentSurface = nullptr;
   PFNEGLGETDISPLAYPROC GetDisplay = nullptr;
   PFNEGLGETERRORPROC GetError = nullptr;
   PFNEGLGETPROCADDRESSPROC GetProcAddress = nullptr;
@@ -107,6 +110,8 @@ struct Egl {
     load(library, DestroyContext, "eglDestroyContext");
     load(library, DestroySurface, "eglDestroySurface");
     load(library, GetCurrentContext, "eglGetCurrentContext");
+    load(library, GetCurrentDisplay, "eglGetCurrentDisplay");
+    load(library, GetCurrentSurface, "eglGetCurrentSurface");
     load(library, GetDisplay, "eglGetDisplay");
     load(library, GetError, "eglGetError");
     load(library, GetProcAddress, "eglGetProcAddress");
@@ -191,16 +196,37 @@ class EglDriver final : public Context::Driver {
   ~EglDriver() override { release(); }
 
   void make_current() override {
+    if (egl_.BindAPI(EGL_OPENGL_API) == EGL_FALSE) fail("no desktop OpenGL");  // the current API is per thread
+    if (egl_.GetCurrentContext() == context_) return;
+    const Binding present = {egl_.GetCurrentDisplay(), egl_.GetCurrentSurface(EGL_DRAW),
+                             egl_.GetCurrentSurface(EGL_READ), egl_.GetCurrentContext()};
     if (egl_.MakeCurrent(display_, surface_, surface_, context_) == EGL_FALSE) egl_.fail_with_error("eglMakeCurrent");
+    replaced_ = present;
+  }
+  void release_current() noexcept override {
+    egl_.BindAPI(EGL_OPENGL_API);  // the current API is per thread, and this may be another thread
+    if (egl_.GetCurrentContext() != context_) return;
+    const Binding previous = std::exchange(replaced_, Binding{});
+    // The replaced context may have been destroyed since. Then no context is current.
+    if (previous.context == EGL_NO_CONTEXT ||
+        egl_.MakeCurrent(previous.display, previous.draw, previous.read, previous.context) == EGL_FALSE)
+      egl_.MakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   }
   void* get_proc(const char* function) override { return reinterpret_cast<void*>(egl_.GetProcAddress(function)); }
   [[nodiscard]] const char* name() const noexcept override { return name_; }
 
  private:
+  /// The context that is current on a thread.
+  struct Binding {
+    EGLDisplay display = EGL_NO_DISPLAY;
+    EGLSurface draw = EGL_NO_SURFACE;
+    EGLSurface read = EGL_NO_SURFACE;
+    EGLContext context = EGL_NO_CONTEXT;
+  };
+
   void release() noexcept {
-    egl_.BindAPI(EGL_OPENGL_API);  // the current API is per thread, and this may be another thread
-    if (egl_.GetCurrentContext() == context_)
-      egl_.MakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    replaced_ = {};
+    EglDriver::release_current();
     if (surface_ != EGL_NO_SURFACE) egl_.DestroySurface(display_, surface_);
     egl_.DestroyContext(display_, context_);
   }
@@ -210,6 +236,7 @@ class EglDriver final : public Context::Driver {
   const char* name_;
   EGLContext context_ = EGL_NO_CONTEXT;
   EGLSurface surface_ = EGL_NO_SURFACE;
+  Binding replaced_;
 };
 
 std::unique_ptr<Context::Driver> create_egl(bool debug, Profile profile) {
@@ -324,15 +351,19 @@ class OsMesaDriver final : public Context::Driver {
   ~OsMesaDriver() override { release(); }
 
   void make_current() override {
+    if (osmesa_.GetCurrentContext() == context_) return;
     if (osmesa_.MakeCurrent(context_, pixel_.data(), OsMesa::unsigned_byte, 1, 1) == 0)
       fail("OSMesaMakeCurrent failed");
+  }
+  void release_current() noexcept override {
+    if (osmesa_.GetCurrentContext() == context_) osmesa_.MakeCurrent(nullptr, nullptr, OsMesa::unsigned_byte, 0, 0);
   }
   void* get_proc(const char* function) override { return osmesa_.GetProcAddress(function); }
   [[nodiscard]] const char* name() const noexcept override { return "osmesa"; }
 
  private:
   void release() noexcept {
-    if (osmesa_.GetCurrentContext() == context_) osmesa_.MakeCurrent(nullptr, nullptr, OsMesa::unsigned_byte, 0, 0);
+    OsMesaDriver::release_current();
     osmesa_.DestroyContext(context_);
   }
 
@@ -372,6 +403,10 @@ Context Context::create(Backend backend, bool debug, Profile profile) {
 }
 
 void Context::make_current() { driver_->make_current(); }
+
+void Context::release_current() noexcept {
+  if (driver_ != nullptr) driver_->release_current();
+}
 
 void* Context::get_proc(void* user, const char* name) {
   if (user == nullptr || name == nullptr) return nullptr;

@@ -25,8 +25,11 @@ class Context {
   /// Releases the context from this thread if it is current here, and destroys it.
   ~Context();
 
-  /// Throws std::runtime_error if the driver refuses.
+  /// Throws std::runtime_error if the driver refuses. Does nothing if the context is current on this thread.
   void make_current();
+  /// Releases the context from this thread if it is current here. With EGL, the context that it replaced here is
+  /// current again.
+  void release_current() noexcept;
 
   /// Returns the address of a GL function, or null. user: the Context. Matches cumulet_get_proc_fn.
   static void* get_proc(void* user, const char* name);

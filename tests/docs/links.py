@@ -14,7 +14,7 @@ from pages import pages, report
 import source_tree
 
 LINK = re.compile(r"\[[^\]]*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)|^ {0,3}\[[^\]]+\]:\s+(\S+)", re.M)
-FOLDERS = "cmake|demo|docs|glsl|scripts|src|tests|third_party_notes"
+FOLDERS = "cmake|demo|docs|glsl|python|scripts|src|tests|third_party_notes"
 PATH = re.compile(rf"(?:{FOLDERS})/[\w./*-]*")
 
 

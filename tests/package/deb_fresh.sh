@@ -24,12 +24,15 @@ quietly apt-get install --yes /tmp/libcumulet0_*.deb /tmp/cumulet_*.deb
 cumulet-scene --only cumulus --voxels 20000 /tmp/scene
 cumulet-render --volume /tmp/scene/cumulus.vdb --size 64x64 --spp 4 -o /tmp/picture.png
 cumulet-demo --version
+quietly apt-get install --yes /tmp/python3-cumulet_*.deb
+python3 -c 'import cumulet; cumulet.render("/tmp/scene/cumulus.vdb", size=(64, 48), samples=4).save("/tmp/python.png")'
 quietly apt-get install --yes --no-install-recommends /tmp/libcumulet-dev_*.deb gcc libc6-dev pkg-config
 cc -std=c11 /tmp/main.c -o /tmp/host $(pkg-config --cflags --libs cumulet)
 /tmp/host
-quietly apt-get purge --yes cumulet libcumulet-dev libcumulet0
+quietly apt-get purge --yes cumulet python3-cumulet libcumulet-dev libcumulet0
 if find /usr /etc -name '*cumulet*' | grep .; then exit 1; fi
 EOF
 env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin "${enter[@]}" "$root" /bin/bash /tmp/steps || fail "not in a new Debian"
 [ -s "$root/tmp/picture.png" ] || fail "cumulet-render wrote no picture"
+[ -s "$root/tmp/python.png" ] || fail "Python wrote no picture"
 echo "installed, ran, built against, and removed after $SECONDS s"

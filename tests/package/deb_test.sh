@@ -11,7 +11,7 @@ done
 
 pack "$1" DEB
 debs=("$work"/pack/*.deb)
-[ "${#debs[@]}" -eq 3 ] || fail "cpack wrote ${#debs[@]} packages, not 3"
+[ "${#debs[@]}" -eq 4 ] || fail "cpack wrote ${#debs[@]} packages, not 4"
 root=$work/root
 mkdir -p "$root"/{usr/{bin,sbin,lib,lib64},tmp,dev}
 ln -s usr/{bin,sbin,lib,lib64} "$root"
@@ -21,7 +21,7 @@ for deb in "${debs[@]}"; do
   [ "$(dpkg-deb -f "$deb" Version)" = "$version-1" ] || fail "$(basename "$deb") is not of version $version"
   mkdir "$work/unpacked"
   dpkg-deb -x "$deb" "$work/unpacked"
-  if find "$work/unpacked" -name '*.so*' ! -name 'libcumulet.so*' | grep .; then fail "$(basename "$deb") bundles that"; fi
+  if find "$work/unpacked" -name '*.so*' ! -name 'libcumulet*.so*' | grep .; then fail "$(basename "$deb") bundles that"; fi
   if rpaths "$work/unpacked" | grep .; then fail "$(basename "$deb") has a search path of its own"; fi
   # apt unpacks all packages into the same root, so no file may be in two of them.
   (cd "$work/unpacked" && find . ! -type d) | while read -r file; do
@@ -31,7 +31,7 @@ for deb in "${debs[@]}"; do
   rm -r "$work/unpacked"
 done
 for file in usr/bin/cumulet-{render,merge,farm,demo,scene} usr/share/man/man1/cumulet-render.1.gz \
-  usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet}/copyright \
+  usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet,python3-cumulet}/copyright \
   usr/share/doc/cumulet/{README,CHANGELOG,CONTRIBUTING}.md; do
   [ -s "$root/$file" ] || fail "no package has $file"
 done
@@ -88,6 +88,14 @@ said=$(in_root "$root" /usr/bin/cumulet-demo --version) || fail "cumulet-demo di
 in_root "$root" /usr/bin/cumulet-farm run --samples 2 --parts 2 -o /tmp/farm.exr -- /tmp/scene/cumulus.vdb --size 32x32 ||
   fail "cumulet-farm made no picture"
 [ -s "$root/tmp/farm.exr" ] || fail "cumulet-farm wrote no picture"
+
+cat >"$root/tmp/render.py" <<'CODE'
+import cumulet
+picture = cumulet.render("/tmp/scene/cumulus.vdb", size=(32, 32), samples=1)
+picture.save("/tmp/python.png")
+CODE
+in_root "$root" /usr/bin/python3 -B /tmp/render.py || fail "import cumulet made no picture"
+[ -s "$root/tmp/python.png" ] || fail "Python wrote no picture"
 
 # --- builds a host against the packages -------------------------------------------------------------------------------
 export PKG_CONFIG_SYSROOT_DIR=$root

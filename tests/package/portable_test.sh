@@ -21,38 +21,9 @@ for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/
   grep -q "/$wanted\$" "$work/list" || fail "the tarball lacks $wanted"
 done
 
-# copy_file FILE ROOT: copies the file under the given name, as a hard link where possible.
-copy_file() {
-  mkdir -p "$2$(dirname "$1")"
-  [ -e "$2$1" ] || cp -lL "$1" "$2$1" 2>/dev/null || cp -L "$1" "$2$1"
-}
-
-new_root() { # ROOT: adds the C library, the loader, /tmp, /dev/null and the unpacked tarball in /opt
-  mkdir -p "$1/opt" "$1/tmp" "$1/dev" "$1/proc/self" "$1/usr/lib" "$1/usr/lib64"
-  ln -s usr/lib usr/lib64 "$1"
-  : >"$1/dev/null"
-  local library
-  for library in ld-linux-x86-64.so.2 libc.so.6 libm.so.6 libpthread.so.0 libdl.so.2 librt.so.1; do
-    library=$(ldconfig_path "$library")
-    copy_file "$library" "$1"
-  done
-  copy_file /lib64/ld-linux-x86-64.so.2 "$1"
+new_root() { # ROOT: adds the C library and the unpacked tarball in /opt
+  bare_root "$1"
   tar -xzf "$tarball" -C "$1/opt" --strip-components=1
-}
-
-ldconfig_path() { # SONAME: prints the library's path on this system
-  ldconfig -p | awk -v name="$1" '$1 == name && /x86-64/ && !n++ {print $NF}'
-}
-
-copy_closure() { # ROOT FILE...: copies files and the libraries that they need
-  local root=$1 file library
-  shift
-  for file in "$@"; do
-    copy_file "$file" "$root"
-    ldd "$file" | awk '$2 == "=>" && $3 ~ /^\// {print $3}' | while read -r library; do
-      copy_file "$library" "$root"
-    done
-  done
 }
 
 # 1. Only the C library. Programs that need no OpenGL run, with the bundled C++ runtime.
@@ -78,19 +49,7 @@ grep -q -- --volume "$work/help" || fail "cumulet-render --help does not name --
 # 2. With Mesa, whose libraries share the process with the bundled ones.
 mesa=$work/mesa
 new_root "$mesa"
-read -ra drivers <<<"$(find /usr/lib -path '*/dri/*' -name 'swrast_dri.so' -printf '%p ')"
-vendor=/usr/share/glvnd/egl_vendor.d/50_mesa.json
-egl=$(ldconfig_path libEGL.so.1) egl_mesa=$(ldconfig_path libEGL_mesa.so.0) osmesa=$(ldconfig_path libOSMesa.so.8)
-backends=()
-if [ -n "$egl" ] && [ -n "$egl_mesa" ] && [ -f "$vendor" ] && [ "${#drivers[@]}" -gt 0 ]; then
-  copy_closure "$mesa" "$egl" "$egl_mesa" "${drivers[@]}"
-  copy_file "$vendor" "$mesa"
-  backends+=(egl)
-fi
-if [ -n "$osmesa" ]; then
-  copy_closure "$mesa" "$osmesa"
-  backends+=(osmesa)
-fi
+add_mesa "$mesa"
 find "$mesa" -path "$mesa/opt" -prune -o \( -name 'libopenvdb*' -o -name 'libtbb*' -o -name 'libOpenEXR*' \) -print |
   grep . && fail "the test's own root holds a library that the tarball should bring"
 cp -r "$bare/tmp/scene" "$mesa/tmp/scene"
