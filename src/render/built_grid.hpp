@@ -39,7 +39,4 @@ struct BuiltGrid {
 /// Grids that were built for the GPU, by source.
 using BuiltGrids = std::map<scene::MarchSourcePtr, BuiltGrid>;
 
-/// Returns the size of the records of a channel.
-std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells);
-
 }  // namespace cumulet::render

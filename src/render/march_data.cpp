@@ -13,6 +13,7 @@
 #include "base/luminance.hpp"
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
+#include "grid/memory.hpp"
 
 namespace cumulet::render {
 
@@ -108,17 +109,17 @@ struct ChannelBytes {
       : emissive(glowing * sizeof(scene::GlowingCell)) {
     using grid::Channel;
     if (const grid::TetGrid* made = source.grid.get()) {
-      emission = channel_bytes(Channel::emission, made->emission.size());
-      velocity = channel_bytes(Channel::velocity, made->velocity.size());
+      emission = grid::channel_bytes(Channel::emission, made->emission.size());
+      velocity = grid::channel_bytes(Channel::velocity, made->velocity.size());
       change = made->change.size() * sizeof(glm::uvec2);  // grids built on the GPU have none
-      color = channel_bytes(Channel::color, made->color.size());
-      anisotropy = channel_bytes(Channel::anisotropy, made->anisotropy.size());
+      color = grid::channel_bytes(Channel::color, made->color.size());
+      anisotropy = grid::channel_bytes(Channel::anisotropy, made->anisotropy.size());
       return;
     }
-    if (source.emits()) emission = channel_bytes(Channel::emission, cells);
-    if (source.moves()) velocity = channel_bytes(Channel::velocity, cells);
-    if (source.colored()) color = channel_bytes(Channel::color, cells);
-    if (source.anisotropic()) anisotropy = channel_bytes(Channel::anisotropy, cells);
+    if (source.emits()) emission = grid::channel_bytes(Channel::emission, cells);
+    if (source.moves()) velocity = grid::channel_bytes(Channel::velocity, cells);
+    if (source.colored()) color = grid::channel_bytes(Channel::color, cells);
+    if (source.anisotropic()) anisotropy = grid::channel_bytes(Channel::anisotropy, cells);
   }
   std::size_t emission = 0, emissive = 0, velocity = 0, change = 0, color = 0, anisotropy = 0;
   [[nodiscard]] std::size_t emissive_at() const { return emission; }

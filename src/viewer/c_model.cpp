@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "scene/model_table.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
 

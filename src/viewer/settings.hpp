@@ -10,14 +10,13 @@
 #include <glm/gtc/type_ptr.hpp>
 #include <optional>
 
+#include "assets/medium.hpp"
+#include "assets/surface_asset.hpp"
+#include "jobs/built.hpp"
 #include "light/sky.hpp"
 #include "render/display.hpp"
 #include "render/picture_settings.hpp"
-#include "scene/phase.hpp"
 #include "settings/settings.hpp"
-#include "viewer/builder.hpp"
-#include "viewer/surface_builder.hpp"
-#include "volume/ramp.hpp"
 
 namespace cumulet::viewer {
 
@@ -45,47 +44,6 @@ struct GridSettings {
     s.camera_adaptive = d.camera_adaptive == 1;
     return s;
   }
-};
-
-struct Medium {
-  double density_scale = 1.0;
-  glm::vec3 albedo{1.0F};
-  scene::Phase phase;
-  std::uint32_t max_bounces = 0;
-  glm::vec3 emission{0.0F};
-  scene::Emission field_emission = {};  // of its emission grids
-  std::uint32_t group = 0;              // light group
-  bool holdout = false;
-
-  static Medium of(const cumulet_medium_desc& d) {
-    return {d.density_scale,
-            1.0F - glm::make_vec3(d.coalbedo),
-            phase_of(d),
-            d.max_bounces,
-            glm::make_vec3(d.emission),
-            {d.flame_strength, glm::make_vec3(d.flame_color),
-             d.temperature_scale > 0.0F ? std::optional<double>(d.temperature_scale) : std::nullopt,
-             d.temperature_offset, d.blackbody, glm::make_vec3(d.blackbody_tint)},
-            d.group,
-            d.holdout == 1};
-  }
-  static scene::Phase phase_of(const cumulet_medium_desc& d) {
-    switch (d.phase) {
-      case CUMULET_PHASE_TWO_LOBE:
-        return {d.anisotropy, d.second_anisotropy, 0.0F, d.second_weight};
-      case CUMULET_PHASE_MIE:
-        return scene::mie_phase(d.droplet_diameter);
-      default:
-        return {.anisotropy = d.anisotropy};
-    }
-  }
-};
-
-/// Ramps (1-D transfer functions) that are applied to grid values first.
-struct Ramps {
-  volume::Ramp density = {};
-  volume::Ramp temperature = {};
-  volume::Ramp flame = {};
 };
 
 struct Light {

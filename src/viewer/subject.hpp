@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "viewer/bounds.hpp"
+#include "assets/bounds.hpp"
 
 namespace cumulet::viewer {
 

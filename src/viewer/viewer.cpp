@@ -14,10 +14,10 @@
 #include "base/library_thread.hpp"
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
+#include "jobs/cell_budget.hpp"
 #include "scene/model_table.hpp"
 #include "scene/origin.hpp"
 #include "scene/space.hpp"
-#include "viewer/cell_budget.hpp"
 
 namespace cumulet::viewer {
 

@@ -13,17 +13,17 @@
 #include <string>
 #include <vector>
 
+#include "assets/instance.hpp"
+#include "assets/sequence.hpp"
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/trace.hpp"
 #include "denoise/network.hpp"
+#include "jobs/jobs.hpp"
 #include "scene/snapshot.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
-#include "viewer/instance.hpp"
-#include "viewer/jobs.hpp"
 #include "viewer/navigation.hpp"
-#include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 
 namespace cumulet::viewer {

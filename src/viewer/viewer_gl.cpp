@@ -14,6 +14,7 @@
 #include "denoise/tza.hpp"
 #include "gl/compatibility_state.hpp"
 #include "gl/state_guard.hpp"
+#include "jobs/build_grid.hpp"
 #include "render/display.hpp"
 #include "viewer/viewer.hpp"
 
