@@ -81,19 +81,6 @@ void stay_with(scene::Volume& volume, const scene::Volume& was) {
   volume.frame = was.frame;
 }
 
-// Metadata of a volume with unknown contents within a box.
-VolumeInfoPtr info_of(const Bounds& bounds) {
-  volume::ScalarVolume box;
-  box.bounds_max = box.bounds_min;
-  for (int axis = 0; axis < 3; ++axis) box.index_to_world[axis][axis] = bounds.max[axis] - bounds.min[axis];
-  box.index_to_world[3] = glm::dvec4(0.5 * (bounds.min + bounds.max), 1.0);
-  return std::make_shared<const VolumeInfo>(VolumeInfo{.empty = false,
-                                                       .may_emit = true,
-                                                       .index_to_world = box.index_to_world,
-                                                       .anisotropy_grid = {},
-                                                       .coarse = volume::CoarseVolume(box)});
-}
-
 using Add = std::function<void(const dvec3&)>;
 
 // Adds the vertices of a mesh, or the corners of its box.
@@ -109,9 +96,17 @@ void add_mesh(const scene::ModelSource& source, const scene::ModelMesh& mesh, co
     add(dvec3(to_world * glm::dvec4(source.pose.vertices[*i].position, 1.0)));
 }
 
-void require_frame(const Sequence& sequence, std::uint32_t frame) {
-  if (frame >= sequence.files()->count())
+// Returns why a frame of a sequence cannot be shown.
+std::optional<Error> failure_of(const SequenceFeed& feed, std::uint32_t frame) {
+  if (frame >= feed.sequence().files()->count())
     throw Error(ErrorCode::invalid_argument, "the sequence has no frame " + std::to_string(frame));
+  return feed.cache().failure_of(frame);
+}
+
+// Refers to a source of jobs of the viewer, which outlives the result.
+template <class Source>
+std::shared_ptr<Source> borrowed(Source& source) {
+  return {std::shared_ptr<void>(), &source};
 }
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
@@ -138,7 +133,7 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 }
 
 Viewer::~Viewer() {
-  watched_.reset();  // its listener notifies the builder, which is destroyed first
+  feed_.reset();  // its listener notifies a builder, which is destroyed first
   lives_in_gl_.clear();
   cancel();  // all workers at once: with a thread limit, jobs wait for each other
   // Without the viewer's context its objects cannot be deleted, and in another context the names belong to other
@@ -166,8 +161,8 @@ void Viewer::sync() {
     take_volume(std::move(loaded->volume));
     suggested_density_scale_ = loaded->density_scale;
     if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
-    if (followed_ || watched_) {
-      leave_sequence();
+    if (feed_) {
+      leave_feed();
       take_medium();
     }
   }
@@ -187,9 +182,8 @@ void Viewer::sync() {
   }
   fit_cells();
   follow_proxy();
-  follow_sequence();
-  follow_live();
-  follow_watching();
+  follow_feed();
+  take_states(false);
   follow_instances();
   follow_models();
   if (auto surfaces = jobs_.surfaces.take()) {
@@ -208,7 +202,7 @@ void Viewer::sync() {
 void Viewer::follow_proxy() {
   // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
   // read-back must only contain the requested volume.
-  if (auto made = jobs_.builder.take_proxy(); made && sampling_.preview && !followed_ && !watched_) {
+  if (auto made = jobs_.builder.take_proxy(); made && sampling_.preview && !feed_) {
     proxy_ = std::move(made);
     show_medium();
   }
@@ -245,7 +239,7 @@ bool Viewer::begin_anew(bool shows, bool showed) {
   jobs_.builder.forget();
   drop_proxy();
   sync();
-  leave_sequence();
+  leave_feed();
   if (!shows) {
     take_volume(nullptr);
     built_ = {};
@@ -259,193 +253,97 @@ bool Viewer::begin_anew(bool shows, bool showed) {
 }
 
 void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
-  if (!begin_anew(sequence != nullptr, followed_.has_value())) return;
-  followed_ = follow(std::move(sequence), settings_at_once());
-  follow_sequence();
+  if (!begin_anew(sequence != nullptr, as_sequence(feed_) != nullptr)) return;
+  feed_ = std::make_shared<SequenceFeed>(std::move(sequence), settings_at_once(), borrowed(jobs_.frames),
+                                         SequenceFeed::Suggestion::used_if_asked, resource_limits_, feed_context());
+  follow_feed();
   touch();
-}
-
-Viewer::Followed Viewer::follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings) {
-  Followed followed;
-  followed.listener = sequence->listen([this] { notify(); });
-  followed.sequence = std::move(sequence);
-  followed.settings = std::move(settings);
-  followed.id = ++last_followed_;
-  return followed;
-}
-
-void Viewer::leave_sequence() {
-  followed_.reset();
-  jobs_.frames.clear();
-  watched_.reset();
-  jobs_.states.follow(nullptr, std::nullopt);
 }
 
 void Viewer::set_live(std::shared_ptr<Live> live) {
-  if (!begin_anew(live != nullptr, watched_.has_value())) return;
-  watched_ = watch(std::move(live), jobs_.states, ++last_followed_);
-  jobs_.states.follow(watched_->live, settings_at_once());
+  if (!begin_anew(live != nullptr, as_dynamic(feed_) != nullptr)) return;
+  track_gpu_resident(live);
+  feed_ = std::make_shared<DynamicFeed>(std::move(live), settings_at_once(), borrowed(jobs_.states), feed_context());
   touch();
 }
 
-Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder, std::uint64_t id) {
-  Watched watched;
-  watched.id = id;
-  if (const auto& bounds = live->bounds()) watched.volume_info = info_of(*bounds);
-  watched.listener = live->listen([this, &builder] {
-    builder.look();
-    notify();
-  });
-  track_gpu_resident(live);
-  watched.live = std::move(live);
-  return watched;
+FeedContext Viewer::feed_context() {
+  return {++last_feed_, last_taken_, [this] { notify(); }};
 }
 
-bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
+void Viewer::leave_feed() {
+  feed_.reset();
+  jobs_.frames.clear();
+  jobs_.states.follow(nullptr, std::nullopt);
+}
+
+bool Viewer::is_seen(const VolumeFeed& feed) const {
+  const std::optional<scene::SequenceFrame>& taken = feed.frame();
   if (!sampling_.preview || !taken) return true;
-  if (gl_) return is_rendered && !gl_->has_pending_frame(*taken);
-  return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
+  if (gl_) return feed.is_rendered() && !gl_->has_pending_frame(*taken);
+  return !simulated_gl_ || (feed.is_rendered() && simulated_gl_->displays_frames);
 }
 
-std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
-  // Each state that was taken is displayed, even if states arrive faster.
-  w.waits = !unseen && !is_seen(w.state, w.is_rendered);
-  if (w.waits) return std::nullopt;
-  auto ready = builder.take();
-  if (!ready) return std::nullopt;
-  w.state = scene::SequenceFrame{ready->number, w.id, ++last_taken_};
-  w.is_rendered = false;
-  w.told.ready = ready->number;
-  ++w.told.ready_count;
-  return ready;
-}
-
-void Viewer::follow_live(bool unseen) {
-  if (!watched_) return;
-  Watched& w = *watched_;
-  auto ready = take_state(w, jobs_.states, unseen);
-  if (!ready) return;
-  const bool other_volume = !w.volume_info || w.told.ready_count == 1;
-  volume_ = ready->built.volume;
-  built_ = std::move(ready->built);
-  volume_info_ = w.volume_info ? w.volume_info : volume_->volume_info();
-  if (other_volume) remark_on_anisotropy();
-  if (!shown_.empty()) requests_due_ = true;
-}
-
-Viewer::Watched& Viewer::watched() {
-  sync();
-  if (!watched_) throw Error(ErrorCode::invalid_argument, "the viewer shows no dynamic volume");
-  return *watched_;
-}
-
-Viewer::LiveStatus Viewer::Watched::status() const {
-  LiveStatus status = told;
-  status.handed = live->newest();
-  return status;
-}
-
-Viewer::LiveStatus Viewer::live() { return watched().status(); }
-
-Viewer::LiveStatus Viewer::live(const Instance& instance) {
-  const Shown& shown = *look_up(instance);
-  if (!shown.is_seen() || !shown.watching)
-    throw Error(ErrorCode::invalid_argument, "the instance shows no dynamic volume");
-  return shown.watching->watched.status();
-}
-
-void Viewer::follow_sequence() {
-  if (!followed_) return;
-  Followed& f = *followed_;
-  if (auto analyzed = jobs_.frames.take_analyzed()) {
+void Viewer::follow_feed() {
+  if (!feed_) return;
+  if (feed_->take_info()) {
     volume_ = nullptr;
-    volume_info_ = std::move(analyzed->volume_info);
+    volume_info_ = feed_->info();
     requests_due_ = true;
     remark_on_anisotropy();
-    f.density_scale = analyzed->density_scale;
-    if (f.sequence->files()->shown.suggested_density_scale) suggested_density_scale_ = analyzed->density_scale;
-    if (suggested_density_scale_) {
-      grid_.build.refine.density_scale = *suggested_density_scale_;
-      if (f.settings) f.settings->refine.density_scale = *suggested_density_scale_;
-      f.request_due = true;
-    }
+    suggested_density_scale_ = feed_->density_scale_to_use();
+    if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
   }
-  tell_request(f, jobs_.frames);
-  if (f.take_due) take_frame();
+  take_from_feed(is_seen(*feed_));
 }
 
-void Viewer::tell_request(Followed& f, FrameCache& cache) const {
-  if (const std::uint64_t revision = f.sequence->revision(); revision != f.revision) {
-    f.revision = revision;
-    f.state = f.sequence->get();
-    f.request_due = true;
+void Viewer::take_from_feed(bool is_seen) {
+  const VolumeFeed::Taken taken = feed_->take(is_seen);
+  if (taken == VolumeFeed::Taken::nothing) return;
+  volume_ = feed_->volume();
+  const std::optional<Built>& built = feed_->built();
+  if (taken == VolumeFeed::Taken::same || !built) return;
+  built_ = *built;
+  if (VolumeInfoPtr info = feed_->info(); info != volume_info_) {
+    volume_info_ = std::move(info);
+    remark_on_anisotropy();
   }
-  if (f.request_due) {
-    std::optional<BuildSettings> settings = f.settings;
-    if (settings) settings->shutter_seconds *= f.state.playback.velocity_scale;
-    cache.request({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
-                   std::min(f.state.memory_bytes, resource_limits_->memory_bytes()),
-                   FrameCache::Steps::of(f.state.playback), &cache == &jobs_.frames});
-    f.request_due = false;
-    f.take_due = true;
-  }
-  if (const std::uint64_t cache_revision = cache.revision(); cache_revision != f.cache_revision) {
-    f.cache_revision = cache_revision;
-    f.take_due = true;
-  }
-}
-
-std::optional<FrameCache::Ready> Viewer::take(Followed& f, FrameCache& cache) const {
-  // Each frame that was taken is displayed, even if frames arrive faster.
-  if (!is_seen(f.frame, f.is_rendered)) return std::nullopt;
-  f.take_due = false;
-  return cache.take();
-}
-
-bool Viewer::note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before) {
-  const bool same = f.frame && ready.frame == f.frame->number && ready.part == f.frame->part;
-  if (same && ready.built.source == before) return false;
-  f.frame = scene::SequenceFrame{ready.frame, f.id, ++last_taken_, ready.part};
-  f.is_rendered = false;
-  return true;
-}
-
-void Viewer::take_frame() {
-  Followed& f = *followed_;
-  auto ready = take(f, jobs_.frames);
-  if (!ready) return;
-  volume_ = ready->built.volume;
-  if (!note_taken(f, *ready, built_.source)) return;
-  built_ = std::move(ready->built);
   if (!shown_.empty()) requests_due_ = true;
   take_suggestion();
 }
 
-Viewer::Followed& Viewer::followed() {
+const DynamicFeed& Viewer::own_live() {
   sync();
-  if (!followed_) throw Error(ErrorCode::invalid_argument, "the viewer shows no sequence");
-  return *followed_;
+  const DynamicFeed* live = as_dynamic(feed_);
+  if (live == nullptr) throw Error(ErrorCode::invalid_argument, "the viewer shows no dynamic volume");
+  return *live;
 }
 
-Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameCache& cache) const {
-  SequenceStatus status;
-  status.asked = scene::frame_of(f.state.playback, f.state.moment);
-  const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
-  status.requested_position = FrameCache::Steps::of(f.state.playback).position(step);
+Viewer::LiveStatus Viewer::live() { return own_live().status(); }
+
+Viewer::LiveStatus Viewer::live(const Instance& instance) {
+  const Shown& shown = *look_up(instance);
+  const DynamicFeed* live = as_dynamic(shown.feed);
+  if (!shown.is_seen() || live == nullptr)
+    throw Error(ErrorCode::invalid_argument, "the instance shows no dynamic volume");
+  return live->status();
+}
+
+const SequenceFeed& Viewer::own_sequence() {
+  sync();
+  const SequenceFeed* sequence = as_sequence(feed_);
+  if (sequence == nullptr) throw Error(ErrorCode::invalid_argument, "the viewer shows no sequence");
+  return *sequence;
+}
+
+Viewer::SequenceStatus Viewer::status_of(const SequenceFeed& feed) const {
   // The displayed frame may belong to another sequence.
-  if (const auto shown = gl_ ? frame_of(*gl_, f.id) : std::nullopt)
-    status.drawn = static_cast<double>(shown->number) + shown->part;
-  status.frames = cache.frames();
-  status.density_scale = f.density_scale;
-  return status;
+  return feed.status(gl_ ? frame_of(*gl_, feed.id()) : std::nullopt);
 }
 
-Viewer::SequenceStatus Viewer::sequence() { return status_of(followed(), jobs_.frames); }
+Viewer::SequenceStatus Viewer::sequence() { return status_of(own_sequence()); }
 
-std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
-  require_frame(*followed().sequence, frame);
-  return jobs_.frames.failure_of(frame);
-}
+std::optional<Error> Viewer::frame_failure(std::uint32_t frame) { return failure_of(own_sequence(), frame); }
 
 std::vector<Viewer::Shown>::iterator Viewer::look_up(const Instance& instance) {
   sync();
@@ -454,21 +352,18 @@ std::vector<Viewer::Shown>::iterator Viewer::look_up(const Instance& instance) {
   return shown;
 }
 
-const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
+const SequenceFeed& Viewer::sequence_of(const Instance& instance) {
   const Shown& shown = *look_up(instance);
-  if (!shown.is_seen() || !shown.played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
-  return shown;
+  const SequenceFeed* sequence = as_sequence(shown.feed);
+  if (!shown.is_seen() || sequence == nullptr)
+    throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
+  return *sequence;
 }
 
-Viewer::SequenceStatus Viewer::sequence(const Instance& instance) {
-  const Played& played = *shown_sequence(instance).played;
-  return status_of(played.followed, played.cache);
-}
+Viewer::SequenceStatus Viewer::sequence(const Instance& instance) { return status_of(sequence_of(instance)); }
 
 std::optional<Error> Viewer::frame_failure(const Instance& instance, std::uint32_t frame) {
-  const Played& played = *shown_sequence(instance).played;
-  require_frame(*played.followed.sequence, frame);
-  return played.cache.failure_of(frame);
+  return failure_of(sequence_of(instance), frame);
 }
 
 std::optional<BuildSettings> Viewer::settings_at_once() const {
@@ -493,21 +388,14 @@ bool Viewer::built_for_another() const {
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   reported_failures_.retire();
   const bool loads = jobs_.builder.configure_load(settings_at_once());
-  if (loads && !followed_ && !watched_) return;
+  if (loads && !feed_) return;
   sync();
   const auto settings = settings_at_once();
-  if (watched_) {
-    if (!loads) jobs_.builder.forget_failure();
-    built_for_.reset();
-    jobs_.states.configure(settings);
-    return;
-  }
-  if (followed_) {
+  if (feed_) {
     if (!loads) jobs_.builder.forget_failure();  // of a load that would have replaced the sequence
     // The `concerned` test is skipped, because other frames may have fields that the displayed one lacks.
     built_for_.reset();
-    followed_->settings = settings;
-    followed_->request_due = true;
+    feed_->request(settings);
     return;
   }
   if (loads) return;
@@ -524,7 +412,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   drop_proxy();
   jobs_.builder.load(file, settings_at_once(), sampling_.preview ? std::optional(grid_.build) : std::nullopt);
   // A sequence or a dynamic volume is shown until the new volume is ready.
-  if (followed_ || watched_) {
+  if (feed_) {
     suggested_density_scale_ = suggested;
     take_medium();
   }
@@ -542,7 +430,7 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   jobs_.builder.take_loaded();  // drops a loaded volume that has not been shown
   drop_proxy();
   sync();
-  leave_sequence();
+  leave_feed();
   take_volume(std::move(volume));
   suggested_density_scale_.reset();
   if (!volume_) {
@@ -726,9 +614,8 @@ void Viewer::follow_instances() {
     shown.settings = shown.instance->get();
     shown.revision = revision;
     shown.medium.set(shown_medium(shown.settings.medium));
-    const bool other_sequence = shown.played && shown.played->source() != shown.settings.sequence;
-    const bool other_live = shown.watching && shown.watching->source() != shown.settings.live;
-    if (other_sequence || other_live || !shown.has_anything()) shown.forget();
+    const bool has_other_source = shown.feed && shown.feed->source() != shown.source();
+    if (has_other_source || !shown.has_anything()) shown.forget();
     if (!shown.settings.volume) {
       shown.request.reset();
       shown.begun.reset();
@@ -736,8 +623,8 @@ void Viewer::follow_instances() {
     requests_due_ = true;
     ++settings_revision_;
   }
-  if (requests_due_) request_for_sequences();
-  follow_played();
+  if (requests_due_) request_for_feeds();
+  take_frames();
   if (jobs_.grids.take_changes()) take_grids();
   // The viewer's own grid, which was to be reused, may have failed.
   if (waits_for_own_ && !jobs_.builder.busy()) requests_due_ = true;
@@ -747,52 +634,33 @@ void Viewer::follow_instances() {
   take_grids();
 }
 
-void Viewer::Played::configure(const std::optional<BuildSettings>& wanted) {
-  if (followed.settings == wanted) return;
-  followed.settings = wanted;
-  followed.request_due = true;
+VolumeFeedPtr Viewer::make_feed(const InstanceSettings& settings, const std::optional<BuildSettings>& build) {
+  const FeedContext context = feed_context();
+  const JobContext jobs = jobs_.context(context.id);
+  if (settings.sequence) {
+    return std::make_shared<SequenceFeed>(settings.sequence, build, std::make_shared<FrameCache>(jobs),
+                                          SequenceFeed::Suggestion::ignored, resource_limits_, context);
+  }
+  track_gpu_resident(settings.live);
+  return std::make_shared<DynamicFeed>(settings.live, build, std::make_shared<LiveBuilder>(jobs), context);
 }
 
-void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
-  if (settings == wanted) return;
-  settings = wanted;
-  builder.configure(wanted);
-}
-
-Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
-                                    const std::optional<BuildSettings>& settings) {
-  Followed followed = follow(sequence, settings);
-  const JobContext context = jobs_.context(followed.id);
-  return std::make_shared<Played>(std::move(followed), context);
-}
-
-Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
-  const std::uint64_t id = ++last_followed_;
-  auto watching = std::make_shared<Watching>(jobs_.context(id));
-  watching->watched = watch(live, watching->builder, id);
-  watching->settings = settings;
-  watching->builder.follow(live, settings);
-  return watching;
-}
-
-template <class Player>
-void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*member) {
+void Viewer::share_feeds(bool (*is_of_kind)(const Shown&), std::vector<VolumeFeedPtr>& feeds) {
   struct Wanted {
     std::optional<BuildSettings> settings;
     std::vector<Shown*> by;
-    [[nodiscard]] const auto& source() const { return Player::source_of(by.front()->settings); }
+    [[nodiscard]] const void* source() const { return by.front()->source(); }
   };
   std::vector<Wanted> all;
   for (Shown& shown : shown_) {
-    if (!Player::source_of(shown.settings)) (shown.*member).reset();
-    // A hidden instance keeps its player for when it is shown again.
-    if (!Player::source_of(shown.settings) || !shown.is_seen()) continue;
+    // A hidden instance keeps its feed for when it is shown again.
+    if (!is_of_kind(shown) || !shown.is_seen()) continue;
     std::optional<BuildSettings> settings;
     if (!grid_.camera_adaptive || view_) settings = settings_of(shown);
     const auto same = std::ranges::find_if(all, [&](const Wanted& wanted) {
       const bool alike =
           settings && wanted.settings ? same_but_view(*wanted.settings, *settings) : !settings && !wanted.settings;
-      return alike && wanted.source() == Player::source_of(shown.settings);
+      return alike && wanted.source() == shown.source();
     });
     if (same == all.end()) {
       all.push_back({settings, {&shown}});
@@ -801,57 +669,50 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
       same->by.push_back(&shown);
     }
   }
-  std::vector<std::shared_ptr<Player>> next;
   for (Wanted& wanted : all) {
-    const auto suits_it = [&](const std::shared_ptr<Player>& p) {
-      return p && p->source() == wanted.source() && std::ranges::find(next, p) == next.end();
+    const auto suits_it = [&](const VolumeFeedPtr& feed) {
+      return feed && feed->source() == wanted.source() && std::ranges::find(feeds, feed) == feeds.end();
     };
-    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->*member); });
-    const auto any = std::ranges::find_if(players, suits_it);
-    std::shared_ptr<Player> p = had != wanted.by.end() ? (*had)->*member : any != players.end() ? *any : nullptr;
-    if (p) {
-      p->configure(wanted.settings);
-    } else {
-      p = player_of(wanted.source(), wanted.settings);
+    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->feed); });
+    const auto any = std::ranges::find_if(feeds_, suits_it);
+    VolumeFeedPtr feed = had != wanted.by.end() ? (*had)->feed : any != feeds_.end() ? *any : nullptr;
+    if (!feed) {
+      feed = make_feed(wanted.by.front()->settings, wanted.settings);
+    } else if (feed->settings() != wanted.settings) {
+      feed->request(wanted.settings);
     }
-    for (Shown* shown : wanted.by) shown->*member = p;
-    next.push_back(std::move(p));
+    for (Shown* shown : wanted.by) shown->feed = feed;
+    feeds.push_back(std::move(feed));
   }
-  players = std::move(next);
 }
 
-void Viewer::request_for_sequences() {
-  share(played_, &Shown::played);
-  share(watching_, &Shown::watching);
+void Viewer::request_for_feeds() {
+  for (Shown& shown : shown_) {
+    if (shown.source() == nullptr) shown.feed.reset();
+  }
+  std::vector<VolumeFeedPtr> feeds;
+  share_feeds([](const Shown& shown) { return shown.settings.sequence != nullptr; }, feeds);
+  share_feeds([](const Shown& shown) { return shown.settings.live != nullptr; }, feeds);
+  feeds_ = std::move(feeds);
   std::vector<std::shared_ptr<JobSource>> players;
-  for (const PlayedPtr& played : played_) players.emplace_back(played, &played->cache);
-  for (const WatchingPtr& watching : watching_) players.emplace_back(watching, &watching->builder);
+  for (const VolumeFeedPtr& feed : feeds_) players.push_back(feed->jobs());
   jobs_.set_players(std::move(players));
 }
 
-void Viewer::follow_watching(bool unseen) {
-  for (const WatchingPtr& watching : watching_) {
-    if (auto ready = take_state(watching->watched, watching->builder, unseen))
-      watching->built = std::move(ready->built);
+void Viewer::take_states(bool unseen) {
+  for (const VolumeFeedPtr& feed : feeds_) {
+    if (as_dynamic(feed) != nullptr) feed->take(unseen || is_seen(*feed));
   }
 }
 
-void Viewer::follow_played() {
-  for (const PlayedPtr& played : played_) {
-    Followed& f = played->followed;
-    if (auto analyzed = played->cache.take_analyzed()) {
-      played->volume_info = std::move(analyzed->volume_info);
-      f.density_scale = analyzed->density_scale;
-    }
-    tell_request(f, played->cache);
-    if (!f.take_due) continue;
-    auto ready = take(f, played->cache);
-    if (!ready || !note_taken(f, *ready, played->built ? played->built->source : nullptr)) continue;
-    played->built = std::move(ready->built);
+void Viewer::take_frames() {
+  for (const VolumeFeedPtr& feed : feeds_) {
+    if (as_sequence(feed) == nullptr) continue;
+    feed->take_info();
+    feed->take(is_seen(*feed));
   }
   for (Shown& shown : shown_) {
-    if (shown.played && shown.played->built) shown.built = shown.played->built;
-    if (shown.watching && shown.watching->built) shown.built = shown.watching->built;
+    if (shown.feed && shown.feed->built()) shown.built = shown.feed->built();
   }
 }
 
@@ -937,8 +798,8 @@ void Viewer::request_for_grids() {
                                        [&](const GridCache::Request& request) {
                                          return request.volume == volume_ && suits(grid_.build, request.settings);
                                        })) ||
-      followed_ || watched_;
-  const std::size_t grids = requests.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
+      feed_;
+  const std::size_t grids = requests.size() + feeds_.size() + (own_is_apart ? 1 : 0);
   const std::size_t before = std::exchange(grids_, std::max<std::size_t>(grids, 1));
   share_gl();
   // The memory left by each frame always varies a little; only a change of an eighth matters.
@@ -1018,8 +879,11 @@ void Viewer::set_limits(const Limits& limits) {
     requests_due_ = requests_due_ || !shown_.empty();
   }
   sync();
-  if (followed_) followed_->request_due = true;
-  for (const PlayedPtr& played : played_) played->followed.request_due = true;
+  const auto renew = [](const VolumeFeedPtr& feed) {
+    if (SequenceFeed* sequence = as_sequence(feed)) sequence->renew_request();
+  };
+  renew(feed_);
+  std::ranges::for_each(feeds_, renew);
   touch();
 }
 
@@ -1027,7 +891,7 @@ void Viewer::fit_cells() {
   // The running job may have been started under other limits, or for another volume.
   if (!cells_due_ || jobs_.builder.busy()) return;
   cells_due_ = false;
-  if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
+  if (!volume_ || !is_of_cells(built_) || feed_) return;
   cuts_own_ = !has_cells_allowed(built_, *resource_limits_);
   if (cuts_own_) request_build();
 }
@@ -1039,8 +903,8 @@ bool Viewer::builds() const {
 }
 
 bool Viewer::frames_are_due() const {
-  const auto are_due = [](const PlayedPtr& played) { return played->followed.is_due(played->cache); };
-  return (followed_ && followed_->is_due(jobs_.frames)) || std::ranges::any_of(played_, are_due);
+  const auto is_due = [](const VolumeFeedPtr& feed) { return feed && feed->is_due(); };
+  return is_due(feed_) || std::ranges::any_of(feeds_, is_due);
 }
 
 void Viewer::load_surfaces(const FilePath& path) {
@@ -1126,8 +990,8 @@ void Viewer::wait(double timeout_ms) {
     sync();
     if (!jobs_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
     // The newest state is waited for, so it need not wait until the previous one has been displayed.
-    follow_live(true);
-    follow_watching(true);
+    if (as_dynamic(feed_) != nullptr) take_from_feed(true);
+    take_states(true);
     sync();
   } while (busy());
   if (const auto failure = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::reported))
@@ -1582,7 +1446,7 @@ void Viewer::show_volumes() {
   // The empty volume for surfaces is left out if instances are displayed.
   const scene::MarchSourcePtr& source = proxy_ ? proxy_->source : built_.source;
   if (source && (shown_info() || !shows_instances())) {
-    const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
+    const auto frame = feed_ ? feed_->frame() : std::nullopt;
     for (const scene::InstanceTransform& transform : transforms_)
       volumes.push_back({0, source, shown_medium_, {transform.to_world, while_open(transform.ends)}, frame});
     for (std::size_t i = 0; i < std::min(volumes.size(), previous_transforms_.size()); ++i)
@@ -1626,7 +1490,7 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
 
 void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const {
   if (max_gl_bytes_ == ResourceLimits::no_limit) return;
-  const bool own = cuts_own_ && jobs_.builder.busy() && !jobs_.builder.loads() && !proxy_ && !followed_ && !watched_;
+  const bool own = cuts_own_ && jobs_.builder.busy() && !jobs_.builder.loads() && !proxy_ && !feed_;
   if (!own && std::ranges::none_of(shown_, [this](const Shown& shown) { return makes_room(shown); })) return;
   const auto was = [&](const scene::Volume& volume) {
     return std::ranges::find(scene_.volumes, volume.id, &scene::Volume::id);

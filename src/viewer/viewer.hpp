@@ -21,6 +21,8 @@
 #include "denoise/network.hpp"
 #include "jobs/jobs.hpp"
 #include "scene/snapshot.hpp"
+#include "stage/dynamic_feed.hpp"
+#include "stage/sequence_feed.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
 #include "viewer/navigation.hpp"
@@ -73,13 +75,7 @@ class Viewer {
   VolumeInfoPtr volume_info();
   /// Shows the current frame of a sequence instead of the volume. Null: removes the sequence that is shown, if any.
   void set_sequence(std::shared_ptr<Sequence> sequence);
-  struct SequenceStatus {
-    std::uint32_t asked = 0;          ///< the current frame of its clock
-    double requested_position = 0.0;  ///< the current step, in frames
-    std::optional<double> drawn;      ///< the step that is displayed, in frames
-    FrameCache::Status frames;
-    std::optional<double> density_scale;  ///< suggested for all frames
-  };
+  using SequenceStatus = SequenceFeed::Status;
   /// sequence() and frame_failure() throw Error(invalid_argument) if the viewer shows no sequence.
   SequenceStatus sequence();
   /// Returns why a frame cannot be shown.
@@ -94,13 +90,7 @@ class Viewer {
   /// [GL] Submits the next state of a dynamic volume from voxels in GL. `live` need not be shown by this viewer. state:
   /// a complete state, or the changes to the last one.
   void set_live_gl(std::shared_ptr<Live> live, const render::GlState& state);
-  struct LiveStatus {
-    std::uint64_t handed = 0;           ///< number of the newest submitted state; 0: none
-    std::uint64_t ready = 0;            ///< number of the state taken last
-    std::uint64_t drawn = 0;            ///< number of the displayed state
-    std::uint64_t ready_count = 0;      ///< how many were taken
-    std::uint64_t displayed_count = 0;  ///< how many of them were displayed
-  };
+  using LiveStatus = DynamicFeed::Status;
   /// Throws Error(invalid_argument) if the viewer shows no dynamic volume.
   LiveStatus live();
   /// Throws Error(invalid_argument) for an instance that the viewer does not show or that has no dynamic volume.
@@ -252,12 +242,14 @@ class Viewer {
   template <class Body>
   void with_gl(Body&& body);
   void sync();
-  // Updates the request of the sequence and takes its results.
-  void follow_sequence();
-  void take_frame();
-  // Updates the sequences and dynamic volumes of instances.
-  void request_for_sequences();
-  void follow_played();
+  // Updates the request of the viewer's own feed and takes its results.
+  void follow_feed();
+  void take_from_feed(bool is_seen);
+  // Updates the feeds of instances.
+  void request_for_feeds();
+  // Take the results of feeds of instances. Frames are taken after the requests were updated, states before.
+  void take_frames();
+  void take_states(bool unseen);
   // Takes the low-resolution proxy of a running load, and drops it when the load ends.
   void follow_proxy();
   // Requests a rebuild if the limits allow more cells or fewer cells than the grid has.
@@ -266,12 +258,9 @@ class Viewer {
   // Metadata of the displayed volume: that of the proxy while there is one.
   [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy_ ? proxy_->volume_info : volume_info_; }
   // Stops showing a sequence or a dynamic volume.
-  void leave_sequence();
-  // Takes states that are ready. unseen: also if the previous state has not been displayed.
-  void follow_live(bool unseen = false);
-  void follow_watching(bool unseen = false);
+  void leave_feed();
   // Returns true if the state or frame taken last has been displayed, or if images are not being displayed at all.
-  [[nodiscard]] bool is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const;
+  [[nodiscard]] bool is_seen(const VolumeFeed& feed) const;
   // Must be called before a sequence or a dynamic volume is shown or removed. Returns true if one is to be shown.
   bool begin_anew(bool shows, bool showed);
   // Makes this the current volume; null: none.
@@ -332,29 +321,6 @@ class Viewer {
   [[nodiscard]] bool fits(const Built& built) const;
   // Returns the displayed frame of a sequence.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
-  // A sequence that is shown, with the last request and the last frame taken.
-  struct Followed {
-    std::shared_ptr<Sequence> sequence;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;             // of the last request
-    std::optional<BuildSettings> settings;  // nullopt: waiting for a view
-    SequenceState state;
-    std::optional<double> density_scale;  // suggested for it, after its analysis
-    bool request_due = true;
-    std::uint64_t cache_revision = 0;  // revision of its cache when it was last checked
-    bool take_due = false;
-    std::uint64_t id = 0;                       // identifies this object
-    std::optional<scene::SequenceFrame> frame;  // frame taken last
-    bool is_rendered = false;                   // a frame has rendered it
-
-    // True if there is work pending for it, beside that of the cache.
-    [[nodiscard]] bool is_due(const FrameCache& cache) const {
-      return !cache.is_final_taken() && (request_due || cache.revision() != cache_revision);
-    }
-  };
-  [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
-  // Sends the newest request to the cache and checks for results.
-  void tell_request(Followed& f, FrameCache& cache) const;
   // Takes the GPU memory used by everything except volumes in this frame.
   void take_gl_bytes(std::uint64_t beside_volumes);
   // Fills in the flags about pending work and failures.
@@ -363,67 +329,17 @@ class Viewer {
   void note_rendered();
   // True if a frame or a state is ready, but waits until the previous one has been displayed.
   [[nodiscard]] bool something_waits() const;
-  // Returns the data to show now, if it may have changed.
-  [[nodiscard]] std::optional<FrameCache::Ready> take(Followed& f, FrameCache& cache) const;
-  // Records that this data was taken. Returns false if it was taken before.
-  bool note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before);
-  [[nodiscard]] SequenceStatus status_of(const Followed& f, const FrameCache& cache) const;
-  // A sequence of instances. Instances whose grids are the same share one.
-  struct Played {
-    Played(Followed requested, const JobContext& context) : followed(std::move(requested)), cache(context) {}
-    Followed followed;
-    VolumeInfoPtr volume_info;   // set after its analysis
-    std::optional<Built> built;  // for the frame taken last
-    FrameCache cache;
-
-    static const std::shared_ptr<Sequence>& source_of(const InstanceSettings& settings) { return settings.sequence; }
-    [[nodiscard]] const std::shared_ptr<Sequence>& source() const { return followed.sequence; }
-    void configure(const std::optional<BuildSettings>& wanted);
-  };
-  using PlayedPtr = std::shared_ptr<Played>;
-  struct Shown;
-  // A dynamic volume that is shown, with the last states taken and displayed.
-  struct Watched {
-    std::shared_ptr<Live> live;
-    std::shared_ptr<void> listener;
-    VolumeInfoPtr volume_info;                  // for all states, if bounds are known
-    std::uint64_t id = 0;                       // identifies this object
-    std::optional<scene::SequenceFrame> state;  // state taken last
-    bool is_rendered = false;                   // a frame has rendered it
-    bool waits = false;                         // another one is ready, but waits until this one has been displayed
-    std::uint64_t seen_last = 0;                // displayed last, as scene::SequenceFrame::taken
-    LiveStatus told;
-
-    [[nodiscard]] LiveStatus status() const;
-  };
-  // Starts following a dynamic volume. The builder is notified of its states while the result exists.
-  [[nodiscard]] Watched watch(std::shared_ptr<Live> live, LiveBuilder& builder, std::uint64_t id);
-  [[nodiscard]] std::optional<LiveBuilder::Ready> take_state(Watched& w, LiveBuilder& builder, bool unseen);
+  [[nodiscard]] SequenceStatus status_of(const SequenceFeed& feed) const;
   // Records which state this frame's image shows.
-  static void note_drawn(const Context& g, Watched& w);
-  // A dynamic volume of instances. Instances whose grids are the same share one.
-  struct Watching {
-    explicit Watching(const JobContext& context) : builder(context) {}
-    LiveBuilder builder;
-    Watched watched;  // its listener notifies `builder`
-    std::optional<BuildSettings> settings;
-    std::optional<Built> built;  // for the state taken last
-
-    static const std::shared_ptr<Live>& source_of(const InstanceSettings& settings) { return settings.live; }
-    [[nodiscard]] const std::shared_ptr<Live>& source() const { return watched.live; }
-    void configure(const std::optional<BuildSettings>& wanted);
-    [[nodiscard]] VolumeInfoPtr volume_info() const {
-      if (watched.volume_info) return watched.volume_info;
-      return built ? built->volume->volume_info() : nullptr;
-    }
-  };
-  using WatchingPtr = std::shared_ptr<Watching>;
-  // Create the object that follows a sequence or a dynamic volume.
-  PlayedPtr player_of(const std::shared_ptr<Sequence>& sequence, const std::optional<BuildSettings>& settings);
-  WatchingPtr player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings);
-  // Assigns one player to all instances that can share it. Existing players are reused.
-  template <class Player>
-  void share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*member);
+  static void note_displayed(const Context& g, const VolumeFeedPtr& feed);
+  // Arguments of a new feed.
+  [[nodiscard]] FeedContext feed_context();
+  struct Shown;
+  // Creates the feed of an instance.
+  [[nodiscard]] VolumeFeedPtr make_feed(const InstanceSettings& settings, const std::optional<BuildSettings>& build);
+  // Assigns one feed to all instances that can share it. Existing feeds are reused. is_of_kind: instances to consider;
+  // feeds: receives their feeds.
+  void share_feeds(bool (*is_of_kind)(const Shown&), std::vector<VolumeFeedPtr>& feeds);
   // A displayed instance, with its settings when it was last checked.
   struct Shown {
     std::shared_ptr<Instance> instance;
@@ -435,31 +351,30 @@ class Viewer {
     std::optional<GridCache::Request> request;
     std::optional<GridCache::Request> begun;  // the last request before `request` that was being built
     std::optional<Built> built;               // the newest
-    PlayedPtr played;                         // its sequence; null: none
-    WatchingPtr watching;                     // its dynamic volume; null: none
+    VolumeFeedPtr feed;                       // of its sequence or its dynamic volume; null: none
     void forget() {
       request.reset();
       begun.reset();
       built.reset();
-      played.reset();
-      watching.reset();
+      feed.reset();
     }
-    [[nodiscard]] bool has_anything() const { return settings.volume || settings.sequence || settings.live; }
+    // Its sequence or its dynamic volume; null: none.
+    [[nodiscard]] const void* source() const {
+      return settings.sequence ? static_cast<const void*>(settings.sequence.get()) : settings.live.get();
+    }
+    [[nodiscard]] bool has_anything() const { return settings.volume || source() != nullptr; }
     [[nodiscard]] bool is_seen() const { return has_anything() && !settings.hidden; }
     // Null: not known yet.
     [[nodiscard]] VolumeInfoPtr volume_info() const {
       if (settings.volume) return settings.volume->volume_info();
-      if (watching) return watching->volume_info();
-      return played ? played->volume_info : nullptr;
+      return feed ? feed->info() : nullptr;
     }
     [[nodiscard]] bool is_there() const { return is_seen() && volume_info(); }
     // Frame of its sequence, or state of its dynamic volume, from which its grid was built.
     [[nodiscard]] std::optional<scene::SequenceFrame> frame() const {
-      const auto current = [&](const auto& player) {
-        return player && player->built && built && built->source == player->built->source;
-      };
-      if (current(watching)) return watching->watched.state;
-      return current(played) ? played->followed.frame : std::nullopt;
+      if (!feed || !built) return std::nullopt;
+      const std::optional<Built>& last = feed->built();
+      return last && built->source == last->source ? feed->frame() : std::nullopt;
     }
   };
   // A displayed model, with its settings when it was last checked.
@@ -617,13 +532,14 @@ class Viewer {
   bool own_left_out_ = false;           // that request left out the viewer's own volume, because a load may replace it
   render::Totals totals_;
 
-  [[nodiscard]] Followed& followed();
+  // Throw Error(invalid_argument) if the viewer shows none.
+  [[nodiscard]] const SequenceFeed& own_sequence();
+  [[nodiscard]] const DynamicFeed& own_live();
   // Throw Error(invalid_argument) for an instance that the viewer does not show, or that has no sequence.
   [[nodiscard]] std::vector<Shown>::iterator look_up(const Instance& instance);
-  [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
-  std::optional<Followed> followed_;  // shown instead of a volume
-  [[nodiscard]] Watched& watched();
-  std::optional<Watched> watched_;  // shown instead of a volume
+  [[nodiscard]] const SequenceFeed& sequence_of(const Instance& instance);
+  VolumeFeedPtr feed_;                // shown instead of a volume; null: none
+  std::vector<VolumeFeedPtr> feeds_;  // of instances: sequences, then dynamic volumes
   // A dynamic volume whose voxels may be resident in this context.
   struct InGl {
     std::weak_ptr<Live> live;
@@ -636,7 +552,7 @@ class Viewer {
     [[nodiscard]] bool needs_products(const scene::StateInGlPtr& state) const;
   };
   std::vector<InGl> lives_in_gl_;
-  std::uint64_t last_followed_ = 0;
+  std::uint64_t last_feed_ = 0;
   std::uint64_t last_taken_ = 0;
 
   std::shared_ptr<ResourceLimits> resource_limits_ = std::make_shared<ResourceLimits>();
@@ -647,8 +563,6 @@ class Viewer {
   std::size_t grids_ = 1;                           // number of grids that share the GPU memory for volumes equally
   std::uint64_t part_of_gl_ = ResourceLimits::no_limit;  // share of each grid when cells were last requested
   std::unique_ptr<Context> gl_;
-  std::vector<PlayedPtr> played_;  // both: players of jobs_
-  std::vector<WatchingPtr> watching_;
   Jobs jobs_;  // last: its threads use the above
 };
 

@@ -121,7 +121,9 @@ void Viewer::prepare(const Frame& frame) {
   // Without a scene the last image is dropped too. Models without triangles still count as a scene, lit by the sky
   // only.
   const bool others = std::ranges::any_of(shown_, &Shown::is_there);
-  const bool watches = watched_ || !watching_.empty();  // the contents of their states may not be known yet
+  const auto is_dynamic = [](const VolumeFeedPtr& feed) { return as_dynamic(feed) != nullptr; };
+  // The contents of states may not be known yet.
+  const bool watches = is_dynamic(feed_) || std::ranges::any_of(feeds_, is_dynamic);
   const bool scene = shown_info() || shows_models() || others || watches;
   if (!scene) built_ = {};
   // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
@@ -146,22 +148,19 @@ void Viewer::prepare(const Frame& frame) {
   const bool transforms_rest = !std::exchange(transforms_changed_, false);
   // A build of the previous volume would replace the queued load.
   const bool another_comes = jobs_.builder.loads();
-  const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
+  const bool waits = another_comes && volume_ && !others && !feed_;
   if ((shown_info() || others || watches) && built_for_another() && !waits) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
     // GPU builds follow a moving camera, one grid after another, each of which is displayed.
     const bool follows =
-        volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
+        volume_ && !feed_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
         !jobs_.builder.busy() && gl_ && !gl_->scene().uploading_volumes() &&
         gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
     if (rests || follows) {
       take_medium();
-      if (watched_) {
-        jobs_.states.configure(settings_for_view());
-      } else if (followed_) {
-        followed_->settings = settings_for_view();
-        followed_->request_due = true;
-        follow_sequence();
+      if (feed_) {
+        feed_->request(settings_for_view());
+        if (!is_dynamic(feed_)) follow_feed();
       } else if (volume_ && !another_comes) {
         jobs_.builder.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
       }
@@ -207,26 +206,20 @@ std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint
   return found == shown.end() ? std::nullopt : std::optional(*found);
 }
 
-void Viewer::note_drawn(const Context& g, Watched& w) {
-  const auto shown = frame_of(g, w.id);
-  if (!shown || shown->taken == w.seen_last) return;
-  w.seen_last = shown->taken;
-  w.told.drawn = shown->number;
-  ++w.told.displayed_count;
+void Viewer::note_displayed(const Context& g, const VolumeFeedPtr& feed) {
+  DynamicFeed* live = as_dynamic(feed);
+  if (live == nullptr) return;
+  if (const auto shown = frame_of(g, live->id())) live->note_displayed(*shown);
 }
 
 void Viewer::note_rendered() {
-  if (followed_) followed_->is_rendered = true;
-  for (const PlayedPtr& played : played_) played->followed.is_rendered = true;
-  if (watched_) watched_->is_rendered = true;
-  for (const WatchingPtr& watching : watching_) watching->watched.is_rendered = true;
+  if (feed_) feed_->note_rendered();
+  for (const VolumeFeedPtr& feed : feeds_) feed->note_rendered();
 }
 
 bool Viewer::something_waits() const {
-  const auto is_due = [](const PlayedPtr& played) { return played->followed.take_due; };
-  const auto waits = [](const WatchingPtr& watching) { return watching->watched.waits; };
-  return (followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due) ||
-         std::ranges::any_of(watching_, waits);
+  const auto waits = [](const VolumeFeedPtr& feed) { return feed && feed->waits(); };
+  return waits(feed_) || std::ranges::any_of(feeds_, waits);
 }
 
 void Viewer::remark_on_samples(Context& g) {
@@ -316,8 +309,8 @@ FrameResult Viewer::render(const Frame& frame) {
     remark_on_samples(g);
     take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    if (watched_) note_drawn(g, *watched_);
-    for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
+    note_displayed(g, feed_);
+    for (const VolumeFeedPtr& feed : feeds_) note_displayed(g, feed);
     report_pending(result);
     if (g.transfers().busy() || voxels_in_gl_wait(g)) {
       result.more = true;
@@ -720,7 +713,8 @@ Stats Viewer::stats() {
     if (!built.source || !built.source->plan) add(built.cells, built.levels, built.limited);
   };
   add_built(built_);
-  s.active_voxels = volume_ ? volume_->volume().active_voxels : (followed_ ? built_.active_voxels : 0);
+  s.active_voxels =
+      volume_ ? volume_->volume().active_voxels : (as_sequence(feed_) != nullptr ? built_.active_voxels : 0);
   std::set<scene::MarchSourcePtr> grids{built_.source};
   std::set<VolumeAssetPtr> volumes{volume_};
   for (const Shown& shown : shown_) {
@@ -742,8 +736,12 @@ Stats Viewer::stats() {
     }
   }
   s.build_seconds = built_.seconds;
-  s.memory_bytes = followed_ ? jobs_.frames.frames().bytes : built_.bytes();
-  for (const PlayedPtr& played : played_) s.memory_bytes += played->cache.frames().bytes;
+  const auto bytes_of = [](const SequenceFeed& feed) { return feed.cache().frames().bytes; };
+  const SequenceFeed* own = as_sequence(feed_);
+  s.memory_bytes = own != nullptr ? bytes_of(*own) : built_.bytes();
+  for (const VolumeFeedPtr& feed : feeds_) {
+    if (const SequenceFeed* sequence = as_sequence(feed)) s.memory_bytes += bytes_of(*sequence);
+  }
   s.steps = totals_.steps;
   s.noise = totals_.noise;
   if (gl_) {
