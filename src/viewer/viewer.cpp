@@ -109,14 +109,6 @@ std::shared_ptr<Source> borrowed(Source& source) {
   return {std::shared_ptr<void>(), &source};
 }
 
-double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
-dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
-  const double azimuth = radians(azimuth_degrees);
-  const double elevation = radians(elevation_degrees);
-  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
-}
-
 }  // namespace
 
 Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace, std::shared_ptr<Sharing> sharing)
@@ -134,7 +126,7 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 
 Viewer::~Viewer() {
   feed_.reset();  // its listener notifies a builder, which is destroyed first
-  lives_in_gl_.clear();
+  dynamic_gl_.clear();
   cancel();  // all workers at once: with a thread limit, jobs wait for each other
   // Without the viewer's context its objects cannot be deleted, and in another context the names belong to other
   // objects.
@@ -190,13 +182,7 @@ void Viewer::sync() {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
     model_source_ = std::move(surfaces->source);
   }
-  if (auto read = jobs_.environments.take_environment()) show_environment(std::move(*read));
-  if (auto sky = jobs_.environments.take_sky()) {
-    if (asked_day_ == sky->day) asked_day_.reset();
-    // A sky requested earlier is displayed until the newest is ready.
-    if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
-    surround();
-  }
+  sky_.sync();
 }
 
 void Viewer::follow_proxy() {
@@ -262,7 +248,7 @@ void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
 
 void Viewer::set_live(std::shared_ptr<Live> live) {
   if (!begin_anew(live != nullptr, as_dynamic(feed_) != nullptr)) return;
-  track_gpu_resident(live);
+  dynamic_gl_.track(live);
   feed_ = std::make_shared<DynamicFeed>(std::move(live), settings_at_once(), borrowed(jobs_.states), feed_context());
   touch();
 }
@@ -641,7 +627,7 @@ VolumeFeedPtr Viewer::make_feed(const InstanceSettings& settings, const std::opt
     return std::make_shared<SequenceFeed>(settings.sequence, build, std::make_shared<FrameCache>(jobs),
                                           SequenceFeed::Suggestion::ignored, resource_limits_, context);
   }
-  track_gpu_resident(settings.live);
+  dynamic_gl_.track(settings.live);
   return std::make_shared<DynamicFeed>(settings.live, build, std::make_shared<LiveBuilder>(jobs), context);
 }
 
@@ -1100,8 +1086,7 @@ Medium Viewer::seen_medium() const {
 void Viewer::show_medium() { shown_medium_.set(shown_medium(seen_medium())); }
 
 void Viewer::set_light(const Light& light) {
-  light_ = light;
-  surround();
+  sky_.set_light(light);
   touch();
 }
 
@@ -1122,66 +1107,22 @@ void Viewer::set_environment(light::EnvironmentPtr environment) {
   reported_failures_.retire();
   jobs_.environments.drop_loads();
   sync();
-  show_environment(std::move(environment));
+  sky_.set_environment(std::move(environment));
   touch();
 }
 
 const light::EnvironmentPtr& Viewer::environment() {
   sync();
-  return environment_;
-}
-
-void Viewer::show_environment(light::EnvironmentPtr environment) {
-  if (environment && !environment->remarks.empty()) {
-    std::string remarks;
-    for (const std::string& remark : environment->remarks) remarks.append(remarks.empty() ? ": " : "; ").append(remark);
-    log_.warning(one_line(environment->name) + remarks);
-  }
-  if (environment && environment->replaced > 0) {
-    log_.warning(one_line(environment->name) + ": " + std::to_string(environment->replaced) +
-                 " pixels have non-finite, negative or too large (above 1e30) values, which are read as 0");
-  }
-  environment_ = std::move(environment);
-  surround();
+  return sky_.environment();
 }
 
 void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
-  environment_settings_ = settings;
-  surround();
+  sky_.set_environment_settings(settings);
   touch();
 }
 
-std::optional<light::Day> Viewer::day() const {
-  if (!light_.sky) return std::nullopt;
-  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.mode != GroundMode::none};
-}
-
-void Viewer::surround() {
-  light::Surroundings surroundings{environment_, environment_settings_.rotation_degrees,
-                                   environment_settings_.strength};
-  const std::optional<light::Day> wanted = day();
-  if (!wanted) {
-    jobs_.environments.forget_sky_failure();
-    daylight_.reset();
-    scene_.lights.set({to_sun(light_.sun_azimuth_degrees, light_.sun_elevation_degrees), light_.sun_irradiance,
-                       light_.sky_radiance, light_.sun_angle_degrees});
-  } else if (!(daylight_ && daylight_->day == *wanted) && asked_day_ != wanted) {
-    jobs_.environments.make_sky(*wanted);
-    asked_day_ = wanted;
-  }
-  // Until the new sky is ready, sun and sky stay unchanged except for the azimuth.
-  if (daylight_) {
-    scene_.lights.set({to_sun(light_.sun_azimuth_degrees, daylight_->day.sun_elevation_degrees),
-                       daylight_->sun_irradiance, light_.sky_radiance, light_.sun_angle_degrees});
-    if (!environment_)
-      surroundings = {.environment = daylight_->surroundings, .rotation_degrees = light_.sun_azimuth_degrees};
-  }
-  scene_.surroundings.set(std::move(surroundings));
-}
-
 void Viewer::set_ground(const GroundSettings& settings) {
-  ground_ = settings;
-  surround();
+  sky_.set_ground(settings);
   touch();
 }
 
@@ -1328,17 +1269,8 @@ bool Viewer::shows_triangles() const {
 }
 
 std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
-  // A ground plane at a given height is also shown without other objects: a sequence's frame may be empty.
-  if (ground_.mode == GroundMode::none || (ground_.mode == GroundMode::below && !all)) return std::nullopt;
-  scene::Ground ground{ground_.height, ground_.albedo};
-  // With models it is slightly below the bounds, because many models include a floor.
-  if (ground_.mode == GroundMode::below)
-    ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
-  // Then the visible edge of the plane is at most 1e-4 radians below the true horizon.
-  const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
-  const double scene = all ? glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) : 0.0;
-  ground.reach = 1e4 * (scene + eye);
-  return ground;
+  const bool on_triangles = sky_.has_ground() && shows_triangles();
+  return sky_.ground(all, on_triangles, view_ ? std::optional(view_->eye) : std::nullopt);
 }
 
 std::optional<Subject> Viewer::subject() const {
@@ -1505,6 +1437,8 @@ scene::SnapshotPtr Viewer::snapshot() {
   const std::optional<scene::Ground> ground = this->ground(box_of(boxes));
   const dvec3 origin = scene_origin(boxes, ground);
   count_from(origin);
+  scene_.lights = sky_.lights();
+  scene_.surroundings = sky_.surroundings();
   scene_.models = models();
   for (scene::Model& model : scene_.models) model = scene::counted_from(std::move(model), origin);
   remark_on_precision();
@@ -1532,8 +1466,8 @@ Shot Viewer::shot() {
   shot.view_rests = view_ == last_view_;
   shot.held = navigation_.dragging();
   shot.max_bounces = medium_.max_bounces;
-  shot.sun_group = light_.sun_group;
-  shot.sky_group = light_.sky_group;
+  shot.sun_group = sky_.light().sun_group;
+  shot.sky_group = sky_.light().sky_group;
   shot.sampling = sampling_;
   shot.surfaces = surface_settings_;
   shot.display = display_;

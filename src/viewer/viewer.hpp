@@ -23,8 +23,10 @@
 #include "scene/snapshot.hpp"
 #include "stage/dynamic_feed.hpp"
 #include "stage/sequence_feed.hpp"
+#include "stage/sky_stage.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
+#include "viewer/dynamic_gl_bridge.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/settings.hpp"
 
@@ -227,11 +229,6 @@ class Viewer {
   [[nodiscard]] Context& gl() const;
   // Must be called after each change of a setting.
   void touch();
-  // Updates the scene's lights and environment from the settings.
-  void surround();
-  // Returns the inputs of the physical sky; nullopt without one.
-  [[nodiscard]] std::optional<light::Day> day() const;
-  void show_environment(light::EnvironmentPtr environment);
   // True if a worker is busy or has a result that has not been taken.
   [[nodiscard]] bool busy() const;
   // busy() for the workers that build grids.
@@ -293,22 +290,6 @@ class Viewer {
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // Prepares a frame before uploads.
   void prepare(const Frame& frame);
-  // Takes voxels whose transfer from GL has completed.
-  static void follow_transfers(Context& g, double budget_ms);
-  // For GPU-resident states of dynamic volumes: starts the computation of emission and the transfer to main memory, as
-  // requested.
-  void update_gpu_resident(Context& g);
-  // True if such work is pending.
-  [[nodiscard]] bool voxels_in_gl_wait(Context& g) const;
-  static void bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels);
-  // Returns the transform for a state that stays GPU-resident; nullopt if the state must go to main memory.
-  static std::optional<glm::dmat4> transform_in_gl(Context& g, const std::shared_ptr<Live>& live,
-                                                   const render::GlState& state);
-  static void make_products(Context& g, const std::shared_ptr<Live>& live);
-  // Sorts and merges the scattered bricks of its newest state.
-  static void gather(Context& g, Live& live);
-  // Registers a dynamic volume with GPU-resident states for per-frame service (read-back, emission).
-  void track_gpu_resident(const std::shared_ptr<Live>& live);
   // Updates the upload progress for status() and stats().
   void follow_upload(const Context& g);
   // Takes the cell counts of GPU-built grids once they are built.
@@ -468,12 +449,6 @@ class Viewer {
   GridSettings grid_;
   Medium medium_;
   Ramps ramps_;
-  Light light_;
-  std::optional<light::Day> asked_day_;      // sky being computed
-  std::optional<light::Daylight> daylight_;  // displayed physical sky
-  light::EnvironmentPtr environment_;        // set by the host, newest
-  EnvironmentSettings environment_settings_;
-  GroundSettings ground_;
   SurfaceSettings surface_settings_;
   SurfaceAssetPtr surface_asset_;       // newest
   scene::ModelSourcePtr model_source_;  // newest pose
@@ -540,18 +515,7 @@ class Viewer {
   [[nodiscard]] const SequenceFeed& sequence_of(const Instance& instance);
   VolumeFeedPtr feed_;                // shown instead of a volume; null: none
   std::vector<VolumeFeedPtr> feeds_;  // of instances: sequences, then dynamic volumes
-  // A dynamic volume whose voxels may be resident in this context.
-  struct InGl {
-    std::weak_ptr<Live> live;
-    std::array<std::shared_ptr<void>, 2> listeners;  // for requests of voxels, and of emission
-    // States for which this was started or has failed; failed work is not retried.
-    std::weak_ptr<const scene::StateInGl> brought, made;
-    std::vector<scene::Emission> made_by;
-    // True if the newest state, which is in this context, needs to be copied to main memory, or needs emission.
-    [[nodiscard]] bool needs_values(Context& g, const scene::StateInGlPtr& state) const;
-    [[nodiscard]] bool needs_products(const scene::StateInGlPtr& state) const;
-  };
-  std::vector<InGl> lives_in_gl_;
+  DynamicGlBridge dynamic_gl_{[this] { notify(); }};
   std::uint64_t last_feed_ = 0;
   std::uint64_t last_taken_ = 0;
 
@@ -563,7 +527,8 @@ class Viewer {
   std::size_t grids_ = 1;                           // number of grids that share the GPU memory for volumes equally
   std::uint64_t part_of_gl_ = ResourceLimits::no_limit;  // share of each grid when cells were last requested
   std::unique_ptr<Context> gl_;
-  Jobs jobs_;  // last: its threads use the above
+  Jobs jobs_;  // its threads use the above
+  SkyStage sky_{jobs_.environments, log_};
 };
 
 }  // namespace cumulet::viewer
