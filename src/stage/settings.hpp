@@ -14,6 +14,7 @@
 #include "assets/surface_asset.hpp"
 #include "jobs/built.hpp"
 #include "light/sky.hpp"
+#include "scene/snapshot.hpp"
 #include "settings/settings.hpp"
 
 namespace cumulet::viewer {
@@ -84,6 +85,12 @@ struct GroundSettings {
     return {static_cast<GroundMode>(d.mode), d.height, glm::make_vec3(d.albedo)};
   }
 };
+
+/// Returns `ends` if the shutter has a duration.
+[[nodiscard]] inline std::optional<scene::ShutterTransforms> while_open(
+    const std::optional<scene::ShutterTransforms>& ends, double shutter_seconds) {
+  return shutter_seconds > 0.0 ? ends : std::nullopt;
+}
 
 enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
 

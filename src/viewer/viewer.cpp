@@ -177,11 +177,7 @@ void Viewer::sync() {
   follow_feed();
   take_states(false);
   follow_instances();
-  follow_models();
-  if (auto surfaces = jobs_.surfaces.take()) {
-    if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
-    model_source_ = std::move(surfaces->source);
-  }
+  settings_revision_ += models_.sync();
   sky_.sync();
 }
 
@@ -478,13 +474,8 @@ std::vector<Viewer::Shown>::iterator Viewer::find(const Instance& instance) {
 void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
   reported_failures_.retire();
   sync();
-  if (find(*model) != shown_models_.end())
-    throw Error(ErrorCode::invalid_argument, "the model is already in the viewer");
-  ShownModel shown;
-  shown.id = ++last_id_;
-  shown.listener = model->listen([this] { notify(); });
-  shown.model = std::move(model);
-  shown_models_.push_back(std::move(shown));
+  models_.add(std::move(model), last_id_ + 1);
+  ++last_id_;
   sync();  // starts posing its surfaces
   touch();
 }
@@ -492,105 +483,9 @@ void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
 void Viewer::remove_model(const ModelInstance& model) {
   reported_failures_.retire();
   sync();
-  const auto found = find(model);
-  if (found == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the model is not in the viewer");
-  shown_models_.erase(found);
-  poses_due_ = true;
+  models_.remove(model);
   sync();  // drops its failures
   touch();
-}
-
-std::vector<Viewer::ShownModel>::iterator Viewer::find(const ModelInstance& model) {
-  return std::ranges::find_if(shown_models_, [&](const ShownModel& shown) { return shown.model.get() == &model; });
-}
-
-void Viewer::follow_models() {
-  for (ShownModel& shown : shown_models_) {
-    const std::uint64_t revision = shown.model->revision();
-    if (revision == shown.revision) continue;
-    const SurfaceAssetPtr before = shown.settings.surfaces;
-    shown.settings = shown.model->get();
-    shown.revision = revision;
-    if (before != shown.settings.surfaces && shown.source &&
-        (!shown.settings.surfaces || shown.source->scene.get() != &shown.settings.surfaces->scene())) {
-      shown.source = nullptr;
-      shown.begun.reset();
-    }
-    poses_due_ = true;
-    ++settings_revision_;
-  }
-  follow_poses();
-}
-
-std::optional<PoseCache::Request> Viewer::previous_pose(const ShownModel& shown) {
-  const ModelSettings& settings = shown.settings;
-  if (!settings.previous_time || *settings.previous_time == settings.choice.time) return std::nullopt;
-  SurfaceChoice choice = settings.choice;
-  choice.time = *settings.previous_time;
-  return PoseCache::Request{settings.surfaces, choice};
-}
-
-void Viewer::follow_poses() {
-  if (!jobs_.poses.take_changes() && !poses_due_) return;
-  std::vector<PoseCache::Request> requests;
-  for (ShownModel& shown : shown_models_) {
-    if (!shown.is_wanted()) {
-      shown.request.reset();
-      continue;
-    }
-    PoseCache::Request request{shown.settings.surfaces, while_open(shown.settings.choice, shown.settings.surfaces)};
-    if (shown.request != request) {
-      if (shown.request && jobs_.poses.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
-      shown.request = request;
-    }
-    if (std::ranges::find(requests, request) == requests.end()) requests.push_back(request);
-    const std::optional<PoseCache::Request> then = previous_pose(shown);
-    if (then && std::ranges::find(requests, *then) == requests.end()) requests.push_back(*then);
-  }
-  // Take results before sending the requests, which may drop poses made for earlier ones.
-  for (ShownModel& shown : shown_models_) {
-    if (!shown.request) continue;
-    auto source = jobs_.poses.built(*shown.request);
-    if (source) shown.begun.reset();  // older poses are not shown again
-    // If requests change faster than poses are made, show one that was begun.
-    if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces)
-      source = jobs_.poses.built(*shown.begun);
-    if (source) shown.source = std::move(*source);
-    const std::optional<PoseCache::Request> then = previous_pose(shown);
-    shown.previous_source = then ? jobs_.poses.built(*then).value_or(nullptr) : nullptr;
-  }
-  if (std::exchange(poses_due_, false)) jobs_.poses.request(std::move(requests));
-}
-
-std::optional<scene::ShutterTransforms> Viewer::while_open(const std::optional<scene::ShutterTransforms>& ends) const {
-  return sampling_.shutter_seconds > 0.0 ? ends : std::nullopt;
-}
-
-SurfaceChoice Viewer::while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const {
-  if (!surfaces || surfaces->scene().may_move(choice.animation)) choice.shutter_seconds = sampling_.shutter_seconds;
-  return choice;
-}
-
-void Viewer::pose_surfaces() {
-  reported_failures_.retire();
-  if (surface_asset_) jobs_.surfaces.pose(surface_asset_, while_open(surface_settings_.choice, surface_asset_));
-}
-
-std::vector<scene::Model> Viewer::models() const {
-  std::vector<scene::Model> models;
-  if (model_source_) {
-    scene::Model& own = models.emplace_back();
-    own.source = model_source_;
-    own.group = surface_settings_.group;
-    own.holdout = surface_settings_.holdout;
-  }
-  for (const ShownModel& shown : shown_models_) {
-    if (shown.is_shown())
-      models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only,
-                        shown.settings.group, shown.settings.previous, shown.previous_source, shown.settings.holdout,
-                        while_open(shown.settings.ends)});
-  }
-  return models;
 }
 
 void Viewer::follow_instances() {
@@ -822,7 +717,7 @@ void Viewer::rebuild() {
   }
   jobs_.rebuild();
   requests_due_ = true;
-  poses_due_ = true;
+  models_.renew_requests();
   take_medium();
   request_build();
   touch();
@@ -896,57 +791,48 @@ bool Viewer::frames_are_due() const {
 void Viewer::load_surfaces(const FilePath& path) {
   reported_failures_.retire();
   sync();
-  jobs_.surfaces.load(path, while_open(surface_settings_.choice, nullptr));
+  models_.load(path);
   touch();
 }
 
 void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
   reported_failures_.retire();
-  jobs_.surfaces.forget_failure();
-  jobs_.surfaces.cancel();
+  models_.cancel_surfaces(false);
   sync();
-  surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
-  model_source_ = std::move(surfaces);
+  models_.show(std::move(surfaces));
   touch();
 }
 
 void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
   reported_failures_.retire();
-  jobs_.surfaces.forget_failure();
-  if (surfaces) {
-    jobs_.surfaces.cancel_loads();  // poses continue: a host may set surfaces faster than they are posed
-  } else {
-    jobs_.surfaces.cancel();
-  }
+  models_.cancel_surfaces(surfaces != nullptr);
   sync();
-  surface_asset_ = std::move(surfaces);
-  pose_surfaces();
-  if (!surface_asset_) model_source_ = nullptr;
+  models_.set_surfaces(std::move(surfaces));
   touch();
 }
 
 SurfaceAssetPtr Viewer::surfaces_asset() {
   sync();
-  return surface_asset_;
+  return models_.asset();
 }
 
 void Viewer::set_surface_settings(const SurfaceSettings& settings) {
-  const bool poses = settings.choice != surface_settings_.choice &&
-                     !jobs_.surfaces.configure_load(while_open(settings.choice, nullptr));
+  const bool poses = models_.configure_load(settings);
   if (poses) sync();
-  surface_settings_ = settings;
-  if (poses) pose_surfaces();
+  models_.set_settings(settings);
+  if (poses) models_.pose_surfaces();
   touch();
 }
 
 void Viewer::use_surface_camera(std::size_t index) {
   sync();
-  const std::size_t count = model_source_ ? model_source_->pose.cameras.size() : 0;
+  const scene::ModelSourcePtr& source = models_.source();
+  const std::size_t count = source ? source->pose.cameras.size() : 0;
   if (index >= count) {
     throw Error(ErrorCode::invalid_argument,
                 "there is no camera " + std::to_string(index) + ": the surfaces have " + std::to_string(count));
   }
-  const surface::SceneCamera& seen = model_source_->pose.cameras[index];
+  const surface::SceneCamera& seen = source->pose.cameras[index];
   const dvec3 eye(seen.to_world[3]);
   const dvec3 forward = -glm::normalize(dvec3(seen.to_world[2]));
   CameraPose pose = camera_->pose();
@@ -1128,15 +1014,9 @@ void Viewer::set_ground(const GroundSettings& settings) {
 
 void Viewer::set_sampling(const Sampling& sampling) {
   sync();
-  const bool other_shutter = sampling_.shutter_seconds != sampling.shutter_seconds;
   sampling_ = sampling;
   if (!sampling_.preview) drop_proxy();
-  if (other_shutter) {
-    poses_due_ = true;
-    const bool loads = jobs_.surfaces.configure_load(while_open(surface_settings_.choice, nullptr));
-    if (!loads && surface_asset_ && surface_asset_->scene().may_move(surface_settings_.choice.animation))
-      pose_surfaces();
-  }
+  models_.set_shutter(sampling.shutter_seconds);
   if (grid_.build.shutter_seconds != sampling.shutter_seconds) {
     requests_due_ = true;
     take_medium();
@@ -1210,13 +1090,7 @@ std::vector<Bounds> Viewer::boxes() const {
     if (shown.is_there() && !shown.volume_info()->empty)
       boxes.push_back(shown.volume_info()->bounds(shown.settings.to_world));
   }
-  if (model_source_ && model_source_->scene->triangle_count() > 0)
-    boxes.push_back({model_source_->pose.low, model_source_->pose.high});
-  for (const ShownModel& shown : shown_models_) {
-    if (!shown.is_shown()) continue;
-    const scene::ModelBounds bounds = scene::bounds_of(*shown.source, shown.settings.to_world);
-    if (bounds.any) boxes.push_back({bounds.low, bounds.high});
-  }
+  models_.append_bounds(boxes);
   return boxes;
 }
 
@@ -1262,14 +1136,8 @@ void Viewer::count_from(const dvec3& origin) {
   }
 }
 
-bool Viewer::shows_models() const { return model_source_ || std::ranges::any_of(shown_models_, &ShownModel::is_shown); }
-
-bool Viewer::shows_triangles() const {
-  return std::ranges::any_of(models(), [](const scene::Model& m) { return m.source->scene->triangle_count() > 0; });
-}
-
 std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
-  const bool on_triangles = sky_.has_ground() && shows_triangles();
+  const bool on_triangles = sky_.has_ground() && models_.shows_triangles();
   return sky_.ground(all, on_triangles, view_ ? std::optional(view_->eye) : std::nullopt);
 }
 
@@ -1313,7 +1181,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   for (const Shown& shown : shown_) {
     if (shown.is_there()) add_volume(*shown.volume_info(), shown.settings.to_world, shown.settings.medium);
   }
-  for (const scene::Model& model : models()) {
+  for (const scene::Model& model : models_.models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
       for (const glm::dmat4& transform : mesh.transforms) {
         // For many instances the boxes are sufficient.
@@ -1380,7 +1248,11 @@ void Viewer::show_volumes() {
   if (source && (shown_info() || !shows_instances())) {
     const auto frame = feed_ ? feed_->frame() : std::nullopt;
     for (const scene::InstanceTransform& transform : transforms_)
-      volumes.push_back({0, source, shown_medium_, {transform.to_world, while_open(transform.ends)}, frame});
+      volumes.push_back({0,
+                         source,
+                         shown_medium_,
+                         {transform.to_world, while_open(transform.ends, sampling_.shutter_seconds)},
+                         frame});
     for (std::size_t i = 0; i < std::min(volumes.size(), previous_transforms_.size()); ++i)
       volumes[i].previous = previous_transforms_[i];
   }
@@ -1389,7 +1261,7 @@ void Viewer::show_volumes() {
       volumes.push_back({shown.id,
                          shown.built->source,
                          shown.medium,
-                         {shown.settings.to_world, while_open(shown.settings.ends)},
+                         {shown.settings.to_world, while_open(shown.settings.ends, sampling_.shutter_seconds)},
                          shown.frame(),
                          shown.settings.previous});
   }
@@ -1439,7 +1311,7 @@ scene::SnapshotPtr Viewer::snapshot() {
   count_from(origin);
   scene_.lights = sky_.lights();
   scene_.surroundings = sky_.surroundings();
-  scene_.models = models();
+  scene_.models = models_.models();
   for (scene::Model& model : scene_.models) model = scene::counted_from(std::move(model), origin);
   remark_on_precision();
   const auto seen = [&](const std::optional<ViewFrame>& view) {
@@ -1469,7 +1341,7 @@ Shot Viewer::shot() {
   shot.sun_group = sky_.light().sun_group;
   shot.sky_group = sky_.light().sky_group;
   shot.sampling = sampling_;
-  shot.surfaces = surface_settings_;
+  shot.surfaces = models_.settings();
   shot.display = display_;
   shot.settings = settings_revision_;
   return shot;

@@ -22,6 +22,7 @@
 #include "jobs/jobs.hpp"
 #include "scene/snapshot.hpp"
 #include "stage/dynamic_feed.hpp"
+#include "stage/model_stage.hpp"
 #include "stage/sequence_feed.hpp"
 #include "stage/sky_stage.hpp"
 #include "viewer/camera.hpp"
@@ -358,37 +359,8 @@ class Viewer {
       return last && built->source == last->source ? feed->frame() : std::nullopt;
     }
   };
-  // A displayed model, with its settings when it was last checked.
-  struct ShownModel {
-    std::shared_ptr<ModelInstance> model;
-    std::uint64_t id = 0;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;
-    ModelSettings settings;
-    std::optional<PoseCache::Request> request;
-    std::optional<PoseCache::Request> begun;  // the last request before `request` that was being posed
-    scene::ModelSourcePtr source;             // the newest; null: none yet
-    scene::ModelSourcePtr previous_source;    // one frame ago; null: same as `source`
-    [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }
-    [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
-  };
-  std::vector<ShownModel>::iterator find(const ModelInstance& model);
   // Returns the host's tag of an instance or model; 0 for the viewer's own objects.
   [[nodiscard]] std::uint64_t tag_of(std::uint64_t id) const;
-  void follow_models();
-  // Takes the poses that are ready.
-  void follow_poses();
-  // Request for its pose one frame ago; nullopt: same as now.
-  [[nodiscard]] static std::optional<PoseCache::Request> previous_pose(const ShownModel& shown);
-  // Returns `ends` if the shutter has a duration.
-  [[nodiscard]] std::optional<scene::ShutterTransforms> while_open(
-      const std::optional<scene::ShutterTransforms>& ends) const;
-  // Sets the shutter duration if the surfaces may move. surfaces: null: they are still to be read.
-  [[nodiscard]] SurfaceChoice while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const;
-  // Requests the pose of the viewer's own surfaces.
-  void pose_surfaces();
-  // Returns all displayed models, including the viewer's own surfaces.
-  [[nodiscard]] std::vector<scene::Model> models() const;
   std::vector<Shown>::iterator find(const Instance& instance);
   void follow_instances();
   // If grids depend on the view, there must be a view.
@@ -426,8 +398,6 @@ class Viewer {
   void remark_on_samples(Context& g);
   // Makes the scene's volumes and lights relative to this origin.
   void count_from(const glm::dvec3& origin);
-  [[nodiscard]] bool shows_triangles() const;
-  [[nodiscard]] bool shows_models() const;
   // all: result of box().
   [[nodiscard]] std::optional<scene::Ground> ground(const std::optional<Bounds>& all) const;
   /// Returns the objects to fit a camera to. The result is valid until something changes.
@@ -449,9 +419,6 @@ class Viewer {
   GridSettings grid_;
   Medium medium_;
   Ramps ramps_;
-  SurfaceSettings surface_settings_;
-  SurfaceAssetPtr surface_asset_;       // newest
-  scene::ModelSourcePtr model_source_;  // newest pose
   Sampling sampling_;
   DisplaySettings display_;
   denoise::NetworkPtr network_;          // network used last...
@@ -477,9 +444,7 @@ class Viewer {
   std::vector<scene::InstanceTransform> transforms_{1};  // instance transforms of the volume; at least one
   scene::Part<scene::Medium> shown_medium_;              // of the viewer's own volume
   std::vector<Shown> shown_;                             // in the order in which they were added
-  std::vector<ShownModel> shown_models_;                 // in the order in which they were added
   std::uint64_t last_id_ = 0;
-  bool poses_due_ = false;           // the requests for poses are outdated
   bool requests_due_ = false;        // the requests for grids are outdated
   bool waits_for_own_ = false;       // an instance waits for the volume's own grid, which is being built
   bool transforms_changed_ = false;  // since the last traced frame
@@ -529,6 +494,7 @@ class Viewer {
   std::unique_ptr<Context> gl_;
   Jobs jobs_;  // its threads use the above
   SkyStage sky_{jobs_.environments, log_};
+  ModelStage models_{jobs_.surfaces, jobs_.poses, reported_failures_, [this] { notify(); }};
 };
 
 }  // namespace cumulet::viewer

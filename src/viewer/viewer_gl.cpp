@@ -124,11 +124,11 @@ void Viewer::prepare(const Frame& frame) {
   const auto is_dynamic = [](const VolumeFeedPtr& feed) { return as_dynamic(feed) != nullptr; };
   // The contents of states may not be known yet.
   const bool watches = is_dynamic(feed_) || std::ranges::any_of(feeds_, is_dynamic);
-  const bool scene = shown_info() || shows_models() || others || watches;
+  const bool scene = shown_info() || models_.shows_models() || others || watches;
   if (!scene) built_ = {};
   // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
   // last job's status is kept.
-  if (!volume_info_ && shows_models() && !shows_instances() && !built_.source && !jobs_.builder.busy()) {
+  if (!volume_info_ && models_.shows_models() && !shows_instances() && !built_.source && !jobs_.builder.busy()) {
     Progress progress;
     built_ = build_grid(log_, empty_volume(), grid_.build, progress);
   }
@@ -375,8 +375,7 @@ Pick Viewer::pick(double x, double y) {
 std::uint64_t Viewer::tag_of(std::uint64_t id) const {
   if (const auto volume = std::ranges::find(shown_, id, &Shown::id); volume != shown_.end())
     return volume->settings.tag;
-  const auto model = std::ranges::find(shown_models_, id, &ShownModel::id);
-  return model != shown_models_.end() ? model->settings.tag : 0;
+  return models_.tag_of(id).value_or(0);
 }
 
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
