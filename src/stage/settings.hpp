@@ -86,6 +86,19 @@ struct GroundSettings {
   }
 };
 
+/// Returns the emission of a medium, with the ramps of its grids.
+[[nodiscard]] inline scene::Emission emission_of(const Medium& medium, const Ramps& ramps) {
+  scene::Emission emission = medium.field_emission;
+  emission.temperature_ramp = ramps.temperature;
+  emission.flame_ramp = ramps.flame;
+  return emission;
+}
+
+/// Returns the medium as scenes use it.
+[[nodiscard]] inline scene::Medium shown_medium(const Medium& medium) {
+  return {medium.density_scale, medium.albedo, medium.phase, medium.emission, medium.group, medium.holdout};
+}
+
 /// Returns `ends` if the shutter has a duration.
 [[nodiscard]] inline std::optional<scene::ShutterTransforms> while_open(
     const std::optional<scene::ShutterTransforms>& ends, double shutter_seconds) {

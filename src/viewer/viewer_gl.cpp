@@ -120,67 +120,41 @@ void Viewer::prepare(const Frame& frame) {
 
   // Without a scene the last image is dropped too. Models without triangles still count as a scene, lit by the sky
   // only.
-  const bool others = std::ranges::any_of(shown_, &Shown::is_there);
-  const auto is_dynamic = [](const VolumeFeedPtr& feed) { return as_dynamic(feed) != nullptr; };
-  // The contents of states may not be known yet.
-  const bool watches = is_dynamic(feed_) || std::ranges::any_of(feeds_, is_dynamic);
-  const bool scene = shown_info() || models_.shows_models() || others || watches;
-  if (!scene) built_ = {};
-  // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
-  // last job's status is kept.
-  if (!volume_info_ && models_.shows_models() && !shows_instances() && !built_.source && !jobs_.builder.busy()) {
-    Progress progress;
-    built_ = build_grid(log_, empty_volume(), grid_.build, progress);
-  }
+  const bool scene = volumes_.is_shown() || models_.shows_models();
+  if (!scene) volumes_.drop_grid();
+  if (models_.shows_models()) volumes_.show_nothing(box);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   view_.reset();
+  volumes_.set_view(view_, frame_size_);
   // Without a scene the camera may still wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
     view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
+  volumes_.set_view(view_, frame_size_);
   previous_view_.reset();
   if (view_ && previous_camera_)
     previous_view_ = previous_camera_->view(double(frame_size_.x) / frame_size_.y, subject());
-  if (requests_due_) follow_instances();  // they were waiting for a view
+  volumes_.send_due_requests();
+  settings_revision_ += volumes_.take_changes();
   if (frame.budget_ms < 0.0) return;
 
   last_view_ = std::exchange(traced_view_, view_);
-  const bool transforms_rest = !std::exchange(transforms_changed_, false);
-  // A build of the previous volume would replace the queued load.
-  const bool another_comes = jobs_.builder.loads();
-  const bool waits = another_comes && volume_ && !others && !feed_;
-  if ((shown_info() || others || watches) && built_for_another() && !waits) {
-    const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
-    // GPU builds follow a moving camera, one grid after another, each of which is displayed.
-    const bool follows =
-        volume_ && !feed_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
-        !jobs_.builder.busy() && gl_ && !gl_->scene().uploading_volumes() &&
-        gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
-    if (rests || follows) {
-      take_medium();
-      if (feed_) {
-        feed_->request(settings_for_view());
-        if (!is_dynamic(feed_)) follow_feed();
-      } else if (volume_ && !another_comes) {
-        jobs_.builder.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
-      }
-      requests_due_ = true;
-      follow_instances();
-      built_for_ = build_view();
-      own_left_out_ = volume_ && another_comes;
-      built_in_motion_ = !rests;
-    }
-  }
+  volumes_.request_for_view(view_ == last_view_, [this] {
+    return gl_ && !gl_->scene().uploading_volumes() &&
+           gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
+  });
+  settings_revision_ += volumes_.take_changes();
 }
 
 void Viewer::follow_upload(const Context& g) {
   upload_progress_ = g.scene().progress();
-  if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+  Built& built = volumes_.built();
+  if (const auto seconds = g.scene().upload_seconds(built.source)) built.seconds.upload = *seconds;
   take_cells(g);
 }
 
 void Viewer::take_cells(const Context& g) {
-  const auto take = [&](Built& built) {
+  volumes_.for_each_grid([&](Built& built) {
     if (!built.source || !built.source->plan || built.cells != 0) return;
     const render::MarchData::Cells* cells = g.scene().cells(built.source);
     if (cells == nullptr) return;
@@ -188,16 +162,12 @@ void Viewer::take_cells(const Context& g) {
     built.levels = g.scene().data()->grid(*built.source)->levels;
     built.limited = cells->limited;
     // Not during camera motion, which requests many grids.
-    if (cells->on_cpu && !built_in_motion_) {
+    if (cells->on_cpu && !volumes_.built_in_motion()) {
       const std::string& name = built.volume ? built.volume->name() : built.source->volume->name;
       log_.info(name + ": its grid is built on the CPU: " + *cells->on_cpu);
     }
     if (built.limited) log_limited(log_, built.source->plan->max_cells, built.settings.refine.max_cells);
-  };
-  take(built_);
-  for (Shown& shown : shown_) {
-    if (shown.built) take(*shown.built);
-  }
+  });
 }
 
 std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint64_t sequence) {
@@ -212,16 +182,6 @@ void Viewer::note_displayed(const Context& g, const VolumeFeedPtr& feed) {
   if (const auto shown = frame_of(g, live->id())) live->note_displayed(*shown);
 }
 
-void Viewer::note_rendered() {
-  if (feed_) feed_->note_rendered();
-  for (const VolumeFeedPtr& feed : feeds_) feed->note_rendered();
-}
-
-bool Viewer::something_waits() const {
-  const auto waits = [](const VolumeFeedPtr& feed) { return feed && feed->waits(); };
-  return waits(feed_) || std::ranges::any_of(feeds_, waits);
-}
-
 void Viewer::remark_on_samples(Context& g) {
   const render::Picture* picture = g.progressive().newest();
   const std::uint64_t count = picture != nullptr ? picture->samples_not_finite() : 0;
@@ -231,34 +191,26 @@ void Viewer::remark_on_samples(Context& g) {
                " samples was not finite; they are black (see nonfinite_samples in the statistics)");
 }
 
-void Viewer::take_gl_bytes(std::uint64_t beside_volumes) {
-  // Requests made before the first frame did not include the memory of images.
-  if (!gl_beside_volumes_ && max_gl_bytes_ != ResourceLimits::no_limit)
-    requests_due_ = requests_due_ || !shown_.empty();
-  gl_beside_volumes_ = beside_volumes;
-  share_gl();
-}
-
 void Viewer::report_pending(FrameResult& result) {
-  if (busy() || proxy_) {
+  if (busy() || volumes_.shows_proxy()) {
     result.loading = true;
     result.converged = false;
   }
-  if (something_waits()) {
+  if (volumes_.something_waits()) {
     result.more = true;
     result.converged = false;
   }
   result.failed = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::left_out).has_value();
-  result.more = result.more || navigation_.moving() || (built_for_another() && !jobs_.builder.loads());
+  result.more = result.more || navigation_.moving() || (volumes_.built_for_another() && !jobs_.builder.loads());
 }
 
 Viewer::DryRun Viewer::dry_run(const Frame& frame) {
   DryRun run;
   update_pending_ = false;
   prepare(frame);
-  note_rendered();
+  volumes_.note_rendered();
   run.shot = shot();
-  if (simulated_gl_) take_gl_bytes(simulated_gl_->bytes_beside_volumes);
+  if (simulated_gl_) volumes_.take_gl_bytes(simulated_gl_->bytes_beside_volumes);
   run.result.converged = true;
   report_pending(run.result);
   return run;
@@ -299,7 +251,7 @@ FrameResult Viewer::render(const Frame& frame) {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, max_gl_bytes_}, deadline);
     });
-    note_rendered();
+    volumes_.note_rendered();
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
@@ -307,10 +259,10 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     remark_on_samples(g);
-    take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
+    volumes_.take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    note_displayed(g, feed_);
-    for (const VolumeFeedPtr& feed : feeds_) note_displayed(g, feed);
+    note_displayed(g, volumes_.feed());
+    for (const VolumeFeedPtr& feed : volumes_.feeds()) note_displayed(g, feed);
     report_pending(result);
     if (g.transfers().busy() || dynamic_gl_.is_due(g)) {
       result.more = true;
@@ -373,15 +325,14 @@ Pick Viewer::pick(double x, double y) {
 }
 
 std::uint64_t Viewer::tag_of(std::uint64_t id) const {
-  if (const auto volume = std::ranges::find(shown_, id, &Shown::id); volume != shown_.end())
-    return volume->settings.tag;
+  if (const auto tag = volumes_.tag_of(id)) return *tag;
   return models_.tag_of(id).value_or(0);
 }
 
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
   const auto of_tagged = [&](MatteObject object) {
     // The empty volume for surfaces has no matte.
-    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !shown_info()) return 0U;
+    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !volumes_.shown_info()) return 0U;
     object.tag = tag_of(object.id);
     return id_of(object);
   };
@@ -473,27 +424,7 @@ const core::CmParameters& Viewer::trace_parameters() { return gl().readable().pa
 Stats Viewer::stats() {
   sync();
   Stats s;
-  const auto add = [&](std::uint64_t cells, std::uint32_t levels, bool limited) {
-    s.cells += cells;
-    s.levels = std::max(s.levels, levels);
-    s.limited = s.limited || limited;
-  };
-  const auto add_built = [&](const Built& built) {
-    if (!built.source || !built.source->plan) add(built.cells, built.levels, built.limited);
-  };
-  add_built(built_);
-  s.active_voxels =
-      volume_ ? volume_->volume().active_voxels : (as_sequence(feed_) != nullptr ? built_.active_voxels : 0);
-  std::set<scene::MarchSourcePtr> grids{built_.source};
-  std::set<VolumeAssetPtr> volumes{volume_};
-  for (const Shown& shown : shown_) {
-    if (!shown.is_seen()) continue;
-    const VolumeAssetPtr& volume = shown.settings.volume;
-    if (volume && volumes.insert(volume).second) s.active_voxels += volume->volume().active_voxels;
-    if (!shown.built || !grids.insert(shown.built->source).second) continue;
-    if (!volume) s.active_voxels += shown.built->active_voxels;
-    add_built(*shown.built);
-  }
+  GridTotals totals = volumes_.totals();
   if (gl_) {
     // For GPU-built grids, count those that exist.
     std::set<scene::MarchSourcePtr> there;
@@ -501,16 +432,15 @@ Stats Viewer::stats() {
       if (!volume.source->plan || !there.insert(volume.source).second) continue;
       // A failed upload may have removed it.
       const render::MarchData::Cells* cells = gl_->scene().cells(volume.source);
-      if (cells != nullptr) add(cells->count, gl_->scene().data()->grid(*volume.source)->levels, cells->limited);
+      if (cells != nullptr) totals.add(cells->count, gl_->scene().data()->grid(*volume.source)->levels, cells->limited);
     }
   }
-  s.build_seconds = built_.seconds;
-  const auto bytes_of = [](const SequenceFeed& feed) { return feed.cache().frames().bytes; };
-  const SequenceFeed* own = as_sequence(feed_);
-  s.memory_bytes = own != nullptr ? bytes_of(*own) : built_.bytes();
-  for (const VolumeFeedPtr& feed : feeds_) {
-    if (const SequenceFeed* sequence = as_sequence(feed)) s.memory_bytes += bytes_of(*sequence);
-  }
+  s.cells = totals.cells;
+  s.levels = totals.levels;
+  s.limited = totals.limited;
+  s.active_voxels = totals.active_voxels;
+  s.memory_bytes = totals.memory_bytes;
+  s.build_seconds = volumes_.built().seconds;
   s.steps = totals_.steps;
   s.noise = totals_.noise;
   if (gl_) {

@@ -7,9 +7,9 @@
 #include <mutex>
 #include <optional>
 
+#include "assets/subject.hpp"
 #include "base/listeners.hpp"
 #include "scene/snapshot.hpp"
-#include "viewer/subject.hpp"
 
 namespace cumulet::viewer {
 

@@ -1,4 +1,4 @@
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 #include <algorithm>
 #include <array>
