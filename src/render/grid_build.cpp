@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
+#include "grid/memory.hpp"
 #include "grid/tet_grid.hpp"
 #include "shader_macros.hpp"
 
@@ -22,36 +23,16 @@ namespace {
 constexpr std::size_t roots_words = 2 * CM_ROOTS + 4;
 constexpr double parts_weight = 0.05;  // cost of a part of a cell, relative to the rest of its record
 
-// Layout as in glsl/grid_leaves.glsl.
-struct TreeCell {
-  std::uint32_t child;
-  std::uint32_t rank;
-  glm::uvec2 where;
-};
-static_assert(sizeof(TreeCell) == 16);
-
-// Includes the cell's links, the counts below it, and its list entry.
-constexpr std::uint64_t tree_cell_bytes =
-    sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2) + sizeof(std::uint32_t);
-
-// Layout as in glsl/grid_clear.comp: rows of occupancy, rows per cone, and the cones of each cube.
-constexpr std::uint64_t full_bytes = std::uint64_t{2} * CM_CLEAR_ROWS * sizeof(glm::uvec2);
-constexpr std::uint64_t clear_bytes = full_bytes + std::uint64_t{CM_CLEAR_CONES} * CM_CLEAR_ROWS * sizeof(glm::uvec2) +
-                                      std::uint64_t{CM_CLEAR_CUBES} * sizeof(std::uint32_t);
-
-// Layout as in glsl/grid_emissive.comp: cell number, position, emission.
-constexpr std::size_t glowing_words = 7;
-
 // Returns the emissive cells in the order of the grid.
 std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
-  const std::size_t count = words.size() / glowing_words;
+  const std::size_t count = words.size() / grid::glowing_words;
   std::vector<std::uint32_t> order(count);
   std::iota(order.begin(), order.end(), 0U);
-  std::ranges::sort(order, {}, [&](std::uint32_t i) { return words[i * glowing_words]; });
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return words[i * grid::glowing_words]; });
   std::vector<scene::GlowingCell> cells;
   cells.reserve(count);
   for (const std::uint32_t i : order) {
-    const std::uint32_t* at = &words[i * glowing_words];
+    const std::uint32_t* at = &words[i * grid::glowing_words];
     const glm::uvec4 emission(at[3], at[4], at[5], at[6]);
     cells.push_back({{}, {at[1], at[2]}, {core::cm_emission_mean(emission), emission.w}});
   }
@@ -62,13 +43,6 @@ gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {gl::macros
 gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {gl::macros::stage(stage)}}; }
 
 }  // namespace
-
-std::uint64_t building_bytes_per_cell(bool emits) {
-  // A tree with n leaves has fewer than n inner cells.
-  return 2 * tree_cell_bytes + (emits ? glowing_words * sizeof(std::uint32_t) : 0);
-}
-
-std::uint64_t building_bytes_at_least() { return clear_bytes; }
 
 GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, LatticeDataPtr data,
                      std::vector<std::uint8_t> levels, std::uint64_t max_cells, std::uint64_t max_bytes,
@@ -221,15 +195,15 @@ void GridBuild::plan_cells() {
   built_.limited = state_.limited != 0;
   built_.levels = static_cast<std::uint32_t>(tree_levels_.size() - 1);
   // The memory is checked before anything is allocated.
-  std::uint64_t needs = std::max(count * tree_cell_bytes, clear_bytes);
+  std::uint64_t needs = std::max(count * grid::tree_cell_bytes, grid::clear_bytes);
   for (const grid::LatticeChannel& channel : data_->lattice().channels) {
     needs += grid::channel_bytes(channel.channel, built_.count);
-    if (channel.channel == grid::Channel::emission) needs += std::uint64_t{built_.count} * glowing_words * 4;
+    if (channel.channel == grid::Channel::emission) needs += std::uint64_t{built_.count} * grid::glowing_words * 4;
   }
   require_room(needs + built_.bytes());
   cells_.emplace(gl_, "building the grid");
   cells_->add([this, count] {
-    tree_cells_ = make_storage(std::uint64_t{count} * sizeof(TreeCell), "creating the tree's cells");
+    tree_cells_ = make_storage(std::uint64_t{count} * sizeof(grid::TreeCell), "creating the tree's cells");
     links_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec4), "creating the tree's links");
     below_ = make_storage(std::uint64_t{count} * sizeof(glm::uvec2), "creating the child data of the tree");
     list_ = make_storage(std::uint64_t{count} * sizeof(std::uint32_t), "creating the list of the tree's cells");
@@ -239,7 +213,7 @@ void GridBuild::plan_cells() {
     built_.tree = make_storage((roots_words + built_.count - CM_ROOTS) * 4, "creating the point-location tree");
   });
   cells_->add([this] {
-    std::array<TreeCell, CM_ROOTS> cells{};
+    std::array<grid::TreeCell, CM_ROOTS> cells{};
     std::array<glm::uvec4, CM_ROOTS> links{};
     const std::array<grid::RootCell, CM_ROOTS> roots = grid::root_cells(data_->lattice().cube.log2_size);
     const bool wide = data_->lattice().cube.wide();
@@ -256,7 +230,7 @@ void GridBuild::plan_cells() {
   // Temporary buffers are freed before more are allocated.
   cells_->add([this, count] {
     for (gl::Object* scratch : {&tree_cells_, &links_, &below_, &list_}) *scratch = {};
-    bytes_ -= count * tree_cell_bytes;
+    bytes_ -= count * grid::tree_cell_bytes;
   });
   plan_clear_cones();
   plan_read_back(*cells_);
@@ -307,8 +281,8 @@ void GridBuild::plan_records() {
 }
 
 void GridBuild::plan_clear_cones() {
-  cells_->add([this] { clear_ = make_storage(clear_bytes, "creating the empty-space cones"); });
-  plan_clear(*cells_, clear_, full_bytes);
+  cells_->add([this] { clear_ = make_storage(grid::clear_bytes, "creating the empty-space cones"); });
+  plan_clear(*cells_, clear_, grid::clear_full_bytes);
   const auto bind = [this](GLuint /*program*/) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
                   {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
@@ -328,7 +302,8 @@ void GridBuild::plan_channels() {
                            [](const auto& channel) { return channel.channel == grid::Channel::emission; }))
     return;
   cells_->add([this] {
-    glowing_ = make_storage(std::uint64_t{built_.count} * glowing_words * 4, "creating the list of emissive cells");
+    glowing_ =
+        make_storage(std::uint64_t{built_.count} * grid::glowing_words * 4, "creating the list of emissive cells");
   });
   const auto bind = [this, &emission](GLuint /*program*/) {
     bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
@@ -367,7 +342,7 @@ void GridBuild::plan_channel(std::size_t index) {
 void GridBuild::plan_emissive() {
   emissive_.emplace(gl_, "reading the emissive cells");
   if (state_.glowing == 0) return;
-  const std::size_t bytes = std::size_t{state_.glowing} * glowing_words * 4;
+  const std::size_t bytes = std::size_t{state_.glowing} * grid::glowing_words * 4;
   emissive_->add([this, bytes] {
     emissive_read_back_ = gl::ReadBack(gl_, bytes, "creating the read-back of emissive cells");
     emissive_words_.resize(bytes / 4);

@@ -21,11 +21,6 @@
 
 namespace cumulet::render {
 
-/// Returns the GL memory per cell of a build in progress, in addition to its result.
-std::uint64_t building_bytes_per_cell(bool emits);
-/// Returns the minimum GL memory of a build in progress, however few cells it has.
-std::uint64_t building_bytes_at_least();
-
 /// Builds a grid for a view on the GPU, in compute passes. The priorities of splits are raised and closed in the
 /// lattice as in grid::DiamondSet. A histogram gives the priority threshold for the cell budget. Cells are made level
 /// by level as in grid::GridBuilder.

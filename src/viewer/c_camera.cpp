@@ -4,9 +4,9 @@
 #include <memory>
 #include <optional>
 
+#include "assets/camera.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
-#include "viewer/camera.hpp"
 
 namespace {
 

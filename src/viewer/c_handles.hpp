@@ -5,15 +5,14 @@
 #include <atomic>
 #include <memory>
 
+#include "assets/instance.hpp"
+#include "assets/live.hpp"
+#include "assets/sequence.hpp"
+#include "assets/surface_asset.hpp"
+#include "assets/volume_asset.hpp"
 #include "light/environment.hpp"
-#include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
-#include "viewer/instance.hpp"
-#include "viewer/live.hpp"
-#include "viewer/sequence.hpp"
 #include "viewer/sharing.hpp"
-#include "viewer/surface_asset.hpp"
-#include "viewer/volume_asset.hpp"
 
 struct cumulet_volume {
   cumulet::viewer::VolumeAssetPtr asset;

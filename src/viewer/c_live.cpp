@@ -3,11 +3,11 @@
 #include <memory>
 #include <vector>
 
+#include "assets/live.hpp"
 #include "base/library_thread.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/c_viewer.hpp"
-#include "viewer/live.hpp"
 
 namespace {
 

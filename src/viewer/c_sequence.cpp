@@ -2,10 +2,10 @@
 
 #include <memory>
 
+#include "assets/sequence.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_support.hpp"
-#include "viewer/sequence.hpp"
 
 namespace {
 

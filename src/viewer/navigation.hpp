@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 namespace cumulet::viewer {
 

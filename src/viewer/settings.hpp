@@ -4,148 +4,16 @@
 
 #include <cumulet/cumulet.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <optional>
 
-#include "light/sky.hpp"
 #include "render/display.hpp"
 #include "render/picture_settings.hpp"
-#include "scene/phase.hpp"
-#include "settings/settings.hpp"
-#include "viewer/builder.hpp"
-#include "viewer/surface_builder.hpp"
-#include "volume/ramp.hpp"
+#include "stage/settings.hpp"
 
 namespace cumulet::viewer {
-
-// The enums have the numbers of cumulet.h.
-static_assert(static_cast<int>(grid::Criterion::range_mean) == CUMULET_CRITERION_RANGE_MEAN);
-static_assert(static_cast<int>(grid::Criterion::transmittance) == CUMULET_CRITERION_TRANSMITTANCE);
-
-static_assert(static_cast<int>(BuildOn::gpu) == CUMULET_BUILD_GPU);
-
-struct GridSettings {
-  BuildSettings build;  // refine.camera is filled in from the viewer's camera
-  bool camera_adaptive = false;
-
-  static GridSettings of(const cumulet_grid_desc& d) {
-    GridSettings s;
-    s.build.march = static_cast<scene::March>(d.type);
-    s.build.on = static_cast<BuildOn>(d.build_device);
-    grid::RefineSettings& refine = s.build.refine;
-    refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
-    const cumulet_refinement_criterion criterion = settings::criterion_of(d);
-    refine.criterion = static_cast<grid::Criterion>(criterion);
-    refine.threshold = d.threshold != 0.0 ? d.threshold : settings::default_threshold(criterion);
-    refine.max_cells = d.max_cells;
-    refine.pixel_size = d.pixel_size;
-    s.camera_adaptive = d.camera_adaptive == 1;
-    return s;
-  }
-};
-
-struct Medium {
-  double density_scale = 1.0;
-  glm::vec3 albedo{1.0F};
-  scene::Phase phase;
-  std::uint32_t max_bounces = 0;
-  glm::vec3 emission{0.0F};
-  scene::Emission field_emission = {};  // of its emission grids
-  std::uint32_t group = 0;              // light group
-  bool holdout = false;
-
-  static Medium of(const cumulet_medium_desc& d) {
-    return {d.density_scale,
-            1.0F - glm::make_vec3(d.coalbedo),
-            phase_of(d),
-            d.max_bounces,
-            glm::make_vec3(d.emission),
-            {d.flame_strength, glm::make_vec3(d.flame_color),
-             d.temperature_scale > 0.0F ? std::optional<double>(d.temperature_scale) : std::nullopt,
-             d.temperature_offset, d.blackbody, glm::make_vec3(d.blackbody_tint)},
-            d.group,
-            d.holdout == 1};
-  }
-  static scene::Phase phase_of(const cumulet_medium_desc& d) {
-    switch (d.phase) {
-      case CUMULET_PHASE_TWO_LOBE:
-        return {d.anisotropy, d.second_anisotropy, 0.0F, d.second_weight};
-      case CUMULET_PHASE_MIE:
-        return scene::mie_phase(d.droplet_diameter);
-      default:
-        return {.anisotropy = d.anisotropy};
-    }
-  }
-};
-
-/// Ramps (1-D transfer functions) that are applied to grid values first.
-struct Ramps {
-  volume::Ramp density = {};
-  volume::Ramp temperature = {};
-  volume::Ramp flame = {};
-};
-
-struct Light {
-  float sun_azimuth_degrees = 0.0F;
-  float sun_elevation_degrees = 0.0F;
-  glm::vec3 sun_irradiance{0.0F};
-  glm::vec3 sky_radiance{0.0F};
-  std::optional<light::SkyModel> sky = std::nullopt;  ///< if set, it replaces the two members above
-  float sun_angle_degrees = 0.0F;
-  std::uint32_t sun_group = 0;  ///< light group
-  std::uint32_t sky_group = 0;  ///< light group of the sky or the environment
-
-  static Light of(const cumulet_sun_sky_desc& d) {
-    Light light{d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
-                glm::make_vec3(d.sky_radiance), std::nullopt};
-    if (d.sky == CUMULET_SKY_PHYSICAL) light.sky = {.turbidity = d.turbidity, .ground_albedo = d.ground_albedo};
-    light.sun_angle_degrees =
-        d.sun_angle_degrees != 0.0F ? std::max(0.0F, d.sun_angle_degrees) : settings::default_sun_angle(d.sky);
-    light.sun_group = d.sun_group;
-    light.sky_group = d.sky_group;
-    return light;
-  }
-};
-
-struct EnvironmentSettings {
-  float rotation_degrees = 0.0F;
-  float strength = 1.0F;
-
-  static EnvironmentSettings of(const cumulet_environment_settings_desc& d) { return {d.rotation_degrees, d.strength}; }
-};
-
-enum class GroundMode { none = 0, below = 1, at_height = 2 };
-
-struct GroundSettings {
-  GroundMode mode = GroundMode::none;
-  double height = 0.0;
-  glm::vec3 albedo{0.3F};
-
-  static GroundSettings of(const cumulet_ground_desc& d) {
-    return {static_cast<GroundMode>(d.mode), d.height, glm::make_vec3(d.albedo)};
-  }
-};
-
-enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
-
-struct SurfaceSettings {
-  SurfaceChoice choice;
-  SurfaceLight light = SurfaceLight::full;
-  float indirect_roughness = 0.0F;
-  std::uint32_t group = 0;  ///< light group
-  bool holdout = false;
-
-  static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
-    return {{d.time, d.animation, d.double_sided == 1, d.variant},
-            static_cast<SurfaceLight>(d.lighting),
-            d.indirect_roughness,
-            d.group,
-            d.holdout == 1};
-  }
-};
 
 struct Sampling {
   std::uint32_t samples = 256;

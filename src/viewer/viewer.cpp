@@ -14,10 +14,10 @@
 #include "base/library_thread.hpp"
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
+#include "jobs/cell_budget.hpp"
 #include "scene/model_table.hpp"
 #include "scene/origin.hpp"
 #include "scene/space.hpp"
-#include "viewer/cell_budget.hpp"
 
 namespace cumulet::viewer {
 
@@ -26,12 +26,8 @@ namespace {
 using glm::dvec3;
 using Clock = std::chrono::steady_clock;
 
-// Maximum number of volume instances for which the camera fit uses their visible parts instead of their boxes.
-constexpr std::size_t most_looked_at = 8;
 // Maximum number of triangles that the camera fit visits individually.
 constexpr std::size_t max_vertices = std::size_t{1} << 24U;
-
-bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
 
 Bounds both(const Bounds& a, const Bounds& b) { return {glm::min(a.min, b.min), glm::max(a.max, b.max)}; }
 
@@ -39,59 +35,6 @@ Bounds both(const Bounds& a, const Bounds& b) { return {glm::min(a.min, b.min), 
 std::optional<Bounds> box_of(const std::vector<Bounds>& boxes) {
   if (boxes.empty()) return std::nullopt;
   return std::accumulate(boxes.begin() + 1, boxes.end(), boxes.front(), both);
-}
-
-scene::Emission emission_of(const Medium& medium, const Ramps& ramps) {
-  scene::Emission emission = medium.field_emission;
-  emission.temperature_ramp = ramps.temperature;
-  emission.flame_ramp = ramps.flame;
-  return emission;
-}
-
-scene::Medium shown_medium(const Medium& medium) {
-  return {medium.density_scale, medium.albedo, medium.phase, medium.emission, medium.group, medium.holdout};
-}
-
-// Returns true if both differ only in opacity and in the view.
-bool same_but_view(BuildSettings a, const BuildSettings& b) {
-  a.refine.density_scale = b.refine.density_scale;
-  a.refine.anisotropy = b.refine.anisotropy;
-  if (a.refine.camera && b.refine.camera) a.refine.camera->transforms = b.refine.camera->transforms;
-  return a == b;
-}
-
-// Makes `a` as fine as both.
-void join(BuildSettings& a, const BuildSettings& b) {
-  a.refine.density_scale = std::max(a.refine.density_scale, b.refine.density_scale);
-  a.refine.anisotropy = std::min(a.refine.anisotropy, b.refine.anisotropy);
-  if (a.refine.camera && b.refine.camera)
-    a.refine.camera->transforms.insert(a.refine.camera->transforms.end(), b.refine.camera->transforms.begin(),
-                                       b.refine.camera->transforms.end());
-}
-
-bool is_of_cells(const Built& built) { return built.source && built.source->march == scene::March::tet; }
-
-bool apart_by_an_eighth(std::uint64_t a, std::uint64_t b) {
-  return std::max(a, b) - std::min(a, b) > std::max(a, b) / 8;
-}
-
-// Keeps displaying the previous data of a volume.
-void stay_with(scene::Volume& volume, const scene::Volume& was) {
-  volume.source = was.source;
-  volume.frame = was.frame;
-}
-
-// Metadata of a volume with unknown contents within a box.
-VolumeInfoPtr info_of(const Bounds& bounds) {
-  volume::ScalarVolume box;
-  box.bounds_max = box.bounds_min;
-  for (int axis = 0; axis < 3; ++axis) box.index_to_world[axis][axis] = bounds.max[axis] - bounds.min[axis];
-  box.index_to_world[3] = glm::dvec4(0.5 * (bounds.min + bounds.max), 1.0);
-  return std::make_shared<const VolumeInfo>(VolumeInfo{.empty = false,
-                                                       .may_emit = true,
-                                                       .index_to_world = box.index_to_world,
-                                                       .anisotropy_grid = {},
-                                                       .coarse = volume::CoarseVolume(box)});
 }
 
 using Add = std::function<void(const dvec3&)>;
@@ -109,17 +52,11 @@ void add_mesh(const scene::ModelSource& source, const scene::ModelMesh& mesh, co
     add(dvec3(to_world * glm::dvec4(source.pose.vertices[*i].position, 1.0)));
 }
 
-void require_frame(const Sequence& sequence, std::uint32_t frame) {
-  if (frame >= sequence.files()->count())
+// Returns why a frame of a sequence cannot be shown.
+std::optional<Error> failure_of(const SequenceFeed& feed, std::uint32_t frame) {
+  if (frame >= feed.sequence().files()->count())
     throw Error(ErrorCode::invalid_argument, "the sequence has no frame " + std::to_string(frame));
-}
-
-double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
-dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
-  const double azimuth = radians(azimuth_degrees);
-  const double elevation = radians(elevation_degrees);
-  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
+  return feed.cache().failure_of(frame);
 }
 
 }  // namespace
@@ -130,7 +67,8 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
       update_(std::move(update)),
       restore_state_(restore_state),
       sharing_(sharing ? std::move(sharing) : std::make_shared<Sharing>()),
-      jobs_({.log = log_, .notify = [this] { notify(); }, .trace = trace, .resource_limits = resource_limits_}) {
+      jobs_({.log = log_, .notify = [this] { notify(); }, .trace = trace, .resource_limits = resource_limits_}),
+      volumes_(jobs_, reported_failures_, *this, resource_limits_, log_) {
   volume::initialize_readers();
   set_medium({});
   set_light({});
@@ -138,8 +76,8 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 }
 
 Viewer::~Viewer() {
-  watched_.reset();  // its listener notifies the builder, which is destroyed first
-  lives_in_gl_.clear();
+  volumes_.close();
+  dynamic_gl_.clear();
   cancel();  // all workers at once: with a thread limit, jobs wait for each other
   // Without the viewer's context its objects cannot be deleted, and in another context the names belong to other
   // objects.
@@ -162,455 +100,46 @@ void Viewer::touch() {
 // ---- volumes and grid builds ----
 
 void Viewer::sync() {
-  if (auto loaded = jobs_.builder.take_loaded()) {
-    take_volume(std::move(loaded->volume));
-    suggested_density_scale_ = loaded->density_scale;
-    if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
-    if (followed_ || watched_) {
-      leave_sequence();
-      take_medium();
-    }
-  }
-  if (auto built = jobs_.builder.take_built()) {
-    // A rebuild keeps the timings of the load.
-    if (built->volume == built_.volume) {
-      if (built->seconds.load == 0.0) built->seconds.load = built_.seconds.load;
-      if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
-    }
-    built_ = std::move(*built);
-    cuts_own_ = false;
-    requests_due_ = true;
-    if (built_.volume == volume_) {  // else it is the previous volume, for which a grid was requested
-      drop_proxy();
-      take_suggestion();
-    }
-  }
-  fit_cells();
-  follow_proxy();
-  follow_sequence();
-  follow_live();
-  follow_watching();
-  follow_instances();
-  follow_models();
-  if (auto surfaces = jobs_.surfaces.take()) {
-    if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
-    model_source_ = std::move(surfaces->source);
-  }
-  if (auto read = jobs_.environments.take_environment()) show_environment(std::move(*read));
-  if (auto sky = jobs_.environments.take_sky()) {
-    if (asked_day_ == sky->day) asked_day_.reset();
-    // A sky requested earlier is displayed until the newest is ready.
-    if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
-    surround();
-  }
+  volumes_.sync();
+  settings_revision_ += volumes_.take_changes();
+  settings_revision_ += models_.sync();
+  sky_.sync();
 }
 
-void Viewer::follow_proxy() {
-  // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
-  // read-back must only contain the requested volume.
-  if (auto made = jobs_.builder.take_proxy(); made && sampling_.options.preview && !followed_ && !watched_) {
-    proxy_ = std::move(made);
-    show_medium();
-  }
-  // Check in this order: a job stores its result before it ends.
-  if (!proxy_ || !proxy_->load.expired() || jobs_.builder.has_result()) return;
-  // Either the volume was loaded and the next frame requests its grid, or the load failed.
-  const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !jobs_.builder.status().failure;
-  if (!waits) drop_proxy();
-}
+Viewer::LiveStatus Viewer::live() { return volumes_.own_live().status(); }
 
-void Viewer::drop_proxy() {
-  if (!proxy_) return;
-  proxy_.reset();
-  show_medium();
-}
+Viewer::LiveStatus Viewer::live(const Instance& instance) { return volumes_.live_of(instance).status(); }
 
-void Viewer::take_suggestion() {
-  if (!suggested_density_scale_) return;
-  medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt) / stretch();
-  show_medium();
-}
-
-void Viewer::take_volume(VolumeAssetPtr volume) {
-  volume_ = std::move(volume);
-  volume_info_ = volume_ ? volume_->volume_info() : nullptr;
-  built_for_.reset();
-  remark_on_anisotropy();
-  requests_due_ = true;  // instances may use its grid, or can no longer do so
-}
-
-bool Viewer::begin_anew(bool shows, bool showed) {
-  if (!shows && !showed) return false;
-  reported_failures_.retire();
-  jobs_.builder.forget();
-  drop_proxy();
-  sync();
-  leave_sequence();
-  if (!shows) {
-    take_volume(nullptr);
-    built_ = {};
-    touch();
-    return false;
-  }
-  suggested_density_scale_.reset();
-  take_medium();
-  built_for_.reset();
-  return true;
-}
-
-void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
-  if (!begin_anew(sequence != nullptr, followed_.has_value())) return;
-  followed_ = follow(std::move(sequence), settings_at_once());
-  follow_sequence();
-  touch();
-}
-
-Viewer::Followed Viewer::follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings) {
-  Followed followed;
-  followed.listener = sequence->listen([this] { notify(); });
-  followed.sequence = std::move(sequence);
-  followed.settings = std::move(settings);
-  followed.id = ++last_followed_;
-  return followed;
-}
-
-void Viewer::leave_sequence() {
-  followed_.reset();
-  jobs_.frames.clear();
-  watched_.reset();
-  jobs_.states.follow(nullptr, std::nullopt);
-}
-
-void Viewer::set_live(std::shared_ptr<Live> live) {
-  if (!begin_anew(live != nullptr, watched_.has_value())) return;
-  watched_ = watch(std::move(live), jobs_.states, ++last_followed_);
-  jobs_.states.follow(watched_->live, settings_at_once());
-  touch();
-}
-
-Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder, std::uint64_t id) {
-  Watched watched;
-  watched.id = id;
-  if (const auto& bounds = live->bounds()) watched.volume_info = info_of(*bounds);
-  watched.listener = live->listen([this, &builder] {
-    builder.look();
-    notify();
-  });
-  track_gpu_resident(live);
-  watched.live = std::move(live);
-  return watched;
-}
-
-bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
-  if (!sampling_.options.preview || !taken) return true;
-  if (gl_) return is_rendered && !gl_->has_pending_frame(*taken);
-  return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
-}
-
-std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
-  // Each state that was taken is displayed, even if states arrive faster.
-  w.waits = !unseen && !is_seen(w.state, w.is_rendered);
-  if (w.waits) return std::nullopt;
-  auto ready = builder.take();
-  if (!ready) return std::nullopt;
-  w.state = scene::SequenceFrame{ready->number, w.id, ++last_taken_};
-  w.is_rendered = false;
-  w.told.ready = ready->number;
-  ++w.told.ready_count;
-  return ready;
-}
-
-void Viewer::follow_live(bool unseen) {
-  if (!watched_) return;
-  Watched& w = *watched_;
-  auto ready = take_state(w, jobs_.states, unseen);
-  if (!ready) return;
-  const bool other_volume = !w.volume_info || w.told.ready_count == 1;
-  volume_ = ready->built.volume;
-  built_ = std::move(ready->built);
-  volume_info_ = w.volume_info ? w.volume_info : volume_->volume_info();
-  if (other_volume) remark_on_anisotropy();
-  if (!shown_.empty()) requests_due_ = true;
-}
-
-Viewer::Watched& Viewer::watched() {
-  sync();
-  if (!watched_) throw Error(ErrorCode::invalid_argument, "the viewer shows no dynamic volume");
-  return *watched_;
-}
-
-Viewer::LiveStatus Viewer::Watched::status() const {
-  LiveStatus status = told;
-  status.handed = live->newest();
-  return status;
-}
-
-Viewer::LiveStatus Viewer::live() { return watched().status(); }
-
-Viewer::LiveStatus Viewer::live(const Instance& instance) {
-  const Shown& shown = *look_up(instance);
-  if (!shown.is_seen() || !shown.watching)
-    throw Error(ErrorCode::invalid_argument, "the instance shows no dynamic volume");
-  return shown.watching->watched.status();
-}
-
-void Viewer::follow_sequence() {
-  if (!followed_) return;
-  Followed& f = *followed_;
-  if (auto analyzed = jobs_.frames.take_analyzed()) {
-    volume_ = nullptr;
-    volume_info_ = std::move(analyzed->volume_info);
-    requests_due_ = true;
-    remark_on_anisotropy();
-    f.density_scale = analyzed->density_scale;
-    if (f.sequence->files()->shown.suggested_density_scale) suggested_density_scale_ = analyzed->density_scale;
-    if (suggested_density_scale_) {
-      grid_.build.refine.density_scale = *suggested_density_scale_;
-      if (f.settings) f.settings->refine.density_scale = *suggested_density_scale_;
-      f.request_due = true;
-    }
-  }
-  tell_request(f, jobs_.frames);
-  if (f.take_due) take_frame();
-}
-
-void Viewer::tell_request(Followed& f, FrameCache& cache) const {
-  if (const std::uint64_t revision = f.sequence->revision(); revision != f.revision) {
-    f.revision = revision;
-    f.state = f.sequence->get();
-    f.request_due = true;
-  }
-  if (f.request_due) {
-    std::optional<BuildSettings> settings = f.settings;
-    if (settings) settings->shutter_seconds *= f.state.playback.velocity_scale;
-    cache.request({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
-                   std::min(f.state.memory_bytes, resource_limits_->memory_bytes()),
-                   FrameCache::Steps::of(f.state.playback), &cache == &jobs_.frames});
-    f.request_due = false;
-    f.take_due = true;
-  }
-  if (const std::uint64_t cache_revision = cache.revision(); cache_revision != f.cache_revision) {
-    f.cache_revision = cache_revision;
-    f.take_due = true;
-  }
-}
-
-std::optional<FrameCache::Ready> Viewer::take(Followed& f, FrameCache& cache) const {
-  // Each frame that was taken is displayed, even if frames arrive faster.
-  if (!is_seen(f.frame, f.is_rendered)) return std::nullopt;
-  f.take_due = false;
-  return cache.take();
-}
-
-bool Viewer::note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before) {
-  const bool same = f.frame && ready.frame == f.frame->number && ready.part == f.frame->part;
-  if (same && ready.built.source == before) return false;
-  f.frame = scene::SequenceFrame{ready.frame, f.id, ++last_taken_, ready.part};
-  f.is_rendered = false;
-  return true;
-}
-
-void Viewer::take_frame() {
-  Followed& f = *followed_;
-  auto ready = take(f, jobs_.frames);
-  if (!ready) return;
-  volume_ = ready->built.volume;
-  if (!note_taken(f, *ready, built_.source)) return;
-  built_ = std::move(ready->built);
-  if (!shown_.empty()) requests_due_ = true;
-  take_suggestion();
-}
-
-Viewer::Followed& Viewer::followed() {
-  sync();
-  if (!followed_) throw Error(ErrorCode::invalid_argument, "the viewer shows no sequence");
-  return *followed_;
-}
-
-Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameCache& cache) const {
-  SequenceStatus status;
-  status.asked = scene::frame_of(f.state.playback, f.state.moment);
-  const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
-  status.requested_position = FrameCache::Steps::of(f.state.playback).position(step);
+Viewer::SequenceStatus Viewer::status_of(const SequenceFeed& feed) const {
   // The displayed frame may belong to another sequence.
-  if (const auto shown = gl_ ? frame_of(*gl_, f.id) : std::nullopt)
-    status.drawn = static_cast<double>(shown->number) + shown->part;
-  status.frames = cache.frames();
-  status.density_scale = f.density_scale;
-  return status;
+  return feed.status(gl_ ? frame_of(*gl_, feed.id()) : std::nullopt);
 }
 
-Viewer::SequenceStatus Viewer::sequence() { return status_of(followed(), jobs_.frames); }
+Viewer::SequenceStatus Viewer::sequence() { return status_of(volumes_.own_sequence()); }
 
-std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
-  require_frame(*followed().sequence, frame);
-  return jobs_.frames.failure_of(frame);
-}
+std::optional<Error> Viewer::frame_failure(std::uint32_t frame) { return failure_of(volumes_.own_sequence(), frame); }
 
-std::vector<Viewer::Shown>::iterator Viewer::look_up(const Instance& instance) {
-  sync();
-  const auto shown = find(instance);
-  if (shown == shown_.end()) throw Error(ErrorCode::invalid_argument, "the instance is not in the viewer");
-  return shown;
-}
-
-const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
-  const Shown& shown = *look_up(instance);
-  if (!shown.is_seen() || !shown.played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
-  return shown;
-}
-
-Viewer::SequenceStatus Viewer::sequence(const Instance& instance) {
-  const Played& played = *shown_sequence(instance).played;
-  return status_of(played.followed, played.cache);
-}
+Viewer::SequenceStatus Viewer::sequence(const Instance& instance) { return status_of(volumes_.sequence_of(instance)); }
 
 std::optional<Error> Viewer::frame_failure(const Instance& instance, std::uint32_t frame) {
-  const Played& played = *shown_sequence(instance).played;
-  require_frame(*played.followed.sequence, frame);
-  return played.cache.failure_of(frame);
-}
-
-std::optional<BuildSettings> Viewer::settings_at_once() const {
-  if (grid_.camera_adaptive) return std::nullopt;
-  return grid_.build;
-}
-
-BuildSettings Viewer::settings_for_view() const {
-  BuildSettings settings = grid_.build;
-  settings.refine.camera = refine_camera();
-  settings.refine.camera->transforms.clear();
-  for (const scene::InstanceTransform& transform : transforms_)
-    settings.refine.camera->transforms.push_back(transform.to_world);
-  return settings;
-}
-
-bool Viewer::built_for_another() const {
-  const bool own_is_due = own_left_out_ && !jobs_.builder.loads();
-  return grid_.camera_adaptive && view_ && (built_in_motion_ || own_is_due || built_for_ != build_view());
-}
-
-void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
-  reported_failures_.retire();
-  const bool loads = jobs_.builder.configure_load(settings_at_once());
-  if (loads && !followed_ && !watched_) return;
-  sync();
-  const auto settings = settings_at_once();
-  if (watched_) {
-    if (!loads) jobs_.builder.forget_failure();
-    built_for_.reset();
-    jobs_.states.configure(settings);
-    return;
-  }
-  if (followed_) {
-    if (!loads) jobs_.builder.forget_failure();  // of a load that would have replaced the sequence
-    // The `concerned` test is skipped, because other frames may have fields that the displayed one lacks.
-    built_for_.reset();
-    followed_->settings = settings;
-    followed_->request_due = true;
-    return;
-  }
-  if (loads) return;
-  if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
-  built_for_.reset();
-  if (volume_ && settings) jobs_.builder.build(volume_, *settings);
-}
-
-void Viewer::load_volume(const VolumeFile& file) {
-  reported_failures_.retire();
-  sync();
-  const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
-  take_medium();
-  drop_proxy();
-  jobs_.builder.load(file, settings_at_once(), sampling_.options.preview ? std::optional(grid_.build) : std::nullopt);
-  // A sequence or a dynamic volume is shown until the new volume is ready.
-  if (followed_ || watched_) {
-    suggested_density_scale_ = suggested;
-    take_medium();
-  }
-  touch();
-}
-
-void Viewer::set_volume(VolumeAssetPtr volume) {
-  reported_failures_.retire();
-  jobs_.builder.forget_failure();
-  if (volume) {
-    jobs_.builder.cancel_loads();  // builds continue: a host may set volumes faster than they build
-  } else {
-    jobs_.builder.cancel();
-  }
-  jobs_.builder.take_loaded();  // drops a loaded volume that has not been shown
-  drop_proxy();
-  sync();
-  leave_sequence();
-  take_volume(std::move(volume));
-  suggested_density_scale_.reset();
-  if (!volume_) {
-    built_ = {};
-  } else if (!grid_.camera_adaptive) {
-    take_medium();
-    jobs_.builder.build(volume_, grid_.build);
-  }
-  touch();
+  return failure_of(volumes_.sequence_of(instance), frame);
 }
 
 VolumeAssetPtr Viewer::volume() {
   sync();
-  return volume_;
+  return volumes_.volume();
 }
 
 VolumeInfoPtr Viewer::volume_info() {
   sync();
-  return volume_info_;
-}
-
-void Viewer::set_transforms(const std::vector<scene::InstanceTransform>& transforms) {
-  sync();
-  transforms_ = transforms;
-  transforms_changed_ = true;
-  show_medium();
-  if (other_opacity()) {
-    take_medium();
-    request_build();
-  }
-  touch();
-}
-
-void Viewer::add_instance(std::shared_ptr<Instance> instance) {
-  reported_failures_.retire();
-  sync();
-  if (find(*instance) != shown_.end())
-    throw Error(ErrorCode::invalid_argument, "the instance is already in the viewer");
-  Shown shown;
-  shown.id = ++last_id_;
-  shown.listener = instance->listen([this] { notify(); });
-  shown.instance = std::move(instance);
-  shown_.push_back(std::move(shown));
-  touch();
-}
-
-void Viewer::remove_instance(const Instance& instance) {
-  reported_failures_.retire();
-  shown_.erase(look_up(instance));
-  requests_due_ = true;
-  sync();  // drops its failures
-  touch();
-}
-
-std::vector<Viewer::Shown>::iterator Viewer::find(const Instance& instance) {
-  return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.instance.get() == &instance; });
+  return volumes_.volume_info();
 }
 
 void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
   reported_failures_.retire();
   sync();
-  if (find(*model) != shown_models_.end())
-    throw Error(ErrorCode::invalid_argument, "the model is already in the viewer");
-  ShownModel shown;
-  shown.id = ++last_id_;
-  shown.listener = model->listen([this] { notify(); });
-  shown.model = std::move(model);
-  shown_models_.push_back(std::move(shown));
+  models_.add(std::move(model), last_id_ + 1);
+  ++last_id_;
   sync();  // starts posing its surfaces
   touch();
 }
@@ -618,485 +147,80 @@ void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
 void Viewer::remove_model(const ModelInstance& model) {
   reported_failures_.retire();
   sync();
-  const auto found = find(model);
-  if (found == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the model is not in the viewer");
-  shown_models_.erase(found);
-  poses_due_ = true;
+  models_.remove(model);
   sync();  // drops its failures
   touch();
 }
 
-std::vector<Viewer::ShownModel>::iterator Viewer::find(const ModelInstance& model) {
-  return std::ranges::find_if(shown_models_, [&](const ShownModel& shown) { return shown.model.get() == &model; });
-}
-
-void Viewer::follow_models() {
-  for (ShownModel& shown : shown_models_) {
-    const std::uint64_t revision = shown.model->revision();
-    if (revision == shown.revision) continue;
-    const SurfaceAssetPtr before = shown.settings.surfaces;
-    shown.settings = shown.model->get();
-    shown.revision = revision;
-    if (before != shown.settings.surfaces && shown.source &&
-        (!shown.settings.surfaces || shown.source->scene.get() != &shown.settings.surfaces->scene())) {
-      shown.source = nullptr;
-      shown.begun.reset();
-    }
-    poses_due_ = true;
-    ++settings_revision_;
-  }
-  follow_poses();
-}
-
-std::optional<PoseCache::Request> Viewer::previous_pose(const ShownModel& shown) {
-  const ModelSettings& settings = shown.settings;
-  if (!settings.previous_time || *settings.previous_time == settings.choice.time) return std::nullopt;
-  SurfaceChoice choice = settings.choice;
-  choice.time = *settings.previous_time;
-  return PoseCache::Request{settings.surfaces, choice};
-}
-
-void Viewer::follow_poses() {
-  if (!jobs_.poses.take_changes() && !poses_due_) return;
-  std::vector<PoseCache::Request> requests;
-  for (ShownModel& shown : shown_models_) {
-    if (!shown.is_wanted()) {
-      shown.request.reset();
-      continue;
-    }
-    PoseCache::Request request{shown.settings.surfaces, while_open(shown.settings.choice, shown.settings.surfaces)};
-    if (shown.request != request) {
-      if (shown.request && jobs_.poses.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
-      shown.request = request;
-    }
-    if (std::ranges::find(requests, request) == requests.end()) requests.push_back(request);
-    const std::optional<PoseCache::Request> then = previous_pose(shown);
-    if (then && std::ranges::find(requests, *then) == requests.end()) requests.push_back(*then);
-  }
-  // Take results before sending the requests, which may drop poses made for earlier ones.
-  for (ShownModel& shown : shown_models_) {
-    if (!shown.request) continue;
-    auto source = jobs_.poses.built(*shown.request);
-    if (source) shown.begun.reset();  // older poses are not shown again
-    // If requests change faster than poses are made, show one that was begun.
-    if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces)
-      source = jobs_.poses.built(*shown.begun);
-    if (source) shown.source = std::move(*source);
-    const std::optional<PoseCache::Request> then = previous_pose(shown);
-    shown.previous_source = then ? jobs_.poses.built(*then).value_or(nullptr) : nullptr;
-  }
-  if (std::exchange(poses_due_, false)) jobs_.poses.request(std::move(requests));
-}
-
-std::optional<scene::ShutterTransforms> Viewer::while_open(const std::optional<scene::ShutterTransforms>& ends) const {
-  return sampling_.shutter_seconds > 0.0 ? ends : std::nullopt;
-}
-
-SurfaceChoice Viewer::while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const {
-  if (!surfaces || surfaces->scene().may_move(choice.animation)) choice.shutter_seconds = sampling_.shutter_seconds;
-  return choice;
-}
-
-void Viewer::pose_surfaces() {
-  reported_failures_.retire();
-  if (surface_asset_) jobs_.surfaces.pose(surface_asset_, while_open(surface_settings_.choice, surface_asset_));
-}
-
-std::vector<scene::Model> Viewer::models() const {
-  std::vector<scene::Model> models;
-  if (model_source_) {
-    scene::Model& own = models.emplace_back();
-    own.source = model_source_;
-    own.group = surface_settings_.group;
-    own.holdout = surface_settings_.holdout;
-  }
-  for (const ShownModel& shown : shown_models_) {
-    if (shown.is_shown())
-      models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only,
-                        shown.settings.group, shown.settings.previous, shown.previous_source, shown.settings.holdout,
-                        while_open(shown.settings.ends)});
-  }
-  return models;
-}
-
-void Viewer::follow_instances() {
-  for (Shown& shown : shown_) {
-    const std::uint64_t revision = shown.instance->revision();
-    if (revision == shown.revision) continue;
-    shown.settings = shown.instance->get();
-    shown.revision = revision;
-    shown.medium.set(shown_medium(shown.settings.medium));
-    const bool other_sequence = shown.played && shown.played->source() != shown.settings.sequence;
-    const bool other_live = shown.watching && shown.watching->source() != shown.settings.live;
-    if (other_sequence || other_live || !shown.has_anything()) shown.forget();
-    if (!shown.settings.volume) {
-      shown.request.reset();
-      shown.begun.reset();
-    }
-    requests_due_ = true;
-    ++settings_revision_;
-  }
-  if (requests_due_) request_for_sequences();
-  follow_played();
-  if (jobs_.grids.take_changes()) take_grids();
-  // The viewer's own grid, which was to be reused, may have failed.
-  if (waits_for_own_ && !jobs_.builder.busy()) requests_due_ = true;
-  if (!requests_due_ || (grid_.camera_adaptive && !view_)) return;
-  requests_due_ = false;
-  request_for_grids();
-  take_grids();
-}
-
-void Viewer::Played::configure(const std::optional<BuildSettings>& wanted) {
-  if (followed.settings == wanted) return;
-  followed.settings = wanted;
-  followed.request_due = true;
-}
-
-void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
-  if (settings == wanted) return;
-  settings = wanted;
-  builder.configure(wanted);
-}
-
-Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
-                                    const std::optional<BuildSettings>& settings) {
-  Followed followed = follow(sequence, settings);
-  const JobContext context = jobs_.context(followed.id);
-  return std::make_shared<Played>(std::move(followed), context);
-}
-
-Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
-  const std::uint64_t id = ++last_followed_;
-  auto watching = std::make_shared<Watching>(jobs_.context(id));
-  watching->watched = watch(live, watching->builder, id);
-  watching->settings = settings;
-  watching->builder.follow(live, settings);
-  return watching;
-}
-
-template <class Player>
-void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*member) {
-  struct Wanted {
-    std::optional<BuildSettings> settings;
-    std::vector<Shown*> by;
-    [[nodiscard]] const auto& source() const { return Player::source_of(by.front()->settings); }
-  };
-  std::vector<Wanted> all;
-  for (Shown& shown : shown_) {
-    if (!Player::source_of(shown.settings)) (shown.*member).reset();
-    // A hidden instance keeps its player for when it is shown again.
-    if (!Player::source_of(shown.settings) || !shown.is_seen()) continue;
-    std::optional<BuildSettings> settings;
-    if (!grid_.camera_adaptive || view_) settings = settings_of(shown);
-    const auto same = std::ranges::find_if(all, [&](const Wanted& wanted) {
-      const bool alike =
-          settings && wanted.settings ? same_but_view(*wanted.settings, *settings) : !settings && !wanted.settings;
-      return alike && wanted.source() == Player::source_of(shown.settings);
-    });
-    if (same == all.end()) {
-      all.push_back({settings, {&shown}});
-    } else {
-      if (settings) join(*same->settings, *settings);
-      same->by.push_back(&shown);
-    }
-  }
-  std::vector<std::shared_ptr<Player>> next;
-  for (Wanted& wanted : all) {
-    const auto suits_it = [&](const std::shared_ptr<Player>& p) {
-      return p && p->source() == wanted.source() && std::ranges::find(next, p) == next.end();
-    };
-    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->*member); });
-    const auto any = std::ranges::find_if(players, suits_it);
-    std::shared_ptr<Player> p = had != wanted.by.end() ? (*had)->*member : any != players.end() ? *any : nullptr;
-    if (p) {
-      p->configure(wanted.settings);
-    } else {
-      p = player_of(wanted.source(), wanted.settings);
-    }
-    for (Shown* shown : wanted.by) shown->*member = p;
-    next.push_back(std::move(p));
-  }
-  players = std::move(next);
-}
-
-void Viewer::request_for_sequences() {
-  share(played_, &Shown::played);
-  share(watching_, &Shown::watching);
-  std::vector<std::shared_ptr<JobSource>> players;
-  for (const PlayedPtr& played : played_) players.emplace_back(played, &played->cache);
-  for (const WatchingPtr& watching : watching_) players.emplace_back(watching, &watching->builder);
-  jobs_.set_players(std::move(players));
-}
-
-void Viewer::follow_watching(bool unseen) {
-  for (const WatchingPtr& watching : watching_) {
-    if (auto ready = take_state(watching->watched, watching->builder, unseen))
-      watching->built = std::move(ready->built);
-  }
-}
-
-void Viewer::follow_played() {
-  for (const PlayedPtr& played : played_) {
-    Followed& f = played->followed;
-    if (auto analyzed = played->cache.take_analyzed()) {
-      played->volume_info = std::move(analyzed->volume_info);
-      f.density_scale = analyzed->density_scale;
-    }
-    tell_request(f, played->cache);
-    if (!f.take_due) continue;
-    auto ready = take(f, played->cache);
-    if (!ready || !note_taken(f, *ready, played->built ? played->built->source : nullptr)) continue;
-    played->built = std::move(ready->built);
-  }
-  for (Shown& shown : shown_) {
-    if (shown.played && shown.played->built) shown.built = shown.played->built;
-    if (shown.watching && shown.watching->built) shown.built = shown.watching->built;
-  }
-}
-
-std::optional<Built> Viewer::grid_of(const GridCache::Request& request) const {
-  const auto is = [&](const Built& built) {
-    return built.volume == request.volume && built.settings == request.settings;
-  };
-  if (built_.source && is(built_)) return built_;
-  for (const Shown& shown : shown_) {
-    if (shown.built && is(*shown.built) && fits(*shown.built)) return shown.built;
-  }
-  return jobs_.grids.built(request);
-}
-
-void Viewer::take_grids() {
-  for (Shown& shown : shown_) {
-    if (!shown.request) continue;
-    auto built = grid_of(*shown.request);
-    // If requests change faster than grids are built, show one that was begun.
-    if (!built && shown.begun) built = jobs_.grids.built(*shown.begun);
-    if (built) shown.built = std::move(built);
-  }
-}
-
-BuildSettings Viewer::settings_of(const Shown& shown) const {
-  const Medium& medium = shown.settings.medium;
-  BuildSettings settings = grid_.build;
-  settings.density_ramp = shown.settings.ramps.density;
-  settings.emission = emission_of(medium, shown.settings.ramps);
-  settings.refine.density_scale = medium.density_scale * scene::mean_stretch(shown.settings.to_world);
-  settings.refine.anisotropy = scene::mean_cosine(medium.phase);
-  settings.anisotropic = medium.phase.may_vary();
-  if (grid_.camera_adaptive) {
-    settings.refine.camera = refine_camera();
-    settings.refine.camera->transforms = {shown.settings.to_world};
-  }
-  return settings;
-}
-
-void Viewer::reuse_grid(GridCache::Request& request) const {
-  const auto serves = [&](const Built& built) {
-    return built.volume == request.volume && built.serves(request.settings) && fits(built);
-  };
-  if (built_.source && built_.volume == request.volume && built_.serves(request.settings)) {
-    request.settings = built_.settings;
-    return;
-  }
-  for (const Shown& shown : shown_) {
-    if (shown.built && serves(*shown.built)) {
-      request.settings = shown.built->settings;
-      return;
-    }
-  }
-  for (const Shown& shown : shown_) {
-    if (shown.request && shown.request->volume == request.volume && shown.request->gl_bytes == request.gl_bytes &&
-        suits(shown.request->settings, request.settings)) {
-      request.settings = shown.request->settings;
-      return;
-    }
-  }
-}
-
-void Viewer::request_for_grids() {
-  // One request for all instances that can share a grid, as fine as the finest of them needs.
-  std::vector<GridCache::Request> requests;
-  std::vector<std::optional<std::size_t>> request_of(shown_.size());
-  for (std::size_t i = 0; i < shown_.size(); ++i) {
-    const Shown& shown = shown_[i];
-    if (!shown.is_seen() || !shown.settings.volume) continue;
-    const BuildSettings settings = settings_of(shown);
-    const auto same = std::ranges::find_if(requests, [&](const GridCache::Request& request) {
-      return request.volume == shown.settings.volume && same_but_view(request.settings, settings);
-    });
-    request_of[i] = static_cast<std::size_t>(same - requests.begin());
-    if (same == requests.end()) {
-      requests.push_back({shown.settings.volume, settings});
-    } else {
-      join(same->settings, settings);
-    }
-  }
-  const bool own_is_apart =
-      (volume_ && std::ranges::none_of(requests,
-                                       [&](const GridCache::Request& request) {
-                                         return request.volume == volume_ && suits(grid_.build, request.settings);
-                                       })) ||
-      followed_ || watched_;
-  const std::size_t grids = requests.size() + played_.size() + watching_.size() + (own_is_apart ? 1 : 0);
-  const std::size_t before = std::exchange(grids_, std::max<std::size_t>(grids, 1));
-  share_gl();
-  // The memory left by each frame always varies a little; only a change of an eighth matters.
-  const bool limited = max_gl_bytes_ != ResourceLimits::no_limit;
-  if (limited && (grids_ != before || apart_by_an_eighth(part_of_gl_, resource_limits_->gl_bytes()))) share_gl_anew();
-  for (GridCache::Request& request : requests) request.gl_bytes = part_of_gl_;
-  waits_for_own_ = false;
-  std::vector<GridCache::Request> to_build;
-  for (GridCache::Request& request : requests) {
-    reuse_grid(request);
-    if (grid_of(request)) continue;
-    const bool comes = jobs_.builder.busy() && !grid_.camera_adaptive && request.volume == volume_;
-    if (comes && suits(grid_.build, request.settings)) {
-      waits_for_own_ = true;
-    } else {
-      to_build.push_back(request);
-    }
-  }
-  for (std::size_t i = 0; i < shown_.size(); ++i) {
-    Shown& shown = shown_[i];
-    if (!request_of[i] || shown.request == requests[*request_of[i]]) continue;
-    if (shown.request && jobs_.grids.is_under_way(*shown.request)) shown.begun = std::move(shown.request);
-    shown.request = requests[*request_of[i]];
-  }
-  jobs_.grids.request(std::move(to_build));
-  fit_cells();  // its share of GPU memory may have changed
-}
-
 void Viewer::rebuild() {
-  reported_failures_.retire();
-  for (Shown& shown : shown_) {
-    shown.request.reset();
-    if (shown.built) shown.built->volume = nullptr;  // stays displayed until replaced, but cannot be reused
-  }
-  jobs_.rebuild();
-  requests_due_ = true;
-  poses_due_ = true;
-  take_medium();
-  request_build();
+  models_.renew_requests();
+  volumes_.rebuild();
   touch();
-}
-
-void Viewer::share_gl() {
-  const bool limited = max_gl_bytes_ != ResourceLimits::no_limit;
-  // Images vary by some KiB from frame to frame. Rounding keeps the number of cells constant.
-  constexpr std::uint64_t step = std::uint64_t{1} << 18U;
-  const std::uint64_t beside = (gl_beside_volumes_.value_or(0) + step - 1) / step * step;
-  const std::uint64_t left = max_gl_bytes_ - std::min(max_gl_bytes_, beside);
-  resource_limits_->set_gl(limited ? left / grids_ : ResourceLimits::no_limit);
-}
-
-void Viewer::share_gl_anew() {
-  cells_due_ = true;
-  part_of_gl_ = resource_limits_->gl_bytes();
-}
-
-bool Viewer::fits(const Built& built) const {
-  ResourceLimits part;
-  part.set_gl(part_of_gl_);
-  return !is_of_cells(built) || has_cells_allowed(built, part);
-}
-
-bool Viewer::makes_room(const Shown& shown) const {
-  return shown.is_seen() && shown.request && shown.built && jobs_.grids.busy() && !fits(*shown.built) &&
-         !grid_of(*shown.request);
 }
 
 void Viewer::set_limits(const Limits& limits) {
-  // Grids are adapted here and when the number of grids changes, but not in every frame: the number of allowed cells
-  // depends on the memory that each frame's images leave.
-  const bool others = limits.gl_bytes != max_gl_bytes_ || limits.memory_bytes != resource_limits_->memory_bytes();
-  resource_limits_->set(limits.threads, limits.memory_bytes);
   max_gl_bytes_ = limits.gl_bytes;
-  share_gl();
-  if (others) {
-    share_gl_anew();
-    requests_due_ = requests_due_ || !shown_.empty();
-  }
-  sync();
-  if (followed_) followed_->request_due = true;
-  for (const PlayedPtr& played : played_) played->followed.request_due = true;
+  volumes_.set_limits(limits.threads, limits.memory_bytes, limits.gl_bytes);
   touch();
 }
 
-void Viewer::fit_cells() {
-  // The running job may have been started under other limits, or for another volume.
-  if (!cells_due_ || jobs_.builder.busy()) return;
-  cells_due_ = false;
-  if (!volume_ || !is_of_cells(built_) || followed_ || watched_) return;
-  cuts_own_ = !has_cells_allowed(built_, *resource_limits_);
-  if (cuts_own_) request_build();
+void Viewer::add_instance(std::shared_ptr<Instance> instance) {
+  volumes_.add_instance(std::move(instance), last_id_ + 1);
+  ++last_id_;
 }
 
-bool Viewer::busy() const { return jobs_.busy() || frames_are_due(); }
-
-bool Viewer::builds() const {
-  return jobs_.busy(ContentKind::volume) || jobs_.busy(ContentKind::instances) || frames_are_due();
+bool Viewer::is_displayed(const scene::SequenceFrame& frame, bool is_rendered) const {
+  if (gl_) return is_rendered && !gl_->has_pending_frame(frame);
+  return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
 }
 
-bool Viewer::frames_are_due() const {
-  const auto are_due = [](const PlayedPtr& played) { return played->followed.is_due(played->cache); };
-  return (followed_ && followed_->is_due(jobs_.frames)) || std::ranges::any_of(played_, are_due);
-}
+bool Viewer::busy() const { return jobs_.busy() || volumes_.frames_are_due(); }
 
 void Viewer::load_surfaces(const FilePath& path) {
   reported_failures_.retire();
   sync();
-  jobs_.surfaces.load(path, while_open(surface_settings_.choice, nullptr));
+  models_.load(path);
   touch();
 }
 
 void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
   reported_failures_.retire();
-  jobs_.surfaces.forget_failure();
-  jobs_.surfaces.cancel();
+  models_.cancel_surfaces(false);
   sync();
-  surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
-  model_source_ = std::move(surfaces);
+  models_.show(std::move(surfaces));
   touch();
 }
 
 void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
   reported_failures_.retire();
-  jobs_.surfaces.forget_failure();
-  if (surfaces) {
-    jobs_.surfaces.cancel_loads();  // poses continue: a host may set surfaces faster than they are posed
-  } else {
-    jobs_.surfaces.cancel();
-  }
+  models_.cancel_surfaces(surfaces != nullptr);
   sync();
-  surface_asset_ = std::move(surfaces);
-  pose_surfaces();
-  if (!surface_asset_) model_source_ = nullptr;
+  models_.set_surfaces(std::move(surfaces));
   touch();
 }
 
 SurfaceAssetPtr Viewer::surfaces_asset() {
   sync();
-  return surface_asset_;
+  return models_.asset();
 }
 
 void Viewer::set_surface_settings(const SurfaceSettings& settings) {
-  const bool poses = settings.choice != surface_settings_.choice &&
-                     !jobs_.surfaces.configure_load(while_open(settings.choice, nullptr));
+  const bool poses = models_.configure_load(settings);
   if (poses) sync();
-  surface_settings_ = settings;
-  if (poses) pose_surfaces();
+  models_.set_settings(settings);
+  if (poses) models_.pose_surfaces();
   touch();
 }
 
 void Viewer::use_surface_camera(std::size_t index) {
   sync();
-  const std::size_t count = model_source_ ? model_source_->pose.cameras.size() : 0;
+  const scene::ModelSourcePtr& source = models_.source();
+  const std::size_t count = source ? source->pose.cameras.size() : 0;
   if (index >= count) {
     throw Error(ErrorCode::invalid_argument,
                 "there is no camera " + std::to_string(index) + ": the surfaces have " + std::to_string(count));
   }
-  const surface::SceneCamera& seen = model_source_->pose.cameras[index];
+  const surface::SceneCamera& seen = source->pose.cameras[index];
   const dvec3 eye(seen.to_world[3]);
   const dvec3 forward = -glm::normalize(dvec3(seen.to_world[2]));
   CameraPose pose = camera_->pose();
@@ -1126,8 +250,7 @@ void Viewer::wait(double timeout_ms) {
     sync();
     if (!jobs_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
     // The newest state is waited for, so it need not wait until the previous one has been displayed.
-    follow_live(true);
-    follow_watching(true);
+    volumes_.take_unseen_states();
     sync();
   } while (busy());
   if (const auto failure = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::reported))
@@ -1157,87 +280,8 @@ Viewer::Status Viewer::status() const {
 
 // ---- settings ----
 
-void Viewer::set_grid(const GridSettings& settings) {
-  grid_ = settings;
-  requests_due_ = true;
-  take_medium();
-  request_build();
-  touch();
-}
-
-void Viewer::take_medium() {
-  grid_.build.emission = field_emission();
-  grid_.build.density_ramp = ramps_.density;
-  grid_.build.refine.density_scale = density_scale_to_come();
-  grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
-  grid_.build.anisotropic = medium_.phase.may_vary();
-  grid_.build.shutter_seconds = sampling_.shutter_seconds;
-}
-
-scene::Emission Viewer::field_emission() const { return emission_of(medium_, ramps_); }
-
-void Viewer::set_ramps(const Ramps& ramps) {
-  const bool other_density = ramps.density != ramps_.density;
-  const bool other_emission = ramps.temperature != ramps_.temperature || ramps.flame != ramps_.flame;
-  if (!other_density && !other_emission) return;
-  ramps_ = ramps;
-  take_medium();
-  request_build(other_density ? nullptr : glows);
-  touch();
-}
-
-void Viewer::remark_on_anisotropy() {
-  if (medium_.phase.may_vary()) remarked_anisotropy_.reset();
-  if (!volume_info_ || !volume_info_->anisotropy_grid || medium_.phase.may_vary()) return;
-  const std::string& name = *volume_info_->anisotropy_grid;
-  if (remarked_anisotropy_ == name) return;
-  remarked_anisotropy_ = name;
-  log_.info("grid \"" + name + "\" is ignored: the Mie phase function has its own anisotropy");
-}
-
-void Viewer::set_medium(const Medium& medium) {
-  sync();
-  medium_ = medium;
-  remark_on_anisotropy();
-  const scene::Emission emission = field_emission();
-  const bool other_emission = grid_.build.emission != emission;
-  if (other_opacity()) {
-    take_medium();
-    request_build();
-  } else if (const bool other_phase = medium.phase.may_vary() != grid_.build.anisotropic;
-             other_emission || other_phase) {
-    const auto varied = [](const VolumeAsset& volume) { return volume.has_anisotropy(); };
-    const auto either = [](const VolumeAsset& volume) { return volume.may_emit() || volume.has_anisotropy(); };
-    grid_.build.emission = emission;
-    grid_.build.anisotropic = medium.phase.may_vary();
-    request_build(!other_phase ? glows : other_emission ? +either : +varied);
-  }
-  show_medium();
-  touch();
-}
-
-double Viewer::density_scale_to_come() const {
-  return suggested_density_scale_ ? *suggested_density_scale_ : medium_.density_scale * stretch();
-}
-
-bool Viewer::other_opacity() const {
-  BuildSettings wanted = grid_.build;
-  wanted.refine.density_scale = density_scale_to_come();
-  wanted.refine.anisotropy = scene::mean_cosine(medium_.phase);
-  return !suits(grid_.build, wanted);
-}
-
-Medium Viewer::seen_medium() const {
-  Medium medium = medium_;
-  if (proxy_ && proxy_->density_scale) medium.density_scale = *proxy_->density_scale / stretch();
-  return medium;
-}
-
-void Viewer::show_medium() { shown_medium_.set(shown_medium(seen_medium())); }
-
 void Viewer::set_light(const Light& light) {
-  light_ = light;
-  surround();
+  sky_.set_light(light);
   touch();
 }
 
@@ -1258,85 +302,31 @@ void Viewer::set_environment(light::EnvironmentPtr environment) {
   reported_failures_.retire();
   jobs_.environments.drop_loads();
   sync();
-  show_environment(std::move(environment));
+  sky_.set_environment(std::move(environment));
   touch();
 }
 
 const light::EnvironmentPtr& Viewer::environment() {
   sync();
-  return environment_;
-}
-
-void Viewer::show_environment(light::EnvironmentPtr environment) {
-  if (environment && !environment->remarks.empty()) {
-    std::string remarks;
-    for (const std::string& remark : environment->remarks) remarks.append(remarks.empty() ? ": " : "; ").append(remark);
-    log_.warning(one_line(environment->name) + remarks);
-  }
-  if (environment && environment->replaced > 0) {
-    log_.warning(one_line(environment->name) + ": " + std::to_string(environment->replaced) +
-                 " pixels have non-finite, negative or too large (above 1e30) values, which are read as 0");
-  }
-  environment_ = std::move(environment);
-  surround();
+  return sky_.environment();
 }
 
 void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
-  environment_settings_ = settings;
-  surround();
+  sky_.set_environment_settings(settings);
   touch();
 }
 
-std::optional<light::Day> Viewer::day() const {
-  if (!light_.sky) return std::nullopt;
-  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.mode != GroundMode::none};
-}
-
-void Viewer::surround() {
-  light::Surroundings surroundings{environment_, environment_settings_.rotation_degrees,
-                                   environment_settings_.strength};
-  const std::optional<light::Day> wanted = day();
-  if (!wanted) {
-    jobs_.environments.forget_sky_failure();
-    daylight_.reset();
-    scene_.lights.set({to_sun(light_.sun_azimuth_degrees, light_.sun_elevation_degrees), light_.sun_irradiance,
-                       light_.sky_radiance, light_.sun_angle_degrees});
-  } else if (!(daylight_ && daylight_->day == *wanted) && asked_day_ != wanted) {
-    jobs_.environments.make_sky(*wanted);
-    asked_day_ = wanted;
-  }
-  // Until the new sky is ready, sun and sky stay unchanged except for the azimuth.
-  if (daylight_) {
-    scene_.lights.set({to_sun(light_.sun_azimuth_degrees, daylight_->day.sun_elevation_degrees),
-                       daylight_->sun_irradiance, light_.sky_radiance, light_.sun_angle_degrees});
-    if (!environment_)
-      surroundings = {.environment = daylight_->surroundings, .rotation_degrees = light_.sun_azimuth_degrees};
-  }
-  scene_.surroundings.set(std::move(surroundings));
-}
-
 void Viewer::set_ground(const GroundSettings& settings) {
-  ground_ = settings;
-  surround();
+  sky_.set_ground(settings);
   touch();
 }
 
 void Viewer::set_sampling(const Sampling& sampling) {
   sync();
-  const bool other_shutter = sampling_.shutter_seconds != sampling.shutter_seconds;
   sampling_ = sampling;
-  if (!sampling_.options.preview) drop_proxy();
-  if (other_shutter) {
-    poses_due_ = true;
-    const bool loads = jobs_.surfaces.configure_load(while_open(surface_settings_.choice, nullptr));
-    if (!loads && surface_asset_ && surface_asset_->scene().may_move(surface_settings_.choice.animation))
-      pose_surfaces();
-  }
-  if (grid_.build.shutter_seconds != sampling.shutter_seconds) {
-    requests_due_ = true;
-    take_medium();
-    request_build([](const VolumeAsset& volume) { return volume.moves(); });
-  }
+  volumes_.set_preview(sampling.options.preview);
+  models_.set_shutter(sampling.shutter_seconds);
+  volumes_.set_shutter(sampling.shutter_seconds);
   touch();
 }
 
@@ -1361,7 +351,7 @@ void Viewer::set_previous_camera(std::shared_ptr<Camera> camera, double seconds)
 }
 
 void Viewer::set_previous_transforms(std::vector<scene::InstanceTransform> transforms) {
-  previous_transforms_ = std::move(transforms);
+  volumes_.set_previous_transforms(std::move(transforms));
   touch();
 }
 
@@ -1382,36 +372,10 @@ void Viewer::frame_all() {
   camera_->fit(*subject(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0);
 }
 
-double Viewer::stretch() const {
-  double most = 0.0;
-  for (const scene::InstanceTransform& transform : transforms_)
-    most = std::max(most, scene::mean_stretch(transform.to_world));
-  return most;
-}
-
-Bounds Viewer::bounds_of(const VolumeInfo& volume) const {
-  Bounds all = volume.bounds(transforms_.front().to_world);
-  for (std::size_t i = 1; i < transforms_.size(); ++i) all = both(all, volume.bounds(transforms_[i].to_world));
-  return all;
-}
-
 std::vector<Bounds> Viewer::boxes() const {
   std::vector<Bounds> boxes;
-  if (const VolumeInfoPtr& volume_info = shown_info(); volume_info && !volume_info->empty) {
-    for (const scene::InstanceTransform& transform : transforms_)
-      boxes.push_back(volume_info->bounds(transform.to_world));
-  }
-  for (const Shown& shown : shown_) {
-    if (shown.is_there() && !shown.volume_info()->empty)
-      boxes.push_back(shown.volume_info()->bounds(shown.settings.to_world));
-  }
-  if (model_source_ && model_source_->scene->triangle_count() > 0)
-    boxes.push_back({model_source_->pose.low, model_source_->pose.high});
-  for (const ShownModel& shown : shown_models_) {
-    if (!shown.is_shown()) continue;
-    const scene::ModelBounds bounds = scene::bounds_of(*shown.source, shown.settings.to_world);
-    if (bounds.any) boxes.push_back({bounds.low, bounds.high});
-  }
+  volumes_.append_bounds(boxes);
+  models_.append_bounds(boxes);
   return boxes;
 }
 
@@ -1446,35 +410,12 @@ void Viewer::count_from(const dvec3& origin) {
     scene_.analytic_lights.set(scene::counted_from(analytic_lights_, origin));
   analytic_lights_due_ = false;
   scene_.origin = origin;
-  for (scene::Volume& volume : scene_.volumes) {
-    const bool is_nothing = volume.id == 0 && built_.volume && built_.volume == empty_volume_;
-    if (!is_nothing) {
-      volume = scene::counted_from(std::move(volume), origin);
-    } else if (origin != dvec3(0.0)) {
-      // The empty volume for surfaces is moved to the origin.
-      volume.transform = {glm::translate(glm::dmat4(1.0), -dvec3(empty_volume_->volume().index_to_world[3]))};
-    }
-  }
-}
-
-bool Viewer::shows_models() const { return model_source_ || std::ranges::any_of(shown_models_, &ShownModel::is_shown); }
-
-bool Viewer::shows_triangles() const {
-  return std::ranges::any_of(models(), [](const scene::Model& m) { return m.source->scene->triangle_count() > 0; });
+  volumes_.count_from(scene_.volumes, origin);
 }
 
 std::optional<scene::Ground> Viewer::ground(const std::optional<Bounds>& all) const {
-  // A ground plane at a given height is also shown without other objects: a sequence's frame may be empty.
-  if (ground_.mode == GroundMode::none || (ground_.mode == GroundMode::below && !all)) return std::nullopt;
-  scene::Ground ground{ground_.height, ground_.albedo};
-  // With models it is slightly below the bounds, because many models include a floor.
-  if (ground_.mode == GroundMode::below)
-    ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
-  // Then the visible edge of the plane is at most 1e-4 radians below the true horizon.
-  const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
-  const double scene = all ? glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) : 0.0;
-  ground.reach = 1e4 * (scene + eye);
-  return ground;
+  const bool on_triangles = sky_.has_ground() && models_.shows_triangles();
+  return sky_.ground(all, on_triangles, view_ ? std::optional(view_->eye) : std::nullopt);
 }
 
 std::optional<Subject> Viewer::subject() const {
@@ -1493,31 +434,9 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     reach.resize(normals.size(), std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
   };
-  const VolumeInfoPtr& own = shown_info();
-  const std::size_t count = (own ? transforms_.size() : 0) + shown_.size();
-  const auto add_volume = [&](const VolumeInfo& volume, const glm::dmat4& to_world, const Medium& medium) {
-    const Bounds box = volume.bounds(to_world);
-    const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
-    // With many volumes, one of them hardly extends the visible bounds.
-    if (count > most_looked_at) {
-      add_box();
-      return;
-    }
-    const dvec3 along = glm::inverse(glm::dmat3(to_world)) * direction;
-    const double density_scale = medium.density_scale / glm::length(along);
-    for (const dvec3& p : volume.coarse.visible(glm::normalize(along), density_scale))
-      add(dvec3(to_world * glm::dvec4(p, 1.0)));
-    // Emission is visible at any density.
-    if (volume.may_emit) add_box();
-  };
+  volumes_.visit_reach(direction, add);
   std::size_t vertices = 0;
-  for (const scene::InstanceTransform& transform : transforms_) {
-    if (own) add_volume(*own, transform.to_world, seen_medium());
-  }
-  for (const Shown& shown : shown_) {
-    if (shown.is_there()) add_volume(*shown.volume_info(), shown.settings.to_world, shown.settings.medium);
-  }
-  for (const scene::Model& model : models()) {
+  for (const scene::Model& model : models_.models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
       for (const glm::dmat4& transform : mesh.transforms) {
         // For many instances the boxes are sufficient.
@@ -1536,112 +455,15 @@ Bounds Viewer::bounds() {
   return *all;
 }
 
-grid::RefineCamera Viewer::refine_camera() const {
-  const ViewFrame& view = *view_;
-  grid::RefineCamera refine;
-  refine.right = glm::normalize(view.right);
-  refine.up = glm::normalize(view.up);
-  refine.forward = glm::normalize(glm::cross(refine.up, refine.right));
-  // Off-axis projection: use the symmetric frustum that contains the image's.
-  refine.tan_half_x = glm::length(view.right) + std::abs(glm::dot(view.forward, refine.right));
-  refine.tan_half_y = glm::length(view.up) + std::abs(glm::dot(view.forward, refine.up));
-  refine.eye = view.eye;
-  refine.pixels_per_radian = frame_size_.y / (2.0 * glm::length(view.up));
-  if (view.orthographic) {
-    // Approximated by a pinhole camera so far back that its rays are nearly parallel.
-    const double back = 1e4 * glm::length(view.up);
-    refine.eye -= back * refine.forward;
-    refine.tan_half_x /= back;
-    refine.tan_half_y /= back;
-    refine.pixels_per_radian *= back;
-  }
-  return refine;
-}
-
-VolumeAssetPtr Viewer::empty_volume() {
-  if (!empty_volume_) {
-    volume::ScalarVolume empty;
-    empty.name = "nothing";
-    empty.bounds_max = glm::ivec3(0);
-    const auto all = box();
-    const dvec3 middle = all ? 0.5 * (all->min + all->max) : dvec3(0.0);
-    // If the scene is far away, count_from() moves the volume to the scene's origin.
-    const bool near = !all || scene::origin_of_scene(std::array{scene::Extent{all->min, all->max}}, {}) == dvec3(0.0);
-    empty.index_to_world[3] = glm::dvec4(near ? middle : dvec3(0.0), 1.0);
-    empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));
-  }
-  return empty_volume_;
-}
-
-bool Viewer::shows_instances() const {
-  return std::ranges::any_of(shown_, [](const Shown& shown) { return shown.is_seen() && shown.built; });
-}
-
-void Viewer::show_volumes() {
-  std::vector<scene::Volume> volumes;
-  // The empty volume for surfaces is left out if instances are displayed.
-  const scene::MarchSourcePtr& source = proxy_ ? proxy_->source : built_.source;
-  if (source && (shown_info() || !shows_instances())) {
-    const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
-    for (const scene::InstanceTransform& transform : transforms_)
-      volumes.push_back({0, source, shown_medium_, {transform.to_world, while_open(transform.ends)}, frame});
-    for (std::size_t i = 0; i < std::min(volumes.size(), previous_transforms_.size()); ++i)
-      volumes[i].previous = previous_transforms_[i];
-  }
-  for (const Shown& shown : shown_) {
-    if (shown.is_seen() && shown.built)
-      volumes.push_back({shown.id,
-                         shown.built->source,
-                         shown.medium,
-                         {shown.settings.to_world, while_open(shown.settings.ends)},
-                         shown.frame(),
-                         shown.settings.previous});
-  }
-  const auto differs = [&](const scene::Volume& volume) {
-    const scene::MarchSource& first = *volumes.front().source;
-    return !volume.source->goes_with(first);
-  };
-  if (std::ranges::any_of(volumes, differs)) keep_to_one_march(volumes);
-  keep_until_cells_are_cut(volumes);
-  scene_.volumes = std::move(volumes);
-}
-
-void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
-  const bool building = builds();
-  // While grids are being built, keep volumes that match the displayed ones; afterwards those that match the settings.
-  const auto fits = [&](const scene::Volume& volume) {
-    if (building && !scene_.volumes.empty()) return volume.source->goes_with(*scene_.volumes.front().source);
-    return volume.source->march == grid_.build.march &&
-           (volume.source->march != scene::March::tet ||
-            volume.source->linear == (grid_.build.refine.cells == grid::CellKind::linear));
-  };
-  for (scene::Volume& volume : volumes) {
-    if (fits(volume)) continue;
-    const auto was = std::ranges::find_if(
-        scene_.volumes, [&](const scene::Volume& other) { return other.id == volume.id && fits(other); });
-    if (was != scene_.volumes.end()) stay_with(volume, *was);
-  }
-  std::erase_if(volumes, [&](const scene::Volume& volume) { return !fits(volume); });
-}
-
-void Viewer::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const {
-  if (max_gl_bytes_ == ResourceLimits::no_limit) return;
-  const bool own = cuts_own_ && jobs_.builder.busy() && !jobs_.builder.loads() && !proxy_ && !followed_ && !watched_;
-  if (!own && std::ranges::none_of(shown_, [this](const Shown& shown) { return makes_room(shown); })) return;
-  const auto was = [&](const scene::Volume& volume) {
-    return std::ranges::find(scene_.volumes, volume.id, &scene::Volume::id);
-  };
-  std::erase_if(volumes, [&](const scene::Volume& volume) { return was(volume) == scene_.volumes.end(); });
-  for (scene::Volume& volume : volumes) stay_with(volume, *was(volume));
-}
-
 scene::SnapshotPtr Viewer::snapshot() {
-  show_volumes();
+  scene_.volumes = volumes_.volumes(scene_.volumes);
   const std::vector<Bounds> boxes = this->boxes();
   const std::optional<scene::Ground> ground = this->ground(box_of(boxes));
   const dvec3 origin = scene_origin(boxes, ground);
   count_from(origin);
-  scene_.models = models();
+  scene_.lights = sky_.lights();
+  scene_.surroundings = sky_.surroundings();
+  scene_.models = models_.models();
   for (scene::Model& model : scene_.models) model = scene::counted_from(std::move(model), origin);
   remark_on_precision();
   const auto seen = [&](const std::optional<ViewFrame>& view) {
@@ -1667,11 +489,11 @@ Shot Viewer::shot() {
   }
   shot.view_rests = view_ == last_view_;
   shot.held = navigation_.dragging();
-  shot.max_bounces = medium_.max_bounces;
-  shot.sun_group = light_.sun_group;
-  shot.sky_group = light_.sky_group;
+  shot.max_bounces = volumes_.medium().max_bounces;
+  shot.sun_group = sky_.light().sun_group;
+  shot.sky_group = sky_.light().sky_group;
   shot.sampling = sampling_;
-  shot.surfaces = surface_settings_;
+  shot.surfaces = models_.settings();
   shot.display = display_;
   shot.settings = settings_revision_;
   return shot;

@@ -13,17 +13,21 @@
 #include <string>
 #include <vector>
 
+#include "assets/camera.hpp"
+#include "assets/instance.hpp"
+#include "assets/sequence.hpp"
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/trace.hpp"
 #include "denoise/network.hpp"
+#include "jobs/jobs.hpp"
 #include "scene/snapshot.hpp"
-#include "viewer/camera.hpp"
+#include "stage/model_stage.hpp"
+#include "stage/sky_stage.hpp"
+#include "stage/volume_stage.hpp"
 #include "viewer/context.hpp"
-#include "viewer/instance.hpp"
-#include "viewer/jobs.hpp"
+#include "viewer/dynamic_gl_bridge.hpp"
 #include "viewer/navigation.hpp"
-#include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 
 namespace cumulet::viewer {
@@ -49,14 +53,14 @@ struct Stats {
 /// The implementation behind the C ABI: takes settings, renders images. A change causes only the rebuilds that it
 /// requires. Threads, GL context and GL state: see cumulet.h. Functions throw Error; a call that throws leaves the
 /// viewer unchanged.
-class Viewer {
+class Viewer final : private StageHost {
  public:
   using GetProc = void* (*)(void* user, const char* name);
   /// restore_state: [GL] calls restore the GL state that they found. sharing: resources of viewers that share shader
   /// programs; null: its own.
   Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace = {},
          std::shared_ptr<Sharing> sharing = nullptr);
-  ~Viewer();
+  ~Viewer() override;
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
@@ -65,21 +69,15 @@ class Viewer {
   void context_lost();
   [[nodiscard]] bool attached() const { return gl_ != nullptr; }
 
-  void load_volume(const VolumeFile& file);
-  void set_volume(VolumeAssetPtr volume);
+  void load_volume(const VolumeFile& file) { volumes_.load_volume(file); }
+  void set_volume(VolumeAssetPtr volume) { volumes_.set_volume(std::move(volume)); }
   /// Returns the newest volume; null if there is none.
   VolumeAssetPtr volume();
   /// Returns the metadata of the volume or the sequence; null if there is none.
   VolumeInfoPtr volume_info();
   /// Shows the current frame of a sequence instead of the volume. Null: removes the sequence that is shown, if any.
-  void set_sequence(std::shared_ptr<Sequence> sequence);
-  struct SequenceStatus {
-    std::uint32_t asked = 0;          ///< the current frame of its clock
-    double requested_position = 0.0;  ///< the current step, in frames
-    std::optional<double> drawn;      ///< the step that is displayed, in frames
-    FrameCache::Status frames;
-    std::optional<double> density_scale;  ///< suggested for all frames
-  };
+  void set_sequence(std::shared_ptr<Sequence> sequence) { volumes_.set_sequence(std::move(sequence)); }
+  using SequenceStatus = SequenceFeed::Status;
   /// sequence() and frame_failure() throw Error(invalid_argument) if the viewer shows no sequence.
   SequenceStatus sequence();
   /// Returns why a frame cannot be shown.
@@ -90,32 +88,26 @@ class Viewer {
   std::optional<Error> frame_failure(const Instance& instance, std::uint32_t frame);
   /// Shows the newest state of a dynamic volume instead of the volume. Null: removes the dynamic volume that is shown,
   /// if any.
-  void set_live(std::shared_ptr<Live> live);
+  void set_live(std::shared_ptr<Live> live) { volumes_.set_live(std::move(live)); }
   /// [GL] Submits the next state of a dynamic volume from voxels in GL. `live` need not be shown by this viewer. state:
   /// a complete state, or the changes to the last one.
   void set_live_gl(std::shared_ptr<Live> live, const render::GlState& state);
-  struct LiveStatus {
-    std::uint64_t handed = 0;           ///< number of the newest submitted state; 0: none
-    std::uint64_t ready = 0;            ///< number of the state taken last
-    std::uint64_t drawn = 0;            ///< number of the displayed state
-    std::uint64_t ready_count = 0;      ///< how many were taken
-    std::uint64_t displayed_count = 0;  ///< how many of them were displayed
-  };
+  using LiveStatus = DynamicFeed::Status;
   /// Throws Error(invalid_argument) if the viewer shows no dynamic volume.
   LiveStatus live();
   /// Throws Error(invalid_argument) for an instance that the viewer does not show or that has no dynamic volume.
   LiveStatus live(const Instance& instance);
   /// Sets the instance transforms of the viewer's own volume, sequence or dynamic volume: affine, from its own world
   /// space; at least one. A grid that does not suit the new scale is rebuilt.
-  void set_transforms(const std::vector<scene::InstanceTransform>& transforms);
-  [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return transforms_; }
+  void set_transforms(const std::vector<scene::InstanceTransform>& transforms) { volumes_.set_transforms(transforms); }
+  [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return volumes_.transforms(); }
   /// World bounds of all instances of a volume.
-  [[nodiscard]] Bounds bounds_of(const VolumeInfo& volume) const;
+  [[nodiscard]] Bounds bounds_of(const VolumeInfo& volume) const { return volumes_.bounds_of(volume); }
   /// Shows an instance with its current settings, beside the viewer's own volume. Throws Error(invalid_argument) if it
   /// is shown already.
   void add_instance(std::shared_ptr<Instance> instance);
   /// Throws Error(invalid_argument) if the viewer does not show it.
-  void remove_instance(const Instance& instance);
+  void remove_instance(const Instance& instance) { volumes_.remove_instance(instance); }
   /// Shows a model with its current settings, beside the viewer's own surfaces. Throws Error(invalid_argument) if it is
   /// shown already.
   void add_model(std::shared_ptr<ModelInstance> model);
@@ -155,10 +147,10 @@ class Viewer {
   /// Copies a camera of the newest surfaces to the viewer's. Throws Error(invalid_argument) if it does not exist.
   void use_surface_camera(std::size_t index);
 
-  void set_grid(const GridSettings& settings);
-  void set_medium(const Medium& medium);
-  void set_ramps(const Ramps& ramps);
-  [[nodiscard]] const Ramps& ramps() const { return ramps_; }
+  void set_grid(const GridSettings& settings) { volumes_.set_grid(settings); }
+  void set_medium(const Medium& medium) { volumes_.set_medium(medium); }
+  void set_ramps(const Ramps& ramps) { volumes_.set_ramps(ramps); }
+  [[nodiscard]] const Ramps& ramps() const { return volumes_.ramps(); }
   void set_light(const Light& light);
   void set_lights(light::AnalyticLights analytic_lights);
   void load_environment(const FilePath& path);
@@ -208,7 +200,7 @@ class Viewer {
   Stats stats();
 
   /// Calls the host's update callback. Calls are coalesced. Thread-safe.
-  void notify();
+  void notify() override;
 
   /// Returns the shader parameters of the current image; for tests.
   const core::CmParameters& trace_parameters();
@@ -236,285 +228,30 @@ class Viewer {
  private:
   [[nodiscard]] Context& gl() const;
   // Must be called after each change of a setting.
-  void touch();
-  // Updates the scene's lights and environment from the settings.
-  void surround();
-  // Returns the inputs of the physical sky; nullopt without one.
-  [[nodiscard]] std::optional<light::Day> day() const;
-  void show_environment(light::EnvironmentPtr environment);
+  void touch() override;
   // True if a worker is busy or has a result that has not been taken.
   [[nodiscard]] bool busy() const;
-  // busy() for the workers that build grids.
-  [[nodiscard]] bool builds() const;
-  // True if a sequence has a request that was not sent, or results that were not checked.
-  [[nodiscard]] bool frames_are_due() const;
   // Runs the body of a [GL] call with state guard and error handling.
   template <class Body>
   void with_gl(Body&& body);
-  void sync();
-  // Updates the request of the sequence and takes its results.
-  void follow_sequence();
-  void take_frame();
-  // Updates the sequences and dynamic volumes of instances.
-  void request_for_sequences();
-  void follow_played();
-  // Takes the low-resolution proxy of a running load, and drops it when the load ends.
-  void follow_proxy();
-  // Requests a rebuild if the limits allow more cells or fewer cells than the grid has.
-  void fit_cells();
-  void drop_proxy();
-  // Metadata of the displayed volume: that of the proxy while there is one.
-  [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy_ ? proxy_->volume_info : volume_info_; }
-  // Stops showing a sequence or a dynamic volume.
-  void leave_sequence();
-  // Takes states that are ready. unseen: also if the previous state has not been displayed.
-  void follow_live(bool unseen = false);
-  void follow_watching(bool unseen = false);
-  // Returns true if the state or frame taken last has been displayed, or if images are not being displayed at all.
-  [[nodiscard]] bool is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const;
-  // Must be called before a sequence or a dynamic volume is shown or removed. Returns true if one is to be shown.
-  bool begin_anew(bool shows, bool showed);
-  // Makes this the current volume; null: none.
-  void take_volume(VolumeAssetPtr volume);
-  // Sets the medium's density scale to the suggested one. Called with the first grid built for it.
-  void take_suggestion();
-  // Requests new grids. concerned: if set, a volume for which it returns false keeps its grid.
-  void request_build(bool (*concerned)(const VolumeAsset&) = nullptr);
-  // Copies the medium and the ramps to the build settings.
-  void take_medium();
-  // Maximum mean scale factor of the volume's instance transforms.
-  [[nodiscard]] double stretch() const;
-  // Density scale for coming grids, per unit length of the volume's own world space.
-  [[nodiscard]] double density_scale_to_come() const;
-  // True if the grid was refined for a density scale or anisotropy that no longer suits the medium, so that it must be
-  // rebuilt.
-  [[nodiscard]] bool other_opacity() const;
-  // Medium for display. While a proxy is shown it has the density scale suggested for the proxy.
-  [[nodiscard]] Medium seen_medium() const;
-  // Updates the medium used for rendering.
-  void show_medium();
-  [[nodiscard]] scene::Emission field_emission() const;
-  // Logs that an anisotropy grid is ignored; once per grid.
-  void remark_on_anisotropy();
-  // Build settings that do not depend on the view. Nullopt if grids do; the next frame requests them then.
-  [[nodiscard]] std::optional<BuildSettings> settings_at_once() const;
-  [[nodiscard]] BuildSettings settings_for_view() const;
-  // True if the current or requested grid was built for another view than that of the last frame.
-  [[nodiscard]] bool built_for_another() const;
-  [[nodiscard]] grid::RefineCamera refine_camera() const;
+  void sync() override;
+  [[nodiscard]] bool is_displayed(const scene::SequenceFrame& frame, bool is_rendered) const override;
+  void track(const std::shared_ptr<Live>& live) override { dynamic_gl_.track(live); }
   // Prepares a frame before uploads.
   void prepare(const Frame& frame);
-  // Takes voxels whose transfer from GL has completed.
-  static void follow_transfers(Context& g, double budget_ms);
-  // For GPU-resident states of dynamic volumes: starts the computation of emission and the transfer to main memory, as
-  // requested.
-  void update_gpu_resident(Context& g);
-  // True if such work is pending.
-  [[nodiscard]] bool voxels_in_gl_wait(Context& g) const;
-  static void bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels);
-  // Returns the transform for a state that stays GPU-resident; nullopt if the state must go to main memory.
-  static std::optional<glm::dmat4> transform_in_gl(Context& g, const std::shared_ptr<Live>& live,
-                                                   const render::GlState& state);
-  static void make_products(Context& g, const std::shared_ptr<Live>& live);
-  // Sorts and merges the scattered bricks of its newest state.
-  static void gather(Context& g, Live& live);
-  // Registers a dynamic volume with GPU-resident states for per-frame service (read-back, emission).
-  void track_gpu_resident(const std::shared_ptr<Live>& live);
   // Updates the upload progress for status() and stats().
   void follow_upload(const Context& g);
   // Takes the cell counts of GPU-built grids once they are built.
   void take_cells(const Context& g);
-  // Sets the GPU memory limit of builds from the memory that the last frame left for volumes.
-  void share_gl();
-  // Also updates part_of_gl_ and lets grids be rebuilt, after a change of the limits or of the number of grids.
-  void share_gl_anew();
-  // True if a grid has as many cells as its share of GPU memory allows.
-  [[nodiscard]] bool fits(const Built& built) const;
   // Returns the displayed frame of a sequence.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
-  // A sequence that is shown, with the last request and the last frame taken.
-  struct Followed {
-    std::shared_ptr<Sequence> sequence;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;             // of the last request
-    std::optional<BuildSettings> settings;  // nullopt: waiting for a view
-    SequenceState state;
-    std::optional<double> density_scale;  // suggested for it, after its analysis
-    bool request_due = true;
-    std::uint64_t cache_revision = 0;  // revision of its cache when it was last checked
-    bool take_due = false;
-    std::uint64_t id = 0;                       // identifies this object
-    std::optional<scene::SequenceFrame> frame;  // frame taken last
-    bool is_rendered = false;                   // a frame has rendered it
-
-    // True if there is work pending for it, beside that of the cache.
-    [[nodiscard]] bool is_due(const FrameCache& cache) const {
-      return !cache.is_final_taken() && (request_due || cache.revision() != cache_revision);
-    }
-  };
-  [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
-  // Sends the newest request to the cache and checks for results.
-  void tell_request(Followed& f, FrameCache& cache) const;
-  // Takes the GPU memory used by everything except volumes in this frame.
-  void take_gl_bytes(std::uint64_t beside_volumes);
   // Fills in the flags about pending work and failures.
   void report_pending(FrameResult& result);
-  // Marks all frames and states taken last as rendered.
-  void note_rendered();
-  // True if a frame or a state is ready, but waits until the previous one has been displayed.
-  [[nodiscard]] bool something_waits() const;
-  // Returns the data to show now, if it may have changed.
-  [[nodiscard]] std::optional<FrameCache::Ready> take(Followed& f, FrameCache& cache) const;
-  // Records that this data was taken. Returns false if it was taken before.
-  bool note_taken(Followed& f, const FrameCache::Ready& ready, const scene::MarchSourcePtr& before);
-  [[nodiscard]] SequenceStatus status_of(const Followed& f, const FrameCache& cache) const;
-  // A sequence of instances. Instances whose grids are the same share one.
-  struct Played {
-    Played(Followed requested, const JobContext& context) : followed(std::move(requested)), cache(context) {}
-    Followed followed;
-    VolumeInfoPtr volume_info;   // set after its analysis
-    std::optional<Built> built;  // for the frame taken last
-    FrameCache cache;
-
-    static const std::shared_ptr<Sequence>& source_of(const InstanceSettings& settings) { return settings.sequence; }
-    [[nodiscard]] const std::shared_ptr<Sequence>& source() const { return followed.sequence; }
-    void configure(const std::optional<BuildSettings>& wanted);
-  };
-  using PlayedPtr = std::shared_ptr<Played>;
-  struct Shown;
-  // A dynamic volume that is shown, with the last states taken and displayed.
-  struct Watched {
-    std::shared_ptr<Live> live;
-    std::shared_ptr<void> listener;
-    VolumeInfoPtr volume_info;                  // for all states, if bounds are known
-    std::uint64_t id = 0;                       // identifies this object
-    std::optional<scene::SequenceFrame> state;  // state taken last
-    bool is_rendered = false;                   // a frame has rendered it
-    bool waits = false;                         // another one is ready, but waits until this one has been displayed
-    std::uint64_t seen_last = 0;                // displayed last, as scene::SequenceFrame::taken
-    LiveStatus told;
-
-    [[nodiscard]] LiveStatus status() const;
-  };
-  // Starts following a dynamic volume. The builder is notified of its states while the result exists.
-  [[nodiscard]] Watched watch(std::shared_ptr<Live> live, LiveBuilder& builder, std::uint64_t id);
-  [[nodiscard]] std::optional<LiveBuilder::Ready> take_state(Watched& w, LiveBuilder& builder, bool unseen);
+  [[nodiscard]] SequenceStatus status_of(const SequenceFeed& feed) const;
   // Records which state this frame's image shows.
-  static void note_drawn(const Context& g, Watched& w);
-  // A dynamic volume of instances. Instances whose grids are the same share one.
-  struct Watching {
-    explicit Watching(const JobContext& context) : builder(context) {}
-    LiveBuilder builder;
-    Watched watched;  // its listener notifies `builder`
-    std::optional<BuildSettings> settings;
-    std::optional<Built> built;  // for the state taken last
-
-    static const std::shared_ptr<Live>& source_of(const InstanceSettings& settings) { return settings.live; }
-    [[nodiscard]] const std::shared_ptr<Live>& source() const { return watched.live; }
-    void configure(const std::optional<BuildSettings>& wanted);
-    [[nodiscard]] VolumeInfoPtr volume_info() const {
-      if (watched.volume_info) return watched.volume_info;
-      return built ? built->volume->volume_info() : nullptr;
-    }
-  };
-  using WatchingPtr = std::shared_ptr<Watching>;
-  // Create the object that follows a sequence or a dynamic volume.
-  PlayedPtr player_of(const std::shared_ptr<Sequence>& sequence, const std::optional<BuildSettings>& settings);
-  WatchingPtr player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings);
-  // Assigns one player to all instances that can share it. Existing players are reused.
-  template <class Player>
-  void share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*member);
-  // A displayed instance, with its settings when it was last checked.
-  struct Shown {
-    std::shared_ptr<Instance> instance;
-    std::uint64_t id = 0;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;
-    InstanceSettings settings;
-    scene::Part<scene::Medium> medium;
-    std::optional<GridCache::Request> request;
-    std::optional<GridCache::Request> begun;  // the last request before `request` that was being built
-    std::optional<Built> built;               // the newest
-    PlayedPtr played;                         // its sequence; null: none
-    WatchingPtr watching;                     // its dynamic volume; null: none
-    void forget() {
-      request.reset();
-      begun.reset();
-      built.reset();
-      played.reset();
-      watching.reset();
-    }
-    [[nodiscard]] bool has_anything() const { return settings.volume || settings.sequence || settings.live; }
-    [[nodiscard]] bool is_seen() const { return has_anything() && !settings.hidden; }
-    // Null: not known yet.
-    [[nodiscard]] VolumeInfoPtr volume_info() const {
-      if (settings.volume) return settings.volume->volume_info();
-      if (watching) return watching->volume_info();
-      return played ? played->volume_info : nullptr;
-    }
-    [[nodiscard]] bool is_there() const { return is_seen() && volume_info(); }
-    // Frame of its sequence, or state of its dynamic volume, from which its grid was built.
-    [[nodiscard]] std::optional<scene::SequenceFrame> frame() const {
-      const auto current = [&](const auto& player) {
-        return player && player->built && built && built->source == player->built->source;
-      };
-      if (current(watching)) return watching->watched.state;
-      return current(played) ? played->followed.frame : std::nullopt;
-    }
-  };
-  // A displayed model, with its settings when it was last checked.
-  struct ShownModel {
-    std::shared_ptr<ModelInstance> model;
-    std::uint64_t id = 0;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;
-    ModelSettings settings;
-    std::optional<PoseCache::Request> request;
-    std::optional<PoseCache::Request> begun;  // the last request before `request` that was being posed
-    scene::ModelSourcePtr source;             // the newest; null: none yet
-    scene::ModelSourcePtr previous_source;    // one frame ago; null: same as `source`
-    [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }
-    [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
-  };
-  std::vector<ShownModel>::iterator find(const ModelInstance& model);
+  static void note_displayed(const Context& g, const VolumeFeedPtr& feed);
   // Returns the host's tag of an instance or model; 0 for the viewer's own objects.
   [[nodiscard]] std::uint64_t tag_of(std::uint64_t id) const;
-  void follow_models();
-  // Takes the poses that are ready.
-  void follow_poses();
-  // Request for its pose one frame ago; nullopt: same as now.
-  [[nodiscard]] static std::optional<PoseCache::Request> previous_pose(const ShownModel& shown);
-  // Returns `ends` if the shutter has a duration.
-  [[nodiscard]] std::optional<scene::ShutterTransforms> while_open(
-      const std::optional<scene::ShutterTransforms>& ends) const;
-  // Sets the shutter duration if the surfaces may move. surfaces: null: they are still to be read.
-  [[nodiscard]] SurfaceChoice while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const;
-  // Requests the pose of the viewer's own surfaces.
-  void pose_surfaces();
-  // Returns all displayed models, including the viewer's own surfaces.
-  [[nodiscard]] std::vector<scene::Model> models() const;
-  std::vector<Shown>::iterator find(const Instance& instance);
-  void follow_instances();
-  // If grids depend on the view, there must be a view.
-  [[nodiscard]] BuildSettings settings_of(const Shown& shown) const;
-  void request_for_grids();
-  // Changes a request to the settings of an existing or requested grid that can be used for it.
-  void reuse_grid(GridCache::Request& request) const;
-  // Returns the matching grid among all existing ones.
-  [[nodiscard]] std::optional<Built> grid_of(const GridCache::Request& request) const;
-  void take_grids();
-  // True if its grid is about to be replaced by a coarser one, because more grids share the memory or the limit was
-  // lowered.
-  [[nodiscard]] bool makes_room(const Shown& shown) const;
-  // True if an instance with a grid is displayed.
-  [[nodiscard]] bool shows_instances() const;
-  // Volumes displayed together must have the same grid type and kind of cells; keeps previous grids until all match.
-  void keep_to_one_march(std::vector<scene::Volume>& volumes) const;
-  // While grids are being coarsened to fit a memory limit, keeps all previous grids, so that old and new ones are not
-  // mixed.
-  void keep_until_cells_are_cut(std::vector<scene::Volume>& volumes) const;
-  // Updates the scene's volumes.
-  void show_volumes();
   // Returns the current scene; the previous snapshot if nothing changed.
   scene::SnapshotPtr snapshot();
   Shot shot();
@@ -530,14 +267,11 @@ class Viewer {
   void remark_on_samples(Context& g);
   // Makes the scene's volumes and lights relative to this origin.
   void count_from(const glm::dvec3& origin);
-  [[nodiscard]] bool shows_triangles() const;
-  [[nodiscard]] bool shows_models() const;
   // all: result of box().
   [[nodiscard]] std::optional<scene::Ground> ground(const std::optional<Bounds>& all) const;
   /// Returns the objects to fit a camera to. The result is valid until something changes.
   [[nodiscard]] std::optional<Subject> subject() const;
   [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
-  VolumeAssetPtr empty_volume();
 
   Log log_;
   Trace trace_;
@@ -550,18 +284,6 @@ class Viewer {
   std::int64_t page_texels_ = 0;
   std::optional<SimulatedGl> simulated_gl_;
 
-  GridSettings grid_;
-  Medium medium_;
-  Ramps ramps_;
-  Light light_;
-  std::optional<light::Day> asked_day_;      // sky being computed
-  std::optional<light::Daylight> daylight_;  // displayed physical sky
-  light::EnvironmentPtr environment_;        // set by the host, newest
-  EnvironmentSettings environment_settings_;
-  GroundSettings ground_;
-  SurfaceSettings surface_settings_;
-  SurfaceAssetPtr surface_asset_;       // newest
-  scene::ModelSourcePtr model_source_;  // newest pose
   Sampling sampling_;
   DisplaySettings display_;
   denoise::NetworkPtr network_;          // network used last...
@@ -571,85 +293,32 @@ class Viewer {
   Navigation navigation_;
   std::chrono::steady_clock::time_point last_frame_time_{};
 
-  VolumeAssetPtr volume_;                           // newest; of a sequence, that of the frame taken last, if in memory
-  VolumeInfoPtr volume_info_;                       // of the volume or the sequence
-  VolumeAssetPtr empty_volume_;                     // used for surfaces without a volume
-  std::optional<std::string> remarked_anisotropy_;  // the ignored grid that was logged
-  std::optional<Proxy> proxy_;                      // shown instead of the volume, and of its predecessor, while it is
-                                                    // loaded
-  Built built_;                                     // newest; uploaded again after a change of context
-  scene::Snapshot scene_;                           // current scene, from which snapshots are made
-  scene::SnapshotPtr snapshot_;                     // newest
-  light::AnalyticLights analytic_lights_;           // set by the host
-  bool analytic_lights_due_ = false;                // the scene's lights are outdated
+  scene::Snapshot scene_;                  // current scene, from which snapshots are made
+  scene::SnapshotPtr snapshot_;            // newest
+  light::AnalyticLights analytic_lights_;  // set by the host
+  bool analytic_lights_due_ = false;       // the scene's lights are outdated
   std::vector<std::weak_ptr<const surface::Scene>> remarked_scenes_;
-  std::optional<std::uint64_t> remarked_picture_;        // the last image with a warning about its samples
-  std::vector<scene::InstanceTransform> transforms_{1};  // instance transforms of the volume; at least one
-  scene::Part<scene::Medium> shown_medium_;              // of the viewer's own volume
-  std::vector<Shown> shown_;                             // in the order in which they were added
-  std::vector<ShownModel> shown_models_;                 // in the order in which they were added
+  std::optional<std::uint64_t> remarked_picture_;  // the last image with a warning about its samples
   std::uint64_t last_id_ = 0;
-  bool poses_due_ = false;           // the requests for poses are outdated
-  bool requests_due_ = false;        // the requests for grids are outdated
-  bool waits_for_own_ = false;       // an instance waits for the volume's own grid, which is being built
-  bool transforms_changed_ = false;  // since the last traced frame
   std::uint64_t settings_revision_ = 1;
   glm::uvec2 frame_size_{0U};  // image size of the last frame
-  // In the volume's own world space, for volume_. It becomes the medium's once a grid has been built for it.
-  std::optional<double> suggested_density_scale_;
   std::shared_ptr<Camera> previous_camera_;
   std::shared_ptr<void> previous_listener_;
   double previous_seconds_ = 0.0;
-  std::vector<scene::InstanceTransform> previous_transforms_;
   std::optional<ViewFrame> previous_view_;  // view of previous_camera_
   std::optional<ViewFrame> view_;           // of the last frame
   std::optional<ViewFrame> traced_view_;    // of the last traced frame
   std::optional<ViewFrame> last_view_;      // of the traced frame before it
-  struct BuildView {
-    ViewFrame view;
-    glm::uvec2 size{0U};
-    std::vector<scene::InstanceTransform> transforms;
-    bool operator==(const BuildView&) const = default;
-  };
-  [[nodiscard]] BuildView build_view() const { return {*view_, frame_size_, transforms_}; }
-  std::optional<BuildView> built_for_;  // camera-adaptive: view of the last request
-  bool built_in_motion_ = false;        // that request kept cells of the previous grid
-  bool own_left_out_ = false;           // that request left out the viewer's own volume, because a load may replace it
   render::Totals totals_;
 
-  [[nodiscard]] Followed& followed();
-  // Throw Error(invalid_argument) for an instance that the viewer does not show, or that has no sequence.
-  [[nodiscard]] std::vector<Shown>::iterator look_up(const Instance& instance);
-  [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
-  std::optional<Followed> followed_;  // shown instead of a volume
-  [[nodiscard]] Watched& watched();
-  std::optional<Watched> watched_;  // shown instead of a volume
-  // A dynamic volume whose voxels may be resident in this context.
-  struct InGl {
-    std::weak_ptr<Live> live;
-    std::array<std::shared_ptr<void>, 2> listeners;  // for requests of voxels, and of emission
-    // States for which this was started or has failed; failed work is not retried.
-    std::weak_ptr<const scene::StateInGl> brought, made;
-    std::vector<scene::Emission> made_by;
-    // True if the newest state, which is in this context, needs to be copied to main memory, or needs emission.
-    [[nodiscard]] bool needs_values(Context& g, const scene::StateInGlPtr& state) const;
-    [[nodiscard]] bool needs_products(const scene::StateInGlPtr& state) const;
-  };
-  std::vector<InGl> lives_in_gl_;
-  std::uint64_t last_followed_ = 0;
-  std::uint64_t last_taken_ = 0;
-
+  DynamicGlBridge dynamic_gl_{[this] { notify(); }};
   std::shared_ptr<ResourceLimits> resource_limits_ = std::make_shared<ResourceLimits>();
   std::uint64_t max_gl_bytes_ = ResourceLimits::no_limit;
-  bool cells_due_ = false;                          // limits changed, so the grid may need another number of cells
-  std::optional<std::uint64_t> gl_beside_volumes_;  // GPU memory used by everything except volumes in the last frame
-  bool cuts_own_ = false;                           // the running build coarsens the viewer's own grid to fit a limit
-  std::size_t grids_ = 1;                           // number of grids that share the GPU memory for volumes equally
-  std::uint64_t part_of_gl_ = ResourceLimits::no_limit;  // share of each grid when cells were last requested
   std::unique_ptr<Context> gl_;
-  std::vector<PlayedPtr> played_;  // both: players of jobs_
-  std::vector<WatchingPtr> watching_;
-  Jobs jobs_;  // last: its threads use the above
+  Jobs jobs_;  // its threads use the above
+  VolumeStage volumes_;
+  SkyStage sky_{jobs_.environments, log_};
+  ModelStage models_{jobs_.surfaces, jobs_.poses, reported_failures_, [this] { notify(); }};
 };
 
 }  // namespace cumulet::viewer

@@ -14,6 +14,7 @@
 #include "denoise/tza.hpp"
 #include "gl/compatibility_state.hpp"
 #include "gl/state_guard.hpp"
+#include "jobs/build_grid.hpp"
 #include "render/display.hpp"
 #include "viewer/viewer.hpp"
 
@@ -119,68 +120,41 @@ void Viewer::prepare(const Frame& frame) {
 
   // Without a scene the last image is dropped too. Models without triangles still count as a scene, lit by the sky
   // only.
-  const bool others = std::ranges::any_of(shown_, &Shown::is_there);
-  const bool watches = watched_ || !watching_.empty();  // the contents of their states may not be known yet
-  const bool scene = shown_info() || shows_models() || others || watches;
-  if (!scene) built_ = {};
-  // Surfaces without volumes are rendered in an empty volume. Its minimal grid is built here, not in a job, so that the
-  // last job's status is kept.
-  if (!volume_info_ && shows_models() && !shows_instances() && !built_.source && !jobs_.builder.busy()) {
-    Progress progress;
-    built_ = build_grid(log_, empty_volume(), grid_.build, progress);
-  }
+  const bool scene = volumes_.is_shown() || models_.shows_models();
+  if (!scene) volumes_.drop_grid();
+  if (models_.shows_models()) volumes_.show_nothing(box);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   view_.reset();
+  volumes_.set_view(view_, frame_size_);
   // Without a scene the camera may still wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
     view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
+  volumes_.set_view(view_, frame_size_);
   previous_view_.reset();
   if (view_ && previous_camera_)
     previous_view_ = previous_camera_->view(double(frame_size_.x) / frame_size_.y, subject());
-  if (requests_due_) follow_instances();  // they were waiting for a view
+  volumes_.send_due_requests();
+  settings_revision_ += volumes_.take_changes();
   if (frame.budget_ms < 0.0) return;
 
   last_view_ = std::exchange(traced_view_, view_);
-  const bool transforms_rest = !std::exchange(transforms_changed_, false);
-  // A build of the previous volume would replace the queued load.
-  const bool another_comes = jobs_.builder.loads();
-  const bool waits = another_comes && volume_ && !others && !followed_ && !watched_;
-  if ((shown_info() || others || watches) && built_for_another() && !waits) {
-    const bool rests = !sampling_.options.preview || !built_for_ || (view_ == last_view_ && transforms_rest);
-    // GPU builds follow a moving camera, one grid after another, each of which is displayed.
-    const bool follows =
-        volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
-        !jobs_.builder.busy() && gl_ && !gl_->scene().uploading_volumes() &&
-        gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
-    if (rests || follows) {
-      take_medium();
-      if (watched_) {
-        jobs_.states.configure(settings_for_view());
-      } else if (followed_) {
-        followed_->settings = settings_for_view();
-        followed_->request_due = true;
-        follow_sequence();
-      } else if (volume_ && !another_comes) {
-        jobs_.builder.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
-      }
-      requests_due_ = true;
-      follow_instances();
-      built_for_ = build_view();
-      own_left_out_ = volume_ && another_comes;
-      built_in_motion_ = !rests;
-    }
-  }
+  volumes_.request_for_view(view_ == last_view_, [this] {
+    return gl_ && !gl_->scene().uploading_volumes() &&
+           gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
+  });
+  settings_revision_ += volumes_.take_changes();
 }
 
 void Viewer::follow_upload(const Context& g) {
   upload_progress_ = g.scene().progress();
-  if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+  Built& built = volumes_.built();
+  if (const auto seconds = g.scene().upload_seconds(built.source)) built.seconds.upload = *seconds;
   take_cells(g);
 }
 
 void Viewer::take_cells(const Context& g) {
-  const auto take = [&](Built& built) {
+  volumes_.for_each_grid([&](Built& built) {
     if (!built.source || !built.source->plan || built.cells != 0) return;
     const render::MarchData::Cells* cells = g.scene().cells(built.source);
     if (cells == nullptr) return;
@@ -188,16 +162,12 @@ void Viewer::take_cells(const Context& g) {
     built.levels = g.scene().data()->grid(*built.source)->levels;
     built.limited = cells->limited;
     // Not during camera motion, which requests many grids.
-    if (cells->on_cpu && !built_in_motion_) {
+    if (cells->on_cpu && !volumes_.built_in_motion()) {
       const std::string& name = built.volume ? built.volume->name() : built.source->volume->name;
       log_.info(name + ": its grid is built on the CPU: " + *cells->on_cpu);
     }
     if (built.limited) log_limited(log_, built.source->plan->max_cells, built.settings.refine.max_cells);
-  };
-  take(built_);
-  for (Shown& shown : shown_) {
-    if (shown.built) take(*shown.built);
-  }
+  });
 }
 
 std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint64_t sequence) {
@@ -206,26 +176,10 @@ std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint
   return found == shown.end() ? std::nullopt : std::optional(*found);
 }
 
-void Viewer::note_drawn(const Context& g, Watched& w) {
-  const auto shown = frame_of(g, w.id);
-  if (!shown || shown->taken == w.seen_last) return;
-  w.seen_last = shown->taken;
-  w.told.drawn = shown->number;
-  ++w.told.displayed_count;
-}
-
-void Viewer::note_rendered() {
-  if (followed_) followed_->is_rendered = true;
-  for (const PlayedPtr& played : played_) played->followed.is_rendered = true;
-  if (watched_) watched_->is_rendered = true;
-  for (const WatchingPtr& watching : watching_) watching->watched.is_rendered = true;
-}
-
-bool Viewer::something_waits() const {
-  const auto is_due = [](const PlayedPtr& played) { return played->followed.take_due; };
-  const auto waits = [](const WatchingPtr& watching) { return watching->watched.waits; };
-  return (followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due) ||
-         std::ranges::any_of(watching_, waits);
+void Viewer::note_displayed(const Context& g, const VolumeFeedPtr& feed) {
+  DynamicFeed* live = as_dynamic(feed);
+  if (live == nullptr) return;
+  if (const auto shown = frame_of(g, live->id())) live->note_displayed(*shown);
 }
 
 void Viewer::remark_on_samples(Context& g) {
@@ -237,34 +191,26 @@ void Viewer::remark_on_samples(Context& g) {
                " samples was not finite; they are black (see nonfinite_samples in the statistics)");
 }
 
-void Viewer::take_gl_bytes(std::uint64_t beside_volumes) {
-  // Requests made before the first frame did not include the memory of images.
-  if (!gl_beside_volumes_ && max_gl_bytes_ != ResourceLimits::no_limit)
-    requests_due_ = requests_due_ || !shown_.empty();
-  gl_beside_volumes_ = beside_volumes;
-  share_gl();
-}
-
 void Viewer::report_pending(FrameResult& result) {
-  if (busy() || proxy_) {
+  if (busy() || volumes_.shows_proxy()) {
     result.loading = true;
     result.converged = false;
   }
-  if (something_waits()) {
+  if (volumes_.something_waits()) {
     result.more = true;
     result.converged = false;
   }
   result.failed = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::left_out).has_value();
-  result.more = result.more || navigation_.moving() || (built_for_another() && !jobs_.builder.loads());
+  result.more = result.more || navigation_.moving() || (volumes_.built_for_another() && !jobs_.builder.loads());
 }
 
 Viewer::DryRun Viewer::dry_run(const Frame& frame) {
   DryRun run;
   update_pending_ = false;
   prepare(frame);
-  note_rendered();
+  volumes_.note_rendered();
   run.shot = shot();
-  if (simulated_gl_) take_gl_bytes(simulated_gl_->bytes_beside_volumes);
+  if (simulated_gl_) volumes_.take_gl_bytes(simulated_gl_->bytes_beside_volumes);
   run.result.converged = true;
   report_pending(run.result);
   return run;
@@ -295,17 +241,17 @@ FrameResult Viewer::render(const Frame& frame) {
     // This query counts against the budget: waking the driver's threads may cost the calling thread its core.
     const bool shares = g.shares_cores();
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
-    if (!lives_in_gl_.empty()) attempt("cumulet: voxels on the GPU", [&] { update_gpu_resident(g); });
+    if (!dynamic_gl_.empty()) attempt("cumulet: voxels on the GPU", [&] { dynamic_gl_.update(g); });
     if (g.transfers().busy()) {
-      attempt("cumulet: dynamic voxels", [&] { follow_transfers(g, frame.budget_ms); });
+      attempt("cumulet: dynamic voxels", [&] { DynamicGlBridge::follow_transfers(g, frame.budget_ms); });
     } else {
-      follow_transfers(g, 0.0);
+      DynamicGlBridge::follow_transfers(g, 0.0);
     }
     attempt("cumulet: upload", [&] {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, max_gl_bytes_}, deadline);
     });
-    note_rendered();
+    volumes_.note_rendered();
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
@@ -313,12 +259,12 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     remark_on_samples(g);
-    take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
+    volumes_.take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    if (watched_) note_drawn(g, *watched_);
-    for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
+    note_displayed(g, volumes_.feed());
+    for (const VolumeFeedPtr& feed : volumes_.feeds()) note_displayed(g, feed);
     report_pending(result);
-    if (g.transfers().busy() || voxels_in_gl_wait(g)) {
+    if (g.transfers().busy() || dynamic_gl_.is_due(g)) {
       result.more = true;
       result.converged = false;
     }
@@ -334,8 +280,8 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   with_gl([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
-    update_gpu_resident(g);
-    follow_transfers(g, frame.budget_ms);
+    dynamic_gl_.update(g);
+    DynamicGlBridge::follow_transfers(g, frame.budget_ms);
     prepare(frame);
     g.upload(shot(), {page_texels_, max_gl_bytes_}, deadline);
     follow_upload(g);
@@ -344,241 +290,11 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   return result;
 }
 
-// ---- GPU-resident states ----
-
-namespace {
-
-// Returns the common transform of a state that may stay GPU-resident: density, and other fields with the same lattice.
-std::optional<glm::dmat4> lattice_in_gl(const render::GlState& state) {
-  bool has_density = false;
-  for (const render::GlVoxels& field : state.fields) {
-    if (field.index_to_world != state.fields[0].index_to_world) return std::nullopt;
-    has_density = has_density || field.channel == volume::Channel::density;
-  }
-  return has_density || state.changed ? std::optional(state.fields[0].index_to_world) : std::nullopt;
-}
-
-std::vector<volume::Channel> channels_of(const scene::StateInGl& state) {
-  std::vector<volume::Channel> channels;
-  for (const scene::StateInGl::Field& field : state.fields) channels.push_back(field.channel);
-  return channels;
-}
-
-// Requests of the dynamic volume that apply to any state.
-render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live) {
-  render::VoxelTransfers::StayInGl stay;
-  stay.values_wanted = live->values_wanted();
-  stay.wanted = [live] { return live->wanted(); };
-  return stay;
-}
-
-// For a complete state.
-render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
-                                            const glm::dmat4& index_to_world) {
-  render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
-  stay.join = [name, index_to_world](const auto& fields) {
-    return scene::StateInGl{.name = name, .fields = fields, .index_to_world = index_to_world, .products = {}};
-  };
-  stay.arrive = [live](scene::StateInGl state) {
-    live->set(std::move(state));
-    return true;
-  };
-  return stay;
-}
-
-// Checks the fields as far as possible without voxels. Returns their channels.
-std::vector<volume::Channel> check(const render::GlState& state) {
-  std::vector<volume::MemoryField> fields;
-  std::vector<volume::Channel> channels;
-  for (const render::GlVoxels& field : state.fields) {
-    fields.push_back({field.channel, volume::SparseVoxels{.brick_origins = {},
-                                                          .brick_values = {},
-                                                          .brick_active = {},
-                                                          .tiles = {},
-                                                          .index_to_world = field.index_to_world}});
-    channels.push_back(field.channel);
-  }
-  if (state.changed) {
-    volume::check_update(fields, state.name);
-  } else {
-    volume::check_fields(fields, state.name);
-  }
-  return channels;
-}
-
-// Transfer to main memory.
-render::VoxelTransfers::Arrive arrive(const std::shared_ptr<Live>& live, const std::string& name, bool boxes) {
-  if (!boxes) return [live, name](std::vector<volume::FieldCopy> copies) { live->set(std::move(copies), name); };
-  return [live, name](std::vector<volume::FieldCopy> copies) {
-    volume::Changes changes;
-    for (volume::FieldCopy& copy : copies)
-      changes.fields.push_back({copy.channel, std::get<volume::BrickCopy>(std::move(copy.voxels))});
-    live->update(std::move(changes), name);
-  };
-}
-
-// For changed boxes, applied to the state that is the newest when they arrive. gather: called before that state is
-// read.
-render::VoxelTransfers::StayInGl stay_in_gl(const std::shared_ptr<Live>& live, const std::string& name,
-                                            const std::function<void()>& gather) {
-  const auto below = std::make_shared<std::uint64_t>(0);
-  render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
-  stay.join = [live, name, below, gather](const auto& fields) -> std::optional<scene::StateInGl> {
-    gather();
-    const Live::InGl now = live->in_gl();
-    if (!now.state) return std::nullopt;
-    *below = now.number;
-    return live->with(*now.state, fields, name);
-  };
-  stay.instead = arrive(live, name, true);
-  stay.arrive = [live, below](scene::StateInGl state) { return live->set_if_newest(*below, std::move(state)); };
-  return stay;
-}
-
-}  // namespace
-
-std::optional<glm::dmat4> Viewer::transform_in_gl(Context& g, const std::shared_ptr<Live>& live,
-                                                  const render::GlState& state) {
-  const std::optional<glm::dmat4> lattice = lattice_in_gl(state);
-  if (!lattice) return std::nullopt;
-  if (!state.changed) return live->gpu_resident() ? lattice : std::nullopt;
-  // Changed boxes go to where the rest of the state is.
-  const auto announced = g.transfers().announced(live.get());
-  const scene::StateInGlPtr rest = live->in_gl().state;
-  if (announced ? !announced->gpu_resident : !rest) return std::nullopt;
-  if (!announced && !g.has(*rest))
-    throw Error(ErrorCode::invalid_argument,
-                one_line(state.name + ": other fields of it belong to another viewer's context"));
-  if (live->gpu_resident()) return announced ? announced->index_to_world : rest->index_to_world;
-  bring_back(g, live, announced ? announced->channels : channels_of(*rest));
-  return std::nullopt;
-}
-
 // live: by value, because the log callback may release the host's last handle.
 void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
-  const std::vector<volume::Channel> channels = check(state);
-  with_gl([&](Context& g) {
-    if (state.changed) {
-      const auto announced = g.transfers().announced(live.get());
-      live->require_updatable(channels, announced ? std::optional(announced->channels) : std::nullopt, state.name);
-    }
-    render::GlState transformed = state;
-    render::VoxelTransfers::Arrival arrival = arrive(live, state.name, state.changed.has_value());
-    if (const std::optional<glm::dmat4> transform = transform_in_gl(g, live, state)) {
-      for (render::GlVoxels& field : transformed.fields) field.index_to_world = *transform;
-      arrival = state.changed ? stay_in_gl(live, state.name, [this, live] { gather(gl(), *live); })
-                              : stay_in_gl(live, state.name, *transform);
-      track_gpu_resident(live);
-    }
-    g.transfers().begin(transformed, live.get(), std::move(arrival), [live] { live->refuse_updates(); });
-  });
+  const std::vector<volume::Channel> channels = DynamicGlBridge::check(state);
+  with_gl([&](Context& g) { dynamic_gl_.submit(g, live, state, channels); });
   notify();
-}
-
-void Viewer::track_gpu_resident(const std::shared_ptr<Live>& live) {
-  if (live->values_wanted() == nullptr) return;
-  if (std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; })) return;
-  lives_in_gl_.push_back({.live = live,
-                          .listeners = {live->values_wanted()->listen([this] { notify(); }),
-                                        live->listen_to_requests([this] { notify(); })},
-                          .brought = {},
-                          .made = {},
-                          .made_by = {}});
-}
-
-void Viewer::bring_back(Context& g, const std::shared_ptr<Live>& live, const std::vector<volume::Channel>& channels) {
-  const auto found = std::make_shared<Live::InGl>();
-  g.transfers().bring_back(
-      live.get(), channels,
-      [live, found] {
-        *found = live->in_gl();
-        return found->state;
-      },
-      [live, found](std::vector<volume::FieldCopy> copies) {
-        live->set_if_newest(found->number, std::move(copies), found->state->name);
-      },
-      [live] { live->refuse_updates(); });
-}
-
-void Viewer::make_products(Context& g, const std::shared_ptr<Live>& live) {
-  const auto found = std::make_shared<Live::InGl>();
-  render::VoxelTransfers::StayInGl stay = stay_in_gl(live);
-  stay.join = [live, found](const auto& /*none*/) {
-    *found = live->in_gl();
-    return found->state ? std::optional(*found->state) : std::nullopt;
-  };
-  stay.arrive = [live, found](scene::StateInGl state) { return live->set_if_newest(found->number, std::move(state)); };
-  g.transfers().make_products(live.get(), "state", std::move(stay));
-}
-
-void Viewer::gather(Context& g, Live& live) {
-  const scene::StateInGlPtr state = live.in_gl().state;
-  if (!state || !g.has(*state)) return;
-  scene::StateInGl made = *state;
-  bool moved = false;
-  for (volume::DeviceBricksPtr* bricks : made.all()) {
-    if (!(*bricks)->scattered()) continue;
-    try {
-      auto gathered = g.memories().gather(g.functions(), **bricks);
-      if (!gathered) continue;
-      *bricks = std::move(gathered);
-      moved = true;
-    } catch (const Error& error) {
-      // The scattered bricks remain usable.
-      if (error.code() == ErrorCode::context_lost) throw;
-      gl::clear_errors(*g.functions());
-    }
-  }
-  if (moved) live.move_in_gl(state, std::make_shared<const scene::StateInGl>(std::move(made)));
-}
-
-bool Viewer::InGl::needs_values(Context& g, const scene::StateInGlPtr& state) const {
-  const std::shared_ptr<Live> of = live.lock();
-  if (!of || of->gpu_resident() || brought.lock() == state) return false;
-  const auto announced = g.transfers().announced(of.get());
-  return !announced || announced->gpu_resident;
-}
-
-bool Viewer::InGl::needs_products(const scene::StateInGlPtr& state) const {
-  const std::shared_ptr<Live> of = live.lock();
-  if (!of || !of->gpu_resident()) return false;
-  const std::vector<scene::Emission> wanted = of->wanted();
-  return !state->has_wanted(wanted) && (made.lock() != state || made_by != wanted);
-}
-
-bool Viewer::voxels_in_gl_wait(Context& g) const {
-  return std::ranges::any_of(lives_in_gl_, [&](const InGl& in_gl) {
-    const std::shared_ptr<Live> live = in_gl.live.lock();
-    const scene::StateInGlPtr state = live ? live->in_gl().state : nullptr;
-    return state && g.has(*state) && (in_gl.needs_values(g, state) || in_gl.needs_products(state));
-  });
-}
-
-void Viewer::update_gpu_resident(Context& g) {
-  std::erase_if(lives_in_gl_, [](const InGl& in_gl) { return in_gl.live.expired(); });
-  for (InGl& in_gl : lives_in_gl_) {
-    const std::shared_ptr<Live> live = in_gl.live.lock();
-    const scene::StateInGlPtr state = live ? live->in_gl().state : nullptr;
-    if (!state) continue;
-    if (state->gone()) live->move_in_gl(state, nullptr);
-    if (!g.has(*state)) continue;
-    if (in_gl.needs_values(g, state)) {
-      in_gl.brought = state;
-      bring_back(g, live, channels_of(*state));
-    }
-    if (in_gl.needs_products(state)) {
-      in_gl.made = state;
-      in_gl.made_by = live->wanted();
-      make_products(g, live);
-    }
-  }
-}
-
-void Viewer::follow_transfers(Context& g, double budget_ms) {
-  // Transfers share the frame's budget with other work.
-  constexpr double part = 0.5;
-  constexpr double min_ms = 2.0;
-  g.transfers().follow(deadline_after(std::max(part * budget_ms, min_ms)));
 }
 
 // ---- transmittance maps for the host's own drawing ----
@@ -609,16 +325,14 @@ Pick Viewer::pick(double x, double y) {
 }
 
 std::uint64_t Viewer::tag_of(std::uint64_t id) const {
-  if (const auto volume = std::ranges::find(shown_, id, &Shown::id); volume != shown_.end())
-    return volume->settings.tag;
-  const auto model = std::ranges::find(shown_models_, id, &ShownModel::id);
-  return model != shown_models_.end() ? model->settings.tag : 0;
+  if (const auto tag = volumes_.tag_of(id)) return *tag;
+  return models_.tag_of(id).value_or(0);
 }
 
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
   const auto of_tagged = [&](MatteObject object) {
     // The empty volume for surfaces has no matte.
-    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !shown_info()) return 0U;
+    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !volumes_.shown_info()) return 0U;
     object.tag = tag_of(object.id);
     return id_of(object);
   };
@@ -710,26 +424,7 @@ const core::CmParameters& Viewer::trace_parameters() { return gl().readable().pa
 Stats Viewer::stats() {
   sync();
   Stats s;
-  const auto add = [&](std::uint64_t cells, std::uint32_t levels, bool limited) {
-    s.cells += cells;
-    s.levels = std::max(s.levels, levels);
-    s.limited = s.limited || limited;
-  };
-  const auto add_built = [&](const Built& built) {
-    if (!built.source || !built.source->plan) add(built.cells, built.levels, built.limited);
-  };
-  add_built(built_);
-  s.active_voxels = volume_ ? volume_->volume().active_voxels : (followed_ ? built_.active_voxels : 0);
-  std::set<scene::MarchSourcePtr> grids{built_.source};
-  std::set<VolumeAssetPtr> volumes{volume_};
-  for (const Shown& shown : shown_) {
-    if (!shown.is_seen()) continue;
-    const VolumeAssetPtr& volume = shown.settings.volume;
-    if (volume && volumes.insert(volume).second) s.active_voxels += volume->volume().active_voxels;
-    if (!shown.built || !grids.insert(shown.built->source).second) continue;
-    if (!volume) s.active_voxels += shown.built->active_voxels;
-    add_built(*shown.built);
-  }
+  GridTotals totals = volumes_.totals();
   if (gl_) {
     // For GPU-built grids, count those that exist.
     std::set<scene::MarchSourcePtr> there;
@@ -737,12 +432,15 @@ Stats Viewer::stats() {
       if (!volume.source->plan || !there.insert(volume.source).second) continue;
       // A failed upload may have removed it.
       const render::MarchData::Cells* cells = gl_->scene().cells(volume.source);
-      if (cells != nullptr) add(cells->count, gl_->scene().data()->grid(*volume.source)->levels, cells->limited);
+      if (cells != nullptr) totals.add(cells->count, gl_->scene().data()->grid(*volume.source)->levels, cells->limited);
     }
   }
-  s.build_seconds = built_.seconds;
-  s.memory_bytes = followed_ ? jobs_.frames.frames().bytes : built_.bytes();
-  for (const PlayedPtr& played : played_) s.memory_bytes += played->cache.frames().bytes;
+  s.cells = totals.cells;
+  s.levels = totals.levels;
+  s.limited = totals.limited;
+  s.active_voxels = totals.active_voxels;
+  s.memory_bytes = totals.memory_bytes;
+  s.build_seconds = volumes_.built().seconds;
   s.steps = totals_.steps;
   s.noise = totals_.noise;
   if (gl_) {

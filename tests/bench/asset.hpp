@@ -1,7 +1,7 @@
 #pragma once
 
+#include "assets/volume_asset.hpp"
 #include "options.hpp"
-#include "viewer/volume_asset.hpp"
 
 namespace cumulet::bench {
 

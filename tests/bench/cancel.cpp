@@ -20,11 +20,11 @@
 #include <vector>
 
 #include "base/milliseconds.hpp"
+#include "jobs/builder.hpp"
+#include "jobs/surface_builder.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
 #include "support/openvdb.hpp"
-#include "viewer/builder.hpp"
-#include "viewer/surface_builder.hpp"
 
 namespace {
 

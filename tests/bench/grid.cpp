@@ -24,11 +24,11 @@
 #include <string>
 #include <vector>
 
+#include "assets/volume_asset.hpp"
 #include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
 #include "grid/grid_builder.hpp"
 #include "render/grid_build.hpp"
-#include "viewer/volume_asset.hpp"
 #include "volume/frame_import.hpp"
 
 namespace {

@@ -32,8 +32,9 @@
 #include <string>
 #include <vector>
 
+#include "assets/volume_file.hpp"
+#include "jobs/build_grid.hpp"
 #include "plot.hpp"
-#include "viewer/builder.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // The camera through the C API.
 
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 #include <gtest/gtest.h>
 

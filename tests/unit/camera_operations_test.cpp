@@ -1,6 +1,6 @@
 // Operations of the camera: orbit, look, roll, pan, dolly, fly and axis views.
 
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 #include <gtest/gtest.h>
 

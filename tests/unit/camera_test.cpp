@@ -1,6 +1,6 @@
 // The camera: consistency of its matrices, rays and depths, and fitting it to bounds.
 
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 #include <gtest/gtest.h>
 

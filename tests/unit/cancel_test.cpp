@@ -19,6 +19,7 @@
 #include <limits>
 #include <thread>
 
+#include "assets/volume_asset.hpp"
 #include "base/progress.hpp"
 #include "grid/grid_builder.hpp"
 #include "light/environment_file.hpp"
@@ -30,7 +31,6 @@
 #include "support/radiance.hpp"
 #include "support/volumes.hpp"
 #include "surface/gltf_import.hpp"
-#include "viewer/volume_asset.hpp"
 #include "volume/memory.hpp"
 
 namespace {

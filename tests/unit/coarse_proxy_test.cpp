@@ -17,10 +17,10 @@
 #include <tuple>
 #include <vector>
 
+#include "assets/instance.hpp"
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/vdb_files.hpp"
-#include "viewer/instance.hpp"
 #include "volume/bricks.hpp"
 #include "volume/frame_import.hpp"
 

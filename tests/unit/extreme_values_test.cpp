@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "assets/volume_asset.hpp"
+#include "jobs/build_grid.hpp"
 #include "scene/space.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/vdb_files.hpp"
 #include "support/volumes.hpp"
-#include "viewer/builder.hpp"
-#include "viewer/volume_asset.hpp"
 #include "volume/memory.hpp"
 #include "volume/value_unit.hpp"
 

@@ -1,7 +1,7 @@
 // The frame cache of a sequence: it reads and builds ahead in the order of need, keeps as many frames as fit, and skips
 // broken ones.
 
-#include "viewer/frame_cache.hpp"
+#include "jobs/frame_cache.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "jobs/build_grid.hpp"
 #include "support/clip.hpp"
 #include "volume/between.hpp"
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "assets/surface_asset.hpp"
 #include "scene/model_source.hpp"
 #include "support/gltf_check.hpp"
 #include "support/gltf_import.hpp"
@@ -12,7 +13,6 @@
 #include "support/gltf_seeds.hpp"
 #include "surface/bvh.hpp"
 #include "surface/specular_glossiness.hpp"
-#include "viewer/surface_asset.hpp"
 
 namespace cumulet::surface {
 namespace {

@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
+#include "jobs/build_grid.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/volumes.hpp"
-#include "viewer/builder.hpp"
 
 namespace {
 

@@ -6,8 +6,8 @@
 #include <memory>
 #include <thread>
 
+#include "jobs/grid_cache.hpp"
 #include "support/volumes.hpp"
-#include "viewer/grid_cache.hpp"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "viewer/jobs.hpp"
+#include "jobs/jobs.hpp"
 
 namespace {
 

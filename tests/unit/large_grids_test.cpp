@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
+#include "jobs/builder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/volumes.hpp"
 #include "support/wide_volumes.hpp"
-#include "viewer/builder.hpp"
 
 namespace {
 

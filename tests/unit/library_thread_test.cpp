@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "base/error.hpp"
-#include "viewer/worker.hpp"
+#include "jobs/worker.hpp"
 
 namespace {
 

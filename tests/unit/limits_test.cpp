@@ -12,10 +12,10 @@
 #include <thread>
 #include <vector>
 
+#include "jobs/resource_limits.hpp"
+#include "jobs/worker.hpp"
 #include "support/c_host.hpp"
 #include "support/simulated.hpp"
-#include "viewer/resource_limits.hpp"
-#include "viewer/worker.hpp"
 
 namespace {
 

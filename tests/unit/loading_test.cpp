@@ -12,11 +12,11 @@
 
 #include "base/file_path.hpp"
 #include "cumulet/cumulet.h"
+#include "jobs/reported_failures.hpp"
 #include "support/c_host.hpp"
 #include "support/clip.hpp"
 #include "support/folder.hpp"
 #include "support/radiance.hpp"
-#include "viewer/reported_failures.hpp"
 
 namespace {
 

@@ -9,6 +9,8 @@
 #include <numbers>
 #include <vector>
 
+#include "assets/instance.hpp"
+#include "assets/sequence.hpp"
 #include "base/error.hpp"
 #include "scene/space.hpp"
 #include "support/blocks.hpp"
@@ -21,8 +23,6 @@
 #include "support/vdb_files.hpp"
 #include "support/volumes.hpp"
 #include "surface/triangles.hpp"
-#include "viewer/instance.hpp"
-#include "viewer/sequence.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // Mouse and keyboard navigation of the camera in every style.
 
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "assets/instance.hpp"
 #include "base/error.hpp"
 #include "support/blocks.hpp"
 #include "support/cloud_test.hpp"
@@ -14,7 +15,6 @@
 #include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
-#include "viewer/instance.hpp"
 
 namespace {
 

@@ -3,8 +3,8 @@
 
 #include <atomic>
 
+#include "assets/surface_asset.hpp"
 #include "support/surfaces.hpp"
-#include "viewer/surface_asset.hpp"
 
 namespace {
 

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "assets/instance.hpp"
 #include "grid/cell.hpp"
 #include "grid/grid_builder.hpp"
+#include "jobs/builder.hpp"
 #include "scene/channels.hpp"
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
@@ -15,8 +17,6 @@
 #include "support/surfaces.hpp"
 #include "support/vdb_files.hpp"
 #include "support/volumes.hpp"
-#include "viewer/builder.hpp"
-#include "viewer/instance.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "viewer/worker.hpp"
+#include "jobs/worker.hpp"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "viewer/camera.hpp"
+#include "assets/camera.hpp"
 
 namespace cumulet::test {
 

@@ -1,0 +1,148 @@
+#include "jobs/worker.hpp"
+
+#include <utility>
+
+namespace cumulet::viewer {
+
+namespace {
+
+std::optional<Error> failure_of(const Worker::Job& job, const ResourceLimitsPtr& resource_limits, Progress& progress) {
+  try {
+    if (resource_limits) {
+      resource_limits->run([&] { job.work(progress); });
+    } else {
+      job.work(progress);
+    }
+    return std::nullopt;
+  } catch (...) {
+    return caught(job.what);
+  }
+}
+
+}  // namespace
+
+Worker::~Worker() { stop(); }
+
+void Worker::stop() {
+  {
+    const std::scoped_lock lock(mutex_);
+    stopping_ = true;
+    if (current_) current_->progress->cancel();
+  }
+  changed_.notify_all();
+}
+
+void Worker::take(Job job, bool replaces) {
+  std::optional<Job> old;  // destroyed after the lock is released, because its contents may be large
+  {
+    const std::scoped_lock lock(mutex_);
+    // Both may throw, so they come before any change.
+    if (stopping_) throw Error(ErrorCode::cancelled, "the process is exiting");
+    if (!thread_) thread_.emplace([this] { run(); }, [this] { stop(); });
+    if (replaces && current_ && !current_->spared) {
+      current_->replaced = true;
+      current_->progress->cancel();
+    }
+    old = std::exchange(next_, std::move(job));
+    failure_.reset();
+  }
+  changed_.notify_all();
+}
+
+void Worker::end_jobs(bool loads_only) {
+  std::optional<Job> old;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (next_ && (next_->load || !loads_only)) {
+      failure_ = Error(ErrorCode::cancelled, "cancelled");
+      old = std::exchange(next_, std::nullopt);
+    }
+    if (current_ && (current_->load || !loads_only)) current_->progress->cancel();
+  }
+  changed_.notify_all();
+}
+
+void Worker::drop() {
+  std::optional<Job> old;
+  {
+    const std::scoped_lock lock(mutex_);
+    old = std::exchange(next_, std::nullopt);
+    failure_.reset();
+    if (current_) {
+      current_->dropped = true;
+      current_->progress->cancel();
+    }
+  }
+  changed_.notify_all();
+}
+
+void Worker::forget_failure() {
+  const std::scoped_lock lock(mutex_);
+  failure_.reset();
+}
+
+bool Worker::busy() const {
+  const std::scoped_lock lock(mutex_);
+  return next_ || current_.has_value();
+}
+
+Worker::Status Worker::status() const {
+  const std::scoped_lock lock(mutex_);
+  Status status;
+  status.failure = failure_;
+  if (next_) {
+    status.stage = next_->stage;
+  } else if (current_) {
+    status.stage = current_->progress->stage();
+    status.fraction = current_->progress->fraction();
+  }
+  return status;
+}
+
+bool Worker::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
+  std::unique_lock lock(mutex_);
+  const auto idle = [this] { return !next_ && !current_; };
+  if (until) return changed_.wait_until(lock, *until, idle);
+  changed_.wait(lock, idle);
+  return true;
+}
+
+void Worker::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return stopping_ || next_; });
+    if (stopping_) break;
+    std::optional<Job> job = std::exchange(next_, std::nullopt);
+    const auto progress = std::make_shared<Progress>();
+    progress->begin(job->stage);
+    current_ = Current{progress, job->load, last_was_replaced_};
+    lock.unlock();
+    std::optional<Error> failure;
+    {
+      const Trace::Span span(trace_, job->what);
+      failure = failure_of(*job, resource_limits_, *progress);
+    }
+    job.reset();
+    // A cancelled job reports only its cancellation, because its result is no longer needed.
+    if (failure && progress->cancelled()) failure = Error(ErrorCode::cancelled, "cancelled");
+    lock.lock();
+    last_was_replaced_ = current_->replaced;
+    const bool dropped = current_->dropped;
+    current_.reset();
+    // If a newer job is queued, this job's failure is not reported.
+    if (!next_ && !dropped) failure_ = std::move(failure);
+    lock.unlock();
+    keep_statics(StaticsOf::job);
+    changed_.notify_all();
+    notify_();
+    lock.lock();
+  }
+  // The queued job will not run; threads waiting for it must return.
+  std::optional<Job> never_begun = std::exchange(next_, std::nullopt);
+  if (never_begun) failure_ = Error(ErrorCode::cancelled, "cancelled");
+  lock.unlock();
+  changed_.notify_all();
+  if (process_is_ending()) notify_();
+}
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "assets/instance.hpp"
+#include "base/file_path.hpp"
+#include "jobs/pose_cache.hpp"
+#include "jobs/reported_failures.hpp"
+#include "jobs/surface_builder.hpp"
+#include "scene/snapshot.hpp"
+#include "stage/settings.hpp"
+
+namespace cumulet::viewer {
+
+/// The viewer's own surfaces, and models. Functions are called on the host's thread. The caller calls sync() before
+/// functions that replace surfaces.
+class ModelStage {
+ public:
+  /// surfaces, poses, failures: outlive the stage. notify: called on any thread when a model has changed.
+  ModelStage(SurfaceBuilder& surfaces, PoseCache& poses, ReportedFailures& failures, std::function<void()> notify)
+      : surfaces_(surfaces), poses_(poses), failures_(failures), notify_(std::move(notify)) {}
+
+  /// Shows a model. Throws Error(invalid_argument) if it is shown already.
+  void add(std::shared_ptr<ModelInstance> model, std::uint64_t id);
+  /// Throws Error(invalid_argument) if the model is not shown.
+  void remove(const ModelInstance& model);
+  /// Reads changed settings, requests poses, and takes results. Returns how many models have changed.
+  std::size_t sync();
+  /// Poses of models are requested again by the next sync().
+  void renew_requests() { poses_due_ = true; }
+
+  void load(const FilePath& path);
+  /// Cancels work because other surfaces will be shown. keep_poses: only loads, because a host may set surfaces faster
+  /// than they are posed.
+  void cancel_surfaces(bool keep_poses);
+  /// Shows these at once.
+  void show(scene::ModelSourcePtr surfaces);
+  /// Poses these, then shows them. Null: removes the surfaces at once.
+  void set_surfaces(SurfaceAssetPtr surfaces);
+  /// Passes other settings to a running load. Returns true if the newest surfaces must be posed instead.
+  [[nodiscard]] bool configure_load(const SurfaceSettings& settings);
+  void set_settings(const SurfaceSettings& settings) { settings_ = settings; }
+  [[nodiscard]] const SurfaceSettings& settings() const { return settings_; }
+  /// Requests the pose of the viewer's own surfaces.
+  void pose_surfaces();
+  void set_shutter(double seconds);
+
+  /// The newest surfaces; null: none.
+  [[nodiscard]] const SurfaceAssetPtr& asset() const { return asset_; }
+  /// Their newest pose; null: none.
+  [[nodiscard]] const scene::ModelSourcePtr& source() const { return source_; }
+  /// Returns all displayed models, including the viewer's own surfaces.
+  [[nodiscard]] std::vector<scene::Model> models() const;
+  [[nodiscard]] bool shows_models() const;
+  [[nodiscard]] bool shows_triangles() const;
+  /// Appends the world bounds of each displayed object.
+  void append_bounds(std::vector<Bounds>& boxes) const;
+  /// Returns the host's tag of a model; nullopt if it is not shown.
+  [[nodiscard]] std::optional<std::uint64_t> tag_of(std::uint64_t id) const;
+
+ private:
+  // A displayed model, with its settings when it was last checked.
+  struct Shown {
+    std::shared_ptr<ModelInstance> model;
+    std::uint64_t id = 0;
+    std::shared_ptr<void> listener;
+    std::uint64_t revision = 0;
+    ModelSettings settings;
+    std::optional<PoseCache::Request> request;
+    std::optional<PoseCache::Request> begun;  // the last request before `request` that was being posed
+    scene::ModelSourcePtr source;             // the newest; null: none yet
+    scene::ModelSourcePtr previous_source;    // one frame ago; null: same as `source`
+    [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }
+    [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
+  };
+  std::vector<Shown>::iterator find(const ModelInstance& model);
+  // Takes the poses that are ready, and requests others.
+  void take_poses();
+  // Request for its pose one frame ago; nullopt: same as now.
+  [[nodiscard]] static std::optional<PoseCache::Request> previous_pose(const Shown& shown);
+  // Returns the choice with the shutter duration if the surfaces may move. surfaces: null: they are still to be read.
+  [[nodiscard]] SurfaceChoice choice_to_pose(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const;
+
+  SurfaceBuilder& surfaces_;
+  PoseCache& poses_;
+  ReportedFailures& failures_;
+  std::function<void()> notify_;
+  SurfaceSettings settings_;
+  SurfaceAssetPtr asset_;
+  scene::ModelSourcePtr source_;
+  std::vector<Shown> shown_;  // in the order in which they were added
+  bool poses_due_ = false;    // the requests for poses are outdated
+  double shutter_seconds_ = 0.0;
+};
+
+}  // namespace cumulet::viewer
