@@ -64,7 +64,8 @@ void camera_operations(StageRecorder& r) {
   set_volume(r, cloud(16, 1));
   r.wait();
   r.frame();
-  viewer::Camera& camera = *r.viewer().camera();
+  const std::shared_ptr<viewer::Camera> first = r.viewer().camera();  // the viewer releases it below
+  viewer::Camera& camera = *first;
   const auto show = [&](const char* name, const std::function<void()>& operation) {
     r.call(name, operation);
     r.frame();
@@ -141,19 +142,21 @@ void grid_for_views(StageRecorder& r) {
   build(r);
   r.frame();
   r.look({12.0, 12.0, 60.0}, {12.0, 12.0, 12.0});
-  r.frame();
   build(r);
   r.frame({32, 32});
+  r.wait();
   r.frame({32, 32});
   r.wait();
   r.frame({32, 32});
   r.call("other transform", [&] { r.viewer().set_transforms({{moved(5.0)}}); });
   r.frame({32, 32});
+  r.wait();
   r.frame({32, 32});
   r.wait();
   r.frame({32, 32});
   r.call("orthographic", [&] { r.viewer().camera()->toggle_orthographic(r.viewer().bounds()); });
   r.frame({32, 32});
+  r.wait();
   r.frame({32, 32});
   r.wait();
   r.frame({32, 32});
@@ -189,7 +192,6 @@ void grid_for_views_by_the_gpu(StageRecorder& r) {
   r.look({12.0, 12.0, 60.0}, {12.0, 12.0, 12.0});
   build(r);
   r.look({12.0, 12.0, 30.0}, {12.0, 12.0, 12.0});
-  r.frame();
   build(r);
   settings.build.refine.pixel_size = 4.0;
   set_grid(r, "larger cells", settings);
@@ -209,14 +211,12 @@ void grid_for_views_of_instances(StageRecorder& r) {
   r.wait();
   build(r);
   r.look({20.0, 8.0, 90.0}, {20.0, 8.0, 8.0});
-  r.frame();
   build(r);
   r.call("move b", [&] { b->edit([](auto& settings) { settings.to_world = moved(60.0); }); });
   build(r);
   r.call("set the volume", [&] { r.viewer().set_volume(cloud(16, 2, "own")); });
   build(r);
   r.look({20.0, 8.0, 60.0}, {20.0, 8.0, 8.0});
-  r.frame();
   build(r);
 }
 
@@ -236,7 +236,6 @@ void grid_for_views_while_reading(StageRecorder& r) {
   r.look({12.0, 12.0, 90.0}, {12.0, 12.0, 12.0});
   r.release();
   r.wait();
-  r.frame();
   build(r);
   r.frame();
 }
@@ -257,7 +256,6 @@ void grid_for_views_after_a_cancelled_load(StageRecorder& r) {
   r.call("cancel", [&] { r.viewer().cancel(); });
   r.release();
   r.wait();
-  r.frame();
   build(r);
 }
 

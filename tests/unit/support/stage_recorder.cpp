@@ -28,7 +28,6 @@ void wait_until(const char* what, Condition&& condition) {
 
 template <class Request>
 std::string list_of(StageText& texts, const std::vector<Request>& requests) {
-  if (requests.empty()) return "nothing";
   std::string list;
   for (const Request& request : requests) list.append(list.empty() ? "" : next_line).append(texts.request(request));
   return list;
@@ -65,7 +64,7 @@ void Gate::release() {
 }
 
 StageRecorder::StageRecorder()
-    : last_{{"grids", "nothing"}, {"poses", "nothing"}, {"states", "follow no dynamic volume"}},
+    : last_{{"states", "follow no dynamic volume"}},
       viewer_(std::make_unique<viewer::Viewer>(
           Log([this](LogLevel level, const char* message) { hear(level, message); }), [this] { ++updates_; }, true,
           Trace(&StageRecorder::end_of_work, this))) {
@@ -258,11 +257,11 @@ void StageRecorder::load_environment(const FilePath& path) { add("environment", 
 void StageRecorder::make_sky(const light::Day& day) { add("environment", "sky " + text_of(day)); }
 
 void StageRecorder::request(const std::vector<viewer::GridRequest>& requests) {
-  replace("grids", list_of(texts_, requests));
+  if (!requests.empty()) replace("grids", list_of(texts_, requests));
 }
 
 void StageRecorder::request(const std::vector<viewer::PoseRequest>& requests) {
-  replace("poses", list_of(texts_, requests));
+  if (!requests.empty()) replace("poses", list_of(texts_, requests));
 }
 
 void StageRecorder::request(Player player, const viewer::FrameRequest& request) {

@@ -46,7 +46,8 @@ class Gate {
 /// The text must not depend on the time that workers take. A script therefore calls wait() or settle() before a step
 /// that takes results, or holds the worker. The recorder does the rest:
 ///
-/// - A list of requests that is sent again unchanged is written once.
+/// - A list of requests that is sent again unchanged is written once. An empty list is not written, because it follows
+///   each result that is taken.
 /// - Requests of a wait are sorted by worker.
 /// - Messages of workers are written by the next step that waits. They are sorted, and equal ones are written once.
 class StageRecorder : private viewer::JobLog {
