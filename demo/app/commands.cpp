@@ -257,7 +257,7 @@ void App::open_dropped(const std::vector<std::string>& files) {
   const DroppedFiles dropped = demo::open_dropped(files);
   execute(dropped.commands);
   for (const std::string& file : dropped.left_out)
-    tell(model_, true, file + ": not opened, because another dropped file of its kind was", now_);
+    show_message(model_, true, file + ": not opened, because another dropped file of its kind was", now_);
 }
 
 void App::save_scene(const std::string& path) {
@@ -273,9 +273,9 @@ void App::save_scene(const std::string& path) {
     demo::save_scene(scene, path);
     model_.scene_path = path;
     model_.preferences.remember(path);
-    tell(model_, false, "Saved " + path, now_);
+    show_message(model_, false, "Saved " + path, now_);
   } catch (const std::exception& error) {
-    tell(model_, true, error.what(), now_);
+    show_message(model_, true, error.what(), now_);
   }
 }
 

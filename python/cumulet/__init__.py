@@ -21,7 +21,7 @@ from .enums import *  # noqa: E402,F401,F403
 from .objects import (Camera, DynamicVolume, Environment, Inspection, Instance, Model, Sequence,  # noqa: E402,F401
                       ShaderCache, Surfaces, Volume, list_grids)
 from .picture import Picture  # noqa: E402,F401
-from .viewer import Viewer, get_proc, render  # noqa: E402,F401
+from .viewer import DAY, Viewer, get_proc, render  # noqa: E402,F401
 
 _support.check_version()
 Error.__module__ = __name__

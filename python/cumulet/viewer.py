@@ -264,8 +264,8 @@ class Viewer(_methods.ViewerMethods):
         return Picture(self.read_linear(), self.read_display(), made_by, self.measure_noise())
 
 
-# The scene that `render` adds: a clear day, as that of cumulet-render.
-DAY = {"sun_azimuth_degrees": 65.0, "sun_elevation_degrees": 40.0, "sun_irradiance": (4.4, 4.05, 3.55),
+#: Arguments of Viewer.set_sun_sky for a clear day, the default of `render` and of cumulet-render.
+DAY: Dict[str, Any] = {"sun_azimuth_degrees": 65.0, "sun_elevation_degrees": 40.0, "sun_irradiance": (4.4, 4.05, 3.55),
        "sky": api.SkyModel.PHYSICAL, "turbidity": 2.5, "ground_albedo": 0.3}
 MODELS = (".gltf", ".glb")
 

@@ -14,7 +14,7 @@ def main():
     target.clear(0, 0, 0, 1)
     # moderngl's functions are those of the current context, which cumulet.get_proc finds.
     with cumulet.Viewer(get_proc=cumulet.get_proc) as viewer:
-        viewer.set_sun_sky(sun_azimuth_degrees=60, sun_elevation_degrees=40, sky="physical")
+        viewer.set_sun_sky(**cumulet.DAY)
         viewer.set_sampling(samples=samples)
         viewer.load_volume_file(volume, suggested_density_scale=True)
         viewer.wait_until_loaded()

@@ -25,7 +25,7 @@ class VolumeView(QOpenGLWidget):
         self.out = out
         self.changed.connect(self.update)
         self.viewer = cumulet.Viewer(update=self.changed.emit, gl_state="host_resets")
-        self.viewer.set_sun_sky(sun_azimuth_degrees=60, sun_elevation_degrees=40, sky="physical")
+        self.viewer.set_sun_sky(**cumulet.DAY)
         self.viewer.set_display(denoise="fast")
         self.viewer.set_sampling(samples=samples)
         self.viewer.load_volume_file(path, suggested_density_scale=True)

@@ -32,10 +32,11 @@ def main():
     size = 2 / len(smoke.density)
     volume = cumulet.DynamicVolume(bounds_min=(-1, -1, -1), bounds_max=(1, 1, 1))
     with cumulet.Viewer.headless(log=lambda level, line: print(line, file=sys.stderr)) as viewer:
-        viewer.set_sun_sky(sun_azimuth_degrees=60, sun_elevation_degrees=40, sky="physical")
-        viewer.set_medium(density_scale=40)
+        viewer.set_sun_sky(**cumulet.DAY)
+        viewer.set_ground(mode="below", albedo=(0.3, 0.3, 0.3))
+        viewer.set_medium(density_scale=20)
         viewer.set_sampling(samples=8, preview="off")
-        viewer.set_camera(cumulet.Camera(eye=(1.5, 1, 4), target=(0, -0.2, 0)))
+        viewer.set_camera(cumulet.Camera(eye=(1.2, 0.8, 3.2), target=(0, -0.2, 0)))
         viewer.set_dynamic_volume(volume)
         for step in range(steps):
             smoke.step()

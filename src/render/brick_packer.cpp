@@ -75,12 +75,12 @@ BrickPacker::BrickPacker(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl
 }
 
 void BrickPacker::plan(PackedFields& packed, std::size_t field, const std::vector<std::uint32_t>* chosen,
-                       std::size_t each, const std::string& what) const {
+                       std::size_t brick_bytes, const std::string& what) const {
   const HostVoxels& source = packed.sources[field];
   const glm::ivec3 bricks = bricks_of(source.size);
   const std::uint64_t layer = std::uint64_t(bricks.x) * std::uint64_t(bricks.y);
   const auto fits = [&](std::uint64_t count, glm::ivec2 layers) {
-    if (count * each > max_bytes_) return false;
+    if (count * brick_bytes > max_bytes_) return false;
     if (source.buffer == 0) return true;
     const glm::u64vec2 range = source.range_of(layers);
     return range.y - range.x <= max_bytes_;

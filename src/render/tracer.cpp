@@ -20,7 +20,7 @@ Tracer::Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       layers_(gl, dispatches_),
       sampler_(gl, programs_, dispatches_),
       inspector_(gl, programs_, dispatches_),
-      feature_pass_(gl, programs_, dispatches_) {}
+      feature_pass_(std::move(gl), programs_, dispatches_) {}
 
 void Tracer::find_programs(const PathFeatures& features, bool measures, const MarchData& data,
                            const TraceInputs& trace_inputs) {

@@ -164,7 +164,7 @@ VoxelTransferPtr TransferInGl::join() {
   }
   if (!stay_.instead) return nullptr;
   // The state that it updates is in main memory.
-  const auto update = std::make_shared<scene::StateInGl>();
+  auto update = std::make_shared<scene::StateInGl>();
   update->name = info_.name;
   update->fields = std::move(fields_);
   update->index_to_world = packed_.index_to_world();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <exception>
 #include <iterator>
 #include <memory>
@@ -65,9 +66,9 @@ void VoxelTransfers::make_products(const void* whose, std::string name, StayInGl
 }
 
 std::optional<VoxelTransfers::Announced> VoxelTransfers::announced(const void* whose) const {
-  for (auto transfer = transfers_.rbegin(); transfer != transfers_.rend(); ++transfer) {
-    if ((*transfer)->info().whose != whose) continue;
-    if (std::optional<Announced> state = (*transfer)->announced()) return state;
+  for (std::size_t i = transfers_.size(); i-- > 0;) {
+    if (transfers_[i]->info().whose != whose) continue;
+    if (std::optional<Announced> state = transfers_[i]->announced()) return state;
   }
   return std::nullopt;
 }

@@ -81,7 +81,9 @@ programs=$here/programs
 has_library() { PATH=$PATH:/sbin:/usr/sbin ldconfig -p | grep -q "$1"; }
 if [ -d "$programs/lib" ]; then
   libraries=$programs/lib:$programs/extra
-  has_library 'libstdc++\.so\.6' || libraries+=:$programs/lib/fallback
+  for library in 'libstdc++\.so\.6' 'libz\.so\.1' 'libzstd\.so\.1' 'liblzma\.so\.5'; do
+    has_library "$library" || { libraries+=:$programs/lib/fallback && break; }
+  done
   has_library 'libEGL\.so\.1' || libraries+=:$programs/loaders
   nvidia=/usr/local/nvidia
   if ! has_library 'libEGL_nvidia\.so' && [ -d "$nvidia/lib64" ]; then libraries+=:$nvidia/lib64; fi
