@@ -227,7 +227,7 @@ bool App::is_unsaid() const {
 
 void App::complain(const std::string& cause) {
   if (loading_.starting) std::cerr << "cumulet-demo: " << one_line(cause) << std::endl;
-  tell(model_, true, cause, now_);
+  show_message(model_, true, cause, now_);
 }
 
 void App::follow_history() {
@@ -316,7 +316,7 @@ void App::accept(const Answer& answer) {
     if (notice.error)
       complain(notice.text);
     else
-      tell(model_, false, notice.text, now_);
+      show_message(model_, false, notice.text, now_);
   }
   remember_files(answer);
   if (!exchange_.waiting() && std::exchange(loading_.pick, false)) {

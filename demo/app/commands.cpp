@@ -264,9 +264,9 @@ void App::save_scene(const std::string& path) {
     demo::save_scene(scene, path);
     model_.scene_path = path;
     model_.preferences.remember(path);
-    tell(model_, false, "Saved " + path, now_);
+    show_message(model_, false, "Saved " + path, now_);
   } catch (const std::exception& error) {
-    tell(model_, true, error.what(), now_);
+    show_message(model_, true, error.what(), now_);
   }
 }
 

@@ -393,7 +393,7 @@ dmat4 Drag::to(const Sight& sight, const dvec2& pixel, bool snapped) {
   return change();
 }
 
-std::string Drag::told() const {
+std::string Drag::label() const {
   constexpr std::array names = {'X', 'Y', 'Z'};
   if (begun_.tool == Tool::rotate) {
     constexpr double step = 15.0;

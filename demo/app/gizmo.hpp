@@ -104,7 +104,7 @@ class Drag {
   /// of a round length (about a tenth of a handle), 15 degrees, or 0.1.
   glm::dmat4 to(const Sight& sight, const glm::dvec2& pixel, bool snapped);
   /// Returns the transform as text: "X 1.25", "30.0°", "1.50 x".
-  [[nodiscard]] std::string told() const;
+  [[nodiscard]] std::string label() const;
   [[nodiscard]] Handle handle() const { return handle_; }
 
  private:

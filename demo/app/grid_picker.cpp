@@ -35,7 +35,7 @@ GridPicker::Reader::Found GridPicker::Reader::found() const {
 }
 
 void GridPicker::Reader::read() {
-  const auto tell = [this](auto&& change) {
+  const auto update = [this](auto&& change) {
     {
       const std::lock_guard lock(mutex_);
       change(found_);
@@ -49,7 +49,7 @@ void GridPicker::Reader::read() {
   const auto status = cumulet_inspect_volume_file(path_.c_str(), &opened, error.data(), error.size());
   const std::unique_ptr<cumulet_inspection, ReleaseInspection> inspection(opened);
   if (status != CUMULET_OK || cumulet_inspection_get_file(opened, &file) != CUMULET_OK) {
-    tell([&](Found& found) {
+    update([&](Found& found) {
       found.trouble = error.data();
       found.all = true;
     });
@@ -67,9 +67,9 @@ void GridPicker::Reader::read() {
               info.max_value,
               {}};
     if (info.values != CUMULET_GRID_VALUES_NONE && info.active_voxels > 0) grid.histogram = heights(info.histogram);
-    tell([&](Found& found) { found.grids.push_back(std::move(grid)); });
+    update([&](Found& found) { found.grids.push_back(std::move(grid)); });
   }
-  tell([](Found& found) { found.all = true; });
+  update([](Found& found) { found.all = true; });
 }
 
 void GridPicker::open(const std::string& path, std::function<void()> wake) {

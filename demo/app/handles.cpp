@@ -270,7 +270,7 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
   }
   draw_handle(pen, *gizmo, *hot, hot_color);
   const auto pivot = sight.project(gizmo->pivot);
-  if (held_ && pivot) pen.text(*pivot + dvec2(0.3, 0.35) * gizmo->reach, held_->drag.told());
+  if (held_ && pivot) pen.text(*pivot + dvec2(0.3, 0.35) * gizmo->reach, held_->drag.label());
 }
 
 }  // namespace cumulet::demo

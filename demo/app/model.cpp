@@ -169,7 +169,7 @@ void give_daylight(SceneOptions& scene) {
   if (settings::same(scene.light, spelled_out({}))) scene.light = daylight();
 }
 
-void tell(Model& model, bool error, const std::string& text, double now) {
+void show_message(Model& model, bool error, const std::string& text, double now) {
   constexpr double seconds = 5.0;
   constexpr std::size_t most = 3;
   const std::string line = one_line(text);

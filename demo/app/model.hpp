@@ -226,7 +226,7 @@ void take_daylight(SceneOptions& scene);
 void give_daylight(SceneOptions& scene);
 
 /// Adds a line to the message bar and replaces an equal one. Errors stay; notices disappear after a while.
-void tell(Model& model, bool error, const std::string& text, double now);
+void show_message(Model& model, bool error, const std::string& text, double now);
 
 /// Replaces zeros that mean a default by the default value (cumulet.h), so that controls can show it.
 void spell_out_defaults(SceneOptions& scene);

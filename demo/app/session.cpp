@@ -90,7 +90,7 @@ void Session::on_update(void* user) { static_cast<Shared*>(user)->wake(); }
 bool Session::check(cumulet_status status) {
   if (status == CUMULET_OK) return true;
   const std::string cause = cumulet_last_error(viewer_.get());
-  tell(true, cause.empty() ? cumulet_status_text(status) : cause);
+  add_notice(true, cause.empty() ? cumulet_status_text(status) : cause);
   return false;
 }
 
@@ -273,7 +273,7 @@ void Session::see_work() {
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
-  tell_warnings();  // reported first, because they precede the result
+  add_warnings();  // reported first, because they precede the result
   see_sequence();
   see_ends();
   finish_others();
@@ -320,13 +320,14 @@ Session::VolumePtr Session::make_backdrop() {
   std::ranges::fill(dense.size, 1);
   cumulet_volume* volume = nullptr;
   std::array<char, 512> error{};
-  if (cumulet_volume_from_dense(&dense, &volume, error.data(), error.size()) != CUMULET_OK) tell(true, error.data());
+  if (cumulet_volume_from_dense(&dense, &volume, error.data(), error.size()) != CUMULET_OK)
+    add_notice(true, error.data());
   return VolumePtr(volume);
 }
 
-void Session::tell_warnings() {
+void Session::add_warnings() {
   const std::lock_guard lock(shared_->mutex);
-  for (const std::string& warning : shared_->warnings) tell(false, warning);
+  for (const std::string& warning : shared_->warnings) add_notice(false, warning);
   shared_->warnings.clear();
 }
 
@@ -487,11 +488,11 @@ void Session::save(const Request& request) {
       note = save_png(viewer_.get(), scene_, status_.frame, request.path);
     }
     events_.files.push_back({request.path, Answer::File::Fate::saved});
-    tell(false, "Saved " + request.path + ", " + std::to_string(status_.frame.width) + "x" +
-                    std::to_string(status_.frame.height));
-    if (!note.empty()) tell(false, note);
+    add_notice(false, "Saved " + request.path + ", " + std::to_string(status_.frame.width) + "x" +
+                          std::to_string(status_.frame.height));
+    if (!note.empty()) add_notice(false, note);
   } catch (const std::exception& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
   }
 }
 

@@ -171,7 +171,7 @@ class Session {
   static void on_log(void* user, cumulet_log_level level, const char* message);
   static void on_update(void* user);
 
-  void tell(bool error, const std::string& text) { events_.notices.push_back({error, text}); }
+  void add_notice(bool error, const std::string& text) { events_.notices.push_back({error, text}); }
   /// Reports the error of a failed call. Returns true on success.
   bool check(cumulet_status status);
   void follow_volume();
@@ -230,7 +230,7 @@ class Session {
   // Suggests the density scale, and the medium if it is not set.
   void suggest_look();
   void give_known_medium();
-  void tell_warnings();
+  void add_warnings();
   void follow_backdrop();
   VolumePtr make_backdrop();
   void follow_navigation();

@@ -92,9 +92,9 @@ bool Session::begin_volume() {
   try {
     row = FrameRow::of_name(scene_.volume);
     if (row) sequence = open_sequence(row->files(), file);
-    if (const std::string line = row ? row->pattern().passed_over() : ""; !line.empty()) tell(false, line);
+    if (const std::string line = row ? row->pattern().passed_over() : ""; !line.empty()) add_notice(false, line);
   } catch (const std::exception& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
     return false;
   }
   if (!row) return check(cumulet_load_volume_file(viewer_.get(), &file));
@@ -164,7 +164,7 @@ void Session::finish_load() {
   cumulet_status listed = CUMULET_ERROR_FILE;
   for (std::uint32_t i = 0; listed != CUMULET_OK && i < (playing_.row ? playing_.row->count() : 1); ++i)
     listed = cumulet_list_grids(file(i).c_str(), add, &grids_, error.data(), error.size());
-  if (listed != CUMULET_OK) tell(true, error.data());
+  if (listed != CUMULET_OK) add_notice(true, error.data());
   status_.neighbours = playing_.row ? std::nullopt : FrameRow::around(volume_.shown.volume);
   events_.files.push_back({volume_.shown.volume, Answer::File::Fate::opened});
   if (std::exchange(first_view_.suggest, false)) suggest_look();
@@ -180,7 +180,7 @@ void Session::follow_others() {
   try {
     others_.show(viewer_.get(), scene_.others);
   } catch (const std::runtime_error& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
   }
   if (opening_.made.valid() || volume_.loading) return;  // the pending volume may be the same file
   const std::vector<VolumeFile> missing = others_.missing(scene_.others);
@@ -191,7 +191,7 @@ void Session::follow_others() {
     own = hidden_ ? std::shared_ptr<cumulet_volume>(cumulet_volume_retain(hidden_.get()), cumulet_volume_release)
                   : std::shared_ptr<cumulet_volume>(shown());
   opening_.made = std::async(std::launch::async, [file = opening_.file, own, shared = shared_.get()] {
-    const Opened tell{shared, &Shared::opened};
+    const Opened opened{shared, &Shared::opened};
     return own ? look_into(own) : open_volume(file, on_log, shared);
   });
 }
@@ -206,7 +206,7 @@ void Session::finish_others() {
     volume = opening_.made.get();
     events_.files.push_back({opening_.file.volume, Answer::File::Fate::opened});
   } catch (const std::runtime_error& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
     events_.files.push_back({opening_.file.volume, Answer::File::Fate::failed});
   }
   others_.give(opening_.file, std::move(volume));
@@ -218,7 +218,7 @@ void Session::follow_models() {
   try {
     models_.show(viewer_.get(), scene_.models);
   } catch (const std::runtime_error& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
   }
   if (opening_model_.made.valid() || surfaces_.loading) return;  // the pending surfaces may be the same file
   const std::vector<std::string> missing = models_.missing(scene_.models);
@@ -231,7 +231,7 @@ void Session::follow_models() {
     own = SurfacesPtr(surfaces, cumulet_surfaces_release);
   }
   opening_model_.made = std::async(std::launch::async, [file = opening_model_.file, own, shared = shared_.get()] {
-    const Opened tell{shared, &Shared::opened_model};
+    const Opened opened{shared, &Shared::opened_model};
     return own ? own : open_surfaces(file);
   });
 }
@@ -246,7 +246,7 @@ void Session::finish_models() {
     surfaces = opening_model_.made.get();
     events_.files.push_back({opening_model_.file, Answer::File::Fate::opened});
   } catch (const std::runtime_error& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
     events_.files.push_back({opening_model_.file, Answer::File::Fate::failed});
   }
   models_.give(opening_model_.file, std::move(surfaces));
@@ -279,7 +279,7 @@ void Session::set_surfaces() {
     if (surfaces_.passed == scene_.surfaces && !surfaces_.loading)
       settings.variant = variant_number(scene_.surfaces, scene_.surface_variant, status_.variants);
   } catch (const std::runtime_error& error) {
-    tell(true, error.what());
+    add_notice(true, error.what());
   }
   check(cumulet_set_surface_settings(viewer_.get(), &settings));
 }
@@ -303,7 +303,7 @@ void Session::finish_surfaces() {
   read_surfaces();
   const std::string refusal = animation_refusal(scene_.surfaces, scene_.surface.animation, status_.surfaces.animations);
   if (!refusal.empty()) {
-    tell(true, refusal);
+    add_notice(true, refusal);
     events_.files.push_back({scene_.surfaces, Answer::File::Fate::failed});
     remove_surfaces();
     return;
@@ -391,24 +391,24 @@ void Session::see_ends() {
   const cumulet_progress& work = status_.work;
   if (!status_.busy) {
     // Rebuilding displayed content can fail too.
-    const auto tell_news = [this](const auto& file, cumulet_status status, const char* message) {
-      if (file.is_news(status)) tell(true, message);
+    const auto add_news = [this](const auto& file, cumulet_status status, const char* message) {
+      if (file.is_news(status)) add_notice(true, message);
     };
     if (surfaces_.loading) {
       finish_surfaces();
       follow_models();
     } else
-      tell_news(surfaces_, work.surfaces_status, work.surfaces_message);
+      add_news(surfaces_, work.surfaces_status, work.surfaces_message);
     if (volume_.loading) {
       finish_load();
       follow_others();
     } else {
-      tell_news(volume_, work.volume_status, work.volume_message);
+      add_news(volume_, work.volume_status, work.volume_message);
     }
     if (environment_.loading)
       finish_environment();
     else
-      tell_news(environment_, work.environment_status, work.environment_message);
+      add_news(environment_, work.environment_status, work.environment_message);
   }
   surfaces_.see(work.surfaces_status, status_.busy);
   volume_.see(work.volume_status, status_.busy);
@@ -418,9 +418,9 @@ void Session::see_ends() {
 bool Session::load_failed(cumulet_status status, const char* message, const std::string& path) {
   if (status == CUMULET_OK) return false;
   if (status == CUMULET_ERROR_CANCELLED) {
-    tell(false, "Cancelled: " + path);
+    add_notice(false, "Cancelled: " + path);
   } else {
-    tell(true, message);
+    add_notice(true, message);
     events_.files.push_back({path, Answer::File::Fate::failed});
   }
   return true;

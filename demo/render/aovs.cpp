@@ -57,7 +57,8 @@ class Mattes {
 
   cumulet_status read(cumulet_viewer* viewer, std::size_t pixels) {
     std::vector<float> pairs(pixels * 2 * matte_ranks);
-    const cumulet_status status = cumulet_read_cryptomatte(viewer, tell, this, matte_ranks, pairs.data(), pairs.size());
+    const cumulet_status status =
+        cumulet_read_cryptomatte(viewer, name_of_object, this, matte_ranks, pairs.data(), pairs.size());
     for (std::vector<float>& layer : layers_) layer.reserve(4 * pixels);
     for (std::size_t i = 0; i < pairs.size(); ++i) layers_[i / 4 % matte_layers].push_back(pairs[i]);
     return status;
@@ -75,8 +76,8 @@ class Mattes {
   }
 
  private:
-  static const char* tell(void* user, cumulet_object_kind kind, std::uint64_t tag,
-                          std::uint32_t /*transform_index*/) noexcept {
+  static const char* name_of_object(void* user, cumulet_object_kind kind, std::uint64_t tag,
+                                    std::uint32_t /*transform_index*/) noexcept {
     auto& mattes = *static_cast<Mattes*>(user);
     const std::string name = mattes.name_(kind, tag);
     if (name.empty()) return nullptr;

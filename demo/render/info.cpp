@@ -38,7 +38,7 @@ Owner<Handle> open(cumulet_status (*opener)(const char*, Handle**, char*, std::s
 
 /// Calls a getter of the library that fills a descriptor. `which`: the object and, if needed, an index in it.
 template <class Desc, class Get, class... Which>
-Desc told(Get get, Which... which) {
+Desc read_desc(Get get, Which... which) {
   Desc desc{};
   desc.struct_size = sizeof desc;
   check(get(which..., &desc));
@@ -49,7 +49,7 @@ Desc told(Get get, Which... which) {
 Json metadata_of(const cumulet_inspection* inspection, std::int32_t grid, std::uint32_t count) {
   Json list = Json::array();
   for (std::uint32_t i = 0; i < count; ++i) {
-    const auto entry = told<cumulet_metadata>(cumulet_inspection_get_metadata, inspection, grid, i);
+    const auto entry = read_desc<cumulet_metadata>(cumulet_inspection_get_metadata, inspection, grid, i);
     list.push_back({{"name", entry.name}, {"type", entry.type}, {"value", entry.value}});
   }
   return list;
@@ -58,7 +58,7 @@ Json metadata_of(const cumulet_inspection* inspection, std::int32_t grid, std::u
 Json volume_info(const std::string& path) {
   const auto owner = open<cumulet_inspection>(cumulet_inspect_volume_file, path);
   cumulet_inspection* inspection = owner.get();
-  const auto file = told<cumulet_volume_file_info>(cumulet_inspection_get_file, inspection);
+  const auto file = read_desc<cumulet_volume_file_info>(cumulet_inspection_get_file, inspection);
   Json json;
   json["file"] = path;
   json["format"] = file.format;
@@ -66,7 +66,7 @@ Json volume_info(const std::string& path) {
   json["metadata"] = metadata_of(inspection, -1, file.metadata_count);
   json["grids"] = Json::array();
   for (std::uint32_t i = 0; i < file.grid_count; ++i) {
-    const auto grid = told<cumulet_grid_info>(cumulet_inspection_get_grid, inspection, i);
+    const auto grid = read_desc<cumulet_grid_info>(cumulet_inspection_get_grid, inspection, i);
     Json entry;
     entry["name"] = grid.name;
     entry["type"] = grid.type;
@@ -97,7 +97,7 @@ Json volume_info(const std::string& path) {
 
 Json surfaces_info(const std::string& path) {
   const auto surfaces = open<cumulet_surfaces>(cumulet_surfaces_open, path);
-  const auto info = told<cumulet_surfaces_info>(cumulet_surfaces_get_info, surfaces.get());
+  const auto info = read_desc<cumulet_surfaces_info>(cumulet_surfaces_get_info, surfaces.get());
   Json json;
   json["file"] = path;
   json["meshes"] = info.meshes;
@@ -111,12 +111,12 @@ Json surfaces_info(const std::string& path) {
   json["bounds_max"] = info.bounds_max;
   json["animations"] = Json::array();
   for (std::uint32_t i = 0; i < info.animations; ++i) {
-    const auto animation = told<cumulet_animation_info>(cumulet_surfaces_get_animation, surfaces.get(), i);
+    const auto animation = read_desc<cumulet_animation_info>(cumulet_surfaces_get_animation, surfaces.get(), i);
     json["animations"].push_back({{"name", animation.name}, {"duration", animation.duration}});
   }
   json["variants"] = Json::array();
   for (std::uint32_t i = 0; i < info.variants; ++i) {
-    const auto variant = told<cumulet_variant_info>(cumulet_surfaces_get_variant, surfaces.get(), i);
+    const auto variant = read_desc<cumulet_variant_info>(cumulet_surfaces_get_variant, surfaces.get(), i);
     json["variants"].push_back({{"name", variant.name}});
   }
   return json;
@@ -152,7 +152,7 @@ void write_lines(const Json& json, const std::string& indent, std::ostream& out)
 
 bool is_z_up(const std::string& volume_file) {
   const auto inspection = open<cumulet_inspection>(cumulet_inspect_volume_file, volume_file);
-  const auto file = told<cumulet_volume_file_info>(cumulet_inspection_get_file, inspection.get());
+  const auto file = read_desc<cumulet_volume_file_info>(cumulet_inspection_get_file, inspection.get());
   for (const Json& entry : metadata_of(inspection.get(), -1, file.metadata_count)) {
     if (entry["name"] == "creator" && entry["value"].get<std::string>().find("Blender") != std::string::npos)
       return true;

@@ -31,8 +31,8 @@ std::vector<std::uint8_t> read_bytes(const FilePath& path, Progress* progress) {
   std::ifstream file(path.absolute(), std::ios::binary);
   if (!file) fail(path.given(), std::strerror(errno));
   std::error_code unknown;
-  const std::uintmax_t told = std::filesystem::file_size(path.absolute(), unknown);
-  const std::uintmax_t size = unknown ? 0 : told;
+  const std::uintmax_t reported = std::filesystem::file_size(path.absolute(), unknown);
+  const std::uintmax_t size = unknown ? 0 : reported;
   constexpr std::size_t piece = std::size_t{1} << 20U;
   ProgressPart part(progress, 0.0, decoded_from, size);
   std::vector<std::uint8_t> bytes;

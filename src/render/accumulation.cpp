@@ -111,20 +111,20 @@ void Accumulation::extend(std::uint32_t samples, std::optional<double> noise_tar
   if (done()) stage_ = Stage::complete;
 }
 
-void Accumulation::go_on_from(const Accumulated& told, std::optional<std::uint32_t> pass) {
+void Accumulation::go_on_from(const Accumulated& counts, std::optional<std::uint32_t> pass) {
   tiles_.current = 0;
   errors_.clear();
   noise_.reset();
-  count_ = std::make_shared<SampleCount>(SampleCount{told.all});
+  count_ = std::make_shared<SampleCount>(SampleCount{counts.all});
   expectation_ = {.expected_samples = allotment_.expected(target_samples())};
   // Finds the pass in progress, because the noise is measured at its end: the first pass whose target is at least the
   // minimum sample count. If all pixels have exactly that many samples, its end may not have been measured.
   pass_target_ = pass.value_or(pass_after(0));
   const auto is_over = [&] {
-    return !pass && (pass_target_ < told.least || (pass_target_ == told.least && told.most > told.least));
+    return !pass && (pass_target_ < counts.least || (pass_target_ == counts.least && counts.most > counts.least));
   };
   while (is_over() && pass_target_ < settings_.target_samples) pass_target_ = pass_after(pass_target_);
-  const bool whole = told.least > 0;
+  const bool whole = counts.least > 0;
   pass_ = whole ? 2 : 0;
   stage_ = whole ? Stage::complete : Stage::incomplete;
   holes_ = !whole;

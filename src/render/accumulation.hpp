@@ -120,7 +120,7 @@ class Accumulation {
                             const std::function<std::uint32_t(glm::uvec2 pixel)>& samples_of);
   /// Continues from restored samples; discards dispatches in flight. pass: target of the pass in progress, needed if
   /// sample counts do not determine it.
-  void go_on_from(const Accumulated& told, std::optional<std::uint32_t> pass);
+  void go_on_from(const Accumulated& counts, std::optional<std::uint32_t> pass);
 
  private:
   enum class Stage { incomplete, complete, done };

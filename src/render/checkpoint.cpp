@@ -42,16 +42,16 @@ std::uint32_t saved_pass(std::span<const std::byte> saved, std::uint32_t target_
 
 template <class SamplesOf>
 Accumulated accumulated_of(glm::uvec2 size, SamplesOf&& samples_of) {
-  Accumulated told;
+  Accumulated counts;
   for (std::uint32_t y = 0; y < size.y; ++y) {
     for (std::uint32_t x = 0; x < size.x; ++x) {
       const std::uint32_t count = samples_of(glm::uvec2(x, y));
-      told.least = std::min(told.least, count);
-      told.most = std::max(told.most, count);
-      told.all += count;
+      counts.least = std::min(counts.least, count);
+      counts.most = std::max(counts.most, count);
+      counts.all += count;
     }
   }
-  return told;
+  return counts;
 }
 
 SavedHeader header_of(const Picture& picture, std::size_t layers) {
@@ -117,14 +117,14 @@ void restore_checkpoint(const gl::Functions& gl, Picture& picture, std::span<con
     const glm::uvec2 at = picture.box().first + pixel;
     return counts[std::size_t{at.y} * picture.size().x + at.x].x;
   };
-  const Accumulated told = accumulated_of(picture.box().size, samples_of);
+  const Accumulated accumulated = accumulated_of(picture.box().size, samples_of);
   const std::size_t squares = picture.accumulation().live_squares().size();
   std::optional<std::uint32_t> pass;
   if (picture.is_adaptive()) pass = saved_pass(saved.last(squares + sizeof(SavedPass)), picture.target_samples());
   if (pass && std::ranges::any_of(saved.last(squares), [](std::byte live) { return live > std::byte{3}; }))
     throw Error(ErrorCode::invalid_argument, "the accumulation is corrupt: adaptive-sampling mask");
-  if (told.most > picture.target_samples()) {
-    throw Error(ErrorCode::invalid_argument, "the accumulation has pixels with " + std::to_string(told.most) +
+  if (accumulated.most > picture.target_samples()) {
+    throw Error(ErrorCode::invalid_argument, "the accumulation has pixels with " + std::to_string(accumulated.most) +
                                                  " samples, but the image is limited to " +
                                                  std::to_string(picture.target_samples()));
   }
@@ -148,7 +148,7 @@ void restore_checkpoint(const gl::Functions& gl, Picture& picture, std::span<con
     std::memcpy(live.data(), saved.last(squares).data(), squares);
     picture.accumulation().restore_live_squares(live, samples_of);
   }
-  picture.accumulation().go_on_from(told, pass);
+  picture.accumulation().go_on_from(accumulated, pass);
 }
 
 }  // namespace cumulet::render

@@ -90,7 +90,7 @@ Compositor::Means* Compositor::some_means(const MeansOf& wanted, bool overwrite,
     means_.clear();
     newest_ = nullptr;
     no_memory_for_ = wanted.size;
-    untold_ = error;
+    unreported_ = error;
     // The picture is drawn from its sums then: slower and with unsampled pixels.
     return nullptr;
   }
@@ -112,19 +112,19 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   } catch (const Error& error) {
     // If the driver does not build the programs, pictures are shown without denoising.
     cannot_filter_ = picture.size;
-    untold_ = error;
+    unreported_ = error;
     return nullptr;
   }
   if (wavelet_.of() != picture.picture || filtering_.background != background) {
     wavelet_.drop();
     if (older && picture.may_lag && !filters_now()) return newest_;
     try {
-      if (auto forgets = wavelet_.begin(picture)) untold_ = std::move(forgets);
+      if (auto forgets = wavelet_.begin(picture)) unreported_ = std::move(forgets);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::out_of_memory) throw;
       wavelet_.free();
       cannot_filter_ = picture.size;
-      untold_ = error;
+      unreported_ = error;
       return nullptr;
     }
     filtering_ = wanted;
@@ -189,7 +189,7 @@ void Compositor::denoise(const PictureTextures& picture, const Display& display,
   target.filter_ms = filter_ms;
   go_on_filtering(picture, background_of(picture, display), display, target);
   gl::check(*gl_, "denoising the image");
-  if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);
+  if (const auto failure = std::exchange(unreported_, std::nullopt)) throw Error(*failure);
 }
 
 Compositor::Background Compositor::background_of(const PictureTextures& picture, const Display& display) {
@@ -404,7 +404,7 @@ bool Compositor::draw_composed(const Shown& shown, const PictureTextures& pictur
   } catch (const Error& error) {
     if (error.code() != ErrorCode::out_of_memory) throw;
     // The image is drawn directly then, which is slower.
-    untold_ = error;
+    unreported_ = error;
   }
   if (texture == 0) return false;
   composed_rows_ = composed_.composed_rows();
@@ -505,7 +505,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   if (reads_means && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
   gl::check(gl, "drawing the image");
-  if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);
+  if (const auto failure = std::exchange(unreported_, std::nullopt)) throw Error(*failure);
 }
 
 }  // namespace cumulet::render

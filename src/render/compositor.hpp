@@ -126,7 +126,7 @@ class Compositor {
   Means* go_on_filtering(const PictureTextures& picture, Background background, const Display& display,
                          const FrameTarget& target);
   static Background background_of(const PictureTextures& picture, const Display& display);
-  // Calls free_means(). If there is no memory, keeps the error in untold_, to be thrown once, and returns null.
+  // Calls free_means(). If there is no memory, keeps the error in unreported_, to be thrown once, and returns null.
   Means* some_means(const MeansOf& wanted, bool overwrite, bool newest_serves);
   // Returns means to overwrite. May reset newest_. If the maximum number waits to be drawn, returns null if
   // newest_serves, else replaces the oldest, whose memory the driver keeps until it is drawn. overwrite: takes means
@@ -153,7 +153,7 @@ class Compositor {
   const gl::Program* color_ = nullptr;  // the program that was drawn with last
   Kind color_kind_;
   std::optional<glm::uvec2> no_memory_for_;  // size that did not fit; retried when the size changes
-  std::optional<Error> untold_;              // error to be thrown by the next draw
+  std::optional<Error> unreported_;          // error to be thrown by the next draw
   std::optional<glm::uvec2> cannot_filter_;  // size of pictures that cannot be denoised
   Wavelet wavelet_;
   MeansOf filtering_;             // means that are being denoised

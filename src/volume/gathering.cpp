@@ -9,9 +9,9 @@ namespace cumulet::volume::detail {
 
 namespace {
 
-constexpr int told_depth = 3;  // progress is reported for cubes of this depth
+constexpr int reported_depth = 3;  // progress is reported for cubes of this depth
 
-std::uint64_t pieces(int depth) { return std::uint64_t{1} << (3 * std::max(told_depth - depth, 0)); }
+std::uint64_t pieces(int depth) { return std::uint64_t{1} << (3 * std::max(reported_depth - depth, 0)); }
 
 }  // namespace
 
@@ -167,14 +167,14 @@ void Gathering::refine(glm::ivec3 origin, int size, int depth, std::span<const I
       const int half = size / 2;
       refine(origin + half * glm::ivec3(child >> 2, (child >> 1) & 1, child & 1), half, depth + 1, items);
     });
-    if (depth < told_depth) return;
+    if (depth < reported_depth) return;
   } else {
     for (std::size_t i = 0; i < made_; ++i) {
       if (known[i] && *known[i] != 0.0F) tiles_.local()[i].push_back({{cube.min, cube.max, *known[i]}, true});
     }
     if (!wanted.empty()) make_brick(origin, needed, items, wanted);
   }
-  if (depth <= told_depth) part_.add(pieces(depth));
+  if (depth <= reported_depth) part_.add(pieces(depth));
 }
 
 void Gathering::make_brick(const glm::ivec3& origin, std::span<const Box> needed, std::span<const Items> items,

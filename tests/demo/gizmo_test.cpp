@@ -172,7 +172,7 @@ TEST(Drag, MovesAlongTheObjectsOwnAxes) {
   const dvec3 axis = glm::normalize(dvec3(transform[1]));
   Drag drag(gizmo, Handle::y, sight, at(sight, dvec3(0.0)));
   expect_near(dvec3(drag.to(sight, at(sight, 1.5 * axis), false)[3]), 1.5 * axis, 1e-9);
-  EXPECT_EQ(drag.told(), "Y 1.5");
+  EXPECT_EQ(drag.label(), "Y 1.5");
 }
 
 TEST(Drag, SnapsToRoundSteps) {
@@ -203,7 +203,7 @@ TEST(Drag, RotatesWithThePointer) {
       // One and a half turns.
       dmat4 turned(1.0);
       for (int i = 1; i <= 30; ++i) turned = drag.to(sight, pixel(0.4 + 0.1 * i * pi), false);
-      EXPECT_EQ(drag.told(), "540.0°");
+      EXPECT_EQ(drag.label(), "540.0°");
       for (const dvec3& point : {dvec3(1.0, 2.0, 3.0), dvec3(-1.0, 0.5, 0.0)}) {
         const dmat4 want = glm::translate(dmat4(1.0), pivot) * glm::rotate(dmat4(1.0), 3.0 * pi, axis) *
                            glm::translate(dmat4(1.0), -pivot);
@@ -211,9 +211,9 @@ TEST(Drag, RotatesWithThePointer) {
       }
       // Steps of 15 degrees.
       static_cast<void>(drag.to(sight, pixel(0.4 + 3.0 * pi + 0.1), true));
-      EXPECT_EQ(drag.told(), "540.0°");
+      EXPECT_EQ(drag.label(), "540.0°");
       static_cast<void>(drag.to(sight, pixel(0.4 + 3.0 * pi + 0.2), true));
-      EXPECT_EQ(drag.told(), "555.0°");
+      EXPECT_EQ(drag.label(), "555.0°");
     }
   }
 }
@@ -252,13 +252,13 @@ TEST(Drag, ScalesAlongTheObjectsOwnAxes) {
         scale[i] = 1.75;
         const dmat4 want = transform * glm::scale(dmat4(1.0), scale);
         for (int column = 0; column < 4; ++column) expect_near(dvec3(changed[column]), dvec3(want[column]), 1e-9);
-        EXPECT_EQ(drag.told(), "1.75 x");
+        EXPECT_EQ(drag.label(), "1.75 x");
         // Dragging through the center and beyond only makes it small; it is not mirrored.
         const dmat4 small = drag.to(sight, at(sight, pivot - 0.5 * axis), false) * transform;
         EXPECT_NEAR(glm::length(dvec3(small[i])), 0.01 * glm::length(dvec3(transform[i])), 1e-9);
         EXPECT_GT(glm::determinant(small), 0.0);
         static_cast<void>(drag.to(sight, at(sight, pivot + 1.76 * axis), true));
-        EXPECT_EQ(drag.told(), "1.8 x");
+        EXPECT_EQ(drag.label(), "1.8 x");
       }
     }
     Drag alike(gizmo_of(Tool::scale, Axes::world, transform, pivot, reach), Handle::free, sight, {300.0, 200.0});
@@ -288,7 +288,7 @@ TEST(Drag, TransformStaysValidForAnyDrag) {
               ASSERT_TRUE(std::isfinite(glm::length(now[column]))) << static_cast<int>(handle);
             ASSERT_GT(glm::determinant(now), 0.0);
             ASSERT_LT(glm::distance(dvec3(now * dvec4(pivot, 1.0)), pivot), 1e5);
-            ASSERT_FALSE(drag.told().empty());
+            ASSERT_FALSE(drag.label().empty());
           }
         }
       }
