@@ -85,7 +85,7 @@ class App {
     std::optional<Recorder> recorder;
     Player::Order order;
   };
-  /// What the next load does, and the files that are still loading.
+  /// Options of the next load, and the files that are still loading.
   struct Loading {
     bool reload = false;  // reload the volume even if it is unchanged
     bool fit = false;

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <image.hpp>
 #include <iterator>
+#include <program.hpp>
 #include <system_error>
 #include <type_traits>
 
@@ -40,12 +41,11 @@ std::string in_words(double value, const char* const* units, std::size_t count, 
 
 std::string end_of(const std::string& text, float width) {
   if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
-  const auto within = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xC0U) == 0x80U; };
   std::size_t first = 0;
   std::string shown;
   do {
     do ++first;
-    while (first < text.size() && within(first));
+    while (first < text.size() && continues_character(text[first]));
     shown = "..." + text.substr(first);
   } while (first < text.size() && ImGui::CalcTextSize(shown.c_str()).x > width);
   return shown;

@@ -5,7 +5,7 @@
 namespace cumulet::demo {
 
 /// A file that the viewer loads on its worker threads: the volume, the surfaces or the environment. The scene has the
-/// requested file. File: its name, or the name and what belongs to it.
+/// requested file. File: its name, or its name with options.
 template <class File>
 struct ViewerFile {
   File passed{};                         // passed to the viewer

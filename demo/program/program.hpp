@@ -17,6 +17,11 @@ class UsageError : public std::runtime_error {
 /// Replaces line breaks by blanks and removes those at the end.
 [[nodiscard]] std::string one_line(std::string text);
 
+/// True for each byte of a UTF-8 character but the first, before which a text must not be cut.
+[[nodiscard]] constexpr bool continues_character(char byte) {
+  return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U;
+}
+
 /// FNV-1a hash, 64 bits (Fowler, Noll and Vo).
 [[nodiscard]] std::uint64_t fnv1a(std::string_view bytes);
 

@@ -632,7 +632,7 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
       if (static_cast<unsigned char>(c) < 0x20) c = ' ';
     if (cause.size() > 200) {
       std::size_t end = 200;
-      while (end > 0 && (static_cast<unsigned char>(cause[end]) & 0xC0U) == 0x80) --end;  // within a UTF-8 character
+      while (end > 0 && continues_character(cause[end])) --end;
       cause = cause.substr(0, end) + "...";
     }
     fail(path, "not JSON: " + cause);

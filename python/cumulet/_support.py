@@ -276,7 +276,7 @@ def converter(struct: Any, name: str, kind: Any) -> Callable[[Any], Any]:
     target = kind._type_
     if name in struct._counts_:
         if target is ctypes.c_char_p:
-            return lambda value: texts(value)
+            return texts
         if issubclass(target, api.Struct):
             return lambda value: structs(target, value, name)
         return lambda value: Array(value, name, SCALARS[target])
@@ -336,7 +336,7 @@ def fill_from(struct: Any, values: Any, name: str) -> Any:
     return fill(struct, values)
 
 
-# C arrays from Python's sequences. They have at least one element, so that none is NULL.
+# C arrays from Python's sequences.
 
 def structs(struct: Any, values: Iterable[Any], name: str) -> Any:
     filled = [fill_from(struct, value, name) for value in values]
@@ -354,12 +354,12 @@ def texts(values: Iterable[Any]) -> Any:
 
 def matrices(values: Iterable[Any], name: str) -> Any:
     flat = [numbers(ctypes.c_double, 16, value, name) for value in values]
-    result = (ctypes.c_double * (16 * len(flat)))(*itertools.chain.from_iterable(flat))
-    return result
+    return (ctypes.c_double * (16 * len(flat)))(*itertools.chain.from_iterable(flat))
 
 
 def pairs(points: Iterable[Any], name: str) -> Any:
-    return (ctypes.c_float * (2 * len(list(points))))(*(c for p in points for c in numbers(ctypes.c_float, 2, p, name)))
+    flat = [numbers(ctypes.c_float, 2, point, name) for point in points]
+    return (ctypes.c_float * (2 * len(flat)))(*itertools.chain.from_iterable(flat))
 
 
 def matrix(value: Any, name: str) -> Any:

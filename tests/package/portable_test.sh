@@ -50,8 +50,7 @@ grep -q -- --volume "$work/help" || fail "cumulet-render --help does not name --
 mesa=$work/mesa
 new_root "$mesa"
 add_mesa "$mesa"
-find "$mesa" -path "$mesa/opt" -prune -o \( -name 'libopenvdb*' -o -name 'libtbb*' -o -name 'libOpenEXR*' \) -print |
-  grep . && fail "the test's own root holds a library that the tarball should bring"
+refuse_own_libraries "$mesa" tarball
 cp -r "$bare/tmp/scene" "$mesa/tmp/scene"
 for backend in "${backends[@]}"; do
   in_root "$mesa" /opt/bin/cumulet-render --volume "${volume#"$bare"}" --size 32x32 --spp 1 --threshold 1 \

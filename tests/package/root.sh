@@ -60,6 +60,12 @@ copy_closure() { # ROOT FILE...: copies files and the libraries that they need
   done
 }
 
+refuse_own_libraries() { # ROOT PACKAGE: fails if the root has libraries that the package in /opt should bring
+  find "$1" -path "$1/opt" -prune -o \( -name 'libopenvdb*' -o -name 'libtbb*' -o -name 'libOpenEXR*' \) -print |
+    grep . && fail "the test's own root holds a library that the $2 should bring"
+  return 0
+}
+
 backends=()
 add_mesa() { # ROOT: adds the installed software drivers of Mesa; their names are in $backends
   local drivers egl egl_mesa osmesa vendor=/usr/share/glvnd/egl_vendor.d/50_mesa.json

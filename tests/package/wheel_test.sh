@@ -20,8 +20,7 @@ cp -r "$stdlib" "$root$(dirname "$stdlib")"
 find "$modules" -name '*.so' >"$work/modules"
 mapfile -t compiled <"$work/modules"
 copy_closure "$root" "$python" "${compiled[@]}"
-find "$root" -path "$root/opt" -prune -o \( -name 'libopenvdb*' -o -name 'libtbb*' -o -name 'libOpenEXR*' \) -print |
-  grep . && fail "the test's own root holds a library that the wheel should bring"
+refuse_own_libraries "$root" wheel
 
 "$python" -m zipfile -e "${wheels[0]}" "$root/opt/site"
 cat >"$root/tmp/render.py" <<'CODE'

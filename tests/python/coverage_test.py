@@ -93,6 +93,15 @@ class Coverage(unittest.TestCase):
                 self.assertTrue(hasattr(cumulet, name), name)
                 self.assertTrue(not member or hasattr(getattr(cumulet, name), member), f"{name}.{member}")
 
+    def test_day_is_that_of_the_programs(self):
+        code = (SOURCE / "demo/scene_file/scene_file.cpp").read_text(encoding="utf-8")
+        day = dict(re.findall(r"\blight\.(\w+) = ([\d.]+)f;", code))
+        sun = re.search(r"\bsun = \{([^}]*)\};", code)[1].replace("f", "").split(",")
+        for name, value in cumulet.DAY.items():
+            if isinstance(value, float):
+                self.assertEqual(value, float(day[name]), name)
+        self.assertEqual(cumulet.DAY["sun_irradiance"], tuple(map(float, sun)))
+
     def test_version_is_that_of_the_library(self):
         self.assertEqual(cumulet.__version__, ".".join(map(str, api.VERSION)) + f".{api.cumulet_version() % 100}")
 

@@ -1,4 +1,4 @@
-"""Measures what a frame costs more by Viewer.render than by the C function, in pairs: frame_cost.py [PAIRS]"""
+"""Measures how much longer a frame takes by Viewer.render than by the C function, in pairs: frame_cost.py [PAIRS]"""
 
 import ctypes
 import statistics
